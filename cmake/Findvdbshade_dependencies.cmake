@@ -1,0 +1,33 @@
+# The libraries that Debian 12 has packages for (tools/packages.txt), each as a target vsh::NAME. Their headers are
+# SYSTEM, so that our warnings stay ours.
+include(FindPackageHandleStandardArgs)
+find_package(TBB REQUIRED CONFIG)
+find_package(OpenEXR 3.1 REQUIRED CONFIG)
+find_package(PkgConfig REQUIRED)
+
+function(vsh_find name header library)
+  find_path(VSH_${name}_INCLUDE ${header})
+  find_library(VSH_${name}_LIBRARY ${library})
+  mark_as_advanced(VSH_${name}_INCLUDE VSH_${name}_LIBRARY)
+  if(VSH_${name}_INCLUDE AND VSH_${name}_LIBRARY AND NOT TARGET vsh::${name})
+    add_library(vsh::${name} UNKNOWN IMPORTED)
+    set_target_properties(vsh::${name} PROPERTIES IMPORTED_LOCATION ${VSH_${name}_LIBRARY}
+                          INTERFACE_INCLUDE_DIRECTORIES ${VSH_${name}_INCLUDE})
+  endif()
+endfunction()
+
+vsh_find(openvdb openvdb/openvdb.h openvdb)
+vsh_find(openimageio OpenImageIO/imageio.h OpenImageIO)
+vsh_find(assimp assimp/cimport.h assimp)
+vsh_find(jansson jansson.h jansson)
+vsh_find(half Imath/half.h Imath-3_1)
+
+find_package_handle_standard_args(vdbshade_dependencies REQUIRED_VARS VSH_openvdb_LIBRARY VSH_openimageio_LIBRARY
+                                  VSH_assimp_LIBRARY VSH_jansson_LIBRARY VSH_half_LIBRARY)
+
+if(NOT TARGET vsh::openexr)
+  set_property(TARGET vsh::openvdb PROPERTY INTERFACE_LINK_LIBRARIES TBB::tbb vsh::half)
+  set_property(TARGET vsh::openimageio PROPERTY INTERFACE_LINK_LIBRARIES Imath::Imath)
+  add_library(vsh::openexr INTERFACE IMPORTED)
+  target_link_libraries(vsh::openexr INTERFACE OpenEXR::OpenEXRCore)
+endif()

@@ -1,0 +1,106 @@
+/* Lightmaps: the texels of a receiver's charts, shaded. */
+#ifndef VDBSHADE_BAKE_H
+#define VDBSHADE_BAKE_H
+
+#include "mesh.h"
+#include "shade.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { VSH_MAX_LIGHTMAP_SIZE = 65536 };
+
+typedef struct vsh_lightmap_options {
+    size_t struct_size;
+    int32_t width; /* texels, 1 … VSH_MAX_LIGHTMAP_SIZE */
+    int32_t height;
+    int32_t supersample;     /* N: N × N samples a texel, 1 … 16 */
+    int32_t padding;         /* texels that charts are grown by, 0 … 4096; fills values, never coverage */
+    vsh_shade_options shade; /* surface_offset is set for each mesh by the bake */
+} vsh_lightmap_options;
+
+static inline vsh_lightmap_options vsh_lightmap_options_default(void) {
+    vsh_lightmap_options options = {sizeof(vsh_lightmap_options), 1024, 1024, 1, 4,
+                                    vsh_shade_options_default()};
+    return options;
+}
+
+/* What is wrong with a receiver's UVs, mesh by mesh. */
+typedef struct vsh_uv_report {
+    size_t overlap_texels;       /* texels that this mesh covers and an earlier triangle covers too */
+    size_t overlap_triangles;    /* triangles of this mesh that have such texels */
+    size_t outside_triangles;    /* triangles that leave the unit square; what lies outside is not baked */
+    size_t degenerate_triangles; /* triangles without area in UV space, but with area in the world */
+} vsh_uv_report;
+
+/* The texels of a receiver at one size: where each lies in the world. Immutable; may be shared by threads. */
+typedef struct vsh_texels vsh_texels;
+
+/* Rasterises the meshes' UVs. `uv_reports` [mesh_count] may be NULL. Errors: VSH_ERROR_ARGUMENT (sizes),
+ * VSH_ERROR_INPUT (no UVs, UVs not finite, and as vsh_mesh_check()), VSH_ERROR_LIMIT, VSH_ERROR_CANCELLED.
+ * Free the result with vsh_texels_free(). */
+VSH_API vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count,
+                                     const vsh_lightmap_options *options, const vsh_run *run,
+                                     vsh_uv_report *uv_reports, vsh_texels **texels, vsh_error *error);
+VSH_API void vsh_texels_free(vsh_texels *texels); /* NULL does nothing */
+
+typedef struct vsh_texels_info {
+    int32_t width;
+    int32_t height;
+    uint64_t covered;     /* texels with at least one sample */
+    uint64_t samples;     /* evaluated positions, supersampling counted */
+    double bounds_min[3]; /* world box of the samples */
+    double bounds_max[3];
+    uint64_t bytes;
+} vsh_texels_info;
+
+VSH_API void vsh_texels_get_info(const vsh_texels *texels, vsh_texels_info *info);
+
+/* The samples behind a lightmap, in the order in which they are shaded. A view into the texels. */
+typedef struct vsh_texel_samples {
+    size_t count;
+    const double
+        *positions; /* [count][3], world units; lifted off coarse triangles towards the smooth surface */
+    const float *normals; /* [count][3], unit, decide shadow: geometric, or smooth where the mesh is smooth */
+    const float *geometric_normals; /* [count][3], unit */
+    const uint32_t *texel;          /* [count], row × width + column, row 0 at v = 1 */
+} vsh_texel_samples;
+
+VSH_API vsh_texel_samples vsh_texels_samples(const vsh_texels *texels);
+
+/* A lightmap in the caller's arrays; each plane is [height][width] with row 0 at v = 1. NULL planes are not
+ * baked and cost nothing. Texels that no chart covers or padding reaches are 0. */
+typedef struct vsh_lightmap {
+    float *const *shadow; /* [light_count] planes: visible fraction of each light; may be NULL */
+    float *ao;            /* open fraction */
+    float *irradiance; /* [height][width][3], linear RGB: Σ visibility × colour × falloff × cosine, × AO where
+                          baked */
+    float *coverage; /* 1: evaluated and valid; 0 elsewhere */
+} vsh_lightmap;
+
+typedef struct vsh_bake_stats {
+    size_t struct_size;
+    uint64_t texels;           /* covered */
+    uint64_t invalid_texels;   /* inside another solid or seen from behind: filled from their neighbours,
+                                  coverage 0 */
+    uint64_t *invalid_by_mesh; /* [mesh_count], filled where not NULL */
+    vsh_shade_stats shade;
+} vsh_bake_stats;
+
+static inline vsh_bake_stats vsh_bake_stats_zero(void) {
+    vsh_bake_stats stats = {sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero()};
+    return stats;
+}
+
+/* Shades the texels and fills the lightmap's planes. `stats` may be NULL. Errors: VSH_ERROR_ARGUMENT,
+ * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (planes then hold nothing of use). */
+VSH_API vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels,
+                                     const vsh_light *lights, size_t light_count,
+                                     const vsh_shade_options *options, const vsh_run *run,
+                                     const vsh_lightmap *lightmap, vsh_bake_stats *stats, vsh_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,79 @@
+/* Results, errors and run options: what every call of vdbshade shares. */
+#ifndef VDBSHADE_BASE_H
+#define VDBSHADE_BASE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#if defined(VSH_BUILD) && defined(__GNUC__)
+#define VSH_API __attribute__((visibility("default")))
+#else
+#define VSH_API
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define VSH_VERSION_MAJOR 0
+#define VSH_VERSION_MINOR 1
+#define VSH_VERSION_PATCH 0
+
+/* "0.1.0"; a static string. Thread safe. */
+VSH_API const char *vsh_version(void);
+
+/* What a call came to. Zero is success; every other value comes with a message in the caller's vsh_error. */
+typedef int32_t vsh_result;
+enum {
+    VSH_OK = 0,
+    VSH_ERROR_ARGUMENT = 1,    /* a parameter or option is out of its range */
+    VSH_ERROR_INPUT = 2,       /* the content of a file, mesh, grid or scene is bad */
+    VSH_ERROR_READ = 3,        /* a file could not be read */
+    VSH_ERROR_WRITE = 4,       /* a file could not be written; the old one is as it was */
+    VSH_ERROR_LIMIT = 5,       /* a memory or size limit would be passed; nothing was taken */
+    VSH_ERROR_MEMORY = 6,      /* the system refused memory */
+    VSH_ERROR_CANCELLED = 7,   /* the progress callback asked to stop */
+    VSH_ERROR_UNSUPPORTED = 8, /* valid input that this build does not handle */
+    VSH_ERROR_INTERNAL = 9     /* a defect of this library */
+};
+
+/* Name of a result, "VSH_ERROR_INPUT"; "VSH_ERROR_UNKNOWN" for other values. A static string. Thread safe. */
+VSH_API const char *vsh_result_name(vsh_result result);
+
+/* Filled by a call that fails; left alone by one that succeeds. The caller owns it; every `error` parameter
+ * may be NULL. The message is one line without a newline and names file, place, value and limit where there
+ * are such. */
+typedef struct vsh_error {
+    vsh_result code;
+    char message[1020];
+} vsh_error;
+
+/* Told the stage ("load", "voxelize", "field", "texels", "shadow.NAME", "ao", "write") and the fraction of it
+ * that is done, 0 … 1, never falling within a stage. Called by one thread at a time, from any of the pool's
+ * threads. Return 0 to go on; anything else cancels: the call frees what it took and returns
+ * VSH_ERROR_CANCELLED. */
+typedef int32_t vsh_progress_fn(void *user, const char *stage, double fraction);
+
+/* Bad things that were worked around: one line each, without a newline ("mesh 'sail': 4 open edges: …"). Same
+ * calling rules as vsh_progress_fn. */
+typedef void vsh_warning_fn(void *user, const char *message);
+
+/* How to run, the same for every call that takes long. NULL stands for vsh_run_default(). */
+typedef struct vsh_run {
+    size_t struct_size;        /* sizeof(vsh_run), set by vsh_run_default() */
+    int32_t threads;           /* 1 … 1024; 0: all cores. Results do not depend on it */
+    uint64_t memory_limit;     /* bytes that one call may hold, with the handles given to it; 0: no limit */
+    vsh_progress_fn *progress; /* may be NULL */
+    vsh_warning_fn *warning;   /* may be NULL */
+    void *user;                /* handed to both */
+} vsh_run;
+
+static inline vsh_run vsh_run_default(void) {
+    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL};
+    return run;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,53 @@
+/* The field: a pyramid of narrow bands in flat bricks, made from a grid, that shadow marching samples. */
+#ifndef VDBSHADE_FIELD_H
+#define VDBSHADE_FIELD_H
+
+#include "grid.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Immutable; may be shared by threads. Free it with vsh_field_free(). It does not need its grid any more. */
+typedef struct vsh_field vsh_field;
+
+typedef struct vsh_field_options {
+    size_t struct_size;
+    double
+        reach; /* largest distance from a surface that must be told apart, world units: tangent of the widest
+                * light's half angle times the longest ray, or the AO distance; 0: four times the diagonal */
+} vsh_field_options;
+
+static inline vsh_field_options vsh_field_options_default(void) {
+    vsh_field_options options = {sizeof(vsh_field_options), 0.0};
+    return options;
+}
+
+/* Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *options,
+                                    const vsh_run *run, vsh_field **field, vsh_error *error);
+VSH_API void vsh_field_free(vsh_field *field); /* NULL does nothing */
+
+/* Signed distance at `count` world positions ([count][3]) from the finest level that resolves it: within the
+ * reach, exact to a voxel of that level (whose band is at most twice the distance); beyond it, a lower bound.
+ * Positions that are not finite give NaN. Thread safe. */
+VSH_API void vsh_field_sample(const vsh_field *field, size_t count, const double *positions,
+                              float *distances);
+
+typedef struct vsh_field_info {
+    double voxel_size;    /* of the finest level, world units */
+    double reach;         /* that the coarsest level resolves, world units */
+    double bounds_min[3]; /* of the solid, world units */
+    double bounds_max[3];
+    double shell_thickness; /* of open meshes in it, world units; 0: none */
+    int32_t levels;
+    uint64_t bricks; /* over all levels */
+    uint64_t bytes;
+} vsh_field_info;
+
+VSH_API void vsh_field_get_info(const vsh_field *field, vsh_field_info *info);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,61 @@
+/* Lights: directional with an angular diameter, sphere, spot. */
+#ifndef VDBSHADE_LIGHT_H
+#define VDBSHADE_LIGHT_H
+
+#include "base.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum {
+    VSH_LIGHT_DIRECTIONAL = 0, /* direction, angle */
+    VSH_LIGHT_SPHERE = 1,      /* position, radius */
+    VSH_LIGHT_SPOT = 2         /* position, radius, direction, inner_angle, outer_angle */
+};
+
+enum {
+    VSH_FALLOFF_NONE = 0,
+    VSH_FALLOFF_INVERSE_SQUARE = 1, /* 1 / d² */
+    VSH_FALLOFF_QUADRATIC = 2       /* (1 - d / reach)², 0 beyond the reach */
+};
+
+/* A light. Only its shape and place enter shadow values; falloff, colour and the cosine enter irradiance
+ * only. A size (angle, radius) of 0 is a hard light. */
+typedef struct vsh_light {
+    int32_t type;        /* VSH_LIGHT_… */
+    int32_t falloff;     /* VSH_FALLOFF_…; sphere and spot only */
+    double direction[3]; /* directional: towards the light; spot: the way it shines. Any length but 0 */
+    double position[3];  /* world units */
+    double angle;        /* directional: angular diameter, radians, 0 … π (excluded) */
+    double radius;       /* sphere, spot: world units, ≥ 0 */
+    double inner_angle;  /* spot: half angle of full light, radians, 0 … outer_angle */
+    double outer_angle;  /* spot: half angle where light ends, radians, > 0 … π */
+    double reach;        /* VSH_FALLOFF_QUADRATIC: world units, > 0 */
+    double color[3]; /* linear RGB times intensity, ≥ 0; irradiance at normal incidence before falloff */
+    char name[64];   /* "sun": its channel is shadow.sun */
+} vsh_light;
+
+/* A white sun of half a degree overhead (+y), named "sun". */
+static inline vsh_light vsh_light_default(void) {
+    vsh_light light = {VSH_LIGHT_DIRECTIONAL,
+                       VSH_FALLOFF_NONE,
+                       {0.0, 1.0, 0.0},
+                       {0.0, 0.0, 0.0},
+                       0.00925,
+                       0.0,
+                       0.35,
+                       0.5,
+                       1.0,
+                       {1.0, 1.0, 1.0},
+                       "sun"};
+    return light;
+}
+
+/* Errors: VSH_ERROR_ARGUMENT, naming the light, the field, the value and the limit. Thread safe. */
+VSH_API vsh_result vsh_light_check(const vsh_light *light, vsh_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

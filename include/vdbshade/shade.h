@@ -1,0 +1,99 @@
+/* Shadow and ambient occlusion at points. */
+#ifndef VDBSHADE_SHADE_H
+#define VDBSHADE_SHADE_H
+
+#include "field.h"
+#include "light.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* How a shadow is estimated, cheapest model first. s is the sine of the light's half angle as seen from the
+ * point, h the distance to the nearest caster at a distance t along the ray. */
+enum {
+    VSH_SHADOW_HARD = 0, /* the light's centre: 0 or 1 */
+    VSH_SHADOW_CLASSIC =
+        1, /* min h/(s t), outer penumbra only (Quilez, "soft shadows in raymarched SDFs", 2010) */
+    VSH_SHADOW_IMPROVED = 2, /* triangulated closest miss, outer penumbra only (Aaltonen, GDC 2018) */
+    VSH_SHADOW_SMOOTH = 3, /* inner and outer penumbra, cubic remap (Quilez, same article, 2018 extension) */
+    VSH_SHADOW_CONE = 4 /* inner and outer penumbra, circular segment: the share of a disc behind an edge */
+};
+
+enum {
+    VSH_AO_TAPS = 0, /* five samples along the normal (Quilez, "multiresolution ambient occlusion", 2008 …) */
+    VSH_AO_CONES = 1 /* cosine-weighted cones (Crassin and others, 2011, marched in a distance field) */
+};
+
+typedef struct vsh_shade_options {
+    size_t struct_size;
+    int32_t method;    /* VSH_SHADOW_… */
+    int32_t ao_method; /* VSH_AO_… */
+    int32_t ao_cones;  /* 1 … 256 */
+    int32_t max_steps; /* a ray that has not ended after so many is counted in stats.unfinished, 16 … 65536 */
+    double ao_distance;    /* world units, > 0 */
+    double start_offset;   /* how far above a point rays begin, along its normal, voxels, 0 … 16 */
+    double surface_offset; /* added to it, world units, ≥ 0: half the thickness of the receiver's own shell */
+} vsh_shade_options;
+
+static inline vsh_shade_options vsh_shade_options_default(void) {
+    vsh_shade_options options = {
+        sizeof(vsh_shade_options), VSH_SHADOW_CONE, VSH_AO_CONES, 16, 1024, 1.0, 1.0, 0.0};
+    return options;
+}
+
+/* "cone" to VSH_SHADOW_CONE and back; -1 and NULL for what is no method. Thread safe. */
+VSH_API int32_t vsh_shadow_method(const char *name);
+VSH_API const char *vsh_shadow_method_name(int32_t method);
+VSH_API int32_t vsh_ao_method(const char *name);
+VSH_API const char *vsh_ao_method_name(int32_t method);
+
+/* Receivers: a view of the caller's arrays. */
+typedef struct vsh_points {
+    size_t count;
+    const double *positions; /* [count][3], world units */
+    const float *normals; /* [count][3], geometric, of any length, pointing away from the solid; may be NULL
+                           * for shadows: then there is no start offset, no horizon and no back side */
+} vsh_points;
+
+/* Work that was done; calls add to it. */
+typedef struct vsh_shade_stats {
+    size_t struct_size;
+    uint64_t marches;    /* cones and rays that were marched */
+    uint64_t samples;    /* samples of the field */
+    uint64_t skipped;    /* points turned away from the light, not marched */
+    uint64_t certified;  /* cones whose light was proved fully seen or fully hidden (to the field's error) */
+    uint64_t unfinished; /* marches that ran out of steps; their value is what was known by then */
+    uint64_t
+        invalid; /* points with a position or normal that is not finite, or a zero normal; they are NaN */
+    uint64_t
+        beyond_reach; /* cones wider somewhere than the field's reach: make the field with a larger one */
+} vsh_shade_stats;
+
+static inline vsh_shade_stats vsh_shade_stats_zero(void) {
+    vsh_shade_stats stats = {sizeof(vsh_shade_stats), 0, 0, 0, 0, 0, 0, 0};
+    return stats;
+}
+
+/* Fraction of the light that each point sees, 0 dark … 1 lit, into visibility[count]: before any cosine,
+ * colour or falloff (a spot's edge counts as falloff). `options`, `run`, `stats` may be NULL. Thread safe.
+ * Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
+                                    const vsh_shade_options *options, const vsh_run *run, float *visibility,
+                                    vsh_shade_stats *stats, vsh_error *error);
+
+/* Cosine-weighted fraction of the hemisphere around the normal that is free within ao_distance, 0 … 1 open,
+ * into ao[count]. Errors and the rest as above; normals must be given. */
+VSH_API vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points,
+                                const vsh_shade_options *options, const vsh_run *run, float *ao,
+                                vsh_shade_stats *stats, vsh_error *error);
+
+/* Irradiance of one light, RGB, added to irradiance[count][3]: visibility × colour × falloff × the cosine to
+ * `shading_normals` [count][3] (NULL: points->normals). NaN visibilities add nothing. Thread safe. */
+VSH_API void vsh_shade_irradiance(const vsh_points *points, const float *shading_normals,
+                                  const vsh_light *light, const float *visibility, float *irradiance);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,19 @@
+/* Filling the caller's error. */
+#ifndef VSHI_ERROR_H
+#define VSHI_ERROR_H
+
+#include <vdbshade/base.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Fills `error` (may be NULL) and returns `code`, so that a failing call can end in `return vshi_fail(…)`.
+ * Control characters in the message (from file names, say) become '?', so that it stays one line. */
+vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,112 @@
+#include "base/job.h"
+
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct vshi_job {
+    vsh_run run;
+    const char *stage;
+    size_t total;
+    _Atomic size_t done;
+    atomic_bool cancelled;
+    atomic_flag reporting; /* held by the thread that is inside the callback */
+    double reported;       /* last fraction; guarded by `reporting` */
+};
+
+vshi_job *vshi_job_begin(const vsh_run *run, const char *stage, size_t total) {
+    vshi_job *job = malloc(sizeof *job);
+    if (job == NULL) {
+        return NULL;
+    }
+    job->run = run != NULL ? *run : vsh_run_default();
+    job->stage = stage;
+    job->total = total > 0 ? total : 1;
+    job->reported = -1.0;
+    atomic_init(&job->done, 0);
+    atomic_init(&job->cancelled, false);
+    atomic_flag_clear(&job->reporting);
+    vshi_job_advance(job, 0);
+    return job;
+}
+
+void vshi_job_end(vshi_job *job) {
+    if (job == NULL) {
+        return;
+    }
+    if (!vshi_job_cancelled(job) && job->run.progress != NULL && job->reported < 1.0) {
+        job->run.progress(job->run.user, job->stage, 1.0);
+    }
+    free(job);
+}
+
+bool vshi_job_advance(vshi_job *job, size_t units) {
+    const size_t done = atomic_fetch_add(&job->done, units) + units;
+    if (job->run.progress != NULL && !atomic_load(&job->cancelled) &&
+        !atomic_flag_test_and_set(&job->reporting)) {
+        double fraction = (double)done / (double)job->total;
+        fraction = fraction < 1.0 ? fraction : 1.0;
+        if (fraction >= job->reported) {
+            job->reported = fraction;
+            if (job->run.progress(job->run.user, job->stage, fraction) != 0) {
+                atomic_store(&job->cancelled, true);
+            }
+        }
+        atomic_flag_clear(&job->reporting);
+    }
+    return atomic_load(&job->cancelled);
+}
+
+bool vshi_job_cancelled(const vshi_job *job) {
+    return atomic_load(&job->cancelled);
+}
+
+int32_t vshi_job_threads(const vshi_job *job) {
+    return job->run.threads;
+}
+
+vsh_result vshi_job_fail_cancelled(const vshi_job *job, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", job->stage);
+}
+
+vsh_result vshi_options_resolve(const void *given, void *defaults, size_t size, const char *what,
+                                vsh_error *error) {
+    if (given == NULL) {
+        return VSH_OK;
+    }
+    size_t given_size;
+    memcpy(&given_size, given, sizeof given_size);
+    if (given_size <= sizeof given_size || given_size > size) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "%s: struct_size %zu, expected %zu; fill it with its default function", what,
+                         given_size, size);
+    }
+    memcpy(defaults, given, given_size);
+    return VSH_OK;
+}
+
+vsh_result vshi_run_resolve(const vsh_run *run, vsh_run *full, vsh_error *error) {
+    *full = vsh_run_default();
+    const vsh_result result = vshi_options_resolve(run, full, sizeof *full, "vsh_run", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (full->threads < 0 || full->threads > 1024) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "threads %d: expected 0 … 1024", full->threads);
+    }
+    return VSH_OK;
+}
+
+void vshi_warn(const vsh_run *run, const char *format, ...) {
+    if (run == NULL || run->warning == NULL) {
+        return;
+    }
+    vsh_error line;
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(line.message, sizeof line.message, format, arguments);
+    va_end(arguments);
+    run->warning(run->user, line.message);
+}

@@ -1,0 +1,33 @@
+#include "base/memory.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { ALIGNMENT = 64 };
+
+vsh_result vshi_allocate(void **memory, size_t count, size_t size, const char *what, vsh_error *error) {
+    *memory = NULL;
+    if (count == 0) {
+        return VSH_OK;
+    }
+    size_t bytes;
+    if (__builtin_mul_overflow(count, size, &bytes) || bytes > SIZE_MAX - ALIGNMENT) {
+        return vshi_fail(error, VSH_ERROR_MEMORY,
+                         "%s: %zu × %zu bytes are more than this machine can address", what, count, size);
+    }
+    bytes = (bytes + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+    *memory = aligned_alloc(ALIGNMENT, bytes);
+    if (*memory == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", what, bytes);
+    }
+    memset(*memory, 0, bytes);
+    return VSH_OK;
+}
+
+vsh_result vshi_check_limit(const vsh_run *run, double bytes, const char *what, vsh_error *error) {
+    if (run == NULL || run->memory_limit == 0 || bytes <= (double)run->memory_limit) {
+        return VSH_OK;
+    }
+    return vshi_fail(error, VSH_ERROR_LIMIT, "%s: about %.0f MB are needed, over the memory limit of %.0f MB",
+                     what, bytes / 1e6, (double)run->memory_limit / 1e6);
+}

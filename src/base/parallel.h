@@ -1,0 +1,23 @@
+/* Loops over the one thread pool (TBB's). */
+#ifndef VSHI_PARALLEL_H
+#define VSHI_PARALLEL_H
+
+#include "base/job.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Handles elements begin … end - 1. May run on any thread; must not depend on how the range was cut. */
+typedef void vshi_range_fn(void *user, size_t begin, size_t end);
+
+/* Calls fn over 0 … count - 1 in pieces of `grain` (the last may be shorter), each piece starting at a
+ * multiple of it, on the job's threads; advances the job by `units` × the elements of every piece and stops
+ * early where the job is cancelled. Errors: VSH_ERROR_CANCELLED, VSH_ERROR_MEMORY, VSH_ERROR_INTERNAL. */
+vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t units, vshi_range_fn *fn,
+                             void *user, vsh_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

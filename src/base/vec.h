@@ -1,0 +1,96 @@
+/* Vectors of three doubles, and transforms of three rows of four. */
+#ifndef VSHI_VEC_H
+#define VSHI_VEC_H
+
+#include <math.h>
+#include <stdbool.h>
+
+typedef struct vshi_vec {
+    double x, y, z;
+} vshi_vec;
+
+static inline vshi_vec vshi_vec_of(const double v[3]) {
+    return (vshi_vec){v[0], v[1], v[2]};
+}
+static inline vshi_vec vshi_vec_off(const float v[3]) {
+    return (vshi_vec){v[0], v[1], v[2]};
+}
+static inline vshi_vec vshi_add(vshi_vec a, vshi_vec b) {
+    return (vshi_vec){a.x + b.x, a.y + b.y, a.z + b.z};
+}
+static inline vshi_vec vshi_sub(vshi_vec a, vshi_vec b) {
+    return (vshi_vec){a.x - b.x, a.y - b.y, a.z - b.z};
+}
+static inline vshi_vec vshi_scale(vshi_vec a, double s) {
+    return (vshi_vec){a.x * s, a.y * s, a.z * s};
+}
+static inline double vshi_dot(vshi_vec a, vshi_vec b) {
+    return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+static inline vshi_vec vshi_cross(vshi_vec a, vshi_vec b) {
+    return (vshi_vec){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+static inline double vshi_length(vshi_vec a) {
+    return sqrt(vshi_dot(a, a));
+}
+static inline bool vshi_finite(vshi_vec a) {
+    return isfinite(a.x) && isfinite(a.y) && isfinite(a.z);
+}
+
+/* Unit vector along a, or zero where a has no direction. Scaled first, so that neither 1e-200 nor 1e200 is
+ * lost. */
+static inline vshi_vec vshi_unit(vshi_vec a) {
+    const double largest = fmax(fabs(a.x), fmax(fabs(a.y), fabs(a.z)));
+    if (!(largest > 0.0) || !isfinite(largest)) {
+        return (vshi_vec){0.0, 0.0, 0.0};
+    }
+    a = (vshi_vec){a.x / largest, a.y / largest, a.z / largest};
+    return vshi_scale(a, 1.0 / vshi_length(a));
+}
+
+/* Point through a transform [12] of three rows of four; NULL is the identity. */
+static inline vshi_vec vshi_transform_point(const double *m, vshi_vec p) {
+    if (m == NULL) {
+        return p;
+    }
+    return (vshi_vec){m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3],
+                      m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
+                      m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11]};
+}
+
+/* Direction through the linear part. */
+static inline vshi_vec vshi_transform_vector(const double *m, vshi_vec v) {
+    if (m == NULL) {
+        return v;
+    }
+    return (vshi_vec){m[0] * v.x + m[1] * v.y + m[2] * v.z, m[4] * v.x + m[5] * v.y + m[6] * v.z,
+                      m[8] * v.x + m[9] * v.y + m[10] * v.z};
+}
+
+/* Determinant of the linear part: negative where the transform mirrors. */
+static inline double vshi_transform_determinant(const double *m) {
+    if (m == NULL) {
+        return 1.0;
+    }
+    return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
+           m[2] * (m[4] * m[9] - m[5] * m[8]);
+}
+
+/* Normal through the cofactors of the linear part, which serve mirrored and uneven scales alike; not
+ * normalised. */
+static inline vshi_vec vshi_transform_normal(const double *m, vshi_vec n) {
+    if (m == NULL) {
+        return n;
+    }
+    const double sign = vshi_transform_determinant(m) < 0.0 ? -1.0 : 1.0;
+    return (vshi_vec){
+        sign * ((m[5] * m[10] - m[6] * m[9]) * n.x + (m[6] * m[8] - m[4] * m[10]) * n.y +
+                (m[4] * m[9] - m[5] * m[8]) * n.z),
+        sign * ((m[2] * m[9] - m[1] * m[10]) * n.x + (m[0] * m[10] - m[2] * m[8]) * n.y +
+                (m[1] * m[8] - m[0] * m[9]) * n.z),
+        sign * ((m[1] * m[6] - m[2] * m[5]) * n.x + (m[2] * m[4] - m[0] * m[6]) * n.y +
+                (m[0] * m[5] - m[1] * m[4]) * n.z),
+    };
+}
+
+#endif

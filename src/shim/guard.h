@@ -1,0 +1,33 @@
+// The one guard at the border between C and C++: every exception becomes a vsh_error.
+#pragma once
+
+#include "base/error.h"
+
+#include <exception>
+#include <new>
+#include <stdexcept>
+
+namespace vshi {
+
+// Thrown inside the shims to leave with a code of our own; the error is filled already.
+struct Failure {
+    vsh_result code;
+};
+
+// Runs body() and returns its vsh_result; exceptions become VSH_ERROR_MEMORY or `code`, prefixed by `what`.
+template <typename Body>
+vsh_result guard(vsh_error *error, vsh_result code, const char *what, Body &&body) noexcept {
+    try {
+        return body();
+    } catch (const Failure &failure) {
+        return failure.code;
+    } catch (const std::bad_alloc &) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
+    } catch (const std::exception &exception) {
+        return vshi_fail(error, code, "%s: %s", what, exception.what());
+    } catch (...) {
+        return vshi_fail(error, VSH_ERROR_INTERNAL, "%s: unknown exception", what);
+    }
+}
+
+} // namespace vshi
