@@ -1,0 +1,173 @@
+#include "field/field.h"
+
+#include "base/memory.h"
+#include "field/level.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Without a wish for a reach: what a light of 60° can use at receivers several diagonals away. */
+static const double DEFAULT_REACH = 4.0; /* diagonals of the bounds */
+
+/* A lattice point within this of the surface may be a corner of a cell that holds some of it, voxels. */
+static const float CELL_DIAGONAL = 1.75f;
+
+void vsh_field_free(vsh_field *field) {
+    if (field == NULL) {
+        return;
+    }
+    free(field->values);
+    free(field->index);
+    free(field);
+}
+
+/* World to index space of a similarity m: its transpose over the squared scale. */
+static void invert(const double *m, double voxel_size, double inverse[12]) {
+    const double s = 1.0 / (voxel_size * voxel_size);
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) {
+            inverse[4 * row + column] = s * m[4 * column + row];
+        }
+        inverse[4 * row + 3] =
+            -(inverse[4 * row] * m[3] + inverse[4 * row + 1] * m[7] + inverse[4 * row + 2] * m[11]);
+    }
+}
+
+/* Box of the lattice points next to the surface, field space. */
+static bool find_bounds(vsh_field *field) {
+    const vshi_level *level = &field->levels[0];
+    int32_t low[3] = {INT32_MAX, INT32_MAX, INT32_MAX}, high[3] = {INT32_MIN, INT32_MIN, INT32_MIN};
+    size_t block = 0;
+    for (int32_t x = 0; x < level->size[0]; ++x) {
+        for (int32_t y = 0; y < level->size[1]; ++y) {
+            for (int32_t z = 0; z < level->size[2]; ++z, ++block) {
+                const int32_t offset = field->index[block];
+                if (offset < 2 * VSHI_BRICK_VALUES) {
+                    continue;
+                }
+                for (int v = 0; v < VSHI_BRICK_VALUES; ++v) {
+                    if (fabsf(field->values[offset + v]) < CELL_DIAGONAL) {
+                        const int32_t at[3] = {8 * x + v / 81, 8 * y + v / 9 % 9, 8 * z + v % 9};
+                        for (int axis = 0; axis < 3; ++axis) {
+                            const int32_t a = at[axis] + level->origin[axis];
+                            low[axis] = a < low[axis] ? a : low[axis];
+                            high[axis] = a > high[axis] ? a : high[axis];
+                        }
+                    }
+                }
+            }
+        }
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        field->bounds_min[axis] = (float)low[axis];
+        field->bounds_max[axis] = (float)high[axis];
+    }
+    return low[0] <= high[0];
+}
+
+vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *options, const vsh_run *run,
+                            vsh_field **field, vsh_error *error) {
+    vsh_field_options o = vsh_field_options_default();
+    vsh_run r;
+    vshi_blocks blocks = {.map = NULL};
+    vshi_feet feet = {NULL};
+    vshi_job *job = NULL;
+    vsh_field *f = NULL;
+    *field = NULL;
+    vsh_result result = vshi_options_resolve(options, &o, sizeof o, "vsh_field_options", error);
+    if (result == VSH_OK) {
+        result = vshi_run_resolve(run, &r, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (!(o.reach >= 0.0) || isinf(o.reach)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "reach %g: expected a length, 0 or more", o.reach);
+    }
+
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    /* levels are progress: each has a quarter of the work of the one below */
+    job = vshi_job_begin(&r, "field", 100);
+    result = vshi_allocate((void **)&f, 1, sizeof *f, "field", error);
+    if (result == VSH_OK && job == NULL) {
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "field: the system refused memory");
+    }
+    if (result != VSH_OK) {
+        goto done;
+    }
+    f->voxel_size = info.voxel_size;
+    f->shell_thickness = info.shell_thickness;
+    memcpy(f->world_min, info.bounds_min, sizeof f->world_min);
+    memcpy(f->world_max, info.bounds_max, sizeof f->world_max);
+    invert(vshi_grid_transform(grid), info.voxel_size, f->to_field);
+
+    const float band = (float)fmin(info.half_width, VSHI_COARSE_BAND);
+    result = vshi_blocks_from_grid(grid, band, &r, &blocks, error);
+    if (result == VSH_OK) {
+        result = vshi_level_append(f, &blocks, NULL, job, &feet, error);
+    }
+    vshi_blocks_free(&blocks);
+    if (result != VSH_OK) {
+        goto done;
+    }
+    if (!find_bounds(f)) {
+        result = vshi_fail(error, VSH_ERROR_INPUT, "field: the level set has no surface");
+        goto done;
+    }
+    double diagonal = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double edge = f->bounds_max[axis] - f->bounds_min[axis];
+        diagonal += edge * edge;
+    }
+    const double reach = o.reach > 0.0 ? o.reach / f->voxel_size : DEFAULT_REACH * sqrt(diagonal);
+    vshi_job_advance(job, 40);
+    for (size_t units = 30; f->level_count < VSHI_MAX_LEVELS; units /= 2) {
+        const vshi_level *top = &f->levels[f->level_count - 1];
+        if (top->band >= reach) {
+            break;
+        }
+        result = vshi_level_derive(f, &feet, job, error);
+        if (result != VSH_OK) {
+            goto done;
+        }
+        if (vshi_job_advance(job, units)) {
+            result = vshi_job_fail_cancelled(job, error);
+            goto done;
+        }
+    }
+    *field = f;
+    f = NULL;
+done:
+    free(feet.points);
+    vsh_field_free(f);
+    vshi_job_end(job);
+    return result;
+}
+
+void vsh_field_sample(const vsh_field *field, size_t count, const double *positions, float *distances) {
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_vec p = vshi_to_field(field, positions + 3 * i);
+        const float at[3] = {(float)p.x, (float)p.y, (float)p.z};
+        const float h = vshi_field_distance(field, at);
+        distances[i] = vshi_finite(p) ? (float)((double)h * field->voxel_size) : NAN;
+    }
+}
+
+void vsh_field_get_info(const vsh_field *field, vsh_field_info *info) {
+    const vshi_level *top = &field->levels[field->level_count - 1];
+    const uint64_t bricks = top->first_brick + top->brick_count;
+    const uint64_t blocks =
+        top->first_index + (uint64_t)top->size[0] * (uint64_t)top->size[1] * (uint64_t)top->size[2];
+    *info = (vsh_field_info){
+        .voxel_size = field->voxel_size,
+        .reach = top->band * field->voxel_size,
+        .shell_thickness = field->shell_thickness,
+        .levels = field->level_count,
+        .bricks = bricks,
+        .bytes = bricks * VSHI_BRICK_VALUES * sizeof(float) + blocks * sizeof(int32_t) + sizeof *field,
+    };
+    memcpy(info->bounds_min, field->world_min, sizeof info->bounds_min);
+    memcpy(info->bounds_max, field->world_max, sizeof info->bounds_max);
+}

@@ -1,0 +1,108 @@
+/* The pyramid: levels of voxels 1, 2, 4 … finest voxels wide, each a narrow band in flat bricks.
+ *
+ * Field space is the finest level's index space: lengths are finest voxels, lattice point (i, j, k) of level
+ * l lies at 2^l (i, j, k). A brick holds 8³ cells of a level as 9³ values (one plane of apron on the far
+ * sides), z fastest, so that a trilinear sample is one look-up of the brick and eight loads. Blocks away from
+ * the surface share one of two constant bricks, so the look-up never branches. */
+#ifndef VSHI_FIELD_H
+#define VSHI_FIELD_H
+
+#include "base/vec.h"
+
+#include <stdint.h>
+#include <vdbshade/field.h>
+
+enum {
+    VSHI_MAX_LEVELS = 48,
+    VSHI_BRICK_CELLS = 8, /* along an edge */
+    VSHI_BRICK_EDGE = 9,  /* values along an edge */
+    VSHI_STRIDE_X = 81,
+    VSHI_STRIDE_Y = 9,
+    VSHI_BRICK_VALUES = 729,
+    VSHI_BRICK_OUTSIDE = 0, /* number of a level's brick that is all +band */
+    VSHI_BRICK_INSIDE = 1   /* all -band */
+};
+
+typedef struct vshi_level {
+    int32_t origin[3];    /* lattice coordinates of the first brick's first value; multiples of 8 */
+    int32_t size[3];      /* bricks along each axis; z fastest */
+    uint64_t first_index; /* of this level in vsh_field.index */
+    uint64_t first_brick; /* of this level in vsh_field.values */
+    uint64_t brick_count; /* with the two constant ones */
+    float scale;          /* 2^level: voxel size, finest voxels */
+    float band;           /* finest voxels; values are clamped to ± band */
+} vshi_level;
+
+struct vsh_field {
+    double to_field[12]; /* world to field space */
+    double voxel_size;   /* finest, world units */
+    double shell_thickness;
+    float bounds_min[3]; /* box around the surface, field space */
+    float bounds_max[3];
+    double world_min[3];
+    double world_max[3];
+    int32_t *index; /* offset in `values` of each block's brick; all levels */
+    float *values;  /* bricks; all levels; finest voxels, negative inside */
+    int32_t level_count;
+    vshi_level levels[VSHI_MAX_LEVELS];
+};
+
+/* Trilinear sample of one level at a field-space position; ± band where nothing is nearer, +band outside the
+ * level's blocks. Where `gradient` is not NULL, it is the cell's own, per finest voxel. */
+static inline float vshi_level_sample(const vsh_field *field, int32_t l, const float p[3],
+                                      float gradient[3]) {
+    const vshi_level *level = &field->levels[l];
+    const float inverse = 1.0f / level->scale;
+    float f[3];
+    int32_t cell[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        const float x = p[axis] * inverse - (float)level->origin[axis];
+        if (!(x >= 0.0f && x < (float)(VSHI_BRICK_CELLS * level->size[axis]))) {
+            if (gradient != NULL) {
+                gradient[0] = gradient[1] = gradient[2] = 0.0f;
+            }
+            return level->band;
+        }
+        cell[axis] = (int32_t)x;
+        f[axis] = x - (float)cell[axis];
+    }
+    const uint64_t block = ((uint64_t)(cell[0] >> 3) * (uint64_t)level->size[1] + (uint64_t)(cell[1] >> 3)) *
+                               (uint64_t)level->size[2] +
+                           (uint64_t)(cell[2] >> 3);
+    const float *v = field->values + field->index[level->first_index + block] +
+                     (cell[0] & 7) * VSHI_STRIDE_X + (cell[1] & 7) * VSHI_STRIDE_Y + (cell[2] & 7);
+    const float z00 = v[0] + (v[1] - v[0]) * f[2];
+    const float z01 = v[9] + (v[10] - v[9]) * f[2];
+    const float z10 = v[81] + (v[82] - v[81]) * f[2];
+    const float z11 = v[90] + (v[91] - v[90]) * f[2];
+    const float y0 = z00 + (z01 - z00) * f[1];
+    const float y1 = z10 + (z11 - z10) * f[1];
+    if (gradient != NULL) {
+        const float d00 = v[1] - v[0], d01 = v[10] - v[9], d10 = v[82] - v[81], d11 = v[91] - v[90];
+        const float d0 = d00 + (d01 - d00) * f[1];
+        const float d1 = d10 + (d11 - d10) * f[1];
+        gradient[0] = (y1 - y0) * inverse;
+        gradient[1] = ((z01 - z00) + ((z11 - z10) - (z01 - z00)) * f[0]) * inverse;
+        gradient[2] = (d0 + (d1 - d0) * f[0]) * inverse;
+    }
+    return y0 + (y1 - y0) * f[0];
+}
+
+/* Signed distance at a field-space position from the finest level that resolves it, finest voxels. */
+static inline float vshi_field_distance(const vsh_field *field, const float p[3]) {
+    float h = 0.0f;
+    for (int32_t l = 0; l < field->level_count; ++l) {
+        h = vshi_level_sample(field, l, p, NULL);
+        if (h < field->levels[l].band && h > -field->levels[l].band) {
+            break;
+        }
+    }
+    return h;
+}
+
+/* World position to field space, in double precision. */
+static inline vshi_vec vshi_to_field(const vsh_field *field, const double position[3]) {
+    return vshi_transform_point(field->to_field, vshi_vec_of(position));
+}
+
+#endif
