@@ -1,0 +1,51 @@
+/* A chunk of cones on their way to the kernel: set up in double precision, marched, read back. */
+#ifndef VSHI_RAYS_H
+#define VSHI_RAYS_H
+
+#include "base/vec.h"
+#include "shade/kernel/march.h"
+
+#include <stdbool.h>
+#include <vdbshade/shade.h>
+
+enum { VSHI_CHUNK = 1024 }; /* rays: some 50 KB, which stay in the second cache */
+
+typedef struct vshi_chunk {
+    vshi_rays rays;
+    uint32_t owner[VSHI_CHUNK]; /* what each ray is for, as the caller numbers it */
+    float memory[11][VSHI_CHUNK];
+} vshi_chunk;
+
+/* A cone in field space. */
+typedef struct vshi_cone {
+    vshi_vec origin;
+    vshi_vec direction; /* unit */
+    double end;         /* > 0, may be infinite */
+    double sine;        /* of the half angle; 0: a ray */
+    double close;       /* what is known of its closeness already: at most `sine`; 1 for rays */
+    double stop;
+} vshi_cone;
+
+void vshi_chunk_clear(vshi_chunk *chunk);
+
+/* Adds a cone, or returns false where it cannot meet the casters' bounds: its closeness then stays as it is.
+ */
+bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *cone, uint32_t owner,
+                    vsh_shade_stats *stats);
+
+/* Fraction of a disc light that is seen past a straight edge at x of its radius from the centre, for x in
+ * [-1, 1]: the circular segment 1/2 + (x √(1 - x²) + asin x) / π. Its own arithmetic, so that no libm shows
+ * in the bits. */
+double vshi_segment(double x);
+
+/* Visible fraction of a cone of `sine` and `closeness` (h / t): the closeness is the sine of the angle
+ * between the axis and the occluder's edge, and the disc's radius and the edge's offset are the angles'
+ * tangents. */
+double vshi_cone_visibility(double closeness, double sine);
+
+/* Unit normal and direction in field space. */
+static inline vshi_vec vshi_direction_to_field(const vsh_field *field, vshi_vec direction) {
+    return vshi_unit(vshi_transform_vector(field->to_field, direction));
+}
+
+#endif

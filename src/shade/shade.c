@@ -1,0 +1,93 @@
+#include "shade/shade.h"
+
+#include "base/parallel.h"
+
+#include <math.h>
+#include <stdatomic.h>
+
+vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
+                                      vsh_error *error) {
+    *full = vsh_shade_options_default();
+    const vsh_result result = vshi_options_resolve(options, full, sizeof *full, "vsh_shade_options", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    const struct {
+        const char *name;
+        double value, low, high;
+    } fields[] = {
+        {"method", full->method, VSH_SHADOW_HARD, VSH_SHADOW_CONE},
+        {"ao_method", full->ao_method, VSH_AO_TAPS, VSH_AO_CONES},
+        {"ao_cones", full->ao_cones, 1, 256},
+        {"max_steps", full->max_steps, 16, 65536},
+        {"ao_distance", full->ao_distance, 0x1p-1000, 0x1p1000},
+        {"start_offset", full->start_offset, 0, 16},
+        {"surface_offset", full->surface_offset, 0, 0x1p1000},
+    };
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; ++i) {
+        if (!(fields[i].value >= fields[i].low && fields[i].value <= fields[i].high)) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s %g is out of range %g … %g", fields[i].name,
+                             fields[i].value, fields[i].low, fields[i].high);
+        }
+    }
+    return VSH_OK;
+}
+
+typedef struct shade_run {
+    vshi_shade_fn *fn;
+    const void *task;
+    _Atomic uint64_t marches, samples, skipped, certified, unfinished, invalid, beyond_reach;
+} shade_run;
+
+static void run_piece(void *user, size_t begin, size_t end) {
+    shade_run *run = user;
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    run->fn(run->task, begin, end, &stats);
+    atomic_fetch_add(&run->marches, stats.marches);
+    atomic_fetch_add(&run->samples, stats.samples);
+    atomic_fetch_add(&run->skipped, stats.skipped);
+    atomic_fetch_add(&run->certified, stats.certified);
+    atomic_fetch_add(&run->unfinished, stats.unfinished);
+    atomic_fetch_add(&run->invalid, stats.invalid);
+    atomic_fetch_add(&run->beyond_reach, stats.beyond_reach);
+}
+
+vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
+                          vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error) {
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    shade_run pieces = {.fn = fn, .task = task};
+    vshi_job *job = vshi_job_begin(&full, stage, count);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
+    }
+    result = vshi_parallel_for(job, count, grain, 1, run_piece, &pieces, error);
+    vshi_job_end(job);
+    if (stats != NULL) {
+        stats->marches += pieces.marches;
+        stats->samples += pieces.samples;
+        stats->skipped += pieces.skipped;
+        stats->certified += pieces.certified;
+        stats->unfinished += pieces.unfinished;
+        stats->invalid += pieces.invalid;
+        stats->beyond_reach += pieces.beyond_reach;
+    }
+    return result;
+}
+
+bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double start_offset,
+                       double surface_offset, vshi_vec *origin, vshi_vec *normal) {
+    *origin = vshi_to_field(field, points->positions + 3 * i);
+    *normal = (vshi_vec){0.0, 0.0, 0.0};
+    if (points->normals != NULL) {
+        *normal = vshi_direction_to_field(field, vshi_vec_off(points->normals + 3 * i));
+        if (!(vshi_dot(*normal, *normal) > 0.0)) {
+            return false;
+        }
+        *origin = vshi_add(*origin, vshi_scale(*normal, start_offset + surface_offset / field->voxel_size));
+    }
+    return vshi_finite(*origin);
+}

@@ -1,0 +1,24 @@
+/* What shadow and AO share: checking options, running points in chunks, adding up their work. */
+#ifndef VSHI_SHADE_H
+#define VSHI_SHADE_H
+
+#include "base/job.h"
+#include "shade/rays.h"
+
+/* Resolves and checks options. Errors: VSH_ERROR_ARGUMENT, naming field, value and limit. */
+vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
+                                      vsh_error *error);
+
+/* Shades points begin … end - 1; adds what it did to *stats. */
+typedef void vshi_shade_fn(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);
+
+/* Runs fn over `count` points in pieces of `grain` under progress stage `stage`. */
+vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
+                          vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error);
+
+/* Where the rays of point i begin, and its unit normal, both in field space. False for a point that is not
+ * finite or has no normal where normals are given (then *normal is zero). */
+bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double start_offset,
+                       double surface_offset, vshi_vec *origin, vshi_vec *normal);
+
+#endif

@@ -1,0 +1,141 @@
+/* Shadow values: the visible fraction of a light, by one cone or ray a point. */
+#include "shade/shade.h"
+
+#include <math.h>
+
+/* A light as the points of one field see it. */
+typedef struct shadow_task {
+    const vsh_field *field;
+    const vsh_points *points;
+    const vsh_light *light;
+    const vsh_shade_options *options;
+    vshi_march_fn *march;
+    float *visibility;
+    vshi_vec towards; /* directional: unit, field space */
+    vshi_vec centre;  /* positional: field space */
+    double sine;      /* directional: of the half angle */
+    double radius;    /* positional: finest voxels */
+} shadow_task;
+
+/* Turns a closeness into a visible fraction, by method. */
+static float remap(int32_t method, double closeness, double sine) {
+    if (method == VSH_SHADOW_HARD || sine <= 0.0) {
+        return closeness > 0.0 ? 1.0f : 0.0f;
+    }
+    const double x = closeness / sine;
+    switch (method) {
+    case VSH_SHADOW_CLASSIC:
+    case VSH_SHADOW_IMPROVED:
+        return (float)(x <= 0.0 ? 0.0 : x >= 1.0 ? 1.0 : x);
+    case VSH_SHADOW_SMOOTH:
+        return (float)(x <= -1.0 ? 0.0 : x >= 1.0 ? 1.0 : 0.25 * (1.0 + x) * (1.0 + x) * (2.0 - x));
+    default:
+        return (float)vshi_cone_visibility(closeness, sine);
+    }
+}
+
+/* The cone from a point to the light; false where the point is within the light. */
+static bool aim(const shadow_task *task, vshi_vec origin, vshi_cone *cone) {
+    cone->origin = origin;
+    if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
+        cone->direction = task->towards;
+        cone->sine = task->sine;
+        cone->end = INFINITY;
+    } else {
+        const vshi_vec to = vshi_sub(task->centre, origin);
+        const double distance = vshi_length(to);
+        if (distance <= task->radius || distance <= 0.0) {
+            return false;
+        }
+        cone->direction = vshi_unit(to);
+        cone->sine = task->radius / distance;
+        /* up to the circle where the cone touches the sphere */
+        cone->end = distance * (1.0 - cone->sine * cone->sine);
+    }
+    if (task->options->method == VSH_SHADOW_HARD) {
+        cone->sine = 0.0;
+    }
+    return true;
+}
+
+static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
+    const shadow_task *task = user;
+    const int32_t method = task->options->method;
+    const bool inner = method == VSH_SHADOW_SMOOTH || method == VSH_SHADOW_CONE;
+    vshi_chunk chunk;
+    vshi_chunk_clear(&chunk);
+    for (size_t i = begin; i < end; ++i) {
+        vshi_cone cone;
+        vshi_vec origin, normal;
+        if (!vshi_shade_origin(task->field, task->points, i, task->options->start_offset,
+                               task->options->surface_offset, &origin, &normal)) {
+            task->visibility[i] = NAN;
+            ++stats->invalid;
+            continue;
+        }
+        if (!aim(task, origin, &cone)) {
+            task->visibility[i] = 1.0f;
+            continue;
+        }
+        const bool hard = cone.sine <= 0.0;
+        cone.close = hard ? 1.0 : cone.sine;
+        cone.stop = inner ? -cone.sine : 0.0;
+        if (task->points->normals != NULL) {
+            /* the receiver's own horizon is an edge like any other: its sine is the closeness of a plane */
+            const double horizon = vshi_dot(normal, cone.direction);
+            if (horizon <= cone.stop) {
+                task->visibility[i] = 0.0f;
+                ++stats->skipped;
+                continue;
+            }
+            cone.close = !hard && horizon < cone.close ? horizon : cone.close;
+        }
+        if (!vshi_chunk_add(&chunk, task->field, &cone, (uint32_t)(i - begin), stats)) {
+            task->visibility[i] = remap(method, cone.close, cone.sine);
+            stats->certified += cone.close >= cone.sine;
+        }
+    }
+    vshi_march_stats work = {0, 0};
+    task->march(task->field, &chunk.rays,
+                method == VSH_SHADOW_IMPROVED ? VSHI_MARCH_TRIANGULATED : VSHI_MARCH_PLAIN,
+                task->options->max_steps, &work);
+    stats->samples += work.samples;
+    stats->unfinished += work.unfinished;
+    for (size_t r = 0; r < chunk.rays.count; ++r) {
+        const double closeness = chunk.rays.close[r];
+        const double sine = chunk.rays.sine[r];
+        task->visibility[begin + chunk.owner[r]] = remap(method, closeness, sine);
+        stats->certified += sine > 0.0 && (closeness >= sine || closeness <= -sine);
+    }
+}
+
+vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
+                            const vsh_shade_options *options, const vsh_run *run, float *visibility,
+                            vsh_shade_stats *stats, vsh_error *error) {
+    vsh_shade_options full;
+    vsh_result result = vshi_shade_options_resolve(options, &full, error);
+    if (result == VSH_OK) {
+        result = vsh_light_check(light, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    shadow_task task = {.field = field,
+                        .points = points,
+                        .light = light,
+                        .options = &full,
+                        .march = vshi_march_best(),
+                        .visibility = visibility};
+    if (light->type == VSH_LIGHT_DIRECTIONAL) {
+        task.towards = vshi_direction_to_field(field, vshi_unit(vshi_vec_of(light->direction)));
+        task.sine = sin(0.5 * light->angle);
+    } else {
+        task.centre = vshi_to_field(field, light->position);
+        task.radius = light->radius / field->voxel_size;
+    }
+    char stage[80] = "shadow.";
+    for (size_t i = 0; i < sizeof light->name && light->name[i] != '\0'; ++i) {
+        stage[7 + i] = light->name[i];
+    }
+    return vshi_shade_run(run, stage, points->count, VSHI_CHUNK, shade_points, &task, stats, error);
+}
