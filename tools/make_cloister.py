@@ -11,7 +11,7 @@ from modelling import atlas
 from modelling.files import Part, write_glb, write_obj
 from modelling.solids import XY, ZY, Solid, arc, box, cross, dot, lathe, line, prism, strip, sub, tube
 
-TEXELS_PER_UNIT = 62.0  # lightmap density at 1024²
+TEXELS_PER_UNIT = 64.5  # lightmap density at 1024²
 UNSEEN = 0.25           # of that density, for the one face that nobody sees: the underside of the ground
 SINK = 0.002
 
@@ -24,7 +24,8 @@ IRON = ("iron", (0.16, 0.16, 0.18))
 CLAY = ("clay", (0.66, 0.40, 0.28))
 
 # Plan
-X0, X1, Z0, Z1 = -3.0, 3.0, -2.2, 2.2      # the ground
+X0, X1, Z0, Z1 = -3.0, 3.0, -2.2, 2.2      # outer faces of what stands on the ground
+EDGE = 0.04                                # how far the ground goes on beyond them
 GALLERY, STEP = 0.24, 0.12                 # heights of the gallery's floor and of the step before it
 GX, GZ, SX, SZ = -1.5, -0.44, -1.3, -0.24  # edges of gallery and step towards the courtyard
 WALL = 0.15                                # thickness of the outer walls
@@ -39,22 +40,22 @@ LANDING = RISER * RISERS
 def floor():
     """Courtyard, step and gallery as one solid, so that nothing lies hidden in another."""
     s = Solid("floor")
-    low = -0.14
+    x0, x1, z0, z1, low = X0 - EDGE, X1 + EDGE, Z0 - EDGE, Z1 + EDGE, -0.14
     up, right, front = (0, 1, 0), (1, 0, 0), (0, 0, 1)
-    s.face(up, [(SX, 0, SZ), (X1, 0, SZ), (X1, 0, Z1), (SX, 0, Z1)])
-    s.face(up, [(GX, STEP, GZ), (X1, STEP, GZ), (X1, STEP, SZ), (SX, STEP, SZ), (SX, STEP, Z1), (GX, STEP, Z1)])
-    s.face(up, [(X0, GALLERY, Z0), (X1, GALLERY, Z0), (X1, GALLERY, GZ), (GX, GALLERY, GZ), (GX, GALLERY, Z1),
-                (X0, GALLERY, Z1)])
+    s.face(up, [(SX, 0, SZ), (x1, 0, SZ), (x1, 0, z1), (SX, 0, z1)])
+    s.face(up, [(GX, STEP, GZ), (x1, STEP, GZ), (x1, STEP, SZ), (SX, STEP, SZ), (SX, STEP, z1), (GX, STEP, z1)])
+    s.face(up, [(x0, GALLERY, z0), (x1, GALLERY, z0), (x1, GALLERY, GZ), (GX, GALLERY, GZ), (GX, GALLERY, z1),
+                (x0, GALLERY, z1)])
     for x, z, y0, y1 in ((SX, SZ, 0, STEP), (GX, GZ, STEP, GALLERY)):
-        s.face(right, [(x, y0, z), (x, y0, Z1), (x, y1, Z1), (x, y1, z)])
-        s.face(front, [(x, y0, z), (X1, y0, z), (X1, y1, z), (x, y1, z)])
-    s.face(front, [(x, y, Z1) for x, y in ((X0, low), (X1, low), (X1, 0), (SX, 0), (SX, STEP), (GX, STEP),
-                                          (GX, GALLERY), (X0, GALLERY))])
-    s.face(right, [(X1, y, z) for z, y in ((Z0, low), (Z1, low), (Z1, 0), (SZ, 0), (SZ, STEP), (GZ, STEP),
-                                          (GZ, GALLERY), (Z0, GALLERY))])
-    s.face((0, 0, -1), [(X0, low, Z0), (X1, low, Z0), (X1, GALLERY, Z0), (X0, GALLERY, Z0)])
-    s.face((-1, 0, 0), [(X0, low, Z0), (X0, low, Z1), (X0, GALLERY, Z1), (X0, GALLERY, Z0)])
-    s.face((0, -1, 0), [(X0, low, Z0), (X1, low, Z0), (X1, low, Z1), (X0, low, Z1)], density=UNSEEN)
+        s.face(right, [(x, y0, z), (x, y0, z1), (x, y1, z1), (x, y1, z)])
+        s.face(front, [(x, y0, z), (x1, y0, z), (x1, y1, z), (x, y1, z)])
+    s.face(front, [(x, y, z1) for x, y in ((x0, low), (x1, low), (x1, 0), (SX, 0), (SX, STEP), (GX, STEP),
+                                          (GX, GALLERY), (x0, GALLERY))])
+    s.face(right, [(x1, y, z) for z, y in ((z0, low), (z1, low), (z1, 0), (SZ, 0), (SZ, STEP), (GZ, STEP),
+                                          (GZ, GALLERY), (z0, GALLERY))])
+    s.face((0, 0, -1), [(x0, low, z0), (x1, low, z0), (x1, GALLERY, z0), (x0, GALLERY, z0)])
+    s.face((-1, 0, 0), [(x0, low, z0), (x0, low, z1), (x0, GALLERY, z1), (x0, GALLERY, z0)])
+    s.face((0, -1, 0), [(x0, low, z0), (x1, low, z0), (x1, low, z1), (x0, low, z1)], density=UNSEEN)
     return s
 
 
@@ -91,25 +92,25 @@ def column(x, z, top=None):
     """Plinth, base, shaft, capital and abacus; with `top` a stump that broke off there."""
     y = GALLERY
     base = [[(0, 0.056), (0.132, 0.056)],
-            [(0.132, 0.056), (0.142, 0.072), (0.140, 0.092), (0.124, 0.104)],
-            [(0.124, 0.104), (0.104, 0.116), (0.100, 0.132), (0.106, 0.146)]]
+            [(0.132, 0.056), (0.144, 0.080), (0.124, 0.104)],
+            [(0.124, 0.104), (0.101, 0.122), (0.106, 0.146)]]
     parts = [box("plinth", (x - 0.15, x + 0.15), (y - SINK, y + 0.058), (z - 0.15, z + 0.15))]
     if top:
         return parts + [lathe("stump", base + [[(0.106, 0.146), (0.092, 0.165)], [(0.092, 0.165), (0.089, top)],
-                                               [(0.089, top), (0, top)]], 24, (x, y, z))]
+                                               [(0.089, top), (0, top)]], 20, (x, y, z))]
     capital = [[(0.106, 0.146), (0.092, 0.165)], [(0.092, 0.165), (0.091, 0.45), (0.080, 0.80)],
-               [(0.080, 0.80), (0.098, 0.808), (0.100, 0.822), (0.084, 0.832)],
-               [(0.084, 0.832), (0.088, 0.87), (0.104, 0.915), (0.138, 0.95), (0.150, 0.962)],
+               [(0.080, 0.80), (0.101, 0.816), (0.084, 0.832)],
+               [(0.084, 0.832), (0.090, 0.88), (0.112, 0.93), (0.150, 0.962)],
                [(0.150, 0.962), (0, 0.962)]]
-    parts.append(lathe("column", base + capital, 24, (x, y, z)))
+    parts.append(lathe("column", base + capital, 20, (x, y, z)))
     parts.append(box("abacus", (x - 0.17, x + 0.17), (y + 0.96, SPRING + SINK), (z - 0.17, z + 0.17)))
     return parts
 
 
-def pier(x, z, base=True):
-    """A square pier over the given ranges, with base and cap that stand out to three or four sides."""
+def pier(x, z, free=True):
+    """A square pier over the given ranges, with base and cap that stand out; not towards +x unless it is free."""
     g = 0.03
-    wide = [(x[0] - g, x[1] + (g if base else 0)), (z[0] - g, z[1] + g)]
+    wide = [(x[0] - g, x[1] + (g if free else 0)), (z[0] - g, z[1] + g)]
     return [box("pier base", wide[0], (GALLERY - SINK, GALLERY + 0.13), wide[1]),
             box("pier", x, (GALLERY + 0.13 - SINK, 1.20 + SINK), z),
             box("pier cap", wide[0], (1.20, SPRING + SINK), wide[1])]
@@ -122,6 +123,10 @@ def cornice(x1, z1):
     profile = [(-0.30, TOP - SINK), (0.02, TOP - SINK), (0.03, 1.885), (0.06, 1.90), (0.10, 1.94), (0.10, 1.98),
                (-0.30, 1.98)]
     for (a, y), (b, t) in zip(profile, profile[1:] + profile[:1]):
+        if y == t:
+            s.face((0, a - b, 0), [(x1, y, zf + a), (xf + a, y, zf + a), (xf + a, y, z1), (xf + b, y, z1),
+                                   (xf + b, y, zf + b), (x1, y, zf + b)])
+            continue
         s.face((0, a - b, t - y), [(x1, y, zf + a), (xf + a, y, zf + a), (xf + b, t, zf + b), (x1, t, zf + b)])
         s.face((t - y, a - b, 0), [(xf + a, y, z1), (xf + a, y, zf + a), (xf + b, t, zf + b), (xf + b, t, z1)])
     s.face((1, 0, 0), [(x1, y, zf + a) for a, y in profile])
@@ -177,10 +182,9 @@ def railing(x, last):
                                    (x, LANDING + height, last)], 0.038, 8, (1, 0, 0)))
     top = rail(newel) + 0.09
     parts.append(box("newel", (x - 0.05, x + 0.05), (-SINK, top), (newel - 0.05, newel + 0.05)))
-    ball = [(max(0.012, p[0]), p[1]) for p in arc((0, 0.07), 0.06, -50, 80, 6)]
-    ball = [(round(r, 4), y) for r, y in ball]
+    ball = arc((0, 0.07), 0.06, -50, 80, 5)
     parts.append(lathe("ball", [[(0, -SINK), (0.03, -SINK)], [(0.03, -SINK), ball[0]], ball,
-                                [ball[-1], (0, ball[-1][1])]], 12, (x, top, newel)))
+                                [ball[-1], (0, ball[-1][1])]], 8, (x, top, newel)))
     return parts
 
 
@@ -207,7 +211,7 @@ def fountain(x, z):
             [(0.245, 0.52), (0.20, 0.47), (0.12, 0.445), (0.05, 0.44)],
             [(0.05, 0.44), (0.035, 0.50), (0.03, 0.58), (0.055, 0.62), (0.06, 0.66), (0.04, 0.71), (0.012, 0.735)],
             [(0.012, 0.735), (0, 0.735)]]
-    return [lathe("basin", basin, 24, (x, 0, z)), lathe("bowl", bowl, 20, (x, 0.20, z))]
+    return [lathe("basin", basin, 24, (x, 0, z)), lathe("bowl", bowl, 16, (x, 0.20, z))]
 
 
 def pot(x, y, z, size):
@@ -215,7 +219,7 @@ def pot(x, y, z, size):
              [(0.075, 0.05), (0.13, 0.12), (0.165, 0.22), (0.15, 0.32), (0.105, 0.39)],
              [(0.105, 0.39), (0.14, 0.43)], [(0.14, 0.43), (0.11, 0.43)], [(0.11, 0.43), (0.085, 0.37)],
              [(0.085, 0.37), (0, 0.37)]]
-    return lathe("pot", [[(r * size, h * size) for r, h in band] for band in shape], 18, (x, y, z))
+    return lathe("pot", [[(r * size, h * size) for r, h in band] for band in shape], 14, (x, y, z))
 
 
 def pergola():
@@ -246,9 +250,9 @@ def parts():
     front = [AX + BAY / 2 + BAY * i for i in range(4)]
     side = (-0.18, 0.78)
     zf = AZ + HALF
-    arches = [arcade("front arcade", XY, AX - HALF, STAIR_X + SINK, front, AZ),
+    arches = [arcade("front arcade", XY, AX - HALF, STAIR_X, front, AZ),
               arcade("side arcade", ZY, -1.40, -zf + SINK, [-z for z in reversed(side)], AX),
-              cornice(STAIR_X + SINK, 1.43),
+              cornice(STAIR_X + 0.01, 1.43),
               box("wall plate", (AX, 2.14), (1.98 - SINK, 2.02), (AZ - 0.13, AZ + 0.09))]
     columns = [c for i in (1, 2, 3) for c in column(AX + BAY * i, AZ)] + column(AX, 0.30) + column(AX, 1.92, 0.47)
     columns += pier((-1.91, -1.59), (-0.91, -0.50)) + pier((1.93, STAIR_X + SINK), (-0.91, -0.59), False)
@@ -266,7 +270,7 @@ def parts():
         Part("pergola", WOOD, pergola()),
         Part("bench", STONE, bench()),
         Part("pots", CLAY, [pot(-1.02, 0, 0.06, 1.0), pot(1.92, 0, 0.10, 0.8), pot(-0.79, STEP, -0.33, 0.55)]),
-        Part("drum", STONE, [drum], (-0.95, 0.087, 1.30), (0.6, 0.0, 0.8), 90.0),
+        Part("drum", STONE, [drum], (-0.42, 0.087, 1.30), (0.6, 0.0, 0.8), 90.0),
     ]
 
 

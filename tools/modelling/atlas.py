@@ -10,6 +10,7 @@ CELL = 2                 # texels a cell of the packer
 GAP = 4                  # texels between charts
 CELLS = TEXELS // CELL
 STEPS = 1 << 16          # UVs are multiples of 1/STEPS: exact in 32-bit floats, and so is 1 - v
+FINE = STEPS // CELLS     # of them in a cell
 EPSILON = 1e-6
 
 
@@ -101,7 +102,7 @@ def pack(charts, density):
             uv = [turn(*vertex[2]) for vertex in chart.vertices]
             low = [min(p[i] for p in uv) for i in (0, 1)]
             scale = density * chart.density / CELL
-            turned.append([((p[0] - low[0]) * scale, (p[1] - low[1]) * scale) for p in uv])
+            turned.append([tuple(round((x - l) * scale * FINE) / FINE for x, l in zip(p, low)) for p in uv])
         extent = [max(p[i] for p in turned[0]) for i in (0, 1)]
         items.append((-max(extent), -min(extent), order, chart, turned))
     occupied = [0] * (CELLS + 1)
@@ -122,7 +123,7 @@ def pack(charts, density):
             wide = spread(row << (x + ring), 2 * ring + 1)
             for other in range(max(y + r - ring, 0), min(y + r + ring, CELLS) + 1):
                 occupied[other] |= wide
-        chart.lightmap = [tuple(round((p + o) / CELLS * STEPS) / STEPS for p, o in zip(q, (x, y))) for q in uv]
+        chart.lightmap = [tuple((p + o) / CELLS for p, o in zip(q, (x, y))) for q in uv]
 
 
 def check(charts):

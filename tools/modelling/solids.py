@@ -6,7 +6,11 @@ chart coordinates (u, v) are scene units too, v up and never mirrored.
 """
 from math import cos, dist, pi, sin, sqrt
 
-DECIMALS = 4  # positions are rounded to 0.1 mm, so that parts weld exactly and OBJ and GLB hold equal numbers
+GRID = 8192  # positions are multiples of 1/GRID: parts weld exactly, and decimals and 32-bit floats hold them alike
+
+
+def snap(x):
+    return round(x * GRID) / GRID
 
 
 def sub(a, b):
@@ -35,7 +39,7 @@ class Chart:
     """Vertices (position, normal, uv, tile) and anticlockwise triangles."""
 
     def __init__(self, vertices, triangles, density=1.0):
-        self.vertices = [(tuple(round(x, DECIMALS) + 0.0 for x in p), n, uv, tile) for p, n, uv, tile in vertices]
+        self.vertices = [(tuple(snap(x) for x in p), n, uv, tile) for p, n, uv, tile in vertices]
         self.triangles = triangles
         self.density = density  # texels per unit, relative to the atlas
 
@@ -144,8 +148,7 @@ def triangulate(loops):
 def arc(centre, radius, start, end, count):
     """Points of a circle from angle start to angle end (degrees), count segments."""
     steps = [(start + (end - start) * i / count) * pi / 180 for i in range(count + 1)]
-    return [(round(centre[0] + radius * cos(t), DECIMALS), round(centre[1] + radius * sin(t), DECIMALS))
-            for t in steps]
+    return [(snap(centre[0] + radius * cos(t)), snap(centre[1] + radius * sin(t))) for t in steps]
 
 
 def line(*points):
@@ -156,7 +159,6 @@ def line(*points):
 # Planes to draw in: (a, b, c) to (x, y, z), right-handed, so that a face looks along +c when a goes right.
 XY = lambda a, b, c: (a, b, c)
 ZY = lambda a, b, c: (c, b, -a)  # seen from +x: a = -z
-XZ = lambda a, b, c: (a, c, -b)  # seen from above: b = -z
 
 
 def strip(solid, plane, run, c0, c1, side=1.0):
