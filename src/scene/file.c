@@ -23,6 +23,7 @@ static vsh_result read_all(const char *path, FILE *file, char **text, size_t *si
     size_t capacity = 0;
     do {
         capacity = capacity == 0 ? (size_t)1 << 16 : 2 * capacity;
+        capacity = capacity > MAX_BYTES ? MAX_BYTES + 1 : capacity;
         char *grown = realloc(*text, capacity + 1);
         if (grown == NULL) {
             return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, capacity);
