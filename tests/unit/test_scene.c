@@ -605,6 +605,26 @@ static void a_file_that_is_not_there_or_is_a_folder_cannot_be_read(void **state)
     vsh_scene_free(NULL);
 }
 
+static void every_example_of_the_reference_is_a_scene(void **state) {
+    (void)state;
+    static const char start[] = "```json\n", end[] = "\n```";
+    size_t size;
+    char *text = read_text(VSH_ASSETS "/../docs/scene.md", &size);
+    size_t count = 0;
+    for (char *at = text; (at = strstr(at, start)) != NULL; ++count) {
+        at += sizeof start - 1;
+        char *stop = strstr(at, end);
+        assert_non_null(stop);
+        *stop = '\0';
+        vsh_scene *scene = parse("docs/scene.md", at);
+        assert_true(scene->receiver_count > 0);
+        vsh_scene_free(scene);
+        at = stop + 1;
+    }
+    assert_true(count >= 7);
+    free(text);
+}
+
 static void a_file_without_end_is_over_the_limit(void **state) {
     (void)state;
     vsh_scene *scene = NULL;
@@ -631,6 +651,7 @@ int main(void) {
         cmocka_unit_test(messages_stay_one_line_whatever_the_key),
         cmocka_unit_test(a_file_that_is_not_there_or_is_a_folder_cannot_be_read),
         cmocka_unit_test(a_file_without_end_is_over_the_limit),
+        cmocka_unit_test(every_example_of_the_reference_is_a_scene),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
