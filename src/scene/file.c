@@ -1,0 +1,63 @@
+/* vsh_scene_read(): the scene file's text, brought into memory within a limit. */
+#include "scene/scene.h"
+
+#include "base/error.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const size_t MAX_BYTES = (size_t)64 << 20;
+
+static vsh_result fail_read(const char *path, int reason, vsh_error *error) {
+    char why[128] = "";
+    if (strerror_r(reason, why, sizeof why) != 0) {
+        snprintf(why, sizeof why, "error %d", reason);
+    }
+    return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, why);
+}
+
+/* Read in pieces, not by the size that the system tells, so that a pipe is read as well. */
+static vsh_result read_all(const char *path, FILE *file, char **text, size_t *size, vsh_error *error) {
+    size_t capacity = 0;
+    do {
+        capacity = capacity == 0 ? (size_t)1 << 16 : 2 * capacity;
+        capacity = capacity > MAX_BYTES ? MAX_BYTES + 1 : capacity;
+        char *grown = realloc(*text, capacity + 1);
+        if (grown == NULL) {
+            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, capacity);
+        }
+        *text = grown;
+        errno = 0;
+        *size += fread(*text + *size, 1, capacity - *size, file);
+        if (ferror(file)) {
+            return fail_read(path, errno, error);
+        }
+        if (*size > MAX_BYTES) {
+            return vshi_fail(error, VSH_ERROR_LIMIT, "%s: is larger than the %zu bytes that a scene may have",
+                             path, MAX_BYTES);
+        }
+    } while (*size == capacity);
+    return VSH_OK;
+}
+
+vsh_result vsh_scene_read(const char *path, vsh_scene **scene, vsh_error *error) {
+    if (path == NULL || scene == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_scene_read: path or scene is NULL");
+    }
+    *scene = NULL;
+    FILE *file = fopen(path, "rb");
+    if (file == NULL) {
+        return fail_read(path, errno, error);
+    }
+    char *text = NULL;
+    size_t size = 0;
+    vsh_result result = read_all(path, file, &text, &size, error);
+    fclose(file);
+    if (result == VSH_OK) {
+        result = vshi_scene_parse(path, text, size, scene, error);
+    }
+    free(text);
+    return result;
+}

@@ -1,0 +1,70 @@
+#include "scene/parts.h"
+#include "scene/transform.h"
+
+#include <vdbshade/image.h>
+#include <vdbshade/scene.h>
+
+/* 1024, or [width, height]. */
+static vsh_result read_size(vshi_reader *reader, const vshi_value *value, void *member) {
+    const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 1.0, .highest = VSH_MAX_LIGHTMAP_SIZE};
+    vsh_receiver *receiver = member;
+    if (!json_is_array(value->json)) {
+        const vsh_result result = vshi_read_value(reader, value, &key, &receiver->width);
+        receiver->height = receiver->width;
+        return result;
+    }
+    const size_t count = json_array_size(value->json);
+    if (count != 2) {
+        return vshi_reader_fail(reader, value, "expected 2 numbers, found %zu", count);
+    }
+    const vshi_value width = vshi_item(value, 0), height = vshi_item(value, 1);
+    const vsh_result result = vshi_read_value(reader, &width, &key, &receiver->width);
+    return result == VSH_OK ? vshi_read_value(reader, &height, &key, &receiver->height) : result;
+}
+
+static vsh_result read_bits(vshi_reader *reader, const vshi_value *value, void *member) {
+    const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 0.0, .highest = 32.0};
+    int32_t *bits = member;
+    const vsh_result result = vshi_read_value(reader, value, &key, bits);
+    if (result == VSH_OK && *bits != 0 && *bits != 8 && *bits != 16 && *bits != 32) {
+        return vshi_reader_fail(reader, value, "%d is none of 0, 8, 16, 32", *bits);
+    }
+    return result;
+}
+
+static const vshi_key receiver_keys[] = {
+    {.name = "mesh", .kind = VSHI_PATH, .required = VSHI_ALL, .offset = offsetof(vsh_receiver, path)},
+    {.name = "transform",
+     .kind = VSHI_CUSTOM,
+     .offset = offsetof(vsh_receiver, transform),
+     .read = vshi_read_transform},
+    {.name = "uv_set",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_receiver, uv_set),
+     .highest = VSH_MAX_UV_SETS - 1},
+    {.name = "size", .kind = VSHI_CUSTOM, .read = read_size},
+    {.name = "supersample",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_receiver, supersample),
+     .lowest = 1.0,
+     .highest = 16.0},
+    {.name = "padding", .kind = VSHI_INTEGER, .offset = offsetof(vsh_receiver, padding), .highest = 4096.0},
+    {.name = "output", .kind = VSHI_PATH, .required = VSHI_ALL, .offset = offsetof(vsh_receiver, output)},
+    {.name = "bits", .kind = VSHI_CUSTOM, .offset = offsetof(vsh_receiver, bits), .read = read_bits},
+    {.name = "pack", .kind = VSHI_STRING, .offset = offsetof(vsh_receiver, pack)},
+};
+static const vshi_table receiver_table = VSHI_TABLE(receiver_keys);
+
+vsh_result vshi_read_receiver(vshi_reader *reader, const vshi_value *value, void *member) {
+    const vsh_lightmap_options lightmap = vsh_lightmap_options_default();
+    const vsh_image_options image = vsh_image_options_default();
+    vsh_receiver *receiver = member;
+    vshi_transform_identity(receiver->transform);
+    receiver->uv_set = -1;
+    receiver->width = lightmap.width;
+    receiver->height = lightmap.height;
+    receiver->supersample = lightmap.supersample;
+    receiver->padding = lightmap.padding;
+    receiver->bits = image.bits;
+    return vshi_read_object(reader, value, &receiver_table, 1, "a receiver", receiver);
+}

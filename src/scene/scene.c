@@ -1,0 +1,233 @@
+#include "scene/scene.h"
+
+#include "base/memory.h"
+#include "scene/keys.h"
+#include "scene/parts.h"
+
+#include <vdbshade/image.h>
+
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    MAX_ITEMS = 65536,
+    MAX_LIGHTS = VSH_MAX_CHANNELS - 5, /* ao, A and three of irradiance must fit into the image too */
+};
+
+/* What vsh_scene_free() gets is the first member. */
+typedef struct owner {
+    vsh_scene scene;
+    vshi_block *blocks;
+} owner;
+
+static vsh_result read_casters(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_scene *scene = member;
+    void *items = NULL;
+    const vsh_result result = vshi_read_list(reader, value, 1, MAX_ITEMS, sizeof *scene->casters,
+                                             vshi_read_caster, &items, &scene->caster_count);
+    scene->casters = items;
+    return result;
+}
+
+static vsh_result read_lights(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_scene *scene = member;
+    void *items = NULL;
+    const vsh_result result = vshi_read_list(reader, value, 0, MAX_LIGHTS, sizeof *scene->lights,
+                                             vshi_read_light, &items, &scene->light_count);
+    scene->lights = items;
+    for (size_t i = 0; result == VSH_OK && i < scene->light_count; ++i) {
+        for (size_t j = 0; j < i; ++j) {
+            const vshi_value light = vshi_item(value, i);
+            vshi_value name;
+            if (strcmp(scene->lights[i].name, scene->lights[j].name) == 0 &&
+                vshi_member(&light, "name", &name)) {
+                return vshi_reader_fail(reader, &name, "\"%s\" is the name of lights[%zu] too",
+                                        scene->lights[i].name, j);
+            }
+        }
+    }
+    return result;
+}
+
+static int by_output(const void *a, const void *b) {
+    const vsh_receiver *const *x = a, *const *y = b;
+    const int order = strcmp((*x)->output, (*y)->output);
+    return order != 0 ? order : (*x > *y) - (*x < *y);
+}
+
+/* Two receivers with one output would overwrite each other. */
+static vsh_result check_outputs(vshi_reader *reader, const vshi_value *value, const vsh_scene *scene) {
+    void *memory;
+    vsh_result result = vshi_allocate(&memory, scene->receiver_count, sizeof(const vsh_receiver *),
+                                      "receivers", reader->error);
+    if (result != VSH_OK || memory == NULL) {
+        return result;
+    }
+    const vsh_receiver **sorted = memory;
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        sorted[i] = &scene->receivers[i];
+    }
+    qsort(memory, scene->receiver_count, sizeof *sorted, by_output);
+    for (size_t i = 1; i < scene->receiver_count; ++i) {
+        const vshi_value receiver = vshi_item(value, (size_t)(sorted[i] - scene->receivers));
+        vshi_value output;
+        if (strcmp(sorted[i - 1]->output, sorted[i]->output) == 0 &&
+            vshi_member(&receiver, "output", &output)) {
+            result =
+                vshi_reader_fail(reader, &output, "\"%.200s\" is the output of receivers[%zu] too",
+                                 json_string_value(output.json), (size_t)(sorted[i - 1] - scene->receivers));
+            break;
+        }
+    }
+    free(memory);
+    return result;
+}
+
+static vsh_result read_receivers(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_scene *scene = member;
+    void *items = NULL;
+    const vsh_result result = vshi_read_list(reader, value, 0, MAX_ITEMS, sizeof *scene->receivers,
+                                             vshi_read_receiver, &items, &scene->receiver_count);
+    scene->receivers = items;
+    return result == VSH_OK ? check_outputs(reader, value, scene) : result;
+}
+
+static const vshi_key ao_keys[] = {
+    {.name = "distance",
+     .kind = VSHI_NUMBER,
+     .required = VSHI_ALL,
+     .offset = offsetof(vsh_shade_options, ao_distance),
+     .highest = VSHI_LARGEST,
+     .flags = VSHI_ABOVE},
+    {.name = "method",
+     .kind = VSHI_NAME,
+     .offset = offsetof(vsh_shade_options, ao_method),
+     .name_of = vsh_ao_method_name},
+    {.name = "cones",
+     .kind = VSHI_INTEGER,
+     .variants = 1U << VSH_AO_CONES,
+     .offset = offsetof(vsh_shade_options, ao_cones),
+     .lowest = 1.0,
+     .highest = 256.0},
+};
+static const vshi_table ao_table = VSHI_TABLE(ao_keys);
+
+static vsh_result read_ao(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_scene *scene = member;
+    scene->ao = 1;
+    vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
+    if (result == VSH_OK) {
+        result = vshi_read_choice(reader, value, "method", vsh_ao_method_name, &scene->shade.ao_method);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    return vshi_read_object(reader, value, &ao_table, 1U << scene->shade.ao_method,
+                            scene->shade.ao_method == VSH_AO_TAPS ? "ao by taps" : "ao", &scene->shade);
+}
+
+static const vshi_key scene_keys[] = {
+    {.name = "casters", .kind = VSHI_CUSTOM, .required = VSHI_ALL, .read = read_casters},
+    {.name = "voxel_size",
+     .kind = VSHI_NUMBER,
+     .offset = offsetof(vsh_scene, grid.voxel_size),
+     .highest = VSHI_LARGEST,
+     .flags = VSHI_ABOVE},
+    {.name = "resolution",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_scene, grid.resolution),
+     .lowest = 2.0,
+     .highest = 65536.0},
+    {.name = "half_width",
+     .kind = VSHI_NUMBER,
+     .offset = offsetof(vsh_scene, grid.half_width),
+     .lowest = 3.0,
+     .highest = 100.0},
+    {.name = "shell_thickness",
+     .kind = VSHI_NUMBER,
+     .offset = offsetof(vsh_scene, grid.shell_thickness),
+     .lowest = 1.0,
+     .highest = 50.0},
+    {.name = "lights", .kind = VSHI_CUSTOM, .read = read_lights},
+    {.name = "ao", .kind = VSHI_CUSTOM, .read = read_ao},
+    {.name = "irradiance", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, irradiance)},
+    {.name = "method",
+     .kind = VSHI_NAME,
+     .offset = offsetof(vsh_scene, shade.method),
+     .name_of = vsh_shadow_method_name},
+    {.name = "max_steps",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_scene, shade.max_steps),
+     .lowest = 16.0,
+     .highest = 65536.0},
+    {.name = "start_offset",
+     .kind = VSHI_NUMBER,
+     .offset = offsetof(vsh_scene, shade.start_offset),
+     .highest = 16.0},
+    {.name = "receivers", .kind = VSHI_CUSTOM, .read = read_receivers},
+};
+static const vshi_table scene_table = VSHI_TABLE(scene_keys);
+
+/* The text as JSON, or an error with Jansson's line and column. Numbers are all read as doubles, so that one
+ * too large for an integer is out of range like any other. */
+static vsh_result load(const vshi_reader *reader, json_t **json) {
+    json_error_t failure;
+    *json =
+        json_loadb(reader->text, reader->size, JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, &failure);
+    if (*json != NULL) {
+        return VSH_OK;
+    }
+    if (json_error_code(&failure) == json_error_out_of_memory) {
+        return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
+    }
+    return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%d:%d: %s", reader->path,
+                     failure.line > 1 ? failure.line : 1, failure.column > 1 ? failure.column : 1,
+                     failure.text);
+}
+
+vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh_scene **scene,
+                            vsh_error *error) {
+    *scene = NULL;
+    static const char byte_order_mark[] = "\xef\xbb\xbf"; /* editors on Windows put it in front of UTF-8 */
+    if (size >= 3 && memcmp(text, byte_order_mark, 3) == 0) {
+        text += 3;
+        size -= 3;
+    }
+    vshi_reader reader = {path, text, size, NULL, error};
+    json_t *json = NULL;
+    owner *made = NULL;
+    vsh_result result = load(&reader, &json);
+    if (result != VSH_OK) {
+        return result;
+    }
+    made = calloc(1, sizeof *made);
+    if (made == NULL) {
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
+        goto done;
+    }
+    made->scene.grid = vsh_grid_options_default();
+    made->scene.shade = vsh_shade_options_default();
+    const vshi_value root = {NULL, NULL, 0, 0, json};
+    result = vshi_read_object(&reader, &root, &scene_table, 1, "a scene", &made->scene);
+    if (result == VSH_OK) {
+        result = vshi_reject_both(&reader, &root, "voxel_size", "resolution");
+    }
+    made->blocks = reader.blocks;
+done:
+    json_decref(json);
+    if (result != VSH_OK) {
+        vsh_scene_free(made == NULL ? NULL : &made->scene);
+        return result;
+    }
+    *scene = &made->scene;
+    return VSH_OK;
+}
+
+void vsh_scene_free(vsh_scene *scene) {
+    if (scene == NULL) {
+        return;
+    }
+    owner *made = (owner *)scene;
+    vshi_blocks_free(made->blocks);
+    free(made);
+}

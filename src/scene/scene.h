@@ -1,0 +1,11 @@
+/* The scene reader on a text in memory. */
+#ifndef VSHI_SCENE_H
+#define VSHI_SCENE_H
+
+#include <vdbshade/scene.h>
+
+/* As vsh_scene_read(), of a text that was read from `path`. */
+vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh_scene **scene,
+                            vsh_error *error);
+
+#endif

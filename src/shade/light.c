@@ -1,0 +1,107 @@
+#include "shade/light.h"
+
+#include "base/error.h"
+#include "base/vec.h"
+
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+enum {
+    DIRECTIONAL = 1 << VSH_LIGHT_DIRECTIONAL,
+    SPHERE = 1 << VSH_LIGHT_SPHERE,
+    SPOT = 1 << VSH_LIGHT_SPOT,
+    ALL = DIRECTIONAL | SPHERE | SPOT,
+};
+
+/* One number, or three, that a light of some types must have in a range. */
+typedef struct field {
+    const char *name;
+    size_t offset;
+    int count;
+    int types;
+    double lowest, highest;
+    bool above, below; /* ends that are excluded */
+    bool nonzero;      /* not all of the numbers may be 0 */
+} field;
+
+/* Infinity as an excluded end stands for: any finite value. */
+static const field fields[] = {
+    {"direction", offsetof(vsh_light, direction), 3, DIRECTIONAL | SPOT, -INFINITY, INFINITY, true, true,
+     true},
+    {"position", offsetof(vsh_light, position), 3, SPHERE | SPOT, -INFINITY, INFINITY, true, true, false},
+    {"angle", offsetof(vsh_light, angle), 1, DIRECTIONAL, 0.0, PI, false, true, false},
+    {"radius", offsetof(vsh_light, radius), 1, SPHERE | SPOT, 0.0, INFINITY, false, true, false},
+    {"outer_angle", offsetof(vsh_light, outer_angle), 1, SPOT, 0.0, PI, true, false, false},
+    {"color", offsetof(vsh_light, color), 3, ALL, 0.0, INFINITY, false, true, false},
+};
+
+static const field reach_field = {
+    "reach", offsetof(vsh_light, reach), 1, SPHERE | SPOT, 0.0, INFINITY, true, true, false};
+
+bool vshi_light_name_valid(const char *name) {
+    static const char allowed[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-";
+    const size_t length = strnlen(name, sizeof(((vsh_light *)NULL)->name));
+    return length > 0 && length < sizeof(((vsh_light *)NULL)->name) && strspn(name, allowed) == length;
+}
+
+static vsh_result check_field(const vsh_light *light, const field *f, vsh_error *error) {
+    static const char *const items[2][3] = {{""}, {"[0]", "[1]", "[2]"}};
+    double values[3];
+    memcpy(values, (const char *)light + f->offset, (size_t)f->count * sizeof values[0]);
+    bool zero = true;
+    for (int i = 0; i < f->count; ++i) {
+        const bool above = f->above ? values[i] > f->lowest : values[i] >= f->lowest;
+        const bool below = f->below ? values[i] < f->highest : values[i] <= f->highest;
+        if (!above || !below) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                             "light '%s': %s%s %.9g is out of range %.9g%s … %.9g%s", light->name, f->name,
+                             items[f->count == 3][i], values[i], f->lowest, f->above ? " (excluded)" : "",
+                             f->highest, f->below ? " (excluded)" : "");
+        }
+        zero = zero && values[i] == 0.0;
+    }
+    if (zero && f->nonzero) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "light '%s': %s (0, 0, 0): expected a length over 0",
+                         light->name, f->name);
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_light_check(const vsh_light *light, vsh_error *error) {
+    if (light == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "light: is NULL");
+    }
+    /* An empty name is allowed: lights that no channel is named after need none. */
+    if (light->name[0] != '\0' && !vshi_light_name_valid(light->name)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "light: name '%.63s': expected at most 63 letters, digits, '_' and '-'",
+                         light->name);
+    }
+    if (light->type < VSH_LIGHT_DIRECTIONAL || light->type > VSH_LIGHT_SPOT) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "light '%s': type %d is out of range 0 … %d", light->name,
+                         light->type, VSH_LIGHT_SPOT);
+    }
+    if (light->falloff < VSH_FALLOFF_NONE || light->falloff > VSH_FALLOFF_QUADRATIC) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "light '%s': falloff %d is out of range 0 … %d",
+                         light->name, light->falloff, VSH_FALLOFF_QUADRATIC);
+    }
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; ++i) {
+        if ((fields[i].types & (1 << light->type)) != 0) {
+            const vsh_result result = check_field(light, &fields[i], error);
+            if (result != VSH_OK) {
+                return result;
+            }
+        }
+    }
+    if (light->type == VSH_LIGHT_SPOT &&
+        !(light->inner_angle >= 0.0 && light->inner_angle <= light->outer_angle)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "light '%s': inner_angle %.9g is out of range 0 … outer_angle %.9g", light->name,
+                         light->inner_angle, light->outer_angle);
+    }
+    if (light->falloff == VSH_FALLOFF_QUADRATIC && light->type != VSH_LIGHT_DIRECTIONAL) {
+        return check_field(light, &reach_field, error);
+    }
+    return VSH_OK;
+}

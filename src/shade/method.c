@@ -1,0 +1,41 @@
+/* Names of the methods, each in one table that both directions read. */
+#include <vdbshade/shade.h>
+
+#include <string.h>
+
+static const char *const shadow_names[] = {
+    [VSH_SHADOW_HARD] = "hard",     [VSH_SHADOW_CLASSIC] = "classic", [VSH_SHADOW_IMPROVED] = "improved",
+    [VSH_SHADOW_SMOOTH] = "smooth", [VSH_SHADOW_CONE] = "cone",
+};
+
+static const char *const ao_names[] = {[VSH_AO_TAPS] = "taps", [VSH_AO_CONES] = "cones"};
+
+enum {
+    SHADOW_COUNT = sizeof shadow_names / sizeof shadow_names[0],
+    AO_COUNT = sizeof ao_names / sizeof ao_names[0],
+};
+
+static int32_t find(const char *const *names, int32_t count, const char *name) {
+    for (int32_t i = 0; name != NULL && i < count; ++i) {
+        if (strcmp(names[i], name) == 0) {
+            return i;
+        }
+    }
+    return -1;
+}
+
+int32_t vsh_shadow_method(const char *name) {
+    return find(shadow_names, SHADOW_COUNT, name);
+}
+
+const char *vsh_shadow_method_name(int32_t method) {
+    return method >= 0 && method < SHADOW_COUNT ? shadow_names[method] : NULL;
+}
+
+int32_t vsh_ao_method(const char *name) {
+    return find(ao_names, AO_COUNT, name);
+}
+
+const char *vsh_ao_method_name(int32_t method) {
+    return method >= 0 && method < AO_COUNT ? ao_names[method] : NULL;
+}

@@ -1,0 +1,203 @@
+/* vsh_light_check() and the names of the methods. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+#include <string.h>
+
+#include <vdbshade/light.h>
+#include <vdbshade/shade.h>
+
+static vsh_light sun(void) {
+    return vsh_light_default();
+}
+
+static vsh_light lamp(void) {
+    vsh_light light = vsh_light_default();
+    light.type = VSH_LIGHT_SPHERE;
+    light.radius = 0.25;
+    strcpy(light.name, "lamp");
+    return light;
+}
+
+static vsh_light spot(void) {
+    vsh_light light = lamp();
+    light.type = VSH_LIGHT_SPOT;
+    strcpy(light.name, "spot");
+    return light;
+}
+
+static void accepts(const vsh_light *light) {
+    vsh_error error = {VSH_OK, ""};
+    assert_int_equal(vsh_light_check(light, &error), VSH_OK);
+    assert_string_equal(error.message, "");
+}
+
+static void refuses(const vsh_light *light, const char *message) {
+    vsh_error error = {VSH_OK, ""};
+    assert_int_equal(vsh_light_check(light, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(error.code, VSH_ERROR_ARGUMENT);
+    assert_string_equal(error.message, message);
+    assert_int_equal(vsh_light_check(light, NULL), VSH_ERROR_ARGUMENT);
+}
+
+static void every_type_of_light_passes_with_its_defaults(void **state) {
+    (void)state;
+    const vsh_light lights[] = {sun(), lamp(), spot()};
+    for (size_t i = 0; i < 3; ++i) {
+        accepts(&lights[i]);
+    }
+}
+
+static void fields_of_other_types_are_not_looked_at(void **state) {
+    (void)state;
+    vsh_light light = sun();
+    light.radius = -1.0;
+    light.position[0] = NAN;
+    light.outer_angle = 9.0;
+    light.inner_angle = NAN;
+    light.falloff = VSH_FALLOFF_QUADRATIC;
+    light.reach = 0.0;
+    accepts(&light);
+    light = lamp();
+    light.angle = -1.0;
+    memset(light.direction, 0, sizeof light.direction);
+    light.reach = -1.0;
+    accepts(&light);
+}
+
+static void zero_sizes_are_hard_lights(void **state) {
+    (void)state;
+    vsh_light light = sun();
+    light.angle = 0.0;
+    accepts(&light);
+    light = lamp();
+    light.radius = 0.0;
+    accepts(&light);
+}
+
+static void ends_of_ranges_are_in_or_out_as_the_header_says(void **state) {
+    (void)state;
+    const double pi = 3.14159265358979323846;
+    vsh_light light = sun();
+    light.angle = nextafter(pi, 0.0);
+    accepts(&light);
+    light.angle = pi;
+    refuses(&light, "light 'sun': angle 3.14159265 is out of range 0 … 3.14159265 (excluded)");
+    light = spot();
+    light.outer_angle = pi;
+    light.inner_angle = pi;
+    accepts(&light);
+    light.outer_angle = light.inner_angle = 0.0;
+    refuses(&light, "light 'spot': outer_angle 0 is out of range 0 (excluded) … 3.14159265");
+}
+
+static void bad_values_are_named_with_field_and_limit(void **state) {
+    (void)state;
+    vsh_light light = sun();
+    light.angle = -0.5;
+    refuses(&light, "light 'sun': angle -0.5 is out of range 0 … 3.14159265 (excluded)");
+    light = sun();
+    light.direction[1] = 0.0;
+    refuses(&light, "light 'sun': direction (0, 0, 0): expected a length over 0");
+    light = sun();
+    light.direction[2] = INFINITY;
+    refuses(&light, "light 'sun': direction[2] inf is out of range -inf (excluded) … inf (excluded)");
+    light = sun();
+    light.color[1] = -1.0;
+    refuses(&light, "light 'sun': color[1] -1 is out of range 0 … inf (excluded)");
+    light = lamp();
+    light.radius = -2.0;
+    refuses(&light, "light 'lamp': radius -2 is out of range 0 … inf (excluded)");
+    light = lamp();
+    light.falloff = VSH_FALLOFF_QUADRATIC;
+    light.reach = 0.0;
+    refuses(&light, "light 'lamp': reach 0 is out of range 0 (excluded) … inf (excluded)");
+    light = spot();
+    light.inner_angle = 0.75;
+    refuses(&light, "light 'spot': inner_angle 0.75 is out of range 0 … outer_angle 0.5");
+    light = sun();
+    light.type = 3;
+    refuses(&light, "light 'sun': type 3 is out of range 0 … 2");
+    light = sun();
+    light.falloff = -1;
+    refuses(&light, "light 'sun': falloff -1 is out of range 0 … 2");
+    refuses(NULL, "light: is NULL");
+}
+
+static void no_value_that_is_not_a_number_passes(void **state) {
+    (void)state;
+    vsh_light lights[] = {sun(), lamp(), lamp(), spot(), spot(), sun(), spot()};
+    lights[0].angle = NAN;
+    lights[1].radius = NAN;
+    lights[2].position[2] = NAN;
+    lights[3].inner_angle = NAN;
+    lights[4].outer_angle = NAN;
+    lights[5].color[0] = NAN;
+    lights[6].direction[0] = NAN;
+    for (size_t i = 0; i < sizeof lights / sizeof lights[0]; ++i) {
+        assert_int_equal(vsh_light_check(&lights[i], NULL), VSH_ERROR_ARGUMENT);
+    }
+}
+
+static void names_are_what_a_channel_can_hold(void **state) {
+    (void)state;
+    vsh_light light = sun();
+    strcpy(light.name, "key-Light_2");
+    accepts(&light);
+    light.name[0] = '\0';
+    accepts(&light);
+    strcpy(light.name, "a.b");
+    refuses(&light, "light: name 'a.b': expected at most 63 letters, digits, '_' and '-'");
+    memset(light.name, 'x', sizeof light.name - 1);
+    light.name[63] = '\0';
+    accepts(&light);
+    light.name[63] = 'x'; /* without an end */
+    assert_int_equal(vsh_light_check(&light, NULL), VSH_ERROR_ARGUMENT);
+}
+
+static void every_method_has_a_name_that_leads_back_to_it(void **state) {
+    (void)state;
+    int32_t count = 0;
+    for (; vsh_shadow_method_name(count) != NULL; ++count) {
+        assert_int_equal(vsh_shadow_method(vsh_shadow_method_name(count)), count);
+    }
+    assert_int_equal(count, VSH_SHADOW_CONE + 1);
+    for (count = 0; vsh_ao_method_name(count) != NULL; ++count) {
+        assert_int_equal(vsh_ao_method(vsh_ao_method_name(count)), count);
+    }
+    assert_int_equal(count, VSH_AO_CONES + 1);
+    assert_int_equal(vsh_shadow_method("improved"), VSH_SHADOW_IMPROVED);
+    assert_int_equal(vsh_ao_method("taps"), VSH_AO_TAPS);
+}
+
+static void what_is_no_method_is_minus_one_and_null(void **state) {
+    (void)state;
+    assert_int_equal(vsh_shadow_method("Cone"), -1);
+    assert_int_equal(vsh_shadow_method(""), -1);
+    assert_int_equal(vsh_shadow_method(NULL), -1);
+    assert_int_equal(vsh_ao_method("cone"), -1);
+    assert_int_equal(vsh_ao_method(NULL), -1);
+    assert_null(vsh_shadow_method_name(-1));
+    assert_null(vsh_ao_method_name(-1));
+    assert_null(vsh_ao_method_name(INT32_MAX));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_type_of_light_passes_with_its_defaults),
+        cmocka_unit_test(fields_of_other_types_are_not_looked_at),
+        cmocka_unit_test(zero_sizes_are_hard_lights),
+        cmocka_unit_test(ends_of_ranges_are_in_or_out_as_the_header_says),
+        cmocka_unit_test(bad_values_are_named_with_field_and_limit),
+        cmocka_unit_test(no_value_that_is_not_a_number_passes),
+        cmocka_unit_test(names_are_what_a_channel_can_hold),
+        cmocka_unit_test(every_method_has_a_name_that_leads_back_to_it),
+        cmocka_unit_test(what_is_no_method_is_minus_one_and_null),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
