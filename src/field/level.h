@@ -9,9 +9,7 @@
 /* Half width of the bands of the coarser levels, in their own voxels. The finest level has the grid's own.
  * Six keeps a cone's radius above 2.5 voxels of the level it is sampled from; three lets it fall to one,
  * where the trilinear error of edges shows (docs/numerics.md). */
-#ifndef VSHI_COARSE_BAND
 #define VSHI_COARSE_BAND 6.0f
-#endif
 
 /* A level under construction: 8³ values a block, before they become bricks. */
 typedef struct vshi_blocks {
