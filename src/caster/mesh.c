@@ -27,7 +27,7 @@ vshi_mesh_name vshi_mesh_label(const vsh_mesh *mesh, size_t index) {
     return name;
 }
 
-static vsh_result check_transform(const vsh_mesh *mesh, size_t index, vsh_error *error) {
+vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_error *error) {
     const double *m = mesh->transform;
     if (m == NULL) {
         return VSH_OK;
@@ -64,7 +64,7 @@ vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *e
                          vshi_mesh_label(mesh, index).text, mesh->vertex_count, mesh->triangle_count,
                          UINT32_MAX, SIZE_MAX / 64);
     }
-    const vsh_result result = check_transform(mesh, index, error);
+    const vsh_result result = vshi_mesh_check_transform(mesh, index, error);
     if (result != VSH_OK) {
         return result;
     }

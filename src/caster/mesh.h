@@ -26,6 +26,9 @@ vshi_mesh_name vshi_mesh_label(const vsh_mesh *mesh, size_t index);
  */
 vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *error);
 
+/* The transform's part of it: finite, and no flattening. */
+vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_error *error);
+
 /* World corners of triangle i, anticlockwise from outside also where the transform mirrors. The mesh has
  * passed vshi_mesh_check_data(). Returns the vertices behind them in `vertex` (may be NULL), in the same
  * order. */
