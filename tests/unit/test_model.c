@@ -13,8 +13,8 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Assimp 5.2 loses what its FBX and glTF readers had taken when a file is cut: theirs, by name. */
-* / const char *__lsan_default_suppressions(void);
+/* Assimp 5.2 loses what its FBX and glTF readers had taken when a file is cut: its leaks, by name. */
+const char *__lsan_default_suppressions(void);
 const char *__lsan_default_suppressions(void) {
     return "leak:libassimp.so\n";
 }
