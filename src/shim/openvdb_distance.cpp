@@ -182,7 +182,11 @@ bool Voxelizer::sample_block(Leaf &leaf, const Coord &corner, float &witness, si
                 const float value = float(d);
                 const bool near = !far && std::fabs(value) < background;
                 witness = near ? value : std::copysign(background, value);
-                leaf.setValueOnly(voxel, witness);
+                if (near) {
+                    leaf.setValueOn(voxel, witness); // meshing looks at active voxels only
+                } else {
+                    leaf.setValueOff(voxel, witness);
+                }
                 in_band |= near;
             }
         }

@@ -15,6 +15,11 @@ namespace {
 // overflow.
 constexpr double LARGEST_INDEX = 268435456.0;
 
+// OpenVDB takes a voxel whose volume is below 3e-15 for none; above, distances must stay 32-bit floats whose
+// squares do too.
+constexpr double SMALLEST_VOXEL = 1.5e-5;
+constexpr double LARGEST_VOXEL = 1e12;
+
 void fail_option(vsh_error *error, const char *name, double value, const char *expected) {
     throw Failure{
         vshi_fail(error, VSH_ERROR_ARGUMENT, "grid options: %s %g: expected %s", name, value, expected)};
@@ -68,11 +73,10 @@ Lattice make_lattice(const vsh_grid_options *given, const Vec3d &low, const Vec3
                                 "voxel size %g: %g voxels along the longest side, %g at most", lattice.voxel,
                                 longest / lattice.voxel, 2.0 * LARGEST_INDEX)};
     }
-    const float background = lattice.background();
-    if (!std::isnormal(background) || !std::isnormal(float(lattice.voxel))) {
-        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT,
-                                "voxel size %g: distances of %g voxels are no 32-bit floats", lattice.voxel,
-                                lattice.half_width)};
+    if (!(lattice.voxel >= SMALLEST_VOXEL && lattice.voxel <= LARGEST_VOXEL)) {
+        throw Failure{vshi_fail(error, VSH_ERROR_LIMIT,
+                                "voxel size %g: OpenVDB's transforms hold %g … %g; scale the scene",
+                                lattice.voxel, SMALLEST_VOXEL, LARGEST_VOXEL)};
     }
     for (int i = 0; i < 3; ++i) {
         const double centre = low[i] + 0.5 * size[i];

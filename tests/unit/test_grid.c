@@ -350,7 +350,10 @@ static void too_small_a_voxel_is_refused_before_memory_is_taken(void **state) {
     vsh_grid_options options = with_voxel(1e-9);
     assert_fails(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT,
                  "voxel size 1e-09");
-    options = with_voxel(1e-7);
+    options = with_voxel(1e-6);
+    assert_fails(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT,
+                 "voxel size 1e-06");
+    options = with_voxel(1.6e-5);
     assert_fails(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT,
                  "this machine's memory");
     assert_true(s.calls < 100000);
