@@ -1,0 +1,24 @@
+// Distances to surfaces of triangles and quads.
+#pragma once
+
+#include "shim/openvdb_grid.h"
+
+#include <vector>
+
+namespace vshi {
+
+// Polygons in index space; a triangle's fourth corner is openvdb::util::INVALID_IDX.
+struct Surface {
+    std::vector<openvdb::Vec3s> points;
+    std::vector<openvdb::Vec4I> polygons;
+};
+
+// Unsigned distances on the lattice, active within half_width of the surface.
+FloatGrid::Ptr measure_surface(const Surface &surface, const Lattice &lattice, double half_width,
+                               double begin, double end, Stage &stage);
+
+// Gives every voxel of `distances` (unsigned, background where nothing is near) the sign that `source`, on
+// the same lattice, has there.
+void take_signs(FloatGrid &distances, const FloatGrid &source, Stage &stage);
+
+} // namespace vshi

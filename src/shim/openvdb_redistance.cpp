@@ -1,0 +1,34 @@
+// True distances for a grid that has none: its zero surface is meshed, and the mesh's distances take the
+// grid's own signs, so that cavities stay as they are (a converter that looks for the inside would fill
+// them).
+#include "shim/openvdb_redistance.h"
+
+#include "shim/openvdb_mesh.h"
+
+#include <cmath>
+#include <openvdb/tools/VolumeToMesh.h>
+
+namespace vshi {
+
+FloatGrid::Ptr redistance(const FloatGrid &source, const Lattice &lattice, double begin, double end,
+                          Stage &stage, vsh_error *error) {
+    Surface surface;
+    stage.run([&] {
+        // In index space: world positions would lose a float's digits far from the origin.
+        const FloatGrid::ConstPtr unit =
+            source.copyReplacingTransform(openvdb::math::Transform::createLinearTransform());
+        openvdb::tools::volumeToMesh(*unit, surface.points, surface.polygons, 0.0);
+    });
+    stage.reach(begin + 0.2 * (end - begin));
+    stage.check();
+    if (surface.polygons.empty()) {
+        throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
+                                "no surface: the values do not change sign at voxel size %g", lattice.voxel)};
+    }
+    FloatGrid::Ptr measured =
+        measure_surface(surface, lattice, lattice.half_width, begin + 0.2 * (end - begin), end, stage);
+    take_signs(*measured, source, stage);
+    return measured;
+}
+
+} // namespace vshi

@@ -1,0 +1,426 @@
+/* Level sets: their values against closed forms, and what is refused. */
+#include <float.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <vdbshade/grid.h>
+
+#include "shim/openvdb.h"
+
+/* ---- Helpers: the leaves of a grid with what goes with them ---- */
+
+typedef struct leaves {
+    vshi_leaf *leaf;
+    size_t count;
+    const double *transform;
+    vsh_grid_info info;
+} leaves;
+
+static leaves leaves_of(const vsh_grid *grid) {
+    leaves all;
+    all.count = vshi_grid_leaves(grid, NULL, 0);
+    all.leaf = malloc((all.count + 1) * sizeof *all.leaf);
+    assert_non_null(all.leaf);
+    assert_int_equal(vshi_grid_leaves(grid, all.leaf, all.count), all.count);
+    all.transform = vshi_grid_transform(grid);
+    vsh_grid_get_info(grid, &all.info);
+    return all;
+}
+
+static void voxel_position(const leaves *all, size_t leaf, int voxel, double position[3]) {
+    const int32_t *origin = all->leaf[leaf].origin;
+    const double index[3] = {origin[0] + (voxel >> 6), origin[1] + ((voxel >> 3) & 7),
+                             origin[2] + (voxel & 7)};
+    for (int row = 0; row < 3; ++row) {
+        const double *m = all->transform + 4 * row;
+        position[row] = m[0] * index[0] + m[1] * index[1] + m[2] * index[2] + m[3];
+    }
+}
+
+typedef double truth_fn(const double position[3]);
+
+/* Largest error, in voxels, over voxels whose true distance lies in -inside … outside voxels; and the signs
+ * of all others that leaves hold. */
+static double worst_error(const vsh_grid *grid, truth_fn *truth, double inside, double outside) {
+    leaves all = leaves_of(grid);
+    const double background = all.info.half_width * all.info.voxel_size;
+    double worst = 0.0;
+    size_t compared = 0;
+    for (size_t i = 0; i < all.count; ++i) {
+        for (int v = 0; v < 512; ++v) {
+            double p[3];
+            voxel_position(&all, i, v, p);
+            const double expected = truth(p);
+            const double value = (double)all.leaf[i].values[v];
+            assert_true(fabs(value) <= background * (1.0 + 1e-6));
+            if (expected > -inside * all.info.voxel_size && expected < outside * all.info.voxel_size) {
+                worst = fmax(worst, fabs(value - expected) / all.info.voxel_size);
+                ++compared;
+            } else {
+                assert_int_equal(value < 0.0, expected < 0.0);
+            }
+        }
+    }
+    free(all.leaf);
+    assert_true(compared > 1000);
+    return worst;
+}
+
+/* Share of blocks over the whole box whose sign is not the truth's, away from the surface. */
+static size_t wrong_blocks(const vsh_grid *grid, truth_fn *truth, int32_t reach) {
+    leaves all = leaves_of(grid);
+    const int32_t origin[3] = {-8 * reach, -8 * reach, -8 * reach};
+    const int32_t size[3] = {2 * reach, 2 * reach, 2 * reach};
+    const size_t count = (size_t)8 * (size_t)(reach * reach) * (size_t)reach;
+    int8_t *signs = malloc(count);
+    assert_non_null(signs);
+    vshi_grid_block_signs(grid, origin, size, signs);
+    size_t wrong = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const int32_t side = 2 * reach, n = (int32_t)i;
+        vshi_leaf block = {{origin[0] + 8 * (n / (side * side)), origin[1] + 8 * (n / side % side),
+                            origin[2] + 8 * (n % side)},
+                           NULL};
+        leaves one = all;
+        one.leaf = &block;
+        double p[3];
+        voxel_position(&one, 0, 0, p);
+        const double expected = truth(p);
+        wrong += fabs(expected) > 0.5 * all.info.voxel_size && (expected < 0.0) != (signs[i] < 0);
+    }
+    free(signs);
+    free(all.leaf);
+    return wrong;
+}
+
+static void assert_same_leaves(const vsh_grid *a, const vsh_grid *b, float tolerance) {
+    leaves left = leaves_of(a), right = leaves_of(b);
+    assert_int_equal(left.count, right.count);
+    for (size_t i = 0; i < left.count; ++i) {
+        assert_memory_equal(left.leaf[i].origin, right.leaf[i].origin, sizeof left.leaf[i].origin);
+        if (tolerance == 0.0f) {
+            assert_memory_equal(left.leaf[i].values, right.leaf[i].values, 512 * sizeof(float));
+        }
+        for (int v = 0; v < 512; ++v) {
+            assert_true(fabsf(left.leaf[i].values[v] - right.leaf[i].values[v]) <= tolerance);
+        }
+    }
+    free(left.leaf);
+    free(right.leaf);
+}
+
+static vsh_error failure;
+
+static void assert_fails(vsh_result result, vsh_result expected, const char *part) {
+    if (result != expected || strstr(failure.message, part) == NULL) {
+        fail_msg("%s '%s': expected %s '%s'", vsh_result_name(result), failure.message,
+                 vsh_result_name(expected), part);
+    }
+}
+
+static vsh_grid_options with_voxel(double size) {
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = size;
+    return options;
+}
+
+/* ---- Distance callbacks and trees ---- */
+
+typedef struct sphere {
+    double centre[3];
+    double radius;
+    atomic_size_t calls;
+} sphere;
+
+static double sphere_distance(void *user, const double p[3]) {
+    sphere *s = user;
+    atomic_fetch_add(&s->calls, 1);
+    const double x = p[0] - s->centre[0], y = p[1] - s->centre[1], z = p[2] - s->centre[2];
+    return sqrt(x * x + y * y + z * z) - s->radius;
+}
+
+static vsh_distance sphere_field(sphere *s) {
+    vsh_distance field = {sphere_distance, s, 1.0, 1, {0, 0, 0}, {0, 0, 0}};
+    for (int i = 0; i < 3; ++i) {
+        field.bounds_min[i] = s->centre[i] - s->radius;
+        field.bounds_max[i] = s->centre[i] + s->radius;
+    }
+    return field;
+}
+
+static double unit_sphere(const double p[3]) {
+    return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - 1.0;
+}
+
+static void a_sphere_is_exact_in_its_band(void **state) {
+    (void)state;
+    sphere s = {{0, 0, 0}, 1.0, 0};
+    const vsh_distance field = sphere_field(&s);
+    const vsh_grid_options options = with_voxel(0.02);
+    vsh_grid *grid = NULL;
+    assert_int_equal(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_OK);
+    assert_true(worst_error(grid, unit_sphere, 2.999, 2.999) < 1e-5);
+    assert_int_equal(wrong_blocks(grid, unit_sphere, 10), 0);
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    assert_float_equal(info.voxel_size, 0.02, 1e-12);
+    assert_float_equal(info.half_width, 3.0, 1e-6);
+    for (int i = 0; i < 3; ++i) {
+        assert_true(info.bounds_min[i] > -1.05 && info.bounds_min[i] < -1.0 + 1e-9);
+        assert_true(info.bounds_max[i] < 1.05 && info.bounds_max[i] > 1.0 - 1e-9);
+    }
+    vsh_grid_free(grid);
+}
+
+static void the_work_follows_the_area(void **state) {
+    (void)state;
+    size_t calls[2];
+    for (int i = 0; i < 2; ++i) {
+        sphere s = {{0, 0, 0}, 1.0, 0};
+        const vsh_distance field = sphere_field(&s);
+        const vsh_grid_options options = with_voxel(i == 0 ? 0.02 : 0.01);
+        vsh_grid *grid = NULL;
+        assert_int_equal(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_OK);
+        vsh_grid_free(grid);
+        calls[i] = s.calls;
+    }
+    const double voxels = 4.0 * 3.14159265 / (0.01 * 0.01);
+    assert_true((double)calls[1] < 20.0 * voxels);          /* layers of voxels, of which the band has 6 */
+    assert_true((double)calls[1] < 4.4 * (double)calls[0]); /* 4: area, 8: volume */
+}
+
+static void far_from_the_origin_nothing_changes(void **state) {
+    (void)state;
+    const vsh_grid_options options = with_voxel(0.03125);
+    vsh_grid *grids[2];
+    for (int i = 0; i < 2; ++i) {
+        sphere s = {{0, 0, 0}, 1.0, 0};
+        s.centre[0] = i * 1e7;
+        s.centre[2] = i * -3e6;
+        const vsh_distance field = sphere_field(&s);
+        assert_int_equal(vsh_grid_from_distance(&field, &options, NULL, &grids[i], &failure), VSH_OK);
+    }
+    assert_same_leaves(grids[0], grids[1], 1e-7f);
+    assert_float_equal(vshi_grid_transform(grids[1])[3] - vshi_grid_transform(grids[0])[3], 1e7, 0.0);
+    vsh_grid_free(grids[0]);
+    vsh_grid_free(grids[1]);
+}
+
+static vsh_sdf_node hole_nodes[3];
+
+static vsh_sdf hollow_sphere(void) {
+    hole_nodes[0] = vsh_sdf_node_default();
+    hole_nodes[1] = vsh_sdf_node_default();
+    hole_nodes[1].radius = 0.6;
+    hole_nodes[2] = vsh_sdf_node_default();
+    hole_nodes[2].shape = VSH_SDF_SUBTRACTION;
+    hole_nodes[2].left = 0;
+    hole_nodes[2].right = 1;
+    return (vsh_sdf){hole_nodes, 3};
+}
+
+static double hollow_truth(const double p[3]) {
+    const double d = unit_sphere(p);
+    return fmax(d, -(d + 0.4));
+}
+
+static void a_room_inside_a_solid_stays_a_room(void **state) {
+    (void)state;
+    const vsh_sdf sdf = hollow_sphere();
+    const vsh_grid_options options = with_voxel(0.02);
+    vsh_grid *grid = NULL;
+    assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure), VSH_OK);
+    const double worst = worst_error(grid, hollow_truth, 2.9, 2.9);
+    print_message("re-distanced hollow sphere: worst error %.3f voxels\n", worst);
+    assert_true(worst < 0.15);
+    assert_int_equal(wrong_blocks(grid, hollow_truth, 10), 0);
+    vsh_grid_free(grid);
+}
+
+/* A bound that is too small by a third, and a cube root's worth of bend: only its zero can be trusted. */
+static double squashed(void *user, const double p[3]) {
+    (void)user;
+    const double d = unit_sphere(p);
+    return 0.6 * d / (1.0 + fabs(d));
+}
+
+static void a_bound_becomes_a_distance(void **state) {
+    (void)state;
+    const vsh_distance field = {squashed, NULL, 0.6, 0, {-1, -1, -1}, {1, 1, 1}};
+    vsh_grid_options options = with_voxel(0.02);
+    options.half_width = 5.0;
+    vsh_grid *grid = NULL;
+    assert_int_equal(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_OK);
+    const double worst = worst_error(grid, unit_sphere, 4.9, 4.9);
+    print_message("re-distanced sphere: worst error %.3f voxels\n", worst);
+    assert_true(worst < 0.15);
+    assert_int_equal(wrong_blocks(grid, unit_sphere, 10), 0);
+    vsh_grid_free(grid);
+}
+
+static void threads_do_not_show(void **state) {
+    (void)state;
+    const vsh_sdf sdf = hollow_sphere();
+    const int32_t threads[3] = {1, 2, 5};
+    vsh_grid *grids[3];
+    const vsh_grid_options options = with_voxel(0.03);
+    for (int i = 0; i < 3; ++i) {
+        vsh_run run = vsh_run_default();
+        run.threads = threads[i];
+        assert_int_equal(vsh_grid_from_sdf(&sdf, &options, &run, &grids[i], &failure), VSH_OK);
+    }
+    assert_same_leaves(grids[0], grids[1], 0.0f);
+    assert_same_leaves(grids[0], grids[2], 0.0f);
+    for (int i = 0; i < 3; ++i) {
+        vsh_grid_free(grids[i]);
+    }
+}
+
+static double hole_in_the_middle(void *user, const double p[3]) {
+    (void)user;
+    const double d = unit_sphere(p);
+    return d < -0.02 && d > -0.03 ? NAN : d;
+}
+
+static double nowhere_near(void *user, const double p[3]) {
+    (void)user;
+    return 5.0 + 0.1 * p[0];
+}
+
+static void bad_fields_and_options_are_refused_with_the_reason(void **state) {
+    (void)state;
+    sphere s = {{0, 0, 0}, 1.0, 0};
+    const vsh_distance good = sphere_field(&s);
+    vsh_distance field = good;
+    vsh_grid_options options = vsh_grid_options_default();
+    vsh_grid *grid = NULL;
+    field.lipschitz = 0.0;
+    assert_fails(vsh_grid_from_distance(&field, NULL, NULL, &grid, &failure), VSH_ERROR_ARGUMENT,
+                 "lipschitz 0");
+    field = good;
+    field.bounds_max[1] = NAN;
+    assert_fails(vsh_grid_from_distance(&field, NULL, NULL, &grid, &failure), VSH_ERROR_ARGUMENT,
+                 "bounds[1]");
+    field = good;
+    field.distance = hole_in_the_middle;
+    options.resolution = 100;
+    assert_fails(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_ERROR_INPUT,
+                 "nan at (");
+    field.distance = nowhere_near;
+    assert_fails(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_ERROR_INPUT,
+                 "no surface");
+    const struct {
+        double voxel, half_width, shell;
+        int32_t resolution;
+        const char *part;
+    } cases[] = {
+        {-1.0, 3.0, 2.0, 256, "voxel_size -1"},    {NAN, 3.0, 2.0, 256, "voxel_size nan"},
+        {INFINITY, 3.0, 2.0, 256, "voxel_size"},   {0.0, 3.0, 2.0, 1, "resolution 1"},
+        {0.0, 2.5, 2.0, 256, "half_width 2.5"},    {0.0, NAN, 2.0, 256, "half_width"},
+        {0.0, 3.0, 0.5, 256, "shell_thickness 0"}, {0.0, 101.0, 2.0, 256, "half_width 101"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        options.voxel_size = cases[i].voxel;
+        options.half_width = cases[i].half_width;
+        options.shell_thickness = cases[i].shell;
+        options.resolution = cases[i].resolution;
+        assert_fails(vsh_grid_from_distance(&good, &options, NULL, &grid, &failure), VSH_ERROR_ARGUMENT,
+                     cases[i].part);
+    }
+    options = vsh_grid_options_default();
+    options.struct_size = 4000;
+    assert_fails(vsh_grid_from_distance(&good, &options, NULL, &grid, &failure), VSH_ERROR_ARGUMENT,
+                 "struct_size");
+    assert_null(grid);
+}
+
+static void too_small_a_voxel_is_refused_before_memory_is_taken(void **state) {
+    (void)state;
+    sphere s = {{0, 0, 0}, 1.0, 0};
+    const vsh_distance field = sphere_field(&s);
+    vsh_grid *grid = NULL;
+    vsh_grid_options options = with_voxel(1e-9);
+    assert_fails(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT,
+                 "voxel size 1e-09");
+    options = with_voxel(1e-6);
+    assert_fails(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT,
+                 "voxel size 1e-06");
+    options = with_voxel(1.6e-5);
+    assert_fails(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT,
+                 "this machine's memory");
+    assert_true(s.calls < 100000);
+    options = with_voxel(0.005);
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 10000000;
+    assert_fails(vsh_grid_from_distance(&field, &options, &run, &grid, &failure), VSH_ERROR_LIMIT,
+                 "over the memory limit of 10 MB");
+    run.memory_limit = 500000000;
+    assert_int_equal(vsh_grid_from_distance(&field, &options, &run, &grid, &failure), VSH_OK);
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    assert_true(info.bytes < run.memory_limit);
+    vsh_grid_free(grid);
+}
+
+typedef struct watch {
+    double last;
+    double stop; /* fraction at which to cancel */
+    int calls;
+} watch;
+
+static int32_t watch_progress(void *user, const char *stage, double fraction) {
+    watch *w = user;
+    assert_string_equal(stage, "voxelize");
+    assert_true(fraction >= w->last && fraction <= 1.0);
+    w->last = fraction;
+    ++w->calls;
+    return fraction >= w->stop;
+}
+
+static void progress_rises_to_one_and_can_cancel(void **state) {
+    (void)state;
+    const vsh_sdf sdf = hollow_sphere();
+    const double stops[] = {2.0, 0.0, 0.1, 0.5, 0.9};
+    for (size_t i = 0; i < sizeof stops / sizeof stops[0]; ++i) {
+        watch w = {0.0, stops[i], 0};
+        vsh_run run = vsh_run_default();
+        run.threads = 2;
+        run.progress = watch_progress;
+        run.user = &w;
+        vsh_grid *grid = NULL;
+        const vsh_grid_options options = with_voxel(0.03);
+        const vsh_result result = vsh_grid_from_sdf(&sdf, &options, &run, &grid, &failure);
+        if (i == 0) {
+            assert_int_equal(result, VSH_OK);
+            assert_float_equal(w.last, 1.0, 0.0);
+            assert_true(w.calls > 10);
+            vsh_grid_free(grid);
+        } else {
+            assert_fails(result, VSH_ERROR_CANCELLED, "cancelled");
+            assert_null(grid);
+        }
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_sphere_is_exact_in_its_band),
+        cmocka_unit_test(the_work_follows_the_area),
+        cmocka_unit_test(far_from_the_origin_nothing_changes),
+        cmocka_unit_test(a_room_inside_a_solid_stays_a_room),
+        cmocka_unit_test(a_bound_becomes_a_distance),
+        cmocka_unit_test(threads_do_not_show),
+        cmocka_unit_test(bad_fields_and_options_are_refused_with_the_reason),
+        cmocka_unit_test(too_small_a_voxel_is_refused_before_memory_is_taken),
+        cmocka_unit_test(progress_rises_to_one_and_can_cancel),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

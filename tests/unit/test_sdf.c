@@ -1,0 +1,331 @@
+/* Procedural shapes: their distances against surfaces found by brute force, and the promises of the tree. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <vdbshade/sdf.h>
+
+static uint64_t random_state = 1;
+
+/* Uniform in low … high, from a counted generator (Steele and others, "SplitMix", 2014). */
+static double uniform(double low, double high) {
+    uint64_t z = (random_state += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return low + (high - low) * (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+static double norm(double x, double y, double z) {
+    return sqrt(x * x + y * y + z * z);
+}
+
+static vsh_sdf_node shape_of(int32_t shape) {
+    vsh_sdf_node node = vsh_sdf_node_default();
+    node.shape = shape;
+    node.size[0] = 0.7;
+    node.size[1] = 0.4;
+    node.size[2] = 0.9;
+    node.radius = shape == VSH_SDF_TORUS || shape == VSH_SDF_CONE ? 0.8 : 0.5;
+    node.minor_radius = 0.2;
+    return node;
+}
+
+/* Membership by the shapes' definitions, with nothing in common with their distances. */
+static int holds(const vsh_sdf_node *n, double x, double y, double z) {
+    const double r = sqrt(x * x + z * z);
+    switch (n->shape) {
+    case VSH_SDF_SPHERE:
+        return norm(x, y, z) < n->radius;
+    case VSH_SDF_BOX:
+        return fabs(x) < n->size[0] && fabs(y) < n->size[1] && fabs(z) < n->size[2];
+    case VSH_SDF_TORUS:
+        return (r - n->radius) * (r - n->radius) + y * y < n->minor_radius * n->minor_radius;
+    case VSH_SDF_PLANE:
+        return fabs(x) < n->size[0] && y < 0.0 && y > -n->size[1] && fabs(z) < n->size[2];
+    case VSH_SDF_CAPSULE:
+        return (fabs(y) < n->size[1] && r < n->radius) || norm(x, y - n->size[1], z) < n->radius ||
+               norm(x, y + n->size[1], z) < n->radius;
+    case VSH_SDF_CYLINDER:
+        return fabs(y) < n->size[1] && r < n->radius;
+    default: {
+        const double up = (y + n->size[1]) / (2.0 * n->size[1]);
+        return up > 0.0 && up < 1.0 && r < n->radius + (n->minor_radius - n->radius) * up;
+    }
+    }
+}
+
+/* Distance to the nearest point of a fine lattice on the other side: an upper bound of the distance, and one
+ * that is high by at most the lattice's diagonal. */
+static double brute_force(const vsh_sdf_node *n, const double p[3], double pitch) {
+    const int inside = holds(n, p[0], p[1], p[2]);
+    double nearest = INFINITY;
+    for (double x = -1.5; x <= 1.5; x += pitch) {
+        for (double y = -1.5; y <= 1.5; y += pitch) {
+            for (double z = -1.5; z <= 1.5; z += pitch) {
+                const double d = norm(x - p[0], y - p[1], z - p[2]);
+                if (d < nearest && holds(n, x, y, z) != inside) {
+                    nearest = d;
+                }
+            }
+        }
+    }
+    return inside ? -nearest : nearest;
+}
+
+static void every_shape_gives_the_distance_to_its_surface(void **state) {
+    (void)state;
+    const double pitch = 0.03;
+    for (int32_t shape = VSH_SDF_SPHERE; shape <= VSH_SDF_CONE; ++shape) {
+        const vsh_sdf_node node = shape_of(shape);
+        const vsh_sdf sdf = {&node, 1};
+        for (int i = 0; i < 30; ++i) {
+            const double p[3] = {uniform(-1.2, 1.2), uniform(-1.2, 1.2), uniform(-1.2, 1.2)};
+            const double d = vsh_sdf_distance(&sdf, p);
+            const double truth = brute_force(&node, p, pitch);
+            if (fabs(d) > fabs(truth) + 1e-9 || fabs(d) < fabs(truth) - 1.8 * pitch ||
+                (d < 0.0) != (truth < 0.0)) {
+                fail_msg("shape %d at %g, %g, %g: %g, brute force %g", shape, p[0], p[1], p[2], d, truth);
+            }
+        }
+    }
+}
+
+static void closed_forms_hold(void **state) {
+    (void)state;
+    vsh_sdf_node node = shape_of(VSH_SDF_BOX);
+    const vsh_sdf sdf = {&node, 1};
+    const double corner[3] = {1.0, 0.8, 1.3};
+    assert_float_equal(vsh_sdf_distance(&sdf, corner), norm(0.3, 0.4, 0.4), 1e-12);
+    node.rounding = 0.1;
+    assert_float_equal(vsh_sdf_distance(&sdf, corner), norm(0.3, 0.4, 0.4) - 0.1, 1e-12);
+    node = shape_of(VSH_SDF_CONE);
+    node.minor_radius = 0.0;
+    const double above[3] = {0.0, 1.0, 0.0};
+    assert_float_equal(vsh_sdf_distance(&sdf, above), 0.6, 1e-12);
+    node = shape_of(VSH_SDF_TORUS);
+    const double middle[3] = {0.0, 0.0, 0.0};
+    assert_float_equal(vsh_sdf_distance(&sdf, middle), 0.6, 1e-12);
+    node = shape_of(VSH_SDF_PLANE);
+    const double over[3] = {0.1, 2.0, 0.1};
+    assert_float_equal(vsh_sdf_distance(&sdf, over), 2.0, 1e-12);
+    const double nowhere[3] = {NAN, 0.0, 0.0};
+    assert_true(isnan(vsh_sdf_distance(&sdf, nowhere)));
+}
+
+static void turn_somehow(vsh_sdf_node *node) {
+    for (int i = 0; i < 4; ++i) {
+        node->rotation[i] = uniform(-1.0, 1.0);
+    }
+    for (int i = 0; i < 3; ++i) {
+        node->translation[i] = uniform(-0.5, 0.5);
+    }
+    node->scale = uniform(0.5, 2.0);
+}
+
+/* An operation over two shapes, all turned. */
+static void make_tree(vsh_sdf_node nodes[3], int32_t a, int32_t b, int32_t operation) {
+    nodes[0] = shape_of(a);
+    nodes[1] = shape_of(b);
+    nodes[2] = vsh_sdf_node_default();
+    nodes[2].shape = operation;
+    nodes[2].left = 0;
+    nodes[2].right = 1;
+    nodes[2].smoothing = 0.3;
+    for (int i = 0; i < 3; ++i) {
+        turn_somehow(&nodes[i]);
+    }
+}
+
+static void no_tree_changes_by_more_than_one_per_unit(void **state) {
+    (void)state;
+    for (int32_t operation = VSH_SDF_UNION; operation <= VSH_SDF_SMOOTH_UNION; ++operation) {
+        for (int32_t pair = 0; pair < 49; ++pair) {
+            vsh_sdf_node nodes[3];
+            make_tree(nodes, pair / 7, pair % 7, operation);
+            const vsh_sdf sdf = {nodes, 3};
+            assert_int_equal(vsh_sdf_check(&sdf, NULL), VSH_OK);
+            for (int i = 0; i < 200; ++i) {
+                const double reach = i % 2 == 0 ? 3.0 : 0.01;
+                double a[3], b[3];
+                for (int j = 0; j < 3; ++j) {
+                    a[j] = uniform(-2.0, 2.0);
+                    b[j] = a[j] + uniform(-reach, reach);
+                }
+                const double change = fabs(vsh_sdf_distance(&sdf, a) - vsh_sdf_distance(&sdf, b));
+                assert_true(change <= norm(a[0] - b[0], a[1] - b[1], a[2] - b[2]) + 1e-12);
+            }
+        }
+    }
+}
+
+static void the_box_holds_the_surface_and_touches_it_for_shapes(void **state) {
+    (void)state;
+    for (int round = 0; round < 60; ++round) {
+        vsh_sdf_node nodes[3];
+        const int32_t operation = VSH_SDF_UNION + round % 4;
+        make_tree(nodes, round % 7, (round / 7) % 7, operation);
+        vsh_sdf sdf = {nodes, 3};
+        double low[3], high[3];
+        vsh_sdf_bounds(&sdf, low, high);
+        for (int i = 0; i < 2000; ++i) {
+            const double p[3] = {uniform(-4.0, 4.0), uniform(-4.0, 4.0), uniform(-4.0, 4.0)};
+            if (vsh_sdf_distance(&sdf, p) < 0.0) {
+                for (int j = 0; j < 3; ++j) {
+                    assert_true(p[j] >= low[j] && p[j] <= high[j]);
+                }
+            }
+        }
+        sdf.node_count = 1;
+        vsh_sdf_bounds(&sdf, low, high);
+        for (int axis = 0; axis < 3; ++axis) { /* the face of the box must come near the shape somewhere */
+            double nearest = INFINITY;
+            for (int i = 0; i < 80 * 80; ++i) {
+                double p[3];
+                p[axis] = high[axis];
+                const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+                p[u] = low[u] + (high[u] - low[u]) * (i % 80 + 0.5) / 80.0;
+                p[v] = low[v] + (high[v] - low[v]) * (floor(i / 80.0) + 0.5) / 80.0;
+                nearest = fmin(nearest, vsh_sdf_distance(&sdf, p));
+            }
+            assert_true(nearest > -1e-9 && nearest < 0.06);
+        }
+    }
+}
+
+static void operations_are_the_sets_operations(void **state) {
+    (void)state;
+    for (int round = 0; round < 49; ++round) {
+        vsh_sdf_node nodes[3];
+        make_tree(nodes, round / 7, round % 7, VSH_SDF_UNION);
+        const vsh_sdf both = {nodes, 3};
+        vsh_sdf_node plain[2] = {nodes[0], nodes[1]};
+        nodes[2].scale = 1.0;
+        memset(nodes[2].translation, 0, sizeof nodes[2].translation);
+        const double straight[4] = {0.0, 0.0, 0.0, 2.0};
+        memcpy(nodes[2].rotation, straight, sizeof straight);
+        const vsh_sdf left = {&plain[0], 1}, right = {&plain[1], 1};
+        for (int i = 0; i < 300; ++i) {
+            const double p[3] = {uniform(-2.0, 2.0), uniform(-2.0, 2.0), uniform(-2.0, 2.0)};
+            const int a = vsh_sdf_distance(&left, p) < 0.0, b = vsh_sdf_distance(&right, p) < 0.0;
+            nodes[2].shape = VSH_SDF_UNION;
+            const double united = vsh_sdf_distance(&both, p);
+            assert_int_equal(united < 0.0, a || b);
+            nodes[2].shape = VSH_SDF_INTERSECTION;
+            assert_int_equal(vsh_sdf_distance(&both, p) < 0.0, a && b);
+            nodes[2].shape = VSH_SDF_SUBTRACTION;
+            assert_int_equal(vsh_sdf_distance(&both, p) < 0.0, a && !b);
+            nodes[2].shape = VSH_SDF_SMOOTH_UNION;
+            const double smooth = vsh_sdf_distance(&both, p);
+            assert_true(smooth <= united && smooth >= united - 0.25 * nodes[2].smoothing);
+        }
+    }
+}
+
+static void a_turned_scaled_shape_is_the_shape_seen_from_elsewhere(void **state) {
+    (void)state;
+    vsh_sdf_node node = shape_of(VSH_SDF_BOX);
+    const vsh_sdf sdf = {&node, 1};
+    const double h = sqrt(0.5);
+    const double quarter[4] = {0.0, 3.0 * h, 0.0,
+                               3.0 * h}; /* 90° about y, not of unit length: x goes to -z */
+    memcpy(node.rotation, quarter, sizeof quarter);
+    node.scale = 2.0;
+    node.translation[0] = 10.0;
+    const double end[3] = {10.0, 0.0, -2.4};
+    assert_float_equal(vsh_sdf_distance(&sdf, end), 1.0, 1e-12);
+    double low[3], high[3];
+    vsh_sdf_bounds(&sdf, low, high);
+    assert_float_equal(low[0], 10.0 - 1.8, 1e-12);
+    assert_float_equal(high[2], 1.4, 1e-12);
+}
+
+static void refused(const vsh_sdf_node *nodes, size_t count, const char *part) {
+    const vsh_sdf sdf = {nodes, count};
+    vsh_error error = {0};
+    assert_int_equal(vsh_sdf_check(&sdf, &error), VSH_ERROR_INPUT);
+    if (strstr(error.message, part) == NULL) {
+        fail_msg("'%s' does not hold '%s'", error.message, part);
+    }
+}
+
+static void bad_nodes_are_refused_by_name(void **state) {
+    (void)state;
+    vsh_sdf_node nodes[3];
+    make_tree(nodes, VSH_SDF_SPHERE, VSH_SDF_CONE, VSH_SDF_SMOOTH_UNION);
+    refused(nodes, 0, "0 nodes");
+    refused(NULL, 1, "nodes");
+    refused(nodes, 2, "node 0 (sphere): no operation uses it");
+    vsh_sdf_node *const leaf = &nodes[0], *const root = &nodes[2];
+    const struct {
+        double *field;
+        double value;
+        const char *part;
+    } cases[] = {
+        {&leaf->radius, 0.0, "node 0 (sphere): radius 0"},
+        {&leaf->radius, NAN, "radius"},
+        {&leaf->scale, -1.0, "scale -1"},
+        {&leaf->translation[1], INFINITY, "translation"},
+        {&nodes[1].minor_radius, -0.1, "node 1 (cone): minor_radius -0.1"},
+        {&root->smoothing, 0.0, "node 2 (smooth union): smoothing 0"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        const double old = *cases[i].field;
+        *cases[i].field = cases[i].value;
+        refused(nodes, 3, cases[i].part);
+        *cases[i].field = old;
+    }
+    root->left = 2;
+    refused(nodes, 3, "left 2: expected 0 … 1");
+    root->left = 1;
+    refused(nodes, 3, "right 1: that node is an operand already");
+    root->left = 0;
+    memset(root->rotation, 0, sizeof root->rotation);
+    refused(nodes, 3, "rotation");
+    root->shape = 11;
+    refused(nodes, 3, "node 2: shape 11");
+}
+
+static void a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works(void **state) {
+    (void)state;
+    enum { SHAPES = 3000 };
+    vsh_sdf_node *nodes = malloc((2 * SHAPES - 1) * sizeof *nodes);
+    assert_non_null(nodes);
+    size_t count = 0;
+    for (int i = 0; i < SHAPES; ++i) {
+        nodes[count] = vsh_sdf_node_default();
+        nodes[count++].translation[0] = i;
+        if (i > 0) {
+            nodes[count] = vsh_sdf_node_default();
+            nodes[count].shape = VSH_SDF_UNION;
+            nodes[count].left = (int32_t)count - 2;
+            nodes[count].right = (int32_t)count - 1;
+            ++count;
+        }
+    }
+    const vsh_sdf deep = {nodes, 2 * 2000 - 1};
+    assert_int_equal(vsh_sdf_check(&deep, NULL), VSH_OK);
+    const double p[3] = {1500.0, 3.0, 0.0};
+    assert_float_equal(vsh_sdf_distance(&deep, p), 2.0, 1e-12);
+    refused(nodes, count, "deep");
+    free(nodes);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_shape_gives_the_distance_to_its_surface),
+        cmocka_unit_test(closed_forms_hold),
+        cmocka_unit_test(no_tree_changes_by_more_than_one_per_unit),
+        cmocka_unit_test(the_box_holds_the_surface_and_touches_it_for_shapes),
+        cmocka_unit_test(operations_are_the_sets_operations),
+        cmocka_unit_test(a_turned_scaled_shape_is_the_shape_seen_from_elsewhere),
+        cmocka_unit_test(bad_nodes_are_refused_by_name),
+        cmocka_unit_test(a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
