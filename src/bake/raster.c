@@ -172,7 +172,7 @@ uint64_t vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *tria
                 if (owner[x] == 0) {
                     owner[x] = number;
                     tile->covered |= texel;
-                } else if (value[0] > 0 && value[1] > 0 && value[2] > 0) {
+                } else {
                     overlap |= texel;
                 }
             }

@@ -49,7 +49,7 @@ typedef struct vshi_tile {
 void vshi_tile_begin(const vshi_raster *raster, size_t column, size_t row, vshi_tile *tile);
 
 /* Gives the free samples inside the triangle (top-left rule) to `number` (triangle + 1). Returns the texels
- * where a sample strictly inside was taken already. */
+ * where a sample was taken already; the rule keeps shared edges out of them. */
 uint64_t vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle, uint32_t number,
                          vshi_tile *tile);
 
