@@ -10,7 +10,6 @@
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include <cmocka.h>
 
@@ -129,13 +128,10 @@ static double least_distance(const truth_solid *solid, const double from[3], con
 
 static void rays_hit_exactly_where_the_distance_along_them_falls_below_zero(void **state) {
     (void)state;
-    /* The seeds, and a box so round that edges and corners are most of what is seen. */
-    truth_solid solids[6] = {{TRUTH_BOX, {0.0, 0.0, 0.0}, {0.15, 0.2, 0.1}, 0.3, 0.0}};
-    memcpy(solids + 1, truth_seeds().solids, 5 * sizeof solids[0]);
-    const truth_scene scene = {solids, 6};
+    const truth_scene scene = truth_seeds();
     size_t hits = 0;
     size_t misses = 0;
-    for (size_t i = 0; i < 3000; i++) {
+    for (size_t i = 0; i < 2000; i++) {
         const truth_solid *solid = &scene.solids[i % scene.count];
         double from[3];
         double direction[3];
@@ -163,6 +159,34 @@ static void rays_hit_exactly_where_the_distance_along_them_falls_below_zero(void
         misses += hit ? 0 : 1;
     }
     assert_true(hits > 500 && misses > 200);
+}
+
+/* Tangents just under and just over every rounded corner, edge and face of a box. */
+static void a_rounded_box_is_as_round_as_it_says_everywhere(void **state) {
+    (void)state;
+    const truth_solid box = {TRUTH_BOX, {0.1, 0.2, 0.3}, {0.4, 0.3, 0.5}, 0.25, 0.0};
+    for (int side = 0; side < 27; side++) {
+        const int sign[3] = {side % 3 - 1, side / 3 % 3 - 1, side / 9 - 1};
+        const double out[3] = {sign[0], sign[1], sign[2]};
+        if (side == 13) {
+            continue; /* the middle */
+        }
+        const truth_frame frame = truth_frame_around(out);
+        for (int i = 0; i < 8; i++) {
+            double direction[3];
+            truth_to_world(&frame, (double[]){cos(0.4 + i), sin(0.4 + i), 0.0}, direction);
+            for (int over = 0; over < 2; over++) {
+                double from[3];
+                for (int k = 0; k < 3; k++) {
+                    from[k] = box.center[k] + sign[k] * box.half[k] +
+                              frame.n[k] * box.radius * (over != 0 ? 1.001 : 0.999) - 3.0 * direction[k];
+                }
+                if (truth_solid_hit(&box, from, direction, INFINITY) != (over == 0)) {
+                    fail_msg("side %d %d %d, tangent %d, over %d", sign[0], sign[1], sign[2], i, over);
+                }
+            }
+        }
+    }
 }
 
 static void rays_end_at_their_limit_and_begin_at_their_origin(void **state) {
@@ -379,6 +403,7 @@ int main(void) {
         cmocka_unit_test(a_straight_edge_leaves_the_circular_segment),
         cmocka_unit_test(a_torus_seen_along_its_axis_hides_a_ring),
         cmocka_unit_test(rays_hit_exactly_where_the_distance_along_them_falls_below_zero),
+        cmocka_unit_test(a_rounded_box_is_as_round_as_it_says_everywhere),
         cmocka_unit_test(rays_end_at_their_limit_and_begin_at_their_origin),
         cmocka_unit_test(distances_of_the_seeds_are_right_by_hand),
         cmocka_unit_test(ao_beside_a_wall_is_a_half_and_fades_with_distance),
