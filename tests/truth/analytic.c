@@ -257,27 +257,33 @@ bool truth_hit(truth_scene scene, const double origin[3], const double direction
     return false;
 }
 
-static double bounding_radius(const truth_solid *solid) {
-    switch (solid->shape) {
-    case TRUTH_SPHERE:
-        return solid->radius;
-    case TRUTH_TORUS:
-        return solid->radius + solid->minor_radius;
-    default:
-        return sqrt(dot(solid->half, solid->half)) + solid->radius;
+/* Half size of the box around a solid. */
+static void bounding_box(const truth_solid *solid, double half[3]) {
+    for (int i = 0; i < 3; i++) {
+        half[i] = solid->shape == TRUTH_BOX ? solid->half[i] + solid->radius : solid->radius;
+    }
+    if (solid->shape == TRUTH_TORUS) {
+        half[0] = half[2] = solid->radius + solid->minor_radius;
+        half[1] = solid->minor_radius;
     }
 }
 
-/* Whether a solid's bounding sphere meets the cone around unit `axis` of half angle `angle`, up to `limit`.
- */
+/* Whether the cone around unit `axis` of half angle `angle`, up to `limit`, may meet a solid: false where no
+ * ray comes nearer along some axis than the solid's box, or near the sphere around that box. */
 static bool cone_meets(const truth_solid *solid, const double point[3], const double axis[3], double angle,
                        double limit) {
     double to[3];
+    double half[3];
+    bounding_box(solid, half);
     for (int i = 0; i < 3; i++) {
         to[i] = solid->center[i] - point[i];
+        const double away = to[i] < 0.0 ? axis[i] : -axis[i]; /* sine of the axis' angle away from the box */
+        if (fabs(to[i]) >= half[i] && away >= sin(angle) + 1e-9) {
+            return false;
+        }
     }
     const double length = sqrt(dot(to, to));
-    const double radius = bounding_radius(solid);
+    const double radius = sqrt(dot(half, half));
     if (length <= radius) {
         return true;
     }
@@ -302,25 +308,49 @@ static truth_scene cull(truth_scene scene, const double point[3], const double a
     return (truth_scene){kept, count};
 }
 
-double truth_light(truth_scene scene, const double point[3], const double *normal, const double towards[3],
-                   double w, double limit, size_t rays) {
-    const truth_frame frame = truth_frame_around(towards);
+/* The share of `directions` [rays][3] that is free, all of them within the cone of tangent w around `axis`.
+ */
+static double free_share(truth_scene scene, const double point[3], const double *normal, const double axis[3],
+                         double w, double limit, const double *directions, size_t rays) {
     truth_solid kept[CULLED_SOLIDS];
-    const truth_scene near = cull(scene, point, frame.n, atan(w), limit, kept);
-    const double rim = normal != NULL ? dot(normal, frame.n) - w * sqrt(dot(normal, normal)) : 1.0;
-    if (near.count == 0 && rim > 0.0) {
+    const truth_scene near = cull(scene, point, axis, atan(w), limit, kept);
+    const bool risen = normal == NULL || dot(normal, axis) > w * sqrt(dot(normal, normal));
+    if (near.count == 0 && risen) {
         return 1.0;
     }
     size_t seen = 0;
     for (size_t i = 0; i < rays; i++) {
-        double direction[3];
-        truth_light_direction(&frame, w, i, rays, direction);
-        if (normal != NULL && dot(normal, direction) <= 0.0) {
+        const double *direction = &directions[3 * i];
+        if (!risen && dot(normal, direction) <= 0.0) {
             continue;
         }
         seen += truth_hit(near, point, direction, limit) ? 0 : 1;
     }
     return (double)seen / (double)rays;
+}
+
+int truth_lights(truth_scene scene, size_t count, const double *points, const double *normal,
+                 const double towards[3], double w, double limit, size_t rays, float *visible) {
+    double *directions = calloc(rays, 3 * sizeof *directions);
+    if (directions == NULL) {
+        return -1;
+    }
+    const truth_frame frame = truth_frame_around(towards);
+    for (size_t i = 0; i < rays; i++) {
+        truth_light_direction(&frame, w, i, rays, &directions[3 * i]);
+    }
+    for (size_t i = 0; i < count; i++) {
+        visible[i] = (float)free_share(scene, &points[3 * i], normal, frame.n, w, limit, directions, rays);
+    }
+    free(directions);
+    return 0;
+}
+
+double truth_light(truth_scene scene, const double point[3], const double *normal, const double towards[3],
+                   double w, double limit, size_t rays) {
+    float visible = NAN;
+    truth_lights(scene, 1, point, normal, towards, w, limit, rays, &visible);
+    return (double)visible;
 }
 
 double truth_ao(truth_scene scene, const double point[3], const double normal[3], double distance,

@@ -43,9 +43,14 @@ bool truth_hit(truth_scene scene, const double origin[3], const double direction
 
 /* Fraction of a light that the point sees: `rays` directions whose points are uniform in area over the disc
  * of radius w, a unit away along `towards`. Rays end at `limit` (INFINITY for a directional light). Rays not
- * above the plane of `normal` count as hidden; NULL: no horizon. */
+ * above the plane of `normal` count as hidden; NULL: no horizon. NAN where memory is short. */
 double truth_light(truth_scene scene, const double point[3], const double *normal, const double towards[3],
                    double w, double limit, size_t rays);
+
+/* The same at `count` points [count][3] that share a normal: the directions are made once. Returns 0, or -1
+ * where memory is short. */
+int truth_lights(truth_scene scene, size_t count, const double *points, const double *normal,
+                 const double towards[3], double w, double limit, size_t rays, float *visible);
 
 /* Cosine-weighted fraction of the hemisphere around the unit `normal` that is free within `distance`. */
 double truth_ao(truth_scene scene, const double point[3], const double normal[3], double distance,
