@@ -6,15 +6,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A trilinear sample is off by at most half a voxel's diagonal. A lift that is shorter than that does not
- * clear a point's own surface, so that only deeper samples are inside another solid for sure. */
-static const double FIELD_ERROR_VOXELS = 0.8660254037844386;
+/* Where a sample is looked at for whether it is free: a voxel above its surface, which is as much as the
+ * field tells apart. Touching solids keep their inner surfaces in a mesh's level set, so under a box that
+ * stands on a floor the distance falls by no more than the height. */
+static const double PROBE_HEIGHT = 1.0;
+/* Deeper than this at the probe is inside another solid, voxels: less may be the trilinear error of a corner.
+ */
+static const double PROBE_DEPTH = 0.25;
 
 typedef struct lifting {
     const vsh_field *field;
     const vsh_texels *texels;
     vshi_origins *origins;
     double offset;    /* world units, all meshes */
+    double probe;     /* same, for the look whether a sample is free */
     double shell;     /* world units, open meshes on top of it */
     double threshold; /* distance below which a sample is invalid, world units */
 } lifting;
@@ -24,9 +29,9 @@ static size_t block_end(const lifting *l, size_t block) {
     return end < l->texels->count ? end : l->texels->count;
 }
 
-static void lift(const lifting *l, size_t i, double origin[3]) {
+static void lift(const lifting *l, size_t i, double offset, double origin[3]) {
     const vsh_texels *texels = l->texels;
-    const double height = l->offset + (texels->open[texels->mesh[i]] ? l->shell : 0.0);
+    const double height = offset + (texels->open[texels->mesh[i]] ? l->shell : 0.0);
     for (size_t k = 0; k < 3; ++k) {
         origin[k] = texels->position[3 * i + k] + height * (double)texels->geometric[3 * i + k];
     }
@@ -39,7 +44,7 @@ static void validate(void *user, size_t begin, size_t end) {
         double origin[VSHI_ORIGIN_BLOCK][3];
         float distance[VSHI_ORIGIN_BLOCK];
         for (size_t i = first; i < last; ++i) {
-            lift(l, i, origin[i - first]);
+            lift(l, i, l->probe, origin[i - first]);
         }
         vsh_field_sample(l->field, last - first, &origin[0][0], distance);
         size_t valid = 0;
@@ -58,7 +63,7 @@ static void pack(void *user, size_t begin, size_t end) {
         size_t next = origins->before[block];
         for (size_t i = block * VSHI_ORIGIN_BLOCK; i < block_end(l, block); ++i) {
             if (origins->valid[i]) {
-                lift(l, i, origins->position + 3 * next);
+                lift(l, i, l->offset, origins->position + 3 * next);
                 memcpy(origins->normal + 3 * next, l->texels->normal + 3 * i, 3 * sizeof(float));
                 ++next;
             }
@@ -83,7 +88,8 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
                  .origins = origins,
                  .offset = offset,
                  .shell = 0.5 * info.shell_thickness,
-                 .threshold = -fmax(0.0, FIELD_ERROR_VOXELS * info.voxel_size - offset)};
+                 .probe = fmax(offset, PROBE_HEIGHT * info.voxel_size),
+                 .threshold = -PROBE_DEPTH * info.voxel_size};
     vsh_result result = VSH_OK;
     vshi_job *job = vshi_job_begin(run, "validate", 2 * origins->blocks);
     if (job == NULL) {
