@@ -1,7 +1,7 @@
 /* How far from a surface a scene's field must be able to tell distances apart. */
-#include "base/vec.h"
-
 #include <vdbshade/scene.h>
+
+#include "base/vec.h"
 
 /* Tangent of 60°: wider half angles are marched as if they were this wide, as a tangent without
  * bound would ask for a field without bound. */

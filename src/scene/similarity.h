@@ -2,6 +2,8 @@
 #ifndef VSHI_SIMILARITY_H
 #define VSHI_SIMILARITY_H
 
+#include <stddef.h>
+
 /* Uniform scale of a transform [12]; 0 for one that shears, scales unevenly or flattens. */
 double vshi_similarity_scale(const double m[12]);
 
