@@ -31,7 +31,7 @@ static const cli_option options[] = {
     {KEY_SIZE, "size", "W[xH]", "texels of the lightmap, 1 to 65536 (1024)"},
     {KEY_BITS, "bits", "N",
      "8, 16 or 32 bits a channel (32 for EXR, else 16\nwhere the format has it, else 8)"},
-    {KEY_PACK, "pack", "R=…,G=…",
+    {KEY_PACK, "pack", "R=NAME,…",
      "what goes where in formats that cannot name channels:\n"
      "R=shadow.sun,G=ao,A=A; 0 and 1 are constants\n"
      "(the first three but A to R, G, B; A to A)"},
