@@ -6,9 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A trilinear sample is off by at most half a voxel's diagonal. A lift that is shorter than that does not
- * clear a point's own surface, so that only deeper samples are inside another solid for sure. */
-static const double FIELD_ERROR_VOXELS = 0.8660254037844386;
+/* How far below its own surface the field may take a point for inside, voxels: over concave creases linear
+ * samples come out too small by about this. A start offset of at least as much clears it; with a smaller one
+ * only deeper samples are taken for invalid. */
+static const double FIELD_ERROR_VOXELS = 0.25;
 
 typedef struct lifting {
     const vsh_field *field;
