@@ -14,12 +14,4 @@ vsh_result vshi_exr_write(const char *temporary, const char *path, const vshi_pl
  * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Thread safe. */
 vsh_result vshi_exr_read(const char *path, vsh_image_file **file, vsh_error *error);
 
-/* What OpenEXR says of a failure: the first message of a call, because it is the most exact. */
-typedef struct vshi_exr_log {
-    char message[400];
-} vshi_exr_log;
-
-struct _priv_exr_context_t;
-void vshi_exr_note(const struct _priv_exr_context_t *context, int32_t code, const char *message);
-
 #endif

@@ -10,10 +10,8 @@
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <climits>
 #include <cstring>
-#include <fcntl.h>
 #include <limits>
 #include <memory>
 #include <string>
@@ -42,9 +40,7 @@ constexpr vshi_format writable[] = {
     {"dpx", BITS_ALL, true, ANY_SIZE, true},
     {"gif", VSHI_BITS_8, false, 65535, true},
     {"sgi", BITS_8_16, true, 65535, false},
-    {"rla", BITS_ALL, true, 32767, false},
     {"fits", VSHI_BITS_8 | VSHI_BITS_32, true, ANY_SIZE, false},
-    {"ico", VSHI_BITS_8, true, 256, false},
 };
 
 // Read, too. Others are no still images, or readers that are not for untrusted files.
@@ -89,21 +85,18 @@ bool is_readable(const std::string &name) {
 }
 
 // OpenImageIO's own file writing does not look at the result of its last flush, and its jpeg writer ends the
-// process when a write fails. This one keeps the first error.
+// process when a write fails.
 class CheckedFile final : public OIIO::Filesystem::IOProxy {
   public:
-    explicit CheckedFile(const char *path)
-        : IOProxy(path, Write), file_(::open(path, O_RDWR | O_TRUNC | O_CLOEXEC)) {
-        error_ = file_ < 0 ? errno : 0;
-    }
+    explicit CheckedFile(const char *path) : IOProxy(path, Write), sink_(vshi_sink_open(path)) {}
     ~CheckedFile() override { finish(); }
     CheckedFile(const CheckedFile &) = delete;
     CheckedFile &operator=(const CheckedFile &) = delete;
 
-    const char *proxytype() const override { return "file"; }
-    void close() override {} // finish() does, when all is written
+    const char *proxytype() const override { return "checked"; } // "file" would promise a FILE *
+    void close() override {}                                     // finish() does, when all is written
     size_t size() const override {
-        const off_t end = file_ >= 0 ? ::lseek(file_, 0, SEEK_END) : 0;
+        const off_t end = sink_.file >= 0 ? ::lseek(sink_.file, 0, SEEK_END) : 0;
         return end > 0 ? static_cast<size_t>(end) : 0;
     }
     size_t read(void *data, size_t count) override {
@@ -112,7 +105,7 @@ class CheckedFile final : public OIIO::Filesystem::IOProxy {
         return done;
     }
     size_t pread(void *data, size_t count, int64_t offset) override {
-        const ssize_t done = file_ >= 0 ? ::pread(file_, data, count, offset) : 0;
+        const ssize_t done = sink_.file >= 0 ? ::pread(sink_.file, data, count, offset) : 0;
         return done > 0 ? static_cast<size_t>(done) : 0;
     }
     size_t write(const void *data, size_t count) override {
@@ -121,30 +114,13 @@ class CheckedFile final : public OIIO::Filesystem::IOProxy {
         return done;
     }
     size_t pwrite(const void *data, size_t count, int64_t offset) override {
-        size_t done = 0;
-        while (error_ == 0 && done < count) {
-            const ssize_t step = ::pwrite(file_, static_cast<const char *>(data) + done, count - done,
-                                          offset + static_cast<int64_t>(done));
-            if (step > 0) {
-                done += static_cast<size_t>(step);
-            } else if (step == 0 || errno != EINTR) {
-                error_ = step == 0 ? ENOSPC : errno;
-            }
-        }
-        return done;
+        return vshi_sink_write(&sink_, data, count, static_cast<uint64_t>(offset)) ? count : 0;
     }
     // Closes; the first error of all, or 0.
-    int finish() {
-        if (file_ >= 0 && ::close(file_) != 0 && error_ == 0) {
-            error_ = errno;
-        }
-        file_ = -1;
-        return error_;
-    }
+    int finish() { return vshi_sink_close(&sink_); }
 
   private:
-    int file_;
-    int error_;
+    vshi_sink sink_;
 };
 
 // 0 … 1 to 0 … maximum, to nearest; NaN becomes 0 because no comparison with it holds.
@@ -391,7 +367,7 @@ bool vshi_oiio_format(const char *path, vshi_format *format) {
 }
 
 const char *vshi_oiio_endings(void) {
-    return "png, tif, jpg, tga, bmp, hdr, ppm, webp, jp2, dpx, gif, sgi, rla, fits, ico";
+    return "png, tif, jpg, tga, bmp, hdr, ppm, webp, jp2, dpx, gif, sgi, fits";
 }
 
 vsh_result vshi_oiio_write(const char *temporary, const char *path, const vshi_format *format,
