@@ -114,7 +114,9 @@ class CheckedFile final : public OIIO::Filesystem::IOProxy {
         return done;
     }
     size_t pwrite(const void *data, size_t count, int64_t offset) override {
-        return vshi_sink_write(&sink_, data, count, static_cast<uint64_t>(offset)) ? count : 0;
+        // A failure is kept for finish() and not told: libpng would print it.
+        vshi_sink_write(&sink_, data, count, static_cast<uint64_t>(offset));
+        return count;
     }
     // Closes; the first error of all, or 0.
     int finish() { return vshi_sink_close(&sink_); }

@@ -207,13 +207,16 @@ static void every_format_keeps_values_to_half_a_step(void **state) {
         double tolerance;
         bool alpha;
     } formats[] = {
-        {"f.png", 8, 0.5 / 255, true},     {"f.png", 16, 0.5 / 65535, true}, {"f.TIF", 8, 0.5 / 255, true},
-        {"f.tiff", 16, 0.5 / 65535, true}, {"f.tif", 32, 0.0, true},         {"f.tga", 8, 0.5 / 255, true},
-        {"f.bmp", 8, 0.5 / 255, true},     {"f.ppm", 8, 0.5 / 255, false},   {"f.jp2", 8, 0.5 / 255, true},
-        {"f.jp2", 16, 0.5 / 65535, true},  {"f.dpx", 8, 0.5 / 255, true},    {"f.dpx", 16, 0.5 / 65535, true},
-        {"f.dpx", 32, 0.0, true},          {"f.sgi", 8, 0.5 / 255, true},    {"f.sgi", 16, 0.5 / 65535, true},
-        {"f.fits", 8, 0.5 / 255, true},    {"f.fits", 32, 0.0, true},        
-        {"f.hdr", 32, 1.0 / 128, false},   {"f.jpg", 8, 0.03, false},        {"f.webp", 8, 0.06, false},
+        {"f.png", 8, 0.5 / 255, true},    {"f.png", 16, 0.5 / 65535, true},
+        {"f.TIF", 8, 0.5 / 255, true},    {"f.tiff", 16, 0.5 / 65535, true},
+        {"f.tif", 32, 0.0, true},         {"f.tga", 8, 0.5 / 255, true},
+        {"f.bmp", 8, 0.5 / 255, true},    {"f.ppm", 8, 0.5 / 255, false},
+        {"f.jp2", 8, 0.5 / 255, true},    {"f.jp2", 16, 0.5 / 65535, true},
+        {"f.dpx", 8, 0.5 / 255, true},    {"f.dpx", 16, 0.5 / 65535, true},
+        {"f.dpx", 32, 0.0, true},         {"f.sgi", 8, 0.5 / 255, true},
+        {"f.sgi", 16, 0.5 / 65535, true}, {"f.fits", 8, 0.5 / 255, true},
+        {"f.fits", 32, 0.0, true},        {"f.hdr", 32, 1.0 / 128, false},
+        {"f.jpg", 8, 0.03, false},        {"f.webp", 8, 0.06, false},
         {"f.gif", 8, 0.3, false}, /* 256 colours */
     };
     sample s;
@@ -465,9 +468,8 @@ static void write_all(const char *path, const unsigned char *bytes, size_t size)
  */
 static void a_full_disk_leaves_the_old_file_and_nothing_else(void **state) {
     (void)state;
-    static const char *const names[] = {"d.exr", "d.png", "d.tif", "d.jpg",  "d.tga",
-                                        "d.bmp", "d.hdr", "d.ppm", "d.webp", "d.jp2",
-                                        "d.dpx", "d.gif", "d.sgi", "d.fits"};
+    static const char *const names[] = {"d.exr", "d.png",  "d.tif", "d.jpg", "d.tga", "d.bmp", "d.hdr",
+                                        "d.ppm", "d.webp", "d.jp2", "d.dpx", "d.gif", "d.sgi", "d.fits"};
     signal(SIGXFSZ, SIG_IGN);
     struct rlimit old_limit;
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &old_limit), 0);
