@@ -174,3 +174,32 @@ void vshi_output_abandon(vshi_output *output) {
     free(output->target);
     *output = (vshi_output){NULL, NULL};
 }
+
+vshi_sink vshi_sink_open(const char *path) {
+    vshi_sink sink = {open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666), 0};
+    sink.error = sink.file < 0 ? errno : 0;
+    return sink;
+}
+
+bool vshi_sink_write(vshi_sink *sink, const void *data, size_t size, uint64_t offset) {
+    const char *bytes = data;
+    while (sink->error == 0 && size > 0) {
+        const ssize_t written = pwrite(sink->file, bytes, size, (off_t)offset);
+        if (written > 0) {
+            bytes += written;
+            size -= (size_t)written;
+            offset += (uint64_t)written;
+        } else if (written == 0 || errno != EINTR) {
+            sink->error = written == 0 ? ENOSPC : errno;
+        }
+    }
+    return sink->error == 0;
+}
+
+int vshi_sink_close(vshi_sink *sink) {
+    if (sink->file >= 0 && close(sink->file) != 0 && sink->error == 0) {
+        sink->error = errno;
+    }
+    sink->file = -1;
+    return sink->error;
+}

@@ -35,6 +35,17 @@ vsh_result vshi_output_commit(vshi_output *output, vsh_error *error);
 /* Removes the temporary; the target is as it was. Does nothing where nothing is under way. */
 void vshi_output_abandon(vshi_output *output);
 
+/* The bytes of a file under way, written at any place. For the libraries whose own writing hides failures, or
+ * does worse after one: the first failure is kept, and what follows is left out. One thread at a time. */
+typedef struct vshi_sink {
+    int file;  /* descriptor, also readable; -1: not open */
+    int error; /* errno of the first failure; 0: none */
+} vshi_sink;
+
+vshi_sink vshi_sink_open(const char *path); /* empties the file; a failure shows in `error` */
+bool vshi_sink_write(vshi_sink *sink, const void *data, size_t size, uint64_t offset);
+int vshi_sink_close(vshi_sink *sink); /* returns `error`, with what closing came to */
+
 #ifdef __cplusplus
 }
 #endif

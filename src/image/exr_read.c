@@ -2,8 +2,26 @@
 
 #include <openexr.h>
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* What OpenEXR says of a failure: the first message of a call, because it is the most exact. */
+typedef struct exr_log {
+    char message[400];
+} exr_log;
+
+static void note(exr_const_context_t context, exr_result_t code, const char *message) {
+    void *user = NULL;
+    (void)code;
+    if (context == NULL || exr_get_user_data(context, &user) != EXR_ERR_SUCCESS || user == NULL) {
+        return;
+    }
+    exr_log *log = user;
+    if (log->message[0] == '\0') {
+        snprintf(log->message, sizeof log->message, "%s", message);
+    }
+}
 
 /* A file being read: its first part. */
 typedef struct exr_reader {
@@ -119,6 +137,8 @@ static vsh_result code_of(exr_result_t status) {
     case EXR_ERR_FILE_ACCESS:
     case EXR_ERR_READ_IO:
         return VSH_ERROR_READ;
+    case EXR_ERR_FEATURE_NOT_IMPLEMENTED: /* DWA compression, in 3.1 */
+        return VSH_ERROR_UNSUPPORTED;
     default:
         return VSH_ERROR_INPUT;
     }
@@ -126,10 +146,10 @@ static vsh_result code_of(exr_result_t status) {
 
 vsh_result vshi_exr_read(const char *path, vsh_image_file **file, vsh_error *error) {
     *file = NULL;
-    vshi_exr_log log = {""};
+    exr_log log = {""};
     exr_reader reader = {0};
     exr_context_initializer_t setup = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    setup.error_handler_fn = vshi_exr_note;
+    setup.error_handler_fn = note;
     setup.user_data = &log;
     /* a file whose table of chunks is missing is cut: guessing its chunks would hide that */
     setup.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;

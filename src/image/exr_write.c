@@ -1,5 +1,6 @@
 #include "image/exr.h"
 
+#include "base/file.h"
 #include "base/memory.h"
 
 #include <Imath/half.h>
@@ -9,16 +10,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-void vshi_exr_note(const struct _priv_exr_context_t *context, int32_t code, const char *message) {
-    void *user = NULL;
+/* OpenEXR would print its messages; ours come from the sink and from its codes. It may hold its lock on the
+ * context here, so the context must not be asked for anything. */
+static void say_nothing(exr_const_context_t context, exr_result_t code, const char *message) {
+    (void)context;
     (void)code;
-    if (context == NULL || exr_get_user_data(context, &user) != EXR_ERR_SUCCESS || user == NULL) {
-        return;
-    }
-    vshi_exr_log *log = user;
-    if (log->message[0] == '\0') {
-        snprintf(log->message, sizeof log->message, "%s", message);
-    }
+    (void)message;
+}
+
+/* After a failed write OpenEXR 3.1.5 waits for ever on its own lock, so it is told of none: the sink keeps
+ * it, and the caller looks there. */
+static int64_t write_bytes(exr_const_context_t context, void *user, const void *data, uint64_t size,
+                           uint64_t offset, exr_stream_error_func_ptr_t fail) {
+    (void)context;
+    (void)fail;
+    vshi_sink *sink = user;
+    vshi_sink_write(sink, data, (size_t)size, offset);
+    return (int64_t)size;
 }
 
 /* A file being written. */
@@ -135,13 +143,14 @@ vsh_result vshi_exr_write(const char *temporary, const char *path, const vshi_pl
                          "%s: %d pixels of %d channels in a row are more than OpenEXR's 2 GiB a chunk", path,
                          planes->width, planes->count);
     }
-    vshi_exr_log log = {""};
+    vshi_sink sink = vshi_sink_open(temporary);
     exr_writer writer = {
         .planes = planes, .type = bits == 16 ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT, .value_size = value_size};
     sort_by_name(planes, writer.order);
     exr_context_initializer_t setup = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    setup.error_handler_fn = vshi_exr_note;
-    setup.user_data = &log;
+    setup.error_handler_fn = say_nothing;
+    setup.user_data = &sink;
+    setup.write_fn = write_bytes;
 
     vsh_result result = VSH_OK;
     void *chunk = NULL;
@@ -159,7 +168,8 @@ vsh_result vshi_exr_write(const char *temporary, const char *path, const vshi_pl
         goto done;
     }
     writer.chunk = chunk;
-    for (int64_t row = 0; status == EXR_ERR_SUCCESS && row < planes->height; row += writer.lines) {
+    for (int64_t row = 0; status == EXR_ERR_SUCCESS && sink.error == 0 && row < planes->height;
+         row += writer.lines) {
         status = write_chunk(&writer, (int32_t)row);
     }
 
@@ -173,10 +183,12 @@ done:
         status = status != EXR_ERR_SUCCESS ? status : finished;
     }
     free(chunk);
-    if (result == VSH_OK && status != EXR_ERR_SUCCESS) {
+    const int number = vshi_sink_close(&sink);
+    if (result == VSH_OK && number != 0) {
+        result = vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", path, strerror(number));
+    } else if (result == VSH_OK && status != EXR_ERR_SUCCESS) {
         result = vshi_fail(error, status == EXR_ERR_OUT_OF_MEMORY ? VSH_ERROR_MEMORY : VSH_ERROR_WRITE,
-                           "%s: could not be written: %s", path,
-                           log.message[0] != '\0' ? log.message : exr_get_default_error_message(status));
+                           "%s: could not be written: %s", path, exr_get_default_error_message(status));
     }
     return result;
 }
