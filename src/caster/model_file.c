@@ -77,7 +77,7 @@ static vsh_result load_file(const char *path, const vsh_run *run, char **text, s
 
 static vsh_result scan_file(const char *path, const char *ending, const vsh_run *run, vshi_job *job,
                             size_t *faces, vsh_error *error) {
-    vshi_scan scan = {path, NULL, 0, job, 0};
+    vshi_scan scan = {.path = path, .job = job, .units = SCAN_UNITS};
     char *text;
     vsh_result result = load_file(path, run, &text, &scan.size, error);
     if (result == VSH_OK) {
@@ -86,7 +86,7 @@ static vsh_result scan_file(const char *path, const char *ending, const vsh_run 
     }
     free(text);
     *faces = scan.faces;
-    if (result == VSH_OK && vshi_job_advance(job, SCAN_UNITS)) {
+    if (result == VSH_OK && vshi_job_advance(job, SCAN_UNITS - scan.units_done)) {
         result = vshi_job_fail_cancelled(job, error);
     }
     return result;

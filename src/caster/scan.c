@@ -21,6 +21,14 @@ vsh_result vshi_scan_file(vshi_scan *scan, const char *ending, vsh_error *error)
     return VSH_OK;
 }
 
+bool vshi_scan_poll(vshi_scan *scan, const char *at) {
+    const double fraction = (double)(at - scan->text) / (double)scan->size;
+    const size_t reached = (size_t)(fraction * (double)scan->units);
+    const size_t more = reached > scan->units_done ? reached - scan->units_done : 0;
+    scan->units_done += more;
+    return vshi_job_advance(scan->job, more);
+}
+
 static bool is_space(char c) {
     return c == ' ' || (c >= '\t' && c <= '\r');
 }

@@ -11,8 +11,10 @@ typedef struct vshi_scan {
     const char *path; /* for messages */
     const char *text; /* the whole file */
     size_t size;
-    vshi_job *job; /* polled for cancelling */
-    size_t faces;  /* out: polygons of three corners or more that a reader must find at least; 0: not known */
+    vshi_job *job;
+    size_t units;      /* of the job, for the whole scan */
+    size_t units_done; /* told to the job so far */
+    size_t faces; /* out: polygons of three corners or more that a reader must find at least; 0: not known */
 } vshi_scan;
 
 /* Looks the file over, by its ending (without the dot, any case); endings without a scanner pass. Errors:
@@ -24,6 +26,9 @@ vsh_result vshi_scan_ply(vshi_scan *scan, vsh_error *error);
 vsh_result vshi_scan_stl(vshi_scan *scan, vsh_error *error);
 vsh_result vshi_scan_gltf(vshi_scan *scan, vsh_error *error);
 vsh_result vshi_scan_glb(vshi_scan *scan, vsh_error *error);
+
+/* Tells the job that the file has been looked at up to `at`; true where it is cancelled. */
+bool vshi_scan_poll(vshi_scan *scan, const char *at);
 
 /* A run of characters that are no white space, within one file. */
 typedef struct vshi_token {

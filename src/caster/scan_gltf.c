@@ -72,8 +72,10 @@ static vsh_result scan_json(vshi_scan *scan, const char *text, size_t size, vsh_
     if (node_seen == NULL || mesh_seen == NULL) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", scan->path);
     } else {
-        /* Without a default scene Assimp takes what it likes: then nothing is expected. */
-        const json_t *scene = element(root, "scenes", json_object_get(root, "scene"));
+        const json_t *index = json_object_get(root, "scene");
+        const json_t *scenes = json_object_get(root, "scenes");
+        /* Assimp takes the first scene where none is named. */
+        const json_t *scene = index != NULL ? element(root, "scenes", index) : json_array_get(scenes, 0);
         visit(root, json_object_get(scene, "nodes"), 0, node_seen, mesh_seen, &scan->faces);
     }
     free(mesh_seen);

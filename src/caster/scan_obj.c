@@ -163,7 +163,7 @@ vsh_result vshi_scan_obj(vshi_scan *scan, vsh_error *error) {
         }
         if (number >= next_poll) {
             next_poll = number + LINES_A_POLL;
-            if (vshi_job_advance(scan->job, 0)) {
+            if (vshi_scan_poll(scan, at)) {
                 return vshi_job_fail_cancelled(scan->job, error);
             }
         }

@@ -223,7 +223,7 @@ vsh_result vshi_scan_ply(vshi_scan *scan, vsh_error *error) {
                     return result;
                 }
             }
-            if (c.row % ROWS_A_POLL == 0 && vshi_job_advance(scan->job, 0)) {
+            if (c.row % ROWS_A_POLL == 0 && vshi_scan_poll(scan, c.at)) {
                 return vshi_job_fail_cancelled(scan->job, error);
             }
         }

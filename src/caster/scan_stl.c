@@ -21,7 +21,7 @@ static vsh_result scan_ascii(vshi_scan *scan, vsh_error *error) {
             at = stop != NULL ? stop : end;
         } else if (vshi_token_is(token, "endfacet")) {
             ++scan->faces;
-            if (scan->faces % FACETS_A_POLL == 0 && vshi_job_advance(scan->job, 0)) {
+            if (scan->faces % FACETS_A_POLL == 0 && vshi_scan_poll(scan, at)) {
                 return vshi_job_fail_cancelled(scan->job, error);
             }
         } else if (vshi_token_is(token, "vertex")) {

@@ -13,7 +13,7 @@
 #include <string.h>
 #include <unistd.h>
 
-/* Assimp 5.2 loses what its FBX and glTF readers had taken when a file turns out to be cut: theirs, by name. */
+/* Assimp 5.2 loses what its FBX and glTF readers had taken when a file is cut: its leaks, by name. */
 const char *__lsan_default_suppressions(void);
 const char *__lsan_default_suppressions(void) {
     return "leak:libassimp.so\n";
@@ -523,6 +523,8 @@ static void bad_gltf_is_refused(void **state) {
     quad_gltf(gltf, one_node, (float[]){INFINITY, 1, 0}, 3);
     refused("a.gltf", gltf, VSH_ERROR_INPUT, "'quad'", "inf");
     quad_gltf(gltf, one_node, NULL, 4);
+    refused("a.gltf", gltf, VSH_ERROR_INPUT, "1 of its 2", "out of range");
+    memcpy(strstr(gltf, "\"scene\""), "\"xcene\"", 7); /* the first scene is meant then */
     refused("a.gltf", gltf, VSH_ERROR_INPUT, "1 of its 2", "out of range");
     quad_gltf(gltf, "{\"name\":\"far\",\"mesh\":0,\"translation\":[1e39,0,0]}", NULL, 3);
     refused("a.gltf", gltf, VSH_ERROR_INPUT, "far/quad", "row 0 column 3");
