@@ -17,6 +17,7 @@ typedef struct baking {
     size_t light_count;
     vsh_shade_options shade; /* without offsets: the origins are lifted already */
     vsh_run run;
+    vsh_run quiet; /* for steps of milliseconds that come once a plane: no stage of their own */
     const vsh_lightmap *lightmap;
     vshi_origins origins;
     uint8_t *state;    /* [height][width]: VSHI_TEXEL_… */
@@ -87,12 +88,12 @@ static void average_blocks(void *user, size_t begin, size_t end) {
     }
 }
 
-static vsh_result average(baking *bake, const char *stage, const float *values, size_t channels, float *plane,
+static vsh_result average(baking *bake, const float *values, size_t channels, float *plane,
                           vsh_error *error) {
     averaging a = {.bake = bake, .values = values, .plane = plane, .channels = channels};
-    vshi_job *job = vshi_job_begin(&bake->run, stage, bake->origins.blocks);
+    vshi_job *job = vshi_job_begin(&bake->quiet, "resolve", bake->origins.blocks);
     if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
+        return vshi_fail(error, VSH_ERROR_MEMORY, "resolve: the system refused memory");
     }
     const vsh_result result = vshi_parallel_for(job, bake->origins.blocks, 1, 1, average_blocks, &a, error);
     vshi_job_end(job);
@@ -120,13 +121,13 @@ static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
     vsh_result result = vsh_shade_shadow(bake->field, &points, &bake->lights[index], &bake->shade, &bake->run,
                                          bake->values, &bake->stats.shade, error);
     if (result == VSH_OK && lightmap->shadow != NULL && lightmap->shadow[index] != NULL) {
-        result = average(bake, "resolve", bake->values, 1, lightmap->shadow[index], error);
+        result = average(bake, bake->values, 1, lightmap->shadow[index], error);
     }
     if (result != VSH_OK || lightmap->irradiance == NULL) {
         return result;
     }
     lighting l = {bake, &bake->lights[index]};
-    vshi_job *job = vshi_job_begin(&bake->run, "irradiance", bake->origins.count);
+    vshi_job *job = vshi_job_begin(&bake->quiet, "irradiance", bake->origins.count);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "irradiance: the system refused memory");
     }
@@ -138,7 +139,7 @@ static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
 static vsh_result bake_planes(baking *bake, vsh_error *error) {
     const vsh_lightmap *lightmap = bake->lightmap;
     const vsh_texels *texels = bake->texels;
-    vsh_result result = average(bake, "resolve", NULL, 0, NULL, error);
+    vsh_result result = average(bake, NULL, 0, NULL, error);
     for (size_t i = 0; result == VSH_OK && i < bake->light_count; ++i) {
         if (light_wanted(lightmap, i)) {
             result = bake_light(bake, i, error);
@@ -149,11 +150,11 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
         result = vsh_shade_ao(bake->field, &points, &bake->shade, &bake->run, bake->values,
                               &bake->stats.shade, error);
         if (result == VSH_OK) {
-            result = average(bake, "resolve", bake->values, 1, lightmap->ao, error);
+            result = average(bake, bake->values, 1, lightmap->ao, error);
         }
     }
     if (result == VSH_OK && lightmap->irradiance != NULL && bake->light_count > 0) {
-        result = average(bake, "resolve", bake->irradiance, 3, lightmap->irradiance, error);
+        result = average(bake, bake->irradiance, 3, lightmap->irradiance, error);
         for (size_t i = 0; result == VSH_OK && lightmap->ao != NULL && i < 3 * texel_count(texels); ++i) {
             lightmap->irradiance[i] *= lightmap->ao[i / 3];
         }
@@ -308,6 +309,8 @@ vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, c
     if (result == VSH_OK) {
         result = check_offsets(&bake.shade, error);
     }
+    bake.quiet = bake.run;
+    bake.quiet.progress = NULL;
     bool light = false;
     for (size_t i = 0; result == VSH_OK && i < light_count; ++i) {
         result = vsh_light_check(&lights[i], error);
