@@ -1,0 +1,68 @@
+/* Triangles of a vsh_mesh in the world, and what casters, receivers and messages need to know of a mesh. */
+#ifndef VSHI_CASTER_MESH_H
+#define VSHI_CASTER_MESH_H
+
+#include "base/error.h"
+#include "base/vec.h"
+
+#include <vdbshade/mesh.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A mesh's name in a message: "mesh 'sail'", "mesh 3" where it has none, and "mesh" where `index` is
+ * VSHI_MESH_ALONE. To be used within one expression: vshi_mesh_label(mesh, i).text. */
+typedef struct vshi_mesh_name {
+    char text[160];
+} vshi_mesh_name;
+
+#define VSHI_MESH_ALONE ((size_t)-1)
+
+vshi_mesh_name vshi_mesh_label(const vsh_mesh *mesh, size_t index);
+
+/* The checks that vsh_mesh_check() refuses a mesh for, without its report: cheap, and nothing is allocated.
+ * Whoever takes meshes from a caller calls this first. `index` is the mesh's place in a list, for messages.
+ */
+vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *error);
+
+/* The transform's part of it: finite, and no flattening. */
+vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_error *error);
+
+/* World corners of triangle i, anticlockwise from outside also where the transform mirrors. The mesh has
+ * passed vshi_mesh_check_data(). Returns the vertices behind them in `vertex` (may be NULL), in the same
+ * order. */
+static inline void vshi_mesh_triangle_of(const vsh_mesh *mesh, size_t i, vshi_vec corner[3],
+                                         uint32_t vertex[3]) {
+    const uint32_t *given = mesh->indices + 3 * i;
+    const bool mirrored = vshi_transform_determinant(mesh->transform) < 0.0;
+    const uint32_t order[3] = {given[0], given[mirrored ? 2 : 1], given[mirrored ? 1 : 2]};
+    for (int k = 0; k < 3; ++k) {
+        corner[k] =
+            vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * (size_t)order[k]));
+        if (vertex != NULL) {
+            vertex[k] = order[k];
+        }
+    }
+}
+
+static inline void vshi_mesh_triangle(const vsh_mesh *mesh, size_t i, vshi_vec corner[3]) {
+    vshi_mesh_triangle_of(mesh, i, corner, NULL);
+}
+
+/* Whether triangle i has no area, so that everything skips it. Decided on the local positions: the products
+ * of differences of floats are nearly always exact in double, so that collinear corners give 0 and not a
+ * rounding's worth of area, as they would after a rotation. */
+bool vshi_mesh_degenerate(const vsh_mesh *mesh, size_t i);
+
+/* weld[v] = the lowest vertex at the very position of v (-0 is 0), for the mesh's vertex_count vertices.
+ * Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_mesh_weld(const vsh_mesh *mesh, uint32_t *weld, vsh_error *error);
+
+/* Edges between welded vertices: fills open_edges and flipped_edges. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_mesh_count_edges(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

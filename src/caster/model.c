@@ -1,0 +1,95 @@
+/* A model: the arrays of each mesh of a file once, and an entry for every node that uses them.
+ *
+ * What Assimp has done by then, and what is left as it is: v of UVs points up in every format (glTF's v is
+ * flipped by its importer); an FBX file's unit stays out of the positions, that is they are in the file's own
+ * numbers, mostly centimetres; the up axis of a format is that of the file, but for those that Assimp turns
+ * by a root node (Collada, FBX). Bones and morph targets are left out: meshes are in their rest pose. */
+#include "caster/model.h"
+
+#include "caster/model_file.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void vsh_model_free(vsh_model *model) {
+    if (model == NULL) {
+        return;
+    }
+    for (size_t i = 0; i < model->entry_count; ++i) {
+        free(model->entries[i].name);
+    }
+    free(model->entries);
+    for (size_t i = 0; i < model->shape_count; ++i) {
+        vshi_model_shape *shape = &model->shapes[i];
+        free(shape->indices);
+        for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
+            free(shape->uvs[set]);
+        }
+        free(shape->normals);
+        free(shape->positions);
+    }
+    free(model->shapes);
+    free(model);
+}
+
+size_t vsh_model_mesh_count(const vsh_model *model) {
+    return model->entry_count;
+}
+
+int32_t vsh_model_uv_sets(const vsh_model *model, size_t index) {
+    return model->shapes[model->entries[index].shape].uv_sets;
+}
+
+vsh_mesh vsh_model_mesh(const vsh_model *model, size_t index, int32_t uv_set) {
+    const vshi_model_entry *entry = &model->entries[index];
+    const vshi_model_shape *shape = &model->shapes[entry->shape];
+    const int32_t set = uv_set == -1 ? shape->uv_sets > 1 : uv_set;
+    return (vsh_mesh){
+        .name = entry->name,
+        .positions = shape->positions,
+        .normals = shape->normals,
+        .uvs = set >= 0 && set < VSH_MAX_UV_SETS ? shape->uvs[set] : NULL,
+        .indices = shape->indices,
+        .vertex_count = shape->vertex_count,
+        .triangle_count = shape->triangle_count,
+        .transform = entry->transform,
+    };
+}
+
+/* STL's normals are those of its facets, often zero or wrong: the triangles know better. */
+static bool wants_normals(const char *path) {
+    const char *dot = strrchr(path, '.');
+    return dot == NULL || (strcmp(dot, ".stl") != 0 && strcmp(dot, ".STL") != 0);
+}
+
+vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error) {
+    enum { BUILD_UNITS = 100 };
+    if (path == NULL || model == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_model_read: %s is NULL",
+                         path == NULL ? "path" : "model");
+    }
+    *model = NULL;
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    vshi_job *job = vshi_job_begin(&full, "load", VSHI_MODEL_FILE_UNITS + BUILD_UNITS);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    }
+    vshi_import *import = NULL;
+    result = vshi_model_file_read(path, &full, job, &import, error);
+    if (result == VSH_OK) {
+        const vshi_model_source source = {path, &full, job, vshi_import_scene(import), wants_normals(path)};
+        result = vshi_model_build(&source, model, error);
+    }
+    vshi_import_free(import);
+    if (result == VSH_OK && vshi_job_advance(job, BUILD_UNITS)) {
+        vsh_model_free(*model);
+        *model = NULL;
+        result = vshi_job_fail_cancelled(job, error);
+    }
+    vshi_job_end(job);
+    return result;
+}

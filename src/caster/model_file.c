@@ -1,0 +1,206 @@
+#include "caster/model_file.h"
+
+#include "base/memory.h"
+#include "caster/scan.h"
+
+#include <assimp/scene.h>
+
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+/* Bytes that reading takes at its peak for one byte of file: its text, Assimp's structures and our arrays.
+ * Measured on a million triangles: OBJ 4.6, PLY 4.3, GLB 4.2, STL 3.4. Some files unfold further (compressed
+ * FBX, many faces of few vertices): what Assimp found is measured once more before it is copied. */
+static const double PEAK_BYTES_A_BYTE = 6.0;
+
+enum {
+    SCAN_UNITS = 150,
+    IMPORT_UNITS = 600,
+    CHECK_UNITS = VSHI_MODEL_FILE_UNITS - SCAN_UNITS - IMPORT_UNITS
+};
+
+static vsh_result check_ending(const char *path, const char **ending, vsh_error *error) {
+    const char *slash = strrchr(path, '/');
+    const char *dot = strrchr(slash != NULL ? slash : path, '.');
+    if (dot == NULL || dot[1] == '\0') {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: has no ending to tell its format by (.obj, .glb, .ply …)", path);
+    }
+    *ending = dot + 1;
+    if (!vshi_import_knows(*ending)) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: '.%s' is no mesh format that can be read", path,
+                         *ending);
+    }
+    return VSH_OK;
+}
+
+/* The whole file in *text, *size bytes of it. */
+static vsh_result load_file(const char *path, const vsh_run *run, char **text, size_t *size,
+                            vsh_error *error) {
+    *text = NULL;
+    FILE *file = fopen(path, "rb");
+    struct stat status;
+    if (file == NULL || fstat(fileno(file), &status) != 0) {
+        const vsh_result result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", path, strerror(errno));
+        if (file != NULL) {
+            fclose(file);
+        }
+        return result;
+    }
+    vsh_result result = VSH_OK;
+    if (!S_ISREG(status.st_mode)) {
+        result = vshi_fail(error, VSH_ERROR_READ, "%s: is no regular file", path);
+    } else if (status.st_size == 0) {
+        result = vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path);
+    } else {
+        *size = (size_t)status.st_size;
+        result = vshi_check_limit(run, PEAK_BYTES_A_BYTE * (double)*size, path, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)text, *size, 1, path, error);
+    }
+    if (result == VSH_OK && fread(*text, 1, *size, file) != *size) {
+        result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", path,
+                           ferror(file) ? strerror(errno) : "became shorter while it was read");
+    }
+    fclose(file);
+    if (result != VSH_OK) {
+        free(*text);
+        *text = NULL;
+    }
+    return result;
+}
+
+static vsh_result scan_file(const char *path, const char *ending, const vsh_run *run, vshi_job *job,
+                            size_t *faces, vsh_error *error) {
+    vshi_scan scan = {.path = path, .job = job, .units = SCAN_UNITS};
+    char *text;
+    vsh_result result = load_file(path, run, &text, &scan.size, error);
+    if (result == VSH_OK) {
+        scan.text = text;
+        result = vshi_scan_file(&scan, ending, error);
+    }
+    free(text);
+    *faces = scan.faces;
+    if (result == VSH_OK && vshi_job_advance(job, SCAN_UNITS - scan.units_done)) {
+        result = vshi_job_fail_cancelled(job, error);
+    }
+    return result;
+}
+
+static vsh_result check_mesh(const char *path, const struct aiMesh *mesh, unsigned place, vsh_error *error) {
+    for (unsigned v = 0; v < mesh->mNumVertices; ++v) {
+        const struct aiVector3D p = mesh->mVertices[v];
+        if (!isfinite(p.x) || !isfinite(p.y) || !isfinite(p.z)) {
+            return vshi_fail(
+                error, VSH_ERROR_INPUT,
+                "%s: mesh %u '%s': vertex %u of %u lies at (%g, %g, %g), expected finite numbers", path,
+                place, mesh->mName.data, v, mesh->mNumVertices, (double)p.x, (double)p.y, (double)p.z);
+        }
+    }
+    for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
+        const struct aiFace *face = &mesh->mFaces[f];
+        for (unsigned k = 0; k < face->mNumIndices; ++k) {
+            if (face->mIndices[k] >= mesh->mNumVertices) {
+                return vshi_fail(error, VSH_ERROR_INPUT,
+                                 "%s: mesh %u '%s': face %u uses vertex %u, but there are only %u", path,
+                                 place, mesh->mName.data, f, face->mIndices[k], mesh->mNumVertices);
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+/* How many faces have three corners or more, and how many triangles those make. */
+static void count_faces(const struct aiScene *scene, size_t *faces, size_t *triangles) {
+    *faces = *triangles = 0;
+    for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
+        const struct aiMesh *mesh = scene->mMeshes[m];
+        for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
+            const unsigned corners = mesh->mFaces[f].mNumIndices;
+            *faces += corners >= 3;
+            *triangles += corners >= 3 ? corners - 2 : 0;
+        }
+    }
+}
+
+/* Everything that Assimp's triangulation takes for granted, and that nothing was lost on the way here. */
+static vsh_result check_scene(const char *path, const struct aiScene *scene, size_t expected, vshi_job *job,
+                              vsh_error *error) {
+    for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
+        if (vshi_job_cancelled(job)) {
+            return vshi_job_fail_cancelled(job, error);
+        }
+        const vsh_result result = check_mesh(path, scene->mMeshes[m], m, error);
+        if (result != VSH_OK) {
+            return result;
+        }
+    }
+    size_t faces, triangles;
+    count_faces(scene, &faces, &triangles);
+    if (faces < expected) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: only %zu of its %zu faces can be read: the others use vertices out of range",
+                         path, faces, expected);
+    }
+    if (triangles == 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", path);
+    }
+    return VSH_OK;
+}
+
+static vsh_result triangulate(vshi_import *import, const char *path, const vsh_run *run, vsh_error *error) {
+    size_t faces, expected, triangles;
+    count_faces(vshi_import_scene(import), &faces, &expected);
+    if (faces == expected) {
+        return VSH_OK; /* triangles already */
+    }
+    const vsh_result result = vshi_import_triangulate(import, path, error);
+    if (result == VSH_OK) {
+        count_faces(vshi_import_scene(import), &triangles, &faces);
+        if (triangles < expected) {
+            vshi_warn(run,
+                      "%s: %zu of %zu triangles are lost: polygons that cross themselves or have no area "
+                      "cannot be cut into triangles",
+                      path, expected - triangles, expected);
+        }
+    }
+    return result;
+}
+
+vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *job, vshi_import **import,
+                                vsh_error *error) {
+    *import = NULL;
+    const char *ending = NULL;
+    size_t faces = 0;
+    struct stat status;
+    /* A missing file is that first, whatever its ending. */
+    if (stat(path, &status) != 0) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: %s", path, strerror(errno));
+    }
+    vsh_result result = check_ending(path, &ending, error);
+    if (result == VSH_OK) {
+        result = scan_file(path, ending, run, job, &faces, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_import_read(path, job, IMPORT_UNITS, import, error);
+    }
+    if (result == VSH_OK) {
+        result = check_scene(path, vshi_import_scene(*import), faces, job, error);
+    }
+    if (result == VSH_OK) {
+        result = triangulate(*import, path, run, error);
+    }
+    if (result == VSH_OK && vshi_job_advance(job, CHECK_UNITS)) {
+        result = vshi_job_fail_cancelled(job, error);
+    }
+    if (result != VSH_OK) {
+        vshi_import_free(*import);
+        *import = NULL;
+    }
+    return result;
+}

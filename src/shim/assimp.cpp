@@ -1,0 +1,108 @@
+#include "shim/assimp.h"
+
+#include "shim/guard.h"
+
+#include <assimp/config.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <assimp/Importer.hpp>
+#include <assimp/ProgressHandler.hpp>
+
+#include <algorithm>
+#include <memory>
+
+namespace {
+
+struct Cancelled : std::runtime_error {
+    Cancelled() : std::runtime_error("cancelled") {}
+};
+
+// Hands Assimp's progress to the job; leaves the reader by an exception where the job is cancelled, which
+// Assimp catches around its readers.
+class Progress : public Assimp::ProgressHandler {
+  public:
+    Progress(vshi_job *job, size_t units) : job_(job), units_(units) {}
+
+    bool Update(float) override { return !vshi_job_cancelled(job_); }
+
+    void UpdateFileRead(int current, int all) override {
+        const double fraction = all > 0 ? std::clamp(static_cast<double>(current) / all, 0.0, 1.0) : 0.0;
+        const auto reached = std::max(done_, static_cast<size_t>(fraction * static_cast<double>(units_)));
+        const size_t more = reached - done_;
+        done_ = reached;
+        // Assimp reports the end of a stage outside of what it catches; only its readers report a middle.
+        if (vshi_job_advance(job_, more) && current > 0 && current < all) {
+            throw Cancelled();
+        }
+    }
+
+  private:
+    vshi_job *job_;
+    size_t units_;
+    size_t done_ = 0;
+};
+
+// "a\nb" would break the one-line rule in a way that vshi_fail() can only patch with '?'.
+std::string first_line(const char *text) {
+    std::string line(text);
+    line.erase(std::min(line.find_first_of("\r\n"), line.size()));
+    return line.empty() ? "no reason given" : line;
+}
+
+} // namespace
+
+struct vshi_import {
+    Assimp::Importer importer;
+    const aiScene *scene = nullptr;
+};
+
+bool vshi_import_knows(const char *ending) {
+    vsh_error ignored;
+    bool knows = false;
+    vshi::guard(&ignored, VSH_ERROR_INTERNAL, "assimp", [&] {
+        knows = Assimp::Importer().IsExtensionSupported(ending);
+        return VSH_OK;
+    });
+    return knows;
+}
+
+vsh_result vshi_import_read(const char *path, vshi_job *job, size_t units, vshi_import **import,
+                            vsh_error *error) {
+    *import = nullptr;
+    return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
+        auto reader = std::make_unique<vshi_import>();
+        // Files that hold bones only would get a made-up mesh of them.
+        reader->importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
+        reader->importer.SetProgressHandler(new Progress(job, units)); // the importer deletes it
+        reader->scene = reader->importer.ReadFile(path, 0);
+        if (vshi_job_cancelled(job)) {
+            return vshi_job_fail_cancelled(job, error);
+        }
+        if (reader->scene == nullptr) {
+            return vshi_fail(error, VSH_ERROR_READ, "%s: damaged or cut short: %s", path,
+                             first_line(reader->importer.GetErrorString()).c_str());
+        }
+        *import = reader.release();
+        return VSH_OK;
+    });
+}
+
+vsh_result vshi_import_triangulate(vshi_import *import, const char *path, vsh_error *error) {
+    return vshi::guard(error, VSH_ERROR_INPUT, path, [&]() -> vsh_result {
+        import->scene = import->importer.ApplyPostProcessing(aiProcess_Triangulate);
+        if (import->scene == nullptr) {
+            return vshi_fail(error, VSH_ERROR_INPUT, "%s: polygons could not be cut into triangles: %s", path,
+                             first_line(import->importer.GetErrorString()).c_str());
+        }
+        return VSH_OK;
+    });
+}
+
+const aiScene *vshi_import_scene(const vshi_import *import) {
+    return import->scene;
+}
+
+void vshi_import_free(vshi_import *import) {
+    delete import;
+}

@@ -1,0 +1,383 @@
+/* vsh_mesh_check() against solids whose edges, area and bounds are known. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "caster/mesh.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+/* The unit cube, anticlockwise from outside: corner i is at (i & 1, i >> 1 & 1, i >> 2). The last two
+ * triangles are its top (z = 1). */
+static const float cube_positions[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
+                                           {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
+static const uint32_t cube_indices[12][3] = {{0, 2, 3}, {0, 3, 1}, {0, 1, 5}, {0, 5, 4},
+                                             {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2},
+                                             {1, 3, 7}, {1, 7, 5}, {4, 5, 7}, {4, 7, 6}};
+
+static vsh_mesh cube(void) {
+    return (vsh_mesh){.name = "cube",
+                      .positions = cube_positions[0],
+                      .indices = cube_indices[0],
+                      .vertex_count = 8,
+                      .triangle_count = 12};
+}
+
+static vsh_mesh_report check(const vsh_mesh *mesh) {
+    vsh_mesh_report report;
+    vsh_error error = {0};
+    if (vsh_mesh_check(mesh, &report, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return report;
+}
+
+static void assert_near(double value, double expected, double tolerance) {
+    if (!(fabs(value - expected) <= tolerance)) {
+        fail_msg("%.17g, expected %.17g within %g", value, expected, tolerance);
+    }
+}
+
+static void a_cube_is_closed(void **state) {
+    (void)state;
+    const vsh_mesh mesh = cube();
+    const vsh_mesh_report report = check(&mesh);
+    assert_int_equal(report.open_edges, 0);
+    assert_int_equal(report.flipped_edges, 0);
+    assert_int_equal(report.degenerate_triangles, 0);
+    assert_near(report.area, 6.0, 0.0);
+    for (int k = 0; k < 3; ++k) {
+        assert_near(report.bounds_min[k], 0.0, 0.0);
+        assert_near(report.bounds_max[k], 1.0, 0.0);
+    }
+}
+
+/* Every triangle with vertices of its own, every other zero negative. */
+static void split_vertices_and_negative_zeros_open_nothing(void **state) {
+    (void)state;
+    float positions[36][3];
+    uint32_t indices[36];
+    for (uint32_t i = 0; i < 36; ++i) {
+        indices[i] = i;
+        for (int k = 0; k < 3; ++k) {
+            const float value = cube_positions[cube_indices[i / 3][i % 3]][k];
+            positions[i][k] = value == 0.0F && i % 2 == 1 ? -0.0F : value;
+        }
+    }
+    const vsh_mesh mesh = {
+        .positions = positions[0], .indices = indices, .vertex_count = 36, .triangle_count = 12};
+    const vsh_mesh_report report = check(&mesh);
+    assert_int_equal(report.open_edges, 0);
+    assert_int_equal(report.flipped_edges, 0);
+}
+
+static void a_cube_without_its_top_has_four_open_edges(void **state) {
+    (void)state;
+    vsh_mesh mesh = cube();
+    mesh.triangle_count = 10;
+    const vsh_mesh_report report = check(&mesh);
+    assert_int_equal(report.open_edges, 4);
+    assert_int_equal(report.flipped_edges, 0);
+    assert_near(report.area, 5.0, 0.0);
+}
+
+static void a_flipped_face_has_its_four_sides_flipped(void **state) {
+    (void)state;
+    uint32_t indices[12][3];
+    memcpy(indices, cube_indices, sizeof indices);
+    for (int i = 10; i < 12; ++i) {
+        indices[i][1] = cube_indices[i][2];
+        indices[i][2] = cube_indices[i][1];
+    }
+    vsh_mesh mesh = cube();
+    mesh.indices = indices[0];
+    const vsh_mesh_report report = check(&mesh);
+    assert_int_equal(report.open_edges, 0);
+    assert_int_equal(report.flipped_edges, 4);
+}
+
+/* Two cubes that share the edge x = y = 1: four triangles meet there, two each way. */
+static void two_cubes_touching_along_an_edge_are_closed_and_agree(void **state) {
+    (void)state;
+    float positions[16][3];
+    uint32_t indices[24][3];
+    for (int i = 0; i < 16; ++i) {
+        for (int k = 0; k < 3; ++k) {
+            positions[i][k] = cube_positions[i % 8][k] + (i >= 8 && k < 2 ? 1.0F : 0.0F);
+        }
+    }
+    for (int i = 0; i < 24; ++i) {
+        for (int k = 0; k < 3; ++k) {
+            indices[i][k] = cube_indices[i % 12][k] + (i >= 12 ? 8 : 0);
+        }
+    }
+    const vsh_mesh mesh = {
+        .positions = positions[0], .indices = indices[0], .vertex_count = 16, .triangle_count = 24};
+    const vsh_mesh_report report = check(&mesh);
+    assert_int_equal(report.open_edges, 0);
+    assert_int_equal(report.flipped_edges, 0);
+}
+
+static void degenerate_triangles_are_counted_and_change_nothing_else(void **state) {
+    (void)state;
+    float positions[11][3] = {{0}};
+    memcpy(positions, cube_positions, sizeof cube_positions);
+    for (int i = 0; i < 3; ++i) {
+        positions[8 + i][0] = 10.0F + 0.1F * (float)i; /* far away, on a line */
+    }
+    positions[10][0] = 2.0F * positions[9][0] - positions[8][0];
+    uint32_t indices[15][3] = {{8, 9, 10}, {3, 3, 5}, {7, 7, 7}};
+    memcpy(indices + 3, cube_indices, sizeof cube_indices);
+    const vsh_mesh mesh = {
+        .positions = positions[0], .indices = indices[0], .vertex_count = 11, .triangle_count = 15};
+    const vsh_mesh_report report = check(&mesh);
+    assert_int_equal(report.degenerate_triangles, 3);
+    assert_int_equal(report.open_edges, 0);
+    assert_near(report.bounds_max[0], 1.0, 0.0);
+    assert_near(report.area, 6.0, 0.0);
+}
+
+/* The top's front edge is cut at (1/2, 0, 1), that of the front is not: the triangle (4, 8, 5) closes the
+ * gap. */
+static void a_flat_triangle_that_joins_a_cut_edge_closes_the_mesh(void **state) {
+    (void)state;
+    float positions[9][3];
+    memcpy(positions, cube_positions, sizeof cube_positions);
+    memcpy(positions[8], (float[3]){0.5F, 0.0F, 1.0F}, sizeof positions[8]);
+    uint32_t indices[14][3];
+    memcpy(indices, cube_indices, sizeof cube_indices);
+    const uint32_t top[4][3] = {{4, 8, 7}, {8, 5, 7}, {4, 7, 6}, {4, 5, 8}};
+    memcpy(indices + 10, top, sizeof top);
+    const vsh_mesh mesh = {
+        .positions = positions[0], .indices = indices[0], .vertex_count = 9, .triangle_count = 14};
+    vsh_mesh_report report = check(&mesh);
+    assert_int_equal(report.degenerate_triangles, 1);
+    assert_int_equal(report.open_edges, 0);
+    assert_int_equal(report.flipped_edges, 0);
+    vsh_mesh cut = mesh;
+    cut.triangle_count = 13;
+    report = check(&cut);
+    assert_int_equal(report.open_edges, 3);
+}
+
+static void an_empty_mesh_has_empty_bounds(void **state) {
+    (void)state;
+    vsh_mesh mesh = cube();
+    mesh.triangle_count = 0;
+    const vsh_mesh_report report = check(&mesh);
+    assert_true(report.bounds_min[0] > report.bounds_max[0]);
+    assert_int_equal(report.open_edges, 0);
+    const vsh_mesh nothing = {0};
+    assert_true(check(&nothing).bounds_min[2] > check(&nothing).bounds_max[2]);
+}
+
+/* A quarter turn about z, scaled by (2, 3, 4), moved by (100, 200, 300). */
+static const double turned[12] = {0, -3, 0, 100, 2, 0, 0, 200, 0, 0, 4, 300};
+
+static void area_and_bounds_are_of_the_world(void **state) {
+    (void)state;
+    vsh_mesh mesh = cube();
+    mesh.transform = turned;
+    const vsh_mesh_report report = check(&mesh);
+    assert_near(report.area, 2.0 * (6.0 + 12.0 + 8.0), 1e-12);
+    const double lowest[3] = {97, 200, 300}, highest[3] = {100, 202, 304};
+    for (int k = 0; k < 3; ++k) {
+        assert_near(report.bounds_min[k], lowest[k], 0.0);
+        assert_near(report.bounds_max[k], highest[k], 0.0);
+    }
+}
+
+/* Sum of a · (b × c) / 6 over the triangles: the volume, positive where they are anticlockwise from outside.
+ */
+static double volume(const vsh_mesh *mesh) {
+    double sum = 0.0;
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        vshi_vec corner[3];
+        vshi_mesh_triangle(mesh, i, corner);
+        sum += vshi_dot(corner[0], vshi_cross(corner[1], corner[2])) / 6.0;
+    }
+    return sum;
+}
+
+static void a_mirrored_transform_keeps_the_outside_outside(void **state) {
+    (void)state;
+    const double mirrored[12] = {-2, 0, 0, 0, 0, 3, 0, 0, 0, 0, 4, 0};
+    vsh_mesh mesh = cube();
+    assert_near(volume(&mesh), 1.0, 1e-12);
+    mesh.transform = mirrored;
+    assert_near(volume(&mesh), 24.0, 1e-12);
+    vshi_vec corner[3];
+    uint32_t vertex[3];
+    vshi_mesh_triangle_of(&mesh, 2, corner, vertex);
+    for (int k = 0; k < 3; ++k) {
+        assert_near(corner[k].x, -2.0 * (double)cube_positions[vertex[k]][0], 0.0);
+    }
+    assert_int_equal(check(&mesh).flipped_edges, 0);
+}
+
+static void refused(const vsh_mesh *mesh, vsh_result code, const char *part, const char *other) {
+    vsh_mesh_report report = {.open_edges = 77};
+    vsh_error error = {0};
+    assert_int_equal(vsh_mesh_check(mesh, &report, &error), code);
+    assert_int_equal(error.code, code);
+    assert_int_equal(report.open_edges, 77);
+    if (strstr(error.message, part) == NULL || strstr(error.message, other) == NULL) {
+        fail_msg("'%s' does not name %s and %s", error.message, part, other);
+    }
+}
+
+static void vertices_that_are_not_finite_are_refused_by_number(void **state) {
+    (void)state;
+    static const float bad[] = {NAN, INFINITY, -INFINITY};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+        float positions[8][3];
+        memcpy(positions, cube_positions, sizeof positions);
+        positions[6][i] = bad[i];
+        vsh_mesh mesh = cube();
+        mesh.positions = positions[0];
+        refused(&mesh, VSH_ERROR_INPUT, "'cube'", "vertex 6");
+    }
+}
+
+static void an_index_out_of_range_is_refused_by_number(void **state) {
+    (void)state;
+    uint32_t indices[12][3];
+    memcpy(indices, cube_indices, sizeof indices);
+    indices[7][2] = 99;
+    vsh_mesh mesh = cube();
+    mesh.indices = indices[0];
+    refused(&mesh, VSH_ERROR_INPUT, "triangle 7", "99");
+    indices[7][2] = UINT32_MAX;
+    refused(&mesh, VSH_ERROR_INPUT, "triangle 7", "4294967295");
+}
+
+static void transforms_that_flatten_or_are_not_finite_are_refused(void **state) {
+    (void)state;
+    double transform[12];
+    vsh_mesh mesh = cube();
+    mesh.transform = transform;
+    memcpy(transform, turned, sizeof transform);
+    transform[3] = NAN;
+    refused(&mesh, VSH_ERROR_INPUT, "transform", "row 0 column 3");
+    memcpy(transform, turned, sizeof transform);
+    transform[10] = 0.0;
+    refused(&mesh, VSH_ERROR_INPUT, "'cube'", "flattens");
+    memcpy(transform, turned, sizeof transform);
+    transform[3] = 1e300;
+    transform[1] = -1e30;
+    check(&mesh); /* far and stretched, but a transform */
+    for (int i = 0; i < 12; ++i) {
+        transform[i] = turned[i] * 1e-30;
+    }
+    check(&mesh); /* small is not flat */
+}
+
+static void arrays_that_are_missing_are_refused(void **state) {
+    (void)state;
+    vsh_mesh mesh = cube();
+    mesh.indices = NULL;
+    refused(&mesh, VSH_ERROR_ARGUMENT, "'cube'", "indices");
+    mesh = cube();
+    mesh.positions = NULL;
+    refused(&mesh, VSH_ERROR_ARGUMENT, "'cube'", "positions");
+    vsh_error error;
+    assert_int_equal(vsh_mesh_check(NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    mesh = cube();
+    assert_int_equal(vsh_mesh_check(&mesh, NULL, NULL), VSH_ERROR_ARGUMENT);
+}
+
+static void labels_say_name_or_number_and_keep_whole_characters(void **state) {
+    (void)state;
+    vsh_mesh mesh = {.name = "sail"};
+    assert_string_equal(vshi_mesh_label(&mesh, 3).text, "mesh 'sail'");
+    mesh.name = "";
+    assert_string_equal(vshi_mesh_label(&mesh, 3).text, "mesh 3");
+    mesh.name = NULL;
+    assert_string_equal(vshi_mesh_label(&mesh, VSHI_MESH_ALONE).text, "mesh");
+    for (size_t shift = 0; shift < 2; ++shift) {
+        char name[400] = "a";
+        for (size_t i = shift; i + 2 < sizeof name; i += 2) {
+            memcpy(name + i, "é", 2);
+        }
+        mesh.name = name;
+        const vshi_mesh_name label = vshi_mesh_label(&mesh, 0);
+        const char *tail = label.text + strlen(label.text) - strlen("é…'");
+        assert_string_equal(tail, "é…'");
+    }
+}
+
+/* A closed grid: two sheets of n × n quads over each other, joined at the rim. */
+static void a_million_triangles_take_about_a_second(void **state) {
+    (void)state;
+    enum { N = 500, SIDE = N + 1 };
+    float *positions = malloc(2 * SIDE * SIDE * sizeof(float[3]));
+    uint32_t *indices = malloc((4 * N * N + 8 * N) * sizeof(uint32_t[3]));
+    size_t count = 0;
+    for (uint32_t i = 0; i < 2 * SIDE * SIDE; ++i) {
+        const uint32_t cell = i % (SIDE * SIDE);
+        positions[3 * i] = (float)(cell % SIDE);
+        positions[3 * i + 1] = (float)(cell / SIDE);
+        positions[3 * i + 2] = i < SIDE * SIDE ? 0.0F : 1.0F;
+    }
+#define TRIANGLE(a, b, c) (memcpy(indices + 3 * count++, (uint32_t[3]){a, b, c}, sizeof(uint32_t[3])))
+    const uint32_t up = SIDE * SIDE;
+    for (uint32_t y = 0; y < N; ++y) {
+        for (uint32_t x = 0; x < N; ++x) {
+            const uint32_t a = y * SIDE + x, b = a + 1, c = a + SIDE + 1, d = a + SIDE;
+            TRIANGLE(a, c, b);
+            TRIANGLE(a, d, c);
+            TRIANGLE(up + a, up + b, up + c);
+            TRIANGLE(up + a, up + c, up + d);
+        }
+    }
+    for (uint32_t i = 0; i < N; ++i) {
+        const uint32_t sides[4][2] = {{i, i + 1},
+                                      {N + i * SIDE, N + (i + 1) * SIDE},
+                                      {N * SIDE + i + 1, N * SIDE + i},
+                                      {(i + 1) * SIDE, i * SIDE}};
+        for (int s = 0; s < 4; ++s) {
+            TRIANGLE(sides[s][0], sides[s][1], up + sides[s][1]);
+            TRIANGLE(sides[s][0], up + sides[s][1], up + sides[s][0]);
+        }
+    }
+#undef TRIANGLE
+    const vsh_mesh mesh = {
+        .positions = positions, .indices = indices, .vertex_count = 2 * SIDE * SIDE, .triangle_count = count};
+    const clock_t start = clock();
+    const vsh_mesh_report report = check(&mesh);
+    const double seconds = (double)(clock() - start) / CLOCKS_PER_SEC;
+    assert_int_equal(report.open_edges, 0);
+    assert_int_equal(report.flipped_edges, 0);
+    assert_near(report.area, 2.0 * N * N + 4.0 * N, 1e-6);
+    print_message("%zu triangles: %.3f s\n", count, seconds);
+    assert_true(seconds < 10.0); /* 0.12 s measured; sanitizers and busy machines take longer */
+    free(indices);
+    free(positions);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_cube_is_closed),
+        cmocka_unit_test(split_vertices_and_negative_zeros_open_nothing),
+        cmocka_unit_test(a_cube_without_its_top_has_four_open_edges),
+        cmocka_unit_test(a_flipped_face_has_its_four_sides_flipped),
+        cmocka_unit_test(two_cubes_touching_along_an_edge_are_closed_and_agree),
+        cmocka_unit_test(degenerate_triangles_are_counted_and_change_nothing_else),
+        cmocka_unit_test(a_flat_triangle_that_joins_a_cut_edge_closes_the_mesh),
+        cmocka_unit_test(an_empty_mesh_has_empty_bounds),
+        cmocka_unit_test(area_and_bounds_are_of_the_world),
+        cmocka_unit_test(a_mirrored_transform_keeps_the_outside_outside),
+        cmocka_unit_test(vertices_that_are_not_finite_are_refused_by_number),
+        cmocka_unit_test(an_index_out_of_range_is_refused_by_number),
+        cmocka_unit_test(transforms_that_flatten_or_are_not_finite_are_refused),
+        cmocka_unit_test(arrays_that_are_missing_are_refused),
+        cmocka_unit_test(labels_say_name_or_number_and_keep_whole_characters),
+        cmocka_unit_test(a_million_triangles_take_about_a_second),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
