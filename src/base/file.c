@@ -1,0 +1,205 @@
+#include "base/file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum {
+    NAME_ROOM = 48,        /* bytes that the temporary's name adds: dots, process, number, "tmp" */
+    MAX_TEMPORARIES = 1000 /* of one target and process at a time */
+};
+
+static const char *last_part(const char *path) {
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+const char *vshi_path_ending(const char *path) {
+    const char *name = last_part(path);
+    const char *dot = strrchr(name, '.');
+    return dot != NULL && dot != name ? dot + 1 : "";
+}
+
+/* The folder of the path, in new memory: "." where the path names none. */
+static char *folder_of(const char *path) {
+    const char *name = last_part(path);
+    if (name == path) {
+        return strdup(".");
+    }
+    const size_t length = (size_t)(name - path);
+    return strndup(path, length > 1 ? length - 1 : 1);
+}
+
+static vsh_result check_target(const char *path, vsh_error *error) {
+    struct stat status;
+    if (stat(path, &status) != 0) {
+        return errno == ENOENT
+                   ? VSH_OK
+                   : vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", path, strerror(errno));
+    }
+    if (S_ISDIR(status.st_mode)) {
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: it is a folder", path);
+    }
+    if (!S_ISREG(status.st_mode)) {
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: it is no regular file", path);
+    }
+    /* rename() would pass over a read-only file, which its owner meant to keep */
+    if (access(path, W_OK) != 0) {
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", path, strerror(errno));
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_output_check(const char *path, vsh_error *error) {
+    if (path == NULL || path[0] == '\0') {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "output path: it is empty");
+    }
+    if (last_part(path)[0] == '\0') {
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: it is a folder", path);
+    }
+    char *folder = folder_of(path);
+    if (folder == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    }
+    struct stat status;
+    vsh_result result;
+    if (stat(folder, &status) != 0 || access(folder, W_OK | X_OK) != 0) {
+        result = vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: folder '%s': %s", path, folder,
+                           strerror(errno));
+    } else {
+        result = check_target(path, error);
+    }
+    free(folder);
+    return result;
+}
+
+/* Creates ".NAME.PID.tmp.ENDING" beside the target (with a number where that name is taken) and returns its
+ * descriptor, or -1 with errno. `text` has room for the target and NAME_ROOM more. */
+static int create_beside(const char *target, char *text, size_t capacity) {
+    const char *name = last_part(target);
+    const char *ending = vshi_path_ending(target);
+    const size_t ending_length = strlen(ending);
+    const int folder_length = (int)(name - target);
+    size_t stem_length = ending_length > 0 ? (size_t)(ending - name) - 1 : strlen(name);
+    const size_t room = ending_length + NAME_ROOM < NAME_MAX ? NAME_MAX - ending_length - NAME_ROOM : 0;
+    stem_length = stem_length < room ? stem_length : room;
+    for (int number = 0; number < MAX_TEMPORARIES; ++number) {
+        char tag[NAME_ROOM];
+        if (number == 0) {
+            snprintf(tag, sizeof tag, "%ld", (long)getpid());
+        } else {
+            snprintf(tag, sizeof tag, "%ld-%d", (long)getpid(), number);
+        }
+        snprintf(text, capacity, "%.*s.%.*s.%s.tmp%s%s", folder_length, target, (int)stem_length, name, tag,
+                 ending_length > 0 ? "." : "", ending);
+        const int file = open(text, O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
+        if (file >= 0 || errno != EEXIST) {
+            return file;
+        }
+    }
+    return -1;
+}
+
+vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *error) {
+    *output = (vshi_output){NULL, NULL};
+    vsh_result result = vshi_output_check(path, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    struct stat old;
+    const bool replaces = stat(path, &old) == 0;
+    output->target = replaces ? realpath(path, NULL) : strdup(path);
+    const size_t capacity = output->target != NULL ? strlen(output->target) + NAME_ROOM : 0;
+    output->temporary = output->target != NULL ? malloc(capacity) : NULL;
+    if (output->temporary == NULL) {
+        free(output->target);
+        output->target = NULL;
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    }
+    const int file = create_beside(output->target, output->temporary, capacity);
+    if (file < 0) {
+        result = vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", path, strerror(errno));
+        free(output->temporary);
+        free(output->target);
+        *output = (vshi_output){NULL, NULL};
+        return result;
+    }
+    if (replaces && fchmod(file, old.st_mode & 0777) != 0) {
+        /* some file systems have no modes; the new file then has the usual ones */
+        errno = 0;
+    }
+    close(file);
+    return VSH_OK;
+}
+
+static vsh_result finish(const char *temporary, const char *target, vsh_error *error) {
+    const int file = open(temporary, O_RDONLY | O_CLOEXEC);
+    if (file < 0) {
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", target, strerror(errno));
+    }
+    const bool flushed = fsync(file) == 0 || errno == EINVAL; /* EINVAL: the file system cannot sync */
+    const int flush_error = errno;
+    const bool closed = close(file) == 0;
+    if (!flushed || !closed) {
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", target,
+                         strerror(flushed ? errno : flush_error));
+    }
+    if (rename(temporary, target) != 0) {
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be put in place: %s", target,
+                         strerror(errno));
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_output_commit(vshi_output *output, vsh_error *error) {
+    const vsh_result result = finish(output->temporary, output->target, error);
+    if (result == VSH_OK) {
+        free(output->temporary);
+        output->temporary = NULL;
+    }
+    vshi_output_abandon(output);
+    return result;
+}
+
+void vshi_output_abandon(vshi_output *output) {
+    if (output->temporary != NULL) {
+        unlink(output->temporary);
+    }
+    free(output->temporary);
+    free(output->target);
+    *output = (vshi_output){NULL, NULL};
+}
+
+vshi_sink vshi_sink_open(const char *path) {
+    vshi_sink sink = {open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666), 0};
+    sink.error = sink.file < 0 ? errno : 0;
+    return sink;
+}
+
+bool vshi_sink_write(vshi_sink *sink, const void *data, size_t size, uint64_t offset) {
+    const char *bytes = data;
+    while (sink->error == 0 && size > 0) {
+        const ssize_t written = pwrite(sink->file, bytes, size, (off_t)offset);
+        if (written > 0) {
+            bytes += written;
+            size -= (size_t)written;
+            offset += (uint64_t)written;
+        } else if (written == 0 || errno != EINTR) {
+            sink->error = written == 0 ? ENOSPC : errno;
+        }
+    }
+    return sink->error == 0;
+}
+
+int vshi_sink_close(vshi_sink *sink) {
+    if (sink->file >= 0 && close(sink->file) != 0 && sink->error == 0) {
+        sink->error = errno;
+    }
+    sink->file = -1;
+    return sink->error;
+}

@@ -1,0 +1,194 @@
+#include "image/exr.h"
+
+#include "base/file.h"
+#include "base/memory.h"
+
+#include <Imath/half.h>
+#include <openexr.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* OpenEXR would print its messages; ours come from the sink and from its codes. It may hold its lock on the
+ * context here, so the context must not be asked for anything. */
+static void say_nothing(exr_const_context_t context, exr_result_t code, const char *message) {
+    (void)context;
+    (void)code;
+    (void)message;
+}
+
+/* After a failed write OpenEXR 3.1.5 waits for ever on its own lock, so it is told of none: the sink keeps
+ * it, and the caller looks there. */
+static int64_t write_bytes(exr_const_context_t context, void *user, const void *data, uint64_t size,
+                           uint64_t offset, exr_stream_error_func_ptr_t fail) {
+    (void)context;
+    (void)fail;
+    vshi_sink *sink = user;
+    vshi_sink_write(sink, data, (size_t)size, offset);
+    return (int64_t)size;
+}
+
+/* A file being written. */
+typedef struct exr_writer {
+    exr_context_t context;
+    int part;
+    const vshi_planes *planes;
+    int32_t order[VSH_MAX_CHANNELS]; /* file's channel → index of planes: by name, as EXR keeps them */
+    exr_pixel_type_t type;
+    size_t value_size;    /* bytes */
+    int32_t lines;        /* scan lines in a chunk */
+    unsigned char *chunk; /* [count][lines][width] values */
+    exr_encode_pipeline_t pipeline;
+    bool pipeline_ready;
+} exr_writer;
+
+static void sort_by_name(const vshi_planes *planes, int32_t *order) {
+    for (int32_t i = 0; i < planes->count; ++i) {
+        int32_t at = i;
+        while (at > 0 && strcmp(planes->planes[order[at - 1]].name, planes->planes[i].name) > 0) {
+            order[at] = order[at - 1];
+            --at;
+        }
+        order[at] = i;
+    }
+}
+
+static exr_result_t write_header(exr_writer *writer) {
+    const vshi_planes *planes = writer->planes;
+    exr_result_t status = exr_set_longname_support(writer->context, 1);
+    if (status == EXR_ERR_SUCCESS) {
+        status = exr_add_part(writer->context, NULL, EXR_STORAGE_SCANLINE, &writer->part);
+    }
+    if (status == EXR_ERR_SUCCESS) {
+        status = exr_initialize_required_attr_simple(writer->context, writer->part, planes->width,
+                                                     planes->height, EXR_COMPRESSION_ZIP);
+    }
+    if (status == EXR_ERR_SUCCESS) {
+        char software[64];
+        snprintf(software, sizeof software, "vdbshade %s", vsh_version());
+        status = exr_attr_set_string(writer->context, writer->part, "software", software);
+    }
+    for (int32_t c = 0; status == EXR_ERR_SUCCESS && c < planes->count; ++c) {
+        status = exr_add_channel(writer->context, writer->part, planes->planes[writer->order[c]].name,
+                                 writer->type, EXR_PERCEPTUALLY_LINEAR, 1, 1);
+    }
+    if (status == EXR_ERR_SUCCESS) {
+        status = exr_write_header(writer->context);
+    }
+    if (status == EXR_ERR_SUCCESS) {
+        status = exr_get_scanlines_per_chunk(writer->context, writer->part, &writer->lines);
+    }
+    return status;
+}
+
+static void fill_values(const exr_writer *writer, const vshi_plane *plane, size_t first, size_t count,
+                        unsigned char *to) {
+    if (writer->type == EXR_PIXEL_FLOAT && plane->values != NULL) {
+        memcpy(to, plane->values + first, count * sizeof(float));
+        return;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        const float value = plane->values != NULL ? plane->values[first + i] : plane->constant;
+        if (writer->type == EXR_PIXEL_FLOAT) {
+            memcpy(to + i * sizeof value, &value, sizeof value);
+        } else {
+            const imath_half_bits_t half_value = imath_float_to_half(value);
+            memcpy(to + i * sizeof half_value, &half_value, sizeof half_value);
+        }
+    }
+}
+
+static exr_result_t write_chunk(exr_writer *writer, int32_t row) {
+    const vshi_planes *planes = writer->planes;
+    exr_encode_pipeline_t *pipeline = &writer->pipeline;
+    exr_chunk_info_t info;
+    exr_result_t status = exr_write_scanline_chunk_info(writer->context, writer->part, row, &info);
+    if (status != EXR_ERR_SUCCESS) {
+        return status;
+    }
+    const bool first = !writer->pipeline_ready;
+    status = first ? exr_encoding_initialize(writer->context, writer->part, &info, pipeline)
+                   : exr_encoding_update(writer->context, writer->part, &info, pipeline);
+    if (status != EXR_ERR_SUCCESS) {
+        return status;
+    }
+    writer->pipeline_ready = true;
+    const size_t width = (size_t)planes->width;
+    const int32_t left = planes->height - row;
+    const size_t lines = (size_t)(left < writer->lines ? left : writer->lines);
+    for (int32_t c = 0; c < planes->count; ++c) {
+        unsigned char *values =
+            writer->chunk + (size_t)c * (size_t)writer->lines * width * writer->value_size;
+        fill_values(writer, &planes->planes[writer->order[c]], (size_t)row * width, lines * width, values);
+        exr_coding_channel_info_t *channel = &pipeline->channels[c];
+        channel->encode_from_ptr = values;
+        channel->user_pixel_stride = (int32_t)writer->value_size;
+        channel->user_line_stride = (int32_t)(width * writer->value_size);
+    }
+    if (first) {
+        status = exr_encoding_choose_default_routines(writer->context, writer->part, pipeline);
+    }
+    return status == EXR_ERR_SUCCESS ? exr_encoding_run(writer->context, writer->part, pipeline) : status;
+}
+
+vsh_result vshi_exr_write(const char *temporary, const char *path, const vshi_planes *planes, int32_t bits,
+                          vsh_error *error) {
+    enum { MAX_CHUNK_LINES = 16 }; /* ZIP's */
+    const size_t value_size = bits == 16 ? sizeof(imath_half_bits_t) : sizeof(float);
+    const double chunk_bytes =
+        (double)planes->count * (double)planes->width * (double)value_size * MAX_CHUNK_LINES;
+    if (chunk_bytes > (double)INT32_MAX) {
+        return vshi_fail(error, VSH_ERROR_LIMIT,
+                         "%s: %d pixels of %d channels in a row are more than OpenEXR's 2 GiB a chunk", path,
+                         planes->width, planes->count);
+    }
+    vshi_sink sink = vshi_sink_open(temporary);
+    exr_writer writer = {
+        .planes = planes, .type = bits == 16 ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT, .value_size = value_size};
+    sort_by_name(planes, writer.order);
+    exr_context_initializer_t setup = EXR_DEFAULT_CONTEXT_INITIALIZER;
+    setup.error_handler_fn = say_nothing;
+    setup.user_data = &sink;
+    setup.write_fn = write_bytes;
+
+    vsh_result result = VSH_OK;
+    void *chunk = NULL;
+    exr_result_t status = exr_start_write(&writer.context, temporary, EXR_WRITE_FILE_DIRECTLY, &setup);
+    if (status != EXR_ERR_SUCCESS) {
+        goto done;
+    }
+    status = write_header(&writer);
+    if (status != EXR_ERR_SUCCESS) {
+        goto done;
+    }
+    result = vshi_allocate(&chunk, (size_t)planes->count * (size_t)writer.lines * (size_t)planes->width,
+                           value_size, path, error);
+    if (result != VSH_OK) {
+        goto done;
+    }
+    writer.chunk = chunk;
+    for (int64_t row = 0; status == EXR_ERR_SUCCESS && sink.error == 0 && row < planes->height;
+         row += writer.lines) {
+        status = write_chunk(&writer, (int32_t)row);
+    }
+
+done:
+    if (writer.pipeline_ready) {
+        exr_encoding_destroy(writer.context, &writer.pipeline);
+    }
+    if (writer.context != NULL) {
+        /* writes the table of chunks, so it can fail as well */
+        const exr_result_t finished = exr_finish(&writer.context);
+        status = status != EXR_ERR_SUCCESS ? status : finished;
+    }
+    free(chunk);
+    const int number = vshi_sink_close(&sink);
+    if (result == VSH_OK && number != 0) {
+        result = vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", path, strerror(number));
+    } else if (result == VSH_OK && status != EXR_ERR_SUCCESS) {
+        result = vshi_fail(error, status == EXR_ERR_OUT_OF_MEMORY ? VSH_ERROR_MEMORY : VSH_ERROR_WRITE,
+                           "%s: could not be written: %s", path, exr_get_default_error_message(status));
+    }
+    return result;
+}

@@ -1,0 +1,59 @@
+/* What the image writers are given, and what the readers fill. */
+#ifndef VSHI_PLANES_H
+#define VSHI_PLANES_H
+
+#include "base/error.h"
+
+#include <vdbshade/image.h>
+
+#include <stdbool.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The most values that one image may have: 8 GiB of floats. */
+#define VSHI_MAX_VALUES (UINT64_C(1) << 31)
+
+typedef struct vshi_plane {
+    const char *name;
+    const float *values; /* [height × width]; NULL: `constant` everywhere */
+    float constant;
+} vshi_plane;
+
+/* The channels of a file, in its order. */
+typedef struct vshi_planes {
+    int32_t width;
+    int32_t height;
+    int32_t count;
+    vshi_plane planes[VSH_MAX_CHANNELS];
+} vshi_planes;
+
+enum { VSHI_FILE_NAME = 256 }; /* EXR's longest channel name is 255 bytes */
+
+struct vsh_image_file {
+    int32_t width;
+    int32_t height;
+    int32_t channel_count;
+    float *values; /* the planes, one after the other */
+    char (*text)[VSHI_FILE_NAME];
+    const char *names[VSH_MAX_CHANNELS];
+    const float *planes[VSH_MAX_CHANNELS];
+};
+
+/* VSH_ERROR_LIMIT where the product passes VSHI_MAX_VALUES; all three are positive. */
+vsh_result vshi_check_values(const char *path, int64_t width, int64_t height, int64_t channels,
+                             vsh_error *error);
+
+/* An image of zeros with empty names. Errors: VSH_ERROR_INPUT (an extent that is not positive),
+ * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+vsh_result vshi_image_file_new(const char *path, int64_t width, int64_t height, int64_t channels,
+                               vsh_image_file **file, vsh_error *error);
+
+/* Cut to VSHI_FILE_NAME. */
+void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *name);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,39 @@
+/* Every image format but OpenEXR, through OpenImageIO. */
+#ifndef VSHI_OIIO_H
+#define VSHI_OIIO_H
+
+#include "image/planes.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { VSHI_BITS_8 = 1, VSHI_BITS_16 = 2, VSHI_BITS_32 = 4 };
+
+/* What a format can hold. 8 and 16 are integers, 32 is float. */
+typedef struct vshi_format {
+    const char *name; /* OpenImageIO's: "png" */
+    int32_t bits;     /* VSHI_BITS_… that it can be written with */
+    bool alpha;       /* keeps R, G and B where A is 0, too */
+    int32_t max_size; /* pixels along a side */
+    bool reports;     /* its writer goes through our own file writing, so that a full disk shows */
+} vshi_format;
+
+/* The format that the path's ending stands for, if it can be written. Thread safe. */
+bool vshi_oiio_format(const char *path, vshi_format *format);
+
+/* The endings that vshi_oiio_format() knows, for messages. */
+const char *vshi_oiio_endings(void);
+
+/* Writes R, G, B and perhaps A into the existing file `temporary`; messages name `path`. `bits` is one that
+ * the format has. Errors: VSH_ERROR_WRITE, VSH_ERROR_MEMORY. Thread safe. */
+vsh_result vshi_oiio_write(const char *temporary, const char *path, const vshi_format *format,
+                           const vshi_planes *planes, int32_t bits, vsh_error *error);
+
+/* Errors: VSH_ERROR_INPUT, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Thread safe. */
+vsh_result vshi_oiio_read(const char *path, vsh_image_file **file, vsh_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
