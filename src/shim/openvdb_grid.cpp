@@ -2,8 +2,9 @@
 #include "shim/openvdb_grid.h"
 
 #include <cmath>
-#include <cstring>
+#include <cstdio>
 #include <memory>
+#include <tbb/info.h>
 #include <unistd.h>
 #include <vector>
 
@@ -108,7 +109,9 @@ void check_memory(const vsh_run *run, double voxel, double leaves, double bytes,
 
 Stage::Stage(const vsh_run &run, const char *name, vsh_error *error_)
     : options(run), job(vshi_job_begin(&run, name, UNITS)), error(error_),
-      arena(run.threads > 0 ? run.threads : tbb::task_arena::automatic) {
+      // TBB prints a warning where an arena asks for more threads than the machine has cores.
+      arena(run.threads > 0 ? std::min(run.threads, tbb::info::default_concurrency())
+                            : tbb::task_arena::automatic) {
     if (job == nullptr) {
         throw std::bad_alloc();
     }
@@ -165,6 +168,7 @@ void set_bounds(vsh_grid_info &info, const double *transform, const openvdb::Coo
 struct Closed {
     openvdb::CoordBBox box;
     size_t active = 0;
+    bool uniform = true; // all of one sign
 };
 
 Closed close_leaf(Leaf &leaf, float background, float voxel) {
@@ -179,6 +183,7 @@ Closed close_leaf(Leaf &leaf, float background, float voxel) {
             values[i] = std::copysign(background, value);
             leaf.setValueOff(i);
         }
+        closed.uniform &= std::signbit(value) == std::signbit(values[0]);
         if (value < voxel) {
             closed.box.expand(leaf.offsetToGlobalCoord(i));
         }
@@ -206,9 +211,13 @@ vsh_grid *close_grid(const FloatGrid::Ptr &level_set, double shell, Stage &stage
 
     openvdb::CoordBBox box;
     vsh_grid_info info{};
-    for (const Closed &leaf : closed) {
-        box.expand(leaf.box);
-        info.active_voxels += leaf.active;
+    for (size_t i = 0; i < leaves.size(); ++i) {
+        box.expand(closed[i].box);
+        info.active_voxels += closed[i].active;
+        if (closed[i].active == 0 && closed[i].uniform) {
+            const float value = leaves[i]->getFirstValue(); // a copy: the tile takes the leaf's place
+            level_set->tree().addTile(1, leaves[i]->origin(), value, false);
+        }
     }
     info.voxel_size = voxel;
     info.half_width = double(background) / voxel;

@@ -1,8 +1,11 @@
 // Distances to surfaces of triangles and quads, by OpenVDB's mesh conversion.
 #include "shim/openvdb_mesh.h"
 
+#include "shim/openvdb_closest.h"
+
 #include <chrono>
 #include <cmath>
+#include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/MeshToVolume.h>
 
 namespace vshi {
@@ -38,19 +41,31 @@ class Interrupter : public openvdb::util::NullInterrupter {
     std::atomic<std::chrono::steady_clock::rep> next{0};
 };
 
+using openvdb::Int32;
 using Adapter = openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec4I>;
+
+// Bands are asked for a little wider, because the conversion's errors leave holes at their rims.
+constexpr double RIM = 1.0;
 
 FloatGrid::Ptr convert(const Surface &surface, const Lattice &lattice, double half_width, int flags,
                        double begin, double end, Stage &stage) {
-    Interrupter interrupter(stage, begin, end);
+    namespace tools = openvdb::tools;
+    const double middle = begin + 0.6 * (end - begin);
+    Interrupter interrupter(stage, begin, middle);
+    const openvdb::Int32Grid::Ptr nearest = openvdb::Int32Grid::create(Int32(openvdb::util::INVALID_IDX));
     FloatGrid::Ptr grid;
     stage.run([&] {
         const Adapter adapter(surface.points, surface.polygons);
-        grid = openvdb::tools::meshToVolume<FloatGrid>(
-            static_cast<openvdb::util::NullInterrupter &>(interrupter), adapter, *lattice.transform(),
-            float(half_width), float(half_width), flags);
+        const float band = float(half_width + RIM);
+        // Renormalising is for bumps of the distances that are measured again below.
+        grid = tools::meshToVolume<FloatGrid>(
+            static_cast<openvdb::util::NullInterrupter &>(interrupter), adapter, *lattice.transform(), band,
+            band, flags | tools::DISABLE_RENORMALIZATION | tools::DISABLE_NARROW_BAND_TRIMMING,
+            nearest.get());
     });
     stage.check();
+    measure_again(*grid, *nearest, surface, lattice.voxel, middle, end, stage);
+    stage.run([&] { tools::changeLevelSetBackground(grid->tree(), float(half_width * lattice.voxel)); });
     return grid;
 }
 
