@@ -4,6 +4,9 @@
 #include "shim/handover.h"
 
 #include <algorithm>
+#include <optional>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -42,6 +45,12 @@ vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t u
                 loop(i);
             }
         } else {
+            // More threads than cores are allowed for as long as this lasts; TBB would complain on standard
+            // error.
+            std::optional<tbb::global_control> more;
+            if (threads > tbb::info::default_concurrency()) {
+                more.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
+            }
             tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
             vshi::give(&loop);
             arena.execute([&] { tbb::parallel_for(size_t{0}, pieces, loop); });
