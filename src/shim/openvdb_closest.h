@@ -1,7 +1,7 @@
 // Distances put right after a mesh conversion.
 #pragma once
 
-#include "shim/openvdb_mesh.h"
+#include "shim/openvdb_surface.h"
 
 namespace vshi {
 

@@ -1,128 +1,192 @@
-// Distances to surfaces of triangles and quads, by OpenVDB's mesh conversion.
-#include "shim/openvdb_mesh.h"
+// Level sets from meshes: all closed ones together, all open ones as shells.
+#include "caster/mesh.h"
+#include "shim/openvdb_surface.h"
 
-#include "shim/openvdb_closest.h"
-
-#include <chrono>
+#include <cfloat>
 #include <cmath>
 #include <openvdb/tools/ChangeBackground.h>
-#include <openvdb/tools/MeshToVolume.h>
+#include <openvdb/tools/Composite.h>
+#include <openvdb/util/Util.h>
 
 namespace vshi {
 
 namespace {
 
-// OpenVDB asks at every polygon; the callback is asked at most every 20 ms.
-class Interrupter : public openvdb::util::NullInterrupter {
-  public:
-    Interrupter(Stage &stage_, double begin_, double end_) : stage(stage_), begin(begin_), end(end_) {}
+// Distances, nearest polygons, their next values, and one more set of distances while they are collected; and
+// what a triangle takes as polygon and corners. Measured: see tests/unit/test_grid.c.
+constexpr double MESH_BYTES_PER_LEAF = 5.0 * BYTES_PER_LEAF;
+constexpr double BYTES_PER_TRIANGLE = 64.0;
 
-    bool wasInterrupted(int percent) override {
-        if (percent >= 0) {
-            stage.reach(begin + (end - begin) * 0.01 * percent);
-        }
-        if (!stop.load(std::memory_order_relaxed)) {
-            const auto now = std::chrono::steady_clock::now().time_since_epoch().count();
-            auto due = next.load(std::memory_order_relaxed);
-            if (now >= due && next.compare_exchange_strong(due, now + period)) {
-                stop = stage.cancelled();
-            }
-        }
-        return stop;
-    }
-
-  private:
-    static constexpr std::chrono::steady_clock::rep period =
-        std::chrono::steady_clock::duration(std::chrono::milliseconds(20)).count();
-    Stage &stage;
-    const double begin;
-    const double end;
-    std::atomic<bool> stop{false};
-    std::atomic<std::chrono::steady_clock::rep> next{0};
+struct Meshes {
+    const vsh_mesh *mesh;
+    size_t count;
+    std::vector<vsh_mesh_report> reports;
+    Vec3d low{DBL_MAX};
+    Vec3d high{-DBL_MAX};
+    size_t triangles = 0;
 };
 
-using openvdb::Int32;
-using Adapter = openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec4I>;
-
-// Bands are asked for a little wider, because the conversion's errors leave holes at their rims.
-constexpr double RIM = 1.0;
-
-FloatGrid::Ptr convert(const Surface &surface, const Lattice &lattice, double half_width, int flags,
-                       double begin, double end, Stage &stage) {
-    namespace tools = openvdb::tools;
-    const double middle = begin + 0.6 * (end - begin);
-    Interrupter interrupter(stage, begin, middle);
-    const openvdb::Int32Grid::Ptr nearest = openvdb::Int32Grid::create(Int32(openvdb::util::INVALID_IDX));
-    FloatGrid::Ptr grid;
-    stage.run([&] {
-        const Adapter adapter(surface.points, surface.polygons);
-        const float band = float(half_width + RIM);
-        // Renormalising is for bumps of the distances that are measured again below.
-        grid = tools::meshToVolume<FloatGrid>(
-            static_cast<openvdb::util::NullInterrupter &>(interrupter), adapter, *lattice.transform(), band,
-            band, flags | tools::DISABLE_RENORMALIZATION | tools::DISABLE_NARROW_BAND_TRIMMING,
-            nearest.get());
-    });
-    stage.check();
-    measure_again(*grid, *nearest, surface, lattice.voxel, middle, end, stage);
-    stage.run([&] { tools::changeLevelSetBackground(grid->tree(), float(half_width * lattice.voxel)); });
-    return grid;
-}
-
-} // namespace
-
-FloatGrid::Ptr measure_surface(const Surface &surface, const Lattice &lattice, double half_width,
-                               double begin, double end, Stage &stage) {
-    return convert(surface, lattice, half_width, openvdb::tools::UNSIGNED_DISTANCE_FIELD, begin, end, stage);
-}
-
-namespace {
-
-// Tiles of a node hold no surface, so each has one sign.
-template <typename Node> void sign_tiles(Node &node, FloatGrid::ConstAccessor &signs, float background) {
-    for (auto tile = node.beginValueAll(); tile; ++tile) {
-        tile.setValue(std::copysign(background, signs.getValue(tile.getCoord())));
+Meshes look_over(const vsh_mesh *mesh, size_t count, vsh_error *error) {
+    if (mesh == nullptr || count == 0) {
+        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT, "voxelize: no meshes")};
     }
-    for (auto tile = node.beginValueOn(); tile; ++tile) {
-        tile.setValueOff();
+    Meshes meshes{mesh, count, std::vector<vsh_mesh_report>(count)};
+    for (size_t i = 0; i < count; ++i) {
+        vsh_result result = vshi_mesh_check_data(&mesh[i], i, error);
+        if (result == VSH_OK) {
+            result = vsh_mesh_check(&mesh[i], &meshes.reports[i], error);
+        }
+        if (result != VSH_OK) {
+            throw Failure{result};
+        }
+        meshes.low = openvdb::math::minComponent(meshes.low, Vec3d(meshes.reports[i].bounds_min));
+        meshes.high = openvdb::math::maxComponent(meshes.high, Vec3d(meshes.reports[i].bounds_max));
+        meshes.triangles += mesh[i].triangle_count - meshes.reports[i].degenerate_triangles;
+    }
+    if (meshes.triangles == 0) {
+        throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "voxelize: %zu mesh%s without a triangle of any area",
+                                count, count == 1 ? "" : "es")};
+    }
+    if (meshes.triangles > size_t(INT32_MAX)) {
+        throw Failure{vshi_fail(error, VSH_ERROR_LIMIT, "voxelize: %zu triangles, %d at most",
+                                meshes.triangles, INT32_MAX)};
+    }
+    return meshes;
+}
+
+// A surface of A voxel² has about A/64 leaves a layer, and its band passes (band + 1.5 leaves) layers.
+void foretell(const Meshes &meshes, const Lattice &lattice, const vsh_run &run, vsh_error *error) {
+    double leaves = 0.0;
+    for (const vsh_mesh_report &report : meshes.reports) {
+        const double band = lattice.half_width + 1.0 + (report.open_edges > 0 ? 0.5 * lattice.shell : 0.0);
+        leaves += report.area / (lattice.voxel * lattice.voxel) / 64.0 * (2.0 * band + 12.0) / 8.0;
+    }
+    check_memory(&run, lattice.voxel, leaves,
+                 leaves * MESH_BYTES_PER_LEAF + double(meshes.triangles) * BYTES_PER_TRIANGLE, error);
+}
+
+// Adds a mesh's triangles in index space. Positions are taken there in double, before they become floats.
+void add_mesh(const vsh_mesh &mesh, const Lattice &lattice, Surface &surface) {
+    const size_t first = surface.points.size();
+    for (size_t v = 0; v < mesh.vertex_count; ++v) {
+        const vshi_vec p = vshi_transform_point(mesh.transform, vshi_vec_off(mesh.positions + 3 * v));
+        surface.points.emplace_back(lattice.index(Vec3d(p.x, p.y, p.z)));
+    }
+    const auto corner = [first](uint32_t vertex) { return openvdb::Index32(first + vertex); };
+    for (size_t i = 0; i < mesh.triangle_count; ++i) {
+        if (!vshi_mesh_degenerate(&mesh, i)) {
+            const uint32_t *vertex = mesh.indices + 3 * i;
+            surface.polygons.emplace_back(corner(vertex[0]), corner(vertex[1]), corner(vertex[2]),
+                                          openvdb::util::INVALID_IDX);
+        }
     }
 }
 
-} // namespace
+// Within this distance (voxels) of a surface the conversion signs a voxel by the side it lies on; farther
+// off, by what can be reached from outside. The first means nothing where a surface ends.
+constexpr float SIGNED_BY_SIDE = 0.87f;
 
-void take_signs(FloatGrid &distances, const FloatGrid &source, Stage &stage) {
-    using Tree = FloatTree;
-    using Lower = Tree::RootNodeType::ChildNodeType::ChildNodeType;
-    using Upper = Tree::RootNodeType::ChildNodeType;
-    Tree &tree = distances.tree();
-    const float background = distances.background();
+// A voxel next to a surface that ends is inside only if the side it lies on is inside farther off, too.
+bool beside_inside(FloatGrid::ConstUnsafeAccessor &values, const Coord &at, float near) {
+    for (int32_t n = 0; n < 26; ++n) {
+        if (values.getValue(at + openvdb::util::COORD_OFFSETS[n]) < -near) {
+            return true;
+        }
+    }
+    return false;
+}
 
+// Moves the surface out by `offset` (world units), so that a sheet becomes a solid; what its conversion found
+// to be enclosed stays inside.
+void thicken(FloatGrid &grid, float offset, float voxel, float background, Stage &stage) {
     std::vector<Leaf *> leaves;
-    tree.getNodes(leaves);
+    grid.tree().getNodes(leaves);
+    std::vector<float> values(leaves.size() * Leaf::SIZE);
+    const float near = SIGNED_BY_SIDE * voxel;
     stage.loop(leaves.size(), 64, 0.0, 0.0, [&](size_t i) {
-        FloatGrid::ConstUnsafeAccessor signs(source.constTree());
-        float *values = leaves[i]->buffer().data();
+        FloatGrid::ConstUnsafeAccessor around(grid.constTree());
         for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
-            values[n] = std::copysign(values[n], signs.getValue(leaves[i]->offsetToGlobalCoord(n)));
+            float value = leaves[i]->getValue(n);
+            if (value < 0.0f && value >= -near &&
+                !beside_inside(around, leaves[i]->offsetToGlobalCoord(n), near)) {
+                value = -value;
+            }
+            values[i * Leaf::SIZE + n] = std::clamp(value - offset, -background, background);
         }
     });
-    FloatGrid::ConstAccessor signs(source.constTree());
-    std::vector<Lower *> lower;
-    tree.getNodes(lower);
-    for (Lower *node : lower) {
-        sign_tiles(*node, signs, background);
-    }
-    std::vector<Upper *> upper;
-    tree.getNodes(upper);
-    for (Upper *node : upper) {
-        sign_tiles(*node, signs, background);
-    }
-    // What no node of `distances` covers but `source` has inside.
-    for (auto tile = source.constTree().cbeginValueAll(); tile; ++tile) {
-        if (tile.getDepth() == 0 && tile.getValue() < 0.0f && tree.getValueDepth(tile.getCoord()) < 1) {
-            tree.addTile(3, tile.getCoord(), -background, false);
+    stage.loop(leaves.size(), 64, 0.0, 0.0, [&](size_t i) {
+        for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
+            const float value = values[i * Leaf::SIZE + n];
+            leaves[i]->setValueOnly(n, value);
+            leaves[i]->setActiveState(n, std::fabs(value) < background);
+        }
+    });
+    stage.run([&] { openvdb::tools::changeLevelSetBackground(grid.tree(), background); });
+}
+
+void warn(const Meshes &meshes, const Lattice &lattice, const vsh_run &run) {
+    for (size_t i = 0; i < meshes.count; ++i) {
+        const vsh_mesh_report &report = meshes.reports[i];
+        const vshi_mesh_name name = vshi_mesh_label(&meshes.mesh[i], i);
+        if (report.open_edges > 0) {
+            vshi_warn(&run, "%s (%zu of %zu): %zu open edge%s: baked as a shell %g voxels (%g units) thick",
+                      name.text, i + 1, meshes.count, report.open_edges, report.open_edges == 1 ? "" : "s",
+                      lattice.shell, lattice.shell * lattice.voxel);
+        } else if (report.flipped_edges > 0) {
+            vshi_warn(
+                &run,
+                "%s (%zu of %zu): %zu edge%s whose triangles disagree about the outside: what it encloses "
+                "is taken for inside",
+                name.text, i + 1, meshes.count, report.flipped_edges, report.flipped_edges == 1 ? "" : "s");
         }
     }
 }
+
+vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_options *options,
+                       const vsh_run *given, vsh_grid **grid, vsh_error *error) {
+    vsh_run run;
+    const vsh_result result = vshi_run_resolve(given, &run, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    const Meshes meshes = look_over(mesh, count, error);
+    const Lattice lattice = make_lattice(options, meshes.low, meshes.high, error);
+    foretell(meshes, lattice, run, error);
+    Stage stage(run, "voxelize", error);
+    warn(meshes, lattice, run);
+
+    Surface closed;
+    Surface open;
+    for (size_t i = 0; i < count; ++i) {
+        add_mesh(mesh[i], lattice, meshes.reports[i].open_edges > 0 ? open : closed);
+    }
+    const double share = double(closed.polygons.size()) / double(meshes.triangles);
+    FloatGrid::Ptr solid;
+    if (!closed.polygons.empty()) {
+        solid = fill_surface(closed, lattice, lattice.half_width, 0.0, share, stage);
+    }
+    if (!open.polygons.empty()) {
+        FloatGrid::Ptr shell =
+            fill_surface(open, lattice, lattice.half_width + 0.5 * lattice.shell, share, 1.0, stage);
+        thicken(*shell, float(0.5 * lattice.shell * lattice.voxel), float(lattice.voxel),
+                lattice.background(), stage);
+        if (solid == nullptr) {
+            solid = shell;
+        } else {
+            stage.run([&] { openvdb::tools::csgUnion(*solid, *shell); });
+        }
+    }
+    *grid = close_grid(solid, open.polygons.empty() ? 0.0 : lattice.shell * lattice.voxel, stage);
+    return VSH_OK;
+}
+
+} // namespace
 
 } // namespace vshi
+
+vsh_result vsh_grid_from_meshes(const vsh_mesh *meshes, size_t mesh_count, const vsh_grid_options *options,
+                                const vsh_run *run, vsh_grid **grid, vsh_error *error) {
+    *grid = nullptr;
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize",
+                       [&] { return vshi::from_meshes(meshes, mesh_count, options, run, grid, error); });
+}

@@ -3,7 +3,7 @@
 // them).
 #include "shim/openvdb_redistance.h"
 
-#include "shim/openvdb_mesh.h"
+#include "shim/openvdb_surface.h"
 
 #include <cmath>
 #include <openvdb/tools/VolumeToMesh.h>

@@ -13,7 +13,12 @@ struct Surface {
     std::vector<openvdb::Vec4I> polygons;
 };
 
-// Unsigned distances on the lattice, active within half_width of the surface.
+// Signed distances on the lattice, active within half_width (voxels) of the surface: inside is what cannot be
+// reached from outside, whatever way the polygons face.
+FloatGrid::Ptr fill_surface(const Surface &surface, const Lattice &lattice, double half_width, double begin,
+                            double end, Stage &stage);
+
+// Unsigned distances on the lattice, active within half_width (voxels) of the surface.
 FloatGrid::Ptr measure_surface(const Surface &surface, const Lattice &lattice, double half_width,
                                double begin, double end, Stage &stage);
 

@@ -1,0 +1,133 @@
+// Distances to surfaces of triangles and quads, by OpenVDB's mesh conversion.
+#include "shim/openvdb_surface.h"
+
+#include "shim/openvdb_closest.h"
+
+#include <chrono>
+#include <cmath>
+#include <openvdb/tools/ChangeBackground.h>
+#include <openvdb/tools/MeshToVolume.h>
+
+namespace vshi {
+
+namespace {
+
+// OpenVDB asks at every polygon; the callback is asked at most every 20 ms.
+class Interrupter : public openvdb::util::NullInterrupter {
+  public:
+    Interrupter(Stage &stage_, double begin_, double end_) : stage(stage_), begin(begin_), end(end_) {}
+
+    bool wasInterrupted(int percent) override {
+        if (percent >= 0) {
+            stage.reach(begin + (end - begin) * 0.01 * percent);
+        }
+        if (!stop.load(std::memory_order_relaxed)) {
+            const auto now = std::chrono::steady_clock::now().time_since_epoch().count();
+            auto due = next.load(std::memory_order_relaxed);
+            if (now >= due && next.compare_exchange_strong(due, now + period)) {
+                stop = stage.cancelled();
+            }
+        }
+        return stop;
+    }
+
+  private:
+    static constexpr std::chrono::steady_clock::rep period =
+        std::chrono::steady_clock::duration(std::chrono::milliseconds(20)).count();
+    Stage &stage;
+    const double begin;
+    const double end;
+    std::atomic<bool> stop{false};
+    std::atomic<std::chrono::steady_clock::rep> next{0};
+};
+
+using openvdb::Int32;
+using Adapter = openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec4I>;
+
+// Bands are asked for a little wider, because the conversion's errors leave holes at their rims.
+constexpr double RIM = 1.0;
+
+FloatGrid::Ptr convert(const Surface &surface, const Lattice &lattice, double half_width, int flags,
+                       double begin, double end, Stage &stage) {
+    namespace tools = openvdb::tools;
+    const double middle = begin + 0.6 * (end - begin);
+    Interrupter interrupter(stage, begin, middle);
+    const openvdb::Int32Grid::Ptr nearest = openvdb::Int32Grid::create(Int32(openvdb::util::INVALID_IDX));
+    FloatGrid::Ptr grid;
+    stage.run([&] {
+        const Adapter adapter(surface.points, surface.polygons);
+        const float band = float(half_width + RIM);
+        // Renormalising is for bumps of the distances that are measured again below.
+        grid = tools::meshToVolume<FloatGrid>(
+            static_cast<openvdb::util::NullInterrupter &>(interrupter), adapter, *lattice.transform(), band,
+            band, flags | tools::DISABLE_RENORMALIZATION | tools::DISABLE_NARROW_BAND_TRIMMING,
+            nearest.get());
+    });
+    stage.check();
+    measure_again(*grid, *nearest, surface, lattice.voxel, middle, end, stage);
+    stage.run([&] { tools::changeLevelSetBackground(grid->tree(), float(half_width * lattice.voxel)); });
+    return grid;
+}
+
+} // namespace
+
+FloatGrid::Ptr fill_surface(const Surface &surface, const Lattice &lattice, double half_width, double begin,
+                            double end, Stage &stage) {
+    return convert(surface, lattice, half_width, 0, begin, end, stage);
+}
+
+FloatGrid::Ptr measure_surface(const Surface &surface, const Lattice &lattice, double half_width,
+                               double begin, double end, Stage &stage) {
+    return convert(surface, lattice, half_width, openvdb::tools::UNSIGNED_DISTANCE_FIELD, begin, end, stage);
+}
+
+namespace {
+
+// Tiles of a node hold no surface, so each has one sign.
+template <typename Node> void sign_tiles(Node &node, FloatGrid::ConstAccessor &signs, float background) {
+    for (auto tile = node.beginValueAll(); tile; ++tile) {
+        tile.setValue(std::copysign(background, signs.getValue(tile.getCoord())));
+    }
+    for (auto tile = node.beginValueOn(); tile; ++tile) {
+        tile.setValueOff();
+    }
+}
+
+} // namespace
+
+void take_signs(FloatGrid &distances, const FloatGrid &source, Stage &stage) {
+    using Tree = FloatTree;
+    using Lower = Tree::RootNodeType::ChildNodeType::ChildNodeType;
+    using Upper = Tree::RootNodeType::ChildNodeType;
+    Tree &tree = distances.tree();
+    const float background = distances.background();
+
+    std::vector<Leaf *> leaves;
+    tree.getNodes(leaves);
+    stage.loop(leaves.size(), 64, 0.0, 0.0, [&](size_t i) {
+        FloatGrid::ConstUnsafeAccessor signs(source.constTree());
+        float *values = leaves[i]->buffer().data();
+        for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
+            values[n] = std::copysign(values[n], signs.getValue(leaves[i]->offsetToGlobalCoord(n)));
+        }
+    });
+    FloatGrid::ConstAccessor signs(source.constTree());
+    std::vector<Lower *> lower;
+    tree.getNodes(lower);
+    for (Lower *node : lower) {
+        sign_tiles(*node, signs, background);
+    }
+    std::vector<Upper *> upper;
+    tree.getNodes(upper);
+    for (Upper *node : upper) {
+        sign_tiles(*node, signs, background);
+    }
+    // What no node of `distances` covers but `source` has inside.
+    for (auto tile = source.constTree().cbeginValueAll(); tile; ++tile) {
+        if (tile.getDepth() == 0 && tile.getValue() < 0.0f && tree.getValueDepth(tile.getCoord()) < 1) {
+            tree.addTile(3, tile.getCoord(), -background, false);
+        }
+    }
+}
+
+} // namespace vshi
