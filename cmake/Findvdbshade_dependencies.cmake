@@ -19,16 +19,21 @@ endfunction()
 vsh_find(openvdb openvdb/openvdb.h openvdb)
 vsh_find(openimageio OpenImageIO/imageio.h OpenImageIO)
 vsh_find(openimageio_util OpenImageIO/filesystem.h OpenImageIO_Util)
+vsh_find(png png.h png)
 vsh_find(assimp assimp/cimport.h assimp)
 vsh_find(jansson jansson.h jansson)
 vsh_find(half Imath/half.h Imath-3_1)
 
-find_package_handle_standard_args(vdbshade_dependencies REQUIRED_VARS VSH_openvdb_LIBRARY VSH_openimageio_LIBRARY VSH_openimageio_util_LIBRARY
+find_package_handle_standard_args(vdbshade_dependencies REQUIRED_VARS VSH_openvdb_LIBRARY VSH_openimageio_LIBRARY
+                                  VSH_openimageio_util_LIBRARY VSH_png_LIBRARY
                                   VSH_assimp_LIBRARY VSH_jansson_LIBRARY VSH_half_LIBRARY)
 
 if(NOT TARGET vsh::openexr)
   set_property(TARGET vsh::openvdb PROPERTY INTERFACE_LINK_LIBRARIES TBB::tbb vsh::half)
-  set_property(TARGET vsh::openimageio PROPERTY INTERFACE_LINK_LIBRARIES "vsh::openimageio_util;Imath::Imath")
+  set_property(TARGET vsh::openimageio PROPERTY INTERFACE_LINK_LIBRARIES "vsh::openimageio_util;vsh::png;Imath::Imath")
   add_library(vsh::openexr INTERFACE IMPORTED)
   target_link_libraries(vsh::openexr INTERFACE OpenEXR::OpenEXRCore)
+  add_library(vsh::dependencies INTERFACE IMPORTED)
+  target_link_libraries(vsh::dependencies INTERFACE vsh::openvdb vsh::openexr vsh::openimageio vsh::assimp
+                                                    vsh::jansson m)
 endif()

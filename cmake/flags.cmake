@@ -19,10 +19,24 @@ function(vsh_set_flags target)
     $<$<BOOL:${VSH_WERROR}>:-Werror>)
 endfunction()
 
-# The marching kernels are one source, built once for each instruction set and chosen at run time.
+# The marching kernels are one source, built once for each instruction set and chosen at run time. Compilers turn their
+# loops into vectors only where they need not care for floating-point traps and errno; neither changes a result.
+set(VSH_KERNEL_FLAGS -O3 -fno-trapping-math -fno-math-errno)
+set(VSH_KERNEL_base_FLAGS "")
+set(VSH_KERNEL_avx2_FLAGS -mavx2)
+set(VSH_KERNEL_avx512_FLAGS -mavx512f -mavx512dq -mavx512vl)
+
 function(vsh_add_kernels target)
-  set(source ${PROJECT_SOURCE_DIR}/src/shade/kernel/march.inc.c)
-  if(NOT EXISTS ${source})
-    return()
+  set(folder ${PROJECT_SOURCE_DIR}/src/shade/kernel)
+  set(kinds base)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+    list(APPEND kinds avx2 avx512)
   endif()
+  target_sources(${target} PRIVATE ${folder}/march.c)
+  foreach(kind ${kinds})
+    target_sources(${target} PRIVATE ${folder}/march_${kind}.c)
+    set_source_files_properties(${folder}/march_${kind}.c PROPERTIES
+                                COMPILE_OPTIONS "${VSH_KERNEL_FLAGS};${VSH_KERNEL_${kind}_FLAGS}"
+                                OBJECT_DEPENDS ${folder}/lanes.inc)
+  endforeach()
 endfunction()

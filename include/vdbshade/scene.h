@@ -51,6 +51,34 @@ typedef struct vsh_scene {
 VSH_API vsh_result vsh_scene_read(const char *path, vsh_scene **scene, vsh_error *error);
 VSH_API void vsh_scene_free(vsh_scene *scene); /* NULL does nothing */
 
+/* What a scene's files hold, each file read once, however many casters and receivers use it. Immutable; may
+ * be shared by threads. */
+typedef struct vsh_assets vsh_assets;
+
+/* Reads the models and level sets that `scene` names and puts them in their places. The scene need not outlive the call. Errors: as
+ * vsh_model_read() and vsh_grid_read(); VSH_ERROR_ARGUMENT (caster without type or path); VSH_ERROR_INPUT (a
+ * receiver's mesh without the UV set asked for). Free the result with vsh_assets_free(). */
+VSH_API vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
+                                   vsh_error *error);
+VSH_API void vsh_assets_free(vsh_assets *assets); /* NULL does nothing */
+
+/* The meshes of receiver (caster) `index`, transforms composed, UVs of the receiver's set; views that belong
+ * to the assets. NULL and a count of 0 for an index beyond the scene's, and for a caster that is no mesh. */
+VSH_API const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count);
+VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count);
+
+/* The union of a scene's casters as one level set of scene->grid's voxel size; without one, of the longest
+ * side of the box around all casters over scene->grid.resolution. `assets` are those loaded for this scene.
+ * Errors: VSH_ERROR_INPUT (no casters; an sdf or vdb caster whose transform shears or scales unevenly); as
+ * the vsh_grid_… calls. Free the grid with vsh_grid_free(). */
+VSH_API vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                                     vsh_grid **grid, vsh_error *error);
+
+/* Reach, world units > 0, that a field of `grid` needs for the scene's lights and AO at receivers within a
+ * world box: see vsh_field_options. Directional lights count up to a half angle of 60°. Thread safe. */
+VSH_API double vsh_scene_reach(const vsh_scene *scene, const vsh_grid *grid, const double receivers_min[3],
+                               const double receivers_max[3]);
+
 #ifdef __cplusplus
 }
 #endif

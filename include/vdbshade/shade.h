@@ -38,7 +38,7 @@ typedef struct vsh_shade_options {
 
 static inline vsh_shade_options vsh_shade_options_default(void) {
     vsh_shade_options options = {
-        sizeof(vsh_shade_options), VSH_SHADOW_CONE, VSH_AO_CONES, 16, 1024, 1.0, 1.0, 0.0};
+        sizeof(vsh_shade_options), VSH_SHADOW_CONE, VSH_AO_CONES, 16, 1024, 1.0, 0.25, 0.0};
     return options;
 }
 

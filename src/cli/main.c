@@ -1,7 +1,73 @@
-#include <stdio.h>
-#include <vdbshade/vdbshade.h>
+/* vdbshade: the command line. Which subcommand, and the exit code. */
+#include "commands.h"
+#include "message.h"
+#include "signals.h"
 
-int main(void) {
-    printf("vdbshade %s\n", vsh_version());
-    return 0;
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+static const cli_command *const commands[] = {&cli_bake, &cli_voxelize, &cli_info};
+enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
+
+static const char help_text[] =
+    "Usage: vdbshade COMMAND …\n"
+    "\n"
+    "Bakes soft shadows and ambient occlusion from signed distance fields.\n"
+    "\n"
+    "Commands:\n"
+    "  bake INPUT -o OUT         lightmap of a mesh or a scene (.json)\n"
+    "  voxelize INPUT -o OUT.vdb level set of a mesh's or a scene's casters\n"
+    "  info FILE                 what a mesh, .vdb, scene or image holds, and what is wrong with it\n"
+    "\n"
+    "  vdbshade COMMAND --help   options of a command\n"
+    "  vdbshade --version        version\n"
+    "\n"
+    "Exit codes: 0 done; 2 bad usage or bad input; 3 a file could not be read or written; 4 a limit\n"
+    "(memory, size) would be passed; 70 a defect of vdbshade; 130 interrupted. Errors are one line on\n"
+    "standard error; a failed or interrupted run leaves the old output as it was.\n";
+
+static int unknown_command(const char *text) {
+    if (text[0] == '-') {
+        return cli_usage("%s: no such option; see 'vdbshade --help'", text);
+    }
+    const char *names[COMMAND_COUNT];
+    for (size_t i = 0; i < COMMAND_COUNT; ++i) {
+        names[i] = commands[i]->name;
+    }
+    const char *near = cli_nearest(text, names, COMMAND_COUNT);
+    if (near != NULL) {
+        return cli_usage("%s: no such command; did you mean %s?", text, near);
+    }
+    return cli_usage("%s: no such command; see 'vdbshade --help'", text);
+}
+
+static int dispatch(int argc, char **argv) {
+    if (argc < 2) {
+        return cli_usage("no command; see 'vdbshade --help'");
+    }
+    if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0) {
+        fputs(help_text, stdout);
+        return CLI_OK;
+    }
+    if (strcmp(argv[1], "--version") == 0) {
+        printf("vdbshade %s\n", vsh_version());
+        return CLI_OK;
+    }
+    for (size_t i = 0; i < COMMAND_COUNT; ++i) {
+        if (strcmp(argv[1], commands[i]->name) == 0) {
+            return commands[i]->main(argc - 1, argv + 1);
+        }
+    }
+    return unknown_command(argv[1]);
+}
+
+int main(int argc, char **argv) {
+    cli_signals_begin();
+    int code = dispatch(argc, argv);
+    if ((fflush(stdout) != 0 || ferror(stdout)) && code == CLI_OK) {
+        cli_say("standard output: cannot be written: %s", strerror(errno));
+        code = CLI_FILE;
+    }
+    return code;
 }

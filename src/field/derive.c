@@ -415,7 +415,7 @@ vsh_result vshi_level_derive(vsh_field *field, vshi_feet *feet, vshi_job *job, v
     free(d.feet);
     free(d.core);
     free(d.corners);
-    vshi_blocks_free(&d.blocks);
+    vshi_level_blocks_free(&d.blocks);
     free(feet->points);
     *feet = next;
     return result;

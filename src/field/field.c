@@ -104,11 +104,11 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     invert(vshi_grid_transform(grid), info.voxel_size, f->to_field);
 
     const float band = (float)fmin(info.half_width, VSHI_COARSE_BAND);
-    result = vshi_blocks_from_grid(grid, band, &r, &blocks, error);
+    result = vshi_level_blocks_read(grid, band, &r, &blocks, error);
     if (result == VSH_OK) {
         result = vshi_level_append(f, &blocks, NULL, job, &feet, error);
     }
-    vshi_blocks_free(&blocks);
+    vshi_level_blocks_free(&blocks);
     if (result != VSH_OK) {
         goto done;
     }

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-void vshi_blocks_free(vshi_blocks *blocks) {
+void vshi_level_blocks_free(vshi_blocks *blocks) {
     free(blocks->values);
     free(blocks->signs);
     free(blocks->map);
@@ -41,8 +41,8 @@ static float clamp(float value, float band) {
     return value > band ? band : value < -band ? -band : value;
 }
 
-vsh_result vshi_blocks_from_grid(const vsh_grid *grid, float band, const vsh_run *run, vshi_blocks *blocks,
-                                 vsh_error *error) {
+vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, const vsh_run *run, vshi_blocks *blocks,
+                                  vsh_error *error) {
     vshi_leaf *leaves = NULL;
     *blocks = (vshi_blocks){.scale = 1.0f, .band = band};
     blocks->count = vshi_grid_leaves(grid, NULL, 0);

@@ -9,9 +9,7 @@
 /* Half width of the bands of the coarser levels, in their own voxels. The finest level has the grid's own.
  * Six keeps a cone's radius above 2.5 voxels of the level it is sampled from; three lets it fall to one,
  * where the trilinear error of edges shows (docs/numerics.md). */
-#ifndef VSHI_COARSE_BAND
 #define VSHI_COARSE_BAND 6.0f
-#endif
 
 /* A level under construction: 8³ values a block, before they become bricks. */
 typedef struct vshi_blocks {
@@ -31,11 +29,11 @@ typedef struct vshi_feet {
     float *points;
 } vshi_feet;
 
-void vshi_blocks_free(vshi_blocks *blocks);
+void vshi_level_blocks_free(vshi_blocks *blocks);
 
 /* The finest level's blocks out of a grid. */
-vsh_result vshi_blocks_from_grid(const vsh_grid *grid, float band, const vsh_run *run, vshi_blocks *blocks,
-                                 vsh_error *error);
+vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, const vsh_run *run, vshi_blocks *blocks,
+                                  vsh_error *error);
 
 /* Appends a level of bricks to the field. With `block_feet` [count][512][3], those of the bricks kept go into
  * *feet (freed by the caller). */

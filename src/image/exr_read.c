@@ -137,6 +137,8 @@ static vsh_result code_of(exr_result_t status) {
     case EXR_ERR_FILE_ACCESS:
     case EXR_ERR_READ_IO:
         return VSH_ERROR_READ;
+    case EXR_ERR_FEATURE_NOT_IMPLEMENTED: /* DWA compression, in 3.1 */
+        return VSH_ERROR_UNSUPPORTED;
     default:
         return VSH_ERROR_INPUT;
     }

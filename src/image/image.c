@@ -4,6 +4,7 @@
 #include "image/exr.h"
 #include "image/pack.h"
 #include "image/planes.h"
+#include "image/png.h"
 #include "shim/oiio.h"
 
 #include <errno.h>
@@ -184,10 +185,13 @@ vsh_result vsh_image_write(const char *path, const vsh_image *image, const vsh_i
     return vshi_output_commit(&output, error);
 }
 
+typedef vsh_result read_fn(const char *path, vsh_image_file **file, vsh_error *error);
+
 /* Looks at the first bytes: an EXR file is one whatever its ending says. */
-static vsh_result is_exr(const char *path, bool *exr, vsh_error *error) {
-    static const unsigned char magic[4] = {0x76, 0x2f, 0x31, 0x01};
-    unsigned char start[sizeof magic];
+static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *error) {
+    static const unsigned char exr[] = {0x76, 0x2f, 0x31, 0x01};
+    static const unsigned char png[] = {0x89, 'P', 'N', 'G'};
+    unsigned char start[4] = {0};
     struct stat status;
     if (stat(path, &status) == 0 && S_ISDIR(status.st_mode)) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: it is a folder", path);
@@ -202,7 +206,13 @@ static vsh_result is_exr(const char *path, bool *exr, vsh_error *error) {
     if (failed) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read", path);
     }
-    *exr = count == sizeof start && memcmp(start, magic, sizeof magic) == 0;
+    if (count == sizeof start && memcmp(start, exr, sizeof exr) == 0) {
+        *reader = vshi_exr_read;
+    } else if (memcmp(start, png, sizeof png) == 0 || strcasecmp(vshi_path_ending(path), "png") == 0) {
+        *reader = vshi_png_read;
+    } else {
+        *reader = vshi_oiio_read;
+    }
     return VSH_OK;
 }
 
@@ -212,10 +222,7 @@ vsh_result vsh_image_read(const char *path, vsh_image_file **file, vsh_error *er
                          file == NULL ? "place for the image" : "path");
     }
     *file = NULL;
-    bool exr = false;
-    const vsh_result result = is_exr(path, &exr, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    return exr ? vshi_exr_read(path, file, error) : vshi_oiio_read(path, file, error);
+    read_fn *reader = NULL;
+    const vsh_result result = find_reader(path, &reader, error);
+    return result == VSH_OK ? reader(path, file, error) : result;
 }

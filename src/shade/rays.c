@@ -40,6 +40,16 @@ bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *
     const double o[3] = {cone->origin.x, cone->origin.y, cone->origin.z};
     const double d[3] = {cone->direction.x, cone->direction.y, cone->direction.z};
     double begin = FIRST_STEP, end = cone->end;
+    /* a point r away and f off the axis comes closest, by h / t, at t = r / cos f: later minima are not the
+     * cone's */
+    double farthest = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double side = fmax(fabs(o[axis] - (double)field->bounds_min[axis]),
+                                 fabs(o[axis] - (double)field->bounds_max[axis]));
+        farthest += side * side;
+    }
+    const double last = sqrt(farthest / (1.0 - cone->sine * cone->sine)) + BOUNDS_MARGIN;
+    end = last < end ? last : end;
     /* a ball of radius t sin b can meet the box only while its centre is within that of each side */
     for (int axis = 0; axis < 3; ++axis) {
         clip(d[axis] + cone->sine, (double)field->bounds_min[axis] - BOUNDS_MARGIN - o[axis], &begin, &end);

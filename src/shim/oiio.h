@@ -16,7 +16,6 @@ typedef struct vshi_format {
     int32_t bits;     /* VSHI_BITS_… that it can be written with */
     bool alpha;       /* keeps R, G and B where A is 0, too */
     int32_t max_size; /* pixels along a side */
-    bool reports;     /* its writer goes through our own file writing, so that a full disk shows */
 } vshi_format;
 
 /* The format that the path's ending stands for, if it can be written. Thread safe. */

@@ -1,32 +1,60 @@
 // Loops over TBB's pool.
 #include "base/parallel.h"
 #include "shim/guard.h"
+#include "shim/handover.h"
 
 #include <algorithm>
+#include <optional>
+#include <tbb/global_control.h>
+#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+
+namespace {
+
+struct Loop {
+    vshi_job *job;
+    size_t count;
+    size_t grain;
+    size_t units;
+    vshi_range_fn *fn;
+    void *user;
+
+    void operator()(size_t index) const {
+        vshi::take(this); // before anything of this loop is read
+        if (!vshi_job_cancelled(job)) {
+            const size_t begin = index * grain;
+            const size_t end = std::min(count, begin + grain);
+            fn(user, begin, end);
+            vshi_job_advance(job, units * (end - begin));
+        }
+        vshi::give(this);
+    }
+};
+
+} // namespace
 
 vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t units, vshi_range_fn *fn,
                              void *user, vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_INTERNAL, "threads", [&]() -> vsh_result {
         const size_t pieces = (count + grain - 1) / grain;
-        const auto piece = [&](size_t index) {
-            if (vshi_job_cancelled(job)) {
-                return;
-            }
-            const size_t begin = index * grain;
-            const size_t end = std::min(count, begin + grain);
-            fn(user, begin, end);
-            vshi_job_advance(job, units * (end - begin));
-        };
+        const Loop loop = {job, count, grain, units, fn, user};
         const int threads = vshi_job_threads(job);
         if (threads == 1) {
             for (size_t i = 0; i < pieces; ++i) {
-                piece(i);
+                loop(i);
             }
         } else {
+            // More threads than cores are allowed for as long as this lasts; TBB would complain on standard
+            // error.
+            std::optional<tbb::global_control> more;
+            if (threads > tbb::info::default_concurrency()) {
+                more.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
+            }
             tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-            arena.execute([&] { tbb::parallel_for(size_t{0}, pieces, piece); });
+            vshi::give(&loop);
+            arena.execute([&] { tbb::parallel_for(size_t{0}, pieces, loop); });
+            vshi::take(&loop);
         }
         return vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
     });

@@ -1,0 +1,30 @@
+/* Timing and printing shared by the benchmarks. */
+#ifndef BENCH_H
+#define BENCH_H
+
+#include "metrics.h"
+
+#include <stdio.h>
+#include <vdbshade/vdbshade.h>
+
+enum { BENCH_RUNS = 5 };
+
+/* Processor seconds of this process: what a shared machine does beside it counts least. */
+double bench_seconds(void);
+
+/* Median of the runs' seconds; sorts them. */
+double bench_median(double *seconds, size_t count);
+
+/* Ends the program with the error where a call has failed. */
+void bench_check(vsh_result result, const vsh_error *error);
+
+/* One row: scene, what, µs a texel (median), samples a texel, times an outside measure, error against truth.
+ */
+void bench_header(FILE *csv);
+void bench_row(FILE *csv, const char *scene, const char *what, double microseconds, double samples,
+               double embree_rays, const truth_metrics *error);
+
+void bench_seeds(FILE *csv);
+void bench_asset(FILE *csv);
+
+#endif

@@ -1,0 +1,36 @@
+/* The triangles of several meshes as one list, put into the tile rows that they reach. */
+#ifndef VSHI_BAKE_CHARTS_H
+#define VSHI_BAKE_CHARTS_H
+
+#include "bake/raster.h"
+#include "base/job.h"
+
+#include <vdbshade/bake.h>
+
+/* Triangles are numbered through all meshes, in their order. */
+typedef struct vshi_charts {
+    const vsh_mesh *meshes;
+    size_t mesh_count;
+    vshi_raster raster;
+    size_t *first;          /* [mesh_count + 1]: number of each mesh's first triangle */
+    size_t rows;            /* of tiles */
+    size_t *row_start;      /* [rows + 1]: where each row's triangles begin */
+    uint32_t *row_triangle; /* in ascending order within a row */
+    uint64_t bytes;
+} vshi_charts;
+
+/* Checks the meshes and their UVs, sorts the triangles into tile rows and counts what is outside or
+ * degenerate into reports[mesh_count]. Errors: VSH_ERROR_INPUT, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED. Free with vshi_charts_free() also after an error. */
+vsh_result vshi_charts_create(const vsh_mesh *meshes, size_t mesh_count, vshi_raster raster,
+                              const vsh_run *run, vshi_job *job, vsh_uv_report *reports, vshi_charts *charts,
+                              vsh_error *error);
+void vshi_charts_free(vshi_charts *charts);
+
+/* Mesh of a triangle, and its number there. */
+size_t vshi_charts_mesh(const vshi_charts *charts, size_t triangle, size_t *local);
+
+/* The triangle in the image; false where it has no area there or in the world. */
+bool vshi_charts_triangle(const vshi_charts *charts, size_t mesh, size_t local, vshi_uv_triangle *triangle);
+
+#endif

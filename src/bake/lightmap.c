@@ -1,0 +1,330 @@
+#include "bake/origins.h"
+#include "bake/padding.h"
+#include "bake/take.h"
+#include "base/parallel.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Invalid texels are filled at least this far, texels, since filtering reads across them. */
+enum { LEAST_INVALID_RADIUS = 8 };
+
+typedef struct baking {
+    const vsh_field *field;
+    const vsh_texels *texels;
+    const vsh_light *lights;
+    size_t light_count;
+    vsh_shade_options shade; /* without offsets: the origins are lifted already */
+    vsh_run run;
+    vsh_run quiet; /* for steps of milliseconds that come once a plane: no stage of their own */
+    const vsh_lightmap *lightmap;
+    vshi_origins origins;
+    uint8_t *state;    /* [height][width]: VSHI_TEXEL_… */
+    float *values;     /* [origins.count]: of one light, or AO */
+    float *irradiance; /* [origins.count][3] */
+    vsh_bake_stats stats;
+} baking;
+
+static size_t texel_count(const vsh_texels *texels) {
+    return (size_t)texels->info.width * (size_t)texels->info.height;
+}
+
+static bool light_wanted(const vsh_lightmap *lightmap, size_t light) {
+    return lightmap->irradiance != NULL || (lightmap->shadow != NULL && lightmap->shadow[light] != NULL);
+}
+
+/* --- averages of samples over texels */
+
+typedef struct averaging {
+    baking *bake;
+    const float *values; /* [origins.count][channels]; NULL: only the state is found */
+    float *plane;
+    size_t channels;
+} averaging;
+
+/* Texels whose samples begin in a block belong to it, also where they go on beyond its end. */
+static void average_blocks(void *user, size_t begin, size_t end) {
+    const averaging *a = user;
+    const vsh_texels *texels = a->bake->texels;
+    const vshi_origins *origins = &a->bake->origins;
+    uint8_t *state = a->bake->state;
+    for (size_t block = begin; block < end; ++block) {
+        size_t i = block * VSHI_ORIGIN_BLOCK;
+        size_t last = i + VSHI_ORIGIN_BLOCK;
+        last = last < texels->count ? last : texels->count;
+        size_t next = origins->before[block];
+        for (; i > 0 && i < last && texels->texel[i] == texels->texel[i - 1]; ++i) {
+            next += origins->valid[i];
+        }
+        while (i < last) {
+            const uint32_t texel = texels->texel[i];
+            double sum[3] = {0.0, 0.0, 0.0};
+            size_t count = 0;
+            for (; i < texels->count && texels->texel[i] == texel; ++i) {
+                if (!origins->valid[i]) {
+                    continue;
+                }
+                const float *value = a->values != NULL ? a->values + next * a->channels : NULL;
+                ++next;
+                if (value != NULL && isnan(value[0])) {
+                    continue;
+                }
+                for (size_t c = 0; value != NULL && c < a->channels; ++c) {
+                    sum[c] += (double)value[c];
+                }
+                ++count;
+            }
+            if (a->values == NULL) {
+                state[texel] = count > 0 ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
+            } else if (count == 0) {
+                state[texel] = VSHI_TEXEL_INVALID;
+            } else {
+                for (size_t c = 0; c < a->channels; ++c) {
+                    a->plane[texel * a->channels + c] = (float)(sum[c] / (double)count);
+                }
+            }
+        }
+    }
+}
+
+static vsh_result average(baking *bake, const float *values, size_t channels, float *plane,
+                          vsh_error *error) {
+    averaging a = {.bake = bake, .values = values, .plane = plane, .channels = channels};
+    vshi_job *job = vshi_job_begin(&bake->quiet, "resolve", bake->origins.blocks);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "resolve: the system refused memory");
+    }
+    const vsh_result result = vshi_parallel_for(job, bake->origins.blocks, 1, 1, average_blocks, &a, error);
+    vshi_job_end(job);
+    return result;
+}
+
+/* --- the planes */
+
+typedef struct lighting {
+    baking *bake;
+    const vsh_light *light;
+} lighting;
+
+static void add_irradiance(void *user, size_t begin, size_t end) {
+    const lighting *l = user;
+    baking *bake = l->bake;
+    const vsh_points points = {end - begin, bake->origins.position + 3 * begin,
+                               bake->origins.normal + 3 * begin};
+    vsh_shade_irradiance(&points, NULL, l->light, bake->values + begin, bake->irradiance + 3 * begin);
+}
+
+static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
+    const vsh_lightmap *lightmap = bake->lightmap;
+    const vsh_points points = {bake->origins.count, bake->origins.position, bake->origins.normal};
+    vsh_result result = vsh_shade_shadow(bake->field, &points, &bake->lights[index], &bake->shade, &bake->run,
+                                         bake->values, &bake->stats.shade, error);
+    if (result == VSH_OK && lightmap->shadow != NULL && lightmap->shadow[index] != NULL) {
+        result = average(bake, bake->values, 1, lightmap->shadow[index], error);
+    }
+    if (result != VSH_OK || lightmap->irradiance == NULL) {
+        return result;
+    }
+    lighting l = {bake, &bake->lights[index]};
+    vshi_job *job = vshi_job_begin(&bake->quiet, "irradiance", bake->origins.count);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "irradiance: the system refused memory");
+    }
+    result = vshi_parallel_for(job, bake->origins.count, 4096, 1, add_irradiance, &l, error);
+    vshi_job_end(job);
+    return result;
+}
+
+static vsh_result bake_planes(baking *bake, vsh_error *error) {
+    const vsh_lightmap *lightmap = bake->lightmap;
+    const vsh_texels *texels = bake->texels;
+    vsh_result result = average(bake, NULL, 0, NULL, error);
+    for (size_t i = 0; result == VSH_OK && i < bake->light_count; ++i) {
+        if (light_wanted(lightmap, i)) {
+            result = bake_light(bake, i, error);
+        }
+    }
+    if (result == VSH_OK && lightmap->ao != NULL) {
+        const vsh_points points = {bake->origins.count, bake->origins.position, bake->origins.normal};
+        result = vsh_shade_ao(bake->field, &points, &bake->shade, &bake->run, bake->values,
+                              &bake->stats.shade, error);
+        if (result == VSH_OK) {
+            result = average(bake, bake->values, 1, lightmap->ao, error);
+        }
+    }
+    if (result == VSH_OK && lightmap->irradiance != NULL && bake->light_count > 0) {
+        result = average(bake, bake->irradiance, 3, lightmap->irradiance, error);
+        for (size_t i = 0; result == VSH_OK && lightmap->ao != NULL && i < 3 * texel_count(texels); ++i) {
+            lightmap->irradiance[i] *= lightmap->ao[i / 3];
+        }
+    }
+    return result;
+}
+
+/* Counts texels without a value, by the mesh of their first sample, and writes the coverage. */
+static size_t finish_coverage(baking *bake) {
+    const vsh_texels *texels = bake->texels;
+    size_t invalid = 0;
+    for (size_t i = 0; i < texels->count; ++i) {
+        const uint32_t texel = texels->texel[i];
+        if (i > 0 && texel == texels->texel[i - 1]) {
+            continue;
+        }
+        if (bake->state[texel] == VSHI_TEXEL_INVALID) {
+            ++invalid;
+            if (bake->stats.invalid_by_mesh != NULL) {
+                ++bake->stats.invalid_by_mesh[texels->mesh[i]];
+            }
+        } else if (bake->lightmap->coverage != NULL) {
+            bake->lightmap->coverage[texel] = 1.0f;
+        }
+    }
+    bake->stats.texels = texels->info.covered;
+    bake->stats.invalid_texels = invalid;
+    return invalid;
+}
+
+static vsh_result pad(baking *bake, size_t invalid, vsh_error *error) {
+    const vsh_lightmap *lightmap = bake->lightmap;
+    const vsh_texels *texels = bake->texels;
+    const int32_t padding = texels->padding;
+    const int32_t invalid_radius = padding > LEAST_INVALID_RADIUS ? padding : LEAST_INVALID_RADIUS;
+    const int32_t radius[VSHI_TEXEL_KINDS] = {padding, 0, invalid > 0 ? invalid_radius : 0};
+    vsh_result result = VSH_OK;
+    vshi_plane *planes = vshi_take(bake->light_count + 2, sizeof *planes, "padding", &result, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    size_t count = 0;
+    for (size_t i = 0; lightmap->shadow != NULL && i < bake->light_count; ++i) {
+        if (lightmap->shadow[i] != NULL) {
+            planes[count++] = (vshi_plane){lightmap->shadow[i], 1};
+        }
+    }
+    if (lightmap->ao != NULL) {
+        planes[count++] = (vshi_plane){lightmap->ao, 1};
+    }
+    if (lightmap->irradiance != NULL) {
+        planes[count++] = (vshi_plane){lightmap->irradiance, 3};
+    }
+    result = vshi_padding_fill(&bake->run, texels->info.width, texels->info.height, bake->state, radius,
+                               planes, count, error);
+    free(planes);
+    return result;
+}
+
+static void clear_planes(const baking *bake) {
+    const vsh_lightmap *lightmap = bake->lightmap;
+    const size_t bytes = texel_count(bake->texels) * sizeof(float);
+    for (size_t i = 0; lightmap->shadow != NULL && i < bake->light_count; ++i) {
+        if (lightmap->shadow[i] != NULL) {
+            memset(lightmap->shadow[i], 0, bytes);
+        }
+    }
+    if (lightmap->ao != NULL) {
+        memset(lightmap->ao, 0, bytes);
+    }
+    if (lightmap->irradiance != NULL) {
+        memset(lightmap->irradiance, 0, 3 * bytes);
+    }
+    if (lightmap->coverage != NULL) {
+        memset(lightmap->coverage, 0, bytes);
+    }
+}
+
+static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error *error) {
+    const vsh_texels *texels = bake->texels;
+    vsh_field_info field;
+    vsh_field_get_info(bake->field, &field);
+    const double samples = (double)texels->count;
+    double bytes = (double)field.bytes + (double)texels->info.bytes + vshi_origins_bytes(texels) +
+                   (double)texel_count(texels) + vshi_padding_bytes(texels->info.width, texels->info.height);
+    bytes += values ? samples * sizeof(float) : 0.0;
+    bytes += irradiance ? samples * 3.0 * sizeof(float) : 0.0;
+    vsh_result result = vshi_check_limit(&bake->run, bytes, "lightmap", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    clear_planes(bake);
+    vsh_shade_options lifted = bake->shade;
+    bake->shade.start_offset = 0.0;
+    bake->shade.surface_offset = 0.0;
+    result = vshi_origins_create(bake->field, texels, &lifted, &bake->run, &bake->origins, error);
+    bake->state = vshi_take(texel_count(texels), 1, "lightmap", &result, error);
+    const size_t count = bake->origins.count;
+    bake->values = vshi_take(values ? count : 0, sizeof(float), "lightmap", &result, error);
+    bake->irradiance = vshi_take(irradiance ? count : 0, 3 * sizeof(float), "lightmap", &result, error);
+    if (result == VSH_OK) {
+        result = bake_planes(bake, error);
+    }
+    if (result == VSH_OK) {
+        result = pad(bake, finish_coverage(bake), error);
+    }
+    free(bake->irradiance);
+    free(bake->values);
+    free(bake->state);
+    vshi_origins_free(&bake->origins);
+    return result;
+}
+
+/* The ranges that the bake itself relies on; the shading calls check the rest. */
+static vsh_result check_offsets(const vsh_shade_options *options, vsh_error *error) {
+    if (!(options->start_offset >= 0.0 && options->start_offset <= 16.0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "start_offset %g: expected 0 … 16 voxels",
+                         options->start_offset);
+    }
+    if (!(options->surface_offset >= 0.0 && isfinite(options->surface_offset))) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "surface_offset %g: expected a finite number, at least 0",
+                         options->surface_offset);
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, const vsh_light *lights,
+                             size_t light_count, const vsh_shade_options *options, const vsh_run *run,
+                             const vsh_lightmap *lightmap, vsh_bake_stats *stats, vsh_error *error) {
+    if (field == NULL || texels == NULL || lightmap == NULL || (lights == NULL && light_count > 0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_lightmap: %s is NULL",
+                         field == NULL                       ? "field"
+                         : texels == NULL                    ? "texels"
+                         : lights == NULL && light_count > 0 ? "lights"
+                                                             : "lightmap");
+    }
+    baking bake = {.field = field,
+                   .texels = texels,
+                   .lights = lights,
+                   .light_count = light_count,
+                   .shade = vsh_shade_options_default(),
+                   .lightmap = lightmap,
+                   .stats = vsh_bake_stats_zero()};
+    vsh_result result = vshi_options_resolve(options != NULL ? options : &texels->shade, &bake.shade,
+                                             sizeof bake.shade, "vsh_shade_options", error);
+    if (result == VSH_OK) {
+        result = vshi_run_resolve(run, &bake.run, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_options_resolve(stats, &bake.stats, sizeof bake.stats, "vsh_bake_stats", error);
+    }
+    if (result == VSH_OK) {
+        result = check_offsets(&bake.shade, error);
+    }
+    bake.quiet = bake.run;
+    bake.quiet.progress = NULL;
+    bool light = false;
+    for (size_t i = 0; result == VSH_OK && i < light_count; ++i) {
+        result = vsh_light_check(&lights[i], error);
+        light = light || light_wanted(lightmap, i);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    for (size_t m = 0; bake.stats.invalid_by_mesh != NULL && m < texels->mesh_count; ++m) {
+        bake.stats.invalid_by_mesh[m] = 0;
+    }
+    result = run_bake(&bake, light || lightmap->ao != NULL, light && lightmap->irradiance != NULL, error);
+    if (stats != NULL && result == VSH_OK) {
+        memcpy(stats, &bake.stats, stats->struct_size);
+    }
+    return result;
+}

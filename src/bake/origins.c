@@ -1,0 +1,123 @@
+#include "bake/origins.h"
+#include "bake/take.h"
+#include "base/parallel.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Where a sample is looked at for whether it is free: a voxel above its surface, which is as much as the
+ * field tells apart. Touching solids keep their inner surfaces in a mesh's level set, so under a box that
+ * stands on a floor the distance falls by no more than the height. */
+static const double PROBE_HEIGHT = 1.0;
+/* Deeper than this at the probe is inside another solid, voxels: less may be the trilinear error of a corner.
+ */
+static const double PROBE_DEPTH = 0.25;
+
+typedef struct lifting {
+    const vsh_field *field;
+    const vsh_texels *texels;
+    vshi_origins *origins;
+    double offset;    /* world units, all meshes */
+    double probe;     /* same, for the look whether a sample is free */
+    double shell;     /* world units, open meshes on top of it */
+    double threshold; /* distance below which a sample is invalid, world units */
+} lifting;
+
+static size_t block_end(const lifting *l, size_t block) {
+    const size_t end = (block + 1) * VSHI_ORIGIN_BLOCK;
+    return end < l->texels->count ? end : l->texels->count;
+}
+
+static void lift(const lifting *l, size_t i, double offset, double origin[3]) {
+    const vsh_texels *texels = l->texels;
+    const double height = offset + (texels->open[texels->mesh[i]] ? l->shell : 0.0);
+    for (size_t k = 0; k < 3; ++k) {
+        origin[k] = texels->position[3 * i + k] + height * (double)texels->geometric[3 * i + k];
+    }
+}
+
+static void validate(void *user, size_t begin, size_t end) {
+    const lifting *l = user;
+    for (size_t block = begin; block < end; ++block) {
+        const size_t first = block * VSHI_ORIGIN_BLOCK, last = block_end(l, block);
+        double origin[VSHI_ORIGIN_BLOCK][3];
+        float distance[VSHI_ORIGIN_BLOCK];
+        for (size_t i = first; i < last; ++i) {
+            lift(l, i, l->probe, origin[i - first]);
+        }
+        vsh_field_sample(l->field, last - first, &origin[0][0], distance);
+        size_t valid = 0;
+        for (size_t i = first; i < last; ++i) {
+            l->origins->valid[i] = (double)distance[i - first] >= l->threshold;
+            valid += l->origins->valid[i];
+        }
+        l->origins->before[block] = valid;
+    }
+}
+
+static void pack(void *user, size_t begin, size_t end) {
+    const lifting *l = user;
+    vshi_origins *origins = l->origins;
+    for (size_t block = begin; block < end; ++block) {
+        size_t next = origins->before[block];
+        for (size_t i = block * VSHI_ORIGIN_BLOCK; i < block_end(l, block); ++i) {
+            if (origins->valid[i]) {
+                lift(l, i, l->offset, origins->position + 3 * next);
+                memcpy(origins->normal + 3 * next, l->texels->normal + 3 * i, 3 * sizeof(float));
+                ++next;
+            }
+        }
+    }
+}
+
+double vshi_origins_bytes(const vsh_texels *texels) {
+    return (double)texels->count * (1.0 + 3.0 * sizeof(double) + 3.0 * sizeof(float));
+}
+
+vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
+                               const vsh_shade_options *options, const vsh_run *run, vshi_origins *origins,
+                               vsh_error *error) {
+    const char *what = "lightmap samples";
+    *origins = (vshi_origins){.blocks = (texels->count + VSHI_ORIGIN_BLOCK - 1) / VSHI_ORIGIN_BLOCK};
+    vsh_field_info info;
+    vsh_field_get_info(field, &info);
+    const double offset = options->start_offset * info.voxel_size + options->surface_offset;
+    lifting l = {.field = field,
+                 .texels = texels,
+                 .origins = origins,
+                 .offset = offset,
+                 .shell = 0.5 * info.shell_thickness,
+                 .probe = fmax(offset, PROBE_HEIGHT * info.voxel_size),
+                 .threshold = -PROBE_DEPTH * info.voxel_size};
+    vsh_result result = VSH_OK;
+    vshi_job *job = vshi_job_begin(run, "validate", 2 * origins->blocks);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
+    }
+    origins->valid = vshi_take(texels->count, 1, what, &result, error);
+    origins->before = vshi_take(origins->blocks + 1, sizeof(size_t), what, &result, error);
+    if (result == VSH_OK) {
+        result = vshi_parallel_for(job, origins->blocks, 1, 1, validate, &l, error);
+    }
+    for (size_t block = 0; result == VSH_OK && block <= origins->blocks; ++block) {
+        const size_t valid = origins->before[block];
+        origins->before[block] = origins->count;
+        origins->count += valid;
+    }
+    origins->position = vshi_take(origins->count, 3 * sizeof(double), what, &result, error);
+    origins->normal = vshi_take(origins->count, 3 * sizeof(float), what, &result, error);
+    if (result == VSH_OK) {
+        result = vshi_parallel_for(job, origins->blocks, 1, 1, pack, &l, error);
+    }
+    vshi_job_end(job);
+    return result;
+}
+
+void vshi_origins_free(vshi_origins *origins) {
+    free(origins->normal);
+    free(origins->position);
+    free(origins->before);
+    free(origins->valid);
+    *origins = (vshi_origins){0};
+}

@@ -1,0 +1,31 @@
+/* Where the rays of a lightmap's samples begin, and which samples can be shaded at all. */
+#ifndef VSHI_BAKE_ORIGINS_H
+#define VSHI_BAKE_ORIGINS_H
+
+#include "bake/texels.h"
+
+enum { VSHI_ORIGIN_BLOCK = 1024 }; /* samples that are worked on together */
+
+/* The valid samples, close-packed in the order of the texels' samples. */
+typedef struct vshi_origins {
+    size_t count;
+    double *position; /* [count][3]: lifted off the surface, world units */
+    float *normal;    /* [count][3]: decides shadow */
+    uint8_t *valid;   /* [all samples]: 1 where the sample is among them */
+    size_t blocks;    /* of all samples */
+    size_t *before;   /* [blocks + 1]: valid samples before each block */
+} vshi_origins;
+
+/* Bytes that the origins of all samples take at most. */
+double vshi_origins_bytes(const vsh_texels *texels);
+
+/* Lifts each sample along its geometric normal by the start offset, and by half a shell's thickness where its
+ * mesh is open. A sample that ends up inside the field's solid is invalid: it lies inside another solid, or
+ * shows its back. Free with vshi_origins_free() also after an error. Errors: VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED. */
+vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
+                               const vsh_shade_options *options, const vsh_run *run, vshi_origins *origins,
+                               vsh_error *error);
+void vshi_origins_free(vshi_origins *origins);
+
+#endif

@@ -1,0 +1,184 @@
+/* vdbshade bake: from files to lightmaps. */
+#include "bake_options.h"
+#include "clock.h"
+#include "message.h"
+#include "progress.h"
+#include "receiver.h"
+#include "signals.h"
+#include "temporary.h"
+#include "trial.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <unistd.h>
+
+typedef struct bake_work {
+    const cli_bake_settings *settings;
+    const vsh_scene *scene;
+    vsh_run run;
+    vsh_assets *assets;
+    vsh_grid *grid;
+    vsh_field *field;
+    vsh_texels *kept; /* of the only receiver; several are rasterised again, so as not to hold all at once */
+    double bounds_min[3];
+    double bounds_max[3];
+    cli_stats stats;
+} bake_work;
+
+/* What can be refused before anything is read, and before there are threads. */
+static int check_files(const cli_bake_settings *settings, const vsh_scene *scene) {
+    int code = settings->stats != NULL ? cli_temporary_check(settings->stats) : CLI_OK;
+    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        if (caster->type == VSH_CASTER_VDB) {
+            code = cli_trial_read(caster->path, caster->grid, settings->common.memory_limit);
+        }
+    }
+    for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
+        code = cli_receiver_check(scene, i);
+    }
+    return code;
+}
+
+static int load(bake_work *work) {
+    const double start = cli_seconds();
+    vsh_error error;
+    const vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
+    cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
+    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+}
+
+static cli_receiver_job receiver_job(const bake_work *work, size_t index) {
+    return (cli_receiver_job){work->scene, work->assets, &work->run, index};
+}
+
+/* UVs are looked over, and complained of, before the long work. */
+static int rasterise(bake_work *work) {
+    const double start = cli_seconds();
+    int code = CLI_OK;
+    for (int axis = 0; axis < 3; ++axis) {
+        work->bounds_min[axis] = INFINITY;
+        work->bounds_max[axis] = -INFINITY;
+    }
+    for (size_t i = 0; i < work->scene->receiver_count && code == CLI_OK; ++i) {
+        const cli_receiver_job job = receiver_job(work, i);
+        vsh_texels *texels = NULL;
+        code = cli_receiver_texels(&job, true, &texels);
+        if (code != CLI_OK) {
+            break;
+        }
+        vsh_texels_info info;
+        vsh_texels_get_info(texels, &info);
+        for (int axis = 0; axis < 3 && info.samples > 0; ++axis) {
+            work->bounds_min[axis] = fmin(work->bounds_min[axis], info.bounds_min[axis]);
+            work->bounds_max[axis] = fmax(work->bounds_max[axis], info.bounds_max[axis]);
+        }
+        if (work->scene->receiver_count == 1) {
+            work->kept = texels;
+        } else {
+            vsh_texels_free(texels);
+        }
+    }
+    cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
+    return code;
+}
+
+static int make_field(bake_work *work) {
+    double now = cli_seconds();
+    vsh_error error;
+    if (vsh_scene_casters(work->scene, work->assets, &work->run, &work->grid, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    vsh_grid_get_info(work->grid, &work->stats.grid);
+    now = cli_stats_stage(&work->stats, CLI_STAGE_VOXELIZE, now);
+    vsh_field_options options = vsh_field_options_default();
+    options.reach = vsh_scene_reach(work->scene, work->grid, work->bounds_min, work->bounds_max);
+    const vsh_result result = vsh_field_create(work->grid, &options, &work->run, &work->field, &error);
+    vsh_grid_free(work->grid); /* the field does not need it */
+    work->grid = NULL;
+    if (result != VSH_OK) {
+        return cli_fail(&error);
+    }
+    vsh_field_get_info(work->field, &work->stats.field);
+    cli_stats_stage(&work->stats, CLI_STAGE_FIELD, now);
+    return CLI_OK;
+}
+
+static void say_receiver(const bake_work *work, size_t index, const cli_stats *before) {
+    if (work->settings->common.quiet) {
+        return;
+    }
+    const vsh_receiver *receiver = &work->scene->receivers[index];
+    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid", receiver->output, receiver->width,
+            receiver->height, work->stats.texels - before->texels,
+            work->stats.invalid_texels - before->invalid_texels);
+}
+
+static int bake_receivers(bake_work *work) {
+    int code = CLI_OK;
+    for (size_t i = 0; i < work->scene->receiver_count && code == CLI_OK; ++i) {
+        const cli_receiver_job job = receiver_job(work, i);
+        vsh_texels *texels = work->kept;
+        if (texels == NULL) {
+            const double start = cli_seconds();
+            code = cli_receiver_texels(&job, false, &texels);
+            cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
+        }
+        const cli_stats before = work->stats;
+        if (code == CLI_OK) {
+            code = cli_receiver_bake(&job, work->field, texels, &work->stats);
+        }
+        vsh_texels_free(texels);
+        work->kept = NULL;
+        if (code == CLI_OK) {
+            say_receiver(work, i, &before);
+        }
+    }
+    return code;
+}
+
+static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
+    bake_work work = {.settings = settings, .scene = scene, .run = cli_common_run(&settings->common)};
+    work.stats.shade = vsh_shade_stats_zero();
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    work.stats.threads = settings->common.threads > 0 ? settings->common.threads : (int32_t)cores;
+    int code = load(&work);
+    code = code == CLI_OK ? rasterise(&work) : code;
+    code = code == CLI_OK ? make_field(&work) : code;
+    code = code == CLI_OK ? bake_receivers(&work) : code;
+    if (code == CLI_OK && settings->stats != NULL) {
+        cli_signals_writing(settings->stats);
+        code = cli_stats_write(&work.stats, settings->stats);
+        cli_signals_writing(NULL);
+    }
+    cli_signals_end();
+    if (code == CLI_OK && !settings->common.quiet) {
+        cli_stats_say(&work.stats);
+    }
+    vsh_texels_free(work.kept);
+    vsh_field_free(work.field);
+    vsh_grid_free(work.grid);
+    vsh_assets_free(work.assets);
+    return code;
+}
+
+int cli_bake_main(int argc, char **argv) {
+    cli_bake_settings settings;
+    bool help;
+    int code = cli_bake_parse(argc, argv, &settings, &help);
+    if (code != CLI_OK || help) {
+        return code;
+    }
+    cli_progress_begin(settings.common.progress, settings.common.quiet);
+    cli_bake_scene made;
+    code = cli_bake_scene_make(&settings, &made);
+    code = code == CLI_OK ? check_files(&settings, &made.scene) : code;
+    if (code == CLI_OK) {
+        cli_signals_watch();
+        code = bake(&settings, &made.scene);
+    }
+    cli_bake_scene_free(&made);
+    cli_progress_end();
+    return code;
+}

@@ -1,0 +1,170 @@
+#include "bake_options.h"
+
+#include "message.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum {
+    KEY_SUN = 0x2000,
+    KEY_SUN_ANGLE,
+    KEY_AO,
+    KEY_AO_METHOD,
+    KEY_AO_CONES,
+    KEY_IRRADIANCE,
+    KEY_METHOD,
+    KEY_CASTER,
+    KEY_SIZE,
+    KEY_UV_SET,
+    KEY_SUPERSAMPLE,
+    KEY_PADDING,
+    KEY_BITS,
+    KEY_PACK,
+    KEY_STATS
+};
+
+static const cli_option options[] = {
+    {0, NULL, NULL, "Output"},
+    {'o', "output", "OUT",
+     "image to write: .exr with named channels, or any\n"
+     "format that OpenImageIO writes (.png, .tif, .hdr …)"},
+    {KEY_SIZE, "size", "W[xH]", "texels of the lightmap, 1 to 65536 (1024)"},
+    {KEY_BITS, "bits", "N",
+     "8, 16 or 32 bits a channel (32 for EXR, else 16\nwhere the format has it, else 8)"},
+    {KEY_PACK, "pack", "R=NAME,…",
+     "what goes where in formats that cannot name channels:\n"
+     "R=shadow.sun,G=ao,A=A; 0 and 1 are constants\n"
+     "(the first three but A to R, G, B; A to A)"},
+    {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
+    {0, NULL, NULL, "Light and occlusion"},
+    {KEY_SUN, "sun", "X,Y,Z", "direction towards the sun; its channel is shadow.sun"},
+    {KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},
+    {KEY_AO, "ao", "DISTANCE", "ambient occlusion within a distance, scene units"},
+    {KEY_AO_METHOD, "ao-method", "NAME", "taps or cones (cones)"},
+    {KEY_AO_CONES, "ao-cones", "N", "cones a texel, 1 to 256 (16)"},
+    {KEY_IRRADIANCE, "irradiance", NULL,
+     "also irradiance.R, .G, .B: visibility × colour ×\nfalloff × cosine, summed, × AO where baked"},
+    {KEY_METHOD, "method", "NAME",
+     "shadow estimate: hard, classic, improved, smooth,\ncone (cone); classic and improved have the outer\n"
+     "half of the penumbra only"},
+    {0, NULL, NULL, "Casters and voxels"},
+    {KEY_CASTER, "caster", "FILE", "another mesh that casts shadows; may be repeated"},
+    CLI_GRID_OPTIONS,
+    {0, NULL, NULL, "Texels"},
+    {KEY_UV_SET, "uv-set", "N",
+     "UV set of the lightmap, from 0 (the second where\nthere is one, else the first)"},
+    {KEY_SUPERSAMPLE, "supersample", "N", "N × N samples a texel, 1 to 16 (1)"},
+    {KEY_PADDING, "padding", "N", "texels that charts are grown by, 0 to 4096 (4)"},
+    CLI_COMMON_OPTIONS,
+};
+
+const cli_command cli_bake = {
+    "bake",
+    "INPUT -o OUT [options]",
+    "Bakes soft shadows and ambient occlusion into a lightmap. INPUT is a mesh file with lightmap UVs\n"
+    "(OBJ, glTF, GLB, PLY, FBX …), which casts and receives, or a scene file (.json), whose values the\n"
+    "options override. Numbers in brackets are what holds without the option.",
+    options,
+    sizeof options / sizeof options[0],
+    cli_bake_main};
+
+/* A name out of the library's list, or an error that shows the list. */
+static int take_name(const char *option, const char *text, int32_t (*value_of)(const char *),
+                     const char *(*name_of)(int32_t), int32_t *value) {
+    *value = value_of(text);
+    if (*value >= 0) {
+        return CLI_OK;
+    }
+    char list[256] = "";
+    size_t used = 0;
+    for (int32_t i = 0; name_of(i) != NULL && used < sizeof list; ++i) {
+        used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", name_of(i));
+    }
+    return cli_usage("%s '%s': no such method; there are: %s", option, text, list);
+}
+
+static int take_bits(const char *name, const char *value, int32_t *bits) {
+    static const char *const widths[] = {"8", "16", "32"};
+    for (int i = 0; i < 3; ++i) {
+        if (strcmp(value, widths[i]) == 0) {
+            *bits = 8 << i;
+            return CLI_OK;
+        }
+    }
+    return cli_usage("%s '%s': expected 8, 16 or 32", name, value);
+}
+
+static int take_caster(cli_bake_settings *s, const char *name, const char *value) {
+    if (s->caster_count == CLI_MAX_EXTRA_CASTERS) {
+        return cli_usage("%s '%s': more than %d casters; put them into a scene file", name, value,
+                         CLI_MAX_EXTRA_CASTERS);
+    }
+    s->casters[s->caster_count++] = value;
+    return CLI_OK;
+}
+
+static int take(void *settings, int key, const char *name, const char *value) {
+    cli_bake_settings *s = settings;
+    switch (key) {
+    case 'o':
+        s->output = value;
+        return CLI_OK;
+    case KEY_STATS:
+        s->stats = value;
+        return CLI_OK;
+    case KEY_SUN:
+        s->has_sun = true;
+        return cli_take_vector(name, value, s->sun);
+    case KEY_SUN_ANGLE:
+        s->has_sun_angle = true;
+        return cli_take_number(name, value, 0.0, 179.0, &s->sun_angle_deg);
+    case KEY_AO:
+        s->has_ao = true;
+        return cli_take_positive(name, value, &s->ao_distance);
+    case KEY_AO_METHOD:
+        s->has_ao_method = true;
+        return take_name(name, value, vsh_ao_method, vsh_ao_method_name, &s->ao_method);
+    case KEY_AO_CONES:
+        s->has_ao_cones = true;
+        return cli_take_integer(name, value, 1, 256, &s->ao_cones);
+    case KEY_IRRADIANCE:
+        s->irradiance = true;
+        return CLI_OK;
+    case KEY_METHOD:
+        s->has_method = true;
+        return take_name(name, value, vsh_shadow_method, vsh_shadow_method_name, &s->method);
+    case KEY_CASTER:
+        return take_caster(s, name, value);
+    case KEY_SIZE:
+        s->has_size = true;
+        return cli_take_size(name, value, &s->width, &s->height);
+    case KEY_UV_SET:
+        s->has_uv_set = true;
+        return cli_take_integer(name, value, 0, VSH_MAX_UV_SETS - 1, &s->uv_set);
+    case KEY_SUPERSAMPLE:
+        s->has_supersample = true;
+        return cli_take_integer(name, value, 1, 16, &s->supersample);
+    case KEY_PADDING:
+        s->has_padding = true;
+        return cli_take_integer(name, value, 0, 4096, &s->padding);
+    case KEY_BITS:
+        s->has_bits = true;
+        return take_bits(name, value, &s->bits);
+    case KEY_PACK:
+        s->pack = value;
+        return CLI_OK;
+    default:
+        break;
+    }
+    bool taken;
+    const int code = cli_grid_take(&s->grid, key, name, value, &taken);
+    return taken ? code : cli_common_take(&s->common, key, name, value, &taken);
+}
+
+int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help) {
+    memset(settings, 0, sizeof *settings);
+    settings->common = cli_common_default();
+    settings->grid.options = vsh_grid_options_default();
+    const int code = cli_parse(&cli_bake, argc, argv, take, settings, "INPUT", &settings->input, help);
+    return code != CLI_OK || *help ? code : cli_grid_check(&settings->grid);
+}

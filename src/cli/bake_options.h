@@ -1,0 +1,49 @@
+/* The options of `vdbshade bake`, and the scene they make of its input. */
+#ifndef CLI_BAKE_OPTIONS_H
+#define CLI_BAKE_OPTIONS_H
+
+#include "commands.h"
+
+enum { CLI_MAX_EXTRA_CASTERS = 256 };
+
+typedef struct cli_bake_settings {
+    const char *input;
+    const char *output;
+    const char *stats;
+    cli_common common;
+    cli_grid_settings grid;
+    double sun[3];
+    double sun_angle_deg;
+    double ao_distance;
+    int32_t ao_method;
+    int32_t ao_cones;
+    int32_t method;
+    int32_t width, height;
+    int32_t uv_set;
+    int32_t supersample;
+    int32_t padding;
+    int32_t bits;
+    const char *pack;
+    const char *casters[CLI_MAX_EXTRA_CASTERS];
+    size_t caster_count;
+    bool has_sun, has_sun_angle, has_ao, has_ao_method, has_ao_cones, has_method, has_size, has_uv_set;
+    bool has_supersample, has_padding, has_bits, irradiance;
+} cli_bake_settings;
+
+/* Takes the command line. */
+int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help);
+
+/* A scene and what of it is ours: the input's, with the options put over it. */
+typedef struct cli_bake_scene {
+    vsh_scene scene;
+    vsh_scene *read; /* the scene file's; NULL for a mesh */
+    vsh_caster *casters;
+    vsh_receiver *receivers;
+    vsh_light sun;
+} cli_bake_scene;
+
+/* Makes the scene, checks that it can be baked and that its outputs replace no input. */
+int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made);
+void cli_bake_scene_free(cli_bake_scene *made);
+
+#endif

@@ -1,0 +1,224 @@
+/* From the options of `bake` to the scene it bakes. */
+#include "bake_options.h"
+#include "message.h"
+#include "paths.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double sun_angle_default_deg = 0.53; /* of the sun from the earth */
+static const double radians_per_degree = 0.017453292519943295;
+
+static void set_identity(double transform[12]) {
+    for (int i = 0; i < 12; ++i) {
+        transform[i] = i % 5 == 0 ? 1.0 : 0.0;
+    }
+}
+
+static int out_of_memory(const char *what) {
+    cli_say("%s: the system refused memory", what);
+    return CLI_LIMIT;
+}
+
+/* The input's casters, then those of --caster. */
+static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
+    const size_t own = made->read != NULL ? made->read->caster_count : 1;
+    const size_t count = own + s->caster_count;
+    made->casters = calloc(count, sizeof *made->casters);
+    if (made->casters == NULL) {
+        return out_of_memory("casters");
+    }
+    for (size_t i = 0; i < count; ++i) {
+        if (i < own && made->read != NULL) {
+            made->casters[i] = made->read->casters[i];
+        } else {
+            made->casters[i].type = VSH_CASTER_MESH;
+            made->casters[i].path = i < own ? s->input : s->casters[i - own];
+            set_identity(made->casters[i].transform);
+        }
+    }
+    made->scene.casters = made->casters;
+    made->scene.caster_count = count;
+    return CLI_OK;
+}
+
+static void override_receiver(const cli_bake_settings *s, vsh_receiver *receiver) {
+    if (s->output != NULL) {
+        receiver->output = s->output;
+    }
+    if (s->has_size) {
+        receiver->width = s->width;
+        receiver->height = s->height;
+    }
+    if (s->has_uv_set) {
+        receiver->uv_set = s->uv_set;
+    }
+    if (s->has_supersample) {
+        receiver->supersample = s->supersample;
+    }
+    if (s->has_padding) {
+        receiver->padding = s->padding;
+    }
+    if (s->has_bits) {
+        receiver->bits = s->bits;
+    }
+    if (s->pack != NULL) {
+        receiver->pack = s->pack;
+    }
+}
+
+static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
+    const size_t count = made->read != NULL ? made->read->receiver_count : 1;
+    if (count == 0) {
+        return cli_usage("%s: no receivers to bake", s->input);
+    }
+    if (made->read != NULL && count > 1 && s->output != NULL) {
+        return cli_usage("-o '%s': %s has %zu receivers, each with its own output", s->output, s->input,
+                         count);
+    }
+    made->receivers = calloc(count, sizeof *made->receivers);
+    if (made->receivers == NULL) {
+        return out_of_memory("receivers");
+    }
+    const vsh_lightmap_options defaults = vsh_lightmap_options_default();
+    for (size_t i = 0; i < count; ++i) {
+        vsh_receiver *receiver = &made->receivers[i];
+        if (made->read != NULL) {
+            *receiver = made->read->receivers[i];
+        } else {
+            receiver->path = s->input;
+            set_identity(receiver->transform);
+            receiver->uv_set = -1;
+            receiver->width = defaults.width;
+            receiver->height = defaults.height;
+            receiver->supersample = defaults.supersample;
+            receiver->padding = defaults.padding;
+        }
+        override_receiver(s, receiver);
+        if (receiver->output == NULL) {
+            return cli_usage("%s: no output; give -o OUT", s->input);
+        }
+    }
+    made->scene.receivers = made->receivers;
+    made->scene.receiver_count = count;
+    return CLI_OK;
+}
+
+static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
+    if (s->has_sun && made->read != NULL) {
+        return cli_usage("--sun: the lights of a scene stand in its file, %s", s->input);
+    }
+    if (s->has_sun_angle && !s->has_sun) {
+        return cli_usage("--sun-angle: there is no --sun");
+    }
+    if (made->read == NULL && !s->has_sun && !s->has_ao) {
+        return cli_usage("%s: nothing to bake; give --sun X,Y,Z or --ao DISTANCE, or both", s->input);
+    }
+    if (s->has_sun) {
+        made->sun = vsh_light_default();
+        memcpy(made->sun.direction, s->sun, sizeof made->sun.direction);
+        made->sun.angle = radians_per_degree * (s->has_sun_angle ? s->sun_angle_deg : sun_angle_default_deg);
+        made->scene.lights = &made->sun;
+        made->scene.light_count = 1;
+        vsh_error error;
+        if (vsh_light_check(&made->sun, &error) != VSH_OK) {
+            return cli_fail(&error);
+        }
+    }
+    return CLI_OK;
+}
+
+static int set_shade(const cli_bake_settings *s, vsh_scene *scene) {
+    if (s->has_ao) {
+        scene->ao = 1;
+        scene->shade.ao_distance = s->ao_distance;
+    }
+    if ((s->has_ao_method || s->has_ao_cones) && !scene->ao) {
+        return cli_usage("%s: there is no --ao", s->has_ao_method ? "--ao-method" : "--ao-cones");
+    }
+    if (s->has_ao_method) {
+        scene->shade.ao_method = s->ao_method;
+    }
+    if (s->has_ao_cones) {
+        scene->shade.ao_cones = s->ao_cones;
+    }
+    if (s->has_method) {
+        scene->shade.method = s->method;
+    }
+    if (s->irradiance) {
+        scene->irradiance = 1;
+    }
+    if (scene->irradiance && scene->light_count == 0) {
+        return cli_usage("--irradiance: there is no light");
+    }
+    if (scene->light_count == 0 && !scene->ao) {
+        return cli_usage("%s: nothing to bake: no lights and no ao", s->input);
+    }
+    return CLI_OK;
+}
+
+static int check_output(const cli_bake_settings *s, const vsh_scene *scene, const char *output) {
+    if (cli_same_file(output, s->input)) {
+        return cli_usage("%s: the output is the input", output);
+    }
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        if (scene->casters[i].path != NULL && cli_same_file(output, scene->casters[i].path)) {
+            return cli_usage("%s: the output is also a caster's file", output);
+        }
+    }
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        if (cli_same_file(output, scene->receivers[i].path)) {
+            return cli_usage("%s: the output is also a receiver's file", output);
+        }
+    }
+    return CLI_OK;
+}
+
+static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        const char *output = scene->receivers[i].output;
+        int code = check_output(s, scene, output);
+        if (code != CLI_OK) {
+            return code;
+        }
+        if (s->stats != NULL && cli_same_file(output, s->stats)) {
+            return cli_usage("%s: both the output and the --stats file", output);
+        }
+        for (size_t k = 0; k < i; ++k) {
+            if (cli_same_file(output, scene->receivers[k].output)) {
+                return cli_usage("%s: the output of two receivers", output);
+            }
+        }
+    }
+    return s->stats != NULL ? check_output(s, scene, s->stats) : CLI_OK;
+}
+
+int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made) {
+    memset(made, 0, sizeof *made);
+    if (cli_has_ending(settings->input, "json")) {
+        vsh_error error;
+        if (vsh_scene_read(settings->input, &made->read, &error) != VSH_OK) {
+            return cli_fail(&error);
+        }
+        made->scene = *made->read;
+    } else {
+        if (settings->output == NULL) {
+            return cli_usage("%s: no output; give -o OUT", settings->input);
+        }
+        made->scene.grid = vsh_grid_options_default();
+        made->scene.shade = vsh_shade_options_default();
+    }
+    cli_grid_apply(&settings->grid, &made->scene.grid);
+    int code = add_lights(settings, made);
+    code = code == CLI_OK ? set_shade(settings, &made->scene) : code;
+    code = code == CLI_OK ? add_casters(settings, made) : code;
+    code = code == CLI_OK ? add_receivers(settings, made) : code;
+    return code == CLI_OK ? check_outputs(settings, &made->scene) : code;
+}
+
+void cli_bake_scene_free(cli_bake_scene *made) {
+    free(made->receivers);
+    free(made->casters);
+    vsh_scene_free(made->read);
+}

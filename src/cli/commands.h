@@ -1,0 +1,13 @@
+/* The subcommands. */
+#ifndef CLI_COMMANDS_H
+#define CLI_COMMANDS_H
+
+#include "options.h"
+
+extern const cli_command cli_bake;
+extern const cli_command cli_voxelize;
+extern const cli_command cli_info;
+
+int cli_bake_main(int argc, char **argv);
+
+#endif

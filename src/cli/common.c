@@ -1,0 +1,103 @@
+/* The options that several commands share. */
+#include "message.h"
+#include "options.h"
+#include "progress.h"
+
+#include <stdio.h>
+#include <unistd.h>
+
+/* The machine's memory, or the control group's where that is less (a container). 0: not known. */
+static uint64_t machine_memory(void) {
+    const long pages = sysconf(_SC_PHYS_PAGES);
+    const long page = sysconf(_SC_PAGESIZE);
+    uint64_t bytes = pages > 0 && page > 0 ? (uint64_t)pages * (uint64_t)page : 0;
+    static const char *const limits[] = {"/sys/fs/cgroup/memory.max",
+                                         "/sys/fs/cgroup/memory/memory.limit_in_bytes"};
+    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; ++i) {
+        FILE *file = fopen(limits[i], "r");
+        unsigned long long limit = 0;
+        if (file != NULL) {
+            if (fscanf(file, "%llu", &limit) == 1 && limit > 0 && (bytes == 0 || limit < bytes)) {
+                bytes = limit;
+            }
+            fclose(file);
+        }
+    }
+    return bytes;
+}
+
+cli_common cli_common_default(void) {
+    return (cli_common){0, machine_memory() / 4 * 3, false, false};
+}
+
+vsh_run cli_common_run(const cli_common *common) {
+    vsh_run run = vsh_run_default();
+    run.threads = common->threads;
+    run.memory_limit = common->memory_limit;
+    run.progress = cli_progress_report;
+    run.warning = cli_progress_warning;
+    return run;
+}
+
+int cli_common_take(cli_common *common, int key, const char *name, const char *value, bool *taken) {
+    *taken = true;
+    switch (key) {
+    case CLI_KEY_THREADS:
+        return cli_take_integer(name, value, 1, 1024, &common->threads);
+    case CLI_KEY_MEMORY_LIMIT:
+        return cli_take_bytes(name, value, &common->memory_limit);
+    case CLI_KEY_QUIET:
+        common->quiet = true;
+        return CLI_OK;
+    case CLI_KEY_PROGRESS:
+        common->progress = true;
+        return CLI_OK;
+    default:
+        *taken = false;
+        return CLI_OK;
+    }
+}
+
+int cli_grid_take(cli_grid_settings *settings, int key, const char *name, const char *value, bool *taken) {
+    *taken = true;
+    switch (key) {
+    case CLI_KEY_RESOLUTION:
+        settings->has_resolution = true;
+        return cli_take_integer(name, value, 2, 65536, &settings->options.resolution);
+    case CLI_KEY_VOXEL_SIZE:
+        settings->has_voxel_size = true;
+        return cli_take_positive(name, value, &settings->options.voxel_size);
+    case CLI_KEY_HALF_WIDTH:
+        settings->has_half_width = true;
+        return cli_take_number(name, value, 3.0, 100.0, &settings->options.half_width);
+    case CLI_KEY_SHELL_THICKNESS:
+        settings->has_shell_thickness = true;
+        return cli_take_number(name, value, 1.0, 50.0, &settings->options.shell_thickness);
+    default:
+        *taken = false;
+        return CLI_OK;
+    }
+}
+
+int cli_grid_check(const cli_grid_settings *settings) {
+    if (settings->has_resolution && settings->has_voxel_size) {
+        return cli_usage("--resolution and --voxel-size: give one of the two");
+    }
+    return CLI_OK;
+}
+
+void cli_grid_apply(const cli_grid_settings *settings, vsh_grid_options *options) {
+    if (settings->has_resolution) {
+        options->resolution = settings->options.resolution;
+        options->voxel_size = 0.0;
+    }
+    if (settings->has_voxel_size) {
+        options->voxel_size = settings->options.voxel_size;
+    }
+    if (settings->has_half_width) {
+        options->half_width = settings->options.half_width;
+    }
+    if (settings->has_shell_thickness) {
+        options->shell_thickness = settings->options.shell_thickness;
+    }
+}

@@ -1,0 +1,69 @@
+/* vdbshade info: what a file holds, and what is wrong with it. */
+#include "info.h"
+
+#include "commands.h"
+#include "message.h"
+#include "paths.h"
+#include "progress.h"
+#include "trial.h"
+
+#include <stdio.h>
+
+static const cli_option options[] = {
+    {0, NULL, NULL, "Options"},
+    {'h', "help", NULL, "show this help"},
+};
+
+static int info_main(int argc, char **argv);
+
+const cli_command cli_info = {
+    "info",
+    "FILE",
+    "Prints what a file holds and what is wrong with it. Meshes: triangles, vertices, UV sets, bounds,\n"
+    "open, flipped and degenerate parts, overlapping UVs. OpenVDB files (.vdb): class, voxel size, band,\n"
+    "bounds, memory of each grid, and why it cannot cast. Scenes (.json): casters, lights, receivers.\n"
+    "Images: size, and the range of each channel.",
+    options,
+    sizeof options / sizeof options[0],
+    info_main};
+
+static int take(void *settings, int key, const char *name, const char *value) {
+    (void)settings;
+    (void)key;
+    (void)value;
+    return cli_usage("%s: no such option", name);
+}
+
+static int print_info(void *user) {
+    static const char *const image_endings[] = {"exr", "png",  "tif", "tiff", "jpg", "jpeg", "hdr", "tga",
+                                                "bmp", "webp", "dpx", "psd",  "pgm", "ppm",  "pfm", "gif"};
+    const char *path = user;
+    if (cli_has_ending(path, "vdb")) {
+        return cli_info_vdb(path);
+    }
+    if (cli_has_ending(path, "json")) {
+        return cli_info_scene(path);
+    }
+    for (size_t i = 0; i < sizeof image_endings / sizeof image_endings[0]; ++i) {
+        if (cli_has_ending(path, image_endings[i])) {
+            return cli_info_image(path);
+        }
+    }
+    return cli_info_mesh(path);
+}
+
+/* Everything is read in a child: a file that is looked at is a file that is not trusted yet. */
+static int info_main(int argc, char **argv) {
+    const char *path = NULL;
+    bool help;
+    const int code = cli_parse(&cli_info, argc, argv, take, NULL, "FILE", &path, &help);
+    if (code != CLI_OK || help) {
+        return code;
+    }
+    cli_progress_begin(false, true);
+    char copy[4096];
+    if (snprintf(copy, sizeof copy, "%s", path) >= (int)sizeof copy) {
+        return cli_usage("%.64s…: the name is too long", path);
+    }
+    return cli_isolated(path, cli_common_default().memory_limit, print_info, copy);
+}

@@ -1,0 +1,11 @@
+/* What `vdbshade info` prints of a file of each kind. Each returns CLI_OK or an exit code, having said why.
+ */
+#ifndef CLI_INFO_H
+#define CLI_INFO_H
+
+int cli_info_mesh(const char *path);
+int cli_info_vdb(const char *path);
+int cli_info_scene(const char *path);
+int cli_info_image(const char *path);
+
+#endif

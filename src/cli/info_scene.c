@@ -1,0 +1,64 @@
+#include "info.h"
+#include "message.h"
+
+#include <stdio.h>
+#include <vdbshade/scene.h>
+
+static void print_caster(const vsh_caster *caster, size_t index) {
+    static const char *const types[] = {"mesh", "sdf", "vdb"};
+    printf("caster %zu: %s", index, types[caster->type]);
+    if (caster->type == VSH_CASTER_SDF) {
+        double min[3], max[3];
+        vsh_sdf_bounds(&caster->sdf, min, max);
+        printf(", %zu nodes, bounds %g %g %g to %g %g %g", caster->sdf.node_count, min[0], min[1], min[2],
+               max[0], max[1], max[2]);
+    } else {
+        printf(" %s", caster->path);
+        if (caster->grid != NULL) {
+            printf(", grid '%s'", caster->grid);
+        }
+    }
+    putchar('\n');
+}
+
+static void print_light(const vsh_light *light) {
+    static const char *const types[] = {"directional", "sphere", "spot"};
+    printf("light '%s': %s", light->name, types[light->type]);
+    if (light->type == VSH_LIGHT_DIRECTIONAL) {
+        printf(", towards %g %g %g, %.4g°\n", light->direction[0], light->direction[1], light->direction[2],
+               light->angle * 57.29577951308232);
+    } else {
+        printf(", at %g %g %g, radius %g\n", light->position[0], light->position[1], light->position[2],
+               light->radius);
+    }
+}
+
+int cli_info_scene(const char *path) {
+    vsh_scene *scene = NULL;
+    vsh_error error;
+    if (vsh_scene_read(path, &scene, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        print_caster(&scene->casters[i], i);
+    }
+    for (size_t i = 0; i < scene->light_count; ++i) {
+        print_light(&scene->lights[i]);
+    }
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        const vsh_receiver *receiver = &scene->receivers[i];
+        printf("receiver %zu: %s to %s, %d × %d\n", i, receiver->path, receiver->output, receiver->width,
+               receiver->height);
+    }
+    if (scene->grid.voxel_size > 0.0) {
+        printf("voxel size: %g\n", scene->grid.voxel_size);
+    } else {
+        printf("resolution: %d\n", scene->grid.resolution);
+    }
+    printf("method: %s\n", vsh_shadow_method_name(scene->shade.method));
+    if (scene->ao) {
+        printf("ao: %s, within %g\n", vsh_ao_method_name(scene->shade.ao_method), scene->shade.ao_distance);
+    }
+    vsh_scene_free(scene);
+    return CLI_OK;
+}

@@ -1,0 +1,55 @@
+#include "info.h"
+#include "message.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <vdbshade/grid.h>
+
+enum { MAX_LISTED = 4096 };
+
+static void print_grid(const vsh_vdb_entry *grid) {
+    char bytes[32];
+    printf("grid '%s'\n  type: %s\n  class: %s\n", grid->name, grid->type, grid->grid_class);
+    printf("  voxel size: %g %g %g\n", grid->voxel_size[0], grid->voxel_size[1], grid->voxel_size[2]);
+    if (grid->background != 0.0) {
+        printf("  background: %g", grid->background);
+        if (grid->voxel_size[0] > 0.0) {
+            printf(" (%.3g voxels)", fabs(grid->background) / grid->voxel_size[0]);
+        }
+        putchar('\n');
+    }
+    printf("  active voxels: %" PRIu64 ", %d %d %d to %d %d %d\n", grid->active_voxels, grid->index_min[0],
+           grid->index_min[1], grid->index_min[2], grid->index_max[0], grid->index_max[1],
+           grid->index_max[2]);
+    printf("  memory: %s\n", cli_bytes_text(grid->bytes, bytes, sizeof bytes));
+    if (grid->problem[0] != '\0') {
+        printf("  problem: %s\n", grid->problem);
+    }
+}
+
+int cli_info_vdb(const char *path) {
+    vsh_vdb_entry *entries = calloc(MAX_LISTED, sizeof *entries);
+    if (entries == NULL) {
+        cli_say("%s: the system refused memory", path);
+        return CLI_LIMIT;
+    }
+    size_t count = 0;
+    vsh_error error;
+    if (vsh_vdb_list(path, entries, MAX_LISTED, &count, &error) != VSH_OK) {
+        free(entries);
+        return cli_fail(&error);
+    }
+    for (size_t i = 0; i < count && i < MAX_LISTED; ++i) {
+        print_grid(&entries[i]);
+    }
+    if (count == 0) {
+        printf("problem: no grids\n");
+    }
+    if (count > MAX_LISTED) {
+        printf("… and %zu more grids\n", count - MAX_LISTED);
+    }
+    free(entries);
+    return CLI_OK;
+}

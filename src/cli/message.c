@@ -1,0 +1,74 @@
+#include "message.h"
+
+#include "progress.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+
+static const struct {
+    vsh_result result;
+    int code;
+} exit_codes[] = {
+    {VSH_OK, CLI_OK},
+    {VSH_ERROR_ARGUMENT, CLI_USAGE},
+    {VSH_ERROR_INPUT, CLI_USAGE},
+    {VSH_ERROR_UNSUPPORTED, CLI_USAGE},
+    {VSH_ERROR_READ, CLI_FILE},
+    {VSH_ERROR_WRITE, CLI_FILE},
+    {VSH_ERROR_LIMIT, CLI_LIMIT},
+    {VSH_ERROR_MEMORY, CLI_LIMIT},
+    {VSH_ERROR_CANCELLED, CLI_INTERRUPTED},
+    {VSH_ERROR_INTERNAL, CLI_DEFECT},
+};
+
+static void say(const char *format, va_list arguments) {
+    char line[2048];
+    vsnprintf(line, sizeof line, format, arguments);
+    for (char *c = line; *c != '\0'; ++c) {
+        if ((unsigned char)*c < 0x20 || *c == 0x7f) {
+            *c = '?';
+        }
+    }
+    cli_progress_line(line);
+}
+
+void cli_say(const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    say(format, arguments);
+    va_end(arguments);
+}
+
+int cli_usage(const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    say(format, arguments);
+    va_end(arguments);
+    return CLI_USAGE;
+}
+
+int cli_fail(const vsh_error *error) {
+    if (error->code == VSH_ERROR_CANCELLED) {
+        cli_say("interrupted; nothing was written");
+        return CLI_INTERRUPTED;
+    }
+    cli_say("%s", error->message);
+    for (size_t i = 0; i < sizeof exit_codes / sizeof exit_codes[0]; ++i) {
+        if (exit_codes[i].result == error->code) {
+            return exit_codes[i].code;
+        }
+    }
+    return CLI_DEFECT;
+}
+
+const char *cli_bytes_text(uint64_t bytes, char *text, size_t capacity) {
+    static const char *const units[] = {"bytes", "KiB", "MiB", "GiB", "TiB"};
+    double value = (double)bytes;
+    size_t unit = 0;
+    while (value >= 1000.0 && unit + 1 < sizeof units / sizeof units[0]) {
+        value /= 1024.0;
+        ++unit;
+    }
+    snprintf(text, capacity, "%.*f %s", unit > 0 && value < 100.0 ? 1 : 0, value, units[unit]);
+    return text;
+}

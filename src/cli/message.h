@@ -1,0 +1,28 @@
+/* What the program says on standard error, and the exit code that goes with it. */
+#ifndef CLI_MESSAGE_H
+#define CLI_MESSAGE_H
+
+#include <vdbshade/base.h>
+
+enum {
+    CLI_OK = 0,
+    CLI_USAGE = 2,
+    CLI_FILE = 3,
+    CLI_LIMIT = 4,
+    CLI_DEFECT = 70, /* EX_SOFTWARE of sysexits.h */
+    CLI_INTERRUPTED = 130
+};
+
+/* "vdbshade: …" as one line: control characters become '?'. */
+void cli_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+/* As cli_say(), and returns CLI_USAGE. */
+int cli_usage(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+/* Says what failed and returns the exit code of its result. */
+int cli_fail(const vsh_error *error);
+
+/* "1.5 GiB", into text[capacity], which is returned. */
+const char *cli_bytes_text(uint64_t bytes, char *text, size_t capacity);
+
+#endif

@@ -1,0 +1,193 @@
+/* The parser of command lines and their help. */
+#include "options.h"
+
+#include "message.h"
+
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_OPTIONS = 64, HELP_COLUMN = 30 };
+
+static int least(int a, int b) {
+    return a < b ? a : b;
+}
+
+/* Edit distance (V. Levenshtein, 1966), for words of up to 63 letters. */
+static int edit_distance(const char *a, const char *b) {
+    enum { LONGEST = 64 };
+    const size_t b_length = strlen(b);
+    if (strlen(a) >= LONGEST || b_length >= LONGEST) {
+        return LONGEST;
+    }
+    int row[LONGEST];
+    for (size_t j = 0; j <= b_length; ++j) {
+        row[j] = (int)j;
+    }
+    for (size_t i = 1; a[i - 1] != '\0'; ++i) {
+        int diagonal = row[0];
+        row[0] = (int)i;
+        for (size_t j = 1; j <= b_length; ++j) {
+            const int above = row[j];
+            row[j] = least(diagonal + (a[i - 1] != b[j - 1]), 1 + least(above, row[j - 1]));
+            diagonal = above;
+        }
+    }
+    return row[b_length];
+}
+
+const char *cli_nearest(const char *text, const char *const *candidates, size_t count) {
+    const char *nearest = NULL;
+    const int length = (int)strlen(text);
+    int best = 1 + (length > 6 ? length / 3 : 2);
+    for (size_t i = 0; i < count; ++i) {
+        const int distance = edit_distance(text, candidates[i]);
+        if (distance < best) {
+            best = distance;
+            nearest = candidates[i];
+        }
+    }
+    return nearest;
+}
+
+static int unknown_option(const cli_command *command, const char *text) {
+    const char *names[MAX_OPTIONS];
+    size_t count = 0;
+    for (size_t i = 0; i < command->option_count; ++i) {
+        if (command->options[i].key != 0) {
+            names[count++] = command->options[i].name;
+        }
+    }
+    char word[64];
+    snprintf(word, sizeof word, "%s", text + strspn(text, "-"));
+    word[strcspn(word, "=")] = '\0';
+    const char *near = cli_nearest(word, names, count);
+    if (near != NULL) {
+        return cli_usage("%s: no such option; did you mean --%s?", text, near);
+    }
+    return cli_usage("%s: no such option; see 'vdbshade %s --help'", text, command->name);
+}
+
+static const cli_option *option_of_key(const cli_command *command, int key) {
+    for (size_t i = 0; i < command->option_count; ++i) {
+        if (command->options[i].key == key) {
+            return &command->options[i];
+        }
+    }
+    return NULL;
+}
+
+static size_t make_getopt_tables(const cli_command *command, struct option *longs, char *shorts) {
+    size_t count = 0;
+    *shorts++ = ':'; /* a missing value is told from an unknown option */
+    for (size_t i = 0; i < command->option_count && count + 1 < MAX_OPTIONS; ++i) {
+        const cli_option *option = &command->options[i];
+        if (option->key == 0) {
+            continue;
+        }
+        longs[count++] = (struct option){
+            option->name, option->value != NULL ? required_argument : no_argument, NULL, option->key};
+        if (option->key < 256) {
+            *shorts++ = (char)option->key;
+            if (option->value != NULL) {
+                *shorts++ = ':';
+            }
+        }
+    }
+    *shorts = '\0';
+    longs[count] = (struct option){NULL, 0, NULL, 0};
+    return count;
+}
+
+/* getopt_long() takes any beginning of a name; a script that relies on one would break at the next option.
+ * The word it took is the last or, where the value stands by itself, the last but one. */
+static bool abbreviated(const cli_option *option, char **argv, const char *value, const char **word) {
+    *word = argv[optind - 1];
+    if (value != NULL && value == argv[optind - 1]) {
+        *word = argv[optind - 2];
+    }
+    if (strncmp(*word, "--", 2) != 0) {
+        return false; /* a short option */
+    }
+    const size_t length = strcspn(*word + 2, "=");
+    return length != strlen(option->name) || strncmp(*word + 2, option->name, length) != 0;
+}
+
+int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
+              const char *what, const char **operand, bool *help) {
+    struct option longs[MAX_OPTIONS];
+    char shorts[2 * MAX_OPTIONS + 2];
+    make_getopt_tables(command, longs, shorts);
+    *help = false;
+    opterr = 0;
+    optind = 1;
+    int key;
+    while ((key = getopt_long(argc, argv, shorts, longs, NULL)) != -1) {
+        if (key == ':') {
+            return cli_usage("%s: needs a value", argv[optind - 1]);
+        }
+        if (key == '?') {
+            const cli_option *known = optopt != 0 ? option_of_key(command, optopt) : NULL;
+            if (known != NULL && known->value == NULL) {
+                return cli_usage("--%s: takes no value", known->name);
+            }
+            char letter[3] = {'-', (char)optopt, '\0'};
+            return unknown_option(command, optopt > 0 && optopt < 256 ? letter : argv[optind - 1]);
+        }
+        if (key == 'h') {
+            *help = true;
+            cli_print_help(command);
+            return CLI_OK;
+        }
+        const cli_option *option = option_of_key(command, key);
+        const char *word;
+        if (abbreviated(option, argv, optarg, &word)) {
+            return unknown_option(command, word);
+        }
+        char name[64];
+        snprintf(name, sizeof name, "--%s", option->name);
+        const int code = take(settings, key, key < 256 ? word : name, optarg);
+        if (code != CLI_OK) {
+            return code;
+        }
+    }
+    if (optind >= argc) {
+        return cli_usage("%s: no %s; see 'vdbshade %s --help'", command->name, what, command->name);
+    }
+    if (optind + 1 < argc) {
+        return cli_usage("%s: one %s is taken, not also '%s'", command->name, what, argv[optind + 1]);
+    }
+    *operand = argv[optind];
+    return CLI_OK;
+}
+
+void cli_print_help(const cli_command *command) {
+    printf("Usage: vdbshade %s %s\n\n%s\n", command->name, command->usage, command->summary);
+    for (size_t i = 0; i < command->option_count; ++i) {
+        const cli_option *option = &command->options[i];
+        if (option->key == 0) {
+            printf("\n%s:\n", option->help);
+            continue;
+        }
+        char left[64];
+        int used = option->key < 256 ? snprintf(left, sizeof left, "  -%c, --%s", option->key, option->name)
+                                     : snprintf(left, sizeof left, "      --%s", option->name);
+        if (option->value != NULL) {
+            used += snprintf(left + used, sizeof left - (size_t)used, " %s", option->value);
+        }
+        printf("%-*s", HELP_COLUMN, left);
+        if (used >= HELP_COLUMN) {
+            printf("\n%*s", HELP_COLUMN, "");
+        }
+        for (const char *line = option->help;;) {
+            const size_t length = strcspn(line, "\n");
+            printf("%.*s\n", (int)length, line);
+            if (line[length] == '\0') {
+                break;
+            }
+            line += length + 1;
+            printf("%*s", HELP_COLUMN, "");
+        }
+    }
+}

@@ -1,0 +1,107 @@
+/* Command lines: tables of options that are parsed, explained and suggested from. */
+#ifndef CLI_OPTIONS_H
+#define CLI_OPTIONS_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <vdbshade/vdbshade.h>
+
+/* An option, or (key 0) a heading of the help. Keys below 256 are also short options. */
+typedef struct cli_option {
+    int key;
+    const char *name;
+    const char *value; /* placeholder; NULL: the option takes none */
+    const char *help;  /* lines separated by \n; for a heading, its text */
+} cli_option;
+
+typedef struct cli_command {
+    const char *name;
+    const char *usage;   /* "INPUT -o OUT [options]" */
+    const char *summary; /* lines that the help begins with */
+    const cli_option *options;
+    size_t option_count;
+    int (*main)(int argc, char **argv); /* argv[0] is the command's name */
+} cli_command;
+
+/* Takes one option; returns CLI_OK or an exit code after saying why. `name` is "--sun". */
+typedef int cli_option_fn(void *settings, int key, const char *name, const char *value);
+
+/* Parses argv and takes exactly one operand, `what` ("INPUT"). *help tells that the help was asked for and
+ * printed. */
+int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
+              const char *what, const char **operand, bool *help);
+
+void cli_print_help(const cli_command *command);
+
+/* The candidate nearest to `text`, or NULL where none is near. */
+const char *cli_nearest(const char *text, const char *const *candidates, size_t count);
+
+/* Strict parsing: the whole text, finite, in the range; says what was expected. */
+int cli_take_number(const char *name, const char *text, double least, double most, double *value);
+int cli_take_positive(const char *name, const char *text, double *value); /* > 0 */
+int cli_take_integer(const char *name, const char *text, int32_t least, int32_t most, int32_t *value);
+int cli_take_vector(const char *name, const char *text, double value[3]);      /* X,Y,Z */
+int cli_take_size(const char *name, const char *text, int32_t *w, int32_t *h); /* W[xH] */
+int cli_take_bytes(const char *name, const char *text, uint64_t *value);       /* 500M, 2GiB */
+
+/* Options that every long command has. */
+typedef struct cli_common {
+    int32_t threads;
+    uint64_t memory_limit;
+    bool quiet;
+    bool progress;
+} cli_common;
+
+cli_common cli_common_default(void);
+vsh_run cli_common_run(const cli_common *common);
+
+enum {
+    CLI_KEY_THREADS = 0x1000,
+    CLI_KEY_MEMORY_LIMIT,
+    CLI_KEY_QUIET,
+    CLI_KEY_PROGRESS,
+    CLI_KEY_RESOLUTION,
+    CLI_KEY_VOXEL_SIZE,
+    CLI_KEY_HALF_WIDTH,
+    CLI_KEY_SHELL_THICKNESS
+};
+
+#define CLI_COMMON_OPTIONS                                                                                   \
+    {0, NULL, NULL, "Running"},                                                                              \
+        {CLI_KEY_THREADS, "threads", "N",                                                                    \
+         "threads, 1 to 1024 (all cores); the result is\nthe same for any number"},                          \
+        {CLI_KEY_MEMORY_LIMIT, "memory-limit", "BYTES",                                                      \
+         "memory that a step may take; with k, M, G or KiB,\nMiB, GiB; 0: no limit (3/4 of the machine's)"}, \
+        {CLI_KEY_PROGRESS, "progress", NULL, "show progress even where it is no terminal"},                  \
+        {CLI_KEY_QUIET, "quiet", NULL, "say nothing but errors"}, {                                          \
+        'h', "help", NULL, "show this help"                                                                  \
+    }
+
+#define CLI_GRID_OPTIONS                                                                                     \
+    {CLI_KEY_RESOLUTION, "resolution", "N",                                                                  \
+     "voxels along the longest side of the casters,\n2 to 65536 (256)"},                                     \
+        {CLI_KEY_VOXEL_SIZE, "voxel-size", "SIZE", "or the edge of a voxel, in scene units"},                \
+        {CLI_KEY_HALF_WIDTH, "half-width", "VOXELS",                                                         \
+         "half width of the narrow band, in voxels,\n3 to 100 (3)"},                                         \
+    {                                                                                                        \
+        CLI_KEY_SHELL_THICKNESS, "shell-thickness", "VOXELS",                                                \
+            "thickness of the solid that an open mesh\nbecomes, in voxels, 1 to 50 (2)"                      \
+    }
+
+/* What of the grid's options was given on the command line. */
+typedef struct cli_grid_settings {
+    bool has_resolution, has_voxel_size, has_half_width, has_shell_thickness;
+    vsh_grid_options options;
+} cli_grid_settings;
+
+/* Take an option of the tables above; *taken tells whether it was one of them. */
+int cli_common_take(cli_common *common, int key, const char *name, const char *value, bool *taken);
+int cli_grid_take(cli_grid_settings *settings, int key, const char *name, const char *value, bool *taken);
+
+/* --resolution and --voxel-size exclude each other. */
+int cli_grid_check(const cli_grid_settings *settings);
+
+/* Puts the given ones over a scene's. */
+void cli_grid_apply(const cli_grid_settings *settings, vsh_grid_options *options);
+
+#endif

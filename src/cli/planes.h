@@ -1,0 +1,28 @@
+/* The planes that a bake fills, and the image they make. */
+#ifndef CLI_PLANES_H
+#define CLI_PLANES_H
+
+#include <vdbshade/vdbshade.h>
+
+typedef struct cli_planes {
+    vsh_image image;       /* the channels, in order: shadow.NAME …, ao, irradiance.R, .G, .B, A */
+    vsh_lightmap lightmap; /* the same memory, as the bake takes it */
+    char (*names)[VSH_CHANNEL_NAME];
+    const char **name_list;
+    float **planes;
+    float *interleaved; /* irradiance as baked; split by cli_planes_split() */
+} cli_planes;
+
+/* Names the channels of a scene at a size, without memory for values: enough for vsh_image_check(). Returns 0
+ * or an exit code, having said why. */
+int cli_planes_name(cli_planes *planes, const vsh_scene *scene, int32_t width, int32_t height);
+
+/* Takes the memory for the values, where they stay within `limit` bytes (0: no limit). */
+int cli_planes_allocate(cli_planes *planes, const vsh_scene *scene, uint64_t limit, const char *output);
+
+/* After the bake: irradiance into its three planes. */
+void cli_planes_split(cli_planes *planes);
+
+void cli_planes_free(cli_planes *planes); /* zeroed ones too */
+
+#endif

@@ -1,0 +1,88 @@
+#include "signals.h"
+
+#include "message.h"
+#include "temporary.h"
+
+#include <errno.h>
+#include <pthread.h>
+#include <semaphore.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+/* How long the work may take to stop of itself: a second in all is promised. */
+static const long grace_nanoseconds = 600 * 1000 * 1000;
+
+static sem_t signalled; /* posted by each signal; waited for by the watcher */
+static atomic_bool interrupted;
+static pthread_mutex_t ending = PTHREAD_MUTEX_INITIALIZER; /* held while the process is ended */
+static const char *writing;                                /* guarded by `ending` */
+
+static void on_signal(int number) {
+    (void)number;
+    const int saved = errno;
+    atomic_store(&interrupted, true);
+    sem_post(&signalled);
+    errno = saved;
+}
+
+void cli_signals_begin(void) {
+    sem_init(&signalled, 0, 0);
+    struct sigaction action;
+    memset(&action, 0, sizeof action);
+    sigemptyset(&action.sa_mask);
+    action.sa_handler = on_signal;
+    action.sa_flags = SA_RESTART;
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    action.sa_handler = SIG_IGN;
+    sigaction(SIGXFSZ, &action, NULL);
+}
+
+bool cli_interrupted(void) {
+    return atomic_load(&interrupted);
+}
+
+/* A thread, and not the handler, ends the process: it may list a folder and take locks. */
+static void *watch(void *unused) {
+    (void)unused;
+    while (sem_wait(&signalled) != 0) {
+    }
+    struct timespec until;
+    clock_gettime(CLOCK_REALTIME, &until);
+    until.tv_nsec += grace_nanoseconds;
+    until.tv_sec += until.tv_nsec / 1000000000;
+    until.tv_nsec %= 1000000000;
+    while (sem_timedwait(&signalled, &until) != 0 && errno == EINTR) {
+    }
+    pthread_mutex_lock(&ending);
+    if (writing != NULL) {
+        cli_temporary_remove(writing);
+    }
+    static const char text[] = "\nvdbshade: interrupted; nothing was written\n";
+    const size_t skip = isatty(STDERR_FILENO) ? 0 : 1;
+    if (write(STDERR_FILENO, text + skip, sizeof text - 1 - skip) < 0) {
+        /* There is nobody left to tell. */
+    }
+    _exit(CLI_INTERRUPTED);
+}
+
+void cli_signals_watch(void) {
+    pthread_t thread;
+    if (pthread_create(&thread, NULL, watch, NULL) == 0) {
+        pthread_detach(thread);
+    }
+}
+
+void cli_signals_writing(const char *path) {
+    pthread_mutex_lock(&ending);
+    writing = path;
+    pthread_mutex_unlock(&ending);
+}
+
+/* The lock is kept: a watcher that wakes now waits for it until the process has ended of itself. */
+void cli_signals_end(void) {
+    pthread_mutex_lock(&ending);
+}

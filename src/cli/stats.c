@@ -1,0 +1,76 @@
+#include "stats.h"
+
+#include "clock.h"
+#include "message.h"
+#include "temporary.h"
+
+#include <inttypes.h>
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/resource.h>
+
+static const char *const stage_names[CLI_STAGE_COUNT] = {"load", "voxelize", "field", "bake", "write"};
+
+double cli_stats_stage(cli_stats *stats, int stage, double since) {
+    const double now = cli_seconds();
+    stats->seconds[stage] += now - since;
+    return now;
+}
+
+static uint64_t peak_bytes(void) {
+    struct rusage usage;
+    return getrusage(RUSAGE_SELF, &usage) == 0 ? (uint64_t)usage.ru_maxrss * 1024 : 0;
+}
+
+int cli_stats_write(const cli_stats *stats, const char *path) {
+    json_t *stages = json_object();
+    for (int i = 0; i < CLI_STAGE_COUNT; ++i) {
+        json_object_set_new(stages, stage_names[i], json_real(stats->seconds[i]));
+    }
+    const struct {
+        const char *name;
+        uint64_t value;
+    } counts[] = {
+        {"texels", stats->texels},
+        {"invalid_texels", stats->invalid_texels},
+        {"samples", stats->shade.samples},
+        {"marches", stats->shade.marches},
+        {"certified", stats->shade.certified},
+        {"unfinished", stats->shade.unfinished},
+        {"skipped", stats->shade.skipped},
+        {"rays", 0}, /* no method of this version traces any */
+        {"peak_bytes", peak_bytes()},
+        {"threads", (uint64_t)stats->threads},
+        {"levels", (uint64_t)stats->field.levels},
+        {"field_bytes", stats->field.bytes},
+        {"active_voxels", stats->grid.active_voxels},
+    };
+    json_t *root = json_object();
+    json_object_set_new(root, "version", json_string(vsh_version()));
+    json_object_set_new(root, "stages_s", stages);
+    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; ++i) {
+        json_object_set_new(root, counts[i].name, json_integer((json_int_t)counts[i].value));
+    }
+    json_object_set_new(root, "voxel_size", json_real(stats->grid.voxel_size));
+    char *text = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
+    json_decref(root);
+    if (text == NULL) {
+        cli_say("%s: the system refused memory", path);
+        return CLI_LIMIT;
+    }
+    const int code = cli_temporary_write(path, text);
+    free(text);
+    return code;
+}
+
+void cli_stats_say(const cli_stats *stats) {
+    char field[32], peak[32];
+    cli_say("voxel %.4g, %" PRIu64 " active voxels, field of %d level%s in %s, %d thread%s, peak %s",
+            stats->grid.voxel_size, stats->grid.active_voxels, stats->field.levels,
+            stats->field.levels == 1 ? "" : "s", cli_bytes_text(stats->field.bytes, field, sizeof field),
+            stats->threads, stats->threads == 1 ? "" : "s", cli_bytes_text(peak_bytes(), peak, sizeof peak));
+    const double *s = stats->seconds;
+    cli_say("load %.2f s, voxelize %.2f s, field %.2f s, bake %.2f s, write %.2f s", s[CLI_STAGE_LOAD],
+            s[CLI_STAGE_VOXELIZE], s[CLI_STAGE_FIELD], s[CLI_STAGE_BAKE], s[CLI_STAGE_WRITE]);
+}

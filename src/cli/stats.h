@@ -1,0 +1,35 @@
+/* What a bake did and what it cost: the --stats file and the summary. */
+#ifndef CLI_STATS_H
+#define CLI_STATS_H
+
+#include <vdbshade/vdbshade.h>
+
+enum {
+    CLI_STAGE_LOAD,
+    CLI_STAGE_VOXELIZE,
+    CLI_STAGE_FIELD,
+    CLI_STAGE_BAKE,
+    CLI_STAGE_WRITE,
+    CLI_STAGE_COUNT
+};
+
+typedef struct cli_stats {
+    double seconds[CLI_STAGE_COUNT];
+    uint64_t texels;
+    uint64_t invalid_texels;
+    vsh_shade_stats shade;
+    int32_t threads;
+    vsh_grid_info grid;
+    vsh_field_info field;
+} cli_stats;
+
+/* Adds the seconds since `since` to a stage and returns the time now. */
+double cli_stats_stage(cli_stats *stats, int stage, double since);
+
+/* Writes the JSON file. CLI_OK or an exit code, having said why. */
+int cli_stats_write(const cli_stats *stats, const char *path);
+
+/* Two lines on standard error. */
+void cli_stats_say(const cli_stats *stats);
+
+#endif

@@ -1,0 +1,110 @@
+/* Values of options, read strictly. */
+#include "message.h"
+#include "options.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* strtod() and strtoll() also take leading blanks. */
+static bool starts_number(const char *text) {
+    return *text != '\0' && strchr("+-.0123456789", *text) != NULL;
+}
+
+static bool read_number(const char *text, double *value, const char **rest) {
+    char *end = NULL;
+    if (!starts_number(text) || strpbrk(text, "xXpP") != NULL) {
+        return false;
+    }
+    *value = strtod(text, &end);
+    *rest = end;
+    return end != text && isfinite(*value);
+}
+
+int cli_take_number(const char *name, const char *text, double least, double most, double *value) {
+    const char *rest;
+    if (!read_number(text, value, &rest) || *rest != '\0' || *value < least || *value > most) {
+        return cli_usage("%s '%s': expected a number from %g to %g", name, text, least, most);
+    }
+    return CLI_OK;
+}
+
+int cli_take_positive(const char *name, const char *text, double *value) {
+    const char *rest;
+    if (!read_number(text, value, &rest) || *rest != '\0' || !(*value > 0.0)) {
+        return cli_usage("%s '%s': expected a number greater than 0", name, text);
+    }
+    return CLI_OK;
+}
+
+static bool read_integer(const char *text, int32_t *value, const char **rest) {
+    if (!starts_number(text)) {
+        return false;
+    }
+    char *end = NULL;
+    errno = 0;
+    const long long number = strtoll(text, &end, 10);
+    *rest = end;
+    if (end == text || errno != 0 || number < INT32_MIN || number > INT32_MAX) {
+        return false;
+    }
+    *value = (int32_t)number;
+    return true;
+}
+
+int cli_take_integer(const char *name, const char *text, int32_t least, int32_t most, int32_t *value) {
+    const char *rest;
+    if (!read_integer(text, value, &rest) || *rest != '\0' || *value < least || *value > most) {
+        return cli_usage("%s '%s': expected a whole number from %d to %d", name, text, least, most);
+    }
+    return CLI_OK;
+}
+
+int cli_take_vector(const char *name, const char *text, double value[3]) {
+    const char *at = text;
+    bool good = true;
+    for (int i = 0; i < 3 && good; ++i) {
+        good = read_number(at, &value[i], &at) && *at == (i < 2 ? ',' : '\0');
+        ++at;
+    }
+    if (!good || (value[0] == 0.0 && value[1] == 0.0 && value[2] == 0.0)) {
+        return cli_usage("%s '%s': expected X,Y,Z, three numbers that are not all 0", name, text);
+    }
+    return CLI_OK;
+}
+
+int cli_take_size(const char *name, const char *text, int32_t *w, int32_t *h) {
+    const char *at;
+    bool good = read_integer(text, w, &at);
+    if (good && *at == 'x') {
+        good = read_integer(at + 1, h, &at);
+    } else {
+        *h = *w;
+    }
+    if (!good || *at != '\0' || *w < 1 || *w > VSH_MAX_LIGHTMAP_SIZE || *h < 1 ||
+        *h > VSH_MAX_LIGHTMAP_SIZE) {
+        return cli_usage("%s '%s': expected W or WxH, each from 1 to %d texels", name, text,
+                         VSH_MAX_LIGHTMAP_SIZE);
+    }
+    return CLI_OK;
+}
+
+int cli_take_bytes(const char *name, const char *text, uint64_t *value) {
+    static const struct {
+        const char *suffix;
+        double factor;
+    } units[] = {{"", 1.0},       {"k", 1e3},      {"M", 1e6},     {"G", 1e9},
+                 {"KiB", 0x1p10}, {"MiB", 0x1p20}, {"GiB", 0x1p30}};
+    double number;
+    const char *rest;
+    if (read_number(text, &number, &rest) && number >= 0.0) {
+        for (size_t i = 0; i < sizeof units / sizeof units[0]; ++i) {
+            if (strcmp(rest, units[i].suffix) == 0 && number * units[i].factor < 0x1p62) {
+                *value = (uint64_t)(number * units[i].factor);
+                return CLI_OK;
+            }
+        }
+    }
+    return cli_usage("%s '%s': expected bytes, with k, M, G, KiB, MiB or GiB behind the number", name, text);
+}

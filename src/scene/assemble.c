@@ -1,0 +1,266 @@
+/* From a scene's casters to one level set. */
+#include "scene/assets.h"
+#include "scene/similarity.h"
+
+#include "base/job.h"
+#include "base/memory.h"
+#include "base/vec.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* An sdf caster ready for voxels: a tree in world space, or a mirrored one (which no quaternion turns) that
+ * its grid's instance mirrors. */
+typedef struct placed_sdf {
+    vsh_sdf_node *nodes; /* owned; NULL where the caster's own serve */
+    vsh_sdf sdf;
+    double scale;            /* from the grid's space to the world; 1 for a folded tree */
+    const double *transform; /* of the grid's instance; NULL for a folded tree */
+} placed_sdf;
+
+/* What is gathered on the way to one grid. */
+typedef struct assembly {
+    const vsh_scene *scene;
+    const vsh_assets *assets;
+    vsh_mesh *meshes; /* of all mesh casters */
+    size_t mesh_count;
+    placed_sdf *sdfs; /* [caster_count]; zero for casters that are none */
+    vsh_grid_instance *instances;
+    size_t instance_count;
+    vsh_grid **made; /* grids of ours among the instances */
+    size_t made_count;
+    vsh_grid_options options;
+} assembly;
+
+static vsh_result place_sdf(const vsh_caster *caster, size_t index, placed_sdf *placed, vsh_error *error) {
+    vsh_result result = vsh_sdf_check(&caster->sdf, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    const double *m = caster->transform;
+    const double scale = vshi_similarity_scale(m);
+    if (scale <= 0.0) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "caster %zu: the transform of an sdf must neither shear nor scale unevenly", index);
+    }
+    placed->sdf = caster->sdf;
+    if (vshi_transform_determinant(m) < 0.0) {
+        placed->scale = scale;
+        placed->transform = m;
+        return VSH_OK;
+    }
+    void *memory = NULL;
+    result = vshi_allocate(&memory, caster->sdf.node_count, sizeof *placed->nodes, "sdf nodes", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    placed->nodes = memory;
+    memcpy(placed->nodes, caster->sdf.nodes, caster->sdf.node_count * sizeof *placed->nodes);
+    placed->sdf.nodes = placed->nodes;
+    placed->scale = 1.0;
+    vsh_sdf_node *root = &placed->nodes[caster->sdf.node_count - 1];
+    double rotation[4];
+    vshi_similarity_rotation(m, scale, rotation);
+    vshi_quaternion_multiply(rotation, root->rotation, root->rotation);
+    const vshi_vec t = vshi_transform_point(m, vshi_vec_of(root->translation));
+    root->translation[0] = t.x;
+    root->translation[1] = t.y;
+    root->translation[2] = t.z;
+    root->scale *= scale;
+    return VSH_OK;
+}
+
+static vsh_result allocate_assembly(assembly *a, vsh_error *error) {
+    const size_t casters = a->scene->caster_count;
+    size_t meshes = 0;
+    for (size_t i = 0; i < casters; ++i) {
+        size_t count = 0;
+        vsh_assets_caster(a->assets, i, &count);
+        meshes += count;
+    }
+    void *memory[4] = {NULL, NULL, NULL, NULL};
+    vsh_result result = vshi_allocate(&memory[0], meshes, sizeof *a->meshes, "meshes", error);
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory[1], casters, sizeof *a->sdfs, "casters", error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory[2], casters + 1, sizeof *a->instances, "casters", error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory[3], casters + 1, sizeof *a->made, "casters", error);
+    }
+    a->meshes = memory[0];
+    a->sdfs = memory[1];
+    a->instances = memory[2];
+    a->made = memory[3];
+    return result;
+}
+
+static vsh_result gather(assembly *a, vsh_error *error) {
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < a->scene->caster_count && result == VSH_OK; ++i) {
+        const vsh_caster *caster = &a->scene->casters[i];
+        if (caster->type == VSH_CASTER_SDF) {
+            result = place_sdf(caster, i, &a->sdfs[i], error);
+        } else if (caster->type == VSH_CASTER_VDB && vshi_similarity_scale(caster->transform) <= 0.0) {
+            result = vshi_fail(error, VSH_ERROR_INPUT,
+                               "caster %zu: %s: the transform of a level set must neither shear nor scale "
+                               "unevenly",
+                               i, caster->path);
+        }
+        size_t count = 0;
+        const vsh_mesh *views = vsh_assets_caster(a->assets, i, &count);
+        for (size_t k = 0; k < count; ++k) {
+            a->meshes[a->mesh_count++] = views[k];
+        }
+    }
+    return result;
+}
+
+typedef struct world_box {
+    vshi_vec min;
+    vshi_vec max;
+} world_box;
+
+/* Grows `all` by a box under a transform (NULL: identity); an empty box grows nothing. */
+static void grow_box(world_box *all, const double min[3], const double max[3], const double *transform) {
+    if (!(min[0] <= max[0] && min[1] <= max[1] && min[2] <= max[2])) {
+        return;
+    }
+    for (int corner = 0; corner < 8; ++corner) {
+        const vshi_vec p = vshi_transform_point(transform, (vshi_vec){corner & 1 ? max[0] : min[0],
+                                                                      corner & 2 ? max[1] : min[1],
+                                                                      corner & 4 ? max[2] : min[2]});
+        all->min = (vshi_vec){fmin(all->min.x, p.x), fmin(all->min.y, p.y), fmin(all->min.z, p.z)};
+        all->max = (vshi_vec){fmax(all->max.x, p.x), fmax(all->max.y, p.y), fmax(all->max.z, p.z)};
+    }
+}
+
+static const world_box empty_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+
+/* The voxel size on which casters of several kinds must agree before the first is voxelised. */
+static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
+    world_box all = empty_box;
+    for (size_t i = 0; i < a->mesh_count; ++i) {
+        vsh_mesh_report report;
+        const vsh_result result = vsh_mesh_check(&a->meshes[i], &report, error);
+        if (result != VSH_OK) {
+            return result;
+        }
+        grow_box(&all, report.bounds_min, report.bounds_max, NULL);
+    }
+    for (size_t i = 0; i < a->scene->caster_count; ++i) {
+        const vsh_caster *caster = &a->scene->casters[i];
+        if (caster->type == VSH_CASTER_SDF) {
+            double min[3], max[3];
+            vsh_sdf_bounds(&a->sdfs[i].sdf, min, max);
+            grow_box(&all, min, max, a->sdfs[i].transform);
+        } else if (caster->type == VSH_CASTER_VDB) {
+            vsh_grid_info info;
+            vsh_grid_get_info(vshi_assets_grid(a->assets, i), &info);
+            grow_box(&all, info.bounds_min, info.bounds_max, caster->transform);
+        }
+    }
+    const vshi_vec sides = vshi_sub(all.max, all.min);
+    const double longest = fmax(sides.x, fmax(sides.y, sides.z));
+    if (!(longest > 0.0) || !isfinite(longest)) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "scene: the longest side of the casters' box is %g",
+                         longest);
+    }
+    if (a->options.resolution < 2 || a->options.resolution > 65536) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "resolution %d: expected 2 … 65536",
+                         a->options.resolution);
+    }
+    a->options.voxel_size = longest / a->options.resolution;
+    return VSH_OK;
+}
+
+static void add_instance(assembly *a, const vsh_grid *grid, const double *transform) {
+    a->instances[a->instance_count++] = (vsh_grid_instance){grid, transform};
+}
+
+static vsh_result make_grids(assembly *a, const vsh_run *run, vsh_error *error) {
+    if (a->mesh_count > 0) {
+        vsh_grid **made = &a->made[a->made_count];
+        const vsh_result result =
+            vsh_grid_from_meshes(a->meshes, a->mesh_count, &a->options, run, made, error);
+        if (result != VSH_OK) {
+            return result;
+        }
+        a->made_count++;
+        add_instance(a, *made, NULL);
+    }
+    for (size_t i = 0; i < a->scene->caster_count; ++i) {
+        const vsh_caster *caster = &a->scene->casters[i];
+        if (caster->type == VSH_CASTER_VDB) {
+            add_instance(a, vshi_assets_grid(a->assets, i), caster->transform);
+        } else if (caster->type == VSH_CASTER_SDF) {
+            const placed_sdf *placed = &a->sdfs[i];
+            vsh_grid_options options = a->options;
+            options.voxel_size /= placed->scale;
+            vsh_grid **made = &a->made[a->made_count];
+            const vsh_result result = vsh_grid_from_sdf(&placed->sdf, &options, run, made, error);
+            if (result != VSH_OK) {
+                return result;
+            }
+            a->made_count++;
+            add_instance(a, *made, placed->transform);
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result unite(assembly *a, const vsh_run *run, vsh_grid **grid, vsh_error *error) {
+    if (a->instance_count == 1 && a->made_count == 1 && a->instances[0].transform == NULL) {
+        *grid = a->made[0];
+        a->made_count = 0;
+        return VSH_OK;
+    }
+    return vsh_grid_unite(a->instances, a->instance_count, &a->options, run, grid, error);
+}
+
+static void free_assembly(assembly *a) {
+    while (a->made_count > 0) {
+        vsh_grid_free(a->made[--a->made_count]);
+    }
+    for (size_t i = 0; a->sdfs != NULL && i < a->scene->caster_count; ++i) {
+        free(a->sdfs[i].nodes);
+    }
+    free(a->made);
+    free(a->instances);
+    free(a->sdfs);
+    free(a->meshes);
+}
+
+vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                             vsh_grid **grid, vsh_error *error) {
+    if (scene == NULL || assets == NULL || grid == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "vsh_scene_casters: scene, assets and grid must not be NULL");
+    }
+    *grid = NULL;
+    if (scene->caster_count == 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters");
+    }
+    assembly a = {.scene = scene, .assets = assets, .options = vsh_grid_options_default()};
+    vsh_result result =
+        vshi_options_resolve(&scene->grid, &a.options, sizeof a.options, "vsh_grid_options", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    result = allocate_assembly(&a, error);
+    if (result == VSH_OK) {
+        result = gather(&a, error);
+    }
+    if (result == VSH_OK && a.options.voxel_size == 0.0) {
+        result = choose_voxel_size(&a, error);
+    }
+    if (result == VSH_OK) {
+        result = make_grids(&a, run, error);
+    }
+    if (result == VSH_OK) {
+        result = unite(&a, run, grid, error);
+    }
+    free_assembly(&a);
+    return result;
+}

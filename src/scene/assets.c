@@ -1,0 +1,284 @@
+/* The files behind a scene: each read once, its meshes put where casters and receivers stand. */
+#include "scene/assets.h"
+
+#include "base/error.h"
+#include "base/memory.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct asset_model {
+    char *path;
+    vsh_model *model;
+} asset_model;
+
+typedef struct asset_grid {
+    char *path;
+    char *name; /* NULL: the first of the file */
+    vsh_grid *grid;
+} asset_grid;
+
+/* One caster or receiver: the file's meshes with its transform in front of theirs. */
+typedef struct asset_place {
+    vsh_mesh *meshes;
+    double *transforms; /* [count][12] */
+    size_t count;
+    const vsh_grid *grid; /* vdb casters; belongs to the assets' grids */
+} asset_place;
+
+struct vsh_assets {
+    asset_model *models;
+    size_t model_count;
+    asset_grid *grids;
+    size_t grid_count;
+    asset_place *casters;
+    size_t caster_count;
+    asset_place *receivers;
+    size_t receiver_count;
+};
+
+void vshi_transform_compose(const double outer[12], const double *inner, double result[12]) {
+    if (inner == NULL) {
+        memcpy(result, outer, 12 * sizeof *result);
+        return;
+    }
+    for (int row = 0; row < 3; ++row) {
+        const double *o = outer + 4 * row;
+        for (int column = 0; column < 4; ++column) {
+            result[4 * row + column] = o[0] * inner[column] + o[1] * inner[4 + column] +
+                                       o[2] * inner[8 + column] + (column == 3 ? o[3] : 0.0);
+        }
+    }
+}
+
+static vsh_result copy_text(const char *text, char **copy, vsh_error *error) {
+    const size_t size = strlen(text) + 1;
+    void *memory = NULL;
+    const vsh_result result = vshi_allocate(&memory, size, 1, "file name", error);
+    if (result == VSH_OK) {
+        *copy = memcpy(memory, text, size);
+    }
+    return result;
+}
+
+static vsh_result find_model(vsh_assets *assets, const char *path, const vsh_run *run,
+                             const vsh_model **model, vsh_error *error) {
+    for (size_t i = 0; i < assets->model_count; ++i) {
+        if (strcmp(assets->models[i].path, path) == 0) {
+            *model = assets->models[i].model;
+            return VSH_OK;
+        }
+    }
+    asset_model *entry = &assets->models[assets->model_count++];
+    vsh_result result = copy_text(path, &entry->path, error);
+    if (result == VSH_OK) {
+        result = vsh_model_read(path, run, &entry->model, error);
+    }
+    *model = entry->model;
+    return result;
+}
+
+static bool same_text(const char *a, const char *b) {
+    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
+}
+
+static vsh_result find_grid(vsh_assets *assets, const char *path, const char *name, const vsh_run *run,
+                            const vsh_grid **grid, vsh_error *error) {
+    for (size_t i = 0; i < assets->grid_count; ++i) {
+        const asset_grid *entry = &assets->grids[i];
+        if (same_text(entry->path, path) && same_text(entry->name, name)) {
+            *grid = entry->grid;
+            return VSH_OK;
+        }
+    }
+    asset_grid *entry = &assets->grids[assets->grid_count++];
+    vsh_result result = copy_text(path, &entry->path, error);
+    if (result == VSH_OK && name != NULL) {
+        result = copy_text(name, &entry->name, error);
+    }
+    if (result == VSH_OK) {
+        result = vsh_grid_read(path, name, run, &entry->grid, error);
+    }
+    *grid = entry->grid;
+    return result;
+}
+
+static vsh_result place_model(asset_place *place, const vsh_model *model, int32_t uv_set,
+                              const double transform[12], vsh_error *error) {
+    const size_t count = vsh_model_mesh_count(model);
+    void *meshes = NULL;
+    void *transforms = NULL;
+    vsh_result result = vshi_allocate(&meshes, count, sizeof *place->meshes, "meshes", error);
+    if (result == VSH_OK) {
+        result = vshi_allocate(&transforms, count, 12 * sizeof(double), "transforms", error);
+    }
+    place->meshes = meshes;
+    place->transforms = transforms;
+    if (result != VSH_OK) {
+        return result;
+    }
+    place->count = count;
+    for (size_t i = 0; i < count; ++i) {
+        double *composed = place->transforms + 12 * i;
+        place->meshes[i] = vsh_model_mesh(model, i, uv_set);
+        vshi_transform_compose(transform, place->meshes[i].transform, composed);
+        place->meshes[i].transform = composed;
+    }
+    return VSH_OK;
+}
+
+static vsh_result place_caster(vsh_assets *assets, const vsh_caster *caster, size_t index, const vsh_run *run,
+                               vsh_error *error) {
+    asset_place *place = &assets->casters[index];
+    if (caster->type == VSH_CASTER_SDF) {
+        return VSH_OK;
+    }
+    if (caster->type != VSH_CASTER_MESH && caster->type != VSH_CASTER_VDB) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: type %d: expected 0 … 2", index,
+                         caster->type);
+    }
+    if (caster->path == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: no path", index);
+    }
+    if (caster->type == VSH_CASTER_VDB) {
+        return find_grid(assets, caster->path, caster->grid, run, &place->grid, error);
+    }
+    const vsh_model *model = NULL;
+    const vsh_result result = find_model(assets, caster->path, run, &model, error);
+    return result == VSH_OK ? place_model(place, model, -1, caster->transform, error) : result;
+}
+
+static vsh_result check_uv_set(const vsh_receiver *receiver, const vsh_model *model, vsh_error *error) {
+    if (receiver->uv_set < -1 || receiver->uv_set >= VSH_MAX_UV_SETS) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: UV set %d: expected -1 … %d", receiver->path,
+                         receiver->uv_set, VSH_MAX_UV_SETS - 1);
+    }
+    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+        const int32_t sets = vsh_model_uv_sets(model, i);
+        const char *name = vsh_model_mesh(model, i, -1).name;
+        if (sets == 0) {
+            return vshi_fail(error, VSH_ERROR_INPUT, "%s: mesh %zu '%s': no UVs to bake into", receiver->path,
+                             i, name != NULL ? name : "");
+        }
+        if (receiver->uv_set >= sets) {
+            return vshi_fail(error, VSH_ERROR_INPUT, "%s: mesh %zu '%s': no UV set %d: expected 0 … %d",
+                             receiver->path, i, name != NULL ? name : "", receiver->uv_set, sets - 1);
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result place_receiver(vsh_assets *assets, const vsh_receiver *receiver, size_t index,
+                                 const vsh_run *run, vsh_error *error) {
+    if (receiver->path == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "receiver %zu: no path", index);
+    }
+    const vsh_model *model = NULL;
+    vsh_result result = find_model(assets, receiver->path, run, &model, error);
+    if (result == VSH_OK) {
+        result = check_uv_set(receiver, model, error);
+    }
+    if (result == VSH_OK) {
+        result = place_model(&assets->receivers[index], model, receiver->uv_set, receiver->transform, error);
+    }
+    return result;
+}
+
+static vsh_result allocate_places(vsh_assets *assets, const vsh_scene *scene, vsh_error *error) {
+    void *memory[4] = {NULL, NULL, NULL, NULL};
+    const size_t files = scene->caster_count + scene->receiver_count;
+    vsh_result result = vshi_allocate(&memory[0], files, sizeof *assets->models, "models", error);
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory[1], scene->caster_count, sizeof *assets->grids, "grids", error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory[2], scene->caster_count, sizeof *assets->casters, "casters", error);
+    }
+    if (result == VSH_OK) {
+        result =
+            vshi_allocate(&memory[3], scene->receiver_count, sizeof *assets->receivers, "receivers", error);
+    }
+    assets->models = memory[0];
+    assets->grids = memory[1];
+    assets->casters = memory[2];
+    assets->receivers = memory[3];
+    if (result == VSH_OK) {
+        assets->caster_count = scene->caster_count;
+        assets->receiver_count = scene->receiver_count;
+    }
+    return result;
+}
+
+vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
+                           vsh_error *error) {
+    if (scene == NULL || assets == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_assets_load: scene and assets must not be NULL");
+    }
+    *assets = NULL;
+    void *memory = NULL;
+    vsh_result result = vshi_allocate(&memory, 1, sizeof(vsh_assets), "assets", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_assets *loaded = memory;
+    result = allocate_places(loaded, scene, error);
+    /* Receivers first: what is wrong with them is cheaper to find than a caster's volume is to read. */
+    for (size_t i = 0; i < scene->receiver_count && result == VSH_OK; ++i) {
+        result = place_receiver(loaded, &scene->receivers[i], i, run, error);
+    }
+    for (size_t i = 0; i < scene->caster_count && result == VSH_OK; ++i) {
+        result = place_caster(loaded, &scene->casters[i], i, run, error);
+    }
+    if (result != VSH_OK) {
+        vsh_assets_free(loaded);
+        return result;
+    }
+    *assets = loaded;
+    return VSH_OK;
+}
+
+static void free_places(asset_place *places, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        free(places[i].transforms);
+        free(places[i].meshes);
+    }
+    free(places);
+}
+
+void vsh_assets_free(vsh_assets *assets) {
+    if (assets == NULL) {
+        return;
+    }
+    free_places(assets->receivers, assets->receiver_count);
+    free_places(assets->casters, assets->caster_count);
+    for (size_t i = 0; i < assets->grid_count; ++i) {
+        vsh_grid_free(assets->grids[i].grid);
+        free(assets->grids[i].name);
+        free(assets->grids[i].path);
+    }
+    free(assets->grids);
+    for (size_t i = 0; i < assets->model_count; ++i) {
+        vsh_model_free(assets->models[i].model);
+        free(assets->models[i].path);
+    }
+    free(assets->models);
+    free(assets);
+}
+
+static const vsh_mesh *placed_meshes(const asset_place *places, size_t count, size_t index,
+                                     size_t *mesh_count) {
+    *mesh_count = index < count ? places[index].count : 0;
+    return index < count ? places[index].meshes : NULL;
+}
+
+const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count) {
+    return placed_meshes(assets->receivers, assets->receiver_count, index, mesh_count);
+}
+
+const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count) {
+    return placed_meshes(assets->casters, assets->caster_count, index, mesh_count);
+}
+
+const vsh_grid *vshi_assets_grid(const vsh_assets *assets, size_t index) {
+    return index < assets->caster_count ? assets->casters[index].grid : NULL;
+}

@@ -1,0 +1,159 @@
+# What a bake writes and says.
+load helper
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    write_box box.obj
+}
+
+@test "the same bits for 1, 2 and 5 threads" {
+    for threads in 1 2 5; do
+        shade bake "$ASSETS/cloister.glb" --sun -0.5,0.8,-0.6 --sun-angle 5 --ao 0.6 --irradiance \
+            --size 128 --resolution 96 --threads "$threads" --quiet -o "$threads.exr"
+        done_well
+    done
+    cmp 1.exr 2.exr
+    cmp 1.exr 5.exr
+}
+
+@test "the channels are named by light, ao, irradiance and coverage" {
+    shade bake box.obj "${SMALL[@]}" --ao 1 --irradiance --quiet -o out.exr
+    done_well
+    shade info out.exr
+    done_well
+    for channel in shadow.sun ao irradiance.R irradiance.G irradiance.B A; do
+        [[ $output == *"channel '$channel'"* ]] || fail "$channel is missing"
+    done
+    [[ $output == *"32 × 32, 6 channels"* ]] || fail "wrong size"
+}
+
+@test "what is not asked for is not in the file" {
+    shade bake box.obj --ao 1 --size 32 --resolution 24 --quiet -o out.exr
+    done_well
+    shade info out.exr
+    [[ $output == *"2 channels"* ]] || fail "more than ao and A"
+}
+
+@test "a lone convex body: lit where it faces the sun, dark where it does not, open all over" {
+    shade bake box.obj --sun 0,1,0 --sun-angle 5 --ao 0.5 --size 64 --resolution 48 --quiet -o out.exr
+    done_well
+    shade info out.exr
+    [[ $output == *"channel 'shadow.sun': min 0, mean "*", max 1"* ]] || fail "no light or no dark"
+    [[ $output == *"channel 'A': min 0, mean "*", max 1"* ]] || fail "no coverage"
+}
+
+@test "every method bakes" {
+    for method in hard classic improved smooth cone; do
+        shade bake box.obj "${SMALL[@]}" --method "$method" --quiet -o "$method.exr"
+        done_well
+    done
+    shade bake box.obj --ao 0.5 --ao-method taps --size 32 --resolution 24 --quiet -o taps.exr
+    done_well
+}
+
+@test "a packed PNG" {
+    shade bake box.obj "${SMALL[@]}" --ao 1 --pack R=shadow.sun,G=ao,B=0,A=A --bits 8 --quiet -o out.png
+    done_well
+    shade info out.png
+    done_well
+    [[ $output == *"32 × 32, 4 channels"* ]] || fail "not four channels"
+    [[ $output == *"channel 'B': min 0, mean 0, max 0"* ]] || fail "B is not 0"
+}
+
+@test "a size of its own in each direction" {
+    shade bake box.obj --ao 1 --size 64x16 --resolution 24 --quiet -o out.exr
+    done_well
+    shade info out.exr
+    [[ $output == *"64 × 16"* ]] || fail "wrong size"
+}
+
+@test "another caster darkens" {
+    sed 's/^v \([01]\) \([01]\) \([01]\)/v \1 2.\2 \3/' box.obj >roof.obj
+    shade bake box.obj --sun 0,1,0 --sun-angle 5 --size 32 --resolution 24 --quiet -o alone.exr
+    done_well
+    shade bake box.obj --sun 0,1,0 --sun-angle 5 --size 32 --resolution 24 --caster roof.obj --quiet \
+        -o under.exr
+    done_well
+    shade info alone.exr
+    [[ $output == *"'shadow.sun': min 0, mean 0."*", max 1"* ]] || fail "nothing is lit without the roof"
+    local alone
+    alone=$(grep -o "sun': min 0, mean [0-9.]*" <<<"$output" | grep -o '[0-9.]*$')
+    shade info under.exr
+    local under
+    under=$(grep -o "sun': min 0, mean [0-9.e-]*" <<<"$output" | grep -o '[0-9.e-]*$')
+    awk -v a="$alone" -v b="$under" 'BEGIN { exit !(b < a - 0.05) }' || fail "alone $alone, under $under"
+}
+
+@test "the statistics have every key" {
+    shade bake box.obj "${SMALL[@]}" --ao 1 --quiet --stats stats.json --threads 2 -o out.exr
+    done_well
+    for key in version stages_s load voxelize field bake write texels invalid_texels samples marches \
+        certified unfinished skipped rays peak_bytes threads voxel_size levels field_bytes active_voxels; do
+        grep -q "\"$key\":" stats.json || fail "$key is missing"
+    done
+    grep -q '"rays": 0' stats.json
+    grep -q '"threads": 2' stats.json
+    if grep -q '"texels": 0,\|"marches": 0,\|"active_voxels": 0,\|"peak_bytes": 0,' stats.json; then
+        fail "a count is 0: $(cat stats.json)"
+    fi
+}
+
+@test "the summary names the output, the texels and the stages" {
+    shade bake box.obj "${SMALL[@]}" -o out.exr
+    done_well
+    [ -z "$output" ] || fail "something on standard output"
+    [[ $stderr == *"out.exr: 32 × 32, "*" texels"* ]] || fail "no texels"
+    [[ $stderr == *load*voxelize*field*bake*write* ]] || fail "no stages"
+    [[ $stderr != *%* ]] || fail "progress without a terminal"
+}
+
+@test "progress on request, by stage" {
+    shade bake box.obj "${SMALL[@]}" --ao 1 --progress -o out.exr
+    done_well
+    for stage in load voxelize field shadow.sun ao; do
+        [[ $stderr == *"vdbshade: $stage "*%* ]] || fail "no $stage"
+    done
+}
+
+@test "an open mesh, overlapping charts and UVs outside the square are reported with the mesh's name" {
+    sed -e '$d' -e 's/^vt 0.35 0.02/vt 0.05 0.02/' -e 's/^vt 0.97 0.97/vt 1.2 0.97/' box.obj >bad.obj
+    shade bake bad.obj "${SMALL[@]}" --size 128 -o out.exr
+    done_well
+    [[ $stderr == *"warning: "*"box"*"open edges"* ]] || fail "no open edges"
+    [[ $stderr == *"warning: "*"box"*"lie over other charts"* ]] || fail "no overlap"
+    [[ $stderr == *"warning: "*"box"*"leave the UV square"* ]] || fail "no outside"
+}
+
+@test "a scene's receivers are all baked, and flags override it" {
+    cat >two.json <<'JSON'
+{"casters": [{"mesh": "box.obj"}, {"sdf": {"shape": "sphere", "radius": 0.5, "translate": [0, 2, 0]}}],
+ "ao": {"distance": 1}, "resolution": 24, "lights": [{"name": "lamp", "type": "sphere", "position": [3, 4, 0],
+ "radius": 0.3}],
+ "receivers": [{"mesh": "box.obj", "size": 16, "output": "a.exr"},
+               {"mesh": "box.obj", "size": 16, "output": "b.exr"}]}
+JSON
+    shade bake two.json --size 24 --method smooth --quiet
+    done_well
+    cmp a.exr b.exr
+    shade info a.exr
+    [[ $output == *"24 × 24, 3 channels"* ]] || fail "--size did not override"
+    [[ $output == *"shadow.lamp"* ]] || fail "no lamp"
+}
+
+@test "a level set from a file casts like the mesh it was made of" {
+    shade voxelize box.obj -o box.vdb --voxel-size 0.04 --quiet
+    done_well
+    for caster in '"mesh": "box.obj"' '"vdb": "box.vdb"'; do
+        name=${caster:1:3}
+        cat >"$name.json" <<JSON
+{"casters": [{$caster}], "voxel_size": 0.04, "ao": {"distance": 1},
+ "receivers": [{"mesh": "box.obj", "size": 32, "output": "$name.exr"}]}
+JSON
+        shade bake "$name.json" --quiet
+        done_well
+    done
+    shade info mes.exr
+    local mesh=$output
+    shade info vdb.exr
+    [ "$mesh" = "$output" ] || fail "they differ: $mesh"
+}

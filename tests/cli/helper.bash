@@ -1,0 +1,110 @@
+# Shared by the command-line tests: VDBSHADE is the binary, ASSETS the folder of sample assets.
+bats_require_minimum_version 1.5.0
+
+: "${VDBSHADE:?is to name the vdbshade binary}"
+: "${ASSETS:=$BATS_TEST_DIRNAME/../../assets}"
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+}
+
+# A unit cube, closed, each face with its own sixth of the UV square.
+write_box() {
+    cat >"$1" <<'OBJ'
+o box
+v 0 0 0
+v 1 0 0
+v 1 1 0
+v 0 1 0
+v 0 0 1
+v 1 0 1
+v 1 1 1
+v 0 1 1
+vt 0.02 0.02
+vt 0.31 0.02
+vt 0.31 0.47
+vt 0.02 0.47
+vt 0.35 0.02
+vt 0.64 0.02
+vt 0.64 0.47
+vt 0.35 0.47
+vt 0.68 0.02
+vt 0.97 0.02
+vt 0.97 0.47
+vt 0.68 0.47
+vt 0.02 0.52
+vt 0.31 0.52
+vt 0.31 0.97
+vt 0.02 0.97
+vt 0.35 0.52
+vt 0.64 0.52
+vt 0.64 0.97
+vt 0.35 0.97
+vt 0.68 0.52
+vt 0.97 0.52
+vt 0.97 0.97
+vt 0.68 0.97
+f 1/1 4/2 3/3
+f 1/1 3/3 2/4
+f 5/5 6/6 7/7
+f 5/5 7/7 8/8
+f 1/9 2/10 6/11
+f 1/9 6/11 5/12
+f 4/13 8/14 7/15
+f 4/13 7/15 3/16
+f 1/17 5/18 8/19
+f 1/17 8/19 4/20
+f 2/21 3/22 7/23
+f 2/21 7/23 6/24
+OBJ
+}
+
+# A small bake of box.obj, which is there: quick, and right in every respect.
+SMALL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
+
+shade() {
+    run --separate-stderr "$VDBSHADE" "$@"
+}
+
+# An output that a failing run must leave as it is.
+old_output() {
+    printf 'old' >"$1"
+}
+
+fail() {
+    echo "$*"
+    echo "status: $status"
+    echo "stdout: $output"
+    echo "stderr: $stderr"
+    return 1
+}
+
+# no_leftovers: no temporary file in the folder.
+no_leftovers() {
+    local left
+    left=$(find . -name '*.tmp*')
+    [ -z "$left" ] || fail "left behind: $left"
+}
+
+# untouched FILE: it still holds what old_output() wrote.
+untouched() {
+    [ "$(cat "$1")" = old ] || fail "$1 was changed"
+    no_leftovers
+}
+
+# refused CODE WORD …: the last run ended with CODE and one line on standard error that holds every WORD.
+refused() {
+    local code=$1 word
+    shift
+    [ "$status" -eq "$code" ] || fail "expected exit code $code"
+    [ -z "$output" ] || fail "expected nothing on standard output"
+    [ "${#stderr_lines[@]}" -eq 1 ] || fail "expected one line on standard error"
+    [[ $stderr == "vdbshade: "* ]] || fail "expected 'vdbshade: …'"
+    for word in "$@"; do
+        [[ $stderr == *"$word"* ]] || fail "expected '$word'"
+    done
+}
+
+done_well() {
+    [ "$status" -eq 0 ] || fail "expected success"
+}

@@ -1,0 +1,85 @@
+# info: what a file holds, and what is wrong with it.
+load helper
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    write_box box.obj
+}
+
+@test "a sound mesh has no problems" {
+    shade info box.obj
+    done_well
+    [[ $output == *"triangles: 12"* ]] || fail "no triangles"
+    [[ $output == *"UV sets: 1"* ]] || fail "no UV sets"
+    [[ $output == *"bounds: 0 0 0 to 1 1 1"* ]] || fail "no bounds"
+    [[ $output != *problem* ]] || fail "a problem"
+}
+
+@test "an open mesh, degenerate triangles and overlapping UVs are problems" {
+    { sed -e '$d' -e 's/^vt 0.35 0.02/vt 0.05 0.02/' box.obj && echo 'f 1/1 1/1 2/2'; } >bad.obj
+    shade info bad.obj
+    done_well
+    [[ $output == *"problem: 3 open edges"* ]] || fail "no open edges"
+    [[ $output == *"problem: 1 triangles of zero area"* ]] || fail "no degenerate triangles"
+    [[ $output == *"lie over other charts"* ]] || fail "no overlap"
+}
+
+@test "the sample asset is sound" {
+    shade info "$ASSETS/cloister.glb"
+    done_well
+    [[ $output != *"other charts"* ]] || fail "charts overlap"
+    [[ $output != *"leave the UV square"* ]] || fail "UVs outside"
+}
+
+@test "a level set" {
+    shade voxelize box.obj -o box.vdb --voxel-size 0.05 --name hull --quiet
+    done_well
+    shade info box.vdb
+    done_well
+    [[ $output == *"grid 'hull'"*"class: level set"*"voxel size: 0.05 0.05 0.05"* ]] || fail "not what was written"
+    [[ $output != *problem* ]] || fail "a problem"
+}
+
+@test "a scene" {
+    shade info "$ASSETS/seeds.json"
+    done_well
+    [[ $output == *"caster 0: sdf"*"light 'sun'"*"receiver 0: "* ]] || fail "no summary"
+}
+
+@test "missing, damaged and empty files" {
+    shade info none.obj
+    refused 3 none.obj
+    shade info none.vdb
+    refused 3 none.vdb
+    shade info none.exr
+    refused 3 none.exr
+    shade info none.json
+    refused 3 none.json
+    for ending in obj glb ply stl exr png vdb; do
+        : >"empty.$ending"
+        shade info "empty.$ending"
+        [ "$status" -eq 2 ] || [ "$status" -eq 3 ] || fail "$ending: expected 2 or 3"
+        refused "$status" "empty.$ending"
+    done
+}
+
+@test "a damaged level set, byte by byte, never takes the program down" {
+    shade voxelize box.obj -o box.vdb --resolution 16 --quiet
+    done_well
+    local size at
+    size=$(wc -c <box.vdb)
+    for ((i = 1; i <= 40; ++i)); do
+        at=$((i * size / 41))
+        { head -c "$at" box.vdb && printf '\377\377\377\177' && tail -c +$((at + 5)) box.vdb; } >bad.vdb
+        shade info bad.vdb
+        case $status in
+        0 | 2 | 3 | 4) ;;
+        *) fail "changed at byte $at" ;;
+        esac
+    done
+}
+
+@test "control characters of a file name stay out of the terminal" {
+    shade info $'none\033[31m\n.obj'
+    refused 3 'none?[31m?.obj'
+}

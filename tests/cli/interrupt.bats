@@ -1,0 +1,39 @@
+# SIGINT and SIGTERM.
+load helper
+
+milliseconds() {
+    echo $(($(date +%s%N) / 1000000))
+}
+
+# interrupt SIGNAL SECONDS: starts a long bake, waits, signals, and sets status, took (ms).
+interrupt() {
+    old_output out.exr
+    "$VDBSHADE" bake "$ASSETS/cloister.glb" --sun -0.5,0.8,-0.6 --sun-angle 20 --ao 2 --ao-cones 256 \
+        --size 4096 --supersample 2 --resolution 512 -o out.exr 2>err.txt &
+    local pid=$! start
+    sleep "$2"
+    kill -s "$1" "$pid"
+    start=$(milliseconds)
+    status=0
+    wait "$pid" || status=$?
+    took=$(($(milliseconds) - start))
+    output=
+    stderr=$(cat err.txt)
+}
+
+@test "a signal ends a bake within a second, at whatever stage, with nothing left behind" {
+    for after in 0.05 0.3 1 2.5 5; do
+        interrupt INT "$after"
+        [ "$status" -eq 130 ] || fail "after $after s"
+        [ "$took" -le 1000 ] || fail "took $took ms, $after s after the start"
+        [[ $stderr == *interrupted* ]] || fail "says nothing"
+        untouched out.exr
+    done
+}
+
+@test "SIGTERM does the same" {
+    interrupt TERM 1
+    [ "$status" -eq 130 ] || fail "wrong code"
+    [ "$took" -le 1000 ] || fail "took $took ms"
+    untouched out.exr
+}

@@ -1,0 +1,95 @@
+# Where the output cannot go, and that it comes whole or not at all.
+load helper
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    write_box box.obj
+}
+
+bake_to() {
+    shade bake box.obj "${SMALL[@]}" -o "$@"
+}
+
+@test "a folder that does not exist" {
+    bake_to none/out.exr
+    refused 3 none/out.exr
+    bake_to out.exr --stats none/stats.json
+    refused 3 none/stats.json
+    [ ! -e out.exr ]
+}
+
+@test "a folder that cannot be written to" {
+    [ "$(id -u)" -ne 0 ] || skip "root may write anywhere"
+    mkdir shut
+    chmod 555 shut
+    bake_to shut/out.exr
+    chmod 755 shut
+    refused 3 shut/out.exr
+}
+
+@test "a folder in place of the output" {
+    mkdir out.exr
+    bake_to out.exr
+    refused 3 out.exr
+}
+
+@test "an ending of no known format, and none" {
+    bake_to out.xyz
+    refused 2 out.xyz
+    bake_to out
+    refused 2 out
+}
+
+@test "bits and packings that a format does not have" {
+    bake_to out.png --bits 32
+    refused 2 32
+    bake_to out.png --pack R=shadow.moon
+    refused 2 shadow.moon
+    no_leftovers
+}
+
+@test "the input, a caster and the scene are never replaced" {
+    cp box.obj copy.obj
+    bake_to box.obj
+    refused 2 box.obj
+    bake_to ./box.obj
+    refused 2 box.obj
+    ln -s copy.obj link.exr
+    bake_to link.exr --caster copy.obj
+    refused 2 link.exr
+    bake_to out.exr --stats box.obj
+    refused 2 box.obj
+    bake_to out.exr --stats out.exr
+    refused 2 out.exr
+    cmp box.obj copy.obj
+}
+
+@test "a full disk leaves the old output" {
+    old_output out.exr
+    # The limit counts blocks of 1 KiB; the lightmap takes more.
+    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" bake box.obj "${SMALL[@]}" \
+        --size 256 --ao 1 --quiet -o out.exr
+    refused 3 out.exr
+    untouched out.exr
+}
+
+@test "a full disk leaves the old PNG and the old level set" {
+    old_output out.png
+    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" bake box.obj "${SMALL[@]}" \
+        --size 256 --ao 1 --bits 16 --quiet -o out.png
+    refused 3 out.png
+    untouched out.png
+    old_output out.vdb
+    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" voxelize box.obj --quiet -o out.vdb
+    refused 3 out.vdb
+    untouched out.vdb
+}
+
+@test "a complete run replaces the old output" {
+    old_output out.exr
+    bake_to out.exr --quiet
+    done_well
+    [ "$(head -c 4 out.exr | od -An -tx1 | tr -d ' ')" = 762f3101 ] || fail "no EXR"
+    [ -z "$stderr" ] || fail "--quiet said something"
+    no_leftovers
+}

@@ -1,0 +1,173 @@
+# Help, version, and what is wrong with a command line.
+load helper
+
+fits() {
+    local line
+    for line in "${lines[@]}"; do
+        [ "${#line}" -le 100 ] || fail "longer than 100 columns: $line"
+    done
+}
+
+@test "the help names the commands and the exit codes" {
+    for flag in --help -h; do
+        shade "$flag"
+        done_well
+        [[ $output == *bake*voxelize*info*130* ]] || fail "commands or exit codes are missing"
+        fits
+    done
+}
+
+@test "the version is the library's" {
+    shade --version
+    done_well
+    [[ $output =~ ^vdbshade\ [0-9]+\.[0-9]+\.[0-9]+$ ]] || fail "no version"
+}
+
+@test "every command has its own help, which fits 100 columns" {
+    for command in bake voxelize info; do
+        shade "$command" --help
+        done_well
+        [[ $output == "Usage: vdbshade $command "* ]] || fail "no usage line"
+        [ -z "$stderr" ] || fail "something on standard error"
+        fits
+    done
+}
+
+@test "the help of bake names every option that holds for good" {
+    shade bake --help
+    for option in sun sun-angle ao size resolution voxel-size uv-set method padding threads memory-limit \
+        stats quiet; do
+        [[ $output == *"--$option "* ]] || fail "--$option is missing"
+    done
+}
+
+@test "no command, an unknown command and an unknown option are usage errors" {
+    shade
+    refused 2 'no command'
+    shade backe
+    refused 2 "did you mean bake?"
+    shade --verson
+    refused 2 --verson
+}
+
+@test "an unknown option suggests the nearest" {
+    write_box box.obj
+    shade bake box.obj -o out.exr --resolutoin 5
+    refused 2 'did you mean --resolution?'
+    shade bake box.obj -o out.exr --zzzzzzzzzz
+    refused 2 'bake --help'
+    shade bake box.obj -o out.exr -z
+    refused 2 '-z'
+}
+
+@test "an abbreviated option is refused, as the next version may have another of that beginning" {
+    write_box box.obj
+    shade bake box.obj -o out.exr --resol 24 --ao 1
+    refused 2 --resol
+}
+
+@test "a missing value, a value too many and an operand too many are usage errors" {
+    write_box box.obj
+    shade bake box.obj -o
+    refused 2 '-o' value
+    shade bake box.obj -o out.exr --sun
+    refused 2 '--sun' value
+    shade bake box.obj -o out.exr --quiet=yes
+    refused 2 '--quiet'
+    shade bake box.obj other.obj -o out.exr --ao 1
+    refused 2 other.obj
+    shade bake -o out.exr
+    refused 2 'no INPUT'
+}
+
+@test "numbers are taken strictly" {
+    write_box box.obj
+    old_output out.exr
+    while read -r option value; do
+        shade bake box.obj -o out.exr "${SMALL[@]}" "$option" "$value"
+        refused 2 "$option" "$value"
+    done <<'LIST'
+--ao 0
+--ao -1
+--ao nan
+--ao 1m
+--ao 0x10
+--ao-cones 0
+--ao-cones 257
+--ao-method rays
+--sun 1,2
+--sun 0,0,0
+--sun 1,2,3,4
+--sun 1,nan,3
+--sun-angle 180
+--sun-angle -1
+--sun-angle inf
+--voxel-size 0
+--voxel-size -0.1
+--voxel-size nan
+--voxel-size inf
+--resolution 1
+--resolution 65537
+--resolution 24.5
+--resolution 99999999999999999999
+--half-width 2
+--shell-thickness 0
+--size 0
+--size 1000000
+--size 64x
+--size 64x0
+--size -64
+--uv-set -1
+--uv-set 8
+--supersample 0
+--supersample 17
+--padding -1
+--padding 4097
+--bits 12
+--threads 0
+--threads 1025
+--memory-limit -5
+--memory-limit 5T
+--memory-limit many
+LIST
+    shade bake box.obj -o out.exr "${SMALL[@]}" --ao ''
+    refused 2 --ao
+    untouched out.exr
+}
+
+@test "an unknown method is refused with the list of those there are" {
+    write_box box.obj
+    old_output out.exr
+    for method in magic rays adaptive; do
+        shade bake box.obj -o out.exr "${SMALL[@]}" --method "$method"
+        refused 2 "$method" 'hard, classic, improved, smooth, cone'
+    done
+    untouched out.exr
+}
+
+@test "a mesh needs something to bake" {
+    write_box box.obj
+    shade bake box.obj -o out.exr
+    refused 2 --sun --ao
+    shade bake box.obj -o out.exr --ao 1 --sun-angle 5
+    refused 2 --sun-angle
+    shade bake box.obj -o out.exr --sun 0,1,0 --ao-cones 5
+    refused 2 --ao-cones
+    shade bake box.obj -o out.exr --ao 1 --irradiance
+    refused 2 --irradiance
+    shade bake box.obj --ao 1
+    refused 2 '-o'
+}
+
+@test "voxel size and resolution exclude each other" {
+    write_box box.obj
+    shade bake box.obj -o out.exr --ao 1 --resolution 24 --voxel-size 0.1
+    refused 2 --resolution --voxel-size
+}
+
+@test "a file whose name begins with a dash comes after --" {
+    write_box ./-box.obj
+    shade bake "${SMALL[@]}" --quiet -o out.exr -- -box.obj
+    done_well
+    [ -s out.exr ]
+}

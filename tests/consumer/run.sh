@@ -1,0 +1,49 @@
+#!/usr/bin/env bash
+# Installs a build to a temporary prefix, moves that prefix, and uses the package there as a stranger would:
+# through CMake, through pkg-config, and from C++. Usage: run.sh BUILD_FOLDER
+set -euo pipefail
+
+build=$(cd "${1:?usage: run.sh BUILD_FOLDER}" && pwd)
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cc=${CC:-cc}
+cxx=${CXX:-c++}
+
+say() { printf '\n== %s\n' "$*"; }
+
+say "install"
+cmake --install "$build" --prefix "$work/first" >"$work/install.log" || { cat "$work/install.log"; exit 1; }
+mv "$work/first" "$work/moved here" # nothing may remember where it was installed
+prefix="$work/moved here"
+library=$(dirname "$(find "$prefix" -name libvdbshade.so)")
+"$prefix/bin/vdbshade" --version
+
+say "every header alone, as C and as C++"
+for header in "$prefix"/include/vdbshade/*.h; do
+    name=vdbshade/$(basename "$header")
+    printf '#include <%s>\ntypedef int some_declaration;\n' "$name" >"$work/alone.c"
+    "$cc" -std=c11 -pedantic -Wall -Wextra -Werror -fsyntax-only -I"$prefix/include" "$work/alone.c"
+    "$cxx" -std=c++11 -pedantic -Wall -Wextra -Werror -fsyntax-only -I"$prefix/include" -x c++ "$work/alone.c"
+done
+
+say "CMake: find_package(vdbshade)"
+cmake -S "$here" -B "$work/cmake" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Release >"$work/cmake.log" ||
+    { cat "$work/cmake.log"; exit 1; }
+cmake --build "$work/cmake" >"$work/cmake.log" || { cat "$work/cmake.log"; exit 1; }
+mkdir "$work/output"
+"$work/cmake/consumer" "$work/output"
+
+say "pkg-config"
+export PKG_CONFIG_PATH="$library/pkgconfig"
+# pkg-config escapes spaces in paths; eval reads them as the shell that a makefile calls would.
+eval "$cc -std=c11 -pedantic -Wall -Wextra -Werror '$here/consumer.c' -o '$work/plain' \
+    $(pkg-config --cflags --libs vdbshade) -lm"
+LD_LIBRARY_PATH=$library "$work/plain" "$work/output" >"$work/plain.log" || { cat "$work/plain.log"; exit 1; }
+echo "the same values"
+
+say "C++"
+eval "$cxx -std=c++11 -pedantic -Wall -Wextra -Werror '$here/header.cpp' -o '$work/plus' \
+    $(pkg-config --cflags --libs vdbshade)"
+LD_LIBRARY_PATH=$library "$work/plus"
+printf '\nconsumer: all passed\n'

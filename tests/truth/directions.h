@@ -1,0 +1,31 @@
+/* Directions towards a disc light and over a hemisphere, the same for analytic and mesh truth. */
+#ifndef TRUTH_DIRECTIONS_H
+#define TRUTH_DIRECTIONS_H
+
+#include <stddef.h>
+
+/* A right-handed orthonormal frame whose third axis is `direction` (any length but 0). */
+typedef struct truth_frame {
+    double u[3], v[3], n[3];
+} truth_frame;
+truth_frame truth_frame_around(const double direction[3]);
+
+/* Point `index` of `count` in the unit disc, uniform in area: Vogel's spiral ("A better way to construct the
+ * sunflower head", 1979), radii √((i+½)/n) so that every ring has its share. */
+void truth_disc_point(size_t index, size_t count, double point[2]);
+
+/* A direction given in a frame's axes, in the world. */
+void truth_to_world(const truth_frame *frame, const double local[3], double direction[3]);
+
+/* Unit direction `index` of `count` towards a disc of radius w, a unit away along the frame's axis. */
+void truth_light_direction(const truth_frame *frame, double w, size_t index, size_t count,
+                           double direction[3]);
+
+/* Unit direction `index` of `count` over the hemisphere, density proportional to the cosine (Malley's method:
+ * the disc's points raised to the sphere). */
+void truth_cosine_direction(const truth_frame *frame, size_t index, size_t count, double direction[3]);
+
+/* Visible share of a disc that a straight edge covers, the edge at x (-1 … 1, in radii) from its centre. */
+double truth_disc_share(double x);
+
+#endif

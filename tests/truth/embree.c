@@ -1,0 +1,318 @@
+#include "embree.h"
+
+#ifndef VSH_TRUTH_EMBREE
+
+truth_mesh *truth_mesh_create(const vsh_mesh *meshes, size_t mesh_count) {
+    (void)meshes;
+    (void)mesh_count;
+    return NULL;
+}
+
+void truth_mesh_free(truth_mesh *truth) {
+    (void)truth;
+}
+
+int truth_mesh_light(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
+                     const double towards[3], double w, size_t rays, int threads, float *visible) {
+    (void)truth, (void)count, (void)origins, (void)normals, (void)towards, (void)w, (void)rays, (void)threads;
+    (void)visible;
+    return -1;
+}
+
+int truth_mesh_ao(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
+                  double distance, size_t rays, int threads, float *open) {
+    (void)truth, (void)count, (void)origins, (void)normals, (void)distance, (void)rays, (void)threads;
+    (void)open;
+    return -1;
+}
+
+int truth_mesh_backs(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
+                     size_t rays, int threads, float *backs) {
+    (void)truth, (void)count, (void)origins, (void)normals, (void)rays, (void)threads, (void)backs;
+    return -1;
+}
+
+#else
+
+#include "directions.h"
+
+#include <embree3/rtcore.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MAX_THREADS = 64, POINTS_AT_ONCE = 256 };
+
+struct truth_mesh {
+    RTCDevice device;
+    RTCScene scene;
+    double center[3]; /* taken off in double, as Embree counts in floats */
+};
+
+static void world_position(const vsh_mesh *mesh, size_t vertex, double world[3]) {
+    const float *p = &mesh->positions[3 * vertex];
+    for (int i = 0; i < 3; i++) {
+        const double *row = mesh->transform != NULL ? &mesh->transform[4 * i] : NULL;
+        world[i] = row != NULL ? row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3] : (double)p[i];
+    }
+}
+
+static void find_center(const vsh_mesh *meshes, size_t mesh_count, double center[3]) {
+    double low[3] = {INFINITY, INFINITY, INFINITY};
+    double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t m = 0; m < mesh_count; m++) {
+        for (size_t v = 0; v < meshes[m].vertex_count; v++) {
+            double world[3];
+            world_position(&meshes[m], v, world);
+            for (int i = 0; i < 3; i++) {
+                low[i] = fmin(low[i], world[i]);
+                high[i] = fmax(high[i], world[i]);
+            }
+        }
+    }
+    for (int i = 0; i < 3; i++) {
+        center[i] = low[i] <= high[i] ? (low[i] + high[i]) / 2.0 : 0.0;
+    }
+}
+
+static bool mirrors(const double *m) {
+    return m != NULL && m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8]) +
+                                m[2] * (m[4] * m[9] - m[5] * m[8]) <
+                            0.0;
+}
+
+static bool attach(truth_mesh *truth, const vsh_mesh *mesh) {
+    RTCGeometry geometry = rtcNewGeometry(truth->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    float *vertices =
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float),
+                                mesh->vertex_count > 0 ? mesh->vertex_count : 1);
+    uint32_t *indices =
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t),
+                                mesh->triangle_count > 0 ? mesh->triangle_count : 1);
+    if (vertices == NULL || indices == NULL) {
+        rtcReleaseGeometry(geometry);
+        return false;
+    }
+    memset(indices, 0, 3 * sizeof(uint32_t));
+    for (size_t v = 0; v < mesh->vertex_count; v++) {
+        double world[3];
+        world_position(mesh, v, world);
+        for (int i = 0; i < 3; i++) {
+            vertices[3 * v + (size_t)i] = (float)(world[i] - truth->center[i]);
+        }
+    }
+    /* A mirroring transform turns triangles inside out; their winding is turned back. */
+    const bool flip = mirrors(mesh->transform);
+    for (size_t t = 0; t < mesh->triangle_count; t++) {
+        const uint32_t *from = &mesh->indices[3 * t];
+        indices[3 * t] = from[0];
+        indices[3 * t + 1] = from[flip ? 2 : 1];
+        indices[3 * t + 2] = from[flip ? 1 : 2];
+    }
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(truth->scene, geometry);
+    rtcReleaseGeometry(geometry);
+    return true;
+}
+
+truth_mesh *truth_mesh_create(const vsh_mesh *meshes, size_t mesh_count) {
+    truth_mesh *truth = calloc(1, sizeof *truth);
+    if (truth == NULL) {
+        return NULL;
+    }
+    find_center(meshes, mesh_count, truth->center);
+    truth->device = rtcNewDevice(NULL);
+    if (truth->device == NULL) {
+        goto fail;
+    }
+    truth->scene = rtcNewScene(truth->device);
+    rtcSetSceneFlags(truth->scene, RTC_SCENE_FLAG_ROBUST);
+    for (size_t m = 0; m < mesh_count; m++) {
+        if (!attach(truth, &meshes[m])) {
+            goto fail;
+        }
+    }
+    rtcCommitScene(truth->scene);
+    if (rtcGetDeviceError(truth->device) != RTC_ERROR_NONE) {
+        goto fail;
+    }
+    return truth;
+fail:
+    truth_mesh_free(truth);
+    return NULL;
+}
+
+void truth_mesh_free(truth_mesh *truth) {
+    if (truth == NULL) {
+        return;
+    }
+    if (truth->scene != NULL) {
+        rtcReleaseScene(truth->scene);
+    }
+    if (truth->device != NULL) {
+        rtcReleaseDevice(truth->device);
+    }
+    free(truth);
+}
+
+typedef enum question { LIGHT, AO, BACKS } question;
+
+typedef struct work {
+    const truth_mesh *truth;
+    question question;
+    size_t count;
+    const double *origins;
+    const float *normals;
+    const double *towards; /* LIGHT */
+    double w;
+    double limit;
+    size_t rays;
+    float *result;
+    double *locals; /* [rays][3], directions in a frame's axes: the same for all points */
+    atomic_size_t next;
+} work;
+
+static struct RTCRay ray_from(const work *job, size_t point, const double direction[3]) {
+    struct RTCRay ray = {0};
+    const double *origin = &job->origins[3 * point];
+    const double *center = job->truth->center;
+    ray.org_x = (float)(origin[0] - center[0]);
+    ray.org_y = (float)(origin[1] - center[1]);
+    ray.org_z = (float)(origin[2] - center[2]);
+    ray.dir_x = (float)direction[0];
+    ray.dir_y = (float)direction[1];
+    ray.dir_z = (float)direction[2];
+    ray.tnear = 0.0F;
+    ray.tfar = (float)job->limit;
+    ray.mask = 0xffffffffU;
+    return ray;
+}
+
+static bool is_free(const work *job, size_t point, const double direction[3]) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    struct RTCRay ray = ray_from(job, point, direction);
+    rtcOccluded1(job->truth->scene, &context, &ray);
+    return ray.tfar >= 0.0F; /* a hit sets it to -∞ */
+}
+
+static bool meets_back(const work *job, size_t point, const double direction[3]) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    struct RTCRayHit hit = {0};
+    hit.ray = ray_from(job, point, direction);
+    hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(job->truth->scene, &context, &hit);
+    return hit.hit.geomID != RTC_INVALID_GEOMETRY_ID &&
+           hit.hit.Ng_x * hit.ray.dir_x + hit.hit.Ng_y * hit.ray.dir_y + hit.hit.Ng_z * hit.ray.dir_z > 0.0F;
+}
+
+static float answer(const work *job, size_t point) {
+    const float *normal = job->normals != NULL ? &job->normals[3 * point] : NULL;
+    const truth_frame frame = job->question == LIGHT
+                                  ? truth_frame_around(job->towards)
+                                  : truth_frame_around((double[]){normal[0], normal[1], normal[2]});
+    size_t yes = 0;
+    for (size_t i = 0; i < job->rays; i++) {
+        double direction[3];
+        truth_to_world(&frame, &job->locals[3 * i], direction);
+        if (job->question == LIGHT && normal != NULL &&
+            direction[0] * normal[0] + direction[1] * normal[1] + direction[2] * normal[2] <= 0.0) {
+            continue;
+        }
+        const bool counts =
+            job->question == BACKS ? meets_back(job, point, direction) : is_free(job, point, direction);
+        yes += counts ? 1 : 0;
+    }
+    return (float)((double)yes / (double)job->rays);
+}
+
+static void *run(void *user) {
+    work *job = user;
+    for (;;) {
+        const size_t begin = atomic_fetch_add(&job->next, POINTS_AT_ONCE);
+        if (begin >= job->count) {
+            return NULL;
+        }
+        const size_t end = job->count - begin > POINTS_AT_ONCE ? begin + POINTS_AT_ONCE : job->count;
+        for (size_t point = begin; point < end; point++) {
+            job->result[point] = answer(job, point);
+        }
+    }
+}
+
+static int run_all(work *job, int threads) {
+    static const truth_frame axes = {{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}};
+    job->locals = calloc(job->rays, 3 * sizeof *job->locals);
+    if (job->locals == NULL) {
+        return -1;
+    }
+    for (size_t i = 0; i < job->rays; i++) {
+        if (job->question == LIGHT) {
+            truth_light_direction(&axes, job->w, i, job->rays, &job->locals[3 * i]);
+        } else {
+            truth_cosine_direction(&axes, i, job->rays, &job->locals[3 * i]);
+        }
+    }
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    int wanted = threads > 0 ? threads : (int)(cores > 0 ? cores : 1);
+    wanted = wanted < MAX_THREADS ? wanted : MAX_THREADS;
+    pthread_t thread[MAX_THREADS];
+    int started = 0;
+    while (started < wanted - 1 && pthread_create(&thread[started], NULL, run, job) == 0) {
+        started++;
+    }
+    run(job);
+    for (int i = 0; i < started; i++) {
+        pthread_join(thread[i], NULL);
+    }
+    free(job->locals);
+    return started == wanted - 1 ? 0 : -1;
+}
+
+int truth_mesh_light(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
+                     const double towards[3], double w, size_t rays, int threads, float *visible) {
+    work job = {.truth = truth,
+                .question = LIGHT,
+                .count = count,
+                .origins = origins,
+                .normals = normals,
+                .towards = towards,
+                .w = w,
+                .limit = INFINITY,
+                .rays = rays,
+                .result = visible};
+    return run_all(&job, threads);
+}
+
+int truth_mesh_ao(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
+                  double distance, size_t rays, int threads, float *open) {
+    work job = {.truth = truth,
+                .question = AO,
+                .count = count,
+                .origins = origins,
+                .normals = normals,
+                .limit = distance,
+                .rays = rays,
+                .result = open};
+    return run_all(&job, threads);
+}
+
+int truth_mesh_backs(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
+                     size_t rays, int threads, float *backs) {
+    work job = {.truth = truth,
+                .question = BACKS,
+                .count = count,
+                .origins = origins,
+                .normals = normals,
+                .limit = INFINITY,
+                .rays = rays,
+                .result = backs};
+    return run_all(&job, threads);
+}
+
+#endif

@@ -1,0 +1,25 @@
+/* How far values are from the truth. RMSE alone hides lost penumbrae, so the rest stands beside it. */
+#ifndef TRUTH_METRICS_H
+#define TRUTH_METRICS_H
+
+#include <stddef.h>
+
+typedef struct truth_metrics {
+    size_t count;         /* compared */
+    size_t penumbra;      /* of them with a truth in 0.02 … 0.98 */
+    double rmse;          /* over all; INFINITY, like the rest, where a value is not finite */
+    double penumbra_rmse; /* over the penumbra; 0 where there is none */
+    double bias;          /* mean of value - truth */
+    double p95;           /* of |value - truth|, nearest rank */
+    double p99;
+    double max;
+    size_t worst; /* index of the largest error */
+} truth_metrics;
+
+/* Compares where mask > 0 (NULL: everywhere). All zero where nothing is compared or memory is short. */
+truth_metrics truth_compare(size_t count, const float *values, const float *truth, const float *mask);
+
+/* One line: "n … rmse … penumbra … bias … p95 … p99 … max …", under `what`, on standard output. */
+void truth_metrics_print(const char *what, const truth_metrics *metrics);
+
+#endif

@@ -1,0 +1,480 @@
+/* The bake of a lightmap: a wall that stands on a floor, a coarse smooth sphere, an open sheet. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <vdbshade/bake.h>
+
+enum { SIZE = 64, TEXELS = SIZE * SIZE };
+
+static const double VOXEL = 0.04;
+static const double WALL = 0.2; /* half its thickness */
+
+static const uint32_t QUAD_INDICES[6] = {0, 1, 2, 0, 2, 3};
+
+/* The floor y = 0 over [-1, 1]², facing up; u runs along x, v along -z. */
+static const float FLOOR_POSITIONS[12] = {-1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1};
+static const float QUAD_UVS[8] = {0, 0, 1, 0, 1, 1, 0, 1};
+
+static vsh_mesh floor_mesh(void) {
+    return (vsh_mesh){.name = "floor",
+                      .positions = FLOOR_POSITIONS,
+                      .uvs = QUAD_UVS,
+                      .indices = QUAD_INDICES,
+                      .vertex_count = 4,
+                      .triangle_count = 2};
+}
+
+static double texel_x(uint32_t texel) {
+    return -1.0 + 2.0 * (texel % SIZE + 0.5) / SIZE;
+}
+
+/* A slab under y = 0 and, where `wall` is not zero, a wall |x| < WALL of height 1 across all of it. */
+static vsh_field *floor_field(int wall) {
+    vsh_sdf_node nodes[3] = {vsh_sdf_node_default(), vsh_sdf_node_default(), vsh_sdf_node_default()};
+    nodes[0].shape = VSH_SDF_BOX;
+    nodes[0].size[0] = nodes[0].size[2] = 1.5;
+    nodes[0].size[1] = 0.25;
+    nodes[0].translation[1] = -0.25;
+    nodes[0].rounding = 0.0;
+    nodes[1] = nodes[0];
+    nodes[1].size[0] = WALL;
+    nodes[1].size[1] = 0.5;
+    nodes[1].translation[1] = 0.5;
+    nodes[2].shape = VSH_SDF_UNION;
+    nodes[2].left = 0;
+    nodes[2].right = 1;
+    const vsh_sdf sdf = {nodes, wall ? 3 : 1};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = VOXEL;
+    vsh_grid *grid = NULL;
+    vsh_field *field = NULL;
+    vsh_error error = {0};
+    if (vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &error) != VSH_OK ||
+        vsh_field_create(grid, NULL, NULL, &field, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    vsh_grid_free(grid);
+    return field;
+}
+
+static vsh_texels *make_texels(const vsh_mesh *meshes, size_t count, int32_t size, int32_t supersample,
+                               int32_t padding) {
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = size;
+    options.supersample = supersample;
+    options.padding = padding;
+    vsh_texels *texels = NULL;
+    vsh_error error = {0};
+    if (vsh_texels_create(meshes, count, &options, NULL, NULL, &texels, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return texels;
+}
+
+static vsh_light sun(double x, double y, double z, double angle) {
+    vsh_light light = vsh_light_default();
+    light.direction[0] = x;
+    light.direction[1] = y;
+    light.direction[2] = z;
+    light.angle = angle;
+    return light;
+}
+
+/* Planes of one light, AO, irradiance and coverage. */
+typedef struct planes {
+    float shadow[TEXELS], ao[TEXELS], irradiance[3 * TEXELS], coverage[TEXELS];
+    float *lights[1];
+    vsh_lightmap all;
+} planes;
+
+static planes *new_planes(void) {
+    planes *p = malloc(sizeof *p);
+    memset(p, 0xff, sizeof *p); /* NaN: whatever is not written shows */
+    p->lights[0] = p->shadow;
+    p->all = (vsh_lightmap){p->lights, p->ao, p->irradiance, p->coverage};
+    return p;
+}
+
+static void bake(const vsh_field *field, const vsh_texels *texels, const vsh_light *light,
+                 const vsh_lightmap *lightmap, vsh_bake_stats *stats, int32_t threads) {
+    vsh_run run = vsh_run_default();
+    run.threads = threads;
+    vsh_error error = {0};
+    if (vsh_bake_lightmap(field, texels, light, light != NULL ? 1 : 0, NULL, &run, lightmap, stats, &error) !=
+        VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+}
+
+static void a_floor_under_open_sky_is_exactly_lit(void **state) {
+    (void)state;
+    vsh_field *field = floor_field(0);
+    const vsh_mesh mesh = floor_mesh();
+    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 0);
+    const vsh_light light = sun(0.3, 1.0, 0.2, 0.2);
+    planes *p = new_planes();
+    vsh_bake_stats stats = vsh_bake_stats_zero();
+    bake(field, texels, &light, &p->all, &stats, 0);
+    for (int i = 0; i < TEXELS; ++i) {
+        assert_true(p->shadow[i] == 1.0f);
+        assert_true(p->coverage[i] == 1.0f);
+    }
+    assert_int_equal(stats.texels, TEXELS);
+    assert_int_equal(stats.invalid_texels, 0);
+    free(p);
+    vsh_texels_free(texels);
+    vsh_field_free(field);
+}
+
+static void texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side(void **state) {
+    (void)state;
+    vsh_field *field = floor_field(1);
+    const vsh_mesh mesh = floor_mesh();
+    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 0);
+    const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
+    planes *p = new_planes();
+    uint64_t invalid_by_mesh[1] = {77};
+    vsh_bake_stats stats = vsh_bake_stats_zero();
+    stats.invalid_by_mesh = invalid_by_mesh;
+    bake(field, texels, &light, &p->all, &stats, 0);
+    uint64_t invalid = 0;
+    for (uint32_t i = 0; i < TEXELS; ++i) {
+        const double x = texel_x(i);
+        invalid += p->coverage[i] == 0.0f;
+        if (fabs(x) < WALL - VOXEL) {
+            assert_true(p->coverage[i] == 0.0f);
+        } else if (fabs(x) > WALL + VOXEL) {
+            assert_true(p->coverage[i] == 1.0f);
+        }
+        /* The shadow of a wall of height 1 at 45° ends beyond the floor's edge. */
+        if (x < -WALL) {
+            assert_true(p->shadow[i] < 0.01f);
+        } else if (x > WALL + VOXEL) {
+            assert_true(p->shadow[i] > 0.99f);
+        }
+    }
+    assert_int_equal(invalid, stats.invalid_texels);
+    assert_int_equal(invalid, invalid_by_mesh[0]);
+    assert_int_equal(stats.texels, TEXELS);
+    /* Invalid texels take the value of the nearest valid one, dark or lit. */
+    for (uint32_t i = 0; i < TEXELS; ++i) {
+        const double x = texel_x(i);
+        if (fabs(x) < WALL - VOXEL && fabs(x) > WALL - 6.0 * 2.0 / SIZE) {
+            assert_true(x < 0.0 ? p->shadow[i] < 0.01f : p->shadow[i] > 0.9f);
+        }
+    }
+    free(p);
+    vsh_texels_free(texels);
+    vsh_field_free(field);
+}
+
+static void irradiance_is_visibility_times_colour_times_cosine_times_ao(void **state) {
+    (void)state;
+    vsh_field *field = floor_field(1);
+    const vsh_mesh mesh = floor_mesh();
+    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 0);
+    vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
+    light.color[0] = 2.0;
+    light.color[1] = 0.5;
+    light.color[2] = 0.0;
+    planes *p = new_planes();
+    bake(field, texels, &light, &p->all, NULL, 0);
+    for (size_t i = 0; i < TEXELS; ++i) {
+        const double expected = (double)p->shadow[i] * sqrt(0.5) * (double)p->ao[i];
+        assert_true(fabs((double)p->irradiance[3 * i] - 2.0 * expected) < 1e-5);
+        assert_true(fabs((double)p->irradiance[3 * i + 1] - 0.5 * expected) < 1e-5);
+        assert_true(p->irradiance[3 * i + 2] == 0.0f);
+    }
+    planes *alone = new_planes();
+    alone->all = (vsh_lightmap){NULL, NULL, alone->irradiance, NULL};
+    bake(field, texels, &light, &alone->all, NULL, 0);
+    for (size_t i = 0; i < TEXELS; ++i) {
+        assert_true(fabs((double)alone->irradiance[3 * i] - 2.0 * sqrt(0.5) * (double)p->shadow[i]) < 1e-5);
+    }
+    free(alone);
+    free(p);
+    vsh_texels_free(texels);
+    vsh_field_free(field);
+}
+
+static void planes_that_are_not_asked_for_cost_nothing_and_change_nothing(void **state) {
+    (void)state;
+    vsh_field *field = floor_field(1);
+    const vsh_mesh mesh = floor_mesh();
+    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 2);
+    const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
+    planes *all = new_planes(), *some = new_planes();
+    bake(field, texels, &light, &all->all, NULL, 0);
+
+    vsh_bake_stats stats = vsh_bake_stats_zero();
+    const vsh_lightmap coverage = {NULL, NULL, NULL, some->coverage};
+    bake(field, texels, &light, &coverage, &stats, 0);
+    assert_int_equal(stats.shade.marches, 0);
+    assert_int_equal(stats.shade.samples, 0);
+    assert_memory_equal(some->coverage, all->coverage, sizeof all->coverage);
+
+    const vsh_lightmap ao = {NULL, some->ao, NULL, NULL};
+    bake(field, texels, NULL, &ao, NULL, 0);
+    assert_memory_equal(some->ao, all->ao, sizeof all->ao);
+    const vsh_lightmap shadow = {some->lights, NULL, NULL, NULL};
+    bake(field, texels, &light, &shadow, NULL, 0);
+    assert_memory_equal(some->shadow, all->shadow, sizeof all->shadow);
+    free(some);
+    free(all);
+    vsh_texels_free(texels);
+    vsh_field_free(field);
+}
+
+static void padding_copies_dark_and_lit_texels_and_leaves_coverage(void **state) {
+    (void)state;
+    enum { PADDING = 3 };
+    vsh_field *field = floor_field(1);
+    /* The part x < -0.5 of the floor, all of it in shadow, and a chart around it. */
+    const float positions[12] = {-1, 0, 1, -0.5f, 0, 1, -0.5f, 0, -1, -1, 0, -1};
+    const float uvs[8] = {0.25f, 0.25f, 0.75f, 0.25f, 0.75f, 0.75f, 0.25f, 0.75f};
+    vsh_mesh mesh = floor_mesh();
+    mesh.positions = positions;
+    mesh.uvs = uvs;
+    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, PADDING);
+    const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
+    planes *p = new_planes();
+    bake(field, texels, &light, &p->all, NULL, 0);
+    for (int i = 0; i < TEXELS; ++i) {
+        const int x = i % SIZE, y = i / SIZE;
+        const int dx = x < 16 ? 16 - x : x > 47 ? x - 47 : 0, dy = y < 16 ? 16 - y : y > 47 ? y - 47 : 0;
+        const int inside = dx == 0 && dy == 0;
+        assert_true(p->coverage[i] == (inside ? 1.0f : 0.0f));
+        if (dx * dx + dy * dy > PADDING * PADDING) {
+            assert_true(p->ao[i] == 0.0f);
+        } else {
+            assert_true(p->ao[i] > 0.0f);
+            const int source = (y < 16 ? 16 : y > 47 ? 47 : y) * SIZE + (x < 16 ? 16 : x > 47 ? 47 : x);
+            assert_true(p->ao[i] == p->ao[source]);
+        }
+        assert_true(p->shadow[i] < 0.01f);
+    }
+    free(p);
+    vsh_texels_free(texels);
+    vsh_field_free(field);
+}
+
+static void any_number_of_threads_gives_the_same_bits(void **state) {
+    (void)state;
+    vsh_field *field = floor_field(1);
+    const vsh_mesh mesh = floor_mesh();
+    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 3, 4);
+    const vsh_light light = sun(1.0, 0.7, 0.3, 0.2);
+    planes *p[3];
+    const int32_t threads[3] = {1, 2, 5};
+    for (int t = 0; t < 3; ++t) {
+        p[t] = new_planes();
+        bake(field, texels, &light, &p[t]->all, NULL, threads[t]);
+        assert_memory_equal(p[t]->shadow, p[0]->shadow, sizeof p[0]->shadow);
+        assert_memory_equal(p[t]->ao, p[0]->ao, sizeof p[0]->ao);
+        assert_memory_equal(p[t]->irradiance, p[0]->irradiance, sizeof p[0]->irradiance);
+        assert_memory_equal(p[t]->coverage, p[0]->coverage, sizeof p[0]->coverage);
+    }
+    for (int t = 0; t < 3; ++t) {
+        free(p[t]);
+    }
+    vsh_texels_free(texels);
+    vsh_field_free(field);
+}
+
+static void a_texel_is_the_mean_of_its_valid_samples(void **state) {
+    (void)state;
+    enum { N = 3, SMALL = 16 };
+    vsh_field *field = floor_field(1);
+    const vsh_mesh mesh = floor_mesh();
+    vsh_texels *texels = make_texels(&mesh, 1, SMALL, N, 0);
+    vsh_texels *fine = make_texels(&mesh, 1, SMALL * N, 1, 0);
+    const vsh_light light = sun(1.0, 1.0, 0.0, 0.3);
+    planes *p = new_planes(), *q = new_planes();
+    bake(field, texels, &light, &p->all, NULL, 0);
+    bake(field, fine, &light, &q->all, NULL, 0);
+    for (int i = 0; i < SMALL * SMALL; ++i) {
+        double sum = 0.0, count = 0.0;
+        for (int s = 0; s < N * N; ++s) {
+            const int at = (i / SMALL * N + s / N) * SMALL * N + i % SMALL * N + s % N;
+            sum += q->coverage[at] > 0.0f ? (double)q->shadow[at] : 0.0;
+            count += (double)q->coverage[at];
+        }
+        assert_true(p->coverage[i] == (count > 0.0 ? 1.0f : 0.0f));
+        if (count > 0.0) {
+            assert_true(fabs((double)p->shadow[i] - sum / count) < 1e-4);
+        }
+    }
+    free(q);
+    free(p);
+    vsh_texels_free(fine);
+    vsh_texels_free(texels);
+    vsh_field_free(field);
+}
+
+static void a_lightmap_of_one_texel_is_the_value_at_its_middle(void **state) {
+    (void)state;
+    vsh_field *field = floor_field(0);
+    const vsh_mesh mesh = floor_mesh();
+    vsh_texels *texels = make_texels(&mesh, 1, 1, 1, 4);
+    const vsh_light light = sun(0.0, 1.0, 0.0, 0.1);
+    planes *p = new_planes();
+    bake(field, texels, &light, &p->all, NULL, 0);
+    assert_true(p->shadow[0] == 1.0f);
+    assert_true(p->coverage[0] == 1.0f);
+    assert_true(isnan(p->coverage[1]));
+    free(p);
+    vsh_texels_free(texels);
+    vsh_field_free(field);
+}
+
+/* A UV sphere, smooth, of `ROWS` × 2 `ROWS` cells, as receiver and caster. */
+static void a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne(void **state) {
+    (void)state;
+    enum { ROWS = 8, COLUMNS = 2 * ROWS, VERTICES = (ROWS + 1) * (COLUMNS + 1) };
+    float positions[3 * VERTICES], uvs[2 * VERTICES];
+    uint32_t indices[6 * ROWS * COLUMNS];
+    size_t v = 0, i = 0;
+    for (uint32_t r = 0; r <= ROWS; ++r) {
+        for (uint32_t c = 0; c <= COLUMNS; ++c, ++v) {
+            const double polar = 3.141592653589793 * r / ROWS, ring = r % ROWS == 0 ? 0.0 : sin(polar);
+            const double around = 6.283185307179586 * (c % COLUMNS) / COLUMNS;
+            positions[3 * v] = (float)(ring * cos(around));
+            positions[3 * v + 1] = (float)cos(polar);
+            positions[3 * v + 2] = (float)(-ring * sin(around));
+            uvs[2 * v] = (float)c / COLUMNS;
+            uvs[2 * v + 1] = 1.0f - (float)r / ROWS;
+            if (r < ROWS && c < COLUMNS) {
+                const uint32_t a = (uint32_t)v, b = a + COLUMNS + 1;
+                const uint32_t cell[6] = {a, b, b + 1, a, b + 1, a + 1};
+                memcpy(indices + i, cell, sizeof cell);
+                i += 6;
+            }
+        }
+    }
+    const vsh_mesh mesh = {.name = "ball",
+                           .positions = positions,
+                           .normals = positions,
+                           .uvs = uvs,
+                           .indices = indices,
+                           .vertex_count = VERTICES,
+                           .triangle_count = i / 3};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = 0.02;
+    vsh_grid *grid = NULL;
+    vsh_field *field = NULL;
+    vsh_error error = {0};
+    if (vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &error) != VSH_OK ||
+        vsh_field_create(grid, NULL, NULL, &field, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 0);
+    const vsh_light light = sun(0.3, 0.9, 0.2, 0.01);
+    const double length = sqrt(0.09 + 0.81 + 0.04);
+    planes *p = new_planes();
+    vsh_bake_stats stats = vsh_bake_stats_zero();
+    bake(field, texels, &light, &p->all, &stats, 0);
+    assert_int_equal(stats.invalid_texels, 0);
+    const vsh_texel_samples samples = vsh_texels_samples(texels);
+    for (size_t s = 0; s < samples.count; ++s) {
+        const float *n = samples.normals + 3 * s;
+        const double cosine = ((double)n[0] * 0.3 + (double)n[1] * 0.9 + (double)n[2] * 0.2) / length;
+        const float value = p->shadow[samples.texel[s]];
+        if (cosine > 0.15) {
+            assert_true(value > 0.98f);
+        } else if (cosine < -0.01) {
+            assert_true(value == 0.0f);
+        }
+    }
+    free(p);
+    vsh_texels_free(texels);
+    vsh_field_free(field);
+    vsh_grid_free(grid);
+}
+
+static void an_open_sheet_does_not_shade_itself(void **state) {
+    (void)state;
+    const vsh_mesh mesh = floor_mesh();
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = VOXEL;
+    vsh_grid *grid = NULL;
+    vsh_field *field = NULL;
+    vsh_error error = {0};
+    if (vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &error) != VSH_OK ||
+        vsh_field_create(grid, NULL, NULL, &field, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 0);
+    const vsh_light light = sun(0.5, 0.8, 0.1, 0.1);
+    planes *p = new_planes();
+    bake(field, texels, &light, &p->all, NULL, 0);
+    for (int i = 0; i < TEXELS; ++i) {
+        assert_true(p->coverage[i] == 1.0f);
+        assert_true(p->shadow[i] == 1.0f);
+    }
+    free(p);
+    vsh_texels_free(texels);
+    vsh_field_free(field);
+    vsh_grid_free(grid);
+}
+
+static int32_t stop_in_shadow(void *user, const char *stage, double fraction) {
+    (void)user;
+    return strcmp(stage, "shadow.sun") == 0 && fraction > 0.0;
+}
+
+static void bad_options_limits_and_cancelling_are_reported(void **state) {
+    (void)state;
+    vsh_field *field = floor_field(1);
+    const vsh_mesh mesh = floor_mesh();
+    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 1, 0);
+    vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
+    planes *p = new_planes();
+    vsh_error error = {0};
+    vsh_shade_options options = vsh_shade_options_default();
+    options.start_offset = NAN;
+    assert_int_equal(vsh_bake_lightmap(field, texels, &light, 1, &options, NULL, &p->all, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "start_offset"));
+    options = vsh_shade_options_default();
+    options.surface_offset = -1.0;
+    assert_int_equal(vsh_bake_lightmap(field, texels, &light, 1, &options, NULL, &p->all, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 1000;
+    assert_int_equal(vsh_bake_lightmap(field, texels, &light, 1, NULL, &run, &p->all, NULL, &error),
+                     VSH_ERROR_LIMIT);
+    run = vsh_run_default();
+    run.progress = stop_in_shadow;
+    assert_int_equal(vsh_bake_lightmap(field, texels, &light, 1, NULL, &run, &p->all, NULL, &error),
+                     VSH_ERROR_CANCELLED);
+    light.angle = -1.0;
+    assert_int_equal(vsh_bake_lightmap(field, texels, &light, 1, NULL, NULL, &p->all, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    free(p);
+    vsh_texels_free(texels);
+    vsh_field_free(field);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_floor_under_open_sky_is_exactly_lit),
+        cmocka_unit_test(texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side),
+        cmocka_unit_test(irradiance_is_visibility_times_colour_times_cosine_times_ao),
+        cmocka_unit_test(planes_that_are_not_asked_for_cost_nothing_and_change_nothing),
+        cmocka_unit_test(padding_copies_dark_and_lit_texels_and_leaves_coverage),
+        cmocka_unit_test(any_number_of_threads_gives_the_same_bits),
+        cmocka_unit_test(a_texel_is_the_mean_of_its_valid_samples),
+        cmocka_unit_test(a_lightmap_of_one_texel_is_the_value_at_its_middle),
+        cmocka_unit_test(a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne),
+        cmocka_unit_test(an_open_sheet_does_not_shade_itself),
+        cmocka_unit_test(bad_options_limits_and_cancelling_are_reported),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,667 @@
+/* Where the texels of a receiver lie: coverage, borders, overlaps, lifted positions. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <vdbshade/bake.h>
+
+static vsh_lightmap_options size_of(int32_t width, int32_t height, int32_t supersample) {
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = width;
+    options.height = height;
+    options.supersample = supersample;
+    return options;
+}
+
+static vsh_texels *create(const vsh_mesh *meshes, size_t count, vsh_lightmap_options options,
+                          vsh_uv_report *reports) {
+    vsh_texels *texels = NULL;
+    vsh_error error = {0};
+    const vsh_result result = vsh_texels_create(meshes, count, &options, NULL, reports, &texels, &error);
+    if (result != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return texels;
+}
+
+static void assert_fails(const vsh_mesh *mesh, vsh_lightmap_options options, vsh_result code,
+                         const char *words[], size_t word_count) {
+    vsh_texels *texels = NULL;
+    vsh_error error = {0};
+    assert_int_equal(vsh_texels_create(mesh, 1, &options, NULL, NULL, &texels, &error), code);
+    assert_null(texels);
+    assert_int_equal(error.code, code);
+    for (size_t i = 0; i < word_count; ++i) {
+        if (strstr(error.message, words[i]) == NULL) {
+            fail_msg("'%s' is not in: %s", words[i], error.message);
+        }
+    }
+}
+
+static const uint32_t QUAD_INDICES[6] = {0, 1, 2, 0, 2, 3};
+
+/* A quad in the plane z = 0 at x = 2 u, y = 3 v, facing +z. */
+typedef struct quad {
+    float positions[12], uvs[8];
+    vsh_mesh mesh;
+} quad;
+
+static void make_quad(quad *q, float u0, float v0, float u1, float v1) {
+    const float corner[4][2] = {{u0, v0}, {u1, v0}, {u1, v1}, {u0, v1}};
+    for (int k = 0; k < 4; ++k) {
+        q->uvs[2 * k] = corner[k][0];
+        q->uvs[2 * k + 1] = corner[k][1];
+        q->positions[3 * k] = 2.0f * corner[k][0];
+        q->positions[3 * k + 1] = 3.0f * corner[k][1];
+        q->positions[3 * k + 2] = 0.0f;
+    }
+    q->mesh = (vsh_mesh){.name = "quad",
+                         .positions = q->positions,
+                         .uvs = q->uvs,
+                         .indices = QUAD_INDICES,
+                         .vertex_count = 4,
+                         .triangle_count = 2};
+}
+
+static void a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place(void **state) {
+    (void)state;
+    quad q;
+    make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
+    const int32_t sizes[][3] = {{16, 16, 1}, {37, 11, 1}, {1, 1, 1}, {8, 24, 2}, {13, 9, 3}, {3, 2, 16}};
+    for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; ++s) {
+        const int32_t w = sizes[s][0], h = sizes[s][1], n = sizes[s][2];
+        vsh_uv_report report;
+        vsh_texels *texels = create(&q.mesh, 1, size_of(w, h, n), &report);
+        vsh_texels_info info;
+        vsh_texels_get_info(texels, &info);
+        assert_int_equal(info.covered, w * h);
+        assert_int_equal(info.samples, w * h * n * n);
+        assert_int_equal(report.overlap_texels, 0);
+        assert_int_equal(report.overlap_triangles, 0);
+        assert_int_equal(report.outside_triangles, 0);
+        assert_int_equal(report.degenerate_triangles, 0);
+        const vsh_texel_samples samples = vsh_texels_samples(texels);
+        double *sum = calloc((size_t)(w * h), 2 * sizeof *sum);
+        int *count = calloc((size_t)(w * h), sizeof *count);
+        for (size_t i = 0; i < samples.count; ++i) {
+            const uint32_t texel = samples.texel[i];
+            const double *p = samples.positions + 3 * i;
+            ++count[texel];
+            sum[2 * texel] += p[0];
+            sum[2 * texel + 1] += p[1];
+            assert_true(p[2] == 0.0);
+            assert_true(samples.normals[3 * i + 2] == 1.0f);
+            assert_true(samples.geometric_normals[3 * i + 2] == 1.0f);
+            const double column = texel % (uint32_t)w, row = texel / (uint32_t)w;
+            assert_true(p[0] > 2.0 * column / w && p[0] < 2.0 * (column + 1) / w);
+            assert_true(p[1] < 3.0 * (1.0 - row / h) && p[1] > 3.0 * (1.0 - (row + 1) / h));
+        }
+        for (int32_t texel = 0; texel < w * h; ++texel) {
+            assert_int_equal(count[texel], n * n);
+            assert_true(fabs(sum[2 * texel] / (n * n) - 2.0 * (texel % w + 0.5) / w) < 1e-12);
+            /* Row 0 lies at v = 1. */
+            assert_true(fabs(sum[2 * texel + 1] / (n * n) - 3.0 * (1.0 - (texel / w + 0.5) / h)) < 1e-12);
+        }
+        free(count);
+        free(sum);
+        vsh_texels_free(texels);
+    }
+}
+
+static void neighbouring_samples_come_tile_by_tile(void **state) {
+    (void)state;
+    quad q;
+    make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
+    vsh_texels *texels = create(&q.mesh, 1, size_of(24, 16, 1), NULL);
+    const vsh_texel_samples samples = vsh_texels_samples(texels);
+    for (size_t i = 0; i < samples.count; ++i) {
+        const size_t column = samples.texel[i] % 24, row = samples.texel[i] / 24;
+        assert_int_equal(row / 8 * 3 + column / 8, i / 64);
+    }
+    vsh_texels_free(texels);
+}
+
+/* A fan around a point that lies on a texel centre, and many that do not. */
+static void triangles_that_share_edges_and_corners_leave_no_gap_and_no_overlap(void **state) {
+    (void)state;
+    enum { SPOKES = 17 };
+    for (int variant = 0; variant < 8; ++variant) {
+        float positions[3 * (SPOKES + 1)] = {0}, uvs[2 * (SPOKES + 1)];
+        uint32_t indices[3 * SPOKES];
+        uvs[0] = variant % 2 == 0 ? 8.5f / 16.0f : 0.47f + 0.01f * (float)variant;
+        uvs[1] = variant % 2 == 0 ? 8.5f / 16.0f : 0.53f;
+        for (int k = 0; k < SPOKES; ++k) {
+            /* Corners on a large square around the unit square, so that the fan covers all of it. */
+            const double angle = 6.283185307179586 * (k + 0.1 * variant) / SPOKES;
+            uvs[2 * k + 2] = (float)(0.5 + 1.5 * cos(angle));
+            uvs[2 * k + 3] = (float)(0.5 + 1.5 * sin(angle));
+            indices[3 * k] = 0;
+            indices[3 * k + 1] = (uint32_t)(k + 1);
+            indices[3 * k + 2] = (uint32_t)((k + 1) % SPOKES + 1);
+        }
+        for (int k = 0; k <= SPOKES; ++k) {
+            positions[3 * k] = uvs[2 * k];
+            positions[3 * k + 1] = uvs[2 * k + 1];
+        }
+        const vsh_mesh mesh = {.name = "fan",
+                               .positions = positions,
+                               .uvs = uvs,
+                               .indices = indices,
+                               .vertex_count = SPOKES + 1,
+                               .triangle_count = SPOKES};
+        vsh_uv_report report;
+        vsh_texels *texels = create(&mesh, 1, size_of(16, 16, 3), &report);
+        vsh_texels_info info;
+        vsh_texels_get_info(texels, &info);
+        assert_int_equal(info.samples, 16 * 16 * 9);
+        assert_int_equal(report.overlap_texels, 0);
+        assert_int_equal(report.overlap_triangles, 0);
+        assert_int_equal(report.outside_triangles, SPOKES);
+        vsh_texels_free(texels);
+    }
+}
+
+static void a_chart_that_fits_the_texels_has_no_border_texels(void **state) {
+    (void)state;
+    quad q;
+    make_quad(&q, 4.0f / 16.0f, 4.0f / 16.0f, 12.0f / 16.0f, 12.0f / 16.0f);
+    vsh_texels *texels = create(&q.mesh, 1, size_of(16, 16, 1), NULL);
+    vsh_texels_info info;
+    vsh_texels_get_info(texels, &info);
+    assert_int_equal(info.covered, 64);
+    vsh_texels_free(texels);
+}
+
+static void a_chart_that_does_not_fit_has_border_texels_at_the_nearest_point(void **state) {
+    (void)state;
+    const int32_t supersample[] = {1, 2};
+    quad q;
+    /* From 4.8 to 11.2 of 16: the texels 4 and 11 are touched, their centres and samples (n = 2) are not. */
+    make_quad(&q, 0.3f, 0.3f, 0.7f, 0.7f);
+    for (size_t s = 0; s < 2; ++s) {
+        vsh_texels *texels = create(&q.mesh, 1, size_of(16, 16, supersample[s]), NULL);
+        const vsh_texel_samples samples = vsh_texels_samples(texels);
+        vsh_texels_info info;
+        vsh_texels_get_info(texels, &info);
+        assert_int_equal(info.covered, 64);
+        int border = 0;
+        for (size_t i = 0; i < samples.count; ++i) {
+            const double low = (double)0.3f, high = (double)0.7f;
+            const double u = (samples.texel[i] % 16 + 0.5) / 16.0,
+                         v = 1.0 - (samples.texel[i] / 16 + 0.5) / 16;
+            if (u > low && u < high && v > low && v < high) {
+                continue;
+            }
+            if (s == 0) {
+                ++border;
+                assert_true(fabs(samples.positions[3 * i] - 2.0 * fmin(fmax(u, low), high)) < 1e-7);
+                assert_true(fabs(samples.positions[3 * i + 1] - 3.0 * fmin(fmax(v, low), high)) < 1e-7);
+            }
+        }
+        assert_int_equal(border, s == 0 ? 28 : 0);
+        for (size_t i = 0; i < samples.count; ++i) {
+            assert_true(samples.positions[3 * i] >= 2.0 * (double)0.3f - 1e-7);
+            assert_true(samples.positions[3 * i] <= 2.0 * (double)0.7f + 1e-7);
+        }
+        vsh_texels_free(texels);
+    }
+}
+
+static void a_triangle_smaller_than_a_texel_still_has_one(void **state) {
+    (void)state;
+    const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    const float uvs[] = {0.51f, 0.51f, 0.512f, 0.51f, 0.51f, 0.512f};
+    const uint32_t indices[] = {0, 1, 2};
+    const vsh_mesh mesh = {
+        .positions = positions, .uvs = uvs, .indices = indices, .vertex_count = 3, .triangle_count = 1};
+    vsh_texels *texels = create(&mesh, 1, size_of(8, 8, 1), NULL);
+    const vsh_texel_samples samples = vsh_texels_samples(texels);
+    assert_int_equal(samples.count, 1);
+    assert_int_equal(samples.texel[0], 3 * 8 + 4);
+    const double *p = samples.positions;
+    assert_true(p[0] >= 0.0 && p[1] >= 0.0 && p[0] + p[1] <= 1.0 + 1e-12);
+    vsh_texels_free(texels);
+}
+
+static void overlaps_are_counted_where_two_meshes_share_texels(void **state) {
+    (void)state;
+    quad q[3];
+    make_quad(&q[0], 0.0f, 0.0f, 0.5f, 1.0f);
+    make_quad(&q[1], 0.5f, 0.0f, 1.0f, 1.0f); /* shares an edge with the first: no overlap */
+    make_quad(&q[2], 0.25f, 0.25f, 0.5f, 0.5f);
+    const vsh_mesh meshes[] = {q[0].mesh, q[1].mesh, q[2].mesh};
+    vsh_uv_report reports[3];
+    vsh_texels *texels = create(meshes, 3, size_of(32, 32, 1), reports);
+    assert_int_equal(reports[0].overlap_texels, 0);
+    assert_int_equal(reports[1].overlap_texels, 0);
+    assert_int_equal(reports[2].overlap_texels, 8 * 8);
+    assert_int_equal(reports[2].overlap_triangles, 2);
+    vsh_texels_info info;
+    vsh_texels_get_info(texels, &info);
+    assert_int_equal(info.samples, 32 * 32);
+    vsh_texels_free(texels);
+}
+
+static void the_first_triangle_keeps_a_texel_that_two_cover(void **state) {
+    (void)state;
+    quad q[2];
+    make_quad(&q[0], 0.0f, 0.0f, 1.0f, 1.0f);
+    make_quad(&q[1], 0.0f, 0.0f, 1.0f, 1.0f);
+    for (int k = 0; k < 4; ++k) {
+        q[1].positions[3 * k + 2] = 7.0f;
+    }
+    for (int first = 0; first < 2; ++first) {
+        const vsh_mesh meshes[] = {q[first].mesh, q[1 - first].mesh};
+        vsh_texels *texels = create(meshes, 2, size_of(9, 9, 1), NULL);
+        const vsh_texel_samples samples = vsh_texels_samples(texels);
+        assert_int_equal(samples.count, 81);
+        for (size_t i = 0; i < samples.count; ++i) {
+            assert_true(samples.positions[3 * i + 2] == (first == 0 ? 0.0 : 7.0));
+        }
+        vsh_texels_free(texels);
+    }
+}
+
+/* A UV sphere with smooth normals and its own chart; `rows` × 2 rows segments. */
+typedef struct sphere {
+    float *positions, *normals, *uvs;
+    uint32_t *indices;
+    vsh_mesh mesh;
+} sphere;
+
+static void make_sphere(sphere *s, uint32_t rows, double radius) {
+    const uint32_t columns = 2 * rows;
+    const size_t vertices = (size_t)(rows + 1) * (columns + 1);
+    s->positions = malloc(vertices * 3 * sizeof(float));
+    s->normals = malloc(vertices * 3 * sizeof(float));
+    s->uvs = malloc(vertices * 2 * sizeof(float));
+    s->indices = malloc((size_t)rows * columns * 6 * sizeof(uint32_t));
+    size_t v = 0, i = 0;
+    for (uint32_t r = 0; r <= rows; ++r) {
+        for (uint32_t c = 0; c <= columns; ++c, ++v) {
+            const double polar = 3.141592653589793 * r / rows, around = 6.283185307179586 * c / columns;
+            const double ring = r == 0 || r == rows ? 0.0 : sin(polar); /* exact poles: no slivers */
+            const double n[3] = {ring * cos(around), cos(polar), -ring * sin(around)};
+            for (int k = 0; k < 3; ++k) {
+                s->normals[3 * v + (size_t)k] = (float)n[k];
+                s->positions[3 * v + (size_t)k] = (float)(radius * n[k]);
+            }
+            s->uvs[2 * v] = (float)c / (float)columns;
+            s->uvs[2 * v + 1] = 1.0f - (float)r / (float)rows;
+        }
+    }
+    for (uint32_t r = 0; r < rows; ++r) {
+        for (uint32_t c = 0; c < columns; ++c) {
+            const uint32_t a = r * (columns + 1) + c, b = a + columns + 1;
+            const uint32_t both[6] = {a, b, b + 1, a, b + 1, a + 1};
+            memcpy(s->indices + i, both, sizeof both);
+            i += 6;
+        }
+    }
+    s->mesh = (vsh_mesh){.name = "sphere",
+                         .positions = s->positions,
+                         .normals = s->normals,
+                         .uvs = s->uvs,
+                         .indices = s->indices,
+                         .vertex_count = vertices,
+                         .triangle_count = i / 3};
+}
+
+static void free_sphere(sphere *s) {
+    free(s->indices);
+    free(s->uvs);
+    free(s->normals);
+    free(s->positions);
+}
+
+static double length_of(const double p[3]) {
+    return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+}
+
+static void samples_of_a_coarse_smooth_sphere_are_lifted_to_within_its_sag(void **state) {
+    (void)state;
+    enum { ROWS = 6 };
+    const double radius = 2.0;
+    sphere s;
+    make_sphere(&s, ROWS, radius);
+    vsh_texels *lifted = create(&s.mesh, 1, size_of(64, 32, 1), NULL);
+    vsh_mesh flat = s.mesh;
+    flat.normals = NULL;
+    vsh_texels *facets = create(&flat, 1, size_of(64, 32, 1), NULL);
+    const vsh_texel_samples a = vsh_texels_samples(lifted), b = vsh_texels_samples(facets);
+    assert_int_equal(a.count, b.count);
+    /* The deepest point of a facet lies under the middle of a cell's diagonal: cos of half its angle, which
+     * is at most that of the sides' angles together. */
+    double sag = 0.0, worst = 0.0, before = 0.0;
+    for (size_t i = 0; i < b.count; ++i) {
+        sag = fmax(sag, radius - length_of(b.positions + 3 * i));
+    }
+    for (size_t i = 0; i < a.count; ++i) {
+        const double *p = a.positions + 3 * i, *q = b.positions + 3 * i;
+        const float *n = a.normals + 3 * i, *g = b.normals + 3 * i;
+        double height = 0.0, cosine = 0.0, unit = 0.0;
+        for (int k = 0; k < 3; ++k) {
+            height += (p[k] - q[k]) * (double)g[k];
+            cosine += (double)n[k] * p[k] / length_of(p);
+            unit += (double)n[k] * (double)n[k];
+        }
+        assert_true(height > -1e-6);
+        assert_true(cosine > 0.98);
+        assert_true(fabs(unit - 1.0) < 1e-6);
+        worst = fmax(worst, fabs(length_of(p) - radius));
+        before += radius - length_of(q);
+    }
+    assert_true(before > 0.0);
+    assert_true(worst <= sag * 1.05);
+    vsh_texels_free(facets);
+    vsh_texels_free(lifted);
+    free_sphere(&s);
+}
+
+static void the_inside_of_a_smooth_sphere_is_not_lifted(void **state) {
+    (void)state;
+    sphere s;
+    make_sphere(&s, 6, 1.0);
+    for (size_t i = 0; i < s.mesh.triangle_count; ++i) {
+        const uint32_t first = s.indices[3 * i];
+        s.indices[3 * i] = s.indices[3 * i + 1];
+        s.indices[3 * i + 1] = first;
+    }
+    for (size_t v = 0; v < 3 * s.mesh.vertex_count; ++v) {
+        s.normals[v] = -s.normals[v];
+    }
+    vsh_texels *smooth = create(&s.mesh, 1, size_of(32, 16, 1), NULL);
+    s.mesh.normals = NULL;
+    vsh_texels *flat = create(&s.mesh, 1, size_of(32, 16, 1), NULL);
+    const vsh_texel_samples a = vsh_texels_samples(smooth), b = vsh_texels_samples(flat);
+    assert_int_equal(a.count, b.count);
+    for (size_t i = 0; i < 3 * a.count; ++i) {
+        assert_true(fabs(a.positions[i] - b.positions[i]) < 1e-6);
+    }
+    vsh_texels_free(flat);
+    vsh_texels_free(smooth);
+    free_sphere(&s);
+}
+
+static void normals_that_are_flat_or_broken_lift_nothing(void **state) {
+    (void)state;
+    const float normals[][3] = {{0, 0, 1}, {0, 0, 5},        {0, 0, 0},        {NAN, 0, 1},   {0, 0, -1},
+                                {1, 0, 0}, {1e-5f, 0, 1.0f}, {INFINITY, 0, 1}, {0, 0, 1e-38f}};
+    for (size_t c = 0; c < sizeof normals / sizeof normals[0]; ++c) {
+        quad q;
+        make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
+        float all[12];
+        for (int k = 0; k < 4; ++k) {
+            memcpy(all + 3 * k, normals[c], sizeof normals[c]);
+        }
+        q.mesh.normals = all;
+        vsh_texels *texels = create(&q.mesh, 1, size_of(8, 8, 1), NULL);
+        const vsh_texel_samples samples = vsh_texels_samples(texels);
+        assert_int_equal(samples.count, 64);
+        for (size_t i = 0; i < samples.count; ++i) {
+            assert_true(samples.positions[3 * i + 2] == 0.0);
+            assert_true(samples.normals[3 * i + 2] == 1.0f);
+        }
+        vsh_texels_free(texels);
+    }
+}
+
+static void a_cube_with_averaged_normals_is_shaded_smooth_but_stays_in_its_place(void **state) {
+    (void)state;
+    const float positions[] = {-1, -1, 1, 1, -1, 1, 1, 1, 1, -1, 1, 1}; /* one face; normals of the corners */
+    const float uvs[] = {0, 0, 1, 0, 1, 1, 0, 1};
+    const vsh_mesh mesh = {.positions = positions,
+                           .normals = positions,
+                           .uvs = uvs,
+                           .indices = QUAD_INDICES,
+                           .vertex_count = 4,
+                           .triangle_count = 2};
+    vsh_texels *texels = create(&mesh, 1, size_of(16, 16, 1), NULL);
+    const vsh_texel_samples samples = vsh_texels_samples(texels);
+    for (size_t i = 0; i < samples.count; ++i) {
+        assert_true(samples.positions[3 * i + 2] == 1.0);
+        assert_true(samples.normals[3 * i + 2] > 0.5f);
+    }
+    vsh_texels_free(texels);
+}
+
+static void a_mirrored_transform_keeps_normals_outward(void **state) {
+    (void)state;
+    const double transforms[][12] = {{-1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0},
+                                     {2, 0, 0, 5, 0, 0, 3, 0, 0, 1, 0, 0},
+                                     {0.5, 0.25, 0, 5, 0, 2, 0, 0, 0, 0, 3, 0},
+                                     {-1, 0, 0, 5, 0, -2, 0, 0, 0, 0, -1, 0}};
+    for (size_t t = 0; t < 4; ++t) {
+        for (int smooth = 0; smooth < 2; ++smooth) {
+            sphere s;
+            make_sphere(&s, 8, 1.0);
+            s.mesh.transform = transforms[t];
+            if (!smooth) {
+                s.mesh.normals = NULL;
+            }
+            vsh_texels *texels = create(&s.mesh, 1, size_of(32, 16, 1), NULL);
+            const vsh_texel_samples samples = vsh_texels_samples(texels);
+            assert_true(samples.count >= 512 - 32);
+            for (size_t i = 0; i < samples.count; ++i) {
+                double geometric = 0.0, deciding = 0.0;
+                for (size_t k = 0; k < 3; ++k) {
+                    const double outward = samples.positions[3 * i + k] - (k == 0 ? 5.0 : 0.0);
+                    geometric += outward * (double)samples.geometric_normals[3 * i + k];
+                    deciding +=
+                        (double)samples.normals[3 * i + k] * (double)samples.geometric_normals[3 * i + k];
+                }
+                assert_true(geometric > 0.0);
+                assert_true(deciding > 0.0);
+            }
+            vsh_texels_free(texels);
+            free_sphere(&s);
+        }
+    }
+}
+
+static void a_mirrored_transform_keeps_uvs_on_their_corners(void **state) {
+    (void)state;
+    const double mirror[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    quad q;
+    make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
+    q.mesh.transform = mirror;
+    vsh_texels *texels = create(&q.mesh, 1, size_of(8, 8, 1), NULL);
+    const vsh_texel_samples samples = vsh_texels_samples(texels);
+    for (size_t i = 0; i < samples.count; ++i) {
+        assert_true(fabs(samples.positions[3 * i] + 2.0 * (samples.texel[i] % 8 + 0.5) / 8) < 1e-12);
+        assert_true(fabs(samples.positions[3 * i + 1] - 3.0 * (1.0 - (samples.texel[i] / 8 + 0.5) / 8)) <
+                    1e-12);
+    }
+    vsh_texels_free(texels);
+}
+
+static void any_number_of_threads_gives_the_same_bits(void **state) {
+    (void)state;
+    sphere s[2];
+    make_sphere(&s[0], 40, 1.0);
+    make_sphere(&s[1], 13, 1.0); /* the same chart: everything overlaps */
+    const vsh_mesh meshes[] = {s[0].mesh, s[1].mesh};
+    const int32_t threads[] = {1, 2, 5};
+    vsh_texels *texels[3];
+    vsh_uv_report reports[3][2];
+    for (int t = 0; t < 3; ++t) {
+        vsh_run run = vsh_run_default();
+        run.threads = threads[t];
+        const vsh_lightmap_options options = size_of(301, 203, 2);
+        memset(reports[t], 0, sizeof reports[t]);
+        assert_int_equal(vsh_texels_create(meshes, 2, &options, &run, reports[t], &texels[t], NULL), VSH_OK);
+    }
+    const vsh_texel_samples a = vsh_texels_samples(texels[0]);
+    for (int t = 1; t < 3; ++t) {
+        const vsh_texel_samples b = vsh_texels_samples(texels[t]);
+        assert_int_equal(a.count, b.count);
+        assert_memory_equal(a.positions, b.positions, a.count * 3 * sizeof(double));
+        assert_memory_equal(a.normals, b.normals, a.count * 3 * sizeof(float));
+        assert_memory_equal(a.geometric_normals, b.geometric_normals, a.count * 3 * sizeof(float));
+        assert_memory_equal(a.texel, b.texel, a.count * sizeof(uint32_t));
+        assert_memory_equal(reports[0], reports[t], sizeof reports[0]);
+    }
+    assert_true(reports[0][1].overlap_texels > 301 * 203 / 2);
+    for (int t = 0; t < 3; ++t) {
+        vsh_texels_free(texels[t]);
+    }
+    free_sphere(&s[1]);
+    free_sphere(&s[0]);
+}
+
+static void huge_uvs_are_clipped_and_counted(void **state) {
+    (void)state;
+    const float huge[] = {1e30f, 3e38f, 1e10f, 1e6f, 300.0f, 1.1f};
+    for (size_t k = 0; k < sizeof huge / sizeof huge[0]; ++k) {
+        const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+        const float uvs[] = {-huge[k], -huge[k], huge[k], -huge[k], 0.5f, huge[k]};
+        const uint32_t indices[] = {0, 1, 2};
+        const vsh_mesh mesh = {
+            .positions = positions, .uvs = uvs, .indices = indices, .vertex_count = 3, .triangle_count = 1};
+        vsh_uv_report report;
+        vsh_texels *texels = create(&mesh, 1, size_of(64, 32, 2), &report);
+        assert_int_equal(report.outside_triangles, 1);
+        const vsh_texel_samples samples = vsh_texels_samples(texels);
+        assert_true(samples.count > 0 && samples.count <= 64 * 32 * 4);
+        for (size_t i = 0; i < samples.count; ++i) {
+            const double *p = samples.positions + 3 * i;
+            assert_true(samples.texel[i] < 64 * 32);
+            assert_true(p[0] >= 0.0 && p[1] >= 0.0 && p[0] + p[1] <= 1.0 + 1e-9 && p[2] == 0.0);
+        }
+        vsh_texels_free(texels);
+    }
+}
+
+static void triangles_without_area_are_skipped_and_those_of_uv_space_counted(void **state) {
+    (void)state;
+    const float positions[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 2, 0, 0};
+    const float uvs[] = {0, 0, 1, 0, 0, 1, 0.5f, 0.5f};
+    /* A good one; no area in the world; no area in UV space (corners 1, 2 and 3 lie on a line there). */
+    const uint32_t indices[] = {0, 1, 2, 0, 1, 3, 1, 3, 2, 0, 0, 0};
+    const vsh_mesh mesh = {
+        .positions = positions, .uvs = uvs, .indices = indices, .vertex_count = 4, .triangle_count = 4};
+    vsh_uv_report report;
+    vsh_texels *texels = create(&mesh, 1, size_of(8, 8, 1), &report);
+    assert_int_equal(report.degenerate_triangles, 1);
+    assert_int_equal(report.overlap_texels, 0);
+    vsh_texels_free(texels);
+}
+
+static void bad_sizes_and_uvs_are_refused_with_the_value_and_the_limit(void **state) {
+    (void)state;
+    quad q;
+    make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
+    assert_fails(&q.mesh, size_of(0, 8, 1), VSH_ERROR_ARGUMENT, (const char *[]){"width 0", "65536"}, 2);
+    assert_fails(&q.mesh, size_of(8, 1000000, 1), VSH_ERROR_ARGUMENT,
+                 (const char *[]){"height 1000000", "65536"}, 2);
+    assert_fails(&q.mesh, size_of(8, -1, 1), VSH_ERROR_ARGUMENT, (const char *[]){"height -1"}, 1);
+    assert_fails(&q.mesh, size_of(8, 8, 17), VSH_ERROR_ARGUMENT, (const char *[]){"supersample 17", "16"}, 2);
+    vsh_lightmap_options padded = size_of(8, 8, 1);
+    padded.padding = 4097;
+    assert_fails(&q.mesh, padded, VSH_ERROR_ARGUMENT, (const char *[]){"padding 4097", "4096"}, 2);
+    q.uvs[5] = NAN;
+    assert_fails(&q.mesh, size_of(8, 8, 1), VSH_ERROR_INPUT, (const char *[]){"mesh 'quad'", "vertex 2"}, 2);
+    q.uvs[5] = -INFINITY;
+    assert_fails(&q.mesh, size_of(8, 8, 1), VSH_ERROR_INPUT, (const char *[]){"mesh 'quad'", "vertex 2"}, 2);
+    q.mesh.uvs = NULL;
+    assert_fails(&q.mesh, size_of(8, 8, 1), VSH_ERROR_INPUT,
+                 (const char *[]){"mesh 'quad'", "no lightmap UVs"}, 2);
+}
+
+static void the_memory_limit_is_passed_by_no_lightmap(void **state) {
+    (void)state;
+    quad q;
+    make_quad(&q, 0.0f, 0.0f, 1.0f, 1.0f);
+    vsh_run run = vsh_run_default();
+    vsh_texels *texels = NULL;
+    vsh_error error = {0};
+    const vsh_lightmap_options small = size_of(64, 64, 1), large = size_of(65536, 65536, 16);
+    run.memory_limit = 1000000;
+    assert_int_equal(vsh_texels_create(&q.mesh, 1, &small, &run, NULL, &texels, &error), VSH_OK);
+    vsh_texels_info info;
+    vsh_texels_get_info(texels, &info);
+    assert_true(info.bytes <= run.memory_limit);
+    vsh_texels_free(texels);
+    assert_int_equal(vsh_texels_create(&q.mesh, 1, &large, &run, NULL, &texels, &error), VSH_ERROR_LIMIT);
+    assert_null(texels);
+    assert_non_null(strstr(error.message, "limit"));
+}
+
+static int32_t stop_at_half(void *user, const char *stage, double fraction) {
+    (void)stage;
+    double *last = user;
+    assert_true(fraction >= *last && fraction <= 1.0);
+    *last = fraction;
+    return fraction >= 0.5;
+}
+
+static void progress_rises_and_cancels(void **state) {
+    (void)state;
+    sphere s;
+    make_sphere(&s, 20, 1.0);
+    vsh_run run = vsh_run_default();
+    double last = 0.0;
+    run.progress = stop_at_half;
+    run.user = &last;
+    vsh_texels *texels = NULL;
+    const vsh_lightmap_options options = size_of(256, 256, 1);
+    assert_int_equal(vsh_texels_create(&s.mesh, 1, &options, &run, NULL, &texels, NULL), VSH_ERROR_CANCELLED);
+    assert_null(texels);
+    assert_true(last >= 0.5 && last < 1.0);
+    free_sphere(&s);
+}
+
+static void count_warning(void *user, const char *message) {
+    assert_null(strchr(message, '\n'));
+    ++*(int *)user;
+}
+
+static void overlaps_are_warned_of_by_mesh(void **state) {
+    (void)state;
+    quad q[2];
+    make_quad(&q[0], 0.0f, 0.0f, 1.0f, 1.0f);
+    make_quad(&q[1], 0.0f, 0.0f, 2.0f, 1.0f);
+    const vsh_mesh meshes[] = {q[0].mesh, q[1].mesh};
+    int warnings = 0;
+    vsh_run run = vsh_run_default();
+    run.warning = count_warning;
+    run.user = &warnings;
+    vsh_texels *texels = NULL;
+    const vsh_lightmap_options options = size_of(16, 16, 1);
+    assert_int_equal(vsh_texels_create(meshes, 2, &options, &run, NULL, &texels, NULL), VSH_OK);
+    assert_int_equal(warnings, 2); /* overlap and outside, both of the second mesh */
+    vsh_texels_free(texels);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place),
+        cmocka_unit_test(neighbouring_samples_come_tile_by_tile),
+        cmocka_unit_test(triangles_that_share_edges_and_corners_leave_no_gap_and_no_overlap),
+        cmocka_unit_test(a_chart_that_fits_the_texels_has_no_border_texels),
+        cmocka_unit_test(a_chart_that_does_not_fit_has_border_texels_at_the_nearest_point),
+        cmocka_unit_test(a_triangle_smaller_than_a_texel_still_has_one),
+        cmocka_unit_test(overlaps_are_counted_where_two_meshes_share_texels),
+        cmocka_unit_test(the_first_triangle_keeps_a_texel_that_two_cover),
+        cmocka_unit_test(samples_of_a_coarse_smooth_sphere_are_lifted_to_within_its_sag),
+        cmocka_unit_test(the_inside_of_a_smooth_sphere_is_not_lifted),
+        cmocka_unit_test(normals_that_are_flat_or_broken_lift_nothing),
+        cmocka_unit_test(a_cube_with_averaged_normals_is_shaded_smooth_but_stays_in_its_place),
+        cmocka_unit_test(a_mirrored_transform_keeps_normals_outward),
+        cmocka_unit_test(a_mirrored_transform_keeps_uvs_on_their_corners),
+        cmocka_unit_test(any_number_of_threads_gives_the_same_bits),
+        cmocka_unit_test(huge_uvs_are_clipped_and_counted),
+        cmocka_unit_test(triangles_without_area_are_skipped_and_those_of_uv_space_counted),
+        cmocka_unit_test(bad_sizes_and_uvs_are_refused_with_the_value_and_the_limit),
+        cmocka_unit_test(the_memory_limit_is_passed_by_no_lightmap),
+        cmocka_unit_test(progress_rises_and_cancels),
+        cmocka_unit_test(overlaps_are_warned_of_by_mesh),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
