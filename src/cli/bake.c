@@ -1,6 +1,7 @@
 /* vdbshade bake: from files to lightmaps. */
 #include "bake_options.h"
 #include "clock.h"
+#include "meshes.h"
 #include "message.h"
 #include "progress.h"
 #include "receiver.h"
@@ -46,7 +47,7 @@ static int load(bake_work *work) {
     vsh_error error;
     const vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return result == VSH_OK ? cli_warn_meshes(work->scene, work->assets, &work->run) : cli_fail(&error);
 }
 
 static cli_receiver_job receiver_job(const bake_work *work, size_t index) {

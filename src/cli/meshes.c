@@ -1,0 +1,57 @@
+#include "meshes.h"
+
+#include "message.h"
+
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+
+static int warn_file(const char *path, const vsh_mesh *meshes, size_t count, const vsh_run *run) {
+    for (size_t i = 0; i < count; ++i) {
+        vsh_mesh_report report;
+        vsh_error error;
+        if (vsh_mesh_check(&meshes[i], &report, &error) != VSH_OK) {
+            return cli_fail(&error);
+        }
+        if (report.degenerate_triangles > 0) {
+            char line[1024];
+            snprintf(line, sizeof line, "%s: mesh '%s': %zu triangles of zero area are skipped", path,
+                     meshes[i].name != NULL ? meshes[i].name : "", report.degenerate_triangles);
+            run->warning(run->user, line);
+        }
+    }
+    return CLI_OK;
+}
+
+static bool seen(const vsh_scene *scene, size_t casters, size_t receivers, const char *path) {
+    for (size_t i = 0; i < casters; ++i) {
+        if (scene->casters[i].type == VSH_CASTER_MESH && strcmp(scene->casters[i].path, path) == 0) {
+            return true;
+        }
+    }
+    for (size_t i = 0; i < receivers; ++i) {
+        if (strcmp(scene->receivers[i].path, path) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+int cli_warn_meshes(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run) {
+    int code = CLI_OK;
+    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
+        size_t count;
+        const vsh_mesh *meshes = vsh_assets_caster(assets, i, &count);
+        if (scene->casters[i].type == VSH_CASTER_MESH && !seen(scene, i, 0, scene->casters[i].path)) {
+            code = warn_file(scene->casters[i].path, meshes, count, run);
+        }
+    }
+    for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
+        size_t count;
+        const vsh_mesh *meshes = vsh_assets_receiver(assets, i, &count);
+        if (!seen(scene, scene->caster_count, i, scene->receivers[i].path)) {
+            code = warn_file(scene->receivers[i].path, meshes, count, run);
+        }
+    }
+    return code;
+}
