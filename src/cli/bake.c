@@ -153,9 +153,11 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
         code = cli_stats_write(&work.stats, settings->stats);
         cli_signals_writing(NULL);
     }
-    cli_signals_end();
-    if (code == CLI_OK && !settings->common.quiet) {
-        cli_stats_say(&work.stats);
+    if (code == CLI_OK) {
+        cli_signals_end();
+        if (!settings->common.quiet) {
+            cli_stats_say(&work.stats);
+        }
     }
     vsh_texels_free(work.kept);
     vsh_field_free(work.field);

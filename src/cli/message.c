@@ -1,6 +1,7 @@
 #include "message.h"
 
 #include "progress.h"
+#include "signals.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -49,7 +50,9 @@ int cli_usage(const char *format, ...) {
 
 int cli_fail(const vsh_error *error) {
     if (error->code == VSH_ERROR_CANCELLED) {
-        cli_say("interrupted; nothing was written");
+        if (cli_signals_tell()) {
+            cli_say("interrupted; nothing was written");
+        }
         return CLI_INTERRUPTED;
     }
     cli_say("%s", error->message);

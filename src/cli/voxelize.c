@@ -110,9 +110,11 @@ static int voxelize(const voxelize_settings *s, const vsh_scene *scene) {
         result = vsh_scene_casters(scene, assets, &run, &grid, &error);
         code = result == VSH_OK ? write_grid(s, grid) : cli_fail(&error);
     }
-    cli_signals_end();
-    if (code == CLI_OK && !s->common.quiet) {
-        say_summary(s, grid, cli_seconds() - start);
+    if (code == CLI_OK) {
+        cli_signals_end();
+        if (!s->common.quiet) {
+            say_summary(s, grid, cli_seconds() - start);
+        }
     }
     vsh_grid_free(grid);
     vsh_assets_free(assets);
