@@ -4,23 +4,40 @@
 
 #include <stdbool.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static int warn_file(const char *path, const vsh_mesh *meshes, size_t count, const vsh_run *run) {
-    for (size_t i = 0; i < count; ++i) {
+    size_t *skipped = calloc(count, sizeof *skipped);
+    if (skipped == NULL) {
+        cli_say("%s: the system refused memory", path);
+        return CLI_LIMIT;
+    }
+    size_t sound = 0;
+    int code = CLI_OK;
+    for (size_t i = 0; i < count && code == CLI_OK; ++i) {
         vsh_mesh_report report;
         vsh_error error;
         if (vsh_mesh_check(&meshes[i], &report, &error) != VSH_OK) {
-            return cli_fail(&error);
+            code = cli_fail(&error);
+            break;
         }
-        if (report.degenerate_triangles > 0) {
+        skipped[i] = report.degenerate_triangles;
+        sound += meshes[i].triangle_count - skipped[i];
+    }
+    if (code == CLI_OK && sound == 0) {
+        code = cli_usage("%s: every triangle has zero area", path);
+    }
+    for (size_t i = 0; i < count && code == CLI_OK; ++i) {
+        if (skipped[i] > 0) {
             char line[1024];
             snprintf(line, sizeof line, "%s: mesh '%s': %zu triangles of zero area are skipped", path,
-                     meshes[i].name != NULL ? meshes[i].name : "", report.degenerate_triangles);
+                     meshes[i].name != NULL ? meshes[i].name : "", skipped[i]);
             run->warning(run->user, line);
         }
     }
-    return CLI_OK;
+    free(skipped);
+    return code;
 }
 
 static bool seen(const vsh_scene *scene, size_t casters, size_t receivers, const char *path) {
