@@ -22,7 +22,7 @@ static const struct {
     {VSH_ERROR_INTERNAL, CLI_DEFECT},
 };
 
-static void say(const char *format, va_list arguments) {
+static void __attribute__((format(printf, 1, 0))) say(const char *format, va_list arguments) {
     char line[2048];
     vsnprintf(line, sizeof line, format, arguments);
     for (char *c = line; *c != '\0'; ++c) {
