@@ -1,6 +1,7 @@
 /* vdbshade bake: from files to lightmaps. */
 #include "bake_options.h"
 #include "clock.h"
+#include "meshes.h"
 #include "message.h"
 #include "progress.h"
 #include "receiver.h"
@@ -46,7 +47,7 @@ static int load(bake_work *work) {
     vsh_error error;
     const vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return result == VSH_OK ? cli_warn_meshes(work->scene, work->assets, &work->run) : cli_fail(&error);
 }
 
 static cli_receiver_job receiver_job(const bake_work *work, size_t index) {
@@ -152,9 +153,11 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
         code = cli_stats_write(&work.stats, settings->stats);
         cli_signals_writing(NULL);
     }
-    cli_signals_end();
-    if (code == CLI_OK && !settings->common.quiet) {
-        cli_stats_say(&work.stats);
+    if (code == CLI_OK) {
+        cli_signals_end();
+        if (!settings->common.quiet) {
+            cli_stats_say(&work.stats);
+        }
     }
     vsh_texels_free(work.kept);
     vsh_field_free(work.field);

@@ -1,6 +1,7 @@
 #include "message.h"
 
 #include "progress.h"
+#include "signals.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -21,7 +22,7 @@ static const struct {
     {VSH_ERROR_INTERNAL, CLI_DEFECT},
 };
 
-static void say(const char *format, va_list arguments) {
+static void __attribute__((format(printf, 1, 0))) say(const char *format, va_list arguments) {
     char line[2048];
     vsnprintf(line, sizeof line, format, arguments);
     for (char *c = line; *c != '\0'; ++c) {
@@ -49,7 +50,9 @@ int cli_usage(const char *format, ...) {
 
 int cli_fail(const vsh_error *error) {
     if (error->code == VSH_ERROR_CANCELLED) {
-        cli_say("interrupted; nothing was written");
+        if (cli_signals_tell()) {
+            cli_say("interrupted; nothing was written");
+        }
         return CLI_INTERRUPTED;
     }
     cli_say("%s", error->message);

@@ -13,10 +13,11 @@
 #include <unistd.h>
 
 /* How long the work may take to stop of itself: a second in all is promised. */
-static const long grace_nanoseconds = 600 * 1000 * 1000;
+static const long grace_nanoseconds = 400 * 1000 * 1000;
 
 static sem_t signalled; /* posted by each signal; waited for by the watcher */
 static atomic_bool interrupted;
+static atomic_bool told;                                   /* the user knows */
 static pthread_mutex_t ending = PTHREAD_MUTEX_INITIALIZER; /* held while the process is ended */
 static const char *writing;                                /* guarded by `ending` */
 
@@ -45,6 +46,10 @@ bool cli_interrupted(void) {
     return atomic_load(&interrupted);
 }
 
+bool cli_signals_tell(void) {
+    return !atomic_exchange(&told, true);
+}
+
 /* A thread, and not the handler, ends the process: it may list a folder and take locks. */
 static void *watch(void *unused) {
     (void)unused;
@@ -63,7 +68,7 @@ static void *watch(void *unused) {
     }
     static const char text[] = "\nvdbshade: interrupted; nothing was written\n";
     const size_t skip = isatty(STDERR_FILENO) ? 0 : 1;
-    if (write(STDERR_FILENO, text + skip, sizeof text - 1 - skip) < 0) {
+    if (cli_signals_tell() && write(STDERR_FILENO, text + skip, sizeof text - 1 - skip) < 0) {
         /* There is nobody left to tell. */
     }
     _exit(CLI_INTERRUPTED);

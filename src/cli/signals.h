@@ -10,6 +10,9 @@ void cli_signals_begin(void);
 
 bool cli_interrupted(void);
 
+/* Whether the caller is the one to say that the run was interrupted: once for a process. */
+bool cli_signals_tell(void);
+
 /* Starts a thread that ends the process with CLI_INTERRUPTED at a second signal, or when the work has not
  * stopped a little after the first. To be called when nothing will be forked any more. */
 void cli_signals_watch(void);
@@ -18,7 +21,8 @@ void cli_signals_watch(void);
  * NULL: none. The string must live until the next call. */
 void cli_signals_writing(const char *path);
 
-/* The work is done: signals end nothing any more. */
+/* The output is written: signals end nothing any more. Not for a cancelled run, which may yet take long to
+ * give its memory back. */
 void cli_signals_end(void);
 
 #endif

@@ -66,8 +66,8 @@ int cli_isolated(const char *path, uint64_t memory, int (*work)(void *user), voi
         if (cli_interrupted()) {
             kill(child, SIGKILL);
             waitpid(child, &status, 0);
-            cli_say("interrupted; nothing was written");
-            return CLI_INTERRUPTED;
+            const vsh_error cancelled = {VSH_ERROR_CANCELLED, ""};
+            return cli_fail(&cancelled);
         }
         const struct timespec pause = {0, 2000000};
         nanosleep(&pause, NULL);

@@ -1,6 +1,7 @@
 /* vdbshade voxelize: casters to a .vdb level set. */
 #include "clock.h"
 #include "commands.h"
+#include "meshes.h"
 #include "message.h"
 #include "paths.h"
 #include "progress.h"
@@ -36,8 +37,8 @@ static int voxelize_main(int argc, char **argv);
 const cli_command cli_voxelize = {
     "voxelize",
     "INPUT -o OUT.vdb [options]",
-    "Turns a mesh file, or all casters of a scene file (.json), into one narrow-band level set. Numbers in\n"
-    "brackets are what holds without the option.",
+    "Turns a mesh file, or all casters of a scene file (.json), into one narrow-band level set.\n"
+    "Numbers in brackets are what holds without the option.",
     options,
     sizeof options / sizeof options[0],
     voxelize_main};
@@ -104,13 +105,16 @@ static int voxelize(const voxelize_settings *s, const vsh_scene *scene) {
     vsh_grid *grid = NULL;
     vsh_error error;
     vsh_result result = vsh_assets_load(scene, &run, &assets, &error);
-    if (result == VSH_OK) {
+    int code = result == VSH_OK ? cli_warn_meshes(scene, assets, &run) : cli_fail(&error);
+    if (code == CLI_OK) {
         result = vsh_scene_casters(scene, assets, &run, &grid, &error);
+        code = result == VSH_OK ? write_grid(s, grid) : cli_fail(&error);
     }
-    const int code = result == VSH_OK ? write_grid(s, grid) : cli_fail(&error);
-    cli_signals_end();
-    if (code == CLI_OK && !s->common.quiet) {
-        say_summary(s, grid, cli_seconds() - start);
+    if (code == CLI_OK) {
+        cli_signals_end();
+        if (!s->common.quiet) {
+            say_summary(s, grid, cli_seconds() - start);
+        }
     }
     vsh_grid_free(grid);
     vsh_assets_free(assets);

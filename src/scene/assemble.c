@@ -164,8 +164,7 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
     const vshi_vec sides = vshi_sub(all.max, all.min);
     const double longest = fmax(sides.x, fmax(sides.y, sides.z));
     if (!(longest > 0.0) || !isfinite(longest)) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "scene: the longest side of the casters' box is %g",
-                         longest);
+        return vshi_fail(error, VSH_ERROR_INPUT, "scene: the casters have no extent");
     }
     if (a->options.resolution < 2 || a->options.resolution > 65536) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "resolution %d: expected 2 … 65536",

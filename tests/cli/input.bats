@@ -31,7 +31,7 @@ bake_bad() {
 @test "an empty mesh" {
     : >empty.obj
     bake_bad empty.obj
-    refused 2 empty.obj
+    refused 3 empty.obj
     printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\n' >points.obj
     bake_bad points.obj
     refused 2 points.obj

@@ -1,0 +1,11 @@
+/* What is odd about a scene's meshes, as warnings. */
+#ifndef CLI_MESHES_H
+#define CLI_MESHES_H
+
+#include <vdbshade/vdbshade.h>
+
+/* Counts the triangles of zero area, which everything skips, in each file once. What is open is told by the
+ * voxeliser. CLI_OK or an exit code, having said why. */
+int cli_warn_meshes(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run);
+
+#endif
