@@ -49,7 +49,7 @@ static receiver take_texels(const vsh_field *field, const vsh_texels *texels) {
         }
         vsh_field_sample(field, 1, probe, &distance);
         r.valid[r.count++] =
-            (double)distance >= -0.25 * info.voxel_size ? 1.0f : 0.0f; /* as the bake judges */
+            distance >= 0.0f ? 1.0f : 0.0f; /* as the bake judges */
     }
     return r;
 }

@@ -1,4 +1,6 @@
 # How everything is compiled: strict warnings, no contraction and no fast-math (the same bits on every machine).
+# Compilers turn loops into vectors only where they need not care for floating-point traps and errno; neither changes
+# a result.
 set(CMAKE_C_STANDARD 11)
 set(CMAKE_C_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_STANDARD 17)
@@ -15,13 +17,11 @@ endif()
 
 function(vsh_set_flags target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wformat=2 -Wundef -Wpointer-arith -Wcast-qual
-    -ffp-contract=off $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes -Wvla>
+    -ffp-contract=off -fno-trapping-math -fno-math-errno $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes -Wvla>
     $<$<BOOL:${VSH_WERROR}>:-Werror>)
 endfunction()
 
-# The marching kernels are one source, built once for each instruction set and chosen at run time. Compilers turn their
-# loops into vectors only where they need not care for floating-point traps and errno; neither changes a result.
-set(VSH_KERNEL_FLAGS -O3 -fno-trapping-math -fno-math-errno)
+# The marching kernels are one source, built once for each instruction set and chosen at run time.
 set(VSH_KERNEL_base_FLAGS "")
 set(VSH_KERNEL_avx2_FLAGS -mavx2)
 set(VSH_KERNEL_avx512_FLAGS -mavx512f -mavx512dq -mavx512vl)
@@ -36,7 +36,7 @@ function(vsh_add_kernels target)
   foreach(kind ${kinds})
     target_sources(${target} PRIVATE ${folder}/march_${kind}.c)
     set_source_files_properties(${folder}/march_${kind}.c PROPERTIES
-                                COMPILE_OPTIONS "${VSH_KERNEL_FLAGS};${VSH_KERNEL_${kind}_FLAGS}"
+                                COMPILE_OPTIONS "-O3;${VSH_KERNEL_${kind}_FLAGS}"
                                 OBJECT_DEPENDS ${folder}/lanes.inc)
   endforeach()
 endfunction()

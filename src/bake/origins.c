@@ -10,18 +10,18 @@
  * field tells apart. Touching solids keep their inner surfaces in a mesh's level set, so under a box that
  * stands on a floor the distance falls by no more than the height. */
 static const double PROBE_HEIGHT = 1.0;
-/* Deeper than this at the probe is inside another solid, voxels: less may be the trilinear error of a corner.
- */
-static const double PROBE_DEPTH = 0.25;
+/* What is nearer than this at the probe, in its heights, is another surface: a sample in a crease, where the
+ * field may be off by more than a start offset clears. Its rays begin at the probe. */
+static const double CREASE = 0.75;
 
 typedef struct lifting {
     const vsh_field *field;
     const vsh_texels *texels;
     vshi_origins *origins;
-    double offset;    /* world units, all meshes */
-    double probe;     /* same, for the look whether a sample is free */
-    double shell;     /* world units, open meshes on top of it */
-    double threshold; /* distance below which a sample is invalid, world units */
+    double offset;   /* world units, all meshes */
+    double probe;    /* same, for the look whether a sample is free */
+    double shell;    /* world units, open meshes on top of it */
+    uint8_t *crease; /* [samples] */
 } lifting;
 
 static size_t block_end(const lifting *l, size_t block) {
@@ -49,7 +49,8 @@ static void validate(void *user, size_t begin, size_t end) {
         vsh_field_sample(l->field, last - first, &origin[0][0], distance);
         size_t valid = 0;
         for (size_t i = first; i < last; ++i) {
-            l->origins->valid[i] = (double)distance[i - first] >= l->threshold;
+            l->origins->valid[i] = distance[i - first] >= 0.0f;
+            l->crease[i] = (double)distance[i - first] < CREASE * l->probe;
             valid += l->origins->valid[i];
         }
         l->origins->before[block] = valid;
@@ -63,7 +64,7 @@ static void pack(void *user, size_t begin, size_t end) {
         size_t next = origins->before[block];
         for (size_t i = block * VSHI_ORIGIN_BLOCK; i < block_end(l, block); ++i) {
             if (origins->valid[i]) {
-                lift(l, i, l->offset, origins->position + 3 * next);
+                lift(l, i, l->crease[i] ? l->probe : l->offset, origins->position + 3 * next);
                 memcpy(origins->normal + 3 * next, l->texels->normal + 3 * i, 3 * sizeof(float));
                 ++next;
             }
@@ -72,7 +73,7 @@ static void pack(void *user, size_t begin, size_t end) {
 }
 
 double vshi_origins_bytes(const vsh_texels *texels) {
-    return (double)texels->count * (1.0 + 3.0 * sizeof(double) + 3.0 * sizeof(float));
+    return (double)texels->count * (2.0 + 3.0 * sizeof(double) + 3.0 * sizeof(float));
 }
 
 vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
@@ -88,14 +89,14 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
                  .origins = origins,
                  .offset = offset,
                  .shell = 0.5 * info.shell_thickness,
-                 .probe = fmax(offset, PROBE_HEIGHT * info.voxel_size),
-                 .threshold = -PROBE_DEPTH * info.voxel_size};
+                 .probe = fmax(offset, PROBE_HEIGHT * info.voxel_size)};
     vsh_result result = VSH_OK;
     vshi_job *job = vshi_job_begin(run, "validate", 2 * origins->blocks);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
     }
     origins->valid = vshi_take(texels->count, 1, what, &result, error);
+    l.crease = vshi_take(texels->count, 1, what, &result, error);
     origins->before = vshi_take(origins->blocks + 1, sizeof(size_t), what, &result, error);
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, origins->blocks, 1, 1, validate, &l, error);
@@ -110,6 +111,7 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, origins->blocks, 1, 1, pack, &l, error);
     }
+    free(l.crease);
     vshi_job_end(job);
     return result;
 }

@@ -180,8 +180,13 @@ static int32_t neighbour(const derivation *d, size_t block, int dx, int dy, int 
     return b->map[((size_t)x * (size_t)b->size[1] + (size_t)y) * (size_t)b->size[2] + (size_t)z];
 }
 
-/* A block's feet of the last round with one voxel around; false where nothing has changed since. */
-static bool gather_halo(const derivation *d, size_t block, float halo[HALO * HALO * HALO][3]) {
+/* A block's feet of the last round with one voxel around, by axis. */
+typedef struct halo {
+    float x[HALO * HALO * HALO], y[HALO * HALO * HALO], z[HALO * HALO * HALO];
+} halo;
+
+/* False where nothing in or around the block has changed since. */
+static bool gather_halo(const derivation *d, size_t block, halo *h) {
     int32_t around[27];
     bool changed = false;
     for (int n = 0; n < 27; ++n) {
@@ -194,18 +199,47 @@ static bool gather_halo(const derivation *d, size_t block, float halo[HALO * HAL
     for (int x = 0; x < HALO; ++x) {
         for (int y = 0; y < HALO; ++y) {
             for (int z = 0; z < HALO; ++z) {
-                const int n = (x + 7) / 8 * 9 + (y + 7) / 8 * 3 + (z + 7) / 8;
+                const int32_t from = around[(x + 7) / 8 * 9 + (y + 7) / 8 * 3 + (z + 7) / 8];
                 const int v = ((x + 7) & 7) * 64 + ((y + 7) & 7) * 8 + ((z + 7) & 7);
-                float *to = halo[(x * HALO + y) * HALO + z];
-                if (around[n] >= 0) {
-                    memcpy(to, d->feet + ((size_t)around[n] * BLOCK + (size_t)v) * 3, 3 * sizeof(float));
-                } else {
-                    to[0] = to[1] = to[2] = NAN;
-                }
+                const float *foot = d->feet + ((size_t)(from >= 0 ? from : 0) * BLOCK + (size_t)v) * 3;
+                const int to = (x * HALO + y) * HALO + z;
+                h->x[to] = from >= 0 ? foot[0] : NAN;
+                h->y[to] = from >= 0 ? foot[1] : NAN;
+                h->z[to] = from >= 0 ? foot[2] : NAN;
             }
         }
     }
     return true;
+}
+
+/* A plane of a block in the halo: from its first voxel to its last, with the halo's voxels between the rows.
+ */
+enum { PLANE_FIRST = HALO + 1, PLANE = 7 * HALO + 8 };
+
+/* For the voxels of a plane, the first of which is at `first` of the halo and at p: where in the halo the
+ * nearest foot within `reach` is; -1: none. Of equally near ones a voxel's own is kept, so that rounds come
+ * to rest. */
+static void nearest_feet(const halo *h, const float p[3], float scale, float reach, int first,
+                         int32_t from[PLANE]) {
+    float best[PLANE], y[PLANE], z[PLANE];
+    for (int i = 0; i < PLANE; ++i) {
+        best[i] = reach * reach;
+        y[i] = p[1] + (float)(i / HALO) * scale;
+        z[i] = p[2] + (float)(i % HALO) * scale;
+        from[i] = -1;
+    }
+    for (int n = 0; n < 27; ++n) {
+        const int k = (n + 13) % 27; /* the voxel itself first */
+        const int at = first + ((k / 9 - 1) * HALO + k / 3 % 3 - 1) * HALO + k % 3 - 1;
+        for (int i = 0; i < PLANE; ++i) {
+            const float a = p[0] - h->x[at + i], b = y[i] - h->y[at + i], c = z[i] - h->z[at + i];
+            const float square = a * a + b * b + c * c;
+            /* NaN is not nearer; a mask and not a condition, of which gcc 12 makes a branch */
+            const int32_t nearer = -(square < best[i]);
+            best[i] = square < best[i] ? square : best[i];
+            from[i] = (nearer & (at + i)) | (~nearer & from[i]);
+        }
+    }
 }
 
 /* One round: each voxel outside the core takes the nearest of the feet that it and its neighbours know. */
@@ -214,40 +248,28 @@ static void spread(void *user, size_t begin, size_t end) {
     /* one voxel beyond the band, so that what lies just inside it has all its neighbours */
     const float reach = d->blocks.band + d->blocks.scale;
     for (size_t block = begin; block < end; ++block) {
-        float halo[HALO * HALO * HALO][3];
+        halo h;
         d->next_changed[block] = 0;
-        if (!gather_halo(d, block, halo)) {
+        if (!gather_halo(d, block, &h)) {
             continue;
         }
-        for (int v = 0; v < BLOCK; ++v) {
-            const size_t i = block * BLOCK + (size_t)v;
-            if (d->core[i]) {
-                continue;
-            }
+        for (int plane = 0; plane < 8; ++plane) {
+            const int first = (plane + 1) * HALO * HALO + PLANE_FIRST;
             float p[3];
-            voxel_position(d, block, v, p);
-            const int centre = ((v / 64 + 1) * HALO + v / 8 % 8 + 1) * HALO + v % 8 + 1;
-            float best = reach * reach;
-            int from = -1;
-            for (int x = -1; x <= 1; ++x) {
-                for (int y = -1; y <= 1; ++y) {
-                    for (int z = -1; z <= 1; ++z) {
-                        const int n = centre + (x * HALO + y) * HALO + z;
-                        const float a = p[0] - halo[n][0], b = p[1] - halo[n][1], c = p[2] - halo[n][2];
-                        const float square = a * a + b * b + c * c;
-                        if (square < best || (square <= best && n == centre)) { /* NaN is never less */
-                            best = square;
-                            from = n;
-                        }
-                    }
+            int32_t from[PLANE];
+            voxel_position(d, block, 64 * plane, p);
+            nearest_feet(&h, p, d->blocks.scale, reach, first, from);
+            for (int v = 0; v < 64; ++v) {
+                const size_t voxel = block * BLOCK + (size_t)(64 * plane + v);
+                const int at = v / 8 * HALO + v % 8;
+                if (d->core[voxel]) {
+                    continue;
                 }
-            }
-            float *foot = d->next_feet + 3 * i;
-            if (from >= 0 && from != centre) {
-                memcpy(foot, halo[from], 3 * sizeof(float));
-                d->next_changed[block] = 1;
-            } else {
-                memcpy(foot, halo[centre], 3 * sizeof(float));
+                const int32_t taken = from[at] >= 0 ? from[at] : first + at;
+                d->next_feet[3 * voxel] = h.x[taken];
+                d->next_feet[3 * voxel + 1] = h.y[taken];
+                d->next_feet[3 * voxel + 2] = h.z[taken];
+                d->next_changed[block] |= taken != first + at;
             }
         }
     }
