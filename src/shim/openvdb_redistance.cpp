@@ -3,15 +3,14 @@
 // them).
 #include "shim/openvdb_redistance.h"
 
-#include "shim/openvdb_surface.h"
+#include "shim/openvdb_tiles.h"
 
 #include <cmath>
 #include <openvdb/tools/VolumeToMesh.h>
 
 namespace vshi {
 
-FloatGrid::Ptr redistance(const FloatGrid &source, const Lattice &lattice, double begin, double end,
-                          Stage &stage, vsh_error *error) {
+Surface mesh_surface(const FloatGrid &source, Stage &stage) {
     Surface surface;
     stage.run([&] {
         // In index space: world positions would lose a float's digits far from the origin.
@@ -19,6 +18,13 @@ FloatGrid::Ptr redistance(const FloatGrid &source, const Lattice &lattice, doubl
             source.copyReplacingTransform(openvdb::math::Transform::createLinearTransform());
         openvdb::tools::volumeToMesh(*unit, surface.points, surface.polygons, 0.0);
     });
+    stage.check();
+    return surface;
+}
+
+FloatGrid::Ptr redistance(const FloatGrid &source, const Lattice &lattice, double begin, double end,
+                          Stage &stage, vsh_error *error) {
+    Surface surface = mesh_surface(source, stage);
     stage.reach(begin + 0.2 * (end - begin));
     stage.check();
     if (surface.polygons.empty()) {
@@ -27,7 +33,11 @@ FloatGrid::Ptr redistance(const FloatGrid &source, const Lattice &lattice, doubl
     }
     FloatGrid::Ptr measured =
         measure_surface(surface, lattice, lattice.half_width, begin + 0.2 * (end - begin), end, stage);
-    take_signs(*measured, source, stage);
+    take_signs(*measured, root_origins(source.constTree()), stage, [&] {
+        return [tree = FloatGrid::ConstUnsafeAccessor(source.constTree())](const Coord &at) {
+            return tree.getValue(at) < 0.0f;
+        };
+    });
     return measured;
 }
 

@@ -22,8 +22,4 @@ FloatGrid::Ptr fill_surface(const Surface &surface, const Lattice &lattice, doub
 FloatGrid::Ptr measure_surface(const Surface &surface, const Lattice &lattice, double half_width,
                                double begin, double end, Stage &stage);
 
-// Gives every voxel of `distances` (unsigned, background where nothing is near) the sign that `source`, on
-// the same lattice, has there.
-void take_signs(FloatGrid &distances, const FloatGrid &source, Stage &stage);
-
 } // namespace vshi
