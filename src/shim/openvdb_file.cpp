@@ -100,6 +100,8 @@ class Reader final : public openvdb::io::Archive {
   private:
     void list(std::istream &in, const char *path, vsh_error *error);
 
+    // The stream keeps this pointer's address.
+    openvdb::io::StreamMetadata::Ptr state = std::make_shared<openvdb::io::StreamMetadata>();
     std::ifstream stream;
     std::vector<GridDescriptor> entries;
     std::vector<GridBase::Ptr> grids; // without a tree yet, but for streamed files
@@ -109,9 +111,11 @@ class Reader final : public openvdb::io::Archive {
 Reader::Reader(const char *path, vsh_error *error) : size(check_file(path, error)) {
     stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
     stream.open(path, std::ios::binary);
-    openvdb::io::StreamMetadata::Ptr state(new openvdb::io::StreamMetadata);
     openvdb::io::setStreamMetadataPtr(stream, state, false);
     readHeader(stream);
+    setFormatVersion(stream); // what is read from it from here on depends on these
+    setLibraryVersion(stream);
+    setDataCompression(stream);
     streamed = !inputHasGridOffsets();
     if (streamed) {
         stream.seekg(0);
