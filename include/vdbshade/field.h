@@ -29,8 +29,8 @@ VSH_API vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_option
 VSH_API void vsh_field_free(vsh_field *field); /* NULL does nothing */
 
 /* Signed distance at `count` world positions ([count][3]) from the finest level that resolves it: within the
- * reach, exact to a voxel of that level (whose band is at most twice the distance); beyond it, a lower bound.
- * Positions that are not finite give NaN. Thread safe. */
+ * reach, exact to a voxel of that level (never wider than the distance, the finest aside); beyond it, a lower
+ * bound. Positions that are not finite give NaN. Thread safe. */
 VSH_API void vsh_field_sample(const vsh_field *field, size_t count, const double *positions,
                               float *distances);
 

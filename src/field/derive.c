@@ -381,7 +381,8 @@ static vsh_result place_blocks(derivation *d, vsh_error *error) {
     return VSH_OK;
 }
 
-static vsh_result allocate_voxels(derivation *d, vsh_error *error) {
+/* Adds what it takes to the budget. */
+static vsh_result allocate_voxels(derivation *d, vshi_budget *budget, vsh_error *error) {
     const size_t count = d->blocks.count;
     const struct {
         void **memory;
@@ -394,21 +395,29 @@ static vsh_result allocate_voxels(derivation *d, vsh_error *error) {
         {(void **)&d->changed, 1},
         {(void **)&d->next_changed, 1},
     };
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0] && result == VSH_OK; ++i) {
+    const size_t wanted_count = sizeof wanted / sizeof wanted[0];
+    for (size_t i = 0; i < wanted_count; ++i) {
+        budget->held += (double)count * (double)wanted[i].size;
+    }
+    vsh_result result = vshi_check_limit(budget->run, budget->held, "field", error);
+    for (size_t i = 0; i < wanted_count && result == VSH_OK; ++i) {
         result = vshi_allocate(wanted[i].memory, count, wanted[i].size, "field level", error);
     }
     return result;
 }
 
-vsh_result vshi_level_derive(vsh_field *field, vshi_feet *feet, vshi_job *job, vsh_error *error) {
+vsh_result vshi_level_derive(vsh_field *field, vshi_feet *feet, vshi_budget budget, vshi_job *job,
+                             vsh_error *error) {
     derivation d = {.field = field,
                     .fine = &field->levels[field->level_count - 1],
                     .fine_feet = field->level_count > 1 ? feet->points : NULL};
     vshi_feet next = {NULL};
+    if (d.fine_feet != NULL) {
+        budget.held += (double)d.fine->brick_count * BLOCK * 3 * sizeof(float);
+    }
     vsh_result result = place_blocks(&d, error);
     if (result == VSH_OK) {
-        result = allocate_voxels(&d, error);
+        result = allocate_voxels(&d, &budget, error);
     }
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, d.blocks.count, 16, 0, take_core, &d, error);
@@ -429,7 +438,7 @@ vsh_result vshi_level_derive(vsh_field *field, vshi_feet *feet, vshi_job *job, v
         result = vshi_parallel_for(job, d.blocks.count, 16, 0, settle, &d, error);
     }
     if (result == VSH_OK) {
-        result = vshi_level_append(field, &d.blocks, d.feet, job, &next, error);
+        result = vshi_level_append(field, &d.blocks, d.feet, budget, job, &next, error);
     }
     free(d.next_changed);
     free(d.changed);

@@ -104,9 +104,11 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     invert(vshi_grid_transform(grid), info.voxel_size, f->to_field);
 
     const float band = (float)fmin(info.half_width, VSHI_COARSE_BAND);
-    result = vshi_level_blocks_read(grid, band, &r, &blocks, error);
+    vshi_budget budget = {&r, (double)info.bytes};
+    result = vshi_level_blocks_read(grid, band, budget, &blocks, error);
     if (result == VSH_OK) {
-        result = vshi_level_append(f, &blocks, NULL, job, &feet, error);
+        budget.held += (double)blocks.count * 512.0 * sizeof(float);
+        result = vshi_level_append(f, &blocks, NULL, budget, job, &feet, error);
     }
     vshi_level_blocks_free(&blocks);
     if (result != VSH_OK) {
@@ -128,7 +130,8 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
         if (top->band >= reach) {
             break;
         }
-        result = vshi_level_derive(f, &feet, job, error);
+        budget.held = (double)info.bytes + vshi_field_bytes(f);
+        result = vshi_level_derive(f, &feet, budget, job, error);
         if (result != VSH_OK) {
             goto done;
         }

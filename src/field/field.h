@@ -88,12 +88,17 @@ static inline float vshi_level_sample(const vsh_field *field, int32_t l, const f
     return y0 + (y1 - y0) * f[0];
 }
 
+/* A cell whose far corners are clamped to the band reads up to √3 voxels short, but only within half a voxel
+ * of the band: this much of a band is left to the next level, voxels. */
+#define VSHI_BAND_EDGE 0.5f
+
 /* Signed distance at a field-space position from the finest level that resolves it, finest voxels. */
 static inline float vshi_field_distance(const vsh_field *field, const float p[3]) {
     float h = 0.0f;
     for (int32_t l = 0; l < field->level_count; ++l) {
+        const float resolved = field->levels[l].band - VSHI_BAND_EDGE * field->levels[l].scale;
         h = vshi_level_sample(field, l, p, NULL);
-        if (h < field->levels[l].band && h > -field->levels[l].band) {
+        if (h < resolved && h > -resolved) {
             break;
         }
     }

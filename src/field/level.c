@@ -15,7 +15,7 @@ void vshi_level_blocks_free(vshi_blocks *blocks) {
     *blocks = (vshi_blocks){.map = NULL};
 }
 
-static vsh_result allocate_map(vshi_blocks *blocks, vsh_error *error) {
+static vsh_result allocate_map(vshi_blocks *blocks, vshi_budget budget, vsh_error *error) {
     size_t count = 1;
     for (int axis = 0; axis < 3; ++axis) {
         if (blocks->size[axis] <= 0 || __builtin_mul_overflow(count, (size_t)blocks->size[axis], &count) ||
@@ -26,7 +26,12 @@ static vsh_result allocate_map(vshi_blocks *blocks, vsh_error *error) {
                 blocks->size[0], blocks->size[1], blocks->size[2]);
         }
     }
-    vsh_result result = vshi_allocate((void **)&blocks->map, count, sizeof(int32_t), "field blocks", error);
+    vsh_result result = vshi_check_limit(
+        budget.run, budget.held + (double)count * (sizeof *blocks->map + sizeof *blocks->signs), "field",
+        error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&blocks->map, count, sizeof(int32_t), "field blocks", error);
+    }
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&blocks->signs, count, sizeof(int8_t), "field signs", error);
     }
@@ -41,13 +46,13 @@ static float clamp(float value, float band) {
     return value > band ? band : value < -band ? -band : value;
 }
 
-vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, const vsh_run *run, vshi_blocks *blocks,
+vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, vshi_budget budget, vshi_blocks *blocks,
                                   vsh_error *error) {
     vshi_leaf *leaves = NULL;
     *blocks = (vshi_blocks){.scale = 1.0f, .band = band};
     blocks->count = vshi_grid_leaves(grid, NULL, 0);
-    vsh_result result =
-        vshi_check_limit(run, (double)blocks->count * (512.0 + VSHI_BRICK_VALUES) * 4.0, "field", error);
+    budget.held += (double)blocks->count * (double)(sizeof *leaves + 512 * sizeof(float));
+    vsh_result result = vshi_check_limit(budget.run, budget.held, "field", error);
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&leaves, blocks->count, sizeof *leaves, "leaves", error);
     }
@@ -68,7 +73,7 @@ vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, const vsh_ru
             low[axis] - 8; /* room for cells between a block without values and one with them */
         blocks->size[axis] = (high[axis] - low[axis]) / 8 + 2;
     }
-    result = allocate_map(blocks, error);
+    result = allocate_map(blocks, budget, error);
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&blocks->values, blocks->count, 512 * sizeof(float), "field values",
                                error);
@@ -177,7 +182,7 @@ static vsh_result grow(void **memory, uint64_t count, size_t size, vsh_error *er
 }
 
 vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, const float *block_feet,
-                             vshi_job *job, vshi_feet *feet, vsh_error *error) {
+                             vshi_budget budget, vshi_job *job, vshi_feet *feet, vsh_error *error) {
     const size_t block_count = block_at(blocks, blocks->size[0], 0, 0);
     int32_t *slots = NULL;
     assembly a = {.blocks = blocks};
@@ -212,7 +217,14 @@ vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, const 
                       (unsigned long long)bricks, INT32_MAX / VSHI_BRICK_VALUES);
         goto done;
     }
-    result = vshi_allocate((void **)&slots, brick_count, sizeof *slots, "field bricks", error);
+    const size_t per_brick = VSHI_BRICK_VALUES * sizeof(float) + sizeof *slots +
+                             (block_feet != NULL ? 512 * 3 * sizeof(float) : 0);
+    budget.held += (double)level->brick_count * (double)per_brick;
+    budget.held += (double)block_count * (double)(sizeof(int32_t) + 1);
+    result = vshi_check_limit(budget.run, budget.held, "field", error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&slots, brick_count, sizeof *slots, "field bricks", error);
+    }
     if (result == VSH_OK) {
         result = grow((void **)&field->values, bricks * VSHI_BRICK_VALUES, sizeof(float), error);
     }

@@ -29,19 +29,37 @@ typedef struct vshi_feet {
     float *points;
 } vshi_feet;
 
+/* What a call may hold, and what it holds already: the grid, the field so far, what the caller took. */
+typedef struct vshi_budget {
+    const vsh_run *run;
+    double held; /* bytes */
+} vshi_budget;
+
+/* Bytes of the field's bricks and indices. */
+static inline double vshi_field_bytes(const vsh_field *field) {
+    double bytes = sizeof *field;
+    for (int32_t l = 0; l < field->level_count; ++l) {
+        const vshi_level *level = &field->levels[l];
+        bytes += (double)level->brick_count * VSHI_BRICK_VALUES * sizeof(float);
+        bytes += (double)level->size[0] * level->size[1] * level->size[2] * sizeof(int32_t);
+    }
+    return bytes;
+}
+
 void vshi_level_blocks_free(vshi_blocks *blocks);
 
 /* The finest level's blocks out of a grid. */
-vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, const vsh_run *run, vshi_blocks *blocks,
+vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, vshi_budget budget, vshi_blocks *blocks,
                                   vsh_error *error);
 
 /* Appends a level of bricks to the field. With `block_feet` [count][512][3], those of the bricks kept go into
  * *feet (freed by the caller). */
 vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, const float *block_feet,
-                             vshi_job *job, vshi_feet *feet, vsh_error *error);
+                             vshi_budget budget, vshi_job *job, vshi_feet *feet, vsh_error *error);
 
 /* Appends the level above the field's coarsest one; *feet holds that one's (none for the finest) and is
  * replaced. */
-vsh_result vshi_level_derive(vsh_field *field, vshi_feet *feet, vshi_job *job, vsh_error *error);
+vsh_result vshi_level_derive(vsh_field *field, vshi_feet *feet, vshi_budget budget, vshi_job *job,
+                             vsh_error *error);
 
 #endif

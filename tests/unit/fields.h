@@ -1,0 +1,102 @@
+/* Fields of analytic scenes, for the tests of the field and the shading. */
+#ifndef TESTS_FIELDS_H
+#define TESTS_FIELDS_H
+
+#include "truth/analytic.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <string.h>
+
+#include <vdbshade/field.h>
+
+enum { MAX_SOLIDS = 16 };
+
+/* The scene as a tree of unions, moved by `offset` and scaled by `scale` (in that order). */
+static inline vsh_grid *grid_of_moved(truth_scene scene, double voxel, double scale, const double offset[3]) {
+    vsh_sdf_node nodes[2 * MAX_SOLIDS];
+    size_t count = 0;
+    int32_t last = -1;
+    assert_true(scene.count > 0 && scene.count <= MAX_SOLIDS);
+    for (size_t i = 0; i < scene.count; ++i) {
+        const truth_solid *solid = &scene.solids[i];
+        vsh_sdf_node node = vsh_sdf_node_default();
+        node.shape = solid->shape == TRUTH_SPHERE ? VSH_SDF_SPHERE
+                     : solid->shape == TRUTH_BOX  ? VSH_SDF_BOX
+                                                  : VSH_SDF_TORUS;
+        node.radius = solid->radius;
+        node.minor_radius = solid->minor_radius;
+        node.rounding = solid->shape == TRUTH_BOX ? solid->radius : 0.0;
+        node.scale = scale;
+        for (int axis = 0; axis < 3; ++axis) {
+            node.size[axis] = solid->half[axis];
+            node.translation[axis] = scale * (solid->center[axis] + offset[axis]);
+        }
+        nodes[count++] = node;
+        if (last >= 0) {
+            vsh_sdf_node both = vsh_sdf_node_default();
+            both.shape = VSH_SDF_UNION;
+            both.left = last;
+            both.right = (int32_t)count - 1;
+            nodes[count++] = both;
+        }
+        last = (int32_t)count - 1;
+    }
+    const vsh_sdf sdf = {nodes, count};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = scale * voxel;
+    vsh_grid *grid = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return grid;
+}
+
+static inline vsh_grid *grid_of(truth_scene scene, double voxel) {
+    const double nowhere[3] = {0.0, 0.0, 0.0};
+    return grid_of_moved(scene, voxel, 1.0, nowhere);
+}
+
+/* Takes the grid. */
+static inline vsh_field *field_of_grid(vsh_grid *grid, double reach) {
+    vsh_field_options options = vsh_field_options_default();
+    options.reach = reach;
+    vsh_field *field = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_field_create(grid, &options, NULL, &field, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    vsh_grid_free(grid);
+    return field;
+}
+
+static inline vsh_field *field_of(truth_scene scene, double voxel, double reach) {
+    return field_of_grid(grid_of(scene, voxel), reach);
+}
+
+/* A number in [0, 1), counted, not drawn: the same in each run and on each machine (splitmix64). */
+static inline double uniform(uint64_t *counter) {
+    uint64_t z = (*counter += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return (double)((z ^ (z >> 31)) >> 11) * 0x1p-53;
+}
+
+static inline double between(uint64_t *counter, double low, double high) {
+    return low + (high - low) * uniform(counter);
+}
+
+static inline uint32_t bits_of(float value) {
+    uint32_t bits;
+    memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+
+#endif

@@ -1,0 +1,583 @@
+/* The pyramid: distances of the seeds' scene against closed forms, level by level. */
+#include "fields.h"
+
+#include "field/field.h"
+
+#include <stdlib.h>
+
+#define VOXEL 0.04
+
+/* The solids touch at the foot of the post: below it the nearest surface is the edge around the foot, not the
+ * plate's top, and the distance to a union's nearest solid is no distance. */
+static bool under_the_post(const double p[3]) {
+    return fabs(p[0] - 0.3) < 0.05 && fabs(p[2] - 1.5) < 0.05 && p[1] > -0.5 && p[1] < 0.05;
+}
+
+static vsh_field *seeds_field(double reach) {
+    return field_of(truth_seeds(), VOXEL, reach);
+}
+
+static void random_point(uint64_t *counter, double margin, double p[3]) {
+    p[0] = between(counter, -3.0 - margin, 3.0 + margin);
+    p[1] = between(counter, -0.5 - margin, 2.0 + margin);
+    p[2] = between(counter, -3.0 - margin, 3.0 + margin);
+}
+
+static float level_value(const vsh_field *field, int32_t level, const double p[3]) {
+    const vshi_vec at = vshi_to_field(field, p);
+    const float f[3] = {(float)at.x, (float)at.y, (float)at.z};
+    return vshi_level_sample(field, level, f, NULL);
+}
+
+/* Errors of one level, in its voxels. */
+typedef struct level_errors {
+    size_t count, saturated, wrong_signs; /* in the band, beyond it, at all */
+    double worst, rms;                    /* in the band */
+    double too_long;                      /* by how much a value beyond it claims more than the truth */
+} level_errors;
+
+static level_errors measure(const vsh_field *field, int32_t level, truth_scene scene, const double center[3],
+                            double radius, size_t tries) {
+    const vshi_level *l = &field->levels[level];
+    const double voxel = (double)l->scale * field->voxel_size;
+    level_errors e = {0, 0, 0, 0.0, 0.0, 0.0};
+    uint64_t counter = (uint64_t)level;
+    for (size_t i = 0; i < tries; ++i) {
+        double p[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            p[axis] = center[axis] + between(&counter, -radius, radius);
+        }
+        if (under_the_post(p)) {
+            continue;
+        }
+        const double truth = truth_distance(scene, p) / voxel;
+        const double value = (double)level_value(field, level, p) / (double)l->scale;
+        const double band = (double)l->band / (double)l->scale;
+        if (fabs(truth) >= band) {
+            ++e.saturated;
+            e.too_long = fmax(e.too_long, value > 0.0 ? value - truth : truth - value);
+        } else {
+            ++e.count;
+            e.worst = fmax(e.worst, fabs(value - truth));
+            e.rms += (value - truth) * (value - truth);
+        }
+        e.wrong_signs += fabs(truth) > 0.87 && (value < 0.0) != (truth < 0.0);
+    }
+    e.rms = sqrt(e.rms / (double)(e.count > 0 ? e.count : 1));
+    return e;
+}
+
+static void each_level_is_within_a_cell_of_the_truth_in_its_band(void **state) {
+    (void)state;
+    vsh_field *field = seeds_field(5.0);
+    const double center[3] = {0.0, 0.75, 0.0};
+    assert_int_equal(field->level_count, 6);
+    for (int32_t l = 0; l < field->level_count; ++l) {
+        const double band = (double)field->levels[l].band * VOXEL;
+        const level_errors e = measure(field, l, truth_seeds(), center, 3.2 + band, 2000000);
+        print_message(
+            "level %d: %zu in the band, rms %.4f, worst %.3f voxels; saturated %zu, too long %.3f\n", l,
+            e.count, e.rms, e.worst, e.saturated, e.too_long);
+        assert_true(e.count > 50000);
+        assert_true(e.worst <= 0.87);
+        assert_true(e.rms < 0.1);
+        assert_true(e.too_long <= 0.87);
+        assert_int_equal(e.wrong_signs, 0);
+    }
+    vsh_field_free(field);
+}
+
+static void thin_parts_are_as_right_as_the_rest(void **state) {
+    (void)state;
+    vsh_field *field = seeds_field(5.0);
+    const truth_scene scene = truth_seeds();
+    const double parts[2][3] = {{1.2, 0.6, -0.3}, {0.3, 1.4, 1.5}};
+    for (int part = 0; part < 2; ++part) {
+        for (int32_t l = 0; l < 3; ++l) {
+            const level_errors e = measure(field, l, scene, parts[part], 0.6, 300000);
+            print_message("part %d level %d: %zu in the band, rms %.4f, worst %.3f voxels\n", part, l,
+                          e.count, e.rms, e.worst);
+            assert_true(e.count > 10000);
+            assert_true(e.worst <= 0.87);
+            assert_true(e.rms < 0.15);
+            assert_true(e.too_long <= 0.87);
+        }
+    }
+    vsh_field_free(field);
+}
+
+/* World size of a voxel of the level that a sampled distance comes from. */
+static double resolving_voxel(const vsh_field *field, float distance) {
+    int32_t l = 0;
+    while (l + 1 < field->level_count &&
+           fabs((double)distance) >=
+               (double)(field->levels[l].band - VSHI_BAND_EDGE * field->levels[l].scale) *
+                   field->voxel_size) {
+        ++l;
+    }
+    return (double)field->levels[l].scale * field->voxel_size;
+}
+
+/* What callers see: the finest level that resolves the distance. */
+static void sampled_distances_are_within_a_voxel_of_the_level_that_resolves_them(void **state) {
+    (void)state;
+    const truth_scene scene = truth_seeds();
+    vsh_field *field = seeds_field(5.0);
+    uint64_t counter = 7;
+    double worst = 0.0;
+    for (int i = 0; i < 1000000; ++i) {
+        double p[3];
+        random_point(&counter, i % 2 ? 0.2 : 2.0, p);
+        if (under_the_post(p)) {
+            continue;
+        }
+        float h;
+        vsh_field_sample(field, 1, p, &h);
+        const double truth = truth_distance(scene, p);
+        const double voxel = resolving_voxel(field, h);
+        worst = fmax(worst, fabs((double)h - truth) / voxel);
+        /* a voxel is never wider than what it measures, but for the finest */
+        assert_true(voxel <= VOXEL || voxel <= fabs((double)h));
+    }
+    print_message("sampled: worst %.3f voxels of the level\n", worst);
+    assert_true(worst <= 0.87);
+    vsh_field_free(field);
+}
+
+static void beyond_the_reach_distances_are_lower_bounds(void **state) {
+    (void)state;
+    const truth_scene scene = truth_seeds();
+    vsh_field *field = seeds_field(0.5);
+    const vshi_level *top = &field->levels[field->level_count - 1];
+    const double band = (double)top->band * VOXEL;
+    const double slack = 0.87 * (double)top->scale * VOXEL;
+    assert_true(band >= 0.5 && band < 1.0);
+    uint64_t counter = 11;
+    size_t beyond = 0;
+    for (int i = 0; i < 300000; ++i) {
+        double p[3];
+        random_point(&counter, i % 2 ? 3.0 : 100.0, p);
+        float h;
+        vsh_field_sample(field, 1, p, &h);
+        const double truth = truth_distance(scene, p);
+        if (truth > band + sqrt(3.0) * (double)top->scale * VOXEL) { /* no corner of the cell is nearer */
+            assert_float_equal(h, band, 1e-6);
+            ++beyond;
+        }
+        assert_true((double)h <= truth + slack);
+    }
+    assert_true(beyond > 100000);
+    vsh_field_free(field);
+}
+
+static void a_field_has_only_the_levels_that_the_reach_needs(void **state) {
+    (void)state;
+    vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
+    /* bands: 3 voxels of the grid, then 6 of each coarser level */
+    const struct {
+        double reach;
+        int32_t levels;
+    } cases[] = {
+        {1e-9, 1},          {3.0 * VOXEL, 1},   {3.01 * VOXEL, 2},   {12.0 * VOXEL, 2},
+        {12.01 * VOXEL, 3}, {24.0 * VOXEL, 3},  {24.01 * VOXEL, 4},  {48.0 * VOXEL, 4},
+        {96.0 * VOXEL, 5},  {192.0 * VOXEL, 6}, {192.01 * VOXEL, 7},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        vsh_field_options options = vsh_field_options_default();
+        options.reach = cases[i].reach;
+        vsh_field *field = NULL;
+        assert_int_equal(vsh_field_create(grid, &options, NULL, &field, NULL), VSH_OK);
+        vsh_field_info info;
+        vsh_field_get_info(field, &info);
+        assert_int_equal(info.levels, cases[i].levels);
+        assert_true(info.reach >= cases[i].reach - 1e-6);
+        vsh_field_free(field);
+    }
+    vsh_grid_free(grid);
+}
+
+static void without_a_wish_the_reach_is_four_diagonals(void **state) {
+    (void)state;
+    const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
+    vsh_field *field = field_of((truth_scene){&ball, 1}, 0.1, 0.0);
+    vsh_field_info info;
+    vsh_field_get_info(field, &info);
+    assert_true(info.reach >= 4.0 * sqrt(12.0) && info.reach < 2.5 * 4.0 * sqrt(12.0));
+    vsh_field_free(field);
+}
+
+static void coarse_levels_take_a_fraction_of_the_finest_ones_memory(void **state) {
+    (void)state;
+    const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
+    vsh_field *one = field_of((truth_scene){&ball, 1}, 0.01, 0.01);
+    vsh_field *many = field_of((truth_scene){&ball, 1}, 0.01, 0.0);
+    vsh_field_info a, b;
+    vsh_field_get_info(one, &a);
+    vsh_field_get_info(many, &b);
+    print_message("ball of 200 voxels: %.2f MB, all of %d levels %.2f MB\n", (double)a.bytes / 1e6, b.levels,
+                  (double)b.bytes / 1e6);
+    /* a third where bands are alike; coarse bands are twice as wide in voxels as the grid's own */
+    assert_true((double)b.bytes < 1.8 * (double)a.bytes);
+    vsh_field_free(one);
+    vsh_field_free(many);
+}
+
+static void signs_hold_deep_inside_big_solids_and_far_outside(void **state) {
+    (void)state;
+    const truth_solid solids[] = {{TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 2.0, 0.0},
+                                  {TRUTH_BOX, {6.0, 0.0, 0.0}, {1.5, 2.5, 3.5}, 0.0, 0.0},
+                                  {TRUTH_BOX, {0.0, -4.0, 0.0}, {4.0, 0.04, 4.0}, 0.0, 0.0}};
+    const truth_scene scene = {solids, 3};
+    for (int reach = 0; reach < 3; ++reach) {
+        vsh_field *field = field_of(scene, VOXEL, reach == 0 ? 0.01 : reach == 1 ? 0.3 : 0.0);
+        uint64_t counter = 3;
+        size_t inside = 0;
+        for (int i = 0; i < 400000; ++i) {
+            const double p[3] = {between(&counter, -5.0, 9.0), between(&counter, -6.0, 5.0),
+                                 between(&counter, -5.0, 5.0)};
+            const double truth = truth_distance(scene, p);
+            float h;
+            vsh_field_sample(field, 1, p, &h);
+            if (fabs(truth) > 0.5 * VOXEL) {
+                assert_int_equal(h < 0.0f, truth < 0.0);
+            }
+            inside += truth < -0.5;
+            for (int32_t l = 0; l < field->level_count; ++l) {
+                if (fabs(truth) > 0.87 * (double)field->levels[l].scale * VOXEL) {
+                    assert_int_equal(level_value(field, l, p) < 0.0f, truth < 0.0);
+                }
+            }
+        }
+        assert_true(inside > 10000);
+        vsh_field_free(field);
+    }
+}
+
+static void turned_and_moved_shapes_have_the_same_distances(void **state) {
+    (void)state;
+    /* a box turned by 50° about (1, 2, 3), far from the origin; voxels of 0.04 at 1000 units */
+    const double half = 25.0 / 180.0 * 3.14159265358979323846, norm = sqrt(14.0);
+    vsh_sdf_node node = vsh_sdf_node_default();
+    node.shape = VSH_SDF_BOX;
+    node.size[0] = 0.8;
+    node.size[1] = 0.5;
+    node.size[2] = 0.3;
+    node.rotation[0] = sin(half) / norm;
+    node.rotation[1] = 2.0 * sin(half) / norm;
+    node.rotation[2] = 3.0 * sin(half) / norm;
+    node.rotation[3] = cos(half);
+    node.translation[0] = 1000.0;
+    node.translation[1] = -500.0;
+    node.translation[2] = 0.123;
+    const vsh_sdf sdf = {&node, 1};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = VOXEL;
+    vsh_grid *grid = NULL;
+    assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, NULL), VSH_OK);
+    vsh_field *field = field_of_grid(grid, 2.0);
+
+    const truth_solid box = {TRUTH_BOX, {0.0, 0.0, 0.0}, {0.8, 0.5, 0.3}, 0.0, 0.0};
+    uint64_t counter = 5;
+    double squares = 0.0;
+    const int count = 200000;
+    for (int i = 0; i < count; ++i) {
+        double local[3], p[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            local[axis] = between(&counter, -1.5, 1.5);
+        }
+        /* Rodrigues' rotation about the unit axis a by 50° */
+        const double a[3] = {1.0 / norm, 2.0 / norm, 3.0 / norm};
+        const double c = cos(2.0 * half), s = sin(2.0 * half);
+        const double along = a[0] * local[0] + a[1] * local[1] + a[2] * local[2];
+        for (int axis = 0; axis < 3; ++axis) {
+            const int j = (axis + 1) % 3, k = (axis + 2) % 3;
+            p[axis] = c * local[axis] + s * (a[j] * local[k] - a[k] * local[j]) +
+                      (1.0 - c) * along * a[axis] + node.translation[axis];
+        }
+        float h;
+        vsh_field_sample(field, 1, p, &h);
+        const double truth = truth_solid_distance(&box, local);
+        const double error = ((double)h - truth) / resolving_voxel(field, h);
+        assert_true(fabs(error) <= 0.87);
+        squares += error * error;
+    }
+    print_message("turned box at 1000 units: rms %.4f voxels\n", sqrt(squares / count));
+    assert_true(sqrt(squares / count) < 0.1);
+    vsh_field_free(field);
+}
+
+static void assert_same_fields(const vsh_field *a, const vsh_field *b) {
+    vsh_field_info x, y;
+    vsh_field_get_info(a, &x);
+    vsh_field_get_info(b, &y);
+    assert_int_equal(x.levels, y.levels);
+    assert_int_equal(x.bricks, y.bricks);
+    assert_int_equal(x.bytes, y.bytes);
+    size_t blocks = 0;
+    for (int32_t l = 0; l < a->level_count; ++l) {
+        const int32_t *size = a->levels[l].size;
+        assert_memory_equal(a->levels[l].origin, b->levels[l].origin, sizeof a->levels[l].origin);
+        assert_memory_equal(size, b->levels[l].size, sizeof a->levels[l].size);
+        assert_int_equal(a->levels[l].brick_count, b->levels[l].brick_count);
+        blocks += (size_t)size[0] * (size_t)size[1] * (size_t)size[2];
+    }
+    assert_memory_equal(a->index, b->index, blocks * sizeof *a->index);
+    assert_memory_equal(a->values, b->values, x.bricks * VSHI_BRICK_VALUES * sizeof *a->values);
+    assert_memory_equal(a->bounds_min, b->bounds_min, sizeof a->bounds_min);
+    assert_memory_equal(a->bounds_max, b->bounds_max, sizeof a->bounds_max);
+}
+
+static void any_number_of_threads_makes_the_same_bits(void **state) {
+    (void)state;
+    vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
+    const int32_t threads[] = {1, 2, 5};
+    vsh_field *fields[3];
+    for (int i = 0; i < 3; ++i) {
+        vsh_run run = vsh_run_default();
+        run.threads = threads[i];
+        assert_int_equal(vsh_field_create(grid, NULL, &run, &fields[i], NULL), VSH_OK);
+        assert_same_fields(fields[0], fields[i]);
+    }
+    enum { COUNT = 100000 };
+    double *positions = malloc(3 * COUNT * sizeof *positions);
+    float *values = malloc(3 * COUNT * sizeof *values);
+    assert_non_null(positions);
+    assert_non_null(values);
+    uint64_t counter = 1;
+    for (size_t i = 0; i < COUNT; ++i) {
+        random_point(&counter, 1.0, positions + 3 * i);
+    }
+    for (int i = 0; i < 3; ++i) {
+        vsh_field_sample(fields[i], COUNT, positions, values + i * COUNT);
+        assert_memory_equal(values, values + i * COUNT, COUNT * sizeof *values);
+    }
+    for (int i = 0; i < 3; ++i) {
+        vsh_field_free(fields[i]);
+    }
+    free(values);
+    free(positions);
+    vsh_grid_free(grid);
+}
+
+static void positions_that_are_not_finite_give_nan_and_far_ones_do_not(void **state) {
+    (void)state;
+    vsh_field *field = seeds_field(1.0);
+    for (int axis = 0; axis < 3; ++axis) {
+        const double bad[] = {(double)NAN, (double)INFINITY, -(double)INFINITY};
+        for (int i = 0; i < 3; ++i) {
+            double p[6] = {0.0, 0.5, 0.0, 0.0, 2.0, 0.0};
+            p[axis] = bad[i];
+            float h[2] = {0.0f, 0.0f};
+            vsh_field_sample(field, 2, p, h);
+            assert_true(isnan(h[0]));
+            assert_true(h[1] > 0.5f); /* the other points of the call are not touched by it */
+        }
+        const double far[] = {1e6, -1e9, 1e15, 1e30, -1e60, 1e300};
+        for (int i = 0; i < 6; ++i) {
+            double p[3] = {0.0, 0.5, 0.0};
+            p[axis] = far[i];
+            float h = 0.0f;
+            vsh_field_sample(field, 1, p, &h);
+            vsh_field_info info;
+            vsh_field_get_info(field, &info);
+            assert_float_equal(h, info.reach, 1e-5);
+        }
+    }
+    vsh_field_sample(field, 0, NULL, NULL);
+    vsh_field_free(field);
+}
+
+static void the_memory_limit_covers_every_level(void **state) {
+    (void)state;
+    vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
+    vsh_field *field = NULL;
+    vsh_error error = {VSH_OK, ""};
+    assert_int_equal(vsh_field_create(grid, NULL, NULL, &field, &error), VSH_OK);
+    vsh_field_info info;
+    vsh_field_get_info(field, &info);
+    vsh_field_free(field);
+
+    vsh_run run = vsh_run_default();
+    vsh_grid_info from;
+    vsh_grid_get_info(grid, &from);
+    run.memory_limit = from.bytes + info.bytes - 1; /* what is given and what comes of it would pass it */
+    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &error), VSH_ERROR_LIMIT);
+    assert_null(field);
+    assert_int_equal(error.code, VSH_ERROR_LIMIT);
+    assert_non_null(strstr(error.message, "memory limit"));
+    assert_null(strchr(error.message, '\n'));
+    run.memory_limit = 1000;
+    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, NULL), VSH_ERROR_LIMIT);
+    assert_null(field);
+    run.memory_limit = 1u << 30;
+    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, NULL), VSH_OK);
+    vsh_field_free(field);
+    vsh_grid_free(grid);
+}
+
+typedef struct progress_log {
+    double limit; /* asks to stop from this fraction on */
+    double last;
+    size_t calls, after_stop;
+    bool falls, stopped, misnamed;
+} progress_log;
+
+static int32_t watch(void *user, const char *stage, double fraction) {
+    progress_log *log = user;
+    ++log->calls;
+    log->falls = log->falls || !(fraction >= log->last && fraction >= 0.0 && fraction <= 1.0);
+    log->after_stop += log->stopped;
+    log->misnamed = log->misnamed || strcmp(stage, "field") != 0;
+    log->last = fraction;
+    log->stopped = log->stopped || fraction >= log->limit;
+    return log->stopped;
+}
+
+static void progress_rises_from_0_to_1_and_can_cancel_anywhere(void **state) {
+    (void)state;
+    vsh_grid *grid = grid_of(truth_seeds(), VOXEL);
+    vsh_run run = vsh_run_default();
+    run.progress = watch;
+    const double limits[] = {2.0, 0.0, 0.1, 0.5};
+    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; ++i) {
+        for (int32_t threads = 1; threads <= 5; threads += 4) {
+            progress_log log = {.limit = limits[i], .last = 0.0};
+            vsh_field *field = NULL;
+            vsh_error error = {VSH_OK, ""};
+            run.user = &log;
+            run.threads = threads;
+            const vsh_result result = vsh_field_create(grid, NULL, &run, &field, &error);
+            assert_false(log.falls);
+            assert_false(log.misnamed);
+            assert_int_equal(log.after_stop, 0);
+            if (limits[i] > 1.0) {
+                assert_int_equal(result, VSH_OK);
+                assert_non_null(field);
+                assert_true(log.last >= 1.0);
+                assert_true(log.calls > 3);
+            } else {
+                assert_int_equal(result, VSH_ERROR_CANCELLED);
+                assert_int_equal(error.code, VSH_ERROR_CANCELLED);
+                assert_null(field);
+            }
+            vsh_field_free(field);
+        }
+    }
+    /* at 1 nothing is left to stop: either answer is true, and neither leaks nor lies */
+    progress_log log = {.limit = 1.0, .last = 0.0};
+    vsh_field *field = NULL;
+    run.user = &log;
+    const vsh_result result = vsh_field_create(grid, NULL, &run, &field, NULL);
+    assert_true(result == VSH_OK ? field != NULL : result == VSH_ERROR_CANCELLED && field == NULL);
+    assert_true(log.last >= 1.0);
+    vsh_field_free(field);
+    vsh_grid_free(grid);
+}
+
+static void options_and_runs_are_checked(void **state) {
+    (void)state;
+    const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
+    vsh_grid *grid = grid_of((truth_scene){&ball, 1}, 0.1);
+    vsh_field *field = NULL;
+    vsh_error error = {VSH_OK, ""};
+    assert_int_equal(vsh_field_create(grid, NULL, NULL, &field, NULL), VSH_OK);
+    assert_non_null(field);
+    vsh_field_free(field);
+
+    const double reaches[] = {-1.0, (double)NAN, (double)INFINITY, -(double)INFINITY};
+    for (int i = 0; i < 4; ++i) {
+        vsh_field_options options = vsh_field_options_default();
+        options.reach = reaches[i];
+        assert_int_equal(vsh_field_create(grid, &options, NULL, &field, &error), VSH_ERROR_ARGUMENT);
+        assert_null(field);
+        assert_non_null(strstr(error.message, "reach"));
+        assert_int_equal(vsh_field_create(grid, &options, NULL, &field, NULL), VSH_ERROR_ARGUMENT);
+    }
+    const size_t sizes[] = {0, sizeof(size_t), sizeof(vsh_field_options) + 8, SIZE_MAX};
+    for (int i = 0; i < 4; ++i) {
+        vsh_field_options options = vsh_field_options_default();
+        options.struct_size = sizes[i];
+        assert_int_equal(vsh_field_create(grid, &options, NULL, &field, &error), VSH_ERROR_ARGUMENT);
+        assert_non_null(strstr(error.message, "vsh_field_options"));
+        vsh_run run = vsh_run_default();
+        run.struct_size = i == 2 ? sizeof run + 8 : sizes[i];
+        assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &error), VSH_ERROR_ARGUMENT);
+        assert_non_null(strstr(error.message, "vsh_run"));
+    }
+    vsh_run run = vsh_run_default();
+    run.threads = -1;
+    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &error), VSH_ERROR_ARGUMENT);
+    run.threads = 1025;
+    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &error), VSH_ERROR_ARGUMENT);
+    vsh_field_free(NULL);
+    vsh_grid_free(grid);
+}
+
+/* A reach beyond anything must not make levels without end. */
+static void a_huge_reach_is_refused_or_met(void **state) {
+    (void)state;
+    const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
+    vsh_grid *grid = grid_of((truth_scene){&ball, 1}, 0.1);
+    const double reaches[] = {1e3, 1e6, 1e12, 1e300};
+    for (int i = 0; i < 4; ++i) {
+        vsh_field_options options = vsh_field_options_default();
+        options.reach = reaches[i];
+        vsh_field *field = NULL;
+        const vsh_result result = vsh_field_create(grid, &options, NULL, &field, NULL);
+        if (result == VSH_OK) {
+            vsh_field_info info;
+            vsh_field_get_info(field, &info);
+            print_message("reach %g: %d levels, %g, %.1f MB\n", reaches[i], info.levels, info.reach,
+                          (double)info.bytes / 1e6);
+            assert_true(info.levels <= VSHI_MAX_LEVELS);
+            assert_true(info.reach >= reaches[i] || info.levels == VSHI_MAX_LEVELS);
+            const double far[3] = {0.5 * fmin(reaches[i], 1e12), 0.0, 0.0}, centre[3] = {0.0, 0.0, 0.0};
+            float h;
+            vsh_field_sample(field, 1, far, &h);
+            assert_true(fabs((double)h - (far[0] - 1.0)) <= 0.2 * far[0]);
+            vsh_field_sample(field, 1, centre, &h);
+            assert_true(h < -0.8f);
+        } else {
+            assert_true(result == VSH_ERROR_LIMIT || result == VSH_ERROR_ARGUMENT);
+        }
+        vsh_field_free(field);
+    }
+    vsh_grid_free(grid);
+}
+
+static void info_tells_the_solids_box_and_voxel(void **state) {
+    (void)state;
+    vsh_field *field = seeds_field(1.0);
+    vsh_field_info info;
+    vsh_field_get_info(field, &info);
+    const double low[3] = {-3.0, -0.5, -3.0}, high[3] = {3.0, 2.0, 3.0};
+    assert_true(fabs(info.voxel_size - VOXEL) < 1e-12);
+    for (int axis = 0; axis < 3; ++axis) {
+        assert_true(fabs(info.bounds_min[axis] - low[axis]) < 2.0 * VOXEL);
+        assert_true(fabs(info.bounds_max[axis] - high[axis]) < 2.0 * VOXEL);
+    }
+    assert_true(info.shell_thickness == 0.0);
+    vsh_field_free(field);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(each_level_is_within_a_cell_of_the_truth_in_its_band),
+        cmocka_unit_test(thin_parts_are_as_right_as_the_rest),
+        cmocka_unit_test(sampled_distances_are_within_a_voxel_of_the_level_that_resolves_them),
+        cmocka_unit_test(beyond_the_reach_distances_are_lower_bounds),
+        cmocka_unit_test(a_field_has_only_the_levels_that_the_reach_needs),
+        cmocka_unit_test(without_a_wish_the_reach_is_four_diagonals),
+        cmocka_unit_test(coarse_levels_take_a_fraction_of_the_finest_ones_memory),
+        cmocka_unit_test(signs_hold_deep_inside_big_solids_and_far_outside),
+        cmocka_unit_test(turned_and_moved_shapes_have_the_same_distances),
+        cmocka_unit_test(any_number_of_threads_makes_the_same_bits),
+        cmocka_unit_test(positions_that_are_not_finite_give_nan_and_far_ones_do_not),
+        cmocka_unit_test(the_memory_limit_covers_every_level),
+        cmocka_unit_test(progress_rises_from_0_to_1_and_can_cancel_anywhere),
+        cmocka_unit_test(options_and_runs_are_checked),
+        cmocka_unit_test(a_huge_reach_is_refused_or_met),
+        cmocka_unit_test(info_tells_the_solids_box_and_voxel),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
