@@ -1,6 +1,7 @@
 #include "shim/openvdb_closest.h"
 
 #include <cmath>
+#include <cstdint>
 #include <openvdb/math/Proximity.h>
 #include <openvdb/util/Util.h>
 
@@ -16,12 +17,18 @@ using openvdb::Int32;
 // conversion pushed off a surface inside the solid stand at √0.75: both stay.
 constexpr double MEASURED_WELL = 0.87;
 const Int32 NOTHING = Int32(openvdb::util::INVALID_IDX);
+// Marks a polygon that is new since the last pass: only those need to be tried by the neighbours.
+constexpr Int32 IS_NEW = INT32_MIN;
 constexpr int PASSES = 2;
 constexpr int HALO = 10; // voxels an edge of a leaf with its neighbours
 
 struct Measure {
     float distance; // voxels, without sign
     Int32 polygon;
+};
+
+struct Neighbour : Measure {
+    bool tempting; // worth trying: its polygon is new to those around it
 };
 
 double squared_distance(const Surface &surface, Int32 polygon, const Vec3d &p) {
@@ -65,8 +72,9 @@ class Again {
         : distances(distances_), nearest(nearest_), surface(surface_), per_world(1.0 / voxel), world(voxel),
           around(neighbours()) {}
 
-    // New measures of a leaf's voxels from the old ones of its neighbourhood.
-    void measure(const NearestLeaf &leaf, Measure *measures) const;
+    // New measures of a leaf's voxels from the old ones of its neighbourhood. False where there is nothing to
+    // be gained: then they are not filled.
+    bool measure(const NearestLeaf &leaf, bool first, Measure *measures) const;
 
     FloatGrid &distances;
     openvdb::Int32Grid &nearest;
@@ -75,23 +83,28 @@ class Again {
     const double world;
 
   private:
-    Measure improve(const Measure *at, const Vec3d &p) const;
+    bool gather(const NearestLeaf &leaf, bool first, Neighbour *halo) const;
+    Measure improve(const Neighbour *at, bool first, const Vec3d &p) const;
     const std::vector<Offset> around;
 };
 
-Measure Again::improve(const Measure *at, const Vec3d &p) const {
+Measure Again::improve(const Neighbour *at, bool first, const Vec3d &p) const {
     Int32 tried[27] = {at->polygon};
     int tries = 1;
     Int32 best = at->polygon;
-    double least = squared_distance(surface, best, p);
-    double length = std::sqrt(least);
+    // At first the value may belong to a part of its polygon only: large ones are converted in pieces.
+    double least = first ? squared_distance(surface, best, p) : -1.0; // negative: not measured yet
+    double length = first ? std::sqrt(least) : double(at->distance);
     for (const Offset &offset : around) {
-        const Measure &there = at[offset.step];
-        if (there.polygon == NOTHING || there.distance - offset.length > length ||
+        const Neighbour &there = at[offset.step];
+        if (!there.tempting || double(there.distance) - double(offset.length) > length ||
             std::find(tried, tried + tries, there.polygon) != tried + tries) {
             continue;
         }
         tried[tries++] = there.polygon;
+        if (least < 0.0) {
+            least = squared_distance(surface, best, p);
+        }
         const double squared = squared_distance(surface, there.polygon, p);
         if (squared < least || (squared == least && there.polygon < best)) {
             least = squared;
@@ -99,34 +112,65 @@ Measure Again::improve(const Measure *at, const Vec3d &p) const {
             length = std::sqrt(least);
         }
     }
-    return {float(length), best};
+    return {float(length), best != at->polygon ? best | IS_NEW : best};
 }
 
-void Again::measure(const NearestLeaf &leaf, Measure *measures) const {
-    Measure halo[HALO * HALO * HALO];
-    openvdb::Int32Grid::ConstUnsafeAccessor polygons(nearest.constTree());
-    FloatGrid::ConstUnsafeAccessor values(distances.constTree());
-    Measure *fill = halo;
-    for (int x = -1; x <= 8; ++x) {
-        for (int y = -1; y <= 8; ++y) {
-            for (int z = -1; z <= 8; ++z, ++fill) {
-                const Coord at = leaf.origin().offsetBy(x, y, z);
-                if (!polygons.probeValue(at, fill->polygon)) {
-                    fill->polygon = NOTHING;
-                } else {
-                    fill->distance = float(std::fabs(values.getValue(at)) * per_world);
+// Part -1, 0 or 1 of the neighbourhood along an axis that position 0 … 9 of the halo lies in.
+int part_of(int position) {
+    return position == 0 ? 0 : position == HALO - 1 ? 2 : 1;
+}
+
+// Fills the halo; false where no voxel has a neighbour whose polygon it should try.
+bool Again::gather(const NearestLeaf &leaf, bool first, Neighbour *halo) const {
+    const NearestLeaf *polygons[27];
+    const Leaf *values[27];
+    openvdb::Int32Grid::ConstUnsafeAccessor find_polygons(nearest.constTree());
+    FloatGrid::ConstUnsafeAccessor find_values(distances.constTree());
+    for (int i = 0; i < 27; ++i) {
+        const Coord origin = leaf.origin().offsetBy(8 * (i / 9 - 1), 8 * (i / 3 % 3 - 1), 8 * (i % 3 - 1));
+        polygons[i] = find_polygons.probeConstLeaf(origin);
+        values[i] = polygons[i] != nullptr ? find_values.probeConstLeaf(origin) : nullptr;
+    }
+    bool tempting = false;
+    Int32 only = NOTHING;
+    bool many = false;
+    for (int x = 0; x < HALO; ++x) {
+        for (int y = 0; y < HALO; ++y) {
+            const int row = 9 * part_of(x) + 3 * part_of(y);
+            for (int z = 0; z < HALO; ++z, ++halo) {
+                *halo = {{0.0f, NOTHING}, false};
+                const int from = row + part_of(z);
+                const auto at = Index(((x + 7) & 7) << 6 | ((y + 7) & 7) << 3 | ((z + 7) & 7));
+                if (values[from] == nullptr || !polygons[from]->isValueOn(at)) {
+                    continue;
                 }
+                const Int32 polygon = polygons[from]->getValue(at);
+                const bool is_new = first || (polygon & IS_NEW) != 0;
+                *halo = {float(std::fabs(double(values[from]->getValue(at))) * per_world), polygon & ~IS_NEW,
+                         is_new};
+                tempting |= is_new;
+                many |= only != NOTHING && only != halo->polygon;
+                only = halo->polygon;
             }
         }
     }
+    return first || (tempting && many);
+}
+
+bool Again::measure(const NearestLeaf &leaf, bool first, Measure *measures) const {
+    Neighbour halo[HALO * HALO * HALO];
+    if (!gather(leaf, first, halo)) {
+        return false;
+    }
     for (Index i = 0; i < NearestLeaf::SIZE; ++i) {
         const Coord local = NearestLeaf::offsetToLocalCoord(i);
-        const Measure *at = halo + ((local[0] + 1) * HALO + local[1] + 1) * HALO + local[2] + 1;
+        const Neighbour *at = halo + ((local[0] + 1) * HALO + local[1] + 1) * HALO + local[2] + 1;
         measures[i] = *at;
         if (at->polygon != NOTHING && at->distance > MEASURED_WELL) {
-            measures[i] = improve(at, (leaf.origin() + local).asVec3d());
+            measures[i] = improve(at, first, (leaf.origin() + local).asVec3d());
         }
     }
+    return true;
 }
 
 } // namespace
@@ -137,18 +181,20 @@ void measure_again(FloatGrid &distances, openvdb::Int32Grid &nearest, const Surf
     std::vector<NearestLeaf *> leaves;
     nearest.tree().getNodes(leaves);
     std::vector<Measure> measures(leaves.size() * NearestLeaf::SIZE);
+    std::vector<char> changed(leaves.size());
     const double step = (end - begin) / PASSES;
     for (int pass = 0; pass < PASSES; ++pass) {
-        stage.loop(leaves.size(), 16, begin + pass * step, begin + (pass + 1) * step,
-                   [&](size_t i) { again.measure(*leaves[i], measures.data() + i * NearestLeaf::SIZE); });
+        stage.loop(leaves.size(), 16, begin + pass * step, begin + (pass + 1) * step, [&](size_t i) {
+            changed[i] = again.measure(*leaves[i], pass == 0, measures.data() + i * NearestLeaf::SIZE);
+        });
         stage.loop(leaves.size(), 64, 0.0, 0.0, [&](size_t i) {
             Leaf *values = distances.tree().probeLeaf(leaves[i]->origin());
             for (Index n = 0; values != nullptr && n < NearestLeaf::SIZE; ++n) {
                 const Measure &measure = measures[i * NearestLeaf::SIZE + n];
-                if (leaves[i]->isValueOn(n)) {
+                if (changed[i] && leaves[i]->isValueOn(n)) {
                     leaves[i]->setValueOnly(n, measure.polygon);
                     values->setValueOn(
-                        n, std::copysign(float(measure.distance * again.world), values->getValue(n)));
+                        n, std::copysign(float(double(measure.distance) * again.world), values->getValue(n)));
                 }
             }
         });

@@ -4,6 +4,7 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "shim/guard.h"
+#include "shim/handover.h"
 #include "shim/openvdb.h"
 
 #include <algorithm>
@@ -68,21 +69,24 @@ class Stage {
     // body(i) for 0 … count - 1, the fraction going from `begin` to `end` meanwhile; throws when cancelled.
     template <typename Body> void loop(size_t count, size_t grain, double begin, double end, Body &&body) {
         std::atomic<size_t> done{0};
+        give(&done);
         arena.execute([&] {
             tbb::parallel_for(
                 tbb::blocked_range<size_t>(0, count, grain),
                 [&](const tbb::blocked_range<size_t> &range) {
-                    if (vshi_job_cancelled(job)) {
-                        return;
+                    take(&done); // before anything of this loop is read
+                    if (!vshi_job_cancelled(job)) {
+                        for (size_t i = range.begin(); i != range.end(); ++i) {
+                            body(i);
+                        }
+                        const size_t so_far = done.fetch_add(range.size()) + range.size();
+                        reach(begin + (end - begin) * double(so_far) / double(count));
                     }
-                    for (size_t i = range.begin(); i != range.end(); ++i) {
-                        body(i);
-                    }
-                    const size_t so_far = done.fetch_add(range.size()) + range.size();
-                    reach(begin + (end - begin) * double(so_far) / double(count));
+                    give(&done);
                 },
                 tbb::simple_partitioner());
         });
+        take(&done);
         check();
     }
 

@@ -1,6 +1,6 @@
 // Level sets from meshes: all closed ones together, all open ones as shells.
 #include "caster/mesh.h"
-#include "shim/openvdb_surface.h"
+#include "shim/openvdb_shells.h"
 
 #include <cfloat>
 #include <cmath>
@@ -15,7 +15,7 @@ namespace {
 // Distances, nearest polygons, their next values, and one more set of distances while they are collected; and
 // what a triangle takes as polygon and corners. Measured: see tests/unit/test_grid.c.
 constexpr double MESH_BYTES_PER_LEAF = 5.0 * BYTES_PER_LEAF;
-constexpr double BYTES_PER_TRIANGLE = 64.0;
+constexpr double BYTES_PER_TRIANGLE = 96.0;
 
 struct Meshes {
     const vsh_mesh *mesh;
@@ -63,23 +63,6 @@ void foretell(const Meshes &meshes, const Lattice &lattice, const vsh_run &run, 
     }
     check_memory(&run, lattice.voxel, leaves,
                  leaves * MESH_BYTES_PER_LEAF + double(meshes.triangles) * BYTES_PER_TRIANGLE, error);
-}
-
-// Adds a mesh's triangles in index space. Positions are taken there in double, before they become floats.
-void add_mesh(const vsh_mesh &mesh, const Lattice &lattice, Surface &surface) {
-    const size_t first = surface.points.size();
-    for (size_t v = 0; v < mesh.vertex_count; ++v) {
-        const vshi_vec p = vshi_transform_point(mesh.transform, vshi_vec_off(mesh.positions + 3 * v));
-        surface.points.emplace_back(lattice.index(Vec3d(p.x, p.y, p.z)));
-    }
-    const auto corner = [first](uint32_t vertex) { return openvdb::Index32(first + vertex); };
-    for (size_t i = 0; i < mesh.triangle_count; ++i) {
-        if (!vshi_mesh_degenerate(&mesh, i)) {
-            const uint32_t *vertex = mesh.indices + 3 * i;
-            surface.polygons.emplace_back(corner(vertex[0]), corner(vertex[1]), corner(vertex[2]),
-                                          openvdb::util::INVALID_IDX);
-        }
-    }
 }
 
 // Within this distance (voxels) of a surface the conversion signs a voxel by the side it lies on; farther
@@ -142,6 +125,38 @@ void warn(const Meshes &meshes, const Lattice &lattice, const vsh_run &run) {
     }
 }
 
+struct Progress {
+    double done;
+    double per_triangle;
+
+    double next(const Surface &surface) { return done += per_triangle * double(surface.polygons.size()); }
+};
+
+// NULL where it has no triangles.
+FloatGrid::Ptr fill_solid(const Solid &solid, const Lattice &lattice, Progress &progress, Stage &stage) {
+    if (solid.outward.polygons.empty()) {
+        return nullptr;
+    }
+    double begin = progress.done;
+    const FloatGrid::Ptr filled =
+        fill_surface(solid.outward, lattice, lattice.half_width, begin, progress.next(solid.outward), stage);
+    if (!solid.rooms.polygons.empty()) {
+        begin = progress.done;
+        const FloatGrid::Ptr rooms =
+            fill_surface(solid.rooms, lattice, lattice.half_width, begin, progress.next(solid.rooms), stage);
+        stage.run([&] { openvdb::tools::csgDifference(*filled, *rooms); });
+    }
+    return filled;
+}
+
+void unite(FloatGrid::Ptr &united, const FloatGrid::Ptr &more, Stage &stage) {
+    if (united == nullptr || more == nullptr) {
+        united = united == nullptr ? more : united;
+    } else {
+        stage.run([&] { openvdb::tools::csgUnion(*united, *more); });
+    }
+}
+
 vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_options *options,
                        const vsh_run *given, vsh_grid **grid, vsh_error *error) {
     vsh_run run;
@@ -155,28 +170,31 @@ vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_option
     Stage stage(run, "voxelize", error);
     warn(meshes, lattice, run);
 
-    Surface closed;
+    std::vector<Solid> solids(1);
     Surface open;
     for (size_t i = 0; i < count; ++i) {
-        add_mesh(mesh[i], lattice, meshes.reports[i].open_edges > 0 ? open : closed);
-    }
-    const double share = double(closed.polygons.size()) / double(meshes.triangles);
-    FloatGrid::Ptr solid;
-    if (!closed.polygons.empty()) {
-        solid = fill_surface(closed, lattice, lattice.half_width, 0.0, share, stage);
-    }
-    if (!open.polygons.empty()) {
-        FloatGrid::Ptr shell =
-            fill_surface(open, lattice, lattice.half_width + 0.5 * lattice.shell, share, 1.0, stage);
-        thicken(*shell, float(0.5 * lattice.shell * lattice.voxel), float(lattice.voxel),
-                lattice.background(), stage);
-        if (solid == nullptr) {
-            solid = shell;
+        if (meshes.reports[i].open_edges > 0) {
+            add_mesh(mesh[i], lattice, open);
+        } else if (meshes.reports[i].flipped_edges > 0) { // says nothing about rooms
+            add_mesh(mesh[i], lattice, solids.front().outward);
         } else {
-            stage.run([&] { openvdb::tools::csgUnion(*solid, *shell); });
+            add_closed_mesh(mesh[i], lattice, solids, error);
         }
     }
-    *grid = close_grid(solid, open.polygons.empty() ? 0.0 : lattice.shell * lattice.voxel, stage);
+    Progress progress{0.0, 1.0 / double(meshes.triangles)};
+    FloatGrid::Ptr united;
+    for (const Solid &solid : solids) {
+        unite(united, fill_solid(solid, lattice, progress, stage), stage);
+    }
+    if (!open.polygons.empty()) {
+        const double begin = progress.done;
+        FloatGrid::Ptr shell =
+            fill_surface(open, lattice, lattice.half_width + 0.5 * lattice.shell, begin, 1.0, stage);
+        thicken(*shell, float(0.5 * lattice.shell * lattice.voxel), float(lattice.voxel),
+                lattice.background(), stage);
+        unite(united, shell, stage);
+    }
+    *grid = close_grid(united, open.polygons.empty() ? 0.0 : lattice.shell * lattice.voxel, stage);
     return VSH_OK;
 }
 

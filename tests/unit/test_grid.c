@@ -625,6 +625,42 @@ static void overlapping_meshes_are_one_solid(void **state) {
     free_model(&ball);
 }
 
+static double room_with_a_ball(const double p[3]) {
+    const double q[3] = {p[0] * 5.0, p[1] * 5.0, p[2] * 5.0};
+    return fmin(hollow_truth(p), 0.2 * unit_sphere(q));
+}
+
+static void a_room_in_a_mesh_stays_open_and_keeps_its_furniture(void **state) {
+    (void)state;
+    /* One mesh of three shells: a ball, a room in it that faces inward, and a ball in the room. */
+    model shells[3] = {make_sphere(200, 1.0, 0), make_sphere(200, 0.6, 1), make_sphere(60, 0.2, 0)};
+    for (int turned = 0; turned < 2; ++turned) {
+        size_t vertices = 0, indices = 0;
+        model all = {malloc(300000 * 3 * sizeof(float)), malloc(600000 * 3 * sizeof(uint32_t)), {0}};
+        assert_non_null(all.positions);
+        assert_non_null(all.indices);
+        for (int i = 0; i < 3; ++i) {
+            const vsh_mesh *m = &shells[turned ? 2 - i : i].mesh;
+            memcpy(all.positions + 3 * vertices, m->positions, m->vertex_count * 3 * sizeof(float));
+            for (size_t j = 0; j < 3 * m->triangle_count; ++j) {
+                all.indices[indices++] = m->indices[j] + (uint32_t)vertices;
+            }
+            vertices += m->vertex_count;
+        }
+        const double mirrored[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0};
+        all.mesh = (vsh_mesh){"house",     all.positions, NULL,        NULL,
+                              all.indices, vertices,      indices / 3, turned ? mirrored : NULL};
+        vsh_grid *grid = grid_of(&all.mesh, 1, 0.02, NULL);
+        assert_true(worst_error(grid, room_with_a_ball, 2.9, 2.9) < 0.1);
+        assert_int_equal(wrong_blocks(grid, room_with_a_ball, 8), 0);
+        vsh_grid_free(grid);
+        free_model(&all);
+    }
+    for (int i = 0; i < 3; ++i) {
+        free_model(&shells[i]);
+    }
+}
+
 static void threads_do_not_show_in_meshes(void **state) {
     (void)state;
     model fine = make_sphere(150, 0.7, 0);
@@ -777,11 +813,6 @@ static void a_turned_mirrored_scaled_grid_is_measured_anew(void **state) {
     vsh_grid_free(ball);
 }
 
-static double room_with_a_ball(const double p[3]) {
-    const double q[3] = {p[0] * 5.0, p[1] * 5.0, p[2] * 5.0};
-    return fmin(hollow_truth(p), 0.2 * unit_sphere(q));
-}
-
 static void rooms_stay_open_in_a_union_of_different_lattices(void **state) {
     (void)state;
     const vsh_sdf sdf = hollow_sphere();
@@ -870,6 +901,7 @@ int main(void) {
         cmocka_unit_test(an_open_quad_becomes_a_shell_with_a_warning),
         cmocka_unit_test(a_crack_keeps_the_inside),
         cmocka_unit_test(overlapping_meshes_are_one_solid),
+        cmocka_unit_test(a_room_in_a_mesh_stays_open_and_keeps_its_furniture),
         cmocka_unit_test(threads_do_not_show_in_meshes),
         cmocka_unit_test(bad_meshes_are_refused_with_the_reason),
         cmocka_unit_test(meshes_can_be_cancelled),
