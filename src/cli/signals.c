@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 /* How long the work may take to stop of itself: a second in all is promised. */
-static const long grace_nanoseconds = 400 * 1000 * 1000;
+static const long grace_nanoseconds = 250 * 1000 * 1000;
 
 static sem_t signalled; /* posted by each signal; waited for by the watcher */
 static atomic_bool interrupted;
