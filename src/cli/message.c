@@ -50,9 +50,7 @@ int cli_usage(const char *format, ...) {
 
 int cli_fail(const vsh_error *error) {
     if (error->code == VSH_ERROR_CANCELLED) {
-        if (cli_signals_tell()) {
-            cli_say("interrupted; nothing was written");
-        }
+        cli_signals_tell();
         return CLI_INTERRUPTED;
     }
     cli_say("%s", error->message);

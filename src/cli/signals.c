@@ -13,11 +13,12 @@
 #include <unistd.h>
 
 /* How long the work may take to stop of itself: a second in all is promised. */
-static const long grace_nanoseconds = 400 * 1000 * 1000;
+static const long grace_nanoseconds = 250 * 1000 * 1000;
 
 static sem_t signalled; /* posted by each signal; waited for by the watcher */
 static atomic_bool interrupted;
-static atomic_bool told;                                   /* the user knows */
+static pthread_mutex_t telling = PTHREAD_MUTEX_INITIALIZER;
+static bool told;                                          /* the user knows; guarded by `telling` */
 static pthread_mutex_t ending = PTHREAD_MUTEX_INITIALIZER; /* held while the process is ended */
 static const char *writing;                                /* guarded by `ending` */
 
@@ -46,8 +47,17 @@ bool cli_interrupted(void) {
     return atomic_load(&interrupted);
 }
 
-bool cli_signals_tell(void) {
-    return !atomic_exchange(&told, true);
+/* Written at once and under its own lock: who ends the process must find the line out already, and must not
+ * wait for a thread that is stuck in writing progress. */
+void cli_signals_tell(void) {
+    static const char text[] = "\r\033[Kvdbshade: interrupted\n";
+    const size_t skip = isatty(STDERR_FILENO) ? 0 : strlen("\r\033[K");
+    pthread_mutex_lock(&telling);
+    if (!told && write(STDERR_FILENO, text + skip, sizeof text - 1 - skip) < 0) {
+        /* There is nobody left to tell. */
+    }
+    told = true;
+    pthread_mutex_unlock(&telling);
 }
 
 /* A thread, and not the handler, ends the process: it may list a folder and take locks. */
@@ -66,11 +76,7 @@ static void *watch(void *unused) {
     if (writing != NULL) {
         cli_temporary_remove(writing);
     }
-    static const char text[] = "\nvdbshade: interrupted; nothing was written\n";
-    const size_t skip = isatty(STDERR_FILENO) ? 0 : 1;
-    if (cli_signals_tell() && write(STDERR_FILENO, text + skip, sizeof text - 1 - skip) < 0) {
-        /* There is nobody left to tell. */
-    }
+    cli_signals_tell();
     _exit(CLI_INTERRUPTED);
 }
 

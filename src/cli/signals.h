@@ -10,8 +10,8 @@ void cli_signals_begin(void);
 
 bool cli_interrupted(void);
 
-/* Whether the caller is the one to say that the run was interrupted: once for a process. */
-bool cli_signals_tell(void);
+/* Says on standard error that the run was interrupted: once for a process. */
+void cli_signals_tell(void);
 
 /* Starts a thread that ends the process with CLI_INTERRUPTED at a second signal, or when the work has not
  * stopped a little after the first. To be called when nothing will be forked any more. */

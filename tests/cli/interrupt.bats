@@ -10,6 +10,7 @@ milliseconds() {
 # would be lost; and a bake that is not interrupted ends by its limit of processor seconds.
 interrupt() {
     old_output out.exr
+    rm -f err.txt # it is what is waited for
     (
         ulimit -t 60
         exec "$VDBSHADE" bake "$ASSETS/cloister.glb" --sun -0.5,0.8,-0.6 --sun-angle 20 --ao 2 --ao-cones 256 \
