@@ -1,0 +1,79 @@
+/* Short ways to ask for shadows and AO, for their tests. */
+#ifndef TESTS_SHADING_H
+#define TESTS_SHADING_H
+
+#include "fields.h"
+
+#include <vdbshade/shade.h>
+
+#define PI 3.14159265358979323846
+#define RADIANS(degrees) ((degrees)*PI / 180.0)
+
+static inline vsh_light sun(const double towards[3], double angle) {
+    vsh_light light = vsh_light_default();
+    memcpy(light.direction, towards, sizeof light.direction);
+    light.angle = angle;
+    return light;
+}
+
+static inline vsh_light lamp(const double position[3], double radius) {
+    vsh_light light = vsh_light_default();
+    light.type = VSH_LIGHT_SPHERE;
+    memcpy(light.position, position, sizeof light.position);
+    light.radius = radius;
+    strcpy(light.name, "lamp");
+    return light;
+}
+
+static inline vsh_shade_stats shadows(const vsh_field *field, const vsh_light *light, int32_t method,
+                                      size_t count, const double *positions, const float *normals,
+                                      float *visible) {
+    vsh_shade_options options = vsh_shade_options_default();
+    options.method = method;
+    const vsh_points points = {count, positions, normals};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_shade_shadow(field, &points, light, &options, NULL, visible, &stats, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return stats;
+}
+
+static inline float shadow_at(const vsh_field *field, const vsh_light *light, int32_t method,
+                              const double *position, const float *normal) {
+    float visible = -1.0f;
+    shadows(field, light, method, 1, position, normal, &visible);
+    return visible;
+}
+
+/* Unit direction `elevation` over the x, z plane at `azimuth`, radians. */
+static inline void direction_at(double elevation, double azimuth, double direction[3]) {
+    direction[0] = cos(elevation) * cos(azimuth);
+    direction[1] = sin(elevation);
+    direction[2] = cos(elevation) * sin(azimuth);
+}
+
+static inline void random_direction(uint64_t *counter, double direction[3]) {
+    const double z = between(counter, -1.0, 1.0), angle = between(counter, 0.0, 2.0 * PI);
+    direction[0] = sqrt(1.0 - z * z) * cos(angle);
+    direction[1] = sqrt(1.0 - z * z) * sin(angle);
+    direction[2] = z;
+}
+
+/* Receivers on the seeds' floor: `size` × `size` of its 512² texels, `stride` apart, with normals up. */
+static inline void floor_texels(size_t size, double *positions, float *normals) {
+    const size_t stride = 512 / size;
+    for (size_t row = 0; row < size; ++row) {
+        for (size_t column = 0; column < size; ++column) {
+            double *p = positions + 3 * (row * size + column);
+            float *n = normals + 3 * (row * size + column);
+            p[0] = -2.5 + 5.0 * ((double)(column * stride) + 0.5) / 512.0;
+            p[1] = 0.001;
+            p[2] = -2.5 + 5.0 * ((double)(row * stride) + 0.5) / 512.0;
+            n[0] = n[2] = 0.0f;
+            n[1] = 1.0f;
+        }
+    }
+}
+
+#endif
