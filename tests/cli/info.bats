@@ -66,10 +66,10 @@ setup() {
 @test "a damaged level set, byte by byte, never takes the program down" {
     shade voxelize box.obj -o box.vdb --resolution 16 --quiet
     done_well
-    local size at
+    local size at part # not i: Bats' own tracing counts with it
     size=$(wc -c <box.vdb)
-    for ((i = 1; i <= 40; ++i)); do
-        at=$((i * size / 41))
+    for ((part = 1; part <= 40; ++part)); do
+        at=$((part * size / 41))
         { head -c "$at" box.vdb && printf '\377\377\377\177' && tail -c +$((at + 5)) box.vdb; } >bad.vdb
         shade info bad.vdb
         case $status in
