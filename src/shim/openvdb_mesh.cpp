@@ -13,7 +13,8 @@ namespace vshi {
 namespace {
 
 // Distances, nearest polygons, their next values, and one more set of distances while they are collected; and
-// what a triangle takes as polygon and corners. Measured: see tests/unit/test_grid.c.
+// what a triangle takes as polygon, corners and part of a shell. Measured over spheres of 16000 leaves: 11 to
+// 13 kB a leaf; the whole estimate comes to 1.3 to 1.8 times the peak.
 constexpr double MESH_BYTES_PER_LEAF = 5.0 * BYTES_PER_LEAF;
 constexpr double BYTES_PER_TRIANGLE = 96.0;
 
