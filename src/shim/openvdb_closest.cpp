@@ -146,8 +146,8 @@ bool Again::gather(const NearestLeaf &leaf, bool first, Neighbour *halo) const {
                 }
                 const Int32 polygon = polygons[from]->getValue(at);
                 const bool is_new = first || (polygon & IS_NEW) != 0;
-                *halo = {float(std::fabs(double(values[from]->getValue(at))) * per_world), polygon & ~IS_NEW,
-                         is_new};
+                const double distance = std::fabs(double(values[from]->getValue(at)));
+                *halo = {{float(distance * per_world), polygon & ~IS_NEW}, is_new};
                 tempting |= is_new;
                 many |= only != NOTHING && only != halo->polygon;
                 only = halo->polygon;
