@@ -1,0 +1,280 @@
+/* Ambient occlusion against closed forms and ray-traced truth. */
+#include "shading.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+static const float UP[3] = {0.0f, 1.0f, 0.0f};
+
+static vsh_shade_stats ao_of(const vsh_field *field, int32_t method, int32_t cones, double distance,
+                             size_t count, const double *positions, const float *normals, float *ao) {
+    vsh_shade_options options = vsh_shade_options_default();
+    options.ao_method = method;
+    options.ao_cones = cones;
+    options.ao_distance = distance;
+    const vsh_points points = {count, positions, normals};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_shade_ao(field, &points, &options, NULL, ao, &stats, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return stats;
+}
+
+static float ao_at(const vsh_field *field, int32_t method, int32_t cones, double distance,
+                   const double position[3], const float normal[3]) {
+    float ao = -1.0f;
+    ao_of(field, method, cones, distance, 1, position, normal, &ao);
+    return ao;
+}
+
+static void an_open_plate_is_exactly_1(void **state) {
+    (void)state;
+    const truth_solid plate = {TRUTH_BOX, {0.0, -0.517, 0.0}, {4.0, 0.517, 4.0}, 0.0, 0.0};
+    vsh_field *field = field_of((truth_scene){&plate, 1}, 0.04, 0.0);
+    uint64_t counter = 1;
+    for (double distance = 0.1; distance < 30.0; distance *= 3.0) {
+        for (int sample = 0; sample < 50; ++sample) {
+            const double p[3] = {between(&counter, -4.0, 4.0), sample % 2 ? 0.0 : 1e-3,
+                                 between(&counter, -4.0, 4.0)};
+            for (int32_t cones = 1; cones <= 64; cones += cones < 16 ? 1 : 16) {
+                const float ao = ao_at(field, VSH_AO_CONES, cones, distance, p, UP);
+                if (ao != 1.0f) {
+                    fail_msg("%d cones, distance %g, (%g, %g, %g): %.9g", cones, distance, p[0], p[1], p[2],
+                             (double)ao);
+                }
+            }
+            const float ao = ao_at(field, VSH_AO_TAPS, 1, distance, p, UP);
+            if (ao != 1.0f) {
+                fail_msg("taps, distance %g, (%g, %g, %g): %.9g", distance, p[0], p[1], p[2], (double)ao);
+            }
+        }
+    }
+    vsh_field_free(field);
+}
+
+static void a_wall_hides_half_of_the_sky_from_its_foot(void **state) {
+    (void)state;
+    const truth_solid solids[] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {3.0, 0.5, 3.0}, 0.0, 0.0},
+                                  {TRUTH_BOX, {-1.0, 1.0, 0.0}, {1.0, 2.0, 3.0}, 0.0, 0.0}};
+    vsh_field *field = field_of((truth_scene){solids, 2}, 0.02, 0.0);
+    for (double away = 0.01; away < 0.05; away += 0.01) {
+        for (int32_t cones = 8; cones <= 64; cones *= 2) {
+            const double p[3] = {away, 0.001, 0.1};
+            const double ao = (double)ao_at(field, VSH_AO_CONES, cones, 1.0, p, UP);
+            print_message("%g from the wall, %d cones: %.3f\n", away, cones, ao);
+            assert_true(fabs(ao - 0.5) < 0.06);
+        }
+    }
+    vsh_field_free(field);
+}
+
+/* Mean and largest error over points around a sphere that rests on a plate, or hovers over it. */
+static void under_a_sphere_ao_is_near_the_truth(void **state) {
+    (void)state;
+    const double heights[] = {0.5, 0.8, 1.2};
+    for (int i = 0; i < 3; ++i) {
+        const truth_solid solids[] = {{TRUTH_BOX, {0.0, -0.25, 0.0}, {3.0, 0.25, 3.0}, 0.0, 0.0},
+                                      {TRUTH_SPHERE, {0.0, heights[i], 0.0}, {0.0, 0.0, 0.0}, 0.5, 0.0}};
+        const truth_scene scene = {solids, 2};
+        vsh_field *field = field_of(scene, 0.02, 0.0);
+        const double normal[3] = {0.0, 1.0, 0.0};
+        double worst = 0.0, bias = 0.0, worst_fine = 0.0;
+        int count = 0;
+        for (double x = 0.18; x < 2.0; x += 0.06) {
+            for (double distance = 0.5; distance < 3.0; distance *= 2.0) {
+                const double p[3] = {x * 0.8, 0.001, x * 0.6};
+                const double truth = truth_ao(scene, p, normal, distance, 4096);
+                const double error = (double)ao_at(field, VSH_AO_CONES, 16, distance, p, UP) - truth;
+                worst = fmax(worst, fabs(error));
+                worst_fine =
+                    fmax(worst_fine, fabs((double)ao_at(field, VSH_AO_CONES, 64, distance, p, UP) - truth));
+                bias += error;
+                ++count;
+            }
+        }
+        /* nearer to the foot of the resting sphere the cleft is lower than a voxel */
+        print_message("sphere at %g: 16 cones worst %.4f, bias %+.4f; 64 cones worst %.4f\n", heights[i],
+                      worst, bias / count, worst_fine);
+        assert_true(worst < 0.06);
+        assert_true(worst_fine < 0.06);
+        vsh_field_free(field);
+    }
+}
+
+/* A cone's ball at its end reaches farther than its centre by the sine of its half angle; the taps ask for
+ * twice the distance along the normal. */
+static void what_is_beyond_the_distance_hides_nothing(void **state) {
+    (void)state;
+    const truth_solid solids[] = {{TRUTH_BOX, {0.0, -0.25, 0.0}, {3.0, 0.25, 3.0}, 0.0, 0.0},
+                                  {TRUTH_BOX, {0.0, 1.5, 0.0}, {3.0, 0.5, 3.0}, 0.0, 0.0}};
+    vsh_field *field = field_of((truth_scene){solids, 2}, 0.04, 0.0); /* a ceiling, 1 over the floor */
+    const double p[3] = {0.1, 0.0, 0.2};
+    for (int32_t cones = 1; cones <= 64; cones *= 2) {
+        const double sine = fmin(sqrt(0.5), sqrt(1.0 - (1.0 - 1.0 / cones) * (1.0 - 1.0 / cones)));
+        assert_true(ao_at(field, VSH_AO_CONES, cones, 0.95 / (1.0 + sine), p, UP) == 1.0f);
+        assert_true(ao_at(field, VSH_AO_CONES, cones, 3.0, p, UP) < 0.5f);
+    }
+    assert_true(ao_at(field, VSH_AO_TAPS, 1, 0.4, p, UP) == 1.0f);
+    assert_true(ao_at(field, VSH_AO_TAPS, 1, 1.0, p, UP) < 1.0f);
+    vsh_field_free(field);
+}
+
+static vsh_field *hollow_box(double voxel) {
+    vsh_sdf_node nodes[3] = {vsh_sdf_node_default(), vsh_sdf_node_default(), vsh_sdf_node_default()};
+    nodes[0].shape = nodes[1].shape = VSH_SDF_BOX;
+    nodes[0].size[0] = nodes[0].size[1] = nodes[0].size[2] = 3.0;
+    nodes[2].shape = VSH_SDF_SUBTRACTION;
+    nodes[2].left = 0;
+    nodes[2].right = 1;
+    const vsh_sdf sdf = {nodes, 3};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = voxel;
+    vsh_grid *grid = NULL;
+    assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, NULL), VSH_OK);
+    return field_of_grid(grid, 0.0);
+}
+
+/* Walls of twice the room's half size. Thinner ones leak, as all occluders that are thinner than the cone is
+ * wide where it meets them: the closeness cannot fall below minus half their thickness. */
+static void a_closed_cavity_is_dark(void **state) {
+    (void)state;
+    vsh_field *field = hollow_box(0.04);
+    uint64_t counter = 2;
+    float brightest[2] = {0.0f, 0.0f};
+    for (int i = 0; i < 200; ++i) {
+        const double p[3] = {between(&counter, -0.95, 0.95), -0.999, between(&counter, -0.95, 0.95)};
+        for (int fine = 0; fine < 2; ++fine) {
+            brightest[fine] = fmaxf(brightest[fine], ao_at(field, VSH_AO_CONES, fine ? 64 : 16, 10.0, p, UP));
+        }
+    }
+    print_message("brightest in the cavity: 16 cones %.4f, 64 cones %.4f\n", (double)brightest[0],
+                  (double)brightest[1]);
+    assert_true(brightest[0] < 0.05f);
+    assert_true(brightest[1] < 0.01f);
+    vsh_field_free(field);
+}
+
+static void farther_distances_hide_more(void **state) {
+    (void)state;
+    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
+    uint64_t counter = 3;
+    float rise = 0.0f;
+    for (int i = 0; i < 200; ++i) {
+        const double p[3] = {between(&counter, -2.5, 2.5), 0.001, between(&counter, -2.5, 2.5)};
+        float last = 1.0f;
+        for (double distance = 0.1; distance < 10.0; distance *= 1.3) {
+            const float ao = ao_at(field, VSH_AO_CONES, 16, distance, p, UP);
+            rise = fmaxf(rise, ao - last);
+            last = ao;
+        }
+    }
+    print_message("AO rises by %.5f at most\n", (double)rise);
+    assert_true(rise <= 1e-3f); /* samples of a longer cone fall elsewhere */
+    vsh_field_free(field);
+}
+
+static void bad_points_are_nan_and_counted_and_others_are_not_touched(void **state) {
+    (void)state;
+    vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
+    enum { COUNT = 7 };
+    const double nan = (double)NAN, inf = (double)INFINITY;
+    const double positions[3 * COUNT] = {0.0, 0.001, 2.0,   nan, 0.0, 0.0,   0.0, inf, 0.0,   0.0, 0.001,
+                                         2.0, 0.0,   0.001, 2.0, 0.0, 0.001, 2.0, 0.0, 0.001, 2.0};
+    const float normals[3 * COUNT] = {0.0f, 1.0f, 0.0f, 0.0f, 1.0f, 0.0f,       0.0f, 1.0f, 0.0f,
+                                      0.0f, 0.0f, 0.0f, 0.0f, 1.0f, (float)NAN, 0.0f, 2.0f, (float)INFINITY,
+                                      0.0f, 2.5f, 0.0f};
+    for (int32_t method = VSH_AO_TAPS; method <= VSH_AO_CONES; ++method) {
+        float ao[COUNT];
+        const vsh_shade_stats stats = ao_of(field, method, 16, 1.0, COUNT, positions, normals, ao);
+        assert_int_equal(stats.invalid, 5);
+        for (int i = 0; i < COUNT; ++i) {
+            assert_int_equal(isnan(ao[i]) != 0, i != 0 && i != 6);
+        }
+        assert_int_equal(bits_of(ao[0]), bits_of(ao[6])); /* normals of any length */
+    }
+    vsh_field_free(field);
+}
+
+static void threads_and_the_order_of_points_do_not_show(void **state) {
+    (void)state;
+    enum { COUNT = 48 * 48 };
+    const size_t size = 64;
+    static double positions[3 * 4096];
+    static float normals[3 * 4096], first[4096], other[4096];
+    floor_texels(size, positions, normals);
+    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
+    for (int32_t method = VSH_AO_TAPS; method <= VSH_AO_CONES; ++method) {
+        vsh_shade_options options = vsh_shade_options_default();
+        options.ao_method = method;
+        options.ao_cones = 7; /* pieces of the kernel's lanes end in the middle of points */
+        const vsh_points points = {4096, positions, normals};
+        const int32_t threads[] = {1, 2, 5};
+        vsh_shade_stats stats[3];
+        for (int i = 0; i < 3; ++i) {
+            vsh_run run = vsh_run_default();
+            run.threads = threads[i];
+            stats[i] = vsh_shade_stats_zero();
+            assert_int_equal(
+                vsh_shade_ao(field, &points, &options, &run, i == 0 ? first : other, &stats[i], NULL),
+                VSH_OK);
+            if (i > 0) {
+                assert_memory_equal(first, other, sizeof first);
+                assert_memory_equal(&stats[0], &stats[i], sizeof stats[0]);
+            }
+        }
+        for (size_t i = 0; i < COUNT; i += 97) { /* one at a time */
+            const vsh_points one = {1, positions + 3 * i, normals + 3 * i};
+            float ao = -1.0f;
+            assert_int_equal(vsh_shade_ao(field, &one, &options, NULL, &ao, NULL, NULL), VSH_OK);
+            assert_int_equal(bits_of(ao), bits_of(first[i]));
+        }
+    }
+    vsh_field_free(field);
+}
+
+static void options_out_of_range_are_named(void **state) {
+    (void)state;
+    vsh_field *field = field_of(truth_seeds(), 0.2, 1.0);
+    const double p[3] = {0.0, 0.001, 2.0};
+    const vsh_points points = {1, p, UP}, bare = {1, p, NULL};
+    float ao = -1.0f;
+    vsh_error error = {VSH_OK, ""};
+    assert_int_equal(vsh_shade_ao(field, &bare, NULL, NULL, &ao, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "normals"));
+    const int32_t counts[] = {0, -1, 257};
+    for (int i = 0; i < 3; ++i) {
+        vsh_shade_options options = vsh_shade_options_default();
+        options.ao_cones = counts[i];
+        assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &ao, NULL, &error), VSH_ERROR_ARGUMENT);
+        assert_non_null(strstr(error.message, "ao_cones"));
+    }
+    const double distances[] = {0.0, -1.0, (double)NAN, (double)INFINITY};
+    for (int i = 0; i < 4; ++i) {
+        vsh_shade_options options = vsh_shade_options_default();
+        options.ao_distance = distances[i];
+        assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &ao, NULL, &error), VSH_ERROR_ARGUMENT);
+        assert_non_null(strstr(error.message, "ao_distance"));
+    }
+    vsh_shade_options options = vsh_shade_options_default();
+    options.ao_method = 2;
+    assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &ao, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "ao_method"));
+    assert_true(ao == -1.0f);
+    vsh_field_free(field);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(an_open_plate_is_exactly_1),
+        cmocka_unit_test(a_wall_hides_half_of_the_sky_from_its_foot),
+        cmocka_unit_test(under_a_sphere_ao_is_near_the_truth),
+        cmocka_unit_test(what_is_beyond_the_distance_hides_nothing),
+        cmocka_unit_test(a_closed_cavity_is_dark),
+        cmocka_unit_test(farther_distances_hide_more),
+        cmocka_unit_test(bad_points_are_nan_and_counted_and_others_are_not_touched),
+        cmocka_unit_test(threads_and_the_order_of_points_do_not_show),
+        cmocka_unit_test(options_out_of_range_are_named),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

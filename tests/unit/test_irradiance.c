@@ -1,0 +1,174 @@
+/* Irradiance: visibility × colour × falloff × cosine, each against its closed form. */
+#include "shading.h"
+
+static const double ORIGIN[3] = {0.0, 0.0, 0.0};
+static const float UP[3] = {0.0f, 1.0f, 0.0f};
+
+/* Of one point at the origin, fully lit. */
+static void lit(const vsh_light *light, const float normal[3], float rgb[3]) {
+    const vsh_points points = {1, ORIGIN, normal};
+    const float one = 1.0f;
+    rgb[0] = rgb[1] = rgb[2] = 0.0f;
+    vsh_shade_irradiance(&points, NULL, light, &one, rgb);
+}
+
+static float red(const vsh_light *light) {
+    float rgb[3];
+    lit(light, UP, rgb);
+    return rgb[0];
+}
+
+static void the_cosine_to_the_light_weighs_it(void **state) {
+    (void)state;
+    for (int degrees = 0; degrees <= 180; degrees += 5) {
+        double towards[3];
+        direction_at(RADIANS(degrees - 90), 0.7, towards);
+        for (int axis = 0; axis < 3; ++axis) {
+            towards[axis] *= 17.0; /* of any length */
+        }
+        const vsh_light light = sun(towards, 0.1);
+        assert_float_equal(red(&light), fmax(0.0, sin(RADIANS(degrees - 90))), 1e-6);
+    }
+    /* normals of any length */
+    const vsh_light light = sun((const double[]){1.0, 1.0, 0.0}, 0.1);
+    float rgb[3];
+    lit(&light, (const float[]){0.0f, 1e-3f, 0.0f}, rgb);
+    assert_float_equal(rgb[0], sqrt(0.5), 1e-6);
+}
+
+static void shading_normals_stand_in_for_geometric_ones(void **state) {
+    (void)state;
+    const vsh_points points = {1, ORIGIN, UP};
+    const float one = 1.0f, sideways[3] = {1.0f, 0.0f, 0.0f};
+    const vsh_light light = sun((const double[]){1.0, 0.0, 0.0}, 0.1);
+    float rgb[3] = {0.0f, 0.0f, 0.0f};
+    vsh_shade_irradiance(&points, NULL, &light, &one, rgb);
+    assert_true(rgb[0] == 0.0f);
+    vsh_shade_irradiance(&points, sideways, &light, &one, rgb);
+    assert_float_equal(rgb[0], 1.0, 1e-6);
+}
+
+static void falloffs_follow_their_formulas(void **state) {
+    (void)state;
+    for (double d = 0.3; d < 20.0; d *= 1.4) {
+        vsh_light light = lamp((const double[]){0.0, d, 0.0}, 0.25);
+        assert_float_equal(red(&light), 1.0, 1e-6);
+        light.falloff = VSH_FALLOFF_INVERSE_SQUARE;
+        assert_true(fabs((double)red(&light) * d * d - 1.0) < 1e-6);
+        light.falloff = VSH_FALLOFF_QUADRATIC;
+        light.reach = 8.0;
+        const double left = d < 8.0 ? 1.0 - d / 8.0 : 0.0;
+        assert_float_equal(red(&light), left * left, 1e-6);
+    }
+}
+
+static void a_point_at_the_light_gets_no_infinity(void **state) {
+    (void)state;
+    const double distances[] = {0.0, 1e-300, 1e-30, 1e-3, 0.2};
+    for (size_t i = 0; i < sizeof distances / sizeof distances[0]; ++i) {
+        vsh_light light = lamp((const double[]){0.0, distances[i], 0.0}, 0.25);
+        light.falloff = VSH_FALLOFF_INVERSE_SQUARE;
+        const float value = red(&light);
+        assert_true(value >= 0.0f && value <= 16.0f + 1e-4f); /* as on the light's own surface */
+    }
+}
+
+static void a_spot_fades_smoothly_between_its_angles(void **state) {
+    (void)state;
+    vsh_light light = lamp((const double[]){0.0, 2.0, 0.0}, 0.1);
+    light.type = VSH_LIGHT_SPOT;
+    light.inner_angle = RADIANS(20.0);
+    light.outer_angle = RADIANS(40.0);
+    float last = 2.0f;
+    for (double degrees = 0.0; degrees <= 90.0; degrees += 0.5) {
+        /* the axis leans by so much from the way down to the point */
+        light.direction[0] = 3.0 * sin(RADIANS(degrees));
+        light.direction[1] = -3.0 * cos(RADIANS(degrees));
+        light.direction[2] = 0.0;
+        const float value = red(&light);
+        const double t = (cos(RADIANS(degrees)) - cos(light.outer_angle)) /
+                         (cos(light.inner_angle) - cos(light.outer_angle));
+        const double s = fmin(1.0, fmax(0.0, t));
+        assert_float_equal(value, s * s * (3.0 - 2.0 * s), 1e-6);
+        assert_true(value <= last);
+        last = value;
+        if (degrees <= 20.0) {
+            assert_float_equal(value, 1.0, 1e-6);
+        }
+        if (degrees >= 40.0) {
+            assert_float_equal(value, 0.0, 1e-6);
+        }
+    }
+    /* without a soft edge */
+    light.inner_angle = light.outer_angle;
+    light.direction[0] = sin(RADIANS(39.0));
+    light.direction[1] = -cos(RADIANS(39.0));
+    assert_true(red(&light) == 1.0f);
+    light.direction[0] = sin(RADIANS(41.0));
+    light.direction[1] = -cos(RADIANS(41.0));
+    assert_true(red(&light) == 0.0f);
+    /* as wide as can be, it is a sphere */
+    light.outer_angle = light.inner_angle = PI;
+    light.direction[0] = 0.0;
+    light.direction[1] = 1.0;
+    assert_true(red(&light) == 1.0f);
+}
+
+static void colour_and_visibility_multiply_and_lights_add(void **state) {
+    (void)state;
+    enum { COUNT = 5 };
+    const double positions[3 * COUNT] = {0.0};
+    float normals[3 * COUNT], rgb[3 * COUNT];
+    for (int i = 0; i < 3 * COUNT; ++i) {
+        normals[i] = UP[i % 3];
+        rgb[i] = 10.0f;
+    }
+    const float visible[COUNT] = {0.0f, 0.25f, 1.0f, (float)NAN, 0.5f};
+    vsh_light light = sun((const double[]){0.0, 1.0, 0.0}, 0.1);
+    light.color[0] = 2.0;
+    light.color[1] = 0.5;
+    light.color[2] = 0.0;
+    const vsh_points points = {COUNT, positions, normals};
+    vsh_shade_irradiance(&points, NULL, &light, visible, rgb);
+    vsh_shade_irradiance(&points, NULL, &light, visible, rgb);
+    for (int i = 0; i < COUNT; ++i) {
+        const float v = isnan(visible[i]) ? 0.0f : visible[i];
+        for (int c = 0; c < 3; ++c) {
+            assert_float_equal(rgb[3 * i + c], 10.0 + 2.0 * (double)v * light.color[c], 1e-5);
+        }
+    }
+    assert_true(rgb[9] == 10.0f); /* NaN adds nothing */
+}
+
+static void what_has_no_place_or_normal_adds_nothing(void **state) {
+    (void)state;
+    const double positions[6] = {(double)NAN, 0.0, 0.0, 0.0, (double)INFINITY, 0.0};
+    const float normals[6] = {0.0f, 1.0f, 0.0f, 0.0f, 1.0f, 0.0f};
+    const float visible[2] = {1.0f, 1.0f};
+    const vsh_light light = lamp((const double[]){0.0, 1.0, 0.0}, 0.1);
+    const vsh_points points = {2, positions, normals};
+    float rgb[6] = {0.0f};
+    vsh_shade_irradiance(&points, NULL, &light, visible, rgb);
+    const double here[6] = {0.0};
+    const float bad[6] = {0.0f, 0.0f, 0.0f, (float)NAN, 1.0f, 0.0f};
+    const vsh_points without = {2, here, bad};
+    vsh_shade_irradiance(&without, NULL, &light, visible, rgb);
+    for (int i = 0; i < 6; ++i) {
+        assert_true(rgb[i] == 0.0f);
+    }
+    const vsh_points none = {0, NULL, NULL};
+    vsh_shade_irradiance(&none, NULL, &light, NULL, NULL);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_cosine_to_the_light_weighs_it),
+        cmocka_unit_test(shading_normals_stand_in_for_geometric_ones),
+        cmocka_unit_test(falloffs_follow_their_formulas),
+        cmocka_unit_test(a_point_at_the_light_gets_no_infinity),
+        cmocka_unit_test(a_spot_fades_smoothly_between_its_angles),
+        cmocka_unit_test(colour_and_visibility_multiply_and_lights_add),
+        cmocka_unit_test(what_has_no_place_or_normal_adds_nothing),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
