@@ -1,0 +1,350 @@
+/* How shadows are computed: the same bits however they are run, work that is counted, bad input. */
+#include "shading.h"
+
+#include "shade/kernel/march.h"
+
+#include <stdlib.h>
+
+enum { SIDE = 64, COUNT = SIDE * SIDE, METHODS = 5 };
+
+static const float UP[3] = {0.0f, 1.0f, 0.0f};
+static double positions[3 * COUNT];
+static float normals[3 * COUNT];
+
+/* Floor texels, points in the air and inside solids, with normals all around. */
+static void fill_points(void) {
+    uint64_t counter = 9;
+    floor_texels(SIDE, positions, normals);
+    for (size_t i = 0; i < COUNT; i += 3) {
+        double n[3];
+        random_direction(&counter, n);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            positions[3 * i + axis] = axis == 1 ? between(&counter, -1.0, 3.0) : between(&counter, -4.0, 4.0);
+            normals[3 * i + axis] = (float)n[axis];
+        }
+    }
+}
+
+typedef struct march_result {
+    float close[1000];
+    vshi_march_stats stats;
+} march_result;
+
+static void march_with(vshi_march_fn *march, const vsh_field *field, size_t count, int32_t kind,
+                       march_result *result) {
+    static float lanes[11][1000];
+    uint64_t counter = 77;
+    for (size_t i = 0; i < count; ++i) {
+        double d[3];
+        random_direction(&counter, d);
+        for (int axis = 0; axis < 3; ++axis) {
+            lanes[axis][i] = (float)between(&counter, axis == 1 ? -20.0 : -100.0, axis == 1 ? 80.0 : 100.0);
+            lanes[3 + axis][i] = (float)d[axis];
+        }
+        const double sine = i % 5 == 0 ? 0.0 : between(&counter, 0.001, 0.6);
+        lanes[6][i] = 0.0625f;
+        lanes[7][i] = (float)between(&counter, 0.1, 300.0);
+        lanes[8][i] = (float)sine;
+        lanes[9][i] = i % 3 == 0 ? 0.0f : -(float)sine;
+        lanes[10][i] = sine > 0.0 ? (float)sine : 1.0f;
+    }
+    const vshi_rays rays = {count,
+                            {lanes[0], lanes[1], lanes[2]},
+                            {lanes[3], lanes[4], lanes[5]},
+                            lanes[6],
+                            lanes[7],
+                            lanes[8],
+                            lanes[9],
+                            lanes[10]};
+    result->stats = (vshi_march_stats){0, 0};
+    march(field, &rays, kind, 40, &result->stats);
+    memcpy(result->close, lanes[10], sizeof result->close);
+}
+
+static void every_instruction_set_gives_the_same_bits(void **state) {
+    (void)state;
+    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
+    vshi_march_fn *others[2] = {NULL, NULL};
+    size_t other_count = 0;
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2")) {
+        others[other_count++] = vshi_march_avx2;
+    }
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512vl")) {
+        others[other_count++] = vshi_march_avx512;
+    }
+#endif
+    print_message("%zu kernels beside the base\n", other_count);
+    static march_result base, other;
+    const size_t counts[] = {0, 1, 15, 16, 17, 100, 1000};
+    for (size_t c = 0; c < sizeof counts / sizeof counts[0]; ++c) {
+        for (int32_t kind = VSHI_MARCH_PLAIN; kind <= VSHI_MARCH_TRIANGULATED; ++kind) {
+            march_with(vshi_march_base, field, counts[c], kind, &base);
+            for (size_t o = 0; o < other_count; ++o) {
+                march_with(others[o], field, counts[c], kind, &other);
+                assert_memory_equal(base.close, other.close, counts[c] * sizeof base.close[0]);
+                assert_int_equal(base.stats.samples, other.stats.samples);
+                assert_int_equal(base.stats.unfinished, other.stats.unfinished);
+            }
+        }
+    }
+    assert_true(base.stats.unfinished > 0); /* of which there were some */
+    vsh_field_free(field);
+}
+
+static void neither_threads_nor_neighbours_show_in_the_bits(void **state) {
+    (void)state;
+    static float first[COUNT], other[COUNT];
+    fill_points();
+    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
+    const double place[3] = {1.0, 1.5, 1.0};
+    const vsh_light lights[2] = {sun(truth_seeds_sun, 0.2), lamp(place, 0.2)};
+    for (int l = 0; l < 2; ++l) {
+        for (int32_t method = 0; method < METHODS; ++method) {
+            vsh_shade_options options = vsh_shade_options_default();
+            options.method = method;
+            const vsh_points points = {COUNT, positions, normals};
+            const int32_t threads[] = {1, 2, 5};
+            vsh_shade_stats stats[3];
+            for (int i = 0; i < 3; ++i) {
+                vsh_run run = vsh_run_default();
+                run.threads = threads[i];
+                stats[i] = vsh_shade_stats_zero();
+                assert_int_equal(vsh_shade_shadow(field, &points, &lights[l], &options, &run,
+                                                  i == 0 ? first : other, &stats[i], NULL),
+                                 VSH_OK);
+                if (i > 0) {
+                    assert_memory_equal(first, other, sizeof first);
+                    assert_memory_equal(&stats[0], &stats[i], sizeof stats[0]);
+                }
+            }
+            for (size_t i = 0; i < COUNT; i += 61) { /* one at a time */
+                const float v = shadow_at(field, &lights[l], method, positions + 3 * i, normals + 3 * i);
+                assert_int_equal(bits_of(v), bits_of(first[i]));
+            }
+        }
+    }
+    vsh_field_free(field);
+}
+
+static void a_scene_scaled_by_a_power_of_two_has_the_same_bits(void **state) {
+    (void)state;
+    static float visible[3][COUNT];
+    static double scaled[3 * COUNT];
+    fill_points();
+    const double scales[3] = {1.0, 1024.0, 1.0 / 1024.0}, nowhere[3] = {0.0, 0.0, 0.0};
+    vsh_field *fields[3];
+    for (int s = 0; s < 3; ++s) {
+        fields[s] = field_of_grid(grid_of_moved(truth_seeds(), 0.03125, scales[s], nowhere), scales[s] * 8.0);
+    }
+    for (int l = 0; l < 2; ++l) {
+        for (int32_t method = 0; method < METHODS; ++method) {
+            for (int s = 0; s < 3; ++s) {
+                for (size_t i = 0; i < 3 * COUNT; ++i) {
+                    scaled[i] = scales[s] * positions[i];
+                }
+                const double place[3] = {scales[s], 1.5 * scales[s], scales[s]};
+                const vsh_light light = l == 0 ? sun(truth_seeds_sun, 0.2) : lamp(place, 0.25 * scales[s]);
+                shadows(fields[s], &light, method, COUNT, scaled, normals, visible[s]);
+                assert_memory_equal(visible[0], visible[s], sizeof visible[0]);
+            }
+        }
+    }
+    for (int s = 0; s < 3; ++s) {
+        vsh_field_free(fields[s]);
+    }
+}
+
+static void every_point_is_marched_skipped_certified_or_invalid(void **state) {
+    (void)state;
+    static float visible[COUNT];
+    fill_points();
+    positions[0] = (double)NAN;
+    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    for (int32_t method = 0; method < METHODS; ++method) {
+        const vsh_shade_stats stats = shadows(field, &light, method, COUNT, positions, normals, visible);
+        size_t zero = 0, nan = 0;
+        for (size_t i = 0; i < COUNT; ++i) {
+            zero += visible[i] == 0.0f;
+            nan += isnan(visible[i]);
+        }
+        assert_int_equal(stats.invalid, 1);
+        assert_int_equal(nan, 1);
+        assert_true(stats.skipped > 0 && stats.skipped <= zero);
+        assert_true(stats.marches > COUNT / 4);
+        const uint64_t done = stats.marches + stats.skipped + stats.invalid;
+        assert_true(done <= COUNT);
+        /* what misses the casters' bounds is neither marched nor skipped */
+        assert_true(COUNT - done < COUNT / 3);
+        assert_true(stats.samples >= stats.marches);
+        assert_int_equal(stats.unfinished, 0);
+        assert_int_equal(stats.beyond_reach, 0);
+        if (method == VSH_SHADOW_CONE) {
+            assert_true(stats.certified > COUNT / 3 &&
+                        stats.certified <= COUNT - stats.skipped - stats.invalid);
+        }
+    }
+    /* calls add to what is there */
+    const vsh_points points = {COUNT, positions, normals};
+    vsh_shade_stats sum = vsh_shade_stats_zero();
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, NULL, visible, &sum, NULL), VSH_OK);
+    const vsh_shade_stats once = sum;
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, NULL, visible, &sum, NULL), VSH_OK);
+    assert_int_equal(sum.marches, 2 * once.marches);
+    assert_int_equal(sum.samples, 2 * once.samples);
+    assert_int_equal(sum.certified, 2 * once.certified);
+    vsh_field_free(field);
+}
+
+static void points_turned_away_are_0_and_skipped_not_marched(void **state) {
+    (void)state;
+    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
+    const double p[3] = {0.0, 5.0, 0.0};
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    const float away[3] = {0.5f, -0.6f, 0.6f};
+    for (int32_t method = 0; method < METHODS; ++method) {
+        float v = -1.0f;
+        const vsh_shade_stats stats = shadows(field, &light, method, 1, p, away, &v);
+        assert_true(v == 0.0f);
+        assert_int_equal(stats.skipped, 1);
+        assert_int_equal(stats.marches, 0);
+        assert_int_equal(stats.invalid, 0);
+    }
+    vsh_field_free(field);
+}
+
+static void points_without_place_or_normal_are_nan_and_counted(void **state) {
+    (void)state;
+    vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
+    const double nan = (double)NAN, inf = (double)INFINITY;
+    const double p[6][3] = {{nan, 0.0, 0.0}, {0.0, inf, 0.0}, {0.0, 0.0, -inf},
+                            {0.0, 5.0, 0.0}, {0.0, 5.0, 0.0}, {0.0, 5.0, 0.0}};
+    const float n[6][3] = {{0.0f, 1.0f, 0.0f}, {0.0f, 1.0f, 0.0f},       {0.0f, 1.0f, 0.0f},
+                           {0.0f, 0.0f, 0.0f}, {0.0f, (float)NAN, 0.0f}, {(float)INFINITY, 0.0f, 0.0f}};
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    for (int32_t method = 0; method < METHODS; ++method) {
+        float v[6];
+        vsh_shade_stats stats = shadows(field, &light, method, 6, &p[0][0], &n[0][0], v);
+        assert_int_equal(stats.invalid, 6);
+        assert_int_equal(stats.marches, 0);
+        for (int i = 0; i < 6; ++i) {
+            assert_true(isnan(v[i]));
+        }
+        stats = shadows(field, &light, method, 6, &p[0][0], NULL, v);
+        assert_int_equal(stats.invalid, 3);
+        for (int i = 0; i < 6; ++i) {
+            assert_int_equal(isnan(v[i]) != 0, i < 3);
+        }
+    }
+    vsh_field_free(field);
+}
+
+static void running_out_of_steps_is_counted_and_stays_in_range(void **state) {
+    (void)state;
+    static float visible[COUNT];
+    floor_texels(SIDE, positions, normals);
+    vsh_field *field = field_of(truth_seeds(), 0.02, 0.0);
+    const double low[3] = {-1.0, 0.02, -0.3}; /* along the floor, where steps are short */
+    const vsh_light light = sun(low, 0.01);
+    vsh_shade_options options = vsh_shade_options_default();
+    const vsh_points points = {COUNT, positions, normals};
+    vsh_shade_stats few = vsh_shade_stats_zero(), many = vsh_shade_stats_zero();
+    options.max_steps = 16;
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, &few, NULL), VSH_OK);
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_true(visible[i] >= 0.0f && visible[i] <= 1.0f);
+    }
+    options.max_steps = 65536;
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, &many, NULL), VSH_OK);
+    print_message("of %d grazing rays, %d out of 16 steps\n", COUNT, (int)few.unfinished);
+    assert_true(few.unfinished > 100);
+    assert_true(few.samples <= 16 * few.marches);
+    assert_int_equal(many.unfinished, 0);
+    vsh_field_free(field);
+}
+
+static void cones_wider_than_the_reach_are_counted(void **state) {
+    (void)state;
+    static float visible[COUNT];
+    floor_texels(SIDE, positions, normals);
+    vsh_field *field = field_of(truth_seeds(), 0.04, 0.2);
+    const vsh_light wide = sun(truth_seeds_sun, RADIANS(60.0)), narrow = sun(truth_seeds_sun, RADIANS(0.5));
+    vsh_shade_stats stats = shadows(field, &wide, VSH_SHADOW_CONE, COUNT, positions, normals, visible);
+    assert_true(stats.beyond_reach > 0 && stats.beyond_reach <= stats.marches);
+    stats = shadows(field, &narrow, VSH_SHADOW_CONE, COUNT, positions, normals, visible);
+    assert_int_equal(stats.beyond_reach, 0);
+    vsh_field_free(field);
+}
+
+static int32_t stop_at(void *user, const char *stage, double fraction) {
+    assert_string_equal(stage, "shadow.sun");
+    return fraction >= *(const double *)user;
+}
+
+static void options_lights_and_cancelling_have_their_codes(void **state) {
+    (void)state;
+    static float visible[COUNT];
+    floor_texels(SIDE, positions, normals);
+    vsh_field *field = field_of(truth_seeds(), 0.2, 1.0);
+    const vsh_points points = {COUNT, positions, normals};
+    vsh_light light = sun(truth_seeds_sun, 0.2);
+    vsh_error error = {VSH_OK, ""};
+    vsh_shade_options options = vsh_shade_options_default();
+    options.method = METHODS;
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "method"));
+    options = vsh_shade_options_default();
+    options.max_steps = 15;
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "max_steps"));
+    const double offsets[] = {-0.1, 17.0, (double)NAN};
+    for (int i = 0; i < 3; ++i) {
+        options = vsh_shade_options_default();
+        options.start_offset = offsets[i];
+        assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &error),
+                         VSH_ERROR_ARGUMENT);
+        assert_non_null(strstr(error.message, "start_offset"));
+    }
+    options = vsh_shade_options_default();
+    options.struct_size = 3;
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    light.angle = -1.0;
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, NULL, visible, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "angle"));
+
+    light.angle = 0.2;
+    const double stops[] = {0.0, 0.1, 0.5};
+    for (int i = 0; i < 3; ++i) {
+        double stop = stops[i];
+        vsh_run run = vsh_run_default();
+        run.progress = stop_at;
+        run.user = &stop;
+        assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, &run, visible, NULL, &error),
+                         VSH_ERROR_CANCELLED);
+    }
+    const vsh_points none = {0, NULL, NULL};
+    assert_int_equal(vsh_shade_shadow(field, &none, &light, NULL, NULL, NULL, NULL, NULL), VSH_OK);
+    assert_true(shadow_at(field, &light, VSH_SHADOW_CONE, (const double[]){0.0, 9.0, 0.0}, UP) == 1.0f);
+    vsh_field_free(field);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_instruction_set_gives_the_same_bits),
+        cmocka_unit_test(neither_threads_nor_neighbours_show_in_the_bits),
+        cmocka_unit_test(a_scene_scaled_by_a_power_of_two_has_the_same_bits),
+        cmocka_unit_test(every_point_is_marched_skipped_certified_or_invalid),
+        cmocka_unit_test(points_turned_away_are_0_and_skipped_not_marched),
+        cmocka_unit_test(points_without_place_or_normal_are_nan_and_counted),
+        cmocka_unit_test(running_out_of_steps_is_counted_and_stays_in_range),
+        cmocka_unit_test(cones_wider_than_the_reach_are_counted),
+        cmocka_unit_test(options_lights_and_cancelling_have_their_codes),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
