@@ -38,9 +38,13 @@ static inline bool vshi_finite(vshi_vec a) {
     return isfinite(a.x) && isfinite(a.y) && isfinite(a.z);
 }
 
-/* Unit vector along a, or zero where a has no direction. Scaled first, so that neither 1e-200 nor 1e200 is
- * lost. */
+/* Unit vector along a, or zero where a has no direction. What would leave the range of doubles when squared
+ * is scaled first, so that neither 1e-200 nor 1e200 is lost. */
 static inline vshi_vec vshi_unit(vshi_vec a) {
+    const double square = vshi_dot(a, a);
+    if (square > 1e-200 && square < 1e200) {
+        return vshi_scale(a, 1.0 / sqrt(square));
+    }
     const double largest = fmax(fabs(a.x), fmax(fabs(a.y), fabs(a.z)));
     if (!(largest > 0.0) || !isfinite(largest)) {
         return (vshi_vec){0.0, 0.0, 0.0};

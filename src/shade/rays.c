@@ -44,8 +44,9 @@ bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *
      * cone's */
     double farthest = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
-        const double side = fmax(fabs(o[axis] - (double)field->bounds_min[axis]),
-                                 fabs(o[axis] - (double)field->bounds_max[axis]));
+        const double low = fabs(o[axis] - (double)field->bounds_min[axis]);
+        const double high = fabs(o[axis] - (double)field->bounds_max[axis]);
+        const double side = low > high ? low : high;
         farthest += side * side;
     }
     const double last = sqrt(farthest / (1.0 - cone->sine * cone->sine)) + BOUNDS_MARGIN;
