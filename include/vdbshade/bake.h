@@ -13,11 +13,11 @@ enum { VSH_MAX_LIGHTMAP_SIZE = 65536 };
 
 typedef struct vsh_lightmap_options {
     size_t struct_size;
-    int32_t width; /* texels, 1 … VSH_MAX_LIGHTMAP_SIZE */
-    int32_t height;
+    int32_t width;           /* texels, 1 … VSH_MAX_LIGHTMAP_SIZE */
+    int32_t height;          /* the same */
     int32_t supersample;     /* N: N × N samples a texel, 1 … 16 */
     int32_t padding;         /* texels that charts are grown by, 0 … 4096; fills values, never coverage */
-    vsh_shade_options shade; /* surface_offset is set for each mesh by the bake */
+    vsh_shade_options shade; /* of a bake that is given none; checked there */
 } vsh_lightmap_options;
 
 static inline vsh_lightmap_options vsh_lightmap_options_default(void) {
@@ -34,12 +34,17 @@ typedef struct vsh_uv_report {
     size_t degenerate_triangles; /* triangles without area in UV space, but with area in the world */
 } vsh_uv_report;
 
-/* The texels of a receiver at one size: where each lies in the world. Immutable; may be shared by threads. */
+/* The texels of a receiver at one size: where each lies in the world. The meshes are not needed any more. */
 typedef struct vsh_texels vsh_texels;
 
-/* Rasterises the meshes' UVs. `uv_reports` [mesh_count] may be NULL. Errors: VSH_ERROR_ARGUMENT (sizes),
- * VSH_ERROR_INPUT (no UVs, UVs not finite, and as vsh_mesh_check()), VSH_ERROR_LIMIT, VSH_ERROR_CANCELLED.
- * Free the result with vsh_texels_free(). */
+/* Rasterises the meshes' UVs, with a warning for what the reports hold. `uv_reports` [mesh_count] may be
+ * NULL and is filled on success. Where triangles overlap, the first in the order of meshes and triangles
+ * keeps the texel. Free the result with vsh_texels_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: texels or meshes NULL, no meshes or more than 2^32 - 1, sizes out of range, run,
+ *   and as vsh_mesh_check();
+ * - VSH_ERROR_INPUT: a mesh without UVs, UVs that are not finite, and as vsh_mesh_check();
+ * - VSH_ERROR_LIMIT: run->memory_limit; more than 2^32 - 2 triangles;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count,
                                      const vsh_lightmap_options *options, const vsh_run *run,
                                      vsh_uv_report *uv_reports, vsh_texels **texels, vsh_error *error);
@@ -50,27 +55,29 @@ typedef struct vsh_texels_info {
     int32_t height;
     uint64_t covered;     /* texels with at least one sample */
     uint64_t samples;     /* evaluated positions, supersampling counted */
-    double bounds_min[3]; /* world box of the samples */
+    double bounds_min[3]; /* world box of the samples; 0 where there are none */
     double bounds_max[3];
-    uint64_t bytes;
+    uint64_t bytes; /* in memory */
 } vsh_texels_info;
 
+/* Cannot fail. */
 VSH_API void vsh_texels_get_info(const vsh_texels *texels, vsh_texels_info *info);
 
-/* The samples behind a lightmap, in the order in which they are shaded. A view into the texels. */
+/* The samples behind a lightmap, in the order in which they are shaded. A view into the texels. Positions are
+ * lifted off coarse triangles towards the smooth surface (Hanika, "Hacking the shadow terminator", 2021). */
 typedef struct vsh_texel_samples {
     size_t count;
-    const double
-        *positions; /* [count][3], world units; lifted off coarse triangles towards the smooth surface */
-    const float *normals; /* [count][3], unit, decide shadow: geometric, or smooth where the mesh is smooth */
+    const double *positions; /* [count][3], world units */
+    const float *normals;    /* [count][3], unit, decide shadow: smooth where the mesh is, or geometric */
     const float *geometric_normals; /* [count][3], unit */
     const uint32_t *texel;          /* [count], row × width + column, row 0 at v = 1 */
 } vsh_texel_samples;
 
+/* Cannot fail; the arrays belong to the texels. */
 VSH_API vsh_texel_samples vsh_texels_samples(const vsh_texels *texels);
 
 /* A lightmap in the caller's arrays; each plane is [height][width] with row 0 at v = 1. NULL planes are not
- * baked and cost nothing. Texels that no chart covers or padding reaches are 0. */
+ * baked and cost nothing. Texels that neither a chart covers nor padding reaches are 0. */
 typedef struct vsh_lightmap {
     float *const *shadow; /* [light_count] planes: visible fraction of each light; may be NULL */
     float *ao;            /* open fraction */
@@ -81,11 +88,11 @@ typedef struct vsh_lightmap {
 
 typedef struct vsh_bake_stats {
     size_t struct_size;
-    uint64_t texels;           /* covered */
-    uint64_t invalid_texels;   /* inside another solid or seen from behind: filled from their neighbours,
-                                  coverage 0 */
-    uint64_t *invalid_by_mesh; /* [mesh_count], filled where not NULL */
-    vsh_shade_stats shade;
+    uint64_t texels;         /* covered */
+    uint64_t invalid_texels; /* inside another solid or seen from behind: coverage 0, filled from the nearest
+                                valid texel within the padding, or 8 texels where that is more */
+    uint64_t *invalid_by_mesh; /* [mesh_count] of the texels, filled where not NULL */
+    vsh_shade_stats shade;     /* added to */
 } vsh_bake_stats;
 
 static inline vsh_bake_stats vsh_bake_stats_zero(void) {
@@ -93,8 +100,14 @@ static inline vsh_bake_stats vsh_bake_stats_zero(void) {
     return stats;
 }
 
-/* Shades the texels and fills the lightmap's planes. `stats` may be NULL. Errors: VSH_ERROR_ARGUMENT,
- * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (planes then hold nothing of use). */
+/* Shades the texels and fills the lightmap's planes. NULL options are those given to vsh_texels_create().
+ * Rays begin start_offset + surface_offset above the surface (a voxel at least in creases), for open meshes
+ * half of the field's shell_thickness farther. `lights` may be NULL where light_count is 0; `stats` is
+ * filled on success. Errors (planes then hold nothing of use):
+ * - VSH_ERROR_ARGUMENT: field, texels, lightmap or lights NULL, options out of range, run, and as
+ *   vsh_light_check();
+ * - VSH_ERROR_LIMIT: run->memory_limit, for field, texels and what the bake itself takes;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels,
                                      const vsh_light *lights, size_t light_count,
                                      const vsh_shade_options *options, const vsh_run *run,

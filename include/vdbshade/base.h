@@ -1,4 +1,20 @@
-/* Results, errors and run options: what every call of vdbshade shares. */
+/* Results, errors and run options: what every call of vdbshade shares.
+ *
+ * What holds for every call, and is not said again at each:
+ *
+ * - The library prints nothing, ends nothing and keeps no state of its own. A call that can fail returns a
+ *   vsh_result and fills the caller's vsh_error.
+ * - Every function may be called by several threads at once. Handles are immutable once made and may be
+ *   shared by threads; each is freed once, when no call uses it any more.
+ * - Pointers must not be NULL but where that is said, and for parameters named options, run, stats or error.
+ *   NULL options and a NULL run stand for what their …_default() function gives.
+ * - Arrays and structs that are passed in stay the caller's and are not used after the call.
+ * - A call that makes a handle leaves NULL in its place where it fails.
+ * - Structs that begin with struct_size are filled by their …_default() or …_zero() function; programs that
+ *   were compiled against an older header then go on working. VSH_ERROR_ARGUMENT where struct_size is 0 or
+ *   more than this library knows.
+ * - VSH_ERROR_MEMORY (the system refused memory) and VSH_ERROR_INTERNAL can come from every call that returns
+ *   a vsh_result, VSH_ERROR_CANCELLED from every one that takes a run; the rest is listed at each call. */
 #ifndef VDBSHADE_BASE_H
 #define VDBSHADE_BASE_H
 
@@ -19,7 +35,7 @@ extern "C" {
 #define VSH_VERSION_MINOR 1
 #define VSH_VERSION_PATCH 0
 
-/* "0.1.0"; a static string. Thread safe. */
+/* "0.1.0"; a static string. */
 VSH_API const char *vsh_version(void);
 
 /* What a call came to. Zero is success; every other value comes with a message in the caller's vsh_error. */
@@ -30,39 +46,39 @@ enum {
     VSH_ERROR_INPUT = 2,       /* the content of a file, mesh, grid or scene is bad */
     VSH_ERROR_READ = 3,        /* a file could not be read */
     VSH_ERROR_WRITE = 4,       /* a file could not be written; the old one is as it was */
-    VSH_ERROR_LIMIT = 5,       /* a memory or size limit would be passed; nothing was taken */
+    VSH_ERROR_LIMIT = 5,       /* a memory or size limit would be passed; found before memory is taken */
     VSH_ERROR_MEMORY = 6,      /* the system refused memory */
     VSH_ERROR_CANCELLED = 7,   /* the progress callback asked to stop */
     VSH_ERROR_UNSUPPORTED = 8, /* valid input that this build does not handle */
     VSH_ERROR_INTERNAL = 9     /* a defect of this library */
 };
 
-/* Name of a result, "VSH_ERROR_INPUT"; "VSH_ERROR_UNKNOWN" for other values. A static string. Thread safe. */
+/* Name of a result, "VSH_ERROR_INPUT"; "VSH_ERROR_UNKNOWN" for other values. A static string. */
 VSH_API const char *vsh_result_name(vsh_result result);
 
-/* Filled by a call that fails; left alone by one that succeeds. The caller owns it; every `error` parameter
- * may be NULL. The message is one line without a newline and names file, place, value and limit where there
- * are such. */
+/* Filled by a call that fails; left alone by one that succeeds. The message is one line without control
+ * characters, ends in NUL, and names file, place, value and limit where there are such. */
 typedef struct vsh_error {
     vsh_result code;
     char message[1020];
 } vsh_error;
 
-/* Told the stage ("load", "voxelize", "field", "texels", "validate", "shadow.NAME", "ao", "padding", "write")
- * and the fraction of it that is done, 0 … 1, never falling within a stage. Called by one thread at a time,
- * from any of the pool's threads. Return 0 to go on; anything else cancels: the call frees what it took and
- * returns VSH_ERROR_CANCELLED. */
+/* Told the stage ("load", "voxelize", "field", "texels", "validate", "shadow.NAME", "ao", "padding") and the
+ * fraction of it that is done, 0 … 1, never falling within a stage. Called by one thread at a time, from any
+ * of the pool's threads. Return 0 to go on; anything else cancels: the call frees what it took and returns
+ * VSH_ERROR_CANCELLED. */
 typedef int32_t vsh_progress_fn(void *user, const char *stage, double fraction);
 
 /* Bad things that were worked around: one line each, without a newline ("mesh 'sail': 4 open edges: …"). Same
  * calling rules as vsh_progress_fn. */
 typedef void vsh_warning_fn(void *user, const char *message);
 
-/* How to run, the same for every call that takes long. NULL stands for vsh_run_default(). */
+/* How to run, the same for every call that takes long. */
 typedef struct vsh_run {
-    size_t struct_size;        /* sizeof(vsh_run), set by vsh_run_default() */
-    int32_t threads;           /* 1 … 1024; 0: all cores. Results do not depend on it */
-    uint64_t memory_limit;     /* bytes that one call may hold, with the handles given to it; 0: no limit */
+    size_t struct_size;    /* sizeof(vsh_run), set by vsh_run_default() */
+    int32_t threads;       /* 0 … 1024, else VSH_ERROR_ARGUMENT; 0: all cores. No result depends on it */
+    uint64_t memory_limit; /* bytes that one call may hold, with the handles given to it, by an estimate
+                              made beforehand; else VSH_ERROR_LIMIT. 0: no limit */
     vsh_progress_fn *progress; /* may be NULL */
     vsh_warning_fn *warning;   /* may be NULL */
     void *user;                /* handed to both */

@@ -8,14 +8,14 @@
 extern "C" {
 #endif
 
-/* Immutable; may be shared by threads. Free it with vsh_field_free(). It does not need its grid any more. */
+/* Free it with vsh_field_free(). It does not need its grid any more. */
 typedef struct vsh_field vsh_field;
 
 typedef struct vsh_field_options {
     size_t struct_size;
-    double
-        reach; /* largest distance from a surface that must be told apart, world units: tangent of the widest
-                * light's half angle times the longest ray, or the AO distance; 0: four times the diagonal */
+    double reach; /* largest distance from a surface that must be told apart, world units, finite, > 0:
+                   * tangent of the widest light's half angle times the longest ray, or the AO distance
+                   * (vsh_scene_reach()); 0: four times the diagonal of the solid's box */
 } vsh_field_options;
 
 static inline vsh_field_options vsh_field_options_default(void) {
@@ -23,14 +23,21 @@ static inline vsh_field_options vsh_field_options_default(void) {
     return options;
 }
 
-/* Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+/* Makes the field of a grid; free it with vsh_field_free(). Time and memory follow the surface's area; each
+ * level above the finest adds about a quarter of the one below. Errors:
+ * - VSH_ERROR_ARGUMENT: a reach that is negative or not finite, options, run;
+ * - VSH_ERROR_INPUT: a grid without a surface;
+ * - VSH_ERROR_LIMIT: run->memory_limit; more blocks or bricks of 8³ voxels than 32 bits count (about 2^31
+ *   and 2.9 million);
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *options,
                                     const vsh_run *run, vsh_field **field, vsh_error *error);
 VSH_API void vsh_field_free(vsh_field *field); /* NULL does nothing */
 
-/* Signed distance at `count` world positions ([count][3]) from the finest level that resolves it: within the
- * reach, exact to a voxel of that level (never wider than the distance, the finest aside); beyond it, a lower
- * bound. Positions that are not finite give NaN. Thread safe. */
+/* Signed distance, world units, negative inside, at `count` world positions ([count][3]) into
+ * distances[count], from the finest level that resolves it: within the reach, exact to a voxel of that level
+ * (never wider than the distance, the finest aside); beyond it, a lower bound. Positions that are not finite
+ * give NaN. Runs on the calling thread. */
 VSH_API void vsh_field_sample(const vsh_field *field, size_t count, const double *positions,
                               float *distances);
 
@@ -41,10 +48,11 @@ typedef struct vsh_field_info {
     double bounds_max[3];
     double shell_thickness; /* of open meshes in it, world units; 0: none */
     int32_t levels;
-    uint64_t bricks; /* over all levels */
-    uint64_t bytes;
+    uint64_t bricks; /* of 8³ cells, over all levels */
+    uint64_t bytes;  /* in memory */
 } vsh_field_info;
 
+/* Cannot fail. */
 VSH_API void vsh_field_get_info(const vsh_field *field, vsh_field_info *info);
 
 #ifdef __cplusplus

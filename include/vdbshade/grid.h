@@ -10,15 +10,14 @@
 extern "C" {
 #endif
 
-/* An OpenVDB level set of floats. Immutable; may be shared by threads. Free it with vsh_grid_free(). */
+/* An OpenVDB level set of floats. Free it with vsh_grid_free(). */
 typedef struct vsh_grid vsh_grid;
 
 typedef struct vsh_grid_options {
     size_t struct_size;
-    double voxel_size; /* edge of a voxel, world units, > 0; 0: from `resolution` */
-    int32_t
-        resolution; /* voxels along the longest side of the bounds, 2 … 65536; used where voxel_size is 0 */
-    double half_width;      /* of the narrow band, voxels, 3 … 100 */
+    double voxel_size;  /* edge of a voxel, world units, 1.5e-5 … 1e12; 0: from `resolution` */
+    int32_t resolution; /* voxels along the longest side of the bounds, 2 … 65536, where voxel_size is 0 */
+    double half_width;  /* of the narrow band, voxels, 3 … 100 */
     double shell_thickness; /* of the solid that an open mesh becomes, voxels, 1 … 50 */
 } vsh_grid_options;
 
@@ -27,55 +26,90 @@ static inline vsh_grid_options vsh_grid_options_default(void) {
     return options;
 }
 
-/* The union of the meshes' solids. An open mesh (vsh_mesh_report.open_edges) becomes a shell of
- * shell_thickness around its triangles, with a warning. Errors: as vsh_mesh_check(); VSH_ERROR_ARGUMENT;
- * VSH_ERROR_LIMIT when the estimated voxels pass run->memory_limit or the index range; VSH_ERROR_CANCELLED.
- */
+/* The union of the meshes' solids: what cannot be reached from outside is inside, but for rooms, shells
+ * that face inward within a closed mesh. An open mesh (vsh_mesh_report.open_edges) becomes a shell of
+ * shell_thickness around its triangles, with a warning; a mesh with flipped edges is warned of. Errors:
+ * - VSH_ERROR_ARGUMENT: no meshes, options out of range, run, and as vsh_mesh_check();
+ * - VSH_ERROR_INPUT: as vsh_mesh_check(); no triangle of any area;
+ * - VSH_ERROR_LIMIT: the estimated memory passes run->memory_limit or the machine's, a voxel size outside
+ *   1.5e-5 … 1e12, more than 2^29 voxels along a side or 1e12 from the origin, more than 2^31 - 1
+ *   triangles;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_grid_from_meshes(const vsh_mesh *meshes, size_t mesh_count,
                                         const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
                                         vsh_error *error);
 
-/* A procedural tree, voxelised where its surface is. Errors: as vsh_sdf_check() and above. */
+/* A procedural tree, voxelised where its surface is; one that is no true distance (vsh_sdf_distance()) is
+ * re-distanced. Errors:
+ * - VSH_ERROR_ARGUMENT: options out of range, run;
+ * - VSH_ERROR_INPUT: as vsh_sdf_check(); the tree has no surface, such as an intersection of what does not
+ *   meet;
+ * - VSH_ERROR_LIMIT: as vsh_grid_from_meshes(), but for triangles;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options *options, const vsh_run *run,
                                      vsh_grid **grid, vsh_error *error);
 
-/* Signed distance at a world position, negative inside; called by many threads at once. */
+/* Signed distance at a world position, negative inside. Called by many threads at once, for positions outside
+ * the bounds too; must return, and the same value for the same position. */
 typedef double vsh_distance_fn(void *user, const double position[3]);
 
-/* A field given by a callback. */
+/* A field given by a callback. A view; nothing is owned. */
 typedef struct vsh_distance {
     vsh_distance_fn *distance;
     void *user;
-    double lipschitz;     /* bound on |distance(a) - distance(b)| / |a - b|, > 0; 1 for a true distance */
+    double lipschitz;     /* bound on |distance(a) - distance(b)| / |a - b|, > 0; 1 for a true distance. Less
+                             than the truth loses parts of the surface */
     int32_t exact;        /* nonzero: a true distance near the surface, taken as it is; 0: re-distanced */
-    double bounds_min[3]; /* world box that holds the whole surface */
+    double bounds_min[3]; /* world box that holds the whole surface, finite */
     double bounds_max[3];
 } vsh_distance;
 
-/* Errors: as above; VSH_ERROR_INPUT where the callback returns a value that is not finite, or shows no
- * surface. */
+/* A field given by a callback, voxelised where its surface is. Errors:
+ * - VSH_ERROR_ARGUMENT: field or callback NULL, lipschitz or bounds, options out of range, run;
+ * - VSH_ERROR_INPUT: the callback returns a value that is not finite, or shows no surface; bounds without
+ *   any size where the voxel size is to follow from the resolution;
+ * - VSH_ERROR_LIMIT: as vsh_grid_from_meshes(), but for triangles;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_grid_options *options,
                                           const vsh_run *run, vsh_grid **grid, vsh_error *error);
 
-/* Reads level set `name` of a .vdb file; NULL: the first. Translated, rotated, mirrored and uniformly scaled
- * transforms are kept. Errors: VSH_ERROR_READ; VSH_ERROR_INPUT with the reason for a grid that is no level
- * set of floats or doubles, is scaled unevenly, sheared or empty, or holds values that are not finite. */
+/* Reads level set `name` of a .vdb file; NULL: the first grid of class level set. Translated, rotated,
+ * mirrored and uniformly scaled transforms are kept, with voxels of 1e-5 … 1e12 world units. Where the
+ * values are no distances, or the band is narrower than 3 voxels, distances are made anew from the zero
+ * surface, with a warning. OpenVDB's reader can crash on damaged files: files from strangers are to be read
+ * in a process of their own first. Errors:
+ * - VSH_ERROR_ARGUMENT: run;
+ * - VSH_ERROR_READ: no such file, no permission, no .vdb file, cut short, of a newer format, damaged;
+ * - VSH_ERROR_INPUT: no grids, none of that name, or, with the reason, a grid that is no level set of
+ *   floats or doubles, is scaled unevenly, sheared, inside out or without a surface, or holds values that
+ *   are not finite;
+ * - VSH_ERROR_LIMIT: the grid, or making its distances anew, passes run->memory_limit or the machine's
+ * memory;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run, vsh_grid **grid,
                                  vsh_error *error);
 
-/* Writes one .vdb file with the grid as `name` (NULL: "surface"). Atomic: a failure leaves an old file alone.
- */
+/* Writes one .vdb file with the grid as `name` (NULL: "surface"); the same grid gives the same bytes. Atomic:
+ * written beside `path` and renamed, so a failure leaves an old file alone. Errors: VSH_ERROR_ARGUMENT (path
+ * NULL or empty), VSH_ERROR_WRITE (no such folder, no permission, a folder or device in the way, disk full),
+ * VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name, vsh_error *error);
 
-/* A caster for vsh_grid_unite(): a grid and where it stands (three rows of four; NULL: as it is). The
- * transform must be a rotation, translation, mirroring or uniform scale. */
+/* A caster for vsh_grid_unite(): a grid and where it stands. A view; nothing is owned. */
 typedef struct vsh_grid_instance {
     const vsh_grid *grid;
-    const double *transform;
+    const double *transform; /* [12], grid's world to world, three rows of four: any of rotation, translation,
+                                mirroring and one scale (to 1e-6); NULL: as it is */
 } vsh_grid_instance;
 
-/* The union of grids as one level set of voxel size `options->voxel_size` (0: the finest of them); those with
- * another lattice are resampled. Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_LIMIT, VSH_ERROR_CANCELLED. */
+/* The union of grids as one level set of options->voxel_size (0: the finest of them, whatever `resolution`
+ * says) and options->half_width. Grids on another lattice, or with a narrower band, are meshed and measured
+ * again; one alone that stands as it is, with a voxel_size of 0, is shared as it is, band included. Errors:
+ * - VSH_ERROR_ARGUMENT: no grids, one that is NULL, a transform other than those above, options out of
+ *   range, run;
+ * - VSH_ERROR_INPUT: a grid to be measured again that has no surface;
+ * - VSH_ERROR_LIMIT: as vsh_grid_from_meshes(), but for triangles;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_grid_unite(const vsh_grid_instance *instances, size_t instance_count,
                                   const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
                                   vsh_error *error);
@@ -86,10 +120,11 @@ typedef struct vsh_grid_info {
     double bounds_min[3]; /* world box of the voxels inside the surface or next to it */
     double bounds_max[3];
     double shell_thickness; /* world units, of open meshes in it; 0: none */
-    uint64_t active_voxels;
-    uint64_t bytes;
+    uint64_t active_voxels; /* of the band */
+    uint64_t bytes;         /* in memory */
 } vsh_grid_info;
 
+/* Cannot fail. */
 VSH_API void vsh_grid_get_info(const vsh_grid *grid, vsh_grid_info *info);
 VSH_API void vsh_grid_free(vsh_grid *grid); /* NULL does nothing */
 

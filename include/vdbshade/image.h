@@ -10,22 +10,24 @@ extern "C" {
 
 enum { VSH_MAX_CHANNELS = 256, VSH_CHANNEL_NAME = 128 };
 
-/* Planes with names: a view. */
+/* Planes with names: a view. width × height × channel_count is at most 2^31. */
 typedef struct vsh_image {
-    int32_t width;
-    int32_t height;
+    int32_t width;              /* pixels, ≥ 1 */
+    int32_t height;             /* pixels, ≥ 1 */
     int32_t channel_count;      /* 1 … VSH_MAX_CHANNELS */
-    const char *const *names;   /* [channel_count]: "shadow.sun", "ao", "A" */
+    const char *const *names;   /* [channel_count]: "shadow.sun", "ao", "A"; 1 … VSH_CHANNEL_NAME - 1 bytes,
+                                   no two alike */
     const float *const *planes; /* [channel_count][height × width], row 0 on top */
 } vsh_image;
 
 typedef struct vsh_image_options {
     size_t struct_size;
-    int32_t bits; /* 8, 16, 32; 0: 32 for EXR, else 16 where the format has it, else 8. 16 is half float in
-                   * EXR and TIFF takes 16-bit integers */
-    const char *
-        pack; /* for formats that cannot name channels: "R=shadow.sun,G=ao,A=A"; values may be channels or the
-               * numbers 0 and 1. NULL: vsh_image_default_pack(). In EXR, NULL writes every channel by name */
+    int32_t bits; /* of a value: 8 and 16 are integers (16 in EXR: half float), 32 is float; 0: 32 for EXR,
+                     else 16 where the format has it, else 8, else 32 */
+    const char *pack; /* for formats that cannot name channels, "R=shadow.sun,G=ao,A=A": R, G, B, A from
+                         channels or the numbers 0 and 1. R, G and B that are missing are 0; without A there
+                         is no alpha. NULL: vsh_image_default_pack(). In EXR, NULL writes every channel by
+                         name, and a pack only what it names */
 } vsh_image_options;
 
 static inline vsh_image_options vsh_image_options_default(void) {
@@ -33,29 +35,47 @@ static inline vsh_image_options vsh_image_options_default(void) {
     return options;
 }
 
-/* Writes an image; the ending of `path` chooses the format. Integer formats clamp to 0 … 1 and round to
- * nearest, with no transfer curve. Atomic: written beside `path` and renamed, so a failure leaves an old file
- * alone. Errors: VSH_ERROR_ARGUMENT (bits or pack not possible in this format, unknown ending),
- * VSH_ERROR_WRITE. Thread safe. */
+/* Writes an image; the ending of `path`, in any case, chooses the format (docs/formats.md lists them).
+ * Integer formats clamp to 0 … 1 and round to nearest, NaN to 0, with no transfer curve. Atomic: written
+ * beside `path` and renamed, so a failure leaves an old file alone. Errors:
+ * - VSH_ERROR_ARGUMENT: path NULL or empty, no image, sizes or channels out of range, a plane NULL,
+ *   options; an unknown ending; bits, a pack or a size that the format does not have;
+ * - VSH_ERROR_LIMIT: more than 2^31 values, or than OpenEXR's 2 GiB in 16 rows;
+ * - VSH_ERROR_WRITE: no such folder, no permission, a folder or device in the way, disk full;
+ * - VSH_ERROR_UNSUPPORTED: this OpenImageIO cannot write the format;
+ * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_image_write(const char *path, const vsh_image *image, const vsh_image_options *options,
                                    vsh_error *error);
 
 /* Whether vsh_image_write() could take this path, these options and these channel names, without writing: to
- * be asked before a long bake. Tests that the folder can be written to. Same errors. */
+ * be asked before a long bake. Tests that the folder can be written to. image->planes may be NULL. Same
+ * errors, as far as they show without writing. */
 VSH_API vsh_result vsh_image_check(const char *path, const vsh_image *image, const vsh_image_options *options,
                                    vsh_error *error);
 
 /* The packing that is used where none is given, as text: the first three channels that are not "A" to R, G, B
- * (one alone: to R, G and B), "A" to A where the format has alpha. Writes at most `capacity` bytes. */
+ * (one alone: to R, G and B), "A" to A, which is left out where the format has no alpha. Writes at most
+ * `capacity` bytes, NUL included. */
 VSH_API void vsh_image_default_pack(const vsh_image *image, char *text, size_t capacity);
 
 /* An image read from a file, as float planes. Free it with vsh_image_free(). */
 typedef struct vsh_image_file vsh_image_file;
 
-/* Errors: VSH_ERROR_READ, VSH_ERROR_INPUT, VSH_ERROR_LIMIT (more than 2^31 values). */
+/* Reads an image file: EXR and PNG by their first bytes, others by the ending of `path`. Integers become 0
+ * … 1 as they stand: no transfer curve, no multiplication by alpha. Errors:
+ * - VSH_ERROR_ARGUMENT: path NULL or empty, file NULL;
+ * - VSH_ERROR_READ: no such file, no permission, a folder;
+ * - VSH_ERROR_INPUT: an ending of no format that is read, damaged, cut short;
+ * - VSH_ERROR_UNSUPPORTED: deep, volume and subsampled images, compressions and formats that the installed
+ *   OpenEXR and OpenImageIO do not read;
+ * - VSH_ERROR_LIMIT: more than 2^31 values or VSH_MAX_CHANNELS channels;
+ * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_image_read(const char *path, vsh_image_file **file, vsh_error *error);
-VSH_API vsh_image vsh_image_view(const vsh_image_file *file); /* belongs to the file */
-VSH_API void vsh_image_free(vsh_image_file *file);            /* NULL does nothing */
+
+/* The planes and names of a file, which they belong to; names are the file's own in EXR, else R, G, B, A or
+ * Y. NULL is an image of 0 × 0. */
+VSH_API vsh_image vsh_image_view(const vsh_image_file *file);
+VSH_API void vsh_image_free(vsh_image_file *file); /* NULL does nothing */
 
 #ifdef __cplusplus
 }

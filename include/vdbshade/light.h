@@ -20,8 +20,9 @@ enum {
     VSH_FALLOFF_QUADRATIC = 2       /* (1 - d / reach)², 0 beyond the reach */
 };
 
-/* A light. Only its shape and place enter shadow values; falloff, colour and the cosine enter irradiance
- * only. A size (angle, radius) of 0 is a hard light. */
+/* A light. Only its shape and place enter shadow values; falloff, colour, a spot's edge and the cosine enter
+ * irradiance only. A size (angle, radius) of 0 is a hard light. All numbers are finite; what a type does not
+ * name is ignored. */
 typedef struct vsh_light {
     int32_t type;        /* VSH_LIGHT_… */
     int32_t falloff;     /* VSH_FALLOFF_…; sphere and spot only */
@@ -31,9 +32,10 @@ typedef struct vsh_light {
     double radius;       /* sphere, spot: world units, ≥ 0 */
     double inner_angle;  /* spot: half angle of full light, radians, 0 … outer_angle */
     double outer_angle;  /* spot: half angle where light ends, radians, > 0 … π */
-    double reach;        /* VSH_FALLOFF_QUADRATIC: world units, > 0 */
+    double reach;        /* sphere and spot with VSH_FALLOFF_QUADRATIC: world units, > 0 */
     double color[3]; /* linear RGB times intensity, ≥ 0; irradiance at normal incidence before falloff */
-    char name[64];   /* "sun": its channel is shadow.sun */
+    char name[64]; /* "sun": its channel is shadow.sun. At most 63 of A … Z, a … z, 0 … 9, _ and -; may
+                      be empty where no channel is named after it */
 } vsh_light;
 
 /* A white sun of half a degree overhead (+y), named "sun". */
@@ -52,7 +54,8 @@ static inline vsh_light vsh_light_default(void) {
     return light;
 }
 
-/* Errors: VSH_ERROR_ARGUMENT, naming the light, the field, the value and the limit. Thread safe. */
+/* Checks a light against the ranges above. Errors: VSH_ERROR_ARGUMENT (light NULL, too), naming the light,
+ * the field, the value and the limit. */
 VSH_API vsh_result vsh_light_check(const vsh_light *light, vsh_error *error);
 
 #ifdef __cplusplus

@@ -10,18 +10,17 @@ extern "C" {
 
 enum { VSH_MAX_UV_SETS = 8 };
 
-/* A view of a triangle mesh. Nothing is copied or owned; arrays must outlive the call they are given to. */
+/* A view of a triangle mesh: nothing is copied or owned. */
 typedef struct vsh_mesh {
     const char *name;       /* for messages; may be NULL */
     const float *positions; /* [vertex_count][3], local units, finite */
     const float *normals;   /* [vertex_count][3], shading normals of any length, or NULL: flat */
-    const float
-        *uvs; /* [vertex_count][2], lightmap coordinates with v up, or NULL where no bake needs them */
+    const float *uvs;       /* [vertex_count][2], lightmap coordinates, v up; NULL where no bake needs them */
     const uint32_t *indices; /* [triangle_count][3], each < vertex_count, anticlockwise from outside */
-    size_t vertex_count;
+    size_t vertex_count;     /* at most 2^32 - 1 */
     size_t triangle_count;
-    const double
-        *transform; /* [12], local to world, three rows of four (column 3 translates); NULL: identity */
+    const double *transform; /* [12], local to world, three rows of four (column 3 translates), may mirror,
+                                scale unevenly and shear, but not flatten; NULL: identity */
 } vsh_mesh;
 
 /* What vsh_mesh_check() found. Vertices at equal positions count as one, so seams of UVs open nothing. */
@@ -29,33 +28,46 @@ typedef struct vsh_mesh_report {
     size_t degenerate_triangles; /* of zero area; they are skipped everywhere */
     size_t open_edges;           /* edges with an odd number of triangles: the mesh bounds no solid */
     size_t flipped_edges;        /* edges whose triangles disagree about the outside */
-    double area;                 /* world units², all triangles */
-    double bounds_min[3]; /* world units, over vertices in use; min > max for a mesh with no triangle left */
+    double area;                 /* world units², of all triangles */
+    double bounds_min[3]; /* world units, over triangles of some area; min > max where there are none */
     double bounds_max[3];
 } vsh_mesh_report;
 
-/* Looks a mesh over. Errors: VSH_ERROR_INPUT for a vertex that is not finite, an index out of range or a
- * transform that is not finite or flattens; VSH_ERROR_MEMORY. Thread safe. */
+/* Looks a mesh over; UVs and normals are not looked at. Errors (*report is then left alone):
+ * - VSH_ERROR_ARGUMENT: mesh or report NULL, an array NULL whose count is not 0, more than 2^32 - 1
+ *   vertices;
+ * - VSH_ERROR_INPUT: a vertex that is not finite (or not once transformed), an index out of range, a
+ *   transform that is not finite or flattens;
+ * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error);
 
-/* A file of meshes: OBJ, glTF/GLB, PLY, STL, FBX and what else Assimp reads. Node transforms are applied, a
- * mesh that two nodes use is two meshes. Immutable; may be shared by threads. */
+/* A file of meshes: OBJ, glTF/GLB, PLY, STL, FBX and what else Assimp reads. A node's transform is that of
+ * its mesh's view; a mesh that two nodes use is two meshes. UVs have v up in every format. */
 typedef struct vsh_model vsh_model;
 
-/* Reads a model; free it with vsh_model_free(). Errors: VSH_ERROR_READ (no such file, no permission, cut
- * short), VSH_ERROR_INPUT (no triangles, vertices that are not finite, indices out of range),
- * VSH_ERROR_LIMIT. */
+/* Reads a model; the ending of `path` tells its format. Warns of meshes that a transform flattens (left
+ * out), normals that are not finite (flat there) and polygons that cannot be cut into triangles. Free the
+ * result with vsh_model_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: path or model NULL, run;
+ * - VSH_ERROR_READ: no such file, no permission, no regular file, empty, cut short, not understood by
+ *   Assimp;
+ * - VSH_ERROR_INPUT: no ending, or one of no format that is read; no triangles; vertices that are not
+ *   finite, indices out of range, a damaged header or JSON;
+ * - VSH_ERROR_LIMIT: run->memory_limit (about six bytes for one of the file), nodes nested more than 1024
+ *   deep;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error);
 VSH_API void vsh_model_free(vsh_model *model); /* NULL does nothing */
 
-/* Number of meshes, at least 1. */
+/* Number of meshes, at least 1; each has a triangle. */
 VSH_API size_t vsh_model_mesh_count(const vsh_model *model);
 
 /* Number of UV sets of mesh `index` (< mesh count), 0 … VSH_MAX_UV_SETS. */
 VSH_API int32_t vsh_model_uv_sets(const vsh_model *model, size_t index);
 
-/* A view of mesh `index`, with the UVs of set `uv_set` (from 0); -1 takes the second set where there is one,
- * else the first. Where the set is missing, `uvs` is NULL. The view's arrays belong to the model. */
+/* A view of mesh `index` (< mesh count), with the UVs of set `uv_set` (from 0); -1 takes the second set where
+ * there is one, else the first. Where the set is missing, `uvs` is NULL. The view's arrays and name belong to
+ * the model. */
 VSH_API vsh_mesh vsh_model_mesh(const vsh_model *model, size_t index, int32_t uv_set);
 
 #ifdef __cplusplus

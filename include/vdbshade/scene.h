@@ -14,7 +14,7 @@ enum { VSH_CASTER_MESH = 0, VSH_CASTER_SDF = 1, VSH_CASTER_VDB = 2 };
 typedef struct vsh_caster {
     int32_t type;         /* VSH_CASTER_… */
     const char *path;     /* mesh, vdb: file */
-    const char *grid;     /* vdb: name of the grid, or NULL */
+    const char *grid;     /* vdb: name of the grid; NULL: the file's first level set */
     vsh_sdf sdf;          /* sdf: tree */
     double transform[12]; /* local to world, three rows of four; sdf and vdb: without shear or uneven scale */
 } vsh_caster;
@@ -22,42 +22,53 @@ typedef struct vsh_caster {
 typedef struct vsh_receiver {
     const char *path;     /* mesh file */
     double transform[12]; /* local to world */
-    int32_t uv_set;       /* from 0; -1: the second where there is one, else the first */
-    int32_t width;        /* texels */
+    int32_t uv_set; /* from 0 to VSH_MAX_UV_SETS - 1; -1: the second where there is one, else the first */
+    int32_t width;  /* these four as in vsh_lightmap_options */
     int32_t height;
     int32_t supersample;
     int32_t padding;
     const char *output; /* image file */
     int32_t bits;       /* as in vsh_image_options */
-    const char *pack;   /* as in vsh_image_options, or NULL */
+    const char *pack;   /* as in vsh_image_options; may be NULL */
 } vsh_receiver;
 
-/* A whole scene. Paths are as the system takes them (the reader has put the scene file's folder in front). */
+/* A whole scene, read from a file or filled by the caller. Paths are as the system takes them (the reader has
+ * put the scene file's folder in front of relative ones). */
 typedef struct vsh_scene {
     const vsh_caster *casters;
     size_t caster_count;
-    const vsh_light *lights;
+    const vsh_light *lights; /* no two names alike, none empty: channels are named after them */
     size_t light_count;
     const vsh_receiver *receivers;
     size_t receiver_count;
     vsh_grid_options grid;
     vsh_shade_options shade;
-    int32_t ao;         /* nonzero: bake AO */
+    int32_t ao;         /* nonzero: bake AO, within shade.ao_distance */
     int32_t irradiance; /* nonzero: bake irradiance */
 } vsh_scene;
 
-/* Reads a scene file. The scene and all it points to belong to *scene; free it with vsh_scene_free(). Errors:
- * VSH_ERROR_READ; VSH_ERROR_INPUT with line and column. Thread safe. */
+/* Reads a scene file; what it names is not opened. The scene and all it points to belong to *scene; free it
+ * with vsh_scene_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: path or scene NULL;
+ * - VSH_ERROR_READ: no such file, no permission, a folder;
+ * - VSH_ERROR_INPUT, with line and column: no JSON, an unknown or missing key, a value of the wrong type or
+ *   out of range;
+ * - VSH_ERROR_LIMIT: a file of more than 64 MiB;
+ * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_scene_read(const char *path, vsh_scene **scene, vsh_error *error);
-VSH_API void vsh_scene_free(vsh_scene *scene); /* NULL does nothing */
+VSH_API void vsh_scene_free(vsh_scene *scene); /* of vsh_scene_read() only; NULL does nothing */
 
-/* What a scene's files hold, each file read once, however many casters and receivers use it. Immutable; may
- * be shared by threads. */
+/* What a scene's files hold, each file read once, however many casters and receivers use it. */
 typedef struct vsh_assets vsh_assets;
 
-/* Reads the models and level sets that `scene` names and puts them in their places. The scene need not outlive the call. Errors: as
- * vsh_model_read() and vsh_grid_read(); VSH_ERROR_ARGUMENT (caster without type or path); VSH_ERROR_INPUT (a
- * receiver's mesh without the UV set asked for). Free the result with vsh_assets_free(). */
+/* Reads the models and level sets that `scene` names, receivers' first, and puts them in their places. The
+ * scene need not outlive the call. Free the result with vsh_assets_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: scene or assets NULL, a caster of no type, a caster or receiver without a path, a
+ *   UV set outside -1 … VSH_MAX_UV_SETS - 1, run;
+ * - VSH_ERROR_INPUT: a receiver's mesh without UVs or without the set asked for; as vsh_model_read() and
+ *   vsh_grid_read();
+ * - VSH_ERROR_READ, VSH_ERROR_LIMIT (for each file alone): as vsh_model_read() and vsh_grid_read();
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
                                    vsh_error *error);
 VSH_API void vsh_assets_free(vsh_assets *assets); /* NULL does nothing */
@@ -69,13 +80,17 @@ VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index
 
 /* The union of a scene's casters as one level set of scene->grid's voxel size; without one, of the longest
  * side of the box around all casters over scene->grid.resolution. `assets` are those loaded for this scene.
- * Errors: VSH_ERROR_INPUT (no casters; an sdf or vdb caster whose transform shears or scales unevenly); as
- * the vsh_grid_… calls. Free the grid with vsh_grid_free(). */
+ * Free the grid with vsh_grid_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: scene, assets or grid NULL, scene->grid out of range, run;
+ * - VSH_ERROR_INPUT: no casters, casters without extent, an sdf or vdb caster whose transform shears or
+ *   scales unevenly; as vsh_mesh_check(), vsh_sdf_check() and the vsh_grid_from_… calls;
+ * - VSH_ERROR_LIMIT: as the vsh_grid_from_… calls and vsh_grid_unite();
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                                      vsh_grid **grid, vsh_error *error);
 
 /* Reach, world units > 0, that a field of `grid` needs for the scene's lights and AO at receivers within a
- * world box: see vsh_field_options. Directional lights count up to a half angle of 60°. Thread safe. */
+ * world box: see vsh_field_options. Directional lights count up to a half angle of 60°. */
 VSH_API double vsh_scene_reach(const vsh_scene *scene, const vsh_grid *grid, const double receivers_min[3],
                                const double receivers_max[3]);
 

@@ -12,9 +12,9 @@ extern "C" {
 /* How a shadow is estimated, cheapest model first. s is the sine of the light's half angle as seen from the
  * point, h the distance to the nearest caster at a distance t along the ray. */
 enum {
-    VSH_SHADOW_HARD = 0, /* the light's centre: 0 or 1 */
-    VSH_SHADOW_CLASSIC =
-        1, /* min h/(s t), outer penumbra only (Quilez, "soft shadows in raymarched SDFs", 2010) */
+    VSH_SHADOW_HARD = 0,     /* the light's centre: 0 or 1 */
+    VSH_SHADOW_CLASSIC = 1,  /* min h/(s t), outer penumbra only (Quilez, "soft shadows in raymarched SDFs",
+                                2010) */
     VSH_SHADOW_IMPROVED = 2, /* triangulated closest miss, outer penumbra only (Aaltonen, GDC 2018) */
     VSH_SHADOW_SMOOTH = 3, /* inner and outer penumbra, cubic remap (Quilez, same article, 2018 extension) */
     VSH_SHADOW_CONE = 4 /* inner and outer penumbra, circular segment: the share of a disc behind an edge */
@@ -27,13 +27,14 @@ enum {
 
 typedef struct vsh_shade_options {
     size_t struct_size;
-    int32_t method;    /* VSH_SHADOW_… */
-    int32_t ao_method; /* VSH_AO_… */
-    int32_t ao_cones;  /* 1 … 256 */
-    int32_t max_steps; /* a ray that has not ended after so many is counted in stats.unfinished, 16 … 65536 */
-    double ao_distance;    /* world units, > 0 */
+    int32_t method;        /* VSH_SHADOW_… */
+    int32_t ao_method;     /* VSH_AO_… */
+    int32_t ao_cones;      /* 1 … 256, with VSH_AO_CONES */
+    int32_t max_steps;     /* 16 … 65536; a ray that has not ended after so many is counted as unfinished */
+    double ao_distance;    /* how far an occluder can be, world units, > 0 (2^-1000 … 2^1000) */
     double start_offset;   /* how far above a point rays begin, along its normal, voxels, 0 … 16 */
-    double surface_offset; /* added to it, world units, ≥ 0: half the thickness of the receiver's own shell */
+    double surface_offset; /* added to it, world units, 0 … 2^1000: where the receiver itself is in the field
+                              as a shell, half of its thickness */
 } vsh_shade_options;
 
 static inline vsh_shade_options vsh_shade_options_default(void) {
@@ -42,7 +43,8 @@ static inline vsh_shade_options vsh_shade_options_default(void) {
     return options;
 }
 
-/* "cone" to VSH_SHADOW_CONE and back; -1 and NULL for what is no method. Thread safe. */
+/* "cone" to VSH_SHADOW_CONE and back; -1 and NULL for what is no method. Names are static strings; NULL is
+ * none. */
 VSH_API int32_t vsh_shadow_method(const char *name);
 VSH_API const char *vsh_shadow_method_name(int32_t method);
 VSH_API int32_t vsh_ao_method(const char *name);
@@ -53,10 +55,10 @@ typedef struct vsh_points {
     size_t count;
     const double *positions; /* [count][3], world units */
     const float *normals; /* [count][3], geometric, of any length, pointing away from the solid; may be NULL
-                           * for shadows: then there is no start offset, no horizon and no back side */
+                             for shadows: then there is no start offset, no horizon and no back side */
 } vsh_points;
 
-/* Work that was done; calls add to it. */
+/* Work that was done; calls add to it, cancelled ones too. Begin with vsh_shade_stats_zero(). */
 typedef struct vsh_shade_stats {
     size_t struct_size;
     uint64_t marches;    /* cones and rays that were marched */
@@ -64,8 +66,7 @@ typedef struct vsh_shade_stats {
     uint64_t skipped;    /* points turned away from the light, not marched */
     uint64_t certified;  /* cones whose light was proved fully seen or fully hidden (to the field's error) */
     uint64_t unfinished; /* marches that ran out of steps; their value is what was known by then */
-    uint64_t
-        invalid; /* points with a position or normal that is not finite, or a zero normal; they are NaN */
+    uint64_t invalid;    /* points with a position or normal that is not finite, or a zero normal: NaN */
     uint64_t
         beyond_reach; /* cones wider somewhere than the field's reach: make the field with a larger one */
 } vsh_shade_stats;
@@ -76,20 +77,24 @@ static inline vsh_shade_stats vsh_shade_stats_zero(void) {
 }
 
 /* Fraction of the light that each point sees, 0 dark … 1 lit, into visibility[count]: before any cosine,
- * colour or falloff (a spot's edge counts as falloff). `options`, `run`, `stats` may be NULL. Thread safe.
- * Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_CANCELLED. */
+ * colour or falloff (a spot's edge counts as falloff). Points turned away from the light are 0, points inside
+ * it 1, invalid ones NaN. Errors (visibility then holds nothing of use): VSH_ERROR_ARGUMENT (options out of
+ * range, run, and as vsh_light_check()), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
                                     const vsh_shade_options *options, const vsh_run *run, float *visibility,
                                     vsh_shade_stats *stats, vsh_error *error);
 
 /* Cosine-weighted fraction of the hemisphere around the normal that is free within ao_distance, 0 … 1 open,
- * into ao[count]. Errors and the rest as above; normals must be given. */
+ * into ao[count]; invalid points are NaN. Errors (ao then holds nothing of use): VSH_ERROR_ARGUMENT (options
+ * out of range, run, points->normals NULL), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points,
                                 const vsh_shade_options *options, const vsh_run *run, float *ao,
                                 vsh_shade_stats *stats, vsh_error *error);
 
-/* Irradiance of one light, RGB, added to irradiance[count][3]: visibility × colour × falloff × the cosine to
- * `shading_normals` [count][3] (NULL: points->normals). NaN visibilities add nothing. Thread safe. */
+/* Irradiance of one light, linear RGB, added to irradiance[count][3]: visibility[count] × colour × falloff ×
+ * the cosine to `shading_normals` [count][3], of any length (NULL: points->normals, which must then be
+ * given). NaN visibilities add nothing. The light must have passed vsh_light_check(). Runs on the calling
+ * thread. */
 VSH_API void vsh_shade_irradiance(const vsh_points *points, const float *shading_normals,
                                   const vsh_light *light, const float *visibility, float *irradiance);
 
