@@ -101,7 +101,7 @@ void bench_asset(FILE *csv) {
         exit(4);
     }
     const double ray = embree_ray_seconds(mesh, &r, values);
-    const vsh_points points = {r.count, r.positions, r.normals};
+    const vsh_points points = {r.count, r.positions, r.normals, NULL};
     vsh_light sun = vsh_light_default();
     memcpy(sun.direction, SUN, sizeof SUN);
     sun.angle = SUN_ANGLE;
@@ -116,7 +116,7 @@ void bench_asset(FILE *csv) {
         for (int i = 0; i < BENCH_RUNS; ++i) {
             stats = vsh_shade_stats_zero();
             const double start = bench_seconds();
-            bench_check(vsh_shade_shadow(field, &points, &sun, &shade, &run, values, &stats, &error), &error);
+            bench_check(vsh_shade_shadow(field, &points, &sun, &shade, &run, values, NULL, &stats, &error), &error);
             seconds[i] = bench_seconds() - start;
         }
         const truth_metrics metrics = truth_compare(r.count, values, truth, r.valid);
@@ -141,7 +141,7 @@ void bench_asset(FILE *csv) {
         shade.ao_distance = AO_DISTANCE;
         vsh_shade_stats stats = vsh_shade_stats_zero();
         const double start = bench_seconds();
-        bench_check(vsh_shade_ao(field, &points, &shade, &run, values, &stats, &error), &error);
+        bench_check(vsh_shade_ao(field, &points, &shade, &run, values, NULL, &stats, &error), &error);
         const double each = (bench_seconds() - start) / (double)r.count;
         const truth_metrics metrics = truth_compare(r.count, values, truth, r.valid);
         bench_row(csv, "cloister", ladder[m].name, 1e6 * each, (double)stats.samples / (double)r.count,

@@ -51,7 +51,7 @@ void bench_seeds(FILE *csv) {
     options.reach = vsh_scene_reach(scene, grid, low, high);
     bench_check(vsh_field_create(grid, &options, &run, &field, &error), &error);
 
-    const vsh_points points = {count, positions, normals};
+    const vsh_points points = {count, positions, normals, NULL};
     vsh_light sun = vsh_light_default();
     memcpy(sun.direction, truth_seeds_sun, sizeof sun.direction);
     sun.angle = 2.0 * atan(truth_seeds_w);
@@ -63,7 +63,7 @@ void bench_seeds(FILE *csv) {
         for (int r = 0; r < BENCH_RUNS; ++r) {
             stats = vsh_shade_stats_zero();
             const double start = bench_seconds();
-            bench_check(vsh_shade_shadow(field, &points, &sun, &shade, &run, values, &stats, &error), &error);
+            bench_check(vsh_shade_shadow(field, &points, &sun, &shade, &run, values, NULL, &stats, &error), &error);
             seconds[r] = bench_seconds() - start;
         }
         const truth_metrics metrics = truth_compare(count, values, truth, NULL);

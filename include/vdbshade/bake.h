@@ -83,7 +83,10 @@ typedef struct vsh_lightmap {
     float *ao;            /* open fraction */
     float *irradiance; /* [height][width][3], linear RGB: Σ visibility × colour × falloff × cosine, × AO where
                           baked */
-    float *coverage; /* 1: evaluated and valid; 0 elsewhere */
+    float *coverage;            /* 1: evaluated and valid; 0 elsewhere */
+    float *const *shadow_error; /* [light_count] planes: standard error left in each value, see
+                                   vsh_shade_shadow(); not padded; may be NULL */
+    float *ao_error;
 } vsh_lightmap;
 
 typedef struct vsh_bake_stats {

@@ -4,6 +4,7 @@
 
 #include "field.h"
 #include "light.h"
+#include "trace.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -17,12 +18,29 @@ enum {
                                 2010) */
     VSH_SHADOW_IMPROVED = 2, /* triangulated closest miss, outer penumbra only (Aaltonen, GDC 2018) */
     VSH_SHADOW_SMOOTH = 3, /* inner and outer penumbra, cubic remap (Quilez, same article, 2018 extension) */
-    VSH_SHADOW_CONE = 4 /* inner and outer penumbra, circular segment: the share of a disc behind an edge */
+    VSH_SHADOW_CONE = 4, /* inner and outer penumbra, circular segment: the share of a disc behind an edge */
+    VSH_SHADOW_RAYS = 5, /* `rays` rays over the light's disc, marched against the field */
+    VSH_SHADOW_ADAPTIVE =
+        6,               /* a cone that proves the light fully seen or hidden, else rays until max_error */
+    VSH_SHADOW_EXACT = 7 /* the same cone, the rays traced against `triangles` */
 };
 
 enum {
     VSH_AO_TAPS = 0, /* five samples along the normal (Quilez, "multiresolution ambient occlusion", 2008 …) */
-    VSH_AO_CONES = 1 /* cosine-weighted cones (Crassin and others, 2011, marched in a distance field) */
+    VSH_AO_CONES = 1,    /* cosine-weighted cones (Crassin and others, 2011, marched in a distance field) */
+    VSH_AO_RAYS = 2,     /* `rays` cosine-weighted rays, marched against the field */
+    VSH_AO_ADAPTIVE = 3, /* cones that prove their part free or hidden, rays in the others until max_error */
+    VSH_AO_EXACT = 4     /* the same cones, the rays traced against `triangles` */
+};
+
+/* Where the rays of a point go, over the light's disc or the hemisphere. `frame` gives another, independent
+ * set: bakes of frames 0 … n - 1 may be averaged. */
+enum {
+    VSH_SAMPLER_SOBOL = 0, /* low discrepancy: Owen-scrambled Sobol points, a scramble a point (Burley,
+                              "Practical hash-based Owen scrambling", 2020) */
+    VSH_SAMPLER_WHITE = 1, /* independent */
+    VSH_SAMPLER_BLUE = 2 /* best-candidate points (Mitchell, 1991), turned for each texel by a blue-noise mask
+                            (Ulichney, "Void and cluster", 1993) that frames shift by the golden ratio */
 };
 
 typedef struct vsh_shade_options {
@@ -35,11 +53,29 @@ typedef struct vsh_shade_options {
     double start_offset;   /* how far above a point rays begin, along its normal, voxels, 0 … 16 */
     double surface_offset; /* added to it, world units, 0 … 2^1000: where the receiver itself is in the field
                               as a shell, half of its thickness */
+    int32_t rays;          /* rays, and the most that adaptive and exact take, 1 … 4096 */
+    int32_t sampler;       /* VSH_SAMPLER_… */
+    int32_t frame;         /* ≥ 0 */
+    int32_t early_rays;    /* rays: where the first so many agree, the rest are not marched; 0: never */
+    double max_error;      /* adaptive, exact: standard error that a value may keep, 1e-4 … 1 */
+    const vsh_triangles *triangles; /* exact: the casters' triangles; else NULL */
 } vsh_shade_options;
 
 static inline vsh_shade_options vsh_shade_options_default(void) {
-    vsh_shade_options options = {
-        sizeof(vsh_shade_options), VSH_SHADOW_CONE, VSH_AO_CONES, 16, 1024, 1.0, 0.25, 0.0};
+    vsh_shade_options options = {sizeof(vsh_shade_options),
+                                 VSH_SHADOW_CONE,
+                                 VSH_AO_CONES,
+                                 16,
+                                 1024,
+                                 1.0,
+                                 0.25,
+                                 0.0,
+                                 64,
+                                 VSH_SAMPLER_SOBOL,
+                                 0,
+                                 0,
+                                 0.02,
+                                 NULL};
     return options;
 }
 
@@ -49,6 +85,8 @@ VSH_API int32_t vsh_shadow_method(const char *name);
 VSH_API const char *vsh_shadow_method_name(int32_t method);
 VSH_API int32_t vsh_ao_method(const char *name);
 VSH_API const char *vsh_ao_method_name(int32_t method);
+VSH_API int32_t vsh_sampler(const char *name);
+VSH_API const char *vsh_sampler_name(int32_t sampler);
 
 /* Receivers: a view of the caller's arrays. */
 typedef struct vsh_points {
@@ -56,6 +94,9 @@ typedef struct vsh_points {
     const double *positions; /* [count][3], world units */
     const float *normals; /* [count][3], geometric, of any length, pointing away from the solid; may be NULL
                              for shadows: then there is no start offset, no horizon and no back side */
+    const uint32_t
+        *texels; /* [count], column + 65536 row: what the samplers tell points apart by, so that a lightmap's
+                  * noise does not depend on the order of its points; NULL: the points' numbers */
 } vsh_points;
 
 /* Work that was done; calls add to it, cancelled ones too. Begin with vsh_shade_stats_zero(). */
@@ -68,28 +109,34 @@ typedef struct vsh_shade_stats {
     uint64_t unfinished; /* marches that ran out of steps; their value is what was known by then */
     uint64_t invalid;    /* points with a position or normal that is not finite, or a zero normal: NaN */
     uint64_t
-        beyond_reach; /* cones wider somewhere than the field's reach: make the field with a larger one */
+        beyond_reach;    /* cones wider somewhere than the field's reach: make the field with a larger one */
+    uint64_t rays;       /* rays marched or traced to refine what no cone decided, or by the rays methods */
+    uint64_t refined;    /* values that took rays */
+    double square_error; /* adaptive, exact: sum over values of the estimated squared error */
 } vsh_shade_stats;
 
 static inline vsh_shade_stats vsh_shade_stats_zero(void) {
-    vsh_shade_stats stats = {sizeof(vsh_shade_stats), 0, 0, 0, 0, 0, 0, 0};
+    vsh_shade_stats stats = {sizeof(vsh_shade_stats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.0};
     return stats;
 }
 
 /* Fraction of the light that each point sees, 0 dark … 1 lit, into visibility[count]: before any cosine,
  * colour or falloff (a spot's edge counts as falloff). Points turned away from the light are 0, points inside
- * it 1, invalid ones NaN. Errors (visibility then holds nothing of use): VSH_ERROR_ARGUMENT (options out of
- * range, run, and as vsh_light_check()), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+ * it 1, invalid ones NaN. `deviation` [count], where not NULL, takes the standard error that is left: 0 where
+ * a cone proved the value, estimated where rays gave it, NaN for methods that know nothing of it. Errors (the
+ * arrays then hold nothing of use): VSH_ERROR_ARGUMENT (options out of range, exact without triangles, run,
+ * and as vsh_light_check()), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
                                     const vsh_shade_options *options, const vsh_run *run, float *visibility,
-                                    vsh_shade_stats *stats, vsh_error *error);
+                                    float *deviation, vsh_shade_stats *stats, vsh_error *error);
 
 /* Cosine-weighted fraction of the hemisphere around the normal that is free within ao_distance, 0 … 1 open,
- * into ao[count]; invalid points are NaN. Errors (ao then holds nothing of use): VSH_ERROR_ARGUMENT (options
- * out of range, run, points->normals NULL), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+ * into ao[count]; invalid points are NaN; `deviation` as above. Errors (ao then holds nothing of use):
+ * VSH_ERROR_ARGUMENT (options out of range, run, points->normals NULL), VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points,
                                 const vsh_shade_options *options, const vsh_run *run, float *ao,
-                                vsh_shade_stats *stats, vsh_error *error);
+                                float *deviation, vsh_shade_stats *stats, vsh_error *error);
 
 /* Irradiance of one light, linear RGB, added to irradiance[count][3]: visibility[count] × colour × falloff ×
  * the cosine to `shading_normals` [count][3], of any length (NULL: points->normals, which must then be

@@ -18,5 +18,6 @@
 #include "scene.h"
 #include "sdf.h"
 #include "shade.h"
+#include "trace.h"
 
 #endif

@@ -111,15 +111,15 @@ static void add_irradiance(void *user, size_t begin, size_t end) {
     const lighting *l = user;
     baking *bake = l->bake;
     const vsh_points points = {end - begin, bake->origins.position + 3 * begin,
-                               bake->origins.normal + 3 * begin};
+                               bake->origins.normal + 3 * begin, NULL};
     vsh_shade_irradiance(&points, NULL, l->light, bake->values + begin, bake->irradiance + 3 * begin);
 }
 
 static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
     const vsh_lightmap *lightmap = bake->lightmap;
-    const vsh_points points = {bake->origins.count, bake->origins.position, bake->origins.normal};
+    const vsh_points points = {bake->origins.count, bake->origins.position, bake->origins.normal, NULL};
     vsh_result result = vsh_shade_shadow(bake->field, &points, &bake->lights[index], &bake->shade, &bake->run,
-                                         bake->values, &bake->stats.shade, error);
+                                         bake->values, NULL, &bake->stats.shade, error);
     if (result == VSH_OK && lightmap->shadow != NULL && lightmap->shadow[index] != NULL) {
         result = average(bake, bake->values, 1, lightmap->shadow[index], error);
     }
@@ -146,8 +146,8 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
         }
     }
     if (result == VSH_OK && lightmap->ao != NULL) {
-        const vsh_points points = {bake->origins.count, bake->origins.position, bake->origins.normal};
-        result = vsh_shade_ao(bake->field, &points, &bake->shade, &bake->run, bake->values,
+        const vsh_points points = {bake->origins.count, bake->origins.position, bake->origins.normal, NULL};
+        result = vsh_shade_ao(bake->field, &points, &bake->shade, &bake->run, bake->values, NULL,
                               &bake->stats.shade, error);
         if (result == VSH_OK) {
             result = average(bake, bake->values, 1, lightmap->ao, error);

@@ -127,7 +127,8 @@ static void shade_taps(const void *user, size_t begin, size_t end, vsh_shade_sta
 }
 
 vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const vsh_shade_options *options,
-                        const vsh_run *run, float *ao, vsh_shade_stats *stats, vsh_error *error) {
+                        const vsh_run *run, float *ao, float *deviation, vsh_shade_stats *stats,
+                        vsh_error *error) {
     vsh_shade_options full;
     const vsh_result result = vshi_shade_options_resolve(options, &full, error);
     if (result != VSH_OK) {
@@ -135,6 +136,12 @@ vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const 
     }
     if (points->normals == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO needs normals: vsh_points.normals is NULL");
+    }
+    if (full.ao_method == VSH_AO_EXACT && full.triangles == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO method exact: triangles is NULL");
+    }
+    for (size_t i = 0; deviation != NULL && i < points->count; ++i) {
+        deviation[i] = NAN;
     }
     ao_task task = {.field = field,
                     .points = points,

@@ -4,15 +4,24 @@
 #include <string.h>
 
 static const char *const shadow_names[] = {
-    [VSH_SHADOW_HARD] = "hard",     [VSH_SHADOW_CLASSIC] = "classic", [VSH_SHADOW_IMPROVED] = "improved",
-    [VSH_SHADOW_SMOOTH] = "smooth", [VSH_SHADOW_CONE] = "cone",
+    [VSH_SHADOW_HARD] = "hard",         [VSH_SHADOW_CLASSIC] = "classic", [VSH_SHADOW_IMPROVED] = "improved",
+    [VSH_SHADOW_SMOOTH] = "smooth",     [VSH_SHADOW_CONE] = "cone",       [VSH_SHADOW_RAYS] = "rays",
+    [VSH_SHADOW_ADAPTIVE] = "adaptive", [VSH_SHADOW_EXACT] = "exact",
 };
 
-static const char *const ao_names[] = {[VSH_AO_TAPS] = "taps", [VSH_AO_CONES] = "cones"};
+static const char *const ao_names[] = {[VSH_AO_TAPS] = "taps",
+                                       [VSH_AO_CONES] = "cones",
+                                       [VSH_AO_RAYS] = "rays",
+                                       [VSH_AO_ADAPTIVE] = "adaptive",
+                                       [VSH_AO_EXACT] = "exact"};
+
+static const char *const sampler_names[] = {
+    [VSH_SAMPLER_SOBOL] = "sobol", [VSH_SAMPLER_WHITE] = "white", [VSH_SAMPLER_BLUE] = "blue"};
 
 enum {
     SHADOW_COUNT = sizeof shadow_names / sizeof shadow_names[0],
     AO_COUNT = sizeof ao_names / sizeof ao_names[0],
+    SAMPLER_COUNT = sizeof sampler_names / sizeof sampler_names[0],
 };
 
 static int32_t find(const char *const *names, int32_t count, const char *name) {
@@ -38,4 +47,12 @@ int32_t vsh_ao_method(const char *name) {
 
 const char *vsh_ao_method_name(int32_t method) {
     return method >= 0 && method < AO_COUNT ? ao_names[method] : NULL;
+}
+
+int32_t vsh_sampler(const char *name) {
+    return find(sampler_names, SAMPLER_COUNT, name);
+}
+
+const char *vsh_sampler_name(int32_t sampler) {
+    return sampler >= 0 && sampler < SAMPLER_COUNT ? sampler_names[sampler] : NULL;
 }

@@ -16,13 +16,18 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
         const char *name;
         double value, low, high;
     } fields[] = {
-        {"method", full->method, VSH_SHADOW_HARD, VSH_SHADOW_CONE},
-        {"ao_method", full->ao_method, VSH_AO_TAPS, VSH_AO_CONES},
+        {"method", full->method, VSH_SHADOW_HARD, VSH_SHADOW_EXACT},
+        {"ao_method", full->ao_method, VSH_AO_TAPS, VSH_AO_EXACT},
         {"ao_cones", full->ao_cones, 1, 256},
         {"max_steps", full->max_steps, 16, 65536},
         {"ao_distance", full->ao_distance, 0x1p-1000, 0x1p1000},
         {"start_offset", full->start_offset, 0, 16},
         {"surface_offset", full->surface_offset, 0, 0x1p1000},
+        {"rays", full->rays, 1, 4096},
+        {"sampler", full->sampler, VSH_SAMPLER_SOBOL, VSH_SAMPLER_BLUE},
+        {"frame", full->frame, 0, INT32_MAX},
+        {"early_rays", full->early_rays, 0, 4096},
+        {"max_error", full->max_error, 1e-4, 1},
     };
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; ++i) {
         if (!(fields[i].value >= fields[i].low && fields[i].value <= fields[i].high)) {
@@ -33,10 +38,13 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
     return VSH_OK;
 }
 
+#define SQUARE_UNIT 0x1p-40
+
 typedef struct shade_run {
     vshi_shade_fn *fn;
     const void *task;
-    _Atomic uint64_t marches, samples, skipped, certified, unfinished, invalid, beyond_reach;
+    _Atomic uint64_t marches, samples, skipped, certified, unfinished, invalid, beyond_reach, rays, refined;
+    _Atomic uint64_t square_error; /* in units of SQUARE_UNIT, so that the order of threads changes no bit */
 } shade_run;
 
 static void run_piece(void *user, size_t begin, size_t end) {
@@ -50,6 +58,9 @@ static void run_piece(void *user, size_t begin, size_t end) {
     atomic_fetch_add(&run->unfinished, stats.unfinished);
     atomic_fetch_add(&run->invalid, stats.invalid);
     atomic_fetch_add(&run->beyond_reach, stats.beyond_reach);
+    atomic_fetch_add(&run->rays, stats.rays);
+    atomic_fetch_add(&run->refined, stats.refined);
+    atomic_fetch_add(&run->square_error, (uint64_t)(stats.square_error / SQUARE_UNIT));
 }
 
 vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
@@ -74,6 +85,9 @@ vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, s
         stats->unfinished += pieces.unfinished;
         stats->invalid += pieces.invalid;
         stats->beyond_reach += pieces.beyond_reach;
+        stats->rays += pieces.rays;
+        stats->refined += pieces.refined;
+        stats->square_error += (double)pieces.square_error * SQUARE_UNIT;
     }
     return result;
 }

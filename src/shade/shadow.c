@@ -110,7 +110,7 @@ static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_s
 }
 
 vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
-                            const vsh_shade_options *options, const vsh_run *run, float *visibility,
+                            const vsh_shade_options *options, const vsh_run *run, float *visibility, float *deviation,
                             vsh_shade_stats *stats, vsh_error *error) {
     vsh_shade_options full;
     vsh_result result = vshi_shade_options_resolve(options, &full, error);
@@ -119,6 +119,12 @@ vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, co
     }
     if (result != VSH_OK) {
         return result;
+    }
+    if (full.method == VSH_SHADOW_EXACT && full.triangles == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "method exact: triangles is NULL");
+    }
+    for (size_t i = 0; deviation != NULL && i < points->count; ++i) {
+        deviation[i] = NAN;
     }
     shadow_task task = {.field = field,
                         .points = points,

@@ -124,7 +124,7 @@ static void ask_points(const vsh_field *field, double least_open, double most_op
     /* Under the caster, and far aside. */
     static const double positions[] = {0.0, 0.0, 0.0, 5.0, 0.0, 0.0};
     static const float normals[] = {0.0F, 1.0F, 0.0F, 0.0F, 1.0F, 0.0F};
-    const vsh_points points = {2, positions, normals};
+    const vsh_points points = {2, positions, normals, NULL};
     const vsh_light light = sun();
     vsh_shade_options options = vsh_shade_options_default();
     options.ao_distance = 3.0;
@@ -132,8 +132,8 @@ static void ask_points(const vsh_field *field, double least_open, double most_op
     vsh_shade_stats stats = vsh_shade_stats_zero();
     float visible[2] = {-1.0F, -1.0F};
     float open[2] = {-1.0F, -1.0F};
-    check("shadow", vsh_shade_shadow(field, &points, &light, &options, NULL, visible, &stats, error), error);
-    check("ao", vsh_shade_ao(field, &points, &options, NULL, open, &stats, error), error);
+    check("shadow", vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &stats, error), error);
+    check("ao", vsh_shade_ao(field, &points, &options, NULL, open, NULL, &stats, error), error);
     expect("shadow under the caster", visible[0], 0.0, 0.0);
     expect("shadow far aside", visible[1], 1.0, 1.0);
     expect("AO under the caster", open[0], least_open, most_open);

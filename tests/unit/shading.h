@@ -30,10 +30,10 @@ static inline vsh_shade_stats shadows(const vsh_field *field, const vsh_light *l
                                       float *visible) {
     vsh_shade_options options = vsh_shade_options_default();
     options.method = method;
-    const vsh_points points = {count, positions, normals};
+    const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(field, &points, light, &options, NULL, visible, &stats, &error) != VSH_OK) {
+    if (vsh_shade_shadow(field, &points, light, &options, NULL, visible, NULL, &stats, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;

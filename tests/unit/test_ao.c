@@ -12,10 +12,10 @@ static vsh_shade_stats ao_of(const vsh_field *field, int32_t method, int32_t con
     options.ao_method = method;
     options.ao_cones = cones;
     options.ao_distance = distance;
-    const vsh_points points = {count, positions, normals};
+    const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_ao(field, &points, &options, NULL, ao, &stats, &error) != VSH_OK) {
+    if (vsh_shade_ao(field, &points, &options, NULL, ao, NULL, &stats, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;
@@ -208,7 +208,7 @@ static void threads_and_the_order_of_points_do_not_show(void **state) {
         vsh_shade_options options = vsh_shade_options_default();
         options.ao_method = method;
         options.ao_cones = 7; /* pieces of the kernel's lanes end in the middle of points */
-        const vsh_points points = {4096, positions, normals};
+        const vsh_points points = {4096, positions, normals, NULL};
         const int32_t threads[] = {1, 2, 5};
         vsh_shade_stats stats[3];
         for (int i = 0; i < 3; ++i) {
@@ -216,7 +216,7 @@ static void threads_and_the_order_of_points_do_not_show(void **state) {
             run.threads = threads[i];
             stats[i] = vsh_shade_stats_zero();
             assert_int_equal(
-                vsh_shade_ao(field, &points, &options, &run, i == 0 ? first : other, &stats[i], NULL),
+                vsh_shade_ao(field, &points, &options, &run, i == 0 ? first : other, NULL, &stats[i], NULL),
                 VSH_OK);
             if (i > 0) {
                 assert_memory_equal(first, other, sizeof first);
@@ -224,9 +224,9 @@ static void threads_and_the_order_of_points_do_not_show(void **state) {
             }
         }
         for (size_t i = 0; i < COUNT; i += 97) { /* one at a time */
-            const vsh_points one = {1, positions + 3 * i, normals + 3 * i};
+            const vsh_points one = {1, positions + 3 * i, normals + 3 * i, NULL};
             float ao = -1.0f;
-            assert_int_equal(vsh_shade_ao(field, &one, &options, NULL, &ao, NULL, NULL), VSH_OK);
+            assert_int_equal(vsh_shade_ao(field, &one, &options, NULL, &ao, NULL, NULL, NULL), VSH_OK);
             assert_int_equal(bits_of(ao), bits_of(first[i]));
         }
     }
@@ -237,28 +237,31 @@ static void options_out_of_range_are_named(void **state) {
     (void)state;
     vsh_field *field = field_of(truth_seeds(), 0.2, 1.0);
     const double p[3] = {0.0, 0.001, 2.0};
-    const vsh_points points = {1, p, UP}, bare = {1, p, NULL};
+    const vsh_points points = {1, p, UP, NULL}, bare = {1, p, NULL, NULL};
     float ao = -1.0f;
     vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_shade_ao(field, &bare, NULL, NULL, &ao, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_shade_ao(field, &bare, NULL, NULL, &ao, NULL, NULL, &error), VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "normals"));
     const int32_t counts[] = {0, -1, 257};
     for (int i = 0; i < 3; ++i) {
         vsh_shade_options options = vsh_shade_options_default();
         options.ao_cones = counts[i];
-        assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &ao, NULL, &error), VSH_ERROR_ARGUMENT);
+        assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &ao, NULL, NULL, &error),
+                         VSH_ERROR_ARGUMENT);
         assert_non_null(strstr(error.message, "ao_cones"));
     }
     const double distances[] = {0.0, -1.0, (double)NAN, (double)INFINITY};
     for (int i = 0; i < 4; ++i) {
         vsh_shade_options options = vsh_shade_options_default();
         options.ao_distance = distances[i];
-        assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &ao, NULL, &error), VSH_ERROR_ARGUMENT);
+        assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &ao, NULL, NULL, &error),
+                         VSH_ERROR_ARGUMENT);
         assert_non_null(strstr(error.message, "ao_distance"));
     }
     vsh_shade_options options = vsh_shade_options_default();
     options.ao_method = 2;
-    assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &ao, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &ao, NULL, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "ao_method"));
     assert_true(ao == -1.0f);
     vsh_field_free(field);

@@ -6,7 +6,7 @@ static const float UP[3] = {0.0f, 1.0f, 0.0f};
 
 /* Of one point at the origin, fully lit. */
 static void lit(const vsh_light *light, const float normal[3], float rgb[3]) {
-    const vsh_points points = {1, ORIGIN, normal};
+    const vsh_points points = {1, ORIGIN, normal, NULL};
     const float one = 1.0f;
     rgb[0] = rgb[1] = rgb[2] = 0.0f;
     vsh_shade_irradiance(&points, NULL, light, &one, rgb);
@@ -38,7 +38,7 @@ static void the_cosine_to_the_light_weighs_it(void **state) {
 
 static void shading_normals_stand_in_for_geometric_ones(void **state) {
     (void)state;
-    const vsh_points points = {1, ORIGIN, UP};
+    const vsh_points points = {1, ORIGIN, UP, NULL};
     const float one = 1.0f, sideways[3] = {1.0f, 0.0f, 0.0f};
     const vsh_light light = sun((const double[]){1.0, 0.0, 0.0}, 0.1);
     float rgb[3] = {0.0f, 0.0f, 0.0f};
@@ -128,7 +128,7 @@ static void colour_and_visibility_multiply_and_lights_add(void **state) {
     light.color[0] = 2.0;
     light.color[1] = 0.5;
     light.color[2] = 0.0;
-    const vsh_points points = {COUNT, positions, normals};
+    const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_shade_irradiance(&points, NULL, &light, visible, rgb);
     vsh_shade_irradiance(&points, NULL, &light, visible, rgb);
     for (int i = 0; i < COUNT; ++i) {
@@ -146,17 +146,17 @@ static void what_has_no_place_or_normal_adds_nothing(void **state) {
     const float normals[6] = {0.0f, 1.0f, 0.0f, 0.0f, 1.0f, 0.0f};
     const float visible[2] = {1.0f, 1.0f};
     const vsh_light light = lamp((const double[]){0.0, 1.0, 0.0}, 0.1);
-    const vsh_points points = {2, positions, normals};
+    const vsh_points points = {2, positions, normals, NULL};
     float rgb[6] = {0.0f};
     vsh_shade_irradiance(&points, NULL, &light, visible, rgb);
     const double here[6] = {0.0};
     const float bad[6] = {0.0f, 0.0f, 0.0f, (float)NAN, 1.0f, 0.0f};
-    const vsh_points without = {2, here, bad};
+    const vsh_points without = {2, here, bad, NULL};
     vsh_shade_irradiance(&without, NULL, &light, visible, rgb);
     for (int i = 0; i < 6; ++i) {
         assert_true(rgb[i] == 0.0f);
     }
-    const vsh_points none = {0, NULL, NULL};
+    const vsh_points none = {0, NULL, NULL, NULL};
     vsh_shade_irradiance(&none, NULL, &light, NULL, NULL);
 }
 

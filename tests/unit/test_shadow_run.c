@@ -104,7 +104,7 @@ static void neither_threads_nor_neighbours_show_in_the_bits(void **state) {
         for (int32_t method = 0; method < METHODS; ++method) {
             vsh_shade_options options = vsh_shade_options_default();
             options.method = method;
-            const vsh_points points = {COUNT, positions, normals};
+            const vsh_points points = {COUNT, positions, normals, NULL};
             const int32_t threads[] = {1, 2, 5};
             vsh_shade_stats stats[3];
             for (int i = 0; i < 3; ++i) {
@@ -112,7 +112,7 @@ static void neither_threads_nor_neighbours_show_in_the_bits(void **state) {
                 run.threads = threads[i];
                 stats[i] = vsh_shade_stats_zero();
                 assert_int_equal(vsh_shade_shadow(field, &points, &lights[l], &options, &run,
-                                                  i == 0 ? first : other, &stats[i], NULL),
+                                                  i == 0 ? first : other, NULL, &stats[i], NULL),
                                  VSH_OK);
                 if (i > 0) {
                     assert_memory_equal(first, other, sizeof first);
@@ -187,11 +187,11 @@ static void every_point_is_marched_skipped_certified_or_invalid(void **state) {
         }
     }
     /* calls add to what is there */
-    const vsh_points points = {COUNT, positions, normals};
+    const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_shade_stats sum = vsh_shade_stats_zero();
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, NULL, visible, &sum, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, NULL, visible, NULL, &sum, NULL), VSH_OK);
     const vsh_shade_stats once = sum;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, NULL, visible, &sum, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, NULL, visible, NULL, &sum, NULL), VSH_OK);
     assert_int_equal(sum.marches, 2 * once.marches);
     assert_int_equal(sum.samples, 2 * once.samples);
     assert_int_equal(sum.certified, 2 * once.certified);
@@ -249,15 +249,15 @@ static void running_out_of_steps_is_counted_and_stays_in_range(void **state) {
     const double low[3] = {-1.0, 0.02, -0.3}; /* along the floor, where steps are short */
     const vsh_light light = sun(low, 0.01);
     vsh_shade_options options = vsh_shade_options_default();
-    const vsh_points points = {COUNT, positions, normals};
+    const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_shade_stats few = vsh_shade_stats_zero(), many = vsh_shade_stats_zero();
     options.max_steps = 16;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, &few, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &few, NULL), VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_true(visible[i] >= 0.0f && visible[i] <= 1.0f);
     }
     options.max_steps = 65536;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, &many, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &many, NULL), VSH_OK);
     print_message("of %d grazing rays, %d out of 16 steps\n", COUNT, (int)few.unfinished);
     assert_true(few.unfinished > 100);
     assert_true(few.samples <= 16 * few.marches);
@@ -288,33 +288,33 @@ static void options_lights_and_cancelling_have_their_codes(void **state) {
     static float visible[COUNT];
     floor_texels(SIDE, positions, normals);
     vsh_field *field = field_of(truth_seeds(), 0.2, 1.0);
-    const vsh_points points = {COUNT, positions, normals};
+    const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_light light = sun(truth_seeds_sun, 0.2);
     vsh_error error = {VSH_OK, ""};
     vsh_shade_options options = vsh_shade_options_default();
     options.method = METHODS;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &error),
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "method"));
     options = vsh_shade_options_default();
     options.max_steps = 15;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &error),
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "max_steps"));
     const double offsets[] = {-0.1, 17.0, (double)NAN};
     for (int i = 0; i < 3; ++i) {
         options = vsh_shade_options_default();
         options.start_offset = offsets[i];
-        assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &error),
+        assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
                          VSH_ERROR_ARGUMENT);
         assert_non_null(strstr(error.message, "start_offset"));
     }
     options = vsh_shade_options_default();
     options.struct_size = 3;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &error),
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     light.angle = -1.0;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, NULL, visible, NULL, &error),
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, NULL, visible, NULL, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "angle"));
 
@@ -325,11 +325,11 @@ static void options_lights_and_cancelling_have_their_codes(void **state) {
         vsh_run run = vsh_run_default();
         run.progress = stop_at;
         run.user = &stop;
-        assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, &run, visible, NULL, &error),
+        assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, &run, visible, NULL, NULL, &error),
                          VSH_ERROR_CANCELLED);
     }
-    const vsh_points none = {0, NULL, NULL};
-    assert_int_equal(vsh_shade_shadow(field, &none, &light, NULL, NULL, NULL, NULL, NULL), VSH_OK);
+    const vsh_points none = {0, NULL, NULL, NULL};
+    assert_int_equal(vsh_shade_shadow(field, &none, &light, NULL, NULL, NULL, NULL, NULL, NULL), VSH_OK);
     assert_true(shadow_at(field, &light, VSH_SHADOW_CONE, (const double[]){0.0, 9.0, 0.0}, UP) == 1.0f);
     vsh_field_free(field);
 }

@@ -1,0 +1,295 @@
+#include "shade/sampler.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MASK_EDGE = 64, CANDIDATES = 32 };
+
+struct vshi_sampler {
+    int32_t kind;
+    int32_t frame;
+    int32_t count;                    /* blue: points */
+    double (*points)[2];              /* blue: progressive, in the unit disc */
+    float mask[MASK_EDGE][MASK_EDGE]; /* blue: ranks in [0, 1) */
+};
+
+static const double PI = 3.14159265358979323846;
+
+/* A hash of 32 bits without fixed patterns (Wang, Jenkins and others; constants of Wellons' prospector,
+ * 2018). */
+static uint32_t hash(uint32_t x) {
+    x ^= x >> 16;
+    x *= 0x7feb352du;
+    x ^= x >> 15;
+    x *= 0x846ca68bu;
+    x ^= x >> 16;
+    return x;
+}
+
+static uint32_t hash2(uint32_t a, uint32_t b) {
+    return hash(a ^ (hash(b) + 0x9e3779b9u + (a << 6) + (a >> 2)));
+}
+
+static double unit(uint32_t x) {
+    return (double)x * 0x1p-32;
+}
+
+/* --- Sobol points, Owen-scrambled (Burley, 2020; the hash is Laine and Karras', 2011, as he mends it) */
+
+static uint32_t reverse(uint32_t x) {
+    x = (x << 16) | (x >> 16);
+    x = ((x & 0x00ff00ffu) << 8) | ((x & 0xff00ff00u) >> 8);
+    x = ((x & 0x0f0f0f0fu) << 4) | ((x & 0xf0f0f0f0u) >> 4);
+    x = ((x & 0x33333333u) << 2) | ((x & 0xccccccccu) >> 2);
+    x = ((x & 0x55555555u) << 1) | ((x & 0xaaaaaaaau) >> 1);
+    return x;
+}
+
+static uint32_t scramble(uint32_t x, uint32_t seed) {
+    x = reverse(x);
+    x ^= x * 0x3d20adeau;
+    x += seed;
+    x *= (seed >> 16) | 1u;
+    x ^= x * 0x05526c56u;
+    x ^= x * 0x53a22864u;
+    return reverse(x);
+}
+
+/* The second dimension of Sobol's sequence: Pascal's triangle modulo 2, a column a step. */
+static uint32_t sobol_second(uint32_t index) {
+    uint32_t result = 0;
+    for (uint32_t column = 1u << 31; index != 0; index >>= 1, column ^= column >> 1) {
+        if (index & 1u) {
+            result ^= column;
+        }
+    }
+    return result;
+}
+
+static void sobol_point(uint32_t index, uint32_t seed, double point[2]) {
+    /* scrambling the index keeps every prefix of 2^k a net and makes the sets of two texels independent */
+    const uint32_t shuffled = scramble(index, seed);
+    point[0] = unit(scramble(reverse(shuffled), hash(seed ^ 0x68bc21ebu)));
+    point[1] = unit(scramble(sobol_second(shuffled), hash(seed ^ 0x02e5be93u)));
+}
+
+/* Sine and cosine up to π/4 by their series, to 1e-13: own arithmetic, so that no libm shows in the bits. */
+static void small_angle(double angle, double *sine, double *cosine) {
+    const double square = angle * angle;
+    double s = 1.0, c = 1.0;
+    for (int k = 14; k >= 2; k -= 2) {
+        s = 1.0 - s * square / (k * (k + 1));
+        c = 1.0 - c * square / (k * (k - 1));
+    }
+    *sine = angle * s;
+    *cosine = c;
+}
+
+/* The unit square to the unit disc, areas kept and neighbours near (Shirley and Chiu, "A low distortion map
+ * between disk and square", 1997). */
+static void to_disc(const double square[2], double disc[2]) {
+    const double x = 2.0 * square[0] - 1.0, y = 2.0 * square[1] - 1.0;
+    if (x == 0.0 && y == 0.0) {
+        disc[0] = disc[1] = 0.0;
+        return;
+    }
+    const bool wide = fabs(x) > fabs(y);
+    const double radius = wide ? x : y;
+    double sine, cosine; /* of the angle to the nearer axis */
+    small_angle(0.25 * PI * (wide ? y / x : x / y), &sine, &cosine);
+    disc[0] = radius * (wide ? cosine : sine);
+    disc[1] = radius * (wide ? sine : cosine);
+}
+
+/* --- blue noise */
+
+/* The candidate that is farthest from all points before it, so that every prefix is spread evenly (Mitchell,
+ * "Spectrally optimal sampling for distribution ray tracing", 1991). */
+static void place_blue(vshi_sampler *sampler) {
+    double(*points)[2] = sampler->points;
+    for (int32_t i = 0; i < sampler->count; ++i) {
+        double best = -1.0;
+        for (int32_t c = 0; c < CANDIDATES; ++c) {
+            const uint32_t seed = hash2((uint32_t)i, (uint32_t)c);
+            const double square[2] = {unit(seed), unit(hash(seed ^ 0x85ebca6bu))};
+            double point[2], nearest = INFINITY;
+            to_disc(square, point);
+            for (int32_t j = 0; j < i; ++j) {
+                const double dx = points[j][0] - point[0], dy = points[j][1] - point[1];
+                const double distance = dx * dx + dy * dy;
+                nearest = distance < nearest ? distance : nearest;
+            }
+            if (nearest > best) {
+                best = nearest;
+                points[i][0] = point[0];
+                points[i][1] = point[1];
+            }
+        }
+    }
+}
+
+/* What a set bit adds to the energy of its neighbours: a Gaussian of 1.9 texels on the torus. */
+static void add_energy(double *energy, const double *kernel, int32_t at, double sign) {
+    const int32_t row = at / MASK_EDGE, column = at % MASK_EDGE;
+    for (int32_t y = 0; y < MASK_EDGE; ++y) {
+        const int32_t ky = (y - row + MASK_EDGE) % MASK_EDGE;
+        for (int32_t x = 0; x < MASK_EDGE; ++x) {
+            energy[y * MASK_EDGE + x] += sign * kernel[ky * MASK_EDGE + (x - column + MASK_EDGE) % MASK_EDGE];
+        }
+    }
+}
+
+/* The set bit in the tightest cluster, or the clear one in the largest void. */
+static int32_t extreme(const double *energy, const uint8_t *set, bool cluster) {
+    int32_t best = -1;
+    for (int32_t i = 0; i < MASK_EDGE * MASK_EDGE; ++i) {
+        if ((set[i] != 0) == cluster &&
+            (best < 0 || (cluster ? energy[i] > energy[best] : energy[i] < energy[best]))) {
+            best = i;
+        }
+    }
+    return best;
+}
+
+/* Ulichney, "The void-and-cluster method for dither array generation", 1993. */
+static bool place_mask(vshi_sampler *sampler) {
+    enum { TEXELS = MASK_EDGE * MASK_EDGE, FIRST = TEXELS / 10 };
+    double *energy = calloc(2 * TEXELS, sizeof *energy), *kernel = energy + TEXELS;
+    uint8_t *set = calloc(2 * TEXELS, 1), *first = set + TEXELS;
+    if (energy == NULL || set == NULL) {
+        free(energy);
+        free(set);
+        return false;
+    }
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        const int32_t y = i / MASK_EDGE, x = i % MASK_EDGE;
+        const int32_t dy = y < MASK_EDGE / 2 ? y : MASK_EDGE - y, dx = x < MASK_EDGE / 2 ? x : MASK_EDGE - x;
+        /* 2^-(r²/5) is the Gaussian of 1.9 texels, in arithmetic that has the same bits everywhere */
+        kernel[i] = ldexp(1.0 - 0.129449436703875 * ((dx * dx + dy * dy) % 5), -((dx * dx + dy * dy) / 5));
+    }
+    for (uint32_t i = 0, placed = 0; placed < FIRST; ++i) {
+        const int32_t at = (int32_t)(hash(i) % TEXELS);
+        if (!set[at]) {
+            set[at] = 1;
+            add_energy(energy, kernel, at, 1.0);
+            ++placed;
+        }
+    }
+    for (;;) { /* even out: from the tightest cluster to the largest void, until it would go back */
+        const int32_t from = extreme(energy, set, true);
+        set[from] = 0;
+        add_energy(energy, kernel, from, -1.0);
+        const int32_t to = extreme(energy, set, false);
+        set[to] = 1;
+        add_energy(energy, kernel, to, 1.0);
+        if (to == from) {
+            break;
+        }
+    }
+    float *mask = &sampler->mask[0][0];
+    memcpy(first, set, TEXELS);
+    double *even = malloc(TEXELS * sizeof *even);
+    if (even == NULL) {
+        free(energy);
+        free(set);
+        return false;
+    }
+    memcpy(even, energy, TEXELS * sizeof *even);
+    for (int32_t rank = FIRST - 1; rank >= 0; --rank) {
+        const int32_t at = extreme(energy, set, true);
+        set[at] = 0;
+        add_energy(energy, kernel, at, -1.0);
+        mask[at] = (float)rank / TEXELS;
+    }
+    for (int32_t rank = FIRST; rank < TEXELS; ++rank) {
+        const int32_t at = extreme(even, first, false);
+        first[at] = 1;
+        add_energy(even, kernel, at, 1.0);
+        mask[at] = (float)rank / TEXELS;
+    }
+    free(even);
+    free(energy);
+    free(set);
+    return true;
+}
+
+/* The point turned about the centre by a part of a whole turn, 0 … 1. */
+static void turn(double part, double point[2]) {
+    const int quarter = (int)(4.0 * part + 0.5);
+    double s, c;
+    small_angle(2.0 * PI * (part - 0.25 * quarter), &s, &c);
+    double x = c * point[0] - s * point[1], y = s * point[0] + c * point[1];
+    for (int i = 0; i < quarter; ++i) {
+        const double from = x;
+        x = -y;
+        y = from;
+    }
+    point[0] = x;
+    point[1] = y;
+}
+
+static void blue_point(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t index,
+                       double point[2]) {
+    static const double GOLDEN = 0.61803398874989485;
+    /* each purpose reads the mask from another place, and each frame has its ranks moved on by the golden
+     * ratio */
+    const uint32_t shift = purpose == 0 ? 0 : hash(purpose);
+    const uint32_t column = ((texel & 0xffffu) + shift) % MASK_EDGE,
+                   row = ((texel >> 16) + (shift >> 16)) % MASK_EDGE;
+    const double part = (double)sampler->mask[row][column] + GOLDEN * (double)sampler->frame;
+    point[0] = sampler->points[index][0];
+    point[1] = sampler->points[index][1];
+    turn(part - floor(part), point);
+}
+
+/* --- the sampler */
+
+vshi_sampler *vshi_sampler_create(int32_t kind, int32_t rays, int32_t frame) {
+    vshi_sampler *sampler = calloc(1, sizeof *sampler);
+    if (sampler == NULL) {
+        return NULL;
+    }
+    sampler->kind = kind;
+    sampler->frame = frame;
+    if (kind != VSH_SAMPLER_BLUE) {
+        return sampler;
+    }
+    sampler->count = rays;
+    sampler->points = calloc((size_t)rays, sizeof *sampler->points);
+    if (sampler->points == NULL || !place_mask(sampler)) {
+        vshi_sampler_free(sampler);
+        return NULL;
+    }
+    place_blue(sampler);
+    return sampler;
+}
+
+void vshi_sampler_free(vshi_sampler *sampler) {
+    if (sampler != NULL) {
+        free(sampler->points);
+        free(sampler);
+    }
+}
+
+void vshi_sampler_disc(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t first,
+                       int32_t count, double (*points)[2]) {
+    const uint32_t seed = hash2(hash2(texel, purpose), (uint32_t)sampler->frame);
+    for (int32_t i = 0; i < count; ++i) {
+        const uint32_t index = (uint32_t)(first + i);
+        double square[2];
+        switch (sampler->kind) {
+        case VSH_SAMPLER_BLUE:
+            blue_point(sampler, texel, purpose, first + i, points[i]);
+            continue;
+        case VSH_SAMPLER_WHITE:
+            square[0] = unit(hash2(seed, 2 * index));
+            square[1] = unit(hash2(seed, 2 * index + 1));
+            break;
+        default:
+            sobol_point(index, seed, square);
+            break;
+        }
+        to_disc(square, points[i]);
+    }
+}
