@@ -132,7 +132,8 @@ static void ask_points(const vsh_field *field, double least_open, double most_op
     vsh_shade_stats stats = vsh_shade_stats_zero();
     float visible[2] = {-1.0F, -1.0F};
     float open[2] = {-1.0F, -1.0F};
-    check("shadow", vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &stats, error), error);
+    check("shadow", vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &stats, error),
+          error);
     check("ao", vsh_shade_ao(field, &points, &options, NULL, open, NULL, &stats, error), error);
     expect("shadow under the caster", visible[0], 0.0, 0.0);
     expect("shadow far aside", visible[1], 1.0, 1.0);
@@ -167,7 +168,7 @@ static void bake_floor(const vsh_field *field, double least_open, double most_op
     static float shadow[SIZE * SIZE], ao[SIZE * SIZE], irradiance[3 * SIZE * SIZE], coverage[SIZE * SIZE];
     float *planes[1] = {shadow};
     const vsh_light light = sun();
-    const vsh_lightmap lightmap = {planes, ao, irradiance, coverage};
+    const vsh_lightmap lightmap = {planes, ao, irradiance, coverage, NULL, NULL};
     vsh_bake_stats stats = vsh_bake_stats_zero();
     check("bake", vsh_bake_lightmap(field, texels, &light, 1, &options.shade, NULL, &lightmap, &stats, error),
           error);
