@@ -1,4 +1,5 @@
 /* vdbshade bake: from files to lightmaps. */
+#include "bake_forecast.h"
 #include "bake_options.h"
 #include "clock.h"
 #include "meshes.h"
@@ -164,6 +165,11 @@ static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
     const long cores = sysconf(_SC_NPROCESSORS_ONLN);
     work.stats.threads = settings->common.threads > 0 ? settings->common.threads : (int32_t)cores;
     int code = load(&work);
+    if (code == CLI_OK && settings->dry_run) {
+        code = cli_bake_forecast(scene, work.assets, &work.run);
+        vsh_assets_free(work.assets);
+        return code;
+    }
     code = code == CLI_OK ? rasterise(&work) : code;
     code = code == CLI_OK ? make_triangles(&work) : code;
     code = code == CLI_OK ? make_field(&work) : code;

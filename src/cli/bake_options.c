@@ -26,7 +26,8 @@ enum {
     KEY_PADDING,
     KEY_BITS,
     KEY_PACK,
-    KEY_STATS
+    KEY_STATS,
+    KEY_DRY_RUN
 };
 
 static const cli_option options[] = {
@@ -42,6 +43,8 @@ static const cli_option options[] = {
      "R=shadow.sun,G=ao,A=A; 0 and 1 are constants\n"
      "(the first three but A to R, G, B; A to A)"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
+    {KEY_DRY_RUN, "dry-run", NULL,
+     "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},
     {0, NULL, NULL, "Light and occlusion"},
     {KEY_SUN, "sun", "X,Y,Z", "direction towards the sun; its channel is shadow.sun"},
     {KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},
@@ -129,6 +132,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_STATS:
         s->stats = value;
+        return CLI_OK;
+    case KEY_DRY_RUN:
+        s->dry_run = true;
         return CLI_OK;
     case KEY_SUN:
         s->has_sun = true;

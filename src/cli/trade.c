@@ -208,25 +208,17 @@ static int measure(trade_work *work) {
     int32_t resolutions[TRADE_MAX_RESOLUTIONS];
     memcpy(resolutions, s->resolutions, sizeof resolutions);
     qsort(resolutions, s->resolution_count, sizeof resolutions[0], by_size);
-    const int32_t finest = resolutions[s->resolution_count - 1];
-    vsh_field *fine = NULL;
-    double fine_s;
-    int code = trade_make_field(work, finest, &fine, &fine_s);
-    code = code == CLI_OK ? trade_take_mask(work, fine) : code;
-    code = code == CLI_OK ? trade_take_truth(work, finest) : code;
-    code = code == CLI_OK ? trade_measure_embree(work) : code;
+    int code = CLI_OK;
     for (size_t i = 0; i < s->resolution_count && code == CLI_OK; ++i) {
-        if (i + 1 == s->resolution_count) {
-            code = trade_measure(work, finest, fine, fine_s);
-            continue;
-        }
-        vsh_field *field = NULL;
-        double seconds;
-        code = trade_make_field(work, resolutions[i], &field, &seconds);
-        code = code == CLI_OK ? trade_measure(work, resolutions[i], field, seconds) : code;
-        vsh_field_free(field);
+        trade_field *next = &work->fields[work->field_count];
+        next->resolution = resolutions[s->resolution_count - 1 - i];
+        code = trade_make_field(work, next->resolution, &next->field, &next->build_s);
+        work->field_count += code == CLI_OK;
     }
-    vsh_field_free(fine);
+    code = code == CLI_OK ? trade_take_mask(work, work->fields[0].field) : code;
+    code = code == CLI_OK ? trade_take_truth(work, work->fields[0].resolution) : code;
+    code = code == CLI_OK ? trade_measure_embree(work) : code;
+    code = code == CLI_OK ? trade_measure(work) : code;
     mark_fronts(work);
     return code;
 }
@@ -239,6 +231,9 @@ static void free_work(trade_work *work) {
         }
         free(subject->runs);
         free(subject->truth);
+    }
+    for (size_t i = 0; i < work->field_count; ++i) {
+        vsh_field_free(work->fields[i].field);
     }
     free(work->mask);
     free(work->positions);

@@ -41,6 +41,12 @@ typedef struct trade_run {
     float *values; /* as trade_subject.truth */
 } trade_run;
 
+typedef struct trade_field {
+    int32_t resolution;
+    vsh_field *field;
+    double build_s;
+} trade_field;
+
 /* Shadows of all lights, or AO. */
 typedef struct trade_subject {
     const char *name; /* "shadow", "ao" */
@@ -60,6 +66,8 @@ typedef struct trade_work {
     vsh_texels_info info;
     vsh_triangles *triangles; /* NULL where a caster is no mesh, or there is no Embree */
     double triangles_s;
+    trade_field fields[TRADE_MAX_RESOLUTIONS]; /* finest first */
+    size_t field_count;
     float *mask; /* [height][width]: 1 where the finest field finds a texel valid */
     size_t valid;
     double *positions; /* [valid][3]: of the valid texels, lifted */
@@ -81,7 +89,7 @@ int trade_out_of_memory(const char *what);
 
 /* All of these return CLI_OK or an exit code, having said why. */
 int trade_make_field(trade_work *work, int32_t resolution, vsh_field **field, double *seconds);
-int trade_measure(trade_work *work, int32_t resolution, vsh_field *field, double build_s);
+int trade_measure(trade_work *work);
 int trade_take_mask(trade_work *work, const vsh_field *field);
 int trade_take_truth(trade_work *work, int32_t finest);
 int trade_measure_embree(trade_work *work);

@@ -20,18 +20,18 @@ typedef struct plan {
 static const plan shadow_plans[] = {
     {VSH_SHADOW_HARD, 0, 0.0},      {VSH_SHADOW_CLASSIC, 0, 0.0},   {VSH_SHADOW_IMPROVED, 0, 0.0},
     {VSH_SHADOW_SMOOTH, 0, 0.0},    {VSH_SHADOW_CONE, 0, 0.0},      {VSH_SHADOW_RAYS, 4, 0.0},
-    {VSH_SHADOW_RAYS, 16, 0.0},     {VSH_SHADOW_RAYS, 64, 0.0},     {VSH_SHADOW_ADAPTIVE, 0, 0.05},
-    {VSH_SHADOW_ADAPTIVE, 0, 0.02}, {VSH_SHADOW_ADAPTIVE, 0, 0.01}, {VSH_SHADOW_ADAPTIVE, 0, 0.005},
-    {VSH_SHADOW_EXACT, 0, 0.05},    {VSH_SHADOW_EXACT, 0, 0.02},    {VSH_SHADOW_EXACT, 0, 0.01},
-    {VSH_SHADOW_EXACT, 0, 0.005},
+    {VSH_SHADOW_ADAPTIVE, 0, 0.05}, {VSH_SHADOW_EXACT, 0, 0.05},    {VSH_SHADOW_ADAPTIVE, 0, 0.02},
+    {VSH_SHADOW_EXACT, 0, 0.02},    {VSH_SHADOW_ADAPTIVE, 0, 0.01}, {VSH_SHADOW_EXACT, 0, 0.01},
+    {VSH_SHADOW_RAYS, 16, 0.0},     {VSH_SHADOW_EXACT, 0, 0.005},   {VSH_SHADOW_ADAPTIVE, 0, 0.005},
+    {VSH_SHADOW_RAYS, 64, 0.0},
 };
 
 static const plan ao_plans[] = {
-    {VSH_AO_TAPS, 0, 0.0},      {VSH_AO_CONES, 4, 0.0},      {VSH_AO_CONES, 16, 0.0},
-    {VSH_AO_CONES, 64, 0.0},    {VSH_AO_RAYS, 4, 0.0},       {VSH_AO_RAYS, 16, 0.0},
-    {VSH_AO_RAYS, 64, 0.0},     {VSH_AO_ADAPTIVE, 0, 0.05},  {VSH_AO_ADAPTIVE, 0, 0.02},
-    {VSH_AO_ADAPTIVE, 0, 0.01}, {VSH_AO_ADAPTIVE, 0, 0.005}, {VSH_AO_EXACT, 0, 0.05},
-    {VSH_AO_EXACT, 0, 0.02},    {VSH_AO_EXACT, 0, 0.01},     {VSH_AO_EXACT, 0, 0.005},
+    {VSH_AO_TAPS, 0, 0.0},      {VSH_AO_CONES, 4, 0.0},     {VSH_AO_CONES, 16, 0.0},
+    {VSH_AO_RAYS, 4, 0.0},      {VSH_AO_ADAPTIVE, 0, 0.05}, {VSH_AO_EXACT, 0, 0.05},
+    {VSH_AO_ADAPTIVE, 0, 0.02}, {VSH_AO_EXACT, 0, 0.02},    {VSH_AO_RAYS, 16, 0.0},
+    {VSH_AO_ADAPTIVE, 0, 0.01}, {VSH_AO_EXACT, 0, 0.01},    {VSH_AO_RAYS, 64, 0.0},
+    {VSH_AO_CONES, 64, 0.0},    {VSH_AO_EXACT, 0, 0.005},   {VSH_AO_ADAPTIVE, 0, 0.005},
 };
 
 int trade_make_field(trade_work *work, int32_t resolution, vsh_field **field, double *seconds) {
@@ -137,27 +137,26 @@ static int bake(const trade_work *work, const trade_subject *subject, const vsh_
     return code;
 }
 
-/* What a plan of `count` took last time, as a guess for the next one. */
-static double expected(const trade_subject *subject, const trade_run *run, const plan *p) {
+/* A guess: what the method took last time, or several times that where the plan asks for more. */
+static double expected(const trade_subject *subject, const trade_run *run, bool first) {
     double seconds = 0.0;
     for (size_t i = 0; i < subject->run_count; ++i) {
         if (subject->runs[i].method == run->method) {
             seconds = subject->runs[i].bake_s;
         }
     }
-    return p->number > 0 || p->max_error > 0.0 ? 4.0 * seconds : seconds;
+    return first ? 4.0 * seconds : seconds;
 }
 
-static int run_plan(trade_work *work, trade_subject *subject, const plan *p, const vsh_field *field,
-                    int32_t resolution, double build_s) {
-    trade_run run = {.resolution = resolution, .build_s = build_s};
+static int run_plan(trade_work *work, trade_subject *subject, const plan *p, const trade_field *on) {
+    trade_run run = {.resolution = on->resolution, .build_s = on->build_s};
     const vsh_shade_options shade = shade_of(work, subject, p, &run);
     const bool exact =
         subject->ao ? p->method == (int32_t)VSH_AO_EXACT : p->method == (int32_t)VSH_SHADOW_EXACT;
     if (exact && work->triangles == NULL) {
         return CLI_OK;
     }
-    if (trade_left(work) < expected(subject, &run, p)) {
+    if (trade_left(work) < expected(subject, &run, on == work->fields)) {
         ++work->skipped;
         return CLI_OK;
     }
@@ -166,11 +165,11 @@ static int run_plan(trade_work *work, trade_subject *subject, const plan *p, con
         return trade_out_of_memory("values");
     }
     vsh_field_info info;
-    vsh_field_get_info(field, &info);
+    vsh_field_get_info(on->field, &info);
     run.bytes = info.bytes + (exact ? vsh_triangles_bytes(work->triangles) : 0);
     run.build_s += exact ? work->triangles_s : 0.0;
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    int code = bake(work, subject, field, &shade, run.values, &run.bake_s, &stats);
+    int code = bake(work, subject, on->field, &shade, run.values, &run.bake_s, &stats);
     if (code == CLI_OK) {
         run.certified = certified_share(work, subject, &shade, &stats);
         code = trade_compare(work, subject, run.values, &run.metrics);
@@ -182,16 +181,20 @@ static int run_plan(trade_work *work, trade_subject *subject, const plan *p, con
     return code != CLI_OK ? code : trade_out_of_memory("runs");
 }
 
-int trade_measure(trade_work *work, int32_t resolution, vsh_field *field, double build_s) {
-    for (size_t s = 0; s < work->subject_count; ++s) {
-        trade_subject *subject = &work->subjects[s];
-        const plan *plans = subject->ao ? ao_plans : shadow_plans;
-        const size_t count =
-            subject->ao ? sizeof ao_plans / sizeof ao_plans[0] : sizeof shadow_plans / sizeof shadow_plans[0];
-        for (size_t i = 0; i < count; ++i) {
-            const int code = run_plan(work, subject, &plans[i], field, resolution, build_s);
-            if (code != CLI_OK) {
-                return code;
+/* The first plans of all come first, on every field: where the budget ends, it is the dear ones that are
+ * missing. */
+int trade_measure(trade_work *work) {
+    static const size_t shadow_count = sizeof shadow_plans / sizeof shadow_plans[0];
+    static const size_t ao_count = sizeof ao_plans / sizeof ao_plans[0];
+    for (size_t i = 0; i < shadow_count || i < ao_count; ++i) {
+        for (size_t s = 0; s < work->subject_count; ++s) {
+            trade_subject *subject = &work->subjects[s];
+            for (size_t f = 0; f < work->field_count && i < (subject->ao ? ao_count : shadow_count); ++f) {
+                const plan *p = subject->ao ? &ao_plans[i] : &shadow_plans[i];
+                const int code = run_plan(work, subject, p, &work->fields[f]);
+                if (code != CLI_OK) {
+                    return code;
+                }
             }
         }
     }
