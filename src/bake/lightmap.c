@@ -15,7 +15,7 @@ typedef struct baking {
     const vsh_texels *texels;
     const vsh_light *lights;
     size_t light_count;
-    vsh_shade_options shade; /* without offsets: the origins are lifted already */
+    vsh_shade_options shade;
     vsh_run run;
     vsh_run quiet; /* for steps of milliseconds that come once a plane: no stage of their own */
     const vsh_lightmap *lightmap;
@@ -49,9 +49,17 @@ static bool errors_wanted(const vsh_lightmap *lightmap, size_t light_count) {
     return wanted;
 }
 
-static vsh_points points_of(const baking *bake) {
+/* Where rays begin: lifted already, but for methods that trace triangles. Those know the surface better than
+ * any voxel does, and lift their cones themselves. */
+static vsh_points points_of(const baking *bake, bool traced, vsh_shade_options *shade) {
     const vshi_origins *origins = &bake->origins;
-    return (vsh_points){origins->count, origins->position, origins->normal, origins->texel};
+    *shade = bake->shade;
+    if (!traced) {
+        shade->start_offset = 0.0;
+        shade->surface_offset = 0.0;
+    }
+    return (vsh_points){origins->count, traced ? origins->surface : origins->position, origins->normal,
+                        origins->texel};
 }
 
 /* --- averages of samples over texels */
@@ -142,10 +150,11 @@ static void add_irradiance(void *user, size_t begin, size_t end) {
 
 static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
     const vsh_lightmap *lightmap = bake->lightmap;
-    const vsh_points points = points_of(bake);
+    vsh_shade_options shade;
+    const vsh_points points = points_of(bake, bake->shade.method == VSH_SHADOW_EXACT, &shade);
     float *errors = lightmap->shadow_error != NULL ? lightmap->shadow_error[index] : NULL;
     vsh_result result =
-        vsh_shade_shadow(bake->field, &points, &bake->lights[index], &bake->shade, &bake->run, bake->values,
+        vsh_shade_shadow(bake->field, &points, &bake->lights[index], &shade, &bake->run, bake->values,
                          errors != NULL ? bake->deviation : NULL, &bake->stats.shade, error);
     if (result == VSH_OK && errors != NULL) {
         result = average(bake, bake->deviation, 1, errors, error);
@@ -176,8 +185,9 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
         }
     }
     if (result == VSH_OK && ao_wanted(lightmap)) {
-        const vsh_points points = points_of(bake);
-        result = vsh_shade_ao(bake->field, &points, &bake->shade, &bake->run, bake->values,
+        vsh_shade_options shade;
+        const vsh_points points = points_of(bake, bake->shade.ao_method == VSH_AO_EXACT, &shade);
+        result = vsh_shade_ao(bake->field, &points, &shade, &bake->run, bake->values,
                               lightmap->ao_error != NULL ? bake->deviation : NULL, &bake->stats.shade, error);
         if (result == VSH_OK && lightmap->ao_error != NULL) {
             result = average(bake, bake->deviation, 1, lightmap->ao_error, error);
@@ -282,6 +292,8 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     double bytes = (double)field.bytes + (double)texels->info.bytes + vshi_origins_bytes(texels) +
                    (double)texel_count(texels) + vshi_padding_bytes(texels->info.width, texels->info.height);
     const bool errors = errors_wanted(bake->lightmap, bake->light_count);
+    const bool traced = bake->shade.method == VSH_SHADOW_EXACT || bake->shade.ao_method == VSH_AO_EXACT;
+    bytes += traced ? samples * 3.0 * sizeof(double) : 0.0;
     bytes += (values ? samples * sizeof(float) : 0.0) + (errors ? samples * sizeof(float) : 0.0);
     bytes += irradiance ? samples * 3.0 * sizeof(float) : 0.0;
     vsh_result result = vshi_check_limit(&bake->run, bytes, "lightmap", error);
@@ -289,10 +301,7 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
         return result;
     }
     clear_planes(bake);
-    vsh_shade_options lifted = bake->shade;
-    bake->shade.start_offset = 0.0;
-    bake->shade.surface_offset = 0.0;
-    result = vshi_origins_create(bake->field, texels, &lifted, &bake->run, &bake->origins, error);
+    result = vshi_origins_create(bake->field, texels, &bake->shade, &bake->run, &bake->origins, error);
     bake->state = vshi_take(texel_count(texels), 1, "lightmap", &result, error);
     const size_t count = bake->origins.count;
     bake->values = vshi_take(values ? count : 0, sizeof(float), "lightmap", &result, error);

@@ -79,6 +79,9 @@ static void pack(void *user, size_t begin, size_t end) {
             if (origins->valid[i]) {
                 lift(l, i, l->crease[i] ? l->probe : l->offset, origins->position + 3 * next);
                 memcpy(origins->normal + 3 * next, l->texels->normal + 3 * i, 3 * sizeof(float));
+                if (origins->surface != NULL) {
+                    memcpy(origins->surface + 3 * next, l->texels->position + 3 * i, 3 * sizeof(double));
+                }
                 origins->texel[next] = sampler_texel(l->texels, i);
                 ++next;
             }
@@ -121,6 +124,8 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
         origins->count += valid;
     }
     origins->position = vshi_take(origins->count, 3 * sizeof(double), what, &result, error);
+    const bool traced = options->method == VSH_SHADOW_EXACT || options->ao_method == VSH_AO_EXACT;
+    origins->surface = vshi_take(traced ? origins->count : 0, 3 * sizeof(double), what, &result, error);
     origins->texel = vshi_take(origins->count, sizeof(uint32_t), what, &result, error);
     origins->normal = vshi_take(origins->count, 3 * sizeof(float), what, &result, error);
     if (result == VSH_OK) {
@@ -134,6 +139,7 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
 void vshi_origins_free(vshi_origins *origins) {
     free(origins->normal);
     free(origins->texel);
+    free(origins->surface);
     free(origins->position);
     free(origins->before);
     free(origins->valid);

@@ -37,6 +37,40 @@ static int hidden(const trade_work *work, const double *position, const float *n
     return CLI_OK;
 }
 
+/* Share of a finest voxel within which another surface makes the truth a matter of rounding: texel centres on
+ * an edge where two solids meet. */
+static const double CONTACT = 0.05;
+
+/* Takes such texels out of the mask. `normals` are geometric. */
+static int drop_contacts(trade_work *work, const float *geometric, double voxel) {
+    if (work->triangles == NULL) {
+        return CLI_OK;
+    }
+    float *open = calloc(work->valid + 1, sizeof *open);
+    if (open == NULL) {
+        return trade_out_of_memory("contacts");
+    }
+    vsh_error error;
+    if (vsh_trace_ao(work->triangles, work->valid, work->positions, geometric, 0.0, CONTACT * voxel, 32,
+                     &work->run, open, &error) != VSH_OK) {
+        free(open);
+        return cli_fail(&error);
+    }
+    size_t left = 0;
+    for (size_t i = 0; i < work->valid; ++i) {
+        if (open[i] < 1.0f) {
+            work->mask[work->texel[i]] = 0.0f;
+            continue;
+        }
+        memcpy(work->positions + 3 * left, work->positions + 3 * i, 3 * sizeof *work->positions);
+        memcpy(work->normals + 3 * left, work->normals + 3 * i, 3 * sizeof *work->normals);
+        work->texel[left++] = work->texel[i];
+    }
+    work->valid = left;
+    free(open);
+    return CLI_OK;
+}
+
 int trade_take_mask(trade_work *work, const vsh_field *field) {
     work->mask = calloc(trade_texels(work), sizeof *work->mask);
     if (work->mask == NULL) {
@@ -52,7 +86,9 @@ int trade_take_mask(trade_work *work, const vsh_field *field) {
     work->positions = calloc(samples.count + 1, 3 * sizeof *work->positions);
     work->normals = calloc(samples.count + 1, 3 * sizeof *work->normals);
     work->texel = calloc(samples.count + 1, sizeof *work->texel);
-    if (work->positions == NULL || work->normals == NULL || work->texel == NULL) {
+    float *geometrics = calloc(samples.count + 1, 3 * sizeof *geometrics);
+    if (work->positions == NULL || work->normals == NULL || work->texel == NULL || geometrics == NULL) {
+        free(geometrics);
         return trade_out_of_memory("samples");
     }
     vsh_field_info info;
@@ -75,13 +111,20 @@ int trade_take_mask(trade_work *work, const vsh_field *field) {
         bool is_hidden;
         const int code = hidden(work, position, geometric, info.voxel_size, &is_hidden);
         if (code != CLI_OK) {
+            free(geometrics);
             return code;
         }
         if (is_hidden) {
             work->mask[samples.texel[i]] = 0.0f;
             continue;
         }
+        memcpy(geometrics + 3 * work->valid, geometric, 3 * sizeof *geometric);
         work->texel[work->valid++] = samples.texel[i];
+    }
+    const int code = drop_contacts(work, geometrics, info.voxel_size);
+    free(geometrics);
+    if (code != CLI_OK) {
+        return code;
     }
     if (work->valid == 0) {
         return cli_usage("%s: no texel is valid: nothing to measure", work->settings->bake.input);
