@@ -48,8 +48,7 @@ static receiver take_texels(const vsh_field *field, const vsh_texels *texels) {
             probe[k] = p + info.voxel_size * n;
         }
         vsh_field_sample(field, 1, probe, &distance);
-        r.valid[r.count++] =
-            distance >= 0.0f ? 1.0f : 0.0f; /* as the bake judges */
+        r.valid[r.count++] = distance >= 0.0f ? 1.0f : 0.0f; /* as the bake judges */
     }
     return r;
 }
@@ -116,7 +115,8 @@ void bench_asset(FILE *csv) {
         for (int i = 0; i < BENCH_RUNS; ++i) {
             stats = vsh_shade_stats_zero();
             const double start = bench_seconds();
-            bench_check(vsh_shade_shadow(field, &points, &sun, &shade, &run, values, NULL, &stats, &error), &error);
+            bench_check(vsh_shade_shadow(field, &points, &sun, &shade, &run, values, NULL, &stats, &error),
+                        &error);
             seconds[i] = bench_seconds() - start;
         }
         const truth_metrics metrics = truth_compare(r.count, values, truth, r.valid);
