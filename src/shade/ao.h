@@ -1,0 +1,50 @@
+/* What the methods of ambient occlusion share: a call's task, and the frame of a point. */
+#ifndef VSHI_AO_H
+#define VSHI_AO_H
+
+#include "shade/sampler.h"
+#include "shade/shade.h"
+
+enum { VSHI_AO_GRAIN = 64 }; /* points a piece, with cones and rays */
+
+typedef struct vshi_ao_cones vshi_ao_cones;
+
+typedef struct vshi_ao_task {
+    const vsh_field *field;
+    const vsh_points *points;
+    const vsh_shade_options *options;
+    vshi_march_fn *march;
+    const vshi_sampler *sampler;
+    const vshi_ao_cones *cones;
+    float *ao;
+    float *deviation; /* may be NULL */
+    double distance;  /* finest voxels */
+} vshi_ao_task;
+
+/* Where a point's cones and rays begin, and the axes they are given in: the third is the normal. */
+typedef struct vshi_ao_frame {
+    vshi_vec origin;
+    vshi_vec axes[3];
+} vshi_ao_frame;
+
+/* The frame of point i in field space; false where the point is invalid: it is then NaN and counted. */
+bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, vsh_shade_stats *stats);
+
+/* A right-handed frame around a unit vector (Duff and others, "Building an orthonormal basis, revisited",
+ * 2017). */
+void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]);
+
+/* A direction of the frame's axes in their space. */
+static inline vshi_vec vshi_ao_direction(const vshi_vec axes[3], vshi_vec d) {
+    return vshi_add(vshi_add(vshi_scale(axes[0], d.x), vshi_scale(axes[1], d.y)), vshi_scale(axes[2], d.z));
+}
+
+/* The methods: each shades points begin … end - 1. */
+vshi_shade_fn vshi_ao_taps;
+vshi_shade_fn vshi_ao_by_cones;
+vshi_shade_fn vshi_ao_by_rays;
+
+/* The directions of options->ao_cones cones; NULL where memory is short. Free with free(). */
+vshi_ao_cones *vshi_ao_cones_create(int32_t count);
+
+#endif
