@@ -57,6 +57,19 @@ static void validate(void *user, size_t begin, size_t end) {
     }
 }
 
+/* Samplers tell points apart by it: column + 65536 row, and for the further samples of a texel a place some
+ * way off, so that they do not all send their rays the same way. */
+static uint32_t sampler_texel(const vsh_texels *texels, size_t i) {
+    static const uint32_t COLUMN_STEP = 47, ROW_STEP = 29;
+    const uint32_t width = (uint32_t)texels->info.width, texel = texels->texel[i];
+    uint32_t sample = 0;
+    for (size_t k = i; k > 0 && texels->texel[k - 1] == texel; --k) {
+        ++sample;
+    }
+    const uint32_t column = (texel % width + COLUMN_STEP * sample) & 0xffff;
+    return column + 65536u * ((texel / width + ROW_STEP * sample) & 0xffff);
+}
+
 static void pack(void *user, size_t begin, size_t end) {
     const lifting *l = user;
     vshi_origins *origins = l->origins;
@@ -66,6 +79,7 @@ static void pack(void *user, size_t begin, size_t end) {
             if (origins->valid[i]) {
                 lift(l, i, l->crease[i] ? l->probe : l->offset, origins->position + 3 * next);
                 memcpy(origins->normal + 3 * next, l->texels->normal + 3 * i, 3 * sizeof(float));
+                origins->texel[next] = sampler_texel(l->texels, i);
                 ++next;
             }
         }
@@ -73,7 +87,7 @@ static void pack(void *user, size_t begin, size_t end) {
 }
 
 double vshi_origins_bytes(const vsh_texels *texels) {
-    return (double)texels->count * (2.0 + 3.0 * sizeof(double) + 3.0 * sizeof(float));
+    return (double)texels->count * (2.0 + 3.0 * sizeof(double) + 4.0 * sizeof(float));
 }
 
 vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
@@ -107,6 +121,7 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
         origins->count += valid;
     }
     origins->position = vshi_take(origins->count, 3 * sizeof(double), what, &result, error);
+    origins->texel = vshi_take(origins->count, sizeof(uint32_t), what, &result, error);
     origins->normal = vshi_take(origins->count, 3 * sizeof(float), what, &result, error);
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, origins->blocks, 1, 1, pack, &l, error);
@@ -118,6 +133,7 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
 
 void vshi_origins_free(vshi_origins *origins) {
     free(origins->normal);
+    free(origins->texel);
     free(origins->position);
     free(origins->before);
     free(origins->valid);

@@ -11,6 +11,7 @@ typedef struct vshi_origins {
     size_t count;
     double *position; /* [count][3]: lifted off the surface, world units */
     float *normal;    /* [count][3]: decides shadow */
+    uint32_t *texel;  /* [count]: as vsh_points.texels; a texel's further samples get numbers of their own */
     uint8_t *valid;   /* [all samples]: 1 where the sample is among them */
     size_t blocks;    /* of all samples */
     size_t *before;   /* [blocks + 1]: valid samples before each block */
