@@ -2,7 +2,6 @@
 #include "shade/ao.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 void vshi_ao_axes(vshi_vec n, vshi_vec axes[3]) {
     const double sign = n.z < 0.0 ? -1.0 : 1.0;
@@ -32,15 +31,10 @@ static vsh_result shade(vshi_ao_task *task, const vsh_run *run, vsh_shade_stats 
         return vshi_shade_run(run, "ao", count, VSHI_CHUNK, vshi_ao_taps, task, stats, error);
     }
     if (options->ao_method == VSH_AO_CONES) {
-        vshi_ao_cones *cones = vshi_ao_cones_create(options->ao_cones);
-        if (cones == NULL) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "ao: the system refused memory");
-        }
-        task->cones = cones;
-        const vsh_result result =
-            vshi_shade_run(run, "ao", count, VSHI_AO_GRAIN, vshi_ao_by_cones, task, stats, error);
-        free(cones);
-        return result;
+        vshi_ao_cones cones;
+        vshi_ao_cones_place(&cones, options->ao_cones);
+        task->cones = &cones;
+        return vshi_shade_run(run, "ao", count, VSHI_AO_GRAIN, vshi_ao_by_cones, task, stats, error);
     }
     vshi_sampler *sampler = vshi_sampler_create(options->sampler, options->rays, options->frame);
     if (sampler == NULL) {

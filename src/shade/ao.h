@@ -7,7 +7,15 @@
 
 enum { VSHI_AO_GRAIN = 64 }; /* points a piece, with cones and rays */
 
-typedef struct vshi_ao_cones vshi_ao_cones;
+enum { VSHI_AO_MAX_CONES = 256, VSHI_AO_NEIGHBOURS = 6, VSHI_AO_TABLE_EDGE = 9 };
+
+typedef struct vshi_ao_cones {
+    int32_t count;
+    int32_t neighbours;                     /* of each, fewer where there are few cones */
+    vshi_vec directions[VSHI_AO_MAX_CONES]; /* around +z, cosine-weighted */
+    double sines[VSHI_AO_MAX_CONES];        /* of the cones' half angles */
+    uint8_t nearest[VSHI_AO_MAX_CONES][VSHI_AO_NEIGHBOURS];
+} vshi_ao_cones;
 
 typedef struct vshi_ao_task {
     const vsh_field *field;
@@ -44,7 +52,14 @@ vshi_shade_fn vshi_ao_taps;
 vshi_shade_fn vshi_ao_by_cones;
 vshi_shade_fn vshi_ao_by_rays;
 
-/* The directions of options->ao_cones cones; NULL where memory is short. Free with free(). */
-vshi_ao_cones *vshi_ao_cones_create(int32_t count);
+void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count);
+
+/* What is known of cone c of a point whose cones have the closenesses `close`: its own over its sine, and the
+ * mean of its neighbours' where they are free, both clamped, in [-1, 1] and [0, 1]. */
+void vshi_ao_cone_evidence(const vshi_ao_cones *cones, const float *close, int32_t c, double evidence[2]);
+
+/* Where evidence between -1 and 1 falls in the table: its cell's first entry, row by own closeness, and how
+ * far in the cell. */
+int32_t vshi_ao_table_cell(const double evidence[2], double part[2]);
 
 #endif

@@ -41,13 +41,11 @@ typedef struct batch {
 static void flush(batch *b, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
     if (b->exact) {
-#ifdef VSH_EMBREE
         bool blocked[VSHI_CHUNK];
         vshi_triangles_blocked(task->options->triangles, b->segments, b->traced, blocked);
         for (size_t r = 0; r < b->traced; ++r) {
             b->points[b->chunk.owner[r]].free += !blocked[r];
         }
-#endif
         stats->rays += b->traced;
         b->traced = 0;
         return;
