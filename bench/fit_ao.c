@@ -178,14 +178,14 @@ static uses uses_of(const sample_set *set, const vshi_ao_cones *cones) {
         vshi_march_stats work = {0, 0};
         vshi_shade_origin(set->field, &points, i, set->start, 0.0, &origin, &normal);
         vshi_ao_axes(normal, axes);
-        vshi_chunk_clear(chunk);
+        vshi_chunk_clear(chunk, false);
         for (int32_t c = 0; c < cones->count; ++c) {
-            const vshi_cone cone = {origin,
-                                    vshi_ao_direction(axes, cones->directions[c]),
-                                    set->distance / set->field->voxel_size,
-                                    cones->sines[c],
-                                    cones->sines[c],
-                                    -cones->sines[c]};
+            const vshi_cone cone = {.origin = origin,
+                                    .direction = vshi_ao_direction(axes, cones->directions[c]),
+                                    .end = set->distance / set->field->voxel_size,
+                                    .sine = cones->sines[c],
+                                    .close = cones->sines[c],
+                                    .stop = -cones->sines[c]};
             close[c] = (float)cone.close;
             vshi_chunk_add(chunk, set->field, &cone, (uint32_t)c, &stats);
         }

@@ -1,5 +1,9 @@
 /* Ambient occlusion by cosine-weighted rays, marched against the field or traced against triangles, in
- * rounds: a point takes part until it has its rays, or its error is small enough. */
+ * rounds: a point takes part until it has its rays, or its error is small enough.
+ *
+ * No cones go before them. Sixteen that prove their part of the sky free or hidden (VSHI_MARCH_PROOF) cost as
+ * much as 16 marched or 50 traced rays and decide a fifth of the rays that follow: near the receiver nothing
+ * is proved. Measured on the cloister, that was slower at every error down to 0.003. */
 #include "shade/ao.h"
 #include "shim/embree.h"
 
@@ -10,6 +14,10 @@ static const uint32_t PURPOSE = 0xa0;
 /* Rays of the first round of adaptive and exact; each further one doubles them: a Sobol sequence is best at
  * powers of two. */
 static const int32_t FIRST_ROUND = 16;
+
+/* Rays on triangles begin this far off the surface, voxels: above the rounding of floats, below what shows.
+ */
+static const double TRACE_LIFT = 1.0 / 64.0;
 
 enum { BALLS = 4, AT_ONCE = 64 };
 
@@ -58,7 +66,7 @@ static void flush(batch *b, vsh_shade_stats *stats) {
     for (size_t r = 0; r < b->chunk.rays.count; ++r) {
         b->points[b->chunk.owner[r]].free += b->chunk.rays.close[r] > 0.0f;
     }
-    vshi_chunk_clear(&b->chunk);
+    vshi_chunk_clear(&b->chunk, false);
 }
 
 /* Free balls up the normal that hold the origin: rays leave the surface through them, and are known up to
@@ -163,7 +171,7 @@ static bool prepare(batch *b, size_t i, ao_point *point, vsh_shade_stats *stats)
     }
     if (b->exact) {
         const vshi_vec normal = vshi_unit(vshi_vec_off(points->normals + 3 * i));
-        const double offset = task->options->start_offset * task->field->voxel_size;
+        const double offset = TRACE_LIFT * task->field->voxel_size;
         vshi_ao_axes(normal, point->world_axes);
         point->world_origin = vshi_add(vshi_vec_of(points->positions + 3 * i),
                                        vshi_scale(normal, offset + task->options->surface_offset));
@@ -215,7 +223,7 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
     b.points = points;
     b.exact = options->ao_method == VSH_AO_EXACT;
     b.traced = 0;
-    vshi_chunk_clear(&b.chunk);
+    vshi_chunk_clear(&b.chunk, false);
     for (size_t i = begin; i < end; ++i) {
         ao_point *point = &points[i - begin];
         point->next = prepare(&b, i, point, stats) ? first : 0;
