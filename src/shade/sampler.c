@@ -56,15 +56,15 @@ static uint32_t scramble(uint32_t x, uint32_t seed) {
     return reverse(x);
 }
 
-/* The second dimension of Sobol's sequence: Pascal's triangle modulo 2, a column a step. */
+/* The second dimension of Sobol's sequence: Pascal's triangle modulo 2, whose entries are products over the
+ * bits of row and column (Lucas), so that a step a bit of the bits' number does. */
 static uint32_t sobol_second(uint32_t index) {
-    uint32_t result = 0;
-    for (uint32_t column = 1u << 31; index != 0; index >>= 1, column ^= column >> 1) {
-        if (index & 1u) {
-            result ^= column;
-        }
-    }
-    return result;
+    index ^= index >> 1 & 0x55555555u;
+    index ^= index >> 2 & 0x33333333u;
+    index ^= index >> 4 & 0x0f0f0f0fu;
+    index ^= index >> 8 & 0x00ff00ffu;
+    index ^= index >> 16;
+    return reverse(index);
 }
 
 static void sobol_point(uint32_t index, uint32_t seed, double point[2]) {
@@ -76,11 +76,15 @@ static void sobol_point(uint32_t index, uint32_t seed, double point[2]) {
 
 /* Sine and cosine up to π/4 by their series, to 1e-13: own arithmetic, so that no libm shows in the bits. */
 static void small_angle(double angle, double *sine, double *cosine) {
+    static const double SINE[] = {1.0 / 210.0, 1.0 / 156.0, 1.0 / 110.0, 1.0 / 72.0,
+                                  1.0 / 42.0,  1.0 / 20.0,  1.0 / 6.0};
+    static const double COSINE[] = {1.0 / 182.0, 1.0 / 132.0, 1.0 / 90.0, 1.0 / 56.0,
+                                    1.0 / 30.0,  1.0 / 12.0,  1.0 / 2.0};
     const double square = angle * angle;
     double s = 1.0, c = 1.0;
-    for (int k = 14; k >= 2; k -= 2) {
-        s = 1.0 - s * square / (k * (k + 1));
-        c = 1.0 - c * square / (k * (k - 1));
+    for (int k = 0; k < 7; ++k) {
+        s = 1.0 - s * square * SINE[k];
+        c = 1.0 - c * square * COSINE[k];
     }
     *sine = angle * s;
     *cosine = c;
