@@ -57,15 +57,15 @@ static uint32_t scramble(uint32_t x, uint32_t seed) {
     return reverse(x);
 }
 
-/* The second dimension of Sobol's sequence: Pascal's triangle modulo 2, a column a step. */
+/* The second dimension of Sobol's sequence: Pascal's triangle modulo 2, whose entries are products over the
+ * bits of row and column (Lucas), so that a step a bit of the bits' number does. */
 static uint32_t sobol_second(uint32_t index) {
-    uint32_t result = 0;
-    for (uint32_t column = 1u << 31; index != 0; index >>= 1, column ^= column >> 1) {
-        if (index & 1u) {
-            result ^= column;
-        }
-    }
-    return result;
+    index ^= index >> 1 & 0x55555555u;
+    index ^= index >> 2 & 0x33333333u;
+    index ^= index >> 4 & 0x0f0f0f0fu;
+    index ^= index >> 8 & 0x00ff00ffu;
+    index ^= index >> 16;
+    return reverse(index);
 }
 
 /* One Owen-scrambled net for all; each texel shifts its digits, which keeps every prefix of 2^k a net (Kollig
