@@ -24,6 +24,12 @@ vsh_find(assimp assimp/cimport.h assimp)
 vsh_find(jansson jansson.h jansson)
 vsh_find(half Imath/half.h Imath-3_1)
 
+# Rays against triangles: optional, and what needs it says where it is missing.
+option(VSH_EMBREE "Trace rays against triangles with Embree, where it is found" ON)
+if(VSH_EMBREE)
+  find_package(embree 3 CONFIG QUIET)
+endif()
+
 find_package_handle_standard_args(vdbshade_dependencies REQUIRED_VARS VSH_openvdb_LIBRARY VSH_openimageio_LIBRARY
                                   VSH_openimageio_util_LIBRARY VSH_png_LIBRARY
                                   VSH_assimp_LIBRARY VSH_jansson_LIBRARY VSH_half_LIBRARY)
@@ -36,4 +42,10 @@ if(NOT TARGET vsh::openexr)
   add_library(vsh::dependencies INTERFACE IMPORTED)
   target_link_libraries(vsh::dependencies INTERFACE vsh::openvdb vsh::openexr vsh::openimageio vsh::assimp
                                                     vsh::jansson m)
+  if(TARGET embree)
+    add_library(vsh::embree INTERFACE IMPORTED)
+    target_link_libraries(vsh::embree INTERFACE embree)
+    target_compile_definitions(vsh::embree INTERFACE VSH_EMBREE)
+    target_link_libraries(vsh::dependencies INTERFACE vsh::embree)
+  endif()
 endif()

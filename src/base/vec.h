@@ -53,6 +53,16 @@ static inline vshi_vec vshi_unit(vshi_vec a) {
     return vshi_scale(a, 1.0 / vshi_length(a));
 }
 
+/* Two more axes of a right-handed frame with unit vector n (Duff and others, "Building an orthonormal basis,
+ * revisited", 2017). */
+static inline void vshi_frame(vshi_vec n, vshi_vec *tangent, vshi_vec *bitangent) {
+    const double sign = n.z < 0.0 ? -1.0 : 1.0;
+    const double a = -1.0 / (sign + n.z);
+    const double b = n.x * n.y * a;
+    *tangent = (vshi_vec){1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x};
+    *bitangent = (vshi_vec){b, sign + n.y * n.y * a, -n.y};
+}
+
 /* Point through a transform [12] of three rows of four; NULL is the identity. */
 static inline vshi_vec vshi_transform_point(const double *m, vshi_vec p) {
     if (m == NULL) {

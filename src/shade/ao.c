@@ -51,7 +51,7 @@ static void flush(const ao_task *task, vshi_chunk *chunk, double *open, vsh_shad
         open[chunk->owner[r]] += vshi_cone_visibility(closeness, sine);
         stats->certified += closeness >= sine || closeness <= -sine;
     }
-    vshi_chunk_clear(chunk);
+    vshi_chunk_clear(chunk, false);
 }
 
 enum { AO_GRAIN = 64 }; /* points a piece */
@@ -61,7 +61,7 @@ static void shade_cones(const void *user, size_t begin, size_t end, vsh_shade_st
     const int32_t count = task->options->ao_cones;
     vshi_chunk chunk;
     double open[AO_GRAIN] = {0.0};
-    vshi_chunk_clear(&chunk);
+    vshi_chunk_clear(&chunk, false);
     for (size_t i = begin; i < end; ++i) {
         vshi_vec origin, normal, tangent, bitangent;
         if (!vshi_shade_origin(task->field, task->points, i, task->options->start_offset,

@@ -7,9 +7,9 @@ static const double FIRST_STEP = 0.0625;
 /* The bounds are those of lattice points next to the surface; half a voxel covers the float rounding. */
 static const double BOUNDS_MARGIN = 0.5;
 
-void vshi_chunk_clear(vshi_chunk *chunk) {
-    float *lane[11];
-    for (int i = 0; i < 11; ++i) {
+void vshi_chunk_clear(vshi_chunk *chunk, bool proof) {
+    float *lane[12];
+    for (int i = 0; i < 12; ++i) {
         lane[i] = chunk->memory[i];
     }
     chunk->rays = (vshi_rays){.count = 0,
@@ -19,7 +19,9 @@ void vshi_chunk_clear(vshi_chunk *chunk) {
                               .end = lane[7],
                               .sine = lane[8],
                               .stop = lane[9],
-                              .close = lane[10]};
+                              .close = lane[10],
+                              .horizon = proof ? lane[11] : NULL,
+                              .proof = proof ? chunk->proof : NULL};
 }
 
 /* Narrows [begin, end] to where slope × t ≥ bound. */
@@ -69,6 +71,9 @@ bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *
     chunk->rays.sine[i] = (float)cone->sine;
     chunk->rays.stop[i] = (float)cone->stop;
     chunk->rays.close[i] = (float)cone->close;
+    if (chunk->rays.proof != NULL) {
+        chunk->rays.horizon[i] = (float)cone->horizon;
+    }
     chunk->owner[i] = owner;
     ++stats->marches;
     if (cone->sine * end > field->levels[field->level_count - 1].band) {

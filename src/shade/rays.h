@@ -13,7 +13,8 @@ enum { VSHI_CHUNK = 1024 }; /* rays: some 50 KB, which stay in the second cache 
 typedef struct vshi_chunk {
     vshi_rays rays;
     uint32_t owner[VSHI_CHUNK]; /* what each ray is for, as the caller numbers it */
-    float memory[11][VSHI_CHUNK];
+    float memory[12][VSHI_CHUNK];
+    int8_t proof[VSHI_CHUNK];
 } vshi_chunk;
 
 /* A cone in field space. */
@@ -24,9 +25,11 @@ typedef struct vshi_cone {
     double sine;        /* of the half angle; 0: a ray */
     double close;       /* what is known of its closeness already: at most `sine`; 1 for rays */
     double stop;
+    double horizon; /* of proofs: see vshi_rays */
 } vshi_cone;
 
-void vshi_chunk_clear(vshi_chunk *chunk);
+/* Empties a chunk; `proof`: of cones for VSHI_MARCH_PROOF. */
+void vshi_chunk_clear(vshi_chunk *chunk, bool proof);
 
 /* Adds a cone, or returns false where it cannot meet the casters' bounds: its closeness then stays as it is.
  */
@@ -42,6 +45,11 @@ double vshi_segment(double x);
  * between the axis and the occluder's edge, and the disc's radius and the edge's offset are the angles'
  * tangents. */
 double vshi_cone_visibility(double closeness, double sine);
+
+/* Standard error of the share of `taken` rays of a VSH_SAMPLER_… that an edge across the disc leaves, of
+ * which `lit` were: c sqrt(p (1 - p)) n^-3/4, for white noise n^-1/2, measured over edges of all places and
+ * directions (test_sampler). */
+double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken);
 
 /* Unit normal and direction in field space. */
 static inline vshi_vec vshi_direction_to_field(const vsh_field *field, vshi_vec direction) {

@@ -1,21 +1,7 @@
 /* Shadow values: the visible fraction of a light, by one cone or ray a point. */
-#include "shade/shade.h"
+#include "shade/shadow.h"
 
 #include <math.h>
-
-/* A light as the points of one field see it. */
-typedef struct shadow_task {
-    const vsh_field *field;
-    const vsh_points *points;
-    const vsh_light *light;
-    const vsh_shade_options *options;
-    vshi_march_fn *march;
-    float *visibility;
-    vshi_vec towards; /* directional: unit, field space */
-    vshi_vec centre;  /* positional: field space */
-    double sine;      /* directional: of the half angle */
-    double radius;    /* positional: finest voxels */
-} shadow_task;
 
 /* Turns a closeness into a visible fraction, by method. */
 static float remap(int32_t method, double closeness, double sine) {
@@ -34,8 +20,7 @@ static float remap(int32_t method, double closeness, double sine) {
     }
 }
 
-/* The cone from a point to the light; false where the point is within the light. */
-static bool aim(const shadow_task *task, vshi_vec origin, vshi_cone *cone) {
+bool vshi_shadow_aim(const vshi_shadow_task *task, vshi_vec origin, vshi_cone *cone) {
     cone->origin = origin;
     if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
         cone->direction = task->towards;
@@ -59,11 +44,11 @@ static bool aim(const shadow_task *task, vshi_vec origin, vshi_cone *cone) {
 }
 
 static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
-    const shadow_task *task = user;
+    const vshi_shadow_task *task = user;
     const int32_t method = task->options->method;
     const bool inner = method == VSH_SHADOW_SMOOTH || method == VSH_SHADOW_CONE;
     vshi_chunk chunk;
-    vshi_chunk_clear(&chunk);
+    vshi_chunk_clear(&chunk, false);
     for (size_t i = begin; i < end; ++i) {
         vshi_cone cone;
         vshi_vec origin, normal;
@@ -73,7 +58,7 @@ static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_s
             ++stats->invalid;
             continue;
         }
-        if (!aim(task, origin, &cone)) {
+        if (!vshi_shadow_aim(task, origin, &cone)) {
             task->visibility[i] = 1.0f;
             continue;
         }
@@ -110,8 +95,8 @@ static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_s
 }
 
 vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
-                            const vsh_shade_options *options, const vsh_run *run, float *visibility, float *deviation,
-                            vsh_shade_stats *stats, vsh_error *error) {
+                            const vsh_shade_options *options, const vsh_run *run, float *visibility,
+                            float *deviation, vsh_shade_stats *stats, vsh_error *error) {
     vsh_shade_options full;
     vsh_result result = vshi_shade_options_resolve(options, &full, error);
     if (result == VSH_OK) {
@@ -123,15 +108,17 @@ vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, co
     if (full.method == VSH_SHADOW_EXACT && full.triangles == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "method exact: triangles is NULL");
     }
-    for (size_t i = 0; deviation != NULL && i < points->count; ++i) {
+    const bool by_rays = full.method >= VSH_SHADOW_RAYS;
+    for (size_t i = 0; !by_rays && deviation != NULL && i < points->count; ++i) {
         deviation[i] = NAN;
     }
-    shadow_task task = {.field = field,
-                        .points = points,
-                        .light = light,
-                        .options = &full,
-                        .march = vshi_march_best(),
-                        .visibility = visibility};
+    vshi_shadow_task task = {.field = field,
+                             .points = points,
+                             .light = light,
+                             .options = &full,
+                             .march = vshi_march_best(),
+                             .visibility = visibility,
+                             .deviation = deviation};
     if (light->type == VSH_LIGHT_DIRECTIONAL) {
         task.towards = vshi_direction_to_field(field, vshi_unit(vshi_vec_of(light->direction)));
         task.sine = sin(0.5 * light->angle);
@@ -142,6 +129,18 @@ vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, co
     char stage[80] = "shadow.";
     for (size_t i = 0; i < sizeof light->name && light->name[i] != '\0'; ++i) {
         stage[7 + i] = light->name[i];
+        task.purpose = 31u * task.purpose + (unsigned char)light->name[i];
     }
-    return vshi_shade_run(run, stage, points->count, VSHI_CHUNK, shade_points, &task, stats, error);
+    if (!by_rays) {
+        return vshi_shade_run(run, stage, points->count, VSHI_CHUNK, shade_points, &task, stats, error);
+    }
+    vshi_sampler *sampler = vshi_sampler_create(full.sampler, full.rays, full.frame);
+    if (sampler == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
+    }
+    task.sampler = sampler;
+    result =
+        vshi_shade_run(run, stage, points->count, VSHI_RAY_GRAIN, vshi_shadow_by_rays, &task, stats, error);
+    vshi_sampler_free(sampler);
+    return result;
 }

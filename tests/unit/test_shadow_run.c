@@ -27,12 +27,13 @@ static void fill_points(void) {
 
 typedef struct march_result {
     float close[1000];
+    int8_t proof[1000];
     vshi_march_stats stats;
 } march_result;
 
 static void march_with(vshi_march_fn *march, const vsh_field *field, size_t count, int32_t kind,
                        march_result *result) {
-    static float lanes[11][1000];
+    static float lanes[12][1000];
     uint64_t counter = 77;
     for (size_t i = 0; i < count; ++i) {
         double d[3];
@@ -47,6 +48,7 @@ static void march_with(vshi_march_fn *march, const vsh_field *field, size_t coun
         lanes[8][i] = (float)sine;
         lanes[9][i] = i % 3 == 0 ? 0.0f : -(float)sine;
         lanes[10][i] = sine > 0.0 ? (float)sine : 1.0f;
+        lanes[11][i] = i % 4 == 0 ? INFINITY : (float)between(&counter, 0.0, 1.0);
     }
     const vshi_rays rays = {count,
                             {lanes[0], lanes[1], lanes[2]},
@@ -55,10 +57,15 @@ static void march_with(vshi_march_fn *march, const vsh_field *field, size_t coun
                             lanes[7],
                             lanes[8],
                             lanes[9],
-                            lanes[10]};
+                            lanes[10],
+                            kind == VSHI_MARCH_PROOF ? lanes[11] : NULL,
+                            kind == VSHI_MARCH_PROOF ? result->proof : NULL};
     result->stats = (vshi_march_stats){0, 0};
     march(field, &rays, kind, 40, &result->stats);
     memcpy(result->close, lanes[10], sizeof result->close);
+    if (kind != VSHI_MARCH_PROOF) {
+        memset(result->proof, 0, sizeof result->proof);
+    }
 }
 
 static void every_instruction_set_gives_the_same_bits(void **state) {
@@ -79,17 +86,25 @@ static void every_instruction_set_gives_the_same_bits(void **state) {
     static march_result base, other;
     const size_t counts[] = {0, 1, 15, 16, 17, 100, 1000};
     for (size_t c = 0; c < sizeof counts / sizeof counts[0]; ++c) {
-        for (int32_t kind = VSHI_MARCH_PLAIN; kind <= VSHI_MARCH_TRIANGULATED; ++kind) {
+        for (int32_t kind = VSHI_MARCH_PLAIN; kind <= VSHI_MARCH_PROOF; ++kind) {
             march_with(vshi_march_base, field, counts[c], kind, &base);
             for (size_t o = 0; o < other_count; ++o) {
                 march_with(others[o], field, counts[c], kind, &other);
                 assert_memory_equal(base.close, other.close, counts[c] * sizeof base.close[0]);
+                assert_memory_equal(base.proof, other.proof, counts[c]);
                 assert_int_equal(base.stats.samples, other.stats.samples);
                 assert_int_equal(base.stats.unfinished, other.stats.unfinished);
             }
         }
     }
-    assert_true(base.stats.unfinished > 0); /* of which there were some */
+    bool unproved = false, proved_free = false;
+    for (size_t i = 0; i < 1000; ++i) {
+        unproved = unproved || base.proof[i] == VSHI_UNPROVED;
+        proved_free = proved_free || base.proof[i] == VSHI_PROVED_FREE;
+    }
+    assert_true(unproved && proved_free);
+    march_with(vshi_march_base, field, 1000, VSHI_MARCH_PLAIN, &base);
+    assert_true(base.stats.unfinished > 0);
     vsh_field_free(field);
 }
 
@@ -252,12 +267,14 @@ static void running_out_of_steps_is_counted_and_stays_in_range(void **state) {
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_shade_stats few = vsh_shade_stats_zero(), many = vsh_shade_stats_zero();
     options.max_steps = 16;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &few, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &few, NULL),
+                     VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_true(visible[i] >= 0.0f && visible[i] <= 1.0f);
     }
     options.max_steps = 65536;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &many, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &many, NULL),
+                     VSH_OK);
     print_message("of %d grazing rays, %d out of 16 steps\n", COUNT, (int)few.unfinished);
     assert_true(few.unfinished > 100);
     assert_true(few.samples <= 16 * few.marches);
@@ -292,7 +309,7 @@ static void options_lights_and_cancelling_have_their_codes(void **state) {
     vsh_light light = sun(truth_seeds_sun, 0.2);
     vsh_error error = {VSH_OK, ""};
     vsh_shade_options options = vsh_shade_options_default();
-    options.method = METHODS;
+    options.method = VSH_SHADOW_EXACT + 1;
     assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "method"));
@@ -305,8 +322,9 @@ static void options_lights_and_cancelling_have_their_codes(void **state) {
     for (int i = 0; i < 3; ++i) {
         options = vsh_shade_options_default();
         options.start_offset = offsets[i];
-        assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
-                         VSH_ERROR_ARGUMENT);
+        assert_int_equal(
+            vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
+            VSH_ERROR_ARGUMENT);
         assert_non_null(strstr(error.message, "start_offset"));
     }
     options = vsh_shade_options_default();

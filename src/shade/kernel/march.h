@@ -17,13 +17,19 @@ typedef struct vshi_rays {
     float *stop;  /* a ray ends when its closeness falls to this: -sine, or 0 for what ends at a hit */
     float *close; /* in: upper bound of the closeness, at least `stop`. out: min of it and of h / t along the
                    * ray, h the distance to the surface at t; `stop` or less where the ray ended by it */
+    /* for VSHI_MARCH_PROOF, which leaves `close` alone; else NULL */
+    float *horizon; /* sine of the direction's height over the receiver's plane; INFINITY without one */
+    int8_t *proof;  /* out */
 } vshi_rays;
 
 /* How the closeness is taken at a sample. */
 enum {
     VSHI_MARCH_PLAIN = 0,       /* h / t */
-    VSHI_MARCH_TRIANGULATED = 1 /* the closest miss between two samples (Aaltonen, GDC 2018) */
+    VSHI_MARCH_TRIANGULATED = 1, /* the closest miss between two samples (Aaltonen, GDC 2018) */
+    VSHI_MARCH_PROOF = 2         /* not at all: whether the cone is free or full for certain */
 };
+
+enum { VSHI_UNPROVED = 0, VSHI_PROVED_FREE = 1, VSHI_PROVED_FULL = 2 };
 
 typedef struct vshi_march_stats {
     uint64_t samples;

@@ -1,0 +1,223 @@
+/* Lights and open sky seen from points, by rays against the triangles themselves: no field, no estimate but
+ * the number of rays. */
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "base/vec.h"
+#include "shim/embree.h"
+
+#include <stdlib.h>
+
+enum { MAX_RAYS = 65536, AT_ONCE = 256, GRAIN = 64 };
+
+typedef struct tracing {
+    const vsh_triangles *triangles;
+    const double *positions;
+    const float *normals;
+    double lift;
+    const vsh_light *light; /* NULL: AO */
+    double distance;        /* AO */
+    int32_t rays;
+    double (*disc)[2]; /* [rays], the same for all points */
+    float *values;
+} tracing;
+
+/* A light as a disc a unit away: its radius, and the most that a ray goes along it. */
+typedef struct target {
+    vshi_vec axis, u, v;
+    double radius;
+    double distance; /* of the light's centre; infinite for a directional light */
+    double size;     /* of the sphere */
+} target;
+
+/* Two vectors that make a right-handed frame with a unit vector (Duff and others, "Building an orthonormal
+ * basis, revisited", 2017). */
+static void frame(target *t) {
+    const vshi_vec n = t->axis;
+    const double sign = n.z < 0.0 ? -1.0 : 1.0;
+    const double a = -1.0 / (sign + n.z), b = n.x * n.y * a;
+    t->u = (vshi_vec){1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x};
+    t->v = (vshi_vec){b, sign + n.y * n.y * a, -n.y};
+}
+
+/* Vogel's spiral ("A better way to construct the sunflower head", 1979), radii √((i + ½) / n), so that every
+ * ring has its share. */
+static void place(tracing *task) {
+    static const double PI = 3.14159265358979323846, TURN = 0.38196601125010515;
+    for (int32_t i = 0; i < task->rays; ++i) {
+        const double radius = sqrt((i + 0.5) / task->rays), angle = 2.0 * PI * fmod(i * TURN, 1.0);
+        task->disc[i][0] = radius * cos(angle);
+        task->disc[i][1] = radius * sin(angle);
+    }
+}
+
+/* Where the light stands, seen from a point; false where the point is within it. */
+static bool aim(const vsh_light *light, vshi_vec from, target *t) {
+    t->distance = INFINITY;
+    t->size = 0.0;
+    if (light->type == VSH_LIGHT_DIRECTIONAL) {
+        t->axis = vshi_unit(vshi_vec_of(light->direction));
+        t->radius = tan(0.5 * light->angle);
+    } else {
+        const vshi_vec to = vshi_sub(vshi_vec_of(light->position), from);
+        t->distance = vshi_length(to);
+        t->size = light->radius;
+        if (!(t->distance > t->size)) {
+            return false;
+        }
+        t->axis = vshi_unit(to);
+        const double sine = t->size / t->distance;
+        t->radius = sine / sqrt((1.0 - sine) * (1.0 + sine));
+    }
+    frame(t);
+    return true;
+}
+
+/* How far a ray at `cosine` to the axis goes: up to the sphere's near side. */
+static double far_of(const target *t, double cosine) {
+    if (!isfinite(t->distance)) {
+        return INFINITY;
+    }
+    const double across = t->size * t->size - t->distance * t->distance * (1.0 - cosine * cosine);
+    return t->distance * cosine - (across > 0.0 ? sqrt(across) : 0.0);
+}
+
+/* Direction i, and how far it goes; false below the horizon of `normal` (NULL: none). */
+static bool direct(const tracing *task, const target *t, int32_t i, const vshi_vec *normal,
+                   vshi_segment_ray *ray) {
+    const double x = task->disc[i][0] * t->radius, y = task->disc[i][1] * t->radius;
+    double up, scale = 1.0;
+    if (task->light != NULL) {
+        scale = 1.0 / sqrt(1.0 + x * x + y * y);
+        up = scale;
+        ray->far = far_of(t, up);
+    } else {
+        const double square = 1.0 - x * x - y * y;
+        up = square > 0.0 ? sqrt(square) : 0.0;
+        ray->far = task->distance;
+    }
+    const vshi_vec d =
+        vshi_add(vshi_add(vshi_scale(t->u, scale * x), vshi_scale(t->v, scale * y)), vshi_scale(t->axis, up));
+    ray->direction[0] = d.x;
+    ray->direction[1] = d.y;
+    ray->direction[2] = d.z;
+    return normal == NULL || vshi_dot(d, *normal) > 0.0;
+}
+
+static float trace_point(const tracing *task, size_t point) {
+    vshi_vec origin = vshi_vec_of(task->positions + 3 * point), normal = {0.0, 0.0, 0.0};
+    if (task->normals != NULL) {
+        normal = vshi_unit(vshi_vec_off(task->normals + 3 * point));
+        if (!(vshi_dot(normal, normal) > 0.5)) {
+            return NAN;
+        }
+        origin = vshi_add(origin, vshi_scale(normal, task->lift));
+    }
+    if (!vshi_finite(origin)) {
+        return NAN;
+    }
+    target t = {.axis = normal, .radius = 1.0};
+    if (task->light == NULL) {
+        frame(&t);
+    } else if (!aim(task->light, origin, &t)) {
+        return 1.0f;
+    }
+    const vshi_vec *horizon = task->light != NULL && task->normals != NULL ? &normal : NULL;
+    vshi_segment_ray rays[AT_ONCE];
+    bool blocked[AT_ONCE];
+    size_t seen = 0, waiting = 0;
+    for (int32_t i = 0; i < task->rays; ++i) {
+        vshi_segment_ray *ray = &rays[waiting];
+        *ray = (vshi_segment_ray){{origin.x, origin.y, origin.z}, {0.0, 0.0, 0.0}, 0.0};
+        waiting += direct(task, &t, i, horizon, ray);
+        if (waiting == AT_ONCE || (i + 1 == task->rays && waiting > 0)) {
+            vshi_triangles_blocked(task->triangles, rays, waiting, blocked);
+            for (size_t r = 0; r < waiting; ++r) {
+                seen += !blocked[r];
+            }
+            waiting = 0;
+        }
+    }
+    return (float)((double)seen / (double)task->rays);
+}
+
+static void trace_points(void *user, size_t begin, size_t end) {
+    const tracing *task = user;
+    for (size_t i = begin; i < end; ++i) {
+        task->values[i] = trace_point(task, i);
+    }
+}
+
+static vsh_result trace(tracing *task, size_t count, const vsh_run *run, const char *stage,
+                        vsh_error *error) {
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    void *disc;
+    result = vshi_allocate(&disc, (size_t)task->rays, sizeof *task->disc, stage, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    task->disc = disc;
+    place(task);
+    vshi_job *job = vshi_job_begin(&full, stage, count);
+    result = job == NULL ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage)
+                         : vshi_parallel_for(job, count, GRAIN, 1, trace_points, task, error);
+    vshi_job_end(job);
+    free(disc);
+    return result;
+}
+
+static vsh_result check(const tracing *task, size_t count, const char *call, vsh_error *error) {
+    if (task->triangles == NULL || (count > 0 && (task->positions == NULL || task->values == NULL))) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %s is NULL", call,
+                         task->triangles == NULL   ? "triangles"
+                         : task->positions == NULL ? "positions"
+                                                   : "the result's array");
+    }
+    if (task->rays < 1 || task->rays > MAX_RAYS) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: rays %d is out of range 1 … %d", call, task->rays,
+                         MAX_RAYS);
+    }
+    if (!(task->lift >= 0.0 && isfinite(task->lift))) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: lift %g: expected a finite number, at least 0", call,
+                         task->lift);
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_trace_shadow(const vsh_triangles *triangles, size_t count, const double *positions,
+                            const float *normals, double lift, const vsh_light *light, int32_t rays,
+                            const vsh_run *run, float *visibility, vsh_error *error) {
+    tracing task = {triangles, positions, normals, lift, light, 0.0, rays, NULL, visibility};
+    vsh_result result = check(&task, count, "vsh_trace_shadow", error);
+    if (result == VSH_OK) {
+        result = vsh_light_check(light, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    /* all rays to a point are one ray */
+    const double size = light->type == VSH_LIGHT_DIRECTIONAL ? light->angle : light->radius;
+    task.rays = size > 0.0 ? rays : 1;
+    return trace(&task, count, run, "trace", error);
+}
+
+vsh_result vsh_trace_ao(const vsh_triangles *triangles, size_t count, const double *positions,
+                        const float *normals, double lift, double distance, int32_t rays, const vsh_run *run,
+                        float *ao, vsh_error *error) {
+    tracing task = {triangles, positions, normals, lift, NULL, distance, rays, NULL, ao};
+    const vsh_result result = check(&task, count, "vsh_trace_ao", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (normals == NULL && count > 0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_trace_ao: normals is NULL");
+    }
+    if (!(distance > 0.0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_trace_ao: distance %g: expected more than 0",
+                         distance);
+    }
+    return trace(&task, count, run, "trace", error);
+}

@@ -1,0 +1,312 @@
+#include "shim/embree.h"
+
+#include "base/job.h"
+#include "base/memory.h"
+#include "caster/mesh.h"
+
+#include <float.h>
+#include <stdlib.h>
+
+#ifndef VSH_EMBREE
+
+struct vsh_triangles {
+    int none;
+};
+
+int vsh_triangles_available(void) {
+    return 0;
+}
+
+vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                vsh_triangles **triangles, vsh_error *error) {
+    (void)meshes, (void)mesh_count, (void)run;
+    if (triangles != NULL) {
+        *triangles = NULL;
+    }
+    return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "triangles: this library was built without Embree");
+}
+
+void vsh_triangles_free(vsh_triangles *triangles) {
+    (void)triangles;
+}
+
+void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                            bool *blocked) {
+    (void)triangles, (void)rays, (void)count, (void)blocked;
+}
+
+#else
+
+#include <embree3/rtcore.h>
+#include <stdatomic.h>
+
+/* Embree counts in floats, drops what is beyond 1.8e18 and loses what is very small, so it gets the scene
+ * around 0 and of a size near 1: `scale` is a power of two, which rounds nothing. */
+struct vsh_triangles {
+    RTCDevice device;
+    RTCScene scene;
+    double centre[3];
+    double scale;
+    uint64_t limit; /* bytes that Embree may hold; 0: no limit */
+    atomic_llong bytes;
+    atomic_bool refused;
+};
+
+/* A triangle's share of buffers and tree, bytes: 180 to 230 measured, more while the tree is made. */
+static const double TRIANGLE_BYTES = 300.0;
+/* A ray that begins farther than this from the scene, whose half size is at most 1, is moved up to it. */
+static const double FAR_ORIGIN = 4.0;
+
+int vsh_triangles_available(void) {
+    return 1;
+}
+
+static bool watch_memory(void *user, ssize_t bytes, bool post) {
+    (void)post;
+    vsh_triangles *triangles = user;
+    const long long held = atomic_fetch_add(&triangles->bytes, (long long)bytes) + (long long)bytes;
+    if (bytes > 0 && triangles->limit > 0 && held > (long long)triangles->limit) {
+        atomic_store(&triangles->refused, true);
+        return false;
+    }
+    return true;
+}
+
+/* Also called while a tree is made, by any thread: a cancelled job ends it. */
+static bool watch_progress(void *user, double fraction) {
+    (void)fraction;
+    return !vshi_job_advance(user, 0);
+}
+
+static void measure(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count) {
+    double low[3] = {DBL_MAX, DBL_MAX, DBL_MAX}, high[3] = {-DBL_MAX, -DBL_MAX, -DBL_MAX};
+    for (size_t m = 0; m < mesh_count; ++m) {
+        for (size_t i = 0; i < meshes[m].triangle_count; ++i) {
+            vshi_vec corner[3];
+            vshi_mesh_triangle(&meshes[m], i, corner);
+            for (int k = 0; k < 3; ++k) {
+                const double at[3] = {corner[k].x, corner[k].y, corner[k].z};
+                for (int axis = 0; axis < 3; ++axis) {
+                    low[axis] = at[axis] < low[axis] ? at[axis] : low[axis];
+                    high[axis] = at[axis] > high[axis] ? at[axis] : high[axis];
+                }
+            }
+        }
+    }
+    double half = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double side = 0.5 * high[axis] - 0.5 * low[axis];
+        triangles->centre[axis] = low[axis] <= high[axis] ? low[axis] + side : 0.0;
+        half = side > half ? side : half;
+    }
+    int exponent = 0;
+    if (half > 0.0) {
+        frexp(half, &exponent);
+    }
+    triangles->scale = ldexp(1.0, exponent < -1000 ? 1000 : -exponent);
+}
+
+static void put(const vsh_triangles *triangles, vshi_vec world, float *out) {
+    out[0] = (float)((world.x - triangles->centre[0]) * triangles->scale);
+    out[1] = (float)((world.y - triangles->centre[1]) * triangles->scale);
+    out[2] = (float)((world.z - triangles->centre[2]) * triangles->scale);
+}
+
+/* False where Embree refuses; its error says why. */
+static bool attach(vsh_triangles *triangles, const vsh_mesh *mesh) {
+    size_t used = 0;
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        used += !vshi_mesh_degenerate(mesh, i);
+    }
+    if (used == 0) {
+        return true;
+    }
+    const RTCGeometry geometry = rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    if (geometry == NULL) {
+        return false;
+    }
+    float *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                              3 * sizeof(float), mesh->vertex_count);
+    uint32_t *indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                3 * sizeof(uint32_t), used);
+    if (vertices != NULL && indices != NULL) {
+        for (size_t v = 0; v < mesh->vertex_count; ++v) {
+            const vshi_vec local = vshi_vec_off(mesh->positions + 3 * v);
+            put(triangles, vshi_transform_point(mesh->transform, local), vertices + 3 * v);
+        }
+        size_t at = 0;
+        for (size_t i = 0; i < mesh->triangle_count; ++i) {
+            if (!vshi_mesh_degenerate(mesh, i)) {
+                for (int k = 0; k < 3; ++k) {
+                    indices[at++] = mesh->indices[3 * i + (size_t)k];
+                }
+            }
+        }
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometry(triangles->scene, geometry);
+    }
+    rtcReleaseGeometry(geometry);
+    return vertices != NULL && indices != NULL;
+}
+
+static vsh_result refuse(const vsh_triangles *triangles, vshi_job *job, vsh_error *error) {
+    const enum RTCError code = rtcGetDeviceError(triangles->device);
+    if (atomic_load(&triangles->refused)) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "triangles: the memory limit of %.0f MB is passed",
+                         (double)triangles->limit / 1e6);
+    }
+    if (vshi_job_cancelled(job)) {
+        return vshi_job_fail_cancelled(job, error);
+    }
+    if (code == RTC_ERROR_OUT_OF_MEMORY) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
+    }
+    return vshi_fail(error, VSH_ERROR_INTERNAL, "triangles: Embree's error %d", (int)code);
+}
+
+static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count, vshi_job *job,
+                        vsh_error *error) {
+    triangles->device = rtcNewDevice(NULL);
+    if (triangles->device == NULL) {
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "triangles: Embree refuses this machine, error %d",
+                         (int)rtcGetDeviceError(NULL));
+    }
+    rtcSetDeviceMemoryMonitorFunction(triangles->device, watch_memory, triangles);
+    triangles->scene = rtcNewScene(triangles->device);
+    if (triangles->scene == NULL) {
+        return refuse(triangles, job, error);
+    }
+    rtcSetSceneFlags(triangles->scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneProgressMonitorFunction(triangles->scene, watch_progress, job);
+    for (size_t m = 0; m < mesh_count; ++m) {
+        if (!attach(triangles, &meshes[m])) {
+            return refuse(triangles, job, error);
+        }
+        if (vshi_job_advance(job, 0)) {
+            return vshi_job_fail_cancelled(job, error);
+        }
+    }
+    rtcCommitScene(triangles->scene);
+    rtcSetSceneProgressMonitorFunction(triangles->scene, NULL, NULL);
+    if (vshi_job_advance(job, 1)) {
+        return vshi_job_fail_cancelled(job, error);
+    }
+    const enum RTCError code = rtcGetDeviceError(triangles->device);
+    if (code != RTC_ERROR_NONE || atomic_load(&triangles->refused)) {
+        return refuse(triangles, job, error);
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                vsh_triangles **triangles, vsh_error *error) {
+    if (triangles != NULL) {
+        *triangles = NULL;
+    }
+    if (triangles == NULL || (meshes == NULL && mesh_count > 0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_triangles_create: %s is NULL",
+                         triangles == NULL ? "triangles" : "meshes");
+    }
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    double bytes = 0.0;
+    for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
+        result = vshi_mesh_check_data(&meshes[m], m, error);
+        bytes += 12.0 * (double)meshes[m].vertex_count + TRIANGLE_BYTES * (double)meshes[m].triangle_count;
+    }
+    if (result == VSH_OK) {
+        result = vshi_check_limit(&full, bytes, "triangles", error);
+    }
+    void *memory = NULL;
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory, 1, sizeof **triangles, "triangles", error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_triangles *made = memory;
+    made->limit = full.memory_limit;
+    measure(made, meshes, mesh_count);
+    vshi_job *job = vshi_job_begin(&full, "triangles", 1);
+    if (job == NULL) {
+        free(made);
+        return vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
+    }
+    result = vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error)
+                                     : build(made, meshes, mesh_count, job, error);
+    vshi_job_end(job);
+    if (result != VSH_OK) {
+        vsh_triangles_free(made);
+        return result;
+    }
+    *triangles = made;
+    return VSH_OK;
+}
+
+void vsh_triangles_free(vsh_triangles *triangles) {
+    if (triangles == NULL) {
+        return;
+    }
+    if (triangles->scene != NULL) {
+        rtcReleaseScene(triangles->scene);
+    }
+    if (triangles->device != NULL) {
+        rtcReleaseDevice(triangles->device);
+    }
+    free(triangles);
+}
+
+enum { PACKET = 8 };
+
+/* Lane `lane` of the packet, in the scene's own units; false where the ray ends before it comes near. */
+static bool aim(const vsh_triangles *triangles, const vshi_segment_ray *ray, struct RTCRay8 *packet,
+                int lane) {
+    double origin[3], far = ray->far * triangles->scale, distance = 0.0, along = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        origin[axis] = (ray->origin[axis] - triangles->centre[axis]) * triangles->scale;
+        distance += origin[axis] * origin[axis];
+        along -= origin[axis] * ray->direction[axis];
+    }
+    if (!(distance <= FAR_ORIGIN * FAR_ORIGIN)) {
+        const double skip = along - FAR_ORIGIN;
+        if (!(skip < far)) { /* not finite either */
+            return false;
+        }
+        for (int axis = 0; skip > 0.0 && axis < 3; ++axis) {
+            origin[axis] += skip * ray->direction[axis];
+        }
+        far -= skip > 0.0 ? skip : 0.0;
+    }
+    packet->org_x[lane] = (float)origin[0];
+    packet->org_y[lane] = (float)origin[1];
+    packet->org_z[lane] = (float)origin[2];
+    packet->dir_x[lane] = (float)ray->direction[0];
+    packet->dir_y[lane] = (float)ray->direction[1];
+    packet->dir_z[lane] = (float)ray->direction[2];
+    packet->tnear[lane] = 0.0f;
+    packet->time[lane] = 0.0f;
+    packet->tfar[lane] = far < (double)FLT_MAX ? (float)far : INFINITY;
+    packet->mask[lane] = 0xffffffffu;
+    packet->flags[lane] = 0;
+    return true;
+}
+
+void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                            bool *blocked) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    for (size_t begin = 0; begin < count; begin += PACKET) {
+        struct RTCRay8 packet = {0};
+        _Alignas(32) int valid[PACKET] = {0};
+        const int lanes = count - begin < PACKET ? (int)(count - begin) : PACKET;
+        for (int lane = 0; lane < lanes; ++lane) {
+            valid[lane] = aim(triangles, &rays[begin + (size_t)lane], &packet, lane) ? -1 : 0;
+        }
+        rtcOccluded8(valid, triangles->scene, &context, &packet);
+        for (int lane = 0; lane < lanes; ++lane) {
+            blocked[begin + (size_t)lane] = valid[lane] != 0 && packet.tfar[lane] < 0.0f;
+        }
+    }
+}
+
+#endif
