@@ -15,7 +15,7 @@ typedef struct vsh_grid vsh_grid;
 
 typedef struct vsh_grid_options {
     size_t struct_size;
-    double voxel_size;  /* edge of a voxel, world units, 1.5e-5 … 1e12; 0: from `resolution` */
+    double voxel_size;  /* edge of a voxel, world units, 1e-12 … 1e12; 0: from `resolution` */
     int32_t resolution; /* voxels along the longest side of the bounds, 2 … 65536, where voxel_size is 0 */
     double half_width;  /* of the narrow band, voxels, 3 … 100 */
     double shell_thickness; /* of the solid that an open mesh becomes, voxels, 1 … 50 */
@@ -32,7 +32,7 @@ static inline vsh_grid_options vsh_grid_options_default(void) {
  * - VSH_ERROR_ARGUMENT: no meshes, options out of range, run, and as vsh_mesh_check();
  * - VSH_ERROR_INPUT: as vsh_mesh_check(); no triangle of any area;
  * - VSH_ERROR_LIMIT: the estimated memory passes run->memory_limit or the machine's, a voxel size outside
- *   1.5e-5 … 1e12, more than 2^29 voxels along a side or 1e12 from the origin, more than 2^31 - 1
+ *   1e-12 … 1e12, more than 2^29 voxels along a side or 1e12 from the origin, more than 2^31 - 1
  *   triangles;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_grid_from_meshes(const vsh_mesh *meshes, size_t mesh_count,
@@ -74,10 +74,10 @@ VSH_API vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_g
                                           const vsh_run *run, vsh_grid **grid, vsh_error *error);
 
 /* Reads level set `name` of a .vdb file; NULL: the first grid of class level set. Translated, rotated,
- * mirrored and uniformly scaled transforms are kept, with voxels of 1e-5 … 1e12 world units. Where the
- * values are no distances, or the band is narrower than 3 voxels, distances are made anew from the zero
- * surface, with a warning. OpenVDB's reader can crash on damaged files: files from strangers are to be read
- * in a process of their own first. Errors:
+ * mirrored and uniformly scaled transforms are kept, with voxels of 1e-12 … 1e12 world units (rotated ones
+ * from 1e-5 on). Where the values are no distances, or the band is narrower than 3 voxels, distances are made
+ * anew from the zero surface, with a warning. OpenVDB's reader can crash on damaged files: files from
+ * strangers are to be read in a process of their own first. Errors:
  * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_READ: no such file, no permission, no .vdb file, cut short, of a newer format, damaged;
  * - VSH_ERROR_INPUT: no grids, none of that name, or, with the reason, a grid that is no level set of

@@ -1,6 +1,7 @@
 #include "bake/origins.h"
 #include "bake/padding.h"
 #include "bake/take.h"
+#include "base/floats.h"
 #include "base/parallel.h"
 
 #include <math.h>
@@ -337,6 +338,7 @@ static vsh_result check_offsets(const vsh_shade_options *options, vsh_error *err
 vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, const vsh_light *lights,
                              size_t light_count, const vsh_shade_options *options, const vsh_run *run,
                              const vsh_lightmap *lightmap, vsh_bake_stats *stats, vsh_error *error) {
+    VSHI_FLOATS;
     if (field == NULL || texels == NULL || lightmap == NULL || (lights == NULL && light_count > 0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_lightmap: %s is NULL",
                          field == NULL                       ? "field"

@@ -13,6 +13,10 @@ static const double PROBE_HEIGHT = 1.0;
 /* What is nearer than this at the probe, in its heights, is another surface: a sample in a crease, where the
  * field may be off by more than a start offset clears. Its rays begin at the probe. */
 static const double CREASE = 0.75;
+/* And nearer than this, which is all that a start offset clears, it may as well be within: the field is no
+ * better known. On the cloister 1.4 % of the samples are so near; one in twelve is buried, reads up to 1
+ * where it should be 0, and those made two thirds of AO's squared error. */
+static const double CLEAR = 0.25;
 
 typedef struct lifting {
     const vsh_field *field;
@@ -49,7 +53,7 @@ static void validate(void *user, size_t begin, size_t end) {
         vsh_field_sample(l->field, last - first, &origin[0][0], distance);
         size_t valid = 0;
         for (size_t i = first; i < last; ++i) {
-            l->origins->valid[i] = distance[i - first] >= 0.0f;
+            l->origins->valid[i] = (double)distance[i - first] >= CLEAR * l->probe;
             l->crease[i] = (double)distance[i - first] < CREASE * l->probe;
             valid += l->origins->valid[i];
         }

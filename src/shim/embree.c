@@ -1,5 +1,6 @@
 #include "shim/embree.h"
 
+#include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "caster/mesh.h"
@@ -205,6 +206,7 @@ static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t
 
 vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
                                 vsh_triangles **triangles, vsh_error *error) {
+    VSHI_FLOATS;
     if (triangles != NULL) {
         *triangles = NULL;
     }
