@@ -1,5 +1,4 @@
 /* Bakes the scene in every way that is worth a look, and takes the time. */
-#include "clock.h"
 #include "message.h"
 #include "trade.h"
 
@@ -35,7 +34,7 @@ static const plan ao_plans[] = {
 };
 
 int trade_make_field(trade_work *work, int32_t resolution, vsh_field **field, double *seconds) {
-    const double start = cli_seconds();
+    const double start = trade_now(work);
     vsh_scene scene = *work->scene;
     scene.grid.resolution = resolution;
     scene.grid.voxel_size = 0.0;
@@ -48,7 +47,7 @@ int trade_make_field(trade_work *work, int32_t resolution, vsh_field **field, do
     options.reach = vsh_scene_reach(&scene, grid, work->info.bounds_min, work->info.bounds_max);
     const vsh_result result = vsh_field_create(grid, &options, &work->run, field, &error);
     vsh_grid_free(grid);
-    *seconds = cli_seconds() - start;
+    *seconds = trade_now(work) - start;
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }
 
@@ -123,12 +122,12 @@ static int bake(const trade_work *work, const trade_subject *subject, const vsh_
     do {
         vsh_bake_stats baked = vsh_bake_stats_zero();
         vsh_error error;
-        const double start = cli_seconds();
+        const double start = trade_now(work);
         if (vsh_bake_lightmap(field, work->texels, work->scene->lights, lights, shade, &work->run, &lightmap,
                               &baked, &error) != VSH_OK) {
             code = cli_fail(&error);
         }
-        times[count++] = cli_seconds() - start;
+        times[count++] = trade_now(work) - start;
         *stats = baked.shade;
     } while (code == CLI_OK && count < REPEATS && times[0] < SHORT_SECONDS);
     qsort(times, (size_t)count, sizeof times[0], by_value);

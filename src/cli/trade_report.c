@@ -188,7 +188,8 @@ static void write_page(FILE *out, const trade_work *work) {
     write_escaped(out, work->settings->bake.input);
     fprintf(out, "</code>, %d × %d, %zu valid texels, one sample each; %s. Truth: %s. vdbshade %s.</p>\n",
             work->info.width, work->info.height, work->valid,
-            work->run.threads == 1 ? "one thread" : "several threads", work->truth_text, vsh_version());
+            work->run.threads == 1 ? "one thread, processor time" : "several threads", work->truth_text,
+            vsh_version());
     if (work->skipped > 0) {
         fprintf(out,
                 "<p>%zu runs did not fit into the budget of %g s; <code>--budget</code> gives more.</p>\n",

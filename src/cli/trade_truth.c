@@ -1,6 +1,5 @@
 /* What a scene's values are: rays against its triangles, or rays against a field finer than all that are
  * measured. And Embree's own curve, which every method has to beat. */
-#include "clock.h"
 #include "message.h"
 #include "progress.h"
 #include "trade.h"
@@ -142,14 +141,14 @@ static int trace(const trade_work *work, const trade_subject *subject, int32_t r
     int code = CLI_OK;
     *seconds = 0.0;
     for (size_t plane = 0; plane < subject->planes && code == CLI_OK; ++plane) {
-        const double start = cli_seconds();
+        const double start = trade_now(work);
         vsh_error error;
         const vsh_result result =
             subject->ao ? vsh_trace_ao(work->triangles, work->valid, work->positions, work->normals, 0.0,
                                        work->scene->shade.ao_distance, rays, &work->run, packed, &error)
                         : vsh_trace_shadow(work->triangles, work->valid, work->positions, work->normals, 0.0,
                                            &work->scene->lights[plane], rays, &work->run, packed, &error);
-        *seconds += cli_seconds() - start;
+        *seconds += trade_now(work) - start;
         if (result != VSH_OK) {
             code = cli_fail(&error);
         }
