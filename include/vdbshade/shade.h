@@ -36,8 +36,8 @@ enum {
 /* Where the rays of a point go, over the light's disc or the hemisphere. `frame` gives another, independent
  * set: bakes of frames 0 … n - 1 may be averaged. */
 enum {
-    VSH_SAMPLER_SOBOL = 0, /* low discrepancy: Owen-scrambled Sobol points, a scramble a point (Burley,
-                              "Practical hash-based Owen scrambling", 2020) */
+    VSH_SAMPLER_SOBOL = 0, /* low discrepancy: Owen-scrambled Sobol points (Burley, "Practical hash-based Owen
+                              scrambling", 2020), their digits shifted for each point */
     VSH_SAMPLER_WHITE = 1, /* independent */
     VSH_SAMPLER_BLUE = 2 /* best-candidate points (Mitchell, 1991), turned for each texel by a blue-noise mask
                             (Ulichney, "Void and cluster", 1993) that frames shift by the golden ratio */

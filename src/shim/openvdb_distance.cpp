@@ -61,7 +61,6 @@ class Voxelizer {
     openvdb::CoordBBox region;
     FloatGrid::Ptr grid;
     std::atomic<size_t> bad{SIZE_MAX}; // first box with a value that is not finite
-    Vec3d bad_index;
     static constexpr int32_t BLOCK = 4;
 };
 

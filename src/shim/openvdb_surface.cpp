@@ -12,12 +12,16 @@ namespace vshi {
 
 namespace {
 
-// OpenVDB asks at every polygon; the callback is asked at most every 20 ms.
+// OpenVDB asks at every polygon, on threads of its own choice; the callback is asked at most every 20 ms.
 class Interrupter : public openvdb::util::NullInterrupter {
   public:
-    Interrupter(Stage &stage_, double begin_, double end_) : stage(stage_), begin(begin_), end(end_) {}
+    Interrupter(Stage &stage_, double begin_, double end_) : stage(stage_), begin(begin_), end(end_) {
+        give(this);
+    }
+    ~Interrupter() override { take(this); }
 
     bool wasInterrupted(int percent) override {
+        take(this);
         if (percent >= 0) {
             stage.reach(begin + (end - begin) * 0.01 * percent);
         }
@@ -28,6 +32,7 @@ class Interrupter : public openvdb::util::NullInterrupter {
                 stop = stage.cancelled();
             }
         }
+        give(this);
         return stop;
     }
 

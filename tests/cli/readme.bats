@@ -25,7 +25,7 @@ setup() {
     local build
     build=$(dirname "$(realpath "$VDBSHADE")")
     awk '/^```c$/ { inside = 1; next } /^```$/ { inside = 0 } inside' "$README" >main.c
-    "${CC:-cc}" -std=c11 -Wall -Wextra -Werror -I"$BATS_TEST_DIRNAME/../../include" main.c -L"$build" -lvdbshade \
-        -Wl,-rpath,"$build" -o main
+    "${CC:-cc}" -std=c11 -Wall -Wextra -Werror ${CFLAGS-} -I"$BATS_TEST_DIRNAME/../../include" main.c -L"$build" \
+        -lvdbshade -Wl,-rpath,"$build" -o main
     [ "$(./main)" = "0 1" ]
 }

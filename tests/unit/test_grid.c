@@ -235,7 +235,7 @@ static double hollow_truth(const double p[3]) {
 static void a_room_inside_a_solid_stays_a_room(void **state) {
     (void)state;
     const vsh_sdf sdf = hollow_sphere();
-    const vsh_grid_options options = with_voxel(0.02);
+    const vsh_grid_options options = with_voxel(0.03);
     vsh_grid *grid = NULL;
     assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure), VSH_OK);
     const double worst = worst_error(grid, hollow_truth, 2.9, 2.9);
@@ -255,7 +255,7 @@ static double squashed(void *user, const double p[3]) {
 static void a_bound_becomes_a_distance(void **state) {
     (void)state;
     const vsh_distance field = {squashed, NULL, 0.6, 0, {-1, -1, -1}, {1, 1, 1}};
-    vsh_grid_options options = with_voxel(0.02);
+    vsh_grid_options options = with_voxel(0.03);
     options.half_width = 5.0;
     vsh_grid *grid = NULL;
     assert_int_equal(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_OK);
@@ -271,7 +271,7 @@ static void threads_do_not_show(void **state) {
     const vsh_sdf sdf = hollow_sphere();
     const int32_t threads[3] = {1, 2, 5};
     vsh_grid *grids[3];
-    const vsh_grid_options options = with_voxel(0.03);
+    const vsh_grid_options options = with_voxel(0.04);
     for (int i = 0; i < 3; ++i) {
         vsh_run run = vsh_run_default();
         run.threads = threads[i];
@@ -396,7 +396,7 @@ static void progress_rises_to_one_and_can_cancel(void **state) {
         run.progress = watch_progress;
         run.user = &w;
         vsh_grid *grid = NULL;
-        const vsh_grid_options options = with_voxel(0.03);
+        const vsh_grid_options options = with_voxel(0.04);
         const vsh_result result = vsh_grid_from_sdf(&sdf, &options, &run, &grid, &failure);
         if (i == 0) {
             assert_int_equal(result, VSH_OK);
@@ -487,8 +487,8 @@ static void keep_warning(void *user, const char *message) {
 static void a_fine_mesh_of_a_sphere_is_the_sphere(void **state) {
     (void)state;
     for (int inverted = 0; inverted < 2; ++inverted) {
-        model ball = make_sphere(400, 1.0, inverted);
-        vsh_grid *grid = grid_of(&ball.mesh, 1, 0.02, NULL);
+        model ball = make_sphere(150, 1.0, inverted);
+        vsh_grid *grid = grid_of(&ball.mesh, 1, 0.03, NULL);
         const double worst = worst_error(grid, unit_sphere, 2.95, 2.95);
         print_message("mesh of a sphere: worst error %.3f voxels\n", worst);
         assert_true(worst < 0.1);
@@ -633,10 +633,10 @@ static double room_with_a_ball(const double p[3]) {
 static void a_room_in_a_mesh_stays_open_and_keeps_its_furniture(void **state) {
     (void)state;
     /* One mesh of three shells: a ball, a room in it that faces inward, and a ball in the room. */
-    model shells[3] = {make_sphere(200, 1.0, 0), make_sphere(200, 0.6, 1), make_sphere(60, 0.2, 0)};
+    model shells[3] = {make_sphere(100, 1.0, 0), make_sphere(100, 0.6, 1), make_sphere(40, 0.2, 0)};
     for (int turned = 0; turned < 2; ++turned) {
         size_t vertices = 0, indices = 0;
-        model all = {malloc(300000 * 3 * sizeof(float)), malloc(600000 * 3 * sizeof(uint32_t)), {0}};
+        model all = {malloc(50000 * 3 * sizeof(float)), malloc(100000 * 3 * sizeof(uint32_t)), {0}};
         assert_non_null(all.positions);
         assert_non_null(all.indices);
         for (int i = 0; i < 3; ++i) {
@@ -650,7 +650,7 @@ static void a_room_in_a_mesh_stays_open_and_keeps_its_furniture(void **state) {
         const double mirrored[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0};
         all.mesh = (vsh_mesh){"house",     all.positions, NULL,        NULL,
                               all.indices, vertices,      indices / 3, turned ? mirrored : NULL};
-        vsh_grid *grid = grid_of(&all.mesh, 1, 0.02, NULL);
+        vsh_grid *grid = grid_of(&all.mesh, 1, 0.03, NULL);
         assert_true(worst_error(grid, room_with_a_ball, 2.9, 2.9) < 0.1);
         assert_int_equal(wrong_blocks(grid, room_with_a_ball, 8), 0);
         vsh_grid_free(grid);
@@ -663,7 +663,7 @@ static void a_room_in_a_mesh_stays_open_and_keeps_its_furniture(void **state) {
 
 static void threads_do_not_show_in_meshes(void **state) {
     (void)state;
-    model fine = make_sphere(150, 0.7, 0);
+    model fine = make_sphere(100, 0.7, 0);
     model coarse = make_sphere(5, 1.0, 0);
     const vsh_mesh sets[2][2] = {{fine.mesh, coarse.mesh}, {coarse.mesh, cube}};
     const int32_t threads[5] = {1, 2, 5, 0, 2};
@@ -672,7 +672,7 @@ static void threads_do_not_show_in_meshes(void **state) {
         for (int i = 0; i < 5; ++i) {
             vsh_run run = vsh_run_default();
             run.threads = threads[i];
-            vsh_grid *grid = grid_of(sets[set], 2, 0.02, &run);
+            vsh_grid *grid = grid_of(sets[set], 2, 0.03, &run);
             if (first == NULL) {
                 first = grid;
             } else {
@@ -721,7 +721,7 @@ static void bad_meshes_are_refused_with_the_reason(void **state) {
 
 static void meshes_can_be_cancelled(void **state) {
     (void)state;
-    model ball = make_sphere(300, 1.0, 0);
+    model ball = make_sphere(100, 1.0, 0);
     const double stops[] = {0.0, 0.1, 0.5, 0.9};
     for (size_t i = 0; i < sizeof stops / sizeof stops[0]; ++i) {
         watch w = {0.0, stops[i], 0};
@@ -730,7 +730,7 @@ static void meshes_can_be_cancelled(void **state) {
         run.progress = watch_progress;
         run.user = &w;
         vsh_grid *grid = NULL;
-        const vsh_grid_options options = with_voxel(0.02);
+        const vsh_grid_options options = with_voxel(0.04);
         assert_fails(vsh_grid_from_meshes(&ball.mesh, 1, &options, &run, &grid, &failure),
                      VSH_ERROR_CANCELLED, "cancelled");
         assert_null(grid);
@@ -792,18 +792,18 @@ static double moved_sphere(const double p[3]) { /* twice as large, its middle at
 
 static void a_turned_mirrored_scaled_grid_is_measured_anew(void **state) {
     (void)state;
-    vsh_grid *ball = ball_grid(0.0, 1.0, 0.02);
+    vsh_grid *ball = ball_grid(0.0, 1.0, 0.03);
     const double c = 2.0 * cos(0.5), s = 2.0 * sin(0.5);
     const double turned[12] = {-c, s, 0, 1, s, c, 0, 2, 0, 0, 2, 3};
     const vsh_grid_instance instance = {ball, turned};
-    const double voxels[] = {0.0, 0.03, 0.06};
+    const double voxels[] = {0.0, 0.045, 0.09};
     for (int i = 0; i < 3; ++i) {
         vsh_grid *moved = NULL;
         const vsh_grid_options options = with_voxel(voxels[i]);
         assert_int_equal(vsh_grid_unite(&instance, 1, &options, NULL, &moved, &failure), VSH_OK);
         vsh_grid_info info;
         vsh_grid_get_info(moved, &info);
-        assert_float_equal(info.voxel_size, i == 0 ? 0.04 : voxels[i], 1e-9);
+        assert_float_equal(info.voxel_size, i == 0 ? 0.06 : voxels[i], 1e-9);
         const double worst = worst_error(moved, moved_sphere, 2.9, 2.9);
         print_message("resampled sphere, voxel %g: worst error %.3f voxels\n", info.voxel_size, worst);
         assert_true(worst < 0.15);
@@ -816,7 +816,7 @@ static void a_turned_mirrored_scaled_grid_is_measured_anew(void **state) {
 static void rooms_stay_open_in_a_union_of_different_lattices(void **state) {
     (void)state;
     const vsh_sdf sdf = hollow_sphere();
-    const vsh_grid_options options = with_voxel(0.02);
+    const vsh_grid_options options = with_voxel(0.03);
     vsh_grid *room = NULL;
     assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &room, &failure), VSH_OK);
     vsh_grid *ball = ball_grid(0.0, 1.0, 0.05);
@@ -833,7 +833,7 @@ static void rooms_stay_open_in_a_union_of_different_lattices(void **state) {
 
 static void threads_do_not_show_in_unions(void **state) {
     (void)state;
-    vsh_grid *ball = ball_grid(0.0, 1.0, 0.04);
+    vsh_grid *ball = ball_grid(0.0, 1.0, 0.05);
     const double turned[12] = {0.6, -0.8, 0, 0.5, 0.8, 0.6, 0, 0, 0, 0, 1, 0.1};
     const vsh_grid_instance instances[2] = {{ball, NULL}, {ball, turned}};
     vsh_grid *first = NULL;

@@ -10,6 +10,7 @@ static const float UP[3] = {0.0f, 1.0f, 0.0f};
 enum { SIDE = 128, TEXELS = SIDE * SIDE };
 static double positions[3 * TEXELS];
 static float normals[3 * TEXELS], visible[TEXELS], deviation[TEXELS], truth[TEXELS], reference[TEXELS];
+static float outside[TEXELS]; /* 1: the texel is not inside one of the solids that stand on the floor */
 
 static vsh_shade_stats shade(const vsh_field *field, const vsh_light *light, const vsh_shade_options *options,
                              size_t count, float *values, float *errors) {
@@ -20,6 +21,13 @@ static vsh_shade_stats shade(const vsh_field *field, const vsh_light *light, con
         fail_msg("%s", error.message);
     }
     return stats;
+}
+
+static void place_floor(void) {
+    floor_texels(SIDE, positions, normals);
+    for (size_t i = 0; i < TEXELS; ++i) {
+        outside[i] = truth_distance(truth_seeds(), positions + 3 * i) > 0.0 ? 1.0f : 0.0f;
+    }
 }
 
 static vsh_shade_options options_of(int32_t method, int32_t rays, double max_error) {
@@ -33,18 +41,18 @@ static vsh_shade_options options_of(int32_t method, int32_t rays, double max_err
 static void rays_close_in_on_the_truth(void **state) {
     (void)state;
     const double normal[3] = {0.0, 1.0, 0.0};
-    floor_texels(SIDE, positions, normals);
+    place_floor();
     assert_int_equal(truth_lights(truth_seeds(), TEXELS, positions, normal, truth_seeds_sun, truth_seeds_w,
                                   (double)INFINITY, 1024, truth),
                      0);
     vsh_field *field = field_of(truth_seeds(), 0.02, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
-    const double bounds[] = {0.021, 0.012, 0.0105};
+    const double bounds[] = {0.020, 0.011, 0.009};
     double last = 1.0;
     for (int i = 0; i < 3; ++i) {
         const vsh_shade_options options = options_of(VSH_SHADOW_RAYS, 16 << (2 * i), 0.02);
         shade(field, &light, &options, TEXELS, visible, NULL);
-        const truth_metrics m = truth_compare(TEXELS, visible, truth, NULL);
+        const truth_metrics m = truth_compare(TEXELS, visible, truth, outside);
         truth_metrics_print("rays", &m);
         assert_true(m.rmse < bounds[i]);
         assert_true(m.rmse < last * 1.01);
@@ -88,7 +96,7 @@ static void adaptive_keeps_the_error_asked_for_and_says_what_it_kept(void **stat
 static void no_proof_is_wrong(void **state) {
     (void)state;
     const double normal[3] = {0.0, 1.0, 0.0};
-    floor_texels(SIDE, positions, normals);
+    place_floor();
     const double widths[] = {0.01, 0.1, 0.4};
     for (int coarse = 0; coarse < 2; ++coarse) {
         vsh_field *field = field_of(truth_seeds(), coarse ? 0.05 : 0.02, 0.0);
@@ -101,12 +109,13 @@ static void no_proof_is_wrong(void **state) {
             shade(field, &light, &options, TEXELS, visible, deviation);
             size_t proved = 0, decided = 0;
             for (size_t i = 0; i < TEXELS; ++i) {
+                if (!(outside[i] > 0.0f)) {
+                    continue;
+                }
                 decided += truth[i] == 0.0f || truth[i] == 1.0f;
                 if (deviation[i] == 0.0f) {
                     ++proved;
-                    if (visible[i] != truth[i]) {
-                        print_message("WRONG %zu at %g %g: %g for %g (w %g coarse %d)\n", i, positions[3 * i], positions[3 * i + 2], visible[i], truth[i], widths[w], coarse);
-                    }
+                    assert_true(visible[i] == truth[i]);
                 }
             }
             print_message("voxel %g, w %g: %.1f %% proved, %.1f %% lit or dark\n", coarse ? 0.05 : 0.02,
@@ -208,7 +217,7 @@ static void early_ends_save_rays_and_cost_little(void **state) {
     print_message("%.1f rays a texel instead of %.1f\n", (double)early.rays / TEXELS,
                   (double)all.rays / TEXELS);
     assert_true((double)early.rays < 0.4 * (double)all.rays);
-    assert_true(m.rmse > 0.0 && m.rmse < 0.006);
+    assert_true(m.rmse > 0.0 && m.rmse < 0.012);
     assert_true(fabs(m.bias) < 0.001);
     vsh_field_free(field);
 }
