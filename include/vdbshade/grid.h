@@ -74,10 +74,10 @@ VSH_API vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_g
                                           const vsh_run *run, vsh_grid **grid, vsh_error *error);
 
 /* Reads level set `name` of a .vdb file; NULL: the first grid of class level set. Translated, rotated,
- * mirrored and uniformly scaled transforms are kept, with voxels of 1e-12 … 1e12 world units (rotated ones
- * from 1e-5 on). Where the values are no distances, or the band is narrower than 3 voxels, distances are made
- * anew from the zero surface, with a warning. OpenVDB's reader can crash on damaged files: files from
- * strangers are to be read in a process of their own first. Errors:
+ * mirrored and uniformly scaled transforms are kept, with voxels of 1e-5 … 1e12 world units. Where the
+ * values are no distances, or the band is narrower than 3 voxels, distances are made anew from the zero
+ * surface, with a warning. OpenVDB's reader can crash on damaged files: files from strangers are to be read
+ * in a process of their own first. Errors:
  * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_READ: no such file, no permission, no .vdb file, cut short, of a newer format, damaged;
  * - VSH_ERROR_INPUT: no grids, none of that name, or, with the reason, a grid that is no level set of
@@ -91,8 +91,8 @@ VSH_API vsh_result vsh_grid_read(const char *path, const char *name, const vsh_r
 
 /* Writes one .vdb file with the grid as `name` (NULL: "surface"); the same grid gives the same bytes. Atomic:
  * written beside `path` and renamed, so a failure leaves an old file alone. Errors: VSH_ERROR_ARGUMENT (path
- * NULL or empty), VSH_ERROR_WRITE (no such folder, no permission, a folder or device in the way, disk full),
- * VSH_ERROR_MEMORY. */
+ * NULL or empty), VSH_ERROR_LIMIT (voxels below 1.45e-5 world units, which OpenVDB cannot write),
+ * VSH_ERROR_WRITE (no such folder, no permission, a folder or device in the way, disk full), VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name, vsh_error *error);
 
 /* A caster for vsh_grid_unite(): a grid and where it stands. A view; nothing is owned. */

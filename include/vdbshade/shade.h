@@ -29,8 +29,9 @@ enum {
     VSH_AO_TAPS = 0, /* five samples along the normal (Quilez, "multiresolution ambient occlusion", 2008 …) */
     VSH_AO_CONES = 1,    /* cosine-weighted cones (Crassin and others, 2011, marched in a distance field) */
     VSH_AO_RAYS = 2,     /* `rays` cosine-weighted rays, marched against the field */
-    VSH_AO_ADAPTIVE = 3, /* cones that prove their part free or hidden, rays in the others until max_error */
-    VSH_AO_EXACT = 4     /* the same cones, the rays traced against `triangles` */
+    VSH_AO_ADAPTIVE = 3, /* the same, as many as max_error takes */
+    VSH_AO_EXACT = 4     /* likewise, the rays traced against `triangles`, from the points themselves:
+                            start_offset is not added */
 };
 
 /* Where the rays of a point go, over the light's disc or the hemisphere. `frame` gives another, independent

@@ -60,6 +60,7 @@ openvdb::math::Transform::Ptr Lattice::transform() const {
     openvdb::initialize();
     const Vec3d size(voxel), inverse(1.0 / voxel);
     std::stringstream text;
+    openvdb::io::setCurrentVersion(text);
     openvdb::writeString(text, Map::mapType());
     for (const Vec3d &member : {translation, size, size, inverse, inverse * inverse, 0.5 * inverse}) {
         member.write(text);
