@@ -1,4 +1,5 @@
 /* Ambient occlusion: options, and which method shades the points. */
+#include "base/floats.h"
 #include "shade/ao.h"
 
 #include <math.h>
@@ -50,6 +51,7 @@ static vsh_result shade(vshi_ao_task *task, const vsh_run *run, vsh_shade_stats 
 vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const vsh_shade_options *options,
                         const vsh_run *run, float *ao, float *deviation, vsh_shade_stats *stats,
                         vsh_error *error) {
+    VSHI_FLOATS;
     vsh_shade_options full;
     const vsh_result result = vshi_shade_options_resolve(options, &full, error);
     if (result != VSH_OK) {

@@ -9,22 +9,15 @@
 
 enum { SIDE = 32, COUNT = SIDE * SIDE, SHADOWS = 5 };
 
-/* vsh_shade_shadow() and vsh_shade_ao() set up their lights and cones in the caller's environment still: only
- * settings that do not show in a sine are tried on them. To be 1 once they begin with VSHI_FLOATS. */
-#define SHADE_SETUP_GUARDED 0
-
 #if defined(__x86_64__)
 /* MXCSR: flush to zero, denormals are zero, both; then rounding down, up, to zero, all of it, and nothing
  * masked but inexact results and denormals. */
 static const vshi_floats SETTINGS[] = {
     VSHI_FLOATS_DEFAULT, 0x9f80, 0x1fc0, 0x9fc0, 0x3f80, 0x5f80, 0x7f80, 0xffc0, 0x1100};
-enum { NEAREST = 4 /* settings that round to nearest and trap nothing */ };
 #elif defined(__aarch64__)
 static const vshi_floats SETTINGS[] = {VSHI_FLOATS_DEFAULT, 1u << 24, 1u << 22, 2u << 22, 3u << 22};
-enum { NEAREST = 2 };
 #else
 static const vshi_floats SETTINGS[] = {VSHI_FLOATS_DEFAULT};
-enum { NEAREST = 1 };
 #endif
 enum { SETTING_COUNT = sizeof SETTINGS / sizeof SETTINGS[0] };
 
@@ -68,7 +61,7 @@ static void run_all(int s, int32_t threads, outcome *o) {
     static const int32_t methods[SHADOWS] = {VSH_SHADOW_CONE, VSH_SHADOW_CONE, VSH_SHADOW_IMPROVED,
                                              VSH_SHADOW_ADAPTIVE, VSH_SHADOW_RAYS};
     const vshi_floats setting = SETTINGS[s];
-    const vshi_floats of_shading = SHADE_SETUP_GUARDED || s < NEAREST ? setting : VSHI_FLOATS_DEFAULT;
+
     vsh_run run = vsh_run_default();
     run.threads = threads;
     run.progress = look;
@@ -97,7 +90,7 @@ static void run_all(int s, int32_t threads, outcome *o) {
     results[0] = vsh_grid_from_distance(&field, &options, &run, &grid, &error);
     results[1] = results[0] == VSH_OK ? vsh_field_create(grid, &field_options, &run, &f, &error) : results[0];
     if (results[1] == VSH_OK) {
-        vshi_floats_set(of_shading);
+        vshi_floats_set(setting);
         for (int i = 0; i < SHADOWS; ++i) {
             vsh_shade_options how = vsh_shade_options_default();
             how.method = methods[i];
@@ -168,7 +161,7 @@ static void denormals_are_numbers(void **state) {
     const float tiny[3] = {0.0f, 1e-41f, 1e-44f}, up[3] = {0.0f, 1.0f, 0.0f};
     const double towards[3] = {5e-324, 1e-310, 0.0};
     const vsh_light light = sun(towards, 1e-310), straight = sun((const double[]){0.0, 1.0, 0.0}, 0.0);
-    for (int s = 0; s < (SHADE_SETUP_GUARDED ? SETTING_COUNT : 1); ++s) {
+    for (int s = 0; s < SETTING_COUNT; ++s) {
         for (int32_t method = 0; method <= VSH_SHADOW_ADAPTIVE; ++method) {
             vshi_floats_set(SETTINGS[s]);
             const float a = shadow_at(field, &light, method, p, tiny);
