@@ -44,9 +44,6 @@ class Interrupter : public openvdb::util::NullInterrupter {
 using openvdb::Int32;
 using Adapter = openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec4I>;
 
-// Bands are asked for a little wider, because the conversion's errors leave holes at their rims.
-constexpr double RIM = 1.0;
-
 FloatGrid::Ptr convert(const Surface &surface, const Lattice &lattice, double half_width, int flags,
                        double begin, double end, Stage &stage) {
     namespace tools = openvdb::tools;
