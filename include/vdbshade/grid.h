@@ -128,24 +128,30 @@ typedef struct vsh_grid_info {
 VSH_API void vsh_grid_get_info(const vsh_grid *grid, vsh_grid_info *info);
 VSH_API void vsh_grid_free(vsh_grid *grid); /* NULL does nothing */
 
-/* One entry of a .vdb file, of any kind. */
+/* One grid of a .vdb file, of any kind. Texts that do not fit are cut. */
 typedef struct vsh_vdb_entry {
     char name[128];
     char type[64];        /* "Tree_float_5_4_3" */
     char grid_class[32];  /* "level set", "fog volume", … */
     double voxel_size[3]; /* world units along the grid's own axes */
-    double background;    /* 0 where the values are no scalars */
-    int32_t index_min[3]; /* of the active voxels */
+    double background;    /* 0 where the values are not floats or doubles */
+    int32_t index_min[3]; /* of the active voxels; 0 where there are none */
     int32_t index_max[3];
     uint64_t active_voxels;
-    uint64_t bytes;
+    uint64_t bytes;    /* in memory */
     char problem[256]; /* why it cannot cast shadows, or what is odd about it; empty: nothing */
 } vsh_vdb_entry;
 
-/* Lists up to `capacity` grids of a .vdb file into `entries`, and their number into *count (which may be
- * larger). Errors: VSH_ERROR_READ, VSH_ERROR_INPUT. */
-VSH_API vsh_result vsh_vdb_list(const char *path, vsh_vdb_entry *entries, size_t capacity, size_t *count,
-                                vsh_error *error);
+/* Lists up to `capacity` grids of a .vdb file into `entries` (may be NULL where that is 0), and their
+ * number into *count, which may be larger (0 on failure). Grids are read one at a time and looked at as by
+ * vsh_grid_read(); one that passes run->memory_limit or the machine's memory is described by what its file
+ * says of it, with a background of 0 and that as its problem. Errors:
+ * - VSH_ERROR_ARGUMENT: run;
+ * - VSH_ERROR_READ: as vsh_grid_read();
+ * - VSH_ERROR_LIMIT: a streamed file, which can only be read whole, that passes run->memory_limit;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,
+                                size_t *count, vsh_error *error);
 
 #ifdef __cplusplus
 }

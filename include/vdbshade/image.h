@@ -62,7 +62,8 @@ VSH_API void vsh_image_default_pack(const vsh_image *image, char *text, size_t c
 typedef struct vsh_image_file vsh_image_file;
 
 /* Reads an image file: EXR and PNG by their first bytes, others by the ending of `path`. Integers become 0
- * … 1 as they stand: no transfer curve, no multiplication by alpha. Errors:
+ * … 1 as they stand: no transfer curve, no multiplication by alpha. OpenImageIO's readers can crash on
+ * damaged files: those from strangers are to be read in a process of their own. Errors:
  * - VSH_ERROR_ARGUMENT: path NULL or empty, file NULL;
  * - VSH_ERROR_READ: no such file, no permission, a folder;
  * - VSH_ERROR_INPUT: an ending of no format that is read, damaged, cut short;

@@ -33,8 +33,10 @@ enum {
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
     {'o', "output", "OUT",
-     "image to write: .exr with named channels, or any\n"
-     "format that OpenImageIO writes (.png, .tif, .hdr …)"},
+     "image to write: .exr with named channels, or\n"
+     ".png .tif .dpx .sgi .jp2 .tga .bmp .ico .iff .rla\n"
+     ".hdr .ppm .pgm .jpg .webp .heic .avif .gif; what each\n"
+     "can hold, and what is not written: docs/formats.md"},
     {KEY_SIZE, "size", "W[xH]", "texels of the lightmap, 1 to 65536 (1024)"},
     {KEY_BITS, "bits", "N",
      "8, 16 or 32 bits a channel (32 for EXR, else 16\nwhere the format has it, else 8)"},

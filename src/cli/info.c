@@ -35,8 +35,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
 }
 
 static int print_info(void *user) {
-    static const char *const image_endings[] = {"exr", "png",  "tif", "tiff", "jpg", "jpeg", "hdr", "tga",
-                                                "bmp", "webp", "dpx", "psd",  "pgm", "ppm",  "pfm", "gif"};
+    static const char *const image_endings[] = {
+        "exr", "png", "tif", "tiff", "jpg", "jpeg", "hdr", "tga", "bmp", "webp", "dpx",  "psd",  "pgm",
+        "ppm", "pnm", "pfm", "gif",  "jp2", "j2k",  "sgi", "rgb", "rla", "ico",  "heic", "heif", "avif"};
     const char *path = user;
     if (cli_has_ending(path, "vdb")) {
         return cli_info_vdb(path);

@@ -1,5 +1,6 @@
 #include "info.h"
 #include "message.h"
+#include "options.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -35,9 +36,11 @@ int cli_info_vdb(const char *path) {
         cli_say("%s: the system refused memory", path);
         return CLI_LIMIT;
     }
+    vsh_run run = vsh_run_default();
+    run.memory_limit = cli_common_default().memory_limit;
     size_t count = 0;
     vsh_error error;
-    if (vsh_vdb_list(path, entries, MAX_LISTED, &count, &error) != VSH_OK) {
+    if (vsh_vdb_list(path, &run, entries, MAX_LISTED, &count, &error) != VSH_OK) {
         free(entries);
         return cli_fail(&error);
     }

@@ -59,6 +59,11 @@ static vsh_result plan_format(const char *path, const vsh_image *image, write_pl
     if (plan->exr) {
         return VSH_OK;
     }
+    const char *refusal = vshi_oiio_refusal(path);
+    if (refusal != NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: '%s' is not written: %s; expected one of exr, %s",
+                         path, ending, refusal, vshi_oiio_endings());
+    }
     if (!vshi_oiio_format(path, &plan->format)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: ending '%s': expected one of exr, %s", path, ending,
                          vshi_oiio_endings());
@@ -91,6 +96,32 @@ static vsh_result plan_bits(const char *path, int32_t bits, write_plan *plan, vs
                      (has & VSHI_BITS_16) != 0 ? " 16" : "", (has & VSHI_BITS_32) != 0 ? " 32" : "");
 }
 
+/* Takes from a packing what the format does not have: an error where the caller asked for it by name. */
+static vsh_result fit_pack(const char *path, const vshi_format *format, bool asked, vshi_pack *pack,
+                           vsh_error *error) {
+    vshi_pack_entry *entries = pack->entries;
+    if (format->alpha == VSHI_ALPHA_NONE && entries[VSHI_PACK_ALPHA].given) {
+        if (asked) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: pack: A is given, but %s has no alpha", path,
+                             format->name);
+        }
+        entries[VSHI_PACK_ALPHA].given = false;
+    }
+    if (format->alpha == VSHI_ALPHA_ALWAYS && !entries[VSHI_PACK_ALPHA].given) {
+        entries[VSHI_PACK_ALPHA] = (vshi_pack_entry){true, -1, 1.0f};
+    }
+    for (int key = 1; key < VSHI_PACK_ALPHA && format->grey; ++key) {
+        if (asked && entries[key].given &&
+            (!entries[0].given || entries[key].channel != entries[0].channel ||
+             entries[key].constant != entries[0].constant)) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: pack: %s is not R, but the format is grey", path,
+                             vshi_pack_keys[key]);
+        }
+        entries[key].given = false;
+    }
+    return VSH_OK;
+}
+
 static vsh_result plan_planes(const char *path, const vsh_image *image, const char *text, write_plan *plan,
                               vsh_error *error) {
     vshi_planes *planes = &plan->planes;
@@ -110,17 +141,14 @@ static vsh_result plan_planes(const char *path, const vsh_image *image, const ch
     if (result != VSH_OK) {
         return result;
     }
-    if (!plan->exr && !plan->format.alpha && pack.entries[VSHI_PACK_ALPHA].given) {
-        if (text != NULL) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: pack: A is given, but %s has no alpha", path,
-                             plan->format.name);
-        }
-        pack.entries[VSHI_PACK_ALPHA].given = false;
+    const vsh_result fits = plan->exr ? VSH_OK : fit_pack(path, &plan->format, text != NULL, &pack, error);
+    if (fits != VSH_OK) {
+        return fits;
     }
     for (int key = 0; key < VSHI_PACK_KEYS; ++key) {
         const vshi_pack_entry *entry = &pack.entries[key];
         /* the other formats have R, G and B whether given or not: what is not given is 0 */
-        if (entry->given || (!plan->exr && key != VSHI_PACK_ALPHA)) {
+        if (entry->given || (!plan->exr && key < (plan->format.grey ? 1 : VSHI_PACK_ALPHA))) {
             const bool channel = entry->given && entry->channel >= 0;
             const float *values = channel && image->planes != NULL ? image->planes[entry->channel] : NULL;
             planes->planes[planes->count++] = (vshi_plane){vshi_pack_keys[key], values, entry->constant};

@@ -10,22 +10,34 @@ extern "C" {
 
 enum { VSHI_BITS_8 = 1, VSHI_BITS_16 = 2, VSHI_BITS_32 = 4 };
 
+enum {
+    VSHI_ALPHA_NONE = 0,
+    VSHI_ALPHA_KEPT = 1,  /* with R, G and B where A is 0 */
+    VSHI_ALPHA_ALWAYS = 2 /* the same, and there must be one: 1 where none is given */
+};
+
 /* What a format can hold. 8 and 16 are integers, 32 is float. */
 typedef struct vshi_format {
     const char *name; /* OpenImageIO's: "png" */
     int32_t bits;     /* VSHI_BITS_… that it can be written with */
-    bool alpha;       /* keeps R, G and B where A is 0, too */
+    int32_t alpha;    /* VSHI_ALPHA_… */
     int32_t max_size; /* pixels along a side */
+    bool lossy;       /* values change by more than their rounding */
+    bool grey;        /* one channel, R */
 } vshi_format;
 
 /* The format that the path's ending stands for, if it can be written. Thread safe. */
 bool vshi_oiio_format(const char *path, vshi_format *format);
 
+/* Why an ending that OpenImageIO knows is not written; NULL for others. A static string. Thread safe. */
+const char *vshi_oiio_refusal(const char *path);
+
 /* The endings that vshi_oiio_format() knows, for messages. */
 const char *vshi_oiio_endings(void);
 
-/* Writes R, G, B and perhaps A into the existing file `temporary`; messages name `path`. `bits` is one that
- * the format has. Errors: VSH_ERROR_WRITE, VSH_ERROR_MEMORY. Thread safe. */
+/* Writes R, G, B and perhaps A, or R alone where the format is grey, into the existing file `temporary`;
+ * messages name `path`. `bits` is one that the format has. Errors: VSH_ERROR_WRITE, VSH_ERROR_UNSUPPORTED,
+ * VSH_ERROR_MEMORY. Thread safe. */
 vsh_result vshi_oiio_write(const char *temporary, const char *path, const vshi_format *format,
                            const vshi_planes *planes, int32_t bits, vsh_error *error);
 

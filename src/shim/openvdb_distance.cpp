@@ -17,8 +17,9 @@ namespace vshi {
 namespace {
 
 constexpr double SQRT3 = 1.7320508075688772;
-// From this many boxes on, their number at one level foretells the number of leaves.
-constexpr size_t FORETELLING_BOXES = 512;
+// From this many boxes on, their number at one level foretells the number of leaves: fewer are so large that
+// edges and corners count for too much.
+constexpr size_t FORETELLING_BOXES = 4096;
 
 // Boxes of one size; `size` voxels an edge, at multiples of it.
 struct Level {
@@ -59,6 +60,7 @@ class Voxelizer {
     Stage &stage;
     vsh_error *error;
     openvdb::CoordBBox region;
+    Vec3d sides; // of the bounds, voxels
     FloatGrid::Ptr grid;
     std::atomic<size_t> bad{SIZE_MAX}; // first box with a value that is not finite
     static constexpr int32_t BLOCK = 4;
@@ -83,6 +85,7 @@ Level Voxelizer::start(const Vec3d &low, const Vec3d &high) {
     const Vec3d first = lattice.index(low) - Vec3d(margin);
     const Vec3d last = lattice.index(high) + Vec3d(margin);
     region = openvdb::CoordBBox(Coord::floor(first), Coord::ceil(last));
+    sides = (high - low) / lattice.voxel;
     Level level{8, {}};
     while (level.size < region.dim()[region.maxExtent()] / 4) {
         level.size *= 2;
@@ -113,19 +116,22 @@ void Voxelizer::fill_inside(const Coord &origin, int32_t size) {
     }
 }
 
-// A surface of area A passes about √3 A / s² boxes of edge s (halfway over all directions), and its leaves
-// are those within band and half a diagonal on either side.
+// The boxes are the children of those that slack() and the band leave on either side of the surface. Leaves
+// are kept by their own voxels.
 void Voxelizer::foretell(const Level &level) const {
     if (level.size > 8 && level.origins.size() < FORETELLING_BOXES) {
         return;
     }
     const double edge = level.size;
-    const double reach = SQRT3 * edge + 2.0 * band / (field.lipschitz * lattice.voxel);
-    const double leaf_reach = SQRT3 * 8.0 + 2.0 * band / (field.lipschitz * lattice.voxel);
-    const double count =
-        double(level.origins.size()) * (edge / 8.0) * (edge / 8.0) * (edge / 8.0) * leaf_reach / reach;
-    const double per_leaf = field.exact ? BYTES_PER_LEAF : REDISTANCE_BYTES_PER_LEAF;
-    check_memory(&stage.options, lattice.voxel, count, count * per_leaf, error);
+    const double width = 2.0 * band / (field.lipschitz * lattice.voxel);
+    const double reach = SQRT3 * (2.0 * edge - 1.0) + width;
+    const double area = double(level.origins.size()) * edge * edge * edge / reach;
+    const double leaves = area * (SQRT3 * 8.0 + width) / double(Leaf::SIZE);
+    if (field.exact) {
+        check_memory(&stage.options, lattice.voxel, leaves, leaves * BYTES_PER_LEAF, error);
+    } else {
+        check_redistance(stage.options, lattice, area, sides, leaves, 0.0, error);
+    }
 }
 
 Level Voxelizer::split(const Level &level) {

@@ -286,18 +286,26 @@ Finding examine_values(const FloatGrid &grid, Stage &stage) {
     return {};
 }
 
+// Area of a surface, voxel², for each voxel that has a neighbour on the other side: a plane of normal n has
+// 2 max |n_i| of them a voxel², 1.66 over all directions.
+constexpr double AREA_PER_VOXEL = 0.6;
+
 FloatGrid::Ptr mend(const FloatGrid &grid, Stage &stage, vsh_error *error) {
     const double voxel = voxel_size(grid);
     const double half_width = std::clamp(std::round(double(grid.background()) / voxel), 3.0, 100.0);
+    // In index space the lattice stands where it likes; the transform is the source's in the end.
+    const Lattice lattice{voxel, half_width, 0.0, Vec3d(0.0)};
     const double count = double(grid.tree().leafCount());
-    check_memory(&stage.options, voxel, count, count * REDISTANCE_BYTES_PER_LEAF, error);
+    check_memory(&stage.options, voxel, count, 2.0 * count * BYTES_PER_LEAF, error);
 
     // Meshing looks at active voxels only: those of all cells that hold both signs.
     const FloatGrid::Ptr source = grid.deepCopy();
     std::vector<Leaf *> leaves;
     source->tree().getNodes(leaves);
+    std::atomic<size_t> crossings{0}; // voxels next to the surface
     stage.loop(leaves.size(), 64, 0.5, 0.6, [&](size_t i) {
         FloatGrid::ConstUnsafeAccessor values(grid.constTree());
+        size_t found = 0;
         for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
             const Coord at = leaves[i]->offsetToGlobalCoord(n);
             const bool inside = leaves[i]->getValue(n) < 0.0f;
@@ -308,14 +316,16 @@ FloatGrid::Ptr mend(const FloatGrid &grid, Stage &stage, vsh_error *error) {
                 crossed = (values.getValue(beside) < 0.0f) != inside;
             }
             leaves[i]->setActiveState(n, crossed);
+            found += crossed;
         }
+        crossings += found;
     });
+    check_redistance(stage.options, lattice, AREA_PER_VOXEL * double(crossings.load()),
+                     source->evalActiveVoxelDim().asVec3d(), count, count * BYTES_PER_LEAF, error);
     stage.run([&] {
         openvdb::tools::dilateActiveValues(source->tree(), 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                            openvdb::tools::PRESERVE_TILES);
     });
-    // In index space the lattice stands where it likes; the transform is the source's in the end.
-    const Lattice lattice{voxel, half_width, 0.0, Vec3d(0.0)};
     const FloatGrid::Ptr mended = redistance(*source, lattice, 0.6, 1.0, stage, error);
     mended->setTransform(grid.transform().copy());
     return mended;

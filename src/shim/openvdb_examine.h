@@ -23,7 +23,7 @@ double voxel_size(const openvdb::GridBase &grid);
 Finding examine_values(const FloatGrid &grid, Stage &stage);
 
 // True distances for an ODD grid: the same surface, signs and transform, a band that is 3 voxels wide at
-// least. Messages do not name the file.
+// least. Messages do not name the file: who reads it puts its name in front.
 FloatGrid::Ptr mend(const FloatGrid &grid, Stage &stage, vsh_error *error);
 
 } // namespace vshi

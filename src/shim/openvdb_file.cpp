@@ -85,7 +85,7 @@ std::string shown_name(const GridDescriptor &entry) {
 // the file would linger) and goes on past the end of a file that is cut short.
 class Reader final : public openvdb::io::Archive {
   public:
-    Reader(const char *path, vsh_error *error);
+    Reader(const char *path, const vsh_run &run, vsh_error *error);
 
     size_t count() const { return entries.size(); }
     std::string name(size_t i) const { return shown_name(entries[i]); }
@@ -93,6 +93,8 @@ class Reader final : public openvdb::io::Archive {
         return name(i) == wanted || entries[i].gridName() == wanted;
     }
     MetaMap metadata(size_t i);
+    double bytes(size_t i);               // in memory, by what the file says of it
+    GridBase::Ptr without_tree(size_t i); // metadata and transform
     GridBase::Ptr grid(size_t i);
 
     const uint64_t size;
@@ -108,7 +110,7 @@ class Reader final : public openvdb::io::Archive {
     bool streamed = false;
 };
 
-Reader::Reader(const char *path, vsh_error *error) : size(check_file(path, error)) {
+Reader::Reader(const char *path, const vsh_run &run, vsh_error *error) : size(check_file(path, error)) {
     stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
     stream.open(path, std::ios::binary);
     openvdb::io::setStreamMetadataPtr(stream, state, false);
@@ -117,7 +119,11 @@ Reader::Reader(const char *path, vsh_error *error) : size(check_file(path, error
     setLibraryVersion(stream);
     setDataCompression(stream);
     streamed = !inputHasGridOffsets();
-    if (streamed) {
+    if (streamed) { // all of it has to be read: at least as much as the file is long
+        const vsh_result result = check_bytes(&run, double(size), path, error);
+        if (result != VSH_OK) {
+            throw Failure{result};
+        }
         stream.seekg(0);
         openvdb::io::Stream all(stream, false);
         for (const GridBase::Ptr &one : *all.getGrids()) {
@@ -162,6 +168,25 @@ MetaMap Reader::metadata(size_t i) {
     MetaMap metadata;
     metadata.readMeta(stream);
     return metadata;
+}
+
+double Reader::bytes(size_t i) {
+    const MetaMap known = metadata(i);
+    const auto bytes = known.getMetadata<openvdb::Int64Metadata>(GridBase::META_FILE_MEM_BYTES);
+    return bytes ? double(bytes->value()) : double(size);
+}
+
+GridBase::Ptr Reader::without_tree(size_t i) {
+    const GridBase::Ptr result = grids[i]->copyGrid();
+    if (!streamed) {
+        entries[i].seekToGrid(stream);
+        readGridCompression(stream);
+        result->readMeta(stream);
+        if (openvdb::io::getFormatVersion(stream) >= openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) {
+            result->readTransform(stream); // behind the tree in older files
+        }
+    }
+    return result;
 }
 
 GridBase::Ptr Reader::grid(size_t i) {
@@ -224,14 +249,6 @@ size_t choose(Reader &reader, const char *path, const char *name, vsh_error *err
         vshi_fail(error, VSH_ERROR_INPUT, "%s: no grid '%s'; it holds %.700s", path, name, names.c_str())};
 }
 
-// With the file's name in front, where the message is of a layer that does not know it.
-void check_bytes(const vsh_run &run, double bytes, const char *path, vsh_error *error) {
-    const vsh_result result = vshi_check_limit(&run, bytes, path, error);
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
-}
-
 // As floats, without what else the file said about it.
 FloatGrid::Ptr to_floats(const GridBase::Ptr &grid) {
     FloatTree::Ptr tree;
@@ -250,34 +267,59 @@ double shell_of(const GridBase &grid) {
     return shell && std::isfinite(shell->value()) && shell->value() > 0.0 ? shell->value() : 0.0;
 }
 
+// A grid of a file, as messages name it.
+struct Named {
+    const char *path;
+    std::string grid;
+
+    std::string text() const { return std::string(path) + ": grid '" + grid + "'"; }
+};
+
+void refuse_bad(const Named &named, const Finding &finding, vsh_error *error) {
+    if (finding.kind == Finding::BAD) {
+        throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s cannot cast shadows: %s", named.text().c_str(),
+                                finding.text.c_str())};
+    }
+}
+
+void refuse_large(const Named &named, const vsh_run &run, double bytes, vsh_error *error) {
+    const vsh_result result = check_bytes(&run, bytes, named.text().c_str(), error);
+    if (result != VSH_OK) {
+        throw Failure{result};
+    }
+}
+
+FloatGrid::Ptr mend_named(const Named &named, const FloatGrid &grid, Stage &stage, vsh_error *error) {
+    vsh_error why;
+    try {
+        return mend(grid, stage, &why);
+    } catch (const Failure &failure) {
+        if (failure.code != VSH_ERROR_CANCELLED) { // which the stage has told already
+            vshi_fail(error, failure.code, "%s: %.700s", named.text().c_str(), why.message);
+        }
+        throw;
+    }
+}
+
 vsh_result read(const char *path, const char *name, const vsh_run &run, vsh_grid **grid, vsh_error *error) {
     Stage stage(run, "load", error);
     stage.check();
-    Reader reader(path, error);
+    Reader reader(path, run, error);
     const size_t chosen = choose(reader, path, name, error);
-    const std::string shown = reader.name(chosen);
-    const auto refuse = [&](const Finding &finding) {
-        if (finding.kind == Finding::BAD) {
-            throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s: grid '%s' cannot cast shadows: %s", path,
-                                    shown.c_str(), finding.text.c_str())};
-        }
-    };
-    const MetaMap metadata = reader.metadata(chosen);
-    const auto bytes = metadata.getMetadata<openvdb::Int64Metadata>(GridBase::META_FILE_MEM_BYTES);
-    check_bytes(run, bytes ? double(bytes->value()) : double(reader.size), path, error);
+    const Named named{path, reader.name(chosen)};
+    refuse_large(named, run, reader.bytes(chosen), error);
 
     const GridBase::Ptr found = reader.grid(chosen);
     stage.reach(0.3);
     stage.check();
-    refuse(examine_kind(*found));
+    refuse_bad(named, examine_kind(*found), error);
     FloatGrid::Ptr floats = to_floats(found);
-    check_bytes(run, double(floats->memUsage()), path, error);
+    refuse_large(named, run, double(floats->memUsage()), error);
     const Finding finding = examine_values(*floats, stage);
-    refuse(finding);
+    refuse_bad(named, finding, error);
     if (finding.kind == Finding::ODD) {
-        vshi_warn(&run, "%s: grid '%s': %s: its distances were made anew", path, shown.c_str(),
-                  finding.text.c_str());
-        floats = mend(*floats, stage, error);
+        vshi_warn(&run, "%s: %s: its distances were made anew", named.text().c_str(), finding.text.c_str());
+        floats = mend_named(named, *floats, stage, error);
     }
     *grid = close_grid(floats, shell_of(*found), stage);
     return VSH_OK;
@@ -432,17 +474,49 @@ template <size_t Capacity> void copy_text(char (&to)[Capacity], const std::strin
     std::snprintf(to, Capacity, "%s", from.c_str());
 }
 
-void describe(Reader &reader, size_t i, Stage &stage, vsh_vdb_entry &entry) {
-    const GridBase::Ptr grid = reader.grid(i);
-    copy_text(entry.name, reader.name(i));
-    copy_text(entry.type, grid->type());
-    copy_text(entry.grid_class, GridBase::gridClassToString(grid->getGridClass()));
-    const openvdb::CoordBBox box = grid->evalActiveVoxelBoundingBox();
+void describe_kind(const GridBase &grid, vsh_vdb_entry &entry) {
+    copy_text(entry.type, grid.type());
+    copy_text(entry.grid_class, GridBase::gridClassToString(grid.getGridClass()));
     for (int axis = 0; axis < 3; ++axis) {
-        entry.voxel_size[axis] = grid->voxelSize()[axis];
+        entry.voxel_size[axis] = grid.voxelSize()[axis];
+    }
+    copy_text(entry.problem, examine_kind(grid).text);
+}
+
+void describe_box(const openvdb::CoordBBox &box, vsh_vdb_entry &entry) {
+    for (int axis = 0; axis < 3; ++axis) {
         entry.index_min[axis] = box.empty() ? 0 : box.min()[axis];
         entry.index_max[axis] = box.empty() ? 0 : box.max()[axis];
     }
+}
+
+// What the file says of a grid that is too large to be read.
+void describe_unread(Reader &reader, size_t i, const char *why, vsh_vdb_entry &entry) {
+    const GridBase::Ptr grid = reader.without_tree(i);
+    describe_kind(*grid, entry);
+    const auto low = grid->getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MIN);
+    const auto high = grid->getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MAX);
+    const auto voxels = grid->getMetadata<openvdb::Int64Metadata>(GridBase::META_FILE_VOXEL_COUNT);
+    if (low && high) {
+        describe_box(openvdb::CoordBBox(Coord(low->value()), Coord(high->value())), entry);
+    }
+    entry.active_voxels = voxels ? uint64_t(std::max<int64_t>(voxels->value(), 0)) : 0;
+    entry.bytes = uint64_t(std::max(reader.bytes(i), 0.0));
+    if (entry.problem[0] == '\0') {
+        copy_text(entry.problem, why);
+    }
+}
+
+void describe(Reader &reader, size_t i, const vsh_run &run, Stage &stage, vsh_vdb_entry &entry) {
+    copy_text(entry.name, reader.name(i));
+    vsh_error over;
+    if (check_bytes(&run, reader.bytes(i), "its values were not read", &over) != VSH_OK) {
+        describe_unread(reader, i, over.message, entry);
+        return;
+    }
+    const GridBase::Ptr grid = reader.grid(i);
+    describe_kind(*grid, entry);
+    describe_box(grid->evalActiveVoxelBoundingBox(), entry);
     entry.active_voxels = grid->activeVoxelCount();
     entry.bytes = grid->memUsage();
     if (grid->isType<FloatGrid>()) {
@@ -450,20 +524,19 @@ void describe(Reader &reader, size_t i, Stage &stage, vsh_vdb_entry &entry) {
     } else if (grid->isType<openvdb::DoubleGrid>()) {
         entry.background = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid)->background();
     }
-    Finding finding = examine_kind(*grid);
-    if (finding.kind == Finding::FINE) {
-        finding = examine_values(*to_floats(grid), stage);
+    if (entry.problem[0] == '\0') {
+        copy_text(entry.problem, examine_values(*to_floats(grid), stage).text);
     }
-    copy_text(entry.problem, finding.text);
 }
 
-vsh_result list(const char *path, vsh_vdb_entry *entries, size_t capacity, size_t *count, vsh_error *error) {
-    const vsh_run run = vsh_run_default();
-    Reader reader(path, error);
+vsh_result list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, size_t capacity, size_t *count,
+                vsh_error *error) {
+    Reader reader(path, run, error);
     for (size_t i = 0; i < std::min(capacity, reader.count()); ++i) {
         Stage stage(run, "load", error);
+        stage.check();
         entries[i] = {};
-        describe(reader, i, stage, entries[i]);
+        describe(reader, i, run, stage, entries[i]);
     }
     *count = reader.count();
     return VSH_OK;
@@ -491,8 +564,14 @@ vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *na
     });
 }
 
-vsh_result vsh_vdb_list(const char *path, vsh_vdb_entry *entries, size_t capacity, size_t *count,
-                        vsh_error *error) {
+vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,
+                        size_t *count, vsh_error *error) {
     *count = 0;
-    return vshi::guard_file(error, path, [&] { return vshi::list(path, entries, capacity, count, error); });
+    vsh_run full;
+    const vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    return vshi::guard_file(error, path,
+                            [&] { return vshi::list(path, full, entries, capacity, count, error); });
 }

@@ -106,18 +106,32 @@ Lattice make_lattice(const vsh_grid_options *given, const Vec3d &low, const Vec3
     return lattice;
 }
 
+// A surface of A voxel² has about A/64 leaves a layer, and a band of half width b passes (2 b + 12)/8 layers.
+// A wide band around a small solid takes more, by Steiner's formula for its box, but nothing beyond that box.
+double band_leaves(double area, const Vec3d &sides, double half_width) {
+    const double b = half_width;
+    const double around = M_PI * b * b * (sides[0] + sides[1] + sides[2] + 4.0 / 3.0 * b);
+    const double most = (sides[0] + 2.0 * b + 8.0) * (sides[1] + 2.0 * b + 8.0) * (sides[2] + 2.0 * b + 8.0);
+    return std::min(area * (2.0 * b + 12.0) + around, most) / double(Leaf::SIZE);
+}
+
+vsh_result check_bytes(const vsh_run *run, double bytes, const char *what, vsh_error *error) {
+    const vsh_result result = vshi_check_limit(run, bytes, what, error);
+    const double machine = double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE));
+    if (result == VSH_OK && machine > 0.0 && bytes > machine) {
+        return vshi_fail(error, VSH_ERROR_LIMIT,
+                         "%s: about %.0f MB are needed, over this machine's memory of %.0f MB", what,
+                         bytes / 1e6, machine / 1e6);
+    }
+    return result;
+}
+
 void check_memory(const vsh_run *run, double voxel, double leaves, double bytes, vsh_error *error) {
     char what[128];
     std::snprintf(what, sizeof what, "voxel size %g (about %.3g voxels)", voxel, leaves * double(Leaf::SIZE));
-    const vsh_result result = vshi_check_limit(run, bytes, what, error);
+    const vsh_result result = check_bytes(run, bytes, what, error);
     if (result != VSH_OK) {
         throw Failure{result};
-    }
-    const double machine = double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE));
-    if (machine > 0.0 && bytes > machine) {
-        throw Failure{vshi_fail(error, VSH_ERROR_LIMIT,
-                                "%s: about %.0f MB are needed, over this machine's memory of %.0f MB", what,
-                                bytes / 1e6, machine / 1e6)};
     }
 }
 

@@ -29,13 +29,16 @@ using openvdb::FloatTree;
 using openvdb::Vec3d;
 using Leaf = FloatTree::LeafNodeType;
 
-// The file that holds a grid's bytes per leaf: 512 values, two masks, origin, and its share of the nodes
-// above.
+// Bytes of a grid per leaf: 512 values, two masks, origin, and its share of the nodes above.
 constexpr double BYTES_PER_LEAF = 2400.0;
 
 // Voxel sizes, world units: distances are 32-bit floats, and their squares and volumes must be such too.
 constexpr double SMALLEST_VOXEL = 1e-12;
 constexpr double LARGEST_VOXEL = 1e12;
+
+// About how many leaves the band takes that reaches `half_width` voxels to either side of a surface of `area`
+// voxel² in a box of `sides` voxels.
+double band_leaves(double area, const Vec3d &sides, double half_width);
 
 // Where the voxels of a new grid lie: world = voxel · index + translation, the translation being a whole
 // number of voxels near the middle of the bounds, so that indices stay small far from the origin.
@@ -54,8 +57,12 @@ struct Lattice {
 // Checks the options and lays the lattice over the bounds; throws Failure. Indices beyond ±2^28 are refused.
 Lattice make_lattice(const vsh_grid_options *options, const Vec3d &low, const Vec3d &high, vsh_error *error);
 
-// Throws Failure where `bytes` pass the run's memory limit or the machine's memory: OpenVDB ends the process
-// when its thread pool runs out. `leaves` are named in the message as voxels of the band.
+// VSH_ERROR_LIMIT, naming `what`, where `bytes` pass the run's memory limit or the machine's memory: OpenVDB
+// ends the process when its thread pool runs out.
+vsh_result check_bytes(const vsh_run *run, double bytes, const char *what, vsh_error *error);
+
+// The same for a grid that is to be made, as Failure; `leaves` are named in the message as voxels of the
+// band.
 void check_memory(const vsh_run *run, double voxel, double leaves, double bytes, vsh_error *error);
 
 // A stage of work with progress given as a fraction, on as many threads as the run says.

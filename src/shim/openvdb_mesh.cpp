@@ -55,12 +55,14 @@ Meshes look_over(const vsh_mesh *mesh, size_t count, vsh_error *error) {
     return meshes;
 }
 
-// A surface of A voxel² has about A/64 leaves a layer, and its band passes (band + 1.5 leaves) layers.
 void foretell(const Meshes &meshes, const Lattice &lattice, const vsh_run &run, vsh_error *error) {
     double leaves = 0.0;
     for (const vsh_mesh_report &report : meshes.reports) {
-        const double band = lattice.half_width + 1.0 + (report.open_edges > 0 ? 0.5 * lattice.shell : 0.0);
-        leaves += report.area / (lattice.voxel * lattice.voxel) / 64.0 * (2.0 * band + 12.0) / 8.0;
+        const double band = lattice.half_width + RIM + (report.open_edges > 0 ? 0.5 * lattice.shell : 0.0);
+        const Vec3d size = Vec3d(report.bounds_max) - Vec3d(report.bounds_min);
+        if (report.area > 0.0) {
+            leaves += band_leaves(report.area / (lattice.voxel * lattice.voxel), size / lattice.voxel, band);
+        }
     }
     check_memory(&run, lattice.voxel, leaves,
                  leaves * MESH_BYTES_PER_LEAF + double(meshes.triangles) * BYTES_PER_TRIANGLE, error);

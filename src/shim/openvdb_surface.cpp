@@ -49,9 +49,6 @@ class Interrupter : public openvdb::util::NullInterrupter {
 using openvdb::Int32;
 using Adapter = openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec4I>;
 
-// Bands are asked for a little wider, because the conversion's errors leave holes at their rims.
-constexpr double RIM = 1.0;
-
 // The conversion constructs maps of its own, which takes voxels of some size (Lattice::transform()).
 constexpr double SMALLEST_CONVERTED = 1e-4;
 

@@ -163,20 +163,23 @@ void foretell(const std::vector<Placed> &placed, const Lattice &lattice, const v
     double bytes = 0.0;
     for (const Placed &instance : placed) {
         const double finer = instance.voxel / lattice.voxel;
-        const double wider = (2.0 * lattice.half_width + 14.0) / (2.0 * instance.grid->info.half_width + 8.0);
         const double count = double(instance.grid->level_set->tree().leafCount());
-        leaves += count * std::max(finer * finer * std::max(wider, 1.0), 0.01);
-        bytes += double(instance.grid->info.bytes);
+        // what band_leaves() makes of a thin band, turned around
+        const double area = count * double(Leaf::SIZE) / (2.0 * instance.grid->info.half_width + 12.0);
+        const Vec3d sides = instance.grid->level_set->evalActiveVoxelDim().asVec3d();
+        leaves += band_leaves(area * finer * finer, sides * finer, lattice.half_width + RIM);
+        bytes += double(instance.grid->info.bytes) + count * SOURCE_BYTES_PER_LEAF;
     }
     check_memory(&run, lattice.voxel, leaves, bytes + leaves * REDISTANCE_BYTES_PER_LEAF, error);
 }
 
 // An instance measured on the lattice. Signs come from its own values, between which they are interpolated.
-FloatGrid::Ptr resample(const Placed &placed, const Lattice &lattice, double begin, double end, Stage &stage,
-                        vsh_error *error) {
+FloatGrid::Ptr resample(const Placed &placed, size_t number, const Lattice &lattice, double begin, double end,
+                        Stage &stage, vsh_error *error) {
     Surface surface = mesh_surface(*placed.grid->level_set, stage);
     if (surface.polygons.empty()) {
-        throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "unite: a grid without a surface")};
+        throw Failure{
+            vshi_fail(error, VSH_ERROR_INPUT, "unite: instance %zu: the grid has no surface", number)};
     }
     stage.loop(surface.points.size(), 4096, begin, begin, [&](size_t i) {
         const Vec3d point(surface.points[i]);
@@ -307,7 +310,7 @@ vsh_result unite(const vsh_grid_instance *instances, size_t count, const vsh_gri
     for (size_t i = 0; i < count; ++i) {
         Part part{placed[i].grid->level_set, Coord(0)};
         if (!lies_on(placed[i], lattice, part.shift)) {
-            part = {resample(placed[i], lattice, 0.9 * double(i) / double(count),
+            part = {resample(placed[i], i, lattice, 0.9 * double(i) / double(count),
                              0.9 * double(i + 1) / double(count), stage, error),
                     Coord(0)};
         }

@@ -112,7 +112,7 @@ static vsh_grid *from_file(const char *folder, vsh_error *error) {
     vsh_grid_free(made);
     size_t count = 0;
     vsh_vdb_entry entry;
-    check("list", vsh_vdb_list(path, &entry, 1, &count, error), error);
+    check("list", vsh_vdb_list(path, NULL, &entry, 1, &count, error), error);
     expect("grids in the file", (double)count, 1.0, 1.0);
     expect("name is \"ball\"", strcmp(entry.name, "ball") == 0 ? 1.0 : 0.0, 1.0, 1.0);
     vsh_grid *grid = NULL;

@@ -370,6 +370,59 @@ static void too_small_a_voxel_is_refused_before_memory_is_taken(void **state) {
     vsh_grid_free(grid);
 }
 
+/* The megabytes that a limit of one byte is told. */
+static double foretold(const vsh_sdf *sdf, const vsh_grid_instance *instance,
+                       const vsh_grid_options *options) {
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 1;
+    vsh_grid *grid = NULL;
+    const vsh_result result = sdf != NULL ? vsh_grid_from_sdf(sdf, options, &run, &grid, &failure)
+                                          : vsh_grid_unite(instance, 1, options, &run, &grid, &failure);
+    assert_fails(result, VSH_ERROR_LIMIT, "about");
+    const char *need = strstr(failure.message, "): about ");
+    assert_non_null(need);
+    return atof(need + 9);
+}
+
+static void re_distancing_is_foretold_with_the_band_that_it_makes(void **state) {
+    (void)state;
+    const vsh_sdf sdf = hollow_sphere();
+    vsh_grid_options options = with_voxel(0.02);
+    vsh_grid *source = NULL;
+    assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &source, &failure), VSH_OK);
+    const double turned[12] = {0.6, -0.8, 0, 0, 0.8, 0.6, 0, 0, 0, 0, 1, 0};
+    const vsh_grid_instance instance = {source, turned};
+    const double half_widths[] = {3.0, 10.0, 30.0};
+    for (int anew = 0; anew < 2; ++anew) { /* a tree that is no distance, a grid that is turned */
+        for (size_t i = 0; i < sizeof half_widths / sizeof half_widths[0]; ++i) {
+            options.half_width = half_widths[i];
+            const double need = foretold(anew ? &sdf : NULL, &instance, &options);
+            for (int over = 0; over < 2; ++over) {
+                vsh_run run = vsh_run_default();
+                run.memory_limit = (uint64_t)(need * 1e6 * (over ? 1.2 : 0.95));
+                vsh_grid *grid = NULL;
+                const vsh_result result = anew
+                                              ? vsh_grid_from_sdf(&sdf, &options, &run, &grid, &failure)
+                                              : vsh_grid_unite(&instance, 1, &options, &run, &grid, &failure);
+                if (!over) {
+                    assert_fails(result, VSH_ERROR_LIMIT, "over the memory limit");
+                    continue;
+                }
+                assert_int_equal(result, VSH_OK);
+                vsh_grid_info info;
+                vsh_grid_get_info(grid, &info);
+                print_message("half width %g: %g MB foretold, %g MB made\n", half_widths[i], need,
+                              (double)info.bytes / 1e6);
+                /* distances, nearest polygons, and the next values of both */
+                assert_true(need * 1e6 > 3.0 * (double)info.bytes);
+                assert_true(need * 1e6 < 9.0 * (double)info.bytes);
+                vsh_grid_free(grid);
+            }
+        }
+    }
+    vsh_grid_free(source);
+}
+
 typedef struct watch {
     double last;
     double stop; /* fraction at which to cancel */
@@ -894,6 +947,7 @@ int main(void) {
         cmocka_unit_test(threads_do_not_show),
         cmocka_unit_test(bad_fields_and_options_are_refused_with_the_reason),
         cmocka_unit_test(too_small_a_voxel_is_refused_before_memory_is_taken),
+        cmocka_unit_test(re_distancing_is_foretold_with_the_band_that_it_makes),
         cmocka_unit_test(progress_rises_to_one_and_can_cancel),
         cmocka_unit_test(a_fine_mesh_of_a_sphere_is_the_sphere),
         cmocka_unit_test(few_large_triangles_are_exact),

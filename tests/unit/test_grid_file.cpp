@@ -10,6 +10,7 @@
 #include <functional>
 #include <limits>
 #include <openvdb/io/File.h>
+#include <openvdb/io/Stream.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/LevelSetSphere.h>
@@ -157,7 +158,7 @@ void refused(const char *file, const openvdb::GridBase::Ptr &grid,
     assert_null(read);
     vsh_vdb_entry entry;
     size_t count = 0;
-    assert_int_equal(vsh_vdb_list(path.c_str(), &entry, 1, &count, &failure), VSH_OK);
+    assert_int_equal(vsh_vdb_list(path.c_str(), nullptr, &entry, 1, &count, &failure), VSH_OK);
     for (const char *part : parts) {
         assert_non_null(std::strstr(entry.problem, part));
     }
@@ -204,7 +205,7 @@ void grids_are_listed_and_found_by_name(void **) {
     const std::string path = save("many.vdb", {fog, vectors, ball});
     vsh_vdb_entry entries[3] = {};
     size_t count = 0;
-    assert_int_equal(vsh_vdb_list(path.c_str(), entries, 3, &count, &failure), VSH_OK);
+    assert_int_equal(vsh_vdb_list(path.c_str(), nullptr, entries, 3, &count, &failure), VSH_OK);
     assert_int_equal(count, 3);
     assert_string_equal(entries[0].name, "density");
     assert_string_equal(entries[0].grid_class, "fog volume");
@@ -216,7 +217,7 @@ void grids_are_listed_and_found_by_name(void **) {
     assert_string_equal(entries[2].name, "sphere");
     assert_string_equal(entries[2].problem, "");
     assert_true(std::fabs(entries[2].background - 3.0 * VOXEL) < 1e-6 && entries[2].bytes > 10000);
-    assert_int_equal(vsh_vdb_list(path.c_str(), nullptr, 0, &count, &failure), VSH_OK);
+    assert_int_equal(vsh_vdb_list(path.c_str(), nullptr, nullptr, 0, &count, &failure), VSH_OK);
     assert_int_equal(count, 3);
 
     vsh_grid *grid = nullptr; // NULL: the first level set
@@ -233,7 +234,7 @@ void what_is_no_vdb_file_is_not_read(void **) {
         assert_said(vsh_grid_read(at.c_str(), nullptr, nullptr, &grid, &failure), VSH_ERROR_READ,
                     {at.c_str(), part});
         size_t count;
-        assert_said(vsh_vdb_list(at.c_str(), nullptr, 0, &count, &failure), VSH_ERROR_READ,
+        assert_said(vsh_vdb_list(at.c_str(), nullptr, nullptr, 0, &count, &failure), VSH_ERROR_READ,
                     {at.c_str(), part});
     };
     read(path, std::strerror(ENOENT));
@@ -449,6 +450,89 @@ void the_memory_limit_holds_for_reading(void **) {
     assert_said(vsh_grid_read(path.c_str(), nullptr, &run, &read, &failure), VSH_ERROR_LIMIT, {path.c_str()});
 }
 
+// A sphere of 2 voxels' band, which is measured again.
+FloatGrid::Ptr narrow_sphere(const char *name, float radius) {
+    const FloatGrid::Ptr grid =
+        openvdb::tools::createLevelSetSphere<FloatGrid>(radius, openvdb::Vec3f(0.0f), float(VOXEL), 2.0f);
+    grid->setName(name);
+    return grid;
+}
+
+void making_distances_anew_names_the_file_and_the_grid(void **) {
+    const FloatGrid::Ptr narrow = narrow_sphere("hull", 3.0f), wide = sphere();
+    const std::string path = save("narrow.vdb", {narrow});
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 3 * narrow->memUsage(); // to read it, and no more
+    vsh_grid *read = nullptr;
+    assert_said(vsh_grid_read(path.c_str(), nullptr, &run, &read, &failure), VSH_ERROR_LIMIT,
+                {path.c_str(), "grid 'hull'", "voxel size 0.05", "over the memory limit"});
+    assert_null(read);
+
+    // Distances that end at 3 voxels, but say 40: the band that is made is foretold, not the one that is
+    // there.
+    openvdb::tools::changeLevelSetBackground(wide->tree(), float(40.0 * VOXEL));
+    wide->setName("wide");
+    const std::string wide_path = save("wide.vdb", {wide});
+    run.memory_limit = 4 * wide->memUsage();
+    assert_said(vsh_grid_read(wide_path.c_str(), nullptr, &run, &read, &failure), VSH_ERROR_LIMIT,
+                {wide_path.c_str(), "grid 'wide'", "over the memory limit"});
+    run.memory_limit = 1000000000;
+    assert_said(vsh_grid_read(wide_path.c_str(), nullptr, &run, &read, &failure), VSH_OK, {});
+    vsh_grid_info info;
+    vsh_grid_get_info(read, &info);
+    assert_true(info.active_voxels > 4 * wide->activeVoxelCount());
+    vsh_grid_free(read);
+}
+
+void grids_over_the_limit_are_listed_by_what_the_file_says(void **) {
+    const FloatGrid::Ptr small = narrow_sphere("small", 0.3f), large = narrow_sphere("large", 4.0f);
+    const FloatGrid::Ptr fog = large->deepCopy();
+    fog->setName("fog");
+    fog->setGridClass(openvdb::GRID_FOG_VOLUME);
+    const std::string path = save("limits.vdb", {small, large, fog});
+    vsh_vdb_entry all[3] = {}, some[3] = {};
+    size_t count = 0;
+    assert_int_equal(vsh_vdb_list(path.c_str(), nullptr, all, 3, &count, &failure), VSH_OK);
+    vsh_run run = vsh_run_default();
+    run.memory_limit = large->memUsage() / 2;
+    assert_int_equal(vsh_vdb_list(path.c_str(), &run, some, 3, &count, &failure), VSH_OK);
+    assert_int_equal(count, 3);
+    assert_memory_equal(&some[0], &all[0], sizeof all[0]);
+    for (int i = 1; i < 3; ++i) {
+        assert_string_equal(some[i].name, all[i].name);
+        assert_string_equal(some[i].type, all[i].type);
+        assert_string_equal(some[i].grid_class, all[i].grid_class);
+        assert_memory_equal(some[i].voxel_size, all[i].voxel_size, sizeof all[i].voxel_size);
+        assert_memory_equal(some[i].index_min, all[i].index_min, sizeof all[i].index_min);
+        assert_memory_equal(some[i].index_max, all[i].index_max, sizeof all[i].index_max);
+        assert_true(some[i].active_voxels == all[i].active_voxels && some[i].bytes > run.memory_limit);
+    }
+    assert_non_null(std::strstr(some[1].problem, "not read"));
+    assert_non_null(std::strstr(some[1].problem, "over the memory limit"));
+    assert_non_null(std::strstr(some[2].problem, "fog volume"));
+
+    std::ofstream stream(in_folder("streamed.vdb"), std::ios::binary); // no offsets: has to be read whole
+    openvdb::io::Stream(stream).write(openvdb::GridPtrVec{small, large});
+    stream.close();
+    run.memory_limit = 1000;
+    const std::string streamed = in_folder("streamed.vdb");
+    assert_said(vsh_vdb_list(streamed.c_str(), &run, some, 3, &count, &failure), VSH_ERROR_LIMIT,
+                {streamed.c_str()});
+    assert_int_equal(count, 0);
+    assert_int_equal(vsh_vdb_list(streamed.c_str(), nullptr, some, 3, &count, &failure), VSH_OK);
+    assert_int_equal(count, 2);
+}
+
+void listing_can_be_cancelled(void **) {
+    const std::string path = save("stop.vdb", {sphere()});
+    vsh_run run = vsh_run_default();
+    run.progress = [](void *, const char *, double) { return int32_t(1); };
+    vsh_vdb_entry entry;
+    size_t count = 1;
+    assert_said(vsh_vdb_list(path.c_str(), &run, &entry, 1, &count, &failure), VSH_ERROR_CANCELLED, {});
+    assert_int_equal(count, 0);
+}
+
 void a_full_disk_leaves_the_old_file(void **) {
     vsh_grid *grid = own_sphere();
     const std::string path = in_folder("full.vdb");
@@ -496,6 +580,9 @@ int main() {
         cmocka_unit_test(what_is_all_inside_is_refused),
         cmocka_unit_test(voxels_too_small_for_openvdb_are_refused_and_the_least_come_back),
         cmocka_unit_test(the_memory_limit_holds_for_reading),
+        cmocka_unit_test(making_distances_anew_names_the_file_and_the_grid),
+        cmocka_unit_test(grids_over_the_limit_are_listed_by_what_the_file_says),
+        cmocka_unit_test(listing_can_be_cancelled),
         cmocka_unit_test(a_full_disk_leaves_the_old_file),
     };
     return cmocka_run_group_tests(tests, nullptr, remove_folder);

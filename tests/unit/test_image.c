@@ -13,6 +13,7 @@
 #include <vdbshade/image.h>
 
 #include "base/file.h"
+#include "image/planes.h"
 
 #include <dirent.h>
 #include <math.h>
@@ -76,6 +77,26 @@ static void assert_ok(vsh_result result, const vsh_error *error) {
     if (result != VSH_OK) {
         fail_msg("%s: %s", vsh_result_name(result), error->message);
     }
+}
+
+static size_t read_all(const char *path, unsigned char **bytes) {
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    assert_int_equal(fseek(file, 0, SEEK_END), 0);
+    const size_t size = (size_t)ftell(file);
+    rewind(file);
+    *bytes = malloc(size + 1);
+    assert_non_null(*bytes);
+    assert_int_equal(fread(*bytes, 1, size, file), size);
+    fclose(file);
+    return size;
+}
+
+static void write_all(const char *path, const unsigned char *bytes, size_t size) {
+    FILE *file = fopen(path, "wb");
+    assert_non_null(file);
+    assert_int_equal(fwrite(bytes, 1, size, file), size);
+    assert_int_equal(fclose(file), 0);
 }
 
 static vsh_image_file *write_and_read(const char *path, const vsh_image *image, int32_t bits,
@@ -207,12 +228,18 @@ static void every_format_keeps_values_to_half_a_step(void **state) {
         double tolerance;
         bool alpha;
     } formats[] = {
-        {"f.png", 8, 0.5 / 255, true},     {"f.png", 16, 0.5 / 65535, true}, {"f.TIF", 8, 0.5 / 255, true},
-        {"f.tiff", 16, 0.5 / 65535, true}, {"f.tif", 32, 0.0, true},         {"f.tga", 8, 0.5 / 255, true},
-        {"f.bmp", 8, 0.5 / 255, true},     {"f.ppm", 8, 0.5 / 255, false},   {"f.jp2", 8, 0.5 / 255, true},
-        {"f.jp2", 16, 0.5 / 65535, true},  {"f.dpx", 8, 0.5 / 255, true},    {"f.dpx", 16, 0.5 / 65535, true},
-        {"f.dpx", 32, 0.0, true},          {"f.hdr", 32, 1.0 / 128, false},  {"f.jpg", 8, 0.03, false},
-        {"f.webp", 8, 0.06, false},        {"f.gif", 8, 0.3, false}, /* 256 colours */
+        {"f.png", 8, 0.5 / 255, true}, {"f.png", 16, 0.5 / 65535, true},
+        {"f.TIF", 8, 0.5 / 255, true}, {"f.tiff", 16, 0.5 / 65535, true},
+        {"f.tif", 32, 0.0, true},      {"f.tga", 8, 0.5 / 255, true},
+        {"f.bmp", 8, 0.5 / 255, true}, {"f.ppm", 8, 0.5 / 255, false},
+        {"f.jp2", 8, 0.5 / 255, true}, {"f.jp2", 16, 0.5 / 65535, true},
+        {"f.dpx", 8, 0.5 / 255, true}, {"f.dpx", 16, 0.5 / 65535, true},
+        {"f.dpx", 32, 0.0, true},      {"f.hdr", 32, 1.0 / 128, false},
+        {"f.jpg", 8, 0.03, false},     {"f.webp", 8, 0.06, false},
+        {"f.gif", 8, 0.3, false}, /* 256 colours */
+        {"f.sgi", 8, 0.5 / 255, true}, {"f.rgb", 16, 0.5 / 65535, true},
+        {"f.rla", 32, 0.0, true},      {"f.ico", 8, 0.5 / 255, true},
+        {"f.heic", 8, 0.15, true},     {"f.avif", 8, 0.15, true}, /* colours at half the resolution */
     };
     sample s;
     make(&s, 70, 90, 4, (const char *const[]){"shadow.sun", "ao", "shadow.lamp", "A"});
@@ -233,6 +260,173 @@ static void every_format_keeps_values_to_half_a_step(void **state) {
                          difference);
             }
         }
+        vsh_image_free(file);
+    }
+    unmake(&s);
+}
+
+static uint32_t big_endian(const unsigned char *bytes, int size) {
+    uint32_t value = 0;
+    for (int i = 0; i < size; ++i) {
+        value = value << 8 | bytes[i];
+    }
+    return value;
+}
+
+/* A tile's bytes, plane by plane or packed into runs, to A, B, G, R of each pixel. */
+static void unpack_iff_tile(const unsigned char *from, size_t size, size_t pixels, unsigned char *to) {
+    if (size == 4 * pixels) {
+        memcpy(to, from, size);
+        return;
+    }
+    const unsigned char *end = from + size;
+    size_t done = 0;
+    while (done < 4 * pixels) {
+        assert_true(from + 1 < end);
+        const bool run = (*from & 0x80) != 0;
+        const size_t count = (size_t)(*from++ & 0x7f) + 1;
+        assert_true(done % pixels + count <= pixels); /* runs end with their plane */
+        for (size_t i = 0; i < count; ++i, ++done) {
+            to[done % pixels * 4 + done / pixels] = *from;
+            from += run ? 0 : 1;
+        }
+        from += run ? 1 : 0;
+    }
+    assert_true(end - from < 4); /* filled up to whole words */
+}
+
+/* Maya's IFF, which the library does not read: FOR4 CIMG { TBHD, FOR4 TBMP { RGBA … } }, tiles from the
+ * bottom up, of 8 bits with alpha. */
+static vsh_image_file *write_and_read_iff(const char *path, const vsh_image *image, const char *pack) {
+    vsh_error error = {0};
+    vsh_image_options options = vsh_image_options_default();
+    options.pack = pack;
+    assert_ok(vsh_image_write(path, image, &options, &error), &error);
+    unsigned char *bytes, *tile = malloc(4 * 64 * 64);
+    const size_t size = read_all(path, &bytes);
+    assert_memory_equal(bytes, "FOR4", 4);
+    assert_int_equal(big_endian(bytes + 4, 4), size - 8);
+    assert_memory_equal(bytes + 8, "CIMGTBHD", 8);
+    vsh_image_file *file;
+    assert_ok(
+        vshi_image_file_new(path, big_endian(bytes + 20, 4), big_endian(bytes + 24, 4), 4, &file, &error),
+        &error);
+    const size_t header = 20 + big_endian(bytes + 16, 4), tiles = big_endian(bytes + 38, 2);
+    assert_memory_equal(bytes + header, "FOR4", 4);
+    assert_memory_equal(bytes + header + 8, "TBMP", 4);
+    assert_int_equal(big_endian(bytes + header + 4, 4), size - header - 8);
+    const unsigned char *at_tile = bytes + header + 12;
+    for (size_t t = 0; t < tiles; ++t) {
+        assert_memory_equal(at_tile, "RGBA", 4);
+        const uint32_t length = big_endian(at_tile + 4, 4), x = big_endian(at_tile + 8, 2),
+                       y = big_endian(at_tile + 10, 2), width = big_endian(at_tile + 12, 2) - x + 1,
+                       height = big_endian(at_tile + 14, 2) - y + 1;
+        unpack_iff_tile(at_tile + 16, length - 8, (size_t)width * height, tile);
+        for (uint32_t i = 0; i < width * height; ++i) {
+            const size_t row = (size_t)file->height - 1 - (y + i / width);
+            for (size_t c = 0; c < 4; ++c) {
+                file->values[(c * (size_t)file->height + row) * (size_t)file->width + x + i % width] =
+                    (float)tile[4 * i + 3 - c] / 255.0f;
+            }
+        }
+        at_tile += 8 + (length + 3) / 4 * 4;
+    }
+    assert_ptr_equal(at_tile, bytes + size);
+    free(tile);
+    free(bytes);
+    return file;
+}
+
+/* Sizes at which tiles, rows of whole words and runs of equal values end in every way; values that pack well
+ * and values that do not. */
+static void formats_of_their_own_writers_keep_every_size(void **state) {
+    (void)state;
+    static const char *const names[] = {"o.sgi", "o.rla", "o.ico", "o.iff"};
+    static const int32_t sizes[][2] = {{1, 1}, {1, 7}, {3, 5}, {8, 1}, {64, 64}, {65, 130}, {255, 254}};
+    for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; ++k) {
+        sample s;
+        make(&s, sizes[k][0], sizes[k][1], 4, (const char *const[]){"a", "b", "c", "A"});
+        const size_t texels = (size_t)sizes[k][0] * (size_t)sizes[k][1];
+        for (size_t pass = 0; pass < 3; ++pass) {
+            uint32_t seed = 7;
+            for (size_t i = 0; i < 4 * texels && pass > 0; ++i) {
+                seed = seed * 1664525u + 1013904223u;
+                s.values[i] = (float)(seed >> 24) / 255.0f;
+                s.values[i] = pass == 1 ? s.values[i] : (float)(i / 5 % 3 == 0);
+            }
+            for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
+                for (int alpha = 0; alpha < 2; ++alpha) {
+                    const char *pack = alpha ? NULL : "R=a,G=b,B=c";
+                    vsh_image_file *file = strcmp(names[n], "o.iff") == 0
+                                               ? write_and_read_iff(at(names[n]), &s.image, pack)
+                                               : write_and_read(at(names[n]), &s.image, 0, pack);
+                    const vsh_image view = vsh_image_view(file);
+                    assert_int_equal(view.width, sizes[k][0]);
+                    assert_int_equal(view.height, sizes[k][1]);
+                    for (int32_t c = 0; c < 3 + alpha; ++c) {
+                        if (!(worst(view.planes[c], s.planes[c], texels) < 0.501 / 255)) {
+                            fail_msg("%s, %d × %d, pass %zu, channel %d", names[n], view.width, view.height,
+                                     pass, c);
+                        }
+                    }
+                    for (size_t i = 0; i < texels && !alpha && view.channel_count == 4; ++i) {
+                        assert_true(view.planes[3][i] == 1.0f);
+                    }
+                    vsh_image_free(file);
+                }
+            }
+        }
+        unmake(&s);
+    }
+}
+
+static void lossy_formats_keep_grey(void **state) {
+    (void)state;
+    sample s;
+    make(&s, 70, 90, 2, (const char *const[]){"ao", "A"});
+    static const char *const names[] = {"g.heic", "g.avif", "g.webp", "g.jpg"};
+    for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
+        vsh_image_file *file = write_and_read(at(names[n]), &s.image, 0, NULL);
+        const vsh_image view = vsh_image_view(file);
+        for (int32_t c = 0; c < 3; ++c) {
+            const double difference = worst(view.planes[c], s.planes[0], 70 * 90);
+            if (!(difference < 0.02)) {
+                fail_msg("%s, channel %d: off by %g", names[n], c, difference);
+            }
+        }
+        assert_true(view.channel_count == 3 || worst(view.planes[3], s.planes[1], 70 * 90) < 0.501 / 255);
+        vsh_image_free(file);
+    }
+    unmake(&s);
+}
+
+static void icons_of_fewer_bits_are_not_given_to_their_reader(void **state) {
+    (void)state;
+    sample s;
+    make(&s, 5, 5, 3, LIGHTMAP);
+    vsh_error error = {0};
+    assert_ok(vsh_image_write(at("icon.ico"), &s.image, NULL, &error), &error);
+    unsigned char *bytes;
+    const size_t size = read_all(at("icon.ico"), &bytes);
+    bytes[22 + 14] = 24;
+    write_all(at("icon.ico"), bytes, size);
+    vsh_image_file *file = NULL;
+    assert_int_equal(vsh_image_read(at("icon.ico"), &file, &error), VSH_ERROR_UNSUPPORTED);
+    assert_non_null(strstr(error.message, "32 bits"));
+    free(bytes);
+    unmake(&s);
+}
+
+static void pgm_is_grey(void **state) {
+    (void)state;
+    sample s;
+    make(&s, 9, 7, 3, LIGHTMAP);
+    static const char *const packs[] = {NULL, "R=shadow.sun", "R=shadow.sun,G=shadow.sun,B=shadow.sun"};
+    for (size_t i = 0; i < sizeof packs / sizeof packs[0]; ++i) {
+        vsh_image_file *file = write_and_read(at("grey.pgm"), &s.image, 0, packs[i]);
+        const vsh_image view = vsh_image_view(file);
+        assert_int_equal(view.channel_count, 1);
+        assert_true(worst(view.planes[0], s.planes[0], 63) < 0.501 / 255);
         vsh_image_free(file);
     }
     unmake(&s);
@@ -376,13 +570,23 @@ static void what_a_format_lacks_is_refused(void **state) {
     refused(at("x.exr"), &s.image, -1, NULL, VSH_ERROR_ARGUMENT, "-1");
     refused(at("x.tif"), &s.image, 12, NULL, VSH_ERROR_ARGUMENT, "12");
     refused(at("x.xyz"), &s.image, 0, NULL, VSH_ERROR_ARGUMENT, "xyz");
-    refused(at("x.pfm"), &s.image, 0, NULL, VSH_ERROR_ARGUMENT, "pfm");
+    static const char *const never[] = {"x.pfm", "x.fits", "x.pbm",  "x.zfile", "x.heics",
+                                        "x.sxr", "x.null", "x.term", "x.FITS",  "x.j2c"};
+    for (size_t i = 0; i < sizeof never / sizeof never[0]; ++i) {
+        refused(at(never[i]), &s.image, 0, NULL, VSH_ERROR_ARGUMENT, "is not written: ");
+    }
+    refused(at("x.rla"), &s.image, 16, NULL, VSH_ERROR_ARGUMENT, "rla has 32");
+    refused(at("x.iff"), &s.image, 16, NULL, VSH_ERROR_ARGUMENT, "iff has 8");
+    refused(at("x.pgm"), &s.image, 0, "R=ao,G=A", VSH_ERROR_ARGUMENT, "grey");
+    refused(at("x.pgm"), &s.image, 0, "G=ao", VSH_ERROR_ARGUMENT, "grey");
+    refused(at("x.pgm"), &s.image, 0, "R=ao,A=1", VSH_ERROR_ARGUMENT, "alpha");
     refused(at("noending"), &s.image, 0, NULL, VSH_ERROR_ARGUMENT, "noending");
     refused("", &s.image, 0, NULL, VSH_ERROR_ARGUMENT, "empty");
     vsh_image wide = s.image;
     wide.width = 70000;
     wide.height = 1;
     refused(at("x.jpg"), &wide, 0, NULL, VSH_ERROR_ARGUMENT, "65500");
+    refused(at("x.ico"), &wide, 0, NULL, VSH_ERROR_ARGUMENT, "255");
     unmake(&s);
 }
 
@@ -439,32 +643,13 @@ static void places_that_cannot_be_written_are_refused(void **state) {
     unmake(&s);
 }
 
-static size_t read_all(const char *path, unsigned char **bytes) {
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    assert_int_equal(fseek(file, 0, SEEK_END), 0);
-    const size_t size = (size_t)ftell(file);
-    rewind(file);
-    *bytes = malloc(size + 1);
-    assert_non_null(*bytes);
-    assert_int_equal(fread(*bytes, 1, size, file), size);
-    fclose(file);
-    return size;
-}
-
-static void write_all(const char *path, const unsigned char *bytes, size_t size) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, size, file), size);
-    assert_int_equal(fclose(file), 0);
-}
-
 /* The limit on a file's size stands for a full disk: at the first byte, in the middle, at the very last one.
  */
 static void a_full_disk_leaves_the_old_file_and_nothing_else(void **state) {
     (void)state;
-    static const char *const names[] = {"d.exr", "d.png", "d.tif",  "d.jpg", "d.tga", "d.bmp",
-                                        "d.hdr", "d.ppm", "d.webp", "d.jp2", "d.dpx", "d.gif"};
+    static const char *const names[] = {"d.exr", "d.png", "d.tif",  "d.jpg",  "d.tga", "d.bmp", "d.hdr",
+                                        "d.ppm", "d.pgm", "d.webp", "d.jp2",  "d.dpx", "d.gif", "d.sgi",
+                                        "d.iff", "d.rla", "d.ico",  "d.heic", "d.avif"};
     signal(SIGXFSZ, SIG_IGN);
     struct rlimit old_limit;
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &old_limit), 0);
@@ -503,8 +688,9 @@ static void a_full_disk_leaves_the_old_file_and_nothing_else(void **state) {
 
 static void the_same_image_is_the_same_bytes_later(void **state) {
     (void)state;
-    static const char *const names[] = {"t.exr", "t.png", "t.tif",  "t.jpg", "t.tga", "t.bmp",
-                                        "t.hdr", "t.ppm", "t.webp", "t.jp2", "t.dpx", "t.gif"};
+    static const char *const names[] = {"t.exr", "t.png", "t.tif",  "t.jpg",  "t.tga", "t.bmp", "t.hdr",
+                                        "t.ppm", "t.pgm", "t.webp", "t.jp2",  "t.dpx", "t.gif", "t.sgi",
+                                        "t.iff", "t.rla", "t.ico",  "t.heic", "t.avif"};
     enum { COUNT = sizeof names / sizeof names[0] };
     unsigned char *bytes[COUNT];
     size_t sizes[COUNT];
@@ -535,8 +721,8 @@ static void the_same_image_is_the_same_bytes_later(void **state) {
 
 static void cut_files_are_errors(void **state) {
     (void)state;
-    static const char *const names[] = {"c.exr", "c.png", "c.tif", "c.tga",
-                                        "c.bmp", "c.hdr", "c.ppm", "c.dpx"};
+    static const char *const names[] = {"c.exr", "c.png", "c.tif", "c.tga", "c.bmp", "c.hdr",
+                                        "c.ppm", "c.dpx", "c.sgi", "c.rla", "c.ico"};
     sample s;
     make(&s, 33, 40, 3, LIGHTMAP);
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
@@ -573,7 +759,8 @@ static void cut_files_are_errors(void **state) {
 
 static void damaged_files_do_no_harm(void **state) {
     (void)state;
-    static const char *const names[] = {"b.exr", "b.png", "b.tif", "b.jpg", "b.tga", "b.bmp"};
+    static const char *const names[] = {"b.exr", "b.png", "b.tif", "b.jpg", "b.tga",
+                                        "b.bmp", "b.sgi", "b.rla", "b.ico"};
     sample s;
     make(&s, 33, 40, 3, LIGHTMAP);
     uint32_t seed = 1;
@@ -611,8 +798,12 @@ static void unreadable_paths_are_read_errors(void **state) {
     assert_int_equal(vsh_image_read(folder, &file, &error), VSH_ERROR_READ);
     write_all(at("empty.png"), (const unsigned char *)"", 0);
     assert_int_equal(vsh_image_read(at("empty.png"), &file, &error), VSH_ERROR_INPUT);
-    write_all(at("text.txt"), (const unsigned char *)"hello", 5);
-    assert_int_equal(vsh_image_read(at("text.txt"), &file, &error), VSH_ERROR_INPUT);
+    static const char *const never[] = {"text.txt", "x.iff", "x.fits"};
+    for (size_t i = 0; i < sizeof never / sizeof never[0]; ++i) {
+        write_all(at(never[i]), (const unsigned char *)"hello", 5);
+        assert_int_equal(vsh_image_read(at(never[i]), &file, &error), VSH_ERROR_INPUT);
+        assert_non_null(strstr(error.message, "no image format that is read"));
+    }
     assert_null(file);
     vsh_image_free(NULL);
 }
@@ -704,6 +895,10 @@ int main(void) {
         cmocka_unit_test(exr_16_is_right_to_half_precision),
         cmocka_unit_test(exr_writes_the_packed_names_when_packed),
         cmocka_unit_test(every_format_keeps_values_to_half_a_step),
+        cmocka_unit_test(formats_of_their_own_writers_keep_every_size),
+        cmocka_unit_test(lossy_formats_keep_grey),
+        cmocka_unit_test(icons_of_fewer_bits_are_not_given_to_their_reader),
+        cmocka_unit_test(pgm_is_grey),
         cmocka_unit_test(integers_clamp_and_turn_nan_to_0),
         cmocka_unit_test(default_bits_are_the_formats_best),
         cmocka_unit_test(colours_that_are_not_given_are_0),

@@ -1,0 +1,326 @@
+// Writing every image format but OpenEXR. Integers are made by us, and no value is multiplied by alpha or
+// sent through a transfer curve. Bytes go through a file of ours where the writer takes one; where it does
+// not, the file is read again, because those writers do not look whether their bytes arrived.
+#include "shim/oiio_formats.h"
+
+#include "base/file.h"
+#include "shim/guard.h"
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <limits>
+#include <memory>
+#include <string>
+#include <sys/stat.h>
+#include <type_traits>
+#include <unistd.h>
+#include <vector>
+
+namespace vshi {
+
+namespace {
+
+// OpenImageIO's own file writing does not look at the result of its last flush, and its jpeg writer ends the
+// process when a write fails.
+class CheckedFile final : public OIIO::Filesystem::IOProxy {
+  public:
+    explicit CheckedFile(const char *path) : IOProxy(path, Write), sink_(vshi_sink_open(path)) {}
+    ~CheckedFile() override { finish(); }
+    CheckedFile(const CheckedFile &) = delete;
+    CheckedFile &operator=(const CheckedFile &) = delete;
+
+    const char *proxytype() const override { return "checked"; } // "file" would promise a FILE *
+    void close() override {}                                     // finish() does, when all is written
+    size_t size() const override {
+        const off_t end = sink_.file >= 0 ? ::lseek(sink_.file, 0, SEEK_END) : 0;
+        return end > 0 ? static_cast<size_t>(end) : 0;
+    }
+    size_t read(void *data, size_t count) override {
+        const size_t done = pread(data, count, m_pos);
+        m_pos += static_cast<int64_t>(done);
+        return done;
+    }
+    size_t pread(void *data, size_t count, int64_t offset) override {
+        const ssize_t done = sink_.file >= 0 ? ::pread(sink_.file, data, count, offset) : 0;
+        return done > 0 ? static_cast<size_t>(done) : 0;
+    }
+    size_t write(const void *data, size_t count) override {
+        const size_t done = pwrite(data, count, m_pos);
+        m_pos += static_cast<int64_t>(done);
+        return done;
+    }
+    size_t pwrite(const void *data, size_t count, int64_t offset) override {
+        // A failure is kept for finish() and not told: libpng would print it.
+        vshi_sink_write(&sink_, data, count, static_cast<uint64_t>(offset));
+        return count;
+    }
+    // Closes; the first error of all, or 0.
+    int finish() { return vshi_sink_close(&sink_); }
+
+  private:
+    vshi_sink sink_;
+};
+
+// 0 … 1 to 0 … maximum, to nearest; NaN becomes 0 because no comparison with it holds.
+template <typename Integer> Integer quantise(float value) {
+    constexpr double maximum = std::numeric_limits<Integer>::max();
+    if (!(value > 0.0f)) {
+        return 0;
+    }
+    return value < 1.0f ? static_cast<Integer>(value * maximum + 0.5) : std::numeric_limits<Integer>::max();
+}
+
+template <typename Value> Value convert(float value) {
+    if constexpr (std::is_same_v<Value, float>) {
+        return value;
+    } else {
+        return quantise<Value>(value);
+    }
+}
+
+// Rows [first, last), interleaved.
+template <typename Value>
+void interleave(const vshi_planes &planes, int first, int last, std::vector<Value> &rows) {
+    const size_t width = static_cast<size_t>(planes.width);
+    const size_t count = static_cast<size_t>(planes.count);
+    const size_t begin = static_cast<size_t>(first) * width;
+    const size_t texels = static_cast<size_t>(last - first) * width;
+    for (size_t c = 0; c < count; ++c) {
+        const vshi_plane &plane = planes.planes[c];
+        for (size_t i = 0; i < texels; ++i) {
+            rows[i * count + c] =
+                convert<Value>(plane.values != nullptr ? plane.values[begin + i] : plane.constant);
+        }
+    }
+}
+
+template <typename Value> constexpr OIIO::TypeDesc::BASETYPE oiio_type() {
+    if constexpr (std::is_same_v<Value, float>) {
+        return OIIO::TypeDesc::FLOAT;
+    } else {
+        return sizeof(Value) == 1 ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::UINT16;
+    }
+}
+
+OIIO::ImageSpec make_spec(const vshi_planes &planes, const char *path, const std::string &format,
+                          OIIO::TypeDesc type) {
+    OIIO::ImageSpec spec(planes.width, planes.height, planes.count, type);
+    const std::string software = std::string("vdbshade ") + vsh_version();
+    spec.attribute("Software", software);
+    spec.attribute("oiio:UnassociatedAlpha", 1); // else colours are divided by alpha
+    if (format == "tiff" || format == "dpx") {
+        spec.attribute("DateTime", "1970:01:01 00:00:00"); // else the hour: same input, same bytes
+    }
+    spec.attribute("oiio:BitsPerSample", static_cast<int>(type.size()) * 8);
+    if (format == "jpeg") {
+        // R, G and B are unrelated data here: halving the resolution of their differences would mix them
+        spec.attribute("compression", "jpeg:95");
+        spec.attribute("jpeg:subsampling", "4:4:4");
+    } else if (format == "webp") {
+        spec.attribute("compression", "webp:100");
+    } else if (format == "heif") { // without loss, but for colours, which it halves the resolution of
+        spec.attribute("compression", ending_of(path) == "avif" ? "avif:100" : "heic:100");
+    } else if (format == "tiff") {
+        spec.attribute("compression", "zip");
+        spec.attribute("tiff:write_exif", 0); // there is none, and libtiff 4.5 refuses the empty one
+    } else if (format == "sgi") {
+        spec.attribute("ImageDescription", software); // else 80 bytes that nobody set
+    } else if (format == "rla") {
+        spec.attribute("oiio:ColorSpace", "Linear");
+    }
+    return spec;
+}
+
+std::string reason(const std::string &text) {
+    return text.empty() ? "the writer gave no reason" : text;
+}
+
+vsh_result fail_write(vsh_error *error, const char *path, const std::string &why) {
+    return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", path, why.c_str());
+}
+
+// The heif writer copies whole rows of libheif's, which are longer than ours: so many bytes at most.
+constexpr size_t READ_BEYOND = 1024;
+
+template <typename Value> std::vector<Value> make_rows(const vshi_planes &planes, int rows) {
+    return std::vector<Value>(static_cast<size_t>(rows) * static_cast<size_t>(planes.width) *
+                                  static_cast<size_t>(planes.count) +
+                              READ_BEYOND);
+}
+
+template <typename Value>
+vsh_result write_rows(OIIO::ImageOutput &output, const char *path, const vshi_planes &planes,
+                      vsh_error *error) {
+    int step = rows_of_band(planes.width, planes.height, planes.count);
+    const int tile =
+        output.spec().tile_width > 0 ? output.spec().tile_height : 1; // of a format of tiles only
+    step = (step + tile - 1) / tile * tile;
+    std::vector<Value> rows = make_rows<Value>(planes, std::min(step, planes.height));
+    for (int64_t y = 0; y < planes.height; y += step) {
+        const int first = static_cast<int>(y);
+        const int last = static_cast<int>(std::min<int64_t>(y + step, planes.height));
+        interleave(planes, first, last, rows);
+        const bool done =
+            output.spec().tile_width > 0
+                ? output.write_tiles(0, planes.width, first, last, 0, 1, oiio_type<Value>(), rows.data())
+                : output.write_scanlines(first, last, 0, oiio_type<Value>(), rows.data());
+        if (!done) {
+            return fail_write(error, path, reason(output.geterror()));
+        }
+    }
+    return VSH_OK;
+}
+
+// rla notes the minute of its making: same input, same bytes.
+int clear_date(const char *temporary) {
+    constexpr off_t DATE_AT = 528;
+    constexpr char date[20] = "Jan 01 00:00 1970";
+    const int file = ::open(temporary, O_WRONLY | O_CLOEXEC);
+    const bool written = file >= 0 && ::pwrite(file, date, sizeof date, DATE_AT) == ssize_t(sizeof date);
+    const int number = written ? 0 : errno;
+    if (file >= 0) {
+        ::close(file);
+    }
+    return number;
+}
+
+// Why nothing more can be written to a file, or 0: asked of a file that is to be thrown away.
+int disk_error(const char *temporary) {
+    const char more[4096] = {0};
+    const int file = ::open(temporary, O_WRONLY | O_APPEND | O_CLOEXEC);
+    const ssize_t written = file >= 0 ? ::write(file, more, sizeof more) : -1;
+    const int number = written < 0 ? errno : written < ssize_t(sizeof more) ? ENOSPC : 0;
+    if (file >= 0) {
+        ::close(file);
+    }
+    return number;
+}
+
+// Bytes of a whole file, or -1 where that is not known beforehand.
+int64_t whole_size(const std::string &format, const vshi_planes &planes, int64_t value_size) {
+    const int64_t width = planes.width, height = planes.height, count = planes.count;
+    if (format == "sgi") {
+        return 512 + width * height * count * value_size;
+    }
+    if (format == "ico") { // headers, pixels, and a mask of bits in rows of whole words
+        return 62 + height * (width * 4 + (width + 31) / 32 * 4);
+    }
+    if (format == "rla") { // header, offset of each row, and a size before each channel's values
+        return 740 + height * (4 + count * (2 + width * value_size));
+    }
+    return -1;
+}
+
+template <typename Value>
+bool reads_back(OIIO::ImageInput &input, const vshi_format &format, const vshi_planes &planes) {
+    const int step = rows_of_band(planes.width, planes.height, planes.count);
+    std::vector<Value> wanted = make_rows<Value>(planes, step), found = wanted;
+    for (int64_t y = 0; y < planes.height; y += step) {
+        const int first = static_cast<int>(y);
+        const int last = static_cast<int>(std::min<int64_t>(y + step, planes.height));
+        interleave(planes, first, last, wanted);
+        const size_t bytes = static_cast<size_t>(last - first) * static_cast<size_t>(planes.width) *
+                             static_cast<size_t>(planes.count) * sizeof(Value);
+        if (!input.read_scanlines(0, 0, first, last, 0, 0, planes.count, oiio_type<Value>(), found.data()) ||
+            (!format.lossy && std::memcmp(found.data(), wanted.data(), bytes) != 0)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+template <typename Value>
+vsh_result verify(const char *temporary, const char *path, const vshi_format &format,
+                  const vshi_planes &planes, vsh_error *error) {
+    const int64_t size = whole_size(format.name, planes, sizeof(Value));
+    struct stat status;
+    bool whole = ::stat(temporary, &status) == 0 && (size < 0 || status.st_size == size);
+    if (whole) {
+        const auto input = OIIO::ImageInput::create(format.name);
+        OIIO::ImageSpec config, spec;
+        config.attribute("oiio:UnassociatedAlpha", 1);
+        config.attribute("oiio:RawColor", 1);
+        whole = input != nullptr && input->open(temporary, spec, config) && spec.width == planes.width &&
+                spec.height == planes.height && spec.nchannels == planes.count &&
+                reads_back<Value>(*input, format, planes);
+        OIIO::geterror();
+    }
+    if (whole) {
+        return VSH_OK;
+    }
+    const int number = disk_error(temporary);
+    return fail_write(error, path, number != 0 ? std::strerror(number) : "it is not read back as written");
+}
+
+template <typename Value>
+vsh_result write_as(const char *temporary, const char *path, const vshi_format &format,
+                    const vshi_planes &planes, vsh_error *error) {
+    std::unique_ptr<CheckedFile> file; // outlives the writer, which may still use it when it goes
+    auto output = OIIO::ImageOutput::create(format.name);
+    if (!output) {
+        OIIO::geterror();
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: this OpenImageIO has no %s", path, format.name);
+    }
+    output->threads(1);
+    const OIIO::TypeDesc type(oiio_type<Value>());
+    if (output->supports("ioproxy")) {
+        file = std::make_unique<CheckedFile>(temporary);
+        if (!output->set_ioproxy(file.get())) {
+            return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: this OpenImageIO cannot write %s safely",
+                             path, format.name);
+        }
+    }
+    if (!output->open(temporary, make_spec(planes, path, format.name, type))) {
+        return fail_write(error, path, reason(output->geterror()));
+    }
+    vsh_result result = VSH_OK;
+    if (output->spec().format != type || output->spec().nchannels != planes.count) {
+        result = vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: this OpenImageIO writes %s as %d × %s only",
+                           path, format.name, output->spec().nchannels, output->spec().format.c_str());
+    }
+    if (result == VSH_OK) {
+        result = write_rows<Value>(*output, path, planes, error);
+    }
+    const bool closed = output->close();
+    const std::string text = output->geterror();
+    output.reset();
+    const bool failed = result != VSH_OK || !closed;
+    const int number = file != nullptr ? file->finish() : failed ? disk_error(temporary) : 0;
+    if (number != 0) { // says more than the writer's own words
+        return fail_write(error, path, std::strerror(number));
+    }
+    if (result == VSH_OK && !closed) {
+        result = fail_write(error, path, reason(text));
+    }
+    if (result != VSH_OK || file != nullptr) {
+        return result;
+    }
+    const int dated = std::strcmp(format.name, "rla") == 0 ? clear_date(temporary) : 0;
+    if (dated != 0) {
+        return fail_write(error, path, std::strerror(dated));
+    }
+    return verify<Value>(temporary, path, format, planes, error);
+}
+
+} // namespace
+
+} // namespace vshi
+
+vsh_result vshi_oiio_write(const char *temporary, const char *path, const vshi_format *format,
+                           const vshi_planes *planes, int32_t bits, vsh_error *error) {
+    return vshi::guard(error, VSH_ERROR_WRITE, path, [&]() -> vsh_result {
+        switch (bits) {
+        case 8:
+            return vshi::write_as<uint8_t>(temporary, path, *format, *planes, error);
+        case 16:
+            return vshi::write_as<uint16_t>(temporary, path, *format, *planes, error);
+        default:
+            return vshi::write_as<float>(temporary, path, *format, *planes, error);
+        }
+    });
+}
