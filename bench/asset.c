@@ -4,10 +4,11 @@
 #include "embree.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIZE = 1024, RESOLUTION = 512, STRIDE = 4, LIGHT_RAYS = 512, AO_RAYS = 1024 };
+enum { SIZE = 1024, RESOLUTION = 512, STRIDE = 4, LIGHT_RAYS = 512, AO_RAYS = 4096, AO_RUNS = 3 };
 
 /* Truth's rays begin this far above the surface, of the asset's size: enough for Embree's floats. */
 static const double LIFT = 1e-5;
@@ -18,10 +19,15 @@ static const double AO_DISTANCE = 0.6;
 typedef struct receiver {
     size_t count;
     double *positions; /* on the surface */
+    double *lifted;    /* where a bake's rays begin */
     double *origins;   /* of the truth's rays */
     float *normals;
     float *valid;
 } receiver;
+
+/* A bake's rays begin a voxel above the surface where it is nearer than CREASE to another surface there, and
+ * a sample is not shaded at all where it is nearer than CLEAR (src/bake/origins.c); voxels. */
+static const double CREASE = 0.75, CLEAR = 0.25;
 
 /* Every STRIDE-th sample in both directions of the tiles, so that the truth takes a minute and not an hour.
  */
@@ -29,9 +35,15 @@ static receiver take_texels(const vsh_field *field, const vsh_texels *texels) {
     const vsh_texel_samples s = vsh_texels_samples(texels);
     vsh_field_info info;
     vsh_field_get_info(field, &info);
-    receiver r = {0, malloc(s.count * 3 * sizeof(double)), malloc(s.count * 3 * sizeof(double)),
-                  malloc(s.count * 3 * sizeof(float)), malloc(s.count * sizeof(float))};
-    if (r.positions == NULL || r.origins == NULL || r.normals == NULL || r.valid == NULL) {
+    const size_t triples = s.count * 3 * sizeof(double);
+    receiver r = {0,
+                  malloc(triples),
+                  malloc(triples),
+                  malloc(triples),
+                  malloc(s.count * 3 * sizeof(float)),
+                  malloc(s.count * sizeof(float))};
+    if (r.positions == NULL || r.lifted == NULL || r.origins == NULL || r.normals == NULL ||
+        r.valid == NULL) {
         exit(4);
     }
     for (size_t i = 0; i < s.count; ++i) {
@@ -48,8 +60,14 @@ static receiver take_texels(const vsh_field *field, const vsh_texels *texels) {
             probe[k] = p + info.voxel_size * n;
         }
         vsh_field_sample(field, 1, probe, &distance);
-        r.valid[r.count++] =
-            distance >= 0.0f ? 1.0f : 0.0f; /* as the bake judges */
+        const double clear = (double)distance / info.voxel_size;
+        const double offset = vsh_shade_options_default().start_offset;
+        for (size_t k = 0; k < 3; ++k) {
+            r.lifted[3 * r.count + k] = s.positions[3 * i + k] + (clear < CREASE ? 1.0 : offset) *
+                                                                     info.voxel_size *
+                                                                     (double)s.geometric_normals[3 * i + k];
+        }
+        r.valid[r.count++] = clear >= CLEAR ? 1.0f : 0.0f;
     }
     return r;
 }
@@ -116,7 +134,8 @@ void bench_asset(FILE *csv) {
         for (int i = 0; i < BENCH_RUNS; ++i) {
             stats = vsh_shade_stats_zero();
             const double start = bench_seconds();
-            bench_check(vsh_shade_shadow(field, &points, &sun, &shade, &run, values, NULL, &stats, &error), &error);
+            bench_check(vsh_shade_shadow(field, &points, &sun, &shade, &run, values, NULL, &stats, &error),
+                        &error);
             seconds[i] = bench_seconds() - start;
         }
         const truth_metrics metrics = truth_compare(r.count, values, truth, r.valid);
@@ -126,32 +145,60 @@ void bench_asset(FILE *csv) {
     }
 
     truth_mesh_ao(mesh, r.count, r.origins, r.normals, AO_DISTANCE, AO_RAYS, 0, truth);
+    vsh_triangles *triangles = NULL;
+    bench_check(vsh_triangles_create(meshes, mesh_count, &run, &triangles, &error), &error);
     const struct {
         const char *name;
-        int32_t method, cones;
-    } ladder[] = {{"ao taps", VSH_AO_TAPS, 1},
-                  {"ao cones 4", VSH_AO_CONES, 4},
-                  {"ao cones 8", VSH_AO_CONES, 8},
-                  {"ao cones 16", VSH_AO_CONES, 16},
-                  {"ao cones 64", VSH_AO_CONES, 64}};
+        int32_t method, count; /* of cones or rays */
+        double max_error;
+    } ladder[] = {{"ao taps", VSH_AO_TAPS, 1, 1.0},
+                  {"ao cones 4", VSH_AO_CONES, 4, 1.0},
+                  {"ao cones 8", VSH_AO_CONES, 8, 1.0},
+                  {"ao cones 16", VSH_AO_CONES, 16, 1.0},
+                  {"ao cones 64", VSH_AO_CONES, 64, 1.0},
+                  {"ao rays 16", VSH_AO_RAYS, 16, 1.0},
+                  {"ao rays 64", VSH_AO_RAYS, 64, 1.0},
+                  {"ao rays 256", VSH_AO_RAYS, 256, 1.0},
+                  {"ao adaptive 0.05", VSH_AO_ADAPTIVE, 4096, 0.05},
+                  {"ao adaptive 0.02", VSH_AO_ADAPTIVE, 4096, 0.02},
+                  {"ao adaptive 0.01", VSH_AO_ADAPTIVE, 4096, 0.01},
+                  {"ao exact 0.05", VSH_AO_EXACT, 4096, 0.05},
+                  {"ao exact 0.02", VSH_AO_EXACT, 4096, 0.02},
+                  {"ao exact 0.01", VSH_AO_EXACT, 4096, 0.01}};
     for (size_t m = 0; m < sizeof ladder / sizeof ladder[0]; ++m) {
+        const bool exact = ladder[m].method == VSH_AO_EXACT;
+        const vsh_points from = {r.count, exact ? r.positions : r.lifted, r.normals, NULL};
         vsh_shade_options shade = vsh_shade_options_default();
         shade.ao_method = ladder[m].method;
-        shade.ao_cones = ladder[m].cones;
+        if (shade.ao_method == VSH_AO_CONES) {
+            shade.ao_cones = ladder[m].count;
+        } else {
+            shade.rays = ladder[m].count;
+        }
+        shade.max_error = ladder[m].max_error;
+        shade.triangles = triangles;
         shade.ao_distance = AO_DISTANCE;
-        vsh_shade_stats stats = vsh_shade_stats_zero();
-        const double start = bench_seconds();
-        bench_check(vsh_shade_ao(field, &points, &shade, &run, values, NULL, &stats, &error), &error);
-        const double each = (bench_seconds() - start) / (double)r.count;
+        shade.start_offset = 0.0;
+        double seconds[AO_RUNS];
+        vsh_shade_stats stats;
+        for (int i = 0; i < AO_RUNS; ++i) {
+            stats = vsh_shade_stats_zero();
+            const double start = bench_seconds();
+            bench_check(vsh_shade_ao(field, &from, &shade, &run, values, NULL, &stats, &error), &error);
+            seconds[i] = bench_seconds() - start;
+        }
+        const double each = bench_median(seconds, AO_RUNS) / (double)r.count;
         const truth_metrics metrics = truth_compare(r.count, values, truth, r.valid);
         bench_row(csv, "cloister", ladder[m].name, 1e6 * each, (double)stats.samples / (double)r.count,
                   each / ray, &metrics);
     }
+    vsh_triangles_free(triangles);
     free(truth);
     free(values);
     free(r.valid);
     free(r.normals);
     free(r.origins);
+    free(r.lifted);
     free(r.positions);
     truth_mesh_free(mesh);
     vsh_texels_free(texels);

@@ -1,6 +1,7 @@
 #include "bench.h"
 
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 
 double bench_seconds(void) {
@@ -43,13 +44,21 @@ void bench_row(FILE *csv, const char *scene, const char *what, double microsecon
 
 int main(int argc, char **argv) {
     FILE *csv = argc > 1 ? fopen(argv[1], "w") : tmpfile();
+    const char *only = argc > 2 ? argv[2] : NULL; /* one of the parts */
     if (csv == NULL) {
         perror(argc > 1 ? argv[1] : "bench");
         return 3;
     }
     puts("One core; medians of 5 runs. 'Embree rays': how many Embree occlusion rays take the same time.");
     bench_header(csv);
-    bench_seeds(csv);
-    bench_asset(csv);
+    const struct {
+        const char *name;
+        void (*run)(FILE *csv);
+    } parts[] = {{"seeds", bench_seeds}, {"asset", bench_asset}, {"refine", bench_refine}};
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
+        if (only == NULL || strcmp(only, parts[i].name) == 0) {
+            parts[i].run(csv);
+        }
+    }
     return fclose(csv) == 0 ? 0 : 3;
 }

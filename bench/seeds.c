@@ -63,7 +63,8 @@ void bench_seeds(FILE *csv) {
         for (int r = 0; r < BENCH_RUNS; ++r) {
             stats = vsh_shade_stats_zero();
             const double start = bench_seconds();
-            bench_check(vsh_shade_shadow(field, &points, &sun, &shade, &run, values, NULL, &stats, &error), &error);
+            bench_check(vsh_shade_shadow(field, &points, &sun, &shade, &run, values, NULL, &stats, &error),
+                        &error);
             seconds[r] = bench_seconds() - start;
         }
         const truth_metrics metrics = truth_compare(count, values, truth, NULL);

@@ -13,6 +13,8 @@
  * - Structs that begin with struct_size are filled by their …_default() or …_zero() function; programs that
  *   were compiled against an older header then go on working. VSH_ERROR_ARGUMENT where struct_size is 0 or
  *   more than this library knows.
+ * - Calls compute in the default floating-point environment (round to nearest, denormals kept, no traps),
+ *   whatever the caller has set, which is given back. Callbacks are called in the default one.
  * - VSH_ERROR_MEMORY (the system refused memory) and VSH_ERROR_INTERNAL can come from every call that returns
  *   a vsh_result, VSH_ERROR_CANCELLED from every one that takes a run; the rest is listed at each call. */
 #ifndef VDBSHADE_BASE_H

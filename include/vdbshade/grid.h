@@ -15,7 +15,7 @@ typedef struct vsh_grid vsh_grid;
 
 typedef struct vsh_grid_options {
     size_t struct_size;
-    double voxel_size;  /* edge of a voxel, world units, 1.5e-5 … 1e12; 0: from `resolution` */
+    double voxel_size;  /* edge of a voxel, world units, 1e-12 … 1e12; 0: from `resolution` */
     int32_t resolution; /* voxels along the longest side of the bounds, 2 … 65536, where voxel_size is 0 */
     double half_width;  /* of the narrow band, voxels, 3 … 100 */
     double shell_thickness; /* of the solid that an open mesh becomes, voxels, 1 … 50 */
@@ -32,7 +32,7 @@ static inline vsh_grid_options vsh_grid_options_default(void) {
  * - VSH_ERROR_ARGUMENT: no meshes, options out of range, run, and as vsh_mesh_check();
  * - VSH_ERROR_INPUT: as vsh_mesh_check(); no triangle of any area;
  * - VSH_ERROR_LIMIT: the estimated memory passes run->memory_limit or the machine's, a voxel size outside
- *   1.5e-5 … 1e12, more than 2^29 voxels along a side or 1e12 from the origin, more than 2^31 - 1
+ *   1e-12 … 1e12, more than 2^29 voxels along a side or 1e12 from the origin, more than 2^31 - 1
  *   triangles;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_grid_from_meshes(const vsh_mesh *meshes, size_t mesh_count,
@@ -91,8 +91,8 @@ VSH_API vsh_result vsh_grid_read(const char *path, const char *name, const vsh_r
 
 /* Writes one .vdb file with the grid as `name` (NULL: "surface"); the same grid gives the same bytes. Atomic:
  * written beside `path` and renamed, so a failure leaves an old file alone. Errors: VSH_ERROR_ARGUMENT (path
- * NULL or empty), VSH_ERROR_WRITE (no such folder, no permission, a folder or device in the way, disk full),
- * VSH_ERROR_MEMORY. */
+ * NULL or empty), VSH_ERROR_LIMIT (voxels below 1.45e-5 world units, which OpenVDB cannot write),
+ * VSH_ERROR_WRITE (no such folder, no permission, a folder or device in the way, disk full), VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name, vsh_error *error);
 
 /* A caster for vsh_grid_unite(): a grid and where it stands. A view; nothing is owned. */

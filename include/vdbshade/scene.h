@@ -45,6 +45,7 @@ typedef struct vsh_scene {
     vsh_shade_options shade;
     int32_t ao;         /* nonzero: bake AO, within shade.ao_distance */
     int32_t irradiance; /* nonzero: bake irradiance */
+    int32_t error; /* nonzero: bake the error left in each shadow and AO value too, where methods know it */
 } vsh_scene;
 
 /* Reads a scene file; what it names is not opened. The scene and all it points to belong to *scene; free it
@@ -88,6 +89,15 @@ VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                                      vsh_grid **grid, vsh_error *error);
+
+/* The triangles of a scene's casters, for VSH_SHADOW_EXACT and VSH_AO_EXACT. Free them with
+ * vsh_triangles_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: scene, assets or triangles NULL, run;
+ * - VSH_ERROR_INPUT: a caster that is no mesh;
+ * - VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED: as
+ *   vsh_triangles_create(). */
+VSH_API vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                                       vsh_triangles **triangles, vsh_error *error);
 
 /* Reach, world units > 0, that a field of `grid` needs for the scene's lights and AO at receivers within a
  * world box: see vsh_field_options. Directional lights count up to a half angle of 60°. */

@@ -29,15 +29,16 @@ enum {
     VSH_AO_TAPS = 0, /* five samples along the normal (Quilez, "multiresolution ambient occlusion", 2008 …) */
     VSH_AO_CONES = 1,    /* cosine-weighted cones (Crassin and others, 2011, marched in a distance field) */
     VSH_AO_RAYS = 2,     /* `rays` cosine-weighted rays, marched against the field */
-    VSH_AO_ADAPTIVE = 3, /* cones that prove their part free or hidden, rays in the others until max_error */
-    VSH_AO_EXACT = 4     /* the same cones, the rays traced against `triangles` */
+    VSH_AO_ADAPTIVE = 3, /* the same, as many as max_error takes */
+    VSH_AO_EXACT = 4     /* likewise, the rays traced against `triangles`, from the points themselves:
+                            start_offset is not added */
 };
 
 /* Where the rays of a point go, over the light's disc or the hemisphere. `frame` gives another, independent
  * set: bakes of frames 0 … n - 1 may be averaged. */
 enum {
-    VSH_SAMPLER_SOBOL = 0, /* low discrepancy: Owen-scrambled Sobol points, a scramble a point (Burley,
-                              "Practical hash-based Owen scrambling", 2020) */
+    VSH_SAMPLER_SOBOL = 0, /* low discrepancy: Owen-scrambled Sobol points (Burley, "Practical hash-based Owen
+                              scrambling", 2020), their digits shifted for each point */
     VSH_SAMPLER_WHITE = 1, /* independent */
     VSH_SAMPLER_BLUE = 2 /* best-candidate points (Mitchell, 1991), turned for each texel by a blue-noise mask
                             (Ulichney, "Void and cluster", 1993) that frames shift by the golden ratio */
@@ -108,11 +109,11 @@ typedef struct vsh_shade_stats {
     uint64_t certified;  /* cones whose light was proved fully seen or fully hidden (to the field's error) */
     uint64_t unfinished; /* marches that ran out of steps; their value is what was known by then */
     uint64_t invalid;    /* points with a position or normal that is not finite, or a zero normal: NaN */
-    uint64_t
-        beyond_reach;    /* cones wider somewhere than the field's reach: make the field with a larger one */
-    uint64_t rays;       /* rays marched or traced to refine what no cone decided, or by the rays methods */
-    uint64_t refined;    /* values that took rays */
-    double square_error; /* adaptive, exact: sum over values of the estimated squared error */
+    uint64_t beyond_reach; /* cones wider somewhere, and taps farther off, than the field's reach: make the
+                              field with a larger one */
+    uint64_t rays;         /* rays marched or traced to refine what no cone decided, or by the rays methods */
+    uint64_t refined;      /* values that took rays */
+    double square_error;   /* adaptive, exact: sum over values of the estimated squared error */
 } vsh_shade_stats;
 
 static inline vsh_shade_stats vsh_shade_stats_zero(void) {

@@ -22,6 +22,9 @@ VSH_API vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_coun
                                         vsh_triangles **triangles, vsh_error *error);
 VSH_API void vsh_triangles_free(vsh_triangles *triangles); /* NULL does nothing */
 
+/* Bytes in memory. Cannot fail. */
+VSH_API uint64_t vsh_triangles_bytes(const vsh_triangles *triangles);
+
 /* Fraction of a light that each of `count` points [count][3] sees, into visibility[count]: `rays` rays (1 …
  * 65536) over the light's disc (Vogel's spiral, 1979), that begin `lift` world units above the point along
  * its normal [count][3] (unit; NULL: no horizon) and count as hidden below the normal's plane. Thread safe.

@@ -1,6 +1,7 @@
 #include "bake/origins.h"
 #include "bake/padding.h"
 #include "bake/take.h"
+#include "base/floats.h"
 #include "base/parallel.h"
 
 #include <math.h>
@@ -15,13 +16,14 @@ typedef struct baking {
     const vsh_texels *texels;
     const vsh_light *lights;
     size_t light_count;
-    vsh_shade_options shade; /* without offsets: the origins are lifted already */
+    vsh_shade_options shade;
     vsh_run run;
     vsh_run quiet; /* for steps of milliseconds that come once a plane: no stage of their own */
     const vsh_lightmap *lightmap;
     vshi_origins origins;
     uint8_t *state;    /* [height][width]: VSHI_TEXEL_… */
     float *values;     /* [origins.count]: of one light, or AO */
+    float *deviation;  /* [origins.count]: of the same; NULL where no plane is for it */
     float *irradiance; /* [origins.count][3] */
     vsh_bake_stats stats;
 } baking;
@@ -31,7 +33,34 @@ static size_t texel_count(const vsh_texels *texels) {
 }
 
 static bool light_wanted(const vsh_lightmap *lightmap, size_t light) {
-    return lightmap->irradiance != NULL || (lightmap->shadow != NULL && lightmap->shadow[light] != NULL);
+    return lightmap->irradiance != NULL || (lightmap->shadow != NULL && lightmap->shadow[light] != NULL) ||
+           (lightmap->shadow_error != NULL && lightmap->shadow_error[light] != NULL);
+}
+
+static bool ao_wanted(const vsh_lightmap *lightmap) {
+    return lightmap->ao != NULL || lightmap->ao_error != NULL;
+}
+
+/* Whether any plane of errors is asked for. */
+static bool errors_wanted(const vsh_lightmap *lightmap, size_t light_count) {
+    bool wanted = lightmap->ao_error != NULL;
+    for (size_t i = 0; i < light_count && lightmap->shadow_error != NULL; ++i) {
+        wanted = wanted || lightmap->shadow_error[i] != NULL;
+    }
+    return wanted;
+}
+
+/* Where rays begin: lifted already, but for methods that trace triangles. Those know the surface better than
+ * any voxel does, and lift their cones themselves. */
+static vsh_points points_of(const baking *bake, bool traced, vsh_shade_options *shade) {
+    const vshi_origins *origins = &bake->origins;
+    *shade = bake->shade;
+    if (!traced) {
+        shade->start_offset = 0.0;
+        shade->surface_offset = 0.0;
+    }
+    return (vsh_points){origins->count, traced ? origins->surface : origins->position, origins->normal,
+                        origins->texel};
 }
 
 /* --- averages of samples over texels */
@@ -41,6 +70,7 @@ typedef struct averaging {
     const float *values; /* [origins.count][channels]; NULL: only the state is found */
     float *plane;
     size_t channels;
+    bool deviation; /* says nothing of whether a texel is valid; what is not known is 0 */
 } averaging;
 
 /* Texels whose samples begin in a block belong to it, also where they go on beyond its end. */
@@ -77,9 +107,9 @@ static void average_blocks(void *user, size_t begin, size_t end) {
             }
             if (a->values == NULL) {
                 state[texel] = count > 0 ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
-            } else if (count == 0) {
+            } else if (count == 0 && !a->deviation) {
                 state[texel] = VSHI_TEXEL_INVALID;
-            } else {
+            } else if (count > 0) {
                 for (size_t c = 0; c < a->channels; ++c) {
                     a->plane[texel * a->channels + c] = (float)(sum[c] / (double)count);
                 }
@@ -90,7 +120,11 @@ static void average_blocks(void *user, size_t begin, size_t end) {
 
 static vsh_result average(baking *bake, const float *values, size_t channels, float *plane,
                           vsh_error *error) {
-    averaging a = {.bake = bake, .values = values, .plane = plane, .channels = channels};
+    averaging a = {.bake = bake,
+                   .values = values,
+                   .plane = plane,
+                   .channels = channels,
+                   .deviation = values != NULL && values == bake->deviation};
     vshi_job *job = vshi_job_begin(&bake->quiet, "resolve", bake->origins.blocks);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "resolve: the system refused memory");
@@ -117,9 +151,15 @@ static void add_irradiance(void *user, size_t begin, size_t end) {
 
 static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
     const vsh_lightmap *lightmap = bake->lightmap;
-    const vsh_points points = {bake->origins.count, bake->origins.position, bake->origins.normal, NULL};
-    vsh_result result = vsh_shade_shadow(bake->field, &points, &bake->lights[index], &bake->shade, &bake->run,
-                                         bake->values, NULL, &bake->stats.shade, error);
+    vsh_shade_options shade;
+    const vsh_points points = points_of(bake, bake->shade.method == VSH_SHADOW_EXACT, &shade);
+    float *errors = lightmap->shadow_error != NULL ? lightmap->shadow_error[index] : NULL;
+    vsh_result result =
+        vsh_shade_shadow(bake->field, &points, &bake->lights[index], &shade, &bake->run, bake->values,
+                         errors != NULL ? bake->deviation : NULL, &bake->stats.shade, error);
+    if (result == VSH_OK && errors != NULL) {
+        result = average(bake, bake->deviation, 1, errors, error);
+    }
     if (result == VSH_OK && lightmap->shadow != NULL && lightmap->shadow[index] != NULL) {
         result = average(bake, bake->values, 1, lightmap->shadow[index], error);
     }
@@ -145,11 +185,15 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
             result = bake_light(bake, i, error);
         }
     }
-    if (result == VSH_OK && lightmap->ao != NULL) {
-        const vsh_points points = {bake->origins.count, bake->origins.position, bake->origins.normal, NULL};
-        result = vsh_shade_ao(bake->field, &points, &bake->shade, &bake->run, bake->values, NULL,
-                              &bake->stats.shade, error);
-        if (result == VSH_OK) {
+    if (result == VSH_OK && ao_wanted(lightmap)) {
+        vsh_shade_options shade;
+        const vsh_points points = points_of(bake, bake->shade.ao_method == VSH_AO_EXACT, &shade);
+        result = vsh_shade_ao(bake->field, &points, &shade, &bake->run, bake->values,
+                              lightmap->ao_error != NULL ? bake->deviation : NULL, &bake->stats.shade, error);
+        if (result == VSH_OK && lightmap->ao_error != NULL) {
+            result = average(bake, bake->deviation, 1, lightmap->ao_error, error);
+        }
+        if (result == VSH_OK && lightmap->ao != NULL) {
             result = average(bake, bake->values, 1, lightmap->ao, error);
         }
     }
@@ -222,6 +266,14 @@ static void clear_planes(const baking *bake) {
             memset(lightmap->shadow[i], 0, bytes);
         }
     }
+    for (size_t i = 0; lightmap->shadow_error != NULL && i < bake->light_count; ++i) {
+        if (lightmap->shadow_error[i] != NULL) {
+            memset(lightmap->shadow_error[i], 0, bytes);
+        }
+    }
+    if (lightmap->ao_error != NULL) {
+        memset(lightmap->ao_error, 0, bytes);
+    }
     if (lightmap->ao != NULL) {
         memset(lightmap->ao, 0, bytes);
     }
@@ -240,20 +292,21 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     const double samples = (double)texels->count;
     double bytes = (double)field.bytes + (double)texels->info.bytes + vshi_origins_bytes(texels) +
                    (double)texel_count(texels) + vshi_padding_bytes(texels->info.width, texels->info.height);
-    bytes += values ? samples * sizeof(float) : 0.0;
+    const bool errors = errors_wanted(bake->lightmap, bake->light_count);
+    const bool traced = bake->shade.method == VSH_SHADOW_EXACT || bake->shade.ao_method == VSH_AO_EXACT;
+    bytes += traced ? samples * 3.0 * sizeof(double) : 0.0;
+    bytes += (values ? samples * sizeof(float) : 0.0) + (errors ? samples * sizeof(float) : 0.0);
     bytes += irradiance ? samples * 3.0 * sizeof(float) : 0.0;
     vsh_result result = vshi_check_limit(&bake->run, bytes, "lightmap", error);
     if (result != VSH_OK) {
         return result;
     }
     clear_planes(bake);
-    vsh_shade_options lifted = bake->shade;
-    bake->shade.start_offset = 0.0;
-    bake->shade.surface_offset = 0.0;
-    result = vshi_origins_create(bake->field, texels, &lifted, &bake->run, &bake->origins, error);
+    result = vshi_origins_create(bake->field, texels, &bake->shade, &bake->run, &bake->origins, error);
     bake->state = vshi_take(texel_count(texels), 1, "lightmap", &result, error);
     const size_t count = bake->origins.count;
     bake->values = vshi_take(values ? count : 0, sizeof(float), "lightmap", &result, error);
+    bake->deviation = vshi_take(errors ? count : 0, sizeof(float), "lightmap", &result, error);
     bake->irradiance = vshi_take(irradiance ? count : 0, 3 * sizeof(float), "lightmap", &result, error);
     if (result == VSH_OK) {
         result = bake_planes(bake, error);
@@ -262,6 +315,7 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
         result = pad(bake, finish_coverage(bake), error);
     }
     free(bake->irradiance);
+    free(bake->deviation);
     free(bake->values);
     free(bake->state);
     vshi_origins_free(&bake->origins);
@@ -284,6 +338,7 @@ static vsh_result check_offsets(const vsh_shade_options *options, vsh_error *err
 vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, const vsh_light *lights,
                              size_t light_count, const vsh_shade_options *options, const vsh_run *run,
                              const vsh_lightmap *lightmap, vsh_bake_stats *stats, vsh_error *error) {
+    VSHI_FLOATS;
     if (field == NULL || texels == NULL || lightmap == NULL || (lights == NULL && light_count > 0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_lightmap: %s is NULL",
                          field == NULL                       ? "field"
@@ -322,7 +377,7 @@ vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, c
     for (size_t m = 0; bake.stats.invalid_by_mesh != NULL && m < texels->mesh_count; ++m) {
         bake.stats.invalid_by_mesh[m] = 0;
     }
-    result = run_bake(&bake, light || lightmap->ao != NULL, light && lightmap->irradiance != NULL, error);
+    result = run_bake(&bake, light || ao_wanted(lightmap), light && lightmap->irradiance != NULL, error);
     if (stats != NULL && result == VSH_OK) {
         memcpy(stats, &bake.stats, stats->struct_size);
     }

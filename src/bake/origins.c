@@ -13,6 +13,10 @@ static const double PROBE_HEIGHT = 1.0;
 /* What is nearer than this at the probe, in its heights, is another surface: a sample in a crease, where the
  * field may be off by more than a start offset clears. Its rays begin at the probe. */
 static const double CREASE = 0.75;
+/* And nearer than this, which is all that a start offset clears, it may as well be within: the field is no
+ * better known. On the cloister 1.4 % of the samples are so near; one in twelve is buried, reads up to 1
+ * where it should be 0, and those made two thirds of AO's squared error. */
+static const double CLEAR = 0.25;
 
 typedef struct lifting {
     const vsh_field *field;
@@ -49,12 +53,25 @@ static void validate(void *user, size_t begin, size_t end) {
         vsh_field_sample(l->field, last - first, &origin[0][0], distance);
         size_t valid = 0;
         for (size_t i = first; i < last; ++i) {
-            l->origins->valid[i] = distance[i - first] >= 0.0f;
+            l->origins->valid[i] = (double)distance[i - first] >= CLEAR * l->probe;
             l->crease[i] = (double)distance[i - first] < CREASE * l->probe;
             valid += l->origins->valid[i];
         }
         l->origins->before[block] = valid;
     }
+}
+
+/* Samplers tell points apart by it: column + 65536 row, and for the further samples of a texel a place some
+ * way off, so that they do not all send their rays the same way. */
+static uint32_t sampler_texel(const vsh_texels *texels, size_t i) {
+    static const uint32_t COLUMN_STEP = 47, ROW_STEP = 29;
+    const uint32_t width = (uint32_t)texels->info.width, texel = texels->texel[i];
+    uint32_t sample = 0;
+    for (size_t k = i; k > 0 && texels->texel[k - 1] == texel; --k) {
+        ++sample;
+    }
+    const uint32_t column = (texel % width + COLUMN_STEP * sample) & 0xffff;
+    return column + 65536u * ((texel / width + ROW_STEP * sample) & 0xffff);
 }
 
 static void pack(void *user, size_t begin, size_t end) {
@@ -66,6 +83,10 @@ static void pack(void *user, size_t begin, size_t end) {
             if (origins->valid[i]) {
                 lift(l, i, l->crease[i] ? l->probe : l->offset, origins->position + 3 * next);
                 memcpy(origins->normal + 3 * next, l->texels->normal + 3 * i, 3 * sizeof(float));
+                if (origins->surface != NULL) {
+                    memcpy(origins->surface + 3 * next, l->texels->position + 3 * i, 3 * sizeof(double));
+                }
+                origins->texel[next] = sampler_texel(l->texels, i);
                 ++next;
             }
         }
@@ -73,7 +94,7 @@ static void pack(void *user, size_t begin, size_t end) {
 }
 
 double vshi_origins_bytes(const vsh_texels *texels) {
-    return (double)texels->count * (2.0 + 3.0 * sizeof(double) + 3.0 * sizeof(float));
+    return (double)texels->count * (2.0 + 3.0 * sizeof(double) + 4.0 * sizeof(float));
 }
 
 vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
@@ -107,6 +128,9 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
         origins->count += valid;
     }
     origins->position = vshi_take(origins->count, 3 * sizeof(double), what, &result, error);
+    const bool traced = options->method == VSH_SHADOW_EXACT || options->ao_method == VSH_AO_EXACT;
+    origins->surface = vshi_take(traced ? origins->count : 0, 3 * sizeof(double), what, &result, error);
+    origins->texel = vshi_take(origins->count, sizeof(uint32_t), what, &result, error);
     origins->normal = vshi_take(origins->count, 3 * sizeof(float), what, &result, error);
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, origins->blocks, 1, 1, pack, &l, error);
@@ -118,6 +142,8 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
 
 void vshi_origins_free(vshi_origins *origins) {
     free(origins->normal);
+    free(origins->texel);
+    free(origins->surface);
     free(origins->position);
     free(origins->before);
     free(origins->valid);

@@ -10,7 +10,9 @@ enum { VSHI_ORIGIN_BLOCK = 1024 }; /* samples that are worked on together */
 typedef struct vshi_origins {
     size_t count;
     double *position; /* [count][3]: lifted off the surface, world units */
+    double *surface;  /* [count][3]: not lifted, for rays against triangles; NULL where no method traces them */
     float *normal;    /* [count][3]: decides shadow */
+    uint32_t *texel;  /* [count]: as vsh_points.texels; a texel's further samples get numbers of their own */
     uint8_t *valid;   /* [all samples]: 1 where the sample is among them */
     size_t blocks;    /* of all samples */
     size_t *before;   /* [blocks + 1]: valid samples before each block */
@@ -20,9 +22,9 @@ typedef struct vshi_origins {
 double vshi_origins_bytes(const vsh_texels *texels);
 
 /* Lifts each sample along its geometric normal by the start offset, and by half a shell's thickness where its
- * mesh is open. A sample that ends up inside the field's solid is invalid: it lies inside another solid, or
- * shows its back. Free with vshi_origins_free() also after an error. Errors: VSH_ERROR_MEMORY,
- * VSH_ERROR_CANCELLED. */
+ * mesh is open. A sample that ends up inside the field's solid, or all but, is invalid: it lies inside
+ * another solid, or shows its back. Free with vshi_origins_free() also after an error. Errors:
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
                                const vsh_shade_options *options, const vsh_run *run, vshi_origins *origins,
                                vsh_error *error);

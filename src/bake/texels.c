@@ -2,6 +2,7 @@
 #include "bake/rows.h"
 #include "bake/surface.h"
 #include "bake/take.h"
+#include "base/floats.h"
 #include "base/parallel.h"
 #include "caster/mesh.h"
 
@@ -327,6 +328,7 @@ done:
 vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
                              const vsh_run *run, vsh_uv_report *uv_reports, vsh_texels **texels,
                              vsh_error *error) {
+    VSHI_FLOATS;
     if (texels == NULL || (meshes == NULL && mesh_count > 0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_texels_create: %s is NULL",
                          texels == NULL ? "texels" : "meshes");

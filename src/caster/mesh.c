@@ -1,5 +1,7 @@
 #include "caster/mesh.h"
 
+#include "base/floats.h"
+
 #include <float.h>
 #include <stdio.h>
 
@@ -107,6 +109,7 @@ static void grow(vsh_mesh_report *report, vshi_vec p) {
 }
 
 vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error) {
+    VSHI_FLOATS;
     if (mesh == NULL || report == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_mesh_check: %s is NULL",
                          mesh == NULL ? "mesh" : "report");

@@ -6,6 +6,7 @@
  * by a root node (Collada, FBX). Bones and morph targets are left out: meshes are in their rest pose. */
 #include "caster/model.h"
 
+#include "base/floats.h"
 #include "caster/model_file.h"
 
 #include <stdlib.h>
@@ -63,6 +64,7 @@ static bool wants_normals(const char *path) {
 }
 
 vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error) {
+    VSHI_FLOATS;
     enum { BUILD_UNITS = 100 };
     if (path == NULL || model == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_model_read: %s is NULL",

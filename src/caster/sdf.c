@@ -7,6 +7,7 @@
 #include "caster/sdf.h"
 
 #include "base/error.h"
+#include "base/floats.h"
 #include "base/memory.h"
 #include "base/vec.h"
 
@@ -130,6 +131,7 @@ static vsh_result check_operands(const vsh_sdf *sdf, size_t index, int32_t *dept
 }
 
 vsh_result vsh_sdf_check(const vsh_sdf *sdf, vsh_error *error) {
+    VSHI_FLOATS;
     if (sdf == NULL || sdf->nodes == NULL || sdf->node_count < 1 || sdf->node_count > MAX_NODES) {
         return vshi_fail(error, VSH_ERROR_INPUT, "sdf: %zu nodes: expected 1 … %d",
                          sdf == NULL || sdf->nodes == NULL ? (size_t)0 : sdf->node_count, MAX_NODES);
@@ -272,6 +274,7 @@ static double node_distance(const vsh_sdf_node *nodes, int32_t index, vshi_vec p
 }
 
 double vsh_sdf_distance(const vsh_sdf *sdf, const double position[3]) {
+    VSHI_FLOATS;
     const vshi_vec p = vshi_vec_of(position);
     if (!vshi_finite(p)) {
         return NAN;
@@ -368,6 +371,7 @@ static void node_bounds(const vsh_sdf_node *nodes, int32_t index, const placemen
 }
 
 void vsh_sdf_bounds(const vsh_sdf *sdf, double bounds_min[3], double bounds_max[3]) {
+    VSHI_FLOATS;
     const placement world = {{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}, {0.0, 0.0, 0.0}, 1.0};
     node_bounds(sdf->nodes, (int32_t)sdf->node_count - 1, &world, bounds_min, bounds_max);
 }

@@ -1,4 +1,5 @@
 /* vdbshade bake: from files to lightmaps. */
+#include "bake_forecast.h"
 #include "bake_options.h"
 #include "clock.h"
 #include "meshes.h"
@@ -16,9 +17,10 @@
 
 typedef struct bake_work {
     const cli_bake_settings *settings;
-    const vsh_scene *scene;
+    vsh_scene *scene;
     vsh_run run;
     vsh_assets *assets;
+    vsh_triangles *triangles; /* of exact methods */
     vsh_grid *grid;
     vsh_field *field;
     vsh_texels *kept; /* of the only receiver; several are rasterised again, so as not to hold all at once */
@@ -106,6 +108,24 @@ static int make_field(bake_work *work) {
     return CLI_OK;
 }
 
+/* Exact methods trace the casters' own triangles. */
+static int make_triangles(bake_work *work) {
+    vsh_shade_options *shade = &work->scene->shade;
+    const bool lights = work->scene->light_count > 0 && shade->method == VSH_SHADOW_EXACT;
+    const bool ao = work->scene->ao && shade->ao_method == VSH_AO_EXACT;
+    if (!lights && !ao) {
+        return CLI_OK;
+    }
+    const double start = cli_seconds();
+    vsh_error error;
+    if (vsh_scene_triangles(work->scene, work->assets, &work->run, &work->triangles, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    shade->triangles = work->triangles;
+    cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
+    return CLI_OK;
+}
+
 static void say_receiver(const bake_work *work, size_t index, const cli_stats *before) {
     if (work->settings->common.quiet) {
         return;
@@ -139,13 +159,19 @@ static int bake_receivers(bake_work *work) {
     return code;
 }
 
-static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
+static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
     bake_work work = {.settings = settings, .scene = scene, .run = cli_common_run(&settings->common)};
     work.stats.shade = vsh_shade_stats_zero();
     const long cores = sysconf(_SC_NPROCESSORS_ONLN);
     work.stats.threads = settings->common.threads > 0 ? settings->common.threads : (int32_t)cores;
     int code = load(&work);
+    if (code == CLI_OK && settings->dry_run) {
+        code = cli_bake_forecast(scene, work.assets, &work.run);
+        vsh_assets_free(work.assets);
+        return code;
+    }
     code = code == CLI_OK ? rasterise(&work) : code;
+    code = code == CLI_OK ? make_triangles(&work) : code;
     code = code == CLI_OK ? make_field(&work) : code;
     code = code == CLI_OK ? bake_receivers(&work) : code;
     if (code == CLI_OK && settings->stats != NULL) {
@@ -160,6 +186,7 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
         }
     }
     vsh_texels_free(work.kept);
+    vsh_triangles_free(work.triangles);
     vsh_field_free(work.field);
     vsh_grid_free(work.grid);
     vsh_assets_free(work.assets);

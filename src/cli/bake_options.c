@@ -13,6 +13,12 @@ enum {
     KEY_AO_CONES,
     KEY_IRRADIANCE,
     KEY_METHOD,
+    KEY_RAYS,
+    KEY_SAMPLER,
+    KEY_FRAME,
+    KEY_EARLY_RAYS,
+    KEY_MAX_ERROR,
+    KEY_ERROR,
     KEY_CASTER,
     KEY_SIZE,
     KEY_UV_SET,
@@ -20,7 +26,8 @@ enum {
     KEY_PADDING,
     KEY_BITS,
     KEY_PACK,
-    KEY_STATS
+    KEY_STATS,
+    KEY_DRY_RUN
 };
 
 static const cli_option options[] = {
@@ -36,17 +43,31 @@ static const cli_option options[] = {
      "R=shadow.sun,G=ao,A=A; 0 and 1 are constants\n"
      "(the first three but A to R, G, B; A to A)"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
+    {KEY_DRY_RUN, "dry-run", NULL,
+     "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},
     {0, NULL, NULL, "Light and occlusion"},
     {KEY_SUN, "sun", "X,Y,Z", "direction towards the sun; its channel is shadow.sun"},
     {KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},
     {KEY_AO, "ao", "DISTANCE", "ambient occlusion within a distance, scene units"},
-    {KEY_AO_METHOD, "ao-method", "NAME", "taps or cones (cones)"},
+    {KEY_AO_METHOD, "ao-method", "NAME", "taps, cones, rays, adaptive or exact (cones)"},
     {KEY_AO_CONES, "ao-cones", "N", "cones a texel, 1 to 256 (16)"},
     {KEY_IRRADIANCE, "irradiance", NULL,
      "also irradiance.R, .G, .B: visibility × colour ×\nfalloff × cosine, summed, × AO where baked"},
     {KEY_METHOD, "method", "NAME",
-     "shadow estimate: hard, classic, improved, smooth,\ncone (cone); classic and improved have the outer\n"
-     "half of the penumbra only"},
+     "shadow estimate: hard, classic, improved, smooth,\ncone, rays, adaptive, exact (cone); classic and\n"
+     "improved have the outer half of the penumbra only"},
+    {0, NULL, NULL, "Accuracy"},
+    {KEY_MAX_ERROR, "max-error", "E",
+     "standard error that a value may keep, 0.0001 to 1\n(0.02); chooses adaptive methods where none is "
+     "named\n"
+     "that keeps one"},
+    {KEY_RAYS, "rays", "N", "rays a texel, and the most that adaptive and exact\ntake, 1 to 4096 (64)"},
+    {KEY_SAMPLER, "sampler", "NAME", "where they go: sobol, white or blue (sobol)"},
+    {KEY_FRAME, "frame", "N", "another set of them: bakes of frames 0, 1, 2 … may\nbe averaged (0)"},
+    {KEY_EARLY_RAYS, "early-rays", "N",
+     "with rays: where the first N agree, the rest are not\nmarched, 0 to 4096 (0: never)"},
+    {KEY_ERROR, "error", NULL,
+     "also error.NAME of each light and error.ao: the\nstandard error left in each value"},
     {0, NULL, NULL, "Casters and voxels"},
     {KEY_CASTER, "caster", "FILE", "another mesh that casts shadows; may be repeated"},
     CLI_GRID_OPTIONS,
@@ -80,7 +101,7 @@ static int take_name(const char *option, const char *text, int32_t (*value_of)(c
     for (int32_t i = 0; name_of(i) != NULL && used < sizeof list; ++i) {
         used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", name_of(i));
     }
-    return cli_usage("%s '%s': no such method; there are: %s", option, text, list);
+    return cli_usage("%s '%s': expected one of %s", option, text, list);
 }
 
 static int take_bits(const char *name, const char *value, int32_t *bits) {
@@ -112,6 +133,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_STATS:
         s->stats = value;
         return CLI_OK;
+    case KEY_DRY_RUN:
+        s->dry_run = true;
+        return CLI_OK;
     case KEY_SUN:
         s->has_sun = true;
         return cli_take_vector(name, value, s->sun);
@@ -133,6 +157,24 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_METHOD:
         s->has_method = true;
         return take_name(name, value, vsh_shadow_method, vsh_shadow_method_name, &s->method);
+    case KEY_RAYS:
+        s->has_rays = true;
+        return cli_take_integer(name, value, 1, 4096, &s->rays);
+    case KEY_SAMPLER:
+        s->has_sampler = true;
+        return take_name(name, value, vsh_sampler, vsh_sampler_name, &s->sampler);
+    case KEY_FRAME:
+        s->has_frame = true;
+        return cli_take_integer(name, value, 0, INT32_MAX, &s->frame);
+    case KEY_EARLY_RAYS:
+        s->has_early_rays = true;
+        return cli_take_integer(name, value, 0, 4096, &s->early_rays);
+    case KEY_MAX_ERROR:
+        s->has_max_error = true;
+        return cli_take_number(name, value, 1e-4, 1.0, &s->max_error);
+    case KEY_ERROR:
+        s->error = true;
+        return CLI_OK;
     case KEY_CASTER:
         return take_caster(s, name, value);
     case KEY_SIZE:

@@ -18,6 +18,8 @@ typedef struct cli_bake_settings {
     int32_t ao_method;
     int32_t ao_cones;
     int32_t method;
+    int32_t rays, sampler, frame, early_rays;
+    double max_error;
     int32_t width, height;
     int32_t uv_set;
     int32_t supersample;
@@ -28,6 +30,8 @@ typedef struct cli_bake_settings {
     size_t caster_count;
     bool has_sun, has_sun_angle, has_ao, has_ao_method, has_ao_cones, has_method, has_size, has_uv_set;
     bool has_supersample, has_padding, has_bits, irradiance;
+    bool dry_run;
+    bool has_rays, has_sampler, has_frame, has_early_rays, has_max_error, error;
 } cli_bake_settings;
 
 /* Takes the command line. */

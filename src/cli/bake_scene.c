@@ -129,6 +129,54 @@ static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
     return CLI_OK;
 }
 
+/* Methods that know the error of their values, and those that work until it is small enough. */
+static bool knows_error(const vsh_scene *scene) {
+    return (scene->light_count > 0 && scene->shade.method >= VSH_SHADOW_RAYS) ||
+           (scene->ao && scene->shade.ao_method >= VSH_AO_RAYS);
+}
+
+static bool keeps_error(const vsh_scene *scene) {
+    return (scene->light_count > 0 && scene->shade.method >= VSH_SHADOW_ADAPTIVE) ||
+           (scene->ao && scene->shade.ao_method >= VSH_AO_ADAPTIVE);
+}
+
+/* Who asks for an error is to get it: a method that keeps none is none that was meant, unless it was named.
+ */
+static int set_accuracy(const cli_bake_settings *s, vsh_scene *scene) {
+    vsh_shade_options *shade = &scene->shade;
+    if (s->has_max_error) {
+        shade->max_error = s->max_error;
+        if (!s->has_method && shade->method < VSH_SHADOW_ADAPTIVE) {
+            shade->method = VSH_SHADOW_ADAPTIVE;
+        }
+        if (!s->has_ao_method && shade->ao_method < VSH_AO_ADAPTIVE) {
+            shade->ao_method = VSH_AO_ADAPTIVE;
+        }
+        if (!keeps_error(scene)) {
+            return cli_usage("--max-error: method %s keeps none; adaptive and exact do",
+                             scene->light_count > 0 ? vsh_shadow_method_name(shade->method)
+                                                    : vsh_ao_method_name(shade->ao_method));
+        }
+    }
+    shade->rays = s->has_rays ? s->rays : shade->rays;
+    shade->sampler = s->has_sampler ? s->sampler : shade->sampler;
+    shade->frame = s->has_frame ? s->frame : shade->frame;
+    shade->early_rays = s->has_early_rays ? s->early_rays : shade->early_rays;
+    scene->error = scene->error || s->error;
+    const char *option = s->has_rays         ? "--rays"
+                         : s->has_sampler    ? "--sampler"
+                         : s->has_frame      ? "--frame"
+                         : s->has_early_rays ? "--early-rays"
+                         : s->error          ? "--error"
+                                             : NULL;
+    if (option != NULL && !knows_error(scene)) {
+        return cli_usage("%s: method %s takes no rays; rays, adaptive and exact do", option,
+                         scene->light_count > 0 ? vsh_shadow_method_name(shade->method)
+                                                : vsh_ao_method_name(shade->ao_method));
+    }
+    return CLI_OK;
+}
+
 static int set_shade(const cli_bake_settings *s, vsh_scene *scene) {
     if (s->has_ao) {
         scene->ao = 1;
@@ -148,6 +196,10 @@ static int set_shade(const cli_bake_settings *s, vsh_scene *scene) {
     }
     if (s->irradiance) {
         scene->irradiance = 1;
+    }
+    const int code = set_accuracy(s, scene);
+    if (code != CLI_OK) {
+        return code;
     }
     if (scene->irradiance && scene->light_count == 0) {
         return cli_usage("--irradiance: there is no light");

@@ -7,6 +7,7 @@
 extern const cli_command cli_bake;
 extern const cli_command cli_voxelize;
 extern const cli_command cli_info;
+extern const cli_command cli_trade;
 
 int cli_bake_main(int argc, char **argv);
 

@@ -2,6 +2,7 @@
 
 #include "message.h"
 
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,9 +12,19 @@ static int out_of_memory(const char *what) {
     return CLI_LIMIT;
 }
 
+/* Channels of the error that is left: only where the method knows it. */
+static bool has_light_errors(const vsh_scene *scene) {
+    return scene->error && scene->shade.method >= VSH_SHADOW_RAYS;
+}
+
+static bool has_ao_error(const vsh_scene *scene) {
+    return scene->error && scene->ao && scene->shade.ao_method >= VSH_AO_RAYS;
+}
+
 int cli_planes_name(cli_planes *planes, const vsh_scene *scene, int32_t width, int32_t height) {
     memset(planes, 0, sizeof *planes);
-    const size_t count = scene->light_count + (scene->ao ? 1 : 0) + (scene->irradiance ? 3 : 0) + 1;
+    const size_t count = scene->light_count * (has_light_errors(scene) ? 2 : 1) + (scene->ao ? 1 : 0) +
+                         (has_ao_error(scene) ? 1 : 0) + (scene->irradiance ? 3 : 0) + 1;
     if (count > VSH_MAX_CHANNELS) {
         return cli_usage("scene: %zu channels, at most %d", count, VSH_MAX_CHANNELS);
     }
@@ -29,6 +40,12 @@ int cli_planes_name(cli_planes *planes, const vsh_scene *scene, int32_t width, i
     }
     if (scene->ao) {
         snprintf(planes->names[at++], VSH_CHANNEL_NAME, "ao");
+    }
+    for (size_t i = 0; i < scene->light_count && has_light_errors(scene); ++i) {
+        snprintf(planes->names[at++], VSH_CHANNEL_NAME, "error.%s", scene->lights[i].name);
+    }
+    if (has_ao_error(scene)) {
+        snprintf(planes->names[at++], VSH_CHANNEL_NAME, "error.ao");
     }
     for (int i = 0; i < 3 && scene->irradiance; ++i) {
         snprintf(planes->names[at++], VSH_CHANNEL_NAME, "irradiance.%c", "RGB"[i]);
@@ -62,6 +79,14 @@ int cli_planes_allocate(cli_planes *planes, const vsh_scene *scene, uint64_t lim
     planes->lightmap.shadow = scene->light_count > 0 ? planes->planes : NULL;
     if (scene->ao) {
         planes->lightmap.ao = planes->planes[scene->light_count];
+    }
+    float **errors = planes->planes + scene->light_count + (scene->ao ? 1 : 0);
+    if (has_light_errors(scene) && scene->light_count > 0) {
+        planes->lightmap.shadow_error = errors;
+        errors += scene->light_count;
+    }
+    if (has_ao_error(scene)) {
+        planes->lightmap.ao_error = *errors;
     }
     planes->lightmap.coverage = planes->planes[count - 1];
     if (scene->irradiance) {

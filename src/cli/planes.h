@@ -5,7 +5,8 @@
 #include <vdbshade/vdbshade.h>
 
 typedef struct cli_planes {
-    vsh_image image;       /* the channels, in order: shadow.NAME …, ao, irradiance.R, .G, .B, A */
+    vsh_image image;       /* the channels, in order: shadow.NAME …, ao, error.NAME …, error.ao,
+                              irradiance.R, .G, .B, A */
     vsh_lightmap lightmap; /* the same memory, as the bake takes it */
     char (*names)[VSH_CHANNEL_NAME];
     const char **name_list;

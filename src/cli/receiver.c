@@ -112,6 +112,20 @@ static void warn_stats(const cli_receiver_job *job, const vsh_bake_stats *baked)
     }
 }
 
+/* Values of valid texels, an error for each of which square_error holds: samples where supersampled. */
+static void add_values(cli_stats *sum, const cli_receiver_job *job, const vsh_texels *texels,
+                       const vsh_bake_stats *baked) {
+    const vsh_scene *scene = job->scene;
+    vsh_texels_info info;
+    vsh_texels_get_info(texels, &info);
+    const double valid =
+        baked->texels > 0 ? (double)(baked->texels - baked->invalid_texels) / (double)baked->texels : 0.0;
+    const bool lights = scene->shade.method >= VSH_SHADOW_ADAPTIVE;
+    const bool ao = scene->ao && scene->shade.ao_method >= VSH_AO_ADAPTIVE;
+    const double planes = (lights ? (double)scene->light_count : 0.0) + (ao ? 1.0 : 0.0);
+    sum->estimated_values += valid * (double)info.samples * planes;
+}
+
 static void add_stats(cli_stats *sum, const vsh_bake_stats *baked) {
     sum->texels += baked->texels;
     sum->invalid_texels += baked->invalid_texels;
@@ -122,6 +136,9 @@ static void add_stats(cli_stats *sum, const vsh_bake_stats *baked) {
     sum->shade.unfinished += baked->shade.unfinished;
     sum->shade.invalid += baked->shade.invalid;
     sum->shade.beyond_reach += baked->shade.beyond_reach;
+    sum->shade.rays += baked->shade.rays;
+    sum->shade.refined += baked->shade.refined;
+    sum->shade.square_error += baked->shade.square_error;
 }
 
 static int write_image(const cli_receiver_job *job, cli_planes *planes) {
@@ -165,6 +182,7 @@ int cli_receiver_bake(const cli_receiver_job *job, const vsh_field *field, const
     now = cli_stats_stage(stats, CLI_STAGE_BAKE, now);
     if (code == CLI_OK) {
         add_stats(stats, &baked);
+        add_values(stats, job, texels, &baked);
         warn_stats(job, &baked);
         code = write_image(job, &planes);
         cli_stats_stage(stats, CLI_STAGE_WRITE, now);

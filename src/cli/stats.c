@@ -6,6 +6,7 @@
 
 #include <inttypes.h>
 #include <jansson.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/resource.h>
@@ -39,7 +40,8 @@ int cli_stats_write(const cli_stats *stats, const char *path) {
         {"certified", stats->shade.certified},
         {"unfinished", stats->shade.unfinished},
         {"skipped", stats->shade.skipped},
-        {"rays", 0}, /* no method of this version traces any */
+        {"rays", stats->shade.rays},
+        {"refined", stats->shade.refined},
         {"peak_bytes", peak_bytes()},
         {"threads", (uint64_t)stats->threads},
         {"levels", (uint64_t)stats->field.levels},
@@ -52,6 +54,13 @@ int cli_stats_write(const cli_stats *stats, const char *path) {
     for (size_t i = 0; i < sizeof counts / sizeof counts[0]; ++i) {
         json_object_set_new(root, counts[i].name, json_integer((json_int_t)counts[i].value));
     }
+    /* what adaptive and exact methods say of themselves; null where no such method ran */
+    const double values = stats->estimated_values;
+    json_object_set_new(root, "certified_share",
+                        values > 0.0 ? json_real(1.0 - fmin(1.0, (double)stats->shade.refined / values))
+                                     : json_null());
+    json_object_set_new(root, "estimated_rmse",
+                        values > 0.0 ? json_real(sqrt(stats->shade.square_error / values)) : json_null());
     json_object_set_new(root, "voxel_size", json_real(stats->grid.voxel_size));
     char *text = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     json_decref(root);

@@ -18,6 +18,7 @@ typedef struct cli_stats {
     uint64_t texels;
     uint64_t invalid_texels;
     vsh_shade_stats shade;
+    double estimated_values; /* behind shade.square_error and shade.refined, by adaptive and exact methods */
     int32_t threads;
     vsh_grid_info grid;
     vsh_field_info field;

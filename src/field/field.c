@@ -1,5 +1,6 @@
 #include "field/field.h"
 
+#include "base/floats.h"
 #include "base/memory.h"
 #include "field/level.h"
 
@@ -68,6 +69,7 @@ static bool find_bounds(vsh_field *field) {
 
 vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *options, const vsh_run *run,
                             vsh_field **field, vsh_error *error) {
+    VSHI_FLOATS;
     vsh_field_options o = vsh_field_options_default();
     vsh_run r;
     vshi_blocks blocks = {.map = NULL};
@@ -150,6 +152,7 @@ done:
 }
 
 void vsh_field_sample(const vsh_field *field, size_t count, const double *positions, float *distances) {
+    VSHI_FLOATS;
     for (size_t i = 0; i < count; ++i) {
         const vshi_vec p = vshi_to_field(field, positions + 3 * i);
         const float at[3] = {(float)p.x, (float)p.y, (float)p.z};
@@ -159,6 +162,7 @@ void vsh_field_sample(const vsh_field *field, size_t count, const double *positi
 }
 
 void vsh_field_get_info(const vsh_field *field, vsh_field_info *info) {
+    VSHI_FLOATS;
     const vshi_level *top = &field->levels[field->level_count - 1];
     const uint64_t bricks = top->first_brick + top->brick_count;
     const uint64_t blocks =

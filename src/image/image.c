@@ -1,5 +1,6 @@
 /* What image files have in common: what may be written, and who writes and reads it. */
 #include "base/file.h"
+#include "base/floats.h"
 #include "base/job.h"
 #include "image/exr.h"
 #include "image/pack.h"
@@ -153,6 +154,7 @@ static vsh_result plan_write(const char *path, const vsh_image *image, const vsh
 
 vsh_result vsh_image_check(const char *path, const vsh_image *image, const vsh_image_options *options,
                            vsh_error *error) {
+    VSHI_FLOATS;
     write_plan plan;
     const vsh_result result = plan_write(path, image, options, &plan, error);
     return result == VSH_OK ? vshi_output_check(path, error) : result;
@@ -160,6 +162,7 @@ vsh_result vsh_image_check(const char *path, const vsh_image *image, const vsh_i
 
 vsh_result vsh_image_write(const char *path, const vsh_image *image, const vsh_image_options *options,
                            vsh_error *error) {
+    VSHI_FLOATS;
     write_plan plan;
     vsh_result result = plan_write(path, image, options, &plan, error);
     if (result != VSH_OK) {
@@ -217,6 +220,7 @@ static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *err
 }
 
 vsh_result vsh_image_read(const char *path, vsh_image_file **file, vsh_error *error) {
+    VSHI_FLOATS;
     if (file == NULL || path == NULL || path[0] == '\0') {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_image_read: no %s was given",
                          file == NULL ? "place for the image" : "path");

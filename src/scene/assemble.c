@@ -1,4 +1,5 @@
 /* From a scene's casters to one level set. */
+#include "base/floats.h"
 #include "scene/assets.h"
 #include "scene/similarity.h"
 
@@ -233,6 +234,7 @@ static void free_assembly(assembly *a) {
 
 vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                              vsh_grid **grid, vsh_error *error) {
+    VSHI_FLOATS;
     if (scene == NULL || assets == NULL || grid == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "vsh_scene_casters: scene, assets and grid must not be NULL");

@@ -2,6 +2,7 @@
 #include "scene/assets.h"
 
 #include "base/error.h"
+#include "base/floats.h"
 #include "base/memory.h"
 
 #include <stdlib.h>
@@ -211,6 +212,7 @@ static vsh_result allocate_places(vsh_assets *assets, const vsh_scene *scene, vs
 
 vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
                            vsh_error *error) {
+    VSHI_FLOATS;
     if (scene == NULL || assets == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_assets_load: scene and assets must not be NULL");
     }

@@ -2,6 +2,7 @@
 #include "scene/scene.h"
 
 #include "base/error.h"
+#include "base/floats.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -43,6 +44,7 @@ static vsh_result read_all(const char *path, FILE *file, char **text, size_t *si
 }
 
 vsh_result vsh_scene_read(const char *path, vsh_scene **scene, vsh_error *error) {
+    VSHI_FLOATS;
     if (path == NULL || scene == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_scene_read: path or scene is NULL");
     }

@@ -1,6 +1,7 @@
 /* How far from a surface a scene's field must be able to tell distances apart. */
 #include <vdbshade/scene.h>
 
+#include "base/floats.h"
 #include "base/vec.h"
 
 /* Tangent of 60°: wider half angles are marched as if they were this wide, as a tangent without
@@ -9,6 +10,7 @@ static const double widest_tangent = 1.7320508075688772;
 
 double vsh_scene_reach(const vsh_scene *scene, const vsh_grid *grid, const double receivers_min[3],
                        const double receivers_max[3]) {
+    VSHI_FLOATS;
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
     vshi_vec sides;

@@ -105,7 +105,7 @@ static const vshi_key ao_keys[] = {
      .name_of = vsh_ao_method_name},
     {.name = "cones",
      .kind = VSHI_INTEGER,
-     .variants = 1U << VSH_AO_CONES,
+     .variants = 1U << VSH_AO_CONES | 1U << VSH_AO_ADAPTIVE | 1U << VSH_AO_EXACT,
      .offset = offsetof(vsh_shade_options, ao_cones),
      .lowest = 1.0,
      .highest = 256.0},
@@ -122,8 +122,11 @@ static vsh_result read_ao(vshi_reader *reader, const vshi_value *value, void *me
     if (result != VSH_OK) {
         return result;
     }
+    static const char *const whats[] = {
+        [VSH_AO_TAPS] = "ao by taps", [VSH_AO_RAYS] = "ao by rays", [VSH_AO_EXACT] = "ao"};
+    const char *what = whats[scene->shade.ao_method];
     return vshi_read_object(reader, value, &ao_table, 1U << scene->shade.ao_method,
-                            scene->shade.ao_method == VSH_AO_TAPS ? "ao by taps" : "ao", &scene->shade);
+                            what != NULL ? what : "ao", &scene->shade);
 }
 
 static const vshi_key scene_keys[] = {
@@ -155,6 +158,26 @@ static const vshi_key scene_keys[] = {
      .kind = VSHI_NAME,
      .offset = offsetof(vsh_scene, shade.method),
      .name_of = vsh_shadow_method_name},
+    {.name = "rays",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_scene, shade.rays),
+     .lowest = 1.0,
+     .highest = 4096.0},
+    {.name = "sampler",
+     .kind = VSHI_NAME,
+     .offset = offsetof(vsh_scene, shade.sampler),
+     .name_of = vsh_sampler_name},
+    {.name = "frame", .kind = VSHI_INTEGER, .offset = offsetof(vsh_scene, shade.frame), .highest = INT32_MAX},
+    {.name = "early_rays",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_scene, shade.early_rays),
+     .highest = 4096.0},
+    {.name = "max_error",
+     .kind = VSHI_NUMBER,
+     .offset = offsetof(vsh_scene, shade.max_error),
+     .lowest = 1e-4,
+     .highest = 1.0},
+    {.name = "error", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, error)},
     {.name = "max_steps",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_scene, shade.max_steps),

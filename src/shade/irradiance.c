@@ -1,4 +1,5 @@
 /* Irradiance: what the shadow value leaves out. */
+#include "base/floats.h"
 #include "base/vec.h"
 
 #include <math.h>
@@ -29,6 +30,7 @@ static double spot(const vsh_light *light, vshi_vec to_light) {
 
 void vsh_shade_irradiance(const vsh_points *points, const float *shading_normals, const vsh_light *light,
                           const float *visibility, float *irradiance) {
+    VSHI_FLOATS;
     const float *normals = shading_normals != NULL ? shading_normals : points->normals;
     const vshi_vec towards = vshi_unit(vshi_vec_of(light->direction));
     for (size_t i = 0; i < points->count; ++i) {

@@ -1,6 +1,7 @@
 #include "shade/light.h"
 
 #include "base/error.h"
+#include "base/floats.h"
 #include "base/vec.h"
 
 #include <string.h>
@@ -69,6 +70,7 @@ static vsh_result check_field(const vsh_light *light, const field *f, vsh_error 
 }
 
 vsh_result vsh_light_check(const vsh_light *light, vsh_error *error) {
+    VSHI_FLOATS;
     if (light == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "light: is NULL");
     }

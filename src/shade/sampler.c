@@ -9,7 +9,8 @@ enum { MASK_EDGE = 64, CANDIDATES = 32 };
 struct vshi_sampler {
     int32_t kind;
     int32_t frame;
-    int32_t count;                    /* blue: points */
+    int32_t count;                    /* of points */
+    uint32_t (*net)[2];               /* sobol */
     double (*points)[2];              /* blue: progressive, in the unit disc */
     float mask[MASK_EDGE][MASK_EDGE]; /* blue: ranks in [0, 1) */
 };
@@ -56,34 +57,35 @@ static uint32_t scramble(uint32_t x, uint32_t seed) {
     return reverse(x);
 }
 
-/* The second dimension of Sobol's sequence: Pascal's triangle modulo 2, a column a step. */
+/* The second dimension of Sobol's sequence: Pascal's triangle modulo 2, whose entries are products over the
+ * bits of row and column (Lucas), so that a step a bit of the bits' number does. */
 static uint32_t sobol_second(uint32_t index) {
-    uint32_t result = 0;
-    for (uint32_t column = 1u << 31; index != 0; index >>= 1, column ^= column >> 1) {
-        if (index & 1u) {
-            result ^= column;
-        }
-    }
-    return result;
+    index ^= index >> 1 & 0x55555555u;
+    index ^= index >> 2 & 0x33333333u;
+    index ^= index >> 4 & 0x0f0f0f0fu;
+    index ^= index >> 8 & 0x00ff00ffu;
+    index ^= index >> 16;
+    return reverse(index);
 }
 
-static void sobol_point(uint32_t index, uint32_t seed, double point[2]) {
-    /* scrambling the index keeps every prefix of 2^k a net and makes the sets of two texels independent */
-    const uint32_t shuffled = scramble(index, seed);
-    point[0] = unit(scramble(reverse(shuffled), hash(seed ^ 0x68bc21ebu)));
-    point[1] = unit(scramble(sobol_second(shuffled), hash(seed ^ 0x02e5be93u)));
+/* One Owen-scrambled net for all; each texel shifts its digits, which keeps every prefix of 2^k a net (Kollig
+ * and Keller, "Efficient multidimensional sampling", 2002) and costs two operations a point. */
+static void place_net(vshi_sampler *sampler) {
+    for (uint32_t i = 0; i < (uint32_t)sampler->count; ++i) {
+        const uint32_t shuffled = scramble(i, 0x9e3779b9u);
+        sampler->net[i][0] = scramble(reverse(shuffled), 0x68bc21ebu);
+        sampler->net[i][1] = scramble(sobol_second(shuffled), 0x02e5be93u);
+    }
 }
 
-/* Sine and cosine up to π/4 by their series, to 1e-13: own arithmetic, so that no libm shows in the bits. */
-static void small_angle(double angle, double *sine, double *cosine) {
-    const double square = angle * angle;
-    double s = 1.0, c = 1.0;
-    for (int k = 14; k >= 2; k -= 2) {
-        s = 1.0 - s * square / (k * (k + 1));
-        c = 1.0 - c * square / (k * (k - 1));
-    }
-    *sine = angle * s;
-    *cosine = c;
+/* Sine and cosine up to π/4 by their series, to 1e-11: own arithmetic, so that no libm shows in the bits. */
+static inline void small_angle(double angle, double *sine, double *cosine) {
+    static const double S[] = {-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362880.0, -1.0 / 39916800.0};
+    static const double C[] = {-1.0 / 2.0,    1.0 / 24.0,       -1.0 / 720.0,
+                               1.0 / 40320.0, -1.0 / 3628800.0, 1.0 / 479001600.0};
+    const double x = angle * angle;
+    *sine = angle * (1.0 + x * (S[0] + x * (S[1] + x * (S[2] + x * (S[3] + x * S[4])))));
+    *cosine = 1.0 + x * (C[0] + x * (C[1] + x * (C[2] + x * (C[3] + x * (C[4] + x * C[5])))));
 }
 
 /* The unit square to the unit disc, areas kept and neighbours near (Shirley and Chiu, "A low distortion map
@@ -252,10 +254,18 @@ vshi_sampler *vshi_sampler_create(int32_t kind, int32_t rays, int32_t frame) {
     }
     sampler->kind = kind;
     sampler->frame = frame;
+    sampler->count = rays;
+    if (kind == VSH_SAMPLER_SOBOL) {
+        sampler->net = calloc((size_t)rays, sizeof *sampler->net);
+        if (sampler->net == NULL) {
+            vshi_sampler_free(sampler);
+            return NULL;
+        }
+        place_net(sampler);
+    }
     if (kind != VSH_SAMPLER_BLUE) {
         return sampler;
     }
-    sampler->count = rays;
     sampler->points = calloc((size_t)rays, sizeof *sampler->points);
     if (sampler->points == NULL || !place_mask(sampler)) {
         vshi_sampler_free(sampler);
@@ -267,6 +277,7 @@ vshi_sampler *vshi_sampler_create(int32_t kind, int32_t rays, int32_t frame) {
 
 void vshi_sampler_free(vshi_sampler *sampler) {
     if (sampler != NULL) {
+        free(sampler->net);
         free(sampler->points);
         free(sampler);
     }
@@ -274,7 +285,7 @@ void vshi_sampler_free(vshi_sampler *sampler) {
 
 void vshi_sampler_disc(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t first,
                        int32_t count, double (*points)[2]) {
-    const uint32_t seed = hash2(hash2(texel, purpose), (uint32_t)sampler->frame);
+    const uint32_t seed = hash2(hash2(texel, purpose), (uint32_t)sampler->frame), second = hash(seed);
     for (int32_t i = 0; i < count; ++i) {
         const uint32_t index = (uint32_t)(first + i);
         double square[2];
@@ -287,7 +298,8 @@ void vshi_sampler_disc(const vshi_sampler *sampler, uint32_t texel, uint32_t pur
             square[1] = unit(hash2(seed, 2 * index + 1));
             break;
         default:
-            sobol_point(index, seed, square);
+            square[0] = unit(sampler->net[index][0] ^ seed);
+            square[1] = unit(sampler->net[index][1] ^ second);
             break;
         }
         to_disc(square, points[i]);

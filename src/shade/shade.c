@@ -1,5 +1,6 @@
 #include "shade/shade.h"
 
+#include "base/floats.h"
 #include "base/parallel.h"
 
 #include <math.h>
@@ -65,6 +66,7 @@ static void run_piece(void *user, size_t begin, size_t end) {
 
 vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
                           vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error) {
+    VSHI_FLOATS;
     vsh_run full;
     vsh_result result = vshi_run_resolve(run, &full, error);
     if (result != VSH_OK) {

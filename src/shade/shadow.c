@@ -1,4 +1,5 @@
 /* Shadow values: the visible fraction of a light, by one cone or ray a point. */
+#include "base/floats.h"
 #include "shade/shadow.h"
 
 #include <math.h>
@@ -97,6 +98,7 @@ static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_s
 vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
                             const vsh_shade_options *options, const vsh_run *run, float *visibility,
                             float *deviation, vsh_shade_stats *stats, vsh_error *error) {
+    VSHI_FLOATS;
     vsh_shade_options full;
     vsh_result result = vshi_shade_options_resolve(options, &full, error);
     if (result == VSH_OK) {

@@ -7,15 +7,20 @@
 
 enum { FIRST_ROUND = 8 };
 
-/* Rays on triangles begin this far off the surface, voxels: above the rounding of floats, below what shows.
- */
-static const double TRACE_LIFT = 1.0 / 64.0;
+/* Rays on triangles begin this part of the casters' size off the surface: above the rounding of floats, below
+ * what shows. */
+static const double TRACE_LIFT = 0x1p-18;
+
+/* Cones whose lowest side rises less than this over the receiver's plane are not proved: bumps of a tenth of
+ * a voxel reach into them. */
+static const double GRAZING = 0.1;
 
 /* A point whose value takes rays. */
 typedef struct open_point {
     size_t point;
     vshi_vec origin, normal; /* field space; no normal: zero */
-    vshi_vec axis, u, v;     /* towards the light, and over its disc a unit away */
+    vshi_vec axis, u, v;     /* towards the light, and over its disc a unit away; exact: in world space */
+    vshi_vec start;          /* exact: of its rays, world space */
     double end;
     int32_t lit, taken;
 } open_point;
@@ -58,19 +63,22 @@ static vshi_vec to_world_direction(const vsh_field *field, vshi_vec d) {
                                 m[2] * d.x + m[6] * d.y + m[10] * d.z});
 }
 
-static void trace(ray_batch *batch, size_t owner, vshi_vec direction) {
-    const vshi_shadow_task *task = batch->task;
-    const open_point *p = &batch->open[owner];
-    const vshi_vec d = to_world_direction(task->field, direction);
-    const vshi_vec n = to_world_direction(task->field, p->normal);
+/* Turns an open point to world space, off its surface by TRACE_LIFT. */
+static void turn_to_world(const vshi_shadow_task *task, open_point *p) {
+    const double tangent = vshi_length(p->u);
     const double *at = task->points->positions + 3 * p->point;
-    const double lift = TRACE_LIFT * task->field->voxel_size + task->options->surface_offset;
-    const size_t r = batch->traced_count++;
-    batch->traced[r] =
-        (vshi_segment_ray){.origin = {at[0] + lift * n.x, at[1] + lift * n.y, at[2] + lift * n.z},
-                           .direction = {d.x, d.y, d.z},
-                           .far = p->end * task->field->voxel_size};
-    batch->chunk.owner[r] = (uint32_t)owner;
+    double size = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double side = task->field->world_max[axis] - task->field->world_min[axis];
+        size = side > size ? side : size;
+    }
+    const double lift = TRACE_LIFT * size + task->options->surface_offset;
+    p->normal = to_world_direction(task->field, p->normal);
+    p->axis = to_world_direction(task->field, p->axis);
+    p->u = vshi_scale(to_world_direction(task->field, p->u), tangent);
+    p->v = vshi_scale(to_world_direction(task->field, p->v), tangent);
+    p->start = vshi_add(vshi_vec_of(at), vshi_scale(p->normal, lift));
+    p->end *= task->field->voxel_size;
 }
 
 /* Rays taken … target - 1 of an open point. */
@@ -94,7 +102,11 @@ static void cast(ray_batch *batch, size_t owner, int32_t target) {
                 flush(batch);
             }
             if (task->options->method == VSH_SHADOW_EXACT) {
-                trace(batch, owner, d);
+                batch->traced[batch->traced_count] =
+                    (vshi_segment_ray){.origin = {p->start.x, p->start.y, p->start.z},
+                                       .direction = {d.x, d.y, d.z},
+                                       .far = p->end};
+                batch->chunk.owner[batch->traced_count++] = (uint32_t)owner;
                 continue;
             }
             const vshi_cone ray = {
@@ -109,9 +121,10 @@ double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken) {
     const double n = taken, p = (lit + 0.5) / (n + 1.0);
     const double root = sqrt(n);
     const double white = 1.0 / root, low = 1.0 / (root * sqrt(root));
-    const double spread = sampler == VSH_SAMPLER_WHITE  ? white
-                          : sampler == VSH_SAMPLER_BLUE ? (1.6 * low > 0.56 * white ? 1.6 * low : 0.56 * white)
-                                                        : 1.04 * low;
+    const double spread = sampler == VSH_SAMPLER_WHITE ? white
+                          : sampler == VSH_SAMPLER_BLUE
+                              ? (1.6 * low > 0.56 * white ? 1.6 * low : 0.56 * white)
+                              : 1.04 * low;
     return spread * sqrt(p * (1.0 - p));
 }
 
@@ -124,6 +137,9 @@ static void cast_rounds(ray_batch *batch) {
     const int32_t most = hard ? 1 : options->rays;
     int32_t target = refining ? FIRST_ROUND : options->early_rays > 0 ? options->early_rays : most;
     size_t unsettled = batch->open_count;
+    for (size_t o = 0; options->method == VSH_SHADOW_EXACT && o < unsettled; ++o) {
+        turn_to_world(batch->task, &batch->open[o]);
+    }
     while (unsettled > 0) {
         target = target < most ? target : most;
         for (size_t o = 0; o < unsettled; ++o) {
@@ -219,8 +235,8 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
         vshi_frame(cone.direction, &p->u, &p->v);
         p->u = vshi_scale(p->u, tangent);
         p->v = vshi_scale(p->v, tangent);
-        /* the receiver's own plane hides a part of the light: nothing to prove */
-        if (proving && cone.horizon >= cone.sine &&
+        /* nothing to prove where the receiver's own plane hides a part of the light, or nearly does */
+        if (proving && cone.horizon >= cone.sine + GRAZING &&
             !vshi_chunk_add(&batch.chunk, task->field, &cone, (uint32_t)batch.open_count, stats)) {
             settle(task, i, 1.0f, 0.0f);
             ++stats->certified;

@@ -1,5 +1,6 @@
 /* Lights and open sky seen from points, by rays against the triangles themselves: no field, no estimate but
  * the number of rays. */
+#include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"
@@ -190,6 +191,7 @@ static vsh_result check(const tracing *task, size_t count, const char *call, vsh
 vsh_result vsh_trace_shadow(const vsh_triangles *triangles, size_t count, const double *positions,
                             const float *normals, double lift, const vsh_light *light, int32_t rays,
                             const vsh_run *run, float *visibility, vsh_error *error) {
+    VSHI_FLOATS;
     tracing task = {triangles, positions, normals, lift, light, 0.0, rays, NULL, visibility};
     vsh_result result = check(&task, count, "vsh_trace_shadow", error);
     if (result == VSH_OK) {
@@ -207,6 +209,7 @@ vsh_result vsh_trace_shadow(const vsh_triangles *triangles, size_t count, const 
 vsh_result vsh_trace_ao(const vsh_triangles *triangles, size_t count, const double *positions,
                         const float *normals, double lift, double distance, int32_t rays, const vsh_run *run,
                         float *ao, vsh_error *error) {
+    VSHI_FLOATS;
     tracing task = {triangles, positions, normals, lift, NULL, distance, rays, NULL, ao};
     const vsh_result result = check(&task, count, "vsh_trace_ao", error);
     if (result != VSH_OK) {

@@ -1,5 +1,6 @@
 #include "shim/embree.h"
 
+#include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "caster/mesh.h"
@@ -28,6 +29,11 @@ vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const
 
 void vsh_triangles_free(vsh_triangles *triangles) {
     (void)triangles;
+}
+
+uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
+    (void)triangles;
+    return 0;
 }
 
 void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
@@ -200,6 +206,7 @@ static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t
 
 vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
                                 vsh_triangles **triangles, vsh_error *error) {
+    VSHI_FLOATS;
     if (triangles != NULL) {
         *triangles = NULL;
     }
@@ -256,7 +263,25 @@ void vsh_triangles_free(vsh_triangles *triangles) {
     free(triangles);
 }
 
+uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
+    const long long bytes = atomic_load(&triangles->bytes);
+    return sizeof *triangles + (bytes > 0 ? (uint64_t)bytes : 0);
+}
+
+/* Eight at once are twice as fast as one at a time, 20 to 9.5 million a second on the cloister towards a sun
+ * of 3°; told that they go together, 23. Over the hemisphere that costs a quarter, 11 to 8.5. */
 enum { PACKET = 8 };
+static const double COHERENT = 0.9; /* cosine between a packet's rays, at least */
+
+static bool together(const vshi_segment_ray *rays, int count) {
+    for (int i = 1; i < count; ++i) {
+        const double *a = rays[0].direction, *b = rays[i].direction;
+        if (!(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] > COHERENT)) {
+            return false;
+        }
+    }
+    return true;
+}
 
 /* Lane `lane` of the packet, in the scene's own units; false where the ray ends before it comes near. */
 static bool aim(const vsh_triangles *triangles, const vshi_segment_ray *ray, struct RTCRay8 *packet,
@@ -302,6 +327,8 @@ void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_r
         for (int lane = 0; lane < lanes; ++lane) {
             valid[lane] = aim(triangles, &rays[begin + (size_t)lane], &packet, lane) ? -1 : 0;
         }
+        context.flags = together(rays + begin, lanes) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                                                      : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
         rtcOccluded8(valid, triangles->scene, &context, &packet);
         for (int lane = 0; lane < lanes; ++lane) {
             blocked[begin + (size_t)lane] = valid[lane] != 0 && packet.tfar[lane] < 0.0f;

@@ -1,7 +1,9 @@
-// The one guard at the border between C and C++: every exception becomes a vsh_error.
+// The one guard at the border between C and C++: every exception becomes a vsh_error, and the host's
+// floating-point environment is kept out.
 #pragma once
 
 #include "base/error.h"
+#include "base/floats.h"
 
 #include <exception>
 #include <new>
@@ -17,6 +19,7 @@ struct Failure {
 // Runs body() and returns its vsh_result; exceptions become VSH_ERROR_MEMORY or `code`, prefixed by `what`.
 template <typename Body>
 vsh_result guard(vsh_error *error, vsh_result code, const char *what, Body &&body) noexcept {
+    VSHI_FLOATS;
     try {
         return body();
     } catch (const Failure &failure) {

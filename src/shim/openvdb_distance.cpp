@@ -3,6 +3,7 @@
 // A field that changes by at most L per unit and is d at the middle of a box cannot come nearer to 0 than
 // |d| - L · (half the box's diagonal) anywhere in it. So boxes of voxels are halved only where the surface or
 // its band may be, from the whole bounds down to leaves of 8³, and the work follows the surface's area.
+#include "base/floats.h"
 #include "caster/sdf.h"
 #include "shim/openvdb_grid.h"
 #include "shim/openvdb_redistance.h"
@@ -320,6 +321,7 @@ vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_grid_opti
 
 vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options *options, const vsh_run *run,
                              vsh_grid **grid, vsh_error *error) {
+    VSHI_FLOATS;
     *grid = nullptr;
     const vsh_result result = vsh_sdf_check(sdf, error);
     if (result != VSH_OK) {

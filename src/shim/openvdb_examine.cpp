@@ -17,9 +17,9 @@ namespace {
 
 // Matrices made of 32-bit floats stray from a rotation by 1e-6; a strayed scale bends distances by as much.
 constexpr double UNEVEN = 1e-4;
-constexpr double SMALLEST_VOXEL = 1e-5, LARGEST_VOXEL = 1e12; // squares and volumes stay 32-bit floats
-constexpr double NARROWEST = 3.0 - 1e-3;                      // half width, voxels; background is a float
-constexpr double LEAST_NORM = 0.8, GREATEST_NORM = 1.2;       // of a distance's gradient, on a lattice
+constexpr double SMALLEST_READ = 1e-5;   // voxel size, world units; OpenVDB writes no smaller ones
+constexpr double NARROWEST = 3.0 - 1e-3; // half width, voxels; background is a float
+constexpr double LEAST_NORM = 0.8, GREATEST_NORM = 1.2; // of a distance's gradient, on a lattice
 constexpr float PLATEAU = 1.0f - 1e-4f; // of the background: an inactive value below was meant to differ
 constexpr float CLIFF = 1.5f;           // voxels from a voxel to the next, where a distance changes by 1
 constexpr double CLIFF_SHARE = 0.1;     // of the band's rim; conversions of meshes leave some
@@ -57,9 +57,9 @@ Finding examine_transform(const openvdb::math::Transform &transform) {
     }
     const double low = std::min({length[0], length[1], length[2]});
     const double high = std::max({length[0], length[1], length[2]});
-    if (!(low >= SMALLEST_VOXEL && high <= LARGEST_VOXEL)) {
+    if (!(low >= SMALLEST_READ && high <= LARGEST_VOXEL)) {
         return finding(Finding::BAD, "voxel size %g x %g x %g: expected %g to %g", length[0], length[1],
-                       length[2], SMALLEST_VOXEL, LARGEST_VOXEL);
+                       length[2], SMALLEST_READ, LARGEST_VOXEL);
     }
     if (high - low > UNEVEN * high) {
         return finding(Finding::BAD, "voxel size %g x %g x %g: it is scaled unevenly, expected cubes",

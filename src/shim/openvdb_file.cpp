@@ -392,7 +392,15 @@ struct Output {
     ~Output() { vshi_output_abandon(&file); } // nothing, once committed
 };
 
+// Below, OpenVDB takes a voxel's volume for 0 while it copies what it writes.
+constexpr double SMALLEST_WRITTEN = 1.45e-5;
+
 vsh_result write(const vsh_grid &grid, const char *path, const char *name, vsh_error *error) {
+    if (grid.info.voxel_size < SMALLEST_WRITTEN) {
+        return vshi_fail(error, VSH_ERROR_LIMIT,
+                         "%s: voxel size %g: OpenVDB writes %g and more; scale the scene", path,
+                         grid.info.voxel_size, SMALLEST_WRITTEN);
+    }
     Output output;
     const vsh_result result = vshi_output_begin(&output.file, path, error);
     if (result != VSH_OK) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <sstream>
 #include <tbb/info.h>
 #include <unistd.h>
 #include <vector>
@@ -16,10 +17,8 @@ namespace {
 // overflow.
 constexpr double LARGEST_INDEX = 268435456.0;
 
-// OpenVDB takes a voxel whose volume is below 3e-15 for none; above, distances must stay 32-bit floats whose
-// squares do too.
-constexpr double SMALLEST_VOXEL = 1.5e-5;
-constexpr double LARGEST_VOXEL = 1e12;
+// OpenVDB's maps cannot be constructed with a voxel whose volume is below this: they take it for singular.
+constexpr double SINGULAR = 3e-15;
 
 void fail_option(vsh_error *error, const char *name, double value, const char *expected) {
     throw Failure{
@@ -51,8 +50,23 @@ vsh_grid_options resolve(const vsh_grid_options *given, vsh_error *error) {
 } // namespace
 
 openvdb::math::Transform::Ptr Lattice::transform() const {
-    auto transform = openvdb::math::Transform::createLinearTransform(voxel);
-    transform->postTranslate(translation);
+    using Map = openvdb::math::UniformScaleTranslateMap;
+    if (voxel * voxel * voxel > 1.01 * SINGULAR) {
+        auto transform = openvdb::math::Transform::createLinearTransform(voxel);
+        transform->postTranslate(translation);
+        return transform;
+    }
+    // Read as from a file, where every size is taken: the map's name, then its members in their order.
+    openvdb::initialize();
+    const Vec3d size(voxel), inverse(1.0 / voxel);
+    std::stringstream text;
+    openvdb::io::setCurrentVersion(text);
+    openvdb::writeString(text, Map::mapType());
+    for (const Vec3d &member : {translation, size, size, inverse, inverse * inverse, 0.5 * inverse}) {
+        member.write(text);
+    }
+    const auto transform = std::make_shared<openvdb::math::Transform>();
+    transform->read(text);
     return transform;
 }
 
@@ -76,7 +90,7 @@ Lattice make_lattice(const vsh_grid_options *given, const Vec3d &low, const Vec3
     }
     if (!(lattice.voxel >= SMALLEST_VOXEL && lattice.voxel <= LARGEST_VOXEL)) {
         throw Failure{vshi_fail(error, VSH_ERROR_LIMIT,
-                                "voxel size %g: OpenVDB's transforms hold %g … %g; scale the scene",
+                                "voxel size %g: distances are kept for %g … %g; scale the scene",
                                 lattice.voxel, SMALLEST_VOXEL, LARGEST_VOXEL)};
     }
     for (int i = 0; i < 3; ++i) {

@@ -33,6 +33,10 @@ using Leaf = FloatTree::LeafNodeType;
 // above.
 constexpr double BYTES_PER_LEAF = 2400.0;
 
+// Voxel sizes, world units: distances are 32-bit floats, and their squares and volumes must be such too.
+constexpr double SMALLEST_VOXEL = 1e-12;
+constexpr double LARGEST_VOXEL = 1e12;
+
 // Where the voxels of a new grid lie: world = voxel · index + translation, the translation being a whole
 // number of voxels near the middle of the bounds, so that indices stay small far from the origin.
 struct Lattice {

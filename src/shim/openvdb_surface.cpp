@@ -53,10 +53,37 @@ using Adapter = openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openv
 // Bands are asked for a little wider, because the conversion's errors leave holes at their rims.
 constexpr double RIM = 1.0;
 
-FloatGrid::Ptr convert(const Surface &surface, const Lattice &lattice, double half_width, int flags,
+// The conversion constructs maps of its own, which takes voxels of some size (Lattice::transform()).
+constexpr double SMALLEST_CONVERTED = 1e-4;
+
+// The lattice scaled by a power of two to what can be converted: its distances are then as exact as its own.
+Lattice scaled_up(const Lattice &lattice, double &scale) {
+    for (scale = 1.0; lattice.voxel * scale < SMALLEST_CONVERTED;) {
+        scale *= 2.0;
+    }
+    Lattice larger = lattice;
+    larger.voxel *= scale;
+    larger.translation *= scale;
+    return larger;
+}
+
+void scale_values(FloatGrid &grid, float factor, Stage &stage) {
+    std::vector<Leaf *> leaves;
+    grid.tree().getNodes(leaves);
+    stage.loop(leaves.size(), 64, 0.0, 0.0, [&](size_t i) {
+        float *values = leaves[i]->buffer().data();
+        for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
+            values[n] *= factor;
+        }
+    });
+}
+
+FloatGrid::Ptr convert(const Surface &surface, const Lattice &given, double half_width, int flags,
                        double begin, double end, Stage &stage) {
     namespace tools = openvdb::tools;
     const double middle = begin + 0.6 * (end - begin);
+    double scale;
+    const Lattice lattice = scaled_up(given, scale);
     Interrupter interrupter(stage, begin, middle);
     const openvdb::Int32Grid::Ptr nearest = openvdb::Int32Grid::create(Int32(openvdb::util::INVALID_IDX));
     FloatGrid::Ptr grid;
@@ -71,7 +98,11 @@ FloatGrid::Ptr convert(const Surface &surface, const Lattice &lattice, double ha
     });
     stage.check();
     measure_again(*grid, *nearest, surface, lattice.voxel, middle, end, stage);
-    stage.run([&] { tools::changeLevelSetBackground(grid->tree(), float(half_width * lattice.voxel)); });
+    if (scale != 1.0) {
+        scale_values(*grid, float(1.0 / scale), stage);
+        grid->setTransform(given.transform());
+    }
+    stage.run([&] { tools::changeLevelSetBackground(grid->tree(), float(half_width * given.voxel)); });
     return grid;
 }
 

@@ -24,7 +24,7 @@ fits() {
 }
 
 @test "every command has its own help, which fits 100 columns" {
-    for command in bake voxelize info; do
+    for command in bake voxelize info trade; do
         shade "$command" --help
         done_well
         [[ $output == "Usage: vdbshade $command "* ]] || fail "no usage line"
@@ -94,7 +94,14 @@ fits() {
 --ao 0x10
 --ao-cones 0
 --ao-cones 257
---ao-method rays
+--ao-method ray
+--rays 0
+--rays 4097
+--sampler green
+--frame -1
+--early-rays 4097
+--max-error 0
+--max-error 2
 --sun 1,2
 --sun 0,0,0
 --sun 1,2,3,4
@@ -138,11 +145,21 @@ LIST
 @test "an unknown method is refused with the list of those there are" {
     write_box box.obj
     old_output out.exr
-    for method in magic rays adaptive; do
+    for method in magic ray; do
         shade bake box.obj -o out.exr "${SMALL[@]}" --method "$method"
-        refused 2 "$method" 'hard, classic, improved, smooth, cone'
+        refused 2 "$method" 'hard, classic, improved, smooth, cone, rays, adaptive, exact'
     done
     untouched out.exr
+}
+
+@test "what a method does not use is refused beside it" {
+    write_box box.obj
+    shade bake box.obj -o out.exr "${SMALL[@]}" --rays 8
+    refused 2 --rays cone 'rays, adaptive and exact'
+    shade bake box.obj -o out.exr "${SMALL[@]}" --error --method smooth
+    refused 2 --error smooth
+    shade bake box.obj -o out.exr "${SMALL[@]}" --max-error 0.1 --method rays
+    refused 2 --max-error rays 'adaptive and exact'
 }
 
 @test "a mesh needs something to bake" {

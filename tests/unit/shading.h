@@ -76,4 +76,20 @@ static inline void floor_texels(size_t size, double *positions, float *normals) 
     }
 }
 
+/* A room of half size 1 in a box whose walls are so thick. */
+static inline vsh_field *hollow_box(double voxel, double wall) {
+    vsh_sdf_node nodes[3] = {vsh_sdf_node_default(), vsh_sdf_node_default(), vsh_sdf_node_default()};
+    nodes[0].shape = nodes[1].shape = VSH_SDF_BOX;
+    nodes[0].size[0] = nodes[0].size[1] = nodes[0].size[2] = 1.0 + wall;
+    nodes[2].shape = VSH_SDF_SUBTRACTION;
+    nodes[2].left = 0;
+    nodes[2].right = 1;
+    const vsh_sdf sdf = {nodes, 3};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = voxel;
+    vsh_grid *grid = NULL;
+    assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, NULL), VSH_OK);
+    return field_of_grid(grid, 0.0);
+}
+
 #endif

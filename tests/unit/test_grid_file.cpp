@@ -18,7 +18,7 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <vdbshade/grid.h>
+#include <vdbshade/shade.h>
 #include <vector>
 
 #include "shim/openvdb.h"
@@ -350,6 +350,97 @@ void values_that_are_no_distances_are_made_so(void **) {
     }
 }
 
+// Shadows under the sphere, seen as the reader left it.
+std::vector<float> shadows_of(const vsh_grid *grid) {
+    vsh_field *field = nullptr;
+    assert_said(vsh_field_create(grid, nullptr, nullptr, &field, &failure), VSH_OK, {});
+    std::vector<double> positions;
+    for (int i = 0; i < 60; ++i) {
+        positions.insert(positions.end(), {0.03 * i, -2.5, 0.01});
+    }
+    vsh_light light = vsh_light_default();
+    light.angle = 0.2;
+    const vsh_points points = {positions.size() / 3, positions.data(), nullptr, nullptr};
+    std::vector<float> visible(points.count);
+    assert_said(vsh_shade_shadow(field, &points, &light, nullptr, nullptr, visible.data(), nullptr, nullptr,
+                                 &failure),
+                VSH_OK, {});
+    vsh_field_free(field);
+    return visible;
+}
+
+// Bands of other widths too: narrower ones than 3 voxels are made anew.
+void scaled_values_and_narrow_bands_cast_the_same_shadows(void **) {
+    vsh_grid *own = own_sphere();
+    const std::vector<float> expected = shadows_of(own);
+    vsh_grid_free(own);
+    const struct {
+        float factor, half_width;
+        size_t warnings;
+    } cases[] = {{1.0f, 3.0f, 0},   {2.0f, 3.0f, 1},  {0.5f, 3.0f, 1}, {0.5f, 10.0f, 1}, {2.0f, 10.0f, 1},
+                 {1.0f, 100.0f, 0}, {1.0f, 1.25f, 1}, {1.0f, 2.0f, 1}, {16.0f, 3.0f, 1}, {0.01f, 5.0f, 1}};
+    for (const auto &one : cases) {
+        const FloatGrid::Ptr grid = sphere(one.half_width);
+        for (auto value = grid->beginValueAll(); value; ++value) {
+            value.setValue(one.factor * *value);
+        }
+        openvdb::tools::changeBackground(grid->tree(), one.factor * grid->background());
+        const std::string path = save("scaled.vdb", {grid});
+        Warnings warnings;
+        vsh_grid *read = nullptr;
+        assert_said(vsh_grid_read(path.c_str(), nullptr, &warnings.run, &read, &failure), VSH_OK, {});
+        assert_int_equal(warnings.lines.size(), one.warnings);
+        const std::vector<float> visible = shadows_of(read);
+        float worst = 0.0f;
+        for (size_t i = 0; i < visible.size(); ++i) {
+            worst = std::max(worst, std::fabs(visible[i] - expected[i]));
+        }
+        print_message("values times %g, half width %g: shadows %.4f apart at most\n", double(one.factor),
+                      double(one.half_width), double(worst));
+        assert_true(worst < 0.03f);
+        vsh_grid_free(read);
+    }
+}
+
+void what_is_all_inside_is_refused(void **) {
+    const FloatGrid::Ptr grid = sphere(), inside = sphere();
+    for (auto value = grid->beginValueAll(); value; ++value) {
+        value.setValue(-std::fabs(*value));
+    }
+    refused("inside.vdb", grid, {"no value is above 0"});
+    for (auto value = inside->beginValueAll(); value; ++value) {
+        value.setValue(-std::fabs(*value));
+    }
+    inside->tree().root().setBackground(-inside->background(), false);
+    refused("inside.vdb", inside, {"outside must be positive"});
+}
+
+void voxels_too_small_for_openvdb_are_refused_and_the_least_come_back(void **) {
+    for (const double voxel : {1e-12, 1.44e-5, 1.46e-5, 1e12}) {
+        vsh_sdf_node node = vsh_sdf_node_default();
+        node.radius = RADIUS;
+        node.scale = voxel / VOXEL;
+        const vsh_sdf tree = {&node, 1};
+        vsh_grid_options options = vsh_grid_options_default();
+        options.voxel_size = voxel;
+        vsh_grid *grid = nullptr, *back = nullptr;
+        assert_said(vsh_grid_from_sdf(&tree, &options, nullptr, &grid, &failure), VSH_OK, {});
+        const std::string path = in_folder("tiny.vdb");
+        Warnings warnings;
+        const vsh_result result = vsh_grid_write(grid, path.c_str(), nullptr, &failure);
+        if (voxel < 1.45e-5) {
+            assert_said(result, VSH_ERROR_LIMIT, {path.c_str(), "1.45e-05"});
+        } else {
+            assert_said(result, VSH_OK, {});
+            assert_said(vsh_grid_read(path.c_str(), nullptr, &warnings.run, &back, &failure), VSH_OK, {});
+            assert_true(warnings.lines.empty());
+            assert_same(grid, back);
+        }
+        vsh_grid_free(back);
+        vsh_grid_free(grid);
+    }
+}
+
 void the_memory_limit_holds_for_reading(void **) {
     const std::string path = save("limit.vdb", {sphere()});
     vsh_run run = vsh_run_default();
@@ -401,6 +492,9 @@ int main() {
         cmocka_unit_test(turned_and_mirrored_grids_stay_where_they_are),
         cmocka_unit_test(doubles_are_read),
         cmocka_unit_test(values_that_are_no_distances_are_made_so),
+        cmocka_unit_test(scaled_values_and_narrow_bands_cast_the_same_shadows),
+        cmocka_unit_test(what_is_all_inside_is_refused),
+        cmocka_unit_test(voxels_too_small_for_openvdb_are_refused_and_the_least_come_back),
         cmocka_unit_test(the_memory_limit_holds_for_reading),
         cmocka_unit_test(a_full_disk_leaves_the_old_file),
     };

@@ -462,8 +462,52 @@ static void bad_options_limits_and_cancelling_are_reported(void **state) {
     vsh_field_free(field);
 }
 
+/* Bakes the floor under a wall by `method` into planes of values and errors. */
+static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_error, float *ao_error) {
+    vsh_field *field = floor_field(1);
+    const vsh_mesh mesh = floor_mesh();
+    vsh_texels *texels = make_texels(&mesh, 1, SIZE, 2, 4);
+    const vsh_light light = sun(1.0, 1.0, 0.0, 0.5);
+    vsh_shade_options shade = vsh_shade_options_default();
+    shade.method = method;
+    float *shadows[1] = {shadow}, *errors[1] = {shadow_error};
+    const vsh_lightmap lightmap = {
+        .shadow = shadow != NULL ? shadows : NULL, .shadow_error = errors, .ao_error = ao_error};
+    vsh_bake_stats stats = vsh_bake_stats_zero();
+    vsh_error error = {0};
+    if (vsh_bake_lightmap(field, texels, &light, 1, &shade, NULL, &lightmap, &stats, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    vsh_texels_free(texels);
+    vsh_field_free(field);
+    return stats;
+}
+
+static void errors_are_baked_where_the_method_knows_them(void **state) {
+    (void)state;
+    static float shadow[TEXELS], errors[TEXELS], alone[TEXELS], ao[TEXELS];
+    const vsh_bake_stats stats = bake_errors(VSH_SHADOW_ADAPTIVE, shadow, errors, ao);
+    size_t some = 0, none = 0;
+    for (size_t i = 0; i < TEXELS; ++i) {
+        /* a mean of standard errors, none of which passes what was asked for by more than its last round */
+        assert_true(errors[i] >= 0.0f && errors[i] <= 0.05f);
+        assert_true(ao[i] == 0.0f); /* cones know nothing of it */
+        some += errors[i] > 0.0f;
+        none += errors[i] == 0.0f;
+    }
+    assert_true(some > TEXELS / 50 && none > TEXELS / 2);
+    assert_true(stats.shade.refined > 0 && stats.shade.square_error > 0.0);
+    bake_errors(VSH_SHADOW_ADAPTIVE, NULL, alone, NULL); /* without the values */
+    assert_memory_equal(errors, alone, sizeof errors);
+    bake_errors(VSH_SHADOW_CONE, shadow, errors, NULL);
+    for (size_t i = 0; i < TEXELS; ++i) {
+        assert_true(errors[i] == 0.0f);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(errors_are_baked_where_the_method_knows_them),
         cmocka_unit_test(a_floor_under_open_sky_is_exactly_lit),
         cmocka_unit_test(texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side),
         cmocka_unit_test(irradiance_is_visibility_times_colour_times_cosine_times_ao),

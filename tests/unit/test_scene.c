@@ -133,6 +133,8 @@ static const char full_scene[] =
     "-1, 0],"
     "  \"inner_deg\": 30, \"outer_deg\": 180, \"falloff\": \"inverse_square\"}],"
     "\"ao\": {\"distance\": 2.5, \"method\": \"cones\", \"cones\": 32},"
+    "\"rays\": 77, \"sampler\": \"blue\", \"frame\": 5, \"early_rays\": 4, \"max_error\": 0.25, \"error\": "
+    "true,"
     "\"irradiance\": true, \"method\": \"smooth\", \"max_steps\": 99, \"start_offset\": 2.5,"
     "\"receivers\": ["
     " {\"mesh\": \"a.glb\", \"transform\": {\"translate\": [1, 0, 0]}, \"uv_set\": 1, \"size\": [128, 64],"
@@ -208,6 +210,12 @@ static void every_key_lands_in_its_field(void **state) {
     assert_int_equal(scene->shade.ao_method, VSH_AO_CONES);
     assert_int_equal(scene->shade.ao_cones, 32);
     assert_int_equal(scene->shade.method, VSH_SHADOW_SMOOTH);
+    assert_int_equal(scene->shade.rays, 77);
+    assert_int_equal(scene->shade.sampler, VSH_SAMPLER_BLUE);
+    assert_int_equal(scene->shade.frame, 5);
+    assert_int_equal(scene->shade.early_rays, 4);
+    assert_true(scene->shade.max_error == 0.25);
+    assert_true(scene->error);
     assert_int_equal(scene->shade.max_steps, 99);
     assert_true(scene->shade.start_offset == 2.5);
     assert_int_equal(scene->receiver_count, 2);
@@ -294,7 +302,7 @@ static const struct {
     {"{\n\t@\"castors\": []}", "castors: unknown key; did you mean \"casters\"?"},
     {CASTERS "@\"é\":1,\"xyzzy\":1}", "é: unknown key"},
     {CASTERS "\"method\":@\"ré\",\"xyzzy\":1}",
-     "method: \"ré\" is none of hard, classic, improved, smooth, cone"},
+     "method: \"ré\" is none of hard, classic, improved, smooth, cone, rays, adaptive, exact"},
     {CASTERS "\"method\":\"cone\",@\"xyzzy\":1}", "xyzzy: unknown key"},
     {"{\"receivers\":[],\"\\u0061o\":{\"distance\":1,@\"cone\":1}}",
      "ao.cone: unknown key; did you mean \"cones\"?"},
@@ -316,7 +324,17 @@ static const struct {
     {CASTERS "\"ao\":{\"distance\":1,\"cones\":@257}}", "ao.cones: 257 is out of range 1 … 256"},
     {CASTERS "\"ao\":{@\"cones\":8,\"method\":\"taps\",\"distance\":1}}",
      "ao.cones: is no key of ao by taps"},
-    {CASTERS "\"ao\":{\"method\":@\"rays\"}}", "ao.method: \"rays\" is none of taps, cones"},
+    {CASTERS "\"ao\":{\"method\":@\"ray\"}}",
+     "ao.method: \"ray\" is none of taps, cones, rays, adaptive, exact"},
+    {CASTERS "\"ao\":{@\"cones\":8,\"method\":\"rays\",\"distance\":1}}",
+     "ao.cones: is no key of ao by rays"},
+    {CASTERS "\"rays\":@0}", "rays: 0 is out of range 1 … 4096"},
+    {CASTERS "\"rays\":@4097}", "rays: 4097 is out of range 1 … 4096"},
+    {CASTERS "\"sampler\":@\"green\"}", "sampler: \"green\" is none of sobol, white, blue"},
+    {CASTERS "\"frame\":@-1}", "frame: -1 is out of range 0 … 2.14748365e+09"},
+    {CASTERS "\"early_rays\":@4097}", "early_rays: 4097 is out of range 0 … 4096"},
+    {CASTERS "\"max_error\":@0}", "max_error: 0 is out of range 0.0001 … 1"},
+    {CASTERS "\"error\":@1}", "error: expected true or false, found a number"},
     /* casters */
     {"{\"casters\":[{\"mesh\":\"a\"},@7]}", "casters[1]: expected an object, found a number"},
     {"{\"casters\":[@{}]}", "casters[0]: key \"mesh\", \"sdf\" or \"vdb\" is missing"},

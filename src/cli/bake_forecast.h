@@ -1,0 +1,12 @@
+/* What a bake will take, found out by a small one. */
+#ifndef CLI_BAKE_FORECAST_H
+#define CLI_BAKE_FORECAST_H
+
+#include <vdbshade/vdbshade.h>
+
+/* Prints texels, voxels, memory and time of baking `scene` to standard output. Levels of few voxels and a
+ * part of the texels are really made, by the same methods, and what they took is scaled up. CLI_OK or an exit
+ * code, having said why. */
+int cli_bake_forecast(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run);
+
+#endif

@@ -1,0 +1,352 @@
+/* vdbshade trade: speed against accuracy, measured on the user's own scene. */
+#include "trade.h"
+#include "clock.h"
+#include "meshes.h"
+#include "message.h"
+#include "paths.h"
+#include "progress.h"
+#include "receiver.h"
+#include "signals.h"
+#include "temporary.h"
+#include "trial.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    KEY_CSV = 0x2000,
+    KEY_SIZE,
+    KEY_RESOLUTIONS,
+    KEY_TRUTH_RAYS,
+    KEY_BUDGET,
+    KEY_SUN,
+    KEY_SUN_ANGLE,
+    KEY_AO,
+    KEY_UV_SET
+};
+
+static const cli_option options[] = {
+    {0, NULL, NULL, "Output"},
+    {'o', "output", "OUT.html", "page to write: plot, table and pictures in one file"},
+    {KEY_CSV, "csv", "FILE.csv", "write the table as CSV too"},
+    {0, NULL, NULL, "What is measured"},
+    {KEY_SIZE, "size", "W[xH]", "texels of the lightmap, 1 to 4096 (256)"},
+    {KEY_RESOLUTIONS, "resolutions", "N,…", "voxels along the longest side, up to 16 of them\n(64,128,256)"},
+    {KEY_TRUTH_RAYS, "truth-rays", "N", "rays a texel of the truth, 16 to 65536 (1024)"},
+    {KEY_BUDGET, "budget", "SECONDS", "time to spend: runs that do not fit are left out,\nand counted (120)"},
+    {0, NULL, NULL, "Light and occlusion, where INPUT is a mesh"},
+    {KEY_SUN, "sun", "X,Y,Z", "direction towards the sun"},
+    {KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},
+    {KEY_AO, "ao", "DISTANCE", "ambient occlusion within a distance, scene units"},
+    {KEY_UV_SET, "uv-set", "N", "UV set of the lightmap, from 0"},
+    CLI_COMMON_OPTIONS,
+};
+
+static int trade_main(int argc, char **argv);
+
+const cli_command cli_trade = {
+    "trade",
+    "INPUT -o OUT.html [options]",
+    "Bakes a mesh or a scene (.json) by every method, at several voxel sizes and settings, and compares\n"
+    "with the truth: rays against the triangles where all casters are meshes, else against a finer field.\n"
+    "The page shows error against time, what is fastest for a given error, and what it looks like. Of a\n"
+    "scene's receivers the first is taken. Numbers in brackets are what holds without the option.",
+    options,
+    sizeof options / sizeof options[0],
+    trade_main};
+
+/* --- options */
+
+static int take_resolutions(trade_settings *s, const char *name, const char *value) {
+    s->resolution_count = 0;
+    for (const char *at = value; s->resolution_count < TRADE_MAX_RESOLUTIONS; ++at) {
+        char *end = NULL;
+        const long number = *at >= '0' && *at <= '9' ? strtol(at, &end, 10) : 0;
+        if (number < 2 || number > 65536 || (*end != ',' && *end != '\0')) {
+            break;
+        }
+        s->resolutions[s->resolution_count++] = (int32_t)number;
+        at = end;
+        if (*at == '\0') {
+            return CLI_OK;
+        }
+    }
+    return cli_usage("%s '%s': expected up to %d whole numbers from 2 to 65536, with commas between them",
+                     name, value, TRADE_MAX_RESOLUTIONS);
+}
+
+static int take_size(trade_settings *s, const char *name, const char *value) {
+    const int code = cli_take_size(name, value, &s->bake.width, &s->bake.height);
+    if (code == CLI_OK && (s->bake.width > 4096 || s->bake.height > 4096)) {
+        return cli_usage("%s '%s': expected at most 4096 texels", name, value);
+    }
+    return code;
+}
+
+static int take(void *settings, int key, const char *name, const char *value) {
+    trade_settings *s = settings;
+    switch (key) {
+    case 'o':
+        s->report = value;
+        return CLI_OK;
+    case KEY_CSV:
+        s->csv = value;
+        return CLI_OK;
+    case KEY_SIZE:
+        return take_size(s, name, value);
+    case KEY_RESOLUTIONS:
+        return take_resolutions(s, name, value);
+    case KEY_TRUTH_RAYS:
+        return cli_take_integer(name, value, 16, 65536, &s->truth_rays);
+    case KEY_BUDGET:
+        return cli_take_positive(name, value, &s->budget);
+    case KEY_SUN:
+        s->bake.has_sun = true;
+        return cli_take_vector(name, value, s->bake.sun);
+    case KEY_SUN_ANGLE:
+        s->bake.has_sun_angle = true;
+        return cli_take_number(name, value, 0.0, 179.0, &s->bake.sun_angle_deg);
+    case KEY_AO:
+        s->bake.has_ao = true;
+        return cli_take_positive(name, value, &s->bake.ao_distance);
+    case KEY_UV_SET:
+        s->bake.has_uv_set = true;
+        return cli_take_integer(name, value, 0, VSH_MAX_UV_SETS - 1, &s->bake.uv_set);
+    default:
+        break;
+    }
+    bool taken;
+    return cli_common_take(&s->bake.common, key, name, value, &taken);
+}
+
+/* --- what the measurements share */
+
+size_t trade_texels(const trade_work *work) {
+    return (size_t)work->info.width * (size_t)work->info.height;
+}
+
+/* With one thread it is the processor's time, so that other work on the machine does not show. */
+double trade_now(const trade_work *work) {
+    if (work->run.threads != 1) {
+        return cli_seconds();
+    }
+    struct timespec now = {0, 0};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+double trade_left(const trade_work *work) {
+    return work->settings->budget - (cli_seconds() - work->began);
+}
+
+int trade_out_of_memory(const char *what) {
+    cli_say("%s: the system refused memory", what);
+    return CLI_LIMIT;
+}
+
+trade_run *trade_add(trade_work *work, trade_subject *subject, const trade_run *run) {
+    trade_run *more = realloc(subject->runs, (subject->run_count + 1) * sizeof *more);
+    if (more == NULL) {
+        return NULL;
+    }
+    subject->runs = more;
+    more[subject->run_count] = *run;
+    if (!work->settings->bake.common.quiet) {
+        char line[256];
+        snprintf(line, sizeof line, "%s%s: RMSE %.4f, %.3f s", run->embree ? "Embree, " : "", run->options,
+                 run->metrics.rmse, run->bake_s);
+        cli_progress_line(line);
+    }
+    return &more[subject->run_count++];
+}
+
+/* --- the work */
+
+static int load(trade_work *work) {
+    vsh_error error;
+    if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    int code = cli_warn_meshes(work->scene, work->assets, &work->run);
+    if (code == CLI_OK) {
+        const cli_receiver_job job = {work->scene, work->assets, &work->run, 0};
+        code = cli_receiver_texels(&job, true, &work->texels);
+    }
+    if (code != CLI_OK) {
+        return code;
+    }
+    vsh_texels_get_info(work->texels, &work->info);
+    bool meshes = true;
+    for (size_t i = 0; i < work->scene->caster_count; ++i) {
+        meshes = meshes && work->scene->casters[i].type == VSH_CASTER_MESH;
+    }
+    if (meshes && vsh_triangles_available()) {
+        const double start = trade_now(work);
+        if (vsh_scene_triangles(work->scene, work->assets, &work->run, &work->triangles, &error) != VSH_OK) {
+            return cli_fail(&error);
+        }
+        work->triangles_s = trade_now(work) - start;
+    }
+    return CLI_OK;
+}
+
+static int by_size(const void *a, const void *b) {
+    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
+    return (x > y) - (x < y);
+}
+
+static void mark_fronts(trade_work *work) {
+    for (size_t s = 0; s < work->subject_count; ++s) {
+        trade_subject *subject = &work->subjects[s];
+        for (size_t i = 0; i < subject->run_count; ++i) {
+            trade_run *run = &subject->runs[i];
+            run->front = !run->embree;
+            for (size_t k = 0; k < subject->run_count && run->front; ++k) {
+                const trade_run *other = &subject->runs[k];
+                run->front = other->embree || k == i ||
+                             !(other->bake_s <= run->bake_s && other->metrics.rmse <= run->metrics.rmse);
+            }
+        }
+    }
+}
+
+/* The finest field comes first, as it says which texels are valid. */
+static int measure(trade_work *work) {
+    const trade_settings *s = work->settings;
+    int32_t resolutions[TRADE_MAX_RESOLUTIONS];
+    memcpy(resolutions, s->resolutions, sizeof resolutions);
+    qsort(resolutions, s->resolution_count, sizeof resolutions[0], by_size);
+    int code = CLI_OK;
+    for (size_t i = 0; i < s->resolution_count && code == CLI_OK; ++i) {
+        trade_field *next = &work->fields[work->field_count];
+        next->resolution = resolutions[s->resolution_count - 1 - i];
+        code = trade_make_field(work, next->resolution, &next->field, &next->build_s);
+        work->field_count += code == CLI_OK;
+    }
+    code = code == CLI_OK ? trade_take_mask(work, work->fields[0].field) : code;
+    code = code == CLI_OK ? trade_take_truth(work, work->fields[0].resolution) : code;
+    code = code == CLI_OK ? trade_measure_embree(work) : code;
+    code = code == CLI_OK ? trade_measure(work) : code;
+    mark_fronts(work);
+    return code;
+}
+
+static void free_work(trade_work *work) {
+    for (size_t s = 0; s < work->subject_count; ++s) {
+        trade_subject *subject = &work->subjects[s];
+        for (size_t i = 0; i < subject->run_count; ++i) {
+            free(subject->runs[i].values);
+        }
+        free(subject->runs);
+        free(subject->truth);
+    }
+    for (size_t i = 0; i < work->field_count; ++i) {
+        vsh_field_free(work->fields[i].field);
+    }
+    free(work->mask);
+    free(work->positions);
+    free(work->normals);
+    free(work->texel);
+    vsh_triangles_free(work->triangles);
+    vsh_texels_free(work->texels);
+    vsh_assets_free(work->assets);
+}
+
+static int trade(const trade_settings *settings, vsh_scene *scene) {
+    trade_work work = {.settings = settings,
+                       .scene = scene,
+                       .run = cli_common_run(&settings->bake.common),
+                       .began = cli_seconds()};
+    if (scene->light_count > 0) {
+        work.subjects[work.subject_count++] = (trade_subject){.name = "shadow", .planes = scene->light_count};
+    }
+    if (scene->ao) {
+        work.subjects[work.subject_count++] = (trade_subject){.name = "ao", .ao = true, .planes = 1};
+    }
+    int code = load(&work);
+    code = code == CLI_OK ? measure(&work) : code;
+    code = code == CLI_OK ? trade_write_csv(&work) : code;
+    code = code == CLI_OK ? trade_write_report(&work) : code;
+    if (code == CLI_OK) {
+        cli_signals_end();
+        if (!settings->bake.common.quiet) {
+            cli_say("%s: %zu runs in %.1f s, %zu left out", settings->report,
+                    work.subjects[0].run_count + work.subjects[1].run_count, cli_seconds() - work.began,
+                    work.skipped);
+        }
+    }
+    free_work(&work);
+    return code;
+}
+
+/* --- beforehand */
+
+static int check_output(const trade_settings *s, const vsh_scene *scene, const char *path) {
+    if (cli_same_file(path, s->bake.input)) {
+        return cli_usage("%s: the output is the input", path);
+    }
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        if (scene->casters[i].path != NULL && cli_same_file(path, scene->casters[i].path)) {
+            return cli_usage("%s: the output is also a caster's file", path);
+        }
+    }
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        if (cli_same_file(path, scene->receivers[i].path)) {
+            return cli_usage("%s: the output is also a receiver's file", path);
+        }
+    }
+    return cli_temporary_check(path);
+}
+
+/* What can be refused before anything is read, and before there are threads. */
+static int check_files(const trade_settings *s, const vsh_scene *scene) {
+    int code = check_output(s, scene, s->report);
+    if (code == CLI_OK && s->csv != NULL) {
+        code = cli_same_file(s->csv, s->report) ? cli_usage("%s: both the output and the --csv file", s->csv)
+                                                : check_output(s, scene, s->csv);
+    }
+    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        if (caster->type == VSH_CASTER_VDB) {
+            code = cli_trial_read(caster->path, caster->grid, s->bake.common.memory_limit);
+        }
+    }
+    return code;
+}
+
+static int trade_main(int argc, char **argv) {
+    trade_settings s;
+    memset(&s, 0, sizeof s);
+    s.bake.common = cli_common_default();
+    s.bake.grid.options = vsh_grid_options_default();
+    s.bake.has_size = s.bake.has_supersample = s.bake.has_padding = true;
+    s.bake.width = s.bake.height = 256;
+    s.bake.supersample = 1; /* a sample a texel: the truth is one of the sample's too */
+    memcpy(s.resolutions, (const int32_t[]){64, 128, 256}, 3 * sizeof s.resolutions[0]);
+    s.resolution_count = 3;
+    s.truth_rays = 1024;
+    s.budget = 120.0;
+    bool help;
+    int code = cli_parse(&cli_trade, argc, argv, take, &s, "INPUT", &s.bake.input, &help);
+    if (code != CLI_OK || help) {
+        return code;
+    }
+    if (s.report == NULL || !cli_has_ending(s.report, "html")) {
+        return cli_usage("%s: give -o OUT.html", s.report != NULL ? s.report : s.bake.input);
+    }
+    /* a mesh needs an output to be a scene; a scene's own are not written */
+    s.bake.output = cli_has_ending(s.bake.input, "json") ? NULL : s.report;
+    cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
+    cli_bake_scene made;
+    code = cli_bake_scene_make(&s.bake, &made);
+    code = code == CLI_OK ? check_files(&s, &made.scene) : code;
+    if (code == CLI_OK) {
+        cli_signals_watch();
+        code = trade(&s, &made.scene);
+    }
+    cli_bake_scene_free(&made);
+    cli_progress_end();
+    return code;
+}

@@ -1,0 +1,51 @@
+/* The triangles of a scene's casters. */
+#include "base/memory.h"
+
+#include <stdlib.h>
+#include <vdbshade/scene.h>
+
+static const char *const type_names[] = {"a mesh", "an sdf", "a vdb"};
+
+vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                               vsh_triangles **triangles, vsh_error *error) {
+    if (triangles != NULL) {
+        *triangles = NULL;
+    }
+    if (scene == NULL || assets == NULL || triangles == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_scene_triangles: %s is NULL",
+                         scene == NULL    ? "scene"
+                         : assets == NULL ? "assets"
+                                          : "triangles");
+    }
+    size_t count = 0;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        if (caster->type != VSH_CASTER_MESH) {
+            const bool known = caster->type > VSH_CASTER_MESH && caster->type <= VSH_CASTER_VDB;
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "casters[%zu] is %s: exact methods trace triangles, and need casters that are "
+                             "all meshes",
+                             i, known ? type_names[caster->type] : "of no type");
+        }
+        size_t own;
+        vsh_assets_caster(assets, i, &own);
+        count += own;
+    }
+    void *memory;
+    vsh_result result = vshi_allocate(&memory, count, sizeof(vsh_mesh), "triangles", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_mesh *meshes = memory;
+    size_t at = 0;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        size_t own;
+        const vsh_mesh *of_caster = vsh_assets_caster(assets, i, &own);
+        for (size_t m = 0; m < own; ++m) {
+            meshes[at++] = of_caster[m];
+        }
+    }
+    result = vsh_triangles_create(meshes, count, run, triangles, error);
+    free(memory);
+    return result;
+}

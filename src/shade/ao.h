@@ -1,0 +1,65 @@
+/* What the methods of ambient occlusion share: a call's task, and the frame of a point. */
+#ifndef VSHI_AO_H
+#define VSHI_AO_H
+
+#include "shade/sampler.h"
+#include "shade/shade.h"
+
+enum { VSHI_AO_GRAIN = 64 }; /* points a piece, with cones and rays */
+
+enum { VSHI_AO_MAX_CONES = 256, VSHI_AO_NEIGHBOURS = 6, VSHI_AO_TABLE_EDGE = 9 };
+
+typedef struct vshi_ao_cones {
+    int32_t count;
+    int32_t neighbours;                     /* of each, fewer where there are few cones */
+    vshi_vec directions[VSHI_AO_MAX_CONES]; /* around +z, cosine-weighted */
+    double sines[VSHI_AO_MAX_CONES];        /* of the cones' half angles */
+    uint8_t nearest[VSHI_AO_MAX_CONES][VSHI_AO_NEIGHBOURS];
+} vshi_ao_cones;
+
+typedef struct vshi_ao_task {
+    const vsh_field *field;
+    const vsh_points *points;
+    const vsh_shade_options *options;
+    vshi_march_fn *march;
+    const vshi_sampler *sampler;
+    const vshi_ao_cones *cones;
+    float *ao;
+    float *deviation; /* may be NULL */
+    double distance;  /* finest voxels */
+} vshi_ao_task;
+
+/* Where a point's cones and rays begin, and the axes they are given in: the third is the normal. */
+typedef struct vshi_ao_frame {
+    vshi_vec origin;
+    vshi_vec axes[3];
+} vshi_ao_frame;
+
+/* The frame of point i in field space; false where the point is invalid: it is then NaN and counted. */
+bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, vsh_shade_stats *stats);
+
+/* A right-handed frame around a unit vector (Duff and others, "Building an orthonormal basis, revisited",
+ * 2017). */
+void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]);
+
+/* A direction of the frame's axes in their space. */
+static inline vshi_vec vshi_ao_direction(const vshi_vec axes[3], vshi_vec d) {
+    return vshi_add(vshi_add(vshi_scale(axes[0], d.x), vshi_scale(axes[1], d.y)), vshi_scale(axes[2], d.z));
+}
+
+/* The methods: each shades points begin … end - 1. */
+vshi_shade_fn vshi_ao_taps;
+vshi_shade_fn vshi_ao_by_cones;
+vshi_shade_fn vshi_ao_by_rays;
+
+void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count);
+
+/* What is known of cone c of a point whose cones have the closenesses `close`: its own over its sine, and the
+ * mean of its neighbours' where they are free, both clamped, in [-1, 1] and [0, 1]. */
+void vshi_ao_cone_evidence(const vshi_ao_cones *cones, const float *close, int32_t c, double evidence[2]);
+
+/* Where evidence between -1 and 1 falls in the table: its cell's first entry, row by own closeness, and how
+ * far in the cell. */
+int32_t vshi_ao_table_cell(const double evidence[2], double part[2]);
+
+#endif

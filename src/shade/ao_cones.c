@@ -1,0 +1,154 @@
+/* Ambient occlusion by cones over the hemisphere, each an equal share of the cosine-weighted sky.
+ *
+ * What a cone sees is taken from how near it comes to the casters, and from how free the cones beside it are.
+ * Its own closeness alone cannot tell: what is thinner than the cone is wide reads as an edge through it
+ * wherever it is, so closed rooms of thin walls were half lit. Beside an edge some cones are free, within a
+ * room none. The table holds the mean of what cones of such evidence saw, by analytic rays, on scenes
+ * of boxes, slats, spheres and rooms: bench/fit_ao.c makes and prints it. */
+#include "shade/ao.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Half angles over those of equal shares of the solid angle. */
+static const double WIDTH = 0.7;
+
+static const float TABLE[VSHI_AO_TABLE_EDGE][VSHI_AO_TABLE_EDGE] = {
+#include "shade/ao_table.inc"
+};
+
+static void find_neighbours(vshi_ao_cones *cones) {
+    const int32_t others = cones->count - 1;
+    cones->neighbours = others < VSHI_AO_NEIGHBOURS ? others : VSHI_AO_NEIGHBOURS;
+    for (int32_t i = 0; i < cones->count; ++i) {
+        double cosines[VSHI_AO_NEIGHBOURS];
+        int32_t found = 0;
+        for (int32_t j = 0; j < cones->count; ++j) {
+            const double cosine = vshi_dot(cones->directions[i], cones->directions[j]);
+            if (j == i || (found == cones->neighbours && (found == 0 || cosine <= cosines[found - 1]))) {
+                continue;
+            }
+            int32_t at = found < cones->neighbours ? found++ : found - 1;
+            for (; at > 0 && cosines[at - 1] < cosine; --at) {
+                cosines[at] = cosines[at - 1];
+                cones->nearest[i][at] = cones->nearest[i][at - 1];
+            }
+            cosines[at] = cosine;
+            cones->nearest[i][at] = (uint8_t)j;
+        }
+    }
+}
+
+/* Directions of equal weight: a golden-angle spiral over the disc, lifted to the hemisphere (Malley's
+ * method). No cone dips below the receiver's plane, which is the receiver's own and hides nothing of what is
+ * counted. */
+void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count) {
+    static const double GOLDEN_ANGLE = 2.39996322972865332, WIDEST = 0.95;
+    cones->count = count;
+    const double cosine = 1.0 - 1.0 / count;
+    const double share = fmin(WIDTH * sqrt(1.0 - cosine * cosine), WIDEST);
+    for (int32_t i = 0; i < count; ++i) {
+        const double square = (i + 0.5) / count; /* of the disc's radius there */
+        const double radius = sqrt(square), height = sqrt(1.0 - square);
+        cones->directions[i] =
+            (vshi_vec){radius * cos(i * GOLDEN_ANGLE), radius * sin(i * GOLDEN_ANGLE), height};
+        cones->sines[i] = share < height ? share : height;
+    }
+    find_neighbours(cones);
+}
+
+void vshi_ao_cone_evidence(const vshi_ao_cones *cones, const float *close, int32_t c, double evidence[2]) {
+    const double own = (double)close[c] / cones->sines[c];
+    evidence[0] = own < -1.0 ? -1.0 : own > 1.0 ? 1.0 : own;
+    double sum = 0.0;
+    for (int32_t k = 0; k < cones->neighbours; ++k) {
+        const int32_t n = cones->nearest[c][k];
+        const double x = (double)close[n] / cones->sines[n];
+        sum += x < 0.0 ? 0.0 : x > 1.0 ? 1.0 : x;
+    }
+    evidence[1] = cones->neighbours > 0 ? sum / cones->neighbours : fmax(evidence[0], 0.0);
+}
+
+int32_t vshi_ao_table_cell(const double evidence[2], double part[2]) {
+    const int32_t last = VSHI_AO_TABLE_EDGE - 2;
+    const double row = 0.5 * (evidence[0] + 1.0) * (last + 1), column = evidence[1] * (last + 1);
+    const int32_t r = (int32_t)row < last ? (int32_t)row : last;
+    const int32_t c = (int32_t)column < last ? (int32_t)column : last;
+    part[0] = row - r;
+    part[1] = column - c;
+    return r * VSHI_AO_TABLE_EDGE + c;
+}
+
+/* What all cones of a point see together. Free and hidden cones are so whatever is beside them. */
+static double open_share(const vshi_ao_cones *cones, const float *close) {
+    double open = 0.0;
+    for (int32_t c = 0; c < cones->count; ++c) {
+        const double closeness = (double)close[c], sine = (double)(float)cones->sines[c];
+        if (closeness >= sine) {
+            open += 1.0;
+        } else if (closeness > -sine) {
+            double evidence[2], part[2];
+            vshi_ao_cone_evidence(cones, close, c, evidence);
+            const float *t = &TABLE[0][0] + vshi_ao_table_cell(evidence, part);
+            const float *u = t + VSHI_AO_TABLE_EDGE;
+            const double near = (double)t[0] + ((double)t[1] - (double)t[0]) * part[1];
+            const double far = (double)u[0] + ((double)u[1] - (double)u[0]) * part[1];
+            open += near + (far - near) * part[0];
+        }
+    }
+    return open / cones->count;
+}
+
+static void flush(const vshi_ao_task *task, vshi_chunk *chunk, float *close, vsh_shade_stats *stats) {
+    vshi_march_stats work = {0, 0};
+    task->march(task->field, &chunk->rays, VSHI_MARCH_PLAIN, task->options->max_steps, &work);
+    stats->samples += work.samples;
+    stats->unfinished += work.unfinished;
+    for (size_t r = 0; r < chunk->rays.count; ++r) {
+        const float closeness = chunk->rays.close[r], sine = chunk->rays.sine[r];
+        close[chunk->owner[r]] = closeness;
+        stats->certified += closeness >= sine || closeness <= -sine;
+    }
+    vshi_chunk_clear(chunk, false);
+}
+
+void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
+    const vshi_ao_task *task = user;
+    const vshi_ao_cones *cones = task->cones;
+    const size_t count = (size_t)cones->count;
+    vshi_chunk chunk;
+    float close[VSHI_AO_GRAIN * VSHI_AO_MAX_CONES];
+    bool valid[VSHI_AO_GRAIN];
+    vshi_chunk_clear(&chunk, false);
+    for (size_t i = begin; i < end; ++i) {
+        vshi_ao_frame frame;
+        valid[i - begin] = vshi_ao_frame_at(task, i, &frame, stats);
+        if (!valid[i - begin]) {
+            continue;
+        }
+        if (chunk.rays.count + count > VSHI_CHUNK) {
+            flush(task, &chunk, close, stats);
+        }
+        for (size_t c = 0; c < count; ++c) {
+            const vshi_cone cone = {
+                .origin = frame.origin,
+                .direction = vshi_ao_direction(frame.axes, cones->directions[c]),
+                .end = task->distance,
+                .sine = cones->sines[c],
+                .close = cones->sines[c],
+                .stop = -cones->sines[c],
+            };
+            const size_t owner = (i - begin) * count + c;
+            if (!vshi_chunk_add(&chunk, task->field, &cone, (uint32_t)owner, stats)) {
+                close[owner] = (float)cone.close;
+                ++stats->certified;
+            }
+        }
+    }
+    flush(task, &chunk, close, stats);
+    for (size_t i = begin; i < end; ++i) {
+        if (valid[i - begin]) {
+            task->ao[i] = (float)open_share(cones, close + (i - begin) * count);
+        }
+    }
+}

@@ -1,0 +1,171 @@
+/* Ambient occlusion with rays against triangles: boxes, whose truth is analytic. Without Embree there is
+ * nothing to test. */
+#include "shading.h"
+
+#include <vdbshade/grid.h>
+#include <vdbshade/trace.h>
+
+enum { SOLIDS = 5, TEXELS = 1000 };
+
+static const float UP[3] = {0.0f, 1.0f, 0.0f};
+static const double DISTANCE = 1.0;
+
+/* A floor, a wall, a slat an eighth of a voxel thick, a post and a box. */
+static const truth_solid SCENE[SOLIDS] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {3.0, 0.5, 3.0}, 0.0, 0.0},
+                                          {TRUTH_BOX, {-1.5, 0.8, 0.0}, {0.2, 0.8, 2.0}, 0.0, 0.0},
+                                          {TRUTH_BOX, {0.0, 0.6, 0.0}, {0.5, 0.0025, 2.0}, 0.0, 0.0},
+                                          {TRUTH_BOX, {0.5, 1.0, 1.0}, {0.04, 1.0, 0.04}, 0.0, 0.0},
+                                          {TRUTH_BOX, {1.4, 0.3, -0.6}, {0.3, 0.3, 0.5}, 0.0, 0.0}};
+
+typedef struct box_mesh {
+    float positions[24];
+    uint32_t indices[36];
+} box_mesh;
+
+static vsh_mesh mesh_of(const truth_solid *box, box_mesh *mesh) {
+    static const uint32_t indices[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                         2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    memcpy(mesh->indices, indices, sizeof indices);
+    for (int corner = 0; corner < 8; ++corner) {
+        for (int axis = 0; axis < 3; ++axis) {
+            const double side = (corner >> axis & 1) != 0 ? box->half[axis] : -box->half[axis];
+            mesh->positions[3 * corner + axis] = (float)(box->center[axis] + side);
+        }
+    }
+    return (vsh_mesh){
+        .positions = mesh->positions, .indices = mesh->indices, .vertex_count = 8, .triangle_count = 12};
+}
+
+typedef struct traced_scene {
+    vsh_field *field;
+    vsh_triangles *triangles;
+} traced_scene;
+
+static traced_scene scene_of(size_t solids) {
+    static box_mesh boxes[SOLIDS];
+    vsh_mesh meshes[SOLIDS];
+    for (size_t i = 0; i < solids; ++i) {
+        meshes[i] = mesh_of(&SCENE[i], &boxes[i]);
+    }
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = 0.04;
+    vsh_grid *grid = NULL;
+    vsh_error error = {VSH_OK, ""};
+    traced_scene scene = {NULL, NULL};
+    if (vsh_grid_from_meshes(meshes, solids, &options, NULL, &grid, &error) != VSH_OK ||
+        vsh_triangles_create(meshes, solids, NULL, &scene.triangles, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    scene.field = field_of_grid(grid, 0.0);
+    return scene;
+}
+
+static void free_scene(traced_scene *scene) {
+    vsh_triangles_free(scene->triangles);
+    vsh_field_free(scene->field);
+}
+
+static vsh_shade_options options_of(const traced_scene *scene, double max_error) {
+    vsh_shade_options options = vsh_shade_options_default();
+    options.ao_method = VSH_AO_EXACT;
+    options.ao_distance = DISTANCE;
+    options.rays = 4096;
+    options.max_error = max_error;
+    options.triangles = scene->triangles;
+    return options;
+}
+
+/* Places on the floor, whatever stands near: only not under it. */
+static void place(size_t solids, double *positions, float *normals) {
+    uint64_t counter = 4;
+    for (size_t i = 0; i < TEXELS;) {
+        const double at[3] = {between(&counter, -2.5, 2.5), 0.0, between(&counter, -2.5, 2.5)};
+        const double above[3] = {at[0], 1e-3, at[2]};
+        if (truth_distance((truth_scene){SCENE, solids}, above) > 0.9e-3) {
+            memcpy(positions + 3 * i, at, sizeof at);
+            memcpy(normals + 3 * i++, UP, sizeof UP);
+        }
+    }
+}
+
+static void an_open_plate_is_exactly_1(void **state) {
+    (void)state;
+    traced_scene scene = scene_of(1);
+    static double positions[3 * TEXELS];
+    static float normals[3 * TEXELS], ao[TEXELS];
+    place(1, positions, normals);
+    const vsh_points points = {TEXELS, positions, normals, NULL};
+    const vsh_shade_options options = options_of(&scene, 0.05);
+    assert_int_equal(vsh_shade_ao(scene.field, &points, &options, NULL, ao, NULL, NULL, NULL), VSH_OK);
+    for (size_t i = 0; i < TEXELS; ++i) {
+        assert_true(ao[i] == 1.0f);
+    }
+    free_scene(&scene);
+}
+
+static void the_error_left_is_what_was_asked_for_and_said(void **state) {
+    (void)state;
+    traced_scene scene = scene_of(SOLIDS);
+    static double positions[3 * TEXELS];
+    static float normals[3 * TEXELS], ao[TEXELS], deviation[TEXELS], other[TEXELS];
+    const double errors[] = {0.05, 0.02, 0.01}, normal[3] = {0.0, 1.0, 0.0};
+    static double truth[TEXELS];
+    place(SOLIDS, positions, normals);
+    for (size_t i = 0; i < TEXELS; ++i) {
+        const double at[3] = {positions[3 * i], 1e-5, positions[3 * i + 2]};
+        truth[i] = truth_ao((truth_scene){SCENE, SOLIDS}, at, normal, DISTANCE, 4096);
+    }
+    const vsh_points points = {TEXELS, positions, normals, NULL};
+    for (int e = 0; e < 3; ++e) {
+        const vsh_shade_options options = options_of(&scene, errors[e]);
+        vsh_shade_stats stats = vsh_shade_stats_zero();
+        assert_int_equal(vsh_shade_ao(scene.field, &points, &options, NULL, ao, deviation, &stats, NULL),
+                         VSH_OK);
+        double squares = 0.0, bias = 0.0, said = 0.0;
+        for (size_t i = 0; i < TEXELS; ++i) {
+            const double error = (double)ao[i] - truth[i];
+            squares += error * error / TEXELS;
+            bias += error / TEXELS;
+            said += (double)deviation[i] * (double)deviation[i] / TEXELS;
+        }
+        print_message("asked %g: said %.4f, is %.4f, bias %+.4f; %.1f rays a point\n", errors[e], sqrt(said),
+                      sqrt(squares), bias, (double)stats.rays / TEXELS);
+        assert_true(sqrt(squares) <= 1.1 * sqrt(said) && sqrt(said) <= errors[e]);
+        assert_true(fabs(bias) < 0.25 * errors[e]);
+        assert_true(fabs(stats.square_error / TEXELS - said) < 1e-4 * said);
+        assert_int_equal(stats.marches, 0);
+        const int32_t threads[] = {2, 5};
+        for (int t = 0; t < 2; ++t) {
+            vsh_run run = vsh_run_default();
+            run.threads = threads[t];
+            assert_int_equal(vsh_shade_ao(scene.field, &points, &options, &run, other, NULL, NULL, NULL),
+                             VSH_OK);
+            assert_memory_equal(ao, other, sizeof ao);
+        }
+    }
+    free_scene(&scene);
+}
+
+static void it_needs_triangles(void **state) {
+    (void)state;
+    traced_scene scene = scene_of(1);
+    vsh_shade_options options = options_of(&scene, 0.05);
+    options.triangles = NULL;
+    const double at[3] = {0.0, 0.0, 0.0};
+    const vsh_points points = {1, at, UP, NULL};
+    float ao = -1.0f;
+    vsh_error error = {VSH_OK, ""};
+    assert_int_equal(vsh_shade_ao(scene.field, &points, &options, NULL, &ao, NULL, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "triangles"));
+    free_scene(&scene);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(an_open_plate_is_exactly_1),
+        cmocka_unit_test(the_error_left_is_what_was_asked_for_and_said),
+        cmocka_unit_test(it_needs_triangles),
+    };
+    return vsh_triangles_available() ? cmocka_run_group_tests(tests, NULL, NULL) : 0;
+}

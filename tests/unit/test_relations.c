@@ -1,0 +1,447 @@
+/* What must hold between two bakes where no truth is needed: scaled, moved, turned and mirrored scenes, more
+ * of the voxels and less of the light. docs/numerics.md has the bounds. Of the relations of one light and one
+ * method, test_shadow.c has: size 0 is `hard`, a far sphere light is a directional one, larger balls hide
+ * more; test_shadow_rays.c: more rays are nearer to the truth; test_shadow_run.c and test_field_run.c:
+ * threads do not show. */
+#include "shading.h"
+
+#include "field/field.h"
+#include "shim/openvdb.h"
+#include "truth/metrics.h"
+
+#include <stdlib.h>
+
+enum { SIDE = 64, COUNT = SIDE * SIDE, SHADOWS = VSH_SHADOW_ADAPTIVE + 1, AOS = VSH_AO_CONES + 1 };
+
+static const double NOWHERE[3] = {0.0, 0.0, 0.0};
+static double positions[3 * COUNT];
+static float normals[3 * COUNT];
+
+/* Floor texels, and every third point in the air or inside a solid with any normal. */
+static void fill_points(void) {
+    uint64_t counter = 21;
+    floor_texels(SIDE, positions, normals);
+    for (size_t i = 0; i < COUNT; i += 3) {
+        double n[3];
+        random_direction(&counter, n);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            positions[3 * i + axis] = axis == 1 ? between(&counter, -1.0, 3.0) : between(&counter, -4.0, 4.0);
+            normals[3 * i + axis] = (float)n[axis];
+        }
+    }
+}
+
+static void occlusion(const vsh_field *field, int32_t method, double distance, const double *places,
+                      const float *ns, float *open) {
+    vsh_shade_options options = vsh_shade_options_default();
+    options.ao_method = method;
+    options.ao_distance = distance;
+    const vsh_points points = {COUNT, places, ns, NULL};
+    assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, open, NULL, NULL, NULL), VSH_OK);
+}
+
+/* Every kind of value at the points: shadows of a sun and of a lamp by each method, and AO. `scale` is that
+ * of all lengths; the lights are given in the scene's own axes through `turn` (rows) and moved by `by`. */
+enum { KINDS = 2 * SHADOWS + AOS };
+
+typedef struct values {
+    float v[KINDS][COUNT];
+} values;
+
+typedef struct motion {
+    double scale;
+    double turn[9];
+    double by[3]; /* after the turn, before the scale */
+} motion;
+
+static const motion STILL = {1.0, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
+
+static void turned(const motion *m, const double v[3], double out[3]) {
+    for (int row = 0; row < 3; ++row) {
+        out[row] = m->turn[3 * row] * v[0] + m->turn[3 * row + 1] * v[1] + m->turn[3 * row + 2] * v[2];
+    }
+}
+
+static void moved(const motion *m, const double p[3], double out[3]) {
+    turned(m, p, out);
+    for (int axis = 0; axis < 3; ++axis) {
+        out[axis] = m->scale * (out[axis] + m->by[axis]);
+    }
+}
+
+static void shade_all(const vsh_field *field, const motion *m, values *all) {
+    static double places[3 * COUNT];
+    static float ns[3 * COUNT];
+    for (size_t i = 0; i < COUNT; ++i) {
+        double n[3] = {(double)normals[3 * i], (double)normals[3 * i + 1], (double)normals[3 * i + 2]}, t[3];
+        moved(m, positions + 3 * i, places + 3 * i);
+        turned(m, n, t);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            ns[3 * i + axis] = (float)t[axis];
+        }
+    }
+    const double over[3] = {1.0, 1.5, 1.0};
+    double towards[3], place[3];
+    turned(m, truth_seeds_sun, towards);
+    moved(m, over, place);
+    const vsh_light lights[2] = {sun(towards, 0.2), lamp(place, 0.25 * m->scale)};
+    for (int kind = 0; kind < KINDS; ++kind) {
+        if (kind < 2 * SHADOWS) {
+            shadows(field, &lights[kind / SHADOWS], kind % SHADOWS, COUNT, places, ns, all->v[kind]);
+        } else {
+            occlusion(field, kind - 2 * SHADOWS, 0.75 * m->scale, places, ns, all->v[kind]);
+        }
+    }
+}
+
+static const char *name_of(int kind) {
+    return kind < 2 * SHADOWS ? vsh_shadow_method_name(kind % SHADOWS)
+                              : vsh_ao_method_name(kind - 2 * SHADOWS);
+}
+
+/* How far two sets of values are apart. */
+typedef struct apart {
+    double rms, worst;
+    size_t beyond; /* values more than 0.01 apart */
+} apart;
+
+static apart compare(const float *a, const float *b) {
+    apart result = {0.0, 0.0, 0};
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_int_equal(isnan(a[i]) != 0, isnan(b[i]) != 0);
+        const double d = isnan(a[i]) ? 0.0 : fabs((double)a[i] - (double)b[i]);
+        result.rms += d * d;
+        result.worst = fmax(result.worst, d);
+        result.beyond += d > 0.01;
+    }
+    result.rms = sqrt(result.rms / COUNT);
+    return result;
+}
+
+static void assert_same_field(const vsh_field *a, const vsh_field *b) {
+    assert_int_equal(a->level_count, b->level_count);
+    assert_memory_equal(a->levels, b->levels, sizeof a->levels[0] * (size_t)a->level_count);
+    const vshi_level *top = &a->levels[a->level_count - 1];
+    const size_t blocks =
+        (size_t)top->first_index + (size_t)top->size[0] * (size_t)top->size[1] * (size_t)top->size[2];
+    assert_memory_equal(a->index, b->index, blocks * sizeof a->index[0]);
+    assert_memory_equal(a->values, b->values,
+                        (size_t)(top->first_brick + top->brick_count) * VSHI_BRICK_VALUES * sizeof(float));
+}
+
+/* From 1e-10 to 1e10 of the voxel: the field's values are voxels, and only they are shaded. */
+static void scaled_by_a_power_of_two_every_bit_stays(void **state) {
+    (void)state;
+    static values still, scaled;
+    fill_points();
+    vsh_field *field = field_of_grid(grid_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE), 8.0);
+    shade_all(field, &STILL, &still);
+    const int exponents[] = {-34, -20, -10, 3, 20, 40, 44};
+    for (size_t e = 0; e < sizeof exponents / sizeof exponents[0]; ++e) {
+        motion m = STILL;
+        m.scale = ldexp(1.0, exponents[e]);
+        if (0.03125 * m.scale > 1e12) {
+            continue;
+        }
+        vsh_field *other =
+            field_of_grid(grid_of_moved(truth_seeds(), 0.03125, m.scale, NOWHERE), 8.0 * m.scale);
+        assert_same_field(field, other);
+        shade_all(other, &m, &scaled);
+        assert_memory_equal(&still, &scaled, sizeof still);
+        vsh_field_free(other);
+    }
+    vsh_field_free(field);
+}
+
+/* A box and a pyramid without its base, of floats that any power of two scales exactly. */
+static vsh_grid *grid_of_meshes(double scale, double half_width, bool open) {
+    static const float box[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
+                                    {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
+    static const uint32_t sides[12][3] = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4},
+                                          {3, 6, 2}, {3, 7, 6}, {0, 4, 7}, {0, 7, 3}, {1, 2, 6}, {1, 6, 5}};
+    static const float roof[5][3] = {
+        {-0.7f, 1.3f, -0.8f}, {0.9f, 1.4f, -0.6f}, {0.8f, 1.3f, 0.7f}, {-0.9f, 1.2f, 0.6f}, {0.1f, 2, 0.05f}};
+    static const uint32_t slopes[4][3] = {{0, 4, 1}, {1, 4, 2}, {2, 4, 3}, {3, 4, 0}};
+    float p[8][3], q[5][3];
+    for (int i = 0; i < 24; ++i) {
+        (&p[0][0])[i] = (float)scale * (&box[0][0])[i];
+        (&q[0][0])[i % 15] = (float)scale * (&roof[0][0])[i % 15];
+    }
+    const vsh_mesh meshes[2] = {{"box", &p[0][0], NULL, NULL, &sides[0][0], 8, 12, NULL},
+                                {"roof", &q[0][0], NULL, NULL, &slopes[0][0], 5, 4, NULL}};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = 0.0625 * scale;
+    options.half_width = half_width;
+    vsh_grid *grid = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_grid_from_meshes(meshes, open ? 2 : 1, &options, NULL, &grid, &error) != VSH_OK) {
+        fail_msg("scale %g: %s", scale, error.message);
+    }
+    return grid;
+}
+
+static void meshes_scaled_by_a_power_of_two_keep_every_bit(void **state) {
+    (void)state;
+    for (int open = 0; open < 2; ++open) {
+        for (double half_width = 3.0; half_width < 20.0; half_width *= 3.0) {
+            vsh_field *field = field_of_grid(grid_of_meshes(1.0, half_width, open != 0), 4.0);
+            const int exponents[] = {-35, -20, -12, 5, 20, 43};
+            for (size_t e = 0; e < sizeof exponents / sizeof exponents[0]; ++e) {
+                const double scale = ldexp(1.0, exponents[e]);
+                vsh_field *other = field_of_grid(grid_of_meshes(scale, half_width, open != 0), 4.0 * scale);
+                assert_same_field(field, other);
+                vsh_field_free(other);
+            }
+            vsh_field_free(field);
+        }
+    }
+}
+
+/* A ball taken as it is, and a box on another lattice, turned and measured anew. */
+static vsh_grid *grid_of_union(double scale) {
+    vsh_sdf_node nodes[2] = {vsh_sdf_node_default(), vsh_sdf_node_default()};
+    vsh_grid *parts[2] = {NULL, NULL}, *both = NULL;
+    nodes[1].shape = VSH_SDF_BOX;
+    for (int i = 0; i < 2; ++i) {
+        const vsh_sdf sdf = {&nodes[i], 1};
+        vsh_grid_options options = vsh_grid_options_default();
+        nodes[i].scale = scale;
+        options.voxel_size = ldexp(scale, i == 0 ? -4 : -3);
+        assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &parts[i], NULL), VSH_OK);
+    }
+    const double place[12] = {0.6, -0.8, 0, 1.3 * scale, 0.8, 0.6, 0, 0.2 * scale, 0, 0, 1, -0.1 * scale};
+    const vsh_grid_instance instances[2] = {{parts[0], NULL}, {parts[1], place}};
+    assert_int_equal(vsh_grid_unite(instances, 2, NULL, NULL, &both, NULL), VSH_OK);
+    vsh_grid_free(parts[0]);
+    vsh_grid_free(parts[1]);
+    return both;
+}
+
+static void unions_scaled_by_a_power_of_two_keep_every_bit(void **state) {
+    (void)state;
+    vsh_field *field = field_of_grid(grid_of_union(1.0), 4.0);
+    const int exponents[] = {-35, -20, 20, 42};
+    for (size_t e = 0; e < sizeof exponents / sizeof exponents[0]; ++e) {
+        const double scale = ldexp(1.0, exponents[e]);
+        vsh_field *other = field_of_grid(grid_of_union(scale), 4.0 * scale);
+        assert_same_field(field, other);
+        vsh_field_free(other);
+    }
+    vsh_field_free(field);
+}
+
+/* Voxels of 2^-5 and places of few digits, so that moving rounds nothing. */
+static void moved_by_whole_voxels_every_bit_stays(void **state) {
+    (void)state;
+    static values still, there;
+    fill_points();
+    for (size_t i = 0; i < 3 * COUNT; ++i) {
+        positions[i] = ldexp(round(ldexp(positions[i], 20)), -20);
+    }
+    vsh_field *field = field_of_grid(grid_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE), 8.0);
+    shade_all(field, &STILL, &still);
+    const double voxels[][3] = {{1, 0, 0}, {-3, 5, 7}, {8, 16, -24}, {1001, -2003, 4007}, {32e6, -16e6, 8e6}};
+    for (size_t s = 0; s < sizeof voxels / sizeof voxels[0]; ++s) {
+        motion m = STILL;
+        for (int axis = 0; axis < 3; ++axis) {
+            m.by[axis] = 0.03125 * voxels[s][axis];
+        }
+        vsh_field *other = field_of_grid(grid_of_moved(truth_seeds(), 0.03125, 1.0, m.by), 8.0);
+        shade_all(other, &m, &there);
+        double worst = 0.0, rms = 0.0;
+        size_t beyond = 0;
+        for (int kind = 0; kind < KINDS; ++kind) {
+            const apart a = compare(still.v[kind], there.v[kind]);
+            worst = fmax(worst, a.worst);
+            rms = fmax(rms, a.rms);
+            beyond += a.beyond;
+        }
+        print_message("moved by (%g, %g, %g) voxels: rms %.2g, worst %.2g, %zu of %d beyond 0.01\n",
+                      voxels[s][0], voxels[s][1], voxels[s][2], rms, worst, beyond, KINDS * COUNT);
+        if (s < 4) {
+            assert_true(worst == 0.0);
+        } else { /* the way of the receivers to field space rounds */
+            assert_true(rms < 1e-3 && beyond < 10);
+        }
+        vsh_field_free(other);
+    }
+    vsh_field_free(field);
+}
+
+/* The seeds' solids turned by a signed permutation of the axes: their boxes go along, their torus around y
+ * only where y stays y, so the ring is a ball here. */
+static vsh_grid *grid_of_turned(const motion *m, double voxel) {
+    truth_solid solids[MAX_SOLIDS];
+    const truth_scene scene = truth_seeds();
+    for (size_t i = 0; i < scene.count; ++i) {
+        double half[3];
+        solids[i] = scene.solids[i];
+        if (solids[i].shape == TRUTH_TORUS) {
+            solids[i].shape = TRUTH_SPHERE;
+        }
+        turned(m, scene.solids[i].center, solids[i].center);
+        turned(m, scene.solids[i].half, half);
+        for (int axis = 0; axis < 3; ++axis) {
+            solids[i].half[axis] = fabs(half[axis]);
+        }
+    }
+    return grid_of_moved((truth_scene){solids, scene.count}, voxel, 1.0, NOWHERE);
+}
+
+static void turned_by_right_angles_and_mirrored_values_stay_within_a_bound(void **state) {
+    (void)state;
+    static values still, there;
+    static const int orders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
+    fill_points();
+    vsh_field *field = field_of_grid(grid_of_turned(&STILL, 0.04), 8.0);
+    shade_all(field, &STILL, &still);
+    apart worst[KINDS] = {{0.0, 0.0, 0}};
+    for (int turn = 1; turn < 48; turn += 2 + turn % 3) {
+        motion m = STILL;
+        for (int row = 0; row < 3; ++row) {
+            for (int column = 0; column < 3; ++column) {
+                m.turn[3 * row + column] =
+                    orders[turn / 8][row] == column ? ((turn >> row & 1) ? -1.0 : 1.0) : 0.0;
+            }
+        }
+        vsh_field *other = field_of_grid(grid_of_turned(&m, 0.04), 8.0);
+        shade_all(other, &m, &there);
+        vsh_field_free(other);
+        for (int kind = 0; kind < KINDS; ++kind) {
+            const apart a = compare(still.v[kind], there.v[kind]);
+            worst[kind].rms = fmax(worst[kind].rms, a.rms);
+            worst[kind].worst = fmax(worst[kind].worst, a.worst);
+            worst[kind].beyond = a.beyond > worst[kind].beyond ? a.beyond : worst[kind].beyond;
+        }
+    }
+    for (int kind = 0; kind < KINDS; ++kind) {
+        print_message("turned, %s: rms %.2g, worst %.2g, %zu of %d beyond 0.01\n", name_of(kind),
+                      worst[kind].rms, worst[kind].worst, worst[kind].beyond, COUNT);
+        const int32_t method = kind % SHADOWS;
+        if (kind < 2 * SHADOWS ? method >= VSH_SHADOW_RAYS : kind > 2 * SHADOWS) {
+            /* where rays and cones lie in the disc or hemisphere does not turn with the scene */
+            assert_true(worst[kind].rms < 0.03);
+        } else {
+            assert_true(worst[kind].rms < 1e-4 && worst[kind].worst < 2e-3 && worst[kind].beyond == 0);
+        }
+    }
+    vsh_field_free(field);
+}
+
+/* Of the methods that know the whole penumbra; the others' errors are their definition's. */
+static void finer_voxels_are_never_farther_from_the_truth(void **state) {
+    (void)state;
+    static float truth[COUNT], visible[COUNT];
+    const double up[3] = {0.0, 1.0, 0.0};
+    floor_texels(SIDE, positions, normals);
+    const double ws[] = {0.0, 0.05, 0.1, 0.3}, voxels[] = {0.16, 0.08, 0.04, 0.02, 0.01};
+    const int32_t methods[] = {VSH_SHADOW_SMOOTH, VSH_SHADOW_CONE, VSH_SHADOW_ADAPTIVE};
+    double last[4][3];
+    for (int v = 0; v < 5; ++v) {
+        vsh_field *field = field_of(truth_seeds(), voxels[v], 0.0);
+        for (int w = 0; w < 4; ++w) {
+            assert_int_equal(truth_lights(truth_seeds(), COUNT, positions, up, truth_seeds_sun, ws[w],
+                                          (double)INFINITY, ws[w] > 0.0 ? 256 : 1, truth),
+                             0);
+            const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(ws[w]));
+            for (int m = 0; m < 3; ++m) {
+                shadows(field, &light, methods[m], COUNT, positions, normals, visible);
+                const truth_metrics metrics = truth_compare(COUNT, visible, truth, NULL);
+                print_message("voxel %g, w %g, %s: rmse %.4f\n", voxels[v], ws[w],
+                              vsh_shadow_method_name(methods[m]), metrics.rmse);
+                if (v > 0) { /* the estimators end at their own error, which does not depend on voxels */
+                    assert_true(metrics.rmse < 1.08 * last[w][m] + 0.002);
+                }
+                if (methods[m] == VSH_SHADOW_ADAPTIVE && v == 4 && w > 0) {
+                    assert_true(metrics.rmse < 0.025);
+                }
+                last[w][m] = metrics.rmse;
+            }
+        }
+        vsh_field_free(field);
+    }
+}
+
+/* A slab that grows from a sliver over half of the receivers to all of them, by less than a voxel a time. */
+static void a_growing_slab_hides_more(void **state) {
+    (void)state;
+    const double up[3] = {0.0, 1.0, 0.0}, voxel = 0.04;
+    const vsh_light light = sun(up, RADIANS(15.0));
+    float last[SHADOWS][16], rise[SHADOWS] = {0.0f}, open[16];
+    double risen = 0.0;
+    for (int i = 0; i < 16; ++i) {
+        open[i] = 1.0f;
+        for (int32_t method = 0; method < SHADOWS; ++method) {
+            last[method][i] = 1.0f;
+        }
+    }
+    for (double half = 0.05; half < 1.2; half += 0.3 * voxel) {
+        const truth_solid slab = {TRUTH_BOX, {0.0, 0.2, 0.0}, {half, 0.2, half}, 0.0, 0.0};
+        vsh_field *field = field_of((truth_scene){&slab, 1}, voxel, 0.0);
+        for (int i = 0; i < 16; ++i) {
+            const double p[3] = {0.09 * i, -1.5, 0.05 * i};
+            const float n[3] = {0.0f, 1.0f, 0.0f};
+            for (int32_t method = 0; method < SHADOWS; ++method) {
+                const float v = shadow_at(field, &light, method, p, NULL);
+                rise[method] = fmaxf(rise[method], v - last[method][i]);
+                last[method][i] = v;
+            }
+            vsh_shade_options options = vsh_shade_options_default();
+            options.ao_distance = 4.0;
+            const vsh_points points = {1, p, n, NULL};
+            float a;
+            assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &a, NULL, NULL, NULL), VSH_OK);
+            risen = fmax(risen, (double)a - (double)open[i]);
+            open[i] = a;
+        }
+        vsh_field_free(field);
+    }
+    for (int32_t method = 0; method < SHADOWS; ++method) {
+        print_message("%s rises by %.4f at most\n", vsh_shadow_method_name(method), (double)rise[method]);
+        /* triangulation takes two samples for one surface; rays are few */
+        assert_true(rise[method] <= (method == VSH_SHADOW_IMPROVED   ? 0.05f
+                                     : method == VSH_SHADOW_ADAPTIVE ? 0.04f
+                                     : method == VSH_SHADOW_RAYS     ? 1.1f / 64.0f
+                                                                     : 1e-3f));
+    }
+    print_message("AO cones rise by %.4f at most\n", risen);
+    assert_true(risen <= 2e-3);
+}
+
+/* The rays too, which test_shadow.c does not have. */
+static void for_rays_too_a_far_lamp_is_a_sun(void **state) {
+    (void)state;
+    static float far[COUNT], directional[COUNT];
+    floor_texels(SIDE, positions, normals);
+    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
+    const double half = atan(truth_seeds_w), away = 1e6, length = sqrt(0.25 + 0.36 + 0.36);
+    double place[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        place[axis] = away * truth_seeds_sun[axis] / length;
+    }
+    const vsh_light s = sun(truth_seeds_sun, 2.0 * half), l = lamp(place, away * sin(half));
+    for (int32_t method = VSH_SHADOW_RAYS; method <= VSH_SHADOW_ADAPTIVE; ++method) {
+        vsh_light alike = l;
+        strcpy(alike.name, s.name); /* by which lights get their own rays */
+        shadows(field, &s, method, COUNT, positions, normals, directional);
+        shadows(field, &alike, method, COUNT, positions, normals, far);
+        const apart a = compare(far, directional);
+        print_message("%s: rms %.2g, worst %.2g\n", vsh_shadow_method_name(method), a.rms, a.worst);
+        assert_true(a.rms < 5e-3);
+    }
+    vsh_field_free(field);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(scaled_by_a_power_of_two_every_bit_stays),
+        cmocka_unit_test(meshes_scaled_by_a_power_of_two_keep_every_bit),
+        cmocka_unit_test(unions_scaled_by_a_power_of_two_keep_every_bit),
+        cmocka_unit_test(moved_by_whole_voxels_every_bit_stays),
+        cmocka_unit_test(turned_by_right_angles_and_mirrored_values_stay_within_a_bound),
+        cmocka_unit_test(finer_voxels_are_never_farther_from_the_truth),
+        cmocka_unit_test(a_growing_slab_hides_more),
+        cmocka_unit_test(for_rays_too_a_far_lamp_is_a_sun),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
