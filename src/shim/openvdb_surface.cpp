@@ -32,8 +32,9 @@ class Interrupter : public openvdb::util::NullInterrupter {
                 stop = stage.cancelled();
             }
         }
+        const bool stopped = stop;
         give(this);
-        return stop;
+        return stopped;
     }
 
   private:
