@@ -92,7 +92,8 @@ VSH_API vsh_result vsh_grid_read(const char *path, const char *name, const vsh_r
 /* Writes one .vdb file with the grid as `name` (NULL: "surface"); the same grid gives the same bytes. Atomic:
  * written beside `path` and renamed, so a failure leaves an old file alone. Errors: VSH_ERROR_ARGUMENT (path
  * NULL or empty), VSH_ERROR_LIMIT (voxels below 1.45e-5 world units, which OpenVDB cannot write),
- * VSH_ERROR_WRITE (no such folder, no permission, a folder or device in the way, disk full), VSH_ERROR_MEMORY. */
+ * VSH_ERROR_WRITE (no such folder, no permission, a folder or device in the way, disk full),
+ * VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name, vsh_error *error);
 
 /* A caster for vsh_grid_unite(): a grid and where it stands. A view; nothing is owned. */

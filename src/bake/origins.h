@@ -10,12 +10,13 @@ enum { VSHI_ORIGIN_BLOCK = 1024 }; /* samples that are worked on together */
 typedef struct vshi_origins {
     size_t count;
     double *position; /* [count][3]: lifted off the surface, world units */
-    double *surface;  /* [count][3]: not lifted, for rays against triangles; NULL where no method traces them */
-    float *normal;    /* [count][3]: decides shadow */
-    uint32_t *texel;  /* [count]: as vsh_points.texels; a texel's further samples get numbers of their own */
-    uint8_t *valid;   /* [all samples]: 1 where the sample is among them */
-    size_t blocks;    /* of all samples */
-    size_t *before;   /* [blocks + 1]: valid samples before each block */
+    double
+        *surface;  /* [count][3]: not lifted, for rays against triangles; NULL where no method traces them */
+    float *normal; /* [count][3]: decides shadow */
+    uint32_t *texel; /* [count]: as vsh_points.texels; a texel's further samples get numbers of their own */
+    uint8_t *valid;  /* [all samples]: 1 where the sample is among them */
+    size_t blocks;   /* of all samples */
+    size_t *before;  /* [blocks + 1]: valid samples before each block */
 } vshi_origins;
 
 /* Bytes that the origins of all samples take at most. */

@@ -84,7 +84,7 @@ typedef struct trade_work {
 trade_run *trade_add(trade_work *work, trade_subject *subject, const trade_run *run);
 
 size_t trade_texels(const trade_work *work);
-double trade_now(const trade_work *work); /* seconds to take differences of */
+double trade_now(const trade_work *work);  /* seconds to take differences of */
 double trade_left(const trade_work *work); /* seconds of the budget */
 int trade_out_of_memory(const char *what);
 

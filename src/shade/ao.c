@@ -1,6 +1,6 @@
 /* Ambient occlusion: options, and which method shades the points. */
-#include "base/floats.h"
 #include "shade/ao.h"
+#include "base/floats.h"
 
 #include <math.h>
 

@@ -1,6 +1,6 @@
 /* Shadow values: the visible fraction of a light, by one cone or ray a point. */
-#include "base/floats.h"
 #include "shade/shadow.h"
+#include "base/floats.h"
 
 #include <math.h>
 

@@ -24,7 +24,7 @@ typedef struct vshi_rays {
 
 /* How the closeness is taken at a sample. */
 enum {
-    VSHI_MARCH_PLAIN = 0,       /* h / t */
+    VSHI_MARCH_PLAIN = 0,        /* h / t */
     VSHI_MARCH_TRIANGULATED = 1, /* the closest miss between two samples (Aaltonen, GDC 2018) */
     VSHI_MARCH_PROOF = 2         /* not at all: whether the cone is free or full for certain */
 };
