@@ -3,7 +3,7 @@
  *
  * No cones go before them. Sixteen that prove their part of the sky free or hidden (VSHI_MARCH_PROOF) cost as
  * much as 16 marched or 50 traced rays and decide a fifth of the rays that follow: near the receiver nothing
- * is proved. Measured on the cloister, that was slower at every error down to 0.003. */
+ * is proved. At an error of 0.01 on the cloister that saved a fifth of the rays and no time. */
 #include "shade/ao.h"
 #include "shim/embree.h"
 
