@@ -75,9 +75,11 @@ int cli_receiver_texels(const cli_receiver_job *job, bool warn, vsh_texels **tex
         cli_say("%s: the system refused memory", receiver->path);
         return CLI_LIMIT;
     }
+    vsh_run run = *job->run;
+    run.warning = NULL; /* its lines are told below, with the file, and not again for the second pass */
     vsh_error error;
     int code = CLI_OK;
-    if (vsh_texels_create(meshes, count, &options, job->run, reports, texels, &error) != VSH_OK) {
+    if (vsh_texels_create(meshes, count, &options, &run, reports, texels, &error) != VSH_OK) {
         code = cli_fail(&error);
     }
     for (size_t i = 0; i < count && warn && code == CLI_OK; ++i) {

@@ -122,6 +122,7 @@ setup() {
     [[ $stderr == *"warning: "*"box"*"open edges"* ]] || fail "no open edges"
     [[ $stderr == *"warning: "*"box"*"lie over other charts"* ]] || fail "no overlap"
     [[ $stderr == *"warning: "*"box"*"leave the UV square"* ]] || fail "no outside"
+    [ "$(grep -c overlap <<<"$stderr")" -eq 0 ] || fail "overlaps are told twice"
 }
 
 @test "a scene's receivers are all baked, and flags override it" {
