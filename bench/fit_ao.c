@@ -178,7 +178,7 @@ static uses uses_of(const sample_set *set, const vshi_ao_cones *cones) {
         vshi_march_stats work = {0, 0};
         vshi_shade_origin(set->field, &points, i, set->start, 0.0, &origin, &normal);
         vshi_ao_axes(normal, axes);
-        vshi_chunk_clear(chunk, false);
+        vshi_chunk_clear(chunk);
         for (int32_t c = 0; c < cones->count; ++c) {
             const vshi_cone cone = {.origin = origin,
                                     .direction = vshi_ao_direction(axes, cones->directions[c]),
@@ -189,7 +189,7 @@ static uses uses_of(const sample_set *set, const vshi_ao_cones *cones) {
             close[c] = (float)cone.close;
             vshi_chunk_add(chunk, set->field, &cone, (uint32_t)c, &stats);
         }
-        vshi_march_best()(set->field, &chunk->rays, VSHI_MARCH_PLAIN, 1024, &work);
+        vshi_kernel_best()->march(set->field, &chunk->rays, VSHI_MARCH_PLAIN, 1024, &work);
         for (size_t r = 0; r < chunk->rays.count; ++r) {
             close[chunk->owner[r]] = chunk->rays.close[r];
         }

@@ -112,12 +112,18 @@ static void write_sample(writer *w, uint32_t number, uint32_t texel, const doubl
     texels->mesh[i] = mesh;
 }
 
+/* Every second bit of a number of six. */
+static size_t even_bits(size_t number) {
+    return (number & 1) | (number >> 1 & 2) | (number >> 2 & 4);
+}
+
+/* The texels of a tile in Morton's order, so that 4, 16 or all 64 that follow each other are a square. */
 static void write_tile(writer *w) {
     const vshi_raster *raster = &w->all->charts.raster;
     const vshi_tile *tile = &w->work->tile;
     const size_t n = (size_t)raster->supersample, side = VSHI_TILE * n;
-    for (size_t bit = 0; bit < (size_t)VSHI_TILE * VSHI_TILE; ++bit) {
-        const size_t x = bit % VSHI_TILE, y = bit / VSHI_TILE;
+    for (size_t place = 0; place < (size_t)VSHI_TILE * VSHI_TILE; ++place) {
+        const size_t x = even_bits(place), y = even_bits(place >> 1), bit = VSHI_TILE * y + x;
         const size_t column = tile->column * VSHI_TILE + x, row = tile->row * VSHI_TILE + y;
         const uint32_t texel = (uint32_t)(row * (size_t)raster->width + column);
         double weight[3];

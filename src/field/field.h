@@ -110,4 +110,19 @@ static inline vshi_vec vshi_to_field(const vsh_field *field, const double positi
     return vshi_transform_point(field->to_field, vshi_vec_of(position));
 }
 
+/* And back: to_field is a turn over the voxel size, so its inverse is its transpose times the square. */
+static inline vshi_vec vshi_direction_to_world(const vsh_field *field, vshi_vec d) {
+    const double *m = field->to_field;
+    return vshi_unit((vshi_vec){m[0] * d.x + m[4] * d.y + m[8] * d.z, m[1] * d.x + m[5] * d.y + m[9] * d.z,
+                                m[2] * d.x + m[6] * d.y + m[10] * d.z});
+}
+
+static inline vshi_vec vshi_to_world(const vsh_field *field, vshi_vec p) {
+    const double *m = field->to_field, square = field->voxel_size * field->voxel_size;
+    const vshi_vec d = {p.x - m[3], p.y - m[7], p.z - m[11]};
+    return vshi_scale((vshi_vec){m[0] * d.x + m[4] * d.y + m[8] * d.z, m[1] * d.x + m[5] * d.y + m[9] * d.z,
+                                 m[2] * d.x + m[6] * d.y + m[10] * d.z},
+                      square);
+}
+
 #endif

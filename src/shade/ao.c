@@ -69,7 +69,7 @@ vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const 
     vshi_ao_task task = {.field = field,
                          .points = points,
                          .options = &full,
-                         .march = vshi_march_best(),
+                         .kernel = vshi_kernel_best(),
                          .ao = ao,
                          .deviation = deviation,
                          .distance = full.ao_distance / field->voxel_size};

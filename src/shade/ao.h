@@ -21,7 +21,7 @@ typedef struct vshi_ao_task {
     const vsh_field *field;
     const vsh_points *points;
     const vsh_shade_options *options;
-    vshi_march_fn *march;
+    const vshi_kernel *kernel;
     const vshi_sampler *sampler;
     const vshi_ao_cones *cones;
     float *ao;

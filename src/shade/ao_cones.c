@@ -101,7 +101,7 @@ static double open_share(const vshi_ao_cones *cones, const float *close) {
 
 static void flush(const vshi_ao_task *task, vshi_chunk *chunk, float *close, vsh_shade_stats *stats) {
     vshi_march_stats work = {0, 0};
-    task->march(task->field, &chunk->rays, VSHI_MARCH_PLAIN, task->options->max_steps, &work);
+    task->kernel->march(task->field, &chunk->rays, VSHI_MARCH_PLAIN, task->options->max_steps, &work);
     stats->samples += work.samples;
     stats->unfinished += work.unfinished;
     for (size_t r = 0; r < chunk->rays.count; ++r) {
@@ -109,7 +109,7 @@ static void flush(const vshi_ao_task *task, vshi_chunk *chunk, float *close, vsh
         close[chunk->owner[r]] = closeness;
         stats->certified += closeness >= sine || closeness <= -sine;
     }
-    vshi_chunk_clear(chunk, false);
+    vshi_chunk_clear(chunk);
 }
 
 void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
@@ -119,7 +119,7 @@ void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stat
     vshi_chunk chunk;
     float close[VSHI_AO_GRAIN * VSHI_AO_MAX_CONES];
     bool valid[VSHI_AO_GRAIN];
-    vshi_chunk_clear(&chunk, false);
+    vshi_chunk_clear(&chunk);
     for (size_t i = begin; i < end; ++i) {
         vshi_ao_frame frame;
         valid[i - begin] = vshi_ao_frame_at(task, i, &frame, stats);

@@ -59,14 +59,14 @@ static void flush(batch *b, vsh_shade_stats *stats) {
         return;
     }
     vshi_march_stats work = {0, 0};
-    task->march(task->field, &b->chunk.rays, VSHI_MARCH_PLAIN, task->options->max_steps, &work);
+    task->kernel->march(task->field, &b->chunk.rays, VSHI_MARCH_PLAIN, task->options->max_steps, &work);
     stats->samples += work.samples;
     stats->unfinished += work.unfinished;
     stats->rays += b->chunk.rays.count;
     for (size_t r = 0; r < b->chunk.rays.count; ++r) {
         b->points[b->chunk.owner[r]].free += b->chunk.rays.close[r] > 0.0f;
     }
-    vshi_chunk_clear(&b->chunk, false);
+    vshi_chunk_clear(&b->chunk);
 }
 
 /* Free balls up the normal that hold the origin: rays leave the surface through them, and are known up to
@@ -223,7 +223,7 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
     b.points = points;
     b.exact = options->ao_method == VSH_AO_EXACT;
     b.traced = 0;
-    vshi_chunk_clear(&b.chunk, false);
+    vshi_chunk_clear(&b.chunk);
     for (size_t i = begin; i < end; ++i) {
         ao_point *point = &points[i - begin];
         point->next = prepare(&b, i, point, stats) ? first : 0;

@@ -4,12 +4,14 @@
 
 /* Rays begin half a voxel on, where h / t starts to mean something: the field itself is not known better. */
 static const double FIRST_STEP = 0.0625;
+/* Cones no longer than this, voxels, are marched as they are: clipping them costs more than it saves. */
+static const double SHORT = 32.0;
 /* The bounds are those of lattice points next to the surface; half a voxel covers the float rounding. */
 static const double BOUNDS_MARGIN = 0.5;
 
-void vshi_chunk_clear(vshi_chunk *chunk, bool proof) {
-    float *lane[12];
-    for (int i = 0; i < 12; ++i) {
+void vshi_chunk_clear(vshi_chunk *chunk) {
+    float *lane[VSHI_RAY_FLOATS];
+    for (int i = 0; i < VSHI_RAY_FLOATS; ++i) {
         lane[i] = chunk->memory[i];
     }
     chunk->rays = (vshi_rays){.count = 0,
@@ -20,28 +22,44 @@ void vshi_chunk_clear(vshi_chunk *chunk, bool proof) {
                               .sine = lane[8],
                               .stop = lane[9],
                               .close = lane[10],
-                              .horizon = proof ? lane[11] : NULL,
-                              .proof = proof ? chunk->proof : NULL};
+                              .horizon = lane[11],
+                              .wide = lane[12],
+                              .clear = lane[13],
+                              .proof = chunk->proof};
+}
+
+void vshi_chunk_push(vshi_chunk *chunk, const vshi_cone *cone, uint32_t owner) {
+    const size_t i = chunk->rays.count++;
+    const vshi_rays *rays = &chunk->rays;
+    rays->origin[0][i] = (float)cone->origin.x;
+    rays->origin[1][i] = (float)cone->origin.y;
+    rays->origin[2][i] = (float)cone->origin.z;
+    rays->direction[0][i] = (float)cone->direction.x;
+    rays->direction[1][i] = (float)cone->direction.y;
+    rays->direction[2][i] = (float)cone->direction.z;
+    rays->begin[i] = (float)cone->begin;
+    rays->end[i] = (float)cone->end;
+    rays->sine[i] = (float)cone->sine;
+    rays->stop[i] = (float)cone->stop;
+    rays->close[i] = (float)cone->close;
+    rays->horizon[i] = (float)cone->horizon;
+    rays->wide[i] = (float)cone->wide;
+    chunk->owner[i] = owner;
 }
 
 /* Narrows [begin, end] to where slope × t ≥ bound. */
 static inline void clip(double slope, double bound, double *begin, double *end) {
-    if (slope > 0.0) {
-        const double t = bound / slope;
-        *begin = t > *begin ? t : *begin;
-    } else if (slope < 0.0) {
-        const double t = bound / slope;
-        *end = t < *end ? t : *end;
-    } else if (bound > 0.0) {
-        *end = -1.0;
-    }
+    const double t = bound / slope;
+    *begin = slope > 0.0 && t > *begin ? t : *begin;
+    *end = slope < 0.0 && t < *end ? t : *end;
+    *end = slope == 0.0 && bound > 0.0 ? -1.0 : *end;
 }
 
-bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *cone, uint32_t owner,
-                    vsh_shade_stats *stats) {
+/* The part of a cone from *begin to *end that can meet the casters' bounds. */
+static void clip_to_bounds(const vsh_field *field, const vshi_cone *cone, double *begin, double *end) {
     const double o[3] = {cone->origin.x, cone->origin.y, cone->origin.z};
     const double d[3] = {cone->direction.x, cone->direction.y, cone->direction.z};
-    double begin = FIRST_STEP, end = cone->end;
+    const double margin = BOUNDS_MARGIN + cone->wide;
     /* a point r away and f off the axis comes closest, by h / t, at t = r / cos f: later minima are not the
      * cone's */
     double farthest = 0.0;
@@ -51,32 +69,32 @@ bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *
         const double side = low > high ? low : high;
         farthest += side * side;
     }
-    const double last = sqrt(farthest / (1.0 - cone->sine * cone->sine)) + BOUNDS_MARGIN;
-    end = last < end ? last : end;
+    const double last = sqrt(farthest / (1.0 - cone->sine * cone->sine)) + margin;
+    *end = last < *end ? last : *end;
     /* a ball of radius t sin b can meet the box only while its centre is within that of each side */
     for (int axis = 0; axis < 3; ++axis) {
-        clip(d[axis] + cone->sine, (double)field->bounds_min[axis] - BOUNDS_MARGIN - o[axis], &begin, &end);
-        clip(cone->sine - d[axis], o[axis] - (double)field->bounds_max[axis] - BOUNDS_MARGIN, &begin, &end);
+        clip(d[axis] + cone->sine, (double)field->bounds_min[axis] - margin - o[axis], begin, end);
+        clip(cone->sine - d[axis], o[axis] - (double)field->bounds_max[axis] - margin, begin, end);
     }
+}
+
+bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *cone, uint32_t owner,
+                    vsh_shade_stats *stats) {
+    double begin = cone->begin > FIRST_STEP ? cone->begin : FIRST_STEP, end = cone->end;
     if (!(begin < end)) {
         return false;
     }
-    const size_t i = chunk->rays.count++;
-    for (int axis = 0; axis < 3; ++axis) {
-        chunk->rays.origin[axis][i] = (float)o[axis];
-        chunk->rays.direction[axis][i] = (float)d[axis];
+    if (end > SHORT) {
+        clip_to_bounds(field, cone, &begin, &end);
+        if (!(begin < end)) {
+            return false;
+        }
     }
-    chunk->rays.begin[i] = (float)begin;
-    chunk->rays.end[i] = (float)end;
-    chunk->rays.sine[i] = (float)cone->sine;
-    chunk->rays.stop[i] = (float)cone->stop;
-    chunk->rays.close[i] = (float)cone->close;
-    if (chunk->rays.proof != NULL) {
-        chunk->rays.horizon[i] = (float)cone->horizon;
-    }
-    chunk->owner[i] = owner;
+    vshi_chunk_push(chunk, cone, owner);
+    chunk->rays.begin[chunk->rays.count - 1] = (float)begin;
+    chunk->rays.end[chunk->rays.count - 1] = (float)end;
     ++stats->marches;
-    if (cone->sine * end > field->levels[field->level_count - 1].band) {
+    if (cone->wide + cone->sine * end > field->levels[field->level_count - 1].band) {
         ++stats->beyond_reach;
     }
     return true;

@@ -8,12 +8,15 @@
 #include <stdbool.h>
 #include <vdbshade/shade.h>
 
-enum { VSHI_CHUNK = 1024 }; /* rays: some 50 KB, which stay in the second cache */
+enum {
+    VSHI_CHUNK = 1024, /* rays: some 70 KB, which stay in the second cache */
+    VSHI_RAY_FLOATS = 14
+};
 
 typedef struct vshi_chunk {
     vshi_rays rays;
     uint32_t owner[VSHI_CHUNK]; /* what each ray is for, as the caller numbers it */
-    float memory[12][VSHI_CHUNK];
+    float memory[VSHI_RAY_FLOATS][VSHI_CHUNK];
     int8_t proof[VSHI_CHUNK];
 } vshi_chunk;
 
@@ -21,18 +24,22 @@ typedef struct vshi_chunk {
 typedef struct vshi_cone {
     vshi_vec origin;
     vshi_vec direction; /* unit */
-    double end;         /* > 0, may be infinite */
+    double begin;       /* what is before is free; 0 where nothing is known */
+    double end;         /* what is after is free; may be infinite, or before `begin` */
     double sine;        /* of the half angle; 0: a ray */
     double close;       /* what is known of its closeness already: at most `sine`; 1 for rays */
     double stop;
     double horizon; /* of proofs: see vshi_rays */
+    double wide;    /* of beams: radius at the origin; else 0 */
 } vshi_cone;
 
-/* Empties a chunk; `proof`: of cones for VSHI_MARCH_PROOF. */
-void vshi_chunk_clear(vshi_chunk *chunk, bool proof);
+/* Empties a chunk. */
+void vshi_chunk_clear(vshi_chunk *chunk);
 
-/* Adds a cone, or returns false where it cannot meet the casters' bounds: its closeness then stays as it is.
- */
+/* Adds a cone as it is. */
+void vshi_chunk_push(vshi_chunk *chunk, const vshi_cone *cone, uint32_t owner);
+
+/* Adds a cone where it can meet the casters' bounds, or returns false: its closeness then stays as it is. */
 bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *cone, uint32_t owner,
                     vsh_shade_stats *stats);
 
@@ -47,9 +54,9 @@ double vshi_segment(double x);
 double vshi_cone_visibility(double closeness, double sine);
 
 /* Standard error of the share of `taken` rays of a VSH_SAMPLER_… that an edge across the disc leaves, of
- * which `lit` were: c sqrt(p (1 - p)) n^-3/4, for white noise n^-1/2, measured over edges of all places and
+ * which `lit` were where the `expected` share were to be (a half where nothing is): c sqrt(p (1 - p)) n^-3/4, for white noise n^-1/2, measured over edges of all places and
  * directions (test_sampler). */
-double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken);
+double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken, double expected);
 
 /* Unit normal and direction in field space. */
 static inline vshi_vec vshi_direction_to_field(const vsh_field *field, vshi_vec direction) {

@@ -1,5 +1,5 @@
 /* Shadow values: the visible fraction of a light, by one cone or ray a point. */
-#include "shade/shadow.h"
+#include "shade/blocks.h"
 #include "base/floats.h"
 
 #include <math.h>
@@ -21,8 +21,9 @@ static float remap(int32_t method, double closeness, double sine) {
     }
 }
 
-bool vshi_shadow_aim(const vshi_shadow_task *task, vshi_vec origin, vshi_cone *cone) {
-    cone->origin = origin;
+/* The cone from a point to the light; false where the point is within the light. */
+static bool aim(const vshi_shadow_task *task, vshi_vec origin, vshi_cone *cone) {
+    *cone = (vshi_cone){.origin = origin, .horizon = INFINITY};
     if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
         cone->direction = task->towards;
         cone->sine = task->sine;
@@ -44,45 +45,56 @@ bool vshi_shadow_aim(const vshi_shadow_task *task, vshi_vec origin, vshi_cone *c
     return true;
 }
 
-static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
-    const vshi_shadow_task *task = user;
-    const int32_t method = task->options->method;
-    const bool inner = method == VSH_SHADOW_SMOOTH || method == VSH_SHADOW_CONE;
-    vshi_chunk chunk;
-    vshi_chunk_clear(&chunk, false);
+void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, vshi_facing *facing,
+                        vshi_chunk *chunk, vsh_shade_stats *stats) {
+    facing->count = 0;
     for (size_t i = begin; i < end; ++i) {
-        vshi_cone cone;
-        vshi_vec origin, normal;
+        vshi_cone *cone = &facing->cone[facing->count];
+        vshi_vec *normal = &facing->normal[facing->count];
+        vshi_vec origin;
         if (!vshi_shade_origin(task->field, task->points, i, task->options->start_offset,
-                               task->options->surface_offset, &origin, &normal)) {
-            task->visibility[i] = NAN;
+                               task->options->surface_offset, &origin, normal)) {
+            vshi_shadow_settle(task, i, NAN, NAN);
             ++stats->invalid;
             continue;
         }
-        if (!vshi_shadow_aim(task, origin, &cone)) {
-            task->visibility[i] = 1.0f;
+        if (!aim(task, origin, cone)) {
+            vshi_shadow_settle(task, i, 1.0f, 0.0f);
             continue;
         }
-        const bool hard = cone.sine <= 0.0;
-        cone.close = hard ? 1.0 : cone.sine;
-        cone.stop = inner ? -cone.sine : 0.0;
         if (task->points->normals != NULL) {
-            /* the receiver's own horizon is an edge like any other: its sine is the closeness of a plane */
-            const double horizon = vshi_dot(normal, cone.direction);
-            if (horizon <= cone.stop) {
-                task->visibility[i] = 0.0f;
+            cone->horizon = vshi_dot(*normal, cone->direction);
+            if (cone->horizon <= -task->lowest * cone->sine) {
+                vshi_shadow_settle(task, i, 0.0f, 0.0f);
                 ++stats->skipped;
                 continue;
             }
-            cone.close = !hard && horizon < cone.close ? horizon : cone.close;
         }
-        if (!vshi_chunk_add(&chunk, task->field, &cone, (uint32_t)(i - begin), stats)) {
-            task->visibility[i] = remap(method, cone.close, cone.sine);
-            stats->certified += cone.close >= cone.sine;
+        facing->settled[facing->count] = false;
+        facing->point[facing->count++] = i;
+    }
+    vshi_blocks_prove(task, facing, chunk, stats);
+}
+
+static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
+    const vshi_shadow_task *task = user;
+    const int32_t method = task->options->method;
+    vshi_facing facing;
+    vshi_chunk chunk;
+    vshi_shadow_gather(task, begin, end, &facing, &chunk, stats);
+    for (size_t i = 0; i < facing.count; ++i) {
+        vshi_cone *cone = &facing.cone[i];
+        const bool hard = cone->sine <= 0.0;
+        /* the receiver's own horizon is an edge like any other: its sine is the closeness of a plane */
+        cone->close = hard ? 1.0 : cone->horizon < cone->sine ? cone->horizon : cone->sine;
+        cone->stop = -task->lowest * cone->sine;
+        if (!vshi_chunk_add(&chunk, task->field, cone, (uint32_t)i, stats)) {
+            task->visibility[facing.point[i]] = remap(method, cone->close, cone->sine);
+            stats->certified += cone->close >= cone->sine;
         }
     }
     vshi_march_stats work = {0, 0};
-    task->march(task->field, &chunk.rays,
+    task->kernel->march(task->field, &chunk.rays,
                 method == VSH_SHADOW_IMPROVED ? VSHI_MARCH_TRIANGULATED : VSHI_MARCH_PLAIN,
                 task->options->max_steps, &work);
     stats->samples += work.samples;
@@ -90,7 +102,7 @@ static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_s
     for (size_t r = 0; r < chunk.rays.count; ++r) {
         const double closeness = chunk.rays.close[r];
         const double sine = chunk.rays.sine[r];
-        task->visibility[begin + chunk.owner[r]] = remap(method, closeness, sine);
+        task->visibility[facing.point[chunk.owner[r]]] = remap(method, closeness, sine);
         stats->certified += sine > 0.0 && (closeness >= sine || closeness <= -sine);
     }
 }
@@ -114,13 +126,16 @@ vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, co
     for (size_t i = 0; !by_rays && deviation != NULL && i < points->count; ++i) {
         deviation[i] = NAN;
     }
+    deviation = by_rays ? deviation : NULL;
+    const bool inner = by_rays || full.method == VSH_SHADOW_SMOOTH || full.method == VSH_SHADOW_CONE;
     vshi_shadow_task task = {.field = field,
                              .points = points,
                              .light = light,
                              .options = &full,
-                             .march = vshi_march_best(),
+                             .kernel = vshi_kernel_best(),
                              .visibility = visibility,
-                             .deviation = deviation};
+                             .deviation = deviation,
+                             .lowest = inner ? 1.0 : 0.0};
     if (light->type == VSH_LIGHT_DIRECTIONAL) {
         task.towards = vshi_direction_to_field(field, vshi_unit(vshi_vec_of(light->direction)));
         task.sine = sin(0.5 * light->angle);
@@ -142,7 +157,7 @@ vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, co
     }
     task.sampler = sampler;
     result =
-        vshi_shade_run(run, stage, points->count, VSHI_RAY_GRAIN, vshi_shadow_by_rays, &task, stats, error);
+        vshi_shade_run(run, stage, points->count, VSHI_CHUNK, vshi_shadow_by_rays, &task, stats, error);
     vshi_sampler_free(sampler);
     return result;
 }

@@ -5,8 +5,6 @@
 #include "shade/sampler.h"
 #include "shade/shade.h"
 
-enum { VSHI_RAY_GRAIN = 256 }; /* points a piece */
-
 /* A light as the points of one field see it. */
 typedef struct vshi_shadow_task {
     const vsh_field *field;
@@ -14,19 +12,41 @@ typedef struct vshi_shadow_task {
     const vsh_light *light;
     const vsh_shade_options *options;
     const vshi_sampler *sampler; /* of rays; else NULL */
-    vshi_march_fn *march;
+    const vshi_kernel *kernel;
     float *visibility;
     float *deviation; /* or NULL */
     vshi_vec towards; /* directional: unit, field space */
     vshi_vec centre;  /* positional: field space */
     double sine;      /* directional: of the half angle */
     double radius;    /* positional: finest voxels */
+    double lowest;    /* sine of how far below the receiver's plane an axis may be, of its cone's: 1 where the
+                       * inner penumbra counts, else 0 */
     uint32_t purpose; /* of the sampler: lights of other names have other sequences */
 } vshi_shadow_task;
 
-/* The cone from a point to the light, without what its estimate needs; false where the point is within the
- * light. */
-bool vshi_shadow_aim(const vshi_shadow_task *task, vshi_vec origin, vshi_cone *cone);
+/* The points of a piece that the light's cones rise above. */
+typedef struct vshi_facing {
+    size_t count;
+    size_t point[VSHI_CHUNK];
+    vshi_vec normal[VSHI_CHUNK]; /* zero where there are none */
+    vshi_cone cone[VSHI_CHUNK];  /* horizon: sine of the axis over the receiver's plane, INFINITY without one;
+                                  * close, stop: not set */
+    bool settled[VSHI_CHUNK];      /* settled: no value is left to find */
+} vshi_facing;
+
+/* Gathers points begin … end - 1, at most VSHI_CHUNK, without those that are settled already: invalid, within
+ * the light, turned away. What blocks of them share is proved (blocks.h). */
+void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, vshi_facing *facing,
+                        vshi_chunk *chunk, vsh_shade_stats *stats);
+
+/* The value of a point and its deviation. */
+static inline void vshi_shadow_settle(const vshi_shadow_task *task, size_t point, float value,
+                                      float deviation) {
+    task->visibility[point] = value;
+    if (task->deviation != NULL) {
+        task->deviation[point] = deviation;
+    }
+}
 
 /* rays, adaptive and exact: a vshi_shade_fn of a vshi_shadow_task. */
 void vshi_shadow_by_rays(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);

@@ -7,6 +7,7 @@
 
 #include <float.h>
 #include <stdlib.h>
+#include <string.h>
 
 #ifndef VSH_EMBREE
 
@@ -41,6 +42,11 @@ void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_r
     (void)triangles, (void)rays, (void)count, (void)blocked;
 }
 
+void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *beams, size_t count, int most,
+                        bool *cut) {
+    (void)triangles, (void)beams, (void)count, (void)most, (void)cut;
+}
+
 #else
 
 #include <embree3/rtcore.h>
@@ -51,6 +57,8 @@ void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_r
 struct vsh_triangles {
     RTCDevice device;
     RTCScene scene;
+    vshi_sheet sheet; /* of all geometries one after the other, in the scene's units */
+    uint32_t *first;  /* triangle of the sheet that each geometry begins with */
     double centre[3];
     double scale;
     uint64_t limit; /* bytes that Embree may hold; 0: no limit */
@@ -118,13 +126,59 @@ static void put(const vsh_triangles *triangles, vshi_vec world, float *out) {
     out[2] = (float)((world.z - triangles->centre[2]) * triangles->scale);
 }
 
-/* False where Embree refuses; its error says why. */
-static bool attach(vsh_triangles *triangles, const vsh_mesh *mesh) {
-    size_t used = 0;
-    for (size_t i = 0; i < mesh->triangle_count; ++i) {
-        used += !vshi_mesh_degenerate(mesh, i);
+/* The sheet of all meshes: their vertices, welded, and the triangles that are not degenerate. */
+static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count,
+                             vsh_error *error) {
+    size_t vertex_count = 0, triangle_count = 0, most = 0;
+    for (size_t m = 0; m < mesh_count; ++m) {
+        vertex_count += meshes[m].vertex_count;
+        most = meshes[m].vertex_count > most ? meshes[m].vertex_count : most;
+        for (size_t i = 0; i < meshes[m].triangle_count; ++i) {
+            triangle_count += !vshi_mesh_degenerate(&meshes[m], i);
+        }
     }
-    if (used == 0) {
+    if (vertex_count > UINT32_MAX || triangle_count >= UINT32_MAX) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "triangles: %zu vertices and %zu triangles, at most 2^32 - 2",
+                         vertex_count, triangle_count);
+    }
+    vshi_sheet *sheet = &triangles->sheet;
+    uint32_t *weld = NULL;
+    vsh_result result = vshi_sheet_allocate(sheet, vertex_count, triangle_count, error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&triangles->first, mesh_count, sizeof(uint32_t), "triangles", error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&weld, most, sizeof *weld, "welded vertices", error);
+    }
+    size_t vertex = 0, triangle = 0;
+    for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
+        const vsh_mesh *mesh = &meshes[m];
+        result = vshi_mesh_weld(mesh, weld, error);
+        triangles->first[m] = (uint32_t)triangle;
+        for (size_t i = 0; result == VSH_OK && i < mesh->triangle_count; ++i) {
+            if (!vshi_mesh_degenerate(mesh, i)) {
+                for (size_t k = 0; k < 3; ++k) {
+                    sheet->corners[3 * triangle + k] = (uint32_t)vertex + weld[mesh->indices[3 * i + k]];
+                }
+                ++triangle;
+            }
+        }
+        for (size_t v = 0; v < mesh->vertex_count; ++v) {
+            const vshi_vec local = vshi_vec_off(mesh->positions + 3 * v);
+            put(triangles, vshi_transform_point(mesh->transform, local), sheet->vertices + 3 * vertex++);
+        }
+    }
+    free(weld);
+    return result == VSH_OK ? vshi_sheet_join(sheet, error) : result;
+}
+
+/* Geometry `mesh`, with that number; false where Embree refuses: its error says why. */
+static bool attach(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count, size_t mesh,
+                   size_t first_vertex) {
+    const vshi_sheet *sheet = &triangles->sheet;
+    const size_t begin = triangles->first[mesh];
+    const size_t end = mesh + 1 < mesh_count ? triangles->first[mesh + 1] : sheet->triangle_count;
+    if (begin == end) {
         return true;
     }
     const RTCGeometry geometry = rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -132,24 +186,17 @@ static bool attach(vsh_triangles *triangles, const vsh_mesh *mesh) {
         return false;
     }
     float *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                              3 * sizeof(float), mesh->vertex_count);
+                                              3 * sizeof(float), meshes[mesh].vertex_count);
     uint32_t *indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                3 * sizeof(uint32_t), used);
+                                                3 * sizeof(uint32_t), end - begin);
     if (vertices != NULL && indices != NULL) {
-        for (size_t v = 0; v < mesh->vertex_count; ++v) {
-            const vshi_vec local = vshi_vec_off(mesh->positions + 3 * v);
-            put(triangles, vshi_transform_point(mesh->transform, local), vertices + 3 * v);
-        }
-        size_t at = 0;
-        for (size_t i = 0; i < mesh->triangle_count; ++i) {
-            if (!vshi_mesh_degenerate(mesh, i)) {
-                for (int k = 0; k < 3; ++k) {
-                    indices[at++] = mesh->indices[3 * i + (size_t)k];
-                }
-            }
+        memcpy(vertices, sheet->vertices + 3 * first_vertex,
+               meshes[mesh].vertex_count * 3 * sizeof(float));
+        for (size_t i = 0; i < 3 * (end - begin); ++i) {
+            indices[i] = sheet->corners[3 * begin + i] - (uint32_t)first_vertex;
         }
         rtcCommitGeometry(geometry);
-        rtcAttachGeometry(triangles->scene, geometry);
+        rtcAttachGeometryByID(triangles->scene, geometry, (unsigned)mesh);
     }
     rtcReleaseGeometry(geometry);
     return vertices != NULL && indices != NULL;
@@ -184,10 +231,16 @@ static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t
     }
     rtcSetSceneFlags(triangles->scene, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneProgressMonitorFunction(triangles->scene, watch_progress, job);
+    const vsh_result result = make_sheet(triangles, meshes, mesh_count, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    size_t vertex = 0;
     for (size_t m = 0; m < mesh_count; ++m) {
-        if (!attach(triangles, &meshes[m])) {
+        if (!attach(triangles, meshes, mesh_count, m, vertex)) {
             return refuse(triangles, job, error);
         }
+        vertex += meshes[m].vertex_count;
         if (vshi_job_advance(job, 0)) {
             return vshi_job_fail_cancelled(job, error);
         }
@@ -219,7 +272,8 @@ vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const
     double bytes = 0.0;
     for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
         result = vshi_mesh_check_data(&meshes[m], m, error);
-        bytes += 12.0 * (double)meshes[m].vertex_count + TRIANGLE_BYTES * (double)meshes[m].triangle_count;
+        const double vertices = (double)meshes[m].vertex_count, faces = (double)meshes[m].triangle_count;
+        bytes += 12.0 * vertices + TRIANGLE_BYTES * faces + vshi_sheet_bytes(vertices, faces);
     }
     if (result == VSH_OK) {
         result = vshi_check_limit(&full, bytes, "triangles", error);
@@ -260,12 +314,16 @@ void vsh_triangles_free(vsh_triangles *triangles) {
     if (triangles->device != NULL) {
         rtcReleaseDevice(triangles->device);
     }
+    vshi_sheet_free(&triangles->sheet);
+    free(triangles->first);
     free(triangles);
 }
 
 uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
     const long long bytes = atomic_load(&triangles->bytes);
-    return sizeof *triangles + (bytes > 0 ? (uint64_t)bytes : 0);
+    const vshi_sheet *sheet = &triangles->sheet;
+    return sizeof *triangles + (bytes > 0 ? (uint64_t)bytes : 0) +
+           (uint64_t)vshi_sheet_bytes((double)sheet->vertex_count, (double)sheet->triangle_count);
 }
 
 /* Eight at once are twice as fast as one at a time, 20 to 9.5 million a second on the cloister towards a sun
@@ -332,6 +390,47 @@ void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_r
         rtcOccluded8(valid, triangles->scene, &context, &packet);
         for (int lane = 0; lane < lanes; ++lane) {
             blocked[begin + (size_t)lane] = valid[lane] != 0 && packet.tfar[lane] < 0.0f;
+        }
+    }
+}
+
+/* Where the axis of a beam meets what is past `from`; false where nothing. */
+static bool next_hit(const vsh_triangles *triangles, const vshi_sheet_beam *beam, double from,
+                     struct RTCRayHit *hit) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    *hit = (struct RTCRayHit){.ray = {.org_x = (float)beam->origin.x,
+                                      .org_y = (float)beam->origin.y,
+                                      .org_z = (float)beam->origin.z,
+                                      .dir_x = (float)beam->axis.x,
+                                      .dir_y = (float)beam->axis.y,
+                                      .dir_z = (float)beam->axis.z,
+                                      .tnear = (float)from,
+                                      .tfar = beam->end < (double)FLT_MAX ? (float)beam->end : INFINITY,
+                                      .mask = 0xffffffffu},
+                              .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
+    rtcIntersect1(triangles->scene, &context, hit);
+    return hit->hit.geomID != RTC_INVALID_GEOMETRY_ID;
+}
+
+void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *beams, size_t count, int most,
+                        bool *cut) {
+    enum { LAYERS = 3 }; /* that may lie before the one that cuts */
+    for (size_t b = 0; b < count; ++b) {
+        vshi_sheet_beam beam = beams[b];
+        const double *centre = triangles->centre, scale = triangles->scale;
+        beam.origin = vshi_scale(vshi_sub(beam.origin, (vshi_vec){centre[0], centre[1], centre[2]}), scale);
+        beam.wide *= scale;
+        beam.end *= scale;
+        cut[b] = false;
+        double from = beam.wide;
+        struct RTCRayHit hit;
+        const bool near = vshi_dot(beam.origin, beam.origin) < FAR_ORIGIN * FAR_ORIGIN;
+        for (int layer = 0; near && layer < LAYERS && !cut[b] && next_hit(triangles, &beam, from, &hit); ++layer) {
+            const double distance = (double)hit.ray.tfar;
+            const uint32_t triangle = triangles->first[hit.hit.geomID] + hit.hit.primID;
+            cut[b] = vshi_sheet_cuts(&triangles->sheet, &beam, triangle, distance, most);
+            from = distance * (1.0 + 0x1p-16) + 0x1p-16;
         }
     }
 }

@@ -33,7 +33,7 @@ static double error_over_estimate(int32_t kind, int32_t n, double *bias) {
             lit += points[i][0] * cos(angle) + points[i][1] * sin(angle) < x;
         }
         const double error = (double)lit / n - truth_disc_share(x);
-        const double deviation = vshi_rays_deviation(kind, lit, n);
+        const double deviation = vshi_rays_deviation(kind, lit, n, 0.5);
         square += error * error;
         estimate += deviation * deviation;
         *bias += error / TEXELS;
@@ -61,7 +61,7 @@ static void low_discrepancy_beats_blue_beats_white_noise(void **state) {
     double errors[3];
     for (size_t k = 0; k < 3; ++k) {
         double bias;
-        errors[k] = error_over_estimate(KINDS[k], 64, &bias) * vshi_rays_deviation(KINDS[k], 32, 64);
+        errors[k] = error_over_estimate(KINDS[k], 64, &bias) * vshi_rays_deviation(KINDS[k], 32, 64, 0.5);
     }
     assert_true(errors[0] < 0.8 * errors[2]);
     assert_true(errors[2] < 0.8 * errors[1]);

@@ -27,13 +27,14 @@ static void fill_points(void) {
 
 typedef struct march_result {
     float close[1000];
+    float clear[1000];
     int8_t proof[1000];
     vshi_march_stats stats;
 } march_result;
 
 static void march_with(vshi_march_fn *march, const vsh_field *field, size_t count, int32_t kind,
                        march_result *result) {
-    static float lanes[12][1000];
+    static float lanes[13][1000];
     uint64_t counter = 77;
     for (size_t i = 0; i < count; ++i) {
         double d[3];
@@ -49,23 +50,25 @@ static void march_with(vshi_march_fn *march, const vsh_field *field, size_t coun
         lanes[9][i] = i % 3 == 0 ? 0.0f : -(float)sine;
         lanes[10][i] = sine > 0.0 ? (float)sine : 1.0f;
         lanes[11][i] = i % 4 == 0 ? INFINITY : (float)between(&counter, 0.0, 1.0);
+        lanes[12][i] = (float)between(&counter, 0.01, 12.0);
     }
-    const vshi_rays rays = {count,
-                            {lanes[0], lanes[1], lanes[2]},
-                            {lanes[3], lanes[4], lanes[5]},
-                            lanes[6],
-                            lanes[7],
-                            lanes[8],
-                            lanes[9],
-                            lanes[10],
-                            kind == VSHI_MARCH_PROOF ? lanes[11] : NULL,
-                            kind == VSHI_MARCH_PROOF ? result->proof : NULL};
+    const vshi_rays rays = {.count = count,
+                            .origin = {lanes[0], lanes[1], lanes[2]},
+                            .direction = {lanes[3], lanes[4], lanes[5]},
+                            .begin = lanes[6],
+                            .end = lanes[7],
+                            .sine = lanes[8],
+                            .stop = lanes[9],
+                            .close = lanes[10],
+                            .horizon = lanes[11],
+                            .wide = lanes[12],
+                            .clear = result->clear,
+                            .proof = result->proof};
+    memset(result->clear, 0, sizeof result->clear);
+    memset(result->proof, 0, sizeof result->proof);
     result->stats = (vshi_march_stats){0, 0};
     march(field, &rays, kind, 40, &result->stats);
     memcpy(result->close, lanes[10], sizeof result->close);
-    if (kind != VSHI_MARCH_PROOF) {
-        memset(result->proof, 0, sizeof result->proof);
-    }
 }
 
 static void every_instruction_set_gives_the_same_bits(void **state) {
@@ -75,35 +78,42 @@ static void every_instruction_set_gives_the_same_bits(void **state) {
     size_t other_count = 0;
 #if defined(__x86_64__)
     if (__builtin_cpu_supports("avx2")) {
-        others[other_count++] = vshi_march_avx2;
+        others[other_count++] = vshi_kernel_avx2.march;
     }
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512vl")) {
-        others[other_count++] = vshi_march_avx512;
+        others[other_count++] = vshi_kernel_avx512.march;
     }
 #endif
     print_message("%zu kernels beside the base\n", other_count);
     static march_result base, other;
     const size_t counts[] = {0, 1, 15, 16, 17, 100, 1000};
     for (size_t c = 0; c < sizeof counts / sizeof counts[0]; ++c) {
-        for (int32_t kind = VSHI_MARCH_PLAIN; kind <= VSHI_MARCH_PROOF; ++kind) {
-            march_with(vshi_march_base, field, counts[c], kind, &base);
+        for (int32_t kind = VSHI_MARCH_PLAIN; kind <= VSHI_MARCH_BEAM; ++kind) {
+            march_with(vshi_kernel_base.march, field, counts[c], kind, &base);
             for (size_t o = 0; o < other_count; ++o) {
                 march_with(others[o], field, counts[c], kind, &other);
                 assert_memory_equal(base.close, other.close, counts[c] * sizeof base.close[0]);
                 assert_memory_equal(base.proof, other.proof, counts[c]);
+                assert_memory_equal(base.clear, other.clear, counts[c] * sizeof base.clear[0]);
                 assert_int_equal(base.stats.samples, other.stats.samples);
                 assert_int_equal(base.stats.unfinished, other.stats.unfinished);
             }
         }
     }
+    size_t partly_clear = 0;
+    for (size_t i = 0; i < 1000; ++i) {
+        partly_clear += base.clear[i] > 0.0625f && base.clear[i] < 300.0f;
+    }
+    assert_true(partly_clear > 10);
+    march_with(vshi_kernel_base.march, field, 1000, VSHI_MARCH_PROOF, &base);
     bool unproved = false, proved_free = false;
     for (size_t i = 0; i < 1000; ++i) {
         unproved = unproved || base.proof[i] == VSHI_UNPROVED;
         proved_free = proved_free || base.proof[i] == VSHI_PROVED_FREE;
     }
     assert_true(unproved && proved_free);
-    march_with(vshi_march_base, field, 1000, VSHI_MARCH_PLAIN, &base);
+    march_with(vshi_kernel_base.march, field, 1000, VSHI_MARCH_PLAIN, &base);
     assert_true(base.stats.unfinished > 0);
     vsh_field_free(field);
 }

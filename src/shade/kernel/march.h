@@ -4,6 +4,7 @@
 
 #include "field/field.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 
 /* Rays in field space (lengths: finest voxels), as arrays of `count`. */
@@ -17,16 +18,20 @@ typedef struct vshi_rays {
     float *stop;  /* a ray ends when its closeness falls to this: -sine, or 0 for what ends at a hit */
     float *close; /* in: upper bound of the closeness, at least `stop`. out: min of it and of h / t along the
                    * ray, h the distance to the surface at t; `stop` or less where the ray ended by it */
-    /* for VSHI_MARCH_PROOF, which leaves `close` alone; else NULL */
-    float *horizon; /* sine of the direction's height over the receiver's plane; INFINITY without one */
+    /* for VSHI_MARCH_PROOF and VSHI_MARCH_BEAM, which leave `close` alone; else NULL */
+    float *horizon; /* of proofs: sine of the direction's height over the receiver's plane; INFINITY without
+                     * one */
     int8_t *proof;  /* out */
+    float *wide;    /* of beams: radius at t = 0, to which that of the cone is added */
+    float *clear;   /* out, of beams: the t from which on it is free; past `end` or infinite: nowhere */
 } vshi_rays;
 
 /* How the closeness is taken at a sample. */
 enum {
     VSHI_MARCH_PLAIN = 0,        /* h / t */
     VSHI_MARCH_TRIANGULATED = 1, /* the closest miss between two samples (Aaltonen, GDC 2018) */
-    VSHI_MARCH_PROOF = 2         /* not at all: whether the cone is free or full for certain */
+    VSHI_MARCH_PROOF = 2,        /* not at all: whether the cone is free or full for certain */
+    VSHI_MARCH_BEAM = 3          /* nor here: from where on a beam of them is free, or whether it is full */
 };
 
 enum { VSHI_UNPROVED = 0, VSHI_PROVED_FREE = 1, VSHI_PROVED_FULL = 2 };
@@ -39,14 +44,24 @@ typedef struct vshi_march_stats {
 typedef void vshi_march_fn(const vsh_field *field, const vshi_rays *rays, int32_t kind, int32_t max_steps,
                            vshi_march_stats *stats);
 
+/* Whether each of the balls of `radius` around `count` points of field space is free for certain; `radius` is
+ * within the finest level's band. */
+typedef void vshi_balls_fn(const vsh_field *field, size_t count, float *const centre[3], float radius,
+                           bool *is_free);
+
 /* One source (lanes.inc), built for each instruction set; all give the same bits. */
-vshi_march_fn vshi_march_base;
+typedef struct vshi_kernel {
+    vshi_march_fn *march;
+    vshi_balls_fn *balls;
+} vshi_kernel;
+
+extern const vshi_kernel vshi_kernel_base;
 #if defined(__x86_64__)
-vshi_march_fn vshi_march_avx2;
-vshi_march_fn vshi_march_avx512;
+extern const vshi_kernel vshi_kernel_avx2;
+extern const vshi_kernel vshi_kernel_avx512;
 #endif
 
 /* The fastest of them that this machine runs. */
-vshi_march_fn *vshi_march_best(void);
+const vshi_kernel *vshi_kernel_best(void);
 
 #endif

@@ -1,4 +1,4 @@
 #include "shade/kernel/march.h"
-#define MARCH_NAME vshi_march_base
+#define KERNEL_NAME vshi_kernel_base
 #define MARCH_WIDTH 4
 #include "shade/kernel/lanes.inc"

@@ -1,0 +1,264 @@
+/* Blocks of points against a light.
+ *
+ * The cones of all points of a ball of radius r towards one light lie in a beam: the cone of the same half
+ * angle whose radius at the ball's centre is r, or for lamps the hull of the ball and the lamp. Where balls
+ * that are free for certain cover the beam up to the light, so they do each cone; where a solid ball is as
+ * wide as the beam, every ray of it is hidden.
+ *
+ * Near its points a beam holds their own surface. There each point is on its own, with the ball that touches
+ * its tangent plane: it holds the rays of its cone from next to the point to where the beams of its neighbours
+ * are clear of the surface. */
+#include "shade/blocks.h"
+
+#include "shim/embree.h"
+
+#include <math.h>
+
+enum { SIZES = 3, SMALLEST = 4 };
+static const struct {
+    size_t points;
+    int triangles; /* to look at for whether they cut its beam */
+} SIZE[SIZES] = {{64, 96}, {16, 32}, {SMALLEST, 12}};
+
+/* Beams that are wider than this at their points hold too much for anything to be proved, voxels. */
+static const double WIDEST = 24.0;
+/* Cones that are left this long are worth a look at smaller blocks, voxels. */
+static const double SHORT = 48.0;
+/* What is so near to a block's points may be their own surface, voxels: no triangles are looked at for it. */
+static const double NEAR = 8.0;
+/* Radius of the ball above a point, voxels: as much as the finest level's band holds. What it may lack of the
+ * height of its centre, so that its rays enter it by then. */
+static const double NEAR_HEIGHT = 1.95, NEAR_LACK = 0.05;
+
+static void march_beams(const vshi_shadow_task *task, vshi_chunk *chunk, vsh_shade_stats *stats) {
+    vshi_march_stats work = {0, 0};
+    task->kernel->march(task->field, &chunk->rays, VSHI_MARCH_BEAM, task->options->max_steps, &work);
+    stats->samples += work.samples;
+}
+
+/* Whether it pays to look at less than the largest blocks where those leave cones open up to `end`: always
+ * where a point's cone takes more than one march. */
+static bool worthwhile(const vshi_shadow_task *task, double end) {
+    return task->options->method >= VSH_SHADOW_RAYS || end < SHORT;
+}
+
+/* --- the ball above each point */
+
+static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_shade_stats *stats) {
+    static const double LEAST_SINE = 0.1; /* of the cone's lowest ray over the plane */
+    float centres[3][VSHI_CHUNK];
+    bool is_free[VSHI_CHUNK];
+    uint32_t owner[VSHI_CHUNK];
+    size_t count = 0;
+    for (size_t i = 0; i < facing->count; ++i) {
+        const vshi_cone *cone = &facing->cone[i];
+        if (worthwhile(task, cone->end) && cone->horizon > cone->sine + LEAST_SINE && cone->horizon <= 1.0) {
+            centres[0][count] = (float)(cone->origin.x + NEAR_HEIGHT * facing->normal[i].x);
+            centres[1][count] = (float)(cone->origin.y + NEAR_HEIGHT * facing->normal[i].y);
+            centres[2][count] = (float)(cone->origin.z + NEAR_HEIGHT * facing->normal[i].z);
+            owner[count++] = (uint32_t)i;
+        }
+    }
+    float *const places[3] = {centres[0], centres[1], centres[2]};
+    task->kernel->balls(task->field, count, places, (float)(NEAR_HEIGHT - NEAR_LACK), is_free);
+    stats->samples += count;
+    const double lack = NEAR_HEIGHT * NEAR_HEIGHT - (NEAR_HEIGHT - NEAR_LACK) * (NEAR_HEIGHT - NEAR_LACK);
+    for (size_t b = 0; b < count; ++b) {
+        if (is_free[b]) {
+            vshi_cone *cone = &facing->cone[owner[b]];
+            /* sine of the lowest ray: the axis's less at most the cone's */
+            const double rise = NEAR_HEIGHT * (cone->horizon - cone->sine);
+            const double square = rise * rise - lack;
+            cone->begin = square > 0.0 ? rise + sqrt(square) : 0.0;
+        }
+    }
+}
+
+/* --- beams */
+
+typedef struct block {
+    size_t first, count;
+    vshi_cone beam;
+    double tilt; /* sine of the most that an axis of its cones is off the beam's */
+    bool near;   /* what is open of it is about its points */
+} block;
+
+static inline double least(double a, double b) {
+    return a < b ? a : b;
+}
+
+/* The beam around the cones of a block's points; false where there is none worth a look. */
+static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, block *b) {
+    const size_t last = b->first + b->count;
+    vshi_vec low = facing->cone[b->first].origin, high = low;
+    for (size_t i = b->first + 1; i < last; ++i) {
+        const vshi_vec p = facing->cone[i].origin;
+        low = (vshi_vec){least(low.x, p.x), least(low.y, p.y), least(low.z, p.z)};
+        high = (vshi_vec){-least(-high.x, -p.x), -least(-high.y, -p.y), -least(-high.z, -p.z)};
+    }
+    const vshi_vec centre = vshi_scale(vshi_add(low, high), 0.5);
+    double square = 0.0;
+    for (size_t i = b->first; i < last; ++i) {
+        const vshi_vec off = vshi_sub(facing->cone[i].origin, centre);
+        square = -least(-square, -vshi_dot(off, off));
+    }
+    vshi_cone *beam = &b->beam;
+    *beam = (vshi_cone){.origin = centre, .wide = sqrt(square) + 1e-3};
+    b->tilt = 0.0;
+    if (!(beam->wide <= WIDEST)) {
+        return false;
+    }
+    const bool hard = task->options->method == VSH_SHADOW_HARD;
+    const double radius = hard ? 0.0 : task->radius;
+    if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
+        beam->direction = task->towards;
+        beam->sine = hard ? 0.0 : task->sine;
+    } else {
+        const vshi_vec to = vshi_sub(task->centre, centre);
+        const double distance = vshi_length(to);
+        if (!(distance > radius + 4.0 * beam->wide)) {
+            return false;
+        }
+        beam->direction = vshi_scale(to, 1.0 / distance);
+        beam->sine = fmax(0.0, (radius - beam->wide) / distance);
+        b->tilt = beam->wide / distance;
+    }
+    /* from where the first of the cones is not yet proved to where the last is */
+    const double aside = (radius + beam->wide) * b->tilt, ahead = 1.0 - b->tilt * b->tilt;
+    beam->begin = INFINITY;
+    beam->end = -INFINITY;
+    for (size_t i = b->first; i < last; ++i) {
+        const vshi_cone *cone = &facing->cone[i];
+        const double along = vshi_dot(vshi_sub(cone->origin, centre), beam->direction);
+        beam->begin = least(beam->begin, along + ahead * cone->begin - aside);
+        beam->end = -least(-beam->end, -(along + cone->end + aside));
+    }
+    return beam->begin < beam->end;
+}
+
+/* Ends the cones of a block where its beam is free from `clear` on. */
+static void shorten(const vshi_shadow_task *task, vshi_facing *facing, const block *b, double clear) {
+    const double aside = (task->radius + b->beam.wide) * b->tilt, ahead = 1.0 - b->tilt * b->tilt;
+    for (size_t i = b->first; i < b->first + b->count; ++i) {
+        vshi_cone *cone = &facing->cone[i];
+        const double along = vshi_dot(vshi_sub(cone->origin, b->beam.origin), b->beam.direction);
+        const double own = (clear > along ? clear - along : 0.0) / ahead + aside;
+        cone->end = least(own, cone->end);
+    }
+}
+
+static void hide(const vshi_shadow_task *task, vshi_facing *facing, const block *b, vsh_shade_stats *stats) {
+    for (size_t i = b->first; i < b->first + b->count; ++i) {
+        facing->settled[i] = true;
+        vshi_shadow_settle(task, facing->point[i], 0.0f, 0.0f);
+    }
+    stats->certified += b->count;
+}
+
+/* Hides the blocks whose beams are cut by triangles. */
+static void hide_cut(const vshi_shadow_task *task, vshi_facing *facing, const block *blocks, size_t count,
+                     int triangles, vsh_shade_stats *stats) {
+    vshi_sheet_beam beams[VSHI_CHUNK / SMALLEST];
+    bool cut[VSHI_CHUNK / SMALLEST];
+    size_t number[VSHI_CHUNK / SMALLEST], tried = 0;
+    const vsh_field *field = task->field;
+    /* the points themselves are below where their cones begin in the field */
+    const double below = task->options->start_offset + task->options->surface_offset / field->voxel_size;
+    for (size_t i = 0; i < count; ++i) {
+        const block *b = &blocks[i];
+        if (b->near) {
+            continue;
+        }
+        const bool parallel = task->light->type == VSH_LIGHT_DIRECTIONAL;
+        const double wide = (b->beam.wide + below) * field->voxel_size;
+        vshi_sheet_beam *beam = &beams[tried];
+        *beam = (vshi_sheet_beam){.origin = vshi_to_world(field, b->beam.origin),
+                                  .axis = vshi_direction_to_world(field, b->beam.direction),
+                                  .wide = wide,
+                                  .tangent = b->beam.sine / sqrt(1.0 - b->beam.sine * b->beam.sine),
+                                  .end = INFINITY};
+        if (!parallel) {
+            const double radius = task->light->radius;
+            const double distance = vshi_length(vshi_sub(vshi_vec_of(task->light->position), beam->origin));
+            beam->end = distance - radius;
+            beam->tangent = (radius + wide) / beam->end;
+        }
+        if (beam->end > 4.0 * wide) {
+            number[tried++] = i;
+        }
+    }
+    vshi_triangles_cut(task->options->triangles, beams, tried, triangles, cut);
+    for (size_t t = 0; t < tried; ++t) {
+        if (cut[t]) {
+            hide(task, facing, &blocks[number[t]], stats);
+        }
+    }
+}
+
+static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s, vshi_chunk *chunk,
+                       vsh_shade_stats *stats) {
+    const size_t size = SIZE[s].points;
+    block blocks[VSHI_CHUNK / SMALLEST];
+    size_t count = 0;
+    vshi_chunk_clear(chunk);
+    for (size_t first = 0; first < facing->count; first += size) {
+        block *b = &blocks[count];
+        const size_t left = facing->count - first;
+        *b = (block){.first = first, .count = left < size ? left : size};
+        if (2 * b->count <= size || !aim_beam(task, facing, b) || (s > 0 && !worthwhile(task, b->beam.end))) {
+            continue;
+        }
+        if (vshi_chunk_add(chunk, task->field, &b->beam, (uint32_t)count, stats)) {
+            ++count;
+        } else {
+            shorten(task, facing, b, b->beam.begin);
+        }
+    }
+    march_beams(task, chunk, stats);
+    for (size_t r = 0; r < chunk->rays.count; ++r) {
+        block *b = &blocks[chunk->owner[r]];
+        const double clear = (double)chunk->rays.clear[r];
+        if (chunk->rays.proof[r] == VSHI_PROVED_FULL) {
+            hide(task, facing, b, stats);
+            b->near = true;
+        } else if (clear < (double)chunk->rays.end[r]) {
+            shorten(task, facing, b, clear > (double)chunk->rays.begin[r] ? clear : b->beam.begin);
+            b->near = clear < b->beam.begin + NEAR + 3.0 * b->beam.wide;
+        }
+    }
+    if (task->options->method == VSH_SHADOW_EXACT) {
+        hide_cut(task, facing, blocks, count, SIZE[s].triangles, stats);
+    }
+}
+
+/* Drops the points that are settled. */
+static void keep_open(vshi_facing *facing) {
+    size_t left = 0;
+    for (size_t i = 0; i < facing->count; ++i) {
+        if (facing->settled[i]) {
+            continue;
+        }
+        if (left < i) {
+            facing->point[left] = facing->point[i];
+            facing->normal[left] = facing->normal[i];
+            facing->cone[left] = facing->cone[i];
+            facing->settled[left] = false;
+        }
+        ++left;
+    }
+    facing->count = left;
+}
+
+void vshi_blocks_prove(const vshi_shadow_task *task, vshi_facing *facing, vshi_chunk *chunk,
+                       vsh_shade_stats *stats) {
+    if (facing->count >= SMALLEST) {
+        for (int s = 0; s < SIZES; ++s) {
+            prove_size(task, facing, s, chunk, stats);
+            keep_open(facing);
+            if (s == 0) {
+                prove_near(task, facing, stats);
+            }
+        }
+    }
+    vshi_chunk_clear(chunk);
+}
