@@ -1,6 +1,6 @@
 /* Sphere tracing (J. C. Hart, "Sphere tracing: a geometric method for the antialiased ray tracing of implicit
- * surfaces", 1996) of procedural solids: a tree's distance never passes the true one and changes by at most 1 per
- * unit (caster/sdf.c), so a step of that length meets nothing. */
+ * surfaces", 1996) of procedural solids: a tree's distance never passes the true one and changes by at most 1
+ * per unit (caster/sdf.c), so a step of that length meets nothing. */
 #include "caster/solids.h"
 
 #include "base/floats.h"
@@ -11,8 +11,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of the diagonal of the box around all solids: a ray that comes this near has met one. Far above the rounding of
- * doubles, far below what a texel shows; a ray that only grazes a solid takes some 10^4 steps. */
+/* Of the diagonal of the box around all solids: a ray that comes this near has met one. Far above the
+ * rounding of doubles, far below what a texel shows; a ray that only grazes a solid takes some 10^4 steps. */
 static const double HIT = 1e-9;
 enum { MOST_STEPS = 100000, CONE_STEPS = 96 };
 /* Of the diagonal: the least step of a cone that looks for a solid to be covered by. */
@@ -195,7 +195,8 @@ static bool meets(const vsh_solids *solids, const vshi_segment_ray *ray) {
     return true; /* it has not got away from the surface */
 }
 
-void vshi_solids_blocked(const vsh_solids *solids, const vshi_segment_ray *rays, size_t count, bool *blocked) {
+void vshi_solids_blocked(const vsh_solids *solids, const vshi_segment_ray *rays, size_t count,
+                         bool *blocked) {
     for (size_t i = 0; i < count; ++i) {
         blocked[i] = blocked[i] || meets(solids, &rays[i]);
     }
@@ -209,9 +210,9 @@ static double last_of(const vsh_solids *solids, vshi_vec origin, vshi_vec axis) 
     return vshi_dot(vshi_sub(to, origin), axis);
 }
 
-/* The ball of radius |distance| around a point of the axis holds the cone's disc there, or does not reach it: all
- * of the disc is then inside one solid, or free; and distances change by at most 1 per unit, which says for how
- * much of the axis that goes on. */
+/* The ball of radius |distance| around a point of the axis holds the cone's disc there, or does not reach it:
+ * all of the disc is then inside one solid, or free; and distances change by at most 1 per unit, which says
+ * for how much of the axis that goes on. */
 vshi_cone_state vshi_solids_cone(const vsh_solids *solids, const double origin[3], const double axis[3],
                                  double tangent, double near, double far) {
     const vshi_vec from = vshi_vec_of(origin), along = vshi_vec_of(axis);

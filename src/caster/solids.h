@@ -7,7 +7,8 @@
 #include <stdbool.h>
 #include <vdbshade/trace.h>
 
-/* Sets blocked[i] where ray i meets a solid; leaves it as it is elsewhere, and does not look where it is set. */
+/* Sets blocked[i] where ray i meets a solid; leaves it as it is elsewhere, and does not look where it is set.
+ */
 void vshi_solids_blocked(const vsh_solids *solids, const vshi_segment_ray *rays, size_t count, bool *blocked);
 
 typedef enum vshi_cone_state {
@@ -16,8 +17,8 @@ typedef enum vshi_cone_state {
     VSHI_CONE_COVERED /* every ray does */
 } vshi_cone_state;
 
-/* What can be proved of all rays from `origin` within `tangent` of the unit `axis`, which end at depths along it
- * between `near` and `far`. */
+/* What can be proved of all rays from `origin` within `tangent` of the unit `axis`, which end at depths along
+ * it between `near` and `far`. */
 vshi_cone_state vshi_solids_cone(const vsh_solids *solids, const double origin[3], const double axis[3],
                                  double tangent, double near, double far);
 

@@ -107,8 +107,7 @@ static vshi_cone_state look(const tracing *task, vshi_vec origin, const target *
         return vsh_solids_distance(task->solids, from) > task->distance ? VSHI_CONE_FREE : VSHI_CONE_UNKNOWN;
     }
     const double axis[3] = {t->axis.x, t->axis.y, t->axis.z};
-    return vshi_solids_cone(task->solids, from, axis, t->radius, t->distance - t->size,
-                            t->distance);
+    return vshi_solids_cone(task->solids, from, axis, t->radius, t->distance - t->size, t->distance);
 }
 
 static void meet(const tracing *task, const vsh_solids *solids, const vshi_segment_ray *rays, size_t count,

@@ -107,10 +107,9 @@ static void ambient_occlusion_of_a_sphere_is_its_share_of_the_cosine(void **stat
 
 /* The seeds' scene as trees of one shape each. */
 static vsh_solids *seeds(void) {
-    vsh_sdf_node nodes[5] = {
-        shape_at(VSH_SDF_PLANE, 0.0, 0.0, 0.0), shape_at(VSH_SDF_SPHERE, 0.0, 0.8, 0.0),
-        box_at(-1.2, 0.7, 0.5, 0.3, 0.3, 0.3), shape_at(VSH_SDF_TORUS, 1.2, 0.6, -0.3),
-        box_at(0.3, 1.0, 1.5, 0.05, 1.0, 0.05)};
+    vsh_sdf_node nodes[5] = {shape_at(VSH_SDF_PLANE, 0.0, 0.0, 0.0), shape_at(VSH_SDF_SPHERE, 0.0, 0.8, 0.0),
+                             box_at(-1.2, 0.7, 0.5, 0.3, 0.3, 0.3), shape_at(VSH_SDF_TORUS, 1.2, 0.6, -0.3),
+                             box_at(0.3, 1.0, 1.5, 0.05, 1.0, 0.05)};
     nodes[0].size[0] = nodes[0].size[2] = 3.0;
     nodes[0].size[1] = 0.5;
     nodes[1].radius = 0.5;
@@ -158,8 +157,8 @@ static void every_floor_texel_sees_what_rays_against_the_solids_say(void **state
         const double to[3] = {place[0] - p[0], place[1] - p[1], place[2] - p[2]};
         const double far = sqrt(to[0] * to[0] + to[1] * to[1] + to[2] * to[2]);
         const double w = tan(asin(0.3 / far));
-        NEAR(seen(solids, p, NULL, &light, RAYS),
-             truth_light(truth_seeds(), p, NULL, to, w, far - 0.3, RAYS), 0.05);
+        NEAR(seen(solids, p, NULL, &light, RAYS), truth_light(truth_seeds(), p, NULL, to, w, far - 0.3, RAYS),
+             0.05);
     }
     vsh_solids_free(solids);
 }
@@ -209,11 +208,10 @@ static void a_ray_is_hidden_that_meets_either_solids_or_triangles(void **state) 
         skip();
     }
     /* a triangle plate over x > 0.1, a solid one over x < -0.1: a slit of the light is left */
-    static const float corners[12] = {0.1f, 5.0f, -100.0f, 100.0f, 5.0f, -100.0f,
-                                      100.0f, 5.0f, 100.0f, 0.1f, 5.0f, 100.0f};
+    static const float corners[12] = {0.1f,   5.0f, -100.0f, 100.0f, 5.0f, -100.0f,
+                                      100.0f, 5.0f, 100.0f,  0.1f,   5.0f, 100.0f};
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    const vsh_mesh mesh = {
-        .positions = corners, .indices = indices, .vertex_count = 4, .triangle_count = 2};
+    const vsh_mesh mesh = {.positions = corners, .indices = indices, .vertex_count = 4, .triangle_count = 2};
     const vsh_sdf_node sheet = box_at(-50.1, 5.0, 0.0, 50.0, 1e-6, 50.0);
     vsh_triangles *triangles = NULL;
     assert_int_equal(vsh_triangles_create(&mesh, 1, NULL, &triangles, NULL), VSH_OK);
@@ -221,10 +219,10 @@ static void a_ray_is_hidden_that_meets_either_solids_or_triangles(void **state) 
     const double half = 0.1, x = 0.1 / (5.0 * tan(half));
     const vsh_light light = sun(OVERHEAD, 2.0 * half);
     float both = -1.0f, one = -1.0f;
-    assert_int_equal(
-        vsh_trace_shadow(triangles, solids, 1, ORIGIN, UP, 0.0, &light, 8192, NULL, &both, NULL), VSH_OK);
-    assert_int_equal(
-        vsh_trace_shadow(triangles, NULL, 1, ORIGIN, UP, 0.0, &light, 8192, NULL, &one, NULL), VSH_OK);
+    assert_int_equal(vsh_trace_shadow(triangles, solids, 1, ORIGIN, UP, 0.0, &light, 8192, NULL, &both, NULL),
+                     VSH_OK);
+    assert_int_equal(vsh_trace_shadow(triangles, NULL, 1, ORIGIN, UP, 0.0, &light, 8192, NULL, &one, NULL),
+                     VSH_OK);
     NEAR(one, truth_disc_share(x), 0.003);
     NEAR(both, 2.0 * truth_disc_share(x) - 1.0, 0.003);
     vsh_solids_free(solids);

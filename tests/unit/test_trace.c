@@ -30,8 +30,8 @@ static vsh_triangles *triangles_of(const vsh_mesh *meshes, size_t count) {
 static float seen(const vsh_triangles *triangles, const double *position, const float *normal,
                   const vsh_light *light, int32_t rays) {
     float value = -1.0f;
-    assert_int_equal(vsh_trace_shadow(triangles, NULL, 1, position, normal, 0.0, light, rays, NULL, &value, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_trace_shadow(triangles, NULL, 1, position, normal, 0.0, light, rays, NULL, &value, NULL), VSH_OK);
     return value;
 }
 
@@ -212,9 +212,9 @@ static void threads_and_packets_change_no_bit(void **state) {
         vsh_run run = vsh_run_default();
         run.threads = threads;
         float *values = threads == 1 ? first : other;
-        assert_int_equal(
-            vsh_trace_shadow(triangles, NULL, COUNT, positions, normals, 0.001, &light, 13, &run, values, NULL),
-            VSH_OK);
+        assert_int_equal(vsh_trace_shadow(triangles, NULL, COUNT, positions, normals, 0.001, &light, 13, &run,
+                                          values, NULL),
+                         VSH_OK);
         assert_true(threads == 1 || memcmp(first, other, sizeof first) == 0);
     }
     vshi_segment_ray rays[100];

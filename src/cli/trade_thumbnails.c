@@ -1,0 +1,92 @@
+/* Small pictures of truth, bake and difference. */
+#include "trade_parts.h"
+#include "trade_plot.h"
+#include "trade_png.h"
+
+#include <math.h>
+
+enum { THUMB = 160, MOST_RECEIVERS = 3 };
+
+static void make_palettes(uint8_t gray[256][3], uint8_t difference[256][3]) {
+    for (int i = 0; i < 256; ++i) {
+        gray[i][0] = gray[i][1] = gray[i][2] = (uint8_t)i;
+        const int off = i > 128 ? i - 128 : 128 - i; /* white in the middle, red too light, blue too dark */
+        const uint8_t rest = (uint8_t)(255 - (off < 128 ? 2 * off : 255));
+        difference[i][0] = i >= 128 ? 255 : rest;
+        difference[i][1] = rest;
+        difference[i][2] = i >= 128 ? rest : 255;
+    }
+}
+
+typedef struct picture {
+    const trade_work *work;
+    const trade_receiver *receiver;
+    int width, height;
+} picture;
+
+/* Means of a plane's measured texels, or of their differences from `from`; where there are none it is grey.
+ */
+static void shrink(const picture *p, const float *plane, const float *from, uint8_t *pixels) {
+    const size_t wide = (size_t)p->receiver->info.width, high = (size_t)p->receiver->info.height;
+    const size_t width = (size_t)p->width, height = (size_t)p->height, first = p->receiver->first;
+    for (size_t row = 0; row < height; ++row) {
+        for (size_t column = 0; column < width; ++column) {
+            double sum = 0.0, count = 0.0;
+            for (size_t y = row * high / height; y < (row + 1) * high / height; ++y) {
+                for (size_t x = column * wide / width; x < (column + 1) * wide / width; ++x) {
+                    const size_t texel = first + y * wide + x;
+                    if (p->work->common[texel]) {
+                        sum += (double)plane[texel] - (from != NULL ? (double)from[texel] : 0.0);
+                        ++count;
+                    }
+                }
+            }
+            double value = from != NULL ? 0.5 : 0.25;
+            if (count > 0.0) {
+                /* a difference of an eighth is all red, or all blue */
+                value = from != NULL ? 0.5 + 4.0 * (sum / count) : sum / count;
+            }
+            pixels[row * width + column] = (uint8_t)lround(255.0 * fmin(1.0, fmax(0.0, value)));
+        }
+    }
+}
+
+/* The first light's plane, or AO. */
+static void write_figure(FILE *out, const trade_work *work, const trade_subject *subject,
+                         const trade_run *run, const trade_receiver *receiver) {
+    uint8_t gray[256][3], difference[256][3], pixels[THUMB * THUMB];
+    make_palettes(gray, difference);
+    const int longest =
+        receiver->info.width > receiver->info.height ? receiver->info.width : receiver->info.height;
+    const int most = longest < THUMB ? longest : THUMB;
+    const picture p = {work, receiver, (int)fmax(1.0, (double)receiver->info.width * most / longest),
+                       (int)fmax(1.0, (double)receiver->info.height * most / longest)};
+    fputs("<figure>", out);
+    shrink(&p, subject->truth, NULL, pixels);
+    trade_png_write(out, p.width, p.height, pixels, gray, "truth");
+    shrink(&p, run->values, NULL, pixels);
+    fputc(' ', out);
+    trade_png_write(out, p.width, p.height, pixels, gray, "bake");
+    shrink(&p, run->values, subject->truth, pixels);
+    fputc(' ', out);
+    trade_png_write(out, p.width, p.height, pixels, difference, "difference");
+    fprintf(out, "<figcaption><code>%s</code><br>RMSE %.4f, %.3g µs a value</figcaption></figure>\n",
+            run->options, run->metrics.rmse, trade_rate(subject, run));
+}
+
+void trade_thumbnails_write(FILE *out, const trade_work *work, const trade_subject *subject) {
+    const size_t shown = work->receiver_count < MOST_RECEIVERS ? work->receiver_count : MOST_RECEIVERS;
+    if (subject->planes > 1) {
+        fprintf(out, " Shown is the first of %zu lights.", subject->planes);
+    }
+    if (shown < work->receiver_count) {
+        fprintf(out, " Shown are the first %zu of %zu receivers.", shown, work->receiver_count);
+    }
+    fputs("</p>\n<div class=\"shots\">\n", out);
+    for (size_t i = 0; i < subject->run_count; ++i) {
+        for (size_t r = 0; r < shown && subject->runs[i].front; ++r) {
+            write_figure(out, work, subject, &subject->runs[i], &work->receivers[r]);
+        }
+    }
+    fputs("</div>\n", out);
+}
