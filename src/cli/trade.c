@@ -191,6 +191,12 @@ static int by_size(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
+/* Whether a run is neither slower nor farther from the truth than another, and better in one of the two. */
+static bool beats(const trade_run *a, const trade_run *b) {
+    return a->rate <= b->rate && a->metrics.rmse <= b->metrics.rmse &&
+           (a->rate < b->rate || a->metrics.rmse < b->metrics.rmse);
+}
+
 static void mark_fronts(trade_work *work) {
     for (size_t s = 0; s < work->subject_count; ++s) {
         trade_subject *subject = &work->subjects[s];
@@ -198,9 +204,7 @@ static void mark_fronts(trade_work *work) {
             trade_run *run = &subject->runs[i];
             run->front = !run->embree;
             for (size_t k = 0; k < subject->run_count && run->front; ++k) {
-                const trade_run *other = &subject->runs[k];
-                run->front = other->embree || k == i ||
-                             !(other->bake_s <= run->bake_s && other->metrics.rmse <= run->metrics.rmse);
+                run->front = subject->runs[k].embree || !beats(&subject->runs[k], run);
             }
         }
     }

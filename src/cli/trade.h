@@ -45,9 +45,10 @@ typedef struct trade_run {
     bool front;         /* nothing is both faster and nearer to the truth */
     double build_s;
     double bake_s;
-    uint64_t bytes;        /* of field and triangles */
-    double certified;      /* share of the values that a cone proved; NaN for rays alone */
-    size_t valid;          /* texels that it gave a value, over one plane */
+    double rate;      /* microseconds that the bake takes for a value: one light's at a texel, or its AO */
+    uint64_t bytes;   /* of field and triangles */
+    double certified; /* share of the values that a cone proved; NaN for rays alone */
+    size_t valid;     /* texels that it gave a value, over one plane */
     trade_metrics metrics; /* over the texels that all runs have */
     double valid_rmse;     /* over all texels that it gave a value */
     float *values;         /* as trade_subject.truth */
@@ -132,7 +133,8 @@ int trade_write_plot(const trade_work *work);
 int trade_bake(const trade_work *work, const vsh_field *field, const vsh_shade_options *shade, float *shadow,
                float *ao, float *coverage, vsh_shade_stats *stats);
 
-/* Measures run->values, on the texels that all runs have and on all of `mask`, `valid` of them. */
+/* Measures run->values and the rate, on the texels that all runs have and on all of `mask`, `valid` of them.
+ */
 int trade_compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask, size_t valid,
                   trade_run *run);
 

@@ -141,6 +141,7 @@ int trade_compare(const trade_work *work, const trade_subject *subject, const ui
     m.width_error = width_error(work, subject, run->values);
     free(errors);
     run->metrics = m;
+    run->rate = 1e6 * run->bake_s / (double)(subject->planes * run->valid);
     run->valid_rmse = rmse_over(work, subject, run->values, mask, valid);
     return CLI_OK;
 }

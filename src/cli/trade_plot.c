@@ -31,10 +31,6 @@ static const char *color_of(const char *method) {
     return "#666666";
 }
 
-double trade_rate(const trade_subject *subject, const trade_run *run) {
-    return run->bake_s / (double)(subject->planes * run->valid) * 1e6;
-}
-
 /* The part of a logarithmic axis that holds all values, in powers of ten. */
 typedef struct axis {
     double low, high;
@@ -80,7 +76,7 @@ static double at_y(const plot *p, double value) {
 }
 
 static double x_of(const plot *p, const trade_run *run) {
-    return at_x(p, trade_rate(p->subject, run));
+    return at_x(p, run->rate);
 }
 
 /* Lines at 1, 2 and 5 times each power of ten; all are labelled where the axis is short enough for that. */
@@ -134,7 +130,7 @@ static void write_line(const plot *p, bool (*belongs)(const trade_run *, const t
         const trade_run *next = NULL;
         double next_rate = INFINITY;
         for (size_t i = 0; i < s->run_count; ++i) {
-            const double rate = trade_rate(s, &s->runs[i]);
+            const double rate = s->runs[i].rate;
             if (belongs(&s->runs[i], like) && rate > last && rate < next_rate) {
                 next = &s->runs[i];
                 next_rate = rate;
@@ -183,11 +179,11 @@ static void write_points(const plot *p) {
     for (size_t i = 0; i < p->subject->run_count; ++i) {
         const trade_run *run = &p->subject->runs[i];
         fprintf(p->out,
-                "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%g\" fill=\"%s\"%s><title>%s %s: RMSE %.4f, %.3g "
-                "s</title></circle>\n",
+                "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%g\" fill=\"%s\"%s><title>%s%s: RMSE %.4f, %.3g "
+                "µs</title></circle>\n",
                 x_of(p, run), at_y(p, error_of(run)), radius_of(p, run->resolution), color_of(run->method),
-                run->front ? " stroke=\"#000\" stroke-width=\"1.5\"" : "", run->embree ? "Embree," : "",
-                run->options, run->metrics.rmse, run->bake_s);
+                run->front ? " stroke=\"#000\" stroke-width=\"1.5\"" : "", run->embree ? "Embree, " : "",
+                run->options, run->metrics.rmse, run->rate);
     }
 }
 
@@ -225,7 +221,7 @@ static void write_legend(const plot *p) {
 void trade_plot_write(FILE *out, const trade_work *work, const trade_subject *subject) {
     plot p = {out, work, subject, {INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
     for (size_t i = 0; i < subject->run_count; ++i) {
-        grow(&p.x, trade_rate(subject, &subject->runs[i]));
+        grow(&p.x, subject->runs[i].rate);
         grow(&p.y, error_of(&subject->runs[i]));
     }
     settle(&p.x);

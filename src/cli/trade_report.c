@@ -21,7 +21,7 @@ static const char head[] =
     ".wide{overflow-x:auto;margin:1em 0}table{border-collapse:collapse;font-size:13px}"
     "th,td{padding:.3em .6em;text-align:right;border-bottom:1px solid #e4e4e4;white-space:nowrap}"
     "th{vertical-align:bottom}.narrow th{white-space:normal}"
-    "td.t,th.t{text-align:left}tr.f{background:#eef6f1}"
+    ".targets td.t{white-space:normal;min-width:15em}td.t,th.t{text-align:left}tr.f{background:#eef6f1}"
     ".all{max-height:40em;overflow:auto}.all thead th{position:sticky;top:0;background:#fff}"
     "code{font:12px ui-monospace,monospace}"
     "img{image-rendering:pixelated;vertical-align:top;width:32%;max-width:192px;height:auto}"
@@ -57,38 +57,38 @@ static void write_escaped(FILE *out, const char *text) {
 /* The fastest of the runs whose RMSE is at most `target`; NULL where there is none. */
 static const trade_run *fastest(const trade_subject *subject, double target, bool building, bool embree) {
     const trade_run *best = NULL;
+    double best_time = INFINITY;
     for (size_t i = 0; i < subject->run_count; ++i) {
         const trade_run *run = &subject->runs[i];
         if (run->embree != embree || !(run->metrics.rmse <= target)) {
             continue;
         }
-        const double time = run->bake_s + (building ? run->build_s : 0.0);
-        const double best_time = best != NULL ? best->bake_s + (building ? best->build_s : 0.0) : INFINITY;
+        const double time = building ? run->bake_s + run->build_s : run->rate;
         best = time < best_time ? run : best;
+        best_time = fmin(time, best_time);
     }
     return best;
 }
 
 static void write_targets(FILE *out, const trade_subject *subject, bool embree_measured) {
-    fprintf(
-        out,
-        "<div class=\"wide\"><table class=\"narrow\"><tr><th>RMSE of at most</th><th class=\"t\">least bake "
-        "time with</th><th>µs a value</th>%s<th class=\"t\">least time, building included, "
-        "with</th><th>s</th></tr>\n",
-        embree_measured ? "<th>Embree’s rays, µs a value</th>" : "");
+    fprintf(out,
+            "<div class=\"wide\"><table class=\"narrow targets\"><tr><th>RMSE of at most</th><th "
+            "class=\"t\">least bake "
+            "time with</th><th>µs a value</th>%s<th class=\"t\">least time, building included, "
+            "with</th><th>s</th></tr>\n",
+            embree_measured ? "<th>Embree’s rays, µs a value</th>" : "");
     for (size_t i = 0; i < sizeof targets / sizeof targets[0]; ++i) {
         const trade_run *bake = fastest(subject, targets[i], false, false);
         const trade_run *all = fastest(subject, targets[i], true, false);
         const trade_run *embree = fastest(subject, targets[i], false, true);
         fprintf(out, "<tr><td>%g</td>", targets[i]);
         if (bake != NULL) {
-            fprintf(out, "<td class=\"t\"><code>%s</code></td><td>%.3g</td>", bake->options,
-                    trade_rate(subject, bake));
+            fprintf(out, "<td class=\"t\"><code>%s</code></td><td>%.3g</td>", bake->options, bake->rate);
         } else {
             fputs("<td class=\"t\">none of these</td><td>–</td>", out);
         }
         if (embree != NULL) {
-            fprintf(out, "<td>%.3g (%s)</td>", trade_rate(subject, embree), embree->options);
+            fprintf(out, "<td>%.3g (%s)</td>", embree->rate, embree->options);
         } else if (embree_measured) {
             fputs("<td>–</td>", out);
         }
@@ -118,7 +118,7 @@ static void write_table(FILE *out, const trade_subject *subject) {
                 "<tr%s><td class=\"t\">%s<code>%s</code></td><td>%.2f</td><td>%.3f</td><td>%.3g</td>"
                 "<td>%.1f</td>",
                 run->front ? " class=\"f\"" : "", run->embree ? "Embree, " : "", run->options, run->build_s,
-                run->bake_s, trade_rate(subject, run), (double)run->bytes / 1e6);
+                run->bake_s, run->rate, (double)run->bytes / 1e6);
         fprintf(out, "<td>%.4f</td><td>%.4f</td><td>%+.4f</td><td>%.3f</td><td>%.3f</td><td>%.3f</td>",
                 m->rmse, m->penumbra_rmse, m->bias, m->p95, m->p99, m->max);
         fprintf(out, isnan(m->width_error) ? "<td>–</td>" : "<td>%.1f %%</td>", 100.0 * m->width_error);

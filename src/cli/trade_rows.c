@@ -1,6 +1,5 @@
 /* The table as CSV: what the page shows, with every digit. */
 #include "trade_parts.h"
-#include "trade_plot.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -20,9 +19,8 @@ void trade_rows_write(FILE *out, const trade_work *work) {
             const trade_run *r = &subject->runs[i];
             const trade_metrics *m = &r->metrics;
             fprintf(out, "%s,%s,%s,%d,%.6g,%.6g,%.6g,%" PRIu64 ",%zu,%zu,%zu,%zu,", subject->name, r->method,
-                    r->options, r->resolution, r->build_s, r->bake_s, trade_rate(subject, r), r->bytes,
-                    work->covered, work->covered - r->valid, r->valid - work->common_count,
-                    work->common_count);
+                    r->options, r->resolution, r->build_s, r->bake_s, r->rate, r->bytes, work->covered,
+                    work->covered - r->valid, r->valid - work->common_count, work->common_count);
             fprintf(out, "%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,", m->rmse, m->penumbra_rmse, m->bias, m->p95, m->p99,
                     m->max);
             fprintf(out, isnan(m->width_error) ? "," : "%.6f,", m->width_error);

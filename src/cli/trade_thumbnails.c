@@ -1,21 +1,28 @@
 /* Small pictures of truth, bake and difference. */
 #include "trade_parts.h"
-#include "trade_plot.h"
 #include "trade_png.h"
 
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 
 enum { THUMB = 160, MOST_RECEIVERS = 3 };
 
+/* The palettes' last entry stands for what is not measured: no shade of grey, and in no difference. */
+enum { SHADES = 255, NOTHING = 255 };
+
 static void make_palettes(uint8_t gray[256][3], uint8_t difference[256][3]) {
-    for (int i = 0; i < 256; ++i) {
+    static const uint8_t nothing[3] = {0xd3, 0xdb, 0xe6};
+    for (int i = 0; i < SHADES; ++i) {
         gray[i][0] = gray[i][1] = gray[i][2] = (uint8_t)i;
-        const int off = i > 128 ? i - 128 : 128 - i; /* white in the middle, red too light, blue too dark */
-        const uint8_t rest = (uint8_t)(255 - (off < 128 ? 2 * off : 255));
-        difference[i][0] = i >= 128 ? 255 : rest;
+        const int off = abs(i - SHADES / 2); /* white in the middle, red too light, blue too dark */
+        const uint8_t rest = (uint8_t)(255 - 2 * off);
+        difference[i][0] = i >= SHADES / 2 ? 255 : rest;
         difference[i][1] = rest;
-        difference[i][2] = i >= 128 ? rest : 255;
+        difference[i][2] = i >= SHADES / 2 ? rest : 255;
     }
+    memcpy(gray[NOTHING], nothing, sizeof nothing);
+    memcpy(difference[NOTHING], nothing, sizeof nothing);
 }
 
 typedef struct picture {
@@ -24,7 +31,7 @@ typedef struct picture {
     int width, height;
 } picture;
 
-/* Means of a plane's measured texels, or of their differences from `from`; where there are none it is grey.
+/* Means of a plane's measured texels, or of their differences from `from`.
  */
 static void shrink(const picture *p, const float *plane, const float *from, uint8_t *pixels) {
     const size_t wide = (size_t)p->receiver->info.width, high = (size_t)p->receiver->info.height;
@@ -41,12 +48,10 @@ static void shrink(const picture *p, const float *plane, const float *from, uint
                     }
                 }
             }
-            double value = from != NULL ? 0.5 : 0.25;
-            if (count > 0.0) {
-                /* a difference of an eighth is all red, or all blue */
-                value = from != NULL ? 0.5 + 4.0 * (sum / count) : sum / count;
-            }
-            pixels[row * width + column] = (uint8_t)lround(255.0 * fmin(1.0, fmax(0.0, value)));
+            /* a difference of an eighth is all red, or all blue */
+            const double value = from != NULL ? 0.5 + 4.0 * (sum / count) : sum / count;
+            pixels[row * width + column] =
+                count > 0.0 ? (uint8_t)lround((SHADES - 1) * fmin(1.0, fmax(0.0, value))) : NOTHING;
         }
     }
 }
@@ -71,7 +76,20 @@ static void write_figure(FILE *out, const trade_work *work, const trade_subject 
     fputc(' ', out);
     trade_png_write(out, p.width, p.height, pixels, difference, "difference");
     fprintf(out, "<figcaption><code>%s</code><br>RMSE %.4f, %.3g µs a value</figcaption></figure>\n",
-            run->options, run->metrics.rmse, trade_rate(subject, run));
+            run->options, run->metrics.rmse, run->rate);
+}
+
+/* The front in the order of time: no two of its runs take the same. */
+static const trade_run *next_on_front(const trade_subject *subject, const trade_run *last) {
+    const trade_run *next = NULL;
+    for (size_t i = 0; i < subject->run_count; ++i) {
+        const trade_run *run = &subject->runs[i];
+        if (run->front && (last == NULL || run->rate > last->rate) &&
+            (next == NULL || run->rate < next->rate)) {
+            next = run;
+        }
+    }
+    return next;
 }
 
 void trade_thumbnails_write(FILE *out, const trade_work *work, const trade_subject *subject) {
@@ -83,9 +101,10 @@ void trade_thumbnails_write(FILE *out, const trade_work *work, const trade_subje
         fprintf(out, " Shown are the first %zu of %zu receivers.", shown, work->receiver_count);
     }
     fputs("</p>\n<div class=\"shots\">\n", out);
-    for (size_t i = 0; i < subject->run_count; ++i) {
-        for (size_t r = 0; r < shown && subject->runs[i].front; ++r) {
-            write_figure(out, work, subject, &subject->runs[i], &work->receivers[r]);
+    const trade_run *last = NULL;
+    for (const trade_run *run; (run = next_on_front(subject, last)) != NULL; last = run) {
+        for (size_t r = 0; r < shown; ++r) {
+            write_figure(out, work, subject, run, &work->receivers[r]);
         }
     }
     fputs("</div>\n", out);
