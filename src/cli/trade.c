@@ -306,13 +306,7 @@ static int check_files(const trade_settings *s, const vsh_scene *scene) {
         code = code == CLI_OK ? cli_bake_check_output(&s->bake, scene, outputs[i]) : code;
         code = code == CLI_OK ? cli_temporary_check(outputs[i]) : code;
     }
-    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
-        const vsh_caster *caster = &scene->casters[i];
-        if (caster->type == VSH_CASTER_VDB) {
-            code = cli_trial_read(caster->path, caster->grid, s->bake.common.memory_limit);
-        }
-    }
-    return code;
+    return code == CLI_OK ? cli_trial_casters(scene, s->bake.common.memory_limit) : code;
 }
 
 /* Leaves the scene with the one receiver that was asked for. */

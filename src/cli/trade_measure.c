@@ -1,4 +1,5 @@
 /* Bakes the scene in every way that is worth a look, and takes the time. */
+#include "field.h"
 #include "message.h"
 #include "trade.h"
 
@@ -36,25 +37,15 @@ int trade_make_field(trade_work *work, int32_t resolution, vsh_field **field, do
     vsh_scene scene = *work->scene;
     scene.grid.resolution = resolution;
     scene.grid.voxel_size = 0.0;
-    vsh_grid *grid = NULL;
-    vsh_error error;
-    if (vsh_scene_casters(&scene, work->assets, &work->run, &grid, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    cli_box receivers = cli_box_empty();
     for (size_t r = 0; r < work->receiver_count; ++r) {
-        const vsh_texels_info *info = &work->receivers[r].info;
-        for (int axis = 0; axis < 3 && info->samples > 0; ++axis) {
-            low[axis] = fmin(low[axis], info->bounds_min[axis]);
-            high[axis] = fmax(high[axis], info->bounds_max[axis]);
-        }
+        cli_box_grow(&receivers, &work->receivers[r].info);
     }
-    vsh_field_options options = vsh_field_options_default();
-    options.reach = vsh_scene_reach(&scene, grid, low, high);
-    const vsh_result result = vsh_field_create(grid, &options, &work->run, field, &error);
-    vsh_grid_free(grid);
+    cli_field made;
+    const int code = cli_field_make(&scene, work->assets, &receivers, &work->run, &made);
+    *field = made.field;
     *seconds = trade_now(work) - start;
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return code;
 }
 
 /* The options of one plan, for the library and in `bake`'s words. */

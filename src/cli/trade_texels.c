@@ -10,8 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of the casters' diagonal: clear of Embree's rounding, and below what any voxel shows. */
-static const double TRUTH_LIFT = 1e-5;
+/* Of the casters' longest side: clear of Embree's rounding (60 units of its floats' last place), and below what
+ * shows: on a smooth mesh grazing light tells 1e-5 from this already. */
+static const double TRUTH_LIFT = 0x1p-18;
 /* A receiver's mesh that stands for a curved solid has its chords inside it. So often the solid's surface is
  * sought from there; a step halves what is left at the least where the mesh's normal is within 60° of the
  * solid's. */
@@ -165,11 +166,11 @@ int trade_place_points(trade_work *work) {
     }
     vsh_field_info info;
     vsh_field_get_info(work->fields[0].field, &info);
-    double square = 0.0;
+    double side = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
-        square += pow(info.bounds_max[axis] - info.bounds_min[axis], 2.0);
+        side = fmax(side, info.bounds_max[axis] - info.bounds_min[axis]);
     }
-    const double lift = TRUTH_LIFT * sqrt(square);
+    const double lift = TRUTH_LIFT * side;
     size_t at = 0;
     for (size_t r = 0; r < work->receiver_count; ++r) {
         const vsh_texel_samples samples = vsh_texels_samples(work->receivers[r].texels);

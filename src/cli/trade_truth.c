@@ -84,7 +84,7 @@ static void describe(trade_work *work) {
         "triangles (Embree) and procedural casters (sphere tracing in double precision), hidden by either",
     };
     const char *what = whats[work->triangles == NULL ? 0 : work->solids == NULL ? 1 : 2];
-    snprintf(work->truth_text, sizeof work->truth_text, "%d rays a texel against the %s",
+    snprintf(work->truth_text, sizeof work->truth_text, "%d rays a texel, from just above it, against the %s",
              work->settings->truth_rays, what);
 }
 
