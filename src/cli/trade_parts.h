@@ -6,6 +6,9 @@
 
 #include <stdio.h>
 
+/* Options as code, to be broken between them only. */
+void trade_options_write(FILE *out, const char *options);
+
 /* Truth, bake and difference of each run on the front, for the first receivers; ends the paragraph before. */
 void trade_thumbnails_write(FILE *out, const trade_work *work, const trade_subject *subject);
 

@@ -23,10 +23,11 @@ static const char head[] =
     "th{vertical-align:bottom}.narrow th{white-space:normal}"
     ".targets td.t{white-space:normal;min-width:15em}td.t,th.t{text-align:left}tr.f{background:#eef6f1}"
     ".all{max-height:40em;overflow:auto}.all thead th{position:sticky;top:0;background:#fff}"
-    "code{font:12px ui-monospace,monospace}"
-    "img{image-rendering:pixelated;vertical-align:top;width:32%;max-width:192px;height:auto}"
+    "code{font:12px ui-monospace,monospace}code span{white-space:nowrap}"
+    "img{image-rendering:pixelated;outline:1px solid "
+    "#e4e4e4;vertical-align:top;width:32%;max-width:192px;height:auto}"
     ".shots{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,330px),1fr));gap:1em}"
-    "figure{margin:0;font-size:12px;line-height:1.4}figcaption{margin-top:.3em}"
+    "figure{margin:0;font-size:12px;line-height:1.4}figure div{margin-bottom:3px}figcaption{margin-top:.3em}"
     "dl{display:grid;grid-template-columns:max-content 1fr;gap:.2em 1em;font-size:14px}dt{font-weight:600}"
     "dd{margin:0}\n"
     "@media(max-width:600px){dl{display:block}dd{margin:0 0 .6em}}\n</style>\n";
@@ -52,6 +53,18 @@ static void write_escaped(FILE *out, const char *text) {
     }
 }
 
+void trade_options_write(FILE *out, const char *options) {
+    fputs("<code><span>", out);
+    for (const char *at = options; *at != '\0'; ++at) {
+        if (at[0] == ' ' && at[1] == '-') {
+            fputs("</span> <span>", out);
+        } else {
+            fputc(*at, out);
+        }
+    }
+    fputs("</span></code>", out);
+}
+
 /* --- which options reach an error in the least time */
 
 /* The fastest of the runs whose RMSE is at most `target`; NULL where there is none. */
@@ -70,6 +83,17 @@ static const trade_run *fastest(const trade_subject *subject, double target, boo
     return best;
 }
 
+/* Two cells: a run, NULL for none, and its time. */
+static void write_fastest(FILE *out, const trade_run *run, double time) {
+    fputs("<td class=\"t\">", out);
+    if (run == NULL) {
+        fputs("none of these</td><td>–</td>", out);
+        return;
+    }
+    trade_options_write(out, run->options);
+    fprintf(out, "</td><td>%.3g</td>", time);
+}
+
 static void write_targets(FILE *out, const trade_subject *subject, bool embree_measured) {
     fprintf(out,
             "<div class=\"wide\"><table class=\"narrow targets\"><tr><th>RMSE of at most</th><th "
@@ -82,22 +106,13 @@ static void write_targets(FILE *out, const trade_subject *subject, bool embree_m
         const trade_run *all = fastest(subject, targets[i], true, false);
         const trade_run *embree = fastest(subject, targets[i], false, true);
         fprintf(out, "<tr><td>%g</td>", targets[i]);
-        if (bake != NULL) {
-            fprintf(out, "<td class=\"t\"><code>%s</code></td><td>%.3g</td>", bake->options, bake->rate);
-        } else {
-            fputs("<td class=\"t\">none of these</td><td>–</td>", out);
-        }
+        write_fastest(out, bake, bake != NULL ? bake->rate : NAN);
         if (embree != NULL) {
             fprintf(out, "<td>%.3g (%s)</td>", embree->rate, embree->options);
         } else if (embree_measured) {
             fputs("<td>–</td>", out);
         }
-        if (all != NULL) {
-            fprintf(out, "<td class=\"t\"><code>%s</code></td><td>%.3g</td>", all->options,
-                    all->bake_s + all->build_s);
-        } else {
-            fputs("<td class=\"t\">none of these</td><td>–</td>", out);
-        }
+        write_fastest(out, all, all != NULL ? all->bake_s + all->build_s : NAN);
         fputs("</tr>\n", out);
     }
     fputs("</table></div>\n", out);
@@ -191,7 +206,7 @@ static void write_page(FILE *out, const trade_work *work) {
         fputs("</div>\n<h3>Which options reach an error in the least time</h3>\n", out);
         write_targets(out, subject, work->meshes);
         fputs("<h3>On the front: truth, bake, difference</h3>\n<p>Red is too light by 1/8 or more, blue too "
-              "dark; grey is not measured.",
+              "dark; grey-blue is not measured.",
               out);
         trade_thumbnails_write(out, work, subject);
         fputs("<h3>All runs</h3>\n", out);

@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of the casters' longest side: clear of Embree's rounding (60 units of its floats' last place), and below what
- * shows: on a smooth mesh grazing light tells 1e-5 from this already. */
+/* Of the casters' longest side: clear of Embree's rounding (60 units of its floats' last place), and below
+ * what shows: on a smooth mesh grazing light tells 1e-5 from this already. */
 static const double TRUTH_LIFT = 0x1p-18;
 /* A receiver's mesh that stands for a curved solid has its chords inside it. So often the solid's surface is
  * sought from there; a step halves what is left at the least where the mesh's normal is within 60° of the

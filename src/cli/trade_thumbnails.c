@@ -56,9 +56,9 @@ static void shrink(const picture *p, const float *plane, const float *from, uint
     }
 }
 
-/* The first light's plane, or AO. */
-static void write_figure(FILE *out, const trade_work *work, const trade_subject *subject,
-                         const trade_run *run, const trade_receiver *receiver) {
+/* The first light's plane, or AO, at one receiver. */
+static void write_pictures(FILE *out, const trade_work *work, const trade_subject *subject,
+                           const trade_run *run, const trade_receiver *receiver) {
     uint8_t gray[256][3], difference[256][3], pixels[THUMB * THUMB];
     make_palettes(gray, difference);
     const int longest =
@@ -66,17 +66,20 @@ static void write_figure(FILE *out, const trade_work *work, const trade_subject 
     const int most = longest < THUMB ? longest : THUMB;
     const picture p = {work, receiver, (int)fmax(1.0, (double)receiver->info.width * most / longest),
                        (int)fmax(1.0, (double)receiver->info.height * most / longest)};
-    fputs("<figure>", out);
-    shrink(&p, subject->truth, NULL, pixels);
-    trade_png_write(out, p.width, p.height, pixels, gray, "truth");
-    shrink(&p, run->values, NULL, pixels);
-    fputc(' ', out);
-    trade_png_write(out, p.width, p.height, pixels, gray, "bake");
-    shrink(&p, run->values, subject->truth, pixels);
-    fputc(' ', out);
-    trade_png_write(out, p.width, p.height, pixels, difference, "difference");
-    fprintf(out, "<figcaption><code>%s</code><br>RMSE %.4f, %.3g µs a value</figcaption></figure>\n",
-            run->options, run->metrics.rmse, run->rate);
+    const struct {
+        const float *plane, *from;
+        const char *what;
+    } shown[] = {{subject->truth, NULL, "truth"},
+                 {run->values, NULL, "bake"},
+                 {run->values, subject->truth, "difference"}};
+    fputs("<div>", out);
+    for (size_t i = 0; i < sizeof shown / sizeof shown[0]; ++i) {
+        shrink(&p, shown[i].plane, shown[i].from, pixels);
+        fputs(i > 0 ? " " : "", out);
+        trade_png_write(out, p.width, p.height, pixels, shown[i].from != NULL ? difference : gray,
+                        shown[i].what);
+    }
+    fputs("</div>", out);
 }
 
 /* The front in the order of time: no two of its runs take the same. */
@@ -103,9 +106,13 @@ void trade_thumbnails_write(FILE *out, const trade_work *work, const trade_subje
     fputs("</p>\n<div class=\"shots\">\n", out);
     const trade_run *last = NULL;
     for (const trade_run *run; (run = next_on_front(subject, last)) != NULL; last = run) {
+        fputs("<figure>", out);
         for (size_t r = 0; r < shown; ++r) {
-            write_figure(out, work, subject, run, &work->receivers[r]);
+            write_pictures(out, work, subject, run, &work->receivers[r]);
         }
+        fputs("<figcaption>", out);
+        trade_options_write(out, run->options);
+        fprintf(out, "<br>RMSE %.4f, %.3g µs a value</figcaption></figure>\n", run->metrics.rmse, run->rate);
     }
     fputs("</div>\n", out);
 }
