@@ -202,6 +202,31 @@ static void transforms_move_what_rays_meet(void **state) {
     vsh_solids_free(moved);
 }
 
+static void the_size_of_the_scene_does_not_show(void **state) {
+    (void)state;
+    vsh_sdf_node nodes[3] = {box_at(0.3, 2.0, 0.1, 0.5, 0.2, 0.4), shape_at(VSH_SDF_CONE, -0.5, 2.5, 0.3),
+                             shape_at(VSH_SDF_UNION, 0.0, 0.25, 0.0)};
+    nodes[2].left = 0;
+    nodes[2].right = 1;
+    nodes[2].rotation[1] = 0.5;
+    float here[64], there[64];
+    const double scales[] = {1.0, 0x1p-100, 0x1p-20, 0x1p20, 0x1p100}, towards[3] = {0.2, 1.0, 0.1};
+    const vsh_light light = sun(towards, 0.4);
+    for (size_t s = 0; s < sizeof scales / sizeof scales[0]; ++s) {
+        const double k = scales[s], m[12] = {k, 0.0, 0.0, 0.0, 0.0, k, 0.0, 0.0, 0.0, 0.0, k, 0.0};
+        vsh_solids *solids = solids_of(nodes, 3, m);
+        int between_both = 0;
+        for (int i = 0; i < 64; ++i) {
+            const double p[3] = {k * (-1.5 + 0.4 * (i % 8)), 0.0, k * (-1.5 + 0.4 * (i / 8))};
+            (s == 0 ? here : there)[i] = seen(solids, p, UP, &light, 256);
+            between_both += here[i] > 0.0f && here[i] < 1.0f;
+        }
+        assert_in_range(between_both, 10, 64);
+        assert_true(s == 0 || memcmp(here, there, sizeof here) == 0);
+        vsh_solids_free(solids);
+    }
+}
+
 static void a_ray_is_hidden_that_meets_either_solids_or_triangles(void **state) {
     (void)state;
     if (!vsh_triangles_available()) {
@@ -291,6 +316,7 @@ int main(void) {
         cmocka_unit_test(every_floor_texel_sees_what_rays_against_the_solids_say),
         cmocka_unit_test(what_lies_beyond_a_lamp_does_not_hide_it),
         cmocka_unit_test(transforms_move_what_rays_meet),
+        cmocka_unit_test(the_size_of_the_scene_does_not_show),
         cmocka_unit_test(a_ray_is_hidden_that_meets_either_solids_or_triangles),
         cmocka_unit_test(threads_change_no_bit),
         cmocka_unit_test(no_solids_hide_nothing),
