@@ -2,6 +2,7 @@
  * triangles. */
 #include "bench.h"
 #include "embree.h"
+#include "scenes.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -84,8 +85,9 @@ void bench_asset(FILE *csv) {
     vsh_error error;
     vsh_run run = vsh_run_default();
     vsh_texels *texels = NULL;
-    bench_scene scene = bench_load(VSH_ASSETS "/cloister.glb", RESOLUTION);
-    const vsh_field *field = scene.field;
+    bench_scene scene;
+    bench_scene_make(BENCH_CLOISTER, &scene);
+    vsh_field *field = bench_scene_field(&scene, RESOLUTION);
     vsh_lightmap_options size = vsh_lightmap_options_default();
     size.width = size.height = SIZE;
     bench_check(vsh_texels_create(scene.meshes, scene.mesh_count, &size, &run, NULL, &texels, &error),
@@ -158,5 +160,6 @@ void bench_asset(FILE *csv) {
     free(r.positions);
     truth_mesh_free(mesh);
     vsh_texels_free(texels);
-    bench_unload(&scene);
+    vsh_field_free(field);
+    bench_scene_free(&scene);
 }

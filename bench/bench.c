@@ -51,31 +51,6 @@ void bench_row(FILE *csv, const char *scene, const char *what, double microsecon
     fflush(stdout);
 }
 
-bench_scene bench_load(const char *path, int32_t resolution) {
-    vsh_error error;
-    const vsh_run run = vsh_run_default();
-    bench_scene scene = {NULL, NULL, 0, NULL};
-    vsh_grid *grid = NULL;
-    bench_check(vsh_model_read(path, &run, &scene.model, &error), &error);
-    scene.mesh_count = vsh_model_mesh_count(scene.model);
-    scene.meshes = bench_take(scene.mesh_count * sizeof *scene.meshes);
-    for (size_t i = 0; i < scene.mesh_count; ++i) {
-        scene.meshes[i] = vsh_model_mesh(scene.model, i, -1);
-    }
-    vsh_grid_options voxels = vsh_grid_options_default();
-    voxels.resolution = resolution;
-    bench_check(vsh_grid_from_meshes(scene.meshes, scene.mesh_count, &voxels, &run, &grid, &error), &error);
-    bench_check(vsh_field_create(grid, NULL, &run, &scene.field, &error), &error);
-    vsh_grid_free(grid);
-    return scene;
-}
-
-void bench_unload(bench_scene *scene) {
-    vsh_field_free(scene->field);
-    free(scene->meshes);
-    vsh_model_free(scene->model);
-}
-
 /* Light NULL: AO. */
 static double shade_seconds(int runs, const vsh_field *field, const vsh_points *points,
                             const vsh_light *light, const vsh_shade_options *shade, float *values,

@@ -27,16 +27,6 @@ void bench_header(FILE *csv);
 void bench_row(FILE *csv, const char *scene, const char *what, double microseconds, double samples,
                double embree_rays, const truth_metrics *error);
 
-/* A model from assets/ and its field, `resolution` voxels along its longest side. */
-typedef struct bench_scene {
-    vsh_model *model;
-    vsh_mesh *meshes; /* views into the model */
-    size_t mesh_count;
-    vsh_field *field;
-} bench_scene;
-bench_scene bench_load(const char *path, int32_t resolution);
-void bench_unload(bench_scene *scene);
-
 /* Median seconds of `runs` calls on one thread. `deviation` may be NULL. */
 double bench_shadow(int runs, const vsh_field *field, const vsh_points *points, const vsh_light *light,
                     const vsh_shade_options *shade, float *values, float *deviation, vsh_shade_stats *stats);

@@ -3,6 +3,7 @@
  * sides. */
 #include "bench.h"
 #include "embree.h"
+#include "scenes.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -14,76 +15,10 @@ static const double SUN[3] = {-0.5, 0.8, -0.6};
 static const double SUN_ANGLE = 5.0 * 3.14159265358979323846 / 180.0;
 static const double LIFT = 1e-5;
 
-/* --- receivers */
-
 typedef struct receivers {
     double *positions, *origins;
     float *normals, *valid, *truth, *values, *reference, *deviation;
 } receivers;
-
-/* The same numbers on every machine. */
-static double next_number(uint64_t *state) {
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*state >> 11) * 0x1p-53;
-}
-
-static void corner_of(const vsh_mesh *mesh, uint32_t vertex, double p[3]) {
-    const float *v = mesh->positions + 3 * (size_t)vertex;
-    const double *m = mesh->transform;
-    for (int k = 0; k < 3; ++k) {
-        p[k] = m == NULL ? (double)v[k]
-                         : m[4 * k] * v[0] + m[4 * k + 1] * v[1] + m[4 * k + 2] * v[2] + m[4 * k + 3];
-    }
-}
-
-/* Points uniform in area over all triangles. */
-static void place_points(const vsh_mesh *meshes, size_t mesh_count, const vsh_field *field, receivers *r) {
-    vsh_field_info info;
-    vsh_field_get_info(field, &info);
-    double total = 0.0, done = 0.0;
-    size_t placed = 0;
-    uint64_t state = 9;
-    for (int pass = 0; pass < 2; ++pass) {
-        for (size_t m = 0; m < mesh_count; ++m) {
-            for (size_t t = 0; t < meshes[m].triangle_count; ++t) {
-                double a[3], b[3], c[3], n[3], length;
-                const uint32_t *index = meshes[m].indices + 3 * t;
-                corner_of(&meshes[m], index[0], a);
-                corner_of(&meshes[m], index[1], b);
-                corner_of(&meshes[m], index[2], c);
-                for (int k = 0; k < 3; ++k) {
-                    b[k] -= a[k];
-                    c[k] -= a[k];
-                }
-                for (int k = 0; k < 3; ++k) {
-                    n[k] = b[(k + 1) % 3] * c[(k + 2) % 3] - b[(k + 2) % 3] * c[(k + 1) % 3];
-                }
-                length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-                if (pass == 0) {
-                    total += length;
-                    continue;
-                }
-                done += length;
-                for (; placed < POINTS && (double)placed + 0.5 <= done / total * POINTS; ++placed) {
-                    const double u = sqrt(next_number(&state)), v = next_number(&state);
-                    double probe[3];
-                    float distance;
-                    for (int k = 0; k < 3; ++k) {
-                        const double p = a[k] + u * (1.0 - v) * b[k] + u * v * c[k];
-                        r->positions[3 * placed + (size_t)k] = p;
-                        r->normals[3 * placed + (size_t)k] = (float)(n[k] / length);
-                        r->origins[3 * placed + (size_t)k] = p + LIFT * n[k] / length;
-                        probe[k] = p + info.voxel_size * n[k] / length;
-                    }
-                    vsh_field_sample(field, 1, probe, &distance);
-                    r->valid[placed] = distance >= 0.0f ? 1.0f : 0.0f; /* as the bake judges */
-                }
-            }
-        }
-    }
-}
-
-/* --- the measurement */
 
 /* Seconds that a curve of falling errors takes for an error, between its points by powers and beyond them
  * likewise. */
@@ -96,13 +31,13 @@ static double seconds_for(double error, const double *errors, const double *seco
     return seconds[i] * pow(seconds[i + 1] / seconds[i], part);
 }
 
-static void measure(FILE *csv, const char *name, const char *path) {
+static void measure(FILE *csv, const bench_scene *scene) {
     vsh_error error;
     vsh_triangles *triangles = NULL;
-    bench_scene scene = bench_load(path, RESOLUTION);
-    const vsh_field *field = scene.field;
-    bench_check(vsh_triangles_create(scene.meshes, scene.mesh_count, NULL, &triangles, &error), &error);
-    truth_mesh *mesh = truth_mesh_create(scene.meshes, scene.mesh_count);
+    const char *name = scene->name;
+    vsh_field *field = bench_scene_field(scene, RESOLUTION);
+    bench_check(vsh_triangles_create(scene->meshes, scene->mesh_count, NULL, &triangles, &error), &error);
+    truth_mesh *mesh = truth_mesh_create(scene->meshes, scene->mesh_count);
     if (mesh == NULL) {
         puts("refine: no Embree, no truth");
         exit(2);
@@ -117,7 +52,10 @@ static void measure(FILE *csv, const char *name, const char *path) {
                    memory + 5 * POINTS,
                    memory + 6 * POINTS,
                    memory + 7 * POINTS};
-    place_points(scene.meshes, scene.mesh_count, field, &r);
+    bench_scene_points(scene, field, 9, POINTS, r.positions, r.normals, r.valid);
+    for (size_t i = 0; i < (size_t)3 * POINTS; ++i) {
+        r.origins[i] = r.positions[i] + LIFT * (double)r.normals[i];
+    }
     const double w = tan(0.5 * SUN_ANGLE);
     truth_mesh_light(mesh, POINTS, r.origins, r.normals, SUN, w, TRUTH_RAYS, 0, r.truth);
 
@@ -188,11 +126,14 @@ static void measure(FILE *csv, const char *name, const char *path) {
     free(memory);
     truth_mesh_free(mesh);
     vsh_triangles_free(triangles);
-    bench_unload(&scene);
+    vsh_field_free(field);
 }
 
 void bench_refine(FILE *csv) {
-    measure(csv, "cloister", VSH_ASSETS "/cloister.glb");
-    measure(csv, "smooth", VSH_ASSETS "/smooth.glb");
-    measure(csv, "thin", VSH_ASSETS "/thin.glb");
+    for (int which = 0; which < BENCH_SCENES; ++which) {
+        bench_scene scene;
+        bench_scene_make(which, &scene);
+        measure(csv, &scene);
+        bench_scene_free(&scene);
+    }
 }
