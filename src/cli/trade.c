@@ -38,7 +38,8 @@ static const cli_option options[] = {
     {KEY_SIZE, "size", "W[xH]", "texels of each lightmap, 1 to 4096 (256)"},
     {KEY_RESOLUTIONS, "resolutions", "N,…", "voxels along the longest side, up to 16 of them\n(64,128,256)"},
     {KEY_TRUTH_RAYS, "truth-rays", "N", "rays a texel of the truth, 16 to 65536 (1024)"},
-    {KEY_BUDGET, "budget", "SECONDS", "time to spend: runs that do not fit are left out,\nand counted (120)"},
+    {KEY_BUDGET, "budget", "SECONDS",
+     "time to spend on runs, once there is a truth: those that\ndo not fit are left out, and counted (120)"},
     {0, NULL, NULL, "Light and occlusion, where INPUT is a mesh"},
     {KEY_SUN, "sun", "X,Y,Z", "direction towards the sun"},
     {KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},
@@ -142,7 +143,7 @@ double trade_now(const trade_work *work) {
 }
 
 double trade_left(const trade_work *work) {
-    return work->settings->budget - (cli_seconds() - work->began);
+    return work->settings->budget - (cli_seconds() - work->measuring);
 }
 
 int trade_out_of_memory(const char *what) {
@@ -226,6 +227,7 @@ static int measure(trade_work *work) {
     code = code == CLI_OK ? trade_take_masks(work) : code;
     code = code == CLI_OK ? trade_place_points(work) : code;
     code = code == CLI_OK ? trade_take_truth(work, work->fields[0].resolution) : code;
+    work->measuring = cli_seconds();
     code = code == CLI_OK ? trade_measure_embree(work) : code;
     code = code == CLI_OK ? trade_measure(work) : code;
     mark_fronts(work);

@@ -98,6 +98,7 @@ typedef struct trade_work {
     size_t subject_count;
     size_t skipped; /* runs that did not fit into the budget */
     double began;
+    double measuring; /* since when: what the budget is for */
     double truth_s;
     char truth_text[320]; /* what the truth is, for the report */
 } trade_work;
