@@ -36,7 +36,7 @@ static const cli_option options[] = {
     {0, NULL, NULL, "What is measured"},
     {KEY_RECEIVER, "receiver", "N", "one receiver of the scene only, from 0 (all)"},
     {KEY_SIZE, "size", "W[xH]", "texels of each lightmap, 1 to 4096 (256)"},
-    {KEY_RESOLUTIONS, "resolutions", "N,…", "voxels along the longest side, up to 16 of them\n(64,128,256)"},
+    {KEY_RESOLUTIONS, "resolutions", "N,N,...", "voxels along the longest side, up to 16 of them\n(64,128,256)"},
     {KEY_TRUTH_RAYS, "truth-rays", "N", "rays a texel of the truth, 16 to 65536 (1024)"},
     {KEY_BUDGET, "budget", "SECONDS",
      "time to spend on runs, once there is a truth: those that\ndo not fit are left out, and counted (120)"},
