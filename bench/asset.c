@@ -2,6 +2,7 @@
  * triangles. */
 #include "bench.h"
 #include "embree.h"
+#include "scenes.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -37,15 +38,11 @@ static receiver take_texels(const vsh_field *field, const vsh_texels *texels) {
     vsh_field_get_info(field, &info);
     const size_t triples = s.count * 3 * sizeof(double);
     receiver r = {0,
-                  malloc(triples),
-                  malloc(triples),
-                  malloc(triples),
-                  malloc(s.count * 3 * sizeof(float)),
-                  malloc(s.count * sizeof(float))};
-    if (r.positions == NULL || r.lifted == NULL || r.origins == NULL || r.normals == NULL ||
-        r.valid == NULL) {
-        exit(4);
-    }
+                  bench_take(triples),
+                  bench_take(triples),
+                  bench_take(triples),
+                  bench_take(s.count * 3 * sizeof(float)),
+                  bench_take(s.count * sizeof(float))};
     for (size_t i = 0; i < s.count; ++i) {
         if ((s.texel[i] % SIZE) % STRIDE != 0 || (s.texel[i] / SIZE) % STRIDE != 0) {
             continue;
@@ -87,66 +84,34 @@ static double embree_ray_seconds(const truth_mesh *mesh, const receiver *r, floa
 void bench_asset(FILE *csv) {
     vsh_error error;
     vsh_run run = vsh_run_default();
-    vsh_model *model = NULL;
-    vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
     vsh_texels *texels = NULL;
-    bench_check(vsh_model_read(VSH_ASSETS "/cloister.glb", &run, &model, &error), &error);
-    const size_t mesh_count = vsh_model_mesh_count(model);
-    vsh_mesh *meshes = malloc(mesh_count * sizeof *meshes);
-    if (meshes == NULL) {
-        exit(4);
-    }
-    for (size_t i = 0; i < mesh_count; ++i) {
-        meshes[i] = vsh_model_mesh(model, i, -1);
-    }
-    vsh_grid_options voxels = vsh_grid_options_default();
-    voxels.resolution = RESOLUTION;
-    bench_check(vsh_grid_from_meshes(meshes, mesh_count, &voxels, &run, &grid, &error), &error);
-    bench_check(vsh_field_create(grid, NULL, &run, &field, &error), &error);
+    bench_scene scene;
+    bench_scene_make(BENCH_CLOISTER, &scene);
+    vsh_field *field = bench_scene_field(&scene, RESOLUTION);
     vsh_lightmap_options size = vsh_lightmap_options_default();
     size.width = size.height = SIZE;
-    bench_check(vsh_texels_create(meshes, mesh_count, &size, &run, NULL, &texels, &error), &error);
-    truth_mesh *mesh = truth_mesh_create(meshes, mesh_count);
+    bench_check(vsh_texels_create(scene.meshes, scene.mesh_count, &size, &run, NULL, &texels, &error),
+                &error);
+    truth_mesh *mesh = truth_mesh_create(scene.meshes, scene.mesh_count);
     if (mesh == NULL) {
         puts("asset: no Embree, no truth");
         exit(2);
     }
 
     receiver r = take_texels(field, texels);
-    float *values = malloc(r.count * sizeof *values), *truth = malloc(r.count * sizeof *truth);
-    if (values == NULL || truth == NULL) {
-        exit(4);
-    }
+    float *values = bench_take(r.count * sizeof *values), *truth = bench_take(r.count * sizeof *truth);
     const double ray = embree_ray_seconds(mesh, &r, values);
     const vsh_points points = {r.count, r.positions, r.normals, NULL};
     vsh_light sun = vsh_light_default();
     memcpy(sun.direction, SUN, sizeof SUN);
     sun.angle = SUN_ANGLE;
-    run.threads = 1;
 
     truth_mesh_light(mesh, r.count, r.origins, r.normals, SUN, tan(0.5 * SUN_ANGLE), LIGHT_RAYS, 0, truth);
-    for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
-        vsh_shade_options shade = vsh_shade_options_default();
-        shade.method = method;
-        double seconds[BENCH_RUNS];
-        vsh_shade_stats stats;
-        for (int i = 0; i < BENCH_RUNS; ++i) {
-            stats = vsh_shade_stats_zero();
-            const double start = bench_seconds();
-            bench_check(vsh_shade_shadow(field, &points, &sun, &shade, &run, values, NULL, &stats, &error),
-                        &error);
-            seconds[i] = bench_seconds() - start;
-        }
-        const truth_metrics metrics = truth_compare(r.count, values, truth, r.valid);
-        const double each = bench_median(seconds, BENCH_RUNS) / (double)r.count;
-        bench_row(csv, "cloister", vsh_shadow_method_name(method), 1e6 * each,
-                  (double)stats.samples / (double)r.count, each / ray, &metrics);
-    }
+    bench_methods(csv, "cloister", field, &points, &sun, ray, truth, r.valid, values);
 
     truth_mesh_ao(mesh, r.count, r.origins, r.normals, AO_DISTANCE, AO_RAYS, 0, truth);
     vsh_triangles *triangles = NULL;
-    bench_check(vsh_triangles_create(meshes, mesh_count, &run, &triangles, &error), &error);
+    bench_check(vsh_triangles_create(scene.meshes, scene.mesh_count, &run, &triangles, &error), &error);
     const struct {
         const char *name;
         int32_t method, count; /* of cones or rays */
@@ -179,15 +144,8 @@ void bench_asset(FILE *csv) {
         shade.triangles = triangles;
         shade.ao_distance = AO_DISTANCE;
         shade.start_offset = 0.0;
-        double seconds[AO_RUNS];
         vsh_shade_stats stats;
-        for (int i = 0; i < AO_RUNS; ++i) {
-            stats = vsh_shade_stats_zero();
-            const double start = bench_seconds();
-            bench_check(vsh_shade_ao(field, &from, &shade, &run, values, NULL, &stats, &error), &error);
-            seconds[i] = bench_seconds() - start;
-        }
-        const double each = bench_median(seconds, AO_RUNS) / (double)r.count;
+        const double each = bench_ao(AO_RUNS, field, &from, &shade, values, &stats) / (double)r.count;
         const truth_metrics metrics = truth_compare(r.count, values, truth, r.valid);
         bench_row(csv, "cloister", ladder[m].name, 1e6 * each, (double)stats.samples / (double)r.count,
                   each / ray, &metrics);
@@ -203,7 +161,5 @@ void bench_asset(FILE *csv) {
     truth_mesh_free(mesh);
     vsh_texels_free(texels);
     vsh_field_free(field);
-    vsh_grid_free(grid);
-    free(meshes);
-    vsh_model_free(model);
+    bench_scene_free(&scene);
 }

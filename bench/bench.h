@@ -15,6 +15,9 @@ double bench_seconds(void);
 /* Median of the runs' seconds; sorts them. */
 double bench_median(double *seconds, size_t count);
 
+/* Memory, or the end of the program. */
+void *bench_take(size_t bytes);
+
 /* Ends the program with the error where a call has failed. */
 void bench_check(vsh_result result, const vsh_error *error);
 
@@ -23,6 +26,17 @@ void bench_check(vsh_result result, const vsh_error *error);
 void bench_header(FILE *csv);
 void bench_row(FILE *csv, const char *scene, const char *what, double microseconds, double samples,
                double embree_rays, const truth_metrics *error);
+
+/* Median seconds of `runs` calls on one thread. `deviation` may be NULL. */
+double bench_shadow(int runs, const vsh_field *field, const vsh_points *points, const vsh_light *light,
+                    const vsh_shade_options *shade, float *values, float *deviation, vsh_shade_stats *stats);
+double bench_ao(int runs, const vsh_field *field, const vsh_points *points, const vsh_shade_options *shade,
+                float *values, vsh_shade_stats *stats);
+
+/* A row for each method that marches one ray or cone. `valid` may be NULL; ray: seconds of an Embree ray, or
+ * 0. */
+void bench_methods(FILE *csv, const char *scene, const vsh_field *field, const vsh_points *points,
+                   const vsh_light *light, double ray, const float *truth, const float *valid, float *values);
 
 void bench_seeds(FILE *csv);
 void bench_asset(FILE *csv);

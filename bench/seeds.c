@@ -26,17 +26,14 @@ static void place_texels(double *positions, float *normals) {
 
 void bench_seeds(FILE *csv) {
     const size_t count = (size_t)SIDE * SIDE;
-    double *positions = malloc(count * 3 * sizeof *positions);
-    float *normals = malloc(count * 3 * sizeof *normals);
-    float *values = malloc(count * sizeof *values), *truth = malloc(count * sizeof *truth);
+    double *positions = bench_take(count * 3 * sizeof *positions);
+    float *normals = bench_take(count * 3 * sizeof *normals);
+    float *values = bench_take(count * sizeof *values), *truth = bench_take(count * sizeof *truth);
     vsh_error error;
     vsh_scene *scene = NULL;
     vsh_assets *assets = NULL;
     vsh_grid *grid = NULL;
     vsh_field *field = NULL;
-    if (positions == NULL || normals == NULL || values == NULL || truth == NULL) {
-        exit(4);
-    }
     place_texels(positions, normals);
     truth_lights(truth_seeds(), count, positions, NULL, truth_seeds_sun, truth_seeds_w, INFINITY, RAYS,
                  truth);
@@ -55,23 +52,7 @@ void bench_seeds(FILE *csv) {
     vsh_light sun = vsh_light_default();
     memcpy(sun.direction, truth_seeds_sun, sizeof sun.direction);
     sun.angle = 2.0 * atan(truth_seeds_w);
-    for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
-        vsh_shade_options shade = vsh_shade_options_default();
-        shade.method = method;
-        double seconds[BENCH_RUNS];
-        vsh_shade_stats stats;
-        for (int r = 0; r < BENCH_RUNS; ++r) {
-            stats = vsh_shade_stats_zero();
-            const double start = bench_seconds();
-            bench_check(vsh_shade_shadow(field, &points, &sun, &shade, &run, values, NULL, &stats, &error),
-                        &error);
-            seconds[r] = bench_seconds() - start;
-        }
-        const truth_metrics metrics = truth_compare(count, values, truth, NULL);
-        bench_row(csv, "seeds", vsh_shadow_method_name(method),
-                  1e6 * bench_median(seconds, BENCH_RUNS) / (double)count,
-                  (double)stats.samples / (double)count, 0.0, &metrics);
-    }
+    bench_methods(csv, "seeds", field, &points, &sun, 0.0, truth, NULL, values);
     vsh_field_free(field);
     vsh_grid_free(grid);
     vsh_assets_free(assets);

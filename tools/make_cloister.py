@@ -5,11 +5,10 @@ Needs Python 3 only, takes no arguments, and writes the same bytes each time. Le
 the courtyard opens towards +x and +z. Parts that stand on others are sunk by SINK, as game assets do.
 """
 import os
-from collections import Counter
 
 from modelling import atlas
 from modelling.files import Part, write_glb, write_obj
-from modelling.solids import XY, ZY, Solid, arc, box, cross, dot, lathe, line, prism, strip, sub, tube
+from modelling.solids import XY, ZY, Solid, arc, box, check_solid, lathe, line, prism, strip, tube
 
 TEXELS_PER_UNIT = 64.5  # lightmap density at 1024²
 UNSEEN = 0.25           # of that density, for the one face that nobody sees: the underside of the ground
@@ -274,25 +273,6 @@ def parts():
     ]
 
 
-def check_solid(solid):
-    """Closed, wound outwards, no triangle without area."""
-    edges = Counter()
-    volume = 0.0
-    for _, vertices in solid.triangles():
-        a, b, c = (v[0] for v in vertices)
-        if dot(cross(sub(b, a), sub(c, a)), cross(sub(b, a), sub(c, a))) < 1e-14:
-            raise ValueError("%s: a triangle without area" % solid.name)
-        volume += dot(a, cross(b, c)) / 6
-        edges.update(((a, b), (b, c), (c, a)))
-    for (a, b), count in edges.items():
-        if count != edges[(b, a)]:
-            raise ValueError("%s: open edge from %s to %s" % (solid.name, a, b))
-        if count != 1:
-            raise ValueError("%s: %d triangles share the edge from %s to %s" % (solid.name, 2 * count, a, b))
-    if volume <= 0.0:
-        raise ValueError("%s: wound inwards" % solid.name)
-
-
 def main():
     model = parts()
     for part in model:
@@ -302,7 +282,7 @@ def main():
     atlas.pack(charts, TEXELS_PER_UNIT)
     used = atlas.check(charts)
     folder = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "assets")
-    size = write_glb(os.path.join(folder, "cloister.glb"), model)
+    size = write_glb(os.path.join(folder, "cloister.glb"), "cloister", "make_cloister.py", model)
     vertices = write_obj(os.path.join(folder, "cloister.obj"), "The corner of a cloister's courtyard", model)
     print("%d parts in %d meshes, %d triangles, %d vertices, %d charts, %.1f %% of the lightmap used, GLB %d bytes"
           % (sum(len(part.solids) for part in model), len(model), sum(len(c.triangles) for c in charts), vertices,

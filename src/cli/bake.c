@@ -2,6 +2,7 @@
 #include "bake_forecast.h"
 #include "bake_options.h"
 #include "clock.h"
+#include "field.h"
 #include "meshes.h"
 #include "message.h"
 #include "progress.h"
@@ -11,7 +12,6 @@
 #include "trial.h"
 
 #include <inttypes.h>
-#include <math.h>
 #include <stdio.h>
 #include <unistd.h>
 
@@ -21,23 +21,16 @@ typedef struct bake_work {
     vsh_run run;
     vsh_assets *assets;
     vsh_triangles *triangles; /* of exact methods */
-    vsh_grid *grid;
     vsh_field *field;
     vsh_texels *kept; /* of the only receiver; several are rasterised again, so as not to hold all at once */
-    double bounds_min[3];
-    double bounds_max[3];
+    cli_box receivers;
     cli_stats stats;
 } bake_work;
 
 /* What can be refused before anything is read, and before there are threads. */
 static int check_files(const cli_bake_settings *settings, const vsh_scene *scene) {
     int code = settings->stats != NULL ? cli_temporary_check(settings->stats) : CLI_OK;
-    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
-        const vsh_caster *caster = &scene->casters[i];
-        if (caster->type == VSH_CASTER_VDB) {
-            code = cli_trial_read(caster->path, caster->grid, settings->common.memory_limit);
-        }
-    }
+    code = code == CLI_OK ? cli_trial_casters(scene, settings->common.memory_limit) : code;
     for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
         code = cli_receiver_check(scene, i);
     }
@@ -60,10 +53,7 @@ static cli_receiver_job receiver_job(const bake_work *work, size_t index) {
 static int rasterise(bake_work *work) {
     const double start = cli_seconds();
     int code = CLI_OK;
-    for (int axis = 0; axis < 3; ++axis) {
-        work->bounds_min[axis] = INFINITY;
-        work->bounds_max[axis] = -INFINITY;
-    }
+    work->receivers = cli_box_empty();
     for (size_t i = 0; i < work->scene->receiver_count && code == CLI_OK; ++i) {
         const cli_receiver_job job = receiver_job(work, i);
         vsh_texels *texels = NULL;
@@ -73,10 +63,7 @@ static int rasterise(bake_work *work) {
         }
         vsh_texels_info info;
         vsh_texels_get_info(texels, &info);
-        for (int axis = 0; axis < 3 && info.samples > 0; ++axis) {
-            work->bounds_min[axis] = fmin(work->bounds_min[axis], info.bounds_min[axis]);
-            work->bounds_max[axis] = fmax(work->bounds_max[axis], info.bounds_max[axis]);
-        }
+        cli_box_grow(&work->receivers, &info);
         if (work->scene->receiver_count == 1) {
             work->kept = texels;
         } else {
@@ -88,42 +75,25 @@ static int rasterise(bake_work *work) {
 }
 
 static int make_field(bake_work *work) {
-    double now = cli_seconds();
-    vsh_error error;
-    if (vsh_scene_casters(work->scene, work->assets, &work->run, &work->grid, &error) != VSH_OK) {
-        return cli_fail(&error);
+    cli_field made;
+    const int code = cli_field_make(work->scene, work->assets, &work->receivers, &work->run, &made);
+    work->field = made.field;
+    if (code == CLI_OK) {
+        work->stats.grid = made.grid;
+        work->stats.field = made.info;
+        work->stats.seconds[CLI_STAGE_VOXELIZE] += made.voxelize_s;
+        work->stats.seconds[CLI_STAGE_FIELD] += made.field_s;
     }
-    vsh_grid_get_info(work->grid, &work->stats.grid);
-    now = cli_stats_stage(&work->stats, CLI_STAGE_VOXELIZE, now);
-    vsh_field_options options = vsh_field_options_default();
-    options.reach = vsh_scene_reach(work->scene, work->grid, work->bounds_min, work->bounds_max);
-    const vsh_result result = vsh_field_create(work->grid, &options, &work->run, &work->field, &error);
-    vsh_grid_free(work->grid); /* the field does not need it */
-    work->grid = NULL;
-    if (result != VSH_OK) {
-        return cli_fail(&error);
-    }
-    vsh_field_get_info(work->field, &work->stats.field);
-    cli_stats_stage(&work->stats, CLI_STAGE_FIELD, now);
-    return CLI_OK;
+    return code;
 }
 
 /* Exact methods trace the casters' own triangles. */
 static int make_triangles(bake_work *work) {
-    vsh_shade_options *shade = &work->scene->shade;
-    const bool lights = work->scene->light_count > 0 && shade->method == VSH_SHADOW_EXACT;
-    const bool ao = work->scene->ao && shade->ao_method == VSH_AO_EXACT;
-    if (!lights && !ao) {
-        return CLI_OK;
-    }
     const double start = cli_seconds();
-    vsh_error error;
-    if (vsh_scene_triangles(work->scene, work->assets, &work->run, &work->triangles, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    shade->triangles = work->triangles;
+    const int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
+    work->scene->shade.triangles = work->triangles;
     cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
-    return CLI_OK;
+    return code;
 }
 
 static void say_receiver(const bake_work *work, size_t index, const cli_stats *before) {
@@ -188,7 +158,6 @@ static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
     vsh_texels_free(work.kept);
     vsh_triangles_free(work.triangles);
     vsh_field_free(work.field);
-    vsh_grid_free(work.grid);
     vsh_assets_free(work.assets);
     return code;
 }

@@ -1,6 +1,7 @@
 #include "bake_forecast.h"
 
 #include "clock.h"
+#include "field.h"
 #include "message.h"
 #include "planes.h"
 #include "receiver.h"
@@ -27,7 +28,7 @@ typedef struct forecast {
     uint64_t texels;
     uint64_t samples;
     uint64_t largest_bytes; /* of a receiver: texels, planes and what the bake takes */
-    double bounds_min[3], bounds_max[3];
+    cli_box receivers;
     double seconds; /* of rasterising */
 } forecast;
 
@@ -47,10 +48,7 @@ static int make_texels(const forecast *f, size_t index, int32_t most, vsh_texels
 }
 
 static int count_texels(forecast *f) {
-    for (int axis = 0; axis < 3; ++axis) {
-        f->bounds_min[axis] = INFINITY;
-        f->bounds_max[axis] = -INFINITY;
-    }
+    f->receivers = cli_box_empty();
     const double start = cli_seconds();
     for (size_t i = 0; i < f->scene->receiver_count; ++i) {
         vsh_texels *texels = NULL;
@@ -73,10 +71,7 @@ static int count_texels(forecast *f) {
         const uint64_t plane = 4 * (uint64_t)info.width * (uint64_t)info.height;
         const uint64_t bytes = info.bytes + channels * plane + 2 * plane + 50 * info.samples;
         f->largest_bytes = bytes > f->largest_bytes ? bytes : f->largest_bytes;
-        for (int axis = 0; axis < 3 && info.samples > 0; ++axis) {
-            f->bounds_min[axis] = fmin(f->bounds_min[axis], info.bounds_min[axis]);
-            f->bounds_max[axis] = fmax(f->bounds_max[axis], info.bounds_max[axis]);
-        }
+        cli_box_grow(&f->receivers, &info);
     }
     f->seconds = cli_seconds() - start;
     return CLI_OK;
@@ -84,11 +79,9 @@ static int count_texels(forecast *f) {
 
 /* What was measured on the trial. */
 typedef struct trial {
-    double finer; /* the scene's resolution over the trial's */
-    double voxelize_s, field_s;
+    double finer;    /* the scene's resolution over the trial's */
     double sample_s; /* of one texel's sample, all lights and AO */
-    vsh_grid_info grid;
-    vsh_field_info field;
+    cli_field made;  /* its field is freed when the trial is over */
 } trial;
 
 static int bake_part(const forecast *f, const vsh_field *field, const vsh_shade_options *shade, trial *t) {
@@ -118,8 +111,7 @@ static int bake_part(const forecast *f, const vsh_field *field, const vsh_shade_
     return code;
 }
 
-/* Voxels of the scene over those of the trial, on a side. A scene that gives a voxel size has it in `voxel`.
- */
+/* Voxels of the scene over those of the trial, on a side. */
 static double finer(const vsh_scene *scene, double trial_voxel) {
     return scene->grid.voxel_size > 0.0 ? trial_voxel / scene->grid.voxel_size
                                         : (double)scene->grid.resolution / TRIAL_RESOLUTION;
@@ -129,37 +121,17 @@ static int try_small(const forecast *f, trial *t) {
     vsh_scene small = *f->scene;
     small.grid.voxel_size = 0.0;
     small.grid.resolution = TRIAL_RESOLUTION;
-    vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
     vsh_triangles *triangles = NULL;
-    vsh_error error;
-    double now = cli_seconds();
-    if (vsh_scene_casters(&small, f->assets, f->run, &grid, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    t->voxelize_s = cli_seconds() - now;
-    vsh_grid_get_info(grid, &t->grid);
-    t->finer = finer(f->scene, t->grid.voxel_size);
-    vsh_field_options options = vsh_field_options_default();
-    options.reach = vsh_scene_reach(&small, grid, f->bounds_min, f->bounds_max);
-    now = cli_seconds();
-    int code = vsh_field_create(grid, &options, f->run, &field, &error) == VSH_OK ? CLI_OK : cli_fail(&error);
-    t->field_s = cli_seconds() - now;
-    vsh_grid_free(grid);
-    vsh_shade_options shade = f->scene->shade;
-    const bool exact = (f->scene->light_count > 0 && shade.method == VSH_SHADOW_EXACT) ||
-                       (f->scene->ao && shade.ao_method == VSH_AO_EXACT);
-    if (code == CLI_OK && exact &&
-        vsh_scene_triangles(f->scene, f->assets, f->run, &triangles, &error) != VSH_OK) {
-        code = cli_fail(&error);
-    }
+    int code = cli_field_make(&small, f->assets, &f->receivers, f->run, &t->made);
+    code = code == CLI_OK ? cli_triangles_make(f->scene, f->assets, f->run, &triangles) : code;
     if (code == CLI_OK) {
-        vsh_field_get_info(field, &t->field);
+        vsh_shade_options shade = f->scene->shade;
         shade.triangles = triangles;
-        code = bake_part(f, field, &shade, t);
+        t->finer = finer(f->scene, t->made.grid.voxel_size);
+        code = bake_part(f, t->made.field, &shade, t);
     }
     vsh_triangles_free(triangles);
-    vsh_field_free(field);
+    vsh_field_free(t->made.field);
     return code;
 }
 
@@ -177,18 +149,21 @@ int cli_bake_forecast(const vsh_scene *scene, const vsh_assets *assets, const vs
         return code;
     }
     const double more = t.finer * t.finer; /* surfaces: voxels grow with the square */
-    const double voxelize = t.voxelize_s * more, field = t.field_s * more;
+    const double voxelize = t.made.voxelize_s * more, field = t.made.field_s * more;
     const double bake =
         f.seconds + (double)f.samples * t.sample_s * pow(MORE_PER_DOUBLING, fmax(0.0, log2(t.finer)));
-    const double grid_bytes = (double)t.grid.bytes * more, field_bytes = (double)t.field.bytes * more;
-    const double base = fmax(0.0, resident_bytes() - MAKING * (double)t.grid.bytes); /* program and assets */
+    const double grid_bytes = (double)t.made.grid.bytes * more,
+                 field_bytes = (double)t.made.info.bytes * more;
+    const double base =
+        fmax(0.0, resident_bytes() - MAKING * (double)t.made.grid.bytes); /* program and assets */
     const double peak = base + fmax(fmax(MAKING * grid_bytes, grid_bytes + field_bytes),
                                     field_bytes + (double)f.largest_bytes);
     char grid_text[32], field_text[32], peak_text[32];
     printf("texels        %" PRIu64 " in %zu lightmap%s, %" PRIu64 " samples\n", f.texels,
            scene->receiver_count, scene->receiver_count == 1 ? "" : "s", f.samples);
     printf("voxels        about %.3g of %.4g, %.4g along the longest side\n",
-           (double)t.grid.active_voxels * more, t.grid.voxel_size / t.finer, TRIAL_RESOLUTION * t.finer);
+           (double)t.made.grid.active_voxels * more, t.made.grid.voxel_size / t.finer,
+           TRIAL_RESOLUTION * t.finer);
     printf("memory        about %s at most: level set %s, field %s\n",
            cli_bytes_text((uint64_t)peak, peak_text, sizeof peak_text),
            cli_bytes_text((uint64_t)grid_bytes, grid_text, sizeof grid_text),

@@ -48,6 +48,9 @@ typedef struct cli_bake_scene {
 
 /* Makes the scene, checks that it can be baked and that its outputs replace no input. */
 int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made);
+
+/* Refuses an output that is one of the scene's inputs. CLI_OK or an exit code, having said why. */
+int cli_bake_check_output(const cli_bake_settings *settings, const vsh_scene *scene, const char *output);
 void cli_bake_scene_free(cli_bake_scene *made);
 
 #endif

@@ -210,7 +210,7 @@ static int set_shade(const cli_bake_settings *s, vsh_scene *scene) {
     return CLI_OK;
 }
 
-static int check_output(const cli_bake_settings *s, const vsh_scene *scene, const char *output) {
+int cli_bake_check_output(const cli_bake_settings *s, const vsh_scene *scene, const char *output) {
     if (cli_same_file(output, s->input)) {
         return cli_usage("%s: the output is the input", output);
     }
@@ -230,7 +230,7 @@ static int check_output(const cli_bake_settings *s, const vsh_scene *scene, cons
 static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         const char *output = scene->receivers[i].output;
-        int code = check_output(s, scene, output);
+        int code = cli_bake_check_output(s, scene, output);
         if (code != CLI_OK) {
             return code;
         }
@@ -243,7 +243,7 @@ static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
             }
         }
     }
-    return s->stats != NULL ? check_output(s, scene, s->stats) : CLI_OK;
+    return s->stats != NULL ? cli_bake_check_output(s, scene, s->stats) : CLI_OK;
 }
 
 int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made) {

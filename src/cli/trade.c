@@ -1,11 +1,9 @@
 /* vdbshade trade: speed against accuracy, measured on the user's own scene. */
 #include "trade.h"
 #include "clock.h"
-#include "meshes.h"
 #include "message.h"
 #include "paths.h"
 #include "progress.h"
-#include "receiver.h"
 #include "signals.h"
 #include "temporary.h"
 #include "trial.h"
@@ -17,6 +15,8 @@
 
 enum {
     KEY_CSV = 0x2000,
+    KEY_PLOT,
+    KEY_RECEIVER,
     KEY_SIZE,
     KEY_RESOLUTIONS,
     KEY_TRUTH_RAYS,
@@ -31,11 +31,16 @@ static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
     {'o', "output", "OUT.html", "page to write: plot, table and pictures in one file"},
     {KEY_CSV, "csv", "FILE.csv", "write the table as CSV too"},
+    {KEY_PLOT, "plot", "FILE.svg",
+     "write the plot of the shadow (without lights, of AO)\nas a picture of its own too"},
     {0, NULL, NULL, "What is measured"},
-    {KEY_SIZE, "size", "W[xH]", "texels of the lightmap, 1 to 4096 (256)"},
-    {KEY_RESOLUTIONS, "resolutions", "N,…", "voxels along the longest side, up to 16 of them\n(64,128,256)"},
+    {KEY_RECEIVER, "receiver", "N", "one receiver of the scene only, from 0 (all)"},
+    {KEY_SIZE, "size", "W[xH]", "texels of each lightmap, 1 to 4096 (256)"},
+    {KEY_RESOLUTIONS, "resolutions", "N,N,...",
+     "voxels along the longest side, up to 16 of them\n(64,128,256)"},
     {KEY_TRUTH_RAYS, "truth-rays", "N", "rays a texel of the truth, 16 to 65536 (1024)"},
-    {KEY_BUDGET, "budget", "SECONDS", "time to spend: runs that do not fit are left out,\nand counted (120)"},
+    {KEY_BUDGET, "budget", "SECONDS",
+     "time to spend on runs, once there is a truth: those that\ndo not fit are left out, and counted (120)"},
     {0, NULL, NULL, "Light and occlusion, where INPUT is a mesh"},
     {KEY_SUN, "sun", "X,Y,Z", "direction towards the sun"},
     {KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},
@@ -50,9 +55,9 @@ const cli_command cli_trade = {
     "trade",
     "INPUT -o OUT.html [options]",
     "Bakes a mesh or a scene (.json) by every method, at several voxel sizes and settings, and compares\n"
-    "with the truth: rays against the triangles where all casters are meshes, else against a finer field.\n"
-    "The page shows error against time, what is fastest for a given error, and what it looks like. Of a\n"
-    "scene's receivers the first is taken. Numbers in brackets are what holds without the option.",
+    "with the truth: rays against the triangles and the procedural shapes themselves, or against a finer\n"
+    "field where a caster is a .vdb file. The page shows error against time, what is fastest for a given\n"
+    "error, and what it looks like. Numbers in brackets are what holds without the option.",
     options,
     sizeof options / sizeof options[0],
     trade_main};
@@ -94,6 +99,11 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_CSV:
         s->csv = value;
         return CLI_OK;
+    case KEY_PLOT:
+        s->plot = value;
+        return CLI_OK;
+    case KEY_RECEIVER:
+        return cli_take_integer(name, value, 0, INT32_MAX, &s->receiver);
     case KEY_SIZE:
         return take_size(s, name, value);
     case KEY_RESOLUTIONS:
@@ -123,10 +133,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
 
 /* --- what the measurements share */
 
-size_t trade_texels(const trade_work *work) {
-    return (size_t)work->info.width * (size_t)work->info.height;
-}
-
 /* With one thread it is the processor's time, so that other work on the machine does not show. */
 double trade_now(const trade_work *work) {
     if (work->run.threads != 1) {
@@ -138,12 +144,30 @@ double trade_now(const trade_work *work) {
 }
 
 double trade_left(const trade_work *work) {
-    return work->settings->budget - (cli_seconds() - work->began);
+    return work->settings->budget - (cli_seconds() - work->measuring);
 }
 
 int trade_out_of_memory(const char *what) {
     cli_say("%s: the system refused memory", what);
     return CLI_LIMIT;
+}
+
+/* A measurement that is as short as this is repeated. */
+static const double SHORT_SECONDS = 0.3;
+
+bool trade_again(const trade_clock *clock) {
+    return (size_t)clock->count < sizeof clock->times / sizeof clock->times[0] &&
+           clock->times[0] < SHORT_SECONDS;
+}
+
+static int by_value(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+double trade_median(trade_clock *clock) {
+    qsort(clock->times, (size_t)clock->count, sizeof clock->times[0], by_value);
+    return clock->times[clock->count / 2];
 }
 
 trade_run *trade_add(trade_work *work, trade_subject *subject, const trade_run *run) {
@@ -164,37 +188,15 @@ trade_run *trade_add(trade_work *work, trade_subject *subject, const trade_run *
 
 /* --- the work */
 
-static int load(trade_work *work) {
-    vsh_error error;
-    if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    int code = cli_warn_meshes(work->scene, work->assets, &work->run);
-    if (code == CLI_OK) {
-        const cli_receiver_job job = {work->scene, work->assets, &work->run, 0};
-        code = cli_receiver_texels(&job, true, &work->texels);
-    }
-    if (code != CLI_OK) {
-        return code;
-    }
-    vsh_texels_get_info(work->texels, &work->info);
-    bool meshes = true;
-    for (size_t i = 0; i < work->scene->caster_count; ++i) {
-        meshes = meshes && work->scene->casters[i].type == VSH_CASTER_MESH;
-    }
-    if (meshes && vsh_triangles_available()) {
-        const double start = trade_now(work);
-        if (vsh_scene_triangles(work->scene, work->assets, &work->run, &work->triangles, &error) != VSH_OK) {
-            return cli_fail(&error);
-        }
-        work->triangles_s = trade_now(work) - start;
-    }
-    return CLI_OK;
-}
-
 static int by_size(const void *a, const void *b) {
     const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
     return (x > y) - (x < y);
+}
+
+/* Whether a run is neither slower nor farther from the truth than another, and better in one of the two. */
+static bool beats(const trade_run *a, const trade_run *b) {
+    return a->rate <= b->rate && a->metrics.rmse <= b->metrics.rmse &&
+           (a->rate < b->rate || a->metrics.rmse < b->metrics.rmse);
 }
 
 static void mark_fronts(trade_work *work) {
@@ -204,15 +206,13 @@ static void mark_fronts(trade_work *work) {
             trade_run *run = &subject->runs[i];
             run->front = !run->embree;
             for (size_t k = 0; k < subject->run_count && run->front; ++k) {
-                const trade_run *other = &subject->runs[k];
-                run->front = other->embree || k == i ||
-                             !(other->bake_s <= run->bake_s && other->metrics.rmse <= run->metrics.rmse);
+                run->front = subject->runs[k].embree || !beats(&subject->runs[k], run);
             }
         }
     }
 }
 
-/* The finest field comes first, as it says which texels are valid. */
+/* The finest field comes first. */
 static int measure(trade_work *work) {
     const trade_settings *s = work->settings;
     int32_t resolutions[TRADE_MAX_RESOLUTIONS];
@@ -225,8 +225,10 @@ static int measure(trade_work *work) {
         code = trade_make_field(work, next->resolution, &next->field, &next->build_s);
         work->field_count += code == CLI_OK;
     }
-    code = code == CLI_OK ? trade_take_mask(work, work->fields[0].field) : code;
+    code = code == CLI_OK ? trade_take_masks(work) : code;
+    code = code == CLI_OK ? trade_place_points(work) : code;
     code = code == CLI_OK ? trade_take_truth(work, work->fields[0].resolution) : code;
+    work->measuring = cli_seconds();
     code = code == CLI_OK ? trade_measure_embree(work) : code;
     code = code == CLI_OK ? trade_measure(work) : code;
     mark_fronts(work);
@@ -243,14 +245,20 @@ static void free_work(trade_work *work) {
         free(subject->truth);
     }
     for (size_t i = 0; i < work->field_count; ++i) {
+        free(work->fields[i].mask);
         vsh_field_free(work->fields[i].field);
     }
-    free(work->mask);
+    for (size_t i = 0; i < work->receiver_count; ++i) {
+        vsh_texels_free(work->receivers[i].texels);
+    }
+    free(work->receivers);
+    free(work->any);
+    free(work->common);
     free(work->positions);
     free(work->normals);
     free(work->texel);
     vsh_triangles_free(work->triangles);
-    vsh_texels_free(work->texels);
+    vsh_solids_free(work->solids);
     vsh_assets_free(work->assets);
 }
 
@@ -265,9 +273,10 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
     if (scene->ao) {
         work.subjects[work.subject_count++] = (trade_subject){.name = "ao", .ao = true, .planes = 1};
     }
-    int code = load(&work);
+    int code = trade_load(&work);
     code = code == CLI_OK ? measure(&work) : code;
     code = code == CLI_OK ? trade_write_csv(&work) : code;
+    code = code == CLI_OK ? trade_write_plot(&work) : code;
     code = code == CLI_OK ? trade_write_report(&work) : code;
     if (code == CLI_OK) {
         cli_signals_end();
@@ -283,37 +292,38 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
 
 /* --- beforehand */
 
-static int check_output(const trade_settings *s, const vsh_scene *scene, const char *path) {
-    if (cli_same_file(path, s->bake.input)) {
-        return cli_usage("%s: the output is the input", path);
-    }
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        if (scene->casters[i].path != NULL && cli_same_file(path, scene->casters[i].path)) {
-            return cli_usage("%s: the output is also a caster's file", path);
-        }
-    }
-    for (size_t i = 0; i < scene->receiver_count; ++i) {
-        if (cli_same_file(path, scene->receivers[i].path)) {
-            return cli_usage("%s: the output is also a receiver's file", path);
-        }
-    }
-    return cli_temporary_check(path);
-}
-
 /* What can be refused before anything is read, and before there are threads. */
 static int check_files(const trade_settings *s, const vsh_scene *scene) {
-    int code = check_output(s, scene, s->report);
-    if (code == CLI_OK && s->csv != NULL) {
-        code = cli_same_file(s->csv, s->report) ? cli_usage("%s: both the output and the --csv file", s->csv)
-                                                : check_output(s, scene, s->csv);
-    }
-    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
-        const vsh_caster *caster = &scene->casters[i];
-        if (caster->type == VSH_CASTER_VDB) {
-            code = cli_trial_read(caster->path, caster->grid, s->bake.common.memory_limit);
+    const char *const outputs[] = {s->report, s->csv, s->plot};
+    static const char *const names[] = {"output", "--csv file", "--plot file"};
+    int code = CLI_OK;
+    for (size_t i = 0; i < sizeof outputs / sizeof outputs[0] && code == CLI_OK; ++i) {
+        if (outputs[i] == NULL) {
+            continue;
         }
+        for (size_t k = 0; k < i && code == CLI_OK; ++k) {
+            if (outputs[k] != NULL && cli_same_file(outputs[i], outputs[k])) {
+                code = cli_usage("%s: both the %s and the %s", outputs[i], names[k], names[i]);
+            }
+        }
+        code = code == CLI_OK ? cli_bake_check_output(&s->bake, scene, outputs[i]) : code;
+        code = code == CLI_OK ? cli_temporary_check(outputs[i]) : code;
     }
-    return code;
+    return code == CLI_OK ? cli_trial_casters(scene, s->bake.common.memory_limit) : code;
+}
+
+/* Leaves the scene with the one receiver that was asked for. */
+static int choose_receiver(const trade_settings *s, vsh_scene *scene) {
+    if (s->receiver < 0) {
+        return CLI_OK;
+    }
+    if ((size_t)s->receiver >= scene->receiver_count) {
+        return cli_usage("--receiver '%d': %s has %zu receiver%s, counted from 0", s->receiver, s->bake.input,
+                         scene->receiver_count, scene->receiver_count == 1 ? "" : "s");
+    }
+    scene->receivers += s->receiver;
+    scene->receiver_count = 1;
+    return CLI_OK;
 }
 
 static int trade_main(int argc, char **argv) {
@@ -327,6 +337,7 @@ static int trade_main(int argc, char **argv) {
     memcpy(s.resolutions, (const int32_t[]){64, 128, 256}, 3 * sizeof s.resolutions[0]);
     s.resolution_count = 3;
     s.truth_rays = 1024;
+    s.receiver = -1;
     s.budget = 120.0;
     bool help;
     int code = cli_parse(&cli_trade, argc, argv, take, &s, "INPUT", &s.bake.input, &help);
@@ -342,6 +353,7 @@ static int trade_main(int argc, char **argv) {
     cli_bake_scene made;
     code = cli_bake_scene_make(&s.bake, &made);
     code = code == CLI_OK ? check_files(&s, &made.scene) : code;
+    code = code == CLI_OK ? choose_receiver(&s, &made.scene) : code;
     if (code == CLI_OK) {
         cli_signals_watch();
         code = trade(&s, &made.scene);

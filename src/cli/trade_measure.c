@@ -1,4 +1,5 @@
 /* Bakes the scene in every way that is worth a look, and takes the time. */
+#include "field.h"
 #include "message.h"
 #include "trade.h"
 
@@ -6,9 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-/* A run that is as short as this is repeated, and its median taken. */
-static const double SHORT_SECONDS = 0.3;
-enum { REPEATS = 3, MOST_RAYS = 1024 };
+enum { MOST_RAYS = 1024 };
 
 typedef struct plan {
     int32_t method;
@@ -38,24 +37,22 @@ int trade_make_field(trade_work *work, int32_t resolution, vsh_field **field, do
     vsh_scene scene = *work->scene;
     scene.grid.resolution = resolution;
     scene.grid.voxel_size = 0.0;
-    vsh_grid *grid = NULL;
-    vsh_error error;
-    if (vsh_scene_casters(&scene, work->assets, &work->run, &grid, &error) != VSH_OK) {
-        return cli_fail(&error);
+    cli_box receivers = cli_box_empty();
+    for (size_t r = 0; r < work->receiver_count; ++r) {
+        cli_box_grow(&receivers, &work->receivers[r].info);
     }
-    vsh_field_options options = vsh_field_options_default();
-    options.reach = vsh_scene_reach(&scene, grid, work->info.bounds_min, work->info.bounds_max);
-    const vsh_result result = vsh_field_create(grid, &options, &work->run, field, &error);
-    vsh_grid_free(grid);
+    cli_field made;
+    const int code = cli_field_make(&scene, work->assets, &receivers, &work->run, &made);
+    *field = made.field;
     *seconds = trade_now(work) - start;
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return code;
 }
 
 /* The options of one plan, for the library and in `bake`'s words. */
 static vsh_shade_options shade_of(const trade_work *work, const trade_subject *subject, const plan *p,
                                   trade_run *run) {
     vsh_shade_options shade = work->scene->shade;
-    shade.triangles = work->triangles;
+    shade.triangles = work->meshes ? work->triangles : NULL;
     shade.early_rays = 0;
     const char *flag = subject->ao ? "--ao-method" : "--method";
     const bool rays = subject->ao ? p->method == VSH_AO_RAYS : p->method == VSH_SHADOW_RAYS;
@@ -84,14 +81,14 @@ static vsh_shade_options shade_of(const trade_work *work, const trade_subject *s
 }
 
 /* Share of the subject's values that a cone proved. */
-static double certified_share(const trade_work *work, const trade_subject *subject,
-                              const vsh_shade_options *shade, const vsh_shade_stats *stats) {
+static double certified_share(const trade_subject *subject, size_t valid, const vsh_shade_options *shade,
+                              const vsh_shade_stats *stats) {
     const int32_t method = subject->ao ? shade->ao_method : shade->method;
     const int32_t rays = subject->ao ? (int32_t)VSH_AO_RAYS : (int32_t)VSH_SHADOW_RAYS;
     if (method == rays || (subject->ao && method == VSH_AO_TAPS)) {
         return NAN;
     }
-    double values = (double)(subject->planes * work->valid);
+    double values = (double)(subject->planes * valid);
     double proved = (double)(stats->certified + stats->skipped);
     if (method > rays) {
         proved = values - (double)stats->refined;
@@ -101,38 +98,48 @@ static double certified_share(const trade_work *work, const trade_subject *subje
     return fmax(0.0, fmin(1.0, proved / values));
 }
 
-static int by_value(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static int bake(const trade_work *work, const trade_subject *subject, const vsh_field *field,
-                const vsh_shade_options *shade, float *values, double *seconds, vsh_shade_stats *stats) {
-    const size_t lights = subject->ao ? 0 : subject->planes;
+int trade_bake(const trade_work *work, const vsh_field *field, const vsh_shade_options *shade, float *shadow,
+               float *ao, float *coverage, vsh_shade_stats *stats) {
+    const size_t lights = shadow != NULL ? work->scene->light_count : 0;
     float **planes = calloc(lights + 1, sizeof *planes);
     if (planes == NULL) {
         return trade_out_of_memory("planes");
     }
-    for (size_t i = 0; i < lights; ++i) {
-        planes[i] = values + i * trade_texels(work);
-    }
-    const vsh_lightmap lightmap = {.shadow = subject->ao ? NULL : planes, .ao = subject->ao ? values : NULL};
-    double times[REPEATS];
-    int count = 0, code = CLI_OK;
-    do {
-        vsh_bake_stats baked = vsh_bake_stats_zero();
+    vsh_bake_stats baked = vsh_bake_stats_zero();
+    int code = CLI_OK;
+    for (size_t r = 0; r < work->receiver_count && code == CLI_OK; ++r) {
+        const size_t first = work->receivers[r].first;
+        for (size_t i = 0; i < lights; ++i) {
+            planes[i] = shadow + i * work->texels + first;
+        }
+        const vsh_lightmap lightmap = {.shadow = lights > 0 ? planes : NULL,
+                                       .ao = ao != NULL ? ao + first : NULL,
+                                       .coverage = coverage != NULL ? coverage + first : NULL};
         vsh_error error;
-        const double start = trade_now(work);
-        if (vsh_bake_lightmap(field, work->texels, work->scene->lights, lights, shade, &work->run, &lightmap,
-                              &baked, &error) != VSH_OK) {
+        if (vsh_bake_lightmap(field, work->receivers[r].texels, work->scene->lights, lights, shade,
+                              &work->run, &lightmap, &baked, &error) != VSH_OK) {
             code = cli_fail(&error);
         }
-        times[count++] = trade_now(work) - start;
-        *stats = baked.shade;
-    } while (code == CLI_OK && count < REPEATS && times[0] < SHORT_SECONDS);
-    qsort(times, (size_t)count, sizeof times[0], by_value);
-    *seconds = times[count / 2];
+    }
     free(planes);
+    if (stats != NULL) {
+        *stats = baked.shade;
+    }
+    return code;
+}
+
+/* Bakes the run's values, several times where it is quick. */
+static int bake(const trade_work *work, const trade_subject *subject, const vsh_field *field,
+                const vsh_shade_options *shade, trade_run *run, vsh_shade_stats *stats) {
+    trade_clock clock = {.count = 0};
+    int code = CLI_OK;
+    do {
+        const double start = trade_now(work);
+        code = trade_bake(work, field, shade, subject->ao ? NULL : run->values,
+                          subject->ao ? run->values : NULL, NULL, stats);
+        clock.times[clock.count++] = trade_now(work) - start;
+    } while (code == CLI_OK && trade_again(&clock));
+    run->bake_s = trade_median(&clock);
     return code;
 }
 
@@ -148,18 +155,18 @@ static double expected(const trade_subject *subject, const trade_run *run, bool 
 }
 
 static int run_plan(trade_work *work, trade_subject *subject, const plan *p, const trade_field *on) {
-    trade_run run = {.resolution = on->resolution, .build_s = on->build_s};
+    trade_run run = {.resolution = on->resolution, .build_s = on->build_s, .valid = on->valid};
     const vsh_shade_options shade = shade_of(work, subject, p, &run);
     const bool exact =
         subject->ao ? p->method == (int32_t)VSH_AO_EXACT : p->method == (int32_t)VSH_SHADOW_EXACT;
-    if (exact && work->triangles == NULL) {
+    if (exact && !work->meshes) {
         return CLI_OK;
     }
     if (trade_left(work) < expected(subject, &run, on == work->fields)) {
         ++work->skipped;
         return CLI_OK;
     }
-    run.values = calloc(subject->planes * trade_texels(work), sizeof *run.values);
+    run.values = calloc(subject->planes * work->texels, sizeof *run.values);
     if (run.values == NULL) {
         return trade_out_of_memory("values");
     }
@@ -168,10 +175,10 @@ static int run_plan(trade_work *work, trade_subject *subject, const plan *p, con
     run.bytes = info.bytes + (exact ? vsh_triangles_bytes(work->triangles) : 0);
     run.build_s += exact ? work->triangles_s : 0.0;
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    int code = bake(work, subject, on->field, &shade, run.values, &run.bake_s, &stats);
+    int code = bake(work, subject, on->field, &shade, &run, &stats);
     if (code == CLI_OK) {
-        run.certified = certified_share(work, subject, &shade, &stats);
-        code = trade_compare(work, subject, run.values, &run.metrics);
+        run.certified = certified_share(subject, run.valid, &shade, &stats);
+        code = trade_compare(work, subject, on->mask, on->valid, &run);
     }
     if (code == CLI_OK && trade_add(work, subject, &run) != NULL) {
         return CLI_OK;

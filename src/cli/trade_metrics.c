@@ -18,13 +18,14 @@ static double percentile(const float *sorted, size_t count, double share) {
 
 /* Texels of one row or column. */
 typedef struct scan {
-    const float *truth, *values, *mask;
+    const float *truth, *values;
+    const uint8_t *mask;
     size_t stride;
     size_t count;
 } scan;
 
 static bool valid_at(const scan *s, size_t i) {
-    return s->mask[i * s->stride] > 0.0f;
+    return s->mask[i * s->stride] != 0;
 }
 
 /* Length, in texels, that a line of values from texel `begin` to `end` spends between 0.1 and 0.9. */
@@ -75,36 +76,51 @@ static void add_widths(const scan *s, double *truth, double *off) {
 }
 
 static double width_error(const trade_work *work, const trade_subject *subject, const float *values) {
-    const size_t width = (size_t)work->info.width, height = (size_t)work->info.height;
     double truth = 0.0, off = 0.0;
     for (size_t plane = 0; plane < subject->planes; ++plane) {
-        const float *t = subject->truth + plane * width * height, *v = values + plane * width * height;
-        for (size_t row = 0; row < height; ++row) {
-            const scan s = {t + row * width, v + row * width, work->mask + row * width, 1, width};
-            add_widths(&s, &truth, &off);
-        }
-        for (size_t column = 0; column < width; ++column) {
-            const scan s = {t + column, v + column, work->mask + column, width, height};
-            add_widths(&s, &truth, &off);
+        for (size_t r = 0; r < work->receiver_count; ++r) {
+            const trade_receiver *receiver = &work->receivers[r];
+            const size_t width = (size_t)receiver->info.width, height = (size_t)receiver->info.height;
+            const float *t = subject->truth + plane * work->texels + receiver->first;
+            const float *v = values + plane * work->texels + receiver->first;
+            const uint8_t *mask = work->common + receiver->first;
+            for (size_t row = 0; row < height; ++row) {
+                const scan s = {t + row * width, v + row * width, mask + row * width, 1, width};
+                add_widths(&s, &truth, &off);
+            }
+            for (size_t column = 0; column < width; ++column) {
+                const scan s = {t + column, v + column, mask + column, width, height};
+                add_widths(&s, &truth, &off);
+            }
         }
     }
     return truth > 0.0 ? off / truth : NAN;
 }
 
-int trade_compare(const trade_work *work, const trade_subject *subject, const float *values,
-                  trade_metrics *metrics) {
-    const size_t texels = trade_texels(work);
+/* RMSE over the texels of a mask. */
+static double rmse_over(const trade_work *work, const trade_subject *subject, const float *values,
+                        const uint8_t *mask, size_t count) {
+    double squares = 0.0;
+    for (size_t i = 0; i < subject->planes * work->texels; ++i) {
+        const double error = (double)values[i] - (double)subject->truth[i];
+        squares += mask[i % work->texels] ? error * error : 0.0;
+    }
+    return count > 0 ? sqrt(squares / (double)(subject->planes * count)) : 0.0;
+}
+
+int trade_compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask, size_t valid,
+                  trade_run *run) {
     trade_metrics m = {0};
-    float *errors = calloc(subject->planes * work->valid + 1, sizeof *errors);
+    float *errors = calloc(subject->planes * work->common_count + 1, sizeof *errors);
     if (errors == NULL) {
         return trade_out_of_memory("errors");
     }
     double squares = 0.0, penumbra_squares = 0.0, sum = 0.0;
-    for (size_t i = 0; i < subject->planes * texels; ++i) {
-        if (!(work->mask[i % texels] > 0.0f)) {
+    for (size_t i = 0; i < subject->planes * work->texels; ++i) {
+        if (!work->common[i % work->texels]) {
             continue;
         }
-        const double truth = (double)subject->truth[i], error = (double)values[i] - truth;
+        const double truth = (double)subject->truth[i], error = (double)run->values[i] - truth;
         errors[m.count++] = (float)fabs(error);
         squares += error * error;
         sum += error;
@@ -122,8 +138,10 @@ int trade_compare(const trade_work *work, const trade_subject *subject, const fl
         m.max = (double)errors[m.count - 1];
         m.penumbra_rmse = m.penumbra > 0 ? sqrt(penumbra_squares / (double)m.penumbra) : 0.0;
     }
-    m.width_error = width_error(work, subject, values);
+    m.width_error = width_error(work, subject, run->values);
     free(errors);
-    *metrics = m;
+    run->metrics = m;
+    run->rate = 1e6 * run->bake_s / (double)(subject->planes * run->valid);
+    run->valid_rmse = rmse_over(work, subject, run->values, mask, valid);
     return CLI_OK;
 }

@@ -3,7 +3,14 @@
 #include <math.h>
 #include <string.h>
 
-enum { WIDTH = 860, HEIGHT = 520, LEFT = 64, RIGHT = 150, TOP = 16, BOTTOM = 48 };
+enum { WIDTH = 860, HEIGHT = 540, LEFT = 64, RIGHT = 164, TOP = 16, BOTTOM = 48 };
+
+/* A picture brings its own looks, as it also stands alone. */
+static const char style[] =
+    "<style>.plot text{font:13px system-ui,sans-serif;fill:#222}.plot .grid{stroke:#e4e4e4;fill:none}"
+    ".plot .minor{stroke:#f3f3f3;fill:none}.plot .sweep{stroke-width:1;stroke-opacity:.45;fill:none}"
+    ".plot .front{stroke:#111;stroke-width:1.5;stroke-dasharray:5 3;fill:none}"
+    ".plot .embree{stroke:#000;stroke-width:2;fill:none}</style>\n";
 
 /* Colours that are told apart without red against green (Okabe and Ito, 2008). */
 static const struct {
@@ -22,10 +29,6 @@ static const char *color_of(const char *method) {
         }
     }
     return "#666666";
-}
-
-double trade_rate(const trade_work *work, const trade_subject *subject, const trade_run *run) {
-    return run->bake_s / (double)(subject->planes * work->valid) * 1e6;
 }
 
 /* The part of a logarithmic axis that holds all values, in powers of ten. */
@@ -73,72 +76,124 @@ static double at_y(const plot *p, double value) {
 }
 
 static double x_of(const plot *p, const trade_run *run) {
-    return at_x(p, trade_rate(p->work, p->subject, run));
+    return at_x(p, run->rate);
 }
 
+/* Lines at 1, 2 and 5 times each power of ten; all are labelled where the axis is short enough for that. */
 static void write_grid(const plot *p) {
+    const bool all_x = p->x.high - p->x.low < 3.5, all_y = p->y.high - p->y.low < 3.5;
     for (int power = -7; power <= 6; ++power) {
         for (int step = 1; step <= 5; step += step == 1 ? 1 : 3) {
             const double value = step * pow(10.0, power), l = log10(value);
+            const char *class = step == 1 ? "grid" : "minor";
             if (l >= p->x.low && l <= p->x.high) {
-                fprintf(p->out,
-                        "<path class=\"grid\" d=\"M%.1f %dV%d\"/><text x=\"%.1f\" y=\"%d\" "
-                        "text-anchor=\"middle\">%g</text>\n",
-                        at_x(p, value), TOP, HEIGHT - BOTTOM, at_x(p, value), HEIGHT - BOTTOM + 16, value);
+                const double x = at_x(p, value);
+                fprintf(p->out, "<path class=\"%s\" d=\"M%.1f %dV%d\"/>", class, x, TOP, HEIGHT - BOTTOM);
+                if (step == 1 || all_x) {
+                    fprintf(p->out, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%g</text>\n", x,
+                            HEIGHT - BOTTOM + 18, value);
+                }
             }
             if (l >= p->y.low && l <= p->y.high) {
-                fprintf(p->out,
-                        "<path class=\"grid\" d=\"M%d %.1fH%d\"/><text x=\"%d\" y=\"%.1f\" "
-                        "text-anchor=\"end\">%g</text>\n",
-                        LEFT, at_y(p, value), WIDTH - RIGHT, LEFT - 6, at_y(p, value) + 4.0, value);
+                const double y = at_y(p, value);
+                fprintf(p->out, "<path class=\"%s\" d=\"M%d %.1fH%d\"/>", class, LEFT, y, WIDTH - RIGHT);
+                if (step == 1 || all_y) {
+                    fprintf(p->out, "<text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%g</text>\n", LEFT - 6,
+                            y + 4.0, value);
+                }
             }
         }
     }
     fprintf(p->out,
-            "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">bake, seconds for a million values</text>\n"
+            "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">bake, microseconds a value</text>\n"
             "<text transform=\"translate(14 %d) rotate(-90)\" text-anchor=\"middle\">RMSE against the "
             "truth</text>\n",
             (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10, (TOP + HEIGHT - BOTTOM) / 2);
 }
 
+static bool on_front(const trade_run *run, const trade_run *like) {
+    (void)like;
+    return run->front;
+}
+
+static bool same_sweep(const trade_run *run, const trade_run *like) {
+    return strcmp(run->method, like->method) == 0 && run->resolution == like->resolution;
+}
+
 /* The runs of a kind joined in the order of their time. */
-static void write_line(const plot *p, bool front, const char *class) {
+static void write_line(const plot *p, bool (*belongs)(const trade_run *, const trade_run *),
+                       const trade_run *like, const char *class, const char *color) {
     const trade_subject *s = p->subject;
     double last = -INFINITY;
     bool begun = false;
     for (;;) {
         const trade_run *next = NULL;
+        double next_rate = INFINITY;
         for (size_t i = 0; i < s->run_count; ++i) {
-            const trade_run *run = &s->runs[i];
-            if ((front ? run->front : run->embree) && run->bake_s > last &&
-                (next == NULL || run->bake_s < next->bake_s)) {
-                next = run;
+            const double rate = s->runs[i].rate;
+            if (belongs(&s->runs[i], like) && rate > last && rate < next_rate) {
+                next = &s->runs[i];
+                next_rate = rate;
             }
         }
         if (next == NULL) {
             break;
         }
         if (!begun) {
-            fprintf(p->out, "<polyline class=\"%s\" points=\"", class);
+            fprintf(p->out, "<polyline class=\"%s\" stroke=\"%s\" points=\"", class, color);
         }
         fprintf(p->out, "%.1f,%.1f ", x_of(p, next), at_y(p, error_of(next)));
         begun = true;
-        last = next->bake_s;
+        last = next_rate;
     }
     if (begun) {
         fputs("\"/>\n", p->out);
     }
 }
 
+/* One method at one voxel size, its numbers growing: a curve of its own. */
+static void write_sweeps(const plot *p) {
+    for (size_t i = 0; i < p->subject->run_count; ++i) {
+        const trade_run *run = &p->subject->runs[i];
+        bool first = true;
+        for (size_t k = 0; k < i && first; ++k) {
+            first = !same_sweep(&p->subject->runs[k], run);
+        }
+        if (first) {
+            write_line(p, same_sweep, run, run->embree ? "embree" : "sweep", color_of(run->method));
+        }
+    }
+}
+
+/* Finer voxels are larger dots. */
+static double radius_of(const plot *p, int32_t resolution) {
+    size_t coarser = 0;
+    for (size_t i = 0; i < p->work->field_count; ++i) {
+        coarser += p->work->fields[i].resolution < resolution;
+    }
+    const double part = p->work->field_count > 1 ? (double)coarser / (double)(p->work->field_count - 1) : 0.5;
+    return resolution == 0 ? 3.0 : 2.5 + 3.5 * part;
+}
+
 static void write_points(const plot *p) {
     for (size_t i = 0; i < p->subject->run_count; ++i) {
         const trade_run *run = &p->subject->runs[i];
         fprintf(p->out,
-                "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%g\" fill=\"%s\"%s><title>%s %s: RMSE %.4f, %.3g "
-                "s</title></circle>\n",
-                x_of(p, run), at_y(p, error_of(run)), run->front ? 5.5 : 3.5, color_of(run->method),
-                run->front ? " stroke=\"#000\" stroke-width=\"1.5\"" : "", run->embree ? "Embree," : "",
-                run->options, run->metrics.rmse, run->bake_s);
+                "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%g\" fill=\"%s\"%s><title>%s%s: RMSE %.4f, %.3g "
+                "µs</title></circle>\n",
+                x_of(p, run), at_y(p, error_of(run)), radius_of(p, run->resolution), color_of(run->method),
+                run->front ? " stroke=\"#000\" stroke-width=\"1.5\"" : "", run->embree ? "Embree, " : "",
+                run->options, run->metrics.rmse, run->rate);
+    }
+}
+
+static void write_sizes(const plot *p, int y) {
+    for (size_t i = p->work->field_count; i-- > 0; y += 20) {
+        const int32_t resolution = p->work->fields[i].resolution;
+        fprintf(p->out,
+                "<circle cx=\"%d\" cy=\"%d\" r=\"%g\" fill=\"#bbb\"/><text x=\"%d\" y=\"%d\">%d "
+                "voxels</text>\n",
+                WIDTH - RIGHT + 16, y, radius_of(p, resolution), WIDTH - RIGHT + 30, y + 4, resolution);
     }
 }
 
@@ -153,28 +208,31 @@ static void write_legend(const plot *p) {
             const int y = TOP + 12 + 20 * line++;
             fprintf(p->out,
                     "<circle cx=\"%d\" cy=\"%d\" r=\"4\" fill=\"%s\"/><text x=\"%d\" y=\"%d\">%s</text>\n",
-                    WIDTH - RIGHT + 16, y, colors[c].color, WIDTH - RIGHT + 26, y + 4,
+                    WIDTH - RIGHT + 16, y, colors[c].color, WIDTH - RIGHT + 30, y + 4,
                     strcmp(colors[c].method, "embree") == 0 ? "Embree’s rays" : colors[c].method);
         }
     }
     const int y = TOP + 12 + 20 * line;
     fprintf(p->out, "<path class=\"front\" d=\"M%d %dh18\"/><text x=\"%d\" y=\"%d\">Pareto front</text>\n",
-            WIDTH - RIGHT + 4, y, WIDTH - RIGHT + 26, y + 4);
+            WIDTH - RIGHT + 6, y, WIDTH - RIGHT + 30, y + 4);
+    write_sizes(p, y + 28);
 }
 
 void trade_plot_write(FILE *out, const trade_work *work, const trade_subject *subject) {
     plot p = {out, work, subject, {INFINITY, -INFINITY}, {INFINITY, -INFINITY}};
     for (size_t i = 0; i < subject->run_count; ++i) {
-        grow(&p.x, trade_rate(work, subject, &subject->runs[i]));
+        grow(&p.x, subject->runs[i].rate);
         grow(&p.y, error_of(&subject->runs[i]));
     }
     settle(&p.x);
     settle(&p.y);
-    fprintf(out, "<svg viewBox=\"0 0 %d %d\" role=\"img\" aria-label=\"error against time\">\n", WIDTH,
-            HEIGHT);
+    fprintf(out,
+            "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" role=\"img\" "
+            "aria-label=\"error against time\">\n%s<rect width=\"%d\" height=\"%d\" fill=\"#fff\"/>\n",
+            WIDTH, HEIGHT, style, WIDTH, HEIGHT);
     write_grid(&p);
-    write_line(&p, false, "embree");
-    write_line(&p, true, "front");
+    write_sweeps(&p);
+    write_line(&p, on_front, NULL, "front", "#111");
     write_points(&p);
     write_legend(&p);
     fputs("</svg>\n", out);

@@ -6,10 +6,8 @@
 
 #include <stdio.h>
 
-/* Seconds of the bake stage for a million values. */
-double trade_rate(const trade_work *work, const trade_subject *subject, const trade_run *run);
-
-/* Writes an inline SVG: RMSE over time, both logarithmic; the Pareto front and Embree's curve as lines. */
+/* Writes an SVG, to stand in a page or alone: RMSE over time, both logarithmic; the runs of a method at a
+ * voxel size, the Pareto front and Embree's rays as lines. */
 void trade_plot_write(FILE *out, const trade_work *work, const trade_subject *subject);
 
 #endif

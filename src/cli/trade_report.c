@@ -2,31 +2,35 @@
 #include "message.h"
 #include "signals.h"
 #include "temporary.h"
+#include "trade_parts.h"
 #include "trade_plot.h"
-#include "trade_png.h"
 
-#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { THUMB = 128 };
 
 static const double targets[] = {0.05, 0.02, 0.01, 0.005};
 
 static const char head[] =
     "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n"
-    "<meta name=\"viewport\" content=\"width=device-width\">\n<style>\n"
-    "body{font:15px/1.45 system-ui,sans-serif;margin:2em auto;max-width:1100px;padding:0 1em;color:#111;"
-    "background:#fff}\n"
-    "h1,h2{line-height:1.2}h2{margin-top:2em}svg{max-width:860px;width:100%;font:12px system-ui,sans-serif}\n"
-    ".grid{stroke:#e4e4e4;fill:none}.front{stroke:#111;stroke-width:1.5;stroke-dasharray:5 3;fill:none}"
-    ".embree{stroke:#000;stroke-width:1;fill:none}\n"
-    ".wide{overflow-x:auto}table{border-collapse:collapse;font-size:13px;white-space:nowrap}"
-    "th,td{padding:.25em .6em;text-align:right;border-bottom:1px solid #e4e4e4}"
-    "td:first-child,th:first-child,td.t,th.t{text-align:left}tr.f{background:#eef6f1}"
-    "code{font:12px ui-monospace,monospace}img{image-rendering:pixelated;vertical-align:top}"
-    "figure{display:inline-block;margin:0 1em 1em 0;font-size:12px}figcaption{max-width:410px}\n</style>\n";
+    "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<style>\n"
+    "body{font:15px/1.5 system-ui,sans-serif;margin:1.5em auto;max-width:1100px;padding:0 1em;color:#111;"
+    "background:#fff;overflow-wrap:break-word}\n"
+    "h1,h2,h3{line-height:1.25}h2{margin-top:2em}svg{width:100%;max-width:860px;min-width:640px;height:auto}"
+    "\n"
+    ".wide{overflow-x:auto;margin:1em 0}table{border-collapse:collapse;font-size:13px}"
+    "th,td{padding:.3em .6em;text-align:right;border-bottom:1px solid #e4e4e4;white-space:nowrap}"
+    "th{vertical-align:bottom}.narrow th{white-space:normal}"
+    ".targets td.t{white-space:normal;min-width:15em}td.t,th.t{text-align:left}tr.f{background:#eef6f1}"
+    ".all{max-height:40em;overflow:auto}.all thead th{position:sticky;top:0;background:#fff}"
+    "code{font:12px ui-monospace,monospace}code span{white-space:nowrap}"
+    "img{image-rendering:pixelated;outline:1px solid "
+    "#e4e4e4;vertical-align:top;width:32%;max-width:192px;height:auto}"
+    ".shots{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,330px),1fr));gap:1em}"
+    "figure{margin:0;font-size:12px;line-height:1.4}figure div{margin-bottom:3px}figcaption{margin-top:.3em}"
+    "dl{display:grid;grid-template-columns:max-content 1fr;gap:.2em 1em;font-size:14px}dt{font-weight:600}"
+    "dd{margin:0}\n"
+    "@media(max-width:600px){dl{display:block}dd{margin:0 0 .6em}}\n</style>\n";
 
 static void write_escaped(FILE *out, const char *text) {
     for (; *text != '\0'; ++text) {
@@ -49,190 +53,174 @@ static void write_escaped(FILE *out, const char *text) {
     }
 }
 
+void trade_options_write(FILE *out, const char *options) {
+    fputs("<code><span>", out);
+    for (const char *at = options; *at != '\0'; ++at) {
+        if (at[0] == ' ' && at[1] == '-') {
+            fputs("</span> <span>", out);
+        } else {
+            fputc(*at, out);
+        }
+    }
+    fputs("</span></code>", out);
+}
+
 /* --- which options reach an error in the least time */
 
 /* The fastest of the runs whose RMSE is at most `target`; NULL where there is none. */
 static const trade_run *fastest(const trade_subject *subject, double target, bool building, bool embree) {
     const trade_run *best = NULL;
+    double best_time = INFINITY;
     for (size_t i = 0; i < subject->run_count; ++i) {
         const trade_run *run = &subject->runs[i];
         if (run->embree != embree || !(run->metrics.rmse <= target)) {
             continue;
         }
-        const double time = run->bake_s + (building ? run->build_s : 0.0);
-        const double best_time = best != NULL ? best->bake_s + (building ? best->build_s : 0.0) : INFINITY;
+        const double time = building ? run->bake_s + run->build_s : run->rate;
         best = time < best_time ? run : best;
+        best_time = fmin(time, best_time);
     }
     return best;
 }
 
-static void write_targets(FILE *out, const trade_work *work, const trade_subject *subject) {
-    fputs("<table><tr><th>RMSE</th><th class=\"t\">least bake time with</th><th>s for a million</th>"
-          "<th>Embree alone</th><th class=\"t\">least time with building</th><th>s</th></tr>\n",
-          out);
+/* Two cells: a run, NULL for none, and its time. */
+static void write_fastest(FILE *out, const trade_run *run, double time) {
+    fputs("<td class=\"t\">", out);
+    if (run == NULL) {
+        fputs("none of these</td><td>–</td>", out);
+        return;
+    }
+    trade_options_write(out, run->options);
+    fprintf(out, "</td><td>%.3g</td>", time);
+}
+
+static void write_targets(FILE *out, const trade_subject *subject, bool embree_measured) {
+    fprintf(out,
+            "<div class=\"wide\"><table class=\"narrow targets\"><tr><th>RMSE of at most</th><th "
+            "class=\"t\">least bake "
+            "time with</th><th>µs a value</th>%s<th class=\"t\">least time, building included, "
+            "with</th><th>s</th></tr>\n",
+            embree_measured ? "<th>Embree’s rays, µs a value</th>" : "");
     for (size_t i = 0; i < sizeof targets / sizeof targets[0]; ++i) {
         const trade_run *bake = fastest(subject, targets[i], false, false);
         const trade_run *all = fastest(subject, targets[i], true, false);
         const trade_run *embree = fastest(subject, targets[i], false, true);
         fprintf(out, "<tr><td>%g</td>", targets[i]);
-        if (bake != NULL) {
-            fprintf(out, "<td class=\"t\"><code>%s</code></td><td>%.3g</td>", bake->options,
-                    trade_rate(work, subject, bake));
-        } else {
-            fputs("<td class=\"t\">none of these</td><td>–</td>", out);
-        }
+        write_fastest(out, bake, bake != NULL ? bake->rate : NAN);
         if (embree != NULL) {
-            fprintf(out, "<td>%.3g (%s)</td>", trade_rate(work, subject, embree), embree->options);
-        } else {
+            fprintf(out, "<td>%.3g (%s)</td>", embree->rate, embree->options);
+        } else if (embree_measured) {
             fputs("<td>–</td>", out);
         }
-        if (all != NULL) {
-            fprintf(out, "<td class=\"t\"><code>%s</code></td><td>%.3g</td>", all->options,
-                    all->bake_s + all->build_s);
-        } else {
-            fputs("<td class=\"t\">none of these</td><td>–</td>", out);
-        }
+        write_fastest(out, all, all != NULL ? all->bake_s + all->build_s : NAN);
         fputs("</tr>\n", out);
-    }
-    fputs("</table>\n", out);
-}
-
-/* --- the table */
-
-static void write_table(FILE *out, const trade_work *work, const trade_subject *subject) {
-    fputs(
-        "<div class=\"wide\"><table><tr><th>options</th><th>build s</th><th>bake s</th><th>s for a million"
-        "</th><th>MB</th><th>RMSE</th><th>in penumbrae</th><th>bias</th><th>p95</th><th>p99</th><th>max</th>"
-        "<th>width error</th><th>certified</th></tr>\n",
-        out);
-    for (size_t i = 0; i < subject->run_count; ++i) {
-        const trade_run *run = &subject->runs[i];
-        const trade_metrics *m = &run->metrics;
-        fprintf(out, "<tr%s><td>%s<code>%s</code></td><td>%.2f</td><td>%.3f</td><td>%.3g</td><td>%.1f</td>",
-                run->front ? " class=\"f\"" : "", run->embree ? "Embree, " : "", run->options, run->build_s,
-                run->bake_s, trade_rate(work, subject, run), (double)run->bytes / 1e6);
-        fprintf(out, "<td>%.4f</td><td>%.4f</td><td>%+.4f</td><td>%.3f</td><td>%.3f</td><td>%.3f</td>",
-                m->rmse, m->penumbra_rmse, m->bias, m->p95, m->p99, m->max);
-        fprintf(out, isnan(m->width_error) ? "<td>–</td>" : "<td>%.1f %%</td>", 100.0 * m->width_error);
-        fprintf(out, isnan(run->certified) ? "<td>–</td></tr>\n" : "<td>%.1f %%</td></tr>\n",
-                100.0 * run->certified);
     }
     fputs("</table></div>\n", out);
 }
 
-/* --- thumbnails */
+/* --- the table */
 
-static void make_palettes(uint8_t gray[256][3], uint8_t difference[256][3]) {
-    for (int i = 0; i < 256; ++i) {
-        gray[i][0] = gray[i][1] = gray[i][2] = (uint8_t)i;
-        const int off = i > 128 ? i - 128 : 128 - i; /* white in the middle, red too light, blue too dark */
-        const uint8_t rest = (uint8_t)(255 - (off < 128 ? 2 * off : 255));
-        difference[i][0] = i >= 128 ? 255 : rest;
-        difference[i][1] = rest;
-        difference[i][2] = i >= 128 ? rest : 255;
-    }
-}
-
-/* Every n-th texel of a plane, or of its difference from `from`; what is not valid is grey. */
-static void shrink(const trade_work *work, const float *plane, const float *from, int width, int height,
-                   uint8_t *pixels) {
-    for (int row = 0; row < height; ++row) {
-        for (int column = 0; column < width; ++column) {
-            const size_t x = (size_t)column * (size_t)work->info.width / (size_t)width;
-            const size_t y = (size_t)row * (size_t)work->info.height / (size_t)height;
-            const size_t texel = y * (size_t)work->info.width + x;
-            double value = from != NULL ? 0.5 : 0.25;
-            if (work->mask[texel] > 0.0f) {
-                value = (double)plane[texel];
-                /* a difference of an eighth is all red, or all blue */
-                value = from != NULL ? 0.5 + 4.0 * (value - (double)from[texel]) : value;
-            }
-            pixels[row * width + column] = (uint8_t)lround(255.0 * fmin(1.0, fmax(0.0, value)));
-        }
-    }
-}
-
-static void write_thumbnails(FILE *out, const trade_work *work, const trade_subject *subject) {
-    const int longest = work->info.width > work->info.height ? work->info.width : work->info.height;
-    const int most = longest < THUMB ? longest : THUMB;
-    const int width = (int)fmax(1.0, (double)work->info.width * most / longest);
-    const int height = (int)fmax(1.0, (double)work->info.height * most / longest);
-    uint8_t gray[256][3], difference[256][3], pixels[THUMB * THUMB];
-    make_palettes(gray, difference);
+static void write_table(FILE *out, const trade_subject *subject) {
+    fputs("<div class=\"wide all\"><table class=\"narrow\"><thead><tr><th class=\"t\">options</th><th>build "
+          "s</th><th>bake s</th><th>µs a value</th><th>MB</th><th>RMSE</th><th>in "
+          "penumbrae</th><th>bias</th><th>p95</th><th>p99</th><th>max</th><th>width "
+          "error</th><th>certified</th><th>RMSE, all its texels</th></tr></thead>\n",
+          out);
     for (size_t i = 0; i < subject->run_count; ++i) {
         const trade_run *run = &subject->runs[i];
-        if (!run->front) {
-            continue;
-        }
-        fputs("<figure>", out);
-        shrink(work, subject->truth, NULL, width, height, pixels);
-        trade_png_write(out, width, height, pixels, gray, "truth");
-        shrink(work, run->values, NULL, width, height, pixels);
-        fputc(' ', out);
-        trade_png_write(out, width, height, pixels, gray, "bake");
-        shrink(work, run->values, subject->truth, width, height, pixels);
-        fputc(' ', out);
-        trade_png_write(out, width, height, pixels, difference, "difference");
-        fprintf(out, "<figcaption><code>%s</code>, RMSE %.4f</figcaption></figure>\n", run->options,
-                run->metrics.rmse);
+        const trade_metrics *m = &run->metrics;
+        fprintf(out,
+                "<tr%s><td class=\"t\">%s<code>%s</code></td><td>%.2f</td><td>%.3f</td><td>%.3g</td>"
+                "<td>%.1f</td>",
+                run->front ? " class=\"f\"" : "", run->embree ? "Embree, " : "", run->options, run->build_s,
+                run->bake_s, run->rate, (double)run->bytes / 1e6);
+        fprintf(out, "<td>%.4f</td><td>%.4f</td><td>%+.4f</td><td>%.3f</td><td>%.3f</td><td>%.3f</td>",
+                m->rmse, m->penumbra_rmse, m->bias, m->p95, m->p99, m->max);
+        fprintf(out, isnan(m->width_error) ? "<td>–</td>" : "<td>%.1f %%</td>", 100.0 * m->width_error);
+        fprintf(out, isnan(run->certified) ? "<td>–</td>" : "<td>%.1f %%</td>", 100.0 * run->certified);
+        fprintf(out, "<td>%.4f</td></tr>\n", run->valid_rmse);
     }
+    fputs("</table></div>\n", out);
 }
 
 /* --- the page */
+
+/* What is measured, and what is not. */
+static void write_texels(FILE *out, const trade_work *work) {
+    fputs("<dl><dt>Input</dt><dd><code>", out);
+    write_escaped(out, work->settings->bake.input);
+    fputs("</code></dd>\n<dt>Receivers</dt><dd>", out);
+    for (size_t r = 0; r < work->receiver_count; ++r) {
+        const trade_receiver *receiver = &work->receivers[r];
+        fputs(r > 0 ? "; " : "", out);
+        write_escaped(out, receiver->path);
+        fprintf(out, ", %d × %d", receiver->info.width, receiver->info.height);
+    }
+    if (work->settings->receiver >= 0) {
+        fprintf(out, " (number %d of the scene’s alone, as asked)", work->settings->receiver);
+    }
+    fprintf(out,
+            "</dd>\n<dt>Texels</dt><dd>%zu measured, one sample each, of %zu that charts cover. Left out: "
+            "what a bake itself marks as invalid (inside another solid, or seen from behind) at one of the "
+            "voxel sizes at least, so that all runs have the same texels:",
+            work->common_count, work->covered);
+    for (size_t f = work->field_count; f-- > 0;) {
+        const trade_field *field = &work->fields[f];
+        fprintf(out, " %zu invalid at %d voxels%s", work->covered - field->valid, field->resolution,
+                f > 0 ? "," : "");
+    }
+    fprintf(
+        out,
+        "; %zu at all sizes. The last column of the table has the error over all texels that are valid at "
+        "a run’s own voxel size.</dd>\n<dt>Truth</dt><dd>%s; it took %.1f s.</dd>\n",
+        work->covered - work->points, work->truth_text, work->truth_s);
+    fprintf(
+        out,
+        "<dt>Time</dt><dd>%s; median of three runs where they are short. A bake’s time is that of the whole "
+        "bake stage: which texels are valid, where rays begin, cones and rays. Building is voxels and "
+        "field%s. A value is one light’s at one texel, or one texel’s AO.</dd>\n",
+        work->run.threads == 1 ? "one thread, processor time" : "all threads asked for, wall time",
+        work->meshes ? ", and the tree of triangles where rays meet those. Embree’s time is that of making "
+                       "and tracing the rays, from texels known to be valid"
+                     : "");
+    if (work->skipped > 0) {
+        fprintf(
+            out,
+            "<dt>Budget</dt><dd>%zu runs did not fit into the budget of %g s; <code>--budget</code> gives "
+            "more.</dd>\n",
+            work->skipped, work->settings->budget);
+    }
+    fprintf(out, "<dt>Made by</dt><dd>vdbshade %s</dd></dl>\n", vsh_version());
+}
 
 static void write_page(FILE *out, const trade_work *work) {
     fputs(head, out);
     fputs("<title>Speed against accuracy: ", out);
     write_escaped(out, work->settings->bake.input);
-    fputs("</title>\n<h1>Speed against accuracy</h1>\n<p><code>", out);
-    write_escaped(out, work->settings->bake.input);
-    fprintf(out, "</code>, %d × %d, %zu valid texels, one sample each; %s. Truth: %s. vdbshade %s.</p>\n",
-            work->info.width, work->info.height, work->valid,
-            work->run.threads == 1 ? "one thread, processor time" : "several threads", work->truth_text,
-            vsh_version());
-    if (work->skipped > 0) {
-        fprintf(out,
-                "<p>%zu runs did not fit into the budget of %g s; <code>--budget</code> gives more.</p>\n",
-                work->skipped, work->settings->budget);
-    }
+    fputs("</title>\n<h1>Speed against accuracy</h1>\n", out);
+    write_texels(out, work);
     for (size_t s = 0; s < work->subject_count; ++s) {
         const trade_subject *subject = &work->subjects[s];
-        fprintf(out, "<h2>%s</h2>\n", subject->ao ? "Ambient occlusion" : "Shadow");
+        fprintf(out, "<h2>%s</h2>\n<div class=\"wide\">", subject->ao ? "Ambient occlusion" : "Shadow");
         trade_plot_write(out, work, subject);
-        write_targets(out, work, subject);
-        fputs("<h3>On the front: truth, bake, difference (red: too light by 1/8 or more, blue: too dark)"
-              "</h3>\n",
+        fputs("</div>\n<h3>Which options reach an error in the least time</h3>\n", out);
+        write_targets(out, subject, work->meshes);
+        fputs("<h3>On the front: truth, bake, difference</h3>\n<p>Red is too light by 1/8 or more, blue too "
+              "dark; grey-blue is not measured.",
               out);
-        write_thumbnails(out, work, subject);
+        trade_thumbnails_write(out, work, subject);
         fputs("<h3>All runs</h3>\n", out);
-        write_table(out, work, subject);
+        write_table(out, subject);
     }
     fputs("<p>In penumbrae: texels whose truth lies in 0.02 … 0.98. Width error: how far the distances from "
           "10 % to 90 % are off, relative to them. Certified: values that a cone proved. Shaded rows are on "
-          "the "
-          "Pareto front: nothing measured is both faster and nearer to the truth.</p>\n</html>\n",
+          "the Pareto front: nothing measured is both faster and nearer to the truth.</p>\n</html>\n",
           out);
 }
 
-static void write_rows(FILE *out, const trade_work *work) {
-    fputs(
-        "subject,method,options,resolution,build_s,bake_s,s_per_million,bytes,texels,rmse,penumbra_rmse,bias,"
-        "p95,p99,max,width_error,certified,front\n",
-        out);
-    for (size_t s = 0; s < work->subject_count; ++s) {
-        const trade_subject *subject = &work->subjects[s];
-        for (size_t i = 0; i < subject->run_count; ++i) {
-            const trade_run *r = &subject->runs[i];
-            const trade_metrics *m = &r->metrics;
-            fprintf(out, "%s,%s,%s,%d,%.6g,%.6g,%.6g,%" PRIu64 ",%zu,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,",
-                    subject->name, r->method, r->options, r->resolution, r->build_s, r->bake_s,
-                    trade_rate(work, subject, r), r->bytes, work->valid, m->rmse, m->penumbra_rmse, m->bias,
-                    m->p95, m->p99, m->max);
-            fprintf(out, isnan(m->width_error) ? "," : "%.6f,", m->width_error);
-            fprintf(out, isnan(r->certified) ? "," : "%.6f,", r->certified);
-            fprintf(out, "%d\n", r->front);
-        }
-    }
+/* Of the shadow, or of AO where there are no lights. */
+static void write_picture(FILE *out, const trade_work *work) {
+    trade_plot_write(out, work, &work->subjects[0]);
 }
 
 /* Composes a text and writes it, whole or not at all. */
@@ -260,5 +248,9 @@ int trade_write_report(const trade_work *work) {
 }
 
 int trade_write_csv(const trade_work *work) {
-    return work->settings->csv != NULL ? write_text(work, work->settings->csv, write_rows) : CLI_OK;
+    return work->settings->csv != NULL ? write_text(work, work->settings->csv, trade_rows_write) : CLI_OK;
+}
+
+int trade_write_plot(const trade_work *work) {
+    return work->settings->plot != NULL ? write_text(work, work->settings->plot, write_picture) : CLI_OK;
 }

@@ -12,7 +12,6 @@
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
-#include <vdbshade/grid.h>
 
 /* Address space beyond the memory limit: libraries, stacks of the thread pool, arenas of the allocator. */
 static const uint64_t address_space_slack = (uint64_t)2 << 30;
@@ -93,7 +92,18 @@ static int read_grid(void *user) {
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }
 
-int cli_trial_read(const char *path, const char *name, uint64_t memory) {
+static int trial_read(const char *path, const char *name, uint64_t memory) {
     trial t = {path, name};
     return cli_isolated(path, memory, read_grid, &t);
+}
+
+int cli_trial_casters(const vsh_scene *scene, uint64_t memory) {
+    int code = CLI_OK;
+    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        if (caster->type == VSH_CASTER_VDB) {
+            code = trial_read(caster->path, caster->grid, memory);
+        }
+    }
+    return code;
 }

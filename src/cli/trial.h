@@ -3,14 +3,15 @@
 #ifndef CLI_TRIAL_H
 #define CLI_TRIAL_H
 
-#include <vdbshade/base.h>
+#include <vdbshade/scene.h>
 
 /* Runs `work` in a child and returns its exit code. Where the child dies instead, says "PATH: damaged: …" and
  * returns CLI_FILE. The child's address space is limited to `memory` bytes (0: not). To be called before the
  * process has threads. */
 int cli_isolated(const char *path, uint64_t memory, int (*work)(void *user), void *user);
 
-/* Reads grid `name` (NULL: the first) of a .vdb file in a child, and drops it. */
-int cli_trial_read(const char *path, const char *name, uint64_t memory);
+/* Reads each level set that the scene names as a caster in a child, and drops it. CLI_OK or an exit code,
+ * having said why. */
+int cli_trial_casters(const vsh_scene *scene, uint64_t memory);
 
 #endif

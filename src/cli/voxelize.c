@@ -68,14 +68,9 @@ static int check_files(const voxelize_settings *s, const vsh_scene *scene) {
         if (caster->path != NULL && cli_same_file(s->output, caster->path)) {
             return cli_usage("%s: the output is also a caster's file", s->output);
         }
-        if (caster->type == VSH_CASTER_VDB) {
-            const int code = cli_trial_read(caster->path, caster->grid, s->common.memory_limit);
-            if (code != CLI_OK) {
-                return code;
-            }
-        }
     }
-    return cli_temporary_check(s->output);
+    const int code = cli_trial_casters(scene, s->common.memory_limit);
+    return code == CLI_OK ? cli_temporary_check(s->output) : code;
 }
 
 static int write_grid(const voxelize_settings *s, const vsh_grid *grid) {

@@ -1,17 +1,20 @@
-/* Lights and open sky seen from points, by rays against the triangles themselves: no field, no estimate but
- * the number of rays. */
+/* Lights and open sky seen from points, by rays against the casters themselves: no field, no estimate but the
+ * number of rays. */
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"
+#include "caster/solids.h"
 #include "shim/embree.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 enum { MAX_RAYS = 65536, AT_ONCE = 256, GRAIN = 64 };
 
 typedef struct tracing {
-    const vsh_triangles *triangles;
+    const vsh_triangles *triangles; /* NULL: none */
+    const vsh_solids *solids;       /* NULL: none */
     const double *positions;
     const float *normals;
     double lift;
@@ -29,16 +32,6 @@ typedef struct target {
     double distance; /* of the light's centre; infinite for a directional light */
     double size;     /* of the sphere */
 } target;
-
-/* Two vectors that make a right-handed frame with a unit vector (Duff and others, "Building an orthonormal
- * basis, revisited", 2017). */
-static void frame(target *t) {
-    const vshi_vec n = t->axis;
-    const double sign = n.z < 0.0 ? -1.0 : 1.0;
-    const double a = -1.0 / (sign + n.z), b = n.x * n.y * a;
-    t->u = (vshi_vec){1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x};
-    t->v = (vshi_vec){b, sign + n.y * n.y * a, -n.y};
-}
 
 /* Vogel's spiral ("A better way to construct the sunflower head", 1979), radii √((i + ½) / n), so that every
  * ring has its share. */
@@ -69,7 +62,7 @@ static bool aim(const vsh_light *light, vshi_vec from, target *t) {
         const double sine = t->size / t->distance;
         t->radius = sine / sqrt((1.0 - sine) * (1.0 + sine));
     }
-    frame(t);
+    vshi_frame(t->axis, &t->u, &t->v);
     return true;
 }
 
@@ -104,6 +97,30 @@ static bool direct(const tracing *task, const target *t, int32_t i, const vshi_v
     return normal == NULL || vshi_dot(d, *normal) > 0.0;
 }
 
+/* What the solids leave of all rays to a target, as far as can be proved at once. */
+static vshi_cone_state look(const tracing *task, vshi_vec origin, const target *t) {
+    const double from[3] = {origin.x, origin.y, origin.z};
+    if (task->solids == NULL) {
+        return VSHI_CONE_FREE;
+    }
+    if (task->light == NULL) {
+        return vsh_solids_distance(task->solids, from) > task->distance ? VSHI_CONE_FREE : VSHI_CONE_UNKNOWN;
+    }
+    const double axis[3] = {t->axis.x, t->axis.y, t->axis.z};
+    return vshi_solids_cone(task->solids, from, axis, t->radius, t->distance - t->size, t->distance);
+}
+
+static void meet(const tracing *task, const vsh_solids *solids, const vshi_segment_ray *rays, size_t count,
+                 bool *blocked) {
+    memset(blocked, 0, count * sizeof *blocked);
+    if (task->triangles != NULL) {
+        vshi_triangles_blocked(task->triangles, rays, count, blocked);
+    }
+    if (solids != NULL) {
+        vshi_solids_blocked(solids, rays, count, blocked);
+    }
+}
+
 static float trace_point(const tracing *task, size_t point) {
     vshi_vec origin = vshi_vec_of(task->positions + 3 * point), normal = {0.0, 0.0, 0.0};
     if (task->normals != NULL) {
@@ -118,10 +135,15 @@ static float trace_point(const tracing *task, size_t point) {
     }
     target t = {.axis = normal, .radius = 1.0};
     if (task->light == NULL) {
-        frame(&t);
+        vshi_frame(t.axis, &t.u, &t.v);
     } else if (!aim(task->light, origin, &t)) {
         return 1.0f;
     }
+    const vshi_cone_state state = look(task, origin, &t);
+    if (state == VSHI_CONE_COVERED) {
+        return 0.0f;
+    }
+    const vsh_solids *solids = state == VSHI_CONE_FREE ? NULL : task->solids;
     const vshi_vec *horizon = task->light != NULL && task->normals != NULL ? &normal : NULL;
     vshi_segment_ray rays[AT_ONCE];
     bool blocked[AT_ONCE];
@@ -131,7 +153,7 @@ static float trace_point(const tracing *task, size_t point) {
         *ray = (vshi_segment_ray){{origin.x, origin.y, origin.z}, {0.0, 0.0, 0.0}, 0.0};
         waiting += direct(task, &t, i, horizon, ray);
         if (waiting == AT_ONCE || (i + 1 == task->rays && waiting > 0)) {
-            vshi_triangles_blocked(task->triangles, rays, waiting, blocked);
+            meet(task, solids, rays, waiting, blocked);
             for (size_t r = 0; r < waiting; ++r) {
                 seen += !blocked[r];
             }
@@ -171,11 +193,12 @@ static vsh_result trace(tracing *task, size_t count, const vsh_run *run, const c
 }
 
 static vsh_result check(const tracing *task, size_t count, const char *call, vsh_error *error) {
-    if (task->triangles == NULL || (count > 0 && (task->positions == NULL || task->values == NULL))) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %s is NULL", call,
-                         task->triangles == NULL   ? "triangles"
-                         : task->positions == NULL ? "positions"
-                                                   : "the result's array");
+    const bool nothing = task->triangles == NULL && task->solids == NULL;
+    if (nothing || (count > 0 && (task->positions == NULL || task->values == NULL))) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %s NULL", call,
+                         nothing                   ? "both triangles and solids are"
+                         : task->positions == NULL ? "positions is"
+                                                   : "the result's array is");
     }
     if (task->rays < 1 || task->rays > MAX_RAYS) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: rays %d is out of range 1 … %d", call, task->rays,
@@ -188,11 +211,12 @@ static vsh_result check(const tracing *task, size_t count, const char *call, vsh
     return VSH_OK;
 }
 
-vsh_result vsh_trace_shadow(const vsh_triangles *triangles, size_t count, const double *positions,
-                            const float *normals, double lift, const vsh_light *light, int32_t rays,
-                            const vsh_run *run, float *visibility, vsh_error *error) {
+vsh_result vsh_trace_shadow(const vsh_triangles *triangles, const vsh_solids *solids, size_t count,
+                            const double *positions, const float *normals, double lift,
+                            const vsh_light *light, int32_t rays, const vsh_run *run, float *visibility,
+                            vsh_error *error) {
     VSHI_FLOATS;
-    tracing task = {triangles, positions, normals, lift, light, 0.0, rays, NULL, visibility};
+    tracing task = {triangles, solids, positions, normals, lift, light, 0.0, rays, NULL, visibility};
     vsh_result result = check(&task, count, "vsh_trace_shadow", error);
     if (result == VSH_OK) {
         result = vsh_light_check(light, error);
@@ -206,11 +230,11 @@ vsh_result vsh_trace_shadow(const vsh_triangles *triangles, size_t count, const 
     return trace(&task, count, run, "trace", error);
 }
 
-vsh_result vsh_trace_ao(const vsh_triangles *triangles, size_t count, const double *positions,
-                        const float *normals, double lift, double distance, int32_t rays, const vsh_run *run,
-                        float *ao, vsh_error *error) {
+vsh_result vsh_trace_ao(const vsh_triangles *triangles, const vsh_solids *solids, size_t count,
+                        const double *positions, const float *normals, double lift, double distance,
+                        int32_t rays, const vsh_run *run, float *ao, vsh_error *error) {
     VSHI_FLOATS;
-    tracing task = {triangles, positions, normals, lift, NULL, distance, rays, NULL, ao};
+    tracing task = {triangles, solids, positions, normals, lift, NULL, distance, rays, NULL, ao};
     const vsh_result result = check(&task, count, "vsh_trace_ao", error);
     if (result != VSH_OK) {
         return result;

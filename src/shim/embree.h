@@ -2,17 +2,11 @@
 #ifndef VSHI_EMBREE_H
 #define VSHI_EMBREE_H
 
+#include "base/segment.h"
 #include "caster/sheet.h"
 
 #include <stdbool.h>
 #include <vdbshade/trace.h>
-
-/* A ray in world space, from `origin` up to `far` along the unit `direction`. */
-typedef struct vshi_segment_ray {
-    double origin[3];
-    double direction[3];
-    double far; /* may be infinite */
-} vshi_segment_ray;
 
 /* Whether each of `count` rays meets a triangle. Thread safe. */
 void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,

@@ -18,15 +18,15 @@ column() {
     done_well
     [ -z "$output" ] || fail "something on standard output"
     no_leftovers
-    for word in '<svg' '</svg>' '<table>' 'data:image/png;base64,' 'Ambient occlusion' 'Pareto front' '</html>'; do
+    for word in '<svg' '</svg>' '<table' 'data:image/png;base64,' 'Ambient occlusion' 'Pareto front' '</html>'; do
         grep -q -- "$word" trade.html || fail "no $word"
     done
     ! grep -qE '(src|href)="?(https?:|/|\.)' trade.html || fail "the page needs something beside it"
     for target in 0.05 0.02 0.01 0.005; do
         grep -q "<tr><td>$target</td>" trade.html || fail "nothing about $target"
     done
-    [ "$(head -1 trade.csv | tr ',' '\n' | wc -l)" -eq 18 ] || fail "not 18 columns"
-    [ "$(awk -F, '{ print NF }' trade.csv | sort -u)" = 18 ] || fail "rows of other lengths"
+    [ "$(head -1 trade.csv | tr ',' '\n' | wc -l)" -eq 22 ] || fail "not 22 columns"
+    [ "$(awk -F, '{ print NF }' trade.csv | sort -u)" = 22 ] || fail "rows of other lengths"
     for method in hard classic improved smooth cone rays adaptive taps cones; do
         column method | grep -qx "$method" || fail "no $method"
     done
@@ -36,25 +36,125 @@ column() {
     column front | grep -qx 1 || fail "nothing on the front"
 }
 
-@test "more rays are nearer to the truth" {
-    shade trade box.obj "${TINY[@]}" -o trade.html --csv trade.csv --quiet
+# scene CASTERS RECEIVERS: scene.json with a wide sun.
+scene() {
+    cat >scene.json <<JSON
+{"casters": [$1],
+ "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "angle_deg": 20}],
+ "receivers": [$2]}
+JSON
+}
+
+BALL='{"sdf": {"shape": "sphere", "radius": 0.5, "translate": [0.5, 2, 0.5]}}'
+BOX='{"mesh": "box.obj"}'
+
+# A floor of 6 × 6 below the box, facing up.
+write_floor() {
+    printf '%s\n' 'v -3 -1 3' 'v 3 -1 3' 'v 3 -1 -3' 'v -3 -1 -3' 'vt 0 0' 'vt 1 0' 'vt 1 1' 'vt 0 1' \
+        'f 1/1 2/2 3/3' 'f 1/1 3/3 4/4' >"$1"
+}
+
+@test "more rays by Embree are nearer to the truth, and stand beside the bakes" {
+    write_floor floor.obj
+    scene "$BOX" '{"mesh": "floor.obj", "output": "a.exr"}'
+    shade trade scene.json --size 48 --resolutions 24 --truth-rays 64 -o trade.html --csv trade.csv --quiet
     done_well
     column method | grep -qx embree || skip "built without Embree"
-    awk -F, '$2 == "embree" { if (NR > 2 && last != "" && $10 > last + 0.02) exit 1; last = $10 }' trade.csv ||
+    awk -F, '$2 == "embree" { if (last != "" && $13 > last + 0.002) exit 1; first = first ? first : $13; last = $13 }
+             END { exit !(first > 0.03 && last < first / 4) }' trade.csv || fail "$(cat trade.csv)"
+    # 1, 2, 4 … 32 rays, half of the truth's, in the same page and plot as the bakes
+    [ "$(column method | grep -cx embree)" -eq 6 ] || fail "$(cat trade.csv)"
+    grep -q 'class="embree"' trade.html || fail "no line of its own"
+    grep -q 'Embree’s time is that of' trade.html || fail "no word of what its time is"
+    # exact traces the same triangles: nearer than any of the same field's rays
+    awk -F, '$3 ~ /exact --max-error 0.005/ { exact = $13 } $3 ~ /adaptive --max-error 0.005/ { adaptive = $13 }
+             END { exit !(exact < 0.01 && exact < adaptive) }' trade.csv || fail "$(cat trade.csv)"
+}
+
+@test "procedural casters: the truth is rays against the shapes themselves" {
+    write_floor floor.obj
+    scene '{"sdf": {"shape": "torus", "radius": 0.8, "tube_radius": 0.06}}' '{"mesh": "floor.obj", "output": "a.exr"}'
+    shade trade scene.json --size 48 --resolutions 8,64 --truth-rays 256 -o trade.html --csv trade.csv --quiet
+    done_well
+    grep -q 'against the procedural casters themselves' trade.html || fail "no word of the truth"
+    [ ! -e a.exr ] || fail "the scene's own output was written"
+    ! column method | grep -qx 'exact\|embree' || fail "triangles without triangles"
+    # a ring half a voxel thick is not the ring; one of four voxels is, nearly
+    awk -F, '$3 == "--method rays --rays 64 --resolution 8" { coarse = $13 }
+             $3 == "--method rays --rays 64 --resolution 64" { fine = $13 }
+             END { exit !(coarse > 3 * fine && fine < 0.02) }' trade.csv || fail "$(cat trade.csv)"
+}
+
+@test "mixed casters: the truth is rays against both, and neither alone" {
+    write_floor floor.obj
+    scene "$BALL, $BOX" '{"mesh": "floor.obj", "output": "a.exr"}'
+    shade trade scene.json --size 48 --resolutions 96 --truth-rays 256 -o trade.html --csv trade.csv --quiet
+    done_well
+    grep -q 'a field of 192 voxels\|hidden by either' trade.html || fail "no word of the truth"
+    ! column method | grep -qx 'exact\|embree' || fail "triangles that are not all"
+    # the box alone, or the ball alone, would leave a part of the shadow out
+    awk -F, '$3 == "--method rays --rays 64 --resolution 96" { exit !($13 < 0.02) }' trade.csv ||
         fail "$(cat trade.csv)"
 }
 
-@test "procedural casters: the truth is a finer field" {
-    cat >scene.json <<'JSON'
-{"casters": [{"sdf": {"shape": "sphere", "radius": 0.5, "translate": [0, 2, 0]}}, {"mesh": "box.obj"}],
- "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "angle_deg": 20}],
- "receivers": [{"mesh": "box.obj", "output": "a.exr"}]}
-JSON
+@test "a vdb caster: the truth is a finer field" {
+    shade voxelize box.obj -o box.vdb --resolution 48 --quiet
+    done_well
+    scene '{"vdb": "box.vdb"}' '{"mesh": "box.obj", "output": "a.exr"}'
     shade trade scene.json --size 24 --resolutions 24 --truth-rays 64 -o trade.html --csv trade.csv --quiet
     done_well
     grep -q 'a field of 48 voxels' trade.html || fail "no word of the truth"
-    [ ! -e a.exr ] || fail "the scene's own output was written"
-    ! column method | grep -qx 'exact\|embree' || fail "triangles without triangles"
+}
+
+# count COLUMN: its value in all rows of trade.csv, which must be the same.
+count() {
+    [ "$(column "$1" | sort -u | wc -l)" -eq 1 ] || fail "$1: $(column "$1" | sort | uniq -c)"
+    column "$1" | head -1
+}
+
+@test "all receivers are measured together, or the one that is asked for" {
+    write_floor floor.obj
+    scene "$BOX" '{"mesh": "floor.obj", "output": "a.exr"}, {"mesh": "box.obj", "output": "b.exr"}'
+    local texels=() covered=()
+    for only in '' '--receiver 0' '--receiver 1'; do
+        # shellcheck disable=SC2086
+        shade trade scene.json --size 24 --resolutions 24 --truth-rays 16 $only -o trade.html --csv trade.csv --quiet
+        done_well
+        texels+=("$(count texels)")
+        covered+=("$(count covered)")
+    done
+    [ "${texels[0]}" -eq $((texels[1] + texels[2])) ] || fail "${texels[*]}"
+    [ "${covered[0]}" -eq $((covered[1] + covered[2])) ] || fail "${covered[*]}"
+    [ "${covered[1]}" -eq 576 ] || fail "${covered[*]}"
+    grep -q 'number 1 of the scene' trade.html || fail "not said"
+    shade trade scene.json --receiver 2 -o trade.html
+    refused 2 "--receiver '2'" '2 receivers'
+}
+
+@test "texels that are left out are counted, with the reason, and all runs have the rest" {
+    # a ball that is sunk into the floor: texels below it are invalid, more of them for coarse voxels
+    write_floor floor.obj
+    scene '{"sdf": {"shape": "sphere", "radius": 0.9, "translate": [0, -1, 0]}}' \
+        '{"mesh": "floor.obj", "output": "a.exr"}'
+    shade trade scene.json --size 64 --resolutions 8,64 --truth-rays 64 -o trade.html --csv trade.csv --quiet
+    done_well
+    grep -q 'invalid at 8 voxels, [0-9]* invalid at 64 voxels' trade.html || fail "not said"
+    [ "$(count covered)" -eq 4096 ]
+    count texels
+    awk -F, 'NR > 1 && $9 != $10 + $11 + $12 { exit 1 }' trade.csv || fail "$(cat trade.csv)"
+    # π 0.9² of 36 are under the ball
+    awk -F, '$4 == 64 && ($10 < 0.9 * 289.5 || $10 > 1.2 * 289.5) { exit 1 }' trade.csv || fail "$(cat trade.csv)"
+    awk -F, '$4 == 64 && $11 > 0 { seen = 1 } END { exit !seen }' trade.csv || fail "$(cat trade.csv)"
+}
+
+@test "the plot alone" {
+    shade trade box.obj "${TINY[@]}" -o trade.html --plot plot.svg --quiet
+    done_well
+    head -1 plot.svg | grep -q '^<svg .*xmlns="http://www.w3.org/2000/svg"' || fail "$(head -1 plot.svg)"
+    tail -1 plot.svg | grep -q '</svg>' || fail "no end"
+    ! grep -qE 'nan|inf' plot.svg || fail "a number is none"
+    shade trade box.obj "${TINY[@]}" -o trade.html --csv same.svg --plot same.svg
+    refused 2 same.svg --csv --plot
 }
 
 @test "what does not fit into the budget is left out and counted" {

@@ -30,8 +30,8 @@ static vsh_triangles *triangles_of(const vsh_mesh *meshes, size_t count) {
 static float seen(const vsh_triangles *triangles, const double *position, const float *normal,
                   const vsh_light *light, int32_t rays) {
     float value = -1.0f;
-    assert_int_equal(vsh_trace_shadow(triangles, 1, position, normal, 0.0, light, rays, NULL, &value, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_trace_shadow(triangles, NULL, 1, position, normal, 0.0, light, rays, NULL, &value, NULL), VSH_OK);
     return value;
 }
 
@@ -132,10 +132,10 @@ static void ambient_occlusion_of_a_sphere_is_its_share_of_the_cosine(void **stat
     vsh_triangles *triangles = triangles_of(&mesh, 1);
     float ao = -1.0f;
     /* a cap of half angle 30° around the normal holds sin² of it */
-    assert_int_equal(vsh_trace_ao(triangles, 1, ORIGIN, UP, 0.0, 10.0, 8192, NULL, &ao, NULL), VSH_OK);
+    assert_int_equal(vsh_trace_ao(triangles, NULL, 1, ORIGIN, UP, 0.0, 10.0, 8192, NULL, &ao, NULL), VSH_OK);
     NEAR(ao, 0.75, 0.003);
     /* and nothing is as near as 0.9 */
-    assert_int_equal(vsh_trace_ao(triangles, 1, ORIGIN, UP, 0.0, 0.9, 1024, NULL, &ao, NULL), VSH_OK);
+    assert_int_equal(vsh_trace_ao(triangles, NULL, 1, ORIGIN, UP, 0.0, 0.9, 1024, NULL, &ao, NULL), VSH_OK);
     NEAR(ao, 1.0, 0.0);
     vsh_triangles_free(triangles);
 }
@@ -212,9 +212,9 @@ static void threads_and_packets_change_no_bit(void **state) {
         vsh_run run = vsh_run_default();
         run.threads = threads;
         float *values = threads == 1 ? first : other;
-        assert_int_equal(
-            vsh_trace_shadow(triangles, COUNT, positions, normals, 0.001, &light, 13, &run, values, NULL),
-            VSH_OK);
+        assert_int_equal(vsh_trace_shadow(triangles, NULL, COUNT, positions, normals, 0.001, &light, 13, &run,
+                                          values, NULL),
+                         VSH_OK);
         assert_true(threads == 1 || memcmp(first, other, sizeof first) == 0);
     }
     vshi_segment_ray rays[100];
@@ -283,16 +283,16 @@ static void bad_input_is_refused(void **state) {
         double distance;
     } cases[] = {{-1.0, 4, 1.0}, {NAN, 4, 1.0}, {0.0, 0, 1.0}, {0.0, 65537, 1.0}, {0.0, 4, 0.0}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        assert_int_equal(vsh_trace_ao(triangles, 1, ORIGIN, UP, cases[i].lift, cases[i].distance,
+        assert_int_equal(vsh_trace_ao(triangles, NULL, 1, ORIGIN, UP, cases[i].lift, cases[i].distance,
                                       cases[i].rays, NULL, &value, &error),
                          VSH_ERROR_ARGUMENT);
     }
-    assert_int_equal(vsh_trace_ao(triangles, 1, ORIGIN, NULL, 0.0, 1.0, 4, NULL, &value, &error),
+    assert_int_equal(vsh_trace_ao(triangles, NULL, 1, ORIGIN, NULL, 0.0, 1.0, 4, NULL, &value, &error),
                      VSH_ERROR_ARGUMENT);
     light.angle = -1.0;
-    assert_int_equal(vsh_trace_shadow(triangles, 1, ORIGIN, UP, 0.0, &light, 4, NULL, &value, &error),
+    assert_int_equal(vsh_trace_shadow(triangles, NULL, 1, ORIGIN, UP, 0.0, &light, 4, NULL, &value, &error),
                      VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_trace_shadow(NULL, 1, ORIGIN, UP, 0.0, &light, 4, NULL, &value, &error),
+    assert_int_equal(vsh_trace_shadow(NULL, NULL, 1, ORIGIN, UP, 0.0, &light, 4, NULL, &value, &error),
                      VSH_ERROR_ARGUMENT);
     vsh_triangles_free(triangles);
 }

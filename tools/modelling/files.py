@@ -69,7 +69,7 @@ def write_obj(path, title, parts):
     return base
 
 
-def write_glb(path, parts):
+def write_glb(path, name, generator, parts):
     blob = bytearray()
     views, accessors, meshes, nodes, materials = [], [], [], [], []
 
@@ -96,11 +96,11 @@ def write_glb(path, parts):
             "TEXCOORD_0": add([(u, 1.0 - v) for _, _, _, (u, v) in vertices], "f", 5126, "VEC2", 34962),
             "TEXCOORD_1": add([(u, 1.0 - v) for u, v in uvs], "f", 5126, "VEC2", 34962),
         }
-        name, colour = part.material
-        if name not in [m["name"] for m in materials]:
-            materials.append({"name": name, "pbrMetallicRoughness": {
+        material_name, colour = part.material
+        if material_name not in [m["name"] for m in materials]:
+            materials.append({"name": material_name, "pbrMetallicRoughness": {
                 "baseColorFactor": [*colour, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.9}})
-        material = [m["name"] for m in materials].index(name)
+        material = [m["name"] for m in materials].index(material_name)
         meshes.append({"name": part.name, "primitives": [{
             "attributes": attributes, "material": material,
             "indices": add(indices, "H", 5123, "SCALAR", 34963)}]})
@@ -109,8 +109,8 @@ def write_glb(path, parts):
             node.update(translation=list(part.offset), rotation=list(part.rotation))
         nodes.append(node)
 
-    document = {"asset": {"version": "2.0", "generator": "make_cloister.py"}, "scene": 0,
-                "scenes": [{"name": "cloister", "nodes": list(range(len(nodes)))}], "nodes": nodes,
+    document = {"asset": {"version": "2.0", "generator": generator}, "scene": 0,
+                "scenes": [{"name": name, "nodes": list(range(len(nodes)))}], "nodes": nodes,
                 "meshes": meshes, "materials": materials, "accessors": accessors, "bufferViews": views,
                 "buffers": [{"byteLength": len(blob)}]}
     text = json.dumps(document, separators=(",", ":")).encode()

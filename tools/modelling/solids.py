@@ -4,6 +4,7 @@ A chart is a piece of surface that is unwrapped as one: a planar face, or a smoo
 edges always part charts, so that no texel has to hold the light of two directions. Lengths are scene units;
 chart coordinates (u, v) are scene units too, v up and never mirrored.
 """
+from collections import Counter
 from math import cos, dist, pi, sin, sqrt
 
 GRID = 8192  # positions are multiples of 1/GRID: parts weld exactly, and decimals and 32-bit floats hold them alike
@@ -251,3 +252,22 @@ def tube(name, path, radius, sides, across):
     solid.face(tuple(-x for x in ways[0]), ends[0])
     solid.face(ways[-1], ends[-1])
     return solid
+
+
+def check_solid(solid):
+    """Closed, wound outwards, no triangle without area."""
+    edges = Counter()
+    volume = 0.0
+    for _, vertices in solid.triangles():
+        a, b, c = (v[0] for v in vertices)
+        if dot(cross(sub(b, a), sub(c, a)), cross(sub(b, a), sub(c, a))) < 1e-14:
+            raise ValueError("%s: a triangle without area" % solid.name)
+        volume += dot(a, cross(b, c)) / 6
+        edges.update(((a, b), (b, c), (c, a)))
+    for (a, b), count in edges.items():
+        if count != edges[(b, a)]:
+            raise ValueError("%s: open edge from %s to %s" % (solid.name, a, b))
+        if count != 1:
+            raise ValueError("%s: %d triangles share the edge from %s to %s" % (solid.name, 2 * count, a, b))
+    if volume <= 0.0:
+        raise ValueError("%s: wound inwards" % solid.name)

@@ -1,4 +1,4 @@
-#include "scene/similarity.h"
+#include "base/similarity.h"
 
 #include "base/vec.h"
 

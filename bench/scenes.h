@@ -1,0 +1,35 @@
+/* The meshes that shadows are measured on, of assets/, and receivers all over them. */
+#ifndef BENCH_SCENES_H
+#define BENCH_SCENES_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <vdbshade/vdbshade.h>
+
+enum {
+    BENCH_CLOISTER, /* the sample asset */
+    BENCH_SMOOTH,   /* a lobed ring of some 50 000 triangles over a plate */
+    BENCH_THIN,     /* posts, slats and a sheet for a roof, over a floor */
+    BENCH_SCENES
+};
+
+typedef struct bench_scene {
+    const char *name;
+    vsh_mesh *meshes; /* views into the model */
+    size_t mesh_count;
+    vsh_model *model;
+} bench_scene;
+
+/* Ends the program where the asset or memory is missing. */
+void bench_scene_make(int which, bench_scene *scene);
+void bench_scene_free(bench_scene *scene);
+
+/* The scene's field, `resolution` voxels along its longest side. */
+vsh_field *bench_scene_field(const bench_scene *scene, int32_t resolution);
+
+/* Points uniform in area over all triangles, the same on every machine: positions [count][3], normals
+ * [count][3], valid [count], 0 for those that the field has inside other geometry, as a bake judges. */
+void bench_scene_points(const bench_scene *scene, const vsh_field *field, uint64_t seed, size_t count,
+                        double *positions, float *normals, float *valid);
+
+#endif

@@ -1,0 +1,25 @@
+/* Rays and cones against procedural solids. Thread safe. */
+#ifndef VSHI_SOLIDS_H
+#define VSHI_SOLIDS_H
+
+#include "base/segment.h"
+
+#include <stdbool.h>
+#include <vdbshade/trace.h>
+
+/* Sets blocked[i] where ray i meets a solid; leaves it as it is elsewhere, and does not look where it is set.
+ */
+void vshi_solids_blocked(const vsh_solids *solids, const vshi_segment_ray *rays, size_t count, bool *blocked);
+
+typedef enum vshi_cone_state {
+    VSHI_CONE_UNKNOWN,
+    VSHI_CONE_FREE,   /* no ray of the cone meets a solid */
+    VSHI_CONE_COVERED /* every ray does */
+} vshi_cone_state;
+
+/* What can be proved of all rays from `origin` within `tangent` of the unit `axis`, which end at depths along
+ * it between `near` and `far`. */
+vshi_cone_state vshi_solids_cone(const vsh_solids *solids, const double origin[3], const double axis[3],
+                                 double tangent, double near, double far);
+
+#endif

@@ -1,0 +1,196 @@
+/* Which texels are measured. Every voxel size has its own view of what is valid (clear of other solids, seen
+ * from the front); runs are compared on the texels that all of them find valid, and each on its own beside.
+ */
+#include "meshes.h"
+#include "message.h"
+#include "receiver.h"
+#include "trade.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Of the casters' longest side: clear of Embree's rounding (60 units of its floats' last place), and below
+ * what shows: on a smooth mesh grazing light tells 1e-5 from this already. */
+static const double TRUTH_LIFT = 0x1p-18;
+/* A receiver's mesh that stands for a curved solid has its chords inside it. So often the solid's surface is
+ * sought from there; a step halves what is left at the least where the mesh's normal is within 60° of the
+ * solid's. */
+enum { SURFACE_STEPS = 16 };
+
+static int load_receivers(trade_work *work) {
+    const size_t count = work->scene->receiver_count;
+    work->receivers = calloc(count, sizeof *work->receivers);
+    if (work->receivers == NULL) {
+        return trade_out_of_memory("receivers");
+    }
+    for (size_t i = 0; i < count; ++i) {
+        trade_receiver *receiver = &work->receivers[i];
+        const cli_receiver_job job = {work->scene, work->assets, &work->run, i};
+        const int code = cli_receiver_texels(&job, true, &receiver->texels);
+        if (code != CLI_OK) {
+            return code;
+        }
+        ++work->receiver_count;
+        vsh_texels_get_info(receiver->texels, &receiver->info);
+        receiver->path = work->scene->receivers[i].path;
+        receiver->first = work->texels;
+        work->texels += (size_t)receiver->info.width * (size_t)receiver->info.height;
+        work->covered += receiver->info.covered;
+        if (work->texels > UINT32_MAX) {
+            cli_say("%s: more than %u texels in all receivers together", work->settings->bake.input,
+                    UINT32_MAX);
+            return CLI_LIMIT;
+        }
+    }
+    return CLI_OK;
+}
+
+/* The casters as rays meet them. */
+static int load_casters(trade_work *work) {
+    const vsh_scene *scene = work->scene;
+    size_t meshes = 0, solids = 0;
+    work->meshes = vsh_triangles_available() != 0;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        size_t own;
+        vsh_assets_caster(work->assets, i, &own);
+        meshes += own;
+        solids += scene->casters[i].type == VSH_CASTER_SDF;
+        work->meshes = work->meshes && scene->casters[i].type == VSH_CASTER_MESH;
+    }
+    vsh_mesh *views = calloc(meshes + 1, sizeof *views);
+    vsh_sdf *trees = calloc(solids + 1, sizeof *trees);
+    double *places = calloc(solids + 1, 12 * sizeof *places);
+    if (views == NULL || trees == NULL || places == NULL) {
+        free(places);
+        free(trees);
+        free(views);
+        return trade_out_of_memory("casters");
+    }
+    meshes = solids = 0;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        size_t own;
+        const vsh_mesh *of_caster = vsh_assets_caster(work->assets, i, &own);
+        for (size_t m = 0; m < own; ++m) {
+            views[meshes++] = of_caster[m];
+        }
+        if (caster->type == VSH_CASTER_SDF) {
+            memcpy(places + 12 * solids, caster->transform, sizeof caster->transform);
+            trees[solids++] = caster->sdf;
+        }
+    }
+    vsh_error error;
+    vsh_result result = VSH_OK;
+    if (solids > 0) {
+        result = vsh_solids_create(trees, places, solids, &work->solids, &error);
+    }
+    if (result == VSH_OK && meshes > 0 && vsh_triangles_available()) {
+        const double start = trade_now(work);
+        result = vsh_triangles_create(views, meshes, &work->run, &work->triangles, &error);
+        work->triangles_s = trade_now(work) - start;
+    }
+    free(places);
+    free(trees);
+    free(views);
+    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+}
+
+int trade_load(trade_work *work) {
+    vsh_error error;
+    if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    int code = cli_warn_meshes(work->scene, work->assets, &work->run);
+    code = code == CLI_OK ? load_receivers(work) : code;
+    return code == CLI_OK ? load_casters(work) : code;
+}
+
+int trade_take_masks(trade_work *work) {
+    float *coverage = calloc(work->texels, sizeof *coverage);
+    work->common = malloc(work->texels);
+    work->any = calloc(work->texels, 1);
+    int code = CLI_OK;
+    if (coverage == NULL || work->common == NULL || work->any == NULL) {
+        code = trade_out_of_memory("coverage");
+    } else {
+        memset(work->common, 1, work->texels);
+    }
+    for (size_t f = 0; f < work->field_count && code == CLI_OK; ++f) {
+        trade_field *field = &work->fields[f];
+        field->mask = calloc(work->texels, 1);
+        code = field->mask == NULL
+                   ? trade_out_of_memory("coverage")
+                   : trade_bake(work, field->field, &work->scene->shade, NULL, NULL, coverage, NULL);
+        for (size_t i = 0; i < work->texels && code == CLI_OK; ++i) {
+            field->mask[i] = coverage[i] > 0.0f;
+            field->valid += field->mask[i];
+            work->common[i] &= field->mask[i];
+            work->any[i] |= field->mask[i];
+        }
+    }
+    free(coverage);
+    for (size_t i = 0; i < work->texels && code == CLI_OK; ++i) {
+        work->common_count += work->common[i];
+        work->points += work->any[i];
+    }
+    if (code == CLI_OK && work->common_count == 0) {
+        return cli_usage("%s: no texel is valid at all voxel sizes: nothing to measure",
+                         work->settings->bake.input);
+    }
+    return code;
+}
+
+/* Moves a point that is barely inside a solid, by less than a voxel, along its normal to just outside. */
+static void raise(const trade_work *work, double *position, const float *normal, double lift, double voxel) {
+    double moved[3] = {position[0], position[1], position[2]}, height = 0.0;
+    for (int step = 0; step < SURFACE_STEPS && height < voxel; ++step) {
+        const double lacking = lift - vsh_solids_distance(work->solids, moved);
+        if (!(lacking > 0.5 * lift)) {
+            memcpy(position, moved, sizeof moved);
+            return;
+        }
+        height += lacking;
+        for (int k = 0; k < 3; ++k) {
+            moved[k] = position[k] + height * (double)normal[k];
+        }
+    }
+}
+
+int trade_place_points(trade_work *work) {
+    work->positions = calloc(work->points, 3 * sizeof *work->positions);
+    work->normals = calloc(work->points, 3 * sizeof *work->normals);
+    work->texel = calloc(work->points, sizeof *work->texel);
+    if (work->positions == NULL || work->normals == NULL || work->texel == NULL) {
+        return trade_out_of_memory("points");
+    }
+    vsh_field_info info;
+    vsh_field_get_info(work->fields[0].field, &info);
+    double side = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        side = fmax(side, info.bounds_max[axis] - info.bounds_min[axis]);
+    }
+    const double lift = TRUTH_LIFT * side;
+    size_t at = 0;
+    for (size_t r = 0; r < work->receiver_count; ++r) {
+        const vsh_texel_samples samples = vsh_texels_samples(work->receivers[r].texels);
+        for (size_t i = 0; i < samples.count; ++i) {
+            const size_t texel = work->receivers[r].first + samples.texel[i];
+            if (!work->any[texel]) {
+                continue;
+            }
+            const float *geometric = samples.geometric_normals + 3 * i;
+            double *position = work->positions + 3 * at;
+            for (size_t k = 0; k < 3; ++k) {
+                position[k] = samples.positions[3 * i + k] + lift * (double)geometric[k];
+                work->normals[3 * at + k] = samples.normals[3 * i + k];
+            }
+            if (work->solids != NULL) {
+                raise(work, position, geometric, lift, info.voxel_size);
+            }
+            work->texel[at++] = (uint32_t)texel;
+        }
+    }
+    work->points = at;
+    return CLI_OK;
+}
