@@ -21,14 +21,15 @@ static float remap(int32_t method, double closeness, double sine) {
     }
 }
 
-bool vshi_shadow_aim(const vshi_shadow_task *task, vshi_vec origin, vshi_cone *cone) {
+bool vshi_shadow_aim(const vshi_shadow_task *task, size_t i, vshi_vec origin, vshi_cone *cone) {
     cone->origin = origin;
     if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
         cone->direction = task->towards;
         cone->sine = task->sine;
         cone->end = INFINITY;
     } else {
-        const vshi_vec to = vshi_sub(task->centre, origin);
+        const vshi_vec to =
+            vshi_sub(task->centre, vshi_to_field(task->field, task->points->positions + 3 * i));
         const double distance = vshi_length(to);
         if (distance <= task->radius || distance <= 0.0) {
             return false;
@@ -59,7 +60,7 @@ static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_s
             ++stats->invalid;
             continue;
         }
-        if (!vshi_shadow_aim(task, origin, &cone)) {
+        if (!vshi_shadow_aim(task, i, origin, &cone)) {
             task->visibility[i] = 1.0f;
             continue;
         }

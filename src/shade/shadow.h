@@ -24,9 +24,10 @@ typedef struct vshi_shadow_task {
     uint32_t purpose; /* of the sampler: lights of other names have other sequences */
 } vshi_shadow_task;
 
-/* The cone from a point to the light, without what its estimate needs; false where the point is within the
- * light. */
-bool vshi_shadow_aim(const vshi_shadow_task *task, vshi_vec origin, vshi_cone *cone);
+/* The cone of point i, which begins at `origin`, without what its estimate needs; false where the point is
+ * within the light. Where a lamp stands, and whether it is over the horizon, is seen from the point itself:
+ * one that is nearer than the start offset would else be below it. */
+bool vshi_shadow_aim(const vshi_shadow_task *task, size_t i, vshi_vec origin, vshi_cone *cone);
 
 /* rays, adaptive and exact: a vshi_shade_fn of a vshi_shadow_task. */
 void vshi_shadow_by_rays(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);

@@ -217,7 +217,7 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
             ++stats->invalid;
             continue;
         }
-        if (!vshi_shadow_aim(task, origin, &cone)) {
+        if (!vshi_shadow_aim(task, i, origin, &cone)) {
             settle(task, i, 1.0f, 0.0f);
             continue;
         }
