@@ -3,6 +3,7 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "caster/mesh.h"
 
 #include <float.h>
@@ -78,8 +79,10 @@ static bool watch_memory(void *user, ssize_t bytes, bool post) {
     return true;
 }
 
-/* Also called while a tree is made, by any thread: a cancelled job ends it. */
+/* Also called while a tree is made, by any thread: a cancelled job ends it. Embree flushes denormals to zero
+ * on the threads that build, which the host's callback must not see. */
 static bool watch_progress(void *user, double fraction) {
+    VSHI_FLOATS;
     (void)fraction;
     return !vshi_job_advance(user, 0);
 }
@@ -170,6 +173,11 @@ static vsh_result refuse(const vsh_triangles *triangles, vshi_job *job, vsh_erro
     return vshi_fail(error, VSH_ERROR_INTERNAL, "triangles: Embree's error %d", (int)code);
 }
 
+/* The tree is made on the pool's threads, as many as the arena around the call has. */
+static void commit(void *user) {
+    rtcCommitScene(user);
+}
+
 static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count, vshi_job *job,
                         vsh_error *error) {
     triangles->device = rtcNewDevice(NULL);
@@ -192,8 +200,11 @@ static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t
             return vshi_job_fail_cancelled(job, error);
         }
     }
-    rtcCommitScene(triangles->scene);
+    const vsh_result result = vshi_parallel_call(job, commit, triangles->scene, error);
     rtcSetSceneProgressMonitorFunction(triangles->scene, NULL, NULL);
+    if (result != VSH_OK) {
+        return result;
+    }
     if (vshi_job_advance(job, 1)) {
         return vshi_job_fail_cancelled(job, error);
     }
