@@ -27,5 +27,6 @@ void bench_row(FILE *csv, const char *scene, const char *what, double microsecon
 void bench_seeds(FILE *csv);
 void bench_asset(FILE *csv);
 void bench_refine(FILE *csv);
+void bench_proofs(FILE *csv);
 
 #endif
