@@ -30,16 +30,6 @@ typedef struct target {
     double size;     /* of the sphere */
 } target;
 
-/* Two vectors that make a right-handed frame with a unit vector (Duff and others, "Building an orthonormal
- * basis, revisited", 2017). */
-static void frame(target *t) {
-    const vshi_vec n = t->axis;
-    const double sign = n.z < 0.0 ? -1.0 : 1.0;
-    const double a = -1.0 / (sign + n.z), b = n.x * n.y * a;
-    t->u = (vshi_vec){1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x};
-    t->v = (vshi_vec){b, sign + n.y * n.y * a, -n.y};
-}
-
 /* Vogel's spiral ("A better way to construct the sunflower head", 1979), radii √((i + ½) / n), so that every
  * ring has its share. */
 static void place(tracing *task) {
@@ -69,7 +59,7 @@ static bool aim(const vsh_light *light, vshi_vec from, target *t) {
         const double sine = t->size / t->distance;
         t->radius = sine / sqrt((1.0 - sine) * (1.0 + sine));
     }
-    frame(t);
+    vshi_frame(t->axis, &t->u, &t->v);
     return true;
 }
 
@@ -118,7 +108,7 @@ static float trace_point(const tracing *task, size_t point) {
     }
     target t = {.axis = normal, .radius = 1.0};
     if (task->light == NULL) {
-        frame(&t);
+        vshi_frame(t.axis, &t.u, &t.v);
     } else if (!aim(task->light, origin, &t)) {
         return 1.0f;
     }

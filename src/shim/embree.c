@@ -25,7 +25,9 @@ vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const
     if (triangles != NULL) {
         *triangles = NULL;
     }
-    return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "triangles: this library was built without Embree");
+    return vshi_fail(
+        error, VSH_ERROR_UNSUPPORTED,
+        "triangles: exact methods trace rays with Embree; this library was built without Embree");
 }
 
 void vsh_triangles_free(vsh_triangles *triangles) {

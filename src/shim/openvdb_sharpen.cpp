@@ -8,9 +8,10 @@ namespace vshi {
 
 namespace {
 
-// Points nearer to the zero than this, voxels, stay: flat and gently curved parts, which are most of a
-// surface, cost one evaluation a point.
-constexpr double NEAR_ENOUGH = 0.02;
+// Points nearer to the zero than this, voxels, stay: flat parts, and curved ones of radii of 30 voxels and
+// more, cost one evaluation a point. An edge that lies so near to a cell's face may be cut by half a voxel
+// with 0.02.
+constexpr double NEAR_ENOUGH = 0.002;
 // Step of the gradient's differences, voxels: small, so that edges are hardly ever within it.
 constexpr double STEP = 1.0 / 1024;
 // How strongly a point is held where it was, beside the planes' mean 1; it is let go over ROUNDS, so that
@@ -36,13 +37,16 @@ Vec3d gradient(const IndexDistance &distance, const Vec3d &p) {
     return g;
 }
 
-// Where the field is 0 between a place inside and one that is not: halving, which edges do not mislead.
+// Where the field is 0 between a place inside and one that is not: by halves, as false position creeps where
+// a second side of an edge is near, and at last by the line between them.
 Vec3d zero_between(const IndexDistance &distance, Vec3d inside, Vec3d outside) {
-    for (int i = 0; i < 12; ++i) {
+    for (int i = 0; i < 10; ++i) {
         const Vec3d middle = 0.5 * (inside + outside);
         (distance(middle) < 0.0 ? inside : outside) = middle;
     }
-    return 0.5 * (inside + outside);
+    const double low = distance(inside);
+    const double high = distance(outside);
+    return high > low ? inside + (outside - inside) * (low / (low - high)) : outside;
 }
 
 Planes planes_of_cell(const IndexDistance &distance, const Vec3d &low) {

@@ -1,5 +1,5 @@
-/* Solids that touch, lie in each other or share faces, values that are no distances, and bounds that become
- * distances. docs/numerics.md has the bounds. */
+/* Solids that touch, lie in each other or share faces, and values that are no distances. docs/numerics.md has
+ * the bounds; test_csg.c has bounds that become distances. */
 #include "traced.h"
 
 #include "field/field.h"
@@ -225,52 +225,10 @@ static void fields_that_are_not_1_lipschitz_are_right_where_they_say_so(void **s
     vsh_triangles_free(triangles);
 }
 
-/* Intersections and subtractions are bounds outside of their corners: a box cut out of boxes is a box. */
-static void bounds_of_csg_become_distances(void **state) {
-    (void)state;
-    vsh_sdf_node nodes[3] = {vsh_sdf_node_default(), vsh_sdf_node_default(), vsh_sdf_node_default()};
-    for (int i = 0; i < 2; ++i) {
-        nodes[i].shape = VSH_SDF_BOX;
-        nodes[i].size[0] = nodes[i].size[1] = nodes[i].size[2] = 1.0;
-    }
-    nodes[0].translation[0] = 0.6;
-    nodes[1].translation[0] = -0.6;
-    nodes[1].translation[2] = 0.5;
-    nodes[2].left = 0;
-    nodes[2].right = 1;
-    const truth_solid results[2] = {{TRUTH_BOX, {0.0, 0.0, 0.25}, {0.4, 1.0, 0.75}, 0.0, 0.0},
-                                    {TRUTH_BOX, {0.0, 0.0, 0.0}, {1.0, 1.0, 1.0}, 0.0, 0.0}};
-    nodes[2].shape = VSH_SDF_INTERSECTION;
-    const vsh_sdf sdf = {nodes, 3};
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = 0.04;
-    vsh_grid *grid = NULL;
-    assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, NULL), VSH_OK);
-    vsh_field *field = field_of_grid(grid, 0.0);
-    uint64_t counter = 17;
-    double worst = 0.0;
-    for (int i = 0; i < 200000; ++i) {
-        const double p[3] = {between(&counter, -0.5, 0.5), between(&counter, -1.1, 1.1),
-                             between(&counter, -0.6, 1.1)};
-        const double truth = truth_solid_distance(&results[0], p);
-        float h;
-        vsh_field_sample(field, 1, p, &h);
-        if (fabs(truth) < 2.0 * 0.04) {
-            worst = fmax(worst, fabs((double)h - truth) / 0.04);
-        }
-    }
-    print_message("intersection of boxes: worst %.3f voxels\n", worst);
-    /* the mesh between the field and its distances cuts corners: here they are lattice points, the worst case
-     */
-    assert_true(worst < 1.6);
-    vsh_field_free(field);
-}
-
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(meshes_that_touch_nest_or_coincide_are_one_solid),
         cmocka_unit_test(fields_that_are_not_1_lipschitz_are_right_where_they_say_so),
-        cmocka_unit_test(bounds_of_csg_become_distances),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
