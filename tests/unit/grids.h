@@ -2,8 +2,6 @@
 #ifndef TESTS_GRIDS_H
 #define TESTS_GRIDS_H
 
-#include "shim/openvdb.h"
-#include <cmocka.h>
 #include <float.h>
 #include <math.h>
 #include <setjmp.h>
@@ -13,7 +11,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include <cmocka.h>
+
 #include <vdbshade/grid.h>
+
+#include "shim/openvdb.h"
 
 typedef struct leaves {
     vshi_leaf *leaf;

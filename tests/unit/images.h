@@ -2,23 +2,27 @@
 #ifndef TESTS_IMAGES_H
 #define TESTS_IMAGES_H
 
-#include "base/file.h"
-#include "image/planes.h"
-#include <cmocka.h>
-#include <dirent.h>
-#include <math.h>
 #include <setjmp.h>
-#include <signal.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include <cmocka.h>
+
+#include <vdbshade/image.h>
+
+#include "base/file.h"
+#include "image/planes.h"
+
+#include <dirent.h>
+#include <math.h>
+#include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <vdbshade/image.h>
 
 static char folder[256];
 

@@ -2,12 +2,15 @@
 #ifndef TESTS_MODELS_H
 #define TESTS_MODELS_H
 
-#include "caster/mesh.h"
-#include <cmocka.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+
+#include <cmocka.h>
+
+#include "caster/mesh.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -2,17 +2,20 @@
 #ifndef TESTS_SCENES_H
 #define TESTS_SCENES_H
 
-#include "scene/scene.h"
-#include <cmocka.h>
-#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
-#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
+#include <cmocka.h>
+
+#include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "scene/scene.h"
 
 static inline vsh_scene *parse(const char *path, const char *text) {
     vsh_scene *scene = NULL;

@@ -2,7 +2,6 @@
 #ifndef TESTS_TEXELS_OF_H
 #define TESTS_TEXELS_OF_H
 
-#include <cmocka.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -10,6 +9,9 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include <cmocka.h>
+
 #include <vdbshade/bake.h>
 
 static inline vsh_lightmap_options size_of(int32_t width, int32_t height, int32_t supersample) {
