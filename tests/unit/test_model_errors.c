@@ -75,7 +75,7 @@ static void files_that_cannot_be_read_say_why(void **state) {
     assert_int_equal(vsh_model_read(path_of("missing.obj").text, NULL, &model, &error), VSH_ERROR_READ);
     assert_non_null(strstr(error.message, "missing.obj: No such file"));
     assert_null(model);
-    char as_folder[160];
+    char as_folder[512];
     snprintf(as_folder, sizeof as_folder, "%s/.", folder);
     assert_int_equal(vsh_model_read(as_folder, NULL, &model, NULL), VSH_ERROR_INPUT);
     refused("empty.obj", "", VSH_ERROR_READ, "is empty", "");
