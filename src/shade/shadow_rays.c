@@ -15,6 +15,13 @@ static const double TRACE_LIFT = 0x1p-18;
  * a voxel reach into them. */
 static const double GRAZING = 0.1;
 
+/* A proof takes the receiver's own plane for free while it is near. Where the field does not rise with the
+ * height over it, as it does by this many voxels up to this much, there is more: a part thinner than a voxel
+ * beside the receiver, or over it, which the samples along the cone cannot tell from the plane. Without this
+ * test 10 of a million certified points of the cloister were wrong, all by something less than half a voxel
+ * away. */
+static const double ALONE_HEIGHT = 1.75, ALONE_SHORT = 0.1;
+
 /* A point whose value takes rays. */
 typedef struct open_point {
     size_t point;
@@ -202,6 +209,18 @@ static void prove(ray_batch *batch) {
     batch->open_count = left;
 }
 
+static double distance_at(const vsh_field *field, vshi_vec p) {
+    const float at[3] = {(float)p.x, (float)p.y, (float)p.z};
+    return (double)vshi_field_distance(field, at);
+}
+
+/* Whether the receiver's own surface is all that there is around it. */
+static bool alone(const vsh_field *field, vshi_vec origin, vshi_vec normal, vsh_shade_stats *stats) {
+    stats->samples += 2;
+    return distance_at(field, vshi_add(origin, vshi_scale(normal, ALONE_HEIGHT))) >=
+           distance_at(field, origin) + ALONE_HEIGHT - ALONE_SHORT;
+}
+
 void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const vshi_shadow_task *task = user;
     const bool proving = task->options->method != VSH_SHADOW_RAYS;
@@ -235,8 +254,13 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
         vshi_frame(cone.direction, &p->u, &p->v);
         p->u = vshi_scale(p->u, tangent);
         p->v = vshi_scale(p->v, tangent);
-        /* nothing to prove where the receiver's own plane hides a part of the light, or nearly does */
-        if (proving && cone.horizon >= cone.sine + GRAZING &&
+        /* nothing to prove where the receiver's own plane hides a part of the light, or nearly does; and
+         * without a plane nothing near is taken for free */
+        const bool clear = cone.horizon >= cone.sine + GRAZING;
+        if (proving && clear && oriented && !alone(task->field, origin, normal, stats)) {
+            cone.horizon = INFINITY;
+        }
+        if (proving && clear &&
             !vshi_chunk_add(&batch.chunk, task->field, &cone, (uint32_t)batch.open_count, stats)) {
             settle(task, i, 1.0f, 0.0f);
             ++stats->certified;
