@@ -258,6 +258,41 @@ static void rooms_are_dark(void **state) {
     }
 }
 
+/* A floor, and on it a wall that stands less than half a voxel beside the receivers, between them and a low
+ * sun: thin ones look like the floor's own height to a cone, which must not certify what it passes. */
+static void no_wall_beside_a_receiver_is_taken_for_its_floor(void **state) {
+    (void)state;
+    const float up[3] = {0.0f, 1.0f, 0.0f};
+    size_t wrong = 0, all = 0;
+    if (!vsh_triangles_available()) {
+        skip();
+    }
+    for (int i = 0; i < 4; ++i) {
+        for (int phase = 0; phase < PHASES; ++phase) {
+            const double by[3] = {VOXEL * phase / PHASES, VOXEL * (3 * phase % PHASES) / PHASES,
+                                  VOXEL * (5 * phase % PHASES) / PHASES};
+            const double h = 0.5 * THICKNESSES[i] * VOXEL;
+            const block blocks[2] = {{{0.0, -0.3, 0.0}, {1.0, 0.3, 1.0}}, {{h, 0.2, 0.0}, {h, 0.2, 0.9}}};
+            caster c = caster_of_blocks(blocks, 2, 0.0, by);
+            assert_non_null(c.field);
+            uint64_t counter = 3;
+            for (int k = 0; k < 60; ++k) {
+                double d[3];
+                const double p[3] = {by[0] - VOXEL * between(&counter, 0.2, 0.5), by[1],
+                                     by[2] + between(&counter, -0.4, 0.4)};
+                direction_at(RADIANS(between(&counter, 7.0, 40.0)), RADIANS(between(&counter, -40.0, 40.0)),
+                             d);
+                const vsh_light light = sun(d, RADIANS(0.5));
+                wrong += cast_shadow_at(&c, &light, VSH_SHADOW_EXACT, p, up) != 0.0f;
+                ++all;
+            }
+            caster_free(&c);
+        }
+    }
+    print_message("%zu of %zu receivers beside walls are lit\n", wrong, all);
+    assert_int_equal(wrong, 0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(walls_over_a_voxel_block_every_ray),
@@ -265,6 +300,7 @@ int main(void) {
         cmocka_unit_test(needles_over_a_voxel_block_their_axis),
         cmocka_unit_test(no_light_comes_through_the_seam_of_boxes_that_touch),
         cmocka_unit_test(rooms_are_dark),
+        cmocka_unit_test(no_wall_beside_a_receiver_is_taken_for_its_floor),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
