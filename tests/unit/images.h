@@ -94,8 +94,12 @@ static inline void write_all(const char *path, const unsigned char *bytes, size_
 
 static inline int make_folder(void **state) {
     (void)state;
+    char here[200];
     const char *place = getenv("TMPDIR");
-    snprintf(folder, sizeof folder, "%s/vdbshade-image-XXXXXX", place != NULL ? place : ".");
+    if (place == NULL) { /* where the tests were built */
+        place = getcwd(here, sizeof here);
+    }
+    snprintf(folder, sizeof folder, "%.200s/vdbshade-image-XXXXXX", place != NULL ? place : ".");
     return mkdtemp(folder) == NULL;
 }
 
