@@ -41,5 +41,6 @@ void bench_methods(FILE *csv, const char *scene, const vsh_field *field, const v
 void bench_seeds(FILE *csv);
 void bench_asset(FILE *csv);
 void bench_refine(FILE *csv);
+void bench_proofs(FILE *csv);
 
 #endif

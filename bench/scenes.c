@@ -38,64 +38,31 @@ vsh_field *bench_scene_field(const bench_scene *scene, int32_t resolution) {
     return field;
 }
 
-/* The same numbers on every machine. */
-static double next_number(uint64_t *state) {
-    *state = *state * 6364136223846793005u + 1442695040888963407u;
-    return (double)(*state >> 11) * 0x1p-53;
-}
-
-static void corner_of(const vsh_mesh *mesh, uint32_t vertex, double p[3]) {
-    const float *v = mesh->positions + 3 * (size_t)vertex;
-    const double *m = mesh->transform;
-    for (int k = 0; k < 3; ++k) {
-        p[k] = m == NULL ? (double)v[k]
-                         : m[4 * k] * v[0] + m[4 * k + 1] * v[1] + m[4 * k + 2] * v[2] + m[4 * k + 3];
-    }
-}
-
 void bench_scene_points(const bench_scene *scene, const vsh_field *field, uint64_t seed, size_t count,
                         double *positions, float *normals, float *valid) {
-    const vsh_mesh *meshes = scene->meshes;
+    enum { SIZE = 1024, RUN = 64 };
+    static const double CLEAR = 0.25; /* voxels, as the bake judges (src/bake/origins.c) */
+    vsh_error error;
+    vsh_texels *texels = NULL;
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = SIZE;
+    bench_check(vsh_texels_create(scene->meshes, scene->mesh_count, &options, NULL, NULL, &texels, &error),
+                &error);
+    const vsh_texel_samples samples = vsh_texels_samples(texels);
     vsh_field_info info;
     vsh_field_get_info(field, &info);
-    double total = 0.0, done = 0.0;
-    size_t placed = 0;
-    uint64_t state = seed;
-    for (int pass = 0; pass < 2; ++pass) {
-        for (size_t m = 0; m < scene->mesh_count; ++m) {
-            for (size_t t = 0; t < meshes[m].triangle_count; ++t) {
-                double a[3], b[3], c[3], n[3], length;
-                const uint32_t *index = meshes[m].indices + 3 * t;
-                corner_of(&meshes[m], index[0], a);
-                corner_of(&meshes[m], index[1], b);
-                corner_of(&meshes[m], index[2], c);
-                for (int k = 0; k < 3; ++k) {
-                    b[k] -= a[k];
-                    c[k] -= a[k];
-                }
-                for (int k = 0; k < 3; ++k) {
-                    n[k] = b[(k + 1) % 3] * c[(k + 2) % 3] - b[(k + 2) % 3] * c[(k + 1) % 3];
-                }
-                length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-                if (pass == 0) {
-                    total += length;
-                    continue;
-                }
-                done += length;
-                for (; placed < count && (double)placed + 0.5 <= done / total * (double)count; ++placed) {
-                    const double u = sqrt(next_number(&state)), v = next_number(&state);
-                    double probe[3];
-                    float distance;
-                    for (int k = 0; k < 3; ++k) {
-                        const double p = a[k] + u * (1.0 - v) * b[k] + u * v * c[k];
-                        positions[3 * placed + (size_t)k] = p;
-                        normals[3 * placed + (size_t)k] = (float)(n[k] / length);
-                        probe[k] = p + info.voxel_size * n[k] / length;
-                    }
-                    vsh_field_sample(field, 1, probe, &distance);
-                    valid[placed] = distance >= 0.0f ? 1.0f : 0.0f; /* as the bake judges */
-                }
-            }
+    const size_t runs = samples.count / RUN, wanted = (count + RUN - 1) / RUN;
+    for (size_t i = 0; i < count; ++i) {
+        const size_t run = (i / RUN * runs / wanted + (size_t)seed) % runs, from = run * RUN + i % RUN;
+        double probe[3];
+        float distance;
+        for (size_t k = 0; k < 3; ++k) {
+            positions[3 * i + k] = samples.positions[3 * from + k];
+            normals[3 * i + k] = samples.geometric_normals[3 * from + k];
+            probe[k] = positions[3 * i + k] + info.voxel_size * (double)normals[3 * i + k];
         }
+        vsh_field_sample(field, 1, probe, &distance);
+        valid[i] = (double)distance >= CLEAR * info.voxel_size ? 1.0f : 0.0f;
     }
+    vsh_texels_free(texels);
 }

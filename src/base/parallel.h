@@ -17,6 +17,10 @@ typedef void vshi_range_fn(void *user, size_t begin, size_t end);
 vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t units, vshi_range_fn *fn,
                              void *user, vsh_error *error);
 
+/* Calls fn(user) once, where what a library in it hands to the pool itself runs on no more than the job's
+ * threads. Errors: VSH_ERROR_MEMORY, VSH_ERROR_INTERNAL. */
+vsh_result vshi_parallel_call(const vshi_job *job, void (*fn)(void *user), void *user, vsh_error *error);
+
 #ifdef __cplusplus
 }
 #endif

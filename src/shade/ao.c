@@ -4,13 +4,9 @@
 
 #include <math.h>
 
-void vshi_ao_axes(vshi_vec n, vshi_vec axes[3]) {
-    const double sign = n.z < 0.0 ? -1.0 : 1.0;
-    const double a = -1.0 / (sign + n.z);
-    const double b = n.x * n.y * a;
-    axes[0] = (vshi_vec){1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x};
-    axes[1] = (vshi_vec){b, sign + n.y * n.y * a, -n.y};
-    axes[2] = n;
+void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]) {
+    vshi_frame(normal, &axes[0], &axes[1]);
+    axes[2] = normal;
 }
 
 bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, vsh_shade_stats *stats) {

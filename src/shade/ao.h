@@ -38,8 +38,7 @@ typedef struct vshi_ao_frame {
 /* The frame of point i in field space; false where the point is invalid: it is then NaN and counted. */
 bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, vsh_shade_stats *stats);
 
-/* A right-handed frame around a unit vector (Duff and others, "Building an orthonormal basis, revisited",
- * 2017). */
+/* vshi_frame() of a unit vector, and the vector. */
 void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]);
 
 /* A direction of the frame's axes in their space. */

@@ -19,6 +19,9 @@ static const int32_t FIRST_ROUND = 16;
  */
 static const double TRACE_LIFT = 1.0 / 64.0;
 
+/* A sample is good to √3/2 voxels: what is deeper than this, voxels, is inside for certain. */
+static const double INSIDE = 1.0;
+
 enum { BALLS = 4, AT_ONCE = 64 };
 
 /* A ball around a place up the normal that the field says is free. */
@@ -162,11 +165,27 @@ static void shoot(batch *b, uint32_t owner, vsh_shade_stats *stats) {
     }
 }
 
+/* Whether a point is in a solid, whose triangles may all be farther than the AO distance. */
+static bool buried(const vshi_ao_task *task, const ao_point *point, vsh_shade_stats *stats) {
+    const vshi_vec o = point->frame.origin;
+    const float at[3] = {(float)o.x, (float)o.y, (float)o.z};
+    ++stats->samples;
+    return (double)vshi_field_distance(task->field, at) < -INSIDE;
+}
+
+/* False where there is nothing to shoot: the value is then known. */
 static bool prepare(batch *b, size_t i, ao_point *point, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
     const vsh_points *points = task->points;
     *point = (ao_point){.texel = points->texels != NULL ? points->texels[i] : (uint32_t)i};
     if (!vshi_ao_frame_at(task, i, &point->frame, stats)) {
+        return false;
+    }
+    if (b->exact && buried(task, point, stats)) {
+        task->ao[i] = 0.0f;
+        if (task->deviation != NULL) {
+            task->deviation[i] = 0.0f;
+        }
         return false;
     }
     if (b->exact) {

@@ -87,6 +87,11 @@ static inline double least(double a, double b) {
     return a < b ? a : b;
 }
 
+/* How far the points themselves are below where their cones begin, voxels. */
+static double below(const vshi_shadow_task *task) {
+    return task->options->start_offset + task->options->surface_offset / task->field->voxel_size;
+}
+
 /* The beam around the cones of a block's points; false where there is none worth a look. */
 static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, block *b) {
     const size_t last = b->first + b->count;
@@ -109,7 +114,8 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
         return false;
     }
     const bool hard = task->options->method == VSH_SHADOW_HARD;
-    const double radius = hard ? 0.0 : task->radius;
+    /* lamps are aimed at from the points, below where the cones begin */
+    const double radius = (hard ? 0.0 : task->radius) + below(task);
     if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
         beam->direction = task->towards;
         beam->sine = hard ? 0.0 : task->sine;
@@ -138,7 +144,7 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
 
 /* Ends the cones of a block where its beam is free from `clear` on. */
 static void shorten(const vshi_shadow_task *task, vshi_facing *facing, const block *b, double clear) {
-    const double aside = (task->radius + b->beam.wide) * b->tilt, ahead = 1.0 - b->tilt * b->tilt;
+    const double aside = (task->radius + below(task) + b->beam.wide) * b->tilt, ahead = 1.0 - b->tilt * b->tilt;
     for (size_t i = b->first; i < b->first + b->count; ++i) {
         vshi_cone *cone = &facing->cone[i];
         const double along = vshi_dot(vshi_sub(cone->origin, b->beam.origin), b->beam.direction);
@@ -162,15 +168,13 @@ static void hide_cut(const vshi_shadow_task *task, vshi_facing *facing, const bl
     bool cut[VSHI_CHUNK / SMALLEST];
     size_t number[VSHI_CHUNK / SMALLEST], tried = 0;
     const vsh_field *field = task->field;
-    /* the points themselves are below where their cones begin in the field */
-    const double below = task->options->start_offset + task->options->surface_offset / field->voxel_size;
     for (size_t i = 0; i < count; ++i) {
         const block *b = &blocks[i];
         if (b->near) {
             continue;
         }
         const bool parallel = task->light->type == VSH_LIGHT_DIRECTIONAL;
-        const double wide = (b->beam.wide + below) * field->voxel_size;
+        const double wide = (b->beam.wide + below(task)) * field->voxel_size;
         vshi_sheet_beam *beam = &beams[tried];
         *beam = (vshi_sheet_beam){.origin = vshi_to_world(field, b->beam.origin),
                                   .axis = vshi_direction_to_world(field, b->beam.direction),
@@ -225,6 +229,9 @@ static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s,
             shorten(task, facing, b, clear > (double)chunk->rays.begin[r] ? clear : b->beam.begin);
             b->near = clear < b->beam.begin + NEAR + 3.0 * b->beam.wide;
         }
+        for (size_t i = b->first; i < b->first + b->count; ++i) {
+            facing->gathered[i] = true;
+        }
     }
     if (task->options->method == VSH_SHADOW_EXACT) {
         hide_cut(task, facing, blocks, count, SIZE[s].triangles, stats);
@@ -243,6 +250,7 @@ static void keep_open(vshi_facing *facing) {
             facing->normal[left] = facing->normal[i];
             facing->cone[left] = facing->cone[i];
             facing->settled[left] = false;
+            facing->gathered[left] = facing->gathered[i];
         }
         ++left;
     }
@@ -251,13 +259,11 @@ static void keep_open(vshi_facing *facing) {
 
 void vshi_blocks_prove(const vshi_shadow_task *task, vshi_facing *facing, vshi_chunk *chunk,
                        vsh_shade_stats *stats) {
-    if (facing->count >= SMALLEST) {
-        for (int s = 0; s < SIZES; ++s) {
-            prove_size(task, facing, s, chunk, stats);
-            keep_open(facing);
-            if (s == 0) {
-                prove_near(task, facing, stats);
-            }
+    for (int s = 0; s < SIZES; ++s) {
+        prove_size(task, facing, s, chunk, stats);
+        keep_open(facing);
+        if (s == 0) {
+            prove_near(task, facing, stats);
         }
     }
     vshi_chunk_clear(chunk);

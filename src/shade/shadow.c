@@ -21,15 +21,18 @@ static float remap(int32_t method, double closeness, double sine) {
     }
 }
 
-/* The cone from a point to the light; false where the point is within the light. */
-static bool aim(const vshi_shadow_task *task, vshi_vec origin, vshi_cone *cone) {
+/* The cone of point i, which begins at `origin`; false where the point is within the light. Where a lamp stands, and
+ * whether it is over the horizon, is seen from the point itself: one that is nearer than the start offset would else be
+ * below it. */
+static bool aim(const vshi_shadow_task *task, size_t i, vshi_vec origin, vshi_cone *cone) {
     *cone = (vshi_cone){.origin = origin, .horizon = INFINITY};
     if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
         cone->direction = task->towards;
         cone->sine = task->sine;
         cone->end = INFINITY;
     } else {
-        const vshi_vec to = vshi_sub(task->centre, origin);
+        const vshi_vec to =
+            vshi_sub(task->centre, vshi_to_field(task->field, task->points->positions + 3 * i));
         const double distance = vshi_length(to);
         if (distance <= task->radius || distance <= 0.0) {
             return false;
@@ -58,7 +61,7 @@ void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, 
             ++stats->invalid;
             continue;
         }
-        if (!aim(task, origin, cone)) {
+        if (!aim(task, i, origin, cone)) {
             vshi_shadow_settle(task, i, 1.0f, 0.0f);
             continue;
         }
@@ -71,6 +74,7 @@ void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, 
             }
         }
         facing->settled[facing->count] = false;
+        facing->gathered[facing->count] = false;
         facing->point[facing->count++] = i;
     }
     vshi_blocks_prove(task, facing, chunk, stats);

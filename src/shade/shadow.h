@@ -31,7 +31,8 @@ typedef struct vshi_facing {
     vshi_vec normal[VSHI_CHUNK]; /* zero where there are none */
     vshi_cone cone[VSHI_CHUNK];  /* horizon: sine of the axis over the receiver's plane, INFINITY without one;
                                   * close, stop: not set */
-    bool settled[VSHI_CHUNK];      /* settled: no value is left to find */
+    bool settled[VSHI_CHUNK];    /* no value is left to find */
+    bool gathered[VSHI_CHUNK];   /* with its neighbours, and not proved: it is likely to be in a penumbra */
 } vshi_facing;
 
 /* Gathers points begin … end - 1, at most VSHI_CHUNK, without those that are settled already: invalid, within

@@ -3,6 +3,7 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "caster/mesh.h"
 
 #include <float.h>
@@ -25,7 +26,9 @@ vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const
     if (triangles != NULL) {
         *triangles = NULL;
     }
-    return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "triangles: this library was built without Embree");
+    return vshi_fail(
+        error, VSH_ERROR_UNSUPPORTED,
+        "triangles: exact methods trace rays with Embree; this library was built without Embree");
 }
 
 void vsh_triangles_free(vsh_triangles *triangles) {
@@ -86,8 +89,10 @@ static bool watch_memory(void *user, ssize_t bytes, bool post) {
     return true;
 }
 
-/* Also called while a tree is made, by any thread: a cancelled job ends it. */
+/* Also called while a tree is made, by any thread: a cancelled job ends it. Embree flushes denormals to zero
+ * on the threads that build, which the host's callback must not see. */
 static bool watch_progress(void *user, double fraction) {
+    VSHI_FLOATS;
     (void)fraction;
     return !vshi_job_advance(user, 0);
 }
@@ -217,6 +222,11 @@ static vsh_result refuse(const vsh_triangles *triangles, vshi_job *job, vsh_erro
     return vshi_fail(error, VSH_ERROR_INTERNAL, "triangles: Embree's error %d", (int)code);
 }
 
+/* The tree is made on the pool's threads, as many as the arena around the call has. */
+static void commit(void *user) {
+    rtcCommitScene(user);
+}
+
 static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count, vshi_job *job,
                         vsh_error *error) {
     triangles->device = rtcNewDevice(NULL);
@@ -231,7 +241,7 @@ static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t
     }
     rtcSetSceneFlags(triangles->scene, RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneProgressMonitorFunction(triangles->scene, watch_progress, job);
-    const vsh_result result = make_sheet(triangles, meshes, mesh_count, error);
+    vsh_result result = make_sheet(triangles, meshes, mesh_count, error);
     if (result != VSH_OK) {
         return result;
     }
@@ -245,8 +255,11 @@ static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t
             return vshi_job_fail_cancelled(job, error);
         }
     }
-    rtcCommitScene(triangles->scene);
+    result = vshi_parallel_call(job, commit, triangles->scene, error);
     rtcSetSceneProgressMonitorFunction(triangles->scene, NULL, NULL);
+    if (result != VSH_OK) {
+        return result;
+    }
     if (vshi_job_advance(job, 1)) {
         return vshi_job_fail_cancelled(job, error);
     }

@@ -304,7 +304,12 @@ vsh_result from_distance(const vsh_distance *field, const vsh_grid_options *opti
         field->exact ? lattice.half_width * lattice.voxel : 1.01 * SQRT3 * field->lipschitz * lattice.voxel;
     FloatGrid::Ptr level_set = Voxelizer(*field, lattice, band, stage, error).run(low, high);
     if (!field->exact) {
-        level_set = redistance(*level_set, lattice, 0.5, 1.0, stage, error);
+        const double unit = 1.0 / (field->lipschitz * lattice.voxel);
+        const IndexDistance exact = [&](const Vec3d &index) {
+            const Vec3d position = index * lattice.voxel + lattice.translation;
+            return unit * field->distance(field->user, position.asPointer());
+        };
+        level_set = redistance(*level_set, exact, lattice, 0.5, 1.0, stage, error);
     }
     *grid = close_grid(level_set, 0.0, stage);
     return VSH_OK;

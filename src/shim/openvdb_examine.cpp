@@ -326,7 +326,7 @@ FloatGrid::Ptr mend(const FloatGrid &grid, Stage &stage, vsh_error *error) {
         openvdb::tools::dilateActiveValues(source->tree(), 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                            openvdb::tools::PRESERVE_TILES);
     });
-    const FloatGrid::Ptr mended = redistance(*source, lattice, 0.6, 1.0, stage, error);
+    const FloatGrid::Ptr mended = redistance(*source, {}, lattice, 0.6, 1.0, stage, error);
     mended->setTransform(grid.transform().copy());
     return mended;
 }

@@ -29,8 +29,8 @@ Surface mesh_surface(const FloatGrid &source, Stage &stage) {
     return surface;
 }
 
-FloatGrid::Ptr redistance(const FloatGrid &source, const Lattice &lattice, double begin, double end,
-                          Stage &stage, vsh_error *error) {
+FloatGrid::Ptr redistance(const FloatGrid &source, const IndexDistance &exact, const Lattice &lattice,
+                          double begin, double end, Stage &stage, vsh_error *error) {
     Surface surface = mesh_surface(source, stage);
     stage.reach(begin + 0.2 * (end - begin));
     stage.check();
@@ -38,8 +38,11 @@ FloatGrid::Ptr redistance(const FloatGrid &source, const Lattice &lattice, doubl
         throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
                                 "no surface: the values do not change sign at voxel size %g", lattice.voxel)};
     }
+    if (exact) {
+        sharpen_surface(surface, exact, begin + 0.2 * (end - begin), begin + 0.3 * (end - begin), stage);
+    }
     FloatGrid::Ptr measured =
-        measure_surface(surface, lattice, lattice.half_width, begin + 0.2 * (end - begin), end, stage);
+        measure_surface(surface, lattice, lattice.half_width, begin + 0.3 * (end - begin), end, stage);
     take_signs(*measured, root_origins(source.constTree()), stage, [&] {
         return [tree = FloatGrid::ConstUnsafeAccessor(source.constTree())](const Coord &at) {
             return tree.getValue(at) < 0.0f;

@@ -1,7 +1,7 @@
 // True distances for a grid that has none.
 #pragma once
 
-#include "shim/openvdb_surface.h"
+#include "shim/openvdb_sharpen.h"
 
 namespace vshi {
 
@@ -21,8 +21,9 @@ Surface mesh_surface(const FloatGrid &source, Stage &stage);
 
 // A level set on the lattice with the zero surface and the signs of `source` (on the same lattice, with
 // values at least wherever neighbours differ in sign) and true distances: the surface is meshed and the mesh
-// measured.
-FloatGrid::Ptr redistance(const FloatGrid &source, const Lattice &lattice, double begin, double end,
-                          Stage &stage, vsh_error *error);
+// measured. `exact`: the field that the source holds values of, by which edges and corners are kept; may be
+// empty.
+FloatGrid::Ptr redistance(const FloatGrid &source, const IndexDistance &exact, const Lattice &lattice,
+                          double begin, double end, Stage &stage, vsh_error *error);
 
 } // namespace vshi

@@ -32,6 +32,22 @@ struct Loop {
     }
 };
 
+// More threads than cores are allowed for as long as one of these lasts; TBB would complain on standard
+// error.
+class Arena {
+  public:
+    explicit Arena(int threads) : arena(threads > 0 ? threads : tbb::task_arena::automatic) {
+        if (threads > tbb::info::default_concurrency()) {
+            more.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
+        }
+    }
+    template <typename Fn> void run(const Fn &fn) { arena.execute(fn); }
+
+  private:
+    std::optional<tbb::global_control> more;
+    tbb::task_arena arena;
+};
+
 } // namespace
 
 vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t units, vshi_range_fn *fn,
@@ -45,17 +61,18 @@ vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t u
                 loop(i);
             }
         } else {
-            // More threads than cores are allowed for as long as this lasts; TBB would complain on standard
-            // error.
-            std::optional<tbb::global_control> more;
-            if (threads > tbb::info::default_concurrency()) {
-                more.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
-            }
-            tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+            Arena arena(threads);
             vshi::give(&loop);
-            arena.execute([&] { tbb::parallel_for(size_t{0}, pieces, loop); });
+            arena.run([&] { tbb::parallel_for(size_t{0}, pieces, loop); });
             vshi::take(&loop);
         }
         return vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+    });
+}
+
+vsh_result vshi_parallel_call(const vshi_job *job, void (*fn)(void *user), void *user, vsh_error *error) {
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "threads", [&]() -> vsh_result {
+        Arena(vshi_job_threads(job)).run([&] { fn(user); });
+        return VSH_OK;
     });
 }

@@ -1,13 +1,12 @@
 /* The host's floating-point environment: no setting of it shows in a result, every setting is given back. */
-#include "shading.h"
+#include "traced.h"
 
 #include "base/floats.h"
 #include "field/field.h"
 
 #include <fenv.h>
-#include <stdlib.h>
 
-enum { SIDE = 32, COUNT = SIDE * SIDE, SHADOWS = 5 };
+enum { SIDE = 32, COUNT = SIDE * SIDE, SHADOWS = VSH_SHADOW_EXACT + 2, AOS = VSH_AO_EXACT + 1 };
 
 #if defined(__x86_64__)
 /* MXCSR: flush to zero, denormals are zero, both; then rounding down, up, to zero, all of it, and nothing
@@ -23,7 +22,7 @@ enum { SETTING_COUNT = sizeof SETTINGS / sizeof SETTINGS[0] };
 
 /* What one run of everything gives. */
 typedef struct outcome {
-    float visible[SHADOWS][COUNT], open[2][COUNT], light[3 * COUNT], sampled[COUNT];
+    float visible[SHADOWS][COUNT], open[AOS][COUNT], light[3 * COUNT], sampled[COUNT], traced[2][COUNT];
     double distances[64];
     uint64_t field; /* hash of its values */
     vsh_shade_stats stats;
@@ -58,8 +57,6 @@ static double ring(void *user, const double p[3]) {
 }
 
 static void run_all(int s, int32_t threads, outcome *o) {
-    static const int32_t methods[SHADOWS] = {VSH_SHADOW_CONE, VSH_SHADOW_CONE, VSH_SHADOW_IMPROVED,
-                                             VSH_SHADOW_ADAPTIVE, VSH_SHADOW_RAYS};
     const vshi_floats setting = SETTINGS[s];
 
     vsh_run run = vsh_run_default();
@@ -83,25 +80,45 @@ static void run_all(int s, int32_t threads, outcome *o) {
     vsh_grid *grid = NULL;
     vsh_field *f = NULL;
     vsh_error error = {VSH_OK, ""};
-    vsh_result results[4 + SHADOWS];
+    vsh_result results[2 + SHADOWS + AOS + 3] = {VSH_OK};
+    size_t calls = 2;
+    vsh_triangles *triangles = NULL;
+    const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.9, 0.0};
+    vsh_mesh mesh = mesh_of_solid(&ball);
     memset(o->light, 0, sizeof o->light);
+    memset(o->visible, 0, sizeof o->visible);
+    memset(o->open, 0, sizeof o->open);
+    memset(o->traced, 0, sizeof o->traced);
 
     vshi_floats_set(setting);
     results[0] = vsh_grid_from_distance(&field, &options, &run, &grid, &error);
     results[1] = results[0] == VSH_OK ? vsh_field_create(grid, &field_options, &run, &f, &error) : results[0];
     if (results[1] == VSH_OK) {
         vshi_floats_set(setting);
-        for (int i = 0; i < SHADOWS; ++i) {
-            vsh_shade_options how = vsh_shade_options_default();
-            how.method = methods[i];
-            results[2 + i] = vsh_shade_shadow(f, &points, &lights[i % 2], &how, &run, o->visible[i], NULL,
-                                              &o->stats, &error);
+        if (vsh_triangles_available()) {
+            results[calls++] = vsh_triangles_create(&mesh, 1, &run, &triangles, &error);
+            vshi_floats_set(setting);
         }
-        for (int i = 0; i < 2; ++i) {
+        for (int32_t i = 0; i <= shadow_methods(); ++i) { /* once more the cone, of the lamp */
             vsh_shade_options how = vsh_shade_options_default();
-            how.ao_method = i == 0 ? VSH_AO_TAPS : VSH_AO_CONES;
-            results[2 + SHADOWS + i] =
-                vsh_shade_ao(f, &points, &how, &run, o->open[i], NULL, &o->stats, &error);
+            how.method = i < shadow_methods() ? i : VSH_SHADOW_CONE;
+            how.triangles = triangles;
+            results[calls++] = vsh_shade_shadow(f, &points, &lights[i == 1 || i >= VSH_SHADOW_EXACT], &how,
+                                                &run, o->visible[i], NULL, &o->stats, &error);
+        }
+        for (int32_t i = 0; i < ao_methods(); ++i) {
+            vsh_shade_options how = vsh_shade_options_default();
+            how.ao_method = i;
+            how.triangles = triangles;
+            results[calls++] = vsh_shade_ao(f, &points, &how, &run, o->open[i], NULL, &o->stats, &error);
+        }
+        if (triangles != NULL) {
+            vshi_floats_set(setting);
+            results[calls++] = vsh_trace_shadow(triangles, NULL, COUNT, positions, normals, 1e-5, &lights[1], 32,
+                                                &run, o->traced[0], &error);
+            vshi_floats_set(setting);
+            results[calls++] =
+                vsh_trace_ao(triangles, NULL, COUNT, positions, normals, 1e-5, 1.0, 32, &run, o->traced[1], &error);
         }
         vshi_floats_set(setting);
         vsh_shade_irradiance(&points, NULL, &lights[1], o->visible[1], o->light);
@@ -116,7 +133,7 @@ static void run_all(int s, int32_t threads, outcome *o) {
     if (results[1] != VSH_OK) {
         fail_msg("%s", error.message);
     }
-    for (int i = 0; i < 4 + SHADOWS; ++i) {
+    for (size_t i = 0; i < calls; ++i) {
         assert_int_equal(results[i], VSH_OK);
     }
     /* flags that say what has happened may be added where the host's setting is the default one */
@@ -124,8 +141,11 @@ static void run_all(int s, int32_t threads, outcome *o) {
     const vshi_level *top = &f->levels[f->level_count - 1];
     o->field = hash(0xcbf29ce484222325u, f->values,
                     (size_t)(top->first_brick + top->brick_count) * VSHI_BRICK_VALUES * sizeof(float));
+    vsh_triangles_free(triangles);
     vsh_field_free(f);
     vsh_grid_free(grid);
+    free((void *)(uintptr_t)mesh.positions);
+    free((void *)(uintptr_t)mesh.indices);
 }
 
 static void no_setting_of_the_host_shows_and_all_are_given_back(void **state) {
@@ -156,21 +176,29 @@ static void no_setting_of_the_host_shows_and_all_are_given_back(void **state) {
 /* Lengths that are denormal numbers, and scenes that have them, are what they are. */
 static void denormals_are_numbers(void **state) {
     (void)state;
-    vsh_field *field = field_of(truth_seeds(), 0.1, 2.0);
+    caster c = caster_of(truth_seeds(), 0.1, 2.0);
     const double p[3] = {0.3, 1e-310, 0.2}, zero[3] = {0.3, 0.0, 0.2};
     const float tiny[3] = {0.0f, 1e-41f, 1e-44f}, up[3] = {0.0f, 1.0f, 0.0f};
     const double towards[3] = {5e-324, 1e-310, 0.0};
     const vsh_light light = sun(towards, 1e-310), straight = sun((const double[]){0.0, 1.0, 0.0}, 0.0);
     for (int s = 0; s < SETTING_COUNT; ++s) {
-        for (int32_t method = 0; method <= VSH_SHADOW_ADAPTIVE; ++method) {
+        for (int32_t method = 0; method < shadow_methods(); ++method) {
             vshi_floats_set(SETTINGS[s]);
-            const float a = shadow_at(field, &light, method, p, tiny);
-            const float b = shadow_at(field, &straight, method, zero, up);
+            const float a = cast_shadow_at(&c, &light, method, p, tiny);
+            const float b = cast_shadow_at(&c, &straight, method, zero, up);
             vshi_floats_set(VSHI_FLOATS_DEFAULT);
             assert_int_equal(bits_of(a), bits_of(b));
         }
+        for (int32_t method = 0; method < ao_methods(); ++method) {
+            vshi_floats_set(SETTINGS[s]);
+            const float a = cast_ao_at(&c, method, 1.0, p, tiny), b = cast_ao_at(&c, method, 1.0, zero, up);
+            vshi_floats_set(VSHI_FLOATS_DEFAULT);
+            const float n = cast_ao_at(&c, method, 1.0, zero, up);
+            assert_int_equal(bits_of(b), bits_of(n));
+            assert_true(fabsf(a - b) <= 1e-2f); /* the normal is turned by a thousandth */
+        }
     }
-    vsh_field_free(field);
+    caster_free(&c);
 }
 
 int main(void) {

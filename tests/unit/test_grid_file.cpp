@@ -560,11 +560,11 @@ int remove_folder(void **) {
 } // namespace
 
 int main() {
-    char name[] = "/tmp/vdbshade-grid-file-XXXXXX";
-    if (mkdtemp(name) == nullptr) {
+    const char *place = std::getenv("TMPDIR");
+    folder = std::string(place != nullptr ? place : ".") + "/vdbshade-grid-file-XXXXXX";
+    if (mkdtemp(folder.data()) == nullptr) {
         return 1;
     }
-    folder = name;
     openvdb::initialize();
     const CMUnitTest tests[] = {
         cmocka_unit_test(a_cut_file_is_an_error_at_every_length), // first: it forks, before there are threads

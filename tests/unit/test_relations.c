@@ -1,17 +1,14 @@
-/* What must hold between two bakes where no truth is needed: scaled, moved, turned and mirrored scenes, more
- * of the voxels and less of the light. docs/numerics.md has the bounds. Of the relations of one light and one
- * method, test_shadow.c has: size 0 is `hard`, a far sphere light is a directional one, larger balls hide
- * more; test_shadow_rays.c: more rays are nearer to the truth; test_shadow_run.c and test_field_run.c:
- * threads do not show. */
-#include "shading.h"
+/* What must hold between two bakes where no truth is needed: scaled, moved, turned and mirrored scenes, of
+ * every method. docs/numerics.md has the bounds. test_monotone.c has more of the voxels, of the rays and of
+ * the casters; test_shadow_run.c and test_field_run.c: threads do not show. */
+#include "traced.h"
 
 #include "field/field.h"
 #include "shim/openvdb.h"
-#include "truth/metrics.h"
 
 #include <stdlib.h>
 
-enum { SIDE = 64, COUNT = SIDE * SIDE, SHADOWS = VSH_SHADOW_ADAPTIVE + 1, AOS = VSH_AO_CONES + 1 };
+enum { SIDE = 64, COUNT = SIDE * SIDE, SHADOWS = VSH_SHADOW_EXACT + 1, AOS = VSH_AO_EXACT + 1 };
 
 static const double NOWHERE[3] = {0.0, 0.0, 0.0};
 static double positions[3 * COUNT];
@@ -31,15 +28,6 @@ static void fill_points(void) {
     }
 }
 
-static void occlusion(const vsh_field *field, int32_t method, double distance, const double *places,
-                      const float *ns, float *open) {
-    vsh_shade_options options = vsh_shade_options_default();
-    options.ao_method = method;
-    options.ao_distance = distance;
-    const vsh_points points = {COUNT, places, ns, NULL};
-    assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, open, NULL, NULL, NULL), VSH_OK);
-}
-
 /* Every kind of value at the points: shadows of a sun and of a lamp by each method, and AO. `scale` is that
  * of all lengths; the lights are given in the scene's own axes through `turn` (rows) and moved by `by`. */
 enum { KINDS = 2 * SHADOWS + AOS };
@@ -56,6 +44,11 @@ typedef struct motion {
 
 static const motion STILL = {1.0, {1, 0, 0, 0, 1, 0, 0, 0, 1}, {0, 0, 0}};
 
+/* Whether this build can trace what the kind asks for. */
+static bool here(int kind) {
+    return kind < 2 * SHADOWS ? kind % SHADOWS < shadow_methods() : kind - 2 * SHADOWS < ao_methods();
+}
+
 static void turned(const motion *m, const double v[3], double out[3]) {
     for (int row = 0; row < 3; ++row) {
         out[row] = m->turn[3 * row] * v[0] + m->turn[3 * row + 1] * v[1] + m->turn[3 * row + 2] * v[2];
@@ -69,7 +62,7 @@ static void moved(const motion *m, const double p[3], double out[3]) {
     }
 }
 
-static void shade_all(const vsh_field *field, const motion *m, values *all) {
+static void shade_all(const caster *c, const motion *m, values *all) {
     static double places[3 * COUNT];
     static float ns[3 * COUNT];
     for (size_t i = 0; i < COUNT; ++i) {
@@ -86,10 +79,12 @@ static void shade_all(const vsh_field *field, const motion *m, values *all) {
     moved(m, over, place);
     const vsh_light lights[2] = {sun(towards, 0.2), lamp(place, 0.25 * m->scale)};
     for (int kind = 0; kind < KINDS; ++kind) {
-        if (kind < 2 * SHADOWS) {
-            shadows(field, &lights[kind / SHADOWS], kind % SHADOWS, COUNT, places, ns, all->v[kind]);
+        if (!here(kind)) {
+            memset(all->v[kind], 0, sizeof all->v[kind]);
+        } else if (kind < 2 * SHADOWS) {
+            cast_shadows(c, &lights[kind / SHADOWS], kind % SHADOWS, COUNT, places, ns, all->v[kind]);
         } else {
-            occlusion(field, kind - 2 * SHADOWS, 0.75 * m->scale, places, ns, all->v[kind]);
+            cast_ao(c, kind - 2 * SHADOWS, 0.75 * m->scale, COUNT, places, ns, all->v[kind]);
         }
     }
 }
@@ -134,8 +129,8 @@ static void scaled_by_a_power_of_two_every_bit_stays(void **state) {
     (void)state;
     static values still, scaled;
     fill_points();
-    vsh_field *field = field_of_grid(grid_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE), 8.0);
-    shade_all(field, &STILL, &still);
+    caster c = caster_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE, 8.0);
+    shade_all(&c, &STILL, &still);
     const int exponents[] = {-34, -20, -10, 3, 20, 40, 44};
     for (size_t e = 0; e < sizeof exponents / sizeof exponents[0]; ++e) {
         motion m = STILL;
@@ -143,14 +138,17 @@ static void scaled_by_a_power_of_two_every_bit_stays(void **state) {
         if (0.03125 * m.scale > 1e12) {
             continue;
         }
-        vsh_field *other =
-            field_of_grid(grid_of_moved(truth_seeds(), 0.03125, m.scale, NOWHERE), 8.0 * m.scale);
-        assert_same_field(field, other);
-        shade_all(other, &m, &scaled);
-        assert_memory_equal(&still, &scaled, sizeof still);
-        vsh_field_free(other);
+        caster other = caster_of_moved(truth_seeds(), 0.03125, m.scale, NOWHERE, 8.0 * m.scale);
+        assert_same_field(c.field, other.field);
+        shade_all(&other, &m, &scaled);
+        for (int kind = 0; kind < KINDS; ++kind) {
+            if (memcmp(still.v[kind], scaled.v[kind], sizeof still.v[kind]) != 0) {
+                fail_msg("scaled by 2^%d: other bits of %s", exponents[e], name_of(kind));
+            }
+        }
+        caster_free(&other);
     }
-    vsh_field_free(field);
+    caster_free(&c);
 }
 
 /* A box and a pyramid without its base, of floats that any power of two scales exactly. */
@@ -238,16 +236,16 @@ static void moved_by_whole_voxels_every_bit_stays(void **state) {
     for (size_t i = 0; i < 3 * COUNT; ++i) {
         positions[i] = ldexp(round(ldexp(positions[i], 20)), -20);
     }
-    vsh_field *field = field_of_grid(grid_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE), 8.0);
-    shade_all(field, &STILL, &still);
+    caster c = caster_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE, 8.0);
+    shade_all(&c, &STILL, &still);
     const double voxels[][3] = {{1, 0, 0}, {-3, 5, 7}, {8, 16, -24}, {1001, -2003, 4007}, {32e6, -16e6, 8e6}};
     for (size_t s = 0; s < sizeof voxels / sizeof voxels[0]; ++s) {
         motion m = STILL;
         for (int axis = 0; axis < 3; ++axis) {
             m.by[axis] = 0.03125 * voxels[s][axis];
         }
-        vsh_field *other = field_of_grid(grid_of_moved(truth_seeds(), 0.03125, 1.0, m.by), 8.0);
-        shade_all(other, &m, &there);
+        caster other = caster_of_moved(truth_seeds(), 0.03125, 1.0, m.by, 8.0);
+        shade_all(&other, &m, &there);
         double worst = 0.0, rms = 0.0;
         size_t beyond = 0;
         for (int kind = 0; kind < KINDS; ++kind) {
@@ -263,14 +261,14 @@ static void moved_by_whole_voxels_every_bit_stays(void **state) {
         } else { /* the way of the receivers to field space rounds */
             assert_true(rms < 1e-3 && beyond < 10);
         }
-        vsh_field_free(other);
+        caster_free(&other);
     }
-    vsh_field_free(field);
+    caster_free(&c);
 }
 
 /* The seeds' solids turned by a signed permutation of the axes: their boxes go along, their torus around y
  * only where y stays y, so the ring is a ball here. */
-static vsh_grid *grid_of_turned(const motion *m, double voxel) {
+static caster caster_of_turned(const motion *m, double voxel) {
     truth_solid solids[MAX_SOLIDS];
     const truth_scene scene = truth_seeds();
     for (size_t i = 0; i < scene.count; ++i) {
@@ -285,7 +283,7 @@ static vsh_grid *grid_of_turned(const motion *m, double voxel) {
             solids[i].half[axis] = fabs(half[axis]);
         }
     }
-    return grid_of_moved((truth_scene){solids, scene.count}, voxel, 1.0, NOWHERE);
+    return caster_of((truth_scene){solids, scene.count}, voxel, 8.0);
 }
 
 static void turned_by_right_angles_and_mirrored_values_stay_within_a_bound(void **state) {
@@ -293,8 +291,8 @@ static void turned_by_right_angles_and_mirrored_values_stay_within_a_bound(void 
     static values still, there;
     static const int orders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
     fill_points();
-    vsh_field *field = field_of_grid(grid_of_turned(&STILL, 0.04), 8.0);
-    shade_all(field, &STILL, &still);
+    caster c = caster_of_turned(&STILL, 0.04);
+    shade_all(&c, &STILL, &still);
     apart worst[KINDS] = {{0.0, 0.0, 0}};
     for (int turn = 1; turn < 48; turn += 2 + turn % 3) {
         motion m = STILL;
@@ -304,9 +302,9 @@ static void turned_by_right_angles_and_mirrored_values_stay_within_a_bound(void 
                     orders[turn / 8][row] == column ? ((turn >> row & 1) ? -1.0 : 1.0) : 0.0;
             }
         }
-        vsh_field *other = field_of_grid(grid_of_turned(&m, 0.04), 8.0);
-        shade_all(other, &m, &there);
-        vsh_field_free(other);
+        caster other = caster_of_turned(&m, 0.04);
+        shade_all(&other, &m, &there);
+        caster_free(&other);
         for (int kind = 0; kind < KINDS; ++kind) {
             const apart a = compare(still.v[kind], there.v[kind]);
             worst[kind].rms = fmax(worst[kind].rms, a.rms);
@@ -325,111 +323,7 @@ static void turned_by_right_angles_and_mirrored_values_stay_within_a_bound(void 
             assert_true(worst[kind].rms < 1e-4 && worst[kind].worst < 2e-3 && worst[kind].beyond == 0);
         }
     }
-    vsh_field_free(field);
-}
-
-/* Of the methods that know the whole penumbra; the others' errors are their definition's. */
-static void finer_voxels_are_never_farther_from_the_truth(void **state) {
-    (void)state;
-    static float truth[COUNT], visible[COUNT];
-    const double up[3] = {0.0, 1.0, 0.0};
-    floor_texels(SIDE, positions, normals);
-    const double ws[] = {0.0, 0.05, 0.1, 0.3}, voxels[] = {0.16, 0.08, 0.04, 0.02, 0.01};
-    const int32_t methods[] = {VSH_SHADOW_SMOOTH, VSH_SHADOW_CONE, VSH_SHADOW_ADAPTIVE};
-    double last[4][3];
-    for (int v = 0; v < 5; ++v) {
-        vsh_field *field = field_of(truth_seeds(), voxels[v], 0.0);
-        for (int w = 0; w < 4; ++w) {
-            assert_int_equal(truth_lights(truth_seeds(), COUNT, positions, up, truth_seeds_sun, ws[w],
-                                          (double)INFINITY, ws[w] > 0.0 ? 256 : 1, truth),
-                             0);
-            const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(ws[w]));
-            for (int m = 0; m < 3; ++m) {
-                shadows(field, &light, methods[m], COUNT, positions, normals, visible);
-                const truth_metrics metrics = truth_compare(COUNT, visible, truth, NULL);
-                print_message("voxel %g, w %g, %s: rmse %.4f\n", voxels[v], ws[w],
-                              vsh_shadow_method_name(methods[m]), metrics.rmse);
-                if (v > 0) { /* the estimators end at their own error, which does not depend on voxels */
-                    assert_true(metrics.rmse < 1.08 * last[w][m] + 0.002);
-                }
-                if (methods[m] == VSH_SHADOW_ADAPTIVE && v == 4 && w > 0) {
-                    assert_true(metrics.rmse < 0.025);
-                }
-                last[w][m] = metrics.rmse;
-            }
-        }
-        vsh_field_free(field);
-    }
-}
-
-/* A slab that grows from a sliver over half of the receivers to all of them, by less than a voxel a time. */
-static void a_growing_slab_hides_more(void **state) {
-    (void)state;
-    const double up[3] = {0.0, 1.0, 0.0}, voxel = 0.04;
-    const vsh_light light = sun(up, RADIANS(15.0));
-    float last[SHADOWS][16], rise[SHADOWS] = {0.0f}, open[16];
-    double risen = 0.0;
-    for (int i = 0; i < 16; ++i) {
-        open[i] = 1.0f;
-        for (int32_t method = 0; method < SHADOWS; ++method) {
-            last[method][i] = 1.0f;
-        }
-    }
-    for (double half = 0.05; half < 1.2; half += 0.3 * voxel) {
-        const truth_solid slab = {TRUTH_BOX, {0.0, 0.2, 0.0}, {half, 0.2, half}, 0.0, 0.0};
-        vsh_field *field = field_of((truth_scene){&slab, 1}, voxel, 0.0);
-        for (int i = 0; i < 16; ++i) {
-            const double p[3] = {0.09 * i, -1.5, 0.05 * i};
-            const float n[3] = {0.0f, 1.0f, 0.0f};
-            for (int32_t method = 0; method < SHADOWS; ++method) {
-                const float v = shadow_at(field, &light, method, p, NULL);
-                rise[method] = fmaxf(rise[method], v - last[method][i]);
-                last[method][i] = v;
-            }
-            vsh_shade_options options = vsh_shade_options_default();
-            options.ao_distance = 4.0;
-            const vsh_points points = {1, p, n, NULL};
-            float a;
-            assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &a, NULL, NULL, NULL), VSH_OK);
-            risen = fmax(risen, (double)a - (double)open[i]);
-            open[i] = a;
-        }
-        vsh_field_free(field);
-    }
-    for (int32_t method = 0; method < SHADOWS; ++method) {
-        print_message("%s rises by %.4f at most\n", vsh_shadow_method_name(method), (double)rise[method]);
-        /* triangulation takes two samples for one surface; rays are few */
-        assert_true(rise[method] <= (method == VSH_SHADOW_IMPROVED   ? 0.05f
-                                     : method == VSH_SHADOW_ADAPTIVE ? 0.04f
-                                     : method == VSH_SHADOW_RAYS     ? 1.1f / 64.0f
-                                                                     : 1e-3f));
-    }
-    print_message("AO cones rise by %.4f at most\n", risen);
-    assert_true(risen <= 2e-3);
-}
-
-/* The rays too, which test_shadow.c does not have. */
-static void for_rays_too_a_far_lamp_is_a_sun(void **state) {
-    (void)state;
-    static float far[COUNT], directional[COUNT];
-    floor_texels(SIDE, positions, normals);
-    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
-    const double half = atan(truth_seeds_w), away = 1e6, length = sqrt(0.25 + 0.36 + 0.36);
-    double place[3];
-    for (int axis = 0; axis < 3; ++axis) {
-        place[axis] = away * truth_seeds_sun[axis] / length;
-    }
-    const vsh_light s = sun(truth_seeds_sun, 2.0 * half), l = lamp(place, away * sin(half));
-    for (int32_t method = VSH_SHADOW_RAYS; method <= VSH_SHADOW_ADAPTIVE; ++method) {
-        vsh_light alike = l;
-        strcpy(alike.name, s.name); /* by which lights get their own rays */
-        shadows(field, &s, method, COUNT, positions, normals, directional);
-        shadows(field, &alike, method, COUNT, positions, normals, far);
-        const apart a = compare(far, directional);
-        print_message("%s: rms %.2g, worst %.2g\n", vsh_shadow_method_name(method), a.rms, a.worst);
-        assert_true(a.rms < 5e-3);
-    }
-    vsh_field_free(field);
+    caster_free(&c);
 }
 
 int main(void) {
@@ -439,9 +333,6 @@ int main(void) {
         cmocka_unit_test(unions_scaled_by_a_power_of_two_keep_every_bit),
         cmocka_unit_test(moved_by_whole_voxels_every_bit_stays),
         cmocka_unit_test(turned_by_right_angles_and_mirrored_values_stay_within_a_bound),
-        cmocka_unit_test(finer_voxels_are_never_farther_from_the_truth),
-        cmocka_unit_test(a_growing_slab_hides_more),
-        cmocka_unit_test(for_rays_too_a_far_lamp_is_a_sun),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,6 +4,7 @@
 #include "shim/embree.h"
 #include "truth/directions.h"
 
+#include <pthread.h>
 #include <stdlib.h>
 #include <vdbshade/trace.h>
 
@@ -198,6 +199,40 @@ static void points_far_from_the_casters_keep_their_precision(void **state) {
     vsh_triangles_free(triangles);
 }
 
+/* Who called back, and in which environment. */
+typedef struct witness {
+    pthread_t thread;
+    size_t calls, others;
+} witness;
+
+static int32_t note_thread(void *user, const char *stage, double fraction) {
+    witness *w = user;
+    (void)stage;
+    (void)fraction;
+    ++w->calls;
+    w->others += !pthread_equal(w->thread, pthread_self());
+    return 0;
+}
+
+/* A tree is made by many threads, or by the caller's alone. */
+static void trees_are_made_by_the_threads_that_were_given(void **state) {
+    (void)state;
+    const double centre[3] = {0.0, 0.0, 0.0};
+    const vsh_mesh mesh = ball(centre, 1.0);
+    for (int i = 0; i < 5; ++i) {
+        witness w = {pthread_self(), 0, 0};
+        vsh_run run = vsh_run_default();
+        run.threads = 1;
+        run.progress = note_thread;
+        run.user = &w;
+        vsh_triangles *triangles = NULL;
+        assert_int_equal(vsh_triangles_create(&mesh, 1, &run, &triangles, NULL), VSH_OK);
+        vsh_triangles_free(triangles);
+        assert_true(w.calls > 2); /* from within the making too */
+        assert_int_equal(w.others, 0);
+    }
+}
+
 static void threads_and_packets_change_no_bit(void **state) {
     (void)state;
     enum { COUNT = 4096 };
@@ -316,6 +351,7 @@ int main(void) {
         cmocka_unit_test(rays_stop_at_the_light_and_both_sides_block),
         cmocka_unit_test(neither_place_nor_size_of_the_scene_shows),
         cmocka_unit_test(points_far_from_the_casters_keep_their_precision),
+        cmocka_unit_test(trees_are_made_by_the_threads_that_were_given),
         cmocka_unit_test(threads_and_packets_change_no_bit),
         cmocka_unit_test(points_that_are_no_points_are_nan),
         cmocka_unit_test(bad_input_is_refused),

@@ -1,0 +1,200 @@
+/* Grids against closed forms: what their tests share. */
+#ifndef TESTS_GRIDS_H
+#define TESTS_GRIDS_H
+
+#include <float.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <vdbshade/grid.h>
+
+#include "shim/openvdb.h"
+
+typedef struct leaves {
+    vshi_leaf *leaf;
+    size_t count;
+    const double *transform;
+    vsh_grid_info info;
+} leaves;
+
+static inline leaves leaves_of(const vsh_grid *grid) {
+    leaves all;
+    all.count = vshi_grid_leaves(grid, NULL, 0);
+    all.leaf = malloc((all.count + 1) * sizeof *all.leaf);
+    assert_non_null(all.leaf);
+    assert_int_equal(vshi_grid_leaves(grid, all.leaf, all.count), all.count);
+    all.transform = vshi_grid_transform(grid);
+    vsh_grid_get_info(grid, &all.info);
+    return all;
+}
+
+static inline void voxel_position(const leaves *all, size_t leaf, int voxel, double position[3]) {
+    const int32_t *origin = all->leaf[leaf].origin;
+    const double index[3] = {origin[0] + (voxel >> 6), origin[1] + ((voxel >> 3) & 7),
+                             origin[2] + (voxel & 7)};
+    for (int row = 0; row < 3; ++row) {
+        const double *m = all->transform + 4 * row;
+        position[row] = m[0] * index[0] + m[1] * index[1] + m[2] * index[2] + m[3];
+    }
+}
+
+typedef double truth_fn(const double position[3]);
+
+/* Largest error, in voxels, over voxels whose true distance lies in -inside … outside voxels; and the signs
+ * of all others that leaves hold. */
+static inline double worst_error(const vsh_grid *grid, truth_fn *truth, double inside, double outside) {
+    leaves all = leaves_of(grid);
+    const double background = all.info.half_width * all.info.voxel_size;
+    double worst = 0.0;
+    size_t compared = 0;
+    for (size_t i = 0; i < all.count; ++i) {
+        for (int v = 0; v < 512; ++v) {
+            double p[3];
+            voxel_position(&all, i, v, p);
+            const double expected = truth(p);
+            const double value = (double)all.leaf[i].values[v];
+            assert_true(fabs(value) <= background * (1.0 + 1e-6));
+            if (expected > -inside * all.info.voxel_size && expected < outside * all.info.voxel_size) {
+                worst = fmax(worst, fabs(value - expected) / all.info.voxel_size);
+                ++compared;
+            } else {
+                assert_int_equal(value < 0.0, expected < 0.0);
+            }
+        }
+    }
+    free(all.leaf);
+    assert_true(compared > 1000);
+    return worst;
+}
+
+/* Share of blocks over the whole box whose sign is not the truth's, away from the surface. */
+static inline size_t wrong_blocks(const vsh_grid *grid, truth_fn *truth, int32_t reach) {
+    leaves all = leaves_of(grid);
+    const int32_t origin[3] = {-8 * reach, -8 * reach, -8 * reach};
+    const int32_t size[3] = {2 * reach, 2 * reach, 2 * reach};
+    const size_t count = (size_t)8 * (size_t)(reach * reach) * (size_t)reach;
+    int8_t *signs = malloc(count);
+    assert_non_null(signs);
+    vshi_grid_block_signs(grid, origin, size, signs);
+    size_t wrong = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const int32_t side = 2 * reach, n = (int32_t)i;
+        vshi_leaf block = {{origin[0] + 8 * (n / (side * side)), origin[1] + 8 * (n / side % side),
+                            origin[2] + 8 * (n % side)},
+                           NULL};
+        leaves one = all;
+        one.leaf = &block;
+        double p[3];
+        voxel_position(&one, 0, 0, p);
+        const double expected = truth(p);
+        wrong += fabs(expected) > 0.5 * all.info.voxel_size && (expected < 0.0) != (signs[i] < 0);
+    }
+    free(signs);
+    free(all.leaf);
+    return wrong;
+}
+
+static inline void assert_same_leaves(const vsh_grid *a, const vsh_grid *b, float tolerance) {
+    leaves left = leaves_of(a), right = leaves_of(b);
+    assert_int_equal(left.count, right.count);
+    for (size_t i = 0; i < left.count; ++i) {
+        assert_memory_equal(left.leaf[i].origin, right.leaf[i].origin, sizeof left.leaf[i].origin);
+        if (tolerance == 0.0f) {
+            assert_memory_equal(left.leaf[i].values, right.leaf[i].values, 512 * sizeof(float));
+        }
+        for (int v = 0; v < 512; ++v) {
+            assert_true(fabsf(left.leaf[i].values[v] - right.leaf[i].values[v]) <= tolerance);
+        }
+    }
+    free(left.leaf);
+    free(right.leaf);
+}
+
+static vsh_error failure;
+
+static inline void assert_fails(vsh_result result, vsh_result expected, const char *part) {
+    if (result != expected || strstr(failure.message, part) == NULL) {
+        fail_msg("%s '%s': expected %s '%s'", vsh_result_name(result), failure.message,
+                 vsh_result_name(expected), part);
+    }
+}
+
+static inline vsh_grid_options with_voxel(double size) {
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = size;
+    return options;
+}
+
+typedef struct sphere {
+    double centre[3];
+    double radius;
+    atomic_size_t calls;
+} sphere;
+
+static inline double sphere_distance(void *user, const double p[3]) {
+    sphere *s = user;
+    atomic_fetch_add(&s->calls, 1);
+    const double x = p[0] - s->centre[0], y = p[1] - s->centre[1], z = p[2] - s->centre[2];
+    return sqrt(x * x + y * y + z * z) - s->radius;
+}
+
+static inline vsh_distance sphere_field(sphere *s) {
+    vsh_distance field = {sphere_distance, s, 1.0, 1, {0, 0, 0}, {0, 0, 0}};
+    for (int i = 0; i < 3; ++i) {
+        field.bounds_min[i] = s->centre[i] - s->radius;
+        field.bounds_max[i] = s->centre[i] + s->radius;
+    }
+    return field;
+}
+
+static inline double unit_sphere(const double p[3]) {
+    return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - 1.0;
+}
+
+static vsh_sdf_node hole_nodes[3];
+
+static inline vsh_sdf hollow_sphere(void) {
+    hole_nodes[0] = vsh_sdf_node_default();
+    hole_nodes[1] = vsh_sdf_node_default();
+    hole_nodes[1].radius = 0.6;
+    hole_nodes[2] = vsh_sdf_node_default();
+    hole_nodes[2].shape = VSH_SDF_SUBTRACTION;
+    hole_nodes[2].left = 0;
+    hole_nodes[2].right = 1;
+    return (vsh_sdf){hole_nodes, 3};
+}
+
+static inline double hollow_truth(const double p[3]) {
+    const double d = unit_sphere(p);
+    return fmax(d, -(d + 0.4));
+}
+
+typedef struct watch {
+    double last;
+    double stop; /* fraction at which to cancel */
+    int calls;
+} watch;
+
+static inline int32_t watch_progress(void *user, const char *stage, double fraction) {
+    watch *w = user;
+    assert_string_equal(stage, "voxelize");
+    assert_true(fraction >= w->last && fraction <= 1.0);
+    w->last = fraction;
+    ++w->calls;
+    return fraction >= w->stop;
+}
+
+static inline double room_with_a_ball(const double p[3]) {
+    const double q[3] = {p[0] * 5.0, p[1] * 5.0, p[2] * 5.0};
+    return fmin(hollow_truth(p), 0.2 * unit_sphere(q));
+}
+
+#endif

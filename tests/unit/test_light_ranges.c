@@ -1,0 +1,291 @@
+/* The ends of what a light can be: angles of suns, radii and distances of lamps, lamps in casters, on their
+ * surfaces and at receivers, light that grazes. Of every method; docs/numerics.md has the bounds,
+ * test_light.c what is refused. */
+#include "traced.h"
+
+static const float UP[3] = {0.0f, 1.0f, 0.0f};
+
+static caster plate(double voxel) {
+    const truth_solid solid = {TRUTH_BOX, {0.0, -0.5, 0.0}, {3.0, 0.5, 3.0}, 0.0, 0.0};
+    return caster_of((truth_scene){&solid, 1}, voxel, 0.0);
+}
+
+/* A ball over the receiver, out of the axis: truth by 4096 rays; cones of one edge are right to what a round
+ * edge differs from a straight one. */
+static void lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth(void **state) {
+    (void)state;
+    const truth_solid ball = {TRUTH_SPHERE, {0.0, 2.0, 0.0}, {0.0, 0.0, 0.0}, 0.7, 0.0};
+    const truth_scene scene = {&ball, 1};
+    caster c = caster_of(scene, 0.04, 0.0), open = plate(0.06);
+    const double up[3] = {0.0, 1.0, 0.0},
+                 angles[] = {0.0, 1e-6, 1e-3, 0.5, 5, 20, 60, 90, 120, 150, 170, 179};
+    for (size_t a = 0; a < sizeof angles / sizeof angles[0]; ++a) {
+        const double w = tan(RADIANS(0.5 * angles[a]));
+        const vsh_light light = sun(up, RADIANS(angles[a]));
+        double worst[VSH_SHADOW_EXACT + 1] = {0.0};
+        for (int i = 0; i < 24; ++i) {
+            const double p[3] = {0.13 * i, 0.0, 0.01 * i};
+            const double truth = truth_light(scene, p, NULL, up, w, (double)INFINITY, 4096);
+            for (int32_t method = 0; method < shadow_methods(); ++method) {
+                const float v = cast_shadow_at(&c, &light, method, p, NULL);
+                assert_true(v >= 0.0f && v <= 1.0f);
+                worst[method] = fmax(worst[method], fabs((double)v - truth));
+            }
+            /* the open plate sees all of a light that is over its horizon */
+            const double q[3] = {0.1 * i - 1.2, 0.0, 0.03 * i};
+            for (int32_t method = 0; method < shadow_methods(); ++method) {
+                const float v = cast_shadow_at(&open, &light, method, q, UP);
+                if (v != 1.0f) {
+                    fail_msg("%g degrees over an open plate, %s: %.9g", angles[a],
+                             vsh_shadow_method_name(method), (double)v);
+                }
+            }
+        }
+        print_message("%g degrees past a ball: cone off by %.3f, rays %.3f, adaptive %.3f, exact %.3f\n",
+                      angles[a], worst[VSH_SHADOW_CONE], worst[VSH_SHADOW_RAYS], worst[VSH_SHADOW_ADAPTIVE],
+                      worst[VSH_SHADOW_EXACT]);
+        /* a ball smaller than the light is no straight edge */
+        assert_true(worst[VSH_SHADOW_CONE] < (angles[a] <= 20.0 ? 0.06 : 0.6));
+        /* three standard errors of 0.02; 64 rays have less */
+        assert_true(worst[VSH_SHADOW_RAYS] < 0.05 && worst[VSH_SHADOW_ADAPTIVE] < 0.06);
+        assert_true(worst[VSH_SHADOW_EXACT] < 0.06);
+    }
+    caster_free(&c);
+    caster_free(&open);
+}
+
+/* A lamp over a plate, with nothing between them, and one under it; radii and distances of 1e-6 … 1e6. */
+static void lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_plate(void **state) {
+    (void)state;
+    caster c = plate(0.06);
+    for (double away = 1e-6; away < 2e6; away *= 10.0) {
+        for (double radius = 1e-6; radius < 2e6; radius *= 10.0) {
+            const double p[3] = {0.31, 0.0, -0.17}, over[3] = {0.31, away, -0.17};
+            const double under[3] = {0.31, -1.0 - away - radius, -0.17};
+            for (int32_t method = 0; method < shadow_methods(); ++method) {
+                vsh_light light = lamp(over, radius);
+                const float lit = cast_shadow_at(&c, &light, method, p, UP);
+                light = lamp(under, radius);
+                const float turned = cast_shadow_at(&c, &light, method, p, UP);
+                const float bare = cast_shadow_at(&c, &light, method, p, NULL);
+                if (lit != 1.0f || turned != 0.0f || !(bare >= 0.0f && bare <= 1.0f)) {
+                    fail_msg("%g away, radius %g, %s: %.9g, %.9g, %.9g", away, radius,
+                             vsh_shadow_method_name(method), (double)lit, (double)turned, (double)bare);
+                }
+            }
+        }
+    }
+    caster_free(&c);
+}
+
+static void lamps_on_a_surface_light_its_own_side(void **state) {
+    (void)state;
+    const double voxel = 0.05;
+    caster c = plate(voxel);
+    uint64_t counter = 6;
+    for (int i = 0; i < 300; ++i) {
+        const double p[3] = {between(&counter, -2.5, 2.5), i % 2 ? 0.4 : -1.4, between(&counter, -2.5, 2.5)};
+        const double x = between(&counter, -2.5, 2.5), z = between(&counter, -2.5, 2.5);
+        const double at[3] = {x, 0.0, z}, off[3] = {x, voxel, z}, in[3] = {x, -voxel, z};
+        for (int32_t method = 0; method < shadow_methods(); ++method) {
+            for (int size = 0; size < 2; ++size) {
+                const vsh_light on = lamp(at, size * 0.1), above = lamp(off, 0.0), below = lamp(in, 0.0);
+                const float v = cast_shadow_at(&c, &on, method, p, NULL);
+                assert_true(v >= 0.0f && v <= 1.0f); /* to a voxel it is on either side */
+                assert_true(cast_shadow_at(&c, &above, method, p, NULL) == (i % 2 ? 1.0f : 0.0f));
+                assert_true(cast_shadow_at(&c, &below, method, p, NULL) == 0.0f);
+            }
+        }
+    }
+    caster_free(&c);
+}
+
+/* Balls and boxes with a lamp in them, which may be larger than a voxel: rays to it meet the caster. */
+static void lamps_in_casters_light_nothing_outside(void **state) {
+    (void)state;
+    const truth_solid solids[2] = {{TRUTH_SPHERE, {-1.2, 0.0, 0.0}, {0, 0, 0}, 0.7, 0.0},
+                                   {TRUTH_BOX, {1.2, 0.1, 0.0}, {0.6, 0.5, 0.7}, 0.0, 0.0}};
+    const truth_scene scene = {solids, 2};
+    caster c = caster_of(scene, 0.05, 0.0);
+    uint64_t counter = 14;
+    for (int i = 0; i < 400;) {
+        const double p[3] = {between(&counter, -3.0, 3.0), between(&counter, -2.0, 2.0),
+                             between(&counter, -2.0, 2.0)};
+        if (truth_distance(scene, p) < 0.1) {
+            continue;
+        }
+        const double radii[] = {0.0, 1e-6, 0.2};
+        const double at[3] = {i % 2 ? 1.2 : -1.2, between(&counter, -0.2, 0.2), between(&counter, -0.2, 0.2)};
+        const vsh_light light = lamp(at, radii[i % 3]);
+        for (int32_t method = 0; method < shadow_methods(); ++method) {
+            const float v = cast_shadow_at(&c, &light, method, p, NULL);
+            if (v != 0.0f) {
+                fail_msg("%s: %.9g from (%g, %g, %g)", vsh_shadow_method_name(method), (double)v, p[0], p[1],
+                         p[2]);
+            }
+        }
+        ++i;
+    }
+    caster_free(&c);
+}
+
+/* Over a floor with nothing near, by its height and its radius: what the receiver sees of it is what its own
+ * horizon leaves, however near it is; 0 away is in it. Turned aside, to `elevation` over the floor, it must
+ * not sink under the place that rays begin at. */
+static void lamps_at_the_receiver_are_cut_by_its_horizon_only(void **state) {
+    (void)state;
+    const double voxel = 0.06;
+    caster c = plate(voxel);
+    const double parts[] = {0.0, 1e-6, 0.01, 0.1, 0.2, 0.25, 0.3, 0.5, 1.0, 2.0}; /* of a voxel */
+    const double elevations[] = {90.0, 60.0, 30.0};
+    for (size_t d = 0; d < sizeof parts / sizeof parts[0]; ++d) {
+        for (size_t e = 0; e < 3; ++e) {
+            const double p[3] = {0.31, 0.0, -0.17};
+            double way[3];
+            direction_at(RADIANS(elevations[e]), 0.3, way);
+            const double away = parts[d] * voxel;
+            const double at[3] = {p[0] + away * way[0], p[1] + away * way[1], p[2] + away * way[2]};
+            /* small enough to be over the horizon, or without size */
+            const double radii[] = {0.0, 0.4 * away, 0.1 * voxel};
+            for (int r = 0; r < 3; ++r) {
+                const vsh_light light = lamp(at, radii[r]);
+                const double sine = away > 0.0 ? radii[r] / away : 2.0;
+                const bool whole = sine >= 1.0 || sine <= way[1];
+                for (int32_t method = 0; method < shadow_methods(); ++method) {
+                    const float v = cast_shadow_at(&c, &light, method, p, UP);
+                    if (whole ? v != 1.0f : !(v >= 0.4f && v <= 1.0f)) {
+                        fail_msg("%g voxels away at %g degrees, radius %g, %s: %.9g", parts[d], elevations[e],
+                                 radii[r], vsh_shadow_method_name(method), (double)v);
+                    }
+                }
+            }
+        }
+    }
+    caster_free(&c);
+}
+
+/* With the triangles there is a truth for it: the one ray. */
+static void exact_of_a_light_without_size_is_one_traced_ray(void **state) {
+    (void)state;
+    enum { SIDE = 64, COUNT = SIDE * SIDE };
+    static double positions[3 * COUNT];
+    static float normals[3 * COUNT], exact[COUNT], ray[COUNT];
+    if (!vsh_triangles_available()) {
+        skip();
+    }
+    floor_texels(SIDE, positions, normals);
+    caster c = caster_of(truth_seeds(), 0.04, 0.0);
+    const double place[3] = {0.4, 2.5, 0.3};
+    const vsh_light lights[2] = {sun(truth_seeds_sun, 0.0), lamp(place, 0.0)};
+    for (int l = 0; l < 2; ++l) {
+        cast_shadows(&c, &lights[l], VSH_SHADOW_EXACT, COUNT, positions, normals, exact);
+        assert_int_equal(
+            vsh_trace_shadow(c.triangles, NULL, COUNT, positions, normals, 1e-5, &lights[l], 1, NULL, ray, NULL),
+            VSH_OK);
+        size_t other = 0, dark = 0;
+        for (size_t i = 0; i < COUNT; ++i) {
+            assert_true(exact[i] == 0.0f || exact[i] == 1.0f);
+            other += exact[i] != ray[i];
+            dark += ray[i] == 0.0f;
+        }
+        print_message("%s: %zu of %d texels are dark, %zu are other\n", l ? "lamp" : "sun", dark, COUNT,
+                      other);
+        /* the two begin a hundred-thousandth apart, which an edge may lie in: not one in a thousand */
+        assert_true(other <= COUNT / 1000 && dark > COUNT / 20 && dark < COUNT);
+    }
+    caster_free(&c);
+}
+
+/* The plate of grazing_light_reaches_an_open_plate() as triangles. NULL without Embree. */
+static vsh_triangles *triangles_of_turned(const vsh_sdf_node *node, int axis, double half) {
+    truth_solid box = {TRUTH_BOX, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.0, 0.0};
+    memcpy(box.half, node->size, sizeof box.half);
+    vsh_mesh mesh = mesh_of_solid(&box);
+    const double c = cos(2.0 * half), s = sin(2.0 * half);
+    const double about_y[12] = {c, 0, s, 0, 0, 1, 0, 0, -s, 0, c, 0};
+    const double about_z[12] = {c, -s, 0, 0, s, c, 0, 0, 0, 0, 1, 0};
+    mesh.transform = axis == 0 ? NULL : axis == 1 ? about_y : about_z;
+    vsh_triangles *triangles = NULL;
+    if (vsh_triangles_available()) {
+        assert_int_equal(vsh_triangles_create(&mesh, 1, NULL, &triangles, NULL), VSH_OK);
+    }
+    free((void *)(uintptr_t)mesh.positions);
+    free((void *)(uintptr_t)mesh.indices);
+    return triangles;
+}
+
+/* Down to a millionth of a radian over the horizon: what the whole light is above of is lit, whichever way
+ * the plate lies on the lattice. */
+static void grazing_light_reaches_an_open_plate(void **state) {
+    (void)state;
+    for (int turn = 0; turn < 3; ++turn) {
+        const double half = RADIANS(0.5 * (turn == 0 ? 0.0 : turn == 1 ? 31.0 : 10.0));
+        vsh_sdf_node node = vsh_sdf_node_default();
+        node.shape = VSH_SDF_BOX;
+        node.size[0] = node.size[2] = 2.0;
+        node.size[1] = 0.5;
+        node.rotation[turn] = sin(half);
+        node.rotation[3] = cos(half);
+        const vsh_sdf sdf = {&node, 1};
+        vsh_grid_options options = vsh_grid_options_default();
+        options.voxel_size = 0.04;
+        vsh_grid *grid = NULL;
+        assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, NULL), VSH_OK);
+        caster c = {field_of_grid(grid, 0.0), triangles_of_turned(&node, turn, half)};
+        const double cosine = cos(2.0 * half), s = sin(2.0 * half);
+        double dark = 0.0, least = 1.0;
+        size_t count = 0, steps = 0;
+        uint64_t counter = 5;
+        for (double sine = 1e-6; sine < 0.2; sine *= 3.0) {
+            for (int i = 0; i < 60; ++i) {
+                double d[3], q[3] = {between(&counter, -1.9, 1.9), 0.5, between(&counter, -1.9, 1.9)};
+                direction_at(asin(sine), between(&counter, 0.0, 2.0 * PI), d);
+                float n[3] = {0.0f, 1.0f, 0.0f};
+                if (turn == 1) { /* about y: nothing of the plate's top changes but its edges */
+                    const double x = d[0];
+                    d[0] = cosine * x + s * d[2];
+                    d[2] = cosine * d[2] - s * x;
+                    const double px = q[0];
+                    q[0] = cosine * px + s * q[2];
+                    q[2] = cosine * q[2] - s * px;
+                } else if (turn == 2) { /* about z */
+                    const double x = d[0], px = q[0];
+                    d[0] = cosine * x - s * d[1];
+                    d[1] = s * x + cosine * d[1];
+                    q[0] = cosine * px - s * q[1];
+                    q[1] = s * px + cosine * q[1];
+                    n[0] = (float)-s;
+                    n[1] = (float)cosine;
+                }
+                for (int32_t method = 0; method < shadow_methods(); ++method) {
+                    const vsh_light light = sun(d, method == VSH_SHADOW_HARD ? 0.0 : sine);
+                    float v = -1.0f;
+                    const vsh_shade_stats stats = cast_shadows(&c, &light, method, 1, q, n, &v);
+                    assert_int_equal(stats.unfinished, 0);
+                    steps = stats.samples > steps ? stats.samples : steps;
+                    assert_true(v >= 0.0f && v <= 1.0f);
+                    dark += v < 1.0f;
+                    least = fmin(least, (double)v);
+                    ++count;
+                }
+            }
+        }
+        print_message("turn %d: %g of %zu grazing values below 1, least %.4f, %zu steps at most\n", turn,
+                      dark, count, least, steps);
+        assert_true(dark == 0.0);
+        caster_free(&c);
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth),
+        cmocka_unit_test(lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_plate),
+        cmocka_unit_test(lamps_on_a_surface_light_its_own_side),
+        cmocka_unit_test(lamps_in_casters_light_nothing_outside),
+        cmocka_unit_test(lamps_at_the_receiver_are_cut_by_its_horizon_only),
+        cmocka_unit_test(exact_of_a_light_without_size_is_one_traced_ray),
+        cmocka_unit_test(grazing_light_reaches_an_open_plate),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

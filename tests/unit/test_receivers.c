@@ -1,0 +1,172 @@
+/* Where receivers can be and what normals they can have: deep inside, far outside, on lattice planes; of any
+ * length, zero, not finite. Of every method; docs/numerics.md has the bounds. */
+#include "traced.h"
+
+static const float UP[3] = {0.0f, 1.0f, 0.0f};
+static const double NOWHERE[3] = {0.0, 0.0, 0.0};
+
+static void receivers_deep_inside_are_dark_and_far_outside_are_lit(void **state) {
+    (void)state;
+    const truth_solid block = {TRUTH_BOX, {0.0, 0.0, 0.0}, {2.0, 2.0, 2.0}, 0.0, 0.0};
+    caster c = caster_of((truth_scene){&block, 1}, 0.05, 0.0);
+    uint64_t counter = 12;
+    for (int i = 0; i < 400; ++i) {
+        double d[3], out[3];
+        random_direction(&counter, d);
+        random_direction(&counter, out);
+        const double depth = pow(10.0, between(&counter, -1.0, 0.0));
+        const double p[3] = {between(&counter, depth - 2.0, 2.0 - depth),
+                             between(&counter, depth - 2.0, 2.0 - depth),
+                             between(&counter, depth - 2.0, 2.0 - depth)};
+        const double away = pow(10.0, between(&counter, 1.0, 15.0));
+        const double q[3] = {away * out[0], away * out[1], away * out[2]};
+        for (int32_t method = 0; method < shadow_methods(); ++method) {
+            const vsh_light light = sun(d, i % 2 ? 0.0 : 0.05), from = sun(out, 0.05);
+            const float v = cast_shadow_at(&c, &light, method, p, NULL);
+            if (v != 0.0f) {
+                fail_msg("inside at (%g, %g, %g), %s: %.9g", p[0], p[1], p[2], vsh_shadow_method_name(method),
+                         (double)v);
+            }
+            assert_true(cast_shadow_at(&c, &from, method, q, NULL) == 1.0f);
+        }
+        const float n[3] = {(float)d[0], (float)d[1], (float)d[2]};
+        for (int32_t method = 0; method < ao_methods(); ++method) {
+            const float in = cast_ao_at(&c, method, 1.0, p, n), away_from = cast_ao_at(&c, method, 1.0, q, n);
+            /* taps go up the normal by the AO distance, and may come out of the solid */
+            if ((method == VSH_AO_TAPS ? !(in < 1.0f) : in != 0.0f) || away_from != 1.0f) {
+                fail_msg("AO %s: %.9g at (%g, %g, %g) inside, %.9g outside", vsh_ao_method_name(method),
+                         (double)in, p[0], p[1], p[2], (double)away_from);
+            }
+        }
+    }
+    caster_free(&c);
+}
+
+/* Exactly on the planes, edges and corners of cells, bricks and levels, and beside them by less than a float
+ * tells: the same to what a float tells; a ray of 64 may come to lie on the other side of an edge. */
+static void receivers_on_voxel_planes_see_what_their_neighbours_see(void **state) {
+    (void)state;
+    enum { PLACES = 4000, SIDES = 6, ALL = PLACES * (SIDES + 1) };
+    static double at[3 * ALL];
+    static float ns[3 * ALL], values[ALL];
+    static uint32_t texels[ALL]; /* neighbours take the same rays */
+    caster c = caster_of(truth_seeds(), 0.0625, 0.0);
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    uint64_t counter = 8;
+    for (uint32_t i = 0; i < PLACES; ++i) {
+        double p[3];
+        for (uint32_t axis = 0; axis < 3; ++axis) {
+            const double step = 0.0625 * (double)(1 << (i % 6));
+            p[axis] = axis != 1 && i % 7 == axis ? between(&counter, -2.4, 2.4)
+                                                 : step * round(between(&counter, -2.4, 2.4) / step);
+        }
+        p[1] = fabs(p[1]) + (i % 3 == 0 ? 0.0 : 0.0625);
+        for (uint32_t side = 0; side <= SIDES; ++side) {
+            const size_t k = (SIDES + 1) * (size_t)i + side;
+            memcpy(at + 3 * k, p, sizeof p);
+            memcpy(ns + 3 * k, UP, sizeof UP);
+            texels[k] = i;
+            if (side < SIDES) {
+                at[3 * k + side / 2] += side % 2 ? 1e-9 : -1e-9;
+            }
+        }
+    }
+    const vsh_points points = {ALL, at, ns, texels};
+    for (int ao = 0; ao < 2; ++ao) {
+        for (int32_t method = 0; method < (ao ? ao_methods() : shadow_methods()); ++method) {
+            vsh_shade_options options = vsh_shade_options_default();
+            *(ao ? &options.ao_method : &options.method) = method;
+            options.ao_distance = 0.5;
+            options.triangles = c.triangles;
+            assert_int_equal(
+                ao ? vsh_shade_ao(c.field, &points, &options, NULL, values, NULL, NULL, NULL)
+                   : vsh_shade_shadow(c.field, &points, &light, &options, NULL, values, NULL, NULL, NULL),
+                VSH_OK);
+            double worst = 0.0;
+            size_t changed = 0;
+            for (size_t i = 0; i < PLACES; ++i) {
+                const float v = values[(SIDES + 1) * i + SIDES];
+                assert_true(v >= 0.0f && v <= 1.0f);
+                for (size_t side = 0; side < SIDES; ++side) {
+                    const double apart = fabs((double)(values[(SIDES + 1) * i + side] - v));
+                    worst = fmax(worst, apart);
+                    changed += apart > 1e-4;
+                }
+            }
+            const char *name = ao ? vsh_ao_method_name(method) : vsh_shadow_method_name(method);
+            print_message("beside lattice planes, %s %s: %.3g apart at most, %zu of %d beyond 1e-4\n",
+                          ao ? "AO" : "shadow", name, worst, changed, PLACES * SIDES);
+            const bool rays =
+                ao ? method >= VSH_AO_RAYS : method >= VSH_SHADOW_RAYS || method == VSH_SHADOW_HARD;
+            if (rays) {
+                assert_true(changed < PLACES * SIDES / 100);
+            } else {
+                assert_true(worst < 1e-4);
+            }
+        }
+    }
+    caster_free(&c);
+}
+
+static void normals_of_any_length_are_directions(void **state) {
+    (void)state;
+    caster c = caster_of(truth_seeds(), 0.0625, 0.0);
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    const int exponents[] = {-149, -126, -60, -1, 1, 60, 127};
+    for (int i = 0; i < 60; ++i) {
+        const double p[3] = {-2.4 + 0.08 * i, 0.0, 0.3};
+        for (size_t e = 0; e < sizeof exponents / sizeof exponents[0]; ++e) {
+            const float n[3] = {0.0f, ldexpf(1.0f, exponents[e]), 0.0f};
+            for (int32_t method = 0; method < shadow_methods(); ++method) {
+                assert_int_equal(bits_of(cast_shadow_at(&c, &light, method, p, n)),
+                                 bits_of(cast_shadow_at(&c, &light, method, p, UP)));
+            }
+            for (int32_t method = 0; method < ao_methods(); ++method) {
+                assert_int_equal(bits_of(cast_ao_at(&c, method, 0.5, p, n)),
+                                 bits_of(cast_ao_at(&c, method, 0.5, p, UP)));
+            }
+        }
+    }
+    caster_free(&c);
+}
+
+/* NaN and counted, in every method; the points beside them are as they are without them. The last place is a
+ * double, but no place in field space. */
+static void points_that_are_none_are_nan_and_counted(void **state) {
+    (void)state;
+    enum { PLACES = 9, BAD = 7 };
+    caster c = caster_of_moved(truth_seeds(), 0.0625, 1e-9, NOWHERE, 8e-9);
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    const float nan = (float)NAN, inf = (float)INFINITY;
+    const double at[3 * PLACES] = {
+        0.3e-9, 1e-12, 0.2e-9, (double)NAN, 0,    0, 0, (double)INFINITY,  0, 0, 0,
+        0,      0,     0,      0,           0,    0, 0, -(double)INFINITY, 0, 0, 1e305,
+        0,      0,     1e-9,   1e-12,       -1e-9};
+    const float ns[3 * PLACES] = {0, 1, 0,   0, 1, 0, 0, 1, 0, 0, 0, 0, nan, 1,
+                                  0, 0, inf, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0};
+    float all[PLACES], one;
+    for (int ao = 0; ao < 2; ++ao) {
+        for (int32_t method = 0; method < (ao ? ao_methods() : shadow_methods()); ++method) {
+            const vsh_shade_stats stats = ao ? cast_ao(&c, method, 0.5e-9, PLACES, at, ns, all)
+                                             : cast_shadows(&c, &light, method, PLACES, at, ns, all);
+            assert_int_equal(stats.invalid, BAD);
+            for (int i = 0; i < PLACES; ++i) {
+                assert_int_equal(isnan(all[i]) != 0, i > 0 && i <= BAD);
+            }
+            /* the samplers tell points apart by their numbers: the first keeps its own */
+            one = ao ? cast_ao_at(&c, method, 0.5e-9, at, ns) : cast_shadow_at(&c, &light, method, at, ns);
+            assert_int_equal(bits_of(one), bits_of(all[0]));
+        }
+    }
+    caster_free(&c);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(receivers_deep_inside_are_dark_and_far_outside_are_lit),
+        cmocka_unit_test(receivers_on_voxel_planes_see_what_their_neighbours_see),
+        cmocka_unit_test(normals_of_any_length_are_directions),
+        cmocka_unit_test(points_that_are_none_are_nan_and_counted),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,190 @@
+/* Casters that are marched and traced: a field, and the same solids as triangles, so that a test can ask
+ * every method for the same thing. Without Embree there are no triangles, and the exact methods are left out.
+ */
+#ifndef TESTS_TRACED_H
+#define TESTS_TRACED_H
+
+#include "shading.h"
+
+#include <stdlib.h>
+#include <vdbshade/trace.h>
+
+typedef struct caster {
+    vsh_field *field;
+    vsh_triangles *triangles; /* NULL without Embree */
+} caster;
+
+/* Numbers of methods that can be asked for here: the exact ones are the last. */
+static inline int32_t shadow_methods(void) {
+    return vsh_triangles_available() ? VSH_SHADOW_EXACT + 1 : VSH_SHADOW_EXACT;
+}
+
+static inline int32_t ao_methods(void) {
+    return vsh_triangles_available() ? VSH_AO_EXACT + 1 : VSH_AO_EXACT;
+}
+
+/* A solid's surface: SOLID_SECTORS columns of SOLID_RINGS + 1 places. Its chords are within 3e-4 of a radius.
+ */
+enum { SOLID_RINGS = 65, SOLID_SECTORS = 128, SOLID_VERTICES = (SOLID_RINGS + 1) * SOLID_SECTORS };
+
+/* Vertex `sector`, `ring` of a solid, around its centre. No vertex lies on a plane of symmetry, so that the
+ * flat sides of a rounded box are quads from one vertex to the next. */
+static inline void solid_vertex(const truth_solid *solid, int sector, int ring, double p[3]) {
+    const double a = 2.0 * PI * (sector + 0.5) / SOLID_SECTORS;
+    if (solid->shape == TRUTH_TORUS) {
+        const double b = 2.0 * PI * ring / SOLID_RINGS, out = solid->radius + solid->minor_radius * cos(b);
+        p[0] = out * cos(a);
+        p[1] = solid->minor_radius * sin(b);
+        p[2] = out * sin(a);
+        return;
+    }
+    /* from pole to pole; the poles themselves are drawn out over the flat sides */
+    const double b = ring == 0             ? -0.5 * PI
+                     : ring == SOLID_RINGS ? 0.5 * PI
+                                           : PI * ((ring - 0.5) / (SOLID_RINGS - 1) - 0.5);
+    const double n[3] = {cos(b) * cos(a), sin(b), cos(b) * sin(a)};
+    for (int axis = 0; axis < 3; ++axis) {
+        const double half = solid->shape == TRUTH_BOX ? solid->half[axis] : 0.0;
+        p[axis] = (n[axis] < 0.0 ? -half : half) + solid->radius * n[axis];
+    }
+    if (ring == 0 || ring == SOLID_RINGS) {
+        p[0] = p[2] = 0.0; /* the middle of the side */
+    }
+}
+
+static inline void add_face(uint32_t *indices, size_t *count, uint32_t a, uint32_t b, uint32_t c) {
+    const uint32_t corners[3] = {a, b, c};
+    memcpy(indices + 3 * *count, corners, sizeof corners);
+    ++*count;
+}
+
+/* The solid around its centre; arrays are the caller's to free. */
+static inline vsh_mesh mesh_of_solid(const truth_solid *solid) {
+    float *positions = malloc(3 * SOLID_VERTICES * sizeof *positions);
+    uint32_t *indices = malloc(6 * (size_t)SOLID_RINGS * SOLID_SECTORS * sizeof *indices);
+    assert_non_null(positions);
+    assert_non_null(indices);
+    size_t triangles = 0, vertices = 0;
+    if (solid->shape == TRUTH_BOX && !(solid->radius > 0.0)) {
+        static const uint32_t SIDES[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6},
+                                              {0, 1, 4}, {1, 5, 4}, {2, 6, 3}, {3, 6, 7},
+                                              {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+        for (; vertices < 8; ++vertices) {
+            for (size_t axis = 0; axis < 3; ++axis) {
+                positions[3 * vertices + axis] =
+                    (float)((vertices >> axis & 1) != 0 ? solid->half[axis] : -solid->half[axis]);
+            }
+        }
+        memcpy(indices, SIDES, sizeof SIDES);
+        triangles = 12;
+    } else {
+        for (int sector = 0; sector < SOLID_SECTORS; ++sector) {
+            for (int ring = 0; ring <= SOLID_RINGS; ++ring, ++vertices) {
+                double p[3];
+                solid_vertex(solid, sector, ring, p);
+                for (size_t axis = 0; axis < 3; ++axis) {
+                    positions[3 * vertices + axis] = (float)p[axis];
+                }
+                if (ring < SOLID_RINGS) {
+                    const uint32_t at = (uint32_t)vertices;
+                    const uint32_t next =
+                        (uint32_t)((sector + 1) % SOLID_SECTORS) * (SOLID_RINGS + 1) + (uint32_t)ring;
+                    add_face(indices, &triangles, at, at + 1, next + 1);
+                    add_face(indices, &triangles, at, next + 1, next);
+                }
+            }
+        }
+    }
+    return (vsh_mesh){
+        .positions = positions, .indices = indices, .vertex_count = vertices, .triangle_count = triangles};
+}
+
+/* The scene's triangles moved by `offset`, then scaled. NULL without Embree. */
+static inline vsh_triangles *triangles_of_moved(truth_scene scene, double scale, const double offset[3]) {
+    vsh_mesh meshes[MAX_SOLIDS];
+    double transforms[MAX_SOLIDS][12];
+    vsh_triangles *triangles = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (!vsh_triangles_available()) {
+        return NULL;
+    }
+    for (size_t i = 0; i < scene.count; ++i) {
+        meshes[i] = mesh_of_solid(&scene.solids[i]);
+        memset(transforms[i], 0, sizeof transforms[i]);
+        for (int axis = 0; axis < 3; ++axis) {
+            transforms[i][5 * axis] = scale;
+            transforms[i][4 * axis + 3] = scale * (scene.solids[i].center[axis] + offset[axis]);
+        }
+        meshes[i].transform = transforms[i];
+    }
+    if (vsh_triangles_create(meshes, scene.count, NULL, &triangles, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    for (size_t i = 0; i < scene.count; ++i) {
+        free((void *)(uintptr_t)meshes[i].positions);
+        free((void *)(uintptr_t)meshes[i].indices);
+    }
+    return triangles;
+}
+
+static inline caster caster_of_moved(truth_scene scene, double voxel, double scale, const double offset[3],
+                                     double reach) {
+    return (caster){field_of_grid(grid_of_moved(scene, voxel, scale, offset), reach),
+                    triangles_of_moved(scene, scale, offset)};
+}
+
+static inline caster caster_of(truth_scene scene, double voxel, double reach) {
+    const double nowhere[3] = {0.0, 0.0, 0.0};
+    return caster_of_moved(scene, voxel, 1.0, nowhere, reach);
+}
+
+static inline void caster_free(caster *c) {
+    vsh_triangles_free(c->triangles);
+    vsh_field_free(c->field);
+}
+
+static inline vsh_shade_stats cast_shadows(const caster *c, const vsh_light *light, int32_t method,
+                                           size_t count, const double *positions, const float *normals,
+                                           float *visible) {
+    vsh_shade_options options = vsh_shade_options_default();
+    options.method = method;
+    options.triangles = c->triangles;
+    const vsh_points points = {count, positions, normals, NULL};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_shade_shadow(c->field, &points, light, &options, NULL, visible, NULL, &stats, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return stats;
+}
+
+static inline float cast_shadow_at(const caster *c, const vsh_light *light, int32_t method,
+                                   const double *position, const float *normal) {
+    float visible = -1.0f;
+    cast_shadows(c, light, method, 1, position, normal, &visible);
+    return visible;
+}
+
+static inline vsh_shade_stats cast_ao(const caster *c, int32_t method, double distance, size_t count,
+                                      const double *positions, const float *normals, float *open) {
+    vsh_shade_options options = vsh_shade_options_default();
+    options.ao_method = method;
+    options.ao_distance = distance;
+    options.triangles = c->triangles;
+    const vsh_points points = {count, positions, normals, NULL};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_shade_ao(c->field, &points, &options, NULL, open, NULL, &stats, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return stats;
+}
+
+static inline float cast_ao_at(const caster *c, int32_t method, double distance, const double *position,
+                               const float *normal) {
+    float open = -1.0f;
+    cast_ao(c, method, distance, 1, position, normal, &open);
+    return open;
+}
+
+#endif
