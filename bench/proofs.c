@@ -92,8 +92,8 @@ static void trace(const points *p, size_t count, const vsh_triangles *triangles,
         memcpy(p->chosen_positions + 3 * i, p->positions + 3 * p->chosen[i], 3 * sizeof(double));
         memcpy(p->chosen_normals + 3 * i, p->normals + 3 * p->chosen[i], 3 * sizeof(float));
     }
-    bench_check(vsh_trace_shadow(triangles, NULL, count, p->chosen_positions, p->chosen_normals, LIFT, light, rays,
-                                 NULL, p->truth, &error),
+    bench_check(vsh_trace_shadow(triangles, NULL, count, p->chosen_positions, p->chosen_normals, LIFT, light,
+                                 rays, NULL, p->truth, &error),
                 &error);
     for (size_t i = 0; i < count; ++i) {
         const float proved = p->values[p->chosen[i]];

@@ -1,6 +1,6 @@
 /* adaptive against rays on its own field, and exact against Embree's rays, on an asset, a smooth mesh and a
- * thin structure (tools/make_bench_scenes.py): receivers are runs of texels all over the lightmaps, one thread for both
- * sides. */
+ * thin structure (tools/make_bench_scenes.py): receivers are runs of texels all over the lightmaps, one
+ * thread for both sides. */
 #include "bench.h"
 #include "embree.h"
 #include "scenes.h"

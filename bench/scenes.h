@@ -27,9 +27,9 @@ void bench_scene_free(bench_scene *scene);
 /* The scene's field, `resolution` voxels along its longest side. */
 vsh_field *bench_scene_field(const bench_scene *scene, int32_t resolution);
 
-/* Points of a 1024² lightmap in its own order, in runs of 64 from all over it, the first chosen by `seed`: positions
- * [count][3], geometric normals [count][3], valid [count], 0 for those that the field has inside other geometry, as a
- * bake judges. */
+/* Points of a 1024² lightmap in its own order, in runs of 64 from all over it, the first chosen by `seed`:
+ * positions [count][3], geometric normals [count][3], valid [count], 0 for those that the field has inside
+ * other geometry, as a bake judges. */
 void bench_scene_points(const bench_scene *scene, const vsh_field *field, uint64_t seed, size_t count,
                         double *positions, float *normals, float *valid);
 

@@ -49,7 +49,8 @@ static uint64_t mix(uint64_t x) {
     return x ^ (x >> 31);
 }
 
-/* Edge k of triangle t is number 3 t + k. The table holds the first edge seen between two vertices, plus 1. */
+/* Edge k of triangle t is number 3 t + k. The table holds the first edge seen between two vertices, plus 1.
+ */
 static void join_edge(vshi_sheet *sheet, uint64_t *slots, size_t capacity, size_t edge) {
     const uint32_t *corners = sheet->corners + edge / 3 * 3;
     const uint32_t a = corners[edge % 3], b = corners[(edge + 1) % 3];
@@ -111,7 +112,7 @@ typedef struct seen {
 typedef struct view {
     const vshi_sheet *sheet;
     vshi_vec origin, axis, u, v;
-    double radius;     /* of the beam, as far as it is looked at */
+    double radius;      /* of the beam, as far as it is looked at */
     double first, last; /* along the axis: where the sheet may be within the beam */
 } view;
 
@@ -179,8 +180,8 @@ bool vshi_sheet_cuts(const vshi_sheet *sheet, const vshi_sheet_beam *beam, uint3
             return false;
         }
         if (i == 0) { /* so many of its size would have to cover the beam */
-            const double area = 0.5 * fabs((p[1].x - p[0].x) * (p[2].y - p[0].y) -
-                                           (p[2].x - p[0].x) * (p[1].y - p[0].y));
+            const double area =
+                0.5 * fabs((p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[2].x - p[0].x) * (p[1].y - p[0].y));
             if (area * most < w.radius * w.radius) {
                 return false;
             }

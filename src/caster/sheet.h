@@ -19,8 +19,8 @@ typedef struct vshi_sheet {
                            * VSHI_SHEET_BORDER where not exactly two triangles meet */
 } vshi_sheet;
 
-/* A beam: all rays from a ball of `wide` around the origin, whose directions have at most `tangent` to the unit
- * axis, as far as `end` along it. */
+/* A beam: all rays from a ball of `wide` around the origin, whose directions have at most `tangent` to the
+ * unit axis, as far as `end` along it. */
 typedef struct vshi_sheet_beam {
     vshi_vec origin;
     vshi_vec axis;
@@ -29,17 +29,17 @@ typedef struct vshi_sheet_beam {
     double end;     /* may be infinite */
 } vshi_sheet_beam;
 
-/* Takes `vertex_count` vertices and `triangle_count` triangles, to be filled by the caller; vshi_sheet_join() finds
- * the neighbours afterwards. Errors: VSH_ERROR_MEMORY. */
+/* Takes `vertex_count` vertices and `triangle_count` triangles, to be filled by the caller; vshi_sheet_join()
+ * finds the neighbours afterwards. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_sheet_allocate(vshi_sheet *sheet, size_t vertex_count, size_t triangle_count,
                                vsh_error *error);
 vsh_result vshi_sheet_join(vshi_sheet *sheet, vsh_error *error);
 void vshi_sheet_free(vshi_sheet *sheet);
 double vshi_sheet_bytes(double vertex_count, double triangle_count);
 
-/* Whether the triangles that hang together with `triangle`, which the axis meets at `distance`, cut the beam, so
- * that each of its rays meets one. Looks at no more than `most` triangles (at most VSHI_SHEET_MOST). False where it
- * cannot tell. */
+/* Whether the triangles that hang together with `triangle`, which the axis meets at `distance`, cut the beam,
+ * so that each of its rays meets one. Looks at no more than `most` triangles (at most VSHI_SHEET_MOST). False
+ * where it cannot tell. */
 enum { VSHI_SHEET_MOST = 128 };
 bool vshi_sheet_cuts(const vshi_sheet *sheet, const vshi_sheet_beam *beam, uint32_t triangle, double distance,
                      int most);

@@ -6,8 +6,8 @@
  * wide as the beam, every ray of it is hidden.
  *
  * Near its points a beam holds their own surface. There each point is on its own, with the ball that touches
- * its tangent plane: it holds the rays of its cone from next to the point to where the beams of its neighbours
- * are clear of the surface. */
+ * its tangent plane: it holds the rays of its cone from next to the point to where the beams of its
+ * neighbours are clear of the surface. */
 #include "shade/blocks.h"
 
 #include "shim/embree.h"
@@ -144,7 +144,8 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
 
 /* Ends the cones of a block where its beam is free from `clear` on. */
 static void shorten(const vshi_shadow_task *task, vshi_facing *facing, const block *b, double clear) {
-    const double aside = (task->radius + below(task) + b->beam.wide) * b->tilt, ahead = 1.0 - b->tilt * b->tilt;
+    const double aside = (task->radius + below(task) + b->beam.wide) * b->tilt,
+                 ahead = 1.0 - b->tilt * b->tilt;
     for (size_t i = b->first; i < b->first + b->count; ++i) {
         vshi_cone *cone = &facing->cone[i];
         const double along = vshi_dot(vshi_sub(cone->origin, b->beam.origin), b->beam.direction);

@@ -54,8 +54,8 @@ double vshi_segment(double x);
 double vshi_cone_visibility(double closeness, double sine);
 
 /* Standard error of the share of `taken` rays of a VSH_SAMPLER_… that an edge across the disc leaves, of
- * which `lit` were where the `expected` share were to be (a half where nothing is): c sqrt(p (1 - p)) n^-3/4, for white noise n^-1/2, measured over edges of all places and
- * directions (test_sampler). */
+ * which `lit` were where the `expected` share were to be (a half where nothing is): c sqrt(p (1 - p)) n^-3/4,
+ * for white noise n^-1/2, measured over edges of all places and directions (test_sampler). */
 double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken, double expected);
 
 /* Unit normal and direction in field space. */

@@ -1,6 +1,6 @@
 /* Shadow values: the visible fraction of a light, by one cone or ray a point. */
-#include "shade/blocks.h"
 #include "base/floats.h"
+#include "shade/blocks.h"
 
 #include <math.h>
 
@@ -21,9 +21,9 @@ static float remap(int32_t method, double closeness, double sine) {
     }
 }
 
-/* The cone of point i, which begins at `origin`; false where the point is within the light. Where a lamp stands, and
- * whether it is over the horizon, is seen from the point itself: one that is nearer than the start offset would else be
- * below it. */
+/* The cone of point i, which begins at `origin`; false where the point is within the light. Where a lamp
+ * stands, and whether it is over the horizon, is seen from the point itself: one that is nearer than the
+ * start offset would else be below it. */
 static bool aim(const vshi_shadow_task *task, size_t i, vshi_vec origin, vshi_cone *cone) {
     *cone = (vshi_cone){.origin = origin, .horizon = INFINITY};
     if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
@@ -99,8 +99,8 @@ static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_s
     }
     vshi_march_stats work = {0, 0};
     task->kernel->march(task->field, &chunk.rays,
-                method == VSH_SHADOW_IMPROVED ? VSHI_MARCH_TRIANGULATED : VSHI_MARCH_PLAIN,
-                task->options->max_steps, &work);
+                        method == VSH_SHADOW_IMPROVED ? VSHI_MARCH_TRIANGULATED : VSHI_MARCH_PLAIN,
+                        task->options->max_steps, &work);
     stats->samples += work.samples;
     stats->unfinished += work.unfinished;
     for (size_t r = 0; r < chunk.rays.count; ++r) {
@@ -160,8 +160,7 @@ vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, co
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
     }
     task.sampler = sampler;
-    result =
-        vshi_shade_run(run, stage, points->count, VSHI_CHUNK, vshi_shadow_by_rays, &task, stats, error);
+    result = vshi_shade_run(run, stage, points->count, VSHI_CHUNK, vshi_shadow_by_rays, &task, stats, error);
     vshi_sampler_free(sampler);
     return result;
 }

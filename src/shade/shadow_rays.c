@@ -136,8 +136,8 @@ double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken, double e
     return spread * sqrt(p * (1.0 - p));
 }
 
-/* The deviation of an open point, its share expected to be that of the rays of the points around it (smoothed by
- * Laplace's rule of succession), or a half where none is near. */
+/* The deviation of an open point, its share expected to be that of the rays of the points around it (smoothed
+ * by Laplace's rule of succession), or a half where none is near. */
 static double deviation_of(const ray_batch *batch, size_t owner) {
     /* where the neighbours' share is taken for a point's, errors come out larger by so much: measured on the
      * seeds' floor, where the estimate is right by it to a tenth */
@@ -206,15 +206,15 @@ static void prove(ray_batch *batch, vshi_facing *facing) {
     const vshi_shadow_task *task = batch->task;
     for (size_t i = 0; i < facing->count; ++i) {
         vshi_cone *cone = &facing->cone[i];
-        /* the receiver's own plane is taken for free only where the ball above it is: a part thinner than a voxel
-         * beside the receiver, or over it, looks like the plane along the cone. Without this 10 of a million proofs
-         * on the cloister were wrong, all by something less than half a voxel away */
+        /* the receiver's own plane is taken for free only where the ball above it is: a part thinner than a
+         * voxel beside the receiver, or over it, looks like the plane along the cone. Without this 10 of a
+         * million proofs on the cloister were wrong, all by something less than half a voxel away */
         const double horizon = cone->horizon;
         if (cone->begin <= 0.0) {
             cone->horizon = INFINITY;
         }
-        /* nothing to prove where the receiver's own plane hides a part of the light, or nearly does; and where no
-         * block around the point was, a few rays on triangles cost less than a long march */
+        /* nothing to prove where the receiver's own plane hides a part of the light, or nearly does; and
+         * where no block around the point was, a few rays on triangles cost less than a long march */
         const bool promising = task->options->method != VSH_SHADOW_EXACT || !facing->gathered[i] ||
                                cone->end < cone->begin + NEAR;
         if (promising && horizon >= cone->sine + GRAZING &&

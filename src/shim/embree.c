@@ -143,8 +143,9 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, s
         }
     }
     if (vertex_count > UINT32_MAX || triangle_count >= UINT32_MAX) {
-        return vshi_fail(error, VSH_ERROR_LIMIT, "triangles: %zu vertices and %zu triangles, at most 2^32 - 2",
-                         vertex_count, triangle_count);
+        return vshi_fail(error, VSH_ERROR_LIMIT,
+                         "triangles: %zu vertices and %zu triangles, at most 2^32 - 2", vertex_count,
+                         triangle_count);
     }
     vshi_sheet *sheet = &triangles->sheet;
     uint32_t *weld = NULL;
@@ -195,8 +196,7 @@ static bool attach(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh
     uint32_t *indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                                 3 * sizeof(uint32_t), end - begin);
     if (vertices != NULL && indices != NULL) {
-        memcpy(vertices, sheet->vertices + 3 * first_vertex,
-               meshes[mesh].vertex_count * 3 * sizeof(float));
+        memcpy(vertices, sheet->vertices + 3 * first_vertex, meshes[mesh].vertex_count * 3 * sizeof(float));
         for (size_t i = 0; i < 3 * (end - begin); ++i) {
             indices[i] = sheet->corners[3 * begin + i] - (uint32_t)first_vertex;
         }
@@ -439,7 +439,8 @@ void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *b
         double from = beam.wide;
         struct RTCRayHit hit;
         const bool near = vshi_dot(beam.origin, beam.origin) < FAR_ORIGIN * FAR_ORIGIN;
-        for (int layer = 0; near && layer < LAYERS && !cut[b] && next_hit(triangles, &beam, from, &hit); ++layer) {
+        for (int layer = 0; near && layer < LAYERS && !cut[b] && next_hit(triangles, &beam, from, &hit);
+             ++layer) {
             const double distance = (double)hit.ray.tfar;
             const uint32_t triangle = triangles->first[hit.hit.geomID] + hit.hit.primID;
             cut[b] = vshi_sheet_cuts(&triangles->sheet, &beam, triangle, distance, most);

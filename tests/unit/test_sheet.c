@@ -1,0 +1,215 @@
+/* Sheets of triangles that cut beams: what is said to be cut lets no ray through, and what can be seen to be
+ * cut is said to be. */
+#include "shading.h"
+
+#include "caster/sheet.h"
+
+#include <stdlib.h>
+
+enum { EDGE = 25, CELLS = EDGE - 1 };
+
+/* Numbers of [0, 1) that are the same everywhere. */
+static double next_number(uint64_t *state) {
+    *state = *state * 6364136223846793005u + 1442695040888963407u;
+    return (double)(*state >> 11) * 0x1p-53;
+}
+
+static double spread(uint64_t *state, double size) {
+    return size * (2.0 * next_number(state) - 1.0);
+}
+
+static void join(vshi_sheet *sheet) {
+    assert_int_equal(vshi_sheet_join(sheet, NULL), VSH_OK);
+}
+
+/* A bumpy sheet of x, y in [-6, 6] around z = 5, without the cells that `missing` (a share) takes. */
+static vshi_sheet bumpy(double height, double missing, uint64_t seed) {
+    vshi_sheet sheet;
+    assert_int_equal(vshi_sheet_allocate(&sheet, EDGE * EDGE, 2 * CELLS * CELLS, NULL), VSH_OK);
+    for (int i = 0; i < EDGE * EDGE; ++i) {
+        float *p = sheet.vertices + 3 * i;
+        p[0] = (float)(i % EDGE) * 0.5f - 6.0f;
+        p[1] = (float)(i / EDGE) * 0.5f - 6.0f;
+        p[2] = (float)(5.0 + spread(&seed, height));
+    }
+    size_t count = 0;
+    for (uint32_t y = 0; y < CELLS; ++y) {
+        for (uint32_t x = 0; x < CELLS; ++x) {
+            const uint32_t a = y * EDGE + x, cell[6] = {a, a + 1, a + EDGE, a + 1, a + EDGE + 1, a + EDGE};
+            if (next_number(&seed) >= missing) {
+                memcpy(sheet.corners + 3 * count, cell, sizeof cell);
+                count += 2;
+            }
+        }
+    }
+    sheet.triangle_count = count;
+    join(&sheet);
+    return sheet;
+}
+
+/* Where a ray meets a triangle: a distance, or a negative number (Möller and Trumbore, "Fast, minimum storage
+ * ray-triangle intersection", 1997). */
+static double meet(const vshi_sheet *sheet, size_t triangle, vshi_vec origin, vshi_vec direction) {
+    vshi_vec p[3];
+    for (int k = 0; k < 3; ++k) {
+        p[k] = vshi_vec_off(sheet->vertices + 3 * (size_t)sheet->corners[3 * triangle + (size_t)k]);
+    }
+    const vshi_vec a = vshi_sub(p[1], p[0]), b = vshi_sub(p[2], p[0]), h = vshi_cross(direction, b);
+    const double determinant = vshi_dot(a, h);
+    if (determinant == 0.0) {
+        return -1.0;
+    }
+    const vshi_vec s = vshi_sub(origin, p[0]), q = vshi_cross(s, a);
+    const double u = vshi_dot(s, h) / determinant, v = vshi_dot(direction, q) / determinant;
+    return u >= 0.0 && v >= 0.0 && u + v <= 1.0 ? vshi_dot(b, q) / determinant : -1.0;
+}
+
+static double first_hit(const vshi_sheet *sheet, vshi_vec origin, vshi_vec direction, uint32_t *triangle) {
+    double nearest = INFINITY;
+    for (size_t i = 0; i < sheet->triangle_count; ++i) {
+        const double t = meet(sheet, i, origin, direction);
+        if (t > 0.0 && t < nearest) {
+            nearest = t;
+            *triangle = (uint32_t)i;
+        }
+    }
+    return nearest;
+}
+
+/* A ray of the beam. */
+static void choose_ray(const vshi_sheet_beam *beam, uint64_t *state, vshi_vec *origin, vshi_vec *direction) {
+    vshi_vec u, v, off;
+    vshi_frame(beam->axis, &u, &v);
+    do {
+        off = (vshi_vec){spread(state, 1.0), spread(state, 1.0), spread(state, 1.0)};
+    } while (vshi_dot(off, off) > 1.0);
+    /* half of them from the rim, where a sheet that is too small would let them by */
+    if (next_number(state) < 0.5) {
+        off = vshi_unit(off);
+    }
+    const double angle = 2.0 * PI * next_number(state), out = beam->tangent * sqrt(next_number(state));
+    *origin = vshi_add(beam->origin, vshi_scale(off, beam->wide));
+    *direction = vshi_unit(
+        vshi_add(beam->axis, vshi_add(vshi_scale(u, out * cos(angle)), vshi_scale(v, out * sin(angle)))));
+}
+
+static void what_is_cut_lets_no_ray_through(void **state) {
+    (void)state;
+    uint64_t numbers = 5;
+    size_t cut = 0, open = 0;
+    for (int s = 0; s < 12; ++s) {
+        vshi_sheet sheet = bumpy(s % 3 == 0 ? 0.0 : 0.8, s % 4 == 0 ? 0.0 : 0.04, (uint64_t)s);
+        for (int b = 0; b < 200; ++b) {
+            vshi_sheet_beam beam = {
+                .origin = {spread(&numbers, 5.0), spread(&numbers, 5.0), spread(&numbers, 1.0)},
+                .axis = vshi_unit((vshi_vec){spread(&numbers, 0.7), spread(&numbers, 0.7), 1.0}),
+                .wide = 1.5 * next_number(&numbers),
+                .tangent = next_number(&numbers) < 0.2 ? 0.0 : 0.2 * next_number(&numbers),
+                .end = INFINITY};
+            uint32_t triangle = 0;
+            const double distance = first_hit(&sheet, beam.origin, beam.axis, &triangle);
+            if (!isfinite(distance) || !vshi_sheet_cuts(&sheet, &beam, triangle, distance, VSHI_SHEET_MOST)) {
+                ++open;
+                continue;
+            }
+            ++cut;
+            for (int r = 0; r < 100; ++r) {
+                vshi_vec origin, direction;
+                choose_ray(&beam, &numbers, &origin, &direction);
+                assert_true(isfinite(first_hit(&sheet, origin, direction, &triangle)));
+            }
+        }
+        vshi_sheet_free(&sheet);
+    }
+    print_message("%zu beams cut, %zu not\n", cut, open);
+    assert_true(cut > 500 && open > 500);
+}
+
+static void whole_sheets_cut_what_is_within_their_borders(void **state) {
+    (void)state;
+    vshi_sheet sheet = bumpy(0.3, 0.0, 3);
+    uint64_t numbers = 8;
+    for (int b = 0; b < 200; ++b) {
+        const vshi_sheet_beam beam = {.origin = {spread(&numbers, 3.0), spread(&numbers, 3.0), 0.0},
+                                      .axis = {0.0, 0.0, 1.0},
+                                      .wide = 0.5,
+                                      .tangent = 0.05,
+                                      .end = INFINITY};
+        uint32_t triangle = 0;
+        const double distance = first_hit(&sheet, beam.origin, beam.axis, &triangle);
+        assert_true(vshi_sheet_cuts(&sheet, &beam, triangle, distance, VSHI_SHEET_MOST));
+        /* nor where that would take more triangles, or the sheet is at the points or past the light */
+        assert_false(vshi_sheet_cuts(&sheet, &beam, triangle, distance, 2));
+        vshi_sheet_beam other = beam;
+        other.end = 4.0;
+        assert_false(vshi_sheet_cuts(&sheet, &other, triangle, distance, VSHI_SHEET_MOST));
+        other = beam;
+        other.origin.z = 4.5;
+        assert_false(vshi_sheet_cuts(&sheet, &other, triangle, distance - 4.5, VSHI_SHEET_MOST));
+    }
+    vshi_sheet_free(&sheet);
+}
+
+/* A box from z = 5 to 6, of x and y within 1. */
+static vshi_sheet slab(void) {
+    static const uint32_t FACES[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    vshi_sheet sheet;
+    assert_int_equal(vshi_sheet_allocate(&sheet, 8, 12, NULL), VSH_OK);
+    for (int i = 0; i < 8; ++i) {
+        sheet.vertices[3 * i] = i & 1 ? 1.0f : -1.0f;
+        sheet.vertices[3 * i + 1] = i & 2 ? 1.0f : -1.0f;
+        sheet.vertices[3 * i + 2] = i & 4 ? 6.0f : 5.0f;
+    }
+    memcpy(sheet.corners, FACES, sizeof FACES);
+    join(&sheet);
+    return sheet;
+}
+
+static void solids_cut_beams_that_they_are_wider_than(void **state) {
+    (void)state;
+    vshi_sheet sheet = slab();
+    for (size_t i = 0; i < 36; ++i) {
+        assert_true(sheet.neighbours[i] < 12);
+    }
+    for (int i = 0; i < 40; ++i) {
+        const vshi_sheet_beam beam = {
+            .origin = {0.1, 0.05, 0.0}, .axis = {0.0, 0.0, 1.0}, .wide = 0.05 * i + 0.01, .end = INFINITY};
+        uint32_t triangle = 0;
+        const double distance = first_hit(&sheet, beam.origin, beam.axis, &triangle);
+        const bool within = beam.wide < 0.9;
+        assert_true(fabs(beam.wide - 0.9) < 1e-3 ||
+                    vshi_sheet_cuts(&sheet, &beam, triangle, distance, VSHI_SHEET_MOST) == within);
+    }
+    vshi_sheet_free(&sheet);
+}
+
+static void edges_of_three_triangles_are_borders(void **state) {
+    (void)state;
+    vshi_sheet sheet;
+    assert_int_equal(vshi_sheet_allocate(&sheet, 5, 3, NULL), VSH_OK);
+    const float vertices[15] = {-9.0f, -9.0f, 5.0f,   9.0f, -9.0f, 5.0f,  0.0f, 20.0f,
+                                5.0f,  0.0f,  -30.0f, 5.0f, 0.0f,  -9.0f, 9.0f};
+    const uint32_t corners[9] = {0, 1, 2, 1, 0, 3, 0, 1, 4};
+    memcpy(sheet.vertices, vertices, sizeof vertices);
+    memcpy(sheet.corners, corners, sizeof corners);
+    join(&sheet);
+    for (size_t i = 0; i < 9; ++i) {
+        assert_int_equal(sheet.neighbours[i], VSHI_SHEET_BORDER);
+    }
+    sheet.triangle_count = 2;
+    join(&sheet);
+    assert_int_equal(sheet.neighbours[0], 1);
+    assert_int_equal(sheet.neighbours[3], 0);
+    vshi_sheet_free(&sheet);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_cut_lets_no_ray_through),
+        cmocka_unit_test(whole_sheets_cut_what_is_within_their_borders),
+        cmocka_unit_test(solids_cut_beams_that_they_are_wider_than),
+        cmocka_unit_test(edges_of_three_triangles_are_borders),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
