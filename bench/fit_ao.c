@@ -176,7 +176,7 @@ static uses uses_of(const sample_set *set, const vshi_ao_cones *cones) {
         float close[VSHI_AO_MAX_CONES];
         vshi_vec origin, normal, axes[3];
         vshi_march_stats work = {0, 0};
-        vshi_shade_origin(set->field, &points, i, set->start, 0.0, &origin, &normal);
+        vshi_shade_origin(set->field, &points, i, set->start, &origin, &normal);
         vshi_ao_axes(normal, axes);
         vshi_chunk_clear(chunk);
         for (int32_t c = 0; c < cones->count; ++c) {

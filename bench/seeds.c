@@ -8,13 +8,14 @@
 
 enum { SIDE = 512, TILE = 8, RAYS = 256 };
 
-/* Texels of the floor in tiles, as a lightmap's samples are ordered. */
+/* Texels of the floor in tiles, each in Morton's order, as a lightmap's samples are. */
 static void place_texels(double *positions, float *normals) {
     size_t i = 0;
     for (int tile = 0; tile < (SIDE / TILE) * (SIDE / TILE); ++tile) {
         for (int t = 0; t < TILE * TILE; ++t, ++i) {
-            const int row = tile / (SIDE / TILE) * TILE + t / TILE,
-                      column = tile % (SIDE / TILE) * TILE + t % TILE;
+            const int x = (t & 1) | (t >> 1 & 2) | (t >> 2 & 4),
+                      y = (t >> 1 & 1) | (t >> 2 & 2) | (t >> 3 & 4);
+            const int row = tile / (SIDE / TILE) * TILE + y, column = tile % (SIDE / TILE) * TILE + x;
             positions[3 * i] = -2.5 + 5.0 * (column + 0.5) / SIDE;
             positions[3 * i + 1] = 0.001;
             positions[3 * i + 2] = -2.5 + 5.0 * (row + 0.5) / SIDE;

@@ -10,8 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Room for the rounding of floats, of the largest coordinate. */
-static const double ROUNDING = 0x1p-20;
+/* Room for the rounding of floats and for what rays are lifted off a surface, in a scene of half size 1. */
+static const double ROUNDING = 0x1p-16;
 
 vsh_result vshi_sheet_allocate(vshi_sheet *sheet, size_t vertex_count, size_t triangle_count,
                                vsh_error *error) {

@@ -13,7 +13,7 @@
 typedef struct vshi_sheet {
     size_t vertex_count;
     size_t triangle_count;
-    float *vertices;      /* [vertex_count][3] */
+    float *vertices;      /* [vertex_count][3], within 1 of the origin */
     uint32_t *corners;    /* [triangle_count][3]: vertices */
     uint32_t *neighbours; /* [triangle_count][3]: triangle across the edge from corner k to k + 1, or
                            * VSHI_SHEET_BORDER where not exactly two triangles meet */

@@ -11,8 +11,8 @@ void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]) {
 
 bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, vsh_shade_stats *stats) {
     vshi_vec normal;
-    if (!vshi_shade_origin(task->field, task->points, i, task->options->start_offset,
-                           task->options->surface_offset, &frame->origin, &normal)) {
+    if (!vshi_shade_origin(task->field, task->points, i, vshi_shade_lift(task->field, task->options),
+                           &frame->origin, &normal)) {
         task->ao[i] = NAN;
         ++stats->invalid;
         return false;

@@ -46,9 +46,9 @@ static bool worthwhile(const vshi_shadow_task *task, double end) {
 
 static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_shade_stats *stats) {
     static const double LEAST_SINE = 0.1; /* of the cone's lowest ray over the plane */
-    float centres[3][VSHI_CHUNK];
-    bool is_free[VSHI_CHUNK];
-    uint32_t owner[VSHI_CHUNK];
+    float centres[3][VSHI_PIECE];
+    bool is_free[VSHI_PIECE];
+    uint32_t owner[VSHI_PIECE];
     size_t count = 0;
     for (size_t i = 0; i < facing->count; ++i) {
         const vshi_cone *cone = &facing->cone[i];
@@ -66,10 +66,11 @@ static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_sh
     for (size_t b = 0; b < count; ++b) {
         if (is_free[b]) {
             vshi_cone *cone = &facing->cone[owner[b]];
-            /* sine of the lowest ray: the axis's less at most the cone's */
+            /* where the lowest ray leaves the ball, whose sine is the axis's less at most the cone's; along
+             * the axis */
             const double rise = NEAR_HEIGHT * (cone->horizon - cone->sine);
-            const double square = rise * rise - lack;
-            cone->begin = square > 0.0 ? rise + sqrt(square) : 0.0;
+            const double square = rise * rise - lack, cosine = sqrt(1.0 - cone->sine * cone->sine);
+            cone->begin = square > 0.0 ? cosine * (rise + sqrt(square)) : 0.0;
         }
     }
 }
@@ -89,7 +90,7 @@ static inline double least(double a, double b) {
 
 /* How far the points themselves are below where their cones begin, voxels. */
 static double below(const vshi_shadow_task *task) {
-    return task->options->start_offset + task->options->surface_offset / task->field->voxel_size;
+    return vshi_shade_lift(task->field, task->options);
 }
 
 /* The beam around the cones of a block's points; false where there is none worth a look. */
@@ -165,9 +166,9 @@ static void hide(const vshi_shadow_task *task, vshi_facing *facing, const block 
 /* Hides the blocks whose beams are cut by triangles. */
 static void hide_cut(const vshi_shadow_task *task, vshi_facing *facing, const block *blocks, size_t count,
                      int triangles, vsh_shade_stats *stats) {
-    vshi_sheet_beam beams[VSHI_CHUNK / SMALLEST];
-    bool cut[VSHI_CHUNK / SMALLEST];
-    size_t number[VSHI_CHUNK / SMALLEST], tried = 0;
+    vshi_sheet_beam beams[VSHI_PIECE / SMALLEST];
+    bool cut[VSHI_PIECE / SMALLEST];
+    size_t number[VSHI_PIECE / SMALLEST], tried = 0;
     const vsh_field *field = task->field;
     for (size_t i = 0; i < count; ++i) {
         const block *b = &blocks[i];
@@ -203,7 +204,7 @@ static void hide_cut(const vshi_shadow_task *task, vshi_facing *facing, const bl
 static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s, vshi_chunk *chunk,
                        vsh_shade_stats *stats) {
     const size_t size = SIZE[s].points;
-    block blocks[VSHI_CHUNK / SMALLEST];
+    block blocks[VSHI_PIECE / SMALLEST];
     size_t count = 0;
     vshi_chunk_clear(chunk);
     for (size_t first = 0; first < facing->count; first += size) {

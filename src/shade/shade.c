@@ -94,8 +94,8 @@ vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, s
     return result;
 }
 
-bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double start_offset,
-                       double surface_offset, vshi_vec *origin, vshi_vec *normal) {
+bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double lift,
+                       vshi_vec *origin, vshi_vec *normal) {
     *origin = vshi_to_field(field, points->positions + 3 * i);
     *normal = (vshi_vec){0.0, 0.0, 0.0};
     if (points->normals != NULL) {
@@ -103,7 +103,7 @@ bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t 
         if (!(vshi_dot(*normal, *normal) > 0.0)) {
             return false;
         }
-        *origin = vshi_add(*origin, vshi_scale(*normal, start_offset + surface_offset / field->voxel_size));
+        *origin = vshi_add(*origin, vshi_scale(*normal, lift));
     }
     return vshi_finite(*origin);
 }

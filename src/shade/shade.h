@@ -16,9 +16,14 @@ typedef void vshi_shade_fn(const void *task, size_t begin, size_t end, vsh_shade
 vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
                           vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error);
 
-/* Where the rays of point i begin, and its unit normal, both in field space. False for a point that is not
- * finite or has no normal where normals are given (then *normal is zero). */
-bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double start_offset,
-                       double surface_offset, vshi_vec *origin, vshi_vec *normal);
+/* How far above a point its rays begin, voxels. */
+static inline double vshi_shade_lift(const vsh_field *field, const vsh_shade_options *options) {
+    return options->start_offset + options->surface_offset / field->voxel_size;
+}
+
+/* Where the rays of point i begin, `lift` voxels above it, and its unit normal, both in field space. False
+ * for a point that is not finite or has no normal where normals are given (then *normal is zero). */
+bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double lift,
+                       vshi_vec *origin, vshi_vec *normal);
 
 #endif

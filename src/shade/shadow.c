@@ -50,13 +50,13 @@ static bool aim(const vshi_shadow_task *task, size_t i, vshi_vec origin, vshi_co
 
 void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, vshi_facing *facing,
                         vshi_chunk *chunk, vsh_shade_stats *stats) {
+    const double lift = vshi_shade_lift(task->field, task->options);
     facing->count = 0;
     for (size_t i = begin; i < end; ++i) {
         vshi_cone *cone = &facing->cone[facing->count];
         vshi_vec *normal = &facing->normal[facing->count];
         vshi_vec origin;
-        if (!vshi_shade_origin(task->field, task->points, i, task->options->start_offset,
-                               task->options->surface_offset, &origin, normal)) {
+        if (!vshi_shade_origin(task->field, task->points, i, lift, &origin, normal)) {
             vshi_shadow_settle(task, i, NAN, NAN);
             ++stats->invalid;
             continue;
@@ -153,14 +153,14 @@ vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, co
         task.purpose = 31u * task.purpose + (unsigned char)light->name[i];
     }
     if (!by_rays) {
-        return vshi_shade_run(run, stage, points->count, VSHI_CHUNK, shade_points, &task, stats, error);
+        return vshi_shade_run(run, stage, points->count, VSHI_PIECE, shade_points, &task, stats, error);
     }
     vshi_sampler *sampler = vshi_sampler_create(full.sampler, full.rays, full.frame);
     if (sampler == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
     }
     task.sampler = sampler;
-    result = vshi_shade_run(run, stage, points->count, VSHI_CHUNK, vshi_shadow_by_rays, &task, stats, error);
+    result = vshi_shade_run(run, stage, points->count, VSHI_PIECE, vshi_shadow_by_rays, &task, stats, error);
     vshi_sampler_free(sampler);
     return result;
 }

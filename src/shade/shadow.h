@@ -24,18 +24,20 @@ typedef struct vshi_shadow_task {
     uint32_t purpose; /* of the sampler: lights of other names have other sequences */
 } vshi_shadow_task;
 
+enum { VSHI_PIECE = 512 }; /* points: with their rays 300 KB of the stack */
+
 /* The points of a piece that the light's cones rise above. */
 typedef struct vshi_facing {
     size_t count;
-    size_t point[VSHI_CHUNK];
-    vshi_vec normal[VSHI_CHUNK]; /* zero where there are none */
-    vshi_cone cone[VSHI_CHUNK];  /* horizon: sine of the axis over the receiver's plane, INFINITY without one;
+    size_t point[VSHI_PIECE];
+    vshi_vec normal[VSHI_PIECE]; /* zero where there are none */
+    vshi_cone cone[VSHI_PIECE];  /* horizon: sine of the axis over the receiver's plane, INFINITY without one;
                                   * close, stop: not set */
-    bool settled[VSHI_CHUNK];    /* no value is left to find */
-    bool gathered[VSHI_CHUNK];   /* with its neighbours, and not proved: it is likely to be in a penumbra */
+    bool settled[VSHI_PIECE];    /* no value is left to find */
+    bool gathered[VSHI_PIECE];   /* with its neighbours, and not proved: it is likely to be in a penumbra */
 } vshi_facing;
 
-/* Gathers points begin … end - 1, at most VSHI_CHUNK, without those that are settled already: invalid, within
+/* Gathers points begin … end - 1, at most VSHI_PIECE, without those that are settled already: invalid, within
  * the light, turned away. What blocks of them share is proved (blocks.h). */
 void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, vshi_facing *facing,
                         vshi_chunk *chunk, vsh_shade_stats *stats);

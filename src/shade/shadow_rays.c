@@ -166,7 +166,7 @@ static void cast_rounds(ray_batch *batch) {
     const bool hard = batch->task->sine <= 0.0 && batch->task->radius <= 0.0; /* all rays are the same */
     const int32_t most = hard ? 1 : options->rays;
     int32_t target = refining ? FIRST_ROUND : options->early_rays > 0 ? options->early_rays : most;
-    size_t unsettled[VSHI_CHUNK], count = batch->open_count;
+    size_t unsettled[VSHI_PIECE], count = batch->open_count;
     for (size_t o = 0; o < count; ++o) {
         unsettled[o] = o;
         if (options->method == VSH_SHADOW_EXACT) {
@@ -242,7 +242,7 @@ static void prove(ray_batch *batch, vshi_facing *facing) {
 void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const vshi_shadow_task *task = user;
     vshi_facing facing;
-    open_point open[VSHI_CHUNK];
+    open_point open[VSHI_PIECE];
     ray_batch batch;
     batch.task = task;
     batch.open = open;
