@@ -28,7 +28,7 @@ static const light_case LIGHTS[] = {
     {"grazing 0.5", {0.9, 0.13, 0.43}, 0.5, 0}, {"grazing 10", {-0.7, 0.2, 0.68}, 10.0, 0},
     {"lamp", {0.13, 0.3, 0.08}, 0.02, 1},       {"large lamp", {-0.3, 0.7, 0.5}, 0.12, 1}};
 enum { LIGHT_COUNT = sizeof LIGHTS / sizeof LIGHTS[0] };
-static const int32_t RESOLUTIONS[] = {512, 128};
+static const int32_t RESOLUTIONS[] = {512, 128, 64, 32};
 
 static vsh_light light_of(const light_case *c, const vsh_field_info *info, double wider) {
     vsh_light light = vsh_light_default();
