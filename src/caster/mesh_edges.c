@@ -2,18 +2,12 @@
  * triangles are counted by direction. An edge met by an odd number of triangles is a border; one whose
  * triangles run along it more often one way than the other joins triangles that disagree about the outside.
  */
+#include "base/hash.h"
 #include "base/memory.h"
 #include "caster/mesh.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-static uint64_t mix(uint64_t x) {
-    /* The finaliser of SplitMix64 (Steele, Lea and Flood 2014): neighbouring floats land far apart. */
-    x = (x ^ (x >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    x = (x ^ (x >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return x ^ (x >> 31);
-}
 
 static uint64_t hash_position(const float *p) {
     uint32_t bits[3];
@@ -21,7 +15,7 @@ static uint64_t hash_position(const float *p) {
         const float value = p[k] == 0.0F ? 0.0F : p[k]; /* -0 equals 0 */
         memcpy(&bits[k], &value, sizeof value);
     }
-    return mix(mix((uint64_t)bits[0] << 32 | bits[1]) + bits[2] + UINT64_C(0x9e3779b97f4a7c15));
+    return vshi_mix(vshi_mix((uint64_t)bits[0] << 32 | bits[1]) + bits[2] + UINT64_C(0x9e3779b97f4a7c15));
 }
 
 vsh_result vshi_mesh_weld(const vsh_mesh *mesh, uint32_t *weld, vsh_error *error) {

@@ -4,6 +4,7 @@
  * the differentiable viewpoint", 1965). The sheet need be neither flat nor closed. */
 #include "caster/sheet.h"
 
+#include "base/hash.h"
 #include "base/memory.h"
 
 #include <math.h>
@@ -43,12 +44,6 @@ double vshi_sheet_bytes(double vertex_count, double triangle_count) {
     return vertex_count * 3.0 * sizeof(float) + triangle_count * 6.0 * sizeof(uint32_t);
 }
 
-static uint64_t mix(uint64_t x) {
-    x = (x ^ (x >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
-    x = (x ^ (x >> 27)) * UINT64_C(0x94d049bb133111eb);
-    return x ^ (x >> 31);
-}
-
 /* Edge k of triangle t is number 3 t + k. The table holds the first edge seen between two vertices, plus 1.
  */
 static void join_edge(vshi_sheet *sheet, uint64_t *slots, size_t capacity, size_t edge) {
@@ -58,7 +53,7 @@ static void join_edge(vshi_sheet *sheet, uint64_t *slots, size_t capacity, size_
     if (a == b) {
         return;
     }
-    size_t slot = (size_t)mix((uint64_t)low << 32 | high) & (capacity - 1);
+    size_t slot = (size_t)vshi_mix((uint64_t)low << 32 | high) & (capacity - 1);
     for (; slots[slot] != 0; slot = (slot + 1) & (capacity - 1)) {
         const size_t other = (size_t)((slots[slot] - 1) >> 2), met = (size_t)((slots[slot] - 1) & 3);
         const uint32_t *held = sheet->corners + other / 3 * 3;
