@@ -9,6 +9,22 @@ void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]) {
     axes[2] = normal;
 }
 
+/* A trilinear sample over a convex edge is too large, by up to 0.44 voxels: what stands out in the field is
+ * smaller than its caster, and edges are what hides the sky. Rays on the cloister's field, from the same
+ * starts as rays on its triangles and out of creases, have an RMSE of 0.0105 and see 0.0043 too much where
+ * they end at 0; at 0.1 these are 0.0071 and 0.0016, at 0.2 0.0060 and -0.0011, at 0.3 0.0080 and -0.0038.
+ * Round casters lose less: at 0.2 sixteen cones are 0.0051 too dark on the seeds' floor, at 0.15 0.0046. */
+static const double GROWN = 0.15;
+/* Of the height of the start at most, so that a receiver never hides itself: what is left of a start offset
+ * is 0.1 voxels. */
+static const double GROWN_SHARE = 0.75;
+
+double vshi_ao_grown(const vsh_field *field, vshi_vec origin) {
+    const float at[3] = {(float)origin.x, (float)origin.y, (float)origin.z};
+    const double most = GROWN_SHARE * (double)vshi_field_distance(field, at);
+    return most > GROWN ? GROWN : most > 0.0 ? most : 0.0;
+}
+
 bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, vsh_shade_stats *stats) {
     vshi_vec normal;
     if (!vshi_shade_origin(task->field, task->points, i, vshi_shade_lift(task->field, task->options),
@@ -18,6 +34,7 @@ bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, 
         return false;
     }
     vshi_ao_axes(normal, frame->axes);
+    frame->grown = 0.0;
     return true;
 }
 

@@ -33,10 +33,14 @@ typedef struct vshi_ao_task {
 typedef struct vshi_ao_frame {
     vshi_vec origin;
     vshi_vec axes[3];
+    double grown; /* what is taken off the distances that its cones and rays meet, voxels */
 } vshi_ao_frame;
 
 /* The frame of point i in field space; false where the point is invalid: it is then NaN and counted. */
 bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, vsh_shade_stats *stats);
+
+/* What the field's edges are short of, voxels, at a point where rays begin. */
+double vshi_ao_grown(const vsh_field *field, vshi_vec origin);
 
 /* vshi_frame() of a unit vector, and the vector. */
 void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]);

@@ -101,7 +101,7 @@ static double open_share(const vshi_ao_cones *cones, const float *close) {
 
 static void flush(const vshi_ao_task *task, vshi_chunk *chunk, float *close, vsh_shade_stats *stats) {
     vshi_march_stats work = {0, 0};
-    task->kernel->march(task->field, &chunk->rays, VSHI_MARCH_PLAIN, task->options->max_steps, &work);
+    task->kernel->march(task->field, &chunk->rays, VSHI_MARCH_GROWN, task->options->max_steps, &work);
     stats->samples += work.samples;
     stats->unfinished += work.unfinished;
     for (size_t r = 0; r < chunk->rays.count; ++r) {
@@ -126,6 +126,8 @@ void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stat
         if (!valid[i - begin]) {
             continue;
         }
+        frame.grown = vshi_ao_grown(task->field, frame.origin);
+        ++stats->samples;
         if (chunk.rays.count + count > VSHI_CHUNK) {
             flush(task, &chunk, close, stats);
         }
@@ -137,6 +139,7 @@ void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stat
                 .sine = cones->sines[c],
                 .close = cones->sines[c],
                 .stop = -cones->sines[c],
+                .wide = frame.grown,
             };
             const size_t owner = (i - begin) * count + c;
             if (!vshi_chunk_add(&chunk, task->field, &cone, (uint32_t)owner, stats)) {

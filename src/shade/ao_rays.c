@@ -62,7 +62,7 @@ static void flush(batch *b, vsh_shade_stats *stats) {
         return;
     }
     vshi_march_stats work = {0, 0};
-    task->kernel->march(task->field, &b->chunk.rays, VSHI_MARCH_PLAIN, task->options->max_steps, &work);
+    task->kernel->march(task->field, &b->chunk.rays, VSHI_MARCH_GROWN, task->options->max_steps, &work);
     stats->samples += work.samples;
     stats->unfinished += work.unfinished;
     stats->rays += b->chunk.rays.count;
@@ -124,7 +124,8 @@ static void march_ray(batch *b, uint32_t owner, vshi_vec local, vsh_shade_stats 
                            .end = task->distance,
                            .sine = 0.0,
                            .close = 1.0,
-                           .stop = 0.0};
+                           .stop = 0.0,
+                           .wide = point->frame.grown};
     if (!vshi_chunk_add(&b->chunk, task->field, &ray, owner, stats)) {
         ++point->free;
         return;
@@ -195,6 +196,8 @@ static bool prepare(batch *b, size_t i, ao_point *point, vsh_shade_stats *stats)
         point->world_origin = vshi_add(vshi_vec_of(points->positions + 3 * i),
                                        vshi_scale(normal, offset + task->options->surface_offset));
     } else {
+        point->frame.grown = vshi_ao_grown(task->field, point->frame.origin);
+        ++stats->samples;
         find_balls(task, point, stats);
     }
     return true;
