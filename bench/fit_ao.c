@@ -1,7 +1,9 @@
 /* Fits what a cone of ambient occlusion sees, given how near it comes to the casters and how free its
  * neighbours are, to analytic rays: prints the table of src/shade/ao_cones.c and the errors it leaves. Scenes
  * of boxes, slats, spheres and closed rooms, none of which is used to measure the result. Not part of a
- * build's tests: run it after a change of the cones' directions or widths. */
+ * build's tests: run it after a change of the cones' directions or widths. The cones are marched in the field
+ * as it is, without what vshi_ao_grown() takes off: fitted with that, sixteen cones were 0.001 brighter on
+ * the cloister. */
 #include "analytic.h"
 #include "shade/ao.h"
 

@@ -1,5 +1,6 @@
 /* Ambient occlusion by rays: fixed numbers of them, and until an error is reached. */
 #include "shading.h"
+#include "truth/metrics.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -289,8 +290,42 @@ static void bad_points_are_nan_with_nan_deviation(void **state) {
     }
 }
 
+/* A slatted roof over a floor: nothing but convex edges, which trilinear samples cut. What rays are to see
+ * through it they see to a hundredth. */
+static void edges_hide_as_much_as_their_casters(void **state) {
+    (void)state;
+    enum { SLATS = 7, COUNT = 40 };
+    truth_solid slats[SLATS];
+    for (int i = 0; i < SLATS; ++i) {
+        slats[i] = (truth_solid){TRUTH_BOX, {0.4 * (i - 3), 0.6, 0.0}, {0.1, 0.1, 1.5}, 0.0, 0.0};
+    }
+    const truth_scene scene = {slats, SLATS};
+    const double up[3] = {0.0, 1.0, 0.0};
+    double places[3 * COUNT];
+    float ups[3 * COUNT] = {0}, open[COUNT], expected[COUNT];
+    for (int i = 0; i < COUNT; ++i) {
+        places[3 * i] = -0.8 + 0.04 * i;
+        places[3 * i + 1] = 0.0;
+        places[3 * i + 2] = 0.013 * i - 0.2;
+        ups[3 * i + 1] = 1.0f;
+        expected[i] = (float)truth_ao(scene, places + 3 * i, up, 1.0, 4096);
+    }
+    vsh_field *field = field_of(scene, 0.06, 0.0);
+    vsh_shade_options options = vsh_shade_options_default();
+    options.ao_method = VSH_AO_RAYS;
+    options.rays = 1024;
+    options.ao_distance = 1.0;
+    const vsh_points points = {COUNT, places, ups, NULL};
+    assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, open, NULL, NULL, NULL), VSH_OK);
+    const truth_metrics m = truth_compare(COUNT, open, expected, NULL);
+    print_message("slats of 3.3 voxels: rmse %.4f, bias %+.4f\n", m.rmse, m.bias);
+    assert_true(fabs(m.bias) < 0.01);
+    vsh_field_free(field);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(edges_hide_as_much_as_their_casters),
         cmocka_unit_test(an_open_plate_is_exactly_1),
         cmocka_unit_test(a_closed_room_is_dark_however_thin_its_walls),
         cmocka_unit_test(more_rays_come_nearer_to_the_truth),
