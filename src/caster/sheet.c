@@ -82,6 +82,9 @@ static void join_edge(vshi_sheet *sheet, uint64_t *slots, size_t capacity, size_
 
 vsh_result vshi_sheet_join(vshi_sheet *sheet, vsh_error *error) {
     const size_t edges = 3 * sheet->triangle_count;
+    if (edges == 0) {
+        return VSH_OK;
+    }
     memset(sheet->neighbours, 0xff, edges * sizeof *sheet->neighbours);
     size_t capacity = 16;
     while (capacity < edges + edges / 2) {
