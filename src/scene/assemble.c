@@ -1,7 +1,7 @@
 /* From a scene's casters to one level set. */
 #include "base/floats.h"
-#include "scene/assets.h"
 #include "base/similarity.h"
+#include "scene/assets.h"
 
 #include "base/job.h"
 #include "base/memory.h"

@@ -114,11 +114,11 @@ static void run_all(int s, int32_t threads, outcome *o) {
         }
         if (triangles != NULL) {
             vshi_floats_set(setting);
-            results[calls++] = vsh_trace_shadow(triangles, NULL, COUNT, positions, normals, 1e-5, &lights[1], 32,
-                                                &run, o->traced[0], &error);
+            results[calls++] = vsh_trace_shadow(triangles, NULL, COUNT, positions, normals, 1e-5, &lights[1],
+                                                32, &run, o->traced[0], &error);
             vshi_floats_set(setting);
-            results[calls++] =
-                vsh_trace_ao(triangles, NULL, COUNT, positions, normals, 1e-5, 1.0, 32, &run, o->traced[1], &error);
+            results[calls++] = vsh_trace_ao(triangles, NULL, COUNT, positions, normals, 1e-5, 1.0, 32, &run,
+                                            o->traced[1], &error);
         }
         vshi_floats_set(setting);
         vsh_shade_irradiance(&points, NULL, &lights[1], o->visible[1], o->light);

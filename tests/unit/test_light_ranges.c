@@ -179,9 +179,9 @@ static void exact_of_a_light_without_size_is_one_traced_ray(void **state) {
     const vsh_light lights[2] = {sun(truth_seeds_sun, 0.0), lamp(place, 0.0)};
     for (int l = 0; l < 2; ++l) {
         cast_shadows(&c, &lights[l], VSH_SHADOW_EXACT, COUNT, positions, normals, exact);
-        assert_int_equal(
-            vsh_trace_shadow(c.triangles, NULL, COUNT, positions, normals, 1e-5, &lights[l], 1, NULL, ray, NULL),
-            VSH_OK);
+        assert_int_equal(vsh_trace_shadow(c.triangles, NULL, COUNT, positions, normals, 1e-5, &lights[l], 1,
+                                          NULL, ray, NULL),
+                         VSH_OK);
         size_t other = 0, dark = 0;
         for (size_t i = 0; i < COUNT; ++i) {
             assert_true(exact[i] == 0.0f || exact[i] == 1.0f);
