@@ -176,17 +176,33 @@ vsh_result write_rows(OIIO::ImageOutput &output, const char *path, const vshi_pl
     return VSH_OK;
 }
 
-// rla notes the minute of its making: same input, same bytes.
-int clear_date(const char *temporary) {
-    constexpr off_t DATE_AT = 528;
-    constexpr char date[20] = "Jan 01 00:00 1970";
-    const int file = ::open(temporary, O_WRONLY | O_CLOEXEC);
-    const bool written = file >= 0 && ::pwrite(file, date, sizeof date, DATE_AT) == ssize_t(sizeof date);
-    const int number = written ? 0 : errno;
-    if (file >= 0) {
-        ::close(file);
+// What a format's header says of the making of the file, and what stands there instead: same input, same
+// bytes.
+struct Stamp {
+    const char *format;
+    off_t at;
+    std::string text;
+};
+
+int clear_stamps(const char *temporary, const char *format) {
+    static const Stamp stamps[] = {
+        {"rla", 528, std::string("Jan 01 00:00 1970").append(3, '\0')}, // the minute
+        {"dpx", 36, std::string(100, '\0')},                            // the temporary file's name
+    };
+    for (const Stamp &stamp : stamps) {
+        if (std::strcmp(format, stamp.format) != 0) {
+            continue;
+        }
+        const int file = ::open(temporary, O_WRONLY | O_CLOEXEC);
+        const bool written = file >= 0 && ::pwrite(file, stamp.text.data(), stamp.text.size(), stamp.at) ==
+                                              ssize_t(stamp.text.size());
+        const int number = written ? 0 : errno;
+        if (file >= 0) {
+            ::close(file);
+        }
+        return number;
     }
-    return number;
+    return 0;
 }
 
 // Why nothing more can be written to a file, or 0: asked of a file that is to be thrown away.
@@ -297,14 +313,14 @@ vsh_result write_as(const char *temporary, const char *path, const vshi_format &
     if (result == VSH_OK && !closed) {
         result = fail_write(error, path, reason(text));
     }
-    if (result != VSH_OK || file != nullptr) {
+    if (result != VSH_OK) {
         return result;
     }
-    const int dated = std::strcmp(format.name, "rla") == 0 ? clear_date(temporary) : 0;
-    if (dated != 0) {
-        return fail_write(error, path, std::strerror(dated));
+    const int stamped = clear_stamps(temporary, format.name);
+    if (stamped != 0) {
+        return fail_write(error, path, std::strerror(stamped));
     }
-    return verify<Value>(temporary, path, format, planes, error);
+    return file != nullptr ? VSH_OK : verify<Value>(temporary, path, format, planes, error);
 }
 
 } // namespace
