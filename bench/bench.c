@@ -1,5 +1,6 @@
 #include "bench.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -27,6 +28,15 @@ static int ascending(const void *a, const void *b) {
 double bench_median(double *seconds, size_t count) {
     qsort(seconds, count, sizeof *seconds, ascending);
     return seconds[count / 2];
+}
+
+double bench_seconds_for(double error, const double *errors, const double *seconds, size_t count) {
+    size_t i = 0;
+    while (i + 2 < count && errors[i + 1] > error) {
+        ++i;
+    }
+    const double part = log(error / errors[i]) / log(errors[i + 1] / errors[i]);
+    return seconds[i] * pow(seconds[i + 1] / seconds[i], part);
 }
 
 void bench_check(vsh_result result, const vsh_error *error) {
@@ -109,8 +119,11 @@ int main(int argc, char **argv) {
     const struct {
         const char *name;
         void (*run)(FILE *csv);
-    } parts[] = {
-        {"seeds", bench_seeds}, {"asset", bench_asset}, {"refine", bench_refine}, {"proofs", bench_proofs}};
+    } parts[] = {{"seeds", bench_seeds},
+                 {"asset", bench_asset},
+                 {"ao", bench_ao_lightmaps},
+                 {"refine", bench_refine},
+                 {"proofs", bench_proofs}};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
         if (only == NULL || strcmp(only, parts[i].name) == 0) {
             parts[i].run(csv);

@@ -15,6 +15,10 @@ double bench_seconds(void);
 /* Median of the runs' seconds; sorts them. */
 double bench_median(double *seconds, size_t count);
 
+/* Seconds that a curve of falling errors takes for an error, between its points by powers and beyond them
+ * likewise. */
+double bench_seconds_for(double error, const double *errors, const double *seconds, size_t count);
+
 /* Memory, or the end of the program. */
 void *bench_take(size_t bytes);
 
@@ -40,6 +44,7 @@ void bench_methods(FILE *csv, const char *scene, const vsh_field *field, const v
 
 void bench_seeds(FILE *csv);
 void bench_asset(FILE *csv);
+void bench_ao_lightmaps(FILE *csv);
 void bench_refine(FILE *csv);
 void bench_proofs(FILE *csv);
 

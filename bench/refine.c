@@ -20,17 +20,6 @@ typedef struct receivers {
     float *normals, *valid, *truth, *values, *reference, *deviation;
 } receivers;
 
-/* Seconds that a curve of falling errors takes for an error, between its points by powers and beyond them
- * likewise. */
-static double seconds_for(double error, const double *errors, const double *seconds, size_t count) {
-    size_t i = 0;
-    while (i + 2 < count && errors[i + 1] > error) {
-        ++i;
-    }
-    const double part = log(error / errors[i]) / log(errors[i + 1] / errors[i]);
-    return seconds[i] * pow(seconds[i + 1] / seconds[i], part);
-}
-
 static void measure(FILE *csv, const bench_scene *scene) {
     vsh_error error;
     vsh_triangles *triangles = NULL;
@@ -115,7 +104,8 @@ static void measure(FILE *csv, const bench_scene *scene) {
                    sqrt(stats.square_error / POINTS), 100.0 * (double)proved / (double)valid, wrong, proved,
                    (double)stats.rays / POINTS);
             if (exact) {
-                const double embree = seconds_for(metrics.rmse, curve_error, curve_seconds, CURVE) / POINTS;
+                const double embree =
+                    bench_seconds_for(metrics.rmse, curve_error, curve_seconds, CURVE) / POINTS;
                 printf("; Embree takes %.3f us for this error: %.2f of its time", 1e6 * embree,
                        each / embree);
             }

@@ -18,11 +18,14 @@ typedef struct vsh_lightmap_options {
     int32_t supersample;     /* N: N × N samples a texel, 1 … 16 */
     int32_t padding;         /* texels that charts are grown by, 0 … 4096; fills values, never coverage */
     vsh_shade_options shade; /* of a bake that is given none; checked there */
+    int32_t ao_spacing;      /* 1, 2, 4 or 8 texels: AO by cones, adaptive or exact is shaded no closer than
+                              * this where casters are far enough, and interpolated between. 1: at every texel,
+                              * as supersampled lightmaps are always */
 } vsh_lightmap_options;
 
 static inline vsh_lightmap_options vsh_lightmap_options_default(void) {
     vsh_lightmap_options options = {sizeof(vsh_lightmap_options), 1024, 1024, 1, 4,
-                                    vsh_shade_options_default()};
+                                    vsh_shade_options_default(),  4};
     return options;
 }
 

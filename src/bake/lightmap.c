@@ -1,4 +1,4 @@
-#include "bake/origins.h"
+#include "bake/lattice.h"
 #include "bake/padding.h"
 #include "bake/take.h"
 #include "base/floats.h"
@@ -48,6 +48,14 @@ static bool errors_wanted(const vsh_lightmap *lightmap, size_t light_count) {
         wanted = wanted || lightmap->shadow_error[i] != NULL;
     }
     return wanted;
+}
+
+/* Whether AO need not be shaded at every texel. `rays` are for those who want just them, taps cost no more.
+ */
+static bool interpolates(const baking *bake) {
+    const int32_t method = bake->shade.ao_method;
+    return bake->texels->ao_spacing > 1 &&
+           (method == VSH_AO_CONES || method == VSH_AO_ADAPTIVE || method == VSH_AO_EXACT);
 }
 
 /* Where rays begin: lifted already, but for methods that trace triangles. Those know the surface better than
@@ -188,8 +196,12 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
     if (result == VSH_OK && ao_wanted(lightmap)) {
         vsh_shade_options shade;
         const vsh_points points = points_of(bake, bake->shade.ao_method == VSH_AO_EXACT, &shade);
-        result = vsh_shade_ao(bake->field, &points, &shade, &bake->run, bake->values,
-                              lightmap->ao_error != NULL ? bake->deviation : NULL, &bake->stats.shade, error);
+        float *deviation = lightmap->ao_error != NULL ? bake->deviation : NULL;
+        result = interpolates(bake) ? vshi_lattice_ao(bake->field, texels, &bake->origins, &points, &shade,
+                                                      texels->ao_spacing, &bake->run, bake->values, deviation,
+                                                      &bake->stats.shade, error)
+                                    : vsh_shade_ao(bake->field, &points, &shade, &bake->run, bake->values,
+                                                   deviation, &bake->stats.shade, error);
         if (result == VSH_OK && lightmap->ao_error != NULL) {
             result = average(bake, bake->deviation, 1, lightmap->ao_error, error);
         }
@@ -297,6 +309,7 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     bytes += traced ? samples * 3.0 * sizeof(double) : 0.0;
     bytes += (values ? samples * sizeof(float) : 0.0) + (errors ? samples * sizeof(float) : 0.0);
     bytes += irradiance ? samples * 3.0 * sizeof(float) : 0.0;
+    bytes += ao_wanted(bake->lightmap) && interpolates(bake) ? vshi_lattice_bytes(texels) : 0.0;
     vsh_result result = vshi_check_limit(&bake->run, bytes, "lightmap", error);
     if (result != VSH_OK) {
         return result;

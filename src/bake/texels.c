@@ -46,7 +46,15 @@ static vsh_result check_options(const vsh_lightmap_options *options, vsh_error *
     if (result == VSH_OK) {
         result = check_range(options->supersample, 1, VSHI_MAX_SUPERSAMPLE, "supersample", error);
     }
-    return result == VSH_OK ? check_range(options->padding, 0, MAX_PADDING, "padding", error) : result;
+    if (result == VSH_OK) {
+        result = check_range(options->padding, 0, MAX_PADDING, "padding", error);
+    }
+    const int32_t spacing = options->ao_spacing;
+    if (result == VSH_OK && spacing != 1 && spacing != 2 && spacing != 4 && spacing != 8) {
+        result =
+            vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap ao_spacing %d: expected 1, 2, 4 or 8", spacing);
+    }
+    return result;
 }
 
 static void count_rows(void *user, size_t begin, size_t end) {
@@ -371,6 +379,7 @@ vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count, const vs
     made->info.width = full.width;
     made->info.height = full.height;
     made->padding = full.padding;
+    made->ao_spacing = full.supersample == 1 ? full.ao_spacing : 1;
     made->shade = full.shade;
     made->mesh_count = mesh_count;
     if ((result = create(meshes, &full, &full_run, job, reports, made, error)) != VSH_OK) {

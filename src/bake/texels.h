@@ -8,6 +8,7 @@
 struct vsh_texels {
     vsh_texels_info info;
     int32_t padding;
+    int32_t ao_spacing;      /* 1 where texels have several samples */
     vsh_shade_options shade; /* those given with the lightmap's size */
     size_t count;            /* samples */
     double *position;        /* [count][3] */

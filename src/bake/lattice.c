@@ -1,0 +1,368 @@
+#include "bake/lattice.h"
+
+#include "bake/take.h"
+#include "base/parallel.h"
+#include "shade/rays.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A cell is interpolated where a free ball of so many of its spacings touches its middle: what hides the sky
+ * from it is farther away than that, or low. */
+static const double CLEAR = 1.0;
+/* What such a ball may lack of being free, of its radius and in voxels: fields are not better known. */
+static const double LACK = 0.25, LACK_VOXELS = 0.25;
+/* The corners of a cell differ by at most this. */
+static const double RANGE = 0.2;
+/* The texels between lie so flat, of the spacing, and their normals within so much (cosine) of each other. */
+static const double FLAT = 0.2, ALIKE = 0.95;
+/* Corners are shaded to this share of max_error: many texels are made of them. */
+static const double FINER = 0.5;
+
+enum { UNKNOWN, CHOSEN, KNOWN };
+
+typedef struct lattice {
+    const vsh_field *field;
+    const vsh_texels *texels;
+    const vshi_origins *origins;
+    const vsh_points *points;
+    double distance; /* of AO, finest voxels */
+    int32_t spacing; /* of this pass */
+    uint32_t *at;    /* [height][width]: number of the texel's origin + 1, 0: none */
+    uint8_t *state;  /* [origins.count] */
+    size_t *before;  /* [blocks + 1]: chosen origins before each block */
+    size_t blocks;
+    float *values, *deviation;
+    /* of the chosen */
+    uint32_t *number;
+    double *position;
+    float *normal;
+    uint32_t *texel;
+    float *chosen_values, *chosen_deviation;
+} lattice;
+
+enum { BLOCK = VSHI_ORIGIN_BLOCK };
+
+static size_t block_end(const lattice *l, size_t block) {
+    const size_t end = (block + 1) * BLOCK;
+    return end < l->origins->count ? end : l->origins->count;
+}
+
+static uint32_t column_of(const lattice *l, size_t i) {
+    return l->origins->texel[i] & 0xffff;
+}
+
+static uint32_t row_of(const lattice *l, size_t i) {
+    return l->origins->texel[i] >> 16;
+}
+
+static void find_texels(void *user, size_t begin, size_t end) {
+    const lattice *l = user;
+    for (size_t i = begin; i < end; ++i) {
+        const size_t width = (size_t)l->texels->info.width;
+        l->at[row_of(l, i) * width + column_of(l, i)] = (uint32_t)i + 1;
+    }
+}
+
+/* --- the texels of a pass */
+
+static void choose(void *user, size_t begin, size_t end) {
+    const lattice *l = user;
+    const uint32_t mask = (uint32_t)l->spacing - 1;
+    for (size_t block = begin; block < end; ++block) {
+        size_t count = 0;
+        for (size_t i = block * BLOCK; i < block_end(l, block); ++i) {
+            if (l->state[i] == UNKNOWN && ((column_of(l, i) | row_of(l, i)) & mask) == 0) {
+                l->state[i] = CHOSEN;
+                ++count;
+            }
+        }
+        l->before[block] = count;
+    }
+}
+
+static void pack(void *user, size_t begin, size_t end) {
+    const lattice *l = user;
+    for (size_t block = begin; block < end; ++block) {
+        size_t next = l->before[block];
+        for (size_t i = block * BLOCK; i < block_end(l, block); ++i) {
+            if (l->state[i] == CHOSEN) {
+                memcpy(l->position + 3 * next, l->points->positions + 3 * i, 3 * sizeof(double));
+                memcpy(l->normal + 3 * next, l->points->normals + 3 * i, 3 * sizeof(float));
+                l->texel[next] = l->points->texels[i];
+                l->number[next++] = (uint32_t)i;
+            }
+        }
+    }
+}
+
+static void unpack(void *user, size_t begin, size_t end) {
+    const lattice *l = user;
+    for (size_t n = begin; n < end; ++n) {
+        const size_t i = l->number[n];
+        l->values[i] = l->chosen_values[n];
+        if (l->deviation != NULL) {
+            l->deviation[i] = l->chosen_deviation[n];
+        }
+        l->state[i] = KNOWN;
+    }
+}
+
+/* --- cells */
+
+typedef struct cell {
+    uint32_t column, row;
+    bool good;
+    size_t corner[4]; /* origins: left and right of the upper row, of the lower */
+} cell;
+
+static bool lookup(const lattice *l, uint32_t column, uint32_t row, size_t *i) {
+    const uint32_t width = (uint32_t)l->texels->info.width, height = (uint32_t)l->texels->info.height;
+    if (column >= width || row >= height) {
+        return false;
+    }
+    const uint32_t number = l->at[(size_t)row * width + column];
+    *i = (size_t)number - 1;
+    return number != 0;
+}
+
+/* Corner values weighted for a place of the cell, 0 … 1 along both sides. */
+static double mix(const double v[4], double x, double y) {
+    return (v[0] * (1.0 - x) + v[1] * x) * (1.0 - y) + (v[2] * (1.0 - x) + v[3] * x) * y;
+}
+
+static vshi_vec position_of(const lattice *l, size_t i) {
+    return vshi_to_field(l->field, l->points->positions + 3 * i);
+}
+
+static bool corners_agree(const lattice *l, const cell *c) {
+    double low = INFINITY, high = -INFINITY;
+    for (int k = 0; k < 4; ++k) {
+        const double v = (double)l->values[c->corner[k]];
+        if (isnan(v)) {
+            return false;
+        }
+        low = fmin(low, v);
+        high = fmax(high, v);
+    }
+    return high - low <= RANGE;
+}
+
+/* Whether all texels of a cell are there, in a plane, and turned alike. */
+static bool lies_flat(const lattice *l, const cell *c, const vshi_vec p[4], double size) {
+    const vshi_vec n = vshi_vec_off(l->points->normals + 3 * c->corner[0]);
+    const double x[4] = {p[0].x, p[1].x, p[2].x, p[3].x}, y[4] = {p[0].y, p[1].y, p[2].y, p[3].y},
+                 z[4] = {p[0].z, p[1].z, p[2].z, p[3].z};
+    const uint32_t s = (uint32_t)l->spacing;
+    for (uint32_t row = 0; row <= s; ++row) {
+        for (uint32_t column = 0; column <= s; ++column) {
+            size_t i;
+            if (!lookup(l, c->column + column, c->row + row, &i) ||
+                vshi_dot(n, vshi_vec_off(l->points->normals + 3 * i)) < ALIKE) {
+                return false;
+            }
+            const double u = (double)column / s, v = (double)row / s;
+            const vshi_vec off =
+                vshi_sub(position_of(l, i), (vshi_vec){mix(x, u, v), mix(y, u, v), mix(z, u, v)});
+            if (vshi_dot(off, off) > FLAT * FLAT * size * size) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+static bool is_clear(const lattice *l, const cell *c, const vshi_vec p[4], double size) {
+    const vshi_vec sum = vshi_add(vshi_add(p[0], p[1]), vshi_add(p[2], p[3]));
+    const vshi_vec normal =
+        vshi_direction_to_field(l->field, vshi_vec_off(l->points->normals + 3 * c->corner[0]));
+    const double radius = fmin(CLEAR * size, l->distance);
+    const vshi_vec centre = vshi_add(vshi_scale(sum, 0.25), vshi_scale(normal, radius));
+    const float at[3] = {(float)centre.x, (float)centre.y, (float)centre.z};
+    const double lack = fmax(LACK * radius, LACK_VOXELS);
+    return (double)vshi_field_distance(l->field, at) >= radius - lack;
+}
+
+static cell look_at(const lattice *l, uint32_t column, uint32_t row) {
+    const uint32_t s = (uint32_t)l->spacing;
+    cell c = {.column = column, .row = row};
+    vshi_vec p[4];
+    for (uint32_t k = 0; k < 4; ++k) {
+        if (!lookup(l, column + s * (k & 1), row + s * (k >> 1), &c.corner[k]) ||
+            l->state[c.corner[k]] != KNOWN) {
+            return c;
+        }
+        p[k] = position_of(l, c.corner[k]);
+    }
+    if (!corners_agree(l, &c)) {
+        return c;
+    }
+    const double size = fmax(vshi_length(vshi_sub(p[3], p[0])), vshi_length(vshi_sub(p[2], p[1])));
+    c.good = is_clear(l, &c, p, size) && lies_flat(l, &c, p, size);
+    return c;
+}
+
+/* Interpolates what lies in good cells. Corners are not among it, so none is read that is being written. */
+static void interpolate(void *user, size_t begin, size_t end) {
+    const lattice *l = user;
+    const uint32_t s = (uint32_t)l->spacing;
+    for (size_t block = begin; block < end; ++block) {
+        cell c = {.column = UINT32_MAX};
+        for (size_t i = block * BLOCK; i < block_end(l, block); ++i) {
+            if (l->state[i] != UNKNOWN) {
+                continue;
+            }
+            const uint32_t column = column_of(l, i), row = row_of(l, i);
+            const uint32_t left = column & ~(s - 1), top = row & ~(s - 1);
+            if (c.column != left || c.row != top) {
+                c = look_at(l, left, top);
+            }
+            if (!c.good) {
+                continue;
+            }
+            const double x = (double)(column - left) / s, y = (double)(row - top) / s;
+            double v[4];
+            for (int k = 0; k < 4; ++k) {
+                v[k] = (double)l->values[c.corner[k]];
+            }
+            l->values[i] = (float)mix(v, x, y);
+            for (int k = 0; k < 4 && l->deviation != NULL; ++k) {
+                v[k] = (double)l->deviation[c.corner[k]];
+            }
+            if (l->deviation != NULL) {
+                l->deviation[i] = (float)mix(v, x, y);
+            }
+            l->state[i] = KNOWN;
+        }
+    }
+}
+
+/* --- passes */
+
+/* Progress of all passes as one stage: a pass moves it by its share. */
+typedef struct passes {
+    const vsh_run *run;
+    double done, share;
+} passes;
+
+static int32_t tell(void *user, const char *stage, double fraction) {
+    const passes *p = user;
+    return p->run->progress(p->run->user, stage, p->done + p->share * fraction);
+}
+
+static void warn(void *user, const char *message) {
+    const passes *p = user;
+    p->run->warning(p->run->user, message);
+}
+
+static vsh_result shade_pass(lattice *l, const vsh_shade_options *options, size_t count, const vsh_run *run,
+                             vshi_job *job, vsh_shade_stats *stats, vsh_error *error) {
+    vsh_result result = VSH_OK;
+    const char *what = "AO texels";
+    l->number = vshi_take(count, sizeof *l->number, what, &result, error);
+    l->position = vshi_take(count, 3 * sizeof(double), what, &result, error);
+    l->normal = vshi_take(count, 3 * sizeof(float), what, &result, error);
+    l->texel = vshi_take(count, sizeof *l->texel, what, &result, error);
+    l->chosen_values = vshi_take(count, sizeof(float), what, &result, error);
+    l->chosen_deviation = vshi_take(l->deviation != NULL ? count : 0, sizeof(float), what, &result, error);
+    if (result == VSH_OK) {
+        result = vshi_parallel_for(job, l->blocks, 1, 0, pack, l, error);
+    }
+    if (result == VSH_OK) {
+        vsh_shade_options shade = *options;
+        if (l->spacing > 1) {
+            shade.max_error = fmax(FINER * shade.max_error, 1e-4);
+        }
+        const vsh_points points = {count, l->position, l->normal, l->texel};
+        result =
+            vsh_shade_ao(l->field, &points, &shade, run, l->chosen_values, l->chosen_deviation, stats, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_parallel_for(job, count, 4096, 0, unpack, l, error);
+    }
+    free(l->chosen_deviation);
+    free(l->chosen_values);
+    free(l->texel);
+    free(l->normal);
+    free(l->position);
+    free(l->number);
+    return result;
+}
+
+static size_t count_known(const lattice *l) {
+    size_t known = 0;
+    for (size_t i = 0; i < l->origins->count; ++i) {
+        known += l->state[i] == KNOWN;
+    }
+    return known;
+}
+
+static vsh_result run_passes(lattice *l, const vsh_shade_options *options, int32_t spacing,
+                             const vsh_run *run, vshi_job *job, vsh_shade_stats *stats, vsh_error *error) {
+    const double all = fmax(1.0, (double)l->origins->count);
+    passes progress = {.run = run};
+    vsh_run part = *run;
+    part.user = &progress;
+    part.progress = run->progress != NULL ? tell : NULL;
+    part.warning = run->warning != NULL ? warn : NULL;
+    vsh_result result = vshi_parallel_for(job, l->origins->count, 4096, 0, find_texels, l, error);
+    for (l->spacing = spacing; result == VSH_OK && l->spacing > 0; l->spacing /= 2) {
+        result = vshi_parallel_for(job, l->blocks, 1, 0, choose, l, error);
+        size_t count = 0;
+        for (size_t block = 0; result == VSH_OK && block <= l->blocks; ++block) {
+            const size_t chosen = l->before[block];
+            l->before[block] = count;
+            count += block < l->blocks ? chosen : 0;
+        }
+        progress.done = (double)count_known(l) / all;
+        progress.share = (double)count / all;
+        if (result == VSH_OK) {
+            result = shade_pass(l, options, count, &part, job, stats, error);
+        }
+        if (result == VSH_OK && l->spacing > 1) {
+            result = vshi_parallel_for(job, l->blocks, 1, 0, interpolate, l, error);
+        }
+    }
+    return result;
+}
+
+double vshi_lattice_bytes(const vsh_texels *texels) {
+    const double texel_count = (double)texels->info.width * (double)texels->info.height;
+    return texel_count * sizeof(uint32_t) +
+           (double)texels->count * (1.0 + 3.0 * sizeof(double) + 7.0 * sizeof(float));
+}
+
+vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
+                           const vsh_points *points, const vsh_shade_options *options, int32_t spacing,
+                           const vsh_run *run, float *values, float *deviation, vsh_shade_stats *stats,
+                           vsh_error *error) {
+    lattice l = {.field = field,
+                 .texels = texels,
+                 .origins = origins,
+                 .points = points,
+                 .distance = options->ao_distance / field->voxel_size,
+                 .blocks = (origins->count + BLOCK - 1) / BLOCK,
+                 .values = values,
+                 .deviation = deviation};
+    const char *what = "AO texels";
+    vsh_run quiet = *run;
+    quiet.progress = NULL;
+    vshi_job *job = vshi_job_begin(&quiet, "ao", origins->count);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "ao: the system refused memory");
+    }
+    vsh_result result = VSH_OK;
+    const size_t texel_count = (size_t)texels->info.width * (size_t)texels->info.height;
+    l.at = vshi_take(texel_count, sizeof *l.at, what, &result, error);
+    l.state = vshi_take(origins->count, 1, what, &result, error);
+    l.before = vshi_take(l.blocks + 1, sizeof *l.before, what, &result, error);
+    if (result == VSH_OK) {
+        result = run_passes(&l, options, spacing, run, job, stats, error);
+    }
+    free(l.before);
+    free(l.state);
+    free(l.at);
+    vshi_job_end(job);
+    return result;
+}

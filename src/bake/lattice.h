@@ -1,0 +1,19 @@
+/* Ambient occlusion over texels: shaded where it varies, interpolated between texels where it cannot. */
+#ifndef VSHI_BAKE_LATTICE_H
+#define VSHI_BAKE_LATTICE_H
+
+#include "bake/origins.h"
+
+/* As vsh_shade_ao() at the origins' points, `points`, of a lightmap of one sample a texel. Texels of a
+ * lattice of `spacing` (1, 2, 4 or 8) are shaded; those between are interpolated where nothing is near enough
+ * to change within a cell, else the lattice is halved there (irradiance caching: Ward, Rubinstein and Clear,
+ * 1988). `deviation` may be NULL. */
+vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
+                           const vsh_points *points, const vsh_shade_options *options, int32_t spacing,
+                           const vsh_run *run, float *values, float *deviation, vsh_shade_stats *stats,
+                           vsh_error *error);
+
+/* Bytes that it takes at most beside the origins. */
+double vshi_lattice_bytes(const vsh_texels *texels);
+
+#endif
