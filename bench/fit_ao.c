@@ -191,7 +191,7 @@ static uses uses_of(const sample_set *set, const vshi_ao_cones *cones) {
             close[c] = (float)cone.close;
             vshi_chunk_add(chunk, set->field, &cone, (uint32_t)c, &stats);
         }
-        vshi_kernel_best()->march(set->field, &chunk->rays, VSHI_MARCH_PLAIN, 1024, &work);
+        vshi_kernel_of(VSH_ISA_BEST)->march(set->field, &chunk->rays, VSHI_MARCH_PLAIN, 1024, &work);
         for (size_t r = 0; r < chunk->rays.count; ++r) {
             close[chunk->owner[r]] = chunk->rays.close[r];
         }

@@ -75,6 +75,22 @@ typedef int32_t vsh_progress_fn(void *user, const char *stage, double fraction);
  * calling rules as vsh_progress_fn. */
 typedef void vsh_warning_fn(void *user, const char *message);
 
+/* Instruction sets that the marching kernels are built for. Other parts of the library have one build; Embree
+ * chooses its own. */
+enum {
+    VSH_ISA_BEST = 0,  /* the best that this machine has */
+    VSH_ISA_BASE = 1,  /* what every processor of the kind has: SSE2 on x86-64, Neon on Arm */
+    VSH_ISA_AVX2 = 2,  /* x86-64 only, as the next */
+    VSH_ISA_AVX512 = 3 /* F, DQ and VL */
+};
+
+/* "avx2" to VSH_ISA_AVX2 and back; -1 and NULL for what is none. Names are static strings; NULL is none. */
+VSH_API int32_t vsh_isa(const char *name);
+VSH_API const char *vsh_isa_name(int32_t isa);
+
+/* Whether this machine has an instruction set: 1 or 0, which it is for what is none. */
+VSH_API int32_t vsh_isa_available(int32_t isa);
+
 /* How to run, the same for every call that takes long. */
 typedef struct vsh_run {
     size_t struct_size;    /* sizeof(vsh_run), set by vsh_run_default() */
@@ -84,10 +100,12 @@ typedef struct vsh_run {
     vsh_progress_fn *progress; /* may be NULL */
     vsh_warning_fn *warning;   /* may be NULL */
     void *user;                /* handed to both */
+    int32_t isa; /* VSH_ISA_…, to test one; VSH_ERROR_ARGUMENT where this machine lacks it. No result depends
+                    on it */
 } vsh_run;
 
 static inline vsh_run vsh_run_default(void) {
-    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL};
+    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST};
     return run;
 }
 

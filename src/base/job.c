@@ -1,5 +1,7 @@
 #include "base/job.h"
 
+#include "base/isa.h"
+
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -96,7 +98,7 @@ vsh_result vshi_run_resolve(const vsh_run *run, vsh_run *full, vsh_error *error)
     if (full->threads < 0 || full->threads > 1024) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "threads %d: expected 0 … 1024", full->threads);
     }
-    return VSH_OK;
+    return vshi_isa_check(full->isa, error);
 }
 
 void vshi_warn(const vsh_run *run, const char *format, ...) {

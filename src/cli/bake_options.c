@@ -79,6 +79,7 @@ static const cli_option options[] = {
     {KEY_SUPERSAMPLE, "supersample", "N", "N × N samples a texel, 1 to 16 (1)"},
     {KEY_PADDING, "padding", "N", "texels that charts are grown by, 0 to 4096 (4)"},
     CLI_COMMON_OPTIONS,
+    CLI_ISA_OPTION,
 };
 
 const cli_command cli_bake = {
@@ -90,21 +91,6 @@ const cli_command cli_bake = {
     options,
     sizeof options / sizeof options[0],
     cli_bake_main};
-
-/* A name out of the library's list, or an error that shows the list. */
-static int take_name(const char *option, const char *text, int32_t (*value_of)(const char *),
-                     const char *(*name_of)(int32_t), int32_t *value) {
-    *value = value_of(text);
-    if (*value >= 0) {
-        return CLI_OK;
-    }
-    char list[256] = "";
-    size_t used = 0;
-    for (int32_t i = 0; name_of(i) != NULL && used < sizeof list; ++i) {
-        used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", name_of(i));
-    }
-    return cli_usage("%s '%s': expected one of %s", option, text, list);
-}
 
 static int take_bits(const char *name, const char *value, int32_t *bits) {
     static const char *const widths[] = {"8", "16", "32"};
@@ -149,7 +135,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return cli_take_positive(name, value, &s->ao_distance);
     case KEY_AO_METHOD:
         s->has_ao_method = true;
-        return take_name(name, value, vsh_ao_method, vsh_ao_method_name, &s->ao_method);
+        return cli_take_name(name, value, vsh_ao_method, vsh_ao_method_name, &s->ao_method);
     case KEY_AO_CONES:
         s->has_ao_cones = true;
         return cli_take_integer(name, value, 1, 256, &s->ao_cones);
@@ -158,13 +144,13 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_METHOD:
         s->has_method = true;
-        return take_name(name, value, vsh_shadow_method, vsh_shadow_method_name, &s->method);
+        return cli_take_name(name, value, vsh_shadow_method, vsh_shadow_method_name, &s->method);
     case KEY_RAYS:
         s->has_rays = true;
         return cli_take_integer(name, value, 1, 4096, &s->rays);
     case KEY_SAMPLER:
         s->has_sampler = true;
-        return take_name(name, value, vsh_sampler, vsh_sampler_name, &s->sampler);
+        return cli_take_name(name, value, vsh_sampler, vsh_sampler_name, &s->sampler);
     case KEY_FRAME:
         s->has_frame = true;
         return cli_take_integer(name, value, 0, INT32_MAX, &s->frame);

@@ -27,13 +27,14 @@ static uint64_t machine_memory(void) {
 }
 
 cli_common cli_common_default(void) {
-    return (cli_common){0, machine_memory() / 4 * 3, false, false};
+    return (cli_common){0, machine_memory() / 4 * 3, false, false, VSH_ISA_BEST};
 }
 
 vsh_run cli_common_run(const cli_common *common) {
     vsh_run run = vsh_run_default();
     run.threads = common->threads;
     run.memory_limit = common->memory_limit;
+    run.isa = common->isa;
     run.progress = cli_progress_report;
     run.warning = cli_progress_warning;
     return run;
@@ -46,6 +47,8 @@ int cli_common_take(cli_common *common, int key, const char *name, const char *v
         return cli_take_integer(name, value, 1, 1024, &common->threads);
     case CLI_KEY_MEMORY_LIMIT:
         return cli_take_bytes(name, value, &common->memory_limit);
+    case CLI_KEY_ISA:
+        return cli_take_name(name, value, vsh_isa, vsh_isa_name, &common->isa);
     case CLI_KEY_QUIET:
         common->quiet = true;
         return CLI_OK;

@@ -44,12 +44,17 @@ int cli_take_vector(const char *name, const char *text, double value[3]);      /
 int cli_take_size(const char *name, const char *text, int32_t *w, int32_t *h); /* W[xH] */
 int cli_take_bytes(const char *name, const char *text, uint64_t *value);       /* 500M, 2GiB */
 
+/* A name out of the library's list, or an error that shows the list. */
+int cli_take_name(const char *name, const char *text, int32_t (*value_of)(const char *),
+                  const char *(*name_of)(int32_t), int32_t *value);
+
 /* Options that every long command has. */
 typedef struct cli_common {
     int32_t threads;
     uint64_t memory_limit;
     bool quiet;
     bool progress;
+    int32_t isa; /* of commands that shade */
 } cli_common;
 
 cli_common cli_common_default(void);
@@ -60,6 +65,7 @@ enum {
     CLI_KEY_MEMORY_LIMIT,
     CLI_KEY_QUIET,
     CLI_KEY_PROGRESS,
+    CLI_KEY_ISA,
     CLI_KEY_RESOLUTION,
     CLI_KEY_VOXEL_SIZE,
     CLI_KEY_HALF_WIDTH,
@@ -75,6 +81,14 @@ enum {
         {CLI_KEY_PROGRESS, "progress", NULL, "show progress even where it is no terminal"},                  \
         {CLI_KEY_QUIET, "quiet", NULL, "say nothing but errors"}, {                                          \
         'h', "help", NULL, "show this help"                                                                  \
+    }
+
+/* After the common ones, in commands that shade. */
+#define CLI_ISA_OPTION                                                                                       \
+    {                                                                                                        \
+        CLI_KEY_ISA, "isa", "NAME",                                                                          \
+            "instruction set to shade with, for tests: best, base,\navx2 or avx512 (best); the result is "   \
+            "the same for any"                                                                               \
     }
 
 #define CLI_GRID_OPTIONS                                                                                     \

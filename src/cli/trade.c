@@ -47,6 +47,7 @@ static const cli_option options[] = {
     {KEY_AO, "ao", "DISTANCE", "ambient occlusion within a distance, scene units"},
     {KEY_UV_SET, "uv-set", "N", "UV set of the lightmap, from 0"},
     CLI_COMMON_OPTIONS,
+    CLI_ISA_OPTION,
 };
 
 static int trade_main(int argc, char **argv);

@@ -4,6 +4,7 @@
 
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -107,4 +108,18 @@ int cli_take_bytes(const char *name, const char *text, uint64_t *value) {
         }
     }
     return cli_usage("%s '%s': expected bytes, with k, M, G, KiB, MiB or GiB behind the number", name, text);
+}
+
+int cli_take_name(const char *option, const char *text, int32_t (*value_of)(const char *),
+                  const char *(*name_of)(int32_t), int32_t *value) {
+    *value = value_of(text);
+    if (*value >= 0) {
+        return CLI_OK;
+    }
+    char list[256] = "";
+    size_t used = 0;
+    for (int32_t i = 0; name_of(i) != NULL && used < sizeof list; ++i) {
+        used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", name_of(i));
+    }
+    return cli_usage("%s '%s': expected one of %s", option, text, list);
 }

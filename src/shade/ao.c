@@ -37,27 +37,40 @@ bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, 
     return true;
 }
 
-static vsh_result shade(vshi_ao_task *task, const vsh_run *run, vsh_shade_stats *stats, vsh_error *error) {
-    const vsh_shade_options *options = task->options;
-    const size_t count = task->points->count;
-    if (options->ao_method == VSH_AO_TAPS) {
-        return vshi_shade_run(run, "ao", count, VSHI_CHUNK, vshi_ao_taps, task, stats, error);
+void vshi_ao_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
+    const vshi_ao_task *task = user;
+    const int32_t method = task->options->ao_method;
+    vshi_shade_fn *shade = method == VSH_AO_TAPS    ? vshi_ao_taps
+                           : method == VSH_AO_CONES ? vshi_ao_by_cones
+                                                    : vshi_ao_by_rays;
+    for (size_t i = begin; task->deviation != NULL && i < end; ++i) {
+        task->deviation[i] = NAN;
+    }
+    for (size_t first = begin; first < end; first += VSHI_AO_GRAIN) {
+        shade(task, first, end - first < VSHI_AO_GRAIN ? end : first + VSHI_AO_GRAIN, stats);
+    }
+}
+
+vsh_result vshi_ao_prepare(const vsh_field *field, const vsh_shade_options *options, vshi_ao_cones *cones,
+                           vshi_ao_task *task, vsh_error *error) {
+    if (options->ao_method == VSH_AO_EXACT && options->triangles == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO method exact: triangles is NULL");
     }
     if (options->ao_method == VSH_AO_CONES) {
-        vshi_ao_cones cones;
-        vshi_ao_cones_place(&cones, options->ao_cones);
-        task->cones = &cones;
-        return vshi_shade_run(run, "ao", count, VSHI_AO_GRAIN, vshi_ao_by_cones, task, stats, error);
+        vshi_ao_cones_place(cones, options->ao_cones);
     }
-    vshi_sampler *sampler = vshi_sampler_create(options->sampler, options->rays, options->frame);
-    if (sampler == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "ao: the system refused memory");
+    *task = (vshi_ao_task){.field = field,
+                           .options = options,
+                           .cones = cones,
+                           .distance = options->ao_distance / field->voxel_size};
+    return VSH_OK;
+}
+
+vsh_result vshi_ao_check_points(const vsh_points *points, vsh_error *error) {
+    if (points->normals == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO needs normals: vsh_points.normals is NULL");
     }
-    task->sampler = sampler;
-    const vsh_result result =
-        vshi_shade_run(run, "ao", count, VSHI_AO_GRAIN, vshi_ao_by_rays, task, stats, error);
-    vshi_sampler_free(sampler);
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const vsh_shade_options *options,
@@ -65,25 +78,32 @@ vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const 
                         vsh_error *error) {
     VSHI_FLOATS;
     vsh_shade_options full;
-    const vsh_result result = vshi_shade_options_resolve(options, &full, error);
-    if (result != VSH_OK) {
-        return result;
+    vsh_run full_run;
+    vshi_ao_task task;
+    vshi_ao_cones cones;
+    vshi_sampler *sampler = NULL;
+    vsh_result result = vshi_shade_options_resolve(options, &full, error);
+    if (result == VSH_OK) {
+        result = vshi_run_resolve(run, &full_run, error);
     }
-    if (points->normals == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO needs normals: vsh_points.normals is NULL");
+    if (result == VSH_OK) {
+        result = vshi_ao_check_points(points, error);
     }
-    if (full.ao_method == VSH_AO_EXACT && full.triangles == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO method exact: triangles is NULL");
+    if (result == VSH_OK) {
+        result = vshi_ao_prepare(field, &full, &cones, &task, error);
     }
-    for (size_t i = 0; deviation != NULL && i < points->count; ++i) {
-        deviation[i] = NAN;
+    if (result == VSH_OK && vshi_ao_has_rays(&full)) {
+        result = vshi_shade_sampler(&full, "ao", &sampler, error);
     }
-    vshi_ao_task task = {.field = field,
-                         .points = points,
-                         .options = &full,
-                         .kernel = vshi_kernel_best(),
-                         .ao = ao,
-                         .deviation = deviation,
-                         .distance = full.ao_distance / field->voxel_size};
-    return shade(&task, run, stats, error);
+    if (result == VSH_OK) {
+        task.sampler = sampler;
+        task.kernel = vshi_kernel_of(full_run.isa);
+        task.points = points;
+        task.ao = ao;
+        task.deviation = deviation;
+        const size_t grain = full.ao_method == VSH_AO_TAPS ? VSHI_CHUNK : VSHI_AO_GRAIN;
+        result = vshi_shade_run(&full_run, "ao", points->count, grain, vshi_ao_shade, &task, stats, error);
+    }
+    vshi_sampler_free(sampler);
+    return result;
 }

@@ -2,7 +2,6 @@
 #ifndef VSHI_AO_H
 #define VSHI_AO_H
 
-#include "shade/sampler.h"
 #include "shade/shade.h"
 
 enum { VSHI_AO_GRAIN = 64 }; /* points a piece, with cones and rays */
@@ -19,15 +18,31 @@ typedef struct vshi_ao_cones {
 
 typedef struct vshi_ao_task {
     const vsh_field *field;
-    const vsh_points *points;
     const vsh_shade_options *options;
-    const vshi_kernel *kernel;
-    const vshi_sampler *sampler;
-    const vshi_ao_cones *cones;
+    const vshi_sampler *sampler; /* of rays; else NULL */
+    const vshi_ao_cones *cones;  /* of cones */
+    double distance;             /* finest voxels */
+    const vshi_kernel *kernel;   /* of a call, as what follows */
+    const vsh_points *points;
     float *ao;
     float *deviation; /* may be NULL */
-    double distance;  /* finest voxels */
 } vshi_ao_task;
+
+/* Checks options (resolved ones); fills *task but for sampler, kernel and arrays, and *cones where the method
+ * takes them. Errors: VSH_ERROR_ARGUMENT. */
+vsh_result vshi_ao_prepare(const vsh_field *field, const vsh_shade_options *options, vshi_ao_cones *cones,
+                           vshi_ao_task *task, vsh_error *error);
+
+/* Points without normals have no AO. Errors: VSH_ERROR_ARGUMENT. */
+vsh_result vshi_ao_check_points(const vsh_points *points, vsh_error *error);
+
+/* Whether AO takes the task's sampler. */
+static inline bool vshi_ao_has_rays(const vsh_shade_options *options) {
+    return options->ao_method >= VSH_AO_RAYS;
+}
+
+/* A vshi_shade_fn of a vshi_ao_task. */
+void vshi_ao_shade(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);
 
 /* Where a point's cones and rays begin, and the axes they are given in: the third is the normal. */
 typedef struct vshi_ao_frame {
@@ -50,7 +65,7 @@ static inline vshi_vec vshi_ao_direction(const vshi_vec axes[3], vshi_vec d) {
     return vshi_add(vshi_add(vshi_scale(axes[0], d.x), vshi_scale(axes[1], d.y)), vshi_scale(axes[2], d.z));
 }
 
-/* The methods: each shades points begin … end - 1. */
+/* The methods: each shades points begin … end - 1, cones and rays VSHI_AO_GRAIN at most. */
 vshi_shade_fn vshi_ao_taps;
 vshi_shade_fn vshi_ao_by_cones;
 vshi_shade_fn vshi_ao_by_rays;

@@ -1,6 +1,5 @@
 #include "shade/shade.h"
 
-#include "base/floats.h"
 #include "base/parallel.h"
 
 #include <math.h>
@@ -39,6 +38,13 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
     return VSH_OK;
 }
 
+vsh_result vshi_shade_sampler(const vsh_shade_options *options, const char *what, vshi_sampler **sampler,
+                              vsh_error *error) {
+    *sampler = vshi_sampler_create(options->sampler, options->rays, options->frame);
+    return *sampler != NULL ? VSH_OK
+                            : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
+}
+
 #define SQUARE_UNIT 0x1p-40
 
 typedef struct shade_run {
@@ -64,21 +70,10 @@ static void run_piece(void *user, size_t begin, size_t end) {
     atomic_fetch_add(&run->square_error, (uint64_t)(stats.square_error / SQUARE_UNIT));
 }
 
-vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
-                          vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error) {
-    VSHI_FLOATS;
-    vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+vsh_result vshi_shade_pieces(vshi_job *job, size_t count, size_t grain, vshi_shade_fn *fn, const void *task,
+                             vsh_shade_stats *stats, vsh_error *error) {
     shade_run pieces = {.fn = fn, .task = task};
-    vshi_job *job = vshi_job_begin(&full, stage, count);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
-    }
-    result = vshi_parallel_for(job, count, grain, 1, run_piece, &pieces, error);
-    vshi_job_end(job);
+    const vsh_result result = vshi_parallel_for(job, count, grain, 1, run_piece, &pieces, error);
     if (stats != NULL) {
         stats->marches += pieces.marches;
         stats->samples += pieces.samples;
@@ -91,6 +86,17 @@ vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, s
         stats->refined += pieces.refined;
         stats->square_error += (double)pieces.square_error * SQUARE_UNIT;
     }
+    return result;
+}
+
+vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
+                          vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error) {
+    vshi_job *job = vshi_job_begin(run, stage, count);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
+    }
+    const vsh_result result = vshi_shade_pieces(job, count, grain, fn, task, stats, error);
+    vshi_job_end(job);
     return result;
 }
 

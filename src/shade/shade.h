@@ -4,6 +4,7 @@
 
 #include "base/job.h"
 #include "shade/rays.h"
+#include "shade/sampler.h"
 
 /* Resolves and checks options. Errors: VSH_ERROR_ARGUMENT, naming field, value and limit. */
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
@@ -12,7 +13,15 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
 /* Shades points begin … end - 1; adds what it did to *stats. */
 typedef void vshi_shade_fn(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);
 
-/* Runs fn over `count` points in pieces of `grain` under progress stage `stage`. */
+/* The sampler of methods by rays, for `what`. */
+vsh_result vshi_shade_sampler(const vsh_shade_options *options, const char *what, vshi_sampler **sampler,
+                              vsh_error *error);
+
+/* Runs fn over `count` points in pieces of `grain`, as a part of a job whose units are points. */
+vsh_result vshi_shade_pieces(vshi_job *job, size_t count, size_t grain, vshi_shade_fn *fn, const void *task,
+                             vsh_shade_stats *stats, vsh_error *error);
+
+/* The same as a job of its own, under progress stage `stage`. `run` is a resolved one. */
 vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
                           vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error);
 

@@ -3,6 +3,7 @@
 #include "shade/blocks.h"
 
 #include <math.h>
+#include <stdio.h>
 
 /* Turns a closeness into a visible fraction, by method. */
 static float remap(int32_t method, double closeness, double sine) {
@@ -80,8 +81,7 @@ void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, 
     vshi_blocks_prove(task, facing, chunk, stats);
 }
 
-static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
-    const vshi_shadow_task *task = user;
+static void shade_points(const vshi_shadow_task *task, size_t begin, size_t end, vsh_shade_stats *stats) {
     const int32_t method = task->options->method;
     vshi_facing facing;
     vshi_chunk chunk;
@@ -111,56 +111,76 @@ static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_s
     }
 }
 
+void vshi_shadow_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
+    const vshi_shadow_task *task = user;
+    if (vshi_shadow_has_rays(task->options)) {
+        vshi_shadow_by_rays(task, begin, end, stats);
+        return;
+    }
+    shade_points(task, begin, end, stats);
+    for (size_t i = begin; task->deviation != NULL && i < end; ++i) {
+        task->deviation[i] = NAN;
+    }
+}
+
+vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
+                               const vsh_shade_options *options, vshi_shadow_task *task, vsh_error *error) {
+    const vsh_result result = vsh_light_check(light, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (options->method == VSH_SHADOW_EXACT && options->triangles == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "method exact: triangles is NULL");
+    }
+    const bool inner = vshi_shadow_has_rays(options) || options->method == VSH_SHADOW_SMOOTH ||
+                       options->method == VSH_SHADOW_CONE;
+    *task =
+        (vshi_shadow_task){.field = field, .light = light, .options = options, .lowest = inner ? 1.0 : 0.0};
+    if (light->type == VSH_LIGHT_DIRECTIONAL) {
+        task->towards = vshi_direction_to_field(field, vshi_unit(vshi_vec_of(light->direction)));
+        task->sine = sin(0.5 * light->angle);
+    } else {
+        task->centre = vshi_to_field(field, light->position);
+        task->radius = light->radius / field->voxel_size;
+    }
+    for (size_t i = 0; i < sizeof light->name && light->name[i] != '\0'; ++i) {
+        task->purpose = 31u * task->purpose + (unsigned char)light->name[i];
+    }
+    return VSH_OK;
+}
+
 vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
                             const vsh_shade_options *options, const vsh_run *run, float *visibility,
                             float *deviation, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     vsh_shade_options full;
+    vsh_run full_run;
+    vshi_shadow_task task;
+    vshi_sampler *sampler = NULL;
     vsh_result result = vshi_shade_options_resolve(options, &full, error);
     if (result == VSH_OK) {
-        result = vsh_light_check(light, error);
+        result = vshi_run_resolve(run, &full_run, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_shadow_prepare(field, light, &full, &task, error);
     }
     if (result != VSH_OK) {
         return result;
     }
-    if (full.method == VSH_SHADOW_EXACT && full.triangles == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "method exact: triangles is NULL");
+    char stage[sizeof light->name + 8];
+    snprintf(stage, sizeof stage, "shadow.%.*s", (int)sizeof light->name, light->name);
+    if (vshi_shadow_has_rays(&full)) {
+        result = vshi_shade_sampler(&full, stage, &sampler, error);
     }
-    const bool by_rays = full.method >= VSH_SHADOW_RAYS;
-    for (size_t i = 0; !by_rays && deviation != NULL && i < points->count; ++i) {
-        deviation[i] = NAN;
+    if (result == VSH_OK) {
+        task.sampler = sampler;
+        task.kernel = vshi_kernel_of(full_run.isa);
+        task.points = points;
+        task.visibility = visibility;
+        task.deviation = deviation;
+        result = vshi_shade_run(&full_run, stage, points->count, VSHI_PIECE, vshi_shadow_shade, &task, stats,
+                                error);
     }
-    deviation = by_rays ? deviation : NULL;
-    const bool inner = by_rays || full.method == VSH_SHADOW_SMOOTH || full.method == VSH_SHADOW_CONE;
-    vshi_shadow_task task = {.field = field,
-                             .points = points,
-                             .light = light,
-                             .options = &full,
-                             .kernel = vshi_kernel_best(),
-                             .visibility = visibility,
-                             .deviation = deviation,
-                             .lowest = inner ? 1.0 : 0.0};
-    if (light->type == VSH_LIGHT_DIRECTIONAL) {
-        task.towards = vshi_direction_to_field(field, vshi_unit(vshi_vec_of(light->direction)));
-        task.sine = sin(0.5 * light->angle);
-    } else {
-        task.centre = vshi_to_field(field, light->position);
-        task.radius = light->radius / field->voxel_size;
-    }
-    char stage[80] = "shadow.";
-    for (size_t i = 0; i < sizeof light->name && light->name[i] != '\0'; ++i) {
-        stage[7 + i] = light->name[i];
-        task.purpose = 31u * task.purpose + (unsigned char)light->name[i];
-    }
-    if (!by_rays) {
-        return vshi_shade_run(run, stage, points->count, VSHI_PIECE, shade_points, &task, stats, error);
-    }
-    vshi_sampler *sampler = vshi_sampler_create(full.sampler, full.rays, full.frame);
-    if (sampler == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
-    }
-    task.sampler = sampler;
-    result = vshi_shade_run(run, stage, points->count, VSHI_PIECE, vshi_shadow_by_rays, &task, stats, error);
     vshi_sampler_free(sampler);
     return result;
 }

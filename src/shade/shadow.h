@@ -2,27 +2,39 @@
 #ifndef VSHI_SHADOW_H
 #define VSHI_SHADOW_H
 
-#include "shade/sampler.h"
 #include "shade/shade.h"
 
-/* A light as the points of one field see it. */
+/* A light as the points of one field see it: what holds for all of them, then a call's kernel and arrays. */
 typedef struct vshi_shadow_task {
     const vsh_field *field;
-    const vsh_points *points;
     const vsh_light *light;
     const vsh_shade_options *options;
     const vshi_sampler *sampler; /* of rays; else NULL */
-    const vshi_kernel *kernel;
-    float *visibility;
-    float *deviation; /* or NULL */
-    vshi_vec towards; /* directional: unit, field space */
-    vshi_vec centre;  /* positional: field space */
-    double sine;      /* directional: of the half angle */
-    double radius;    /* positional: finest voxels */
+    vshi_vec towards;            /* directional: unit, field space */
+    vshi_vec centre;             /* positional: field space */
+    double sine;                 /* directional: of the half angle */
+    double radius;               /* positional: finest voxels */
     double lowest;    /* sine of how far below the receiver's plane an axis may be, of its cone's: 1 where the
                        * inner penumbra counts, else 0 */
     uint32_t purpose; /* of the sampler: lights of other names have other sequences */
+    const vshi_kernel *kernel;
+    const vsh_points *points;
+    float *visibility;
+    float *deviation; /* or NULL */
 } vshi_shadow_task;
+
+/* Checks the light, and options (resolved ones) for it; fills *task but for sampler, kernel and arrays.
+ * Errors: VSH_ERROR_ARGUMENT. */
+vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
+                               const vsh_shade_options *options, vshi_shadow_task *task, vsh_error *error);
+
+/* Whether shadows take the task's sampler. */
+static inline bool vshi_shadow_has_rays(const vsh_shade_options *options) {
+    return options->method >= VSH_SHADOW_RAYS;
+}
+
+/* A vshi_shade_fn of a vshi_shadow_task, at most VSHI_PIECE points at once. */
+void vshi_shadow_shade(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);
 
 enum { VSHI_PIECE = 512 }; /* points: with their rays 300 KB of the stack */
 

@@ -131,6 +131,7 @@ fits() {
 --padding -1
 --padding 4097
 --bits 12
+--isa sse2
 --threads 0
 --threads 1025
 --memory-limit -5

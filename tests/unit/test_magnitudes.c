@@ -271,7 +271,7 @@ static void a_hundred_thousand_least_steps_lose_nothing(void **state) {
                                 .stop = &lane[9],
                                 .close = &lane[10]};
         vshi_march_stats stats = {0, 0};
-        vshi_kernel_best()->march(field, &rays, VSHI_MARCH_PLAIN, 1 << 20, &stats);
+        vshi_kernel_of(VSH_ISA_BEST)->march(field, &rays, VSHI_MARCH_PLAIN, 1 << 20, &stats);
         const double expected = heights[i] / (length - 200.0);
         print_message("height %g: %llu samples, closeness off by %.2g of it\n", heights[i],
                       (unsigned long long)stats.samples, fabs((double)lane[10] / expected - 1.0));

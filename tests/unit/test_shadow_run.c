@@ -1,8 +1,6 @@
 /* How shadows are computed: the same bits however they are run, work that is counted, bad input. */
 #include "shading.h"
 
-#include "shade/kernel/march.h"
-
 #include <stdlib.h>
 
 enum { SIDE = 64, COUNT = SIDE * SIDE, METHODS = 5 };
@@ -23,100 +21,6 @@ static void fill_points(void) {
             normals[3 * i + axis] = (float)n[axis];
         }
     }
-}
-
-typedef struct march_result {
-    float close[1000];
-    float clear[1000];
-    int8_t proof[1000];
-    vshi_march_stats stats;
-} march_result;
-
-static void march_with(vshi_march_fn *march, const vsh_field *field, size_t count, int32_t kind,
-                       march_result *result) {
-    static float lanes[13][1000];
-    uint64_t counter = 77;
-    for (size_t i = 0; i < count; ++i) {
-        double d[3];
-        random_direction(&counter, d);
-        for (int axis = 0; axis < 3; ++axis) {
-            lanes[axis][i] = (float)between(&counter, axis == 1 ? -20.0 : -100.0, axis == 1 ? 80.0 : 100.0);
-            lanes[3 + axis][i] = (float)d[axis];
-        }
-        const double sine = i % 5 == 0 ? 0.0 : between(&counter, 0.001, 0.6);
-        lanes[6][i] = 0.0625f;
-        lanes[7][i] = (float)between(&counter, 0.1, 300.0);
-        lanes[8][i] = (float)sine;
-        lanes[9][i] = i % 3 == 0 ? 0.0f : -(float)sine;
-        lanes[10][i] = sine > 0.0 ? (float)sine : 1.0f;
-        lanes[11][i] = i % 4 == 0 ? INFINITY : (float)between(&counter, 0.0, 1.0);
-        lanes[12][i] = (float)between(&counter, 0.01, 12.0);
-    }
-    const vshi_rays rays = {.count = count,
-                            .origin = {lanes[0], lanes[1], lanes[2]},
-                            .direction = {lanes[3], lanes[4], lanes[5]},
-                            .begin = lanes[6],
-                            .end = lanes[7],
-                            .sine = lanes[8],
-                            .stop = lanes[9],
-                            .close = lanes[10],
-                            .horizon = lanes[11],
-                            .wide = lanes[12],
-                            .clear = result->clear,
-                            .proof = result->proof};
-    memset(result->clear, 0, sizeof result->clear);
-    memset(result->proof, 0, sizeof result->proof);
-    result->stats = (vshi_march_stats){0, 0};
-    march(field, &rays, kind, 40, &result->stats);
-    memcpy(result->close, lanes[10], sizeof result->close);
-}
-
-static void every_instruction_set_gives_the_same_bits(void **state) {
-    (void)state;
-    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
-    vshi_march_fn *others[2] = {NULL, NULL};
-    size_t other_count = 0;
-#if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx2")) {
-        others[other_count++] = vshi_kernel_avx2.march;
-    }
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512vl")) {
-        others[other_count++] = vshi_kernel_avx512.march;
-    }
-#endif
-    print_message("%zu kernels beside the base\n", other_count);
-    static march_result base, other;
-    const size_t counts[] = {0, 1, 15, 16, 17, 100, 1000};
-    for (size_t c = 0; c < sizeof counts / sizeof counts[0]; ++c) {
-        for (int32_t kind = VSHI_MARCH_PLAIN; kind <= VSHI_MARCH_GROWN; ++kind) {
-            march_with(vshi_kernel_base.march, field, counts[c], kind, &base);
-            for (size_t o = 0; o < other_count; ++o) {
-                march_with(others[o], field, counts[c], kind, &other);
-                assert_memory_equal(base.close, other.close, counts[c] * sizeof base.close[0]);
-                assert_memory_equal(base.proof, other.proof, counts[c]);
-                assert_memory_equal(base.clear, other.clear, counts[c] * sizeof base.clear[0]);
-                assert_int_equal(base.stats.samples, other.stats.samples);
-                assert_int_equal(base.stats.unfinished, other.stats.unfinished);
-            }
-        }
-    }
-    march_with(vshi_kernel_base.march, field, 1000, VSHI_MARCH_BEAM, &base);
-    size_t partly_clear = 0;
-    for (size_t i = 0; i < 1000; ++i) {
-        partly_clear += base.clear[i] > 0.0625f && base.clear[i] < 300.0f;
-    }
-    assert_true(partly_clear > 10);
-    march_with(vshi_kernel_base.march, field, 1000, VSHI_MARCH_PROOF, &base);
-    bool unproved = false, proved_free = false;
-    for (size_t i = 0; i < 1000; ++i) {
-        unproved = unproved || base.proof[i] == VSHI_UNPROVED;
-        proved_free = proved_free || base.proof[i] == VSHI_PROVED_FREE;
-    }
-    assert_true(unproved && proved_free);
-    march_with(vshi_kernel_base.march, field, 1000, VSHI_MARCH_PLAIN, &base);
-    assert_true(base.stats.unfinished > 0);
-    vsh_field_free(field);
 }
 
 static void neither_threads_nor_neighbours_show_in_the_bits(void **state) {
@@ -365,7 +269,6 @@ static void options_lights_and_cancelling_have_their_codes(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_instruction_set_gives_the_same_bits),
         cmocka_unit_test(neither_threads_nor_neighbours_show_in_the_bits),
         cmocka_unit_test(a_scene_scaled_by_a_power_of_two_has_the_same_bits),
         cmocka_unit_test(every_point_is_marched_skipped_certified_or_invalid),

@@ -1,14 +1,16 @@
 #include "shade/kernel/march.h"
 
-const vshi_kernel *vshi_kernel_best(void) {
+#include "base/isa.h"
+
+const vshi_kernel *vshi_kernel_of(int32_t isa) {
+    switch (vshi_isa_resolve(isa)) {
 #if defined(__x86_64__)
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-        __builtin_cpu_supports("avx512vl")) {
+    case VSH_ISA_AVX512:
         return &vshi_kernel_avx512;
-    }
-    if (__builtin_cpu_supports("avx2")) {
+    case VSH_ISA_AVX2:
         return &vshi_kernel_avx2;
-    }
 #endif
-    return &vshi_kernel_base;
+    default:
+        return &vshi_kernel_base;
+    }
 }

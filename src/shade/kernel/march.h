@@ -62,7 +62,7 @@ extern const vshi_kernel vshi_kernel_avx2;
 extern const vshi_kernel vshi_kernel_avx512;
 #endif
 
-/* The fastest of them that this machine runs. */
-const vshi_kernel *vshi_kernel_best(void);
+/* That of a VSH_ISA_… which this machine has; base.h says which. */
+const vshi_kernel *vshi_kernel_of(int32_t isa);
 
 #endif
