@@ -27,6 +27,7 @@ typedef struct vsh_receiver {
     int32_t height;
     int32_t supersample;
     int32_t padding;
+    int32_t ao_spacing;
     const char *output; /* image file */
     int32_t bits;       /* as in vsh_image_options */
     const char *pack;   /* as in vsh_image_options; may be NULL */

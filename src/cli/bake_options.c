@@ -24,6 +24,7 @@ enum {
     KEY_UV_SET,
     KEY_SUPERSAMPLE,
     KEY_PADDING,
+    KEY_AO_SPACING,
     KEY_BITS,
     KEY_PACK,
     KEY_STATS,
@@ -78,6 +79,9 @@ static const cli_option options[] = {
      "UV set of the lightmap, from 0 (the second where\nthere is one, else the first)"},
     {KEY_SUPERSAMPLE, "supersample", "N", "N × N samples a texel, 1 to 16 (1)"},
     {KEY_PADDING, "padding", "N", "texels that charts are grown by, 0 to 4096 (4)"},
+    {KEY_AO_SPACING, "ao-spacing", "N",
+     "1, 2, 4 or 8 texels: AO by cones, adaptive or exact is\ninterpolated between texels so far apart where "
+     "casters\nare far; 1: never (4)"},
     CLI_COMMON_OPTIONS,
     CLI_ISA_OPTION,
 };
@@ -174,6 +178,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_SUPERSAMPLE:
         s->has_supersample = true;
         return cli_take_integer(name, value, 1, 16, &s->supersample);
+    case KEY_AO_SPACING:
+        s->has_ao_spacing = true;
+        return cli_take_integer(name, value, 1, 8, &s->ao_spacing);
     case KEY_PADDING:
         s->has_padding = true;
         return cli_take_integer(name, value, 0, 4096, &s->padding);

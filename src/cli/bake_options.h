@@ -24,12 +24,13 @@ typedef struct cli_bake_settings {
     int32_t uv_set;
     int32_t supersample;
     int32_t padding;
+    int32_t ao_spacing;
     int32_t bits;
     const char *pack;
     const char *casters[CLI_MAX_EXTRA_CASTERS];
     size_t caster_count;
     bool has_sun, has_sun_angle, has_ao, has_ao_method, has_ao_cones, has_method, has_size, has_uv_set;
-    bool has_supersample, has_padding, has_bits, irradiance;
+    bool has_supersample, has_padding, has_ao_spacing, has_bits, irradiance;
     bool dry_run;
     bool has_rays, has_sampler, has_frame, has_early_rays, has_max_error, error;
 } cli_bake_settings;

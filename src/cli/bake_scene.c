@@ -60,6 +60,9 @@ static void override_receiver(const cli_bake_settings *s, vsh_receiver *receiver
     if (s->has_padding) {
         receiver->padding = s->padding;
     }
+    if (s->has_ao_spacing) {
+        receiver->ao_spacing = s->ao_spacing;
+    }
     if (s->has_bits) {
         receiver->bits = s->bits;
     }
@@ -94,6 +97,7 @@ static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
             receiver->height = defaults.height;
             receiver->supersample = defaults.supersample;
             receiver->padding = defaults.padding;
+            receiver->ao_spacing = defaults.ao_spacing;
         }
         override_receiver(s, receiver);
         if (receiver->output == NULL) {

@@ -69,6 +69,7 @@ int cli_receiver_texels(const cli_receiver_job *job, bool warn, vsh_texels **tex
     options.height = receiver->height;
     options.supersample = receiver->supersample;
     options.padding = receiver->padding;
+    options.ao_spacing = receiver->ao_spacing;
     options.shade = job->scene->shade;
     vsh_uv_report *reports = calloc(count, sizeof *reports);
     if (reports == NULL) {

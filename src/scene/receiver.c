@@ -49,6 +49,11 @@ static const vshi_key receiver_keys[] = {
      .lowest = 1.0,
      .highest = 16.0},
     {.name = "padding", .kind = VSHI_INTEGER, .offset = offsetof(vsh_receiver, padding), .highest = 4096.0},
+    {.name = "ao_spacing",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_receiver, ao_spacing),
+     .lowest = 1.0,
+     .highest = 8.0},
     {.name = "output", .kind = VSHI_PATH, .required = VSHI_ALL, .offset = offsetof(vsh_receiver, output)},
     {.name = "bits", .kind = VSHI_CUSTOM, .offset = offsetof(vsh_receiver, bits), .read = read_bits},
     {.name = "pack", .kind = VSHI_STRING, .offset = offsetof(vsh_receiver, pack)},
@@ -65,6 +70,7 @@ vsh_result vshi_read_receiver(vshi_reader *reader, const vshi_value *value, void
     receiver->height = lightmap.height;
     receiver->supersample = lightmap.supersample;
     receiver->padding = lightmap.padding;
+    receiver->ao_spacing = lightmap.ao_spacing;
     receiver->bits = image.bits;
     return vshi_read_object(reader, value, &receiver_table, 1, "a receiver", receiver);
 }
