@@ -317,7 +317,7 @@ static vsh_result run_passes(lattice *l, const vsh_shade_options *options, int32
         }
         progress.done = (double)count_known(l) / all;
         progress.share = (double)count / all;
-        if (result == VSH_OK) {
+        if (result == VSH_OK && count > 0) {
             result = shade_pass(l, options, count, &part, job, stats, error);
         }
         if (result == VSH_OK && l->spacing > 1) {
