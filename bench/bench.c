@@ -109,8 +109,11 @@ int main(int argc, char **argv) {
     const struct {
         const char *name;
         void (*run)(FILE *csv);
-    } parts[] = {
-        {"seeds", bench_seeds}, {"asset", bench_asset}, {"refine", bench_refine}, {"proofs", bench_proofs}};
+    } parts[] = {{"seeds", bench_seeds},
+                 {"asset", bench_asset},
+                 {"refine", bench_refine},
+                 {"proofs", bench_proofs},
+                 {"points", bench_points}};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
         if (only == NULL || strcmp(only, parts[i].name) == 0) {
             parts[i].run(csv);

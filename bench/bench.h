@@ -42,5 +42,6 @@ void bench_seeds(FILE *csv);
 void bench_asset(FILE *csv);
 void bench_refine(FILE *csv);
 void bench_proofs(FILE *csv);
+void bench_points(FILE *csv);
 
 #endif

@@ -15,6 +15,7 @@
 #include "image.h"
 #include "light.h"
 #include "mesh.h"
+#include "query.h"
 #include "scene.h"
 #include "sdf.h"
 #include "shade.h"
