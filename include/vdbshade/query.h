@@ -40,9 +40,9 @@ static inline vsh_query_output vsh_query_output_default(void) {
  *
  * Up to 64 points are shaded at once on the calling thread, without allocation, progress or cancelling. More
  * run on run->threads under the stage "query". Where many points do not follow each other in space they are
- * shaded in the order of a curve that fills it (Hilbert, 1891), as neighbours share proofs, and each value is
- * put in its place: random points then take a fraction of the time. The order is found for up to 4 194 304
- * points at a time, which takes 16 bytes for each of them.
+ * shaded in the order of a curve that fills it (Morton, 1966), as neighbours share proofs and memory, and
+ * each value is put in its place: random points then take a fraction of the time. The order is found for up
+ * to 4 194 304 points at a time, which takes 16 bytes for each of them.
  *
  * Values do not depend on that order, nor on the other points of a call, but for shadows by adaptive and
  * exact (see vsh_points), whose rays depend on it within their error; none depends on threads.

@@ -1,6 +1,6 @@
-/* Hilbert's curve through the points' box, 2^10 cells along each edge, and a radix sort by place on it. A
- * square of points on a surface stays together on it; Morton's curve is quicker to compute, but jumps: random
- * points took MORTON_RATIO the time in its order. */
+/* Morton's curve through the points' box, 2^10 cells along each edge, and a radix sort by place on it.
+ * Hilbert's, which never jumps, saves a hundredth of the samples of a million random points and takes 30 ns
+ * more a point to compute. */
 #include "shade/order.h"
 
 #include "base/memory.h"
@@ -15,15 +15,16 @@ enum {
     DIGIT = 10,
     VALUES = 1 << DIGIT,
     PASSES = 3 * BITS / DIGIT,
-    SLICES = 32, /* of the points, each counted and placed by one thread */
-    AT_ONCE = 16 /* points whose keys are computed together */
+    SLICES = 32,   /* at most, of the points: each is counted and placed by one thread */
+    SLICE = 16384, /* points of one, at least: its counts are as many as VALUES */
+    LAST = (1 << 3 * BITS) - 1
 };
 
 typedef struct entry {
     uint32_t key, point;
 } entry;
 
-/* Cells of the curve are laid over the points' own box, so far as it is within this many of the casters'
+/* Cells are laid over the points' own box, so far as it is within this many of the casters'
  * diagonals of their box: what is farther off is put on the sides. */
 static const double FAR = 4.0;
 
@@ -39,34 +40,6 @@ void vshi_order_free(vshi_order *order) {
 
 /* --- places on the curve */
 
-/* Turns cells into Hilbert's order: after it the bits of x, y and z, taken in turn from the highest, are the
- * place on the curve (Skilling, "Programming the Hilbert curve", 2004), here without branches and over
- * several points. */
-static void hilbert(uint32_t (*restrict x)[AT_ONCE]) {
-    for (uint32_t bit = BITS - 1; bit > 0; --bit) {
-        const uint32_t below = (1u << bit) - 1;
-        for (int axis = 0; axis < 3; ++axis) {
-            for (int i = 0; i < AT_ONCE; ++i) {
-                const uint32_t set = 0u - (x[axis][i] >> bit & 1u);
-                const uint32_t swap = (x[0][i] ^ x[axis][i]) & below & ~set;
-                x[0][i] ^= (below & set) | swap;
-                x[axis][i] ^= swap;
-            }
-        }
-    }
-    for (int i = 0; i < AT_ONCE; ++i) {
-        x[1][i] ^= x[0][i];
-        x[2][i] ^= x[1][i];
-        uint32_t turn = 0;
-        for (uint32_t bit = BITS - 1; bit > 0; --bit) {
-            turn ^= ((1u << bit) - 1) & (0u - (x[2][i] >> bit & 1u));
-        }
-        for (int axis = 0; axis < 3; ++axis) {
-            x[axis][i] ^= turn;
-        }
-    }
-}
-
 /* The low ten bits, two zeros between each. */
 static inline uint32_t spread(uint32_t x) {
     x = (x | x << 16) & 0x030000ffu;
@@ -78,11 +51,11 @@ static inline uint32_t spread(uint32_t x) {
 /* --- the sort */
 
 typedef struct sorting {
-    const double *positions; /* of the first point */
-    size_t count, slice;
+    const double *positions;     /* of the first point */
+    size_t count, slices, slice; /* points of each */
     double low[3], high[3];
     double slice_low[SLICES][3], slice_high[SLICES][3];
-    double scale[3];
+    double scale; /* cells are cubes */
     const entry *from;
     entry *to;
     uint32_t *out; /* of the last pass, instead of `to` */
@@ -123,7 +96,7 @@ static void lay_cells(sorting *s, const vsh_field *field) {
     for (int axis = 0; axis < 3; ++axis) {
         s->low[axis] = field->world_max[axis] + FAR * diagonal;
         s->high[axis] = field->world_min[axis] - FAR * diagonal;
-        for (int n = 0; n < SLICES; ++n) {
+        for (size_t n = 0; n < s->slices; ++n) {
             s->low[axis] = fmin(s->low[axis], s->slice_low[n][axis]);
             s->high[axis] = fmax(s->high[axis], s->slice_high[n][axis]);
         }
@@ -131,36 +104,29 @@ static void lay_cells(sorting *s, const vsh_field *field) {
         s->high[axis] = fmin(s->high[axis], field->world_max[axis] + FAR * diagonal);
         longest = fmax(longest, s->high[axis] - s->low[axis]);
     }
-    for (int axis = 0; axis < 3; ++axis) { /* the same for all: cells are cubes */
-        s->scale[axis] = longest > 0.0 ? (1 << BITS) / longest : 0.0;
+    s->scale = longest > 0.0 ? (1 << BITS) / longest : 0.0;
+}
+
+static uint32_t place_of(const sorting *s, const double p[3]) {
+    const double most = (1 << BITS) - 1;
+    uint32_t place = 0;
+    bool finite = true;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double cell = (p[axis] - s->low[axis]) * s->scale;
+        finite = finite && isfinite(p[axis]);
+        place = place << 1 | spread((uint32_t)(cell > 0.0 ? cell < most ? cell : most : 0.0));
     }
+    return finite ? place : LAST;
 }
 
 static void make_keys(void *user, size_t begin, size_t end) {
     sorting *s = user;
     for (size_t n = begin; n < end; ++n) {
         memset(s->places[n], 0, sizeof s->places[n]);
-        for (size_t first = n * s->slice; first < slice_end(s, n); first += AT_ONCE) {
-            const size_t left = slice_end(s, n) - first;
-            const size_t count = left < AT_ONCE ? left : AT_ONCE;
-            uint32_t x[3][AT_ONCE] = {{0}};
-            bool finite[AT_ONCE];
-            for (size_t i = 0; i < count; ++i) {
-                const double *p = s->positions + 3 * (first + i);
-                finite[i] = isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]);
-                for (int axis = 0; axis < 3; ++axis) {
-                    const double most = (1 << BITS) - 1;
-                    const double cell = (p[axis] - s->low[axis]) * s->scale[axis];
-                    x[axis][i] = (uint32_t)(cell > 0.0 ? cell < most ? cell : most : 0.0);
-                }
-            }
-            hilbert(x);
-            for (size_t i = 0; i < count; ++i) {
-                const uint32_t place = spread(x[0][i]) << 2 | spread(x[1][i]) << 1 | spread(x[2][i]);
-                const uint32_t key = finite[i] ? place : (1u << 3 * BITS) - 1;
-                s->to[first + i] = (entry){key, (uint32_t)(first + i)};
-                ++s->places[n][key & (VALUES - 1)];
-            }
+        for (size_t i = n * s->slice; i < slice_end(s, n); ++i) {
+            const uint32_t key = place_of(s, s->positions + 3 * i);
+            s->to[i] = (entry){key, (uint32_t)i};
+            ++s->places[n][key & (VALUES - 1)];
         }
     }
 }
@@ -179,7 +145,7 @@ static void count_digits(void *user, size_t begin, size_t end) {
 static void add_up(sorting *s) {
     uint32_t sum = 0;
     for (int value = 0; value < VALUES; ++value) {
-        for (int n = 0; n < SLICES; ++n) {
+        for (size_t n = 0; n < s->slices; ++n) {
             const uint32_t count = s->places[n][value];
             s->places[n][value] = sum;
             sum += count;
@@ -210,7 +176,7 @@ static void put_out(void *user, size_t begin, size_t end) {
 }
 
 static vsh_result each_slice(vshi_job *job, vshi_range_fn *fn, sorting *s, vsh_error *error) {
-    return vshi_parallel_for(job, SLICES, 1, 0, fn, s, error);
+    return vshi_parallel_for(job, s->slices, 1, 0, fn, s, error);
 }
 
 vsh_result vshi_order_points(vshi_job *job, const vsh_field *field, const vsh_points *points, size_t first,
@@ -223,7 +189,9 @@ vsh_result vshi_order_points(vshi_job *job, const vsh_field *field, const vsh_po
     entry *buffers[2] = {order->memory, (entry *)order->memory + order->most};
     s->positions = points->positions + 3 * first;
     s->count = count;
-    s->slice = (count + SLICES - 1) / SLICES;
+    s->slices = (count + SLICE - 1) / SLICE;
+    s->slices = s->slices < SLICES ? s->slices : SLICES;
+    s->slice = (count + s->slices - 1) / s->slices;
     s->to = buffers[0];
     result = each_slice(job, find_box, s, error);
     if (result == VSH_OK) {
@@ -246,10 +214,11 @@ vsh_result vshi_order_points(vshi_job *job, const vsh_field *field, const vsh_po
     return result;
 }
 
-/* --- whether it pays */
+/* --- whether it pays: a million random points on the sample asset take 0.59 µs each by cone as they come and
+ * 0.38 in order, a hundred thousand 0.59 and 0.49, ten thousand 0.63 and 0.67 */
 
 bool vshi_order_pays(const vsh_field *field, const vsh_points *points) {
-    enum { LEAST = 4096, TOGETHER = 16, LOOKS = 256 };
+    enum { LEAST = 32768, TOGETHER = 16, LOOKS = 256 };
     static const double SPREAD = 8.0; /* voxels: side of the box of so many points that share little */
     if (points->count < LEAST) {
         return false;
