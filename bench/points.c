@@ -118,6 +118,27 @@ static double query_seconds(const points_bench *b, const vsh_query *query, size_
     return bench_median(seconds, RUNS);
 }
 
+/* The same of vsh_shade_shadow(), a point a call. */
+static double shade_seconds(const points_bench *b, const vsh_shade_options *shade, size_t count,
+                            vsh_shade_stats *stats) {
+    double seconds[RUNS];
+    vsh_run run = vsh_run_default();
+    run.threads = 1;
+    vsh_error error;
+    for (int r = 0; r < RUNS; ++r) {
+        *stats = vsh_shade_stats_zero();
+        const double start = bench_seconds();
+        for (size_t i = 0; i < count; ++i) {
+            const vsh_points points = {1, b->points.positions + 3 * i, b->points.normals + 3 * i, NULL};
+            bench_check(
+                vsh_shade_shadow(b->field, &points, b->sun, shade, &run, b->values + i, NULL, stats, &error),
+                &error);
+        }
+        seconds[r] = bench_seconds() - start;
+    }
+    return bench_median(seconds, RUNS);
+}
+
 static void row(const points_bench *b, const char *how, int32_t method, size_t count, double seconds,
                 const vsh_shade_stats *stats) {
     char what[64];
@@ -159,8 +180,20 @@ void bench_points(FILE *csv) {
         row(&b, "1e6 query, 2 threads", methods[m], MANY, seconds, &stats);
         seconds = query_seconds(&b, query, SINGLE, 1, 1, &stats);
         row(&b, "single query", methods[m], SINGLE, seconds, &stats);
+        seconds = shade_seconds(&b, &shade, SINGLE, &stats);
+        row(&b, "single vsh_shade_shadow", methods[m], SINGLE, seconds, &stats);
         vsh_query_free(query);
     }
+    /* one at a time, each next to the one before: what the call costs where memory does not */
+    vsh_query *query = NULL;
+    vsh_shade_stats stats;
+    vsh_error error;
+    bench_scene_points(&scene, field, 5, SINGLE, positions, normals, reference);
+    bench_check(vsh_query_create(field, &sun, 1, NULL, &query, &error), &error);
+    bench_shadow(1, field, &b.points, &sun, NULL, reference, NULL, &stats);
+    const double seconds = query_seconds(&b, query, SINGLE, 1, 1, &stats);
+    row(&b, "single query, lightmap order", VSH_SHADOW_CONE, SINGLE, seconds, &stats);
+    vsh_query_free(query);
     free(positions);
     free(normals);
     free(values);

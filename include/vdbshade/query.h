@@ -45,7 +45,8 @@ static inline vsh_query_output vsh_query_output_default(void) {
  * to 4 194 304 points at a time, which takes 16 bytes for each of them.
  *
  * Values do not depend on that order, nor on the other points of a call, but for shadows by adaptive and
- * exact (see vsh_points), whose rays depend on it within their error; none depends on threads.
+ * exact, whose rays depend on it within their error (see vsh_points), as the deviations of shadows by rays
+ * do; nothing depends on threads.
  *
  * Errors (the arrays then hold nothing of use): VSH_ERROR_ARGUMENT (run, output's size, a deviation without
  * its values, AO without normals), VSH_ERROR_LIMIT (field and order need more than run->memory_limit),
