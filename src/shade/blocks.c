@@ -263,8 +263,10 @@ static void keep_open(vshi_facing *facing) {
 void vshi_blocks_prove(const vshi_shadow_task *task, vshi_facing *facing, vshi_chunk *chunk,
                        vsh_shade_stats *stats) {
     for (int s = 0; s < SIZES; ++s) {
-        prove_size(task, facing, s, chunk, stats);
-        keep_open(facing);
+        if (2 * facing->count > SIZE[s].points) {
+            prove_size(task, facing, s, chunk, stats);
+            keep_open(facing);
+        }
         if (s == 0) {
             prove_near(task, facing, stats);
         }
