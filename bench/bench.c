@@ -123,7 +123,8 @@ int main(int argc, char **argv) {
                  {"asset", bench_asset},
                  {"ao", bench_ao_lightmaps},
                  {"refine", bench_refine},
-                 {"proofs", bench_proofs}};
+                 {"proofs", bench_proofs},
+                 {"points", bench_points}};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
         if (only == NULL || strcmp(only, parts[i].name) == 0) {
             parts[i].run(csv);

@@ -47,5 +47,6 @@ void bench_asset(FILE *csv);
 void bench_ao_lightmaps(FILE *csv);
 void bench_refine(FILE *csv);
 void bench_proofs(FILE *csv);
+void bench_points(FILE *csv);
 
 #endif

@@ -21,12 +21,13 @@ endfunction()
 
 # The marching kernels are one source, built once for each instruction set and chosen at run time.
 set(VSH_KERNEL_base_FLAGS "")
+set(VSH_KERNEL_few_FLAGS "")
 set(VSH_KERNEL_avx2_FLAGS -mavx2)
 set(VSH_KERNEL_avx512_FLAGS -mavx512f -mavx512dq -mavx512vl)
 
 function(vsh_add_kernels target)
   set(folder ${PROJECT_SOURCE_DIR}/src/shade/kernel)
-  set(kinds base)
+  set(kinds base few)
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     list(APPEND kinds avx2 avx512)
   endif()

@@ -90,9 +90,9 @@ VSH_API int32_t vsh_sampler(const char *name);
 VSH_API const char *vsh_sampler_name(int32_t sampler);
 
 /* Receivers: a view of the caller's arrays. Points that follow each other and lie within a few voxels of each
- * other share proofs, which makes them several times as fast: sort them along a curve that fills space.
- * adaptive and exact also take from them how many rays a point needs, so that its value depends, within its
- * error, on the points before and after it; never on threads. */
+ * other share proofs, which makes them several times as fast: sort them along a curve that fills space
+ * (query.h does so). adaptive and exact also take from them how many rays a point needs, so that its value
+ * depends, within its error, on the points before and after it; never on threads. */
 typedef struct vsh_points {
     size_t count;
     const double *positions; /* [count][3], world units */

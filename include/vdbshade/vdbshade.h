@@ -1,6 +1,6 @@
 /* vdbshade: soft shadows and ambient occlusion baked from signed distance fields.
  *
- *     casters ─▶ vsh_grid (level set) ─▶ vsh_field (pyramid) ─▶ vsh_shade_… (points)
+ *     casters ─▶ vsh_grid (level set) ─▶ vsh_field (pyramid) ─▶ vsh_shade_… (points), vsh_query_…
  *                                                            └▶ vsh_bake_…  (lightmaps)
  *
  * World space is right-handed, in scene units; angles are radians. What holds for every call stands in
@@ -15,6 +15,7 @@
 #include "image.h"
 #include "light.h"
 #include "mesh.h"
+#include "query.h"
 #include "scene.h"
 #include "sdf.h"
 #include "shade.h"

@@ -44,6 +44,7 @@ static bool worthwhile(const vshi_shadow_task *task, double end) {
 
 /* --- the ball above each point */
 
+/* Looked at for every point, whatever its neighbours prove: where a march begins decides where it samples. */
 static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_shade_stats *stats) {
     static const double LEAST_SINE = 0.1; /* of the cone's lowest ray over the plane */
     float centres[3][VSHI_PIECE];
@@ -52,7 +53,7 @@ static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_sh
     size_t count = 0;
     for (size_t i = 0; i < facing->count; ++i) {
         const vshi_cone *cone = &facing->cone[i];
-        if (worthwhile(task, cone->end) && cone->horizon > cone->sine + LEAST_SINE && cone->horizon <= 1.0) {
+        if (cone->horizon > cone->sine + LEAST_SINE && cone->horizon <= 1.0) {
             centres[0][count] = (float)(cone->origin.x + NEAR_HEIGHT * facing->normal[i].x);
             centres[1][count] = (float)(cone->origin.y + NEAR_HEIGHT * facing->normal[i].y);
             centres[2][count] = (float)(cone->origin.z + NEAR_HEIGHT * facing->normal[i].z);
@@ -262,8 +263,10 @@ static void keep_open(vshi_facing *facing) {
 void vshi_blocks_prove(const vshi_shadow_task *task, vshi_facing *facing, vshi_chunk *chunk,
                        vsh_shade_stats *stats) {
     for (int s = 0; s < SIZES; ++s) {
-        prove_size(task, facing, s, chunk, stats);
-        keep_open(facing);
+        if (2 * facing->count > SIZE[s].points) {
+            prove_size(task, facing, s, chunk, stats);
+            keep_open(facing);
+        }
         if (s == 0) {
             prove_near(task, facing, stats);
         }

@@ -57,6 +57,10 @@ typedef struct vshi_kernel {
 } vshi_kernel;
 
 extern const vshi_kernel vshi_kernel_base;
+/* For so many rays, in as many lanes: what the others hand them to, as empty lanes cost what full ones do. It
+ * has one build: a lone ray waits for memory, not for arithmetic. */
+#define VSHI_KERNEL_FEW 4
+extern const vshi_kernel vshi_kernel_few;
 #if defined(__x86_64__)
 extern const vshi_kernel vshi_kernel_avx2;
 extern const vshi_kernel vshi_kernel_avx512;
