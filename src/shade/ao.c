@@ -37,17 +37,18 @@ bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, 
     return true;
 }
 
-static vsh_result shade(vshi_ao_task *task, const vsh_run *run, vsh_shade_stats *stats, vsh_error *error) {
+static vsh_result shade(vshi_ao_task *task, const vshi_point_rows *rows, const vsh_run *run,
+                        vsh_shade_stats *stats, vsh_error *error) {
     const vsh_shade_options *options = task->options;
     const size_t count = task->points->count;
     if (options->ao_method == VSH_AO_TAPS) {
-        return vshi_shade_run(run, "ao", count, VSHI_CHUNK, vshi_ao_taps, task, stats, error);
+        return vshi_shade_run(run, "ao", count, rows, VSHI_CHUNK, vshi_ao_taps, task, stats, error);
     }
     if (options->ao_method == VSH_AO_CONES) {
         vshi_ao_cones cones;
         vshi_ao_cones_place(&cones, options->ao_cones);
         task->cones = &cones;
-        return vshi_shade_run(run, "ao", count, VSHI_AO_GRAIN, vshi_ao_by_cones, task, stats, error);
+        return vshi_shade_run(run, "ao", count, rows, VSHI_AO_GRAIN, vshi_ao_by_cones, task, stats, error);
     }
     vshi_sampler *sampler = vshi_sampler_create(options->sampler, options->rays, options->frame);
     if (sampler == NULL) {
@@ -55,7 +56,7 @@ static vsh_result shade(vshi_ao_task *task, const vsh_run *run, vsh_shade_stats 
     }
     task->sampler = sampler;
     const vsh_result result =
-        vshi_shade_run(run, "ao", count, VSHI_AO_GRAIN, vshi_ao_by_rays, task, stats, error);
+        vshi_shade_run(run, "ao", count, rows, VSHI_AO_GRAIN, vshi_ao_by_rays, task, stats, error);
     vshi_sampler_free(sampler);
     return result;
 }
@@ -63,6 +64,12 @@ static vsh_result shade(vshi_ao_task *task, const vsh_run *run, vsh_shade_stats 
 vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const vsh_shade_options *options,
                         const vsh_run *run, float *ao, float *deviation, vsh_shade_stats *stats,
                         vsh_error *error) {
+    return vshi_shade_ao(field, points, NULL, options, run, ao, deviation, stats, error);
+}
+
+vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
+                         const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
+                         vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     vsh_shade_options full;
     const vsh_result result = vshi_shade_options_resolve(options, &full, error);
@@ -85,5 +92,5 @@ vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const 
                          .ao = ao,
                          .deviation = deviation,
                          .distance = full.ao_distance / field->voxel_size};
-    return shade(&task, run, stats, error);
+    return shade(&task, rows, run, stats, error);
 }

@@ -114,6 +114,12 @@ static void shade_points(const void *user, size_t begin, size_t end, vsh_shade_s
 vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
                             const vsh_shade_options *options, const vsh_run *run, float *visibility,
                             float *deviation, vsh_shade_stats *stats, vsh_error *error) {
+    return vshi_shade_shadow(field, points, NULL, light, options, run, visibility, deviation, stats, error);
+}
+
+vsh_result vshi_shade_shadow(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
+                             const vsh_light *light, const vsh_shade_options *options, const vsh_run *run,
+                             float *visibility, float *deviation, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     vsh_shade_options full;
     vsh_result result = vshi_shade_options_resolve(options, &full, error);
@@ -153,14 +159,15 @@ vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, co
         task.purpose = 31u * task.purpose + (unsigned char)light->name[i];
     }
     if (!by_rays) {
-        return vshi_shade_run(run, stage, points->count, VSHI_PIECE, shade_points, &task, stats, error);
+        return vshi_shade_run(run, stage, points->count, rows, VSHI_PIECE, shade_points, &task, stats, error);
     }
     vshi_sampler *sampler = vshi_sampler_create(full.sampler, full.rays, full.frame);
     if (sampler == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
     }
     task.sampler = sampler;
-    result = vshi_shade_run(run, stage, points->count, VSHI_PIECE, vshi_shadow_by_rays, &task, stats, error);
+    result =
+        vshi_shade_run(run, stage, points->count, rows, VSHI_PIECE, vshi_shadow_by_rays, &task, stats, error);
     vshi_sampler_free(sampler);
     return result;
 }
