@@ -24,6 +24,7 @@ enum {
     KEY_UV_SET,
     KEY_SUPERSAMPLE,
     KEY_PADDING,
+    KEY_BAND_ROWS,
     KEY_BITS,
     KEY_PACK,
     KEY_STATS,
@@ -78,6 +79,9 @@ static const cli_option options[] = {
      "UV set of the lightmap, from 0 (the second where\nthere is one, else the first)"},
     {KEY_SUPERSAMPLE, "supersample", "N", "N × N samples a texel, 1 to 16 (1)"},
     {KEY_PADDING, "padding", "N", "texels that charts are grown by, 0 to 4096 (4)"},
+    {KEY_BAND_ROWS, "band-rows", "N",
+     "rows baked and written at a time, 1 to 65536,\nrounded up to eights; changes no value (all, or as\n"
+     "many as --memory-limit allows)"},
     CLI_COMMON_OPTIONS,
 };
 
@@ -191,6 +195,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_PADDING:
         s->has_padding = true;
         return cli_take_integer(name, value, 0, 4096, &s->padding);
+    case KEY_BAND_ROWS:
+        return cli_take_integer(name, value, 1, VSH_MAX_LIGHTMAP_SIZE, &s->band_rows);
     case KEY_BITS:
         s->has_bits = true;
         return take_bits(name, value, &s->bits);
