@@ -66,6 +66,54 @@ typedef struct vsh_texels_info {
 /* Cannot fail. */
 VSH_API void vsh_texels_get_info(const vsh_texels *texels, vsh_texels_info *info);
 
+/* --- bands of rows: lightmaps larger than memory */
+
+/* A receiver's triangles, sorted and counted for one size of lightmap: the texels of any band of its rows are
+ * made from them. They refer to the meshes and to the arrays behind them, which must outlive them. */
+typedef struct vsh_charts vsh_charts;
+
+/* Checks and sorts the meshes' triangles and counts the samples of every row. The same arguments, reports,
+ * warnings and errors as of vsh_texels_create(), but memory is taken for the triangles only. Free with
+ * vsh_charts_free(). */
+VSH_API vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count,
+                                     const vsh_lightmap_options *options, const vsh_run *run,
+                                     vsh_uv_report *uv_reports, vsh_charts **charts, vsh_error *error);
+VSH_API void vsh_charts_free(vsh_charts *charts); /* NULL does nothing */
+
+typedef struct vsh_charts_info {
+    int32_t width;
+    int32_t height;
+    uint64_t covered; /* as of vsh_texels_info, of the whole lightmap */
+    uint64_t samples;
+    uint64_t bytes; /* in memory */
+} vsh_charts_info;
+
+/* Cannot fail. */
+VSH_API void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info *info);
+
+/* World box of all samples, as of vsh_texels_info: what a field's `receivers` are to hold. Takes as long as
+ * making all texels. Errors: VSH_ERROR_ARGUMENT (run), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
+                                     double bounds_max[3], vsh_error *error);
+
+enum { VSH_BAND_STEP = 8 }; /* bands of rows begin at multiples of it */
+
+/* The texels of `rows` rows from `first_row` on, and those beside them that padding copies from. `first_row`
+ * is a multiple of VSH_BAND_STEP, and so is `rows`, but where it goes to the last row. vsh_bake_lightmap()
+ * then fills planes of [rows][width], with the values that baking the whole lightmap gives there, bit by bit;
+ * infos and statistics are the band's share of the whole's. The charts are not needed any more. Errors:
+ * VSH_ERROR_ARGUMENT (texels or charts NULL, rows, run), VSH_ERROR_LIMIT (run->memory_limit),
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t first_row, int32_t rows,
+                                          const vsh_run *run, vsh_texels **texels, vsh_error *error);
+
+/* Bytes that baking such a band takes at most, beside charts and field: texels, planes and what
+ * vsh_bake_lightmap() takes, with the shading options given to vsh_charts_create(). `floats` is the sum of
+ * all planes' channels; `errors` and `irradiance` tell (not 0) whether there are such planes. 0 where the
+ * rows are no band. */
+VSH_API uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows,
+                                       int32_t floats, int32_t errors, int32_t irradiance);
+
 /* The samples behind a lightmap, in the order in which they are shaded. A view into the texels. Positions are
  * lifted off coarse triangles towards the smooth surface (Hanika, "Hacking the shadow terminator", 2021). */
 typedef struct vsh_texel_samples {
@@ -79,7 +127,8 @@ typedef struct vsh_texel_samples {
 /* Cannot fail; the arrays belong to the texels. */
 VSH_API vsh_texel_samples vsh_texels_samples(const vsh_texels *texels);
 
-/* A lightmap in the caller's arrays; each plane is [height][width] with row 0 at v = 1. NULL planes are not
+/* A lightmap in the caller's arrays; each plane is [height][width] with row 0 at v = 1, and for the texels of
+ * a band [rows][width] from its first row on. NULL planes are not
  * baked and cost nothing. Texels that neither a chart covers nor padding reaches are 0. */
 typedef struct vsh_lightmap {
     float *const *shadow; /* [light_count] planes: visible fraction of each light; may be NULL */

@@ -10,7 +10,8 @@ extern "C" {
 
 enum { VSH_MAX_CHANNELS = 256, VSH_CHANNEL_NAME = 128 };
 
-/* Planes with names: a view. width × height × channel_count is at most 2^31. */
+/* Planes with names: a view. width × height × channel_count is at most 2^31; in
+ * an EXR file that is written row by row there is no such limit. */
 typedef struct vsh_image {
     int32_t width;              /* pixels, ≥ 1 */
     int32_t height;             /* pixels, ≥ 1 */
@@ -47,9 +48,38 @@ static inline vsh_image_options vsh_image_options_default(void) {
 VSH_API vsh_result vsh_image_write(const char *path, const vsh_image *image, const vsh_image_options *options,
                                    vsh_error *error);
 
-/* Whether vsh_image_write() could take this path, these options and these channel names, without writing: to
- * be asked before a long bake. Tests that the folder can be written to. image->planes may be NULL. Same
- * errors, as far as they show without writing. */
+/* An image that is written as its rows come, so that it need not be in memory at once. One thread at a time.
+ */
+typedef struct vsh_image_writer vsh_image_writer;
+
+/* Begins the file that vsh_image_write() would write: the same bytes, for the same values. image->planes is
+ * not looked at; names are copied. Same errors, and VSH_ERROR_ARGUMENT for writer NULL. End with
+ * vsh_image_writer_finish() or vsh_image_writer_abandon(). */
+VSH_API vsh_result vsh_image_writer_create(const char *path, const vsh_image *image,
+                                           const vsh_image_options *options, vsh_image_writer **writer,
+                                           vsh_error *error);
+
+/* The next `rows` rows from the top, `planes` [channel_count][rows × width]. Errors: VSH_ERROR_ARGUMENT
+ * (more rows than are left, or fewer than 1; a plane NULL), VSH_ERROR_WRITE, VSH_ERROR_UNSUPPORTED,
+ * VSH_ERROR_MEMORY; after one, nothing but vsh_image_writer_abandon() is of use. */
+VSH_API vsh_result vsh_image_writer_add(vsh_image_writer *writer, int32_t rows, const float *const *planes,
+                                        vsh_error *error);
+
+/* Puts the file in place and frees the writer, also where it fails; the old file is then as it was. Errors:
+ * VSH_ERROR_ARGUMENT (rows are missing), and as vsh_image_writer_add(). */
+VSH_API vsh_result vsh_image_writer_finish(vsh_image_writer *writer, vsh_error *error);
+
+/* Frees the writer; the old file is as it was. NULL does nothing. */
+VSH_API void vsh_image_writer_abandon(vsh_image_writer *writer);
+
+/* Bytes that writing takes at most, beside the planes: some rows, or in formats that OpenImageIO writes from
+ * memory only the whole image. 0 where vsh_image_check() has objections to what is given. */
+VSH_API uint64_t vsh_image_writer_bytes(const char *path, const vsh_image *image,
+                                        const vsh_image_options *options);
+
+/* Whether vsh_image_writer_create() could take this path, these options and these channel names, without
+ * writing: to be asked before a long bake. Tests that the folder can be written to. image->planes may be
+ * NULL. Same errors, as far as they show without writing. */
 VSH_API vsh_result vsh_image_check(const char *path, const vsh_image *image, const vsh_image_options *options,
                                    vsh_error *error);
 

@@ -29,7 +29,7 @@ typedef struct lattice {
     const vsh_points *points;
     double distance; /* of AO, finest voxels */
     int32_t spacing; /* of this pass */
-    uint32_t *at;    /* [height][width]: number of the texel's origin + 1, 0: none */
+    uint32_t *at;    /* [rows held][width]: number of the texel's origin + 1, 0: none */
     uint8_t *state;  /* [origins.count] */
     size_t *before;  /* [blocks + 1]: chosen origins before each block */
     size_t blocks;
@@ -40,6 +40,7 @@ typedef struct lattice {
     float *normal;
     uint32_t *texel;
     float *chosen_values, *chosen_deviation;
+    size_t *row_start; /* [rows of the origins + 1] */
 } lattice;
 
 enum { BLOCK = VSHI_ORIGIN_BLOCK };
@@ -60,8 +61,8 @@ static uint32_t row_of(const lattice *l, size_t i) {
 static void find_texels(void *user, size_t begin, size_t end) {
     const lattice *l = user;
     for (size_t i = begin; i < end; ++i) {
-        const size_t width = (size_t)l->texels->info.width;
-        l->at[row_of(l, i) * width + column_of(l, i)] = (uint32_t)i + 1;
+        const size_t row = row_of(l, i) - (uint32_t)l->texels->band.first;
+        l->at[row * (size_t)l->texels->info.width + column_of(l, i)] = (uint32_t)i + 1;
     }
 }
 
@@ -97,6 +98,20 @@ static void pack(void *user, size_t begin, size_t end) {
     }
 }
 
+/* Where the rows of the origins begin among the chosen. */
+static vshi_point_rows chosen_rows(const lattice *l, size_t count) {
+    vshi_point_rows rows = l->origins->rows;
+    size_t next = 0;
+    for (size_t row = 0; row <= rows.count; ++row) {
+        while (next < count && l->number[next] < rows.start[row]) {
+            ++next;
+        }
+        l->row_start[row] = next;
+    }
+    rows.start = l->row_start;
+    return rows;
+}
+
 static void unpack(void *user, size_t begin, size_t end) {
     const lattice *l = user;
     for (size_t n = begin; n < end; ++n) {
@@ -118,11 +133,12 @@ typedef struct cell {
 } cell;
 
 static bool lookup(const lattice *l, uint32_t column, uint32_t row, size_t *i) {
-    const uint32_t width = (uint32_t)l->texels->info.width, height = (uint32_t)l->texels->info.height;
-    if (column >= width || row >= height) {
+    const vshi_band *band = &l->texels->band;
+    const uint32_t width = (uint32_t)l->texels->info.width, held = row - (uint32_t)band->first;
+    if (column >= width || held >= (uint32_t)band->rows) {
         return false;
     }
-    const uint32_t number = l->at[(size_t)row * width + column];
+    const uint32_t number = l->at[(size_t)held * width + column];
     *i = (size_t)number - 1;
     return number != 0;
 }
@@ -275,8 +291,9 @@ static vsh_result shade_pass(lattice *l, const vsh_shade_options *options, size_
             shade.max_error = fmax(FINER * shade.max_error, 1e-4);
         }
         const vsh_points points = {count, l->position, l->normal, l->texel};
-        result =
-            vsh_shade_ao(l->field, &points, &shade, run, l->chosen_values, l->chosen_deviation, stats, error);
+        const vshi_point_rows rows = chosen_rows(l, count);
+        result = vshi_shade_ao(l->field, &points, &rows, &shade, run, l->chosen_values, l->chosen_deviation,
+                               stats, error);
     }
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, count, 4096, 0, unpack, l, error);
@@ -298,8 +315,8 @@ static size_t count_known(const lattice *l) {
     return known;
 }
 
-static vsh_result run_passes(lattice *l, const vsh_shade_options *options, int32_t spacing,
-                             const vsh_run *run, vshi_job *job, vsh_shade_stats *stats, vsh_error *error) {
+static vsh_result run_passes(lattice *l, const vsh_shade_options *options, const vsh_run *run, vshi_job *job,
+                             vsh_shade_stats *stats, vsh_error *error) {
     const double all = fmax(1.0, (double)l->origins->count);
     passes progress = {.run = run};
     vsh_run part = *run;
@@ -307,7 +324,7 @@ static vsh_result run_passes(lattice *l, const vsh_shade_options *options, int32
     part.progress = run->progress != NULL ? tell : NULL;
     part.warning = run->warning != NULL ? warn : NULL;
     vsh_result result = vshi_parallel_for(job, l->origins->count, 4096, 0, find_texels, l, error);
-    for (l->spacing = spacing; result == VSH_OK && l->spacing > 0; l->spacing /= 2) {
+    for (l->spacing = l->texels->ao_spacing; result == VSH_OK && l->spacing > 0; l->spacing /= 2) {
         result = vshi_parallel_for(job, l->blocks, 1, 0, choose, l, error);
         size_t count = 0;
         for (size_t block = 0; result == VSH_OK && block <= l->blocks; ++block) {
@@ -327,16 +344,13 @@ static vsh_result run_passes(lattice *l, const vsh_shade_options *options, int32
     return result;
 }
 
-double vshi_lattice_bytes(const vsh_texels *texels) {
-    const double texel_count = (double)texels->info.width * (double)texels->info.height;
-    return texel_count * sizeof(uint32_t) +
-           (double)texels->count * (1.0 + 3.0 * sizeof(double) + 7.0 * sizeof(float));
+double vshi_lattice_bytes(double samples, double texels) {
+    return texels * sizeof(uint32_t) + samples * (1.0 + 3.0 * sizeof(double) + 7.0 * sizeof(float));
 }
 
 vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
-                           const vsh_points *points, const vsh_shade_options *options, int32_t spacing,
-                           const vsh_run *run, float *values, float *deviation, vsh_shade_stats *stats,
-                           vsh_error *error) {
+                           const vsh_points *points, const vsh_shade_options *options, const vsh_run *run,
+                           float *values, float *deviation, vsh_shade_stats *stats, vsh_error *error) {
     lattice l = {.field = field,
                  .texels = texels,
                  .origins = origins,
@@ -353,13 +367,14 @@ vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, con
         return vshi_fail(error, VSH_ERROR_MEMORY, "ao: the system refused memory");
     }
     vsh_result result = VSH_OK;
-    const size_t texel_count = (size_t)texels->info.width * (size_t)texels->info.height;
-    l.at = vshi_take(texel_count, sizeof *l.at, what, &result, error);
+    l.at = vshi_take(vshi_texels_held(texels), sizeof *l.at, what, &result, error);
     l.state = vshi_take(origins->count, 1, what, &result, error);
     l.before = vshi_take(l.blocks + 1, sizeof *l.before, what, &result, error);
+    l.row_start = vshi_take(origins->rows.count + 1, sizeof *l.row_start, what, &result, error);
     if (result == VSH_OK) {
-        result = run_passes(&l, options, spacing, run, job, stats, error);
+        result = run_passes(&l, options, run, job, stats, error);
     }
+    free(l.row_start);
     free(l.before);
     free(l.state);
     free(l.at);

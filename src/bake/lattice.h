@@ -4,16 +4,18 @@
 
 #include "bake/origins.h"
 
-/* As vsh_shade_ao() at the origins' points, `points`, of a lightmap of one sample a texel. Texels of a
- * lattice of `spacing` (1, 2, 4 or 8) are shaded; those between are interpolated where nothing is near enough
- * to change within a cell, else the lattice is halved there (irradiance caching: Ward, Rubinstein and Clear,
- * 1988). `deviation` may be NULL. */
-vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
-                           const vsh_points *points, const vsh_shade_options *options, int32_t spacing,
-                           const vsh_run *run, float *values, float *deviation, vsh_shade_stats *stats,
-                           vsh_error *error);
+enum { VSHI_LATTICE_ROWS = 2 }; /* of tiles, below a texel's own: what its cell and theirs depend on */
 
-/* Bytes that it takes at most beside the origins. */
-double vshi_lattice_bytes(const vsh_texels *texels);
+/* As vsh_shade_ao() at the origins' points, `points`, of a lightmap of one sample a texel. Texels of a
+ * lattice of the texels' ao_spacing (1, 2, 4 or 8) are shaded; those between are interpolated where nothing
+ * is near enough to change within a cell, else the lattice is halved there (irradiance caching: Ward,
+ * Rubinstein and Clear, 1988). Of a band, the last VSHI_LATTICE_ROWS held have other values than in the
+ * whole. `deviation` may be NULL. */
+vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
+                           const vsh_points *points, const vsh_shade_options *options, const vsh_run *run,
+                           float *values, float *deviation, vsh_shade_stats *stats, vsh_error *error);
+
+/* Bytes that it takes at most for so many samples and texels, beside the origins. */
+double vshi_lattice_bytes(double samples, double texels);
 
 #endif

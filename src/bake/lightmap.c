@@ -1,5 +1,6 @@
+#include "bake/halo.h"
 #include "bake/lattice.h"
-#include "bake/padding.h"
+#include "bake/origins.h"
 #include "bake/take.h"
 #include "base/floats.h"
 #include "base/parallel.h"
@@ -7,9 +8,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Invalid texels are filled at least this far, texels, since filtering reads across them. */
-enum { LEAST_INVALID_RADIUS = 8 };
 
 typedef struct baking {
     const vsh_field *field;
@@ -19,18 +17,15 @@ typedef struct baking {
     vsh_shade_options shade;
     vsh_run run;
     vsh_run quiet; /* for steps of milliseconds that come once a plane: no stage of their own */
-    const vsh_lightmap *lightmap;
+    const vsh_lightmap *lightmap; /* planes of all rows that the texels hold */
+    vshi_halo halo;
     vshi_origins origins;
-    uint8_t *state;    /* [height][width]: VSHI_TEXEL_… */
+    uint8_t *state;    /* [rows held][width]: VSHI_TEXEL_… */
     float *values;     /* [origins.count]: of one light, or AO */
     float *deviation;  /* [origins.count]: of the same; NULL where no plane is for it */
     float *irradiance; /* [origins.count][3] */
     vsh_bake_stats stats;
 } baking;
-
-static size_t texel_count(const vsh_texels *texels) {
-    return (size_t)texels->info.width * (size_t)texels->info.height;
-}
 
 static bool light_wanted(const vsh_lightmap *lightmap, size_t light) {
     return lightmap->irradiance != NULL || (lightmap->shadow != NULL && lightmap->shadow[light] != NULL) ||
@@ -86,6 +81,7 @@ static void average_blocks(void *user, size_t begin, size_t end) {
     const averaging *a = user;
     const vsh_texels *texels = a->bake->texels;
     const vshi_origins *origins = &a->bake->origins;
+    const size_t base = vshi_texels_base(texels);
     uint8_t *state = a->bake->state;
     for (size_t block = begin; block < end; ++block) {
         size_t i = block * VSHI_ORIGIN_BLOCK;
@@ -113,13 +109,14 @@ static void average_blocks(void *user, size_t begin, size_t end) {
                 }
                 ++count;
             }
+            const size_t at = texel - base;
             if (a->values == NULL) {
-                state[texel] = count > 0 ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
+                state[at] = count > 0 ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
             } else if (count == 0 && !a->deviation) {
-                state[texel] = VSHI_TEXEL_INVALID;
+                state[at] = VSHI_TEXEL_INVALID;
             } else if (count > 0) {
                 for (size_t c = 0; c < a->channels; ++c) {
-                    a->plane[texel * a->channels + c] = (float)(sum[c] / (double)count);
+                    a->plane[at * a->channels + c] = (float)(sum[c] / (double)count);
                 }
             }
         }
@@ -163,8 +160,8 @@ static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
     const vsh_points points = points_of(bake, bake->shade.method == VSH_SHADOW_EXACT, &shade);
     float *errors = lightmap->shadow_error != NULL ? lightmap->shadow_error[index] : NULL;
     vsh_result result =
-        vsh_shade_shadow(bake->field, &points, &bake->lights[index], &shade, &bake->run, bake->values,
-                         errors != NULL ? bake->deviation : NULL, &bake->stats.shade, error);
+        vshi_shade_shadow(bake->field, &points, &bake->origins.rows, &bake->lights[index], &shade, &bake->run,
+                          bake->values, errors != NULL ? bake->deviation : NULL, &bake->stats.shade, error);
     if (result == VSH_OK && errors != NULL) {
         result = average(bake, bake->deviation, 1, errors, error);
     }
@@ -197,11 +194,11 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
         vsh_shade_options shade;
         const vsh_points points = points_of(bake, bake->shade.ao_method == VSH_AO_EXACT, &shade);
         float *deviation = lightmap->ao_error != NULL ? bake->deviation : NULL;
-        result = interpolates(bake) ? vshi_lattice_ao(bake->field, texels, &bake->origins, &points, &shade,
-                                                      texels->ao_spacing, &bake->run, bake->values, deviation,
-                                                      &bake->stats.shade, error)
-                                    : vsh_shade_ao(bake->field, &points, &shade, &bake->run, bake->values,
-                                                   deviation, &bake->stats.shade, error);
+        result = interpolates(bake)
+                     ? vshi_lattice_ao(bake->field, texels, &bake->origins, &points, &shade, &bake->run,
+                                       bake->values, deviation, &bake->stats.shade, error)
+                     : vshi_shade_ao(bake->field, &points, &bake->origins.rows, &shade, &bake->run,
+                                     bake->values, deviation, &bake->stats.shade, error);
         if (result == VSH_OK && lightmap->ao_error != NULL) {
             result = average(bake, bake->deviation, 1, lightmap->ao_error, error);
         }
@@ -211,29 +208,34 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
     }
     if (result == VSH_OK && lightmap->irradiance != NULL && bake->light_count > 0) {
         result = average(bake, bake->irradiance, 3, lightmap->irradiance, error);
-        for (size_t i = 0; result == VSH_OK && lightmap->ao != NULL && i < 3 * texel_count(texels); ++i) {
+        for (size_t i = 0; result == VSH_OK && lightmap->ao != NULL && i < 3 * vshi_texels_held(texels);
+             ++i) {
             lightmap->irradiance[i] *= lightmap->ao[i / 3];
         }
     }
     return result;
 }
 
-/* Counts texels without a value, by the mesh of their first sample, and writes the coverage. */
+/* Counts the band's texels without a value, by the mesh of their first sample, and writes the coverage. */
 static size_t finish_coverage(baking *bake) {
     const vsh_texels *texels = bake->texels;
+    const vshi_band *band = &texels->band;
+    const size_t base = vshi_texels_base(texels);
+    const size_t first = texels->row_start[band->own_begin - band->held_begin];
+    const size_t last = texels->row_start[band->own_end - band->held_begin];
     size_t invalid = 0;
-    for (size_t i = 0; i < texels->count; ++i) {
+    for (size_t i = first; i < last; ++i) {
         const uint32_t texel = texels->texel[i];
-        if (i > 0 && texel == texels->texel[i - 1]) {
+        if (i > first && texel == texels->texel[i - 1]) {
             continue;
         }
-        if (bake->state[texel] == VSHI_TEXEL_INVALID) {
+        if (bake->state[texel - base] == VSHI_TEXEL_INVALID) {
             ++invalid;
             if (bake->stats.invalid_by_mesh != NULL) {
                 ++bake->stats.invalid_by_mesh[texels->mesh[i]];
             }
         } else if (bake->lightmap->coverage != NULL) {
-            bake->lightmap->coverage[texel] = 1.0f;
+            bake->lightmap->coverage[texel - base] = 1.0f;
         }
     }
     bake->stats.texels = texels->info.covered;
@@ -242,81 +244,39 @@ static size_t finish_coverage(baking *bake) {
 }
 
 static vsh_result pad(baking *bake, size_t invalid, vsh_error *error) {
-    const vsh_lightmap *lightmap = bake->lightmap;
     const vsh_texels *texels = bake->texels;
-    const int32_t padding = texels->padding;
-    const int32_t invalid_radius = padding > LEAST_INVALID_RADIUS ? padding : LEAST_INVALID_RADIUS;
+    const int32_t padding = texels->padding, least = VSHI_LEAST_INVALID_RADIUS;
+    const int32_t invalid_radius = padding > least ? padding : least;
     const int32_t radius[VSHI_TEXEL_KINDS] = {padding, 0, invalid > 0 ? invalid_radius : 0};
-    vsh_result result = VSH_OK;
-    vshi_plane *planes = vshi_take(bake->light_count + 2, sizeof *planes, "padding", &result, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    size_t count = 0;
-    for (size_t i = 0; lightmap->shadow != NULL && i < bake->light_count; ++i) {
-        if (lightmap->shadow[i] != NULL) {
-            planes[count++] = (vshi_plane){lightmap->shadow[i], 1};
-        }
-    }
-    if (lightmap->ao != NULL) {
-        planes[count++] = (vshi_plane){lightmap->ao, 1};
-    }
-    if (lightmap->irradiance != NULL) {
-        planes[count++] = (vshi_plane){lightmap->irradiance, 3};
-    }
-    result = vshi_padding_fill(&bake->run, texels->info.width, texels->info.height, bake->state, radius,
-                               planes, count, error);
-    free(planes);
-    return result;
-}
-
-static void clear_planes(const baking *bake) {
-    const vsh_lightmap *lightmap = bake->lightmap;
-    const size_t bytes = texel_count(bake->texels) * sizeof(float);
-    for (size_t i = 0; lightmap->shadow != NULL && i < bake->light_count; ++i) {
-        if (lightmap->shadow[i] != NULL) {
-            memset(lightmap->shadow[i], 0, bytes);
-        }
-    }
-    for (size_t i = 0; lightmap->shadow_error != NULL && i < bake->light_count; ++i) {
-        if (lightmap->shadow_error[i] != NULL) {
-            memset(lightmap->shadow_error[i], 0, bytes);
-        }
-    }
-    if (lightmap->ao_error != NULL) {
-        memset(lightmap->ao_error, 0, bytes);
-    }
-    if (lightmap->ao != NULL) {
-        memset(lightmap->ao, 0, bytes);
-    }
-    if (lightmap->irradiance != NULL) {
-        memset(lightmap->irradiance, 0, 3 * bytes);
-    }
-    if (lightmap->coverage != NULL) {
-        memset(lightmap->coverage, 0, bytes);
-    }
+    return vshi_padding_fill(&bake->run, texels->info.width, texels->band.rows, bake->state, radius,
+                             bake->halo.planes, bake->halo.padded, error);
 }
 
 static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error *error) {
     const vsh_texels *texels = bake->texels;
     vsh_field_info field;
     vsh_field_get_info(bake->field, &field);
-    const double samples = (double)texels->count;
-    double bytes = (double)field.bytes + (double)texels->info.bytes + vshi_origins_bytes(texels) +
-                   (double)texel_count(texels) + vshi_padding_bytes(texels->info.width, texels->info.height);
     const bool errors = errors_wanted(bake->lightmap, bake->light_count);
-    const bool traced = bake->shade.method == VSH_SHADOW_EXACT || bake->shade.ao_method == VSH_AO_EXACT;
-    bytes += traced ? samples * 3.0 * sizeof(double) : 0.0;
-    bytes += (values ? samples * sizeof(float) : 0.0) + (errors ? samples * sizeof(float) : 0.0);
-    bytes += irradiance ? samples * 3.0 * sizeof(float) : 0.0;
-    bytes += ao_wanted(bake->lightmap) && interpolates(bake) ? vshi_lattice_bytes(texels) : 0.0;
+    const vshi_bake_need need = {.samples = (double)texels->count,
+                                 .texels = (double)vshi_texels_held(texels),
+                                 .traced = bake->shade.method == VSH_SHADOW_EXACT ||
+                                           bake->shade.ao_method == VSH_AO_EXACT,
+                                 .values = values,
+                                 .errors = errors,
+                                 .irradiance = irradiance,
+                                 .lattice = ao_wanted(bake->lightmap) && interpolates(bake)};
+    const double bytes = (double)field.bytes + (double)texels->info.bytes + vshi_bake_bytes(&need) +
+                         vshi_halo_bytes(texels, bake->lightmap, bake->light_count);
     vsh_result result = vshi_check_limit(&bake->run, bytes, "lightmap", error);
     if (result != VSH_OK) {
         return result;
     }
-    clear_planes(bake);
-    result = vshi_origins_create(bake->field, texels, &bake->shade, &bake->run, &bake->origins, error);
-    bake->state = vshi_take(texel_count(texels), 1, "lightmap", &result, error);
+    result = vshi_halo_open(texels, bake->lightmap, bake->light_count, &bake->halo, error);
+    bake->lightmap = &bake->halo.lightmap;
+    if (result == VSH_OK) {
+        result = vshi_origins_create(bake->field, texels, &bake->shade, &bake->run, &bake->origins, error);
+    }
+    bake->state = vshi_take(vshi_texels_held(texels), 1, "lightmap", &result, error);
     const size_t count = bake->origins.count;
     bake->values = vshi_take(values ? count : 0, sizeof(float), "lightmap", &result, error);
     bake->deviation = vshi_take(errors ? count : 0, sizeof(float), "lightmap", &result, error);
@@ -327,11 +287,15 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     if (result == VSH_OK) {
         result = pad(bake, finish_coverage(bake), error);
     }
+    if (result == VSH_OK) {
+        vshi_halo_give(texels, &bake->halo);
+    }
     free(bake->irradiance);
     free(bake->deviation);
     free(bake->values);
     free(bake->state);
     vshi_origins_free(&bake->origins);
+    vshi_halo_close(&bake->halo);
     return result;
 }
 

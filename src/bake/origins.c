@@ -93,8 +93,25 @@ static void pack(void *user, size_t begin, size_t end) {
     }
 }
 
-double vshi_origins_bytes(const vsh_texels *texels) {
-    return (double)texels->count * (2.0 + 3.0 * sizeof(double) + 4.0 * sizeof(float));
+/* Where the tile rows begin among the valid samples. */
+static void find_rows(const vsh_texels *texels, vshi_origins *origins) {
+    const vshi_band *band = &texels->band;
+    const size_t rows = band->held_end - band->held_begin;
+    for (size_t row = 0; row <= rows; ++row) {
+        const size_t sample = texels->row_start[row], block = sample / VSHI_ORIGIN_BLOCK;
+        origins->row_start[row] = origins->before[block];
+        for (size_t i = block * VSHI_ORIGIN_BLOCK; i < sample; ++i) {
+            origins->row_start[row] += origins->valid[i];
+        }
+    }
+    origins->rows = (vshi_point_rows){.count = rows,
+                                      .start = origins->row_start,
+                                      .first = band->own_begin - band->held_begin,
+                                      .last = band->own_end - band->held_begin};
+}
+
+double vshi_origins_sample_bytes(bool traced) {
+    return 2.0 + (traced ? 6.0 : 3.0) * sizeof(double) + 4.0 * sizeof(float);
 }
 
 vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
@@ -127,6 +144,11 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
         origins->before[block] = origins->count;
         origins->count += valid;
     }
+    origins->row_start =
+        vshi_take(texels->band.held_end - texels->band.held_begin + 1, sizeof(size_t), what, &result, error);
+    if (result == VSH_OK) {
+        find_rows(texels, origins);
+    }
     origins->position = vshi_take(origins->count, 3 * sizeof(double), what, &result, error);
     const bool traced = options->method == VSH_SHADOW_EXACT || options->ao_method == VSH_AO_EXACT;
     origins->surface = vshi_take(traced ? origins->count : 0, 3 * sizeof(double), what, &result, error);
@@ -145,6 +167,7 @@ void vshi_origins_free(vshi_origins *origins) {
     free(origins->texel);
     free(origins->surface);
     free(origins->position);
+    free(origins->row_start);
     free(origins->before);
     free(origins->valid);
     *origins = (vshi_origins){0};

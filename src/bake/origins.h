@@ -17,10 +17,12 @@ typedef struct vshi_origins {
     uint8_t *valid;  /* [all samples]: 1 where the sample is among them */
     size_t blocks;   /* of all samples */
     size_t *before;  /* [blocks + 1]: valid samples before each block */
+    vshi_point_rows rows; /* of tiles, the band's own counted */
+    size_t *row_start;    /* [rows.count + 1] */
 } vshi_origins;
 
-/* Bytes that the origins of all samples take at most. */
-double vshi_origins_bytes(const vsh_texels *texels);
+/* Bytes that the origin of a sample takes at most. */
+double vshi_origins_sample_bytes(bool traced);
 
 /* Lifts each sample along its geometric normal by the start offset, and by half a shell's thickness where its
  * mesh is open. A sample that ends up inside the field's solid, or all but, is invalid: it lies inside

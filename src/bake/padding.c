@@ -20,10 +20,6 @@ typedef struct filling {
     int16_t *down; /* [height][width]: rows from a texel to the nearest valid one of its column; NONE */
 } filling;
 
-double vshi_padding_bytes(int32_t width, int32_t height) {
-    return (double)width * height * sizeof(int16_t);
-}
-
 static void search_columns(void *user, size_t begin, size_t end) {
     filling *f = user;
     for (size_t strip = begin; strip < end; ++strip) {
@@ -121,7 +117,7 @@ vsh_result vshi_padding_fill(const vsh_run *run, int32_t width, int32_t height, 
         return vshi_fail(error, VSH_ERROR_MEMORY, "padding: the system refused memory");
     }
     vsh_result result = VSH_OK;
-    f.down = vshi_take(f.width * f.height, sizeof *f.down, "padding", &result, error);
+    f.down = vshi_take(f.width * f.height, VSHI_PADDING_TEXEL_BYTES, "padding", &result, error);
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, strips, 1, STRIP * f.height, search_columns, &f, error);
     }

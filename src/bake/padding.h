@@ -23,8 +23,11 @@ typedef struct vshi_plane {
     size_t channels;
 } vshi_plane;
 
-/* Bytes that vshi_padding_fill() takes beside its arguments. */
-double vshi_padding_bytes(int32_t width, int32_t height);
+/* Invalid texels are filled at least this far, texels, since filtering reads across them. */
+enum { VSHI_LEAST_INVALID_RADIUS = 8 };
+
+/* Bytes that vshi_padding_fill() takes beside its arguments, each texel. */
+enum { VSHI_PADDING_TEXEL_BYTES = sizeof(int16_t) };
 
 /* Fills each texel of kind k from the valid texel whose centre is nearest (Euclidean), where that is at most
  * radius[k] texels away (0 … VSHI_MAX_PADDING; 0: not filled); of equally near ones from the first in the

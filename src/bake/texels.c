@@ -4,93 +4,28 @@
 #include "bake/take.h"
 #include "base/floats.h"
 #include "base/parallel.h"
-#include "caster/mesh.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_PADDING = 4096 };
-
-static const size_t SAMPLE_BYTES = 3 * sizeof(double) + 6 * sizeof(float) + 2 * sizeof(uint32_t);
-
-/* What a row of tiles comes to. */
-typedef struct row_total {
-    size_t samples; /* then: where the row's samples begin */
-    size_t texels;
-    double low[3], high[3]; /* box of the positions */
-} row_total;
+/* Box of positions. */
+typedef struct box {
+    double low[3], high[3];
+} box;
 
 typedef struct creation {
-    vshi_charts charts;
-    const vshi_overlaps *overlaps;
-    row_total *rows;
-    vsh_texels *texels;
-    uint64_t most_samples;         /* that the memory limit allows */
-    _Atomic uint64_t samples;      /* counted so far */
+    const vsh_charts *charts;
+    size_t first;                  /* tile row */
+    vsh_texels *texels;            /* NULL: only the boxes are found */
+    box *boxes;                    /* [tile rows] */
     _Atomic vsh_result row_result; /* of the rows that failed */
 } creation;
-
-static vsh_result check_range(int32_t value, int32_t low, int32_t high, const char *name, vsh_error *error) {
-    if (value < low || value > high) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap %s %d: expected %d … %d", name, value, low,
-                         high);
-    }
-    return VSH_OK;
-}
-
-static vsh_result check_options(const vsh_lightmap_options *options, vsh_error *error) {
-    vsh_result result = check_range(options->width, 1, VSH_MAX_LIGHTMAP_SIZE, "width", error);
-    if (result == VSH_OK) {
-        result = check_range(options->height, 1, VSH_MAX_LIGHTMAP_SIZE, "height", error);
-    }
-    if (result == VSH_OK) {
-        result = check_range(options->supersample, 1, VSHI_MAX_SUPERSAMPLE, "supersample", error);
-    }
-    if (result == VSH_OK) {
-        result = check_range(options->padding, 0, MAX_PADDING, "padding", error);
-    }
-    const int32_t spacing = options->ao_spacing;
-    if (result == VSH_OK && spacing != 1 && spacing != 2 && spacing != 4 && spacing != 8) {
-        result =
-            vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap ao_spacing %d: expected 1, 2, 4 or 8", spacing);
-    }
-    return result;
-}
-
-static void count_rows(void *user, size_t begin, size_t end) {
-    creation *all = user;
-    const size_t side = (size_t)VSHI_TILE * (size_t)all->charts.raster.supersample;
-    for (size_t row = begin; row < end; ++row) {
-        vshi_row work;
-        const bool over = atomic_load(&all->samples) > all->most_samples;
-        const vsh_result result = over ? VSH_ERROR_LIMIT : vshi_row_open(&all->charts, row, &work, NULL);
-        if (result != VSH_OK) {
-            atomic_store(&all->row_result, result);
-        }
-        for (size_t column = 0; result == VSH_OK && column < work.tiles; ++column) {
-            if (work.tile_start[column] == work.tile_start[column + 1]) {
-                continue;
-            }
-            vshi_row_tile(&all->charts, &work, column, all->overlaps);
-            size_t samples = (size_t)__builtin_popcountll(work.tile.border);
-            for (size_t i = 0; i < side * side; ++i) {
-                samples += work.tile.owner[i] != 0;
-            }
-            all->rows[row].samples += samples;
-            all->rows[row].texels += (size_t)__builtin_popcountll(work.tile.border | work.tile.covered);
-        }
-        if (!over) {
-            vshi_row_close(&work);
-        }
-        atomic_fetch_add(&all->samples, all->rows[row].samples);
-    }
-}
 
 /* Writes samples one after the other; neighbours are nearly always of one triangle, which stays set up. */
 typedef struct writer {
     const creation *all;
     const vshi_row *work;
-    row_total *total;
+    box *box;
     size_t next;
     uint32_t number; /* triangle + 1 that is set up; 0: none */
     vshi_surface surface;
@@ -100,7 +35,7 @@ static void write_sample(writer *w, uint32_t number, uint32_t texel, const doubl
     vsh_texels *texels = w->all->texels;
     const uint32_t mesh = w->work->mesh[number - 1];
     if (number != w->number) {
-        vshi_surface_set(&w->all->charts.meshes[mesh], w->work->local[number - 1], &w->surface);
+        vshi_surface_set(&w->all->charts->sorted.meshes[mesh], w->work->local[number - 1], &w->surface);
         w->number = number;
     }
     vshi_vec position, normal;
@@ -108,13 +43,18 @@ static void write_sample(writer *w, uint32_t number, uint32_t texel, const doubl
     const double p[3] = {position.x, position.y, position.z};
     const double n[3] = {normal.x, normal.y, normal.z};
     const double g[3] = {w->surface.geometric.x, w->surface.geometric.y, w->surface.geometric.z};
+    for (size_t k = 0; k < 3; ++k) {
+        w->box->low[k] = p[k] < w->box->low[k] ? p[k] : w->box->low[k];
+        w->box->high[k] = p[k] > w->box->high[k] ? p[k] : w->box->high[k];
+    }
+    if (texels == NULL) {
+        return;
+    }
     const size_t i = w->next++;
     for (size_t k = 0; k < 3; ++k) {
         texels->position[3 * i + k] = p[k];
         texels->normal[3 * i + k] = (float)n[k];
         texels->geometric[3 * i + k] = (float)g[k];
-        w->total->low[k] = p[k] < w->total->low[k] ? p[k] : w->total->low[k];
-        w->total->high[k] = p[k] > w->total->high[k] ? p[k] : w->total->high[k];
     }
     texels->texel[i] = texel;
     texels->mesh[i] = mesh;
@@ -127,7 +67,7 @@ static size_t even_bits(size_t number) {
 
 /* The texels of a tile in Morton's order, so that 4, 16 or all 64 that follow each other are a square. */
 static void write_tile(writer *w) {
-    const vshi_raster *raster = &w->all->charts.raster;
+    const vshi_raster *raster = &w->all->charts->sorted.raster;
     const vshi_tile *tile = &w->work->tile;
     const size_t n = (size_t)raster->supersample, side = VSHI_TILE * n;
     for (size_t place = 0; place < (size_t)VSHI_TILE * VSHI_TILE; ++place) {
@@ -156,21 +96,21 @@ static void write_tile(writer *w) {
 
 static void write_rows(void *user, size_t begin, size_t end) {
     creation *all = user;
+    const vshi_charts *sorted = &all->charts->sorted;
     for (size_t row = begin; row < end; ++row) {
-        row_total *total = &all->rows[row];
-        for (int k = 0; k < 3; ++k) {
-            total->low[k] = INFINITY;
-            total->high[k] = -INFINITY;
-        }
         vshi_row work;
-        const vsh_result result = vshi_row_open(&all->charts, row, &work, NULL);
+        const vsh_result result = vshi_row_open(sorted, all->first + row, &work, NULL);
         if (result != VSH_OK) {
             atomic_store(&all->row_result, result);
         }
-        writer w = {.all = all, .work = &work, .total = total, .next = total->samples};
+        writer w = {.all = all,
+                    .work = &work,
+                    .box = &all->boxes[row],
+                    .next = all->texels != NULL ? all->texels->row_start[row] : 0};
+        *w.box = (box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
         for (size_t column = 0; result == VSH_OK && column < work.tiles; ++column) {
             if (work.tile_start[column] != work.tile_start[column + 1]) {
-                vshi_row_tile(&all->charts, &work, column, NULL);
+                vshi_row_tile(sorted, &work, column, NULL);
                 write_tile(&w);
             }
         }
@@ -178,165 +118,141 @@ static void write_rows(void *user, size_t begin, size_t end) {
     }
 }
 
-/* Texels that the triangles would cover if none overlapped, at most the whole image: for the message. */
-static double estimate_samples(const creation *all) {
-    const vshi_raster *raster = &all->charts.raster;
-    const double image = (double)raster->width * raster->height;
-    double area = 0.0;
-    for (size_t i = 0; i < all->charts.row_start[all->charts.rows]; ++i) {
-        size_t local;
-        const size_t mesh = vshi_charts_mesh(&all->charts, all->charts.row_triangle[i], &local);
-        vshi_uv_triangle t;
-        vshi_charts_triangle(&all->charts, mesh, local, &t);
-        const double across = fmin(fmax(t.x[0], fmax(t.x[1], t.x[2])), raster->width) -
-                              fmax(fmin(t.x[0], fmin(t.x[1], t.x[2])), 0.0);
-        area += across * VSHI_TILE;
-    }
-    return fmin(area, image) * raster->supersample * raster->supersample;
-}
-
-static vsh_result rows_result(const creation *all, const vsh_run *run, double held, vsh_error *error) {
-    const vsh_result result = atomic_load(&all->row_result);
-    if (result == VSH_ERROR_LIMIT) {
-        const double least = (double)all->most_samples + 1.0;
-        return vshi_check_limit(run, held + fmax(estimate_samples(all), least) * (double)SAMPLE_BYTES,
-                                "texels", error);
-    }
-    return result == VSH_OK ? VSH_OK
-                            : vshi_fail(error, result, "texels: the system refused memory for a row");
-}
-
-/* Counts samples, takes memory for them, and fills it. */
-static vsh_result rasterise(creation *all, const vsh_run *run, vshi_job *job, double held, vsh_error *error) {
-    vsh_texels *texels = all->texels;
-    const size_t rows = all->charts.rows;
+/* Rasterises `rows` rows of tiles. */
+static vsh_result rasterise(creation *all, size_t rows, const vsh_run *run, vsh_error *error) {
     vsh_result result = VSH_OK;
-    all->rows = vshi_take(rows, sizeof *all->rows, "texels", &result, error);
-    if (result != VSH_OK) {
-        return result;
+    vshi_job *job = vshi_job_begin(run, "texels", rows);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "texels: the system refused memory");
     }
-    held += vshi_row_bytes(&all->charts, run->threads);
-    if ((result = vshi_check_limit(run, held, "texels", error)) != VSH_OK) {
-        return result;
-    }
-    all->most_samples = run->memory_limit == 0
-                            ? UINT64_MAX
-                            : (uint64_t)(((double)run->memory_limit - held) / (double)SAMPLE_BYTES);
-    if ((result = vshi_parallel_for(job, rows, 1, 1, count_rows, all, error)) != VSH_OK) {
-        return result;
-    }
-    size_t count = 0;
-    for (size_t row = 0; row < rows; ++row) {
-        const size_t samples = all->rows[row].samples;
-        all->rows[row].samples = count;
-        count += samples;
-        texels->info.covered += all->rows[row].texels;
-    }
-    if (count > all->most_samples) {
-        atomic_store(&all->row_result, VSH_ERROR_LIMIT);
-    }
-    if ((result = rows_result(all, run, held, error)) != VSH_OK) {
-        return result;
-    }
-    texels->position = vshi_take(count, 3 * sizeof(double), "texels", &result, error);
-    texels->normal = vshi_take(count, 3 * sizeof(float), "texels", &result, error);
-    texels->geometric = vshi_take(count, 3 * sizeof(float), "texels", &result, error);
-    texels->texel = vshi_take(count, sizeof(uint32_t), "texels", &result, error);
-    texels->mesh = vshi_take(count, sizeof(uint32_t), "texels", &result, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    texels->count = count;
-    texels->info.samples = count;
-    texels->info.bytes = sizeof *texels + count * SAMPLE_BYTES + texels->mesh_count;
-    if ((result = vshi_parallel_for(job, rows, 1, 1, write_rows, all, error)) != VSH_OK) {
-        return result;
-    }
-    if (count > 0) {
-        for (int k = 0; k < 3; ++k) {
-            double low = INFINITY, high = -INFINITY;
-            for (size_t row = 0; row < rows; ++row) {
-                low = fmin(low, all->rows[row].low[k]);
-                high = fmax(high, all->rows[row].high[k]);
-            }
-            texels->info.bounds_min[k] = low;
-            texels->info.bounds_max[k] = high;
-        }
-    }
-    return rows_result(all, run, held, error);
-}
-
-static void finish_reports(const creation *all, const vsh_run *run, vsh_uv_report *reports) {
-    for (size_t m = 0; m < all->charts.mesh_count; ++m) {
-        vsh_uv_report *report = &reports[m];
-        report->overlap_texels = atomic_load(&all->overlaps->texels[m]);
-        for (size_t i = all->charts.first[m]; i < all->charts.first[m + 1]; ++i) {
-            report->overlap_triangles += atomic_load(&all->overlaps->triangles[i]);
-        }
-        const vshi_mesh_name label = vshi_mesh_label(&all->charts.meshes[m], m);
-        const char *name = label.text;
-        if (report->overlap_texels > 0) {
-            vshi_warn(run,
-                      "%s: lightmap UVs overlap: %zu texels of %zu triangles are covered already; the first "
-                      "triangle keeps them",
-                      name, report->overlap_texels, report->overlap_triangles);
-        }
-        if (report->outside_triangles > 0) {
-            vshi_warn(run,
-                      "%s: lightmap UVs of %zu triangles leave the unit square; what is outside is not baked",
-                      name, report->outside_triangles);
-        }
-        if (report->degenerate_triangles > 0) {
-            vshi_warn(run, "%s: %zu triangles have no area in the lightmap UVs and are not baked", name,
-                      report->degenerate_triangles);
-        }
-    }
-}
-
-static vsh_result find_open(const vsh_mesh *meshes, vsh_texels *texels, vshi_job *job, vsh_error *error) {
-    vsh_result result = VSH_OK;
-    texels->open = vshi_take(texels->mesh_count, 1, "texels", &result, error);
-    for (size_t m = 0; result == VSH_OK && m < texels->mesh_count; ++m) {
-        vsh_mesh_report report;
-        result = vsh_mesh_check(&meshes[m], &report, error);
-        if (result == VSH_OK) {
-            texels->open[m] = report.open_edges > 0;
-            result = vshi_job_advance(job, 0) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
-        }
-    }
-    return result;
-}
-
-static vsh_result create(const vsh_mesh *meshes, const vsh_lightmap_options *options, const vsh_run *run,
-                         vshi_job *job, vsh_uv_report *reports, vsh_texels *texels, vsh_error *error) {
-    creation all = {.texels = texels};
-    vshi_overlaps overlaps = {NULL, NULL};
-    const vshi_raster raster = {options->width, options->height, options->supersample};
-    vsh_result result =
-        vshi_charts_create(meshes, texels->mesh_count, raster, run, job, reports, &all.charts, error);
-    if (result != VSH_OK) {
-        goto done;
-    }
-    if ((result = find_open(meshes, texels, job, error)) != VSH_OK) {
-        goto done;
-    }
-    const size_t triangles = all.charts.first[texels->mesh_count];
-    overlaps.texels = vshi_take(texels->mesh_count, sizeof *overlaps.texels, "overlaps", &result, error);
-    overlaps.triangles = vshi_take(triangles, sizeof *overlaps.triangles, "overlaps", &result, error);
-    if (result != VSH_OK) {
-        goto done;
-    }
-    all.overlaps = &overlaps;
-    result = rasterise(&all, run, job, (double)all.charts.bytes + (double)triangles, error);
+    all->boxes = vshi_take(rows, sizeof *all->boxes, "texels", &result, error);
     if (result == VSH_OK) {
-        finish_reports(&all, run, reports);
+        result = vshi_parallel_for(job, rows, 1, 1, write_rows, all, error);
     }
-done:
-    free(overlaps.triangles);
-    free(overlaps.texels);
-    free(all.rows);
-    vshi_charts_free(&all.charts);
+    if (result == VSH_OK && atomic_load(&all->row_result) != VSH_OK) {
+        result =
+            vshi_fail(error, atomic_load(&all->row_result), "texels: the system refused memory for a row");
+    }
+    vshi_job_end(job);
     return result;
+}
+
+/* Box of the boxes begin … end - 1; zeros where there are no samples. */
+static void join(const box *boxes, size_t begin, size_t end, double low[3], double high[3]) {
+    for (int k = 0; k < 3; ++k) {
+        double least = INFINITY, most = -INFINITY;
+        for (size_t row = begin; row < end; ++row) {
+            least = fmin(least, boxes[row].low[k]);
+            most = fmax(most, boxes[row].high[k]);
+        }
+        low[k] = least <= most ? least : 0.0;
+        high[k] = least <= most ? most : 0.0;
+    }
+}
+
+vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
+                             double bounds_max[3], vsh_error *error) {
+    VSHI_FLOATS;
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    creation all = {.charts = charts};
+    const size_t rows = charts->sorted.rows;
+    result = rasterise(&all, rows, &full, error);
+    if (result == VSH_OK) {
+        join(all.boxes, 0, rows, bounds_min, bounds_max);
+    }
+    free(all.boxes);
+    return result;
+}
+
+static vsh_result take_samples(vsh_texels *texels, vsh_error *error) {
+    const char *what = "texels";
+    vsh_result result = VSH_OK;
+    texels->position = vshi_take(texels->count, 3 * sizeof(double), what, &result, error);
+    texels->normal = vshi_take(texels->count, 3 * sizeof(float), what, &result, error);
+    texels->geometric = vshi_take(texels->count, 3 * sizeof(float), what, &result, error);
+    texels->texel = vshi_take(texels->count, sizeof(uint32_t), what, &result, error);
+    texels->mesh = vshi_take(texels->count, sizeof(uint32_t), what, &result, error);
+    return result;
+}
+
+static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_texels *texels,
+                            vsh_error *error) {
+    const vshi_band *band = &texels->band;
+    const size_t rows = band->held_end - band->held_begin;
+    vsh_result result = VSH_OK;
+    texels->row_start = vshi_take(rows + 1, sizeof *texels->row_start, "texels", &result, error);
+    texels->open = vshi_take(texels->mesh_count, 1, "texels", &result, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    memcpy(texels->open, charts->open, texels->mesh_count);
+    for (size_t row = 0; row < rows; ++row) {
+        const vshi_tile_row *counted = &charts->rows[band->held_begin + row];
+        const bool own = band->held_begin + row >= band->own_begin && band->held_begin + row < band->own_end;
+        texels->row_start[row + 1] = texels->row_start[row] + counted->samples;
+        texels->info.covered += own ? counted->texels : 0;
+        texels->info.samples += own ? counted->samples : 0;
+    }
+    texels->count = texels->row_start[rows];
+    const double samples = (double)texels->count * VSHI_SAMPLE_BYTES;
+    const double held = (double)charts->info.bytes + vshi_row_bytes(&charts->sorted, run->threads);
+    if ((result = vshi_check_limit(run, held + samples, "texels", error)) != VSH_OK) {
+        return result;
+    }
+    texels->info.bytes = sizeof *texels + texels->count * VSHI_SAMPLE_BYTES + texels->mesh_count +
+                         (rows + 1) * sizeof *texels->row_start;
+    creation all = {.charts = charts, .first = band->held_begin, .texels = texels};
+    result = take_samples(texels, error);
+    if (result == VSH_OK) {
+        result = rasterise(&all, rows, run, error);
+    }
+    if (result == VSH_OK) {
+        join(all.boxes, band->own_begin - band->held_begin, band->own_end - band->held_begin,
+             texels->info.bounds_min, texels->info.bounds_max);
+    }
+    free(all.boxes);
+    return result;
+}
+
+static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t rows, const vsh_run *run,
+                         vsh_texels **texels, vsh_error *error) {
+    vshi_band band;
+    vsh_result result = vshi_band_set(charts, first_row, rows, &band, error);
+    vsh_texels *made = vshi_take(1, sizeof *made, "texels", &result, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    made->band = band;
+    made->info.width = charts->info.width;
+    made->info.height = charts->info.height;
+    made->padding = charts->padding;
+    made->ao_spacing = charts->ao_spacing;
+    made->shade = charts->shade;
+    made->mesh_count = charts->sorted.mesh_count;
+    result = make_band(charts, run, made, error);
+    if (result == VSH_OK) {
+        *texels = made;
+    } else {
+        vsh_texels_free(made);
+    }
+    return result;
+}
+
+vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t first_row, int32_t rows,
+                                  const vsh_run *run, vsh_texels **texels, vsh_error *error) {
+    VSHI_FLOATS;
+    if (texels == NULL || charts == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_texels_create_band: %s is NULL",
+                         texels == NULL ? "texels" : "charts");
+    }
+    *texels = NULL;
+    vsh_run full;
+    const vsh_result result = vshi_run_resolve(run, &full, error);
+    return result == VSH_OK ? create(charts, first_row, rows, &full, texels, error) : result;
 }
 
 vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
@@ -348,52 +264,17 @@ vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count, const vs
                          texels == NULL ? "texels" : "meshes");
     }
     *texels = NULL;
-    vsh_lightmap_options full = vsh_lightmap_options_default();
-    vsh_run full_run;
-    vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_lightmap_options", error);
-    if (result == VSH_OK) {
-        result = check_options(&full, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_run_resolve(run, &full_run, error);
-    }
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
     if (result != VSH_OK) {
         return result;
     }
-    if (mesh_count == 0 || mesh_count > UINT32_MAX) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap of %zu meshes: expected 1 … %u", mesh_count,
-                         UINT32_MAX);
+    vsh_charts *charts = NULL;
+    result = vshi_charts_make(meshes, mesh_count, options, &full, true, uv_reports, &charts, error);
+    if (result == VSH_OK) {
+        result = create(charts, 0, charts->info.height, &full, texels, error);
     }
-    vsh_uv_report *reports = NULL;
-    vsh_texels *made = NULL;
-    const size_t tile_rows = ((size_t)full.height + VSHI_TILE - 1) / VSHI_TILE;
-    vshi_job *job = vshi_job_begin(&full_run, "texels", 2 * tile_rows);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "texels: the system refused memory");
-    }
-    reports = vshi_take(mesh_count, sizeof *reports, "UV reports", &result, error);
-    made = vshi_take(1, sizeof *made, "texels", &result, error);
-    if (result != VSH_OK) {
-        goto done;
-    }
-    made->info.width = full.width;
-    made->info.height = full.height;
-    made->padding = full.padding;
-    made->ao_spacing = full.supersample == 1 ? full.ao_spacing : 1;
-    made->shade = full.shade;
-    made->mesh_count = mesh_count;
-    if ((result = create(meshes, &full, &full_run, job, reports, made, error)) != VSH_OK) {
-        goto done;
-    }
-    if (uv_reports != NULL) {
-        memcpy(uv_reports, reports, mesh_count * sizeof *reports);
-    }
-    *texels = made;
-    made = NULL;
-done:
-    vsh_texels_free(made);
-    free(reports);
-    vshi_job_end(job);
+    vsh_charts_free(charts);
     return result;
 }
 
@@ -407,6 +288,7 @@ void vsh_texels_free(vsh_texels *texels) {
     free(texels->geometric);
     free(texels->normal);
     free(texels->position);
+    free(texels->row_start);
     free(texels);
 }
 
@@ -415,6 +297,9 @@ void vsh_texels_get_info(const vsh_texels *texels, vsh_texels_info *info) {
 }
 
 vsh_texel_samples vsh_texels_samples(const vsh_texels *texels) {
-    return (vsh_texel_samples){texels->count, texels->position, texels->normal, texels->geometric,
-                               texels->texel};
+    const vshi_band *band = &texels->band;
+    const size_t first = texels->row_start[band->own_begin - band->held_begin];
+    const size_t last = texels->row_start[band->own_end - band->held_begin];
+    return (vsh_texel_samples){last - first, texels->position + 3 * first, texels->normal + 3 * first,
+                               texels->geometric + 3 * first, texels->texel + first};
 }

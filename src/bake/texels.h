@@ -1,23 +1,90 @@
-/* What the bake knows of texels beyond the public view. */
+/* What the bake knows of texels and charts beyond the public view. */
 #ifndef VSHI_BAKE_TEXELS_H
 #define VSHI_BAKE_TEXELS_H
 
+#include "bake/charts.h"
+#include "shade/shade.h"
+
 #include <vdbshade/bake.h>
+
+/* A row of tiles, rasterised. */
+typedef struct vshi_tile_row {
+    size_t samples;
+    size_t texels; /* covered */
+} vshi_tile_row;
+
+struct vsh_charts {
+    vsh_charts_info info;
+    vshi_charts sorted;
+    int32_t padding;
+    int32_t ao_spacing; /* 1 where texels have several samples */
+    vsh_shade_options shade;
+    vshi_tile_row *rows; /* [sorted.rows] */
+    unsigned char *open; /* [mesh_count]: the mesh bounds no solid, so that the field holds its shell */
+};
+
+/* Bytes of one sample in texels. */
+enum { VSHI_SAMPLE_BYTES = 3 * sizeof(double) + 6 * sizeof(float) + 2 * sizeof(uint32_t) };
+
+/* vsh_charts_create() with all that is checked, but for the memory of samples: VSH_ERROR_LIMIT where there
+ * are more than the run's limit allows beside the charts, if `limited`. */
+vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
+                            const vsh_run *run, bool limited, vsh_uv_report *uv_reports, vsh_charts **charts,
+                            vsh_error *error);
+
+/* Rows of texels that a band holds: its own, those beside it that its padding is copied from, and those below
+ * them that their AO is interpolated from. */
+typedef struct vshi_band {
+    size_t own_begin, own_end;   /* tile rows */
+    size_t held_begin, held_end; /* the same */
+    int32_t own_first, own_rows; /* rows of texels */
+    int32_t first, rows;         /* the same, held */
+} vshi_band;
+
+/* Errors: VSH_ERROR_ARGUMENT. */
+vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t rows, vshi_band *band,
+                         vsh_error *error);
+
+/* What vsh_bake_lightmap() takes beside field, texels and planes, bytes: the most it holds at a time. */
+typedef struct vshi_bake_need {
+    double samples, texels; /* held */
+    bool traced;            /* rays against triangles */
+    bool values, errors, irradiance, lattice;
+} vshi_bake_need;
+
+double vshi_bake_bytes(const vshi_bake_need *need);
 
 /* The samples of a texel follow each other; texels come tile by tile (8 × 8), tiles row by row. */
 struct vsh_texels {
-    vsh_texels_info info;
+    vsh_texels_info info; /* of the band's own rows */
+    vshi_band band;
     int32_t padding;
-    int32_t ao_spacing;      /* 1 where texels have several samples */
+    int32_t ao_spacing;      /* as of the charts */
     vsh_shade_options shade; /* those given with the lightmap's size */
     size_t count;            /* samples */
+    size_t *row_start;       /* [held tile rows + 1]: first sample of each */
     double *position;        /* [count][3] */
     float *normal;           /* [count][3] */
     float *geometric;        /* [count][3] */
-    uint32_t *texel;         /* [count] */
+    uint32_t *texel;         /* [count]: in the whole lightmap */
     uint32_t *mesh;          /* [count]: index of the mesh */
     size_t mesh_count;
-    unsigned char *open; /* [mesh_count]: the mesh bounds no solid, so that the field holds its shell */
+    unsigned char *open; /* [mesh_count]: as of the charts */
 };
+
+/* Number of the first texel that is held. */
+static inline size_t vshi_texels_base(const vsh_texels *texels) {
+    return (size_t)texels->band.first * (size_t)texels->info.width;
+}
+
+/* Texels that are held. */
+static inline size_t vshi_texels_held(const vsh_texels *texels) {
+    return (size_t)texels->band.rows * (size_t)texels->info.width;
+}
+
+/* Whether rows beside the band's own are held. */
+static inline bool vshi_texels_has_halo(const vsh_texels *texels) {
+    return texels->band.own_begin > texels->band.held_begin || texels->band.own_end < texels->band.held_end;
+}
 
 #endif

@@ -22,7 +22,9 @@ typedef struct bake_work {
     vsh_assets *assets;
     vsh_triangles *triangles; /* of exact methods */
     vsh_field *field;
-    vsh_texels *kept; /* of the only receiver; several are rasterised again, so as not to hold all at once */
+    /* of the only receiver; several are rasterised again, so as not to hold all at once */
+    vsh_charts *charts;
+    vsh_texels *kept; /* NULL where it is baked in bands */
     cli_box receivers;
     cli_stats stats;
 } bake_work;
@@ -46,7 +48,29 @@ static int load(bake_work *work) {
 }
 
 static cli_receiver_job receiver_job(const bake_work *work, size_t index) {
-    return (cli_receiver_job){work->scene, work->assets, &work->run, index};
+    return (cli_receiver_job){work->scene, work->assets, &work->run, index, work->settings->band_rows};
+}
+
+/* Where its samples are: all of them are made, where they go into memory at once, or looked at in passing. */
+static int find_bounds(const bake_work *work, const cli_receiver_job *job, const vsh_charts *charts,
+                       vsh_texels **texels, vsh_texels_info *info) {
+    cli_bands bands;
+    int code = cli_receiver_plan(job, charts, 0, &bands);
+    if (code == CLI_OK && bands.count == 1) {
+        code = cli_receiver_texels(charts, 0, bands.rows, &work->run, texels);
+        if (code == CLI_OK) {
+            vsh_texels_get_info(*texels, info);
+        }
+    } else if (code == CLI_OK) {
+        vsh_charts_info counted;
+        vsh_charts_get_info(charts, &counted);
+        info->samples = counted.samples;
+        vsh_error error;
+        if (vsh_charts_bounds(charts, &work->run, info->bounds_min, info->bounds_max, &error) != VSH_OK) {
+            code = cli_fail(&error);
+        }
+    }
+    return code;
 }
 
 /* UVs are looked over, and complained of, before the long work. */
@@ -56,18 +80,20 @@ static int rasterise(bake_work *work) {
     work->receivers = cli_box_empty();
     for (size_t i = 0; i < work->scene->receiver_count && code == CLI_OK; ++i) {
         const cli_receiver_job job = receiver_job(work, i);
+        vsh_charts *charts = NULL;
         vsh_texels *texels = NULL;
-        code = cli_receiver_texels(&job, true, &texels);
-        if (code != CLI_OK) {
-            break;
+        vsh_texels_info info = {0};
+        code = cli_receiver_charts(&job, true, &charts);
+        code = code == CLI_OK ? find_bounds(work, &job, charts, &texels, &info) : code;
+        if (code == CLI_OK) {
+            cli_box_grow(&work->receivers, &info);
         }
-        vsh_texels_info info;
-        vsh_texels_get_info(texels, &info);
-        cli_box_grow(&work->receivers, &info);
-        if (work->scene->receiver_count == 1) {
+        if (code == CLI_OK && work->scene->receiver_count == 1) {
+            work->charts = charts;
             work->kept = texels;
         } else {
             vsh_texels_free(texels);
+            vsh_charts_free(charts);
         }
     }
     cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
@@ -96,35 +122,57 @@ static int make_triangles(bake_work *work) {
     return code;
 }
 
-static void say_receiver(const bake_work *work, size_t index, const cli_stats *before) {
+static void say_receiver(const bake_work *work, size_t index, const cli_bands *bands,
+                         const cli_stats *before) {
     if (work->settings->common.quiet) {
         return;
     }
     const vsh_receiver *receiver = &work->scene->receivers[index];
-    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid", receiver->output, receiver->width,
-            receiver->height, work->stats.texels - before->texels,
-            work->stats.invalid_texels - before->invalid_texels);
+    char banded[64] = "";
+    if (bands->count > 1) {
+        snprintf(banded, sizeof banded, ", in %d bands of %d rows", bands->count, bands->rows);
+    }
+    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid%s", receiver->output,
+            receiver->width, receiver->height, work->stats.texels - before->texels,
+            work->stats.invalid_texels - before->invalid_texels, banded);
+}
+
+static int bake_receiver(bake_work *work, size_t index) {
+    const cli_receiver_job job = receiver_job(work, index);
+    cli_receiver_input input = {.field = work->field};
+    int code = CLI_OK;
+    if (work->charts == NULL) {
+        const double start = cli_seconds();
+        code = cli_receiver_charts(&job, false, &work->charts);
+        cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
+    }
+    input.charts = work->charts;
+    if (code == CLI_OK) {
+        const uint64_t held =
+            work->stats.field.bytes + (work->triangles != NULL ? vsh_triangles_bytes(work->triangles) : 0);
+        code = cli_receiver_plan(&job, work->charts, held, &input.bands);
+    }
+    if (code == CLI_OK && input.bands.count > 1) {
+        vsh_texels_free(work->kept);
+        work->kept = NULL;
+    }
+    input.texels = work->kept;
+    const cli_stats before = work->stats;
+    code = code == CLI_OK ? cli_receiver_bake(&job, &input, &work->stats) : code;
+    vsh_texels_free(work->kept);
+    vsh_charts_free(work->charts);
+    work->kept = NULL;
+    work->charts = NULL;
+    if (code == CLI_OK) {
+        say_receiver(work, index, &input.bands, &before);
+    }
+    return code;
 }
 
 static int bake_receivers(bake_work *work) {
     int code = CLI_OK;
     for (size_t i = 0; i < work->scene->receiver_count && code == CLI_OK; ++i) {
-        const cli_receiver_job job = receiver_job(work, i);
-        vsh_texels *texels = work->kept;
-        if (texels == NULL) {
-            const double start = cli_seconds();
-            code = cli_receiver_texels(&job, false, &texels);
-            cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
-        }
-        const cli_stats before = work->stats;
-        if (code == CLI_OK) {
-            code = cli_receiver_bake(&job, work->field, texels, &work->stats);
-        }
-        vsh_texels_free(texels);
-        work->kept = NULL;
-        if (code == CLI_OK) {
-            say_receiver(work, i, &before);
-        }
+        code = bake_receiver(work, i);
     }
     return code;
 }
@@ -136,7 +184,7 @@ static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
     work.stats.threads = settings->common.threads > 0 ? settings->common.threads : (int32_t)cores;
     int code = load(&work);
     if (code == CLI_OK && settings->dry_run) {
-        code = cli_bake_forecast(scene, work.assets, &work.run);
+        code = cli_bake_forecast(scene, work.assets, &work.run, settings->band_rows);
         vsh_assets_free(work.assets);
         return code;
     }
@@ -156,6 +204,7 @@ static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
         }
     }
     vsh_texels_free(work.kept);
+    vsh_charts_free(work.charts);
     vsh_triangles_free(work.triangles);
     vsh_field_free(work.field);
     vsh_assets_free(work.assets);

@@ -9,6 +9,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <sys/resource.h>
 
 /* The trial: voxels along the longest side, and texels on a side. */
@@ -27,50 +28,34 @@ typedef struct forecast {
     const vsh_run *run;
     uint64_t texels;
     uint64_t samples;
-    uint64_t largest_bytes; /* of a receiver: texels, planes and what the bake takes */
+    vsh_charts **charts; /* [receivers] */
+    int32_t band_rows;
     cli_box receivers;
     double seconds; /* of rasterising */
 } forecast;
 
-static int make_texels(const forecast *f, size_t index, int32_t most, vsh_texels **texels) {
-    const vsh_receiver *receiver = &f->scene->receivers[index];
-    size_t count;
-    const vsh_mesh *meshes = vsh_assets_receiver(f->assets, index, &count);
-    vsh_lightmap_options options = vsh_lightmap_options_default();
-    options.width = receiver->width < most ? receiver->width : most;
-    options.height = receiver->height < most ? receiver->height : most;
-    options.supersample = most < receiver->width ? 1 : receiver->supersample;
-    options.padding = most < receiver->width ? 0 : receiver->padding;
-    vsh_error error;
-    return vsh_texels_create(meshes, count, &options, f->run, NULL, texels, &error) == VSH_OK
-               ? CLI_OK
-               : cli_fail(&error);
+static cli_receiver_job receiver_job(const forecast *f, size_t index) {
+    return (cli_receiver_job){f->scene, f->assets, f->run, index, f->band_rows};
 }
 
 static int count_texels(forecast *f) {
     f->receivers = cli_box_empty();
     const double start = cli_seconds();
     for (size_t i = 0; i < f->scene->receiver_count; ++i) {
-        vsh_texels *texels = NULL;
-        const int code = make_texels(f, i, VSH_MAX_LIGHTMAP_SIZE, &texels);
+        const cli_receiver_job job = receiver_job(f, i);
+        const int code = cli_receiver_charts(&job, false, &f->charts[i]);
         if (code != CLI_OK) {
             return code;
         }
-        vsh_texels_info info;
-        vsh_texels_get_info(texels, &info);
-        vsh_texels_free(texels);
-        cli_planes planes;
-        const int named = cli_planes_name(&planes, f->scene, info.width, info.height);
-        const uint64_t channels = (uint64_t)planes.image.channel_count + (f->scene->irradiance ? 3 : 0);
-        cli_planes_free(&planes);
-        if (named != CLI_OK) {
-            return named;
+        vsh_charts_info counted;
+        vsh_charts_get_info(f->charts[i], &counted);
+        f->texels += counted.covered;
+        f->samples += counted.samples;
+        vsh_texels_info info = {.samples = counted.samples};
+        vsh_error error;
+        if (vsh_charts_bounds(f->charts[i], f->run, info.bounds_min, info.bounds_max, &error) != VSH_OK) {
+            return cli_fail(&error);
         }
-        f->texels += info.covered;
-        f->samples += info.samples;
-        const uint64_t plane = 4 * (uint64_t)info.width * (uint64_t)info.height;
-        const uint64_t bytes = info.bytes + channels * plane + 2 * plane + 50 * info.samples;
-        f->largest_bytes = bytes > f->largest_bytes ? bytes : f->largest_bytes;
         cli_box_grow(&f->receivers, &info);
     }
     f->seconds = cli_seconds() - start;
@@ -84,9 +69,24 @@ typedef struct trial {
     cli_field made;  /* its field is freed when the trial is over */
 } trial;
 
+static int make_texels(const forecast *f, vsh_texels **texels) {
+    const vsh_receiver *receiver = &f->scene->receivers[0];
+    size_t count;
+    const vsh_mesh *meshes = vsh_assets_receiver(f->assets, 0, &count);
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = receiver->width < TRIAL_SIZE ? receiver->width : TRIAL_SIZE;
+    options.height = receiver->height < TRIAL_SIZE ? receiver->height : TRIAL_SIZE;
+    options.supersample = TRIAL_SIZE < receiver->width ? 1 : receiver->supersample;
+    options.padding = TRIAL_SIZE < receiver->width ? 0 : receiver->padding;
+    vsh_error error;
+    return vsh_texels_create(meshes, count, &options, f->run, NULL, texels, &error) == VSH_OK
+               ? CLI_OK
+               : cli_fail(&error);
+}
+
 static int bake_part(const forecast *f, const vsh_field *field, const vsh_shade_options *shade, trial *t) {
     vsh_texels *texels = NULL;
-    int code = make_texels(f, 0, TRIAL_SIZE, &texels);
+    int code = make_texels(f, &texels);
     if (code != CLI_OK) {
         return code;
     }
@@ -94,9 +94,9 @@ static int bake_part(const forecast *f, const vsh_field *field, const vsh_shade_
     vsh_texels_get_info(texels, &info);
     cli_planes planes;
     code = cli_planes_name(&planes, f->scene, info.width, info.height);
-    code = code == CLI_OK
-               ? cli_planes_allocate(&planes, f->scene, f->run->memory_limit, f->scene->receivers[0].output)
-               : code;
+    code = code == CLI_OK ? cli_planes_allocate(&planes, f->scene, info.height, f->run->memory_limit,
+                                                f->scene->receivers[0].output)
+                          : code;
     if (code == CLI_OK) {
         const double start = cli_seconds();
         vsh_error error;
@@ -140,35 +140,71 @@ static double resident_bytes(void) {
     return getrusage(RUSAGE_SELF, &usage) == 0 ? 1024.0 * (double)usage.ru_maxrss : 0.0;
 }
 
-int cli_bake_forecast(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run) {
-    forecast f = {.scene = scene, .assets = assets, .run = run};
-    int code = count_texels(&f);
-    trial t = {0};
-    code = code == CLI_OK ? try_small(&f, &t) : code;
+/* What the largest bake takes, the field with it; and where asked for a line for each lightmap that is baked
+ * in bands. */
+static int plan_bands(const forecast *f, double field_bytes, bool tell, uint64_t *largest) {
+    for (size_t i = 0; i < f->scene->receiver_count; ++i) {
+        const cli_receiver_job job = receiver_job(f, i);
+        cli_bands bands;
+        const int code = cli_receiver_plan(&job, f->charts[i], (uint64_t)field_bytes, &bands);
+        if (code != CLI_OK) {
+            return code;
+        }
+        if (tell && bands.count > 1) {
+            printf("bands         %d of %d rows: %s\n", bands.count, bands.rows,
+                   f->scene->receivers[i].output);
+        }
+        *largest = bands.bytes > *largest ? bands.bytes : *largest;
+    }
+    return CLI_OK;
+}
+
+static int predict(const forecast *f, const trial *t) {
+    const double more = t->finer * t->finer; /* surfaces: voxels grow with the square */
+    const double voxelize = t->made.voxelize_s * more, field = t->made.field_s * more;
+    const double bake =
+        f->seconds + (double)f->samples * t->sample_s * pow(MORE_PER_DOUBLING, fmax(0.0, log2(t->finer)));
+    const double grid_bytes = (double)t->made.grid.bytes * more,
+                 field_bytes = (double)t->made.info.bytes * more;
+    const double base =
+        fmax(0.0, resident_bytes() - MAKING * (double)t->made.grid.bytes); /* program and assets */
+    uint64_t largest = 0; /* of a receiver: field, texels, planes and what the bake takes */
+    int code = plan_bands(f, field_bytes, false, &largest);
     if (code != CLI_OK) {
         return code;
     }
-    const double more = t.finer * t.finer; /* surfaces: voxels grow with the square */
-    const double voxelize = t.made.voxelize_s * more, field = t.made.field_s * more;
-    const double bake =
-        f.seconds + (double)f.samples * t.sample_s * pow(MORE_PER_DOUBLING, fmax(0.0, log2(t.finer)));
-    const double grid_bytes = (double)t.made.grid.bytes * more,
-                 field_bytes = (double)t.made.info.bytes * more;
-    const double base =
-        fmax(0.0, resident_bytes() - MAKING * (double)t.made.grid.bytes); /* program and assets */
-    const double peak = base + fmax(fmax(MAKING * grid_bytes, grid_bytes + field_bytes),
-                                    field_bytes + (double)f.largest_bytes);
+    printf("texels        %" PRIu64 " in %zu lightmap%s, %" PRIu64 " samples\n", f->texels,
+           f->scene->receiver_count, f->scene->receiver_count == 1 ? "" : "s", f->samples);
+    code = plan_bands(f, field_bytes, true, &largest);
+    const double peak = base + fmax(fmax(MAKING * grid_bytes, grid_bytes + field_bytes), (double)largest);
     char grid_text[32], field_text[32], peak_text[32];
-    printf("texels        %" PRIu64 " in %zu lightmap%s, %" PRIu64 " samples\n", f.texels,
-           scene->receiver_count, scene->receiver_count == 1 ? "" : "s", f.samples);
     printf("voxels        about %.3g of %.4g, %.4g along the longest side\n",
-           (double)t.made.grid.active_voxels * more, t.made.grid.voxel_size / t.finer,
-           TRIAL_RESOLUTION * t.finer);
+           (double)t->made.grid.active_voxels * more, t->made.grid.voxel_size / t->finer,
+           TRIAL_RESOLUTION * t->finer);
     printf("memory        about %s at most: level set %s, field %s\n",
            cli_bytes_text((uint64_t)peak, peak_text, sizeof peak_text),
            cli_bytes_text((uint64_t)grid_bytes, grid_text, sizeof grid_text),
            cli_bytes_text((uint64_t)field_bytes, field_text, sizeof field_text));
     printf("time          about %.2g s: voxelize %.2g s, field %.2g s, bake %.2g s (%s)\n",
            voxelize + field + bake, voxelize, field, bake, time_note);
-    return CLI_OK;
+    return code;
+}
+
+int cli_bake_forecast(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                      int32_t band_rows) {
+    forecast f = {.scene = scene, .assets = assets, .run = run, .band_rows = band_rows};
+    f.charts = calloc(scene->receiver_count, sizeof *f.charts);
+    if (f.charts == NULL) {
+        cli_say("forecast: the system refused memory");
+        return CLI_LIMIT;
+    }
+    int code = count_texels(&f);
+    trial t = {0};
+    code = code == CLI_OK ? try_small(&f, &t) : code;
+    code = code == CLI_OK ? predict(&f, &t) : code;
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        vsh_charts_free(f.charts[i]);
+    }
+    free(f.charts);
+    return code;
 }

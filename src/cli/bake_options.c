@@ -25,6 +25,7 @@ enum {
     KEY_SUPERSAMPLE,
     KEY_PADDING,
     KEY_AO_SPACING,
+    KEY_BAND_ROWS,
     KEY_BITS,
     KEY_PACK,
     KEY_STATS,
@@ -82,6 +83,9 @@ static const cli_option options[] = {
     {KEY_AO_SPACING, "ao-spacing", "N",
      "1, 2, 4 or 8 texels: AO by cones, adaptive or exact is\ninterpolated between texels so far apart where "
      "casters\nare far; 1: never (4)"},
+    {KEY_BAND_ROWS, "band-rows", "N",
+     "rows baked and written at a time, 1 to 65536,\nrounded up to eights; changes no value (all, or as\n"
+     "many as --memory-limit allows)"},
     CLI_COMMON_OPTIONS,
     CLI_ISA_OPTION,
 };
@@ -184,6 +188,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_PADDING:
         s->has_padding = true;
         return cli_take_integer(name, value, 0, 4096, &s->padding);
+    case KEY_BAND_ROWS:
+        return cli_take_integer(name, value, 1, VSH_MAX_LIGHTMAP_SIZE, &s->band_rows);
     case KEY_BITS:
         s->has_bits = true;
         return take_bits(name, value, &s->bits);

@@ -25,6 +25,7 @@ typedef struct cli_bake_settings {
     int32_t supersample;
     int32_t padding;
     int32_t ao_spacing;
+    int32_t band_rows; /* 0: as many as go */
     int32_t bits;
     const char *pack;
     const char *casters[CLI_MAX_EXTRA_CASTERS];

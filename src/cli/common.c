@@ -4,9 +4,11 @@
 #include "progress.h"
 
 #include <stdio.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
-/* The machine's memory, or the control group's where that is less (a container). 0: not known. */
+/* The machine's memory, or where they are less the control group's (a container) and what the process may
+ * address (ulimit -v). 0: not known. */
 static uint64_t machine_memory(void) {
     const long pages = sysconf(_SC_PHYS_PAGES);
     const long page = sysconf(_SC_PAGESIZE);
@@ -22,6 +24,11 @@ static uint64_t machine_memory(void) {
             }
             fclose(file);
         }
+    }
+    struct rlimit space;
+    if (getrlimit(RLIMIT_AS, &space) == 0 && space.rlim_cur != RLIM_INFINITY &&
+        (bytes == 0 || space.rlim_cur < bytes)) {
+        bytes = space.rlim_cur;
     }
     return bytes;
 }

@@ -59,17 +59,19 @@ int cli_planes_name(cli_planes *planes, const vsh_scene *scene, int32_t width, i
     return CLI_OK;
 }
 
-int cli_planes_allocate(cli_planes *planes, const vsh_scene *scene, uint64_t limit, const char *output) {
+int cli_planes_allocate(cli_planes *planes, const vsh_scene *scene, int32_t rows, uint64_t limit,
+                        const char *output) {
     const size_t count = (size_t)planes->image.channel_count;
-    const size_t texels = (size_t)planes->image.width * (size_t)planes->image.height; /* at most 2^32 */
+    const size_t texels = (size_t)planes->image.width * (size_t)rows; /* at most 2^32 */
     const double bytes = (double)texels * sizeof(float) * ((double)count + (scene->irradiance ? 3.0 : 0.0));
     if (bytes > (double)SIZE_MAX / 2.0 || (limit > 0 && bytes > (double)limit)) {
         char need[32], have[32];
         cli_say("%s: %d × %d texels in %zu channels need %s; the memory limit is %s", output,
-                planes->image.width, planes->image.height, count,
-                cli_bytes_text((uint64_t)bytes, need, sizeof need), cli_bytes_text(limit, have, sizeof have));
+                planes->image.width, rows, count, cli_bytes_text((uint64_t)bytes, need, sizeof need),
+                cli_bytes_text(limit, have, sizeof have));
         return CLI_LIMIT;
     }
+    planes->rows = rows;
     for (size_t i = 0; i < count; ++i) {
         planes->planes[i] = calloc(texels, sizeof(float));
         if (planes->planes[i] == NULL) {
@@ -103,7 +105,7 @@ void cli_planes_split(cli_planes *planes) {
     if (planes->interleaved == NULL) {
         return;
     }
-    const size_t texels = (size_t)planes->image.width * (size_t)planes->image.height;
+    const size_t texels = (size_t)planes->image.width * (size_t)planes->rows;
     float *const *rgb = planes->planes + planes->image.channel_count - 4;
     for (size_t i = 0; i < texels; ++i) {
         for (size_t c = 0; c < 3; ++c) {

@@ -12,14 +12,16 @@ typedef struct cli_planes {
     const char **name_list;
     float **planes;
     float *interleaved; /* irradiance as baked; split by cli_planes_split() */
+    int32_t rows;       /* that there is memory for */
 } cli_planes;
 
 /* Names the channels of a scene at a size, without memory for values: enough for vsh_image_check(). Returns 0
  * or an exit code, having said why. */
 int cli_planes_name(cli_planes *planes, const vsh_scene *scene, int32_t width, int32_t height);
 
-/* Takes the memory for the values, where they stay within `limit` bytes (0: no limit). */
-int cli_planes_allocate(cli_planes *planes, const vsh_scene *scene, uint64_t limit, const char *output);
+/* Takes the memory for the values of `rows` rows, where they stay within `limit` bytes (0: no limit). */
+int cli_planes_allocate(cli_planes *planes, const vsh_scene *scene, int32_t rows, uint64_t limit,
+                        const char *output);
 
 /* After the bake: irradiance into its three planes. */
 void cli_planes_split(cli_planes *planes);

@@ -2,6 +2,7 @@
 
 #include "clock.h"
 #include "message.h"
+#include "overall.h"
 #include "planes.h"
 #include "progress.h"
 #include "signals.h"
@@ -60,7 +61,7 @@ int cli_receiver_check(const vsh_scene *scene, size_t index) {
     return code;
 }
 
-int cli_receiver_texels(const cli_receiver_job *job, bool warn, vsh_texels **texels) {
+int cli_receiver_charts(const cli_receiver_job *job, bool warn, vsh_charts **charts) {
     const vsh_receiver *receiver = &job->scene->receivers[job->index];
     size_t count = 0;
     const vsh_mesh *meshes = vsh_assets_receiver(job->assets, job->index, &count);
@@ -69,7 +70,7 @@ int cli_receiver_texels(const cli_receiver_job *job, bool warn, vsh_texels **tex
     options.height = receiver->height;
     options.supersample = receiver->supersample;
     options.padding = receiver->padding;
-    options.ao_spacing = receiver->ao_spacing;
+    options.ao_spacing = job->scene->ao ? receiver->ao_spacing : 1;
     options.shade = job->scene->shade;
     vsh_uv_report *reports = calloc(count, sizeof *reports);
     if (reports == NULL) {
@@ -80,7 +81,7 @@ int cli_receiver_texels(const cli_receiver_job *job, bool warn, vsh_texels **tex
     run.warning = NULL; /* its lines are told below, with the file, and not again for the second pass */
     vsh_error error;
     int code = CLI_OK;
-    if (vsh_texels_create(meshes, count, &options, &run, reports, texels, &error) != VSH_OK) {
+    if (vsh_charts_create(meshes, count, &options, &run, reports, charts, &error) != VSH_OK) {
         code = cli_fail(&error);
     }
     for (size_t i = 0; i < count && warn && code == CLI_OK; ++i) {
@@ -88,6 +89,30 @@ int cli_receiver_texels(const cli_receiver_job *job, bool warn, vsh_texels **tex
     }
     free(reports);
     return code;
+}
+
+int cli_receiver_plan(const cli_receiver_job *job, const vsh_charts *charts, uint64_t held,
+                      cli_bands *bands) {
+    const vsh_receiver *receiver = &job->scene->receivers[job->index];
+    cli_planes planes;
+    int code = cli_planes_name(&planes, job->scene, receiver->width, receiver->height);
+    if (code == CLI_OK) {
+        const vsh_image_options options = image_options(receiver);
+        cli_bands_need need = cli_bands_need_of(job->scene, &planes.image, receiver->output, &options);
+        need.held = held;
+        need.limit = job->run->memory_limit;
+        need.rows = job->band_rows;
+        code = cli_bands_plan(charts, &need, bands);
+    }
+    cli_planes_free(&planes);
+    return code;
+}
+
+int cli_receiver_texels(const vsh_charts *charts, int32_t first, int32_t rows, const vsh_run *run,
+                        vsh_texels **texels) {
+    vsh_error error;
+    return vsh_texels_create_band(charts, first, rows, run, texels, &error) == VSH_OK ? CLI_OK
+                                                                                      : cli_fail(&error);
 }
 
 static void warn_stats(const cli_receiver_job *job, const vsh_bake_stats *baked) {
@@ -116,11 +141,10 @@ static void warn_stats(const cli_receiver_job *job, const vsh_bake_stats *baked)
 }
 
 /* Values of valid texels, an error for each of which square_error holds: samples where supersampled. */
-static void add_values(cli_stats *sum, const cli_receiver_job *job, const vsh_texels *texels,
+static void add_values(cli_stats *sum, const vsh_scene *scene, const vsh_charts *charts,
                        const vsh_bake_stats *baked) {
-    const vsh_scene *scene = job->scene;
-    vsh_texels_info info;
-    vsh_texels_get_info(texels, &info);
+    vsh_charts_info info;
+    vsh_charts_get_info(charts, &info);
     const double valid =
         baked->texels > 0 ? (double)(baked->texels - baked->invalid_texels) / (double)baked->texels : 0.0;
     const bool lights = scene->shade.method >= VSH_SHADOW_ADAPTIVE;
@@ -144,53 +168,144 @@ static void add_stats(cli_stats *sum, const vsh_bake_stats *baked) {
     sum->shade.square_error += baked->shade.square_error;
 }
 
-static int write_image(const cli_receiver_job *job, cli_planes *planes) {
-    const vsh_receiver *receiver = &job->scene->receivers[job->index];
-    if (cli_progress_report(NULL, "write", 0.0) != 0) {
+/* A receiver under way. */
+typedef struct receiver_work {
+    const cli_receiver_job *job;
+    const cli_receiver_input *input;
+    cli_stats *stats;
+    cli_planes planes;
+    vsh_bake_stats baked; /* of all bands so far */
+    uint64_t *invalid;    /* [mesh_count]: of one band */
+    size_t mesh_count;
+    cli_overall overall;      /* where there are several bands */
+    vsh_image_writer *writer; /* NULL: no row has been written */
+} receiver_work;
+
+static int bake_band(receiver_work *work, int32_t first, int32_t rows, const vsh_run *run) {
+    const vsh_scene *scene = work->job->scene;
+    vsh_texels *own = NULL;
+    const vsh_texels *texels = work->input->texels;
+    if (texels == NULL) {
+        const int code = cli_receiver_texels(work->input->charts, first, rows, run, &own);
+        if (code != CLI_OK) {
+            return code;
+        }
+        texels = own;
+    }
+    vsh_bake_stats band = vsh_bake_stats_zero();
+    band.invalid_by_mesh = work->invalid;
+    band.shade = work->baked.shade;
+    vsh_error error;
+    const vsh_result result = vsh_bake_lightmap(work->input->field, texels, scene->lights, scene->light_count,
+                                                &scene->shade, run, &work->planes.lightmap, &band, &error);
+    vsh_texels_free(own);
+    if (result != VSH_OK) {
+        return cli_fail(&error);
+    }
+    work->baked.texels += band.texels;
+    work->baked.invalid_texels += band.invalid_texels;
+    work->baked.shade = band.shade;
+    for (size_t m = 0; m < work->mesh_count; ++m) {
+        work->baked.invalid_by_mesh[m] += band.invalid_by_mesh[m];
+    }
+    return CLI_OK;
+}
+
+/* The file stands beside its target from its first rows on. */
+static int write_band(receiver_work *work, int32_t rows) {
+    const vsh_receiver *receiver = &work->job->scene->receivers[work->job->index];
+    const char *stage = work->input->bands.count > 1 ? "bake" : "write";
+    if (cli_progress_report(NULL, stage, work->input->bands.count > 1 ? work->overall.before : 0.0) != 0) {
         const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
         return cli_fail(&cancelled);
     }
-    const vsh_image_options options = image_options(receiver);
-    cli_planes_split(planes);
-    cli_signals_writing(receiver->output);
+    cli_planes_split(&work->planes);
     vsh_error error;
-    const vsh_result result = vsh_image_write(receiver->output, &planes->image, &options, &error);
-    cli_signals_writing(NULL);
+    vsh_result result = VSH_OK;
+    if (work->writer == NULL) {
+        const vsh_image_options options = image_options(receiver);
+        cli_signals_writing(receiver->output);
+        result =
+            vsh_image_writer_create(receiver->output, &work->planes.image, &options, &work->writer, &error);
+    }
+    if (result == VSH_OK) {
+        result = vsh_image_writer_add(work->writer, rows, work->planes.image.planes, &error);
+    }
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }
 
-int cli_receiver_bake(const cli_receiver_job *job, const vsh_field *field, const vsh_texels *texels,
-                      cli_stats *stats) {
+static int finish_image(receiver_work *work, int code) {
+    vsh_error error;
+    if (code != CLI_OK) {
+        vsh_image_writer_abandon(work->writer);
+    } else if (vsh_image_writer_finish(work->writer, &error) != VSH_OK) {
+        code = cli_fail(&error);
+    }
+    cli_signals_writing(NULL);
+    return code;
+}
+
+static int bake_bands(receiver_work *work) {
+    const cli_receiver_job *job = work->job;
+    const cli_bands *bands = &work->input->bands;
+    const int32_t height = job->scene->receivers[job->index].height;
+    const bool several = bands->count > 1;
+    if (several) { /* texels, validate, padding, and what is shaded */
+        cli_overall_begin(&work->overall, job->run, "bake",
+                          3 + (int)job->scene->light_count + (job->scene->ao ? 1 : 0));
+    }
+    int code = CLI_OK;
+    for (int32_t first = 0; first < height && code == CLI_OK; first += bands->rows) {
+        const int32_t left = height - first, rows = left < bands->rows ? left : bands->rows;
+        double now = cli_seconds();
+        const vsh_run run =
+            several ? cli_overall_round(&work->overall, (double)rows / (double)height) : *job->run;
+        code = bake_band(work, first, rows, &run);
+        if (several) {
+            cli_overall_next(&work->overall);
+        }
+        now = cli_stats_stage(work->stats, CLI_STAGE_BAKE, now);
+        if (code == CLI_OK && left <= bands->rows) {
+            warn_stats(job, &work->baked);
+        }
+        code = code == CLI_OK ? write_band(work, rows) : code;
+        cli_stats_stage(work->stats, CLI_STAGE_WRITE, now);
+        if (left <= bands->rows) {
+            break;
+        }
+    }
+    return code;
+}
+
+int cli_receiver_bake(const cli_receiver_job *job, const cli_receiver_input *input, cli_stats *stats) {
     const vsh_scene *scene = job->scene;
     const vsh_receiver *receiver = &scene->receivers[job->index];
-    double now = cli_seconds();
-    size_t mesh_count = 0;
-    vsh_assets_receiver(job->assets, job->index, &mesh_count);
-    vsh_bake_stats baked = vsh_bake_stats_zero();
-    cli_planes planes;
-    int code = cli_planes_name(&planes, scene, receiver->width, receiver->height);
+    receiver_work work = {.job = job, .input = input, .stats = stats, .baked = vsh_bake_stats_zero()};
+    vsh_assets_receiver(job->assets, job->index, &work.mesh_count);
+    int code = cli_planes_name(&work.planes, scene, receiver->width, receiver->height);
     if (code == CLI_OK) {
-        code = cli_planes_allocate(&planes, scene, job->run->memory_limit, receiver->output);
+        code = cli_planes_allocate(&work.planes, scene, input->bands.rows, job->run->memory_limit,
+                                   receiver->output);
     }
-    baked.invalid_by_mesh = calloc(mesh_count, sizeof *baked.invalid_by_mesh);
-    if (code == CLI_OK && baked.invalid_by_mesh == NULL) {
+    work.invalid = calloc(work.mesh_count, sizeof *work.invalid);
+    work.baked.invalid_by_mesh = calloc(work.mesh_count, sizeof *work.baked.invalid_by_mesh);
+    if (code == CLI_OK && (work.invalid == NULL || work.baked.invalid_by_mesh == NULL)) {
         cli_say("%s: the system refused memory", receiver->path);
         code = CLI_LIMIT;
     }
-    vsh_error error;
-    if (code == CLI_OK && vsh_bake_lightmap(field, texels, scene->lights, scene->light_count, &scene->shade,
-                                            job->run, &planes.lightmap, &baked, &error) != VSH_OK) {
-        code = cli_fail(&error);
-    }
-    now = cli_stats_stage(stats, CLI_STAGE_BAKE, now);
     if (code == CLI_OK) {
-        add_stats(stats, &baked);
-        add_values(stats, job, texels, &baked);
-        warn_stats(job, &baked);
-        code = write_image(job, &planes);
+        code = bake_bands(&work);
+        const double now = cli_seconds();
+        code = finish_image(&work, code);
         cli_stats_stage(stats, CLI_STAGE_WRITE, now);
     }
-    free(baked.invalid_by_mesh);
-    cli_planes_free(&planes);
+    if (code == CLI_OK) {
+        add_stats(stats, &work.baked);
+        add_values(stats, scene, input->charts, &work.baked);
+        stats->bands += (uint64_t)input->bands.count;
+    }
+    free(work.baked.invalid_by_mesh);
+    free(work.invalid);
+    cli_planes_free(&work.planes);
     return code;
 }

@@ -2,6 +2,7 @@
 #ifndef CLI_RECEIVER_H
 #define CLI_RECEIVER_H
 
+#include "bands.h"
 #include "stats.h"
 
 #include <stdbool.h>
@@ -10,17 +11,32 @@ typedef struct cli_receiver_job {
     const vsh_scene *scene;
     const vsh_assets *assets;
     const vsh_run *run;
-    size_t index; /* of the receiver */
+    size_t index;      /* of the receiver */
+    int32_t band_rows; /* wanted; 0: as many as go */
 } cli_receiver_job;
 
 /* Whether its image can be written. Needs no assets. CLI_OK or an exit code, having said why. */
 int cli_receiver_check(const vsh_scene *scene, size_t index);
 
-/* Rasterises it, warns (where asked to) of what is wrong with its UVs, and hands out the texels. */
-int cli_receiver_texels(const cli_receiver_job *job, bool warn, vsh_texels **texels);
+/* Sorts and counts it, and warns (where asked to) of what is wrong with its UVs. */
+int cli_receiver_charts(const cli_receiver_job *job, bool warn, vsh_charts **charts);
+
+/* How many rows go at a time, where `held` bytes are taken beside them. */
+int cli_receiver_plan(const cli_receiver_job *job, const vsh_charts *charts, uint64_t held, cli_bands *bands);
+
+/* The texels of some rows. */
+int cli_receiver_texels(const vsh_charts *charts, int32_t first, int32_t rows, const vsh_run *run,
+                        vsh_texels **texels);
+
+/* What a receiver is baked from. */
+typedef struct cli_receiver_input {
+    const vsh_field *field;
+    const vsh_charts *charts;
+    const vsh_texels *texels; /* all, where they are there already; or NULL */
+    cli_bands bands;
+} cli_receiver_input;
 
 /* Shades the texels and writes the file. */
-int cli_receiver_bake(const cli_receiver_job *job, const vsh_field *field, const vsh_texels *texels,
-                      cli_stats *stats);
+int cli_receiver_bake(const cli_receiver_job *job, const cli_receiver_input *input, cli_stats *stats);
 
 #endif

@@ -43,6 +43,7 @@ int cli_stats_write(const cli_stats *stats, const char *path) {
         {"rays", stats->shade.rays},
         {"refined", stats->shade.refined},
         {"peak_bytes", peak_bytes()},
+        {"bands", stats->bands},
         {"threads", (uint64_t)stats->threads},
         {"levels", (uint64_t)stats->field.levels},
         {"field_bytes", stats->field.bytes},

@@ -17,6 +17,7 @@ typedef struct cli_stats {
     double seconds[CLI_STAGE_COUNT];
     uint64_t texels;
     uint64_t invalid_texels;
+    uint64_t bands; /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
     double estimated_values; /* behind shade.square_error and shade.refined, by adaptive and exact methods */
     int32_t threads;

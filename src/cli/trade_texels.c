@@ -26,8 +26,14 @@ static int load_receivers(trade_work *work) {
     }
     for (size_t i = 0; i < count; ++i) {
         trade_receiver *receiver = &work->receivers[i];
-        const cli_receiver_job job = {work->scene, work->assets, &work->run, i};
-        const int code = cli_receiver_texels(&job, true, &receiver->texels);
+        const cli_receiver_job job = {work->scene, work->assets, &work->run, i, 0};
+        vsh_charts *charts = NULL;
+        int code = cli_receiver_charts(&job, true, &charts);
+        if (code == CLI_OK) {
+            code = cli_receiver_texels(charts, 0, work->scene->receivers[i].height, &work->run,
+                                       &receiver->texels);
+        }
+        vsh_charts_free(charts);
         if (code != CLI_OK) {
             return code;
         }

@@ -29,19 +29,25 @@ static int64_t write_bytes(exr_const_context_t context, void *user, const void *
     return (int64_t)size;
 }
 
-/* A file being written. */
-typedef struct exr_writer {
+enum { MAX_CHUNK_LINES = 16 }; /* ZIP's */
+
+struct vshi_exr_writer {
+    vshi_sink sink;
     exr_context_t context;
     int part;
-    const vshi_planes *planes;
+    const char *path;
+    int32_t width, height, count;
     int32_t order[VSH_MAX_CHANNELS]; /* file's channel → index of planes: by name, as EXR keeps them */
     exr_pixel_type_t type;
     size_t value_size;    /* bytes */
     int32_t lines;        /* scan lines in a chunk */
+    int32_t row;          /* first of the chunk */
+    int32_t filled;       /* rows in it */
     unsigned char *chunk; /* [count][lines][width] values */
     exr_encode_pipeline_t pipeline;
     bool pipeline_ready;
-} exr_writer;
+    exr_result_t status; /* the first failure */
+};
 
 static void sort_by_name(const vshi_planes *planes, int32_t *order) {
     for (int32_t i = 0; i < planes->count; ++i) {
@@ -54,8 +60,7 @@ static void sort_by_name(const vshi_planes *planes, int32_t *order) {
     }
 }
 
-static exr_result_t write_header(exr_writer *writer) {
-    const vshi_planes *planes = writer->planes;
+static exr_result_t write_header(vshi_exr_writer *writer, const vshi_planes *planes) {
     exr_result_t status = exr_set_longname_support(writer->context, 1);
     if (status == EXR_ERR_SUCCESS) {
         status = exr_add_part(writer->context, NULL, EXR_STORAGE_SCANLINE, &writer->part);
@@ -82,7 +87,7 @@ static exr_result_t write_header(exr_writer *writer) {
     return status;
 }
 
-static void fill_values(const exr_writer *writer, const vshi_plane *plane, size_t first, size_t count,
+static void fill_values(const vshi_exr_writer *writer, const vshi_plane *plane, size_t first, size_t count,
                         unsigned char *to) {
     if (writer->type == EXR_PIXEL_FLOAT && plane->values != NULL) {
         memcpy(to, plane->values + first, count * sizeof(float));
@@ -99,11 +104,11 @@ static void fill_values(const exr_writer *writer, const vshi_plane *plane, size_
     }
 }
 
-static exr_result_t write_chunk(exr_writer *writer, int32_t row) {
-    const vshi_planes *planes = writer->planes;
+/* Writes the rows that the chunk holds. */
+static exr_result_t write_chunk(vshi_exr_writer *writer) {
     exr_encode_pipeline_t *pipeline = &writer->pipeline;
     exr_chunk_info_t info;
-    exr_result_t status = exr_write_scanline_chunk_info(writer->context, writer->part, row, &info);
+    exr_result_t status = exr_write_scanline_chunk_info(writer->context, writer->part, writer->row, &info);
     if (status != EXR_ERR_SUCCESS) {
         return status;
     }
@@ -114,27 +119,42 @@ static exr_result_t write_chunk(exr_writer *writer, int32_t row) {
         return status;
     }
     writer->pipeline_ready = true;
-    const size_t width = (size_t)planes->width;
-    const int32_t left = planes->height - row;
-    const size_t lines = (size_t)(left < writer->lines ? left : writer->lines);
-    for (int32_t c = 0; c < planes->count; ++c) {
-        unsigned char *values =
-            writer->chunk + (size_t)c * (size_t)writer->lines * width * writer->value_size;
-        fill_values(writer, &planes->planes[writer->order[c]], (size_t)row * width, lines * width, values);
+    const size_t line = (size_t)writer->width * writer->value_size;
+    for (int32_t c = 0; c < writer->count; ++c) {
         exr_coding_channel_info_t *channel = &pipeline->channels[c];
-        channel->encode_from_ptr = values;
+        channel->encode_from_ptr = writer->chunk + (size_t)c * (size_t)writer->lines * line;
         channel->user_pixel_stride = (int32_t)writer->value_size;
-        channel->user_line_stride = (int32_t)(width * writer->value_size);
+        channel->user_line_stride = (int32_t)line;
     }
     if (first) {
         status = exr_encoding_choose_default_routines(writer->context, writer->part, pipeline);
     }
+    writer->row += writer->filled;
+    writer->filled = 0;
     return status == EXR_ERR_SUCCESS ? exr_encoding_run(writer->context, writer->part, pipeline) : status;
 }
 
-vsh_result vshi_exr_write(const char *temporary, const char *path, const vshi_planes *planes, int32_t bits,
-                          vsh_error *error) {
-    enum { MAX_CHUNK_LINES = 16 }; /* ZIP's */
+double vshi_exr_writer_bytes(const vshi_planes *planes, int32_t bits) {
+    const double chunk = (double)planes->count * (double)planes->width * (bits / 8) * MAX_CHUNK_LINES;
+    return 4.0 * chunk; /* ours, and the encoder's: packed, two steps of compression */
+}
+
+static vsh_result result_of(vshi_exr_writer *writer, vsh_error *error) {
+    const int number = writer->sink.error;
+    if (number != 0) {
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", writer->path,
+                         strerror(number));
+    }
+    return writer->status == EXR_ERR_SUCCESS
+               ? VSH_OK
+               : vshi_fail(error,
+                           writer->status == EXR_ERR_OUT_OF_MEMORY ? VSH_ERROR_MEMORY : VSH_ERROR_WRITE,
+                           "%s: could not be written: %s", writer->path,
+                           exr_get_default_error_message(writer->status));
+}
+
+vsh_result vshi_exr_begin(const char *temporary, const char *path, const vshi_planes *planes, int32_t bits,
+                          vshi_exr_writer **made, vsh_error *error) {
     const size_t value_size = bits == 16 ? sizeof(imath_half_bits_t) : sizeof(float);
     const double chunk_bytes =
         (double)planes->count * (double)planes->width * (double)value_size * MAX_CHUNK_LINES;
@@ -143,52 +163,76 @@ vsh_result vshi_exr_write(const char *temporary, const char *path, const vshi_pl
                          "%s: %d pixels of %d channels in a row are more than OpenEXR's 2 GiB a chunk", path,
                          planes->width, planes->count);
     }
-    vshi_sink sink = vshi_sink_open(temporary);
-    exr_writer writer = {
-        .planes = planes, .type = bits == 16 ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT, .value_size = value_size};
-    sort_by_name(planes, writer.order);
+    void *memory = NULL;
+    vsh_result result = vshi_allocate(&memory, 1, sizeof(vshi_exr_writer), path, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    vshi_exr_writer *writer = memory;
+    writer->sink = vshi_sink_open(temporary);
+    writer->path = path;
+    writer->width = planes->width;
+    writer->height = planes->height;
+    writer->count = planes->count;
+    writer->type = bits == 16 ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT;
+    writer->value_size = value_size;
+    sort_by_name(planes, writer->order);
     exr_context_initializer_t setup = EXR_DEFAULT_CONTEXT_INITIALIZER;
     setup.error_handler_fn = say_nothing;
-    setup.user_data = &sink;
+    setup.user_data = &writer->sink;
     setup.write_fn = write_bytes;
-
-    vsh_result result = VSH_OK;
-    void *chunk = NULL;
-    exr_result_t status = exr_start_write(&writer.context, temporary, EXR_WRITE_FILE_DIRECTLY, &setup);
-    if (status != EXR_ERR_SUCCESS) {
-        goto done;
+    writer->status = exr_start_write(&writer->context, temporary, EXR_WRITE_FILE_DIRECTLY, &setup);
+    if (writer->status == EXR_ERR_SUCCESS) {
+        writer->status = write_header(writer, planes);
     }
-    status = write_header(&writer);
-    if (status != EXR_ERR_SUCCESS) {
-        goto done;
+    result = result_of(writer, error);
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory, (size_t)planes->count * (size_t)writer->lines * (size_t)planes->width,
+                               value_size, path, error);
+        writer->chunk = memory;
     }
-    result = vshi_allocate(&chunk, (size_t)planes->count * (size_t)writer.lines * (size_t)planes->width,
-                           value_size, path, error);
     if (result != VSH_OK) {
-        goto done;
+        vshi_exr_end(writer, NULL);
+        return result;
     }
-    writer.chunk = chunk;
-    for (int64_t row = 0; status == EXR_ERR_SUCCESS && sink.error == 0 && row < planes->height;
-         row += writer.lines) {
-        status = write_chunk(&writer, (int32_t)row);
-    }
+    *made = writer;
+    return VSH_OK;
+}
 
-done:
-    if (writer.pipeline_ready) {
-        exr_encoding_destroy(writer.context, &writer.pipeline);
+vsh_result vshi_exr_add(vshi_exr_writer *writer, const vshi_planes *planes, int32_t rows, vsh_error *error) {
+    const size_t width = (size_t)writer->width;
+    for (int32_t y = 0; y < rows && writer->status == EXR_ERR_SUCCESS && writer->sink.error == 0;) {
+        const int32_t room = writer->lines - writer->filled;
+        const int32_t count = rows - y < room ? rows - y : room;
+        for (int32_t c = 0; c < writer->count; ++c) {
+            const size_t line = (size_t)c * (size_t)writer->lines + (size_t)writer->filled;
+            fill_values(writer, &planes->planes[writer->order[c]], (size_t)y * width, (size_t)count * width,
+                        writer->chunk + line * width * writer->value_size);
+        }
+        y += count;
+        writer->filled += count;
+        if (writer->filled == writer->lines || writer->row + writer->filled == writer->height) {
+            writer->status = write_chunk(writer);
+        }
     }
-    if (writer.context != NULL) {
+    return result_of(writer, error);
+}
+
+vsh_result vshi_exr_end(vshi_exr_writer *writer, vsh_error *error) {
+    if (writer == NULL) {
+        return VSH_OK;
+    }
+    if (writer->pipeline_ready) {
+        exr_encoding_destroy(writer->context, &writer->pipeline);
+    }
+    if (writer->context != NULL) {
         /* writes the table of chunks, so it can fail as well */
-        const exr_result_t finished = exr_finish(&writer.context);
-        status = status != EXR_ERR_SUCCESS ? status : finished;
+        const exr_result_t finished = exr_finish(&writer->context);
+        writer->status = writer->status != EXR_ERR_SUCCESS ? writer->status : finished;
     }
-    free(chunk);
-    const int number = vshi_sink_close(&sink);
-    if (result == VSH_OK && number != 0) {
-        result = vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", path, strerror(number));
-    } else if (result == VSH_OK && status != EXR_ERR_SUCCESS) {
-        result = vshi_fail(error, status == EXR_ERR_OUT_OF_MEMORY ? VSH_ERROR_MEMORY : VSH_ERROR_WRITE,
-                           "%s: could not be written: %s", path, exr_get_default_error_message(status));
-    }
+    vshi_sink_close(&writer->sink);
+    const vsh_result result = result_of(writer, error);
+    free(writer->chunk);
+    free(writer);
     return result;
 }

@@ -76,6 +76,12 @@ vsh_result vshi_ao_check_points(const vsh_points *points, vsh_error *error) {
 vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const vsh_shade_options *options,
                         const vsh_run *run, float *ao, float *deviation, vsh_shade_stats *stats,
                         vsh_error *error) {
+    return vshi_shade_ao(field, points, NULL, options, run, ao, deviation, stats, error);
+}
+
+vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
+                         const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
+                         vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     vsh_shade_options full;
     vsh_run full_run;
@@ -102,7 +108,8 @@ vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const 
         task.ao = ao;
         task.deviation = deviation;
         const size_t grain = full.ao_method == VSH_AO_TAPS ? VSHI_CHUNK : VSHI_AO_GRAIN;
-        result = vshi_shade_run(&full_run, "ao", points->count, grain, vshi_ao_shade, &task, stats, error);
+        result =
+            vshi_shade_run(&full_run, "ao", points->count, rows, grain, vshi_ao_shade, &task, stats, error);
     }
     vshi_sampler_free(sampler);
     return result;

@@ -209,7 +209,7 @@ static vsh_result shade_ordered(query_call *call, const vsh_run *run, vshi_job *
         result = vshi_order_points(job, field, call->points, call->first, now, &order, error);
         if (result == VSH_OK) {
             call->order = order.point;
-            result = vshi_shade_pieces(job, now, VSHI_PIECE, shade_in_order, call, stats, error);
+            result = vshi_shade_pieces(job, now, NULL, VSHI_PIECE, shade_in_order, call, stats, error);
         }
     }
     vshi_order_free(&order);
@@ -261,9 +261,10 @@ vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, co
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "query: the system refused memory");
     }
-    result = vshi_order_pays(query->ao.field, points)
-                 ? shade_ordered(&call, &full_run, job, stats, error)
-                 : vshi_shade_pieces(job, points->count, VSHI_PIECE, shade_in_place, &call, stats, error);
+    result =
+        vshi_order_pays(query->ao.field, points)
+            ? shade_ordered(&call, &full_run, job, stats, error)
+            : vshi_shade_pieces(job, points->count, NULL, VSHI_PIECE, shade_in_place, &call, stats, error);
     vshi_job_end(job);
     return result;
 }

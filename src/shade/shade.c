@@ -1,9 +1,11 @@
 #include "shade/shade.h"
 
+#include "base/memory.h"
 #include "base/parallel.h"
 
 #include <math.h>
 #include <stdatomic.h>
+#include <stdlib.h>
 
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
                                       vsh_error *error) {
@@ -50,14 +52,35 @@ vsh_result vshi_shade_sampler(const vsh_shade_options *options, const char *what
 typedef struct shade_run {
     vshi_shade_fn *fn;
     const void *task;
+    vshi_job *job;
+    size_t grain;
+    const vshi_point_rows *rows;
+    const size_t *pieces; /* [rows + 1]: before each row */
     _Atomic uint64_t marches, samples, skipped, certified, unfinished, invalid, beyond_reach, rays, refined;
     _Atomic uint64_t square_error; /* in units of SQUARE_UNIT, so that the order of threads changes no bit */
 } shade_run;
 
-static void run_piece(void *user, size_t begin, size_t end) {
+static void run_piece(void *user, size_t piece, size_t next) {
+    (void)next; /* one at a time */
     shade_run *run = user;
+    const vshi_point_rows *rows = run->rows;
+    size_t row = 0, beyond = rows->count;
+    while (beyond - row > 1) {
+        const size_t middle = row + (beyond - row) / 2;
+        if (run->pieces[middle] <= piece) {
+            row = middle;
+        } else {
+            beyond = middle;
+        }
+    }
+    const size_t begin = rows->start[row] + (piece - run->pieces[row]) * run->grain;
+    const size_t left = rows->start[row + 1] - begin, count = left < run->grain ? left : run->grain;
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    run->fn(run->task, begin, end, &stats);
+    run->fn(run->task, begin, begin + count, &stats);
+    vshi_job_advance(run->job, count);
+    if (row < rows->first || row >= rows->last) {
+        return;
+    }
     atomic_fetch_add(&run->marches, stats.marches);
     atomic_fetch_add(&run->samples, stats.samples);
     atomic_fetch_add(&run->skipped, stats.skipped);
@@ -70,10 +93,27 @@ static void run_piece(void *user, size_t begin, size_t end) {
     atomic_fetch_add(&run->square_error, (uint64_t)(stats.square_error / SQUARE_UNIT));
 }
 
-vsh_result vshi_shade_pieces(vshi_job *job, size_t count, size_t grain, vshi_shade_fn *fn, const void *task,
-                             vsh_shade_stats *stats, vsh_error *error) {
-    shade_run pieces = {.fn = fn, .task = task};
-    const vsh_result result = vshi_parallel_for(job, count, grain, 1, run_piece, &pieces, error);
+vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows *rows, size_t grain,
+                             vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error) {
+    const size_t all[2] = {0, count};
+    const vshi_point_rows one = {1, all, 0, 1};
+    rows = rows != NULL ? rows : &one;
+    size_t few[2] = {0, 0}, *before = few;
+    void *memory = NULL;
+    if (rows->count > 1) {
+        const vsh_result result =
+            vshi_allocate(&memory, rows->count + 1, sizeof *before, "rows of points", error);
+        if (result != VSH_OK) {
+            return result;
+        }
+        before = memory;
+    }
+    for (size_t row = 0; row < rows->count; ++row) {
+        before[row + 1] = before[row] + (rows->start[row + 1] - rows->start[row] + grain - 1) / grain;
+    }
+    shade_run pieces = {.fn = fn, .task = task, .job = job, .grain = grain, .rows = rows, .pieces = before};
+    const vsh_result result = vshi_parallel_for(job, before[rows->count], 1, 0, run_piece, &pieces, error);
+    free(memory);
     if (stats != NULL) {
         stats->marches += pieces.marches;
         stats->samples += pieces.samples;
@@ -89,13 +129,14 @@ vsh_result vshi_shade_pieces(vshi_job *job, size_t count, size_t grain, vshi_sha
     return result;
 }
 
-vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
-                          vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error) {
+vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, const vshi_point_rows *rows,
+                          size_t grain, vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats,
+                          vsh_error *error) {
     vshi_job *job = vshi_job_begin(run, stage, count);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
     }
-    const vsh_result result = vshi_shade_pieces(job, count, grain, fn, task, stats, error);
+    const vsh_result result = vshi_shade_pieces(job, count, rows, grain, fn, task, stats, error);
     vshi_job_end(job);
     return result;
 }

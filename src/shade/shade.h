@@ -17,13 +17,31 @@ typedef void vshi_shade_fn(const void *task, size_t begin, size_t end, vsh_shade
 vsh_result vshi_shade_sampler(const vsh_shade_options *options, const char *what, vshi_sampler **sampler,
                               vsh_error *error);
 
-/* Runs fn over `count` points in pieces of `grain`, as a part of a job whose units are points. */
-vsh_result vshi_shade_pieces(vshi_job *job, size_t count, size_t grain, vshi_shade_fn *fn, const void *task,
-                             vsh_shade_stats *stats, vsh_error *error);
+/* Rows that points come in. Each begins a piece of its own, so that what is worked on together, and with it
+ * every value, does not depend on which rows there are. */
+typedef struct vshi_point_rows {
+    size_t count;        /* of the rows, at least 1 */
+    const size_t *start; /* [count + 1]: first point of each row, from 0 to the number of points */
+    size_t first, last;  /* rows first … last - 1 are counted in the statistics */
+} vshi_point_rows;
+
+/* Runs fn over `count` points in pieces of `grain`, as a part of a job whose units are points. `rows` may be
+ * NULL: the points are one row. */
+vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows *rows, size_t grain,
+                             vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error);
 
 /* The same as a job of its own, under progress stage `stage`. `run` is a resolved one. */
-vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
-                          vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error);
+vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, const vshi_point_rows *rows,
+                          size_t grain, vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats,
+                          vsh_error *error);
+
+/* vsh_shade_shadow() and vsh_shade_ao() for points in rows; `rows` may be NULL. */
+vsh_result vshi_shade_shadow(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
+                             const vsh_light *light, const vsh_shade_options *options, const vsh_run *run,
+                             float *visibility, float *deviation, vsh_shade_stats *stats, vsh_error *error);
+vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
+                         const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
+                         vsh_shade_stats *stats, vsh_error *error);
 
 /* How far above a point its rays begin, voxels. */
 static inline double vshi_shade_lift(const vsh_field *field, const vsh_shade_options *options) {

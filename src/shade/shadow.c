@@ -152,6 +152,12 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
 vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
                             const vsh_shade_options *options, const vsh_run *run, float *visibility,
                             float *deviation, vsh_shade_stats *stats, vsh_error *error) {
+    return vshi_shade_shadow(field, points, NULL, light, options, run, visibility, deviation, stats, error);
+}
+
+vsh_result vshi_shade_shadow(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
+                             const vsh_light *light, const vsh_shade_options *options, const vsh_run *run,
+                             float *visibility, float *deviation, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     vsh_shade_options full;
     vsh_run full_run;
@@ -178,8 +184,8 @@ vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, co
         task.points = points;
         task.visibility = visibility;
         task.deviation = deviation;
-        result = vshi_shade_run(&full_run, stage, points->count, VSHI_PIECE, vshi_shadow_shade, &task, stats,
-                                error);
+        result = vshi_shade_run(&full_run, stage, points->count, rows, VSHI_PIECE, vshi_shadow_shade, &task,
+                                stats, error);
     }
     vshi_sampler_free(sampler);
     return result;

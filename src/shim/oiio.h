@@ -24,6 +24,7 @@ typedef struct vshi_format {
     int32_t max_size; /* pixels along a side */
     bool lossy;       /* values change by more than their rounding */
     bool grey;        /* one channel, R */
+    double held;      /* bytes a value that the writer keeps until the end, over those of the value itself */
 } vshi_format;
 
 /* The format that the path's ending stands for, if it can be written. Thread safe. */
@@ -35,11 +36,26 @@ const char *vshi_oiio_refusal(const char *path);
 /* The endings that vshi_oiio_format() knows, for messages. */
 const char *vshi_oiio_endings(void);
 
-/* Writes R, G, B and perhaps A, or R alone where the format is grey, into the existing file `temporary`;
- * messages name `path`. `bits` is one that the format has. Errors: VSH_ERROR_WRITE, VSH_ERROR_UNSUPPORTED,
- * VSH_ERROR_MEMORY. Thread safe. */
-vsh_result vshi_oiio_write(const char *temporary, const char *path, const vshi_format *format,
-                           const vshi_planes *planes, int32_t bits, vsh_error *error);
+/* A file under way. */
+typedef struct vshi_oiio_writer vshi_oiio_writer;
+
+/* Begins a file of R, G, B and perhaps A, or R alone where the format is grey, in the existing file
+ * `temporary`; messages name `path`. Both are to live as long as the writer. `bits` is one that the format
+ * has; of the planes, size and number count. End with vshi_oiio_end(). Errors: VSH_ERROR_WRITE,
+ * VSH_ERROR_UNSUPPORTED, VSH_ERROR_MEMORY. One thread at a time. */
+vsh_result vshi_oiio_begin(const char *temporary, const char *path, const vshi_format *format,
+                           const vshi_planes *planes, int32_t bits, vshi_oiio_writer **writer,
+                           vsh_error *error);
+
+/* The next rows, with `values` [rows × width]. Same errors. */
+vsh_result vshi_oiio_add(vshi_oiio_writer *writer, const vshi_planes *planes, int32_t rows, vsh_error *error);
+
+/* Closes the file and, where all rows were given, looks whether it is whole; frees the writer. NULL does
+ * nothing. Same errors. */
+vsh_result vshi_oiio_end(vshi_oiio_writer *writer, vsh_error *error);
+
+/* Bytes that writing takes at most. */
+double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits);
 
 /* Errors: VSH_ERROR_INPUT, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Thread safe. */
 vsh_result vshi_oiio_read(const char *path, vsh_image_file **file, vsh_error *error);

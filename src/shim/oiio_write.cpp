@@ -4,6 +4,7 @@
 #include "shim/oiio_formats.h"
 
 #include "base/file.h"
+#include "base/hash.h"
 #include "shim/guard.h"
 
 #include <OpenImageIO/filesystem.h>
@@ -59,6 +60,7 @@ class CheckedFile final : public OIIO::Filesystem::IOProxy {
         vshi_sink_write(&sink_, data, count, static_cast<uint64_t>(offset));
         return count;
     }
+    int error() const { return sink_.error; } // so far
     // Closes; the first error of all, or 0.
     int finish() { return vshi_sink_close(&sink_); }
 
@@ -83,9 +85,9 @@ template <typename Value> Value convert(float value) {
     }
 }
 
-// Rows [first, last), interleaved.
+// Rows [first, last) of the planes, interleaved into `rows`.
 template <typename Value>
-void interleave(const vshi_planes &planes, int first, int last, std::vector<Value> &rows) {
+void interleave(const vshi_planes &planes, int32_t first, int32_t last, Value *rows) {
     const size_t width = static_cast<size_t>(planes.width);
     const size_t count = static_cast<size_t>(planes.count);
     const size_t begin = static_cast<size_t>(first) * width;
@@ -153,28 +155,27 @@ template <typename Value> std::vector<Value> make_rows(const vshi_planes &planes
                               READ_BEYOND);
 }
 
-template <typename Value>
-vsh_result write_rows(OIIO::ImageOutput &output, const char *path, const vshi_planes &planes,
-                      vsh_error *error) {
-    int step = rows_of_band(planes.width, planes.height, planes.count);
-    const int tile =
-        output.spec().tile_width > 0 ? output.spec().tile_height : 1; // of a format of tiles only
-    step = (step + tile - 1) / tile * tile;
-    std::vector<Value> rows = make_rows<Value>(planes, std::min(step, planes.height));
-    for (int64_t y = 0; y < planes.height; y += step) {
-        const int first = static_cast<int>(y);
-        const int last = static_cast<int>(std::min<int64_t>(y + step, planes.height));
-        interleave(planes, first, last, rows);
-        const bool done =
-            output.spec().tile_width > 0
-                ? output.write_tiles(0, planes.width, first, last, 0, 1, oiio_type<Value>(), rows.data())
-                : output.write_scanlines(first, last, 0, oiio_type<Value>(), rows.data());
-        if (!done) {
-            return fail_write(error, path, reason(output.geterror()));
+// What was written, in a word: the same for the same rows, however many at a time.
+class Sum {
+  public:
+    template <typename Value> void add(const Value *row, size_t values) {
+        const auto *bytes = reinterpret_cast<const unsigned char *>(row);
+        const size_t count = values * sizeof(Value);
+        uint64_t word;
+        size_t at = 0;
+        for (; at + sizeof word <= count; at += sizeof word) {
+            std::memcpy(&word, bytes + at, sizeof word);
+            sum_ = vshi_mix(sum_ + word);
         }
+        word = 0;
+        std::memcpy(&word, bytes + at, count - at);
+        sum_ = vshi_mix(sum_ + word);
     }
-    return VSH_OK;
-}
+    bool operator==(const Sum &other) const { return sum_ == other.sum_; }
+
+  private:
+    uint64_t sum_ = 0x9e3779b97f4a7c15;
+};
 
 // What a format's header says of the making of the file, and what stands there instead: same input, same
 // bytes.
@@ -233,26 +234,28 @@ int64_t whole_size(const std::string &format, const vshi_planes &planes, int64_t
 }
 
 template <typename Value>
-bool reads_back(OIIO::ImageInput &input, const vshi_format &format, const vshi_planes &planes) {
+bool reads_back(OIIO::ImageInput &input, const vshi_format &format, const vshi_planes &planes,
+                const Sum &written) {
     const int step = rows_of_band(planes.width, planes.height, planes.count);
-    std::vector<Value> wanted = make_rows<Value>(planes, step), found = wanted;
+    const size_t values = static_cast<size_t>(planes.width) * static_cast<size_t>(planes.count);
+    std::vector<Value> found = make_rows<Value>(planes, step);
+    Sum sum;
     for (int64_t y = 0; y < planes.height; y += step) {
         const int first = static_cast<int>(y);
         const int last = static_cast<int>(std::min<int64_t>(y + step, planes.height));
-        interleave(planes, first, last, wanted);
-        const size_t bytes = static_cast<size_t>(last - first) * static_cast<size_t>(planes.width) *
-                             static_cast<size_t>(planes.count) * sizeof(Value);
-        if (!input.read_scanlines(0, 0, first, last, 0, 0, planes.count, oiio_type<Value>(), found.data()) ||
-            (!format.lossy && std::memcmp(found.data(), wanted.data(), bytes) != 0)) {
+        if (!input.read_scanlines(0, 0, first, last, 0, 0, planes.count, oiio_type<Value>(), found.data())) {
             return false;
         }
+        for (int row = first; row < last; ++row) {
+            sum.add(found.data() + static_cast<size_t>(row - first) * values, values);
+        }
     }
-    return true;
+    return format.lossy || sum == written;
 }
 
 template <typename Value>
 vsh_result verify(const char *temporary, const char *path, const vshi_format &format,
-                  const vshi_planes &planes, vsh_error *error) {
+                  const vshi_planes &planes, const Sum &written, vsh_error *error) {
     const int64_t size = whole_size(format.name, planes, sizeof(Value));
     struct stat status;
     bool whole = ::stat(temporary, &status) == 0 && (size < 0 || status.st_size == size);
@@ -263,7 +266,7 @@ vsh_result verify(const char *temporary, const char *path, const vshi_format &fo
         config.attribute("oiio:RawColor", 1);
         whole = input != nullptr && input->open(temporary, spec, config) && spec.width == planes.width &&
                 spec.height == planes.height && spec.nchannels == planes.count &&
-                reads_back<Value>(*input, format, planes);
+                reads_back<Value>(*input, format, planes, written);
         OIIO::geterror();
     }
     if (whole) {
@@ -273,70 +276,185 @@ vsh_result verify(const char *temporary, const char *path, const vshi_format &fo
     return fail_write(error, path, number != 0 ? std::strerror(number) : "it is not read back as written");
 }
 
-template <typename Value>
-vsh_result write_as(const char *temporary, const char *path, const vshi_format &format,
-                    const vshi_planes &planes, vsh_error *error) {
-    std::unique_ptr<CheckedFile> file; // outlives the writer, which may still use it when it goes
-    auto output = OIIO::ImageOutput::create(format.name);
-    if (!output) {
-        OIIO::geterror();
-        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: this OpenImageIO has no %s", path, format.name);
-    }
-    output->threads(1);
-    const OIIO::TypeDesc type(oiio_type<Value>());
-    if (output->supports("ioproxy")) {
-        file = std::make_unique<CheckedFile>(temporary);
-        if (!output->set_ioproxy(file.get())) {
-            return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: this OpenImageIO cannot write %s safely",
-                             path, format.name);
+} // namespace
+
+} // namespace vshi
+
+struct vshi_oiio_writer {
+    vshi_oiio_writer(const char *where, const char *name, const vshi_format &kind, const vshi_planes &planes)
+        : temporary(where), path(name), format(kind), shape(planes) {}
+    virtual ~vshi_oiio_writer() = default;
+    vshi_oiio_writer(const vshi_oiio_writer &) = delete;
+    vshi_oiio_writer &operator=(const vshi_oiio_writer &) = delete;
+    virtual vsh_result open(vsh_error *error) = 0;
+    virtual vsh_result add(const vshi_planes &planes, int32_t rows, vsh_error *error) = 0;
+    virtual vsh_result close(vsh_error *error) = 0;
+
+    const char *const temporary, *const path; // the caller's
+    const vshi_format format;
+    const vshi_planes shape; // size and number of the planes
+};
+
+namespace vshi {
+
+namespace {
+
+// Rows are gathered until there are as many as are handed over at a time, whatever the caller has of them.
+template <typename Value> class Writer final : public vshi_oiio_writer {
+  public:
+    using vshi_oiio_writer::vshi_oiio_writer;
+
+    vsh_result open(vsh_error *error) override {
+        output_ = OIIO::ImageOutput::create(format.name);
+        if (!output_) {
+            OIIO::geterror();
+            return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: this OpenImageIO has no %s", path,
+                             format.name);
         }
+        output_->threads(1);
+        const OIIO::TypeDesc type(oiio_type<Value>());
+        if (output_->supports("ioproxy")) {
+            file_ = std::make_unique<CheckedFile>(temporary);
+            if (!output_->set_ioproxy(file_.get())) {
+                return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: this OpenImageIO cannot write %s safely",
+                                 path, format.name);
+            }
+        }
+        if (!output_->open(temporary, make_spec(shape, path, format.name, type))) {
+            return fail_write(error, path, reason(output_->geterror()));
+        }
+        if (output_->spec().format != type || output_->spec().nchannels != shape.count) {
+            return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: this OpenImageIO writes %s as %d × %s only",
+                             path, format.name, output_->spec().nchannels, output_->spec().format.c_str());
+        }
+        tiled_ = output_->spec().tile_width > 0; // of a format of tiles only
+        const int tile = tiled_ ? output_->spec().tile_height : 1;
+        const int step = rows_of_band(shape.width, shape.height, shape.count);
+        step_ = std::min((step + tile - 1) / tile * tile, shape.height);
+        rows_ = make_rows<Value>(shape, step_);
+        return VSH_OK;
     }
-    if (!output->open(temporary, make_spec(planes, path, format.name, type))) {
-        return fail_write(error, path, reason(output->geterror()));
+
+    vsh_result add(const vshi_planes &planes, int32_t rows, vsh_error *error) override {
+        const size_t values = static_cast<size_t>(shape.width) * static_cast<size_t>(shape.count);
+        for (int32_t y = 0; y < rows;) {
+            const int32_t count = std::min(rows - y, step_ - filled_);
+            Value *first = rows_.data() + static_cast<size_t>(filled_) * values;
+            interleave(planes, y, y + count, first);
+            for (int32_t row = 0; row < count && file_ == nullptr; ++row) {
+                sum_.add(first + static_cast<size_t>(row) * values, values);
+            }
+            y += count;
+            filled_ += count;
+            if (filled_ == step_ || row_ + filled_ == shape.height) {
+                const vsh_result result = flush(error);
+                if (result != VSH_OK) {
+                    return result;
+                }
+            }
+        }
+        return VSH_OK;
     }
-    vsh_result result = VSH_OK;
-    if (output->spec().format != type || output->spec().nchannels != planes.count) {
-        result = vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: this OpenImageIO writes %s as %d × %s only",
-                           path, format.name, output->spec().nchannels, output->spec().format.c_str());
+
+    vsh_result close(vsh_error *error) override {
+        const bool whole = row_ == shape.height;
+        if (row_ == 0 && output_ != nullptr) { // libpng prints that a file without rows has none
+            filled_ = step_;
+            flush(nullptr);
+        }
+        const bool closed = output_ != nullptr && output_->close();
+        const std::string text = output_ != nullptr ? output_->geterror() : "";
+        output_.reset();
+        const int number = file_ != nullptr ? file_->finish() : !closed ? disk_error(temporary) : 0;
+        if (number != 0) { // says more than the writer's own words
+            return fail_write(error, path, std::strerror(number));
+        }
+        if (!closed) {
+            return fail_write(error, path, reason(text));
+        }
+        if (!whole) {
+            return VSH_OK;
+        }
+        const int stamped = clear_stamps(temporary, format.name);
+        if (stamped != 0) {
+            return fail_write(error, path, std::strerror(stamped));
+        }
+        return file_ != nullptr ? VSH_OK : verify<Value>(temporary, path, format, shape, sum_, error);
     }
-    if (result == VSH_OK) {
-        result = write_rows<Value>(*output, path, planes, error);
+
+  private:
+    // A disk that is full says more than the writer's own words.
+    vsh_result flush(vsh_error *error) {
+        const int first = row_, last = row_ + filled_;
+        row_ = last;
+        filled_ = 0;
+        const bool done =
+            tiled_ ? output_->write_tiles(0, shape.width, first, last, 0, 1, oiio_type<Value>(), rows_.data())
+                   : output_->write_scanlines(first, last, 0, oiio_type<Value>(), rows_.data());
+        if (done && (file_ == nullptr || file_->error() == 0)) {
+            return VSH_OK;
+        }
+        const std::string text = output_->geterror();
+        const int number = file_ != nullptr ? file_->error() : disk_error(temporary);
+        return fail_write(error, path, number != 0 ? std::strerror(number) : reason(text));
     }
-    const bool closed = output->close();
-    const std::string text = output->geterror();
-    output.reset();
-    const bool failed = result != VSH_OK || !closed;
-    const int number = file != nullptr ? file->finish() : failed ? disk_error(temporary) : 0;
-    if (number != 0) { // says more than the writer's own words
-        return fail_write(error, path, std::strerror(number));
+
+    std::unique_ptr<CheckedFile> file_; // outlives the writer, which may still use it when it goes
+    std::unique_ptr<OIIO::ImageOutput> output_;
+    std::vector<Value> rows_;
+    Sum sum_; // of what has been given, where the file is to be read again
+    int32_t step_ = 0, filled_ = 0, row_ = 0;
+    bool tiled_ = false;
+};
+
+std::unique_ptr<vshi_oiio_writer> make_writer(const char *temporary, const char *path,
+                                              const vshi_format &format, const vshi_planes &planes,
+                                              int32_t bits) {
+    switch (bits) {
+    case 8:
+        return std::make_unique<Writer<uint8_t>>(temporary, path, format, planes);
+    case 16:
+        return std::make_unique<Writer<uint16_t>>(temporary, path, format, planes);
+    default:
+        return std::make_unique<Writer<float>>(temporary, path, format, planes);
     }
-    if (result == VSH_OK && !closed) {
-        result = fail_write(error, path, reason(text));
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
-    const int stamped = clear_stamps(temporary, format.name);
-    if (stamped != 0) {
-        return fail_write(error, path, std::strerror(stamped));
-    }
-    return file != nullptr ? VSH_OK : verify<Value>(temporary, path, format, planes, error);
 }
 
 } // namespace
 
 } // namespace vshi
 
-vsh_result vshi_oiio_write(const char *temporary, const char *path, const vshi_format *format,
-                           const vshi_planes *planes, int32_t bits, vsh_error *error) {
+vsh_result vshi_oiio_begin(const char *temporary, const char *path, const vshi_format *format,
+                           const vshi_planes *planes, int32_t bits, vshi_oiio_writer **writer,
+                           vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_WRITE, path, [&]() -> vsh_result {
-        switch (bits) {
-        case 8:
-            return vshi::write_as<uint8_t>(temporary, path, *format, *planes, error);
-        case 16:
-            return vshi::write_as<uint16_t>(temporary, path, *format, *planes, error);
-        default:
-            return vshi::write_as<float>(temporary, path, *format, *planes, error);
+        auto made = vshi::make_writer(temporary, path, *format, *planes, bits);
+        const vsh_result result = made->open(error);
+        if (result == VSH_OK) {
+            *writer = made.release();
         }
+        return result;
     });
+}
+
+vsh_result vshi_oiio_add(vshi_oiio_writer *writer, const vshi_planes *planes, int32_t rows,
+                         vsh_error *error) {
+    return vshi::guard(error, VSH_ERROR_WRITE, writer->path,
+                       [&]() -> vsh_result { return writer->add(*planes, rows, error); });
+}
+
+vsh_result vshi_oiio_end(vshi_oiio_writer *writer, vsh_error *error) {
+    if (writer == nullptr) {
+        return VSH_OK;
+    }
+    const std::unique_ptr<vshi_oiio_writer> owned(writer);
+    return vshi::guard(error, VSH_ERROR_WRITE, writer->path,
+                       [&]() -> vsh_result { return writer->close(error); });
+}
+
+double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits) {
+    const double values = static_cast<double>(planes->width) * planes->height * planes->count;
+    const double step = vshi::rows_of_band(planes->width, planes->height, planes->count);
+    const double rows = step * planes->width * planes->count;
+    return (bits / 8) * (4.0 * rows + format->held * values); // rows: ours, and the format's on their way
 }

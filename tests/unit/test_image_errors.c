@@ -98,7 +98,10 @@ static void bad_images_are_refused(void **state) {
     refused(at("x.exr"), &bad, 0, NULL, VSH_ERROR_ARGUMENT, "0 × 2");
     bad.width = 1 << 20;
     bad.height = 1 << 20;
-    refused(at("x.exr"), &bad, 0, NULL, VSH_ERROR_LIMIT, "2^31");
+    refused(at("x.tif"), &bad, 0, NULL, VSH_ERROR_LIMIT, "2^31");
+    vsh_error error = {0};
+    assert_int_equal(vsh_image_write(at("x.exr"), &bad, NULL, &error), VSH_ERROR_LIMIT); /* not row by row */
+    assert_non_null(strstr(error.message, "2^31"));
     bad = s.image;
     bad.channel_count = 0;
     refused(at("x.exr"), &bad, 0, NULL, VSH_ERROR_ARGUMENT, "0 channels");
@@ -116,7 +119,7 @@ static void bad_images_are_refused(void **state) {
     refused(at("x.exr"), &s.image, 0, NULL, VSH_ERROR_ARGUMENT, "127");
     s.names[1] = "ao";
     s.planes[1] = NULL;
-    vsh_error error = {0};
+    error = (vsh_error){0};
     assert_int_equal(vsh_image_write(at("x.exr"), &s.image, NULL, &error), VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "'ao'"));
     s.image.planes = NULL; /* enough for a check before the bake */

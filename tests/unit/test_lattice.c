@@ -118,6 +118,46 @@ static void errors_are_as_said(void **state) {
     free(truth);
 }
 
+/* A chart that ends two rows beyond a tile's edge: the band above copies its padding from texels whose
+ * corners' corners lie two tiles on. */
+static void bands_are_interpolated_as_the_whole(void **state) {
+    enum { ROWS = 8 };
+    const vsh_mesh mesh = {
+        .positions = POSITIONS, .uvs = UVS, .indices = INDICES, .vertex_count = 4, .triangle_count = 2};
+    const vsh_shade_options shade = options_of(VSH_AO_CONES);
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = SIZE;
+    options.padding = 0;
+    options.ao_spacing = 8;
+    float *whole = calloc(TEXELS, sizeof *whole), *banded = calloc(TEXELS, sizeof *banded);
+    vsh_bake_stats stats = vsh_bake_stats_zero(), sum = vsh_bake_stats_zero();
+    vsh_lightmap lightmap = {.ao = whole};
+    vsh_texels *texels;
+    vsh_charts *charts;
+    assert_int_equal(vsh_texels_create(&mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
+    assert_int_equal(vsh_bake_lightmap(*state, texels, NULL, 0, &shade, NULL, &lightmap, &stats, NULL),
+                     VSH_OK);
+    vsh_texels_free(texels);
+    assert_int_equal(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
+    for (int32_t row = 0; row < SIZE; row += ROWS) {
+        lightmap.ao = banded + (size_t)row * SIZE;
+        assert_int_equal(vsh_texels_create_band(charts, row, ROWS, NULL, &texels, NULL), VSH_OK);
+        assert_int_equal(vsh_bake_lightmap(*state, texels, NULL, 0, &shade, NULL, &lightmap, &sum, NULL),
+                         VSH_OK);
+        vsh_texels_free(texels);
+    }
+    vsh_charts_free(charts);
+    for (size_t i = 0; i < TEXELS; ++i) {
+        if (whole[i] != banded[i]) {
+            fail_msg("row %zu, column %zu: %.9g whole, %.9g in bands", i / SIZE, i % SIZE, (double)whole[i],
+                     (double)banded[i]);
+        }
+    }
+    assert_memory_equal(&stats.shade, &sum.shade, sizeof stats.shade);
+    free(whole);
+    free(banded);
+}
+
 static void other_spacings_are_refused(void **state) {
     (void)state;
     static const int32_t bad[] = {0, -4, 3, 5, 6, 16, INT32_MAX};
@@ -146,9 +186,8 @@ static int tear_down(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(little_is_lost_and_much_is_saved),
-        cmocka_unit_test(threads_change_no_bit),
-        cmocka_unit_test(errors_are_as_said),
+        cmocka_unit_test(little_is_lost_and_much_is_saved),    cmocka_unit_test(threads_change_no_bit),
+        cmocka_unit_test(bands_are_interpolated_as_the_whole), cmocka_unit_test(errors_are_as_said),
         cmocka_unit_test(other_spacings_are_refused),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);

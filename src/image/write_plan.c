@@ -1,26 +1,12 @@
-/* What image files have in common: what may be written, and who writes and reads it. */
-#include "base/file.h"
-#include "base/floats.h"
-#include "base/job.h"
-#include "image/exr.h"
-#include "image/pack.h"
-#include "image/planes.h"
-#include "image/png.h"
-#include "shim/oiio.h"
+/* What may be written into which file. */
+#include "image/write_plan.h"
 
-#include <errno.h>
-#include <stdio.h>
+#include "base/file.h"
+#include "base/job.h"
+#include "image/pack.h"
+
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
-
-/* How a path is to be written: what the checks found out. */
-typedef struct write_plan {
-    bool exr;
-    vshi_format format; /* where it is not EXR */
-    int32_t bits;       /* 8, 16 or 32 */
-    vshi_planes planes;
-} write_plan;
 
 static vsh_result check_image(const char *path, const vsh_image *image, vsh_error *error) {
     if (image == NULL || image->names == NULL) {
@@ -50,10 +36,11 @@ static vsh_result check_image(const char *path, const vsh_image *image, vsh_erro
             }
         }
     }
-    return vshi_check_values(path, image->width, image->height, image->channel_count, error);
+    return VSH_OK;
 }
 
-static vsh_result plan_format(const char *path, const vsh_image *image, write_plan *plan, vsh_error *error) {
+static vsh_result plan_format(const char *path, const vsh_image *image, vshi_write_plan *plan,
+                              vsh_error *error) {
     const char *ending = vshi_path_ending(path);
     plan->exr = strcasecmp(ending, "exr") == 0;
     if (plan->exr) {
@@ -75,7 +62,7 @@ static vsh_result plan_format(const char *path, const vsh_image *image, write_pl
     return VSH_OK;
 }
 
-static vsh_result plan_bits(const char *path, int32_t bits, write_plan *plan, vsh_error *error) {
+static vsh_result plan_bits(const char *path, int32_t bits, vshi_write_plan *plan, vsh_error *error) {
     static const struct {
         int32_t bits;
         int32_t flag;
@@ -122,15 +109,15 @@ static vsh_result fit_pack(const char *path, const vshi_format *format, bool ask
     return VSH_OK;
 }
 
-static vsh_result plan_planes(const char *path, const vsh_image *image, const char *text, write_plan *plan,
-                              vsh_error *error) {
+static vsh_result plan_planes(const char *path, const vsh_image *image, const char *text,
+                              vshi_write_plan *plan, vsh_error *error) {
     vshi_planes *planes = &plan->planes;
     *planes = (vshi_planes){.width = image->width, .height = image->height};
     if (plan->exr && text == NULL) {
         planes->count = image->channel_count;
         for (int32_t c = 0; c < image->channel_count; ++c) {
-            const float *values = image->planes != NULL ? image->planes[c] : NULL;
-            planes->planes[c] = (vshi_plane){image->names[c], values, 0.0f};
+            planes->planes[c] = (vshi_plane){image->names[c], NULL, 0.0f};
+            plan->channel[c] = c;
         }
         return VSH_OK;
     }
@@ -149,16 +136,15 @@ static vsh_result plan_planes(const char *path, const vsh_image *image, const ch
         const vshi_pack_entry *entry = &pack.entries[key];
         /* the other formats have R, G and B whether given or not: what is not given is 0 */
         if (entry->given || (!plan->exr && key < (plan->format.grey ? 1 : VSHI_PACK_ALPHA))) {
-            const bool channel = entry->given && entry->channel >= 0;
-            const float *values = channel && image->planes != NULL ? image->planes[entry->channel] : NULL;
-            planes->planes[planes->count++] = (vshi_plane){vshi_pack_keys[key], values, entry->constant};
+            plan->channel[planes->count] = entry->given ? entry->channel : -1;
+            planes->planes[planes->count++] = (vshi_plane){vshi_pack_keys[key], NULL, entry->constant};
         }
     }
     return VSH_OK;
 }
 
-static vsh_result plan_write(const char *path, const vsh_image *image, const vsh_image_options *options,
-                             write_plan *plan, vsh_error *error) {
+vsh_result vshi_write_plan_make(const char *path, const vsh_image *image, const vsh_image_options *options,
+                                vshi_write_plan *plan, vsh_error *error) {
     vsh_image_options full = vsh_image_options_default();
     vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_image_options", error);
     if (result != VSH_OK) {
@@ -171,6 +157,9 @@ static vsh_result plan_write(const char *path, const vsh_image *image, const vsh
     if (result == VSH_OK) {
         result = plan_format(path, image, plan, error);
     }
+    if (result == VSH_OK && !plan->exr) { /* whose rows are written as they come */
+        result = vshi_check_values(path, image->width, image->height, image->channel_count, error);
+    }
     if (result == VSH_OK) {
         result = plan_bits(path, full.bits, plan, error);
     }
@@ -178,83 +167,4 @@ static vsh_result plan_write(const char *path, const vsh_image *image, const vsh
         result = plan_planes(path, image, full.pack, plan, error);
     }
     return result;
-}
-
-vsh_result vsh_image_check(const char *path, const vsh_image *image, const vsh_image_options *options,
-                           vsh_error *error) {
-    VSHI_FLOATS;
-    write_plan plan;
-    const vsh_result result = plan_write(path, image, options, &plan, error);
-    return result == VSH_OK ? vshi_output_check(path, error) : result;
-}
-
-vsh_result vsh_image_write(const char *path, const vsh_image *image, const vsh_image_options *options,
-                           vsh_error *error) {
-    VSHI_FLOATS;
-    write_plan plan;
-    vsh_result result = plan_write(path, image, options, &plan, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    for (int32_t c = 0; c < image->channel_count; ++c) {
-        if (image->planes == NULL || image->planes[c] == NULL) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: channel '%s' has no values", path,
-                             image->names[c]);
-        }
-    }
-    vshi_output output;
-    result = vshi_output_begin(&output, path, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    result = plan.exr ? vshi_exr_write(output.temporary, path, &plan.planes, plan.bits, error)
-                      : vshi_oiio_write(output.temporary, path, &plan.format, &plan.planes, plan.bits, error);
-    if (result != VSH_OK) {
-        vshi_output_abandon(&output);
-        return result;
-    }
-    return vshi_output_commit(&output, error);
-}
-
-typedef vsh_result read_fn(const char *path, vsh_image_file **file, vsh_error *error);
-
-/* Looks at the first bytes: an EXR file is one whatever its ending says. */
-static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *error) {
-    static const unsigned char exr[] = {0x76, 0x2f, 0x31, 0x01};
-    static const unsigned char png[] = {0x89, 'P', 'N', 'G'};
-    unsigned char start[4] = {0};
-    struct stat status;
-    if (stat(path, &status) == 0 && S_ISDIR(status.st_mode)) {
-        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: it is a folder", path);
-    }
-    FILE *file = fopen(path, "rb");
-    if (file == NULL) {
-        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, strerror(errno));
-    }
-    const size_t count = fread(start, 1, sizeof start, file);
-    const bool failed = ferror(file) != 0;
-    fclose(file);
-    if (failed) {
-        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read", path);
-    }
-    if (count == sizeof start && memcmp(start, exr, sizeof exr) == 0) {
-        *reader = vshi_exr_read;
-    } else if (memcmp(start, png, sizeof png) == 0 || strcasecmp(vshi_path_ending(path), "png") == 0) {
-        *reader = vshi_png_read;
-    } else {
-        *reader = vshi_oiio_read;
-    }
-    return VSH_OK;
-}
-
-vsh_result vsh_image_read(const char *path, vsh_image_file **file, vsh_error *error) {
-    VSHI_FLOATS;
-    if (file == NULL || path == NULL || path[0] == '\0') {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_image_read: no %s was given",
-                         file == NULL ? "place for the image" : "path");
-    }
-    *file = NULL;
-    read_fn *reader = NULL;
-    const vsh_result result = find_reader(path, &reader, error);
-    return result == VSH_OK ? reader(path, file, error) : result;
 }

@@ -1,0 +1,337 @@
+/* Charts that are counted once, and cut into bands of rows. */
+#include "bake/lattice.h"
+#include "bake/origins.h"
+#include "bake/padding.h"
+#include "bake/rows.h"
+#include "bake/take.h"
+#include "base/floats.h"
+#include "base/parallel.h"
+#include "caster/mesh.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    MAX_PADDING = 4096,
+    LEAST_HALO = VSHI_LEAST_INVALID_RADIUS /* texels beside a band: padding may copy from as far */
+};
+
+static vsh_result check_range(int32_t value, int32_t low, int32_t high, const char *name, vsh_error *error) {
+    if (value < low || value > high) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap %s %d: expected %d … %d", name, value, low,
+                         high);
+    }
+    return VSH_OK;
+}
+
+static vsh_result check_options(const vsh_lightmap_options *options, vsh_error *error) {
+    vsh_result result = check_range(options->width, 1, VSH_MAX_LIGHTMAP_SIZE, "width", error);
+    if (result == VSH_OK) {
+        result = check_range(options->height, 1, VSH_MAX_LIGHTMAP_SIZE, "height", error);
+    }
+    if (result == VSH_OK) {
+        result = check_range(options->supersample, 1, VSHI_MAX_SUPERSAMPLE, "supersample", error);
+    }
+    if (result == VSH_OK) {
+        result = check_range(options->padding, 0, MAX_PADDING, "padding", error);
+    }
+    const int32_t spacing = options->ao_spacing;
+    if (result == VSH_OK && spacing != 1 && spacing != 2 && spacing != 4 && spacing != 8) {
+        result =
+            vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap ao_spacing %d: expected 1, 2, 4 or 8", spacing);
+    }
+    return result;
+}
+
+/* --- counting */
+
+typedef struct counting {
+    vsh_charts *charts;
+    vshi_overlaps overlaps;
+    uint64_t most_samples;         /* that the memory limit allows */
+    _Atomic uint64_t samples;      /* counted so far */
+    _Atomic vsh_result row_result; /* of the rows that failed */
+} counting;
+
+static void count_rows(void *user, size_t begin, size_t end) {
+    counting *all = user;
+    const vshi_charts *sorted = &all->charts->sorted;
+    const size_t side = (size_t)VSHI_TILE * (size_t)sorted->raster.supersample;
+    for (size_t row = begin; row < end; ++row) {
+        vshi_tile_row *total = &all->charts->rows[row];
+        vshi_row work;
+        const bool over = atomic_load(&all->samples) > all->most_samples;
+        const vsh_result result = over ? VSH_ERROR_LIMIT : vshi_row_open(sorted, row, &work, NULL);
+        if (result != VSH_OK) {
+            atomic_store(&all->row_result, result);
+        }
+        for (size_t column = 0; result == VSH_OK && column < work.tiles; ++column) {
+            if (work.tile_start[column] == work.tile_start[column + 1]) {
+                continue;
+            }
+            vshi_row_tile(sorted, &work, column, &all->overlaps);
+            size_t samples = (size_t)__builtin_popcountll(work.tile.border);
+            for (size_t i = 0; i < side * side; ++i) {
+                samples += work.tile.owner[i] != 0;
+            }
+            total->samples += samples;
+            total->texels += (size_t)__builtin_popcountll(work.tile.border | work.tile.covered);
+        }
+        if (!over) {
+            vshi_row_close(&work);
+        }
+        atomic_fetch_add(&all->samples, total->samples);
+    }
+}
+
+/* Texels that the triangles would cover if none overlapped, at most the whole image: for the message. */
+static double estimate_samples(const vshi_charts *sorted) {
+    const vshi_raster *raster = &sorted->raster;
+    const double image = (double)raster->width * raster->height;
+    double area = 0.0;
+    for (size_t i = 0; i < sorted->row_start[sorted->rows]; ++i) {
+        size_t local;
+        const size_t mesh = vshi_charts_mesh(sorted, sorted->row_triangle[i], &local);
+        vshi_uv_triangle t;
+        vshi_charts_triangle(sorted, mesh, local, &t);
+        const double across = fmin(fmax(t.x[0], fmax(t.x[1], t.x[2])), raster->width) -
+                              fmax(fmin(t.x[0], fmin(t.x[1], t.x[2])), 0.0);
+        area += across * VSHI_TILE;
+    }
+    return fmin(area, image) * raster->supersample * raster->supersample;
+}
+
+/* Rasterises every row of tiles, for its samples and for what is covered twice. */
+static vsh_result count(counting *all, const vsh_run *run, bool limited, vshi_job *job, vsh_error *error) {
+    vsh_charts *charts = all->charts;
+    vshi_charts *sorted = &charts->sorted;
+    const size_t triangles = sorted->first[sorted->mesh_count];
+    const double held = (double)charts->info.bytes + (double)triangles + vshi_row_bytes(sorted, run->threads);
+    vsh_result result = vshi_check_limit(run, held, "texels", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    all->most_samples = !limited || run->memory_limit == 0
+                            ? UINT64_MAX
+                            : (uint64_t)(((double)run->memory_limit - held) / VSHI_SAMPLE_BYTES);
+    if ((result = vshi_parallel_for(job, sorted->rows, 1, 1, count_rows, all, error)) != VSH_OK) {
+        return result;
+    }
+    for (size_t row = 0; row < sorted->rows; ++row) {
+        charts->info.samples += charts->rows[row].samples;
+        charts->info.covered += charts->rows[row].texels;
+    }
+    result = charts->info.samples > all->most_samples ? VSH_ERROR_LIMIT : atomic_load(&all->row_result);
+    if (result == VSH_ERROR_LIMIT) {
+        const double samples = fmax(estimate_samples(sorted), (double)all->most_samples + 1.0);
+        return vshi_check_limit(run, held + samples * VSHI_SAMPLE_BYTES, "texels", error);
+    }
+    return result == VSH_OK ? VSH_OK
+                            : vshi_fail(error, result, "texels: the system refused memory for a row");
+}
+
+static void finish_reports(const counting *all, const vsh_run *run, vsh_uv_report *reports) {
+    const vshi_charts *sorted = &all->charts->sorted;
+    for (size_t m = 0; m < sorted->mesh_count; ++m) {
+        vsh_uv_report *report = &reports[m];
+        report->overlap_texels = atomic_load(&all->overlaps.texels[m]);
+        for (size_t i = sorted->first[m]; i < sorted->first[m + 1]; ++i) {
+            report->overlap_triangles += atomic_load(&all->overlaps.triangles[i]);
+        }
+        const vshi_mesh_name label = vshi_mesh_label(&sorted->meshes[m], m);
+        const char *name = label.text;
+        if (report->overlap_texels > 0) {
+            vshi_warn(run,
+                      "%s: lightmap UVs overlap: %zu texels of %zu triangles are covered already; the first "
+                      "triangle keeps them",
+                      name, report->overlap_texels, report->overlap_triangles);
+        }
+        if (report->outside_triangles > 0) {
+            vshi_warn(run,
+                      "%s: lightmap UVs of %zu triangles leave the unit square; what is outside is not baked",
+                      name, report->outside_triangles);
+        }
+        if (report->degenerate_triangles > 0) {
+            vshi_warn(run, "%s: %zu triangles have no area in the lightmap UVs and are not baked", name,
+                      report->degenerate_triangles);
+        }
+    }
+}
+
+static vsh_result find_open(vsh_charts *charts, vshi_job *job, vsh_error *error) {
+    const vshi_charts *sorted = &charts->sorted;
+    vsh_result result = VSH_OK;
+    charts->open = vshi_take(sorted->mesh_count, 1, "texels", &result, error);
+    for (size_t m = 0; result == VSH_OK && m < sorted->mesh_count; ++m) {
+        vsh_mesh_report report;
+        result = vsh_mesh_check(&sorted->meshes[m], &report, error);
+        if (result == VSH_OK) {
+            charts->open[m] = report.open_edges > 0;
+            result = vshi_job_advance(job, 0) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+        }
+    }
+    return result;
+}
+
+static vsh_result make(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
+                       const vsh_run *run, bool limited, vshi_job *job, vsh_uv_report *reports,
+                       vsh_charts *charts, vsh_error *error) {
+    counting all = {.charts = charts};
+    const vshi_raster raster = {options->width, options->height, options->supersample};
+    vshi_charts *sorted = &charts->sorted;
+    vsh_result result = vshi_charts_create(meshes, mesh_count, raster, run, job, reports, sorted, error);
+    if (result == VSH_OK) {
+        result = find_open(charts, job, error);
+    }
+    if (result == VSH_OK) {
+        charts->rows = vshi_take(sorted->rows, sizeof *charts->rows, "texels", &result, error);
+        charts->info.bytes =
+            sizeof *charts + sorted->bytes + mesh_count + sorted->rows * sizeof *charts->rows;
+        all.overlaps.texels = vshi_take(mesh_count, sizeof *all.overlaps.texels, "overlaps", &result, error);
+        all.overlaps.triangles =
+            vshi_take(sorted->first[mesh_count], sizeof *all.overlaps.triangles, "overlaps", &result, error);
+    }
+    if (result == VSH_OK) {
+        result = count(&all, run, limited, job, error);
+    }
+    if (result == VSH_OK) {
+        finish_reports(&all, run, reports);
+    }
+    free(all.overlaps.triangles);
+    free(all.overlaps.texels);
+    return result;
+}
+
+vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
+                            const vsh_run *run, bool limited, vsh_uv_report *uv_reports, vsh_charts **charts,
+                            vsh_error *error) {
+    *charts = NULL;
+    vsh_lightmap_options full = vsh_lightmap_options_default();
+    vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_lightmap_options", error);
+    if (result == VSH_OK) {
+        result = check_options(&full, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (mesh_count == 0 || mesh_count > UINT32_MAX) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap of %zu meshes: expected 1 … %u", mesh_count,
+                         UINT32_MAX);
+    }
+    vsh_uv_report *reports = NULL;
+    vsh_charts *made = NULL;
+    vshi_job *job = vshi_job_begin(run, "charts", ((size_t)full.height + VSHI_TILE - 1) / VSHI_TILE);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "texels: the system refused memory");
+    }
+    reports = vshi_take(mesh_count, sizeof *reports, "UV reports", &result, error);
+    made = vshi_take(1, sizeof *made, "texels", &result, error);
+    if (result == VSH_OK) {
+        made->info.width = full.width;
+        made->info.height = full.height;
+        made->padding = full.padding;
+        made->ao_spacing = full.supersample == 1 ? full.ao_spacing : 1;
+        made->shade = full.shade;
+        result = make(meshes, mesh_count, &full, run, limited, job, reports, made, error);
+    }
+    if (result == VSH_OK && uv_reports != NULL) {
+        memcpy(uv_reports, reports, mesh_count * sizeof *reports);
+    }
+    if (result == VSH_OK) {
+        *charts = made;
+    } else {
+        vsh_charts_free(made);
+    }
+    free(reports);
+    vshi_job_end(job);
+    return result;
+}
+
+vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
+                             const vsh_run *run, vsh_uv_report *uv_reports, vsh_charts **charts,
+                             vsh_error *error) {
+    VSHI_FLOATS;
+    if (charts == NULL || (meshes == NULL && mesh_count > 0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_charts_create: %s is NULL",
+                         charts == NULL ? "charts" : "meshes");
+    }
+    *charts = NULL;
+    vsh_run full;
+    const vsh_result result = vshi_run_resolve(run, &full, error);
+    return result == VSH_OK
+               ? vshi_charts_make(meshes, mesh_count, options, &full, false, uv_reports, charts, error)
+               : result;
+}
+
+void vsh_charts_free(vsh_charts *charts) {
+    if (charts == NULL) {
+        return;
+    }
+    free(charts->open);
+    free(charts->rows);
+    vshi_charts_free(&charts->sorted);
+    free(charts);
+}
+
+void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info *info) {
+    *info = charts->info;
+}
+
+/* --- bands */
+
+vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t rows, vshi_band *band,
+                         vsh_error *error) {
+    const int32_t height = charts->info.height;
+    if (first_row < 0 || first_row >= height || first_row % VSH_BAND_STEP != 0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "band from row %d: expected a multiple of %d below %d",
+                         first_row, VSH_BAND_STEP, height);
+    }
+    if (rows < 1 || rows > height - first_row || (rows % VSH_BAND_STEP != 0 && rows != height - first_row)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "band of %d rows from row %d: expected a multiple of %d, or the %d that are left",
+                         rows, first_row, VSH_BAND_STEP, height - first_row);
+    }
+    const size_t tile = VSHI_TILE, all = charts->sorted.rows;
+    const size_t reach = (size_t)(charts->padding > LEAST_HALO ? charts->padding : LEAST_HALO);
+    const size_t halo = (reach + tile - 1) / tile;
+    const size_t below = halo + (charts->ao_spacing > 1 ? VSHI_LATTICE_ROWS : 0);
+    band->own_first = first_row;
+    band->own_rows = rows;
+    band->own_begin = (size_t)first_row / tile;
+    band->own_end = ((size_t)first_row + (size_t)rows + tile - 1) / tile;
+    band->held_begin = band->own_begin > halo ? band->own_begin - halo : 0;
+    band->held_end = all - band->own_end > below ? band->own_end + below : all;
+    band->first = (int32_t)(band->held_begin * tile);
+    band->rows = (band->held_end == all ? height : (int32_t)(band->held_end * tile)) - band->first;
+    return VSH_OK;
+}
+
+double vshi_bake_bytes(const vshi_bake_need *need) {
+    double sample = vshi_origins_sample_bytes(need->traced);
+    sample += (need->values ? 1 : 0) * sizeof(float) + (need->errors ? 1 : 0) * sizeof(float);
+    sample += (need->irradiance ? 3 : 0) * sizeof(float);
+    return need->samples * sample + need->texels * (1.0 + VSHI_PADDING_TEXEL_BYTES) +
+           (need->lattice ? vshi_lattice_bytes(need->samples, need->texels) : 0.0);
+}
+
+uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows, int32_t floats,
+                               int32_t errors, int32_t irradiance) {
+    vshi_band band;
+    if (vshi_band_set(charts, first_row, rows, &band, NULL) != VSH_OK) {
+        return 0;
+    }
+    const double width = charts->info.width;
+    const vsh_shade_options *shade = &charts->shade;
+    vshi_bake_need need = {.texels = width * band.rows,
+                           .traced = shade->method == VSH_SHADOW_EXACT || shade->ao_method == VSH_AO_EXACT,
+                           .values = true,
+                           .errors = errors != 0,
+                           .irradiance = irradiance != 0,
+                           .lattice = charts->ao_spacing > 1};
+    for (size_t row = band.held_begin; row < band.held_end; ++row) {
+        need.samples += (double)charts->rows[row].samples;
+    }
+    const bool halo = band.rows > rows;
+    const double planes = width * (rows + (halo ? band.rows : 0)) * (double)floats * sizeof(float);
+    return (uint64_t)(need.samples * VSHI_SAMPLE_BYTES + vshi_bake_bytes(&need) + planes);
+}

@@ -1,0 +1,55 @@
+/* Which reader a file is for. */
+#include "base/file.h"
+#include "base/floats.h"
+#include "image/exr.h"
+#include "image/png.h"
+#include "shim/oiio.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+typedef vsh_result read_fn(const char *path, vsh_image_file **file, vsh_error *error);
+
+/* Looks at the first bytes: an EXR file is one whatever its ending says. */
+static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *error) {
+    static const unsigned char exr[] = {0x76, 0x2f, 0x31, 0x01};
+    static const unsigned char png[] = {0x89, 'P', 'N', 'G'};
+    unsigned char start[4] = {0};
+    struct stat status;
+    if (stat(path, &status) == 0 && S_ISDIR(status.st_mode)) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: it is a folder", path);
+    }
+    FILE *file = fopen(path, "rb");
+    if (file == NULL) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, strerror(errno));
+    }
+    const size_t count = fread(start, 1, sizeof start, file);
+    const bool failed = ferror(file) != 0;
+    fclose(file);
+    if (failed) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read", path);
+    }
+    if (count == sizeof start && memcmp(start, exr, sizeof exr) == 0) {
+        *reader = vshi_exr_read;
+    } else if (memcmp(start, png, sizeof png) == 0 || strcasecmp(vshi_path_ending(path), "png") == 0) {
+        *reader = vshi_png_read;
+    } else {
+        *reader = vshi_oiio_read;
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_image_read(const char *path, vsh_image_file **file, vsh_error *error) {
+    VSHI_FLOATS;
+    if (file == NULL || path == NULL || path[0] == '\0') {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_image_read: no %s was given",
+                         file == NULL ? "place for the image" : "path");
+    }
+    *file = NULL;
+    read_fn *reader = NULL;
+    const vsh_result result = find_reader(path, &reader, error);
+    return result == VSH_OK ? reader(path, file, error) : result;
+}

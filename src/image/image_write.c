@@ -1,0 +1,192 @@
+/* Images that are written, whole or as their rows come. */
+#include "base/file.h"
+#include "base/floats.h"
+#include "base/memory.h"
+#include "image/exr.h"
+#include "image/write_plan.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+struct vsh_image_writer {
+    vshi_write_plan plan;
+    vshi_output output;
+    char *path;
+    char (*names)[VSH_CHANNEL_NAME]; /* of the image's channels */
+    int32_t channel_count;
+    int32_t row; /* next */
+    vshi_exr_writer *exr;
+    vshi_oiio_writer *oiio;
+};
+
+static void free_writer(vsh_image_writer *writer) {
+    vshi_output_abandon(&writer->output);
+    free(writer->names);
+    free(writer->path);
+    free(writer);
+}
+
+/* Closes the file, and says what its closing came to. */
+static vsh_result close_file(vsh_image_writer *writer, vsh_error *error) {
+    const vsh_result result =
+        writer->plan.exr ? vshi_exr_end(writer->exr, error) : vshi_oiio_end(writer->oiio, error);
+    writer->exr = NULL;
+    writer->oiio = NULL;
+    return result;
+}
+
+static vsh_result copy_texts(vsh_image_writer *writer, const char *path, const vsh_image *image,
+                             vsh_error *error) {
+    void *names = NULL;
+    const vsh_result result =
+        vshi_allocate(&names, (size_t)image->channel_count, sizeof *writer->names, path, error);
+    writer->names = names;
+    writer->path = strdup(path);
+    if (result != VSH_OK || writer->path == NULL) {
+        return result != VSH_OK ? result
+                                : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    }
+    writer->channel_count = image->channel_count;
+    for (int32_t c = 0; c < image->channel_count; ++c) {
+        strcpy(writer->names[c], image->names[c]); /* the plan has looked at their lengths */
+    }
+    for (int32_t p = 0; p < writer->plan.planes.count; ++p) {
+        vshi_plane *plane = &writer->plan.planes.planes[p];
+        const int32_t channel = writer->plan.channel[p];
+        if (channel >= 0 && plane->name == image->names[channel]) {
+            plane->name = writer->names[channel];
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_image_writer_create(const char *path, const vsh_image *image, const vsh_image_options *options,
+                                   vsh_image_writer **writer, vsh_error *error) {
+    VSHI_FLOATS;
+    if (writer == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_image_writer_create: writer is NULL");
+    }
+    *writer = NULL;
+    void *memory = NULL;
+    vsh_result result = vshi_allocate(&memory, 1, sizeof **writer, "image", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_image_writer *made = memory;
+    result = vshi_write_plan_make(path, image, options, &made->plan, error);
+    if (result == VSH_OK) {
+        result = copy_texts(made, path, image, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_output_begin(&made->output, path, error);
+    }
+    if (result == VSH_OK) {
+        const vshi_write_plan *plan = &made->plan;
+        const char *temporary = made->output.temporary;
+        result = plan->exr
+                     ? vshi_exr_begin(temporary, made->path, &plan->planes, plan->bits, &made->exr, error)
+                     : vshi_oiio_begin(temporary, made->path, &plan->format, &plan->planes, plan->bits,
+                                       &made->oiio, error);
+    }
+    if (result != VSH_OK) {
+        free_writer(made);
+        return result;
+    }
+    *writer = made;
+    return VSH_OK;
+}
+
+vsh_result vsh_image_writer_add(vsh_image_writer *writer, int32_t rows, const float *const *planes,
+                                vsh_error *error) {
+    VSHI_FLOATS;
+    vshi_planes *list = &writer->plan.planes;
+    if (rows < 1 || rows > list->height - writer->row) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %d rows from row %d: expected 1 … %d", writer->path,
+                         rows, writer->row, list->height - writer->row);
+    }
+    for (int32_t c = 0; c < writer->channel_count; ++c) {
+        if (planes == NULL || planes[c] == NULL) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: channel '%s' has no values", writer->path,
+                             writer->names[c]);
+        }
+    }
+    for (int32_t p = 0; p < list->count; ++p) {
+        const int32_t channel = writer->plan.channel[p];
+        list->planes[p].values = channel >= 0 ? planes[channel] : NULL;
+    }
+    const vsh_result result = writer->plan.exr ? vshi_exr_add(writer->exr, list, rows, error)
+                                               : vshi_oiio_add(writer->oiio, list, rows, error);
+    writer->row += rows;
+    return result;
+}
+
+vsh_result vsh_image_writer_finish(vsh_image_writer *writer, vsh_error *error) {
+    VSHI_FLOATS;
+    const int32_t height = writer->plan.planes.height;
+    if (writer->row < height) {
+        const vsh_result result = vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %d of %d rows were given",
+                                            writer->path, writer->row, height);
+        vsh_image_writer_abandon(writer);
+        return result;
+    }
+    vsh_result result = close_file(writer, error);
+    if (result == VSH_OK) {
+        result = vshi_output_commit(&writer->output, error);
+    }
+    free_writer(writer);
+    return result;
+}
+
+void vsh_image_writer_abandon(vsh_image_writer *writer) {
+    VSHI_FLOATS;
+    if (writer != NULL) {
+        close_file(writer, NULL);
+        free_writer(writer);
+    }
+}
+
+vsh_result vsh_image_write(const char *path, const vsh_image *image, const vsh_image_options *options,
+                           vsh_error *error) {
+    VSHI_FLOATS;
+    vshi_write_plan plan;
+    vsh_result result = vshi_write_plan_make(path, image, options, &plan, error);
+    if (result == VSH_OK) {
+        result = vshi_check_values(path, image->width, image->height, image->channel_count, error);
+    }
+    for (int32_t c = 0; result == VSH_OK && c < image->channel_count; ++c) {
+        if (image->planes == NULL || image->planes[c] == NULL) {
+            result =
+                vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: channel '%s' has no values", path, image->names[c]);
+        }
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_image_writer *writer = NULL;
+    result = vsh_image_writer_create(path, image, options, &writer, error);
+    if (result == VSH_OK) {
+        result = vsh_image_writer_add(writer, image->height, image->planes, error);
+        if (result == VSH_OK) {
+            return vsh_image_writer_finish(writer, error);
+        }
+        vsh_image_writer_abandon(writer);
+    }
+    return result;
+}
+
+vsh_result vsh_image_check(const char *path, const vsh_image *image, const vsh_image_options *options,
+                           vsh_error *error) {
+    VSHI_FLOATS;
+    vshi_write_plan plan;
+    const vsh_result result = vshi_write_plan_make(path, image, options, &plan, error);
+    return result == VSH_OK ? vshi_output_check(path, error) : result;
+}
+
+uint64_t vsh_image_writer_bytes(const char *path, const vsh_image *image, const vsh_image_options *options) {
+    vshi_write_plan plan;
+    if (vshi_write_plan_make(path, image, options, &plan, NULL) != VSH_OK) {
+        return 0;
+    }
+    return (uint64_t)(plan.exr ? vshi_exr_writer_bytes(&plan.planes, plan.bits)
+                               : vshi_oiio_writer_bytes(&plan.format, &plan.planes, plan.bits));
+}

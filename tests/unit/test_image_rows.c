@@ -1,0 +1,204 @@
+/* Images that are written as their rows come are those that are written whole. */
+#include "images.h"
+
+static const char *const ENDINGS[] = {"exr", "png", "tif", "jpg", "tga", "bmp", "hdr", "ppm",  "pgm", "webp",
+                                      "jp2", "dpx", "gif", "sgi", "iff", "rla", "ico", "heic", "avif"};
+enum { ENDING_COUNT = sizeof ENDINGS / sizeof ENDINGS[0] };
+
+/* The next `rows` rows of the sample, from `first` on. */
+static vsh_result add_rows(vsh_image_writer *writer, const sample *s, int32_t first, int32_t rows,
+                           vsh_error *error) {
+    const float *planes[MOST];
+    for (int32_t c = 0; c < s->image.channel_count; ++c) {
+        planes[c] = s->planes[c] + (size_t)first * (size_t)s->image.width;
+    }
+    return vsh_image_writer_add(writer, rows, planes, error);
+}
+
+static vsh_image_writer *begin(const char *path, const sample *s) {
+    vsh_image_writer *writer = NULL;
+    vsh_error error = {0};
+    vsh_image shape = s->image;
+    shape.planes = NULL;
+    assert_ok(vsh_image_writer_create(path, &shape, NULL, &writer, &error), &error);
+    return writer;
+}
+
+/* Pieces of 1, 2, 3 … or of `step` rows. */
+static void write_in_pieces(const char *path, const sample *s, int32_t step) {
+    vsh_image_writer *writer = begin(path, s);
+    vsh_error error = {0};
+    int32_t next = 1;
+    for (int32_t first = 0; first < s->image.height;) {
+        const int32_t left = s->image.height - first, wanted = step > 0 ? step : next++;
+        const int32_t rows = left < wanted ? left : wanted;
+        assert_ok(add_rows(writer, s, first, rows, &error), &error);
+        first += rows;
+    }
+    assert_ok(vsh_image_writer_finish(writer, &error), &error);
+}
+
+static void assert_same_file(const char *path, const char *other) {
+    unsigned char *bytes, *more;
+    const size_t size = read_all(path, &bytes);
+    assert_int_equal(read_all(other, &more), size);
+    if (memcmp(bytes, more, size) != 0) {
+        fail_msg("%s is not %s", path, other);
+    }
+    free(bytes);
+    free(more);
+}
+
+static void rows_make_the_bytes_of_the_whole_image(void **state) {
+    (void)state;
+    sample s;
+    make(&s, 200, 150, 3, LIGHTMAP);
+    for (size_t e = 0; e < ENDING_COUNT; ++e) {
+        char whole[16], pieces[16];
+        snprintf(whole, sizeof whole, "whole.%s", ENDINGS[e]);
+        snprintf(pieces, sizeof pieces, "pieces.%s", ENDINGS[e]);
+        vsh_error error = {0};
+        assert_ok(vsh_image_write(at(whole), &s.image, NULL, &error), &error);
+        write_in_pieces(at(pieces), &s, 0);
+        assert_same_file(at(whole), at(pieces));
+        write_in_pieces(at(pieces), &s, 64);
+        assert_same_file(at(whole), at(pieces));
+    }
+    unmake(&s);
+}
+
+/* Wide enough that OpenImageIO is handed several lots of rows. */
+static void long_rows_make_them_too(void **state) {
+    (void)state;
+    sample s;
+    make(&s, 8192, 100, 4, (const char *const[]){"shadow.sun", "ao", "shadow.lamp", "A"});
+    static const char *const endings[] = {"exr", "png", "tif", "tga", "iff", "sgi", "rla", "jpg"};
+    for (size_t e = 0; e < sizeof endings / sizeof endings[0]; ++e) {
+        char whole[16], pieces[16];
+        snprintf(whole, sizeof whole, "whole.%s", endings[e]);
+        snprintf(pieces, sizeof pieces, "pieces.%s", endings[e]);
+        vsh_error error = {0};
+        assert_ok(vsh_image_write(at(whole), &s.image, NULL, &error), &error);
+        write_in_pieces(at(pieces), &s, 24);
+        assert_same_file(at(whole), at(pieces));
+        unlink(at(whole));
+        unlink(at(pieces));
+    }
+    unmake(&s);
+}
+
+static int hidden_files(void) {
+    DIR *directory = opendir(folder);
+    assert_non_null(directory);
+    int count = 0;
+    for (const struct dirent *entry = readdir(directory); entry != NULL; entry = readdir(directory)) {
+        count += entry->d_name[0] == '.' && strstr(entry->d_name, ".tmp") != NULL;
+    }
+    closedir(directory);
+    return count;
+}
+
+static void assert_untouched(const char *path, const unsigned char *old, size_t size) {
+    unsigned char *bytes;
+    assert_int_equal(read_all(path, &bytes), size);
+    assert_memory_equal(bytes, old, size);
+    free(bytes);
+    assert_int_equal(hidden_files(), 0);
+}
+
+static void what_is_given_up_or_short_of_rows_leaves_the_old_file(void **state) {
+    (void)state;
+    const unsigned char old[] = "the old content";
+    sample s;
+    make(&s, 200, 150, 3, LIGHTMAP);
+    for (size_t e = 0; e < ENDING_COUNT; ++e) {
+        char name[16];
+        snprintf(name, sizeof name, "old.%s", ENDINGS[e]);
+        write_all(at(name), old, sizeof old);
+        for (int32_t rows = 0; rows <= 150; rows += 50) {
+            vsh_error error = {0};
+            vsh_image_writer *writer = begin(at(name), &s);
+            if (rows > 0) {
+                assert_ok(add_rows(writer, &s, 0, rows, &error), &error);
+            }
+            assert_int_equal(hidden_files(), 1);
+            vsh_image_writer_abandon(writer);
+            assert_untouched(at(name), old, sizeof old);
+        }
+        vsh_error error = {0};
+        vsh_image_writer *writer = begin(at(name), &s);
+        assert_ok(add_rows(writer, &s, 0, 149, &error), &error);
+        assert_int_equal(vsh_image_writer_finish(writer, &error), VSH_ERROR_ARGUMENT);
+        assert_non_null(strstr(error.message, "149 of 150"));
+        assert_untouched(at(name), old, sizeof old);
+    }
+    unmake(&s);
+}
+
+static void rows_that_are_none_of_it_are_refused(void **state) {
+    (void)state;
+    sample s;
+    make(&s, 20, 10, 3, LIGHTMAP);
+    vsh_error error = {0};
+    vsh_image_writer *writer = begin(at("refused.exr"), &s);
+    assert_int_equal(add_rows(writer, &s, 0, 0, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(add_rows(writer, &s, 0, 11, &error), VSH_ERROR_ARGUMENT);
+    s.planes[1] = NULL;
+    assert_int_equal(vsh_image_writer_add(writer, 10, s.planes, &error), VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "'ao'"));
+    vsh_image_writer_abandon(writer);
+    vsh_image_writer_abandon(NULL);
+    assert_int_equal(vsh_image_writer_create(at("x.exr"), NULL, NULL, &writer, &error), VSH_ERROR_ARGUMENT);
+    assert_null(writer);
+    unmake(&s);
+}
+
+/* The limit on a file's size stands for a full disk, met in the middle of the rows. */
+static void a_full_disk_leaves_the_old_file(void **state) {
+    (void)state;
+    const unsigned char old[] = "the old content";
+    signal(SIGXFSZ, SIG_IGN);
+    struct rlimit old_limit;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &old_limit), 0);
+    sample s;
+    make(&s, 200, 150, 3, LIGHTMAP);
+    for (size_t e = 0; e < ENDING_COUNT; ++e) {
+        char name[16];
+        snprintf(name, sizeof name, "full.%s", ENDINGS[e]);
+        write_in_pieces(at(name), &s, 50);
+        struct stat status;
+        assert_int_equal(stat(at(name), &status), 0);
+        write_all(at(name), old, sizeof old);
+        const struct rlimit limit = {(rlim_t)status.st_size / 2, old_limit.rlim_max};
+        vsh_image_writer *writer = begin(at(name), &s);
+        vsh_error error = {0};
+        vsh_result result = VSH_OK;
+        assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
+        for (int32_t first = 0; first < 150 && result == VSH_OK; first += 50) {
+            result = add_rows(writer, &s, first, 50, &error);
+        }
+        if (result == VSH_OK) {
+            result = vsh_image_writer_finish(writer, &error);
+        } else {
+            vsh_image_writer_abandon(writer);
+        }
+        assert_int_equal(setrlimit(RLIMIT_FSIZE, &old_limit), 0);
+        if (result != VSH_ERROR_WRITE) {
+            fail_msg("%s: %s", name, vsh_result_name(result));
+        }
+        assert_untouched(at(name), old, sizeof old);
+    }
+    signal(SIGXFSZ, SIG_DFL);
+    unmake(&s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rows_make_the_bytes_of_the_whole_image),
+        cmocka_unit_test(long_rows_make_them_too),
+        cmocka_unit_test(what_is_given_up_or_short_of_rows_leaves_the_old_file),
+        cmocka_unit_test(rows_that_are_none_of_it_are_refused),
+        cmocka_unit_test(a_full_disk_leaves_the_old_file),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
