@@ -44,13 +44,17 @@ static bool worthwhile(const vshi_shadow_task *task, double end) {
 
 /* --- the ball above each point */
 
-/* Looked at for every point, whatever its neighbours prove: where a march begins decides where it samples. */
+/* Looked at for every point, whatever its neighbours prove: where a march begins decides where it samples.
+ * `improved` takes more from its first samples than any other method, and begins at the surface. */
 static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_shade_stats *stats) {
     static const double LEAST_SINE = 0.1; /* of the cone's lowest ray over the plane */
     float centres[3][VSHI_PIECE];
     bool is_free[VSHI_PIECE];
     uint32_t owner[VSHI_PIECE];
     size_t count = 0;
+    if (task->options->method == VSH_SHADOW_IMPROVED) {
+        return;
+    }
     for (size_t i = 0; i < facing->count; ++i) {
         const vshi_cone *cone = &facing->cone[i];
         if (cone->horizon > cone->sine + LEAST_SINE && cone->horizon <= 1.0) {

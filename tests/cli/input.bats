@@ -105,7 +105,7 @@ bake_bad() {
 }
 
 @test "a lightmap so large that the memory limit would be passed" {
-    shade bake box.obj -o out.exr --ao 1 --size 8192 --resolution 24 --memory-limit 100M
+    shade bake box.obj -o out.exr --ao 1 --size 8192 --resolution 24 --memory-limit 5M
     refused 4
     untouched out.exr
 }
