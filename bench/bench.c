@@ -89,12 +89,18 @@ typedef struct table {
     FILE *csv; /* NULL: not begun */
 } table;
 
-static table tables[] = {{"", bench_header, NULL}, {"-ratios", ratio_header, NULL}};
+static table tables[] = {{"", bench_header, NULL},
+                         {"-ratios", ratio_header, NULL},
+                         {"-scaling", bench_scaling_header, NULL},
+                         {"-features", bench_features_header, NULL}};
 
 static table *table_of(const char *part) {
     static const struct {
         const char *part, *suffix;
-    } others[] = {{"intersector", "-ratios"}, {"nanovdb", "-ratios"}};
+    } others[] = {{"intersector", "-ratios"},
+                  {"nanovdb", "-ratios"},
+                  {"scaling", "-scaling"},
+                  {"features", "-features"}};
     const char *suffix = "";
     for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i) {
         suffix = strcmp(part, others[i].part) == 0 ? others[i].suffix : suffix;
@@ -129,6 +135,9 @@ static FILE *begin_table(table *t, const char *path) {
 int main(int argc, char **argv) {
     const char *path = argc > 1 ? argv[1] : NULL;
     const char *only = argc > 2 ? argv[2] : NULL; /* one of the parts */
+    if (argc == 3 && strcmp(argv[1], BENCH_FEATURE) == 0) {
+        return bench_feature(atoi(argv[2]));
+    }
     puts("One core; medians of 5 runs. 'Embree rays': how many Embree occlusion rays take the same time.");
     const struct {
         const char *name;
@@ -138,7 +147,9 @@ int main(int argc, char **argv) {
                  {"refine", bench_refine},
                  {"proofs", bench_proofs},
                  {"intersector", bench_intersector},
-                 {"nanovdb", bench_nanovdb}};
+                 {"nanovdb", bench_nanovdb},
+                 {"scaling", bench_scaling},
+                 {"features", bench_features}};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
         if (only == NULL || strcmp(only, parts[i].name) == 0) {
             parts[i].run(begin_table(table_of(parts[i].name), path));

@@ -15,6 +15,8 @@ double bench_seconds(void);
 /* Seconds of the wall clock: for what runs on several threads. */
 double bench_wall(void);
 
+int32_t bench_cores(void);
+
 /* Median of the runs' seconds; sorts them. */
 double bench_median(double *seconds, size_t count);
 
@@ -52,5 +54,13 @@ void bench_refine(FILE *csv);
 void bench_proofs(FILE *csv);
 void bench_intersector(FILE *csv);
 void bench_nanovdb(FILE *csv);
+void bench_scaling(FILE *csv);
+void bench_scaling_header(FILE *csv);
+void bench_features(FILE *csv);
+void bench_features_header(FILE *csv);
+
+/* One row of the features, in a process of its own; prints it for bench_features(). */
+#define BENCH_FEATURE "--feature"
+int bench_feature(int index);
 
 #endif
