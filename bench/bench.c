@@ -99,6 +99,7 @@ static table *table_of(const char *part) {
         const char *part, *suffix;
     } others[] = {{"intersector", "-ratios"},
                   {"nanovdb", "-ratios"},
+                  {"cores", "-ratios"},
                   {"scaling", "-scaling"},
                   {"features", "-features"}};
     const char *suffix = "";
@@ -148,6 +149,7 @@ int main(int argc, char **argv) {
                  {"proofs", bench_proofs},
                  {"intersector", bench_intersector},
                  {"nanovdb", bench_nanovdb},
+                 {"cores", bench_all_cores},
                  {"scaling", bench_scaling},
                  {"features", bench_features}};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {

@@ -54,6 +54,7 @@ void bench_refine(FILE *csv);
 void bench_proofs(FILE *csv);
 void bench_intersector(FILE *csv);
 void bench_nanovdb(FILE *csv);
+void bench_all_cores(FILE *csv);
 void bench_scaling(FILE *csv);
 void bench_scaling_header(FILE *csv);
 void bench_features(FILE *csv);

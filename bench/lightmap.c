@@ -2,9 +2,9 @@
  *
  *   vsh_lightmap truth ASSET SIZE X,Y,Z DEGREES DISTANCE RAYS N OUT.exr
  *       shadow.sun, ao and A by RAYS Embree rays at each of N × N samples of a texel, from the very surface
- *   vsh_lightmap compare TRUTH.exr VALID.exr NAME FILE.exr CHANNEL
- *       error of a file's channel against the truth's channel NAME, where A is 1 in both TRUTH and VALID:
- *       "texels,rmse,bias,p99,max"
+ *   vsh_lightmap compare TRUTH.exr NAME FILE.exr CHANNEL VALID.exr …
+ *       error of a file's channel against the truth's channel NAME, over texels where A is 1 in TRUTH and in
+ *       every VALID: "texels,rmse,bias,p99,max"
  */
 #include "bench.h"
 #include "packets.h"
@@ -112,30 +112,40 @@ static const float *channel(const vsh_image_file *file, const char *path, const 
     exit(2);
 }
 
-static int compare(char **arguments) {
+static void same_size(const vsh_image *a, const vsh_image *b, const char *path) {
+    if (a->width != b->width || a->height != b->height) {
+        fprintf(stderr, "lightmap: %s: %d × %d, the truth has %d × %d\n", path, b->width, b->height, a->width,
+                a->height);
+        exit(2);
+    }
+}
+
+static int compare(char **arguments, int valid_count, char **valid) {
     vsh_error error;
-    vsh_image_file *truth = NULL, *valid = NULL, *file = NULL;
+    vsh_image_file *truth = NULL, *file = NULL;
     bench_check(vsh_image_read(arguments[0], &truth, &error), &error);
-    bench_check(vsh_image_read(arguments[1], &valid, &error), &error);
-    bench_check(vsh_image_read(arguments[3], &file, &error), &error);
-    const vsh_image size = vsh_image_view(truth), other = vsh_image_view(file), third = vsh_image_view(valid);
+    bench_check(vsh_image_read(arguments[2], &file, &error), &error);
+    const vsh_image size = vsh_image_view(truth), other = vsh_image_view(file);
+    same_size(&size, &other, arguments[2]);
     const size_t count = (size_t)size.width * (size_t)size.height;
-    if (size.width != other.width || size.height != other.height || size.width != third.width ||
-        size.height != third.height) {
-        fputs("lightmap: images of different sizes\n", stderr);
-        return 2;
-    }
     float *mask = bench_take(count * sizeof *mask);
-    const float *a = channel(truth, arguments[0], "A"), *b = channel(valid, arguments[1], "A");
-    for (size_t i = 0; i < count; ++i) {
-        mask[i] = a[i] == 1.0f && b[i] == 1.0f ? 1.0f : 0.0f;
+    memcpy(mask, channel(truth, arguments[0], "A"), count * sizeof *mask);
+    for (int v = 0; v < valid_count; ++v) {
+        vsh_image_file *judge = NULL;
+        bench_check(vsh_image_read(valid[v], &judge, &error), &error);
+        const vsh_image view = vsh_image_view(judge);
+        same_size(&size, &view, valid[v]);
+        const float *a = channel(judge, valid[v], "A");
+        for (size_t i = 0; i < count; ++i) {
+            mask[i] = a[i] == 1.0f ? mask[i] : 0.0f;
+        }
+        vsh_image_free(judge);
     }
-    const truth_metrics m = truth_compare(count, channel(file, arguments[3], arguments[4]),
-                                          channel(truth, arguments[0], arguments[2]), mask);
+    const truth_metrics m = truth_compare(count, channel(file, arguments[2], arguments[3]),
+                                          channel(truth, arguments[0], arguments[1]), mask);
     printf("%zu,%.6f,%.6f,%.5f,%.5f\n", m.count, m.rmse, m.bias, m.p99, m.max);
     free(mask);
     vsh_image_free(file);
-    vsh_image_free(valid);
     vsh_image_free(truth);
     return 0;
 }
@@ -144,8 +154,8 @@ int main(int argc, char **argv) {
     if (argc == 10 && strcmp(argv[1], "truth") == 0) {
         return make_truth(argv + 2);
     }
-    if (argc == 7 && strcmp(argv[1], "compare") == 0) {
-        return compare(argv + 2);
+    if (argc >= 6 && strcmp(argv[1], "compare") == 0) {
+        return compare(argv + 2, argc - 6, argv + 6);
     }
     fputs("usage: the first lines of bench/lightmap.c\n", stderr);
     return 2;
