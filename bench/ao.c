@@ -1,8 +1,8 @@
 /* AO lightmaps at 512 voxels against Embree's own rays, on an asset, a smooth mesh and a thin structure:
  * whole bakes of 1024², compared at runs of texels all over them; one thread for both sides. */
 #include "bench.h"
-#include "embree.h"
 #include "scenes.h"
+#include "yardstick.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -76,25 +76,9 @@ static void measure(FILE *csv, const bench_scene *scene) {
     for (size_t i = 0; i < count; ++i) {
         valid[i] = coverage[at[i]];
     }
-    enum { CURVE = 5 };
-    double curve_error[CURVE], curve_seconds[CURVE], ray = 0.0;
-    for (int i = 0; i < CURVE; ++i) {
-        double seconds[BENCH_RUNS];
-        const size_t rays = (size_t)1 << (2 * i);
-        const int runs = i < 3 ? BENCH_RUNS : 1;
-        for (int k = 0; k < runs; ++k) {
-            const double start = bench_seconds();
-            truth_mesh_ao(mesh, count, origins, normals, AO_DISTANCE, rays, 1, values);
-            seconds[k] = bench_seconds() - start;
-        }
-        const truth_metrics metrics = truth_compare(count, values, truth, valid);
-        curve_seconds[i] = bench_median(seconds, (size_t)runs) / (double)count;
-        curve_error[i] = metrics.rmse;
-        ray = curve_seconds[i] / (double)rays;
-        char what[64];
-        snprintf(what, sizeof what, "ao embree %zu", rays);
-        bench_row(csv, scene->name, what, 1e6 * curve_seconds[i], 0.0, (double)rays, &metrics);
-    }
+    const truth_question question = {
+        .count = count, .origins = origins, .normals = normals, .distance = AO_DISTANCE};
+    const bench_curve curve = bench_embree(csv, scene->name, mesh, &question, truth, valid, values);
     for (size_t s = 0; s < sizeof LADDER / sizeof LADDER[0]; ++s) {
         vsh_shade_options shade = vsh_shade_options_default();
         shade.ao_method = LADDER[s].method;
@@ -122,8 +106,8 @@ static void measure(FILE *csv, const bench_scene *scene) {
         }
         const truth_metrics metrics = truth_compare(count, values, truth, valid);
         bench_row(csv, scene->name, LADDER[s].name, 1e6 * each,
-                  (double)stats.shade.samples / (double)samples.count, each / ray, &metrics);
-        const double embree = bench_seconds_for(metrics.rmse, curve_error, curve_seconds, CURVE);
+                  (double)stats.shade.samples / (double)samples.count, each / curve.ray, &metrics);
+        const double embree = bench_embree_seconds(&curve, metrics.rmse) / (double)count;
         printf("          Embree takes %.3f us for this error: %.2f of its time\n", 1e6 * embree,
                each / embree);
     }

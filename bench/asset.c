@@ -3,6 +3,7 @@
 #include "bench.h"
 #include "embree.h"
 #include "scenes.h"
+#include "yardstick.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -69,18 +70,6 @@ static receiver take_texels(const vsh_field *field, const vsh_texels *texels) {
     return r;
 }
 
-/* Processor seconds that one Embree occlusion ray takes on this scene and these receivers. */
-static double embree_ray_seconds(const truth_mesh *mesh, const receiver *r, float *values) {
-    double seconds[BENCH_RUNS];
-    const size_t rays = 16;
-    for (int run = 0; run < BENCH_RUNS; ++run) {
-        const double start = bench_seconds();
-        truth_mesh_light(mesh, r->count, r->origins, r->normals, SUN, tan(0.5 * SUN_ANGLE), rays, 1, values);
-        seconds[run] = bench_seconds() - start;
-    }
-    return bench_median(seconds, BENCH_RUNS) / (double)(r->count * rays);
-}
-
 void bench_asset(FILE *csv) {
     vsh_error error;
     vsh_run run = vsh_run_default();
@@ -100,16 +89,24 @@ void bench_asset(FILE *csv) {
 
     receiver r = take_texels(field, texels);
     float *values = bench_take(r.count * sizeof *values), *truth = bench_take(r.count * sizeof *truth);
-    const double ray = embree_ray_seconds(mesh, &r, values);
     const vsh_points points = {r.count, r.positions, r.normals, NULL};
     vsh_light sun = vsh_light_default();
     memcpy(sun.direction, SUN, sizeof SUN);
     sun.angle = SUN_ANGLE;
 
     truth_mesh_light(mesh, r.count, r.origins, r.normals, SUN, tan(0.5 * SUN_ANGLE), LIGHT_RAYS, 0, truth);
-    bench_methods(csv, "cloister", field, &points, &sun, ray, truth, r.valid, values);
+    truth_question question = {.count = r.count,
+                               .origins = r.origins,
+                               .normals = r.normals,
+                               .towards = SUN,
+                               .w = tan(0.5 * SUN_ANGLE)};
+    bench_curve embree = bench_embree(csv, "cloister", mesh, &question, truth, r.valid, values);
+    bench_methods(csv, "cloister", field, &points, &sun, embree.ray, truth, r.valid, values);
 
     truth_mesh_ao(mesh, r.count, r.origins, r.normals, AO_DISTANCE, AO_RAYS, 0, truth);
+    question.towards = NULL;
+    question.distance = AO_DISTANCE;
+    embree = bench_embree(csv, "cloister", mesh, &question, truth, r.valid, values);
     vsh_triangles *triangles = NULL;
     bench_check(vsh_triangles_create(scene.meshes, scene.mesh_count, &run, &triangles, &error), &error);
     const struct {
@@ -148,7 +145,9 @@ void bench_asset(FILE *csv) {
         const double each = bench_ao(AO_RUNS, field, &from, &shade, values, &stats) / (double)r.count;
         const truth_metrics metrics = truth_compare(r.count, values, truth, r.valid);
         bench_row(csv, "cloister", ladder[m].name, 1e6 * each, (double)stats.samples / (double)r.count,
-                  each / ray, &metrics);
+                  each / embree.ray, &metrics);
+        const double same = bench_embree_seconds(&embree, metrics.rmse) / (double)r.count;
+        printf("          Embree takes %.3f us for this error: %.2f of its time\n", 1e6 * same, each / same);
     }
     vsh_triangles_free(triangles);
     free(truth);

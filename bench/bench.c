@@ -1,50 +1,8 @@
 #include "bench.h"
 
-#include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-
-double bench_seconds(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-void *bench_take(size_t bytes) {
-    void *memory = malloc(bytes > 0 ? bytes : 1);
-    if (memory == NULL) {
-        fputs("bench: the system refused memory\n", stderr);
-        exit(4);
-    }
-    return memory;
-}
-
-static int ascending(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-double bench_median(double *seconds, size_t count) {
-    qsort(seconds, count, sizeof *seconds, ascending);
-    return seconds[count / 2];
-}
-
-double bench_seconds_for(double error, const double *errors, const double *seconds, size_t count) {
-    size_t i = 0;
-    while (i + 2 < count && errors[i + 1] > error) {
-        ++i;
-    }
-    const double part = log(error / errors[i]) / log(errors[i + 1] / errors[i]);
-    return seconds[i] * pow(seconds[i + 1] / seconds[i], part);
-}
-
-void bench_check(vsh_result result, const vsh_error *error) {
-    if (result != VSH_OK) {
-        fprintf(stderr, "bench: %s: %s\n", vsh_result_name(result), error->message);
-        exit(2);
-    }
-}
 
 void bench_header(FILE *csv) {
     fprintf(csv, "scene,what,us_per_texel,samples_per_texel,embree_rays,rmse,penumbra_rmse,bias,p99,max\n");
@@ -58,6 +16,16 @@ void bench_row(FILE *csv, const char *scene, const char *what, double microsecon
             embree_rays, e->rmse, e->penumbra_rmse, e->bias, e->p99, e->max);
     printf("%-9s %-20s %9.3f %9.1f %12.2f %8.4f %8.4f %8.4f %7.3f %7.3f\n", scene, what, microseconds,
            samples, embree_rays, e->rmse, e->penumbra_rmse, e->bias, e->p99, e->max);
+    fflush(stdout);
+}
+
+void bench_ratio(FILE *csv, const char *part, const char *scene, const char *what, const char *other,
+                 int threads, double ours, double theirs, double difference) {
+    const char *on = threads == 1 ? "one" : "all";
+    fprintf(csv, "%s,%s,%s,%s,%s,%.5f,%.5f,%.2f,%.6f\n", part, scene, what, other, on, ours, theirs,
+            theirs / ours, difference);
+    printf("%-9s %-16s %-24s %-5s %10.4f %10.4f %8.1f %10.5f\n", scene, what, other, on, ours, theirs,
+           theirs / ours, difference);
     fflush(stdout);
 }
 
@@ -107,15 +75,71 @@ void bench_methods(FILE *csv, const char *scene, const vsh_field *field, const v
     }
 }
 
+static void ratio_header(FILE *csv) {
+    fputs("part,scene,what,other,cores,us,other_us,ratio,difference\n", csv);
+    printf("%-9s %-16s %-24s %-5s %10s %10s %8s %10s\n", "scene", "what", "other", "cores", "us", "other us",
+           "ratio", "difference");
+}
+
+/* Parts whose rows have other columns have a file of their own: FILE.csv's name with the suffix before its
+ * last dot. */
+typedef struct table {
+    const char *suffix;
+    void (*header)(FILE *csv);
+    FILE *csv; /* NULL: not begun */
+} table;
+
+static table tables[] = {{"", bench_header, NULL},
+                         {"-ratios", ratio_header, NULL},
+                         {"-scaling", bench_scaling_header, NULL},
+                         {"-features", bench_features_header, NULL}};
+
+static table *table_of(const char *part) {
+    static const struct {
+        const char *part, *suffix;
+    } others[] = {{"intersector", "-ratios"},
+                  {"nanovdb", "-ratios"},
+                  {"cores", "-ratios"},
+                  {"scaling", "-scaling"},
+                  {"features", "-features"}};
+    const char *suffix = "";
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i) {
+        suffix = strcmp(part, others[i].part) == 0 ? others[i].suffix : suffix;
+    }
+    size_t t = 0;
+    while (strcmp(tables[t].suffix, suffix) != 0) {
+        ++t;
+    }
+    return &tables[t];
+}
+
+static FILE *begin_table(table *t, const char *path) {
+    char name[4096];
+    if (t->csv == NULL && path != NULL) {
+        const char *dot = strrchr(path, '.'), *slash = strrchr(path, '/');
+        const size_t stem =
+            dot != NULL && (slash == NULL || dot > slash) ? (size_t)(dot - path) : strlen(path);
+        snprintf(name, sizeof name, "%.*s%s%s", (int)stem, path, t->suffix, path + stem);
+    }
+    const bool begun = t->csv != NULL;
+    t->csv = begun ? t->csv : path != NULL ? fopen(name, "w") : tmpfile();
+    if (t->csv == NULL) {
+        perror(path != NULL ? name : "bench");
+        exit(3);
+    }
+    if (!begun) {
+        t->header(t->csv);
+    }
+    return t->csv;
+}
+
 int main(int argc, char **argv) {
-    FILE *csv = argc > 1 ? fopen(argv[1], "w") : tmpfile();
+    const char *path = argc > 1 ? argv[1] : NULL;
     const char *only = argc > 2 ? argv[2] : NULL; /* one of the parts */
-    if (csv == NULL) {
-        perror(argc > 1 ? argv[1] : "bench");
-        return 3;
+    if (argc == 3 && strcmp(argv[1], BENCH_FEATURE) == 0) {
+        return bench_feature(atoi(argv[2]));
     }
     puts("One core; medians of 5 runs. 'Embree rays': how many Embree occlusion rays take the same time.");
-    bench_header(csv);
     const struct {
         const char *name;
         void (*run)(FILE *csv);
@@ -124,11 +148,20 @@ int main(int argc, char **argv) {
                  {"ao", bench_ao_lightmaps},
                  {"refine", bench_refine},
                  {"proofs", bench_proofs},
-                 {"points", bench_points}};
+                 {"points", bench_points},
+                 {"intersector", bench_intersector},
+                 {"nanovdb", bench_nanovdb},
+                 {"cores", bench_all_cores},
+                 {"scaling", bench_scaling},
+                 {"features", bench_features}};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
         if (only == NULL || strcmp(only, parts[i].name) == 0) {
-            parts[i].run(csv);
+            parts[i].run(begin_table(table_of(parts[i].name), path));
         }
     }
-    return fclose(csv) == 0 ? 0 : 3;
+    bool written = true;
+    for (size_t t = 0; t < sizeof tables / sizeof tables[0]; ++t) {
+        written = (tables[t].csv == NULL || fclose(tables[t].csv) == 0) && written;
+    }
+    return written ? 0 : 3;
 }

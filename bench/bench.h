@@ -12,12 +12,13 @@ enum { BENCH_RUNS = 5 };
 /* Processor seconds of this process: what a shared machine does beside it counts least. */
 double bench_seconds(void);
 
+/* Seconds of the wall clock: for what runs on several threads. */
+double bench_wall(void);
+
+int32_t bench_cores(void);
+
 /* Median of the runs' seconds; sorts them. */
 double bench_median(double *seconds, size_t count);
-
-/* Seconds that a curve of falling errors takes for an error, between its points by powers and beyond them
- * likewise. */
-double bench_seconds_for(double error, const double *errors, const double *seconds, size_t count);
 
 /* Memory, or the end of the program. */
 void *bench_take(size_t bytes);
@@ -30,6 +31,11 @@ void bench_check(vsh_result result, const vsh_error *error);
 void bench_header(FILE *csv);
 void bench_row(FILE *csv, const char *scene, const char *what, double microseconds, double samples,
                double embree_rays, const truth_metrics *error);
+
+/* One row of the ratios: ours and another library's µs for the same (a ray, a sample), on `threads` threads
+ * (0: all cores), and how far the results are apart. */
+void bench_ratio(FILE *csv, const char *part, const char *scene, const char *what, const char *other,
+                 int threads, double ours, double theirs, double difference);
 
 /* Median seconds of `runs` calls on one thread. `deviation` may be NULL. */
 double bench_shadow(int runs, const vsh_field *field, const vsh_points *points, const vsh_light *light,
@@ -48,5 +54,16 @@ void bench_ao_lightmaps(FILE *csv);
 void bench_refine(FILE *csv);
 void bench_proofs(FILE *csv);
 void bench_points(FILE *csv);
+void bench_intersector(FILE *csv);
+void bench_nanovdb(FILE *csv);
+void bench_all_cores(FILE *csv);
+void bench_scaling(FILE *csv);
+void bench_scaling_header(FILE *csv);
+void bench_features(FILE *csv);
+void bench_features_header(FILE *csv);
+
+/* One row of the features, in a process of its own; prints it for bench_features(). */
+#define BENCH_FEATURE "--feature"
+int bench_feature(int index);
 
 #endif

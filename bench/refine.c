@@ -4,6 +4,7 @@
 #include "bench.h"
 #include "embree.h"
 #include "scenes.h"
+#include "yardstick.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -48,27 +49,10 @@ static void measure(FILE *csv, const bench_scene *scene) {
     const double w = tan(0.5 * SUN_ANGLE);
     truth_mesh_light(mesh, POINTS, r.origins, r.normals, SUN, w, TRUTH_RAYS, 0, r.truth);
 
-    /* Embree's own curve, rays one by one in its fastest order: error and seconds of 1, 4 … rays */
-    enum { CURVE = 5 };
-    double curve_error[CURVE], curve_seconds[CURVE];
+    const truth_question question = {
+        .count = POINTS, .origins = r.origins, .normals = r.normals, .towards = SUN, .w = w};
+    const bench_curve curve = bench_embree(csv, name, mesh, &question, r.truth, r.valid, r.values);
     char what[64];
-    double ray = 0.0;
-    for (int i = 0; i < CURVE; ++i) {
-        double seconds[BENCH_RUNS];
-        const size_t rays = (size_t)1 << (2 * i);
-        for (int k = 0; k < (i < 3 ? BENCH_RUNS : 1); ++k) {
-            const double start = bench_seconds();
-            truth_mesh_light(mesh, POINTS, r.origins, r.normals, SUN, w, rays, 1, r.values);
-            seconds[k] = bench_seconds() - start;
-        }
-        const truth_metrics metrics = truth_compare(POINTS, r.values, r.truth, r.valid);
-        curve_seconds[i] = bench_median(seconds, i < 3 ? BENCH_RUNS : 1);
-        curve_error[i] = metrics.rmse;
-        ray = curve_seconds[i] / POINTS / (double)rays;
-        snprintf(what, sizeof what, "embree %zu", rays);
-        bench_row(csv, name, what, 1e6 * curve_seconds[i] / POINTS, 0.0, curve_seconds[i] / POINTS / ray,
-                  &metrics);
-    }
 
     const vsh_points points = {POINTS, r.positions, r.normals, NULL};
     vsh_light sun = vsh_light_default();
@@ -91,7 +75,8 @@ static void measure(FILE *csv, const bench_scene *scene) {
             const truth_metrics metrics =
                 truth_compare(POINTS, r.values, exact ? r.truth : r.reference, r.valid);
             snprintf(what, sizeof what, "%s %g", exact ? "exact" : "adaptive", asked[e]);
-            bench_row(csv, name, what, 1e6 * each, (double)stats.samples / POINTS, each / ray, &metrics);
+            bench_row(csv, name, what, 1e6 * each, (double)stats.samples / POINTS, each / curve.ray,
+                      &metrics);
             size_t proved = 0, wrong = 0, valid = 0;
             for (size_t i = 0; i < POINTS; ++i) {
                 if (r.valid[i] > 0.0f) {
@@ -104,8 +89,7 @@ static void measure(FILE *csv, const bench_scene *scene) {
                    sqrt(stats.square_error / POINTS), 100.0 * (double)proved / (double)valid, wrong, proved,
                    (double)stats.rays / POINTS);
             if (exact) {
-                const double embree =
-                    bench_seconds_for(metrics.rmse, curve_error, curve_seconds, CURVE) / POINTS;
+                const double embree = bench_embree_seconds(&curve, metrics.rmse) / POINTS;
                 printf("; Embree takes %.3f us for this error: %.2f of its time", 1e6 * embree,
                        each / embree);
             }

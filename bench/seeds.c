@@ -1,5 +1,6 @@
 /* The seeds' scene: 512² floor texels against 256 analytic rays each. */
-#include "analytic.h"
+#include "seeds.h"
+
 #include "bench.h"
 
 #include <math.h>
@@ -25,41 +26,47 @@ static void place_texels(double *positions, float *normals) {
     }
 }
 
-void bench_seeds(FILE *csv) {
-    const size_t count = (size_t)SIDE * SIDE;
-    double *positions = bench_take(count * 3 * sizeof *positions);
-    float *normals = bench_take(count * 3 * sizeof *normals);
-    float *values = bench_take(count * sizeof *values), *truth = bench_take(count * sizeof *truth);
+void bench_seeds_make(bench_seeds_scene *seeds) {
     vsh_error error;
-    vsh_scene *scene = NULL;
-    vsh_assets *assets = NULL;
-    vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
-    place_texels(positions, normals);
-    truth_lights(truth_seeds(), count, positions, NULL, truth_seeds_sun, truth_seeds_w, INFINITY, RAYS,
-                 truth);
-
     vsh_run run = vsh_run_default();
     run.threads = 1;
+    vsh_scene *scene = NULL;
+    vsh_assets *assets = NULL;
+    seeds->count = (size_t)SIDE * SIDE;
+    seeds->positions = bench_take(seeds->count * 3 * sizeof *seeds->positions);
+    seeds->normals = bench_take(seeds->count * 3 * sizeof *seeds->normals);
+    place_texels(seeds->positions, seeds->normals);
     bench_check(vsh_scene_read(VSH_ASSETS "/seeds.json", &scene, &error), &error);
     bench_check(vsh_assets_load(scene, &run, &assets, &error), &error);
-    bench_check(vsh_scene_casters(scene, assets, &run, &grid, &error), &error);
+    bench_check(vsh_scene_casters(scene, assets, &run, &seeds->grid, &error), &error);
     vsh_field_options options = vsh_field_options_default();
     const double low[3] = {-2.5, 0.0, -2.5}, high[3] = {2.5, 0.0, 2.5};
-    options.reach = vsh_scene_reach(scene, grid, low, high);
-    bench_check(vsh_field_create(grid, &options, &run, &field, &error), &error);
-
-    const vsh_points points = {count, positions, normals, NULL};
-    vsh_light sun = vsh_light_default();
-    memcpy(sun.direction, truth_seeds_sun, sizeof sun.direction);
-    sun.angle = 2.0 * atan(truth_seeds_w);
-    bench_methods(csv, "seeds", field, &points, &sun, 0.0, truth, NULL, values);
-    vsh_field_free(field);
-    vsh_grid_free(grid);
+    options.reach = vsh_scene_reach(scene, seeds->grid, low, high);
+    bench_check(vsh_field_create(seeds->grid, &options, &run, &seeds->field, &error), &error);
     vsh_assets_free(assets);
     vsh_scene_free(scene);
+    seeds->sun = vsh_light_default();
+    memcpy(seeds->sun.direction, truth_seeds_sun, sizeof seeds->sun.direction);
+    seeds->sun.angle = 2.0 * atan(truth_seeds_w);
+}
+
+void bench_seeds_free(bench_seeds_scene *seeds) {
+    vsh_field_free(seeds->field);
+    vsh_grid_free(seeds->grid);
+    free(seeds->normals);
+    free(seeds->positions);
+}
+
+void bench_seeds(FILE *csv) {
+    bench_seeds_scene seeds;
+    bench_seeds_make(&seeds);
+    float *values = bench_take(seeds.count * sizeof *values),
+          *truth = bench_take(seeds.count * sizeof *truth);
+    truth_lights(truth_seeds(), seeds.count, seeds.positions, NULL, truth_seeds_sun, truth_seeds_w, INFINITY,
+                 RAYS, truth);
+    const vsh_points points = {seeds.count, seeds.positions, seeds.normals, NULL};
+    bench_methods(csv, "seeds", seeds.field, &points, &seeds.sun, 0.0, truth, NULL, values);
     free(truth);
     free(values);
-    free(normals);
-    free(positions);
+    bench_seeds_free(&seeds);
 }

@@ -35,8 +35,8 @@ int truth_mesh_backs(const truth_mesh *truth, size_t count, const double *origin
 #else
 
 #include "directions.h"
+#include "embree_scene.h"
 
-#include <embree3/rtcore.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -45,13 +45,7 @@ int truth_mesh_backs(const truth_mesh *truth, size_t count, const double *origin
 #include <string.h>
 #include <unistd.h>
 
-enum { MAX_THREADS = 64, POINTS_AT_ONCE = 256 };
-
-struct truth_mesh {
-    RTCDevice device;
-    RTCScene scene;
-    double center[3]; /* taken off in double, as Embree counts in floats */
-};
+enum { MAX_THREADS = 64 };
 
 static void world_position(const vsh_mesh *mesh, size_t vertex, double world[3]) {
     const float *p = &mesh->positions[3 * vertex];
@@ -173,7 +167,6 @@ typedef struct work {
     size_t rays;
     float *result;
     double *locals; /* [rays][3], directions in a frame's axes: the same for all points */
-    atomic_size_t next;
 } work;
 
 static struct RTCRay ray_from(const work *job, size_t point, const double direction[3]) {
@@ -231,18 +224,47 @@ static float answer(const work *job, size_t point) {
     return (float)((double)yes / (double)job->rays);
 }
 
-static void *run(void *user) {
+static void answer_all(void *user, size_t begin, size_t end) {
     work *job = user;
+    for (size_t point = begin; point < end; point++) {
+        job->result[point] = answer(job, point);
+    }
+}
+
+typedef struct pieces {
+    size_t count;
+    void (*body)(void *user, size_t begin, size_t end);
+    void *user;
+    atomic_size_t next;
+} pieces;
+
+static void *run(void *user) {
+    pieces *all = user;
     for (;;) {
-        const size_t begin = atomic_fetch_add(&job->next, POINTS_AT_ONCE);
-        if (begin >= job->count) {
+        const size_t begin = atomic_fetch_add(&all->next, TRUTH_AT_ONCE);
+        if (begin >= all->count) {
             return NULL;
         }
-        const size_t end = job->count - begin > POINTS_AT_ONCE ? begin + POINTS_AT_ONCE : job->count;
-        for (size_t point = begin; point < end; point++) {
-            job->result[point] = answer(job, point);
-        }
+        all->body(all->user, begin, all->count - begin > TRUTH_AT_ONCE ? begin + TRUTH_AT_ONCE : all->count);
     }
+}
+
+int truth_in_pieces(size_t count, int threads, void (*body)(void *user, size_t begin, size_t end),
+                    void *user) {
+    pieces all = {.count = count, .body = body, .user = user};
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    int wanted = threads > 0 ? threads : (int)(cores > 0 ? cores : 1);
+    wanted = wanted < MAX_THREADS ? wanted : MAX_THREADS;
+    pthread_t thread[MAX_THREADS];
+    int started = 0;
+    while (started < wanted - 1 && pthread_create(&thread[started], NULL, run, &all) == 0) {
+        started++;
+    }
+    run(&all);
+    for (int i = 0; i < started; i++) {
+        pthread_join(thread[i], NULL);
+    }
+    return started == wanted - 1 ? 0 : -1;
 }
 
 static int run_all(work *job, int threads) {
@@ -258,20 +280,9 @@ static int run_all(work *job, int threads) {
             truth_cosine_direction(&axes, i, job->rays, &job->locals[3 * i]);
         }
     }
-    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    int wanted = threads > 0 ? threads : (int)(cores > 0 ? cores : 1);
-    wanted = wanted < MAX_THREADS ? wanted : MAX_THREADS;
-    pthread_t thread[MAX_THREADS];
-    int started = 0;
-    while (started < wanted - 1 && pthread_create(&thread[started], NULL, run, job) == 0) {
-        started++;
-    }
-    run(job);
-    for (int i = 0; i < started; i++) {
-        pthread_join(thread[i], NULL);
-    }
+    const int result = truth_in_pieces(job->count, threads, answer_all, job);
     free(job->locals);
-    return started == wanted - 1 ? 0 : -1;
+    return result;
 }
 
 int truth_mesh_light(const truth_mesh *truth, size_t count, const double *origins, const float *normals,

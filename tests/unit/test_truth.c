@@ -3,12 +3,14 @@
 #include "directions.h"
 #include "embree.h"
 #include "metrics.h"
+#include "packets.h"
 
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <string.h>
 #include <stdlib.h>
 
 #include <cmocka.h>
@@ -368,6 +370,44 @@ static void mesh_truth_does_not_depend_on_threads(void **state) {
     truth_mesh_free(truth);
 }
 
+/* A yardstick that traced other rays, or fewer, would be no yardstick. */
+static void packets_answer_as_lone_rays_do(void **state) {
+    (void)state;
+    enum { FEW = 37 }; /* no multiple of a packet */
+    static receivers points;
+    static float lone[POINTS], values[POINTS];
+    const double transform[12] = {0.5, 0.0, 0.0, 0.0, 0.0, 0.4, 0.0, 1.0, 0.0, 0.0, 0.3, 0.0};
+    const vsh_mesh mesh = box_mesh(transform);
+    truth_mesh *truth = truth_mesh_create(&mesh, 1);
+    if (truth == NULL) {
+        skip();
+    }
+    place(&points, origin);
+    for (int ao = 0; ao < 2; ao++) {
+        const truth_question question = {.count = POINTS,
+                                         .origins = points.positions,
+                                         .normals = points.normals,
+                                         .towards = ao ? NULL : truth_seeds_sun,
+                                         .w = 0.2,
+                                         .distance = 1.5,
+                                         .rays = FEW};
+        const int result =
+            ao ? truth_mesh_ao(truth, POINTS, points.positions, points.normals, 1.5, FEW, 1, lone)
+               : truth_mesh_light(truth, POINTS, points.positions, points.normals, truth_seeds_sun, 0.2, FEW,
+                                  1, lone);
+        assert_int_equal(result, 0);
+        for (int packing = 0; packing < TRUTH_PACKINGS; packing++) {
+            memset(values, 0, sizeof values);
+            assert_int_equal(truth_mesh_packets(truth, packing, &question, 2, values), 0);
+            const truth_metrics off = truth_compare(POINTS, values, lone, NULL);
+            assert_true(off.penumbra > 20);
+            near_value(off.max, 0.0, 1.5 / FEW, truth_packing_name(packing));
+            near_value(off.rmse, 0.0, 0.1 / FEW, truth_packing_name(packing));
+        }
+    }
+    truth_mesh_free(truth);
+}
+
 static void metrics_are_right_by_hand(void **state) {
     (void)state;
     float values[100], truth[100], mask[100];
@@ -412,6 +452,7 @@ int main(void) {
         cmocka_unit_test(culling_changes_nothing),
         cmocka_unit_test(mesh_and_analytic_truth_agree_on_a_box),
         cmocka_unit_test(mesh_truth_does_not_depend_on_threads),
+        cmocka_unit_test(packets_answer_as_lone_rays_do),
         cmocka_unit_test(metrics_are_right_by_hand),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

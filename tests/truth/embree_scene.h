@@ -1,0 +1,22 @@
+/* What the two files on Embree share. */
+#ifndef TRUTH_EMBREE_SCENE_H
+#define TRUTH_EMBREE_SCENE_H
+
+#include "embree.h"
+
+#include <embree3/rtcore.h>
+
+struct truth_mesh {
+    RTCDevice device;
+    RTCScene scene;
+    double center[3]; /* taken off in double, as Embree counts in floats */
+};
+
+enum { TRUTH_AT_ONCE = 256 };
+
+/* body(user, begin, end) over 0 … count - 1 in pieces of at most TRUTH_AT_ONCE, on `threads` threads (0: all
+ * cores). 0, or -1 where not all could be started; the work is done all the same. */
+int truth_in_pieces(size_t count, int threads, void (*body)(void *user, size_t begin, size_t end),
+                    void *user);
+
+#endif
