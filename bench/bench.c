@@ -145,6 +145,7 @@ int main(int argc, char **argv) {
         void (*run)(FILE *csv);
     } parts[] = {{"seeds", bench_seeds},
                  {"asset", bench_asset},
+                 {"shadow", bench_shadow_lightmaps},
                  {"ao", bench_ao_lightmaps},
                  {"refine", bench_refine},
                  {"proofs", bench_proofs},

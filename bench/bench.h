@@ -50,6 +50,7 @@ void bench_methods(FILE *csv, const char *scene, const vsh_field *field, const v
 
 void bench_seeds(FILE *csv);
 void bench_asset(FILE *csv);
+void bench_shadow_lightmaps(FILE *csv);
 void bench_ao_lightmaps(FILE *csv);
 void bench_refine(FILE *csv);
 void bench_proofs(FILE *csv);

@@ -91,16 +91,19 @@ VSH_API const char *vsh_sampler_name(int32_t sampler);
 
 /* Receivers: a view of the caller's arrays. Points that follow each other and lie within a few voxels of each
  * other share proofs, which makes them several times as fast: sort them along a curve that fills space
- * (query.h does so). adaptive and exact also take from them how many rays a point needs, so that its value
- * depends, within its error, on the points before and after it; never on threads. */
+ * (query.h does so). adaptive and exact also take from them how many rays a point needs, and where `texels`
+ * and normals are given they cast rays for a part of the points of a square of 8 × 8 or 4 × 4 texels that
+ * follow each other, lie flat and differ little, and interpolate the others (after hierarchical surpluses:
+ * Bungartz and Griebel, "Sparse grids", 2004). A value thus depends, within its error, on the points before
+ * and after it; never on threads. */
 typedef struct vsh_points {
     size_t count;
     const double *positions; /* [count][3], world units */
-    const float *normals; /* [count][3], geometric, of any length, pointing away from the solid; may be NULL
-                             for shadows: then there is no start offset, no horizon and no back side */
-    const uint32_t
-        *texels; /* [count], column + 65536 row: what the samplers tell points apart by, so that a lightmap's
-                  * noise does not depend on the order of its points; NULL: the points' numbers */
+    const float *normals;   /* [count][3], geometric, of any length, pointing away from the solid; may be NULL
+                               for shadows: then there is no start offset, no horizon and no back side */
+    const uint32_t *texels; /* [count], column + 65536 row: what the samplers tell points apart by, so that a
+                             * lightmap's noise does not depend on the order of its points, and where they lie
+                             * in it; NULL: the points' numbers, and no lightmap */
 } vsh_points;
 
 /* Work that was done; calls add to it, cancelled ones too. Begin with vsh_shade_stats_zero(). */
@@ -127,9 +130,10 @@ static inline vsh_shade_stats vsh_shade_stats_zero(void) {
 /* Fraction of the light that each point sees, 0 dark … 1 lit, into visibility[count]: before any cosine,
  * colour or falloff (a spot's edge counts as falloff). Points turned away from the light are 0, points inside
  * it 1, invalid ones NaN. `deviation` [count], where not NULL, takes the standard error that is left: 0 where
- * a cone proved the value, estimated where rays gave it, NaN for methods that know nothing of it. Errors (the
- * arrays then hold nothing of use): VSH_ERROR_ARGUMENT (options out of range, exact without triangles, run,
- * and as vsh_light_check()), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+ * a cone proved the value, estimated where rays gave it, NaN for methods that know nothing of it. Takes up to
+ * 512 KB of the stack of every thread it runs on, the caller's too. Errors (the arrays then hold nothing of
+ * use): VSH_ERROR_ARGUMENT (options out of range, exact without triangles, run, and as vsh_light_check()),
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
                                     const vsh_shade_options *options, const vsh_run *run, float *visibility,
                                     float *deviation, vsh_shade_stats *stats, vsh_error *error);

@@ -1,6 +1,7 @@
 #include "bake/origins.h"
 #include "bake/take.h"
 #include "base/parallel.h"
+#include "shade/kernel/march.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -22,9 +23,10 @@ typedef struct lifting {
     const vsh_field *field;
     const vsh_texels *texels;
     vshi_origins *origins;
-    double offset;   /* world units, all meshes */
-    double probe;    /* same, for the look whether a sample is free */
-    double shell;    /* world units, open meshes on top of it */
+    double offset; /* world units, all meshes */
+    double probe;  /* same, for the look whether a sample is free */
+    double shell;  /* world units, open meshes on top of it */
+    const vshi_kernel *kernel;
     uint8_t *crease; /* [samples] */
 } lifting;
 
@@ -43,18 +45,31 @@ static void lift(const lifting *l, size_t i, double offset, double origin[3]) {
 
 static void validate(void *user, size_t begin, size_t end) {
     const lifting *l = user;
+    const float radius = (float)(CREASE * l->probe / l->field->voxel_size);
     for (size_t block = begin; block < end; ++block) {
         const size_t first = block * VSHI_ORIGIN_BLOCK, last = block_end(l, block);
-        double origin[VSHI_ORIGIN_BLOCK][3];
-        float distance[VSHI_ORIGIN_BLOCK];
+        float at[3][VSHI_ORIGIN_BLOCK];
+        float *const centres[3] = {at[0], at[1], at[2]};
+        bool is_free[VSHI_ORIGIN_BLOCK];
         for (size_t i = first; i < last; ++i) {
-            lift(l, i, l->probe, origin[i - first]);
+            double origin[3];
+            lift(l, i, l->probe, origin);
+            const vshi_vec p = vshi_to_field(l->field, origin);
+            at[0][i - first] = (float)p.x;
+            at[1][i - first] = (float)p.y;
+            at[2][i - first] = (float)p.z;
         }
-        vsh_field_sample(l->field, last - first, &origin[0][0], distance);
+        l->kernel->balls(l->field, last - first, centres, radius, is_free);
         size_t valid = 0;
         for (size_t i = first; i < last; ++i) {
-            l->origins->valid[i] = (double)distance[i - first] >= CLEAR * l->probe;
-            l->crease[i] = (double)distance[i - first] < CREASE * l->probe;
+            const size_t k = i - first;
+            const double distance =
+                is_free[k]
+                    ? INFINITY
+                    : l->field->voxel_size *
+                          (double)vshi_field_distance(l->field, (float[]){at[0][k], at[1][k], at[2][k]});
+            l->origins->valid[i] = distance >= CLEAR * l->probe;
+            l->crease[i] = distance < CREASE * l->probe;
             valid += l->origins->valid[i];
         }
         l->origins->before[block] = valid;
@@ -125,6 +140,7 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
     lifting l = {.field = field,
                  .texels = texels,
                  .origins = origins,
+                 .kernel = vshi_kernel_of(run->isa),
                  .offset = offset,
                  .shell = 0.5 * info.shell_thickness,
                  .probe = fmax(offset, PROBE_HEIGHT * info.voxel_size)};

@@ -1,6 +1,6 @@
 /* Shadow values from rays over the light's disc: all of them (rays), or as many as a cone leaves open
  * (adaptive, on the field; exact, on the triangles). */
-#include "shade/shadow.h"
+#include "shade/share.h"
 #include "shim/embree.h"
 
 #include <math.h>
@@ -44,6 +44,11 @@ typedef struct ray_batch {
     size_t traced_count;
     vsh_shade_stats *stats;
 } ray_batch;
+
+/* Whether all rays of a point are the same. */
+static bool is_hard(const vshi_shadow_task *task) {
+    return task->sine <= 0.0 && task->radius <= 0.0;
+}
 
 static void flush(ray_batch *batch) {
     const vshi_shadow_task *task = batch->task;
@@ -158,19 +163,19 @@ static double deviation_of(const ray_batch *batch, size_t owner) {
     return taken > 2.0 ? BORROWED * deviation : deviation;
 }
 
-/* Casts rays for the open points, all up to the first target, then twice as many in each round for those that
- * are not settled. */
-static void cast_rounds(ray_batch *batch) {
+/* Casts rays for some open points, all up to the first target, then twice as many in each round for those
+ * that are not settled. */
+static void cast_rounds(ray_batch *batch, const size_t *some, size_t count) {
     const vsh_shade_options *options = batch->task->options;
     const bool refining = options->method != VSH_SHADOW_RAYS;
-    const bool hard = batch->task->sine <= 0.0 && batch->task->radius <= 0.0; /* all rays are the same */
+    const bool hard = is_hard(batch->task);
     const int32_t most = hard ? 1 : options->rays;
     int32_t target = refining ? FIRST_ROUND : options->early_rays > 0 ? options->early_rays : most;
-    size_t unsettled[VSHI_PIECE], count = batch->open_count;
-    for (size_t o = 0; o < count; ++o) {
-        unsettled[o] = o;
+    size_t unsettled[VSHI_PIECE];
+    for (size_t i = 0; i < count; ++i) {
+        unsettled[i] = some[i];
         if (options->method == VSH_SHADOW_EXACT) {
-            turn_to_world(batch->task, &batch->open[o]);
+            turn_to_world(batch->task, &batch->open[some[i]]);
         }
     }
     while (count > 0) {
@@ -193,12 +198,65 @@ static void cast_rounds(ray_batch *batch) {
         count = left;
         target = refining ? 2 * target : most;
     }
-    for (size_t o = 0; o < batch->open_count; ++o) {
-        const open_point *p = &batch->open[o];
-        vshi_shadow_settle(batch->task, p->point, (float)p->lit / (float)p->taken, (float)p->deviation);
-        batch->stats->square_error += p->deviation * p->deviation;
+}
+
+static void settle(ray_batch *batch, size_t point, float value, float deviation) {
+    vshi_shadow_settle(batch->task, point, value, deviation);
+    batch->stats->square_error += (double)deviation * (double)deviation;
+}
+
+static void settle_cast(ray_batch *batch, const size_t *some, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        const open_point *p = &batch->open[some[i]];
+        settle(batch, p->point, (float)p->lit / (float)p->taken, (float)p->deviation);
     }
-    batch->stats->refined += batch->open_count;
+}
+
+/* Casts rays for those of the open points that the others can be interpolated from, interpolates these, and
+ * leaves the rest in `some`. Returns their number. */
+static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *some) {
+    const vshi_shadow_task *task = batch->task;
+    vshi_share share = {
+        .points = task->points, .begin = begin, .count = end - begin, .max_error = task->options->max_error};
+    for (size_t k = 0; k < share.count; ++k) {
+        share.value[k] = task->visibility[begin + k];
+        share.deviation[k] = 0.0f;
+        share.state[k] = isnan(share.value[k]) ? VSHI_SHARE_GONE : VSHI_SHARE_KNOWN;
+    }
+    for (size_t o = 0; o < batch->open_count; ++o) {
+        share.state[batch->open[o].point - begin] = VSHI_SHARE_OPEN;
+    }
+    vshi_share_begin(&share);
+    for (int level = 0; level < VSHI_SHARE_LEVELS; ++level) {
+        size_t wanted = 0;
+        if (vshi_share_want(&share, level)) {
+            for (size_t o = 0; o < batch->open_count; ++o) {
+                if (share.state[batch->open[o].point - begin] == VSHI_SHARE_WANTED) {
+                    some[wanted++] = o;
+                }
+            }
+        }
+        cast_rounds(batch, some, wanted);
+        settle_cast(batch, some, wanted);
+        for (size_t i = 0; i < wanted; ++i) {
+            const open_point *p = &batch->open[some[i]];
+            const size_t k = p->point - begin;
+            share.state[k] = VSHI_SHARE_KNOWN;
+            share.value[k] = task->visibility[p->point];
+            share.deviation[k] = (float)p->deviation;
+        }
+        vshi_share_interpolate(&share, level);
+    }
+    size_t left = 0;
+    for (size_t o = 0; o < batch->open_count; ++o) {
+        const size_t point = batch->open[o].point, k = point - begin;
+        if (share.state[k] == VSHI_SHARE_OPEN) {
+            some[left++] = o;
+        } else if (batch->open[o].taken == 0) {
+            settle(batch, point, share.value[k], share.deviation[k]);
+        }
+    }
+    return left;
 }
 
 /* Proves cones free or full, and drops those points. */
@@ -268,5 +326,14 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
         p->u = vshi_scale(p->u, tangent);
         p->v = vshi_scale(p->v, tangent);
     }
-    cast_rounds(&batch);
+    size_t some[VSHI_PIECE], count = batch.open_count;
+    for (size_t o = 0; o < count; ++o) {
+        some[o] = o;
+    }
+    if (task->options->method != VSH_SHADOW_RAYS && !is_hard(task) && vshi_share_can(task->points)) {
+        count = cast_shared(&batch, begin, end, some);
+    }
+    cast_rounds(&batch, some, count);
+    settle_cast(&batch, some, count);
+    stats->refined += batch.open_count;
 }

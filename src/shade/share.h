@@ -1,0 +1,38 @@
+/* Texels of a lightmap that share rays: where light changes little from one to the next, rays are cast for
+ * some of a square and the values between are interpolated. */
+#ifndef VSHI_SHARE_H
+#define VSHI_SHARE_H
+
+#include "shade/shadow.h"
+
+enum { VSHI_SHARE_GONE, VSHI_SHARE_KNOWN, VSHI_SHARE_OPEN, VSHI_SHARE_WANTED };
+
+/* Points of a piece, by their place in it. */
+typedef struct vshi_share {
+    const vsh_points *points;
+    size_t begin, count;
+    double max_error; /* standard error that a value may have */
+    uint8_t state[VSHI_PIECE];
+    float value[VSHI_PIECE], deviation[VSHI_PIECE]; /* of what is known */
+    /* runs of points in the same square of eight by eight texels */
+    size_t runs;
+    uint16_t run_begin[VSHI_PIECE + 1];
+} vshi_share;
+
+enum { VSHI_SHARE_LEVELS = 2 }; /* squares of 8 × 8 texels, then of 4 × 4 */
+
+/* Whether points can share: they have normals, and places in a lightmap. */
+bool vshi_share_can(const vsh_points *points);
+
+/* Finds the squares, of states that are set. */
+void vshi_share_begin(vshi_share *share);
+
+/* Marks as VSHI_SHARE_WANTED those open points of the level's squares that the others are to be interpolated
+ * from. False where there are none. */
+bool vshi_share_want(vshi_share *share, int level);
+
+/* Once all that was wanted is known: gives the open points of a square their values, where those that are
+ * known agree with each other to within their errors; they are then known too. */
+void vshi_share_interpolate(vshi_share *share, int level);
+
+#endif

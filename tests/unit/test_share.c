@@ -1,0 +1,225 @@
+/* Rays that texels share: what is interpolated, what is not, and what that costs of the error. */
+#include "shade/share.h"
+#include "shading.h"
+
+#include "truth/metrics.h"
+
+#include <stdlib.h>
+
+enum { SQUARE = 8, POINTS = SQUARE * SQUARE };
+
+static double positions[3 * POINTS];
+static float normals[3 * POINTS];
+static uint32_t texels[POINTS];
+
+/* A level square of texels at (8, 16), all open. */
+static void lay_square(vshi_share *share) {
+    static const vsh_points points = {POINTS, positions, normals, texels};
+    *share = (vshi_share){.points = &points, .count = POINTS, .max_error = 0.02};
+    for (uint32_t k = 0; k < POINTS; ++k) {
+        const uint32_t column = k % SQUARE, row = k / SQUARE;
+        positions[3 * k] = 0.1 * column;
+        positions[3 * k + 1] = 0.0;
+        positions[3 * k + 2] = 0.1 * row;
+        normals[3 * k] = normals[3 * k + 2] = 0.0f;
+        normals[3 * k + 1] = 1.0f;
+        texels[k] = (column + 8) + 65536 * (row + 16);
+        share->state[k] = VSHI_SHARE_OPEN;
+    }
+}
+
+typedef double light_fn(double column, double row);
+
+/* Finds what is wanted by `light` to within an error; how many. */
+static int answer(vshi_share *share, light_fn *light) {
+    int wanted = 0;
+    for (size_t k = 0; k < POINTS; ++k) {
+        if (share->state[k] == VSHI_SHARE_WANTED) {
+            share->state[k] = VSHI_SHARE_KNOWN;
+            share->value[k] = (float)light((double)(k % SQUARE), (double)(k / SQUARE));
+            share->deviation[k] = 0.01f;
+            ++wanted;
+        }
+    }
+    return wanted;
+}
+
+static int still_open(const vshi_share *share) {
+    int open = 0;
+    for (size_t k = 0; k < POINTS; ++k) {
+        open += share->state[k] == VSHI_SHARE_OPEN;
+    }
+    return open;
+}
+
+/* Shares by a light at both levels; how many are left. */
+static int run(vshi_share *share, light_fn *light, int wanted[VSHI_SHARE_LEVELS]) {
+    vshi_share_begin(share);
+    for (int level = 0; level < VSHI_SHARE_LEVELS; ++level) {
+        vshi_share_want(share, level);
+        wanted[level] = answer(share, light);
+        vshi_share_interpolate(share, level);
+    }
+    return still_open(share);
+}
+
+static double ramp(double column, double row) {
+    return 0.3 + 0.03 * column + 0.02 * row;
+}
+
+/* Bent, so that only small squares follow it. */
+static double bend(double column, double row) {
+    (void)row;
+    return 0.3 + 0.007 * (column - 3.0) * (column - 3.0);
+}
+
+static double edge(double column, double row) {
+    return column + row > 7.0 ? 0.9 : 0.2;
+}
+
+/* Seen by none of the corners. */
+static double spot(double column, double row) {
+    return column > 2.0 && column < 6.0 && row > 2.0 && row < 6.0 ? 0.3 : 0.5;
+}
+
+static void a_ramp_takes_nine_of_64(void **state) {
+    (void)state;
+    static vshi_share share;
+    int wanted[VSHI_SHARE_LEVELS];
+    lay_square(&share);
+    assert_int_equal(run(&share, ramp, wanted), 0);
+    assert_int_equal(wanted[0], 9);
+    assert_int_equal(wanted[1], 0);
+    for (size_t k = 0; k < POINTS; ++k) {
+        const double off = (double)share.value[k] - ramp((double)(k % SQUARE), (double)(k / SQUARE));
+        assert_true(fabs(off) < 1e-6);
+        assert_true(share.deviation[k] > 0.004f && share.deviation[k] <= 0.0101f);
+    }
+}
+
+static void a_bend_takes_small_squares(void **state) {
+    (void)state;
+    static vshi_share share;
+    int wanted[VSHI_SHARE_LEVELS];
+    lay_square(&share);
+    assert_int_equal(run(&share, bend, wanted), 0);
+    assert_int_equal(wanted[0], 9);
+    assert_int_equal(wanted[1], 11);
+    for (size_t k = 0; k < POINTS; ++k) {
+        const double off = (double)share.value[k] - bend((double)(k % SQUARE), (double)(k / SQUARE));
+        assert_true(fabs(off) < 2.5 * (double)share.deviation[k] + 1e-6);
+    }
+}
+
+static void edges_and_spots_stay_open(void **state) {
+    (void)state;
+    static vshi_share share;
+    int wanted[VSHI_SHARE_LEVELS];
+    lay_square(&share);
+    /* of its four quarters two are not crossed by the edge */
+    assert_int_equal(run(&share, edge, wanted), 2 * (16 - 5));
+    lay_square(&share);
+    assert_true(run(&share, spot, wanted) > 0);
+    for (size_t k = 0; k < POINTS; ++k) {
+        if (share.state[k] == VSHI_SHARE_KNOWN) {
+            const double off = (double)share.value[k] - spot((double)(k % SQUARE), (double)(k / SQUARE));
+            assert_true(fabs(off) < 0.07);
+        }
+    }
+}
+
+static void what_is_bent_or_missing_is_not_shared(void **state) {
+    (void)state;
+    static vshi_share share;
+    int wanted[VSHI_SHARE_LEVELS];
+    lay_square(&share);
+    for (size_t k = 0; k < POINTS; ++k) { /* a step in the middle of the lower right quarter */
+        positions[3 * k + 1] = k % SQUARE > 5 && k / SQUARE > 5 ? 0.2 : 0.0;
+    }
+    assert_int_equal(run(&share, ramp, wanted), 16);
+    assert_int_equal(wanted[0], 0);
+    lay_square(&share);
+    share.state[0] = VSHI_SHARE_GONE;
+    assert_int_equal(run(&share, ramp, wanted), 15);
+    lay_square(&share);
+    texels[5] = texels[4];
+    assert_int_equal(run(&share, ramp, wanted), POINTS);
+    lay_square(&share);
+    for (size_t k = 0; k < POINTS; ++k) { /* every other one is of another square */
+        texels[k] += k & 1 ? 0 : 8;
+    }
+    assert_int_equal(run(&share, ramp, wanted), POINTS);
+}
+
+/* --- on a field */
+
+enum { SIDE = 256, FLOOR = SIDE * SIDE };
+static double places[3 * FLOOR], rows[3 * FLOOR];
+static float ups[3 * FLOOR], visible[FLOOR], deviation[FLOOR], reference[FLOOR];
+static uint32_t numbers[FLOOR];
+
+/* The seeds' floor in squares of eight. */
+static void place_floor(void) {
+    size_t next = 0;
+    floor_texels(SIDE, rows, ups);
+    for (uint32_t tile = 0; tile < FLOOR / POINTS; ++tile) {
+        for (uint32_t k = 0; k < POINTS; ++k, ++next) {
+            const uint32_t column = tile % (SIDE / SQUARE) * SQUARE + k % SQUARE;
+            const uint32_t row = tile / (SIDE / SQUARE) * SQUARE + k / SQUARE;
+            memcpy(places + 3 * next, rows + 3 * ((size_t)row * SIDE + column), 3 * sizeof *places);
+            numbers[next] = column + 65536 * row;
+        }
+    }
+}
+
+static vsh_shade_stats shade(const vsh_field *field, const uint32_t *at, int32_t method, double max_error,
+                             float *values, float *errors) {
+    const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
+    const vsh_points points = {FLOOR, places, ups, at};
+    vsh_shade_options options = vsh_shade_options_default();
+    options.method = method;
+    options.rays = 1024;
+    options.max_error = max_error;
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, values, errors, &stats, NULL),
+                     VSH_OK);
+    return stats;
+}
+
+static void rays_are_saved_and_the_error_is_as_said(void **state) {
+    (void)state;
+    vsh_field *field = field_of(truth_seeds(), 0.02, 0.0);
+    place_floor();
+    shade(field, numbers, VSH_SHADOW_RAYS, 0.02, reference, NULL);
+    const double asked[] = {0.05, 0.02, 0.01};
+    for (int e = 0; e < 3; ++e) {
+        const vsh_shade_stats alone = shade(field, NULL, VSH_SHADOW_ADAPTIVE, asked[e], visible, NULL);
+        const vsh_shade_stats shared =
+            shade(field, numbers, VSH_SHADOW_ADAPTIVE, asked[e], visible, deviation);
+        const truth_metrics m = truth_compare(FLOOR, visible, reference, NULL);
+        const double estimate = sqrt(shared.square_error / FLOOR);
+        print_message("asked %g: rmse %.4f, estimated %.4f, %.2f of the rays\n", asked[e], m.rmse, estimate,
+                      (double)shared.rays / (double)alone.rays);
+        assert_true(m.rmse <= 1.25 * estimate);
+        assert_true(m.penumbra_rmse <= asked[e]);
+        assert_true((double)shared.rays < 0.7 * (double)alone.rays);
+        assert_int_equal(shared.refined, alone.refined);
+        size_t wrong = 0;
+        for (size_t i = 0; i < FLOOR; ++i) {
+            wrong += deviation[i] == 0.0f && visible[i] != reference[i];
+        }
+        assert_int_equal(wrong, 0);
+    }
+    vsh_field_free(field);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_ramp_takes_nine_of_64),
+        cmocka_unit_test(a_bend_takes_small_squares),
+        cmocka_unit_test(edges_and_spots_stay_open),
+        cmocka_unit_test(what_is_bent_or_missing_is_not_shared),
+        cmocka_unit_test(rays_are_saved_and_the_error_is_as_said),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
