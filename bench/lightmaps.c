@@ -146,7 +146,7 @@ static void measure(FILE *csv, const bench_scene *scene, bool sunlit, const ladd
         const double embree = bench_embree_seconds(&curve, metrics.rmse) / (double)count;
         size_t proved = 0, wrong = 0;
         for (size_t i = 0; i < count; ++i) {
-            const bool sure = valid[i] > 0.0f && deviation[at[i]] == 0.0f;
+            const bool sure = stats.shade.square_error > 0.0 && valid[i] > 0.0f && deviation[at[i]] == 0.0f;
             proved += sure;
             wrong += sure && values[i] != truth[i];
         }

@@ -20,7 +20,7 @@ static const double FLAT = 0.2, ALIKE = 0.95;
 /* Corners are shaded to this share of max_error: many texels are made of them. */
 static const double FINER = 0.5;
 
-enum { UNKNOWN, CHOSEN, KNOWN };
+enum { UNKNOWN, CHOSEN, KNOWN, BETWEEN }; /* known: shaded, or interpolated */
 
 typedef struct lattice {
     const vsh_field *field;
@@ -66,15 +66,81 @@ static void find_texels(void *user, size_t begin, size_t end) {
     }
 }
 
+/* --- cells */
+
+/* Between lattice lines, both included; at the edge of a chart clipped to the texels that are there. */
+typedef struct cell {
+    uint32_t column, row; /* of its first lattice lines */
+    uint32_t left, right, top, bottom;
+    bool good;
+    size_t corner[4]; /* origins: left and right of the upper row, of the lower */
+} cell;
+
+static bool lookup(const lattice *l, uint32_t column, uint32_t row, size_t *i) {
+    const vshi_band *band = &l->texels->band;
+    const uint32_t width = (uint32_t)l->texels->info.width, held = row - (uint32_t)band->first;
+    if (column >= width || held >= (uint32_t)band->rows) {
+        return false;
+    }
+    const uint32_t number = l->at[(size_t)held * width + column];
+    *i = (size_t)number - 1;
+    return number != 0;
+}
+
+/* Texels of the cell from (column, row) on; false where they are no rectangle. */
+static bool clip(const lattice *l, uint32_t column, uint32_t row, cell *c) {
+    const uint32_t s = (uint32_t)l->spacing;
+    size_t i, found = 0;
+    *c = (cell){
+        .column = column, .row = row, .left = column, .right = column + s, .top = row, .bottom = row + s};
+    if (lookup(l, column, row, &i) && lookup(l, column + s, row, &i) && lookup(l, column, row + s, &i) &&
+        lookup(l, column + s, row + s, &i)) {
+        return true;
+    }
+    uint32_t left = UINT32_MAX, right = 0, top = UINT32_MAX, bottom = 0;
+    for (uint32_t y = row; y <= c->bottom; ++y) {
+        for (uint32_t x = column; x <= c->right; ++x) {
+            if (lookup(l, x, y, &i)) {
+                left = x < left ? x : left;
+                right = x > right ? x : right;
+                top = y < top ? y : top;
+                bottom = y;
+                ++found;
+            }
+        }
+    }
+    c->left = left, c->right = right, c->top = top, c->bottom = bottom;
+    return found > 0 && found == (size_t)(right - left + 1) * (bottom - top + 1);
+}
+
+/* Whether a texel is the corner of a cell, its own or one that ends at it. */
+static bool is_corner(const lattice *l, uint32_t column, uint32_t row) {
+    const uint32_t s = (uint32_t)l->spacing, mask = s - 1;
+    if (((column | row) & mask) == 0) {
+        return true;
+    }
+    for (int k = 0; k < 4; ++k) {
+        const uint32_t before = k & 1, above = k >> 1;
+        if ((before && ((column & mask) != 0 || column == 0)) || (above && ((row & mask) != 0 || row == 0))) {
+            continue;
+        }
+        cell c;
+        if (clip(l, (column & ~mask) - before * s, (row & ~mask) - above * s, &c) &&
+            (column == c.left || column == c.right) && (row == c.top || row == c.bottom)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* --- the texels of a pass */
 
 static void choose(void *user, size_t begin, size_t end) {
     const lattice *l = user;
-    const uint32_t mask = (uint32_t)l->spacing - 1;
     for (size_t block = begin; block < end; ++block) {
         size_t count = 0;
         for (size_t i = block * BLOCK; i < block_end(l, block); ++i) {
-            if (l->state[i] == UNKNOWN && ((column_of(l, i) | row_of(l, i)) & mask) == 0) {
+            if (l->state[i] == UNKNOWN && is_corner(l, column_of(l, i), row_of(l, i))) {
                 l->state[i] = CHOSEN;
                 ++count;
             }
@@ -124,28 +190,16 @@ static void unpack(void *user, size_t begin, size_t end) {
     }
 }
 
-/* --- cells */
-
-typedef struct cell {
-    uint32_t column, row;
-    bool good;
-    size_t corner[4]; /* origins: left and right of the upper row, of the lower */
-} cell;
-
-static bool lookup(const lattice *l, uint32_t column, uint32_t row, size_t *i) {
-    const vshi_band *band = &l->texels->band;
-    const uint32_t width = (uint32_t)l->texels->info.width, held = row - (uint32_t)band->first;
-    if (column >= width || held >= (uint32_t)band->rows) {
-        return false;
-    }
-    const uint32_t number = l->at[(size_t)held * width + column];
-    *i = (size_t)number - 1;
-    return number != 0;
-}
+/* --- values between */
 
 /* Corner values weighted for a place of the cell, 0 … 1 along both sides. */
 static double mix(const double v[4], double x, double y) {
     return (v[0] * (1.0 - x) + v[1] * x) * (1.0 - y) + (v[2] * (1.0 - x) + v[3] * x) * y;
+}
+
+/* How far x lies between two lines, 0 … 1. */
+static double part(uint32_t x, uint32_t from, uint32_t to) {
+    return to > from ? (double)(x - from) / (double)(to - from) : 0.0;
 }
 
 static vshi_vec position_of(const lattice *l, size_t i) {
@@ -170,15 +224,14 @@ static bool lies_flat(const lattice *l, const cell *c, const vshi_vec p[4], doub
     const vshi_vec n = vshi_vec_off(l->points->normals + 3 * c->corner[0]);
     const double x[4] = {p[0].x, p[1].x, p[2].x, p[3].x}, y[4] = {p[0].y, p[1].y, p[2].y, p[3].y},
                  z[4] = {p[0].z, p[1].z, p[2].z, p[3].z};
-    const uint32_t s = (uint32_t)l->spacing;
-    for (uint32_t row = 0; row <= s; ++row) {
-        for (uint32_t column = 0; column <= s; ++column) {
+    for (uint32_t row = c->top; row <= c->bottom; ++row) {
+        for (uint32_t column = c->left; column <= c->right; ++column) {
             size_t i;
-            if (!lookup(l, c->column + column, c->row + row, &i) ||
+            if (!lookup(l, column, row, &i) ||
                 vshi_dot(n, vshi_vec_off(l->points->normals + 3 * i)) < ALIKE) {
                 return false;
             }
-            const double u = (double)column / s, v = (double)row / s;
+            const double u = part(column, c->left, c->right), v = part(row, c->top, c->bottom);
             const vshi_vec off =
                 vshi_sub(position_of(l, i), (vshi_vec){mix(x, u, v), mix(y, u, v), mix(z, u, v)});
             if (vshi_dot(off, off) > FLAT * FLAT * size * size) {
@@ -201,12 +254,14 @@ static bool is_clear(const lattice *l, const cell *c, const vshi_vec p[4], doubl
 }
 
 static cell look_at(const lattice *l, uint32_t column, uint32_t row) {
-    const uint32_t s = (uint32_t)l->spacing;
-    cell c = {.column = column, .row = row};
+    cell c;
     vshi_vec p[4];
-    for (uint32_t k = 0; k < 4; ++k) {
-        if (!lookup(l, column + s * (k & 1), row + s * (k >> 1), &c.corner[k]) ||
-            l->state[c.corner[k]] != KNOWN) {
+    if (!clip(l, column, row, &c)) {
+        return c;
+    }
+    for (int k = 0; k < 4; ++k) {
+        if (!lookup(l, k & 1 ? c.right : c.left, k >> 1 ? c.bottom : c.top, &c.corner[k]) ||
+            l->state[c.corner[k]] < KNOWN) {
             return c;
         }
         p[k] = position_of(l, c.corner[k]);
@@ -230,14 +285,14 @@ static void interpolate(void *user, size_t begin, size_t end) {
                 continue;
             }
             const uint32_t column = column_of(l, i), row = row_of(l, i);
-            const uint32_t left = column & ~(s - 1), top = row & ~(s - 1);
-            if (c.column != left || c.row != top) {
-                c = look_at(l, left, top);
+            const uint32_t first_column = column & ~(s - 1), first_row = row & ~(s - 1);
+            if (c.column != first_column || c.row != first_row) {
+                c = look_at(l, first_column, first_row);
             }
             if (!c.good) {
                 continue;
             }
-            const double x = (double)(column - left) / s, y = (double)(row - top) / s;
+            const double x = part(column, c.left, c.right), y = part(row, c.top, c.bottom);
             double v[4];
             for (int k = 0; k < 4; ++k) {
                 v[k] = (double)l->values[c.corner[k]];
@@ -249,7 +304,7 @@ static void interpolate(void *user, size_t begin, size_t end) {
             if (l->deviation != NULL) {
                 l->deviation[i] = (float)mix(v, x, y);
             }
-            l->state[i] = KNOWN;
+            l->state[i] = BETWEEN;
         }
     }
 }
@@ -310,7 +365,7 @@ static vsh_result shade_pass(lattice *l, const vsh_shade_options *options, size_
 static size_t count_known(const lattice *l) {
     size_t known = 0;
     for (size_t i = 0; i < l->origins->count; ++i) {
-        known += l->state[i] == KNOWN;
+        known += l->state[i] >= KNOWN;
     }
     return known;
 }
@@ -344,8 +399,19 @@ static vsh_result run_passes(lattice *l, const vsh_shade_options *options, const
     return result;
 }
 
+/* What was interpolated adds to the squared error, as what was shaded has. */
+static void add_errors(const lattice *l, vsh_shade_stats *stats) {
+    const vshi_point_rows *rows = &l->origins->rows;
+    uint64_t sum = 0;
+    for (size_t i = rows->start[rows->first]; i < rows->start[rows->last]; ++i) {
+        const double deviation = l->state[i] == BETWEEN ? (double)l->deviation[i] : 0.0;
+        sum += deviation > 0.0 ? (uint64_t)(deviation * deviation / VSHI_SQUARE_UNIT) : 0;
+    }
+    stats->square_error += (double)sum * VSHI_SQUARE_UNIT;
+}
+
 double vshi_lattice_bytes(double samples, double texels) {
-    return texels * sizeof(uint32_t) + samples * (1.0 + 3.0 * sizeof(double) + 7.0 * sizeof(float));
+    return texels * sizeof(uint32_t) + samples * (1.0 + 3.0 * sizeof(double) + 8.0 * sizeof(float));
 }
 
 vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
@@ -357,8 +423,7 @@ vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, con
                  .points = points,
                  .distance = options->ao_distance / field->voxel_size,
                  .blocks = (origins->count + BLOCK - 1) / BLOCK,
-                 .values = values,
-                 .deviation = deviation};
+                 .values = values};
     const char *what = "AO texels";
     vsh_run quiet = *run;
     quiet.progress = NULL;
@@ -371,9 +436,17 @@ vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, con
     l.state = vshi_take(origins->count, 1, what, &result, error);
     l.before = vshi_take(l.blocks + 1, sizeof *l.before, what, &result, error);
     l.row_start = vshi_take(origins->rows.count + 1, sizeof *l.row_start, what, &result, error);
+    const bool estimates = options->ao_method == VSH_AO_ADAPTIVE || options->ao_method == VSH_AO_EXACT;
+    float *own =
+        vshi_take(estimates && deviation == NULL ? origins->count : 0, sizeof *own, what, &result, error);
+    l.deviation = deviation == NULL && estimates ? own : deviation;
     if (result == VSH_OK) {
         result = run_passes(&l, options, run, job, stats, error);
     }
+    if (result == VSH_OK && estimates && stats != NULL) {
+        add_errors(&l, stats);
+    }
+    free(own);
     free(l.row_start);
     free(l.before);
     free(l.state);

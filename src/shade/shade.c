@@ -47,8 +47,6 @@ vsh_result vshi_shade_sampler(const vsh_shade_options *options, const char *what
                             : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
 }
 
-#define SQUARE_UNIT 0x1p-40
-
 typedef struct shade_run {
     vshi_shade_fn *fn;
     const void *task;
@@ -57,7 +55,7 @@ typedef struct shade_run {
     const vshi_point_rows *rows;
     const size_t *pieces; /* [rows + 1]: before each row */
     _Atomic uint64_t marches, samples, skipped, certified, unfinished, invalid, beyond_reach, rays, refined;
-    _Atomic uint64_t square_error; /* in units of SQUARE_UNIT, so that the order of threads changes no bit */
+    _Atomic uint64_t square_error; /* in units of VSHI_SQUARE_UNIT, so that the order of threads changes no bit */
 } shade_run;
 
 static void run_piece(void *user, size_t piece, size_t next) {
@@ -90,7 +88,7 @@ static void run_piece(void *user, size_t piece, size_t next) {
     atomic_fetch_add(&run->beyond_reach, stats.beyond_reach);
     atomic_fetch_add(&run->rays, stats.rays);
     atomic_fetch_add(&run->refined, stats.refined);
-    atomic_fetch_add(&run->square_error, (uint64_t)(stats.square_error / SQUARE_UNIT));
+    atomic_fetch_add(&run->square_error, (uint64_t)(stats.square_error / VSHI_SQUARE_UNIT));
 }
 
 vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows *rows, size_t grain,
@@ -124,7 +122,7 @@ vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows 
         stats->beyond_reach += pieces.beyond_reach;
         stats->rays += pieces.rays;
         stats->refined += pieces.refined;
-        stats->square_error += (double)pieces.square_error * SQUARE_UNIT;
+        stats->square_error += (double)pieces.square_error * VSHI_SQUARE_UNIT;
     }
     return result;
 }

@@ -10,6 +10,9 @@
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
                                       vsh_error *error);
 
+/* Squared errors are added up in units of it, so that the order of threads and bands changes no bit. */
+#define VSHI_SQUARE_UNIT 0x1p-40
+
 /* Shades points begin … end - 1; adds what it did to *stats. */
 typedef void vshi_shade_fn(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);
 
