@@ -63,7 +63,7 @@ static inline vsh_query_output vsh_query_output_default(void) {
 VSH_API vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, const vsh_run *run,
                                     const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error);
 
-enum { VSH_QUERY_BATCH = 1 << 22 };
+enum { VSH_QUERY_BATCH = 1 << 20 };
 
 /* Points as they stand in the caller's memory, in an array of structs say: what vsh_points holds, with
  * strides, which are bytes from one point to the next, multiples of what they step over (4, of doubles 8) and
