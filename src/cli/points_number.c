@@ -231,6 +231,25 @@ char *cli_number_write_float(char *text, float value) {
     return put_digits(text, (uint64_t)digits, 9, leading);
 }
 
+#if LDBL_MANT_DIG == 64
+/* Digits from arithmetic of 64 bits, off by 0.505 of the last of 17: doubles are 1.1 of it apart at least. */
+static char *put_wide(char *text, double size, int count) {
+    int leading = 0;
+    while (leading < 15 && size >= powers[leading + 1]) {
+        ++leading;
+    }
+    while (leading > -6 && leading <= 0 && size * powers[-leading] < 1.0) {
+        --leading;
+    }
+    const int shift = count - 1 - leading;
+    const long double power = (long double)powers[shift < 0 ? -shift : shift];
+    const long double exact = shift < 0 ? (long double)size / power : (long double)size * power;
+    const uint64_t digits = (uint64_t)(exact + 0.5L);
+    return digits < (uint64_t)powers[count] ? put_digits(text, digits, count, leading)
+                                            : put_slowly(text, count, size);
+}
+#endif
+
 char *cli_number_write_double(char *text, double value) {
     char *special = put_special(&text, value);
     if (special != NULL) {
@@ -238,7 +257,11 @@ char *cli_number_write_double(char *text, double value) {
     }
     const double size = fabs(value);
     for (int count = 15;; ++count) {
+#if LDBL_MANT_DIG == 64
+        char *end = size >= 1e-6 && size < 1e15 ? put_wide(text, size, count) : put_slowly(text, count, size);
+#else
         char *end = put_slowly(text, count, size);
+#endif
         double back;
         if (count == 17 || (cli_number_read(text, end, &back) && back == size)) {
             return end;

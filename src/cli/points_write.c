@@ -235,8 +235,8 @@ static bool put_text_row(cli_points_writer *w, const cli_points *points, size_t 
     const char delimiter = w->format == CLI_POINTS_PLY ? ' ' : w->delimiter;
     if (!w->keep && !w->answers_only) {
         for (size_t k = 0; k < 3; ++k) {
-            const double p = points->positions[3 * i + k];
-            at = w->floats ? cli_number_write_float(at, (float)p) : cli_number_write_double(at, p);
+            /* of a float too all digits that its double has: who reads it gets the same point */
+            at = cli_number_write_double(at, points->positions[3 * i + k]);
             *at++ = delimiter;
         }
         for (size_t k = 0; w->normals && k < 3; ++k) {

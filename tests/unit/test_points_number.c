@@ -152,10 +152,16 @@ static void floats_come_back_with_the_same_bits(void **state) {
 
 static void doubles_come_back_with_the_same_bits(void **state) {
     (void)state;
-    for (int i = 0; i < 50000; ++i) {
+    for (int i = 0; i < 200000; ++i) {
         const uint64_t bits = draw();
         double value;
         memcpy(&value, &bits, sizeof value);
+        if (i % 2 != 0) { /* coordinates, of doubles and of floats, and what lies next to powers of two */
+            value = ((double)(bits >> 11) * 0x1p-53 - 0.5) * 200.0;
+            value = i % 4 == 1 ? (double)(float)value : value;
+            value =
+                i % 8 == 3 ? ldexp(1.0 - 0x1p-53 * (double)(bits & 3), (int)(bits >> 20 & 63) - 18) : value;
+        }
         char text[CLI_NUMBER_ROOM + 1];
         *cli_number_write_double(text, value) = '\0';
         const double back = strtod(text, NULL);
