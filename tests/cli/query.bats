@@ -119,7 +119,7 @@ ANSWERS=(--distance --gradient --answers-only)
     points 40000 >p.raw
     shade "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes -o whole.raw
     done_well
-    for options in "--threads 1" "--batch 1000" "--batch 7" "--memory-limit 16M"; do
+    for options in "--threads 1" "--batch 1000" "--batch 7" "--memory-limit 24M"; do
         shade "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes $options -o part.raw
         done_well
         cmp part.raw whole.raw || fail "$options"
