@@ -117,6 +117,7 @@ ANSWERS=(--distance --gradient --answers-only)
 
 @test "threads, batches and memory change no bit" {
     points 40000 >p.raw
+    QUERY+=(--method rays --rays 4) # rows are told apart by their numbers
     shade "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes -o whole.raw
     done_well
     for options in "--threads 1" "--batch 1000" "--batch 7" "--memory-limit 24M"; do
