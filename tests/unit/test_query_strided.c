@@ -240,7 +240,8 @@ static void calls_for_a_batch_each_give_the_bits_of_one_call(void **state) {
         /* the first batch in no order, the second in rows: each is looked at by itself */
         at[3 * i] = i < VSH_QUERY_BATCH ? between(&count, -2.5, 2.5) : -2.5 + 5.0 * (i % 200) / 200.0;
         at[3 * i + 1] = 0.001;
-        at[3 * i + 2] = i < VSH_QUERY_BATCH ? between(&count, -2.5, 2.5) : 0.0;
+        at[3 * i + 2] =
+            i < VSH_QUERY_BATCH ? between(&count, -2.5, 2.5) : -2.5 + 5.0 * (i / 200 % 200) / 200.0;
         numbers[i] = i;
     }
     float *const all[1] = {one};
