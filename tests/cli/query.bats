@@ -289,6 +289,12 @@ write_binary_ply() {
         cmp again.raw ascii.raw
     done
     [ "$(wc -c <ascii.raw)" -eq 32 ]
+    # rows of 29 bytes, two answers behind each, in the file's own order of bytes
+    for order in little:f\< big:f\>; do
+        tail -c $((4 * 37 + 26)) "${order%:*}-out.ply" |
+            perl -e 'local $/; my $d = <STDIN>; for (0 .. 3) { print pack("f<2", unpack($ARGV[0] . "2", substr($d, 37 * $_ + 29, 8))) }' \
+                "${order#*:}" | cmp - ascii.raw || fail "$order"
+    done
     tail -2 ascii-out.ply | cmp - <(printf '3 0 1 2\n3 0 2 3\n')
     tail -c 26 big-out.ply | cmp - <(tail -c 26 big.ply)
 }

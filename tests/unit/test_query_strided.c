@@ -47,7 +47,7 @@ static vsh_query *query_of(const vsh_field *field, const vsh_light *light, int32
     vsh_shade_options options = vsh_shade_options_default();
     options.method = method;
     options.ao_method = VSH_AO_TAPS;
-    options.rays = 8;
+    options.rays = method == VSH_SHADOW_ADAPTIVE ? 64 : 8;
     if (vsh_query_create(field, light, light != NULL ? 1 : 0, &options, &query, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
@@ -239,7 +239,7 @@ static void calls_for_a_batch_each_give_the_bits_of_one_call(void **state) {
     for (uint32_t i = 0; i < ALL; ++i) {
         /* the first batch in no order, the second in rows: each is looked at by itself */
         at[3 * i] = i < VSH_QUERY_BATCH ? between(&count, -2.5, 2.5) : -2.5 + 5.0 * (i % 200) / 200.0;
-        at[3 * i + 1] = 0.001;
+        at[3 * i + 1] = 0.3;
         at[3 * i + 2] =
             i < VSH_QUERY_BATCH ? between(&count, -2.5, 2.5) : -2.5 + 5.0 * (i / 200 % 200) / 200.0;
         numbers[i] = i;
@@ -257,6 +257,11 @@ static void calls_for_a_batch_each_give_the_bits_of_one_call(void **state) {
                                  numbers + first};
         assert_int_equal(vsh_query_points(query, &some, NULL, &output, NULL, NULL), VSH_OK);
     }
+    size_t between_them = 0; /* whose rays depend on the points around them */
+    for (size_t i = VSH_QUERY_BATCH; i < ALL; ++i) {
+        between_them += one[i] > 0.0f && one[i] < 1.0f;
+    }
+    assert_true(between_them > 1000);
     assert_memory_equal(parts, one, (size_t)ALL * sizeof *one);
     free(at);
     free(one);
