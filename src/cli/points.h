@@ -67,7 +67,6 @@ typedef struct cli_points_reader {
     bool has_normals, floats; /* floats: positions came as such */
     bool strict;              /* a bad row ends it */
     uint64_t rows, bad;       /* so far */
-    uint64_t bad_told;
     char *header;                      /* lines of the header as they came, with their ends; NULL: none */
     size_t header_size, header_insert; /* where a PLY's new properties go */
     /* text */

@@ -9,7 +9,6 @@
 typedef struct points_source {
     const char *name; /* for messages */
     int file;
-    int error; /* errno of a read that failed; 0: none */
     bool ended;
     char *buffer;
     size_t begin, end, room;
