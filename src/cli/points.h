@@ -64,9 +64,9 @@ typedef struct ply_header {
 typedef struct cli_points_reader {
     points_source source;
     int32_t format;
-    bool has_normals, floats; /* floats: positions came as such */
-    bool strict;              /* a bad row ends it */
-    uint64_t rows, bad;       /* so far */
+    bool has_normals, floats;          /* floats: positions came as such */
+    bool strict;                       /* a bad row ends it */
+    uint64_t rows, bad;                /* so far */
     char *header;                      /* lines of the header as they came, with their ends; NULL: none */
     size_t header_size, header_insert; /* where a PLY's new properties go */
     /* text */
