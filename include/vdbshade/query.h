@@ -21,18 +21,26 @@ VSH_API vsh_result vsh_query_create(const vsh_field *field, const vsh_light *lig
                                     const vsh_shade_options *options, vsh_query **query, vsh_error *error);
 VSH_API void vsh_query_free(vsh_query *query); /* NULL does nothing */
 
-/* Where values go, in the points' order; what is NULL costs nothing. Values are those of vsh_shade_shadow()
- * and vsh_shade_ao(). */
+/* Where values go, in the points' order; what is NULL costs nothing. Values are those of vsh_shade_shadow(),
+ * vsh_shade_ao() and vsh_field_sample(). */
 typedef struct vsh_query_output {
     size_t struct_size;
     float *const *visibility; /* [light_count] arrays [count], each or all of them NULL where not asked for */
-    float *const *deviation;  /* likewise, of lights whose visibility is asked for */
-    float *ao;                /* [count]; needs points->normals */
+    float *const *deviation;  /* the standard error left in them, likewise, of lights whose visibility is
+                                 asked for */
+    float *ao;                /* [count]; needs normals */
     float *ao_deviation;      /* [count], with `ao` */
+    float *distance;          /* [count], of the point itself (no start offset), signed, world units: negative
+                                 inside; NaN where the position is not finite */
+    float *gradient; /* [count][3], unit: the direction in which the distance grows, next to a surface
+                        its normal. 0, 0, 0 where the field has none: beyond its reach, at the middle
+                        of a sphere. NaN where the position is not finite */
+    size_t stride;   /* bytes from one point's value to the next in every array, a multiple of 4, at
+                        least 4, with `gradient` 12; 0: as above, without gaps */
 } vsh_query_output;
 
 static inline vsh_query_output vsh_query_output_default(void) {
-    vsh_query_output output = {sizeof(vsh_query_output), NULL, NULL, NULL, NULL};
+    vsh_query_output output = {sizeof(vsh_query_output), NULL, NULL, NULL, NULL, NULL, NULL, 0};
     return output;
 }
 
@@ -41,18 +49,48 @@ static inline vsh_query_output vsh_query_output_default(void) {
  * Up to 64 points are shaded at once on the calling thread, without allocation, progress or cancelling. More
  * run on run->threads under the stage "query". Where many points do not follow each other in space they are
  * shaded in the order of a curve that fills it (Morton, 1966), as neighbours share proofs and memory, and
- * each value is put in its place: random points then take a fraction of the time. The order is found for up
- * to 4 194 304 points at a time, which takes 16 bytes for each of them.
+ * each value is put in its place: random points then take a fraction of the time. The order is found for
+ * VSH_QUERY_BATCH points at a time, which takes 16 bytes for each of them.
  *
  * Values do not depend on that order, nor on the other points of a call, but for shadows by adaptive and
  * exact, whose rays depend on it within their error (see vsh_points), as the deviations of shadows by rays
- * do; nothing depends on threads.
+ * do; nothing depends on threads. Calls for VSH_QUERY_BATCH points each, in turn, and their numbers as
+ * `texels`, give every bit of one call for all.
  *
  * Errors (the arrays then hold nothing of use): VSH_ERROR_ARGUMENT (run, output's size, a deviation without
  * its values, AO without normals), VSH_ERROR_LIMIT (field and order need more than run->memory_limit),
  * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, const vsh_run *run,
                                     const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error);
+
+enum { VSH_QUERY_BATCH = 1 << 20 };
+
+/* Points as they stand in the caller's memory, in an array of structs say: what vsh_points holds, with
+ * strides, which are bytes from one point to the next, multiples of what they step over (4, of doubles 8) and
+ * at least a point long; 0: without gaps. */
+typedef struct vsh_strided_points {
+    size_t struct_size;
+    size_t count;
+    const double *positions;      /* [count][3], world units */
+    const float *float_positions; /* instead of them, where `positions` is NULL; the bits are those of the
+                                     same numbers as doubles */
+    size_t position_stride;
+    const float *normals; /* [count][3]; may be NULL, as in vsh_points */
+    size_t normal_stride;
+    const uint32_t *texels; /* [count]; may be NULL, as in vsh_points */
+    size_t texel_stride;
+} vsh_strided_points;
+
+static inline vsh_strided_points vsh_strided_points_default(void) {
+    vsh_strided_points points = {sizeof(vsh_strided_points), 0, NULL, NULL, 0, NULL, 0, NULL, 0};
+    return points;
+}
+
+/* As vsh_query_points(), with the same bits. Errors: as there; VSH_ERROR_ARGUMENT too for points' size, a
+ * stride that is none, both or neither of the positions with a count above 0. */
+VSH_API vsh_result vsh_query_strided(const vsh_query *query, const vsh_strided_points *points,
+                                     const vsh_run *run, const vsh_query_output *output,
+                                     vsh_shade_stats *stats, vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -6,20 +6,7 @@
 #include <string.h>
 
 enum {
-    KEY_SUN = 0x2000,
-    KEY_SUN_ANGLE,
-    KEY_AO,
-    KEY_AO_METHOD,
-    KEY_AO_CONES,
-    KEY_IRRADIANCE,
-    KEY_METHOD,
-    KEY_RAYS,
-    KEY_SAMPLER,
-    KEY_FRAME,
-    KEY_EARLY_RAYS,
-    KEY_MAX_ERROR,
-    KEY_ERROR,
-    KEY_CASTER,
+    KEY_IRRADIANCE = 0x2000,
     KEY_SIZE,
     KEY_UV_SET,
     KEY_SUPERSAMPLE,
@@ -50,30 +37,11 @@ static const cli_option options[] = {
     {KEY_DRY_RUN, "dry-run", NULL,
      "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},
     {0, NULL, NULL, "Light and occlusion"},
-    {KEY_SUN, "sun", "X,Y,Z", "direction towards the sun; its channel is shadow.sun"},
-    {KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},
-    {KEY_AO, "ao", "DISTANCE", "ambient occlusion within a distance, scene units"},
-    {KEY_AO_METHOD, "ao-method", "NAME", "taps, cones, rays, adaptive or exact (cones)"},
-    {KEY_AO_CONES, "ao-cones", "N", "cones a texel, 1 to 256 (16)"},
+    CLI_LIGHT_OPTIONS,
     {KEY_IRRADIANCE, "irradiance", NULL,
      "also irradiance.R, .G, .B: visibility × colour ×\nfalloff × cosine, summed, × AO where baked"},
-    {KEY_METHOD, "method", "NAME",
-     "shadow estimate: hard, classic, improved, smooth,\ncone, rays, adaptive, exact (cone); classic and\n"
-     "improved have the outer half of the penumbra only"},
-    {0, NULL, NULL, "Accuracy"},
-    {KEY_MAX_ERROR, "max-error", "E",
-     "standard error that a value may keep, 0.0001 to 1\n(0.02); chooses adaptive methods where none is "
-     "named\n"
-     "that keeps one"},
-    {KEY_RAYS, "rays", "N", "rays a texel, and the most that adaptive and exact\ntake, 1 to 4096 (64)"},
-    {KEY_SAMPLER, "sampler", "NAME", "where they go: sobol, white or blue (sobol)"},
-    {KEY_FRAME, "frame", "N", "another set of them: bakes of frames 0, 1, 2 … may\nbe averaged (0)"},
-    {KEY_EARLY_RAYS, "early-rays", "N",
-     "with rays: where the first N agree, the rest are not\nmarched, 0 to 4096 (0: never)"},
-    {KEY_ERROR, "error", NULL,
-     "also error.NAME of each light and error.ao: the\nstandard error left in each value"},
-    {0, NULL, NULL, "Casters and voxels"},
-    {KEY_CASTER, "caster", "FILE", "another mesh that casts shadows; may be repeated"},
+    CLI_ACCURACY_OPTIONS,
+    CLI_CASTER_OPTIONS,
     CLI_GRID_OPTIONS,
     {0, NULL, NULL, "Texels"},
     {KEY_UV_SET, "uv-set", "N",
@@ -120,6 +88,53 @@ static int take_caster(cli_bake_settings *s, const char *name, const char *value
     return CLI_OK;
 }
 
+int cli_shade_take(cli_bake_settings *s, int key, const char *name, const char *value, bool *taken) {
+    *taken = true;
+    switch (key) {
+    case CLI_KEY_SUN:
+        s->has_sun = true;
+        return cli_take_vector(name, value, s->sun);
+    case CLI_KEY_SUN_ANGLE:
+        s->has_sun_angle = true;
+        return cli_take_number(name, value, 0.0, 179.0, &s->sun_angle_deg);
+    case CLI_KEY_AO:
+        s->has_ao = true;
+        return cli_take_positive(name, value, &s->ao_distance);
+    case CLI_KEY_AO_METHOD:
+        s->has_ao_method = true;
+        return cli_take_name(name, value, vsh_ao_method, vsh_ao_method_name, &s->ao_method);
+    case CLI_KEY_AO_CONES:
+        s->has_ao_cones = true;
+        return cli_take_integer(name, value, 1, 256, &s->ao_cones);
+    case CLI_KEY_METHOD:
+        s->has_method = true;
+        return cli_take_name(name, value, vsh_shadow_method, vsh_shadow_method_name, &s->method);
+    case CLI_KEY_RAYS:
+        s->has_rays = true;
+        return cli_take_integer(name, value, 1, 4096, &s->rays);
+    case CLI_KEY_SAMPLER:
+        s->has_sampler = true;
+        return cli_take_name(name, value, vsh_sampler, vsh_sampler_name, &s->sampler);
+    case CLI_KEY_FRAME:
+        s->has_frame = true;
+        return cli_take_integer(name, value, 0, INT32_MAX, &s->frame);
+    case CLI_KEY_EARLY_RAYS:
+        s->has_early_rays = true;
+        return cli_take_integer(name, value, 0, 4096, &s->early_rays);
+    case CLI_KEY_MAX_ERROR:
+        s->has_max_error = true;
+        return cli_take_number(name, value, 1e-4, 1.0, &s->max_error);
+    case CLI_KEY_ERROR:
+        s->error = true;
+        return CLI_OK;
+    case CLI_KEY_CASTER:
+        return take_caster(s, name, value);
+    default:
+        *taken = false;
+        return CLI_OK;
+    }
+}
+
 static int take(void *settings, int key, const char *name, const char *value) {
     cli_bake_settings *s = settings;
     switch (key) {
@@ -132,47 +147,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_DRY_RUN:
         s->dry_run = true;
         return CLI_OK;
-    case KEY_SUN:
-        s->has_sun = true;
-        return cli_take_vector(name, value, s->sun);
-    case KEY_SUN_ANGLE:
-        s->has_sun_angle = true;
-        return cli_take_number(name, value, 0.0, 179.0, &s->sun_angle_deg);
-    case KEY_AO:
-        s->has_ao = true;
-        return cli_take_positive(name, value, &s->ao_distance);
-    case KEY_AO_METHOD:
-        s->has_ao_method = true;
-        return cli_take_name(name, value, vsh_ao_method, vsh_ao_method_name, &s->ao_method);
-    case KEY_AO_CONES:
-        s->has_ao_cones = true;
-        return cli_take_integer(name, value, 1, 256, &s->ao_cones);
     case KEY_IRRADIANCE:
         s->irradiance = true;
         return CLI_OK;
-    case KEY_METHOD:
-        s->has_method = true;
-        return cli_take_name(name, value, vsh_shadow_method, vsh_shadow_method_name, &s->method);
-    case KEY_RAYS:
-        s->has_rays = true;
-        return cli_take_integer(name, value, 1, 4096, &s->rays);
-    case KEY_SAMPLER:
-        s->has_sampler = true;
-        return cli_take_name(name, value, vsh_sampler, vsh_sampler_name, &s->sampler);
-    case KEY_FRAME:
-        s->has_frame = true;
-        return cli_take_integer(name, value, 0, INT32_MAX, &s->frame);
-    case KEY_EARLY_RAYS:
-        s->has_early_rays = true;
-        return cli_take_integer(name, value, 0, 4096, &s->early_rays);
-    case KEY_MAX_ERROR:
-        s->has_max_error = true;
-        return cli_take_number(name, value, 1e-4, 1.0, &s->max_error);
-    case KEY_ERROR:
-        s->error = true;
-        return CLI_OK;
-    case KEY_CASTER:
-        return take_caster(s, name, value);
     case KEY_SIZE:
         s->has_size = true;
         return cli_take_size(name, value, &s->width, &s->height);
@@ -200,7 +177,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
         break;
     }
     bool taken;
-    const int code = cli_grid_take(&s->grid, key, name, value, &taken);
+    int code = cli_shade_take(s, key, name, value, &taken);
+    code = taken ? code : cli_grid_take(&s->grid, key, name, value, &taken);
     return taken ? code : cli_common_take(&s->common, key, name, value, &taken);
 }
 

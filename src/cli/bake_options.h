@@ -6,6 +6,59 @@
 
 enum { CLI_MAX_EXTRA_CASTERS = 256 };
 
+/* What commands that shade share: keys, rows of their tables, and who takes them. */
+enum {
+    CLI_KEY_SUN = 0x3000,
+    CLI_KEY_SUN_ANGLE,
+    CLI_KEY_AO,
+    CLI_KEY_AO_METHOD,
+    CLI_KEY_AO_CONES,
+    CLI_KEY_METHOD,
+    CLI_KEY_RAYS,
+    CLI_KEY_SAMPLER,
+    CLI_KEY_FRAME,
+    CLI_KEY_EARLY_RAYS,
+    CLI_KEY_MAX_ERROR,
+    CLI_KEY_ERROR,
+    CLI_KEY_CASTER
+};
+
+#define CLI_LIGHT_OPTIONS                                                                                    \
+    {CLI_KEY_SUN, "sun", "X,Y,Z", "direction towards the sun; its channel is shadow.sun"},                   \
+        {CLI_KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},           \
+        {CLI_KEY_AO, "ao", "DISTANCE", "ambient occlusion within a distance, scene units"},                  \
+        {CLI_KEY_AO_METHOD, "ao-method", "NAME", "taps, cones, rays, adaptive or exact (cones)"},            \
+        {CLI_KEY_AO_CONES, "ao-cones", "N", "cones a texel, 1 to 256 (16)"}, {                               \
+        CLI_KEY_METHOD, "method", "NAME",                                                                    \
+            "shadow estimate: hard, classic, improved, smooth,\ncone, rays, adaptive, exact (cone); "        \
+            "classic and\n"                                                                                  \
+            "improved have the outer half of the penumbra only"                                              \
+    }
+
+#define CLI_ACCURACY_OPTIONS                                                                                 \
+    {0, NULL, NULL, "Accuracy"},                                                                             \
+        {CLI_KEY_MAX_ERROR, "max-error", "E",                                                                \
+         "standard error that a value may keep, 0.0001 to 1\n(0.02); chooses adaptive methods where none "   \
+         "is "                                                                                               \
+         "named\n"                                                                                           \
+         "that keeps one"},                                                                                  \
+        {CLI_KEY_RAYS, "rays", "N",                                                                          \
+         "rays a texel, and the most that adaptive and exact\ntake, 1 to 4096 (64)"},                        \
+        {CLI_KEY_SAMPLER, "sampler", "NAME", "where they go: sobol, white or blue (sobol)"},                 \
+        {CLI_KEY_FRAME, "frame", "N",                                                                        \
+         "another set of them: bakes of frames 0, 1, 2 … may\nbe averaged (0)"},                             \
+        {CLI_KEY_EARLY_RAYS, "early-rays", "N",                                                              \
+         "with rays: where the first N agree, the rest are not\nmarched, 0 to 4096 (0: never)"},             \
+    {                                                                                                        \
+        CLI_KEY_ERROR, "error", NULL,                                                                        \
+            "also error.NAME of each light and error.ao: the\nstandard error left in each value"             \
+    }
+
+#define CLI_CASTER_OPTIONS                                                                                   \
+    {0, NULL, NULL, "Casters and voxels"}, {                                                                 \
+        CLI_KEY_CASTER, "caster", "FILE", "another mesh that casts shadows; may be repeated"                 \
+    }
+
 typedef struct cli_bake_settings {
     const char *input;
     const char *output;
@@ -36,6 +89,9 @@ typedef struct cli_bake_settings {
     bool has_rays, has_sampler, has_frame, has_early_rays, has_max_error, error;
 } cli_bake_settings;
 
+/* Takes an option of the tables above; *taken tells whether it was one of them. */
+int cli_shade_take(cli_bake_settings *settings, int key, const char *name, const char *value, bool *taken);
+
 /* Takes the command line. */
 int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help);
 
@@ -50,6 +106,9 @@ typedef struct cli_bake_scene {
 
 /* Makes the scene, checks that it can be baked and that its outputs replace no input. */
 int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made);
+
+/* The same without its receivers: for points, which may ask for no light and no AO. */
+int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made);
 
 /* Refuses an output that is one of the scene's inputs. CLI_OK or an exit code, having said why. */
 int cli_bake_check_output(const cli_bake_settings *settings, const vsh_scene *scene, const char *output);

@@ -116,9 +116,6 @@ static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
     if (s->has_sun_angle && !s->has_sun) {
         return cli_usage("--sun-angle: there is no --sun");
     }
-    if (made->read == NULL && !s->has_sun && !s->has_ao) {
-        return cli_usage("%s: nothing to bake; give --sun X,Y,Z or --ao DISTANCE, or both", s->input);
-    }
     if (s->has_sun) {
         made->sun = vsh_light_default();
         memcpy(made->sun.direction, s->sun, sizeof made->sun.direction);
@@ -208,7 +205,14 @@ static int set_shade(const cli_bake_settings *s, vsh_scene *scene) {
     if (scene->irradiance && scene->light_count == 0) {
         return cli_usage("--irradiance: there is no light");
     }
-    if (scene->light_count == 0 && !scene->ao) {
+    return CLI_OK;
+}
+
+static int check_work(const cli_bake_settings *s, const cli_bake_scene *made) {
+    if (made->read == NULL && !s->has_sun && !s->has_ao) {
+        return cli_usage("%s: nothing to bake; give --sun X,Y,Z or --ao DISTANCE, or both", s->input);
+    }
+    if (made->scene.light_count == 0 && !made->scene.ao) {
         return cli_usage("%s: nothing to bake: no lights and no ao", s->input);
     }
     return CLI_OK;
@@ -250,7 +254,8 @@ static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
     return s->stats != NULL ? cli_bake_check_output(s, scene, s->stats) : CLI_OK;
 }
 
-int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made) {
+/* The input, or defaults for a mesh, with what the options put over it. */
+static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scene *made) {
     memset(made, 0, sizeof *made);
     if (cli_has_ending(settings->input, "json")) {
         vsh_error error;
@@ -259,7 +264,7 @@ int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made)
         }
         made->scene = *made->read;
     } else {
-        if (settings->output == NULL) {
+        if (receivers && settings->output == NULL) {
             return cli_usage("%s: no output; give -o OUT", settings->input);
         }
         made->scene.grid = vsh_grid_options_default();
@@ -268,7 +273,19 @@ int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made)
     cli_grid_apply(&settings->grid, &made->scene.grid);
     int code = add_lights(settings, made);
     code = code == CLI_OK ? set_shade(settings, &made->scene) : code;
-    code = code == CLI_OK ? add_casters(settings, made) : code;
+    code = code == CLI_OK && receivers ? check_work(settings, made) : code;
+    return code == CLI_OK ? add_casters(settings, made) : code;
+}
+
+int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made) {
+    const int code = make(settings, false, made);
+    made->scene.receivers = NULL;
+    made->scene.receiver_count = 0;
+    return code;
+}
+
+int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made) {
+    int code = make(settings, true, made);
     code = code == CLI_OK ? add_receivers(settings, made) : code;
     return code == CLI_OK ? check_outputs(settings, &made->scene) : code;
 }

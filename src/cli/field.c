@@ -17,8 +17,30 @@ void cli_box_grow(cli_box *box, const vsh_texels_info *info) {
     }
 }
 
-int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_box *receivers,
-                   const vsh_run *run, cli_field *made) {
+/* Reach for receivers in `box`, or (NULL) for points within `within` of the casters' box. */
+static double reach_of(const vsh_scene *scene, const vsh_grid *grid, const cli_box *box, double within) {
+    if (box != NULL) {
+        return vsh_scene_reach(scene, grid, box->min, box->max);
+    }
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    double diagonal = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        diagonal = hypot(diagonal, info.bounds_max[axis] - info.bounds_min[axis]);
+    }
+    cli_box around;
+    const double margin = within > 0.0 ? within : CLI_WITHIN_DIAGONALS * diagonal;
+    for (int axis = 0; axis < 3; ++axis) {
+        around.min[axis] = info.bounds_min[axis] - margin;
+        around.max[axis] = info.bounds_max[axis] + margin;
+    }
+    const double reach = vsh_scene_reach(scene, grid, around.min, around.max);
+    /* the library's own default, where that is enough: a program that takes it gets the same bits */
+    return reach > CLI_WITHIN_DIAGONALS * diagonal ? reach : vsh_field_options_default().reach;
+}
+
+static int make(const vsh_scene *scene, const vsh_assets *assets, const cli_box *receivers, double within,
+                const vsh_run *run, cli_field *made) {
     const double start = cli_seconds();
     vsh_grid *grid = NULL;
     vsh_error error;
@@ -29,7 +51,7 @@ int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_b
     vsh_grid_get_info(grid, &made->grid);
     const double voxelized = cli_seconds();
     vsh_field_options options = vsh_field_options_default();
-    options.reach = vsh_scene_reach(scene, grid, receivers->min, receivers->max);
+    options.reach = reach_of(scene, grid, receivers, within);
     const vsh_result result = vsh_field_create(grid, &options, run, &made->field, &error);
     vsh_grid_free(grid); /* the field does not need it */
     if (result != VSH_OK) {
@@ -39,6 +61,16 @@ int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_b
     made->voxelize_s = voxelized - start;
     made->field_s = cli_seconds() - voxelized;
     return CLI_OK;
+}
+
+int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_box *receivers,
+                   const vsh_run *run, cli_field *made) {
+    return make(scene, assets, receivers, 0.0, run, made);
+}
+
+int cli_field_make_around(const vsh_scene *scene, const vsh_assets *assets, double within, const vsh_run *run,
+                          cli_field *made) {
+    return make(scene, assets, NULL, within, run, made);
 }
 
 int cli_triangles_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,

@@ -24,6 +24,14 @@ typedef struct cli_field {
 int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_box *receivers,
                    const vsh_run *run, cli_field *made);
 
+/* Diagonals of the casters' box. */
+#define CLI_WITHIN_DIAGONALS 4.0
+
+/* The same for points that are not known beforehand, within a distance of the casters' box; 0:
+ * CLI_WITHIN_DIAGONALS. It does not depend on the points, so that neither do their bits. */
+int cli_field_make_around(const vsh_scene *scene, const vsh_assets *assets, double within, const vsh_run *run,
+                          cli_field *made);
+
 /* The casters' triangles where one of the scene's methods traces them, else NULL; likewise. */
 int cli_triangles_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                        vsh_triangles **triangles);

@@ -29,12 +29,13 @@ int cli_stats_write(const cli_stats *stats, const char *path) {
     for (int i = 0; i < CLI_STAGE_COUNT; ++i) {
         json_object_set_new(stages, stage_names[i], json_real(stats->seconds[i]));
     }
+    const bool points = stats->of_points;
     const struct {
         const char *name;
         uint64_t value;
     } counts[] = {
-        {"texels", stats->texels},
-        {"invalid_texels", stats->invalid_texels},
+        {points ? "points" : "texels", points ? stats->points : stats->texels},
+        {points ? "bad_rows" : "invalid_texels", points ? stats->bad_rows : stats->invalid_texels},
         {"samples", stats->shade.samples},
         {"marches", stats->shade.marches},
         {"certified", stats->shade.certified},
@@ -43,7 +44,7 @@ int cli_stats_write(const cli_stats *stats, const char *path) {
         {"rays", stats->shade.rays},
         {"refined", stats->shade.refined},
         {"peak_bytes", peak_bytes()},
-        {"bands", stats->bands},
+        {points ? "beyond_reach" : "bands", points ? stats->shade.beyond_reach : stats->bands},
         {"threads", (uint64_t)stats->threads},
         {"levels", (uint64_t)stats->field.levels},
         {"field_bytes", stats->field.bytes},
@@ -81,6 +82,7 @@ void cli_stats_say(const cli_stats *stats) {
             stats->field.levels == 1 ? "" : "s", cli_bytes_text(stats->field.bytes, field, sizeof field),
             stats->threads, stats->threads == 1 ? "" : "s", cli_bytes_text(peak_bytes(), peak, sizeof peak));
     const double *s = stats->seconds;
-    cli_say("load %.2f s, voxelize %.2f s, field %.2f s, bake %.2f s, write %.2f s", s[CLI_STAGE_LOAD],
-            s[CLI_STAGE_VOXELIZE], s[CLI_STAGE_FIELD], s[CLI_STAGE_BAKE], s[CLI_STAGE_WRITE]);
+    cli_say("load %.2f s, voxelize %.2f s, field %.2f s, %s %.2f s, write %.2f s", s[CLI_STAGE_LOAD],
+            s[CLI_STAGE_VOXELIZE], s[CLI_STAGE_FIELD], stats->of_points ? "shade" : "bake", s[CLI_STAGE_BAKE],
+            s[CLI_STAGE_WRITE]);
 }

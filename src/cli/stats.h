@@ -2,6 +2,7 @@
 #ifndef CLI_STATS_H
 #define CLI_STATS_H
 
+#include <stdbool.h>
 #include <vdbshade/vdbshade.h>
 
 enum {
@@ -17,6 +18,8 @@ typedef struct cli_stats {
     double seconds[CLI_STAGE_COUNT];
     uint64_t texels;
     uint64_t invalid_texels;
+    bool of_points; /* the counts are points, not texels */
+    uint64_t points, bad_rows;
     uint64_t bands; /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
     double estimated_values; /* behind shade.square_error and shade.refined, by adaptive and exact methods */

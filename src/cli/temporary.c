@@ -4,8 +4,7 @@
 
 #include <dirent.h>
 #include <errno.h>
-#include <limits.h>
-#include <stdio.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -62,25 +61,48 @@ int cli_temporary_check(const char *target) {
     return access(folder, W_OK | X_OK) == 0 ? CLI_OK : fail(target);
 }
 
-int cli_temporary_write(const char *target, const char *text) {
+int cli_temporary_begin(cli_temporary *t, const char *target) {
     char real[PATH_MAX], folder[PATH_MAX];
     const char *name = split(target, real, folder);
-    char temporary[2 * PATH_MAX];
-    snprintf(temporary, sizeof temporary, "%s/.%.200s.%ld.tmp", folder, name, (long)getpid());
-    char final[2 * PATH_MAX];
-    snprintf(final, sizeof final, "%s/%s", folder, name);
-    FILE *file = fopen(temporary, "wbx");
-    if (file == NULL) {
-        return fail(target);
+    *t = (cli_temporary){.target = target};
+    snprintf(t->temporary, sizeof t->temporary, "%s/.%.200s.%ld.tmp", folder, name, (long)getpid());
+    snprintf(t->final, sizeof t->final, "%s/%s", folder, name);
+    t->file = fopen(t->temporary, "wbx");
+    return t->file != NULL ? CLI_OK : fail(target);
+}
+
+void cli_temporary_abandon(cli_temporary *t) {
+    if (t->file != NULL) {
+        fclose(t->file);
+        unlink(t->temporary);
+        t->file = NULL;
     }
-    const int written = fputs(text, file) >= 0 && fflush(file) == 0;
+}
+
+int cli_temporary_commit(cli_temporary *t) {
+    const bool written = fflush(t->file) == 0 && !ferror(t->file);
     const int write_error = errno;
-    const int closed = fclose(file) == 0;
-    if (!written || !closed || rename(temporary, final) != 0) {
+    const bool closed = fclose(t->file) == 0;
+    t->file = NULL;
+    struct stat old;
+    if (written && closed && stat(t->final, &old) == 0 && chmod(t->temporary, old.st_mode & 0777) != 0) {
+        errno = 0; /* some file systems have no modes */
+    }
+    if (!written || !closed || rename(t->temporary, t->final) != 0) {
         errno = written ? errno : write_error;
-        const int code = fail(target);
-        unlink(temporary);
+        const int code = fail(t->target);
+        unlink(t->temporary);
         return code;
     }
     return CLI_OK;
+}
+
+int cli_temporary_write(const char *target, const char *text) {
+    cli_temporary t;
+    const int code = cli_temporary_begin(&t, target);
+    if (code != CLI_OK) {
+        return code;
+    }
+    fputs(text, t.file); /* a failure stays with the file */
+    return cli_temporary_commit(&t);
 }

@@ -2,8 +2,24 @@
 #ifndef CLI_TEMPORARY_H
 #define CLI_TEMPORARY_H
 
+#include <limits.h>
+#include <stdio.h>
+
 /* Removes this process's temporary files from the folder of `target`. */
 void cli_temporary_remove(const char *target);
+
+/* A file under way, written through `file`. */
+typedef struct cli_temporary {
+    FILE *file; /* NULL: nothing is under way */
+    const char *target;
+    char temporary[2 * PATH_MAX], final[2 * PATH_MAX];
+} cli_temporary;
+
+/* CLI_OK or, having said why, CLI_FILE. After success, end with commit, which also returns one of them and
+ * puts the file in its place, or with abandon. */
+int cli_temporary_begin(cli_temporary *temporary, const char *target);
+int cli_temporary_commit(cli_temporary *temporary);
+void cli_temporary_abandon(cli_temporary *temporary);
 
 /* Writes a text file: whole, or not at all. Returns CLI_OK or, having said why, CLI_FILE. */
 int cli_temporary_write(const char *target, const char *text);

@@ -92,17 +92,22 @@ static inline float vshi_level_sample(const vsh_field *field, int32_t l, const f
  * of the band: this much of a band is left to the next level, voxels. */
 #define VSHI_BAND_EDGE 0.5f
 
-/* Signed distance at a field-space position from the finest level that resolves it, finest voxels. */
-static inline float vshi_field_distance(const vsh_field *field, const float p[3]) {
+/* Signed distance at a field-space position from the finest level that resolves it, finest voxels. Where
+ * `gradient` is not NULL, it is that level's cell's own; zero beyond the reach. */
+static inline float vshi_field_sample(const vsh_field *field, const float p[3], float gradient[3]) {
     float h = 0.0f;
     for (int32_t l = 0; l < field->level_count; ++l) {
         const float resolved = field->levels[l].band - VSHI_BAND_EDGE * field->levels[l].scale;
-        h = vshi_level_sample(field, l, p, NULL);
+        h = vshi_level_sample(field, l, p, gradient);
         if (h < resolved && h > -resolved) {
             break;
         }
     }
     return h;
+}
+
+static inline float vshi_field_distance(const vsh_field *field, const float p[3]) {
+    return vshi_field_sample(field, p, NULL);
 }
 
 /* World position to field space, in double precision. */

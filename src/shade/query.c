@@ -7,6 +7,7 @@
 #include "shade/ao.h"
 #include "shade/order.h"
 #include "shade/shadow.h"
+#include "shade/view.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -89,11 +90,12 @@ vsh_result vsh_query_create(const vsh_field *field, const vsh_light *lights, siz
 
 typedef struct query_call {
     const vsh_query *query;
-    const vsh_points *points;
+    const vsh_points *points; /* where they, and the output, are packed; else NULL */
+    vshi_view view;
     const vsh_query_output *output;
     const vshi_kernel *kernel;
-    size_t first;          /* of the points in `order` */
-    const uint32_t *order; /* numbers from `first` on */
+    size_t first;          /* of the points that are under way */
+    const uint32_t *order; /* their numbers from `first` on, or NULL: as they come */
 } query_call;
 
 static inline float *array_of(float *const *arrays, size_t light) {
@@ -120,10 +122,35 @@ static void shade_sky(const query_call *call, const vsh_points *points, size_t b
     vshi_ao_shade(&task, begin, end, stats);
 }
 
-/* Points begin … end - 1, at most VSHI_PIECE of them, as they stand. */
+/* Distances and, where not NULL, gradients of positions [count][3]. */
+static void measure(const query_call *call, size_t count, const double *positions, float *distances,
+                    float *gradients) {
+    const vsh_field *field = call->query->ao.field;
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_vec p = vshi_to_field(field, positions + 3 * i);
+        const bool finite = vshi_finite(p);
+        const float at[3] = {(float)p.x, (float)p.y, (float)p.z};
+        float slope[3];
+        const float h = vshi_field_sample(field, at, gradients != NULL ? slope : NULL);
+        if (distances != NULL) {
+            distances[i] = finite ? (float)((double)h * field->voxel_size) : NAN;
+        }
+        if (gradients != NULL) {
+            const vshi_vec g =
+                finite ? vshi_direction_to_world(field, vshi_vec_off(slope)) : (vshi_vec){NAN, NAN, NAN};
+            gradients[3 * i] = (float)g.x;
+            gradients[3 * i + 1] = (float)g.y;
+            gradients[3 * i + 2] = (float)g.z;
+        }
+    }
+}
+
+/* Points begin … end - 1 from `first` on, at most VSHI_PIECE of them, as they stand. */
 static void shade_in_place(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const query_call *call = user;
     const vsh_query_output *output = call->output;
+    begin += call->first;
+    end += call->first;
     for (size_t l = 0; output->visibility != NULL && l < call->query->light_count; ++l) {
         if (output->visibility[l] != NULL) {
             shade_light(call, l, call->points, begin, end, output->visibility[l],
@@ -133,83 +160,118 @@ static void shade_in_place(const void *user, size_t begin, size_t end, vsh_shade
     if (output->ao != NULL) {
         shade_sky(call, call->points, begin, end, output->ao, output->ao_deviation, stats);
     }
+    if (output->distance != NULL || output->gradient != NULL) {
+        measure(call, end - begin, call->points->positions + 3 * begin,
+                output->distance != NULL ? output->distance + begin : NULL,
+                output->gradient != NULL ? output->gradient + 3 * begin : NULL);
+    }
 }
 
-/* Points of the order, brought together. */
+/* Points from anywhere, brought together. */
 typedef struct gathered {
     double positions[VSHI_PIECE][3];
     float normals[VSHI_PIECE][3];
     uint32_t texels[VSHI_PIECE];
     float values[VSHI_PIECE], deviations[VSHI_PIECE];
+    float gradients[VSHI_PIECE][3];
 } gathered;
 
-static void scatter(const uint32_t *order, size_t count, const float *values, float *to) {
-    for (size_t i = 0; i < count; ++i) {
-        to[order[i]] = values[i];
+/* Numbers of the points of a piece. */
+typedef struct piece {
+    const query_call *call;
+    size_t begin, count;
+    size_t stride; /* of the output, bytes; 0: packed */
+} piece;
+
+static inline size_t number_of(const piece *p, size_t i) {
+    const query_call *call = p->call;
+    return call->first + (call->order != NULL ? call->order[p->begin + i] : p->begin + i);
+}
+
+static void scatter(const piece *p, size_t width, const float *values, float *to) {
+    const size_t stride = p->stride != 0 ? p->stride : width * sizeof *to;
+    for (size_t i = 0; to != NULL && i < p->count; ++i) {
+        memcpy((char *)to + number_of(p, i) * stride, values + width * i, width * sizeof *to);
     }
 }
 
-/* The same of the order's begin … end - 1. */
-static void shade_in_order(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
+static void gather(const piece *p, gathered *g) {
     enum { AHEAD = 16 }; /* what comes next, from anywhere in memory, is asked for so early */
+    const vshi_view *all = &p->call->view;
+    for (size_t i = 0; i < p->count; ++i) {
+        const size_t next = number_of(p, i + AHEAD < p->count ? i + AHEAD : i);
+        const size_t point = number_of(p, i);
+        __builtin_prefetch(all->positions + next * all->position_stride);
+        vshi_view_position(all, point, g->positions[i]);
+        if (all->normals != NULL) {
+            __builtin_prefetch(all->normals + next * all->normal_stride);
+            memcpy(g->normals[i], all->normals + point * all->normal_stride, sizeof g->normals[i]);
+        }
+        g->texels[i] = (uint32_t)point;
+        if (all->texels != NULL) {
+            memcpy(&g->texels[i], all->texels + point * all->texel_stride, sizeof g->texels[i]);
+        }
+    }
+}
+
+/* The same of points in an order, or apart in memory. */
+static void shade_gathered(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const query_call *call = user;
     const vsh_query_output *output = call->output;
-    const vsh_points *all = call->points;
-    const uint32_t *order = call->order + begin;
-    const size_t count = end - begin;
+    const piece p = {call, begin, end - begin, output->stride};
     gathered g;
-    for (size_t i = 0; i < count; ++i) {
-        const size_t next = call->first + order[i + AHEAD < count ? i + AHEAD : i];
-        const size_t point = call->first + order[i];
-        __builtin_prefetch(all->positions + 3 * next);
-        memcpy(g.positions[i], all->positions + 3 * point, sizeof g.positions[i]);
-        if (all->normals != NULL) {
-            __builtin_prefetch(all->normals + 3 * next);
-            memcpy(g.normals[i], all->normals + 3 * point, sizeof g.normals[i]);
-        }
-        g.texels[i] = all->texels != NULL ? all->texels[point] : (uint32_t)point;
-    }
-    const vsh_points points = {count, &g.positions[0][0], all->normals != NULL ? &g.normals[0][0] : NULL,
-                               g.texels};
+    gather(&p, &g);
+    const vsh_points points = {p.count, &g.positions[0][0],
+                               call->view.normals != NULL ? &g.normals[0][0] : NULL, g.texels};
     for (size_t l = 0; output->visibility != NULL && l < call->query->light_count; ++l) {
-        if (output->visibility[l] == NULL) {
-            continue;
-        }
-        float *deviation = array_of(output->deviation, l);
-        shade_light(call, l, &points, 0, count, g.values, deviation != NULL ? g.deviations : NULL, stats);
-        scatter(order, count, g.values, output->visibility[l] + call->first);
-        if (deviation != NULL) {
-            scatter(order, count, g.deviations, deviation + call->first);
+        if (output->visibility[l] != NULL) {
+            float *deviation = array_of(output->deviation, l);
+            shade_light(call, l, &points, 0, p.count, g.values, deviation != NULL ? g.deviations : NULL,
+                        stats);
+            scatter(&p, 1, g.values, output->visibility[l]);
+            scatter(&p, 1, g.deviations, deviation);
         }
     }
     if (output->ao != NULL) {
-        shade_sky(call, &points, 0, count, g.values, output->ao_deviation != NULL ? g.deviations : NULL,
+        shade_sky(call, &points, 0, p.count, g.values, output->ao_deviation != NULL ? g.deviations : NULL,
                   stats);
-        scatter(order, count, g.values, output->ao + call->first);
-        if (output->ao_deviation != NULL) {
-            scatter(order, count, g.deviations, output->ao_deviation + call->first);
-        }
+        scatter(&p, 1, g.values, output->ao);
+        scatter(&p, 1, g.deviations, output->ao_deviation);
+    }
+    if (output->distance != NULL || output->gradient != NULL) {
+        measure(call, p.count, points.positions, g.values,
+                output->gradient != NULL ? &g.gradients[0][0] : NULL);
+        scatter(&p, 1, g.values, output->distance);
+        scatter(&p, 3, &g.gradients[0][0], output->gradient);
     }
 }
 
-static vsh_result shade_ordered(query_call *call, const vsh_run *run, vshi_job *job, vsh_shade_stats *stats,
-                                vsh_error *error) {
+/* VSHI_ORDER_MOST points at a time, so that calls for so many each give the same bits. */
+static vsh_result shade_many(query_call *call, const vsh_run *run, vshi_job *job, vsh_shade_stats *stats,
+                             vsh_error *error) {
     const vsh_field *field = call->query->ao.field;
-    const size_t count = call->points->count;
+    const size_t count = call->view.count;
     const size_t most = count < VSHI_ORDER_MOST ? count : VSHI_ORDER_MOST;
     vshi_order order = {NULL, NULL, 0};
-    vsh_result result =
-        vshi_check_limit(run, vshi_field_bytes(field) + (double)most * VSHI_ORDER_BYTES, "query", error);
-    if (result == VSH_OK) {
-        result = vshi_order_create(most, &order, error);
-    }
+    vsh_result result = VSH_OK;
     for (; result == VSH_OK && call->first < count; call->first += most) {
         const size_t left = count - call->first;
         const size_t now = left < most ? left : most;
-        result = vshi_order_points(job, field, call->points, call->first, now, &order, error);
-        if (result == VSH_OK) {
+        const bool ordered = vshi_order_pays(field, &call->view, call->first, now);
+        call->order = NULL;
+        if (ordered && order.memory == NULL) {
+            result = vshi_check_limit(run, vshi_field_bytes(field) + (double)most * VSHI_ORDER_BYTES, "query",
+                                      error);
+            result = result == VSH_OK ? vshi_order_create(most, &order, error) : result;
+        }
+        if (result == VSH_OK && ordered) {
+            result = vshi_order_points(job, field, &call->view, call->first, now, &order, error);
             call->order = order.point;
-            result = vshi_shade_pieces(job, now, NULL, VSHI_PIECE, shade_in_order, call, stats, error);
+        }
+        if (result == VSH_OK) {
+            result = vshi_shade_pieces(job, now, NULL, VSHI_PIECE,
+                                       ordered || call->points == NULL ? shade_gathered : shade_in_place,
+                                       call, stats, error);
         }
     }
     vshi_order_free(&order);
@@ -217,9 +279,9 @@ static vsh_result shade_ordered(query_call *call, const vsh_run *run, vshi_job *
 }
 
 /* Whether anything is asked for. Errors: VSH_ERROR_ARGUMENT. */
-static vsh_result check_output(const vsh_query *query, const vsh_points *points,
-                               const vsh_query_output *output, bool *any, vsh_error *error) {
-    *any = output->ao != NULL;
+static vsh_result check_output(const vsh_query *query, const vshi_view *view, const vsh_query_output *output,
+                               bool *any, vsh_error *error) {
+    *any = output->ao != NULL || output->distance != NULL || output->gradient != NULL;
     for (size_t l = 0; l < query->light_count; ++l) {
         const bool asked = array_of(output->visibility, l) != NULL;
         if (!asked && array_of(output->deviation, l) != NULL) {
@@ -231,12 +293,19 @@ static vsh_result check_output(const vsh_query *query, const vsh_points *points,
     if (output->ao == NULL && output->ao_deviation != NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: ao_deviation without ao");
     }
-    return output->ao != NULL ? vshi_ao_check_points(points, error) : VSH_OK;
+    const size_t least = (output->gradient != NULL ? 3 : 1) * sizeof(float);
+    if (output->stride != 0 && (output->stride < least || output->stride % sizeof(float) != 0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: stride %zu: expected 0 or bytes, %zu, %zu …",
+                         output->stride, least, least + sizeof(float));
+    }
+    return output->ao != NULL && view->normals == NULL ? vshi_ao_check_points(&(vsh_points){0}, error)
+                                                       : VSH_OK;
 }
 
-vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, const vsh_run *run,
-                            const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error) {
-    VSHI_FLOATS;
+/* `packed`: the points, where they are without gaps; else NULL. */
+static vsh_result answer(const vsh_query *query, const vshi_view *view, const vsh_points *packed,
+                         const vsh_run *run, const vsh_query_output *output, vsh_shade_stats *stats,
+                         vsh_error *error) {
     vsh_run full_run;
     vsh_query_output full = vsh_query_output_default();
     bool any = false;
@@ -245,26 +314,83 @@ vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, co
         result = vshi_options_resolve(output, &full, sizeof full, "vsh_query_output", error);
     }
     if (result == VSH_OK) {
-        result = check_output(query, points, &full, &any, error);
+        result = check_output(query, view, &full, &any, error);
     }
-    if (result != VSH_OK || !any || points->count == 0) {
+    if (result != VSH_OK || !any || view->count == 0) {
         return result;
     }
-    query_call call = {
-        .query = query, .points = points, .output = &full, .kernel = vshi_kernel_of(full_run.isa)};
-    if (points->count <= FEW) {
+    query_call call = {.query = query,
+                       .points = full.stride == 0 ? packed : NULL,
+                       .view = *view,
+                       .output = &full,
+                       .kernel = vshi_kernel_of(full_run.isa)};
+    if (view->count <= FEW) {
         vsh_shade_stats own = vsh_shade_stats_zero();
-        shade_in_place(&call, 0, points->count, stats != NULL ? stats : &own);
+        vshi_shade_fn *shade = call.points != NULL ? shade_in_place : shade_gathered;
+        shade(&call, 0, view->count, stats != NULL ? stats : &own);
         return VSH_OK;
     }
-    vshi_job *job = vshi_job_begin(&full_run, "query", points->count);
+    vshi_job *job = vshi_job_begin(&full_run, "query", view->count);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "query: the system refused memory");
     }
-    result =
-        vshi_order_pays(query->ao.field, points)
-            ? shade_ordered(&call, &full_run, job, stats, error)
-            : vshi_shade_pieces(job, points->count, NULL, VSHI_PIECE, shade_in_place, &call, stats, error);
+    result = shade_many(&call, &full_run, job, stats, error);
     vshi_job_end(job);
     return result;
+}
+
+vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, const vsh_run *run,
+                            const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error) {
+    VSHI_FLOATS;
+    const vshi_view view = vshi_view_of(points);
+    return answer(query, &view, points, run, output, stats, error);
+}
+
+/* 0 becomes `packed`. Errors: VSH_ERROR_ARGUMENT. */
+static vsh_result resolve_stride(const char *name, size_t unit, size_t packed, size_t *stride,
+                                 vsh_error *error) {
+    if (*stride != 0 && (*stride < packed || *stride % unit != 0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "points: %s %zu: expected 0 or bytes, %zu, %zu …", name,
+                         *stride, packed, packed + unit);
+    }
+    *stride = *stride != 0 ? *stride : packed;
+    return VSH_OK;
+}
+
+vsh_result vsh_query_strided(const vsh_query *query, const vsh_strided_points *points, const vsh_run *run,
+                             const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error) {
+    VSHI_FLOATS;
+    vsh_strided_points p = vsh_strided_points_default();
+    vsh_result result = vshi_options_resolve(points, &p, sizeof p, "vsh_strided_points", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    const bool floats = p.positions == NULL;
+    if (p.count > 0 && floats == (p.float_positions == NULL)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "points: expected one of positions and float_positions");
+    }
+    const size_t unit = floats ? sizeof(float) : sizeof(double);
+    result = resolve_stride("position_stride", unit, 3 * unit, &p.position_stride, error);
+    if (result == VSH_OK) {
+        result = resolve_stride("normal_stride", sizeof(float), 3 * sizeof(float), &p.normal_stride, error);
+    }
+    if (result == VSH_OK) {
+        result = resolve_stride("texel_stride", sizeof(uint32_t), sizeof(uint32_t), &p.texel_stride, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    const vshi_view view = {p.count,
+                            floats ? (const char *)p.float_positions : (const char *)p.positions,
+                            (const char *)p.normals,
+                            (const char *)p.texels,
+                            p.position_stride,
+                            p.normal_stride,
+                            p.texel_stride,
+                            floats};
+    const vsh_points packed = {p.count, p.positions, p.normals, p.texels};
+    const bool gaps = floats || p.position_stride != 3 * sizeof(double) ||
+                      (p.normals != NULL && p.normal_stride != 3 * sizeof(float)) ||
+                      (p.texels != NULL && p.texel_stride != sizeof(uint32_t));
+    return answer(query, &view, gaps ? NULL : &packed, run, output, stats, error);
 }

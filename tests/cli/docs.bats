@@ -1,4 +1,4 @@
-# Every scene in docs/scene.md bakes.
+# Every scene in docs/scene.md bakes, and every command in docs/query.md runs.
 load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
@@ -31,4 +31,19 @@ setup() {
             [ -s "$output" ] || fail "$scene: no $output"
         done
     done
+}
+
+@test "every command of docs/query.md" {
+    mkdir bin
+    ln -s "$(realpath "$VDBSHADE")" bin/vdbshade
+    ln -s "$(cd "$ASSETS" && pwd)" assets
+    printf '0.5,0.001,0.5,0,1,0\n-1,0.001,1,0,1,0\n' >points.csv
+    printf 'ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n' >props.ply
+    printf 'property float nx\nproperty float ny\nproperty float nz\nend_header\n0 0.1 0 0 1 0\n' >>props.ply
+    awk '/^```sh$/ { inside = 1; next } /^```$/ { inside = 0 } inside' "$DOCS/query.md" >commands
+    [ "$(grep -c vdbshade commands)" -ge 3 ]
+    while read -r command; do
+        PATH=$PWD/bin:$PATH bash -c "set -o pipefail; $command" >/dev/null 2>err.txt || fail "$command: $(cat err.txt)"
+    done <commands
+    [ -s shaded.csv ] && [ -s props-lit.ply ] && [ "$(wc -l <sorted.csv)" -eq 2 ]
 }

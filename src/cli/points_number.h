@@ -1,0 +1,20 @@
+/* Numbers in text, as every locale writes them in files: read exactly, written so that they read back as the
+ * same bits. */
+#ifndef CLI_POINTS_NUMBER_H
+#define CLI_POINTS_NUMBER_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+enum { CLI_NUMBER_ROOM = 32 }; /* what any number takes as text */
+
+/* The number that text … end - 1 is, all of it: [+-]digits[.digits][e[+-]digits], correctly rounded, or nan,
+ * inf and infinity in any case. False where it is none. */
+bool cli_number_read(const char *text, const char *end, double *value);
+
+/* The shortest decimal, of up to 9 (17) digits, that reads back as `value`; "nan", "inf" and "-inf". Not
+ * ended by NUL. Returns behind it. */
+char *cli_number_write_float(char *text, float value);
+char *cli_number_write_double(char *text, double value);
+
+#endif

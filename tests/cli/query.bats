@@ -1,0 +1,458 @@
+# vdbshade query: points in files and pipes.
+load helper
+
+SOURCE=$BATS_TEST_DIRNAME/../..
+
+# The seeds' scene, coarse, and points over its floor.
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    sed 's/"voxel_size": 0.02/"voxel_size": 0.05/' "$ASSETS/seeds.json" >scene.json
+    ln -s "$(cd "$ASSETS" && pwd)/seeds_floor.obj" .
+    QUERY=(query scene.json --ao-method taps --quiet)
+}
+
+# compile NAME [SOURCE …]: NAME.c with the library and its headers.
+compile() {
+    local build name=$1
+    shift
+    build=$(dirname "$(realpath "$VDBSHADE")")
+    "${CC:-cc}" -std=gnu11 -O1 ${CFLAGS-} -I"$SOURCE/include" -I"$SOURCE/tests" "$name.c" "$@" -L"$build" -lvdbshade -lm \
+        -Wl,-rpath,"$build" -o "$name"
+}
+
+# points N: raw floats on standard output, a spiral over the floor, normals up or leaning.
+points() {
+    [ -x points ] || {
+        cat >points.c <<'C'
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+int main(int argc, char **argv) {
+    const long count = atol(argv[argc - 1]);
+    for (long i = 0; i < count; ++i) {
+        const double r = 2.4 * sqrt((i + 0.5) / count), a = 2.399963 * i;
+        const float row[6] = {(float)(r * cos(a)), 0.001f, (float)(r * sin(a)), 0.0f, 1.0f, i % 3 == 1 ? 0.1f : 0.0f};
+        fwrite(row, sizeof row, 1, stdout);
+    }
+    return 0;
+}
+C
+        compile points
+    }
+    ./points "$1"
+}
+
+# What the C API answers for raw rows of 6 floats: shadow, ao, distance, gradient of each, as raw floats.
+api() {
+    cat >api.c <<'C'
+#include <stdio.h>
+#include <stdlib.h>
+#include <vdbshade/vdbshade.h>
+#define CHECK(call) if ((call) != VSH_OK) return fprintf(stderr, "%s\n", error.message), 1
+int main(int argc, char **argv) {
+    (void)argc;
+    vsh_error error = {0};
+    vsh_scene *scene;
+    vsh_assets *assets;
+    vsh_grid *grid;
+    vsh_field *field;
+    vsh_query *query;
+    CHECK(vsh_scene_read("scene.json", &scene, &error));
+    CHECK(vsh_assets_load(scene, NULL, &assets, &error));
+    CHECK(vsh_scene_casters(scene, assets, NULL, &grid, &error));
+    CHECK(vsh_field_create(grid, NULL, NULL, &field, &error));
+    vsh_shade_options shade = scene->shade;
+    shade.method = vsh_shadow_method(argv[1]);
+    shade.ao_method = VSH_AO_TAPS;
+    CHECK(vsh_query_create(field, scene->lights, scene->light_count, &shade, &query, &error));
+    enum { MOST = 100000 };
+    static float rows[MOST][6], answers[MOST][6];
+    vsh_strided_points points = vsh_strided_points_default();
+    points.count = fread(rows, sizeof rows[0], MOST, stdin);
+    points.float_positions = rows[0];
+    points.normals = rows[0] + 3;
+    points.position_stride = points.normal_stride = sizeof rows[0];
+    float *const visibility[1] = {answers[0]};
+    vsh_query_output output = vsh_query_output_default();
+    output.visibility = visibility;
+    output.ao = answers[0] + 1;
+    output.distance = answers[0] + 2;
+    output.gradient = answers[0] + 3;
+    output.stride = sizeof answers[0];
+    CHECK(vsh_query_strided(query, &points, NULL, &output, NULL, &error));
+    fwrite(answers, sizeof answers[0], points.count, stdout);
+    return 0;
+}
+C
+    compile api
+    ./api "$1"
+}
+
+ANSWERS=(--distance --gradient --answers-only)
+
+@test "file, pipe and C API give the same bits, in every format" {
+    points 40000 >p.raw # enough to be put in order
+    for method in cone adaptive; do
+        api "$method" <p.raw >api.raw
+        [ "$(wc -c <api.raw)" -eq 960000 ]
+        shade "${QUERY[@]}" --method "$method" "${ANSWERS[@]}" --points p.raw --normals yes -o file.raw
+        done_well
+        cmp file.raw api.raw
+        "$VDBSHADE" "${QUERY[@]}" --method "$method" "${ANSWERS[@]}" --points - --points-format raw --normals yes -o - \
+            <p.raw | cmp - api.raw
+    done
+    # the points through CSV and PLY, and the answers back
+    for format in csv ply; do
+        "$VDBSHADE" "${QUERY[@]}" --distance --points p.raw --normals yes -o "p.$format"
+        "$VDBSHADE" "${QUERY[@]}" --method adaptive "${ANSWERS[@]}" --points "p.$format" -o "$format.raw"
+        cmp "$format.raw" api.raw
+        # and by text: a CSV of answers, read as positions, is the answers
+        "$VDBSHADE" "${QUERY[@]}" --method adaptive "${ANSWERS[@]}" --points - --points-format "$format" --format csv \
+            -o - <"p.$format" >"$format.csv"
+        [ "$(head -1 "$format.csv")" = "shadow.sun,ao,distance,gradient.x,gradient.y,gradient.z" ] || fail "head"
+        cmp "$format.csv" csv.csv
+    done
+    perl -F, -ne 'print pack("f<6", @F) if $. > 1' csv.csv | cmp - api.raw
+}
+
+@test "threads, batches and memory change no bit" {
+    points 40000 >p.raw
+    QUERY+=(--method rays --rays 4) # rows are told apart by their numbers
+    shade "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes -o whole.raw
+    done_well
+    for options in "--threads 1" "--batch 1000" "--batch 7" "--memory-limit 24M"; do
+        shade "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes $options -o part.raw
+        done_well
+        cmp part.raw whole.raw || fail "$options"
+    done
+    shade "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes --memory-limit 4M -o part.raw
+    refused 4 "memory limit"
+}
+
+@test "answers are near the truth" {
+    cat >truth.c <<'C'
+#include "truth/analytic.h"
+#include <math.h>
+#include <stdio.h>
+int main(void) {
+    float row[9];
+    double sum = 0.0, most = 0.0, off = 0.0;
+    long count = 0;
+    while (fread(row, sizeof row, 1, stdin) == 1) { /* x y z nx ny nz, shadow, ao, distance */
+        const double p[3] = {row[0], row[1], row[2]}, n[3] = {row[3], row[4], row[5]};
+        const double lit = truth_light(truth_seeds(), p, n, truth_seeds_sun, truth_seeds_w, INFINITY, 256);
+        const double e = fabs(lit - (double)row[6]);
+        sum += e * e;
+        most = e > most ? e : most;
+        off = fmax(off, fabs(truth_distance(truth_seeds(), p) - (double)row[8]));
+        ++count;
+    }
+    printf("%ld %g %g %g\n", count, sqrt(sum / (double)count), most, off);
+    return !(count == 3000 && sqrt(sum / (double)count) < 0.02 && most < 0.4 && off < 0.05);
+}
+C
+    compile truth "$SOURCE/tests/truth/analytic.c" "$SOURCE/tests/truth/directions.c"
+    points 3000 >p.raw
+    "$VDBSHADE" "${QUERY[@]}" --voxel-size 0.02 --method adaptive --distance --points p.raw --normals yes -o - |
+        ./truth || fail "count, RMSE, worst, distance"
+}
+
+@test "a CSV keeps its rows, whatever their columns, and answers stand behind them" {
+    printf 'id;nz;Y;x;z;note;nx;ny\r\n7;0;0.001;0.5;0.5;"a b";0;1\r\n\r\n# a comment\r\n8;0; 0.001 ;"2.1";2;;0;1' >p.csv
+    shade "${QUERY[@]}" --points p.csv -o out.csv
+    done_well
+    [ "$(cut -d';' -f1-8 out.csv)" = "$(printf 'id;nz;Y;x;z;note;nx;ny\n7;0;0.001;0.5;0.5;"a b";0;1\n8;0; 0.001 ;"2.1";2;;0;1')" ]
+    [ "$(head -1 out.csv)" = 'id;nz;Y;x;z;note;nx;ny;shadow.sun;ao' ]
+    [[ $(sed -n 2p out.csv) == *';0;0.7054'* ]] || fail "$(cat out.csv)"
+    [[ $(sed -n 3p out.csv) == *';1;1' ]] || fail "$(cat out.csv)"
+    # blanks and tabs, no header: none out
+    printf ' 0.5  0.001 0.5 0 1 0\n2.1 0.001\t2 0 1 0\n' >p.xyz
+    shade "${QUERY[@]}" --points p.xyz -o out.xyz
+    done_well
+    [ "$(cut -d' ' -f9- <out.xyz | head -1)" = "$(sed -n 2p out.csv | cut -d';' -f9- | tr ';' ' ')" ] || fail "$(cat out.xyz)"
+    [ "$(wc -l <out.xyz)" -eq 2 ]
+}
+
+@test "without normals there is no ao, and no horizon" {
+    printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
+    shade query scene.json --points p.csv -o out.csv
+    done_well
+    [[ $stderr == *"no normals: no ao"* ]] || fail "no warning"
+    [ "$(head -1 out.csv)" = x,y,z,shadow.sun ]
+    shade "${QUERY[@]}" --ao 0.5 --points p.csv -o other.csv
+    refused 2 p.csv normals --ao
+    printf '{"casters": [{"sdf": {"shape": "sphere", "radius": 1}}], "voxel_size": 0.1}' >bare.json
+    shade query bare.json --points p.csv -o other.csv --quiet
+    refused 2 "nothing to answer"
+    shade query bare.json --points p.csv --distance -o other.csv --quiet
+    done_well
+    [ "$(head -1 other.csv)" = x,y,z,distance ]
+}
+
+@test "bad rows are told by number and answered nan, the rest as without them" {
+    cat >good.csv <<'CSV'
+x,y,z,nx,ny,nz
+0.5,0.001,0.5,0,1,0
+2.1,0.001,2,0,1,0
+0.1,0.001,0.4,0,1,0
+CSV
+    cat >bad.csv <<'CSV'
+x,y,z,nx,ny,nz
+0.5,0.001,0.5,0,1,0
+0.5,0.001
+0.5,"0,001",0.5,0,1,0
+2.1,0.001,2,0,1,0
+inf,0,0,0,1,0
+1,0.001,1,0,0,0
+0.1,0.001,0.4,0,1,0
+1,,1,0,1,0
+1,0x1,1,0,1,0
+CSV
+    shade "${QUERY[@]}" --points good.csv -o good.out --format csv
+    done_well
+    [ -z "$stderr" ] || fail "a clean input is nothing to speak of"
+    shade "${QUERY[@]}" --points bad.csv -o bad.out --format csv --stats stats.json
+    done_well
+    for line in "row 2: 2 columns" "row 3: column 2 is '0,001'" "row 5: x is not finite" "row 6: the normal is zero" \
+        "row 8: column 2 is ''" "6 of 9 rows are bad"; do
+        [[ $stderr == *"bad.csv: $line"* ]] || fail "says not: $line"
+    done
+    [[ $stderr != *"row 9"* ]] || fail "more than five are told"
+    grep -q '"bad_rows": 6' stats.json && grep -q '"points": 9' stats.json
+    [ "$(wc -l <bad.out)" -eq 10 ]
+    diff <(sed -n '2p;5p;8p' bad.out) <(sed 1d good.out)
+    [ "$(sed -n 3p bad.out)" = "0.5,0.001,,,,,nan,nan" ] # in its columns
+    [ "$(grep -c ',nan,nan$' bad.out)" -eq 6 ]
+    # raw and PLY
+    perl -e 'print pack("f<6", @$_, 0.5, 0, 1, 0) for [0.5, 0.001], [9**9**9, 1], [0.5, 0.001];
+        print pack("f<6", 1, 2, 3, 0, 0, 0), pack("f<6", 1, 2, 3, 0, -sin(9**9**9), 0)' >bad.raw
+    shade "${QUERY[@]}" --points bad.raw --normals yes -o bad.ply
+    done_well
+    for line in "row 2: x is not finite" "row 4: the normal is zero" "row 5: ny is not finite" "3 of 5 rows are bad"; do
+        [[ $stderr == *"bad.raw: $line"* ]] || fail "says not: $line"
+    done
+    shade "${QUERY[@]}" --points bad.ply --answers-only -o again.csv
+    [[ $stderr == *"bad.ply: 3 of 5 rows are bad"* ]] || fail "PLY"
+    [ "$(grep -c '^nan,nan$' again.csv)" -eq 3 ]
+    old_output strict.csv
+    shade "${QUERY[@]}" --points bad.csv -o strict.csv --strict
+    refused 2 "row 2: 2 columns"
+    untouched strict.csv
+}
+
+@test "a locale with a decimal comma changes nothing" {
+    printf 'x,y,z,nx,ny,nz\n0.5,0.001,0.5,0,1,0\n' >p.csv
+    shade "${QUERY[@]}" --points p.csv -o a.csv
+    LC_ALL=de_DE.UTF-8 shade "${QUERY[@]}" --points p.csv -o b.csv
+    done_well
+    cmp a.csv b.csv
+}
+
+# ply FORMAT: a mesh of two triangles, properties in an odd order.
+ply_head() {
+    printf 'ply\nformat %s 1.0\ncomment of ours\nelement vertex 4\nproperty uchar red\nproperty float x\nproperty double y\n' "$1"
+    printf 'property float z\nproperty float nx\nproperty float ny\nproperty float nz\nelement face 2\n'
+    printf 'property list uchar int vertex_indices\nend_header\n'
+}
+
+write_ascii_ply() {
+    ply_head ascii
+    printf '9 0.5 0.001 0.5 0 1 0\n8 2.1 0.001 2 0 1 0\n7 0 0.001 0 0 1 0\n6 1 0.001 1 0 1 0\n3 0 1 2\n3 0 2 3\n'
+}
+
+# The same as little (<) or big (>) endian bytes.
+write_binary_ply() {
+    ply_head "$1"
+    perl -e 'my $o = shift; for ([9, 0.5, 0.001, 0.5], [8, 2.1, 0.001, 2], [7, 0, 0.001, 0], [6, 1, 0.001, 1]) {
+        print pack("C f$o d$o f$o f$o f$o f$o", @$_, 0, 1, 0) }
+        print pack("C l$o l$o l$o", 3, 0, 1, 2), pack("C l$o l$o l$o", 3, 0, 2, 3)' "$2"
+}
+
+@test "a PLY keeps its properties and faces, ascii and binary of both orders" {
+    write_ascii_ply >ascii.ply
+    write_binary_ply binary_little_endian '<' >little.ply
+    write_binary_ply binary_big_endian '>' >big.ply
+    for kind in ascii little big; do
+        shade "${QUERY[@]}" --points "$kind.ply" -o "$kind-out.ply"
+        done_well
+        shade "${QUERY[@]}" --points "$kind.ply" --answers-only -o "$kind.raw"
+        done_well
+        cmp "$kind.raw" ascii.raw
+        grep -aq '^property float shadow.sun$' "$kind-out.ply" && grep -aq '^comment of ours$' "$kind-out.ply"
+        shade info "$kind-out.ply"
+        [ "$status" -eq 0 ] || fail "$kind"
+        [[ $output == *"triangles: 2"* ]] || fail "$kind: no faces"
+        # what was written is read: its answers are named already
+        shade "${QUERY[@]}" --points "$kind-out.ply" -o again.ply
+        refused 2 shadow.sun --answers-only
+        shade "${QUERY[@]}" --points "$kind-out.ply" -o again.raw --answers-only
+        cmp again.raw ascii.raw
+    done
+    [ "$(wc -c <ascii.raw)" -eq 32 ]
+    # rows of 29 bytes, two answers behind each, in the file's own order of bytes
+    for order in little:f\< big:f\>; do
+        tail -c $((4 * 37 + 26)) "${order%:*}-out.ply" |
+            perl -e 'local $/; my $d = <STDIN>; for (0 .. 3) { print pack("f<2", unpack($ARGV[0] . "2", substr($d, 37 * $_ + 29, 8))) }' \
+                "${order#*:}" | cmp - ascii.raw || fail "$order"
+    done
+    tail -2 ascii-out.ply | cmp - <(printf '3 0 1 2\n3 0 2 3\n')
+    tail -c 26 big-out.ply | cmp - <(tail -c 26 big.ply)
+}
+
+@test "a PLY from rows that are not counted beforehand is the same in a file and a pipe" {
+    points 1000 >p.raw
+    shade "${QUERY[@]}" --points p.raw --normals yes -o out.ply
+    done_well
+    "$VDBSHADE" "${QUERY[@]}" --points - --points-format raw --normals yes --format ply -o - <p.raw | cmp - out.ply
+    grep -aq '^element vertex 1000$' out.ply
+    shade info out.ply
+    [[ $output == *"1000 vertices"* || $stderr == *"no faces"* || $status -eq 2 ]] || fail "not read"
+    shade "${QUERY[@]}" --points out.ply --normals yes --answers-only -o a.raw
+    shade "${QUERY[@]}" --points p.raw --normals yes --answers-only -o b.raw
+    cmp a.raw b.raw
+}
+
+@test "files that are cut short or are no PLY are refused, and the output is left" {
+    write_binary_ply binary_little_endian '<' >whole.ply
+    old_output out.ply
+    local head size
+    head=$(ply_head binary_little_endian | wc -c)
+    size=$(wc -c <whole.ply)
+    for length in $((head + 1)) $((head + 30)) $((head + 4 * 29 - 1)) $((head + 4 * 29)) $((size - 1)); do
+        head -c "$length" whole.ply >cut.ply
+        shade "${QUERY[@]}" --points cut.ply -o out.ply
+        refused 3 cut.ply "cut short"
+        untouched out.ply
+    done
+    head -c 40 whole.ply >cut.ply
+    shade "${QUERY[@]}" --points cut.ply -o out.ply
+    refused 3 "end_header"
+    write_ascii_ply | head -n -3 >cut.ply
+    shade "${QUERY[@]}" --points cut.ply -o out.ply
+    refused 3 "vertex 3 of 4"
+    printf 'plx\n' >none.ply
+    shade "${QUERY[@]}" --points none.ply -o out.ply
+    refused 2 none.ply "line 1"
+    ply_head binary_middle_endian >none.ply
+    shade "${QUERY[@]}" --points none.ply -o out.ply
+    refused 2 "binary_middle_endian"
+    printf 'ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n' >none.ply
+    shade "${QUERY[@]}" --points none.ply -o out.ply
+    refused 2 "'z'"
+    points 3 | head -c 50 >cut.raw
+    shade "${QUERY[@]}" --points cut.raw --normals yes -o out.ply
+    refused 3 cut.raw "row 3"
+    printf 'a,b,c\n1,2,3\n' >none.csv
+    shade "${QUERY[@]}" --points none.csv -o out.ply
+    refused 2 none.csv "column x"
+    untouched out.ply
+}
+
+@test "no points are no error" {
+    : >empty.csv
+    : >empty.raw
+    printf 'x,y,z,nx,ny,nz\n' >head.csv
+    write_ascii_ply | sed 's/^element vertex 4/element vertex 0/; s/^element face 2/element face 0/; /^end_header/q' >empty.ply
+    for points in empty.csv empty.raw head.csv empty.ply; do
+        for format in csv ply raw; do
+            shade "${QUERY[@]}" --points "$points" --normals yes -o "out.$format"
+            done_well || fail "$points to $format"
+        done
+    done
+    grep -aq '^element vertex 0$' out.ply
+    [ ! -s out.raw ]
+    shade "${QUERY[@]}" --points head.csv -o out.csv
+    [ "$(cat out.csv)" = "x,y,z,nx,ny,nz,shadow.sun,ao" ]
+    : >empty.ply
+    shade "${QUERY[@]}" --points empty.ply -o out.ply
+    refused 2 empty.ply "empty"
+}
+
+@test "one row at a time is answered before the next is there" {
+    mkfifo in out
+    "$VDBSHADE" "${QUERY[@]}" --batch 1 --points - --points-format csv -o - <in >out 2>err.txt &
+    exec 7>in 8<out
+    printf 'x,y,z,nx,ny,nz\n0.5,0.001,0.5,0,1,0\n' >&7
+    local line
+    read -r -t 60 line <&8 && [ "$line" = x,y,z,nx,ny,nz,shadow.sun,ao ]
+    read -r -t 60 line <&8 && [[ $line == 0.5,0.001,0.5,0,1,0,0,* ]]
+    printf '2.1,0.001,2,0,1,0\n' >&7
+    read -r -t 60 line <&8 && [ "$line" = 2.1,0.001,2,0,1,0,1,1 ]
+    exec 7>&-
+    wait
+    exec 8<&-
+    [ ! -s err.txt ]
+}
+
+@test "nothing but answers goes to standard output" {
+    printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
+    shade query scene.json --points p.csv --progress -o -
+    [ "$status" -eq 0 ]
+    [ "${#lines[@]}" -eq 2 ] && [ "${lines[0]}" = x,y,z,shadow.sun ]
+    [[ $stderr == *voxelize* ]] || fail "no progress"
+}
+
+@test "a pipe or disk that takes no more ends the run" {
+    points 40000 >p.raw
+    run bash -c '"$0" "${@}" --points p.raw --normals yes --format csv -o - 2>err.txt | head -1; exit "${PIPESTATUS[0]}"' \
+        "$VDBSHADE" "${QUERY[@]}"
+    [ "$status" -eq 141 ] || [ "$status" -eq 3 ] || fail "status"
+    [ "${lines[0]}" = "x,y,z,nx,ny,nz,shadow.sun,ao" ]
+    [ ! -e /dev/full ] || {
+        run bash -c '"$0" "${@}" --points p.raw --normals yes -o - 2>err.txt >/dev/full' "$VDBSHADE" "${QUERY[@]}"
+        [ "$status" -eq 3 ]
+        grep -q 'standard output: cannot be written' err.txt
+    }
+    run bash -c '"$0" "${@}" --points p.raw --normals yes -o - 2>err.txt >&-' "$VDBSHADE" "${QUERY[@]}"
+    [ "$status" -eq 3 ]
+    old_output out.raw
+    run bash -c 'ulimit -f 16; "$0" "${@}" --points p.raw --normals yes -o out.raw 2>err.txt' "$VDBSHADE" "${QUERY[@]}"
+    [ "$status" -eq 3 ] || fail "$(cat err.txt)"
+    untouched out.raw
+}
+
+@test "what is wrong on the command line is said" {
+    printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
+    shade query scene.json -o out.csv
+    refused 2 --points
+    shade query scene.json --points p.csv
+    refused 2 "-o OUT"
+    shade query scene.json --points - -o -
+    refused 2 --points-format
+    shade query scene.json --points p.csv -o out.dat
+    refused 2 out.dat --format
+    shade query scene.json --points p.csv --format exr -o out.dat
+    refused 2 exr "csv, ply, raw"
+    shade query scene.json --points p.csv --normals maybe -o out.csv
+    refused 2 maybe "yes or no"
+    shade query scene.json --points p.csv --batch 0 -o out.csv
+    refused 2 --batch
+    shade query scene.json --points p.csv -o p.csv
+    refused 2 p.csv
+    shade query scene.json --points p.csv -o scene.json --format csv
+    refused 2 scene.json
+    shade query scene.json --points none.csv -o out.csv
+    refused 3 none.csv
+    shade query scene.json --points . --points-format csv -o out.csv
+    refused 3 folder
+    shade query scene.json --points p.csv --error -o out.csv
+    refused 2 --error
+    [ ! -e out.csv ]
+}
+
+@test "--error answers what error is left" {
+    points 500 >p.raw
+    shade "${QUERY[@]}" --points p.raw --normals yes --method adaptive --max-error 0.05 --error -o out.csv
+    done_well
+    [ "$(head -1 out.csv)" = x,y,z,nx,ny,nz,shadow.sun,ao,error.sun ]
+    awk -F, 'NR > 1 && !($9 >= 0 && $9 <= 0.3) { bad = 1 } NR > 1 && $9 > 0 { some = 1 } END { exit bad || !some }' out.csv
+}
+
+@test "the help names every option" {
+    shade query --help
+    done_well
+    for option in points points-format output format normals answers-only strict batch stats sun ao method distance gradient \
+        max-error rays error caster resolution within threads memory-limit quiet isa; do
+        [[ $output == *"--$option"* ]] || fail "no --$option"
+    done
+}

@@ -1,0 +1,183 @@
+/* Numbers of points' text against the C library's: the same bits in, the same bits back. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+/* The command line's sources are no library. */
+#include "cli/points_number.c"
+
+static uint64_t counter;
+
+static uint64_t draw(void) {
+    uint64_t z = (counter += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+}
+
+static void expect_as_strtod(const char *text) {
+    double value = -1.0;
+    if (!cli_number_read(text, text + strlen(text), &value)) {
+        fail_msg("'%s' is not read", text);
+    }
+    const double expected = strtod(text, NULL);
+    if (memcmp(&value, &expected, sizeof value) != 0) {
+        fail_msg("'%s' is %.17g, expected %.17g", text, value, expected);
+    }
+}
+
+static void numbers_are_read_as_strtod_reads_them(void **state) {
+    (void)state;
+    static const char *const texts[] = {"0",
+                                        "-0",
+                                        "+1",
+                                        "1.",
+                                        ".5",
+                                        "-.5e1",
+                                        "1e5",
+                                        "1E+5",
+                                        "1e-5",
+                                        "00012.500",
+                                        "0.1",
+                                        "9007199254740993",
+                                        "9007199254740992.5",
+                                        "9007199254740993e3",
+                                        "123456789012345678901234567890",
+                                        "18446744073709551615",
+                                        "9999999999999999999",
+                                        "0.00000000000000000000000000001",
+                                        "1e-400",
+                                        "1e400",
+                                        "4.9e-324",
+                                        "1e22",
+                                        "1e23",
+                                        "2.2250738585072011e-308",
+                                        "8.41e21",
+                                        "0e99999",
+                                        "3.518437208883201171875e13",
+                                        "1.00000000000000011102230246251565404236316680908203125",
+                                        "179769313486231580793e289",
+                                        "0.000000000000000000000000000000000000000000000000001e51"};
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; ++i) {
+        expect_as_strtod(texts[i]);
+    }
+    for (int i = 0; i < 300000; ++i) {
+        char text[64];
+        const uint64_t bits = draw();
+        switch (i % 4) {
+        case 0: { /* of any magnitude */
+            double value;
+            memcpy(&value, &bits, sizeof value);
+            snprintf(text, sizeof text, "%.*g", (int)(draw() % 21), isfinite(value) ? value : 1.0);
+            break;
+        }
+        case 1: /* as programs write coordinates */
+            snprintf(text, sizeof text, "%.17g", ((double)(bits >> 11) * 0x1p-53 - 0.5) * 200.0);
+            break;
+        case 2:
+            snprintf(text, sizeof text, "%lu.%lu", (unsigned long)(bits >> 40),
+                     (unsigned long)(draw() >> 20));
+            break;
+        default: { /* next to the middle between two doubles */
+            const double low = 1.0 + (double)(bits >> 12) * 0x1p-52;
+            snprintf(text, sizeof text, "%.19Lg",
+                     (long double)low + 0x1p-53L + (long double)(i % 3 - 1) * 0x1p-60L);
+            break;
+        }
+        }
+        expect_as_strtod(text);
+    }
+}
+
+static void what_is_no_decimal_number_is_refused(void **state) {
+    (void)state;
+    static const char *const texts[] = {"",     "-",   "+",     ".",       "e5",   "1e", "1e+",
+                                        "0x10", "1,5", "1 2",   "1.2.3",   "abc",  "1f", "nanx",
+                                        "in",   "--1", "1e5.0", "infinit", "1_000"};
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; ++i) {
+        double value;
+        if (cli_number_read(texts[i], texts[i] + strlen(texts[i]), &value)) {
+            fail_msg("'%s' is read as %g", texts[i], value);
+        }
+    }
+    double value;
+    assert_true(cli_number_read("nAn", (const char *)"nAn" + 3, &value) && isnan(value));
+    const char *low = "-Infinity";
+    assert_true(cli_number_read(low, low + 9, &value) && isinf(value) && value < 0.0);
+}
+
+static void only_the_given_characters_are_read(void **state) {
+    (void)state;
+    const char *text = "12.5678";
+    double value;
+    assert_true(cli_number_read(text, text + 4, &value));
+    assert_true(value == 12.5);
+}
+
+static void floats_come_back_with_the_same_bits(void **state) {
+    (void)state;
+    for (int i = 0; i < 600000; ++i) {
+        uint32_t bits = (uint32_t)draw();
+        if (i % 2 != 0) { /* visibilities */
+            const float value = (float)((double)(draw() >> 40) * 0x1p-24);
+            memcpy(&bits, &value, sizeof bits);
+        }
+        float value;
+        memcpy(&value, &bits, sizeof value);
+        char text[CLI_NUMBER_ROOM + 1];
+        *cli_number_write_float(text, value) = '\0';
+        const float back = strtof(text, NULL);
+        double wide;
+        assert_true(cli_number_read(text, text + strlen(text), &wide));
+        if (isnan(value) ? !isnan(back) : memcmp(&back, &value, 4) != 0 || (float)wide != value) {
+            fail_msg("%.9g is written '%s'", (double)value, text);
+        }
+        assert_true(strlen(text) < 18);
+    }
+    static const struct {
+        float value;
+        const char *text;
+    } cases[] = {{0.1f, "0.1"}, {1.0f, "1"},         {-0.5f, "-0.5"},
+                 {0.0f, "0"},   {100.0f, "100"},     {0.001f, "0.001"},
+                 {-0.0f, "-0"}, {1e8f, "100000000"}, {0.97918636f, "0.97918636"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        char text[CLI_NUMBER_ROOM + 1];
+        *cli_number_write_float(text, cases[i].value) = '\0';
+        assert_string_equal(text, cases[i].text);
+    }
+}
+
+static void doubles_come_back_with_the_same_bits(void **state) {
+    (void)state;
+    for (int i = 0; i < 200000; ++i) {
+        const uint64_t bits = draw();
+        double value;
+        memcpy(&value, &bits, sizeof value);
+        if (i % 2 != 0) { /* coordinates, of doubles and of floats, and what lies next to powers of two */
+            value = ((double)(bits >> 11) * 0x1p-53 - 0.5) * 200.0;
+            value = i % 4 == 1 ? (double)(float)value : value;
+            value =
+                i % 8 == 3 ? ldexp(1.0 - 0x1p-53 * (double)(bits & 3), (int)(bits >> 20 & 63) - 18) : value;
+        }
+        char text[CLI_NUMBER_ROOM + 1];
+        *cli_number_write_double(text, value) = '\0';
+        const double back = strtod(text, NULL);
+        if (isnan(value) ? !isnan(back) : memcmp(&back, &value, sizeof back) != 0) {
+            fail_msg("%.17g is written '%s'", value, text);
+        }
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(numbers_are_read_as_strtod_reads_them),
+        cmocka_unit_test(what_is_no_decimal_number_is_refused),
+        cmocka_unit_test(only_the_given_characters_are_read),
+        cmocka_unit_test(floats_come_back_with_the_same_bits),
+        cmocka_unit_test(doubles_come_back_with_the_same_bits),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

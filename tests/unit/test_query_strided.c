@@ -1,0 +1,337 @@
+/* Points with strides, in floats, and answers with gaps; distance and gradient; batches. */
+#include "traced.h"
+
+#include <vdbshade/query.h>
+
+enum { SIDE = 256, MANY = SIDE * SIDE };
+
+/* As an engine's vertices stand in memory. */
+typedef struct vertex {
+    float position[3];
+    uint8_t colour[4];
+    float normal[3];
+    uint32_t texel;
+    double place[3];
+    float visibility, deviation, ao, distance, gradient[3];
+} vertex;
+
+static double positions[3 * MANY];
+static float normals[3 * MANY];
+static uint32_t texels[MANY];
+static vertex vertices[MANY];
+static float visibility[MANY], deviation[MANY], ao[MANY], distance[MANY], gradient[3 * MANY];
+
+/* Points all over the seeds' scene whose coordinates are floats, in no order. */
+static void fill_points(void) {
+    uint64_t count = 5;
+    for (uint32_t i = 0; i < MANY; ++i) {
+        double n[3];
+        random_direction(&count, n);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            vertices[i].position[axis] =
+                (float)between(&count, axis == 1 ? 0.01 : -2.5, axis == 1 ? 2.0 : 2.5);
+            normals[3 * i + axis] = vertices[i].normal[axis] = (float)n[axis];
+        }
+        texels[i] = vertices[i].texel = 5u * i + 1u;
+    }
+    for (uint32_t i = 0; i < 3 * MANY; ++i) {
+        const float *from = &vertices[i / 3].position[i % 3];
+        positions[i] = vertices[i / 3].place[i % 3] = (double)*from;
+        assert_true((double)(float)positions[i] == positions[i]);
+    }
+}
+
+static vsh_query *query_of(const vsh_field *field, const vsh_light *light, int32_t method) {
+    vsh_query *query = NULL;
+    vsh_error error = {VSH_OK, ""};
+    vsh_shade_options options = vsh_shade_options_default();
+    options.method = method;
+    options.ao_method = VSH_AO_TAPS;
+    options.rays = method == VSH_SHADOW_ADAPTIVE ? 64 : 8;
+    if (vsh_query_create(field, light, light != NULL ? 1 : 0, &options, &query, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return query;
+}
+
+static void ask_packed(const vsh_query *query, size_t count) {
+    float *const shadow[1] = {visibility}, *const error[1] = {deviation};
+    vsh_query_output output = vsh_query_output_default();
+    output.visibility = shadow;
+    output.deviation = error;
+    output.ao = ao;
+    output.distance = distance;
+    output.gradient = gradient;
+    const vsh_points points = {count, positions, normals, texels};
+    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+}
+
+static void strides_floats_and_gaps_give_the_bits_of_packed_arrays(void **state) {
+    (void)state;
+    vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    fill_points();
+    vsh_query *query = query_of(field, &light, VSH_SHADOW_RAYS);
+    const size_t counts[] = {1, 64, 65, 1000, MANY};
+    for (size_t n = 0; n < sizeof counts / sizeof counts[0]; ++n) {
+        const size_t count = counts[n];
+        ask_packed(query, count);
+        for (int floats = 0; floats < 2; ++floats) {
+            for (size_t i = 0; i < count; ++i) {
+                vertices[i].visibility = vertices[i].deviation = vertices[i].ao = vertices[i].distance =
+                    -7.0f;
+                vertices[i].gradient[0] = vertices[i].gradient[1] = vertices[i].gradient[2] = -7.0f;
+            }
+            vsh_strided_points points = vsh_strided_points_default();
+            points.count = count;
+            points.positions = floats ? NULL : vertices[0].place;
+            points.float_positions = floats ? vertices[0].position : NULL;
+            points.normals = vertices[0].normal;
+            points.texels = &vertices[0].texel;
+            points.position_stride = points.normal_stride = points.texel_stride = sizeof vertices[0];
+            float *const shadow[1] = {&vertices[0].visibility}, *const error[1] = {&vertices[0].deviation};
+            vsh_query_output output = vsh_query_output_default();
+            output.visibility = shadow;
+            output.deviation = error;
+            output.ao = &vertices[0].ao;
+            output.distance = &vertices[0].distance;
+            output.gradient = vertices[0].gradient;
+            output.stride = sizeof vertices[0];
+            vsh_error why = {VSH_OK, ""};
+            if (vsh_query_strided(query, &points, NULL, &output, NULL, &why) != VSH_OK) {
+                fail_msg("%s", why.message);
+            }
+            for (size_t i = 0; i < count; ++i) {
+                assert_int_equal(bits_of(vertices[i].visibility), bits_of(visibility[i]));
+                /* of rays in an order, deviations depend on it; it is the same one */
+                assert_int_equal(bits_of(vertices[i].deviation), bits_of(deviation[i]));
+                assert_int_equal(bits_of(vertices[i].ao), bits_of(ao[i]));
+                assert_int_equal(bits_of(vertices[i].distance), bits_of(distance[i]));
+                assert_memory_equal(vertices[i].gradient, gradient + 3 * i, 3 * sizeof(float));
+                assert_true(vertices[i].place[0] == positions[3 * i]);
+            }
+        }
+    }
+    /* and without gaps, by strides of 0, at positions that are packed */
+    vsh_strided_points points = vsh_strided_points_default();
+    points.count = 1000;
+    points.positions = positions;
+    points.normals = normals;
+    points.texels = texels;
+    static float again[1000];
+    float *const shadow[1] = {again};
+    vsh_query_output output = vsh_query_output_default();
+    output.visibility = shadow;
+    ask_packed(query, 1000);
+    assert_int_equal(vsh_query_strided(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    assert_memory_equal(again, visibility, sizeof again);
+    vsh_query_free(query);
+    vsh_field_free(field);
+}
+
+static void distance_is_the_fields_and_near_the_truth(void **state) {
+    (void)state;
+    const double voxel = 0.04;
+    vsh_field *field = field_of(truth_seeds(), voxel, 0.0);
+    fill_points();
+    vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);
+    vsh_query_output output = vsh_query_output_default();
+    output.distance = distance;
+    const vsh_points points = {MANY, positions, NULL, NULL};
+    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    vsh_field_sample(field, MANY, positions, ao);
+    assert_memory_equal(distance, ao, sizeof distance);
+    for (size_t i = 0; i < MANY; ++i) {
+        const double true_distance = truth_distance(truth_seeds(), positions + 3 * i);
+        if (true_distance > 0.0) { /* within solids that touch, the scene's is none */
+            const double most = fmax(voxel, true_distance);
+            if (fabs((double)distance[i] - true_distance) > most) {
+                fail_msg("distance %g, expected %g", (double)distance[i], true_distance);
+            }
+        }
+    }
+    vsh_query_free(query);
+    vsh_field_free(field);
+}
+
+static void gradients_are_unit_and_point_away_from_the_sphere(void **state) {
+    (void)state;
+    const truth_solid ball = {.shape = TRUTH_SPHERE, .center = {0.3, -0.2, 0.1}, .radius = 1.0};
+    const truth_scene scene = {&ball, 1};
+    const double voxel = 0.05;
+    vsh_field *field = field_of(scene, voxel, 0.0);
+    vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);
+    enum { COUNT = 5000 };
+    uint64_t count = 9;
+    for (size_t i = 0; i < COUNT; ++i) {
+        double away[3];
+        random_direction(&count, away);
+        const double radius = between(&count, 0.9, 3.0);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            positions[3 * i + axis] = ball.center[axis] + radius * away[axis];
+        }
+    }
+    vsh_query_output output = vsh_query_output_default();
+    output.gradient = gradient;
+    const vsh_points points = {COUNT, positions, NULL, NULL};
+    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    double worst_near = 1.0, worst = 1.0;
+    for (size_t i = 0; i < COUNT; ++i) {
+        double length = 0.0, along = 0.0, radius = 0.0;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const double from = positions[3 * i + axis] - ball.center[axis],
+                         g = (double)gradient[3 * i + axis];
+            length += g * g;
+            along += g * from;
+            radius += from * from;
+        }
+        radius = sqrt(radius);
+        assert_true(fabs(length - 1.0) < 1e-6);
+        worst = fmin(worst, along / radius);
+        if (fabs(radius - 1.0) < 2.0 * voxel) {
+            worst_near = fmin(worst_near, along / radius);
+        }
+    }
+    /* a trilinear cell's gradient turns by up to half of its diagonal over the distance to the centre: 0.87 ×
+     * 0.05, or 2.5°; farther off levels are coarser, with voxels of a third of the distance, and their values
+     * distances to points of the surface that were found (NODE in lanes.inc) */
+    if (!(worst_near > cos(RADIANS(2.5))) || !(worst > cos(RADIANS(20.0)))) {
+        fail_msg("off by %g and %g degrees", acos(worst_near) / RADIANS(1.0), acos(worst) / RADIANS(1.0));
+    }
+    vsh_query_free(query);
+    vsh_field_free(field);
+}
+
+static void there_is_no_gradient_beyond_the_reach_nor_where_nothing_is(void **state) {
+    (void)state;
+    const truth_solid ball = {.shape = TRUTH_SPHERE, .radius = 1.0};
+    vsh_field *field = field_of((truth_scene){&ball, 1}, 0.05, 1.0);
+    vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);
+    const double places[4][3] = {
+        {1e6, 0.0, 0.0}, {(double)NAN, 0.0, 0.0}, {0.0, (double)INFINITY, 0.0}, {1.1, 0.0, 0.0}};
+    vsh_query_output output = vsh_query_output_default();
+    output.gradient = gradient;
+    output.distance = distance;
+    const vsh_points points = {4, places[0], NULL, NULL};
+    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    assert_true(gradient[0] == 0.0f && gradient[1] == 0.0f && gradient[2] == 0.0f);
+    assert_true(distance[0] > 0.0f);
+    for (size_t i = 3; i < 9; ++i) {
+        assert_true(isnan(gradient[i]));
+    }
+    assert_true(isnan(distance[1]) && isnan(distance[2]));
+    assert_true(gradient[9] > 0.99f);
+    vsh_query_free(query);
+    vsh_field_free(field);
+}
+
+static void calls_for_a_batch_each_give_the_bits_of_one_call(void **state) {
+    (void)state;
+    enum { ALL = VSH_QUERY_BATCH + 40000 };
+    vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
+    const vsh_light light = sun(truth_seeds_sun, 0.1);
+    vsh_query *query = query_of(field, &light, VSH_SHADOW_ADAPTIVE);
+    double *at = malloc((size_t)ALL * 3 * sizeof *at);
+    float *one = malloc((size_t)ALL * sizeof *one), *parts = malloc((size_t)ALL * sizeof *parts);
+    uint32_t *numbers = malloc((size_t)ALL * sizeof *numbers);
+    assert_true(at != NULL && one != NULL && parts != NULL && numbers != NULL);
+    uint64_t count = 2;
+    for (uint32_t i = 0; i < ALL; ++i) {
+        /* the first batch in no order, the second in rows: each is looked at by itself */
+        at[3 * i] = i < VSH_QUERY_BATCH ? between(&count, -2.5, 2.5) : -2.5 + 5.0 * (i % 200) / 200.0;
+        at[3 * i + 1] = 0.3;
+        at[3 * i + 2] =
+            i < VSH_QUERY_BATCH ? between(&count, -2.5, 2.5) : -2.5 + 5.0 * (i / 200 % 200) / 200.0;
+        numbers[i] = i;
+    }
+    float *const all[1] = {one};
+    vsh_query_output output = vsh_query_output_default();
+    output.visibility = all;
+    const vsh_points points = {ALL, at, NULL, NULL};
+    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    for (size_t first = 0; first < ALL; first += VSH_QUERY_BATCH) {
+        float *const part[1] = {parts + first};
+        output.visibility = part;
+        const size_t left = ALL - first;
+        const vsh_points some = {left < VSH_QUERY_BATCH ? left : VSH_QUERY_BATCH, at + 3 * first, NULL,
+                                 numbers + first};
+        assert_int_equal(vsh_query_points(query, &some, NULL, &output, NULL, NULL), VSH_OK);
+    }
+    size_t between_them = 0; /* whose rays depend on the points around them */
+    for (size_t i = VSH_QUERY_BATCH; i < ALL; ++i) {
+        between_them += one[i] > 0.0f && one[i] < 1.0f;
+    }
+    assert_true(between_them > 1000);
+    assert_memory_equal(parts, one, (size_t)ALL * sizeof *one);
+    free(at);
+    free(one);
+    free(parts);
+    free(numbers);
+    vsh_query_free(query);
+    vsh_field_free(field);
+}
+
+static void strides_that_are_none_are_refused_by_name(void **state) {
+    (void)state;
+    const truth_solid ball = {.shape = TRUTH_SPHERE, .radius = 1.0};
+    vsh_field *field = field_of((truth_scene){&ball, 1}, 0.1, 1.0);
+    vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);
+    vsh_strided_points good = vsh_strided_points_default();
+    good.count = 2;
+    good.positions = positions;
+    good.normals = normals;
+    good.texels = texels;
+    vsh_query_output output = vsh_query_output_default();
+    output.distance = distance;
+    struct {
+        vsh_strided_points points;
+        size_t stride;
+        const char *word;
+    } cases[8];
+    for (int i = 0; i < 8; ++i) {
+        cases[i].points = good;
+        cases[i].stride = 0;
+    }
+    cases[0].points.position_stride = 3;
+    cases[0].word = "position_stride 3";
+    cases[1].points.position_stride = 28;
+    cases[1].word = "position_stride 28";
+    cases[2].points.normal_stride = 8;
+    cases[2].word = "normal_stride";
+    cases[3].points.texel_stride = 6;
+    cases[3].word = "texel_stride";
+    cases[4].points.float_positions = normals;
+    cases[4].word = "float_positions";
+    cases[5].points.positions = NULL;
+    cases[5].word = "float_positions";
+    cases[6].stride = 2;
+    cases[6].word = "stride 2";
+    cases[7].points.struct_size = 0;
+    cases[7].word = "vsh_strided_points";
+    for (int i = 0; i < 8; ++i) {
+        vsh_error error = {VSH_OK, ""};
+        output.stride = cases[i].stride;
+        assert_int_equal(vsh_query_strided(query, &cases[i].points, NULL, &output, NULL, &error),
+                         VSH_ERROR_ARGUMENT);
+        if (strstr(error.message, cases[i].word) == NULL) {
+            fail_msg("'%s' names no %s", error.message, cases[i].word);
+        }
+    }
+    output.stride = 8; /* too near for a gradient */
+    output.gradient = gradient;
+    assert_int_equal(vsh_query_strided(query, &good, NULL, &output, NULL, NULL), VSH_ERROR_ARGUMENT);
+    vsh_query_free(query);
+    vsh_field_free(field);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(strides_floats_and_gaps_give_the_bits_of_packed_arrays),
+        cmocka_unit_test(distance_is_the_fields_and_near_the_truth),
+        cmocka_unit_test(gradients_are_unit_and_point_away_from_the_sphere),
+        cmocka_unit_test(there_is_no_gradient_beyond_the_reach_nor_where_nothing_is),
+        cmocka_unit_test(calls_for_a_batch_each_give_the_bits_of_one_call),
+        cmocka_unit_test(strides_that_are_none_are_refused_by_name),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
