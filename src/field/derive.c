@@ -31,11 +31,11 @@ static const float MAX_RESIDUE = 0.5f;
 typedef struct derivation {
     const vsh_field *field;
     const vshi_level *fine;
-    const float *fine_feet; /* of `fine`'s bricks; NULL where it is the finest */
-    vshi_blocks blocks;     /* of the new level */
-    int32_t *corners;       /* [count][3], lattice coordinates of each block's first voxel */
-    uint8_t *core;          /* [count][512]: value taken from the level below */
-    float *feet;            /* [count][512][3], of the last round */
+    vshi_feet fine_feet; /* none where it is the finest */
+    vshi_blocks blocks;  /* of the new level */
+    int32_t *corners;    /* [count][3], lattice coordinates of each block's first voxel */
+    uint8_t *core;       /* [count][512]: value taken from the level below */
+    float *feet;         /* [count][512][3], of the last round */
     float *next_feet;
     uint8_t *changed; /* [count], in the last round */
     uint8_t *next_changed;
@@ -63,13 +63,13 @@ static float fine_value(const derivation *d, const int32_t at[3], const float **
     const size_t block =
         ((size_t)(v[0] >> 3) * (size_t)fine->size[1] + (size_t)(v[1] >> 3)) * (size_t)fine->size[2] +
         (size_t)(v[2] >> 3);
-    const int32_t offset = d->field->index[fine->first_index + block];
-    const size_t brick = (size_t)offset / VSHI_BRICK_VALUES - (size_t)fine->first_brick;
     const int x = v[0] & 7, y = v[1] & 7, z = v[2] & 7;
-    if (foot != NULL && d->fine_feet != NULL) {
-        *foot = d->fine_feet + (brick * BLOCK + (size_t)(x * 64 + y * 8 + z)) * 3;
+    if (foot != NULL && d->fine_feet.points != NULL && d->fine_feet.map[block] >= 0) {
+        *foot = d->fine_feet.points +
+                ((size_t)d->fine_feet.map[block] * BLOCK + (size_t)(x * 64 + y * 8 + z)) * 3;
     }
-    return d->field->values[offset + x * VSHI_STRIDE_X + y * VSHI_STRIDE_Y + z];
+    const int16_t *brick = d->field->values + d->field->index[fine->first_index + block];
+    return fine->quantum * (float)brick[x * VSHI_STRIDE_X + y * VSHI_STRIDE_Y + z];
 }
 
 /* Foot of a finest lattice point of value h by one step down the gradient, from central differences. */
@@ -149,12 +149,13 @@ static void take_core(void *user, size_t begin, size_t end) {
             float *foot = d->feet + 3 * i;
             foot[0] = foot[1] = foot[2] = NAN;
             d->core[i] = fabsf(value) < d->fine->band;
-            d->blocks.values[i] = d->core[i] ? value : copysignf(d->blocks.band, value);
+            d->blocks.values[i] =
+                vshi_blocks_value(&d->blocks, d->core[i] ? value : copysignf(d->blocks.band, value));
             if (d->core[i]) {
                 float p[3];
                 voxel_position(d, block, v, p);
-                if (known != NULL) {
-                    memcpy(foot, known, 3 * sizeof(float));
+                if (d->fine_feet.points != NULL) {
+                    memcpy(foot, known != NULL ? known : foot, 3 * sizeof(float));
                 } else {
                     first_foot(d, p, value, foot);
                     if (!isnan(foot[0]) && fabsf(slide(d->field, p, 1.0f, foot)) > MAX_RESIDUE) {
@@ -287,14 +288,14 @@ static void settle(void *user, size_t begin, size_t end) {
             }
             float p[3];
             voxel_position(d, block, v, p);
-            const float sign = copysignf(1.0f, d->blocks.values[i]);
+            const float sign = d->blocks.values[i] < 0 ? -1.0f : 1.0f;
             const float residue = slide(d->field, p, d->blocks.scale, foot);
             /* a foot just outside the surface is nearer to p than the surface by that, for p outside */
             const float distance =
                 distance_to(p, foot) + sign * (fabsf(residue) < MAX_RESIDUE ? residue : 0.0f);
             if (distance < d->blocks.band) {
                 /* the level below has said that it is at least its band away */
-                d->blocks.values[i] = sign * fmaxf(distance, d->fine->band);
+                d->blocks.values[i] = vshi_blocks_value(&d->blocks, sign * fmaxf(distance, d->fine->band));
             }
         }
     }
@@ -306,7 +307,7 @@ static vsh_result place_blocks(derivation *d, vsh_error *error) {
     const vshi_level *fine = d->fine;
     vshi_blocks *b = &d->blocks;
     b->scale = 2.0f * fine->scale;
-    b->band = VSHI_COARSE_BAND * b->scale;
+    vshi_blocks_set_band(b, VSHI_COARSE_BAND * b->scale);
     for (int axis = 0; axis < 3; ++axis) {
         const int32_t low = floor_div(fine->origin[axis], 16) * 8 - 8;
         const int32_t high = floor_div(fine->origin[axis] + 8 * fine->size[axis], 16) * 8 + 8;
@@ -326,12 +327,12 @@ static vsh_result place_blocks(derivation *d, vsh_error *error) {
     for (int32_t x = 0; x < fine->size[0]; ++x) {
         for (int32_t y = 0; y < fine->size[1]; ++y) {
             for (int32_t z = 0; z < fine->size[2]; ++z, ++fine_block) {
-                const float *brick = d->field->values + d->field->index[fine_block];
+                const int16_t *brick = d->field->values + d->field->index[fine_block];
                 /* cells of the surface have corners within a cell's diagonal of it */
-                const float near = 1.75f * fine->scale;
+                const float near = 1.75f * fine->scale / fine->quantum;
                 bool surface = false;
                 for (int v = 0; v < VSHI_BRICK_VALUES && !surface; ++v) {
-                    surface = fabsf(brick[v]) < near;
+                    surface = fabsf((float)brick[v]) < near;
                 }
                 if (!surface) {
                     continue;
@@ -388,7 +389,7 @@ static vsh_result allocate_voxels(derivation *d, vshi_budget *budget, vsh_error 
         void **memory;
         size_t size;
     } wanted[] = {
-        {(void **)&d->blocks.values, BLOCK * sizeof(float)},
+        {(void **)&d->blocks.values, BLOCK * sizeof *d->blocks.values},
         {(void **)&d->core, BLOCK},
         {(void **)&d->feet, BLOCK * 3 * sizeof(float)},
         {(void **)&d->next_feet, BLOCK * 3 * sizeof(float)},
@@ -406,15 +407,16 @@ static vsh_result allocate_voxels(derivation *d, vshi_budget *budget, vsh_error 
     return result;
 }
 
+void vshi_feet_free(vshi_feet *feet) {
+    free(feet->points);
+    free(feet->map);
+    *feet = (vshi_feet){0, NULL, NULL};
+}
+
 vsh_result vshi_level_derive(vsh_field *field, vshi_feet *feet, vshi_budget budget, vshi_job *job,
                              vsh_error *error) {
-    derivation d = {.field = field,
-                    .fine = &field->levels[field->level_count - 1],
-                    .fine_feet = field->level_count > 1 ? feet->points : NULL};
-    vshi_feet next = {NULL};
-    if (d.fine_feet != NULL) {
-        budget.held += (double)d.fine->brick_count * BLOCK * 3 * sizeof(float);
-    }
+    derivation d = {.field = field, .fine = &field->levels[field->level_count - 1], .fine_feet = *feet};
+    budget.held += (double)feet->count * BLOCK * 3 * sizeof(float);
     vsh_result result = place_blocks(&d, error);
     if (result == VSH_OK) {
         result = allocate_voxels(&d, &budget, error);
@@ -438,7 +440,13 @@ vsh_result vshi_level_derive(vsh_field *field, vshi_feet *feet, vshi_budget budg
         result = vshi_parallel_for(job, d.blocks.count, 16, 0, settle, &d, error);
     }
     if (result == VSH_OK) {
-        result = vshi_level_append(field, &d.blocks, d.feet, budget, job, &next, error);
+        result = vshi_level_append(field, &d.blocks, budget, job, error);
+    }
+    vshi_feet_free(feet);
+    if (result == VSH_OK) {
+        *feet = (vshi_feet){d.blocks.count, d.blocks.map, d.feet};
+        d.blocks.map = NULL;
+        d.feet = NULL;
     }
     free(d.next_changed);
     free(d.changed);
@@ -447,7 +455,5 @@ vsh_result vshi_level_derive(vsh_field *field, vshi_feet *feet, vshi_budget budg
     free(d.core);
     free(d.corners);
     vshi_level_blocks_free(&d.blocks);
-    free(feet->points);
-    *feet = next;
     return result;
 }

@@ -39,6 +39,7 @@ static void invert(const double *m, double voxel_size, double inverse[12]) {
 static bool find_bounds(vsh_field *field) {
     const vshi_level *level = &field->levels[0];
     int32_t low[3] = {INT32_MAX, INT32_MAX, INT32_MAX}, high[3] = {INT32_MIN, INT32_MIN, INT32_MIN};
+    const float near = CELL_DIAGONAL / level->quantum;
     size_t block = 0;
     for (int32_t x = 0; x < level->size[0]; ++x) {
         for (int32_t y = 0; y < level->size[1]; ++y) {
@@ -48,7 +49,7 @@ static bool find_bounds(vsh_field *field) {
                     continue;
                 }
                 for (int v = 0; v < VSHI_BRICK_VALUES; ++v) {
-                    if (fabsf(field->values[offset + v]) < CELL_DIAGONAL) {
+                    if (fabsf((float)field->values[offset + v]) < near) {
                         const int32_t at[3] = {8 * x + v / 81, 8 * y + v / 9 % 9, 8 * z + v % 9};
                         for (int axis = 0; axis < 3; ++axis) {
                             const int32_t a = at[axis] + level->origin[axis];
@@ -73,7 +74,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     vsh_field_options o = vsh_field_options_default();
     vsh_run r;
     vshi_blocks blocks = {.map = NULL};
-    vshi_feet feet = {NULL};
+    vshi_feet feet = {0, NULL, NULL};
     vshi_job *job = NULL;
     vsh_field *f = NULL;
     *field = NULL;
@@ -109,8 +110,8 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     vshi_budget budget = {&r, (double)info.bytes};
     result = vshi_level_blocks_read(grid, band, budget, &blocks, error);
     if (result == VSH_OK) {
-        budget.held += (double)blocks.count * 512.0 * sizeof(float);
-        result = vshi_level_append(f, &blocks, NULL, budget, job, &feet, error);
+        budget.held += (double)blocks.count * 512.0 * sizeof *blocks.values;
+        result = vshi_level_append(f, &blocks, budget, job, error);
     }
     vshi_level_blocks_free(&blocks);
     if (result != VSH_OK) {
@@ -145,7 +146,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     *field = f;
     f = NULL;
 done:
-    free(feet.points);
+    vshi_feet_free(&feet);
     vsh_field_free(f);
     vshi_job_end(job);
     return result;
@@ -164,16 +165,17 @@ void vsh_field_sample(const vsh_field *field, size_t count, const double *positi
 void vsh_field_get_info(const vsh_field *field, vsh_field_info *info) {
     VSHI_FLOATS;
     const vshi_level *top = &field->levels[field->level_count - 1];
-    const uint64_t bricks = top->first_brick + top->brick_count;
-    const uint64_t blocks =
-        top->first_index + (uint64_t)top->size[0] * (uint64_t)top->size[1] * (uint64_t)top->size[2];
+    uint64_t bricks = 0;
+    for (int32_t l = 0; l < field->level_count; ++l) {
+        bricks += field->levels[l].brick_count;
+    }
     *info = (vsh_field_info){
         .voxel_size = field->voxel_size,
         .reach = top->band * field->voxel_size,
         .shell_thickness = field->shell_thickness,
         .levels = field->level_count,
         .bricks = bricks,
-        .bytes = bricks * VSHI_BRICK_VALUES * sizeof(float) + blocks * sizeof(int32_t) + sizeof *field,
+        .bytes = (uint64_t)vshi_field_bytes(field),
     };
     memcpy(info->bounds_min, field->world_min, sizeof info->bounds_min);
     memcpy(info->bounds_max, field->world_max, sizeof info->bounds_max);
