@@ -51,6 +51,7 @@ struct vsh_field {
     int32_t *index;  /* offset in `values` of each block's brick; all levels */
     int16_t *values; /* bricks; all levels; multiples of the level's quantum, negative inside */
     uint64_t value_count;
+    uint64_t active_voxels; /* of the grid */
     int32_t level_count;
     vshi_level levels[VSHI_MAX_LEVELS];
 };

@@ -8,6 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* A lattice point within this of the surface may be a corner of a cell that holds some of it, voxels. */
+static const float CELL_DIAGONAL = 1.75f;
+
 void vshi_level_blocks_free(vshi_blocks *blocks) {
     free(blocks->values);
     free(blocks->signs);
@@ -42,8 +45,32 @@ static size_t block_at(const vshi_blocks *blocks, int32_t x, int32_t y, int32_t 
     return ((size_t)x * (size_t)blocks->size[1] + (size_t)y) * (size_t)blocks->size[2] + (size_t)z;
 }
 
-vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, vshi_budget budget, vshi_blocks *blocks,
-                                  vsh_error *error) {
+void vshi_below_free(vshi_below *below) {
+    free(below->feet);
+    free(below->map);
+    free(below->boxes);
+    free(below->bricks);
+    *below = (vshi_below){.bricks = NULL};
+}
+
+typedef struct leaf_reading {
+    const vshi_leaf *leaves;
+    vshi_blocks *blocks;
+    double per_voxel;
+} leaf_reading;
+
+static void read_leaves(void *user, size_t begin, size_t end) {
+    const leaf_reading *r = user;
+    for (size_t i = begin; i < end; ++i) {
+        for (size_t v = 0; v < 512; ++v) {
+            r->blocks->values[i * 512 + v] =
+                vshi_blocks_value(r->blocks, (float)(r->leaves[i].values[v] * r->per_voxel));
+        }
+    }
+}
+
+vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, vshi_budget budget, vshi_job *job,
+                                  vshi_blocks *blocks, vsh_error *error) {
     vshi_leaf *leaves = NULL;
     *blocks = (vshi_blocks){.scale = 1.0f};
     vshi_blocks_set_band(blocks, band);
@@ -78,20 +105,17 @@ vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, vshi_budget 
     if (result != VSH_OK) {
         goto done;
     }
-    vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
-    const double per_voxel = 1.0 / info.voxel_size;
     vshi_grid_block_signs(grid, blocks->origin, blocks->size, blocks->signs);
     memset(blocks->map, 0xff, sizeof(int32_t) * block_at(blocks, blocks->size[0], 0, 0));
     for (size_t i = 0; i < blocks->count; ++i) {
         const int32_t *o = leaves[i].origin;
         blocks->map[block_at(blocks, (o[0] - blocks->origin[0]) / 8, (o[1] - blocks->origin[1]) / 8,
                              (o[2] - blocks->origin[2]) / 8)] = (int32_t)i;
-        for (int v = 0; v < 512; ++v) {
-            blocks->values[i * 512 + (size_t)v] =
-                vshi_blocks_value(blocks, (float)(leaves[i].values[v] * per_voxel));
-        }
     }
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    leaf_reading r = {leaves, blocks, 1.0 / info.voxel_size};
+    result = vshi_parallel_for(job, blocks->count, 64, 0, read_leaves, &r, error);
 done:
     free(leaves);
     return result;
@@ -102,6 +126,7 @@ typedef struct assembly {
     const int32_t *slots;   /* of each brick to write: its block in the map */
     const int32_t *offsets; /* and where it goes, from `values` on */
     int16_t *values;
+    int8_t *boxes; /* as in vshi_below */
     uint8_t *keep; /* of each block in the map: whether it needs a brick */
 } assembly;
 
@@ -164,6 +189,35 @@ static void mark_bricks(void *user, size_t begin, size_t end) {
     }
 }
 
+/* The box of vshi_below of a brick's first planes. */
+static void find_box(const vshi_blocks *blocks, const int16_t *brick, int count, int8_t box[6]) {
+    const int32_t near = (int32_t)(CELL_DIAGONAL * blocks->scale / blocks->quantum);
+    int32_t planes = 0, across = 0, columns = 0;
+    for (int x = 0; x < count; ++x) {
+        int32_t any = 0;
+        for (int v = 0; v < VSHI_STRIDE_X; ++v) {
+            any |= abs(brick[x * VSHI_STRIDE_X + v]) <= near;
+        }
+        planes |= any << x;
+    }
+    memset(box, 0, 6);
+    box[0] = (int8_t)(planes == 0);
+    for (int x = 0; x < count; ++x) {
+        for (int y = 0; y < 9 && (planes >> x & 1) != 0; ++y) {
+            for (int z = 0; z < 9; ++z) {
+                const int32_t hit = abs(brick[x * VSHI_STRIDE_X + y * VSHI_STRIDE_Y + z]) <= near;
+                across |= hit << y;
+                columns |= hit << z;
+            }
+        }
+    }
+    const int32_t masks[3] = {planes, across, columns};
+    for (int axis = 0; axis < 3 && planes != 0; ++axis) {
+        box[axis] = (int8_t)__builtin_ctz((unsigned)masks[axis]);
+        box[3 + axis] = (int8_t)(31 - __builtin_clz((unsigned)masks[axis]));
+    }
+}
+
 /* The last plane is the next brick's first one, where there is one. */
 static void write_bricks(void *user, size_t begin, size_t end) {
     const assembly *a = user;
@@ -171,7 +225,9 @@ static void write_bricks(void *user, size_t begin, size_t end) {
     for (size_t i = begin; i < end; ++i) {
         const size_t block = (size_t)a->slots[i], next = block + plane;
         const bool shared = next < plane * (size_t)a->blocks->size[0] && a->keep[next];
-        gather_brick(a->blocks, block, shared ? 8 : 9, a->values + a->offsets[i]);
+        const int planes = shared ? 8 : 9;
+        gather_brick(a->blocks, block, planes, a->values + a->offsets[i]);
+        find_box(a->blocks, a->values + a->offsets[i], planes, a->boxes + 6 * i);
     }
 }
 
@@ -210,9 +266,10 @@ static uint64_t place_bricks(const assembly *a, uint64_t begin, int32_t *slots, 
 }
 
 vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, vshi_budget budget, vshi_job *job,
-                             vsh_error *error) {
+                             vshi_below *below, vsh_error *error) {
     const size_t block_count = block_at(blocks, blocks->size[0], 0, 0);
-    int32_t *slots = NULL;
+    int32_t *slots = NULL, *offsets = NULL;
+    *below = (vshi_below){.bricks = NULL};
     assembly a = {.blocks = blocks};
     vsh_result result = vshi_allocate((void **)&a.keep, block_count, 1, "field blocks", error);
     if (result != VSH_OK) {
@@ -228,18 +285,18 @@ vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, vshi_b
     }
 
     vshi_level *level = &field->levels[field->level_count];
-    const vshi_level *below = field->level_count > 0 ? level - 1 : NULL;
+    const vshi_level *last = field->level_count > 0 ? level - 1 : NULL;
     *level = (vshi_level){.scale = blocks->scale,
                           .band = blocks->band,
                           .quantum = blocks->quantum,
-                          .rounding = 0.5f * blocks->quantum + (below != NULL ? below->rounding : 0.0f),
+                          .rounding = 0.5f * blocks->quantum + (last != NULL ? last->rounding : 0.0f),
                           .first_value = field->value_count,
                           .brick_count = brick_count + 2};
     memcpy(level->origin, blocks->origin, sizeof level->origin);
     memcpy(level->size, blocks->size, sizeof level->size);
-    if (below != NULL) {
-        level->first_index = below->first_index +
-                             (uint64_t)below->size[0] * (uint64_t)below->size[1] * (uint64_t)below->size[2];
+    if (last != NULL) {
+        level->first_index =
+            last->first_index + (uint64_t)last->size[0] * (uint64_t)last->size[1] * (uint64_t)last->size[2];
     }
     const uint64_t most = level->first_value + level->brick_count * VSHI_BRICK_VALUES;
     if (most > INT32_MAX || level->first_index + block_count > INT32_MAX) {
@@ -248,16 +305,21 @@ vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, vshi_b
                       (unsigned long long)(most / VSHI_BRICK_VALUES), INT32_MAX / VSHI_BRICK_VALUES);
         goto done;
     }
-    budget.held += (double)level->brick_count * (VSHI_BRICK_VALUES * sizeof(int16_t) + 2 * sizeof *slots);
+    budget.held += (double)level->brick_count * (VSHI_BRICK_VALUES * sizeof(int16_t) + 2 * sizeof *slots + 6);
     budget.held += (double)block_count * (double)(sizeof(int32_t) + 1);
     result = vshi_check_limit(budget.run, budget.held, "field", error);
     if (result == VSH_OK) {
-        result = vshi_allocate((void **)&slots, brick_count, 2 * sizeof *slots, "field bricks", error);
+        result = vshi_allocate((void **)&slots, brick_count, sizeof *slots, "field bricks", error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&offsets, brick_count, sizeof *offsets, "field bricks", error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&a.boxes, brick_count, 6, "field bricks", error);
     }
     if (result != VSH_OK) {
         goto done;
     }
-    int32_t *offsets = slots + brick_count;
     const uint64_t first = level->first_value + 2 * VSHI_BRICK_VALUES;
     const uint64_t value_count = first + place_bricks(&a, first, slots, offsets);
     result = grow((void **)&field->values, value_count, sizeof *field->values, error);
@@ -290,8 +352,13 @@ vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, vshi_b
     if (result == VSH_OK) {
         field->value_count = value_count;
         ++field->level_count;
+        *below = (vshi_below){.brick_count = brick_count, .bricks = slots, .boxes = a.boxes};
+        slots = NULL;
+        a.boxes = NULL;
     }
 done:
+    free(a.boxes);
+    free(offsets);
     free(slots);
     free(a.keep);
     return result;
