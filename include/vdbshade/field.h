@@ -50,6 +50,8 @@ typedef struct vsh_field_info {
     int32_t levels;
     uint64_t bricks; /* of 8³ cells, over all levels */
     uint64_t bytes;  /* in memory */
+    uint64_t
+        active_voxels; /* of the grid that it was made from: bytes / active_voxels are those of a voxel */
 } vsh_field_info;
 
 /* Cannot fail. */

@@ -24,6 +24,11 @@ static uint64_t peak_bytes(void) {
     return getrusage(RUSAGE_SELF, &usage) == 0 ? (uint64_t)usage.ru_maxrss * 1024 : 0;
 }
 
+/* Of the field, for each active voxel of the level set. */
+static double bytes_per_voxel(const cli_stats *stats) {
+    return (double)stats->field.bytes / fmax(1.0, (double)stats->field.active_voxels);
+}
+
 int cli_stats_write(const cli_stats *stats, const char *path) {
     json_t *stages = json_object();
     for (int i = 0; i < CLI_STAGE_COUNT; ++i) {
@@ -63,6 +68,7 @@ int cli_stats_write(const cli_stats *stats, const char *path) {
                                      : json_null());
     json_object_set_new(root, "estimated_rmse",
                         values > 0.0 ? json_real(sqrt(stats->shade.square_error / values)) : json_null());
+    json_object_set_new(root, "field_bytes_per_voxel", json_real(bytes_per_voxel(stats)));
     json_object_set_new(root, "voxel_size", json_real(stats->grid.voxel_size));
     char *text = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     json_decref(root);
@@ -77,10 +83,13 @@ int cli_stats_write(const cli_stats *stats, const char *path) {
 
 void cli_stats_say(const cli_stats *stats) {
     char field[32], peak[32];
-    cli_say("voxel %.4g, %" PRIu64 " active voxels, field of %d level%s in %s, %d thread%s, peak %s",
+    cli_say("voxel %.4g, %" PRIu64
+            " active voxels, field of %d level%s in %s (%.1f bytes a voxel), %d thread%s, "
+            "peak %s",
             stats->grid.voxel_size, stats->grid.active_voxels, stats->field.levels,
             stats->field.levels == 1 ? "" : "s", cli_bytes_text(stats->field.bytes, field, sizeof field),
-            stats->threads, stats->threads == 1 ? "" : "s", cli_bytes_text(peak_bytes(), peak, sizeof peak));
+            bytes_per_voxel(stats), stats->threads, stats->threads == 1 ? "" : "s",
+            cli_bytes_text(peak_bytes(), peak, sizeof peak));
     const double *s = stats->seconds;
     cli_say("load %.2f s, voxelize %.2f s, field %.2f s, %s %.2f s, write %.2f s", s[CLI_STAGE_LOAD],
             s[CLI_STAGE_VOXELIZE], s[CLI_STAGE_FIELD], stats->of_points ? "shade" : "bake", s[CLI_STAGE_BAKE],

@@ -2,15 +2,15 @@
  *
  * A lattice point of the new level is every second one of the level below, so where that one's band reaches,
  * values and signs are taken over as they are: signs of thin parts always come from the finest level. Farther
- * out the distance is that to the nearest point of the surface (its foot). Feet spread from voxel to voxel,
- * as in a vector distance transform (Danielsson, "Euclidean distance mapping", 1980), in rounds that read the
- * last round only, so that threads do not show. Then each foot slides along the finest level's surface to
- * where it faces its voxel, which takes away what the lattice's spacing adds. Fast sweeping (Zhao 2005) was
- * worse here: its first-order upwind differences leave distances 0.1 voxel too long, and too long is what
- * makes a marcher step through a wall. */
+ * out the distance is that to the nearest point of the surface (its foot). Feet spread from voxel to voxel
+ * (spread.c); then each slides along the finest level's surface to where it faces its voxel, which takes away
+ * what the lattice's spacing adds. Fast sweeping (Zhao 2005) was worse here: its first-order upwind
+ * differences leave distances 0.1 voxel too long, and too long is what makes a marcher step through a wall.
+ */
+#include "field/derive.h"
+
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "field/level.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -18,28 +18,19 @@
 
 enum {
     BLOCK = 512,
-    HALO = 10,       /* a block's edge with one voxel around it */
-    MAX_ROUNDS = 16, /* a foot travels one voxel a round; the band is 6 wide */
-    SLIDES = 2       /* of a foot along the surface; the second is for curved ones */
+    SLIDES = 2 /* of a foot along the surface; the second is for curved ones */
 };
 
 /* A gradient shorter than this has no direction to follow: a crease of the medial axis. */
 static const float MIN_GRADIENT = 0.25f;
 /* A foot that ends farther off the finest level's zero, in its voxels, has slid off the surface. */
 static const float MAX_RESIDUE = 0.5f;
-
-typedef struct derivation {
-    const vsh_field *field;
-    const vshi_level *fine;
-    const float *fine_feet; /* of `fine`'s bricks; NULL where it is the finest */
-    vshi_blocks blocks;     /* of the new level */
-    int32_t *corners;       /* [count][3], lattice coordinates of each block's first voxel */
-    uint8_t *core;          /* [count][512]: value taken from the level below */
-    float *feet;            /* [count][512][3], of the last round */
-    float *next_feet;
-    uint8_t *changed; /* [count], in the last round */
-    uint8_t *next_changed;
-} derivation;
+/* A slide that would bring a foot nearer by less than this, in voxels of its level, is not worth its samples:
+ * NODE of the kernels leaves room for 300 of them. */
+static const float LEAST_GAIN = 1.0f / 1024.0f;
+/* Slides by a voxel each bring a foot that is a band away nearer by no more than this with what is left of
+ * MAX_RESIDUE, voxels of its level: 2² / (2 · 6), and half a finest voxel. */
+static const float SLIDE_GAIN = 0.6f;
 
 static int32_t floor_div(int32_t a, int32_t b) {
     return a / b - (a % b < 0);
@@ -50,47 +41,60 @@ static float distance_to(const float p[3], const float foot[3]) {
     return sqrtf(x * x + y * y + z * z);
 }
 
-/* Value of the level below at one of its lattice points, and where its foot is kept (NULL: nowhere). */
-static float fine_value(const derivation *d, const int32_t at[3], const float **foot) {
+/* A block of the level below: its brick, and its feet [3][512] where any are kept. */
+typedef struct fine_block {
+    const int16_t *brick; /* NULL outside the level: +band */
+    const int16_t *feet;
+} fine_block;
+
+/* By the lattice coordinates of one of its voxels. */
+static fine_block fine_block_at(const vshi_derivation *d, const int32_t at[3]) {
     const vshi_level *fine = d->fine;
+    fine_block found = {NULL, NULL};
     int32_t v[3];
     for (int axis = 0; axis < 3; ++axis) {
         v[axis] = at[axis] - fine->origin[axis];
         if (v[axis] < 0 || v[axis] >= 8 * fine->size[axis]) {
-            return fine->band;
+            return found;
         }
     }
     const size_t block =
         ((size_t)(v[0] >> 3) * (size_t)fine->size[1] + (size_t)(v[1] >> 3)) * (size_t)fine->size[2] +
         (size_t)(v[2] >> 3);
-    const int32_t offset = d->field->index[fine->first_index + block];
-    const size_t brick = (size_t)offset / VSHI_BRICK_VALUES - (size_t)fine->first_brick;
-    const int x = v[0] & 7, y = v[1] & 7, z = v[2] & 7;
-    if (foot != NULL && d->fine_feet != NULL) {
-        *foot = d->fine_feet + (brick * BLOCK + (size_t)(x * 64 + y * 8 + z)) * 3;
+    found.brick = d->field->values + d->field->index[fine->first_index + block];
+    if (d->below.feet != NULL && d->below.map[block] >= 0) {
+        found.feet = d->below.feet + (size_t)d->below.map[block] * BLOCK * 3;
     }
-    return d->field->values[offset + x * VSHI_STRIDE_X + y * VSHI_STRIDE_Y + z];
+    return found;
+}
+
+static float fine_value(const vshi_derivation *d, const int32_t at[3]) {
+    const int16_t *brick = fine_block_at(d, at).brick;
+    return brick == NULL
+               ? d->fine->band
+               : d->fine->quantum *
+                     (float)brick[(at[0] & 7) * VSHI_STRIDE_X + (at[1] & 7) * VSHI_STRIDE_Y + (at[2] & 7)];
 }
 
 /* Foot of a finest lattice point of value h by one step down the gradient, from central differences. */
-static void first_foot(const derivation *d, const float p[3], float h, float foot[3]) {
+static void first_foot(const vshi_derivation *d, const int32_t at[3], float h, float foot[3]) {
     float g[3], length = 0.0f;
     for (int axis = 0; axis < 3; ++axis) {
-        float a[3] = {p[0], p[1], p[2]}, b[3] = {p[0], p[1], p[2]};
-        a[axis] -= 1.0f;
-        b[axis] += 1.0f;
-        g[axis] = 0.5f * (vshi_level_sample(d->field, 0, b, NULL) - vshi_level_sample(d->field, 0, a, NULL));
+        int32_t a[3] = {at[0], at[1], at[2]}, b[3] = {at[0], at[1], at[2]};
+        --a[axis];
+        ++b[axis];
+        g[axis] = 0.5f * (fine_value(d, b) - fine_value(d, a));
         length += g[axis] * g[axis];
     }
     length = sqrtf(length);
     for (int axis = 0; axis < 3; ++axis) {
-        foot[axis] = length >= MIN_GRADIENT ? p[axis] - h * g[axis] / length : NAN;
+        foot[axis] = length >= MIN_GRADIENT ? (float)at[axis] - h * g[axis] / length : NAN;
     }
 }
 
-/* Slides a foot along the finest level's surface until it faces p; returns its distance to the surface's
- * zero. */
-static float slide(const vsh_field *field, const float p[3], float reach, float foot[3]) {
+/* Slides a foot along the finest level's surface until it faces p, by no more than a voxel of the level of
+ * `scale` at a time; returns its distance to the surface's zero. */
+static float slide(const vsh_field *field, const float p[3], float scale, float foot[3]) {
     float g[3];
     float residue = vshi_level_sample(field, 0, foot, g);
     for (int i = 0; i < SLIDES; ++i) {
@@ -103,7 +107,11 @@ static float slide(const vsh_field *field, const float p[3], float reach, float 
         float lateral[3] = {v[0] - along * g[0], v[1] - along * g[1], v[2] - along * g[2]};
         const float length =
             sqrtf(lateral[0] * lateral[0] + lateral[1] * lateral[1] + lateral[2] * lateral[2]);
-        const float shorten = length > reach ? reach / length : 1.0f;
+        /* what a right-angled triangle's longer leg is shorter than its hypotenuse */
+        if (length * length < 2.0f * LEAST_GAIN * scale * distance_to(p, foot)) {
+            break;
+        }
+        const float shorten = length > scale ? scale / length : 1.0f;
         float moved[3], moved_g[3];
         for (int axis = 0; axis < 3; ++axis) {
             moved[axis] = foot[axis] + shorten * lateral[axis];
@@ -129,184 +137,114 @@ static float slide(const vsh_field *field, const float p[3], float reach, float 
     return residue;
 }
 
-static void voxel_position(const derivation *d, size_t block, int voxel, float p[3]) {
+/* Keeps a foot of the voxel at p. Feet of core voxels, too, are within a band and a step of theirs. */
+static void keep_foot(const vshi_derivation *d, const float p[3], const float foot[3], int16_t *feet) {
+    const float steps = VSHI_FOOT_STEPS / d->blocks.scale;
+    for (int axis = 0; axis < 3; ++axis) {
+        feet[axis * BLOCK] = vshi_round((foot[axis] - p[axis]) * steps);
+    }
+}
+
+/* One octant of a block: a block of the level below, every second voxel of it. Whether any foot is known. */
+static bool take_octant(vshi_derivation *d, size_t block, int octant) {
+    const int first[3] = {octant & 4, octant << 1 & 4, octant << 2 & 4};
     const int32_t *c = d->corners + 3 * block;
-    p[0] = (float)(c[0] + voxel / 64) * d->blocks.scale;
-    p[1] = (float)(c[1] + voxel / 8 % 8) * d->blocks.scale;
-    p[2] = (float)(c[2] + voxel % 8) * d->blocks.scale;
+    const int32_t corner[3] = {2 * (c[0] + first[0]), 2 * (c[1] + first[1]), 2 * (c[2] + first[2])};
+    const fine_block fine = fine_block_at(d, corner);
+    bool any = false;
+    for (int n = 0; n < 64; ++n) {
+        const int x = n >> 4, y = n >> 2 & 3, z = n & 3;
+        const size_t v = (size_t)((first[0] + x) * 64 + (first[1] + y) * 8 + first[2] + z);
+        const float value =
+            fine.brick == NULL
+                ? d->fine->band
+                : d->fine->quantum * (float)fine.brick[2 * (x * VSHI_STRIDE_X + y * VSHI_STRIDE_Y + z)];
+        const bool core = fabsf(value) < d->fine->band;
+        int16_t *const feet = d->feet + block * BLOCK * 3 + v;
+        feet[0] = feet[BLOCK] = feet[2 * BLOCK] = VSHI_FOOT_UNKNOWN;
+        d->core[block * BLOCK + v] = core;
+        d->blocks.values[block * BLOCK + v] =
+            core ? vshi_blocks_value(&d->blocks, value)
+                 : (int16_t)(value < 0.0f ? -d->blocks.most : d->blocks.most);
+        if (core && fine.feet != NULL) {
+            const int16_t *const known = fine.feet + 2 * (x * 64 + y * 8 + z);
+            if (known[0] != VSHI_FOOT_UNKNOWN) {
+                for (int axis = 0; axis < 3; ++axis) {
+                    feet[axis * BLOCK] = (int16_t)(known[axis * BLOCK] / 2);
+                }
+                any = true;
+            }
+        } else if (core && d->below.feet == NULL) {
+            const int32_t at[3] = {corner[0] + 2 * x, corner[1] + 2 * y, corner[2] + 2 * z};
+            const float p[3] = {(float)at[0], (float)at[1], (float)at[2]};
+            float foot[3];
+            first_foot(d, at, value, foot);
+            if (!isnan(foot[0]) && fabsf(slide(d->field, p, 1.0f, foot)) <= MAX_RESIDUE) {
+                keep_foot(d, p, foot, feet);
+                any = true;
+            }
+        }
+    }
+    return any;
 }
 
 /* Takes over what the level below knows. */
 static void take_core(void *user, size_t begin, size_t end) {
-    derivation *d = user;
+    vshi_derivation *d = user;
     for (size_t block = begin; block < end; ++block) {
-        const int32_t *c = d->corners + 3 * block;
-        for (int v = 0; v < BLOCK; ++v) {
-            const int32_t at[3] = {2 * (c[0] + v / 64), 2 * (c[1] + v / 8 % 8), 2 * (c[2] + v % 8)};
-            const size_t i = block * BLOCK + (size_t)v;
-            const float *known = NULL;
-            const float value = fine_value(d, at, &known);
-            float *foot = d->feet + 3 * i;
-            foot[0] = foot[1] = foot[2] = NAN;
-            d->core[i] = fabsf(value) < d->fine->band;
-            d->blocks.values[i] = d->core[i] ? value : copysignf(d->blocks.band, value);
-            if (d->core[i]) {
-                float p[3];
-                voxel_position(d, block, v, p);
-                if (known != NULL) {
-                    memcpy(foot, known, 3 * sizeof(float));
-                } else {
-                    first_foot(d, p, value, foot);
-                    if (!isnan(foot[0]) && fabsf(slide(d->field, p, 1.0f, foot)) > MAX_RESIDUE) {
-                        foot[0] = foot[1] = foot[2] = NAN;
-                    }
-                }
-            }
+        bool any = false;
+        for (int octant = 0; octant < 8; ++octant) {
+            any = take_octant(d, block, octant) || any;
         }
-        memcpy(d->next_feet + block * BLOCK * 3, d->feet + block * BLOCK * 3, BLOCK * 3 * sizeof(float));
-        d->changed[block] = 1;
-    }
-}
-
-static int32_t neighbour(const derivation *d, size_t block, int dx, int dy, int dz) {
-    const vshi_blocks *b = &d->blocks;
-    const int32_t *c = d->corners + 3 * block;
-    const int32_t x = (c[0] - b->origin[0]) / 8 + dx;
-    const int32_t y = (c[1] - b->origin[1]) / 8 + dy;
-    const int32_t z = (c[2] - b->origin[2]) / 8 + dz;
-    if (x < 0 || y < 0 || z < 0 || x >= b->size[0] || y >= b->size[1] || z >= b->size[2]) {
-        return -1;
-    }
-    return b->map[((size_t)x * (size_t)b->size[1] + (size_t)y) * (size_t)b->size[2] + (size_t)z];
-}
-
-/* A block's feet of the last round with one voxel around, by axis. */
-typedef struct halo {
-    float x[HALO * HALO * HALO], y[HALO * HALO * HALO], z[HALO * HALO * HALO];
-} halo;
-
-/* False where nothing in or around the block has changed since. */
-static bool gather_halo(const derivation *d, size_t block, halo *h) {
-    int32_t around[27];
-    bool changed = false;
-    for (int n = 0; n < 27; ++n) {
-        around[n] = neighbour(d, block, n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1);
-        changed = changed || (around[n] >= 0 && d->changed[around[n]]);
-    }
-    if (!changed) {
-        return false;
-    }
-    for (int x = 0; x < HALO; ++x) {
-        for (int y = 0; y < HALO; ++y) {
-            for (int z = 0; z < HALO; ++z) {
-                const int32_t from = around[(x + 7) / 8 * 9 + (y + 7) / 8 * 3 + (z + 7) / 8];
-                const int v = ((x + 7) & 7) * 64 + ((y + 7) & 7) * 8 + ((z + 7) & 7);
-                const float *foot = d->feet + ((size_t)(from >= 0 ? from : 0) * BLOCK + (size_t)v) * 3;
-                const int to = (x * HALO + y) * HALO + z;
-                h->x[to] = from >= 0 ? foot[0] : NAN;
-                h->y[to] = from >= 0 ? foot[1] : NAN;
-                h->z[to] = from >= 0 ? foot[2] : NAN;
-            }
-        }
-    }
-    return true;
-}
-
-/* A plane of a block in the halo: from its first voxel to its last, with the halo's voxels between the rows.
- */
-enum { PLANE_FIRST = HALO + 1, PLANE = 7 * HALO + 8 };
-
-/* For the voxels of a plane, the first of which is at `first` of the halo and at p: where in the halo the
- * nearest foot within `reach` is; -1: none. Of equally near ones a voxel's own is kept, so that rounds come
- * to rest. */
-static void nearest_feet(const halo *h, const float p[3], float scale, float reach, int first,
-                         int32_t from[PLANE]) {
-    float best[PLANE], y[PLANE], z[PLANE];
-    for (int i = 0; i < PLANE; ++i) {
-        best[i] = reach * reach;
-        y[i] = p[1] + (float)(i / HALO) * scale;
-        z[i] = p[2] + (float)(i % HALO) * scale;
-        from[i] = -1;
-    }
-    for (int n = 0; n < 27; ++n) {
-        const int k = (n + 13) % 27; /* the voxel itself first */
-        const int at = first + ((k / 9 - 1) * HALO + k / 3 % 3 - 1) * HALO + k % 3 - 1;
-        for (int i = 0; i < PLANE; ++i) {
-            const float a = p[0] - h->x[at + i], b = y[i] - h->y[at + i], c = z[i] - h->z[at + i];
-            const float square = a * a + b * b + c * c;
-            /* NaN is not nearer; a mask and not a condition, of which gcc 12 makes a branch */
-            const int32_t nearer = -(square < best[i]);
-            best[i] = square < best[i] ? square : best[i];
-            from[i] = (nearer & (at + i)) | (~nearer & from[i]);
-        }
-    }
-}
-
-/* One round: each voxel outside the core takes the nearest of the feet that it and its neighbours know. */
-static void spread(void *user, size_t begin, size_t end) {
-    derivation *d = user;
-    /* one voxel beyond the band, so that what lies just inside it has all its neighbours */
-    const float reach = d->blocks.band + d->blocks.scale;
-    for (size_t block = begin; block < end; ++block) {
-        halo h;
-        d->next_changed[block] = 0;
-        if (!gather_halo(d, block, &h)) {
-            continue;
-        }
-        for (int plane = 0; plane < 8; ++plane) {
-            const int first = (plane + 1) * HALO * HALO + PLANE_FIRST;
-            float p[3];
-            int32_t from[PLANE];
-            voxel_position(d, block, 64 * plane, p);
-            nearest_feet(&h, p, d->blocks.scale, reach, first, from);
-            for (int v = 0; v < 64; ++v) {
-                const size_t voxel = block * BLOCK + (size_t)(64 * plane + v);
-                const int at = v / 8 * HALO + v % 8;
-                if (d->core[voxel]) {
-                    continue;
-                }
-                const int32_t taken = from[at] >= 0 ? from[at] : first + at;
-                d->next_feet[3 * voxel] = h.x[taken];
-                d->next_feet[3 * voxel + 1] = h.y[taken];
-                d->next_feet[3 * voxel + 2] = h.z[taken];
-                d->next_changed[block] |= taken != first + at;
-            }
+        d->seen[block] = -1;
+        for (size_t i = 0; i < VSHI_FOOT_CHANGES; ++i) {
+            d->changed[VSHI_FOOT_CHANGES * block + i] = any ? 0 : -1;
         }
     }
 }
 
 /* Distances from feet. */
 static void settle(void *user, size_t begin, size_t end) {
-    derivation *d = user;
+    vshi_derivation *d = user;
+    const float scale = d->blocks.scale, step = scale / VSHI_FOOT_STEPS;
     for (size_t block = begin; block < end; ++block) {
+        const int32_t *c = d->corners + 3 * block;
         for (int v = 0; v < BLOCK; ++v) {
-            const size_t i = block * BLOCK + (size_t)v;
-            float *foot = d->feet + 3 * i;
-            if (d->core[i] || isnan(foot[0])) {
+            int16_t *const feet = d->feet + block * BLOCK * 3 + v;
+            int16_t *const value = d->blocks.values + block * BLOCK + v;
+            if (d->core[block * BLOCK + (size_t)v] || feet[0] == VSHI_FOOT_UNKNOWN) {
                 continue;
             }
-            float p[3];
-            voxel_position(d, block, v, p);
-            const float sign = copysignf(1.0f, d->blocks.values[i]);
-            const float residue = slide(d->field, p, d->blocks.scale, foot);
+            const float p[3] = {(float)(c[0] + v / 64) * scale, (float)(c[1] + v / 8 % 8) * scale,
+                                (float)(c[2] + v % 8) * scale};
+            float foot[3];
+            for (int axis = 0; axis < 3; ++axis) {
+                foot[axis] = p[axis] + (float)feet[axis * BLOCK] * step;
+            }
+            if (distance_to(p, foot) > d->blocks.band + SLIDE_GAIN * scale) {
+                continue;
+            }
+            const float sign = *value < 0 ? -1.0f : 1.0f;
+            const float residue = slide(d->field, p, scale, foot);
             /* a foot just outside the surface is nearer to p than the surface by that, for p outside */
             const float distance =
                 distance_to(p, foot) + sign * (fabsf(residue) < MAX_RESIDUE ? residue : 0.0f);
             if (distance < d->blocks.band) {
                 /* the level below has said that it is at least its band away */
-                d->blocks.values[i] = sign * fmaxf(distance, d->fine->band);
+                *value = vshi_blocks_value(&d->blocks, sign * fmaxf(distance, d->fine->band));
             }
+            keep_foot(d, p, foot, feet);
         }
     }
 }
 
 /* Blocks of the new level that the band can reach: it grows by no more than its width from bricks below that
  * hold the surface itself. */
-static vsh_result place_blocks(derivation *d, vsh_error *error) {
+static vsh_result place_blocks(vshi_derivation *d, vsh_error *error) {
     const vshi_level *fine = d->fine;
     vshi_blocks *b = &d->blocks;
     b->scale = 2.0f * fine->scale;
-    b->band = VSHI_COARSE_BAND * b->scale;
+    vshi_blocks_set_band(b, VSHI_COARSE_BAND * b->scale);
     for (int axis = 0; axis < 3; ++axis) {
         const int32_t low = floor_div(fine->origin[axis], 16) * 8 - 8;
         const int32_t high = floor_div(fine->origin[axis] + 8 * fine->size[axis], 16) * 8 + 8;
@@ -322,36 +260,23 @@ static vsh_result place_blocks(derivation *d, vsh_error *error) {
         return result;
     }
     const int32_t grow = (int32_t)VSHI_COARSE_BAND + 1;
-    size_t fine_block = (size_t)fine->first_index;
-    for (int32_t x = 0; x < fine->size[0]; ++x) {
-        for (int32_t y = 0; y < fine->size[1]; ++y) {
-            for (int32_t z = 0; z < fine->size[2]; ++z, ++fine_block) {
-                const float *brick = d->field->values + d->field->index[fine_block];
-                /* cells of the surface have corners within a cell's diagonal of it */
-                const float near = 1.75f * fine->scale;
-                bool surface = false;
-                for (int v = 0; v < VSHI_BRICK_VALUES && !surface; ++v) {
-                    surface = fabsf(brick[v]) < near;
-                }
-                if (!surface) {
-                    continue;
-                }
-                const int32_t at[3] = {fine->origin[0] + 8 * x, fine->origin[1] + 8 * y,
-                                       fine->origin[2] + 8 * z};
-                int32_t low[3], high[3];
-                for (int axis = 0; axis < 3; ++axis) {
-                    low[axis] = floor_div(floor_div(at[axis], 2) - grow - b->origin[axis], 8);
-                    high[axis] = floor_div(floor_div(at[axis] + 9, 2) + grow - b->origin[axis], 8);
-                    low[axis] = low[axis] > 0 ? low[axis] : 0;
-                    high[axis] = high[axis] < b->size[axis] - 1 ? high[axis] : b->size[axis] - 1;
-                }
-                for (int32_t i = low[0]; i <= high[0]; ++i) {
-                    for (int32_t j = low[1]; j <= high[1]; ++j) {
-                        for (int32_t k = low[2]; k <= high[2]; ++k) {
-                            b->map[((size_t)i * (size_t)b->size[1] + (size_t)j) * (size_t)b->size[2] +
-                                   (size_t)k] = 1;
-                        }
-                    }
+    for (size_t n = 0; n < d->below.brick_count; ++n) {
+        const int8_t *box = d->below.boxes + 6 * n;
+        int32_t at[3], low[3], high[3];
+        if (box[0] > box[3]) {
+            continue;
+        }
+        vshi_block_corner(fine->origin, fine->size, (size_t)d->below.bricks[n], at);
+        for (int axis = 0; axis < 3; ++axis) {
+            low[axis] = floor_div(floor_div(at[axis] + box[axis], 2) - grow - b->origin[axis], 8);
+            high[axis] = floor_div(floor_div(at[axis] + box[3 + axis] + 1, 2) + grow - b->origin[axis], 8);
+            low[axis] = low[axis] > 0 ? low[axis] : 0;
+            high[axis] = high[axis] < b->size[axis] - 1 ? high[axis] : b->size[axis] - 1;
+        }
+        for (int32_t i = low[0]; i <= high[0]; ++i) {
+            for (int32_t j = low[1]; j <= high[1]; ++j) {
+                for (int32_t k = low[2]; k <= high[2]; ++k) {
+                    b->map[((size_t)i * (size_t)b->size[1] + (size_t)j) * (size_t)b->size[2] + (size_t)k] = 1;
                 }
             }
         }
@@ -364,36 +289,33 @@ static vsh_result place_blocks(derivation *d, vsh_error *error) {
         return result;
     }
     int32_t number = 0;
-    const size_t plane = (size_t)b->size[1] * (size_t)b->size[2];
     for (size_t i = 0; i < total; ++i) {
-        const int32_t corner[3] = {b->origin[0] + 8 * (int32_t)(i / plane),
-                                   b->origin[1] + 8 * (int32_t)(i % plane / (size_t)b->size[2]),
-                                   b->origin[2] + 8 * (int32_t)(i % (size_t)b->size[2])};
+        int32_t corner[3];
+        vshi_block_corner(b->origin, b->size, i, corner);
         if (b->map[i] != 0) {
             memcpy(d->corners + 3 * number, corner, sizeof corner);
             b->map[i] = number++;
         } else {
             const int32_t at[3] = {2 * corner[0], 2 * corner[1], 2 * corner[2]};
             b->map[i] = -1;
-            b->signs[i] = fine_value(d, at, NULL) < 0.0f ? -1 : 1;
+            b->signs[i] = fine_value(d, at) < 0.0f ? -1 : 1;
         }
     }
     return VSH_OK;
 }
 
 /* Adds what it takes to the budget. */
-static vsh_result allocate_voxels(derivation *d, vshi_budget *budget, vsh_error *error) {
+static vsh_result allocate_voxels(vshi_derivation *d, vshi_budget *budget, vsh_error *error) {
     const size_t count = d->blocks.count;
     const struct {
         void **memory;
         size_t size;
     } wanted[] = {
-        {(void **)&d->blocks.values, BLOCK * sizeof(float)},
+        {(void **)&d->blocks.values, BLOCK * sizeof *d->blocks.values},
         {(void **)&d->core, BLOCK},
-        {(void **)&d->feet, BLOCK * 3 * sizeof(float)},
-        {(void **)&d->next_feet, BLOCK * 3 * sizeof(float)},
-        {(void **)&d->changed, 1},
-        {(void **)&d->next_changed, 1},
+        {(void **)&d->feet, BLOCK * 3 * sizeof *d->feet},
+        {(void **)&d->changed, VSHI_FOOT_CHANGES * sizeof *d->changed},
+        {(void **)&d->seen, sizeof *d->seen},
     };
     const size_t wanted_count = sizeof wanted / sizeof wanted[0];
     for (size_t i = 0; i < wanted_count; ++i) {
@@ -406,15 +328,12 @@ static vsh_result allocate_voxels(derivation *d, vshi_budget *budget, vsh_error 
     return result;
 }
 
-vsh_result vshi_level_derive(vsh_field *field, vshi_feet *feet, vshi_budget budget, vshi_job *job,
+vsh_result vshi_level_derive(vsh_field *field, vshi_below *below, vshi_budget budget, vshi_job *job,
                              vsh_error *error) {
-    derivation d = {.field = field,
-                    .fine = &field->levels[field->level_count - 1],
-                    .fine_feet = field->level_count > 1 ? feet->points : NULL};
-    vshi_feet next = {NULL};
-    if (d.fine_feet != NULL) {
-        budget.held += (double)d.fine->brick_count * BLOCK * 3 * sizeof(float);
-    }
+    vshi_derivation d = {.field = field, .fine = &field->levels[field->level_count - 1], .below = *below};
+    budget.held += (double)below->count * BLOCK * 3 * sizeof *below->feet +
+                   (double)below->brick_count * (sizeof *below->bricks + 6);
+    vshi_below next = {.bricks = NULL};
     vsh_result result = place_blocks(&d, error);
     if (result == VSH_OK) {
         result = allocate_voxels(&d, &budget, error);
@@ -422,32 +341,29 @@ vsh_result vshi_level_derive(vsh_field *field, vshi_feet *feet, vshi_budget budg
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, d.blocks.count, 16, 0, take_core, &d, error);
     }
-    for (int round = 0; round < MAX_ROUNDS && result == VSH_OK; ++round) {
-        result = vshi_parallel_for(job, d.blocks.count, 16, 0, spread, &d, error);
-        float *swap_feet = d.feet;
-        d.feet = d.next_feet;
-        d.next_feet = swap_feet;
-        uint8_t *swap_changed = d.changed;
-        d.changed = d.next_changed;
-        d.next_changed = swap_changed;
-        if (d.blocks.count == 0 || memchr(d.changed, 1, d.blocks.count) == NULL) {
-            break;
-        }
+    if (result == VSH_OK) {
+        result = vshi_feet_spread(&d, job, error);
     }
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, d.blocks.count, 16, 0, settle, &d, error);
     }
     if (result == VSH_OK) {
-        result = vshi_level_append(field, &d.blocks, d.feet, budget, job, &next, error);
+        result = vshi_level_append(field, &d.blocks, budget, job, &next, error);
     }
-    free(d.next_changed);
+    vshi_below_free(below);
+    if (result == VSH_OK) {
+        *below = next;
+        below->count = d.blocks.count;
+        below->map = d.blocks.map;
+        below->feet = d.feet;
+        d.blocks.map = NULL;
+        d.feet = NULL;
+    }
+    free(d.seen);
     free(d.changed);
-    free(d.next_feet);
     free(d.feet);
     free(d.core);
     free(d.corners);
     vshi_level_blocks_free(&d.blocks);
-    free(feet->points);
-    *feet = next;
     return result;
 }

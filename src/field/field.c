@@ -11,9 +11,6 @@
 /* Without a wish for a reach: what a light of 60° can use at receivers several diagonals away. */
 static const double DEFAULT_REACH = 4.0; /* diagonals of the bounds */
 
-/* A lattice point within this of the surface may be a corner of a cell that holds some of it, voxels. */
-static const float CELL_DIAGONAL = 1.75f;
-
 void vsh_field_free(vsh_field *field) {
     if (field == NULL) {
         return;
@@ -36,28 +33,17 @@ static void invert(const double *m, double voxel_size, double inverse[12]) {
 }
 
 /* Box of the lattice points next to the surface, field space. */
-static bool find_bounds(vsh_field *field) {
+static bool find_bounds(vsh_field *field, const vshi_below *finest) {
     const vshi_level *level = &field->levels[0];
     int32_t low[3] = {INT32_MAX, INT32_MAX, INT32_MAX}, high[3] = {INT32_MIN, INT32_MIN, INT32_MIN};
-    size_t block = 0;
-    for (int32_t x = 0; x < level->size[0]; ++x) {
-        for (int32_t y = 0; y < level->size[1]; ++y) {
-            for (int32_t z = 0; z < level->size[2]; ++z, ++block) {
-                const int32_t offset = field->index[block];
-                if (offset < 2 * VSHI_BRICK_VALUES) {
-                    continue;
-                }
-                for (int v = 0; v < VSHI_BRICK_VALUES; ++v) {
-                    if (fabsf(field->values[offset + v]) < CELL_DIAGONAL) {
-                        const int32_t at[3] = {8 * x + v / 81, 8 * y + v / 9 % 9, 8 * z + v % 9};
-                        for (int axis = 0; axis < 3; ++axis) {
-                            const int32_t a = at[axis] + level->origin[axis];
-                            low[axis] = a < low[axis] ? a : low[axis];
-                            high[axis] = a > high[axis] ? a : high[axis];
-                        }
-                    }
-                }
-            }
+    for (size_t i = 0; i < finest->brick_count; ++i) {
+        const int8_t *box = finest->boxes + 6 * i;
+        int32_t corner[3];
+        vshi_block_corner(level->origin, level->size, (size_t)finest->bricks[i], corner);
+        for (int axis = 0; axis < 3 && box[0] <= box[3]; ++axis) {
+            const int32_t a = corner[axis] + box[axis], b = corner[axis] + box[3 + axis];
+            low[axis] = a < low[axis] ? a : low[axis];
+            high[axis] = b > high[axis] ? b : high[axis];
         }
     }
     for (int axis = 0; axis < 3; ++axis) {
@@ -73,7 +59,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     vsh_field_options o = vsh_field_options_default();
     vsh_run r;
     vshi_blocks blocks = {.map = NULL};
-    vshi_feet feet = {NULL};
+    vshi_below below = {.bricks = NULL};
     vshi_job *job = NULL;
     vsh_field *f = NULL;
     *field = NULL;
@@ -101,22 +87,23 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     }
     f->voxel_size = info.voxel_size;
     f->shell_thickness = info.shell_thickness;
+    f->active_voxels = info.active_voxels;
     memcpy(f->world_min, info.bounds_min, sizeof f->world_min);
     memcpy(f->world_max, info.bounds_max, sizeof f->world_max);
     invert(vshi_grid_transform(grid), info.voxel_size, f->to_field);
 
     const float band = (float)fmin(info.half_width, VSHI_COARSE_BAND);
     vshi_budget budget = {&r, (double)info.bytes};
-    result = vshi_level_blocks_read(grid, band, budget, &blocks, error);
+    result = vshi_level_blocks_read(grid, band, budget, job, &blocks, error);
     if (result == VSH_OK) {
-        budget.held += (double)blocks.count * 512.0 * sizeof(float);
-        result = vshi_level_append(f, &blocks, NULL, budget, job, &feet, error);
+        budget.held += (double)blocks.count * 512.0 * sizeof *blocks.values;
+        result = vshi_level_append(f, &blocks, budget, job, &below, error);
     }
     vshi_level_blocks_free(&blocks);
     if (result != VSH_OK) {
         goto done;
     }
-    if (!find_bounds(f)) {
+    if (!find_bounds(f, &below)) {
         result = vshi_fail(error, VSH_ERROR_INPUT, "field: the level set has no surface");
         goto done;
     }
@@ -133,7 +120,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
             break;
         }
         budget.held = (double)info.bytes + vshi_field_bytes(f);
-        result = vshi_level_derive(f, &feet, budget, job, error);
+        result = vshi_level_derive(f, &below, budget, job, error);
         if (result != VSH_OK) {
             goto done;
         }
@@ -145,7 +132,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     *field = f;
     f = NULL;
 done:
-    free(feet.points);
+    vshi_below_free(&below);
     vsh_field_free(f);
     vshi_job_end(job);
     return result;
@@ -164,16 +151,18 @@ void vsh_field_sample(const vsh_field *field, size_t count, const double *positi
 void vsh_field_get_info(const vsh_field *field, vsh_field_info *info) {
     VSHI_FLOATS;
     const vshi_level *top = &field->levels[field->level_count - 1];
-    const uint64_t bricks = top->first_brick + top->brick_count;
-    const uint64_t blocks =
-        top->first_index + (uint64_t)top->size[0] * (uint64_t)top->size[1] * (uint64_t)top->size[2];
+    uint64_t bricks = 0;
+    for (int32_t l = 0; l < field->level_count; ++l) {
+        bricks += field->levels[l].brick_count;
+    }
     *info = (vsh_field_info){
         .voxel_size = field->voxel_size,
         .reach = top->band * field->voxel_size,
         .shell_thickness = field->shell_thickness,
         .levels = field->level_count,
         .bricks = bricks,
-        .bytes = bricks * VSHI_BRICK_VALUES * sizeof(float) + blocks * sizeof(int32_t) + sizeof *field,
+        .bytes = (uint64_t)vshi_field_bytes(field),
+        .active_voxels = field->active_voxels,
     };
     memcpy(info->bounds_min, field->world_min, sizeof info->bounds_min);
     memcpy(info->bounds_max, field->world_max, sizeof info->bounds_max);

@@ -2,8 +2,12 @@
  *
  * Field space is the finest level's index space: lengths are finest voxels, lattice point (i, j, k) of level
  * l lies at 2^l (i, j, k). A brick holds 8³ cells of a level as 9³ values (one plane of apron on the far
- * sides), z fastest, so that a trilinear sample is one look-up of the brick and eight loads. Blocks away from
- * the surface share one of two constant bricks, so the look-up never branches. */
+ * sides), z fastest, so that a trilinear sample is one look-up of the brick and four loads of two neighbours
+ * each. Bricks that are neighbours along x follow each other in memory and share the plane between them.
+ * Blocks away from the surface share one of two constant bricks, so the look-up never branches.
+ *
+ * Values are 16-bit multiples of a level's quantum, a power of two: for a band of 3 voxels 2^-13 voxel, of 6
+ * 2^-12. Rounding is then all that is lost, and a cell interpolates to the same bits as its floats would. */
 #ifndef VSHI_FIELD_H
 #define VSHI_FIELD_H
 
@@ -19,18 +23,21 @@ enum {
     VSHI_STRIDE_X = 81,
     VSHI_STRIDE_Y = 9,
     VSHI_BRICK_VALUES = 729,
-    VSHI_BRICK_OUTSIDE = 0, /* number of a level's brick that is all +band */
-    VSHI_BRICK_INSIDE = 1   /* all -band */
+    VSHI_VALUE_MOST = INT16_MAX
 };
 
 typedef struct vshi_level {
     int32_t origin[3];    /* lattice coordinates of the first brick's first value; multiples of 8 */
     int32_t size[3];      /* bricks along each axis; z fastest */
     uint64_t first_index; /* of this level in vsh_field.index */
-    uint64_t first_brick; /* of this level in vsh_field.values */
-    uint64_t brick_count; /* with the two constant ones */
+    uint64_t first_value; /* of this level in vsh_field.values; its first brick is all +band, its second all
+                           * -band */
+    uint64_t brick_count; /* with these two */
     float scale;          /* 2^level: voxel size, finest voxels */
-    float band;           /* finest voxels; values are clamped to ± band */
+    float band;           /* finest voxels, a multiple of `quantum`; values are clamped to ± band */
+    float quantum;        /* a step of the values, finest voxels */
+    float rounding;       /* how far rounding may have moved a value, here and on the levels below, finest
+                           * voxels */
 } vshi_level;
 
 struct vsh_field {
@@ -41,8 +48,10 @@ struct vsh_field {
     float bounds_max[3];
     double world_min[3];
     double world_max[3];
-    int32_t *index; /* offset in `values` of each block's brick; all levels */
-    float *values;  /* bricks; all levels; finest voxels, negative inside */
+    int32_t *index;  /* offset in `values` of each block's brick; all levels */
+    int16_t *values; /* bricks; all levels; multiples of the level's quantum, negative inside */
+    uint64_t value_count;
+    uint64_t active_voxels; /* of the grid */
     int32_t level_count;
     vshi_level levels[VSHI_MAX_LEVELS];
 };
@@ -69,23 +78,25 @@ static inline float vshi_level_sample(const vsh_field *field, int32_t l, const f
     const uint64_t block = ((uint64_t)(cell[0] >> 3) * (uint64_t)level->size[1] + (uint64_t)(cell[1] >> 3)) *
                                (uint64_t)level->size[2] +
                            (uint64_t)(cell[2] >> 3);
-    const float *v = field->values + field->index[level->first_index + block] +
-                     (cell[0] & 7) * VSHI_STRIDE_X + (cell[1] & 7) * VSHI_STRIDE_Y + (cell[2] & 7);
-    const float z00 = v[0] + (v[1] - v[0]) * f[2];
-    const float z01 = v[9] + (v[10] - v[9]) * f[2];
-    const float z10 = v[81] + (v[82] - v[81]) * f[2];
-    const float z11 = v[90] + (v[91] - v[90]) * f[2];
+    const int16_t *v = field->values + field->index[level->first_index + block] +
+                       (cell[0] & 7) * VSHI_STRIDE_X + (cell[1] & 7) * VSHI_STRIDE_Y + (cell[2] & 7);
+    const float d00 = (float)(v[1] - v[0]), d01 = (float)(v[10] - v[9]);
+    const float d10 = (float)(v[82] - v[81]), d11 = (float)(v[91] - v[90]);
+    const float z00 = (float)v[0] + d00 * f[2];
+    const float z01 = (float)v[9] + d01 * f[2];
+    const float z10 = (float)v[81] + d10 * f[2];
+    const float z11 = (float)v[90] + d11 * f[2];
     const float y0 = z00 + (z01 - z00) * f[1];
     const float y1 = z10 + (z11 - z10) * f[1];
     if (gradient != NULL) {
-        const float d00 = v[1] - v[0], d01 = v[10] - v[9], d10 = v[82] - v[81], d11 = v[91] - v[90];
         const float d0 = d00 + (d01 - d00) * f[1];
         const float d1 = d10 + (d11 - d10) * f[1];
-        gradient[0] = (y1 - y0) * inverse;
-        gradient[1] = ((z01 - z00) + ((z11 - z10) - (z01 - z00)) * f[0]) * inverse;
-        gradient[2] = (d0 + (d1 - d0) * f[0]) * inverse;
+        const float step = level->quantum * inverse;
+        gradient[0] = (y1 - y0) * step;
+        gradient[1] = ((z01 - z00) + ((z11 - z10) - (z01 - z00)) * f[0]) * step;
+        gradient[2] = (d0 + (d1 - d0) * f[0]) * step;
     }
-    return y0 + (y1 - y0) * f[0];
+    return (y0 + (y1 - y0) * f[0]) * level->quantum;
 }
 
 /* A cell whose far corners are clamped to the band reads up to √3 voxels short, but only within half a voxel

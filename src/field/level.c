@@ -8,6 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* A lattice point within this of the surface may be a corner of a cell that holds some of it, voxels. */
+static const float CELL_DIAGONAL = 1.75f;
+
 void vshi_level_blocks_free(vshi_blocks *blocks) {
     free(blocks->values);
     free(blocks->signs);
@@ -42,16 +45,37 @@ static size_t block_at(const vshi_blocks *blocks, int32_t x, int32_t y, int32_t 
     return ((size_t)x * (size_t)blocks->size[1] + (size_t)y) * (size_t)blocks->size[2] + (size_t)z;
 }
 
-static float clamp(float value, float band) {
-    return value > band ? band : value < -band ? -band : value;
+void vshi_below_free(vshi_below *below) {
+    free(below->feet);
+    free(below->map);
+    free(below->boxes);
+    free(below->bricks);
+    *below = (vshi_below){.bricks = NULL};
 }
 
-vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, vshi_budget budget, vshi_blocks *blocks,
-                                  vsh_error *error) {
+typedef struct leaf_reading {
+    const vshi_leaf *leaves;
+    vshi_blocks *blocks;
+    double per_voxel;
+} leaf_reading;
+
+static void read_leaves(void *user, size_t begin, size_t end) {
+    const leaf_reading *r = user;
+    for (size_t i = begin; i < end; ++i) {
+        for (size_t v = 0; v < 512; ++v) {
+            r->blocks->values[i * 512 + v] =
+                vshi_blocks_value(r->blocks, (float)(r->leaves[i].values[v] * r->per_voxel));
+        }
+    }
+}
+
+vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, vshi_budget budget, vshi_job *job,
+                                  vshi_blocks *blocks, vsh_error *error) {
     vshi_leaf *leaves = NULL;
-    *blocks = (vshi_blocks){.scale = 1.0f, .band = band};
+    *blocks = (vshi_blocks){.scale = 1.0f};
+    vshi_blocks_set_band(blocks, band);
     blocks->count = vshi_grid_leaves(grid, NULL, 0);
-    budget.held += (double)blocks->count * (double)(sizeof *leaves + 512 * sizeof(float));
+    budget.held += (double)blocks->count * (double)(sizeof *leaves + 512 * sizeof *blocks->values);
     vsh_result result = vshi_check_limit(budget.run, budget.held, "field", error);
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&leaves, blocks->count, sizeof *leaves, "leaves", error);
@@ -75,25 +99,23 @@ vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, vshi_budget 
     }
     result = allocate_map(blocks, budget, error);
     if (result == VSH_OK) {
-        result = vshi_allocate((void **)&blocks->values, blocks->count, 512 * sizeof(float), "field values",
-                               error);
+        result = vshi_allocate((void **)&blocks->values, blocks->count, 512 * sizeof *blocks->values,
+                               "field values", error);
     }
     if (result != VSH_OK) {
         goto done;
     }
-    vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
-    const double per_voxel = 1.0 / info.voxel_size;
     vshi_grid_block_signs(grid, blocks->origin, blocks->size, blocks->signs);
     memset(blocks->map, 0xff, sizeof(int32_t) * block_at(blocks, blocks->size[0], 0, 0));
     for (size_t i = 0; i < blocks->count; ++i) {
         const int32_t *o = leaves[i].origin;
         blocks->map[block_at(blocks, (o[0] - blocks->origin[0]) / 8, (o[1] - blocks->origin[1]) / 8,
                              (o[2] - blocks->origin[2]) / 8)] = (int32_t)i;
-        for (int v = 0; v < 512; ++v) {
-            blocks->values[i * 512 + (size_t)v] = clamp((float)(leaves[i].values[v] * per_voxel), band);
-        }
     }
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    leaf_reading r = {leaves, blocks, 1.0 / info.voxel_size};
+    result = vshi_parallel_for(job, blocks->count, 64, 0, read_leaves, &r, error);
 done:
     free(leaves);
     return result;
@@ -101,72 +123,111 @@ done:
 
 typedef struct assembly {
     const vshi_blocks *blocks;
-    const int32_t *slots; /* block in the map of each brick to write */
-    float *bricks;
-    uint8_t *keep; /* first pass: whether the block needs a brick */
+    const int32_t *slots;   /* of each brick to write: its block in the map */
+    const int32_t *offsets; /* and where it goes, from `values` on */
+    int16_t *values;
+    int8_t *boxes; /* as in vshi_below */
+    uint8_t *keep; /* of each block in the map: whether it needs a brick */
 } assembly;
 
-/* Value of a voxel given in voxels from the blocks' origin; background where there is no block. */
-static float block_value(const vshi_blocks *blocks, int32_t x, int32_t y, int32_t z) {
-    if (x >= 8 * blocks->size[0] || y >= 8 * blocks->size[1] || z >= 8 * blocks->size[2]) {
-        return blocks->band;
+/* Values of the block at (x, y, z) of the map, or, where it has none, the one that stands for all: ± most. */
+static const int16_t *values_at(const vshi_blocks *blocks, int32_t x, int32_t y, int32_t z,
+                                int16_t *constant) {
+    *constant = blocks->most;
+    if (x >= blocks->size[0] || y >= blocks->size[1] || z >= blocks->size[2]) {
+        return NULL;
     }
-    const size_t block = block_at(blocks, x >> 3, y >> 3, z >> 3);
-    const int32_t number = blocks->map[block];
-    if (number < 0) {
-        return (float)blocks->signs[block] * blocks->band;
+    const size_t block = block_at(blocks, x, y, z);
+    if (blocks->map[block] < 0) {
+        *constant = (int16_t)(blocks->signs[block] * blocks->most);
+        return NULL;
     }
-    return blocks->values[(size_t)number * 512 + (size_t)((x & 7) * 64 + (y & 7) * 8 + (z & 7))];
+    return blocks->values + (size_t)blocks->map[block] * 512;
 }
 
-static void block_corner(const vshi_blocks *blocks, size_t block, int32_t corner[3]) {
+/* The first `planes` planes of a block's brick: its own values and those of the seven blocks beyond its far
+ * faces, row by row. False where all eight have no values. */
+static bool gather_brick(const vshi_blocks *blocks, size_t block, int planes, int16_t *brick) {
     const size_t plane = (size_t)blocks->size[1] * (size_t)blocks->size[2];
-    corner[0] = (int32_t)(block / plane) * 8;
-    corner[1] = (int32_t)(block % plane / (size_t)blocks->size[2]) * 8;
-    corner[2] = (int32_t)(block % (size_t)blocks->size[2]) * 8;
+    const int32_t at[3] = {(int32_t)(block / plane), (int32_t)(block % plane / (size_t)blocks->size[2]),
+                           (int32_t)(block % (size_t)blocks->size[2])};
+    const int16_t *from[8];
+    int16_t constant[8];
+    bool any = false;
+    for (int n = 0; n < 8; ++n) {
+        from[n] = values_at(blocks, at[0] + (n >> 2), at[1] + (n >> 1 & 1), at[2] + (n & 1), &constant[n]);
+        any = any || from[n] != NULL;
+    }
+    for (int row = 0; any && row < 9 * planes; ++row, brick += 9) {
+        const int x = row / 9, y = row % 9, n = (x >> 3) * 4 + (y >> 3) * 2;
+        const int first = (x & 7) * 64 + (y & 7) * 8;
+        if (from[n] != NULL) {
+            memcpy(brick, from[n] + first, 8 * sizeof *brick);
+        } else {
+            for (int z = 0; z < 8; ++z) {
+                brick[z] = constant[n];
+            }
+        }
+        brick[8] = from[n + 1] != NULL ? from[n + 1][first] : constant[n + 1];
+    }
+    return any;
 }
 
 /* A block needs a brick where one of its 9³ values lies within the band, or where signs change without that
  * (a .vdb whose band is torn). */
 static void mark_bricks(void *user, size_t begin, size_t end) {
     const assembly *a = user;
-    const vshi_blocks *blocks = a->blocks;
     for (size_t block = begin; block < end; ++block) {
-        int32_t c[3];
-        block_corner(blocks, block, c);
-        bool near = false;
-        for (int n = 0; n < 8 && !near; ++n) {
-            const int32_t x = (c[0] >> 3) + (n >> 2), y = (c[1] >> 3) + (n >> 1 & 1),
-                          z = (c[2] >> 3) + (n & 1);
-            near = x < blocks->size[0] && y < blocks->size[1] && z < blocks->size[2] &&
-                   blocks->map[block_at(blocks, x, y, z)] >= 0;
+        int16_t brick[VSHI_BRICK_VALUES];
+        if (gather_brick(a->blocks, block, 9, brick)) {
+            int others = abs(brick[0]) != a->blocks->most;
+            for (int v = 0; v < VSHI_BRICK_VALUES; ++v) {
+                others |= brick[v] ^ brick[0];
+            }
+            a->keep[block] = others != 0;
         }
-        if (!near) {
-            continue;
-        }
-        const float first = block_value(blocks, c[0], c[1], c[2]);
-        bool keep = false;
-        for (int v = 0; v < VSHI_BRICK_VALUES && !keep; ++v) {
-            const float value = block_value(blocks, c[0] + v / 81, c[1] + v / 9 % 9, c[2] + v % 9);
-            keep = fabsf(value) < blocks->band || (value < 0.0f) != (first < 0.0f);
-        }
-        a->keep[block] = keep;
     }
 }
 
-static void write_bricks(void *user, size_t begin, size_t end) {
-    const assembly *a = user;
-    for (size_t i = begin; i < end; ++i) {
-        int32_t c[3];
-        block_corner(a->blocks, (size_t)a->slots[i], c);
-        float *brick = a->bricks + i * VSHI_BRICK_VALUES;
-        for (int x = 0; x < 9; ++x) {
-            for (int y = 0; y < 9; ++y) {
-                for (int z = 0; z < 9; ++z) {
-                    *brick++ = block_value(a->blocks, c[0] + x, c[1] + y, c[2] + z);
-                }
+/* The box of vshi_below of a brick's first planes. */
+static void find_box(const vshi_blocks *blocks, const int16_t *brick, int count, int8_t box[6]) {
+    const int32_t near = (int32_t)(CELL_DIAGONAL * blocks->scale / blocks->quantum);
+    int32_t planes = 0, across = 0, columns = 0;
+    for (int x = 0; x < count; ++x) {
+        int32_t any = 0;
+        for (int v = 0; v < VSHI_STRIDE_X; ++v) {
+            any |= abs(brick[x * VSHI_STRIDE_X + v]) <= near;
+        }
+        planes |= any << x;
+    }
+    memset(box, 0, 6);
+    box[0] = (int8_t)(planes == 0);
+    for (int x = 0; x < count; ++x) {
+        for (int y = 0; y < 9 && (planes >> x & 1) != 0; ++y) {
+            for (int z = 0; z < 9; ++z) {
+                const int32_t hit = abs(brick[x * VSHI_STRIDE_X + y * VSHI_STRIDE_Y + z]) <= near;
+                across |= hit << y;
+                columns |= hit << z;
             }
         }
+    }
+    const int32_t masks[3] = {planes, across, columns};
+    for (int axis = 0; axis < 3 && planes != 0; ++axis) {
+        box[axis] = (int8_t)__builtin_ctz((unsigned)masks[axis]);
+        box[3 + axis] = (int8_t)(31 - __builtin_clz((unsigned)masks[axis]));
+    }
+}
+
+/* The last plane is the next brick's first one, where there is one. */
+static void write_bricks(void *user, size_t begin, size_t end) {
+    const assembly *a = user;
+    const size_t plane = (size_t)a->blocks->size[1] * (size_t)a->blocks->size[2];
+    for (size_t i = begin; i < end; ++i) {
+        const size_t block = (size_t)a->slots[i], next = block + plane;
+        const bool shared = next < plane * (size_t)a->blocks->size[0] && a->keep[next];
+        const int planes = shared ? 8 : 9;
+        gather_brick(a->blocks, block, planes, a->values + a->offsets[i]);
+        find_box(a->blocks, a->values + a->offsets[i], planes, a->boxes + 6 * i);
     }
 }
 
@@ -181,17 +242,40 @@ static vsh_result grow(void **memory, uint64_t count, size_t size, vsh_error *er
     return VSH_OK;
 }
 
-vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, const float *block_feet,
-                             vshi_budget budget, vshi_job *job, vshi_feet *feet, vsh_error *error) {
+/* Where the bricks go, neighbours along x after each other; returns the values that they take. */
+static uint64_t place_bricks(const assembly *a, uint64_t begin, int32_t *slots, int32_t *offsets) {
+    const int32_t *size = a->blocks->size;
+    uint64_t next = begin;
+    size_t count = 0;
+    for (int32_t y = 0; y < size[1]; ++y) {
+        for (int32_t z = 0; z < size[2]; ++z) {
+            bool after = false;
+            for (int32_t x = 0; x < size[0]; ++x) {
+                const size_t block = block_at(a->blocks, x, y, z);
+                if (a->keep[block]) {
+                    next -= after ? VSHI_STRIDE_X : 0;
+                    slots[count] = (int32_t)block;
+                    offsets[count++] = (int32_t)next; /* checked by the caller */
+                    next += VSHI_BRICK_VALUES;
+                }
+                after = a->keep[block];
+            }
+        }
+    }
+    return next - begin;
+}
+
+vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, vshi_budget budget, vshi_job *job,
+                             vshi_below *below, vsh_error *error) {
     const size_t block_count = block_at(blocks, blocks->size[0], 0, 0);
-    int32_t *slots = NULL;
+    int32_t *slots = NULL, *offsets = NULL;
+    *below = (vshi_below){.bricks = NULL};
     assembly a = {.blocks = blocks};
-    feet->points = NULL;
     vsh_result result = vshi_allocate((void **)&a.keep, block_count, 1, "field blocks", error);
     if (result != VSH_OK) {
         return result;
     }
-    result = vshi_parallel_for(job, block_count, 4096, 0, mark_bricks, &a, error);
+    result = vshi_parallel_for(job, block_count, 1024, 0, mark_bricks, &a, error);
     if (result != VSH_OK) {
         goto done;
     }
@@ -201,83 +285,80 @@ vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, const 
     }
 
     vshi_level *level = &field->levels[field->level_count];
-    const vshi_level *below = field->level_count > 0 ? level - 1 : NULL;
-    *level = (vshi_level){.scale = blocks->scale, .band = blocks->band, .brick_count = brick_count + 2};
+    const vshi_level *last = field->level_count > 0 ? level - 1 : NULL;
+    *level = (vshi_level){.scale = blocks->scale,
+                          .band = blocks->band,
+                          .quantum = blocks->quantum,
+                          .rounding = 0.5f * blocks->quantum + (last != NULL ? last->rounding : 0.0f),
+                          .first_value = field->value_count,
+                          .brick_count = brick_count + 2};
     memcpy(level->origin, blocks->origin, sizeof level->origin);
     memcpy(level->size, blocks->size, sizeof level->size);
-    if (below != NULL) {
-        level->first_brick = below->first_brick + below->brick_count;
-        level->first_index = below->first_index +
-                             (uint64_t)below->size[0] * (uint64_t)below->size[1] * (uint64_t)below->size[2];
+    if (last != NULL) {
+        level->first_index =
+            last->first_index + (uint64_t)last->size[0] * (uint64_t)last->size[1] * (uint64_t)last->size[2];
     }
-    const uint64_t bricks = level->first_brick + level->brick_count;
-    if (bricks > INT32_MAX / VSHI_BRICK_VALUES || level->first_index + block_count > INT32_MAX) {
+    const uint64_t most = level->first_value + level->brick_count * VSHI_BRICK_VALUES;
+    if (most > INT32_MAX || level->first_index + block_count > INT32_MAX) {
         result =
             vshi_fail(error, VSH_ERROR_LIMIT, "field: %llu bricks pass the limit of %d; use larger voxels",
-                      (unsigned long long)bricks, INT32_MAX / VSHI_BRICK_VALUES);
+                      (unsigned long long)(most / VSHI_BRICK_VALUES), INT32_MAX / VSHI_BRICK_VALUES);
         goto done;
     }
-    const size_t per_brick = VSHI_BRICK_VALUES * sizeof(float) + sizeof *slots +
-                             (block_feet != NULL ? 512 * 3 * sizeof(float) : 0);
-    budget.held += (double)level->brick_count * (double)per_brick;
+    budget.held += (double)level->brick_count * (VSHI_BRICK_VALUES * sizeof(int16_t) + 2 * sizeof *slots + 6);
     budget.held += (double)block_count * (double)(sizeof(int32_t) + 1);
     result = vshi_check_limit(budget.run, budget.held, "field", error);
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&slots, brick_count, sizeof *slots, "field bricks", error);
     }
     if (result == VSH_OK) {
-        result = grow((void **)&field->values, bricks * VSHI_BRICK_VALUES, sizeof(float), error);
+        result = vshi_allocate((void **)&offsets, brick_count, sizeof *offsets, "field bricks", error);
     }
     if (result == VSH_OK) {
-        result = grow((void **)&field->index, level->first_index + block_count, sizeof(int32_t), error);
+        result = vshi_allocate((void **)&a.boxes, brick_count, 6, "field bricks", error);
     }
-    if (result == VSH_OK && block_feet != NULL) {
-        result = vshi_allocate((void **)&feet->points, level->brick_count, 512 * 3 * sizeof(float),
-                               "field feet", error);
+    if (result != VSH_OK) {
+        goto done;
+    }
+    const uint64_t first = level->first_value + 2 * VSHI_BRICK_VALUES;
+    const uint64_t value_count = first + place_bricks(&a, first, slots, offsets);
+    result = grow((void **)&field->values, value_count, sizeof *field->values, error);
+    if (result == VSH_OK) {
+        result = grow((void **)&field->index, level->first_index + block_count, sizeof(int32_t), error);
     }
     if (result != VSH_OK) {
         goto done;
     }
 
-    float *constant = field->values + level->first_brick * VSHI_BRICK_VALUES;
+    const int32_t outside = (int32_t)level->first_value, inside = outside + VSHI_BRICK_VALUES;
     for (int v = 0; v < VSHI_BRICK_VALUES; ++v) {
-        constant[VSHI_BRICK_OUTSIDE * VSHI_BRICK_VALUES + v] = level->band;
-        constant[VSHI_BRICK_INSIDE * VSHI_BRICK_VALUES + v] = -level->band;
+        field->values[outside + v] = blocks->most;
+        field->values[inside + v] = (int16_t)-blocks->most;
     }
-    size_t slot = 0;
+    int32_t *index = field->index + level->first_index;
     for (size_t block = 0; block < block_count; ++block) {
-        uint64_t brick = blocks->signs[block] < 0 ? VSHI_BRICK_INSIDE : VSHI_BRICK_OUTSIDE;
         const int32_t number = blocks->map[block];
-        if (a.keep[block]) {
-            brick = slot + 2;
-            slots[slot++] = (int32_t)block;
-            if (block_feet != NULL) {
-                float *to = feet->points + brick * 512 * 3;
-                if (number >= 0) {
-                    memcpy(to, block_feet + (size_t)number * 512 * 3, 512 * 3 * sizeof(float));
-                } else {
-                    for (int v = 0; v < 512 * 3; ++v) {
-                        to[v] = NAN;
-                    }
-                }
-            }
-        } else if (number >= 0) { /* all of it is background of one sign */
-            brick = blocks->values[(size_t)number * 512] < 0.0f ? VSHI_BRICK_INSIDE : VSHI_BRICK_OUTSIDE;
-        }
-        field->index[level->first_index + block] =
-            (int32_t)((level->first_brick + brick) * VSHI_BRICK_VALUES);
+        /* without a brick all of a block is background of one sign */
+        const bool solid = number >= 0 ? blocks->values[(size_t)number * 512] < 0 : blocks->signs[block] < 0;
+        index[block] = solid ? inside : outside;
+    }
+    for (size_t i = 0; i < brick_count; ++i) {
+        index[slots[i]] = offsets[i];
     }
     a.slots = slots;
-    a.bricks = constant + 2 * VSHI_BRICK_VALUES;
+    a.offsets = offsets;
+    a.values = field->values;
     result = vshi_parallel_for(job, brick_count, 64, 0, write_bricks, &a, error);
     if (result == VSH_OK) {
+        field->value_count = value_count;
         ++field->level_count;
+        *below = (vshi_below){.brick_count = brick_count, .bricks = slots, .boxes = a.boxes};
+        slots = NULL;
+        a.boxes = NULL;
     }
 done:
-    if (result != VSH_OK) {
-        free(feet->points);
-        feet->points = NULL;
-    }
+    free(a.boxes);
+    free(offsets);
     free(slots);
     free(a.keep);
     return result;

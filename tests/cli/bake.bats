@@ -103,9 +103,11 @@ setup() {
     shade bake box.obj "${SMALL[@]}" --ao 1 --quiet --stats stats.json --threads 2 -o out.exr
     done_well
     for key in version stages_s load voxelize field bake write texels invalid_texels samples marches \
-        certified unfinished skipped rays peak_bytes threads voxel_size levels field_bytes active_voxels; do
+        certified unfinished skipped rays peak_bytes threads voxel_size levels field_bytes field_bytes_per_voxel active_voxels; do
         grep -q "\"$key\":" stats.json || fail "$key is missing"
     done
+    awk -F'[:,]' '/"field_bytes"/ { b = $2 } /"active_voxels"/ { n = $2 } /"field_bytes_per_voxel"/ { v = $2 }
+        END { exit !(v > 0 && b / n > 0.999 * v && b / n < 1.001 * v) }' stats.json || fail "$(cat stats.json)"
     grep -q '"rays": 0' stats.json
     grep -q '"threads": 2' stats.json
     if grep -q '"texels": 0,\|"marches": 0,\|"active_voxels": 0,\|"peak_bytes": 0,' stats.json; then

@@ -2,6 +2,7 @@
 #include "fields.h"
 
 #include "field/field.h"
+#include "shim/openvdb.h"
 
 #include <stdlib.h>
 
@@ -349,6 +350,67 @@ static void info_tells_the_solids_box_and_voxel(void **state) {
     vsh_field_free(field);
 }
 
+/* Against the grid's own floats, which it was made from. */
+static void values_are_rounded_by_no_more_than_half_a_quantum(void **state) {
+    (void)state;
+    const double half_widths[] = {3.0, 4.7, 6.0, 20.0};
+    for (int h = 0; h < 4; ++h) {
+        vsh_sdf_node node = vsh_sdf_node_default();
+        node.radius = 1.0;
+        const vsh_sdf sdf = {&node, 1};
+        vsh_grid_options options = vsh_grid_options_default();
+        options.voxel_size = VOXEL;
+        options.half_width = half_widths[h];
+        vsh_grid *grid = NULL;
+        assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, NULL), VSH_OK);
+        vsh_field *field = NULL;
+        assert_int_equal(vsh_field_create(grid, NULL, NULL, &field, NULL), VSH_OK);
+        const size_t count = vshi_grid_leaves(grid, NULL, 0);
+        vshi_leaf *leaves = malloc(count * sizeof *leaves);
+        assert_non_null(leaves);
+        vshi_grid_leaves(grid, leaves, count);
+        const vshi_level *finest = &field->levels[0];
+        double worst = 0.0;
+        for (size_t i = 0; i < count * 512; ++i) {
+            const int v = (int)(i % 512);
+            const int32_t *o = leaves[i / 512].origin;
+            const float p[3] = {(float)(o[0] + v / 64), (float)(o[1] + v / 8 % 8), (float)(o[2] + v % 8)};
+            const double exact = (double)leaves[i / 512].values[v] / VOXEL;
+            const double stored = (double)vshi_level_sample(field, 0, p, NULL);
+            if (fabs(exact) < (double)finest->band) {
+                worst = fmax(worst, fabs(stored - exact));
+            } else {
+                assert_true(fabs(stored) == (double)finest->band && (stored < 0.0) == (exact < 0.0));
+            }
+        }
+        print_message("half width %g: quantum 2^%g, worst %.3g of it\n", half_widths[h],
+                      log2((double)finest->quantum), worst / (double)finest->quantum);
+        assert_true(worst <= (double)finest->rounding + 1e-6); /* of the float to voxels */
+        assert_true(worst > 0.9 * (double)finest->rounding);
+        for (int32_t l = 0; l < field->level_count; ++l) {
+            assert_true(field->levels[l].rounding < 2.5e-4f * field->levels[l].scale);
+        }
+        free(leaves);
+        vsh_field_free(field);
+        vsh_grid_free(grid);
+    }
+}
+
+static void a_voxel_takes_no_more_than_eighteen_bytes(void **state) {
+    (void)state;
+    const double voxels[] = {0.04, 0.02, 0.01};
+    for (int i = 0; i < 3; ++i) {
+        vsh_field *field = field_of(truth_seeds(), voxels[i], 0.0);
+        vsh_field_info info;
+        vsh_field_get_info(field, &info);
+        const double each = (double)info.bytes / (double)info.active_voxels;
+        print_message("voxel %g: %.2f bytes for each of %llu\n", voxels[i], each,
+                      (unsigned long long)info.active_voxels);
+        assert_true(each > 2.0 && each <= 18.0);
+        vsh_field_free(field);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_level_is_within_a_cell_of_the_truth_in_its_band),
@@ -362,6 +424,8 @@ int main(void) {
         cmocka_unit_test(turned_and_moved_shapes_have_the_same_distances),
         cmocka_unit_test(positions_that_are_not_finite_give_nan_and_far_ones_do_not),
         cmocka_unit_test(info_tells_the_solids_box_and_voxel),
+        cmocka_unit_test(values_are_rounded_by_no_more_than_half_a_quantum),
+        cmocka_unit_test(a_voxel_takes_no_more_than_eighteen_bytes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
