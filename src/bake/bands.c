@@ -294,12 +294,14 @@ vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t ro
     const size_t tile = VSHI_TILE, all = charts->sorted.rows;
     const size_t reach = (size_t)(charts->padding > LEAST_HALO ? charts->padding : LEAST_HALO);
     const size_t halo = (reach + tile - 1) / tile;
-    const size_t below = halo + (charts->ao_spacing > 1 ? VSHI_LATTICE_ROWS : 0);
+    const bool lattice = charts->ao_spacing > 1;
+    const size_t above = halo + (lattice ? VSHI_LATTICE_ABOVE : 0);
+    const size_t below = halo + (lattice ? VSHI_LATTICE_BELOW : 0);
     band->own_first = first_row;
     band->own_rows = rows;
     band->own_begin = (size_t)first_row / tile;
     band->own_end = ((size_t)first_row + (size_t)rows + tile - 1) / tile;
-    band->held_begin = band->own_begin > halo ? band->own_begin - halo : 0;
+    band->held_begin = band->own_begin > above ? band->own_begin - above : 0;
     band->held_end = all - band->own_end > below ? band->own_end + below : all;
     band->first = (int32_t)(band->held_begin * tile);
     band->rows = (band->held_end == all ? height : (int32_t)(band->held_end * tile)) - band->first;

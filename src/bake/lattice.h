@@ -4,12 +4,14 @@
 
 #include "bake/origins.h"
 
-enum { VSHI_LATTICE_ROWS = 2 }; /* of tiles, below a texel's own: what its cell and theirs depend on */
+/* Rows of tiles beside a texel's own that its value depends on: the cells that end at it, its own and theirs.
+ */
+enum { VSHI_LATTICE_ABOVE = 1, VSHI_LATTICE_BELOW = 2 };
 
 /* As vsh_shade_ao() at the origins' points, `points`, of a lightmap of one sample a texel. Texels of a
  * lattice of the texels' ao_spacing (1, 2, 4 or 8) are shaded; those between are interpolated where nothing
  * is near enough to change within a cell, else the lattice is halved there (irradiance caching: Ward,
- * Rubinstein and Clear, 1988). Of a band, the last VSHI_LATTICE_ROWS held have other values than in the
+ * Rubinstein and Clear, 1988). Of a band, so many held at either end may have other values than in the
  * whole. `deviation` may be NULL. */
 vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
                            const vsh_points *points, const vsh_shade_options *options, const vsh_run *run,
