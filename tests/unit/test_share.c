@@ -28,16 +28,18 @@ static void lay_square(vshi_share *share) {
     }
 }
 
+static float known_within = 0.01f;
+
 typedef double light_fn(double column, double row);
 
-/* Finds what is wanted by `light` to within an error; how many. */
+/* Finds what is wanted by `light`; how many. */
 static int answer(vshi_share *share, light_fn *light) {
     int wanted = 0;
     for (size_t k = 0; k < POINTS; ++k) {
         if (share->state[k] == VSHI_SHARE_WANTED) {
             share->state[k] = VSHI_SHARE_KNOWN;
             share->value[k] = (float)light((double)(k % SQUARE), (double)(k / SQUARE));
-            share->deviation[k] = 0.01f;
+            share->deviation[k] = known_within;
             ++wanted;
         }
     }
@@ -108,6 +110,47 @@ static void a_bend_takes_small_squares(void **state) {
     for (size_t k = 0; k < POINTS; ++k) {
         const double off = (double)share.value[k] - bend((double)(k % SQUARE), (double)(k / SQUARE));
         assert_true(fabs(off) < 2.5 * (double)share.deviation[k] + 1e-6);
+    }
+}
+
+static double slight_bend(double column, double row) {
+    (void)column;
+    return 0.3 + 0.0015 * (row - 3.5) * (row - 3.5);
+}
+
+/* Where the anchors are exact, what is left between them is said too. */
+static void the_error_between_counts(void **state) {
+    (void)state;
+    static vshi_share share;
+    int wanted[VSHI_SHARE_LEVELS];
+    lay_square(&share);
+    known_within = 0.0f;
+    assert_int_equal(run(&share, slight_bend, wanted), 0);
+    known_within = 0.01f;
+    assert_int_equal(wanted[1], 0);
+    for (size_t k = 0; k < POINTS; ++k) {
+        const double off = (double)share.value[k] - slight_bend((double)(k % SQUARE), (double)(k / SQUARE));
+        assert_true(fabs(off) < 2.5 * (double)share.deviation[k] + 1e-6);
+    }
+}
+
+/* An edge that all anchors of the large square agree on. */
+static double straight(double column, double row) {
+    (void)column;
+    return row < 4.0 ? 0.95 : row > 4.0 ? 0.05 : 0.95 - 0.9 * 4.0 / 7.0;
+}
+
+static void a_wide_range_is_not_bridged(void **state) {
+    (void)state;
+    static vshi_share share;
+    int wanted[VSHI_SHARE_LEVELS];
+    lay_square(&share);
+    assert_true(run(&share, straight, wanted) > 0);
+    for (size_t k = 0; k < POINTS; ++k) {
+        if (share.state[k] == VSHI_SHARE_KNOWN) {
+            const double off = (double)share.value[k] - straight((double)(k % SQUARE), (double)(k / SQUARE));
+            assert_true(fabs(off) < 0.01);
+        }
     }
 }
 
@@ -217,6 +260,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_ramp_takes_nine_of_64),
         cmocka_unit_test(a_bend_takes_small_squares),
+        cmocka_unit_test(the_error_between_counts),
+        cmocka_unit_test(a_wide_range_is_not_bridged),
         cmocka_unit_test(edges_and_spots_stay_open),
         cmocka_unit_test(what_is_bent_or_missing_is_not_shared),
         cmocka_unit_test(rays_are_saved_and_the_error_is_as_said),
