@@ -4,6 +4,7 @@
 #include "shim/embree.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { FIRST_ROUND = 8 };
 
@@ -172,12 +173,7 @@ static void cast_rounds(ray_batch *batch, const size_t *some, size_t count) {
     const int32_t most = hard ? 1 : options->rays;
     int32_t target = refining ? FIRST_ROUND : options->early_rays > 0 ? options->early_rays : most;
     size_t unsettled[VSHI_PIECE];
-    for (size_t i = 0; i < count; ++i) {
-        unsettled[i] = some[i];
-        if (options->method == VSH_SHADOW_EXACT) {
-            turn_to_world(batch->task, &batch->open[some[i]]);
-        }
-    }
+    memcpy(unsettled, some, count * sizeof *some);
     while (count > 0) {
         target = target < most ? target : most;
         for (size_t i = 0; i < count; ++i) {
@@ -216,16 +212,27 @@ static void settle_cast(ray_batch *batch, const size_t *some, size_t count) {
  * leaves the rest in `some`. Returns their number. */
 static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *some) {
     const vshi_shadow_task *task = batch->task;
-    vshi_share share = {
-        .points = task->points, .begin = begin, .count = end - begin, .max_error = task->options->max_error};
+    vshi_share share = {.points = task->points,
+                        .begin = begin,
+                        .count = end - begin,
+                        .max_error = task->options->max_error,
+                        .sampler = task->options->sampler,
+                        .rays = vshi_share_rays(task->options->max_error)};
     for (size_t k = 0; k < share.count; ++k) {
         share.value[k] = task->visibility[begin + k];
         share.deviation[k] = 0.0f;
         share.state[k] = isnan(share.value[k]) ? VSHI_SHARE_GONE : VSHI_SHARE_KNOWN;
     }
     for (size_t o = 0; o < batch->open_count; ++o) {
-        share.state[batch->open[o].point - begin] = VSHI_SHARE_OPEN;
+        cast(batch, o, share.rays);
     }
+    flush(batch);
+    for (size_t o = 0; o < batch->open_count; ++o) {
+        const size_t k = batch->open[o].point - begin;
+        share.state[k] = VSHI_SHARE_OPEN;
+        share.lit[k] = (uint8_t)batch->open[o].lit;
+    }
+    bool anchor[VSHI_PIECE] = {false};
     vshi_share_begin(&share);
     for (int level = 0; level < VSHI_SHARE_LEVELS; ++level) {
         size_t wanted = 0;
@@ -241,6 +248,7 @@ static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *so
         for (size_t i = 0; i < wanted; ++i) {
             const open_point *p = &batch->open[some[i]];
             const size_t k = p->point - begin;
+            anchor[some[i]] = true;
             share.state[k] = VSHI_SHARE_KNOWN;
             share.value[k] = task->visibility[p->point];
             share.deviation[k] = (float)p->deviation;
@@ -252,7 +260,7 @@ static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *so
         const size_t point = batch->open[o].point, k = point - begin;
         if (share.state[k] == VSHI_SHARE_OPEN) {
             some[left++] = o;
-        } else if (batch->open[o].taken == 0) {
+        } else if (!anchor[o]) {
             settle(batch, point, share.value[k], share.deviation[k]);
         }
     }
@@ -325,12 +333,17 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
         vshi_frame(cone->direction, &p->u, &p->v);
         p->u = vshi_scale(p->u, tangent);
         p->v = vshi_scale(p->v, tangent);
+        if (task->options->method == VSH_SHADOW_EXACT) {
+            turn_to_world(task, p);
+        }
     }
     size_t some[VSHI_PIECE], count = batch.open_count;
     for (size_t o = 0; o < count; ++o) {
         some[o] = o;
     }
-    if (task->options->method != VSH_SHADOW_RAYS && !is_hard(task) && vshi_share_can(task->points)) {
+    if (task->options->method != VSH_SHADOW_RAYS &&
+        task->options->rays > vshi_share_rays(task->options->max_error) && !is_hard(task) &&
+        vshi_share_can(task->points)) {
         count = cast_shared(&batch, begin, end, some);
     }
     cast_rounds(&batch, some, count);

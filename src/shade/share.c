@@ -21,6 +21,8 @@ static const pattern LEVELS[VSHI_SHARE_LEVELS] = {
 
 /* Corners differ by at most this: an edge between them is not seen from the middle. */
 static const double RANGE = 0.5;
+/* Standard errors that rays may be off. */
+static const double SIGMAS = 2.5;
 /* Points lie so flat, of the square's size, and their normals within so much (cosine) of each other. */
 static const double FLAT = 0.1, ALIKE = 0.98;
 
@@ -38,6 +40,14 @@ static uint32_t square_of(const vshi_share *share, size_t k) {
 
 bool vshi_share_can(const vsh_points *points) {
     return points->texels != NULL && points->normals != NULL;
+}
+
+int32_t vshi_share_rays(double max_error) {
+    int32_t rays = 4;
+    while (rays < 32 && rays * max_error < 0.16) {
+        rays *= 2;
+    }
+    return rays;
 }
 
 void vshi_share_begin(vshi_share *share) {
@@ -221,17 +231,20 @@ static bool read(const square *s, anchors *a) {
     return high - low <= RANGE && a->surplus <= p->agree * share->max_error;
 }
 
-static void interpolate(vshi_share *share, const square *s) {
+/* Values and variances of a square's open points, in the order of rows. */
+typedef struct between {
+    size_t count, point[SIDE * SIDE];
+    double value[SIDE * SIDE], variance[SIDE * SIDE];
+} between;
+
+static void mix_open(const square *s, const anchors *a, between *found) {
     const pattern *p = s->pattern;
-    anchors a;
-    if (!read(s, &a)) {
-        return;
-    }
-    const double left = p->keeps * a.surplus;
+    const double left = p->keeps * a->surplus;
+    found->count = 0;
     for (int row = 0; row < p->size; ++row) {
         for (int column = 0; column < p->size; ++column) {
             const size_t k = point_at(s, column, row);
-            if (k == SIZE_MAX || share->state[k] != VSHI_SHARE_OPEN) {
+            if (k == SIZE_MAX || s->share->state[k] != VSHI_SHARE_OPEN) {
                 continue;
             }
             const int i = column >= p->place[1], j = row >= p->place[1];
@@ -241,13 +254,47 @@ static void interpolate(vshi_share *share, const square *s) {
             double value = 0.0, variance = left * left;
             for (int b = 0; b < 4; ++b) {
                 const double w = weight[b >> 1][b & 1];
-                value += w * a.value[j + (b >> 1)][i + (b & 1)];
-                variance += w * w * a.variance[j + (b >> 1)][i + (b & 1)];
+                value += w * a->value[j + (b >> 1)][i + (b & 1)];
+                variance += w * w * a->variance[j + (b >> 1)][i + (b & 1)];
             }
-            share->state[k] = VSHI_SHARE_KNOWN;
-            share->value[k] = (float)fmin(fmax(value, 0.0), 1.0);
-            share->deviation[k] = (float)sqrt(variance);
+            found->point[found->count] = k;
+            found->value[found->count] = fmin(fmax(value, 0.0), 1.0);
+            found->variance[found->count++] = variance;
         }
+    }
+}
+
+/* Whether the open points' own rays say the same, each and on average. */
+static bool rays_agree(const vshi_share *share, const between *found) {
+    double sum = 0.0, variance = 0.0;
+    for (size_t n = 0; n < found->count; ++n) {
+        const int lit = share->lit[found->point[n]];
+        const double error = vshi_rays_deviation(share->sampler, lit, share->rays, found->value[n]);
+        const double off = (double)lit / (double)share->rays - found->value[n];
+        if (fabs(off) > SIGMAS * error + share->max_error) {
+            return false;
+        }
+        sum += off;
+        variance += error * error;
+    }
+    return fabs(sum) <= SIGMAS * sqrt(variance) + share->max_error * (double)found->count;
+}
+
+static void interpolate(vshi_share *share, const square *s) {
+    anchors a;
+    between found;
+    if (!read(s, &a)) {
+        return;
+    }
+    mix_open(s, &a, &found);
+    if (!rays_agree(share, &found)) {
+        return;
+    }
+    for (size_t n = 0; n < found.count; ++n) {
+        const size_t k = found.point[n];
+        share->state[k] = VSHI_SHARE_KNOWN;
+        share->value[k] = (float)found.value[n];
+        share->deviation[k] = (float)sqrt(found.variance[n]);
     }
 }
 

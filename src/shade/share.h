@@ -12,6 +12,11 @@ typedef struct vshi_share {
     const vsh_points *points;
     size_t begin, count;
     double max_error; /* standard error that a value may have */
+    int32_t sampler;  /* VSH_SAMPLER_… of the rays */
+    /* rays that are cast for every open point first, to be compared with what is interpolated: what is
+     * narrower than the steps between anchors shows in them */
+    int32_t rays;
+    uint8_t lit[VSHI_PIECE]; /* of them */
     uint8_t state[VSHI_PIECE];
     float value[VSHI_PIECE], deviation[VSHI_PIECE]; /* of what is known */
     /* runs of points in the same square of eight by eight texels */
@@ -20,6 +25,9 @@ typedef struct vshi_share {
 } vshi_share;
 
 enum { VSHI_SHARE_LEVELS = 2 }; /* squares of 8 × 8 texels, then of 4 × 4 */
+
+/* How many rays that takes: 4 to 32, a small part of what the error takes. */
+int32_t vshi_share_rays(double max_error);
 
 /* Whether points can share: they have normals, and places in a lightmap. */
 bool vshi_share_can(const vsh_points *points);
@@ -32,7 +40,8 @@ void vshi_share_begin(vshi_share *share);
 bool vshi_share_want(vshi_share *share, int level);
 
 /* Once all that was wanted is known: gives the open points of a square their values, where those that are
- * known agree with each other to within their errors; they are then known too. */
+ * known agree with each other to within their errors, and with the open points' own rays; they are then known
+ * too. */
 void vshi_share_interpolate(vshi_share *share, int level);
 
 #endif

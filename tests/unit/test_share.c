@@ -15,7 +15,8 @@ static uint32_t texels[POINTS];
 /* A level square of texels at (8, 16), all open. */
 static void lay_square(vshi_share *share) {
     static const vsh_points points = {POINTS, positions, normals, texels};
-    *share = (vshi_share){.points = &points, .count = POINTS, .max_error = 0.02};
+    *share = (vshi_share){
+        .points = &points, .count = POINTS, .max_error = 0.02, .sampler = VSH_SAMPLER_SOBOL, .rays = 8};
     for (uint32_t k = 0; k < POINTS; ++k) {
         const uint32_t column = k % SQUARE, row = k / SQUARE;
         positions[3 * k] = 0.1 * column;
@@ -56,6 +57,10 @@ static int still_open(const vshi_share *share) {
 
 /* Shares by a light at both levels; how many are left. */
 static int run(vshi_share *share, light_fn *light, int wanted[VSHI_SHARE_LEVELS]) {
+    for (size_t k = 0; k < POINTS; ++k) {
+        const double seen = light((double)(k % SQUARE), (double)(k / SQUARE));
+        share->lit[k] = (uint8_t)lround(share->rays * seen);
+    }
     vshi_share_begin(share);
     for (int level = 0; level < VSHI_SHARE_LEVELS; ++level) {
         vshi_share_want(share, level);
@@ -151,6 +156,23 @@ static void a_wide_range_is_not_bridged(void **state) {
             const double off = (double)share.value[k] - straight((double)(k % SQUARE), (double)(k / SQUARE));
             assert_true(fabs(off) < 0.01);
         }
+    }
+}
+
+/* A line that none of the anchors is on. */
+static double line(double column, double row) {
+    (void)column;
+    return row == 5.0 ? 0.0 : 1.0;
+}
+
+static void what_lies_between_anchors_shows_in_the_rays(void **state) {
+    (void)state;
+    static vshi_share share;
+    int wanted[VSHI_SHARE_LEVELS];
+    lay_square(&share);
+    assert_int_equal(run(&share, line, wanted), 2 * (16 - 5));
+    for (size_t k = 0; k < POINTS; ++k) {
+        assert_true(share.state[k] == VSHI_SHARE_OPEN || share.value[k] == 1.0f);
     }
 }
 
@@ -262,6 +284,7 @@ int main(void) {
         cmocka_unit_test(a_bend_takes_small_squares),
         cmocka_unit_test(the_error_between_counts),
         cmocka_unit_test(a_wide_range_is_not_bridged),
+        cmocka_unit_test(what_lies_between_anchors_shows_in_the_rays),
         cmocka_unit_test(edges_and_spots_stay_open),
         cmocka_unit_test(what_is_bent_or_missing_is_not_shared),
         cmocka_unit_test(rays_are_saved_and_the_error_is_as_said),
