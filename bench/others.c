@@ -239,7 +239,7 @@ static void compare_samples(FILE *csv) {
     vsh_shade_stats stats;
     const double ours =
         bench_shadow(BENCH_RUNS, seeds.field, &points, &seeds.sun, &shade, values, NULL, &stats);
-    bench_ratio(csv, "nanovdb", "seeds", "cone, a sample", "trilinear sample", 1,
+    bench_ratio(csv, "nanovdb", "seeds", "cone by sample", "trilinear sample", 1,
                 1e6 * ours / (double)stats.samples, 1e6 * theirs, 0.0);
     free(values);
     free(places);
