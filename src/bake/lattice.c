@@ -119,7 +119,7 @@ static bool is_corner(const lattice *l, uint32_t column, uint32_t row) {
     if (((column | row) & mask) == 0) {
         return true;
     }
-    for (int k = 0; k < 4; ++k) {
+    for (uint32_t k = 0; k < 4; ++k) {
         const uint32_t before = k & 1, above = k >> 1;
         if ((before && ((column & mask) != 0 || column == 0)) || (above && ((row & mask) != 0 || row == 0))) {
             continue;

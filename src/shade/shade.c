@@ -55,7 +55,8 @@ typedef struct shade_run {
     const vshi_point_rows *rows;
     const size_t *pieces; /* [rows + 1]: before each row */
     _Atomic uint64_t marches, samples, skipped, certified, unfinished, invalid, beyond_reach, rays, refined;
-    _Atomic uint64_t square_error; /* in units of VSHI_SQUARE_UNIT, so that the order of threads changes no bit */
+    _Atomic uint64_t
+        square_error; /* in units of VSHI_SQUARE_UNIT, so that the order of threads changes no bit */
 } shade_run;
 
 static void run_piece(void *user, size_t piece, size_t next) {
