@@ -1,0 +1,79 @@
+/* Flat scenes: light maps of a plane, for 2D games. Casters are areas of the plane (outline.h), lights are
+ * discs in it or far away. */
+#ifndef VDBSHADE_FLAT_H
+#define VDBSHADE_FLAT_H
+
+#include "light.h"
+#include "outline.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* How much of a light a point sees. Shadow is the share of the angle under which the light's disc is seen, as
+ * a disc that shines evenly in a plane lights a point. */
+enum {
+    VSH_FLAT_HARD = 0,    /* the light's centre: 0 or 1, without error */
+    VSH_FLAT_CLASSIC = 1, /* min h/(s t) along the ray to the centre, outer half of the penumbra only, h from
+                             a grid of distances, s the sine of the light's half angle (Kaplan's 2D lighting
+                             after Quilez, "soft shadows in raymarched SDFs", 2010) */
+    VSH_FLAT_EXACT = 2    /* the union of the angles that the outline hides, in closed form: without error but
+                             rounding, whatever the outline */
+};
+
+/* "exact" to VSH_FLAT_EXACT and back; -1 and NULL for what is none. Names are static strings; NULL is none.
+ */
+VSH_API int32_t vsh_flat_method(const char *name);
+VSH_API const char *vsh_flat_method_name(int32_t method);
+
+typedef struct vsh_flat_options {
+    size_t struct_size;
+    int32_t width;        /* texels, 1 … 65536 */
+    int32_t height;       /* the same */
+    double region_min[2]; /* world rectangle that the map shows, finite, at most 1e15 in size; row 0 of the
+                             map is */
+    double region_max[2]; /* its upper side, y = region_max[1] */
+    int32_t method;       /* VSH_FLAT_… */
+    int32_t supersample;  /* N: N × N samples a texel, 1 … 16 */
+    int32_t padding;      /* texels that values are grown by into solids, 0 … 4096; never coverage */
+    int32_t
+        max_steps; /* classic: 16 … 65536; a ray that has not ended after so many takes what is known then */
+} vsh_flat_options;
+
+static inline vsh_flat_options vsh_flat_options_default(void) {
+    vsh_flat_options options = {sizeof(vsh_flat_options), 512, 512, {-1.0, -1.0}, {1.0, 1.0},
+                                VSH_FLAT_EXACT,           1,   4,   1024};
+    return options;
+}
+
+/* Where a bake's values go; each plane [height][width], row 0 on top. */
+typedef struct vsh_flat_map {
+    float *const *shadow; /* [light_count] planes: the share of each light that is seen, 0 dark … 1 lit, and 0
+                             beyond its reach, where no light arrives; NULL, or a plane NULL: not wanted */
+    float *const *irradiance; /* [3] planes, linear R, G and B: over all lights visibility × colour × falloff
+                                 (and a spot's edge); NULL: not wanted */
+    float *coverage;          /* share of a texel's samples outside solids; NULL: not wanted */
+} vsh_flat_map;
+
+/* Bakes a light map: each texel's values are the mean of those of its samples that are outside solids; where
+ * there is none they are 0, but for padding. `casters` NULL is a plane without any. Lights are as in light.h,
+ * but for the third components of direction and position, which are ignored; their radius is that of a disc,
+ * a spot's angles are in the plane. A point inside a light's disc sees all of it. Values depend on no number
+ * of threads. Errors (the planes then hold nothing of use):
+ * - VSH_ERROR_ARGUMENT: map NULL, options out of range, lights NULL with a count above 0, a light that
+ *   vsh_light_check() refuses or whose direction has no length in the plane (with its number), run;
+ * - VSH_ERROR_LIMIT: run->memory_limit, with outline and planes; classic: more than 2^31 distances in its
+ * grid, which covers the outline and the lights' half widths around it in steps of a texel;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_flat_bake(const vsh_outline *casters, const vsh_light *lights, size_t light_count,
+                                 const vsh_flat_options *options, const vsh_run *run, const vsh_flat_map *map,
+                                 vsh_error *error);
+
+/* The share of a light that a point [2] sees, as by VSH_FLAT_EXACT and without its reach: 0 … 1; NaN where
+ * the point is not finite. The light must have passed vsh_light_check(). */
+VSH_API double vsh_flat_visibility(const vsh_outline *casters, const vsh_light *light, const double point[2]);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
