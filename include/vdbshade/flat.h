@@ -73,6 +73,53 @@ VSH_API vsh_result vsh_flat_bake(const vsh_outline *casters, const vsh_light *li
  * the point is not finite. The light must have passed vsh_light_check(). */
 VSH_API double vsh_flat_visibility(const vsh_outline *casters, const vsh_light *light, const double point[2]);
 
+/* --- flat scenes */
+
+enum {
+    VSH_FLAT_MASK = 0,   /* path, mask */
+    VSH_FLAT_TEXT = 1,   /* path (the font), text, letters */
+    VSH_FLAT_CIRCLE = 2, /* radius; as a polygon of 256 sides of the same area */
+    VSH_FLAT_BOX = 3,    /* half_size */
+    VSH_FLAT_POLYGON = 4 /* points */
+};
+
+typedef struct vsh_flat_caster {
+    int32_t type;     /* VSH_FLAT_… */
+    const char *path; /* file */
+    vsh_mask_options mask;
+    const char *text;
+    vsh_text_options letters;
+    double radius;        /* world units, > 0 */
+    double half_size[2];  /* the same */
+    const double *points; /* [point_count][2], closed, of either sense, may cross itself */
+    size_t point_count;   /* ≥ 3 */
+    double transform[6];  /* as in vsh_outline_instance */
+} vsh_flat_caster;
+
+/* A flat scene, read from a file or filled by the caller. Paths are as the system takes them. */
+typedef struct vsh_flat_scene {
+    const vsh_flat_caster *casters;
+    size_t caster_count;
+    const vsh_light *lights; /* no two names alike, none empty: channels are named after them */
+    size_t light_count;
+    vsh_flat_options options;
+    const char *output; /* image file; NULL: none is named */
+    int32_t bits;       /* as in vsh_image_options */
+    const char *pack;   /* as in vsh_image_options; may be NULL */
+} vsh_flat_scene;
+
+/* Reads a flat scene's file (docs/flat.md); what it names is not opened. The scene and all it points to
+ * belong to *scene; free it with vsh_flat_scene_free(). Errors: as vsh_scene_read(). */
+VSH_API vsh_result vsh_flat_scene_read(const char *path, vsh_flat_scene **scene, vsh_error *error);
+VSH_API void
+vsh_flat_scene_free(vsh_flat_scene *scene); /* of vsh_flat_scene_read() only; NULL does nothing */
+
+/* The union of a flat scene's casters; NULL, with VSH_OK, where it has none. Free it with vsh_outline_free().
+ * Errors: VSH_ERROR_ARGUMENT (scene or outline NULL, a caster of no type, run), and with the caster's number
+ * in the message those of vsh_outline_from_…() and vsh_outline_unite(). */
+VSH_API vsh_result vsh_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *run,
+                                          vsh_outline **outline, vsh_error *error);
+
 #ifdef __cplusplus
 }
 #endif

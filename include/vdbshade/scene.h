@@ -4,19 +4,31 @@
 
 #include "bake.h"
 #include "grid.h"
+#include "outline.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-enum { VSH_CASTER_MESH = 0, VSH_CASTER_SDF = 1, VSH_CASTER_VDB = 2 };
+enum {
+    VSH_CASTER_MESH = 0,
+    VSH_CASTER_SDF = 1,
+    VSH_CASTER_VDB = 2,
+    VSH_CASTER_MASK = 3, /* an image, extruded: vsh_outline_from_image(), vsh_grid_from_outline() */
+    VSH_CASTER_TEXT = 4  /* text, likewise */
+};
 
 typedef struct vsh_caster {
     int32_t type;         /* VSH_CASTER_… */
-    const char *path;     /* mesh, vdb: file */
+    const char *path;     /* mesh, vdb, mask: file; text: font */
     const char *grid;     /* vdb: name of the grid; NULL: the file's first level set */
     vsh_sdf sdf;          /* sdf: tree */
-    double transform[12]; /* local to world, three rows of four; sdf and vdb: without shear or uneven scale */
+    double transform[12]; /* local to world, three rows of four; all but meshes: without shear or uneven
+                             scale */
+    vsh_mask_options mask;
+    const char *text;
+    vsh_text_options letters; /* text */
+    double thickness;         /* mask, text: along z, local units, > 0 */
 } vsh_caster;
 
 typedef struct vsh_receiver {
@@ -67,9 +79,9 @@ typedef struct vsh_assets vsh_assets;
  * scene need not outlive the call. Free the result with vsh_assets_free(). Errors:
  * - VSH_ERROR_ARGUMENT: scene or assets NULL, a caster of no type, a caster or receiver without a path, a
  *   UV set outside -1 … VSH_MAX_UV_SETS - 1, run;
- * - VSH_ERROR_INPUT: a receiver's mesh without UVs or without the set asked for; as vsh_model_read() and
- *   vsh_grid_read();
- * - VSH_ERROR_READ, VSH_ERROR_LIMIT (for each file alone): as vsh_model_read() and vsh_grid_read();
+ * - VSH_ERROR_INPUT: a receiver's mesh without UVs or without the set asked for; as vsh_model_read(),
+ *   vsh_grid_read() and vsh_outline_from_…();
+ * - VSH_ERROR_READ, VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT (for each file alone): as these;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
                                    vsh_error *error);
@@ -84,8 +96,8 @@ VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index
  * side of the box around all casters over scene->grid.resolution. `assets` are those loaded for this scene.
  * Free the grid with vsh_grid_free(). Errors:
  * - VSH_ERROR_ARGUMENT: scene, assets or grid NULL, scene->grid out of range, run;
- * - VSH_ERROR_INPUT: no casters, casters without extent, an sdf or vdb caster whose transform shears or
- *   scales unevenly; as vsh_mesh_check(), vsh_sdf_check() and the vsh_grid_from_… calls;
+ * - VSH_ERROR_INPUT: no casters, casters without extent, a caster other than a mesh whose transform shears
+ *   or scales unevenly; as vsh_mesh_check(), vsh_sdf_check() and the vsh_grid_from_… calls;
  * - VSH_ERROR_LIMIT: as the vsh_grid_from_… calls and vsh_grid_unite();
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,

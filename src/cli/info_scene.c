@@ -2,10 +2,11 @@
 #include "message.h"
 
 #include <stdio.h>
+#include <string.h>
 #include <vdbshade/scene.h>
 
 static void print_caster(const vsh_caster *caster, size_t index) {
-    static const char *const types[] = {"mesh", "sdf", "vdb"};
+    static const char *const types[] = {"mesh", "sdf", "vdb", "mask", "text"};
     printf("caster %zu: %s", index, types[caster->type]);
     if (caster->type == VSH_CASTER_SDF) {
         double min[3], max[3];
@@ -16,6 +17,9 @@ static void print_caster(const vsh_caster *caster, size_t index) {
         printf(" %s", caster->path);
         if (caster->grid != NULL) {
             printf(", grid '%s'", caster->grid);
+        }
+        if (caster->type == VSH_CASTER_TEXT) {
+            printf(", %zu bytes of text", strlen(caster->text));
         }
     }
     putchar('\n');

@@ -62,7 +62,8 @@ static int march(trade_work *work, int32_t resolution) {
     snprintf(work->truth_text, sizeof work->truth_text,
              "%d rays a texel marched against a field of %d voxels along the longest side, as %s", shade.rays,
              resolution,
-             vsh_triangles_available() ? "a caster is a .vdb level set" : "this build has no Embree");
+             vsh_triangles_available() ? "a caster is neither a mesh nor procedural"
+                                       : "this build has no Embree");
     return code;
 }
 
@@ -70,7 +71,8 @@ static int march(trade_work *work, int32_t resolution) {
 static bool traceable(const trade_work *work) {
     for (size_t i = 0; i < work->scene->caster_count; ++i) {
         const int32_t type = work->scene->casters[i].type;
-        if (type == VSH_CASTER_VDB || (type == VSH_CASTER_MESH && !vsh_triangles_available())) {
+        if ((type != VSH_CASTER_MESH && type != VSH_CASTER_SDF) ||
+            (type == VSH_CASTER_MESH && !vsh_triangles_available())) {
             return false;
         }
     }

@@ -1,8 +1,9 @@
-/* Work on files that may come from anywhere, in a child process: the installed OpenVDB reader can crash on
- * damaged ones. */
+/* Work on files that may come from anywhere, in a child process: the installed OpenVDB reader and
+ * OpenImageIO's can crash on damaged ones. */
 #ifndef CLI_TRIAL_H
 #define CLI_TRIAL_H
 
+#include <vdbshade/flat.h>
 #include <vdbshade/scene.h>
 
 /* Runs `work` in a child and returns its exit code. Where the child dies instead, says "PATH: damaged: …" and
@@ -10,8 +11,9 @@
  * process has threads. */
 int cli_isolated(const char *path, uint64_t memory, int (*work)(void *user), void *user);
 
-/* Reads each level set that the scene names as a caster in a child, and drops it. CLI_OK or an exit code,
- * having said why. */
+/* Reads each level set, mask and font that the scene names as a caster in a child, and drops it. CLI_OK or an
+ * exit code, having said why. */
 int cli_trial_casters(const vsh_scene *scene, uint64_t memory);
+int cli_trial_flat(const vsh_flat_scene *scene, uint64_t memory);
 
 #endif

@@ -118,45 +118,51 @@ static vshi_point along(vshi_point a, vshi_point b, double t) {
     return t >= 1.0 ? b : (vshi_point){a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)};
 }
 
-/* Slope at an end of what was clipped; exactly the cone's edge where it was clipped there. */
-static double slope_at(const hiding *h, vshi_point p) {
-    const double slope = p.y / p.x;
-    return slope < h->low ? h->low : slope > h->high ? h->high : slope;
-}
+/* A part of a segment: from where to where along it, and the slopes there where they are the cone's edges. */
+typedef struct part {
+    double from, to;
+    double from_slope, to_slope; /* NAN: to be found */
+} part;
 
-/* Hides what the part t0 … t1 of a segment does, which is wholly in the cone and outside the light's disc. */
-static void hide_part(hiding *h, vshi_point a, vshi_point b, double t0, double t1) {
-    const vshi_point middle = along(a, b, 0.5 * (t0 + t1)), p = along(a, b, t0), q = along(a, b, t1);
-    if (!(t0 < t1) || dot(middle, middle) >= h->tangent2 || !(p.x > 0.0 && q.x > 0.0)) {
+/* Hides what a part does, which is wholly in the cone and outside the light's disc. */
+static void hide_part(hiding *h, vshi_point a, vshi_point b, part w) {
+    const vshi_point middle = along(a, b, 0.5 * (w.from + w.to));
+    const vshi_point p = along(a, b, w.from), q = along(a, b, w.to);
+    if (!(w.from < w.to) || dot(middle, middle) >= h->tangent2 || !(p.x > 0.0 && q.x > 0.0)) {
         return; /* behind the light; or the point is on the segment, which hides nothing of one side */
     }
-    const double s = slope_at(h, p), e = slope_at(h, q);
+    const double s = isnan(w.from_slope) ? p.y / p.x : w.from_slope;
+    const double e = isnan(w.to_slope) ? q.y / q.x : w.to_slope;
     hide(h, s < e ? s : e, s < e ? e : s);
 }
 
-/* Clips t0 … t1 to where n·(a + t (b - a)) is not over 0, in the light's frame. */
-static bool clip(double at_a, double at_b, double *t0, double *t1) {
+/* Clips a part to where what is at_a and at_b at the segment's ends is not over 0; it is 0 at the cone's edge
+ * of that slope. */
+static bool clip(double at_a, double at_b, double slope, part *w) {
     if (at_a > 0.0 && at_b > 0.0) {
         return false;
     }
-    if (at_a > 0.0) {
-        *t0 = fmax(*t0, at_a / (at_a - at_b));
-    } else if (at_b > 0.0) {
-        *t1 = fmin(*t1, at_a / (at_a - at_b));
+    const double t = at_a / (at_a - at_b);
+    if (at_a > 0.0 && t > w->from) {
+        w->from = t;
+        w->from_slope = slope;
+    } else if (at_b > 0.0 && t < w->to) {
+        w->to = t;
+        w->to_slope = slope;
     }
-    return *t0 < *t1;
+    return w->from < w->to;
 }
 
 static void hide_segment(hiding *h, vshi_point from, vshi_point to) {
     const vshi_flat_view *v = h->view;
     const vshi_point a = local(v, from), b = local(v, to);
-    double t0 = 0.0, t1 = 1.0;
-    if (!clip(a.y - h->high * a.x, b.y - h->high * b.x, &t0, &t1) ||
-        !clip(h->low * a.x - a.y, h->low * b.x - b.y, &t0, &t1)) {
+    part whole = {0.0, 1.0, NAN, NAN};
+    if (!clip(a.y - h->high * a.x, b.y - h->high * b.x, h->high, &whole) ||
+        !clip(h->low * a.x - a.y, h->low * b.x - b.y, h->low, &whole)) {
         return;
     }
     if (dot(a, a) < h->sure2 && dot(b, b) < h->sure2) {
-        hide_part(h, a, b, t0, t1);
+        hide_part(h, a, b, whole);
         return;
     }
     /* without the part in the light's disc: |a + t d - c|² = r² */
@@ -164,16 +170,24 @@ static void hide_segment(hiding *h, vshi_point from, vshi_point to) {
     const double dd = dot(d, d), dc = dot(d, c), rest = dot(c, c) - v->radius * v->radius;
     const double root2 = dc * dc - dd * rest;
     if (!(dd > 0.0) || !(root2 > 0.0)) {
-        hide_part(h, a, b, t0, t1);
+        hide_part(h, a, b, whole);
         return;
     }
-    const double root = sqrt(root2);
-    hide_part(h, a, b, t0, fmin(t1, (-dc - root) / dd));
-    hide_part(h, a, b, fmax(t0, (-dc + root) / dd), t1);
+    const double root = sqrt(root2), enters = (-dc - root) / dd, leaves = (-dc + root) / dd;
+    const bool before = enters<whole.to, after = leaves> whole.from;
+    hide_part(
+        h, a, b,
+        (part){whole.from, before ? enters : whole.to, whole.from_slope, before ? NAN : whole.to_slope});
+    hide_part(h, a, b,
+              (part){after ? leaves : whole.from, whole.to, after ? NAN : whole.from_slope, whole.to_slope});
 }
 
 /* What a node's box may still hide. */
-typedef enum reach { NOTHING, PARTS, WHOLE /* all of it before the point and before the light */ } reach;
+typedef enum reach {
+    NOTHING,
+    PARTS,
+    WHOLE /* of the box: before the point, and before the light */
+} reach;
 
 static reach look_at_box(const hiding *h, const vshi_outline_node *node) {
     const vshi_flat_view *v = h->view;
@@ -220,11 +234,11 @@ static void walk(hiding *h) {
     stack[top++] = 0;
     while (top > 0 && !h->overflow) {
         const vshi_outline_node *node = &o->nodes[stack[--top]];
-        const reach part = look_at_box(h, node);
-        if (part == NOTHING) {
+        const reach reached = look_at_box(h, node);
+        if (reached == NOTHING) {
             continue;
         }
-        if (node->count > 0 && part == WHOLE) {
+        if (node->count > 0 && reached == WHOLE) {
             const vshi_point a = local(h->view, o->points[node->first]);
             const vshi_point b = local(h->view, o->points[node->first + node->count]);
             const double s = a.y / a.x, e = b.y / b.x;

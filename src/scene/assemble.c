@@ -109,6 +109,12 @@ static vsh_result gather(assembly *a, vsh_error *error) {
                                "unevenly",
                                i, caster->path);
         }
+        if (vshi_assets_outline(a->assets, i) != NULL && vshi_similarity_scale(caster->transform) <= 0.0) {
+            result = vshi_fail(error, VSH_ERROR_INPUT,
+                               "caster %zu: the transform of a mask or text must neither shear nor scale "
+                               "unevenly",
+                               i);
+        }
         size_t count = 0;
         const vsh_mesh *views = vsh_assets_caster(a->assets, i, &count);
         for (size_t k = 0; k < count; ++k) {
@@ -160,6 +166,12 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
             vsh_grid_info info;
             vsh_grid_get_info(vshi_assets_grid(a->assets, i), &info);
             grow_box(&all, info.bounds_min, info.bounds_max, caster->transform);
+        } else if (vshi_assets_outline(a->assets, i) != NULL) {
+            vsh_outline_info info;
+            vsh_outline_get_info(vshi_assets_outline(a->assets, i), &info);
+            const double half = 0.5 * caster->thickness;
+            grow_box(&all, (const double[]){info.bounds_min[0], info.bounds_min[1], -half},
+                     (const double[]){info.bounds_max[0], info.bounds_max[1], half}, caster->transform);
         }
     }
     const vshi_vec sides = vshi_sub(all.max, all.min);
@@ -205,6 +217,16 @@ static vsh_result make_grids(assembly *a, const vsh_run *run, vsh_error *error) 
             }
             a->made_count++;
             add_instance(a, *made, placed->transform);
+        } else if (vshi_assets_outline(a->assets, i) != NULL) {
+            vsh_grid **made = &a->made[a->made_count];
+            const vsh_result result =
+                vsh_grid_from_outline(vshi_assets_outline(a->assets, i), caster->thickness, caster->transform,
+                                      &a->options, run, made, error);
+            if (result != VSH_OK) {
+                return result;
+            }
+            a->made_count++;
+            add_instance(a, *made, NULL);
         }
     }
     return VSH_OK;

@@ -25,6 +25,7 @@ typedef struct asset_place {
     double *transforms; /* [count][12] */
     size_t count;
     const vsh_grid *grid; /* vdb casters; belongs to the assets' grids */
+    vsh_outline *outline; /* mask and text casters */
 } asset_place;
 
 struct vsh_assets {
@@ -134,15 +135,22 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_caster *caster, siz
     if (caster->type == VSH_CASTER_SDF) {
         return VSH_OK;
     }
-    if (caster->type != VSH_CASTER_MESH && caster->type != VSH_CASTER_VDB) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: type %d: expected 0 … 2", index,
-                         caster->type);
+    if (caster->type < VSH_CASTER_MESH || caster->type > VSH_CASTER_TEXT) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: type %d: expected 0 … %d", index,
+                         caster->type, VSH_CASTER_TEXT);
     }
     if (caster->path == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: no path", index);
     }
     if (caster->type == VSH_CASTER_VDB) {
         return find_grid(assets, caster->path, caster->grid, run, &place->grid, error);
+    }
+    if (caster->type == VSH_CASTER_MASK) {
+        return vsh_outline_from_image(caster->path, &caster->mask, run, &place->outline, error);
+    }
+    if (caster->type == VSH_CASTER_TEXT) {
+        return vsh_outline_from_text(caster->text, caster->path, &caster->letters, run, &place->outline,
+                                     error);
     }
     const vsh_model *model = NULL;
     const vsh_result result = find_model(assets, caster->path, run, &model, error);
@@ -243,6 +251,7 @@ static void free_places(asset_place *places, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         free(places[i].transforms);
         free(places[i].meshes);
+        vsh_outline_free(places[i].outline);
     }
     free(places);
 }
@@ -283,4 +292,8 @@ const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t
 
 const vsh_grid *vshi_assets_grid(const vsh_assets *assets, size_t index) {
     return index < assets->caster_count ? assets->casters[index].grid : NULL;
+}
+
+const vsh_outline *vshi_assets_outline(const vsh_assets *assets, size_t index) {
+    return index < assets->caster_count ? assets->casters[index].outline : NULL;
 }

@@ -1,16 +1,29 @@
+#include "scene/outline_keys.h"
 #include "scene/parts.h"
 #include "scene/transform.h"
 #include "scene/tree.h"
 
 #include <vdbshade/scene.h>
 
-enum { MESH = 1 << VSH_CASTER_MESH, SDF = 1 << VSH_CASTER_SDF, VDB = 1 << VSH_CASTER_VDB };
+enum {
+    MESH = 1 << VSH_CASTER_MESH,
+    SDF = 1 << VSH_CASTER_SDF,
+    VDB = 1 << VSH_CASTER_VDB,
+    MASK = 1 << VSH_CASTER_MASK,
+    TEXT = 1 << VSH_CASTER_TEXT
+};
 
-static const char *const types[] = {
-    [VSH_CASTER_MESH] = "mesh", [VSH_CASTER_SDF] = "sdf", [VSH_CASTER_VDB] = "vdb"};
+static const char *const types[] = {[VSH_CASTER_MESH] = "mesh",
+                                    [VSH_CASTER_SDF] = "sdf",
+                                    [VSH_CASTER_VDB] = "vdb",
+                                    [VSH_CASTER_MASK] = "mask",
+                                    [VSH_CASTER_TEXT] = "text"};
+enum { TYPE_COUNT = sizeof types / sizeof types[0] };
 static const char *const whats[] = {[VSH_CASTER_MESH] = "a mesh caster",
                                     [VSH_CASTER_SDF] = "an sdf caster",
-                                    [VSH_CASTER_VDB] = "a vdb caster"};
+                                    [VSH_CASTER_VDB] = "a vdb caster",
+                                    [VSH_CASTER_MASK] = "a mask caster",
+                                    [VSH_CASTER_TEXT] = "a text caster"};
 
 static const vshi_key caster_keys[] = {
     {.name = "mesh", .kind = VSHI_PATH, .variants = MESH, .offset = offsetof(vsh_caster, path)},
@@ -25,6 +38,14 @@ static const vshi_key caster_keys[] = {
      .kind = VSHI_CUSTOM,
      .offset = offsetof(vsh_caster, transform),
      .read = vshi_read_transform},
+    VSHI_OUTLINE_KEYS(vsh_caster, MASK, TEXT),
+    {.name = "thickness",
+     .kind = VSHI_NUMBER,
+     .variants = MASK | TEXT,
+     .required = MASK | TEXT,
+     .offset = offsetof(vsh_caster, thickness),
+     .highest = VSHI_LARGEST,
+     .flags = VSHI_ABOVE},
 };
 static const vshi_table caster_table = VSHI_TABLE(caster_keys);
 
@@ -32,12 +53,14 @@ vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *
     vsh_caster *caster = member;
     caster->type = -1;
     vshi_transform_identity(caster->transform);
+    caster->mask = vsh_mask_options_default();
+    caster->letters = vsh_text_options_default();
     vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
     if (result != VSH_OK) {
         return result;
     }
     vshi_value given, transform;
-    for (int32_t i = VSH_CASTER_MESH; i <= VSH_CASTER_VDB; ++i) {
+    for (int32_t i = VSH_CASTER_MESH; i < TYPE_COUNT; ++i) {
         if (!vshi_member(value, types[i], &given)) {
             continue;
         }
@@ -54,7 +77,8 @@ vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *
         return result;
     }
     if (caster->type < 0) {
-        return vshi_reader_fail(reader, value, "key \"mesh\", \"sdf\" or \"vdb\" is missing");
+        return vshi_reader_fail(reader, value,
+                                "key \"mesh\", \"sdf\", \"vdb\", \"mask\" or \"text\" is missing");
     }
     if (caster->type != VSH_CASTER_MESH && !vshi_transform_is_similarity(caster->transform) &&
         vshi_member(value, "transform", &transform)) {

@@ -4,25 +4,28 @@
 #include <vdbshade/image.h>
 #include <vdbshade/scene.h>
 
-/* 1024, or [width, height]. */
-static vsh_result read_size(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_size(vshi_reader *reader, const vshi_value *value, int32_t *width, int32_t *height) {
     const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 1.0, .highest = VSH_MAX_LIGHTMAP_SIZE};
-    vsh_receiver *receiver = member;
     if (!json_is_array(value->json)) {
-        const vsh_result result = vshi_read_value(reader, value, &key, &receiver->width);
-        receiver->height = receiver->width;
+        const vsh_result result = vshi_read_value(reader, value, &key, width);
+        *height = *width;
         return result;
     }
     const size_t count = json_array_size(value->json);
     if (count != 2) {
         return vshi_reader_fail(reader, value, "expected 2 numbers, found %zu", count);
     }
-    const vshi_value width = vshi_item(value, 0), height = vshi_item(value, 1);
-    const vsh_result result = vshi_read_value(reader, &width, &key, &receiver->width);
-    return result == VSH_OK ? vshi_read_value(reader, &height, &key, &receiver->height) : result;
+    const vshi_value first = vshi_item(value, 0), second = vshi_item(value, 1);
+    const vsh_result result = vshi_read_value(reader, &first, &key, width);
+    return result == VSH_OK ? vshi_read_value(reader, &second, &key, height) : result;
 }
 
-static vsh_result read_bits(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_size(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_receiver *receiver = member;
+    return vshi_read_size(reader, value, &receiver->width, &receiver->height);
+}
+
+vsh_result vshi_read_bits(vshi_reader *reader, const vshi_value *value, void *member) {
     const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 0.0, .highest = 32.0};
     int32_t *bits = member;
     const vsh_result result = vshi_read_value(reader, value, &key, bits);
@@ -55,7 +58,7 @@ static const vshi_key receiver_keys[] = {
      .lowest = 1.0,
      .highest = 8.0},
     {.name = "output", .kind = VSHI_PATH, .required = VSHI_ALL, .offset = offsetof(vsh_receiver, output)},
-    {.name = "bits", .kind = VSHI_CUSTOM, .offset = offsetof(vsh_receiver, bits), .read = read_bits},
+    {.name = "bits", .kind = VSHI_CUSTOM, .offset = offsetof(vsh_receiver, bits), .read = vshi_read_bits},
     {.name = "pack", .kind = VSHI_STRING, .offset = offsetof(vsh_receiver, pack)},
 };
 static const vshi_table receiver_table = VSHI_TABLE(receiver_keys);

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <vdbshade/scene.h>
 
-static const char *const type_names[] = {"a mesh", "an sdf", "a vdb"};
+static const char *const type_names[] = {"a mesh", "an sdf", "a vdb", "a mask", "a text"};
 
 vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                                vsh_triangles **triangles, vsh_error *error) {
@@ -21,7 +21,7 @@ vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
         if (caster->type != VSH_CASTER_MESH) {
-            const bool known = caster->type > VSH_CASTER_MESH && caster->type <= VSH_CASTER_VDB;
+            const bool known = caster->type > VSH_CASTER_MESH && caster->type <= VSH_CASTER_TEXT;
             return vshi_fail(error, VSH_ERROR_INPUT,
                              "casters[%zu] is %s: exact methods trace triangles, and need casters that are "
                              "all meshes",
