@@ -59,6 +59,13 @@ static bool same(vshi_point a, vshi_point b) {
     return a.x == b.x && a.y == b.y;
 }
 
+static int compare(vshi_point a, vshi_point b) {
+    if (a.x != b.x) {
+        return a.x < b.x ? -1 : 1;
+    }
+    return (a.y > b.y) - (a.y < b.y);
+}
+
 static double turn(vshi_point a, vshi_point b, vshi_point p) {
     return (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
 }
@@ -81,6 +88,19 @@ static bool between(vshi_point a, vshi_point b, vshi_point p) {
     return p.x >= fmin(a.x, b.x) && p.x <= fmax(a.x, b.x) && p.y >= fmin(a.y, b.y) && p.y <= fmax(a.y, b.y);
 }
 
+/* Where two segments cross: the same bits whatever their order and sense, so that contours that lie on each
+ * other are cut alike. */
+static vshi_point meet(vshi_point a, vshi_point b, vshi_point c, vshi_point d) {
+    const bool ab = compare(a, b) < 0, cd = compare(c, d) < 0;
+    const vshi_point ends[2][2] = {{ab ? a : b, ab ? b : a}, {cd ? c : d, cd ? d : c}};
+    const int order = compare(ends[0][0], ends[1][0]);
+    const int first = order != 0 ? order > 0 : compare(ends[0][1], ends[1][1]) > 0;
+    const vshi_point from = ends[first][0], to = ends[first][1], *other = ends[1 - first];
+    const double before = turn(other[0], other[1], from), after = turn(other[0], other[1], to);
+    const double t = before / (before - after);
+    return (vshi_point){from.x + t * (to.x - from.x), from.y + t * (to.y - from.y)};
+}
+
 /* Cuts both segments of a pair where they meet: the same point for both. */
 static bool cut_pair(work *w, uint32_t i, uint32_t k) {
     const vshi_point *s = w->outline->points;
@@ -88,8 +108,7 @@ static bool cut_pair(work *w, uint32_t i, uint32_t k) {
     const double ta = turn(c, d, a), tb = turn(c, d, b), tc = turn(a, b, c), td = turn(a, b, d);
     if (((ta > 0.0 && tb < 0.0) || (ta < 0.0 && tb > 0.0)) &&
         ((tc > 0.0 && td < 0.0) || (tc < 0.0 && td > 0.0))) {
-        const double t = ta / (ta - tb);
-        const vshi_point meeting = {a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)};
+        const vshi_point meeting = meet(a, b, c, d);
         return add_cut(w, i, meeting) && add_cut(w, k, meeting);
     }
     bool going = true;
@@ -188,13 +207,6 @@ static bool cut_all(work *w) {
         }
     }
     return true;
-}
-
-static int compare(vshi_point a, vshi_point b) {
-    if (a.x != b.x) {
-        return a.x < b.x ? -1 : 1;
-    }
-    return (a.y > b.y) - (a.y < b.y);
 }
 
 static int by_ends(const void *a, const void *b) {

@@ -1,0 +1,589 @@
+/* Outlines of images, of text, of polygons, and the solids they are extruded to, against closed forms. */
+#include "outlines.h"
+
+#include <unistd.h>
+
+#include <vdbshade/image.h>
+
+#include "caster/outline.h"
+
+static const double at_corner[2] = {3.0, 4.0};
+
+static void a_square_s_distance(void **state) {
+    (void)state;
+    vsh_outline *square = box(-1.0, -1.0, 1.0, 1.0);
+    for (int i = 0; i < 2000; ++i) {
+        const double p[2] = {6.0 * any(2 * (uint64_t)i) - 3.0, 6.0 * any(2 * (uint64_t)i + 1) - 3.0};
+        const double x = fabs(p[0]) - 1.0, y = fabs(p[1]) - 1.0;
+        const double expected = x > 0.0 && y > 0.0 ? hypot(x, y) : fmax(x, y);
+        assert_true(fabs(vsh_outline_distance(square, p) - expected) < 1e-14);
+    }
+    assert_true(isnan(vsh_outline_distance(square, (const double[]){NAN, 0.0})));
+    assert_true(isnan(vsh_outline_distance(square, (const double[]){0.0, INFINITY})));
+    vsh_outline_free(square);
+}
+
+static void the_tree_finds_what_looking_at_all_finds(void **state) {
+    (void)state;
+    vsh_outline *letters = text("R&8\nqi%", 1.0);
+    int inside = 0;
+    for (int i = 0; i < 2000; ++i) {
+        const double p[2] = {5.0 * any(2 * (uint64_t)i) - 2.5, 4.0 * any(2 * (uint64_t)i + 1) - 2.5};
+        const double distance = vsh_outline_distance(letters, p);
+        assert_true(fabs(fabs(distance) - sqrt(truth_square(letters, p[0], p[1]))) < 1e-12);
+        assert_int_equal(distance < 0.0, truth_inside(letters, p[0], p[1]));
+        inside += distance < 0.0;
+    }
+    assert_true(inside > 100);
+    vsh_outline_free(letters);
+}
+
+/* --- the area that contours wind around */
+
+static vsh_outline *polygons(const double *points, const size_t *counts, size_t count) {
+    vsh_outline *outline = NULL;
+    assert_ok(vsh_outline_from_polygons(points, counts, count, NULL, &outline, &failure));
+    return outline;
+}
+
+static vsh_outline_info info_of(const vsh_outline *outline) {
+    vsh_outline_info info;
+    vsh_outline_get_info(outline, &info);
+    return info;
+}
+
+static void overlapping_squares_are_one_area(void **state) {
+    (void)state;
+    /* one runs backwards; their overlap, 1 × 1, is inside all the same, as each is given alone and they are
+     * united */
+    const double first[8] = {0, 0, 2, 0, 2, 2, 0, 2}, second[8] = {1, 1, 1, 3, 3, 3, 3, 1};
+    vsh_outline *a = polygon(first, 4), *b = polygon(second, 4), *both = NULL;
+    const vsh_outline_instance instances[2] = {{a, NULL}, {b, NULL}};
+    assert_ok(vsh_outline_unite(instances, 2, NULL, &both, &failure));
+    assert_true(fabs(info_of(both).area - 7.0) < 1e-14);
+    assert_int_equal(info_of(both).contours, 1);
+    assert_int_equal(info_of(both).points, 8);
+    /* what lies inside is no border: the overlap's middle is as far from the area's edge as that is */
+    assert_true(fabs(vsh_outline_distance(both, (const double[]){1.5, 1.5}) + sqrt(0.5)) < 1e-14);
+    assert_true(fabs(vsh_outline_distance(both, (const double[]){2.5, 0.5}) - 0.5) < 1e-14);
+    vsh_outline_free(both);
+    vsh_outline_free(a);
+    vsh_outline_free(b);
+}
+
+static void squares_that_share_an_edge_are_one_area(void **state) {
+    (void)state;
+    const double points[16] = {0, 0, 1, 0, 1, 1, 0, 1, 1, 0.25, 2, 0.25, 2, 0.75, 1, 0.75};
+    const size_t counts[2] = {4, 4};
+    vsh_outline *both = polygons(points, counts, 2);
+    assert_true(fabs(info_of(both).area - 1.5) < 1e-14);
+    assert_true(fabs(vsh_outline_distance(both, (const double[]){1.0, 0.5}) + 0.25) < 1e-14);
+    vsh_outline_free(both);
+}
+
+static void a_contour_the_other_way_is_a_hole(void **state) {
+    (void)state;
+    const double points[24] = {0, 0, 4, 0, 4,   4,   0,   4,   1,   1,   1,   3,
+                               3, 3, 3, 1, 1.5, 1.5, 2.5, 1.5, 2.5, 2.5, 1.5, 2.5};
+    const size_t counts[3] = {4, 4, 4};
+    vsh_outline *island = polygons(points, counts, 3);
+    assert_true(fabs(info_of(island).area - 13.0) < 1e-14);
+    assert_true(vsh_outline_distance(island, (const double[]){1.2, 2.0}) > 0.0);
+    assert_true(vsh_outline_distance(island, (const double[]){2.0, 2.0}) == -0.5);
+    size_t count;
+    for (size_t c = 0; c < 3; ++c) { /* the area to the left, everywhere */
+        const double *p = vsh_outline_contour(island, c, &count);
+        const double x = 0.5 * (p[0] + p[2]) - 1e-3 * (p[3] - p[1]),
+                     y = 0.5 * (p[1] + p[3]) + 1e-3 * (p[2] - p[0]);
+        assert_true(vsh_outline_distance(island, (const double[]){x, y}) < 0.0);
+    }
+    assert_null(vsh_outline_contour(island, 3, &count));
+    assert_int_equal(count, 0);
+    vsh_outline_free(island);
+    /* a filled disc in it that runs the same way changes nothing */
+    const double inner[16] = {0, 0, 4, 0, 4, 4, 0, 4, 1, 1, 3, 1, 3, 3, 1, 3};
+    vsh_outline *filled = polygons(inner, counts, 2);
+    assert_true(info_of(filled).area == 16.0 && info_of(filled).contours == 1);
+    vsh_outline_free(filled);
+}
+
+/* Five lines that cross: wound around twice in the middle. */
+static void a_pentagram_is_filled(void **state) {
+    (void)state;
+    double points[10];
+    for (int i = 0; i < 5; ++i) {
+        points[2 * i] = cos(4.0 * PI * i / 5.0);
+        points[2 * i + 1] = sin(4.0 * PI * i / 5.0);
+    }
+    vsh_outline *star = polygon(points, 5);
+    /* ten triangles between the centre, a tip, and an inner corner at (3 - √5)/2 */
+    const double inner = 0.5 * (3.0 - sqrt(5.0));
+    assert_true(fabs(info_of(star).area - 5.0 * inner * sin(PI / 5.0)) < 1e-13);
+    assert_int_equal(info_of(star).points, 10);
+    assert_true(fabs(vsh_outline_distance(star, (const double[]){0.0, 0.0}) + inner) < 1e-12);
+    vsh_outline_free(star);
+}
+
+static void many_overlaps_leave_the_union(void **state) {
+    (void)state;
+    enum { COUNT = 40 };
+    double points[8 * COUNT];
+    size_t counts[COUNT];
+    for (size_t i = 0; i < COUNT; ++i) {
+        const double x = 2.0 * any(5 * i), y = 2.0 * any(5 * i + 1), w = 0.1 + 0.5 * any(5 * i + 2),
+                     turn = any(5 * i + 3);
+        for (int k = 0; k < 4; ++k) {
+            points[8 * i + 2 * (size_t)k] = x + w * cos(turn + 0.5 * PI * k);
+            points[8 * i + 2 * (size_t)k + 1] = y + w * sin(turn + 0.5 * PI * k);
+        }
+        counts[i] = 4;
+    }
+    vsh_outline *all = polygons(points, counts, COUNT);
+    for (uint64_t i = 0; i < 3000; ++i) {
+        const double p[2] = {4.0 * any(900 + 2 * i) - 1.0, 4.0 * any(901 + 2 * i) - 1.0};
+        double nearest = INFINITY; /* distance of the union, where that is known: outside */
+        for (size_t k = 0; k < COUNT; ++k) {
+            vsh_outline *one = polygon(points + 8 * k, 4);
+            nearest = fmin(nearest, vsh_outline_distance(one, p));
+            vsh_outline_free(one);
+        }
+        const double distance = vsh_outline_distance(all, p);
+        assert_int_equal(distance < 0.0, nearest < 0.0);
+        assert_true(nearest < 0.0 ? distance <= nearest + 1e-12 : fabs(distance - nearest) < 1e-12);
+        /* the border is a border: just beside it are inside and outside */
+    }
+    size_t count;
+    const double *p;
+    for (size_t c = 0; (p = vsh_outline_contour(all, c, &count)) != NULL; ++c) {
+        for (size_t i = 0; i < count; ++i) {
+            const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count);
+            const double dx = 1e-6 * (b[0] - a[0]), dy = 1e-6 * (b[1] - a[1]);
+            const double middle[2] = {0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])};
+            assert_true(vsh_outline_distance(all, (const double[]){middle[0] - dy, middle[1] + dx}) < 0.0);
+            assert_true(vsh_outline_distance(all, (const double[]){middle[0] + dy, middle[1] - dx}) > 0.0);
+        }
+    }
+    vsh_outline_free(all);
+}
+
+/* --- images */
+
+static char image_path[] = "vsh-outline-XXXXXX.exr";
+
+static void write_image(int32_t width, int32_t height, int32_t channels, const char *const *names,
+                        const float *const *planes) {
+    const vsh_image image = {width, height, channels, names, planes};
+    assert_ok(vsh_image_write(image_path, &image, NULL, &failure));
+}
+
+static void write_mask(int32_t width, int32_t height, const float *plane) {
+    const char *const names[1] = {"Y"};
+    write_image(width, height, 1, names, &plane);
+}
+
+static vsh_outline *outline_of_image(const vsh_mask_options *options) {
+    vsh_outline *outline = NULL;
+    assert_ok(vsh_outline_from_image(image_path, options, NULL, &outline, &failure));
+    return outline;
+}
+
+static void a_solid_image_is_its_rectangle(void **state) {
+    (void)state;
+    float white[12];
+    for (int i = 0; i < 12; ++i) {
+        white[i] = 1.0f;
+    }
+    write_mask(4, 3, white);
+    vsh_mask_options options = vsh_mask_options_default();
+    options.width = 8.0;
+    vsh_outline *outline = outline_of_image(&options);
+    const vsh_outline_info info = info_of(outline);
+    assert_true(info.area == 48.0 && info.contours == 1); /* square pixels: 8 × 6 */
+    assert_true(info.bounds_min[0] == -4.0 && info.bounds_max[1] == 3.0);
+    const double beyond[2] = {-4.0 - at_corner[0], 3.0 + at_corner[1]};
+    assert_true(fabs(vsh_outline_distance(outline, beyond) - 5.0) < 1e-14);
+    vsh_outline_free(outline);
+    options.height = 1.0;
+    outline = outline_of_image(&options);
+    assert_true(info_of(outline).area == 8.0);
+    vsh_outline_free(outline);
+}
+
+/* A disc as a painter anti-aliases it: the share of each pixel that it covers, by 16 × 16 samples. */
+static void an_anti_aliased_disc_is_round(void **state) {
+    (void)state;
+    enum { SIZE = 64 };
+    static float plane[SIZE * SIZE], hard[SIZE * SIZE];
+    const double radius = 20.3, cx = 31.7, cy = 32.4; /* pixels, from the upper left corner */
+    for (int i = 0; i < SIZE * SIZE; ++i) {
+        int covered = 0;
+        for (int s = 0; s < 256; ++s) {
+            const double x = i % SIZE + (s % 16 + 0.5) / 16.0,
+                         y = (double)(i / SIZE) + ((double)(s / 16) + 0.5) / 16.0;
+            covered += hypot(x - cx, y - cy) < radius;
+        }
+        plane[i] = (float)covered / 256.0f;
+        hard[i] = covered >= 128 ? 1.0f : 0.0f;
+    }
+    vsh_mask_options options = vsh_mask_options_default();
+    options.width = SIZE; /* a unit a pixel */
+    double worst[2] = {0.0, 0.0};
+    for (int pass = 0; pass < 2; ++pass) {
+        write_mask(SIZE, SIZE, pass == 0 ? plane : hard);
+        vsh_outline *outline = outline_of_image(&options);
+        assert_int_equal(info_of(outline).contours, 1);
+        for (int i = 0; i < 360; ++i) {
+            const double angle = PI * i / 180.0;
+            const double p[2] = {cx - 0.5 * SIZE + radius * cos(angle),
+                                 0.5 * SIZE - cy + radius * sin(angle)};
+            worst[pass] = fmax(worst[pass], fabs(vsh_outline_distance(outline, p)));
+        }
+        if (pass == 0) {
+            assert_true(fabs(info_of(outline).area / (PI * radius * radius) - 1.0) < 0.001);
+        }
+        vsh_outline_free(outline);
+    }
+    print_message("a disc's border: within %.3f pixels, without anti-aliasing %.3f\n", worst[0], worst[1]);
+    assert_true(worst[0] < 0.09 && worst[1] > 0.3);
+}
+
+/* Pixels that touch at corners only: by the middle of the four. */
+static void corners_join_by_their_middle(void **state) {
+    (void)state;
+    float plane[16] = {0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0};
+    vsh_mask_options options = vsh_mask_options_default();
+    options.width = 4.0;
+    options.threshold = 0.51; /* the middle, 0.5, is below */
+    write_mask(4, 4, plane);
+    vsh_outline *outline = outline_of_image(&options);
+    assert_int_equal(info_of(outline).contours, 2);
+    assert_true(vsh_outline_distance(outline, (const double[]){0.0, 0.0}) > 0.0);
+    vsh_outline_free(outline);
+    options.threshold = 0.49;
+    outline = outline_of_image(&options);
+    assert_int_equal(info_of(outline).contours, 1);
+    assert_true(vsh_outline_distance(outline, (const double[]){0.0, 0.0}) < 0.0);
+    vsh_outline_free(outline);
+}
+
+static void any_image_closes(void **state) {
+    (void)state;
+    enum { W = 37, H = 23 };
+    float plane[W * H];
+    for (int i = 0; i < W * H; ++i) {
+        plane[i] = (float)any((uint64_t)i);
+    }
+    write_mask(W, H, plane);
+    vsh_mask_options options = vsh_mask_options_default();
+    options.width = W;
+    double areas[2];
+    for (int invert = 0; invert < 2; ++invert) {
+        options.invert = invert;
+        vsh_outline *outline = outline_of_image(&options);
+        for (int i = 0; i < W * H; ++i) { /* each pixel's centre is where it belongs */
+            const double p[2] = {i % W + 0.5 - 0.5 * W, 0.5 * H - (double)(i / W) - 0.5};
+            assert_int_equal(vsh_outline_distance(outline, p) < 0.0, (plane[i] >= 0.5f) != invert);
+            assert_int_equal(truth_inside(outline, p[0], p[1]), (plane[i] >= 0.5f) != invert);
+        }
+        areas[invert] = info_of(outline).area;
+        vsh_outline_free(outline);
+    }
+    assert_true(fabs(areas[0] + areas[1] - W * H) < 1e-9); /* what is not solid is the rest */
+}
+
+static void channels_are_chosen(void **state) {
+    (void)state;
+    const float r[4] = {1, 0, 0, 0}, g[4] = {0, 1, 0, 0}, b[4] = {0, 0, 1, 1}, a[4] = {1, 1, 0, 1};
+    const float one[4] = {1, 1, 1, 1};
+    const char *const names[4] = {"R", "G", "B", "A"};
+    const float *planes[4] = {r, g, b, a};
+    write_image(4, 1, 4, names, planes);
+    const struct {
+        const char *channel;
+        double area, threshold;
+    } cases[] = {{NULL, 3.0, 0.5},    {"alpha", 3.0, 0.5}, {"A", 3.0, 0.5},        {"red", 1.0, 0.5},
+                 {"green", 1.0, 0.5}, {"B", 2.0, 0.5},     {"luminance", 1.0, 0.5}};
+    vsh_mask_options options = vsh_mask_options_default();
+    options.width = 4.0;
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        options.channel = cases[i].channel;
+        vsh_outline *outline = outline_of_image(&options);
+        /* borders between pixels of 0 and 1 are half-way, of luminance elsewhere */
+        assert_true(fabs(info_of(outline).area - cases[i].area) < 0.35);
+        vsh_outline_free(outline);
+    }
+    planes[3] = one; /* an alpha that says nothing */
+    write_image(4, 1, 4, names, planes);
+    options.channel = NULL;
+    vsh_outline *outline = outline_of_image(&options);
+    assert_true(info_of(outline).area < 2.0);
+    vsh_outline_free(outline);
+}
+
+static void bad_images_are_refused(void **state) {
+    (void)state;
+    vsh_outline *outline = NULL;
+    float plane[4] = {0, 0, 0, 0};
+    write_mask(2, 2, plane);
+    vsh_mask_options options = vsh_mask_options_default();
+    assert_fails(vsh_outline_from_image(image_path, &options, NULL, &outline, &failure), VSH_ERROR_INPUT,
+                 "no outline");
+    assert_null(outline);
+    options.channel = "alpha";
+    assert_fails(vsh_outline_from_image(image_path, &options, NULL, &outline, &failure), VSH_ERROR_INPUT,
+                 "no channel 'alpha'; it has Y");
+    options.channel = NULL;
+    const double sizes[] = {0.0, -1.0, NAN, INFINITY, 1e16};
+    for (size_t i = 0; i < sizeof sizes / sizeof sizes[0]; ++i) {
+        options.width = sizes[i];
+        assert_fails(vsh_outline_from_image(image_path, &options, NULL, &outline, &failure),
+                     VSH_ERROR_ARGUMENT, "width");
+    }
+    options.width = 1.0;
+    options.threshold = NAN;
+    assert_fails(vsh_outline_from_image(image_path, &options, NULL, &outline, &failure), VSH_ERROR_ARGUMENT,
+                 "threshold");
+    options.threshold = 0.5;
+    plane[2] = NAN;
+    write_mask(2, 2, plane);
+    assert_fails(vsh_outline_from_image(image_path, &options, NULL, &outline, &failure), VSH_ERROR_INPUT,
+                 "pixel (0, 1)");
+    assert_fails(vsh_outline_from_image("none.png", &options, NULL, &outline, &failure), VSH_ERROR_READ,
+                 "none.png");
+    assert_fails(vsh_outline_from_image(".", &options, NULL, &outline, &failure), VSH_ERROR_READ, "folder");
+    enum { SIZE = 300 };
+    static float noise[SIZE * SIZE];
+    for (int i = 0; i < SIZE * SIZE; ++i) {
+        noise[i] = (float)any((uint64_t)i);
+    }
+    write_mask(SIZE, SIZE, noise);
+    vsh_run run = vsh_run_default();
+    for (run.memory_limit = 100000; run.memory_limit < 5000000; run.memory_limit *= 3) {
+        assert_fails(vsh_outline_from_image(image_path, &options, &run, &outline, &failure), VSH_ERROR_LIMIT,
+                     "limit");
+        assert_null(outline);
+    }
+}
+
+/* --- text */
+
+static vsh_outline *lines_of(const char *letters, int32_t align) {
+    vsh_text_options options = vsh_text_options_default();
+    options.align = align;
+    vsh_outline *outline = NULL;
+    assert_ok(vsh_outline_from_text(letters, FONT, &options, NULL, &outline, &failure));
+    return outline;
+}
+
+static double width_of(const char *letters) {
+    vsh_outline *outline = lines_of(letters, VSH_ALIGN_LEFT);
+    const vsh_outline_info info = info_of(outline);
+    vsh_outline_free(outline);
+    return info.bounds_max[0] - info.bounds_min[0];
+}
+
+/* DejaVu Sans: 2048 units an em; l is a bar from 193 to 377 and to 1556, of exact lines. */
+static void letters_have_the_font_s_measures(void **state) {
+    (void)state;
+    vsh_outline *bar = lines_of("l", VSH_ALIGN_LEFT);
+    const vsh_outline_info info = info_of(bar);
+    assert_int_equal(info.points, 4);
+    assert_true(info.bounds_min[0] == 193.0 / 2048.0 && info.bounds_max[0] == 377.0 / 2048.0);
+    assert_true(info.bounds_min[1] == 0.0 && info.bounds_max[1] == 1556.0 / 2048.0);
+    vsh_outline_free(bar);
+    vsh_outline *o = lines_of("o", VSH_ALIGN_LEFT); /* a ring, with x-height 1120 */
+    assert_int_equal(info_of(o).contours, 2);
+    const vsh_outline_info ring = info_of(o);
+    assert_true(vsh_outline_distance(o, (const double[]){0.5 * (ring.bounds_min[0] + ring.bounds_max[0]),
+                                                         560.0 / 2048.0}) > 0.1);
+    vsh_outline_free(o);
+}
+
+static void letters_are_kerned(void **state) {
+    (void)state;
+    assert_true(width_of("AVA") < width_of("AHA") - 0.05);
+    /* H is 1540 units wide, and pairs of them are not kerned */
+    assert_true(fabs(width_of("HH") - width_of("H") - 1540.0 / 2048.0) < 1e-9);
+    assert_true(width_of("AV") - width_of("V") < 1401.0 / 2048.0 - 0.02);
+}
+
+static void lines_lie_as_they_are_told_to(void **state) {
+    (void)state;
+    vsh_outline *lines = lines_of("l\r\nlll\n\nl", VSH_ALIGN_LEFT);
+    /* three line heights of 2384 units below */
+    assert_true(fabs(info_of(lines).bounds_min[1] + 3.0 * 2384.0 / 2048.0) < 1e-12);
+    assert_int_equal(info_of(lines).contours, 5);
+    vsh_outline_free(lines);
+    const struct {
+        int32_t align;
+        double x;
+    } cases[] = {{VSH_ALIGN_LEFT, 285.0},
+                 {VSH_ALIGN_CENTER, 0.5 * (2 * 285.0 - 569.0)},
+                 {VSH_ALIGN_RIGHT, 285.0 - 569.0}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) { /* l is 569 wide, its bar's middle at 285 */
+        vsh_outline *bar = lines_of("l", cases[i].align);
+        const vsh_outline_info info = info_of(bar);
+        assert_true(fabs(0.5 * (info.bounds_min[0] + info.bounds_max[0]) - cases[i].x / 2048.0) < 1e-12);
+        vsh_outline_free(bar);
+    }
+}
+
+/* Å is A with a ring, which other fonts let overlap; the same letter over itself adds nothing. */
+static void letters_that_overlap_are_one_area(void **state) {
+    (void)state;
+    vsh_outline *o = lines_of("o", VSH_ALIGN_LEFT), *both = NULL;
+    const double aside[6] = {1.0, 0.0, 0.3, 0.0, 1.0, 0.0};
+    const vsh_outline_instance instances[3] = {{o, NULL}, {o, aside}, {o, NULL}};
+    assert_ok(vsh_outline_unite(instances, 3, NULL, &both, &failure));
+    for (uint64_t i = 0; i < 2000; ++i) {
+        const double p[2] = {1.2 * any(2 * i) - 0.1, 0.8 * any(2 * i + 1) - 0.1};
+        const double a = vsh_outline_distance(o, p);
+        const double b = vsh_outline_distance(o, (const double[]){p[0] - 0.3, p[1]});
+        const double distance = vsh_outline_distance(both, p);
+        assert_true(a > 0.0 && b > 0.0 ? fabs(distance - fmin(a, b)) < 1e-12 : distance < fmin(a, b) + 1e-12);
+    }
+    /* the border lies on one of the two, and never in the other */
+    size_t count;
+    const double *p;
+    for (size_t c = 0; (p = vsh_outline_contour(both, c, &count)) != NULL; ++c) {
+        for (size_t i = 0; i < count; ++i) {
+            const double a = vsh_outline_distance(o, p + 2 * i);
+            const double b = vsh_outline_distance(o, (const double[]){p[2 * i] - 0.3, p[2 * i + 1]});
+            assert_true(fmin(a, b) > -1e-12);
+        }
+    }
+    vsh_outline_free(both);
+    vsh_outline_free(o);
+}
+
+/* Cut eight times as fine the outline's area changes by less than the tolerance times its length. */
+static void curves_are_followed(void **state) {
+    (void)state;
+    /* the outer contour of O: its points lie on the curve, so the polygon's error is in its area */
+    vsh_outline *o = lines_of("O", VSH_ALIGN_LEFT);
+    const vsh_outline_info info = info_of(o);
+    assert_true(info.points > 100 && info.points < 2000);
+    double longest = 0.0, sharpest = 0.0;
+    size_t count;
+    const double *p = vsh_outline_contour(o, 0, &count);
+    for (size_t i = 0; i < count; ++i) {
+        const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count), *c = p + 2 * ((i + 2) % count);
+        const double first = atan2(b[1] - a[1], b[0] - a[0]), second = atan2(c[1] - b[1], c[0] - b[0]);
+        const double length = hypot(b[0] - a[0], b[1] - a[1]);
+        longest = fmax(longest, length);
+        sharpest = fmax(sharpest, fabs(remainder(second - first, 2.0 * PI)) * length / 8.0); /* sagitta */
+    }
+    print_message("O: %zu points, at most %.2g em from its curves\n", info.points, sharpest);
+    assert_true(sharpest < 3e-5);
+    vsh_outline_free(o);
+}
+
+static void bad_text_is_refused(void **state) {
+    (void)state;
+    vsh_outline *outline = NULL;
+    const struct {
+        const char *text;
+        const char *font;
+        vsh_result result;
+        const char *part;
+    } cases[] = {{"", FONT, VSH_ERROR_INPUT, "empty"},
+                 {"a\tb", FONT, VSH_ERROR_INPUT, "U+0009, at byte 1"},
+                 {"a\rb", FONT, VSH_ERROR_INPUT, "U+000D"},
+                 {"\xc3", FONT, VSH_ERROR_INPUT, "no UTF-8 at byte 0"},
+                 {"ab\xff", FONT, VSH_ERROR_INPUT, "no UTF-8 at byte 2"},
+                 {"\xed\xa0\x80", FONT, VSH_ERROR_INPUT, "no UTF-8"},
+                 {"\xc0\xaf", FONT, VSH_ERROR_INPUT, "no UTF-8"},
+                 {"\xf4\x90\x80\x80", FONT, VSH_ERROR_INPUT, "no UTF-8"},
+                 {"  \n ", FONT, VSH_ERROR_INPUT, "no outline"},
+                 {"\xe5\xad\x97", FONT, VSH_ERROR_INPUT, "no letter for U+5B57"},
+                 {"a", "none.ttf", VSH_ERROR_READ, "none.ttf"},
+                 {"a", ".", VSH_ERROR_READ, "."},
+                 {"a", image_path, VSH_ERROR_INPUT, "no font"}};
+    const float one = 1.0f;
+    write_mask(1, 1, &one);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        assert_fails(vsh_outline_from_text(cases[i].text, cases[i].font, NULL, NULL, &outline, &failure),
+                     cases[i].result, cases[i].part);
+        assert_null(outline);
+    }
+    vsh_text_options options = vsh_text_options_default();
+    options.height = NAN;
+    assert_fails(vsh_outline_from_text("a", FONT, &options, NULL, &outline, &failure), VSH_ERROR_ARGUMENT,
+                 "height");
+    options.height = 1.0;
+    options.align = 3;
+    assert_fails(vsh_outline_from_text("a", FONT, &options, NULL, &outline, &failure), VSH_ERROR_ARGUMENT,
+                 "align");
+    options.align = 0;
+    options.line_spacing = 0.0;
+    assert_fails(vsh_outline_from_text("a", FONT, &options, NULL, &outline, &failure), VSH_ERROR_ARGUMENT,
+                 "line_spacing");
+    char *huge = calloc(1, (1 << 20) + 2);
+    memset(huge, 'o', (1 << 20) + 1);
+    assert_fails(vsh_outline_from_text(huge, FONT, NULL, NULL, &outline, &failure), VSH_ERROR_LIMIT, "bytes");
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 1 << 20;
+    huge[10000] = '\0';
+    assert_fails(vsh_outline_from_text(huge, FONT, NULL, &run, &outline, &failure), VSH_ERROR_LIMIT, "limit");
+    free(huge);
+}
+
+static void bad_polygons_are_refused(void **state) {
+    (void)state;
+    vsh_outline *outline = NULL;
+    const double line[8] = {0, 0, 1, 0, 2, 0, 3, 0}, bad[6] = {0, 0, 1, NAN, 0, 1},
+                 far[6] = {0, 0, 1e16, 0, 0, 1};
+    const size_t four = 4, three = 3, two = 2;
+    assert_fails(vsh_outline_from_polygons(line, &four, 1, NULL, &outline, &failure), VSH_ERROR_INPUT,
+                 "no outline");
+    assert_fails(vsh_outline_from_polygons(line, &two, 1, NULL, &outline, &failure), VSH_ERROR_INPUT,
+                 "no outline");
+    assert_fails(vsh_outline_from_polygons(bad, &three, 1, NULL, &outline, &failure), VSH_ERROR_INPUT, "nan");
+    assert_fails(vsh_outline_from_polygons(far, &three, 1, NULL, &outline, &failure), VSH_ERROR_INPUT,
+                 "1e+16");
+    assert_fails(vsh_outline_unite(NULL, 0, NULL, &outline, &failure), VSH_ERROR_ARGUMENT, "no instances");
+    vsh_outline *square = box(0, 0, 1, 1);
+    const double flat[6] = {1, 1, 0, 1, 1, 0};
+    const vsh_outline_instance instance = {square, flat};
+    assert_fails(vsh_outline_unite(&instance, 1, NULL, &outline, &failure), VSH_ERROR_ARGUMENT, "flattens");
+    vsh_outline_free(square);
+    vsh_outline_free(NULL);
+}
+
+static int remove_image(void **state) {
+    (void)state;
+    unlink(image_path);
+    return 0;
+}
+
+static int name_image(void **state) {
+    (void)state;
+    const int file = mkstemps(image_path, 4);
+    return file < 0 || close(file) != 0;
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_square_s_distance),
+        cmocka_unit_test(the_tree_finds_what_looking_at_all_finds),
+        cmocka_unit_test(overlapping_squares_are_one_area),
+        cmocka_unit_test(squares_that_share_an_edge_are_one_area),
+        cmocka_unit_test(a_contour_the_other_way_is_a_hole),
+        cmocka_unit_test(a_pentagram_is_filled),
+        cmocka_unit_test(many_overlaps_leave_the_union),
+        cmocka_unit_test(a_solid_image_is_its_rectangle),
+        cmocka_unit_test(an_anti_aliased_disc_is_round),
+        cmocka_unit_test(corners_join_by_their_middle),
+        cmocka_unit_test(any_image_closes),
+        cmocka_unit_test(channels_are_chosen),
+        cmocka_unit_test(bad_images_are_refused),
+        cmocka_unit_test(letters_have_the_font_s_measures),
+        cmocka_unit_test(letters_are_kerned),
+        cmocka_unit_test(lines_lie_as_they_are_told_to),
+        cmocka_unit_test(letters_that_overlap_are_one_area),
+        cmocka_unit_test(curves_are_followed),
+        cmocka_unit_test(bad_text_is_refused),
+        cmocka_unit_test(bad_polygons_are_refused),
+    };
+    return cmocka_run_group_tests(tests, name_image, remove_image);
+}
