@@ -57,6 +57,12 @@ static inline vsh_outline *text(const char *letters, double height) {
     return outline;
 }
 
+static inline vsh_outline_info info_of(const vsh_outline *outline) {
+    vsh_outline_info info;
+    vsh_outline_get_info(outline, &info);
+    return info;
+}
+
 /* Anything between 0 and 1, the same in every run. */
 static inline double any(uint64_t i) {
     i = (i ^ (i >> 30)) * UINT64_C(0xbf58476d1ce4e5b9) + UINT64_C(0x9e3779b97f4a7c15);
