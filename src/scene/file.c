@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "base/floats.h"
+#include "caster/foreign.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -50,7 +51,10 @@ vsh_result vshi_scene_text(const char *path, char **text, size_t *size, vsh_erro
     if (file == NULL) {
         return fail_read(path, errno, error);
     }
-    const vsh_result result = read_all(path, file, text, size, error);
+    vsh_result result = vshi_foreign_check(path, error);
+    if (result == VSH_OK) {
+        result = read_all(path, file, text, size, error);
+    }
     fclose(file);
     return result;
 }
