@@ -28,7 +28,7 @@ same_distances() {
         $1 + 0 == $1 && $2 + 0 == $2 { ++n; d = $1 - $2; if (d < 0) d = -d; if (d > worst) worst = d }
         $1 < 0.1 && $1 > -0.1 { ++beside; if (d > near) near = d }
         END { printf "%d points, at most %g apart; %d near, %g\n", n, worst, beside, near
-              exit !(n > 3000 && worst < 0.1 && beside > 50 && near < tolerance) }'
+              exit !(n > 3000 && worst < 0.1 && beside > 8 && near < tolerance) }'
 }
 
 @test "a mask is the solid that its picture shows" {
