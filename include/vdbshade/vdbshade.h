@@ -14,6 +14,7 @@
 #include "flat.h"
 #include "grid.h"
 #include "image.h"
+#include "layer.h"
 #include "light.h"
 #include "mesh.h"
 #include "outline.h"

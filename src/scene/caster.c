@@ -38,6 +38,7 @@ static const vshi_key caster_keys[] = {
      .kind = VSHI_CUSTOM,
      .offset = offsetof(vsh_caster, transform),
      .read = vshi_read_transform},
+    {.name = "layer", .kind = VSHI_STRING, .offset = offsetof(vsh_caster, layer)},
     VSHI_OUTLINE_KEYS(vsh_caster, MASK, TEXT),
     {.name = "thickness",
      .kind = VSHI_NUMBER,
