@@ -1,8 +1,10 @@
 #include "info.h"
 #include "message.h"
 
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
+#include <vdbshade/flat.h>
 #include <vdbshade/scene.h>
 
 static void print_caster(const vsh_caster *caster, size_t index) {
@@ -60,11 +62,35 @@ static void print_layer(const vsh_scene_layer *layer) {
     printf("%s\n", shade->ao ? "" : ", no ao");
 }
 
+/* False where the file is no flat scene. */
+static bool print_flat(const char *path) {
+    static const char *const casters[] = {"mask", "text", "circle", "box", "polygon"};
+    static const char *const lights[] = {"directional", "disc", "spot"};
+    vsh_flat_scene *scene = NULL;
+    vsh_error error;
+    if (vsh_flat_scene_read(path, &scene, &error) != VSH_OK) {
+        return false;
+    }
+    const vsh_flat_options *o = &scene->options;
+    printf("flat scene: %g %g to %g %g, %d × %d, method %s\n", o->region_min[0], o->region_min[1],
+           o->region_max[0], o->region_max[1], o->width, o->height, vsh_flat_method_name(o->method));
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const char *file = scene->casters[i].path;
+        printf("caster %zu: %s%s%s\n", i, casters[scene->casters[i].type], file != NULL ? " " : "",
+               file != NULL ? file : "");
+    }
+    for (size_t i = 0; i < scene->light_count; ++i) {
+        printf("light '%s': %s\n", scene->lights[i].name, lights[scene->lights[i].type]);
+    }
+    vsh_flat_scene_free(scene);
+    return true;
+}
+
 int cli_info_scene(const char *path) {
     vsh_scene *scene = NULL;
     vsh_error error;
     if (vsh_scene_read(path, &scene, &error) != VSH_OK) {
-        return cli_fail(&error);
+        return error.code == VSH_ERROR_INPUT && print_flat(path) ? CLI_OK : cli_fail(&error);
     }
     for (size_t i = 0; i < scene->caster_count; ++i) {
         print_caster(&scene->casters[i], i);

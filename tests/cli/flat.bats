@@ -68,6 +68,13 @@ JSON
     [ -s own.exr ]
 }
 
+@test "info describes a flat scene" {
+    shade info wall.json
+    done_well
+    [[ $output == *"flat scene: -2 -2 to 2 2, 64 × 64, method exact"*"caster 0: box"*"light 'lamp': disc"* ]] ||
+        fail "not described"
+}
+
 # spoilt FROM TO [option …]: the scene with one thing changed.
 spoilt() {
     sed "s|$1|$2|" wall.json >bad.json
