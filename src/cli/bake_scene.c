@@ -156,6 +156,7 @@ static int set_accuracy(const cli_bake_settings *s, vsh_scene *scene) {
     }
     shade->rays = s->has_rays ? s->rays : shade->rays;
     shade->sampler = s->has_sampler ? s->sampler : shade->sampler;
+    shade->jitter = s->has_jitter ? s->jitter : shade->jitter;
     shade->frame = s->has_frame ? s->frame : shade->frame;
     shade->early_rays = s->has_early_rays ? s->early_rays : shade->early_rays;
     scene->error = scene->error || s->error;

@@ -30,6 +30,7 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
         {"frame", full->frame, 0, INT32_MAX},
         {"early_rays", full->early_rays, 0, 4096},
         {"max_error", full->max_error, 1e-4, 1},
+        {"jitter", full->jitter, 0, 1},
     };
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; ++i) {
         if (!(fields[i].value >= fields[i].low && fields[i].value <= fields[i].high)) {

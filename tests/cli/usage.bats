@@ -148,7 +148,7 @@ LIST
     old_output out.exr
     for method in magic ray; do
         shade bake box.obj -o out.exr "${SMALL[@]}" --method "$method"
-        refused 2 "$method" 'hard, classic, improved, smooth, cone, rays, adaptive, exact'
+        refused 2 "$method" 'hard, classic, practical, improved, smooth, cone, rays, adaptive, exact'
     done
     untouched out.exr
 }
