@@ -39,28 +39,45 @@ static double reach_of(const vsh_scene *scene, const vsh_grid *grid, const cli_b
     return reach > CLI_WITHIN_DIAGONALS * diagonal ? reach : vsh_field_options_default().reach;
 }
 
-static int make(const vsh_scene *scene, const vsh_assets *assets, const cli_box *receivers, double within,
-                const vsh_run *run, cli_field *made) {
+int cli_grid_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run, vsh_grid **grid,
+                  cli_field *made) {
     const double start = cli_seconds();
-    vsh_grid *grid = NULL;
     vsh_error error;
-    made->field = NULL;
-    if (vsh_scene_casters(scene, assets, run, &grid, &error) != VSH_OK) {
+    *made = (cli_field){0};
+    if (vsh_scene_casters(scene, assets, run, grid, &error) != VSH_OK) {
         return cli_fail(&error);
     }
-    vsh_grid_get_info(grid, &made->grid);
-    const double voxelized = cli_seconds();
+    vsh_grid_get_info(*grid, &made->grid);
+    made->voxelize_s = cli_seconds() - start;
+    return CLI_OK;
+}
+
+static int make_field(const vsh_scene *scene, const vsh_grid *grid, const cli_box *receivers, double within,
+                      const vsh_run *run, cli_field *made) {
+    const double start = cli_seconds();
+    vsh_error error;
     vsh_field_options options = vsh_field_options_default();
     options.reach = reach_of(scene, grid, receivers, within);
-    const vsh_result result = vsh_field_create(grid, &options, run, &made->field, &error);
-    vsh_grid_free(grid); /* the field does not need it */
-    if (result != VSH_OK) {
+    if (vsh_field_create(grid, &options, run, &made->field, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     vsh_field_get_info(made->field, &made->info);
-    made->voxelize_s = voxelized - start;
-    made->field_s = cli_seconds() - voxelized;
+    made->field_s = cli_seconds() - start;
     return CLI_OK;
+}
+
+int cli_field_of_grid(const vsh_scene *scene, const vsh_grid *grid, const cli_box *receivers,
+                      const vsh_run *run, cli_field *made) {
+    return make_field(scene, grid, receivers, 0.0, run, made);
+}
+
+static int make(const vsh_scene *scene, const vsh_assets *assets, const cli_box *receivers, double within,
+                const vsh_run *run, cli_field *made) {
+    vsh_grid *grid = NULL;
+    int code = cli_grid_make(scene, assets, run, &grid, made);
+    code = code == CLI_OK ? make_field(scene, grid, receivers, within, run, made) : code;
+    vsh_grid_free(grid); /* the field does not need it */
+    return code;
 }
 
 int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_box *receivers,

@@ -32,6 +32,12 @@ int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_b
 int cli_field_make_around(const vsh_scene *scene, const vsh_assets *assets, double within, const vsh_run *run,
                           cli_field *made);
 
+/* The steps of it: the level set, to be freed, and what made->field is made of. */
+int cli_grid_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run, vsh_grid **grid,
+                  cli_field *made);
+int cli_field_of_grid(const vsh_scene *scene, const vsh_grid *grid, const cli_box *receivers,
+                      const vsh_run *run, cli_field *made);
+
 /* The casters' triangles where one of the scene's methods traces them, else NULL; likewise. */
 int cli_triangles_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                        vsh_triangles **triangles);

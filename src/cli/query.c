@@ -268,7 +268,7 @@ static void say_results(const query_work *work) {
 
 static int run_query(const query_settings *s, vsh_scene *scene) {
     query_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
-    work.stats.of_points = true;
+    work.stats.of = CLI_STATS_POINTS;
     work.stats.shade = vsh_shade_stats_zero();
     const long cores = sysconf(_SC_NPROCESSORS_ONLN);
     work.stats.threads = s->bake.common.threads > 0 ? s->bake.common.threads : (int32_t)cores;

@@ -6,6 +6,7 @@
 #include "field/level.h"
 #include "shade/ao.h"
 #include "shade/order.h"
+#include "shade/query.h"
 #include "shade/shadow.h"
 #include "shade/view.h"
 
@@ -68,6 +69,12 @@ static vsh_result prepare(vsh_query *q, const vsh_field *field, const vsh_light 
 
 vsh_result vsh_query_create(const vsh_field *field, const vsh_light *lights, size_t light_count,
                             const vsh_shade_options *options, vsh_query **query, vsh_error *error) {
+    return vshi_query_create(field, lights, light_count, options, false, query, error);
+}
+
+vsh_result vshi_query_create(const vsh_field *field, const vsh_light *lights, size_t light_count,
+                             const vsh_shade_options *options, bool sphere, vsh_query **query,
+                             vsh_error *error) {
     VSHI_FLOATS;
     vsh_query *q = NULL;
     *query = NULL;
@@ -77,6 +84,9 @@ vsh_result vsh_query_create(const vsh_field *field, const vsh_light *lights, siz
     }
     if (result == VSH_OK) {
         result = prepare(q, field, lights, light_count, error);
+    }
+    if (result == VSH_OK && sphere) {
+        result = vshi_ao_prepare_sphere(&q->cones, &q->ao, error);
     }
     if (result != VSH_OK) {
         vsh_query_free(q);
@@ -298,7 +308,7 @@ static vsh_result check_output(const vsh_query *query, const vshi_view *view, co
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: stride %zu: expected 0 or bytes, %zu, %zu …",
                          output->stride, least, least + sizeof(float));
     }
-    return output->ao != NULL && view->normals == NULL ? vshi_ao_check_points(&(vsh_points){0}, error)
+    return output->ao != NULL && view->normals == NULL && !query->ao.sphere ? vshi_ao_check_points(&(vsh_points){0}, error)
                                                        : VSH_OK;
 }
 
