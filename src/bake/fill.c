@@ -48,6 +48,15 @@ vsh_result vshi_fill_begin(vshi_fill *fill, const vsh_field *field, const vsh_vo
                         .longest = vshi_voxels_longest_axis(voxels)};
     fill->blocks = vshi_voxels_blocks(voxels, &fill->block_count);
     list_steps(fill->steps);
+    for (int square = 0, s = 0; square <= VSHI_FILL_REACH * VSHI_FILL_REACH; ++square) {
+        while (s < VSHI_FILL_STEPS && fill->steps[s].square < square) {
+            ++s;
+        }
+        fill->first_step[square] = s;
+    }
+    vsh_field_info info;
+    vsh_field_get_info(field, &info);
+    fill->distance_error = DISTANCE_ERROR * info.voxel_size;
     vsh_result result =
         vshi_allocate((void **)&fill->shaded, fill->block_count, sizeof *fill->shaded, "volume", error);
     if (result == VSH_OK) {
@@ -77,15 +86,13 @@ static void find_around(const vshi_fill *fill, size_t block, size_t around[27]) 
     }
 }
 
-/* Voxels in reach of a block's voxel: the block and number of the nearest that was shaded. */
+/* Voxels in reach of a block's voxel, from `least` voxels off: the block and number of the nearest that was
+ * shaded. */
 static bool find_nearest(const vshi_fill *fill, const size_t around[27], int voxel, double least,
                          size_t *block, int *nearest) {
     const int at[3] = {8 + (voxel >> 6), 8 + (voxel >> 3 & 7), 8 + (voxel & 7)};
-    for (int s = 0; s < VSHI_FILL_STEPS; ++s) {
+    for (int s = fill->first_step[(int)ceil(least * least)]; s < VSHI_FILL_STEPS; ++s) {
         const vshi_fill_step *step = &fill->steps[s];
-        if ((double)step->square < least * least) {
-            continue;
-        }
         const int x = at[0] + step->by[0], y = at[1] + step->by[1], z = at[2] + step->by[2];
         *block = around[9 * (x >> 3) + 3 * (y >> 3) + (z >> 3)];
         *nearest = 64 * (x & 7) + 8 * (y & 7) + (z & 7);
@@ -96,14 +103,24 @@ static bool find_nearest(const vshi_fill *fill, const size_t around[27], int vox
     return false;
 }
 
-/* How far, at least, a voxel is from any that was shaded, voxels: 0 where nothing is known. */
-static double least_step(const vshi_fill *fill, const double centre[3]) {
-    vsh_field_info info;
-    vsh_field_get_info(fill->field, &info);
-    float distance;
-    vsh_field_sample(fill->field, 1, centre, &distance);
-    const double inside = -(double)distance - DISTANCE_ERROR * info.voxel_size;
-    return inside > 0.0 ? inside / fill->longest : 0.0;
+/* The voxels of a block that were not shaded, and how far, at least, each is from any that was, voxels: 0
+ * where nothing is known. */
+static size_t list_open(const vshi_fill *fill, size_t block, uint16_t *voxel, double *least) {
+    const uint64_t *mask = fill->blocks[block].mask, *shaded = fill->shaded[block];
+    double centre[VSHI_BLOCK_VOXELS][3];
+    float distance[VSHI_BLOCK_VOXELS];
+    size_t count = 0;
+    for (int v = 0; v < VSHI_BLOCK_VOXELS; ++v) {
+        voxel[count] = (uint16_t)v;
+        count += is_set(mask, v) && !is_set(shaded, v);
+    }
+    vshi_voxels_centres(fill->voxels, block, count, voxel, centre);
+    vsh_field_sample(fill->field, count, &centre[0][0], distance);
+    for (size_t i = 0; i < count; ++i) {
+        const double inside = -(double)distance[i] - fill->distance_error;
+        least[i] = inside > 0.0 ? inside / fill->longest : 0.0;
+    }
+    return count;
 }
 
 static bool copy_value(const vshi_fill *fill, size_t block, int voxel, size_t from, int nearest) {
@@ -135,17 +152,14 @@ bool vshi_fill_block(vshi_fill *fill, size_t block) {
     }
     size_t around[27];
     find_around(fill, block, around);
-    for (int voxel = 0; voxel < VSHI_BLOCK_VOXELS; ++voxel) {
-        if (!is_set(mask, voxel) || is_set(shaded, voxel)) {
-            continue;
-        }
-        const uint16_t number = (uint16_t)voxel;
-        double centre[1][3];
-        vshi_voxels_centres(fill->voxels, block, 1, &number, centre);
-        const double least = least_step(fill, centre[0]);
+    uint16_t open[VSHI_BLOCK_VOXELS + 1];
+    double least[VSHI_BLOCK_VOXELS];
+    const size_t count = list_open(fill, block, open, least);
+    for (size_t i = 0; i < count; ++i) {
+        const int voxel = open[i];
         size_t from;
         int nearest;
-        if (least <= VSHI_FILL_REACH && find_nearest(fill, around, voxel, least, &from, &nearest)) {
+        if (least[i] <= VSHI_FILL_REACH && find_nearest(fill, around, voxel, least[i], &from, &nearest)) {
             if (!copy_value(fill, block, voxel, from, nearest)) {
                 return false;
             }

@@ -22,10 +22,12 @@ typedef struct vshi_fill {
     vsh_volume *volume;
     size_t block_count, channel_count;
     bool fills;
-    uint64_t (*shaded)[VSHI_MASK_WORDS]; /* [block_count]: set by who shades them */
-    uint64_t (*filled)[VSHI_MASK_WORDS]; /* [block_count] */
-    vshi_fill_step steps[VSHI_FILL_STEPS]; /* the nearest first */
-    double longest; /* axis of a voxel, world units */
+    uint64_t (*shaded)[VSHI_MASK_WORDS];                   /* [block_count]: set by who shades them */
+    uint64_t (*filled)[VSHI_MASK_WORDS];                   /* [block_count] */
+    vshi_fill_step steps[VSHI_FILL_STEPS];                 /* the nearest first */
+    int first_step[VSHI_FILL_REACH * VSHI_FILL_REACH + 1]; /* whose length's square is this at least */
+    double longest;                                        /* axis of a voxel, world units */
+    double distance_error;                                 /* world units */
     _Atomic uint64_t shaded_count, filled_count, off_count;
 } vshi_fill;
 

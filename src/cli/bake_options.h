@@ -56,7 +56,7 @@ enum {
 
 #define CLI_CASTER_OPTIONS                                                                                   \
     {0, NULL, NULL, "Casters and voxels"}, {                                                                 \
-        CLI_KEY_CASTER, "caster", "FILE", "another mesh or .vdb that casts shadows; may be\nrepeated"                 \
+        CLI_KEY_CASTER, "caster", "FILE", "another mesh or .vdb that casts shadows; may be\nrepeated"        \
     }
 
 typedef struct cli_bake_settings {

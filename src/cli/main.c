@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const cli_command *const commands[] = {&cli_bake,  &cli_voxelize, &cli_info,
-                                             &cli_trade, &cli_query,    &cli_volume};
+                                              &cli_trade, &cli_query,    &cli_volume};
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
 static const char help_text[] =

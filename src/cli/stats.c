@@ -103,6 +103,6 @@ void cli_stats_say(const cli_stats *stats) {
             cli_bytes_text(peak_bytes(), peak, sizeof peak));
     const double *s = stats->seconds;
     cli_say("load %.2f s, voxelize %.2f s, field %.2f s, %s %.2f s, write %.2f s", s[CLI_STAGE_LOAD],
-            s[CLI_STAGE_VOXELIZE], s[CLI_STAGE_FIELD], stats->of == CLI_STATS_POINTS ? "shade" : "bake", s[CLI_STAGE_BAKE],
-            s[CLI_STAGE_WRITE]);
+            s[CLI_STAGE_VOXELIZE], s[CLI_STAGE_FIELD], stats->of == CLI_STATS_POINTS ? "shade" : "bake",
+            s[CLI_STAGE_BAKE], s[CLI_STAGE_WRITE]);
 }

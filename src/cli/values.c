@@ -83,8 +83,9 @@ int cli_take_box(const char *name, const char *text, double min[3], double max[3
         ++at;
     }
     if (!good || !(min[0] < max[0] && min[1] < max[1] && min[2] < max[2])) {
-        return cli_usage("%s '%s': expected X0,Y0,Z0,X1,Y1,Z1, the second corner above the first on every axis",
-                         name, text);
+        return cli_usage(
+            "%s '%s': expected X0,Y0,Z0,X1,Y1,Z1, the second corner above the first on every axis", name,
+            text);
     }
     return CLI_OK;
 }

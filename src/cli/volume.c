@@ -200,9 +200,8 @@ static int make_field(volume_work *work) {
     int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
     work->scene->shade.triangles = work->triangles;
     cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
-    code = code == CLI_OK
-               ? cli_grid_make(work->scene, work->assets, &work->run, &work->grid, &work->made)
-               : code;
+    code = code == CLI_OK ? cli_grid_make(work->scene, work->assets, &work->run, &work->grid, &work->made)
+                          : code;
     work->stats.seconds[CLI_STAGE_VOXELIZE] += work->made.voxelize_s;
     code = code == CLI_OK ? choose_voxels(work) : code;
     if (code == CLI_OK) {

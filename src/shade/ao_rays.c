@@ -202,8 +202,8 @@ static bool prepare(batch *b, size_t i, ao_point *point, vsh_shade_stats *stats)
             task->sphere ? point->frame.axes[2] : vshi_unit(vshi_vec_off(points->normals + 3 * i));
         const double offset = TRACE_LIFT * task->field->voxel_size + task->options->surface_offset;
         vshi_ao_axes(normal, point->world_axes);
-        point->world_origin = vshi_add(vshi_vec_of(points->positions + 3 * i),
-                                       vshi_scale(normal, task->sphere ? 0.0 : offset));
+        point->world_origin =
+            vshi_add(vshi_vec_of(points->positions + 3 * i), vshi_scale(normal, task->sphere ? 0.0 : offset));
     } else {
         point->frame.grown = vshi_ao_grown(task->field, point->frame.origin);
         ++stats->samples;

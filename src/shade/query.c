@@ -5,9 +5,9 @@
 #include "base/memory.h"
 #include "field/level.h"
 #include "shade/ao.h"
+#include "shade/blocks.h"
 #include "shade/order.h"
 #include "shade/query.h"
-#include "shade/shadow.h"
 #include "shade/view.h"
 
 #include <stdlib.h>
@@ -94,6 +94,20 @@ vsh_result vshi_query_create(const vsh_field *field, const vsh_light *lights, si
     }
     *query = q;
     return VSH_OK;
+}
+
+void vshi_query_prove(const vsh_query *query, int32_t isa, size_t light, size_t count,
+                      const double (*centre)[3], const double *radius, int8_t *proof,
+                      vsh_shade_stats *stats) {
+    vshi_shadow_task task = query->shadow[light];
+    task.kernel = vshi_kernel_of(isa);
+    vshi_vec at[VSHI_QUERY_BALLS];
+    double voxels[VSHI_QUERY_BALLS];
+    for (size_t i = 0; i < count; ++i) {
+        at[i] = vshi_to_field(task.field, centre[i]);
+        voxels[i] = radius[i] / task.field->voxel_size;
+    }
+    vshi_blocks_prove_balls(&task, count, at, voxels, proof, stats);
 }
 
 /* --- points */
@@ -308,8 +322,9 @@ static vsh_result check_output(const vsh_query *query, const vshi_view *view, co
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: stride %zu: expected 0 or bytes, %zu, %zu …",
                          output->stride, least, least + sizeof(float));
     }
-    return output->ao != NULL && view->normals == NULL && !query->ao.sphere ? vshi_ao_check_points(&(vsh_points){0}, error)
-                                                       : VSH_OK;
+    return output->ao != NULL && view->normals == NULL && !query->ao.sphere
+               ? vshi_ao_check_points(&(vsh_points){0}, error)
+               : VSH_OK;
 }
 
 /* `packed`: the points, where they are without gaps; else NULL. */

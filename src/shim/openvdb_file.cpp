@@ -1,7 +1,7 @@
-// Reading .vdb files. The reader of OpenVDB 10.0.1 crashes on some damaged files (it writes past its buffers where
-// Blosc data lie about their size): positions and sizes are checked here and a short file shows as an error,
-// but damage inside the packed data cannot be seen beforehand. Who reads untrusted files makes a trial read
-// in a child process first, as the command line does.
+// Reading .vdb files. The reader of OpenVDB 10.0.1 crashes on some damaged files (it writes past its buffers
+// where Blosc data lie about their size): positions and sizes are checked here and a short file shows as an
+// error, but damage inside the packed data cannot be seen beforehand. Who reads untrusted files makes a trial
+// read in a child process first, as the command line does.
 #include "shim/openvdb_file.h"
 #include "shim/openvdb_examine.h"
 
@@ -227,8 +227,8 @@ std::string class_of(const MetaMap &metadata) {
     return text ? text->value() : "";
 }
 
-// The first grid of that name, or (nullptr) that `wanted(i)` holds for; else the first one, to be refused with
-// its reason.
+// The first grid of that name, or (nullptr) that `wanted(i)` holds for; else the first one, to be refused
+// with its reason.
 template <typename Wanted>
 size_t choose(Reader &reader, const char *path, const char *name, vsh_error *error, Wanted &&wanted) {
     if (reader.count() == 0) {
@@ -408,8 +408,8 @@ GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &ru
     initialize();
     try {
         Reader reader(path, run, error);
-        const size_t chosen = choose(reader, path, name, error,
-                                     [&](size_t i) { return has_numbers(*reader.without_tree(i)); });
+        const size_t chosen =
+            choose(reader, path, name, error, [&](size_t i) { return has_numbers(*reader.without_tree(i)); });
         const Named named{path, reader.name(chosen)};
         const GridBase::Ptr bare = reader.without_tree(chosen);
         if (!has_numbers(*bare)) {

@@ -13,7 +13,8 @@ constexpr const char *SHELL_THICKNESS = "vdbshade_shell_thickness"; // metadata,
 constexpr size_t UUID_AT = 21;
 constexpr size_t UUID_LENGTH = 36;
 
-// Voxels below, world units, OpenVDB cannot write: it takes their volume for 0 while it copies what it writes.
+// Voxels below, world units, OpenVDB cannot write: it takes their volume for 0 while it copies what it
+// writes.
 constexpr double SMALLEST_WRITTEN = 1.45e-5;
 
 // Once a process, before anything is read or written.
@@ -22,8 +23,8 @@ void initialize();
 // Grids with a number, or a bit, in each voxel.
 using NumberGrids = openvdb::NumericGridTypes::Append<openvdb::BoolGrid, openvdb::MaskGrid>;
 
-// Grid `name` of a .vdb file (nullptr: the first of NumberGrids), its tree read within the run's memory limit;
-// throws Failure where there is none, and where it is none of them.
+// Grid `name` of a .vdb file (nullptr: the first of NumberGrids), its tree read within the run's memory
+// limit; throws Failure where there is none, and where it is none of them.
 openvdb::GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &run, vsh_error *error);
 
 // A grid of ours: shares the tree.

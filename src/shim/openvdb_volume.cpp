@@ -154,6 +154,12 @@ float *vshi_volume_values(vsh_volume *volume, size_t channel, size_t block) {
     }
 }
 
+void vshi_volume_set_tile(vsh_volume *volume, size_t channel, size_t block, float value) {
+    vshi::Slot &slot = volume->channels[channel].slots[block];
+    slot.is_tile = true;
+    slot.tile = value;
+}
+
 float vshi_volume_value(const vsh_volume *volume, size_t channel, size_t block, int voxel) {
     const vshi::Slot &slot = volume->channels[channel].slots[block];
     return slot.leaf != nullptr ? slot.leaf->buffer().data()[voxel] : slot.tile;

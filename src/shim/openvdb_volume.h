@@ -28,6 +28,9 @@ size_t vshi_voxels_find(const vsh_voxels *voxels, const int32_t origin[3]);
 /* Longest axis of a voxel, world units; infinite where it is not the same everywhere. */
 double vshi_voxels_longest_axis(const vsh_voxels *voxels);
 
+/* A ball that holds the centres of all voxels of a block. */
+void vshi_voxels_ball(const vsh_voxels *voxels, size_t block, double centre[3], double *radius);
+
 /* Centres of `count` voxels of a block, by their numbers in it. */
 void vshi_voxels_centres(const vsh_voxels *voxels, size_t block, size_t count, const uint16_t *voxel,
                          double (*centres)[3]);
@@ -49,6 +52,9 @@ vsh_result vshi_volume_begin(const vsh_voxels *voxels, const vshi_channel *chann
 /* The values [512] of a block in a grid that is made; background at first. NULL where memory is short.
  * Different blocks on different threads. */
 float *vshi_volume_values(vsh_volume *volume, size_t channel, size_t block);
+
+/* Gives all voxels of a block one value, without memory for them. */
+void vshi_volume_set_tile(vsh_volume *volume, size_t channel, size_t block, float value);
 
 /* A value that is there, also once it was settled. */
 float vshi_volume_value(const vsh_volume *volume, size_t channel, size_t block, int voxel);

@@ -12,8 +12,8 @@ namespace vshi {
 namespace {
 
 constexpr int32_t LARGEST_INDEX = 1 << 28;
-constexpr double FARTHEST = 1e12;  // of a voxel from the origin, voxels: doubles must tell voxels apart there
-constexpr double ROUNDING = 1e-6;  // voxels: a side so much longer takes no voxel more
+constexpr double FARTHEST = 1e12; // of a voxel from the origin, voxels: doubles must tell voxels apart there
+constexpr double ROUNDING = 1e-6; // voxels: a side so much longer takes no voxel more
 constexpr double BAND_ROUNDING = 1e-6; // of a band's width: the background is a float
 
 void check_blocks(const vsh_run &run, double count, const char *what, vsh_error *error) {
@@ -337,11 +337,10 @@ const vshi_block *vshi_voxels_blocks(const vsh_voxels *voxels, size_t *count) {
 
 size_t vshi_voxels_find(const vsh_voxels *voxels, const int32_t origin[3]) {
     const auto &blocks = voxels->set->blocks;
-    const auto at = std::lower_bound(blocks.begin(), blocks.end(), origin,
-                                     [](const vshi_block &block, const int32_t *wanted) {
-                                         return std::lexicographical_compare(
-                                             block.origin, block.origin + 3, wanted, wanted + 3);
-                                     });
+    const auto at = std::lower_bound(
+        blocks.begin(), blocks.end(), origin, [](const vshi_block &block, const int32_t *wanted) {
+            return std::lexicographical_compare(block.origin, block.origin + 3, wanted, wanted + 3);
+        });
     return at != blocks.end() && std::equal(at->origin, at->origin + 3, origin) ? size_t(at - blocks.begin())
                                                                                 : SIZE_MAX;
 }
@@ -360,4 +359,17 @@ void vshi_voxels_centres(const vsh_voxels *voxels, size_t block, size_t count, c
                                origin[2] + (voxel[i] & 7)};
         vsh_voxels_centre(voxels, at, centres[i]);
     }
+}
+
+void vshi_voxels_ball(const vsh_voxels *voxels, size_t block, double centre[3], double *radius) {
+    const openvdb::Coord low(voxels->set->blocks[block].origin);
+    const openvdb::math::Transform &transform = *voxels->set->transform;
+    const vshi::Vec3d middle = transform.indexToWorld(low.asVec3d() + vshi::Vec3d(3.5));
+    double square = 0.0;
+    for (int corner = 0; corner < 8; ++corner) { // centres lie within their hull
+        const vshi::Vec3d at((corner & 1) * 7.0, (corner >> 1 & 1) * 7.0, (corner >> 2) * 7.0);
+        square = std::max(square, (transform.indexToWorld(low.asVec3d() + at) - middle).lengthSqr());
+    }
+    std::copy(middle.asPointer(), middle.asPointer() + 3, centre);
+    *radius = std::sqrt(square);
 }
