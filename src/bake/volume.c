@@ -1,5 +1,4 @@
 /* Volumes: voxels are shaded block by block, then what is inside solids is filled. */
-
 #include "bake/channels.h"
 #include "bake/volume_blocks.h"
 #include "base/floats.h"
@@ -96,7 +95,7 @@ static vsh_result begin_volume(vshi_volume_bake *bake, const vsh_light *lights, 
                                 bake->ao_error, info.voxel_size};
     vshi_channels_describe(&what, channels);
     const double held =
-        (double)info.bytes + (double)bake->block_count * sizeof *bake->fill.shaded +
+        (double)info.bytes + 2.0 * (double)bake->block_count * sizeof *bake->fill.shaded +
         (bake->options.shade.triangles != NULL ? (double)vsh_triangles_bytes(bake->options.shade.triangles)
                                                : 0.0);
     result = vshi_volume_begin(bake->voxels, channels, bake->channel_count, run, held, &bake->volume, error);

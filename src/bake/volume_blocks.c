@@ -164,7 +164,8 @@ static bool choose_answers(vshi_volume_bake *bake, size_t block, const facts *kn
     a->output.visibility = a->to;
     a->output.deviation = a->to + lights;
     if (bake->options.ao != 0 && known->open) {
-        good = good && set_all(bake, ao, block, 1.0f);
+        good = good && set_all(bake, ao, block, 1.0f) &&
+               (!bake->ao_error || set_all(bake, bake->channel_count - 1, block, 0.0f));
     } else if (bake->options.ao != 0) {
         a->output.ao = plane(a, ao);
         a->output.ao_deviation = bake->ao_error ? plane(a, bake->channel_count - 1) : NULL;

@@ -68,7 +68,7 @@ static void ao_of_free_space_is_the_free_share_of_all_directions(void **state) {
     static const struct {
         int32_t method, number;
         double error; /* RMSE */
-    } methods[] = {{VSH_AO_CONES, 16, 0.03}, {VSH_AO_CONES, 64, 0.02}, {VSH_AO_RAYS, 256, 0.015}};
+    } methods[] = {{VSH_AO_CONES, 16, 0.015}, {VSH_AO_CONES, 64, 0.008}, {VSH_AO_RAYS, 256, 0.01}};
     for (size_t m = 0; m < sizeof methods / sizeof methods[0]; ++m) {
         vsh_volume_options options = vsh_volume_options_default();
         options.ao = 1;
@@ -77,19 +77,16 @@ static void ao_of_free_space_is_the_free_share_of_all_directions(void **state) {
         options.shade.ao_cones = options.shade.rays = methods[m].number;
         vsh_volume *volume = bake(field, voxels, NULL, 0, &options, NULL);
         dense d = copy_of(volume, 0, voxels);
-        double *centre = centres_of(&d, voxels), square = 0.0, bias = 0.0;
+        double *centre = centres_of(&d, voxels), square = 0.0;
         size_t count = 0;
         for (size_t i = 0; i < d.count; ++i) {
             const double far = length(centre + 3 * i);
             if (far > 1.05) {
                 const double truth = 1.0 - 0.5 * (1.0 - sqrt(1.0 - 1.0 / (far * far)));
                 square += (d.values[i] - truth) * (d.values[i] - truth);
-                bias += d.values[i] - truth;
                 ++count;
             }
         }
-        print_message("sphere AO %d x %d: RMSE %.4f bias %.4f\n", methods[m].method, methods[m].number,
-                      sqrt(square / (double)count), bias / (double)count);
         assert_true(count > 10000 && sqrt(square / (double)count) < methods[m].error);
         free(centre);
         free(d.values);
@@ -126,7 +123,7 @@ static size_t compare(const vsh_field *field, const vsh_voxels *voxels, const vs
         double slope[3], at[2][3];
         float beside[2];
         if (!(distance[i] >= 0.0f) ||
-            (normals && fabs((double)distance[i]) > 3.0 * info.voxel_size[0] * (1.0 - 1e-4))) {
+            (normals && fabs((double)distance[i]) > 2.4 * info.voxel_size[0])) {
             continue;
         }
         for (int axis = 0; axis < 3; ++axis) {
@@ -156,16 +153,16 @@ static size_t compare(const vsh_field *field, const vsh_voxels *voxels, const vs
     assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
     /* the lattice's own axes are multiplied in another order: some normals differ by a bit, and what is near
      * an edge with them */
-    size_t different = 0;
+    size_t different = 0, far = 0;
     for (size_t g = 0; g < LIGHTS + (ao ? 1 : 0); ++g) {
         for (size_t i = 0; i < count; ++i) {
             const float own = d[g].values[number[i]];
             different += bits_of(own) != bits_of(values[g][i]);
-            assert_true(fabsf(own - values[g][i]) < (normals ? 1e-3f : 1e-30f));
+            far += !(fabsf(own - values[g][i]) < 1e-3f);
         }
         free(d[g].values);
     }
-    assert_true(different == 0 || (normals && different < count / 50));
+    assert_true(different == 0 || (normals && different < count / 50 && far < 10));
     for (int g = 0; g <= LIGHTS; ++g) {
         free(values[g]);
     }
@@ -303,11 +300,9 @@ static void a_lightmap_and_a_band_agree_where_texel_and_voxel_meet(void **state)
             worst[g] = floor_alone ? fmax(worst[g], difference[g]) : worst[g];
         }
     }
-    print_message("%zu texels, %zu of the floor alone: worst %.5f %.5f, RMSE %.5f %.5f\n", count, alone,
-                  worst[0], worst[1], sqrt(square[0] / (double)count), sqrt(square[1] / (double)count));
     assert_true(count > TEXELS / 2 && alone > count / 2);
     for (int g = 0; g < 2; ++g) {
-        assert_true(worst[g] < 0.01 && sqrt(square[g] / (double)count) < 0.01);
+        assert_true(worst[g] < 1e-4 && sqrt(square[g] / (double)count) < 0.002);
     }
     vsh_texels_free(texels);
     vsh_volume_free(volume);

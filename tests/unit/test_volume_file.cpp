@@ -105,7 +105,7 @@ FloatGrid::Ptr fog() {
     grid->setGridClass(openvdb::GRID_FOG_VOLUME);
     grid->fill(CoordBBox(-3, 0, 0, 4, 5, 6), 0.5f);
     grid->tree().addTile(1, Coord(16, 16, 16), 0.7f, true);
-    grid->tree().addTile(2, Coord(128, 0, 0), 0.9f, true); // 128³
+    grid->tree().addTile(2, Coord(0, -128, 0), 0.9f, true); // 128³
     grid->tree().addTile(1, Coord(32, 16, 16), 0.0f, false);
     const auto transform = openvdb::math::Transform::createLinearTransform(0.05);
     transform->postScale(Vec3d(1.0, 2.0, 1.0));
@@ -125,7 +125,7 @@ void a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles(void **) {
     const uint64_t expected = 8 * 6 * 7 + 512 + 128 * 128 * 128;
     assert_int_equal(source->activeVoxelCount(), expected);
     assert_int_equal(info.count, expected);
-    assert_true(info.index_min[0] == -3 && info.index_max[0] == 255 && info.has_normals == 0);
+    assert_true(info.index_min[0] == -3 && info.index_max[0] == 127 && info.has_normals == 0);
     assert_true(std::fabs(info.voxel_size[1] / info.voxel_size[0] - 2.0) < 1e-12);
     const int32_t index[3] = {17, 18, 19};
     double centre[3];
@@ -190,8 +190,8 @@ void a_frustum_keeps_its_map(void **) {
     const FloatGrid::Ptr source = FloatGrid::create(0.0f);
     source->setName("camera");
     source->fill(CoordBBox(0, 0, 0, 31, 31, 31), 1.0f);
-    const openvdb::math::NonlinearFrustumMap map(Vec3d(0.0, 4.0, 4.0), Vec3d(0.0, -0.5, -1.0),
-                                                 Vec3d(0.0, 1.0, -0.5) * 0.5, 0.5, 6.0, 32, 32, 32);
+    const openvdb::math::NonlinearFrustumMap map(Vec3d(0.0, 4.0, 4.0), Vec3d(0.0, -0.83, -0.55),
+                                                 Vec3d(0.0, 0.275, -0.415), 0.5, 8.0, 32, 32, 32);
     source->setTransform(std::make_shared<openvdb::math::Transform>(map.copy()));
     vsh_voxels *voxels = like(save("frustum.vdb", {source}), nullptr);
     vsh_field *field = ball();
@@ -262,7 +262,7 @@ void other_programs_read_names_class_metadata_and_halves(void **) {
     assert_true(!full->saveFloatAsHalf() && rounded->saveFloatAsHalf());
     assert_int_equal(full->getGridClass(), openvdb::GRID_UNKNOWN);
     assert_true(full->background() == 1.0f);
-    assert_true(full->tree().activeTileCount() > 100);
+    assert_true(full->tree().activeTileCount() > 50);
     assert_true(full->metaValue<std::string>("vdbshade_method") == "cone");
     assert_non_null(
         std::strstr(full->metaValue<std::string>("description").c_str(), "visible fraction of light 'sun'"));
