@@ -13,6 +13,7 @@
 #include "field.h"
 #include "grid.h"
 #include "image.h"
+#include "layer.h"
 #include "light.h"
 #include "mesh.h"
 #include "query.h"

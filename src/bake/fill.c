@@ -38,9 +38,9 @@ static void list_steps(vshi_fill_step *steps) {
     qsort(steps, count, sizeof *steps, compare_steps);
 }
 
-vsh_result vshi_fill_begin(vshi_fill *fill, const vsh_field *field, const vsh_voxels *voxels,
+vsh_result vshi_fill_begin(vshi_fill *fill, const vshi_solid *solid, const vsh_voxels *voxels,
                            vsh_volume *volume, size_t channel_count, bool fills, vsh_error *error) {
-    *fill = (vshi_fill){.field = field,
+    *fill = (vshi_fill){.solid = solid,
                         .voxels = voxels,
                         .volume = volume,
                         .channel_count = channel_count,
@@ -54,9 +54,7 @@ vsh_result vshi_fill_begin(vshi_fill *fill, const vsh_field *field, const vsh_vo
         }
         fill->first_step[square] = s;
     }
-    vsh_field_info info;
-    vsh_field_get_info(field, &info);
-    fill->distance_error = DISTANCE_ERROR * info.voxel_size;
+    fill->distance_error = DISTANCE_ERROR * solid->voxel_size;
     vsh_result result =
         vshi_allocate((void **)&fill->shaded, fill->block_count, sizeof *fill->shaded, "volume", error);
     if (result == VSH_OK) {
@@ -115,7 +113,7 @@ static size_t list_open(const vshi_fill *fill, size_t block, uint16_t *voxel, do
         count += is_set(mask, v) && !is_set(shaded, v);
     }
     vshi_voxels_centres(fill->voxels, block, count, voxel, centre);
-    vsh_field_sample(fill->field, count, &centre[0][0], distance);
+    vshi_solid_sample(fill->solid, count, &centre[0][0], distance);
     for (size_t i = 0; i < count; ++i) {
         const double inside = -(double)distance[i] - fill->distance_error;
         least[i] = inside > 0.0 ? inside / fill->longest : 0.0;

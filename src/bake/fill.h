@@ -2,6 +2,7 @@
 #ifndef VSHI_BAKE_FILL_H
 #define VSHI_BAKE_FILL_H
 
+#include "bake/solid.h"
 #include "shim/openvdb_volume.h"
 
 #include <stdatomic.h>
@@ -16,7 +17,7 @@ typedef struct vshi_fill_step {
 enum { VSHI_FILL_REACH = 4, VSHI_FILL_STEPS = 256 }; /* voxels; places within them */
 
 typedef struct vshi_fill {
-    const vsh_field *field;
+    const vshi_solid *solid;
     const vsh_voxels *voxels;
     const vshi_block *blocks;
     vsh_volume *volume;
@@ -32,7 +33,7 @@ typedef struct vshi_fill {
 } vshi_fill;
 
 /* Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_fill_begin(vshi_fill *fill, const vsh_field *field, const vsh_voxels *voxels,
+vsh_result vshi_fill_begin(vshi_fill *fill, const vshi_solid *solid, const vsh_voxels *voxels,
                            vsh_volume *volume, size_t channel_count, bool fills, vsh_error *error);
 void vshi_fill_end(vshi_fill *fill);
 

@@ -115,7 +115,7 @@ static vsh_result bake_all(vshi_volume_bake *bake, const vsh_light *lights, cons
         result = begin_volume(bake, lights, run, error);
     }
     if (result == VSH_OK) {
-        result = vshi_fill_begin(&bake->fill, bake->field, bake->voxels, bake->volume, bake->channel_count,
+        result = vshi_fill_begin(&bake->fill, &bake->solid, bake->voxels, bake->volume, bake->channel_count,
                                  bake->options.inside == VSH_INSIDE_NEAREST, error);
     }
     if (result == VSH_OK) {
@@ -186,6 +186,9 @@ vsh_result vsh_bake_volume(const vsh_field *field, const vsh_voxels *voxels, con
         bake.options.shade = shade;
     }
     if (result == VSH_OK) {
+        result = vshi_solid_of(field, &bake.options.shade, &bake.solid, error);
+    }
+    if (result == VSH_OK) {
         result = vshi_run_resolve(run, &full, error);
     }
     if (result == VSH_OK) {
@@ -202,9 +205,6 @@ vsh_result vsh_bake_volume(const vsh_field *field, const vsh_voxels *voxels, con
     bake.shadow_error = bake.options.error != 0 && light_count > 0 && shade->method >= VSH_SHADOW_RAYS;
     bake.ao_error = bake.options.error != 0 && bake.options.ao != 0 && shade->ao_method >= VSH_AO_RAYS;
     bake.channel_count = light_count * (bake.shadow_error ? 2 : 1) + (bake.options.ao != 0) + bake.ao_error;
-    vsh_field_info made;
-    vsh_field_get_info(field, &made);
-    bake.voxel_size = made.voxel_size;
     bake.one.threads = 1;
     bake.one.isa = full.isa;
     find_half_axes(&bake);

@@ -43,7 +43,7 @@ static void list_voxels(const vshi_block *block, piece *p) {
 /* Keeps the voxels that are outside. */
 static void keep_outside(const vshi_volume_bake *bake, piece *p) {
     float distance[VSHI_BLOCK_VOXELS];
-    vsh_field_sample(bake->field, p->count, &p->centre[0][0], distance);
+    vshi_solid_sample(&bake->solid, p->count, &p->centre[0][0], distance);
     size_t kept = 0;
     for (size_t i = 0; i < p->count; ++i) {
         if (distance[i] >= 0.0f) {
@@ -67,7 +67,7 @@ static void find_normals(const vshi_volume_bake *bake, piece *p) {
             }
         }
         for (int side = 0; side < 2; ++side) {
-            vsh_field_sample(bake->field, p->count, &at[side][0][0], distance[side]);
+            vshi_solid_sample(&bake->solid, p->count, &at[side][0][0], distance[side]);
         }
         for (size_t i = 0; i < p->count; ++i) {
             slope[i][axis] = (double)distance[1][i] - (double)distance[0][i];
@@ -242,9 +242,9 @@ static void look_around(const vshi_volume_bake *bake, size_t begin, size_t count
     for (size_t i = 0; i < count; ++i) {
         vshi_voxels_ball(bake->voxels, begin + i, centre[i], &radius[i]);
     }
-    vsh_field_sample(bake->field, count, &centre[0][0], distance);
+    vshi_solid_sample(&bake->solid, count, &centre[0][0], distance);
     for (size_t i = 0; i < count; ++i) {
-        const double sure = SURE * fabs((double)distance[i]) - bake->voxel_size - radius[i];
+        const double sure = SURE * fabs((double)distance[i]) - bake->solid.voxel_size - radius[i];
         known[i].inside = sure > 0.0 && distance[i] < 0.0f;
         known[i].outside = sure > 0.0 && distance[i] > 0.0f;
         known[i].open = known[i].outside && sure > 2.0 * bake->options.shade.ao_distance;

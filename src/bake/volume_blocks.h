@@ -12,6 +12,7 @@ enum { VSHI_VOLUME_GRAIN = 16 }; /* blocks of a piece of work: as many as march 
 
 typedef struct vshi_volume_bake {
     const vsh_field *field;
+    vshi_solid solid; /* with its layers */
     const vsh_voxels *voxels;
     const vshi_block *blocks;
     size_t block_count;
@@ -19,7 +20,6 @@ typedef struct vshi_volume_bake {
     vsh_volume_options options;
     bool normals;           /* the band of a surface */
     double half_axis[3][3]; /* of its voxels, world units */
-    double voxel_size;      /* of the field, world units */
     bool shadow_error, ao_error;
     size_t channel_count;
     vsh_query *query;

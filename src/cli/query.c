@@ -66,10 +66,9 @@ const cli_command cli_query = {
     "query",
     "INPUT --points FILE -o OUT [options]",
     "Answers at points what a light's shadow, ambient occlusion and the distance are there. INPUT is a\n"
-    "mesh file or a scene file (.json; its lights and ao, not its receivers). Rows that are bad are told by\n"
-    "number and answered nan. Formats and columns: docs/query.md. Numbers in brackets are what holds "
-    "without\n"
-    "the option.",
+    "mesh file, a .vdb level set or a scene file (.json; its lights and ao, not its receivers). Bad rows\n"
+    "are told by number and answered nan. Formats and columns: docs/query.md. Numbers in brackets are\n"
+    "what holds without the option.",
     options,
     sizeof options / sizeof options[0],
     query_main};
@@ -238,6 +237,8 @@ static int make_query(query_work *work) {
     work->stats.seconds[CLI_STAGE_VOXELIZE] += work->made.voxelize_s;
     work->stats.seconds[CLI_STAGE_FIELD] += work->made.field_s;
     vsh_shade_options shade = work->scene->shade;
+    shade.layers = work->made.layers;
+    shade.layer_count = work->made.layer_count;
     if (!work->scene->ao) {
         shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
     }
@@ -292,7 +293,7 @@ static int run_query(const query_settings *s, vsh_scene *scene) {
     }
     query_answers_free(&work.answers);
     vsh_query_free(work.query);
-    vsh_field_free(work.made.field);
+    cli_field_free(&work.made);
     vsh_triangles_free(work.triangles);
     vsh_assets_free(work.assets);
     cli_points_close(&work.reader);

@@ -187,11 +187,28 @@ static int choose_voxels(volume_work *work) {
     vsh_error error;
     vsh_result result = VSH_OK;
     if (s->has_box) {
-        const double size = s->box_voxel_size > 0.0 ? s->box_voxel_size : work->made.grid.voxel_size;
+        vsh_grid_info info = {.voxel_size = s->box_voxel_size};
+        if (s->box_voxel_size == 0.0) {
+            vsh_grid_get_info(work->grid, &info);
+        }
+        const double size = info.voxel_size;
         result = vsh_voxels_from_box(s->box_min, s->box_max, size, &work->run, &work->voxels, &error);
     } else if (s->like == NULL) {
         result = vsh_voxels_from_grid(work->grid, s->band, &work->run, &work->voxels, &error);
     }
+    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+}
+
+/* The union of all casters: what has the band, and without layers what casts. */
+static int make_grid(volume_work *work) {
+    const volume_settings *s = work->settings;
+    if (work->scene->layer_count > 0 && (s->like != NULL || s->box_voxel_size > 0.0)) {
+        return CLI_OK;
+    }
+    const double start = cli_seconds();
+    vsh_error error;
+    const vsh_result result = vsh_scene_casters(work->scene, work->assets, &work->run, &work->grid, &error);
+    cli_stats_stage(&work->stats, CLI_STAGE_VOXELIZE, start);
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }
 
@@ -200,9 +217,7 @@ static int make_field(volume_work *work) {
     int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
     work->scene->shade.triangles = work->triangles;
     cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
-    code = code == CLI_OK ? cli_grid_make(work->scene, work->assets, &work->run, &work->grid, &work->made)
-                          : code;
-    work->stats.seconds[CLI_STAGE_VOXELIZE] += work->made.voxelize_s;
+    code = code == CLI_OK ? make_grid(work) : code;
     code = code == CLI_OK ? choose_voxels(work) : code;
     if (code == CLI_OK) {
         vsh_voxels_info info;
@@ -210,12 +225,14 @@ static int make_field(volume_work *work) {
         cli_box box;
         memcpy(box.min, info.bounds_min, sizeof box.min);
         memcpy(box.max, info.bounds_max, sizeof box.max);
-        code = cli_field_of_grid(work->scene, work->grid, &box, &work->run, &work->made);
+        const vsh_grid *all = work->scene->layer_count == 0 ? work->grid : NULL;
+        code = cli_field_make_of(work->scene, work->assets, all, &box, &work->run, &work->made);
     }
     vsh_grid_free(work->grid); /* neither the field nor the voxels need it */
     work->grid = NULL;
     work->stats.grid = work->made.grid;
     work->stats.field = work->made.info;
+    work->stats.seconds[CLI_STAGE_VOXELIZE] += work->made.voxelize_s;
     work->stats.seconds[CLI_STAGE_FIELD] += work->made.field_s;
     return code;
 }
@@ -227,6 +244,8 @@ static int bake_volume(volume_work *work) {
     bake.ao = work->scene->ao;
     bake.error = work->scene->error;
     bake.shade = work->scene->shade;
+    bake.shade.layers = work->made.layers;
+    bake.shade.layer_count = work->made.layer_count;
     vsh_error error;
     const vsh_result result =
         vsh_bake_volume(work->made.field, work->voxels, work->scene->lights, work->scene->light_count, &bake,
@@ -297,7 +316,7 @@ static int run_volume(const volume_settings *s, vsh_scene *scene) {
     }
     vsh_volume_free(work.volume);
     vsh_voxels_free(work.voxels);
-    vsh_field_free(work.made.field);
+    cli_field_free(&work.made);
     vsh_triangles_free(work.triangles);
     vsh_assets_free(work.assets);
     return code;

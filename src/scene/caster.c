@@ -25,6 +25,7 @@ static const vshi_key caster_keys[] = {
      .kind = VSHI_CUSTOM,
      .offset = offsetof(vsh_caster, transform),
      .read = vshi_read_transform},
+    {.name = "layer", .kind = VSHI_STRING, .offset = offsetof(vsh_caster, layer)},
 };
 static const vshi_table caster_table = VSHI_TABLE(caster_keys);
 
