@@ -150,18 +150,18 @@ static size_t compare(const vsh_field *field, const vsh_voxels *voxels, const vs
     output.ao = ao ? values[LIGHTS] : NULL;
     const vsh_points points = {count, centre, normals ? normal : NULL, NULL};
     assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
-    /* the lattice's own axes are multiplied in another order: some normals differ by a bit, and what is near
-     * an edge with them */
+    /* some normals differ by a bit, as the lattice's own axes are multiplied in another order; and a march
+     * from beyond the casters' bounds begins at them or at the point, by how far neighbours proved it free */
     size_t different = 0, far = 0;
     for (size_t g = 0; g < LIGHTS + (ao ? 1 : 0); ++g) {
         for (size_t i = 0; i < count; ++i) {
             const float own = d[g].values[number[i]];
             different += bits_of(own) != bits_of(values[g][i]);
-            far += !(fabsf(own - values[g][i]) < 1e-3f);
+            far += !(fabsf(own - values[g][i]) < 0.05f);
         }
         free(d[g].values);
     }
-    assert_true(different == 0 || (normals && different < count / 50 && far < 50));
+    assert_true(different < count / 50 && far < 50);
     for (int g = 0; g <= LIGHTS; ++g) {
         free(values[g]);
     }
@@ -265,10 +265,11 @@ static void layers_hide_light_and_are_solid(void **state) {
     output.visibility = visibility;
     const vsh_points points = {d.count, centre, NULL, NULL};
     assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
-    size_t behind = 0, inside = 0, near = 0;
+    size_t different = 0, behind = 0, inside = 0, near = 0;
     for (size_t i = 0; i < d.count; ++i) {
         if (one[i] >= 0.0f && two[i] >= 0.0f) {
-            assert_true(bits_of(values[i]) == bits_of(d.values[i]));
+            different += bits_of(values[i]) != bits_of(d.values[i]);
+            assert_true(fabsf(values[i] - d.values[i]) < 0.05f);
             behind += d.values[i] == 0.0f && centre[3 * i + 1] > 1.0;
             near += two[i] < 0.1f && one[i] > 0.6f && ao.values[i] < 0.7f;
         }
@@ -276,7 +277,7 @@ static void layers_hide_light_and_are_solid(void **state) {
     }
     vsh_volume_info info;
     vsh_volume_get_info(volume, &info);
-    assert_true(behind > 50 && inside > 10 && near > 50);
+    assert_true(different < d.count / 50 && behind > 50 && inside > 10 && near > 50);
     assert_true(info.shaded + info.filled + info.off == d.count && info.filled > 500);
     free(values);
     free(two);
