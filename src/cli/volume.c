@@ -47,9 +47,9 @@ static int volume_main(int argc, char **argv);
 const cli_command cli_volume = {
     "volume",
     "INPUT -o OUT.vdb [options]",
-    "Bakes soft shadows and ambient occlusion into sparse grids. INPUT is a mesh file, a .vdb level set or\n"
-    "a scene file (.json; its casters, lights and ao, not its receivers). What is written, and how it is\n"
-    "to be read: docs/volume.md. Numbers in brackets are what holds without the option.",
+    "Bakes soft shadows and ambient occlusion into sparse grids. INPUT is a mesh file, a .vdb level set\n"
+    "or a scene file (.json; its casters, lights and ao, not its receivers). What is written, and how it\n"
+    "is to be read: docs/volume.md. Numbers in brackets are what holds without the option.",
     options,
     sizeof options / sizeof options[0],
     volume_main};
