@@ -59,7 +59,7 @@ enum {
 
 #define CLI_CASTER_OPTIONS                                                                                   \
     {0, NULL, NULL, "Casters and voxels"}, {                                                                 \
-        CLI_KEY_CASTER, "caster", "FILE", "another mesh that casts shadows; may be repeated"                 \
+        CLI_KEY_CASTER, "caster", "FILE", "another mesh or .vdb that casts shadows; may be\nrepeated"        \
     }
 
 typedef struct cli_bake_settings {
@@ -115,6 +115,9 @@ int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made)
 
 /* The same without its receivers: for points, which may ask for no light and no AO. */
 int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made);
+
+/* Whether a scene for points has anything to bake: CLI_OK, or CLI_USAGE having said why. */
+int cli_bake_check_work(const cli_bake_settings *settings, const cli_bake_scene *made);
 
 /* Refuses an output that is one of the scene's inputs. CLI_OK or an exit code, having said why. */
 int cli_bake_check_output(const cli_bake_settings *settings, const vsh_scene *scene, const char *output);

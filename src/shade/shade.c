@@ -48,6 +48,19 @@ vsh_result vshi_shade_sampler(const vsh_shade_options *options, const char *what
                             : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
 }
 
+void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more) {
+    stats->marches += more->marches;
+    stats->samples += more->samples;
+    stats->skipped += more->skipped;
+    stats->certified += more->certified;
+    stats->unfinished += more->unfinished;
+    stats->invalid += more->invalid;
+    stats->beyond_reach += more->beyond_reach;
+    stats->rays += more->rays;
+    stats->refined += more->refined;
+    stats->square_error += more->square_error;
+}
+
 typedef struct shade_run {
     vshi_shade_fn *fn;
     const void *task;
@@ -115,16 +128,17 @@ vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows 
     const vsh_result result = vshi_parallel_for(job, before[rows->count], 1, 0, run_piece, &pieces, error);
     free(memory);
     if (stats != NULL) {
-        stats->marches += pieces.marches;
-        stats->samples += pieces.samples;
-        stats->skipped += pieces.skipped;
-        stats->certified += pieces.certified;
-        stats->unfinished += pieces.unfinished;
-        stats->invalid += pieces.invalid;
-        stats->beyond_reach += pieces.beyond_reach;
-        stats->rays += pieces.rays;
-        stats->refined += pieces.refined;
-        stats->square_error += (double)pieces.square_error * VSHI_SQUARE_UNIT;
+        const vsh_shade_stats done = {.marches = pieces.marches,
+                                      .samples = pieces.samples,
+                                      .skipped = pieces.skipped,
+                                      .certified = pieces.certified,
+                                      .unfinished = pieces.unfinished,
+                                      .invalid = pieces.invalid,
+                                      .beyond_reach = pieces.beyond_reach,
+                                      .rays = pieces.rays,
+                                      .refined = pieces.refined,
+                                      .square_error = (double)pieces.square_error * VSHI_SQUARE_UNIT};
+        vshi_shade_stats_add(stats, &done);
     }
     return result;
 }
