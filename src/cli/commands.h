@@ -9,6 +9,7 @@ extern const cli_command cli_voxelize;
 extern const cli_command cli_info;
 extern const cli_command cli_trade;
 extern const cli_command cli_query;
+extern const cli_command cli_volume;
 extern const cli_command cli_flat;
 
 int cli_bake_main(int argc, char **argv);

@@ -75,6 +75,21 @@ int cli_take_vector(const char *name, const char *text, double value[3]) {
     return CLI_OK;
 }
 
+int cli_take_box(const char *name, const char *text, double min[3], double max[3]) {
+    const char *at = text;
+    bool good = true;
+    for (int i = 0; i < 6 && good; ++i) {
+        good = read_number(at, i < 3 ? &min[i] : &max[i - 3], &at) && *at == (i < 5 ? ',' : '\0');
+        ++at;
+    }
+    if (!good || !(min[0] < max[0] && min[1] < max[1] && min[2] < max[2])) {
+        return cli_usage(
+            "%s '%s': expected X0,Y0,Z0,X1,Y1,Z1, the second corner above the first on every axis", name,
+            text);
+    }
+    return CLI_OK;
+}
+
 int cli_take_size(const char *name, const char *text, int32_t *w, int32_t *h) {
     const char *at;
     bool good = read_integer(text, w, &at);
