@@ -12,6 +12,7 @@
 #include "base.h"
 #include "field.h"
 #include "grid.h"
+#include "heights.h"
 #include "image.h"
 #include "light.h"
 #include "mesh.h"

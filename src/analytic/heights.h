@@ -1,0 +1,23 @@
+/* Shadow and ambient occlusion of a heightfield that is marched as it is: what a layer asks for. */
+#ifndef VSHI_ANALYTIC_HEIGHTS_H
+#define VSHI_ANALYTIC_HEIGHTS_H
+
+#include <vdbshade/heights.h>
+#include <vdbshade/shade.h>
+
+/* Visible fraction of a light (checked before) at points begin … end - 1 into visibility[end - begin]: what
+ * the heightfield leaves of it, the receiver's own horizon not counted. `softness` scales the light's size;
+ * with 0, or VSH_SHADOW_HARD, it is its centre, 0 or 1. Every other method is the same: slices of the disc,
+ * each above its horizon. Points are first moved `lift` world units along their normals; one up to a quarter
+ * of a cell under the surface is taken for one on it, one deeper is dark. Invalid points are NaN. Thread
+ * safe. */
+void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, double softness, int32_t method,
+                         const vsh_points *points, size_t begin, size_t end, double lift, float *visibility,
+                         vsh_shade_stats *stats);
+
+/* Cosine-weighted fraction of the hemisphere that the heightfield leaves free within a distance, likewise;
+ * points->normals must be given. */
+void vshi_heights_ao(const vsh_heights *heights, double ao_distance, const vsh_points *points, size_t begin,
+                     size_t end, double lift, float *ao, vsh_shade_stats *stats);
+
+#endif
