@@ -5,7 +5,7 @@
 #include <vdbshade/scene.h>
 
 static void print_caster(const vsh_caster *caster, size_t index) {
-    static const char *const types[] = {"mesh", "sdf", "vdb"};
+    static const char *const types[] = {"mesh", "sdf", "vdb", "heightfield"};
     printf("caster %zu: %s", index, types[caster->type]);
     if (caster->type == VSH_CASTER_SDF) {
         double min[3], max[3];
@@ -16,6 +16,9 @@ static void print_caster(const vsh_caster *caster, size_t index) {
         printf(" %s", caster->path);
         if (caster->grid != NULL) {
             printf(", grid '%s'", caster->grid);
+        }
+        if (caster->type == VSH_CASTER_HEIGHTFIELD) {
+            printf(", %g × %g, height %g", caster->size[0], caster->size[1], caster->height);
         }
     }
     putchar('\n');

@@ -4,13 +4,21 @@
 
 #include <vdbshade/scene.h>
 
-enum { MESH = 1 << VSH_CASTER_MESH, SDF = 1 << VSH_CASTER_SDF, VDB = 1 << VSH_CASTER_VDB };
+enum {
+    MESH = 1 << VSH_CASTER_MESH,
+    SDF = 1 << VSH_CASTER_SDF,
+    VDB = 1 << VSH_CASTER_VDB,
+    HEIGHTFIELD = 1 << VSH_CASTER_HEIGHTFIELD,
+};
 
-static const char *const types[] = {
-    [VSH_CASTER_MESH] = "mesh", [VSH_CASTER_SDF] = "sdf", [VSH_CASTER_VDB] = "vdb"};
+static const char *const types[] = {[VSH_CASTER_MESH] = "mesh",
+                                    [VSH_CASTER_SDF] = "sdf",
+                                    [VSH_CASTER_VDB] = "vdb",
+                                    [VSH_CASTER_HEIGHTFIELD] = "heightfield"};
 static const char *const whats[] = {[VSH_CASTER_MESH] = "a mesh caster",
                                     [VSH_CASTER_SDF] = "an sdf caster",
-                                    [VSH_CASTER_VDB] = "a vdb caster"};
+                                    [VSH_CASTER_VDB] = "a vdb caster",
+                                    [VSH_CASTER_HEIGHTFIELD] = "a heightfield caster"};
 
 static const vshi_key caster_keys[] = {
     {.name = "mesh", .kind = VSHI_PATH, .variants = MESH, .offset = offsetof(vsh_caster, path)},
@@ -21,6 +29,28 @@ static const vshi_key caster_keys[] = {
      .read = vshi_read_sdf},
     {.name = "vdb", .kind = VSHI_PATH, .variants = VDB, .offset = offsetof(vsh_caster, path)},
     {.name = "grid", .kind = VSHI_STRING, .variants = VDB, .offset = offsetof(vsh_caster, grid)},
+    {.name = "heightfield", .kind = VSHI_PATH, .variants = HEIGHTFIELD, .offset = offsetof(vsh_caster, path)},
+    {.name = "size",
+     .kind = VSHI_VECTOR,
+     .variants = HEIGHTFIELD,
+     .required = HEIGHTFIELD,
+     .offset = offsetof(vsh_caster, size),
+     .count = 2,
+     .lowest = 1e-12,
+     .highest = 1e12},
+    {.name = "height",
+     .kind = VSHI_NUMBER,
+     .variants = HEIGHTFIELD,
+     .required = HEIGHTFIELD,
+     .offset = offsetof(vsh_caster, height),
+     .lowest = -1e12,
+     .highest = 1e12},
+    {.name = "base",
+     .kind = VSHI_NUMBER,
+     .variants = HEIGHTFIELD,
+     .offset = offsetof(vsh_caster, base),
+     .highest = 1e12,
+     .flags = VSHI_ABOVE},
     {.name = "transform",
      .kind = VSHI_CUSTOM,
      .offset = offsetof(vsh_caster, transform),
@@ -37,7 +67,7 @@ vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *
         return result;
     }
     vshi_value given, transform;
-    for (int32_t i = VSH_CASTER_MESH; i <= VSH_CASTER_VDB; ++i) {
+    for (int32_t i = VSH_CASTER_MESH; i <= VSH_CASTER_HEIGHTFIELD; ++i) {
         if (!vshi_member(value, types[i], &given)) {
             continue;
         }
@@ -54,7 +84,8 @@ vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *
         return result;
     }
     if (caster->type < 0) {
-        return vshi_reader_fail(reader, value, "key \"mesh\", \"sdf\" or \"vdb\" is missing");
+        return vshi_reader_fail(reader, value,
+                                "key \"mesh\", \"sdf\", \"vdb\" or \"heightfield\" is missing");
     }
     if (caster->type != VSH_CASTER_MESH && !vshi_transform_is_similarity(caster->transform) &&
         vshi_member(value, "transform", &transform)) {
