@@ -24,10 +24,19 @@ typedef struct vsh_caster {
     const char *grid;     /* vdb: name of the grid; NULL: the file's first level set */
     vsh_sdf sdf;          /* sdf: tree */
     double transform[12]; /* local to world, three rows of four; but for meshes no shear, no uneven scale */
+    const char *layer;    /* name of the layer it is in; NULL: none */
     double size[2];       /* heightfield, as in vsh_heights_source: these three */
     double height;
     double base;
 } vsh_caster;
+
+/* Casters that are shaded in a way of their own. */
+typedef struct vsh_scene_layer {
+    const char *name;  /* no two alike */
+    double voxel_size; /* these two as in vsh_grid_options; both 0: as the scene's */
+    int32_t resolution;
+    vsh_layer shade; /* field and triangles NULL */
+} vsh_scene_layer;
 
 enum { VSH_RECEIVER_MESH = 0, VSH_RECEIVER_HEIGHTFIELD = 1 };
 
@@ -53,6 +62,8 @@ typedef struct vsh_receiver {
 typedef struct vsh_scene {
     const vsh_caster *casters;
     size_t caster_count;
+    const vsh_scene_layer *layers; /* that casters may be in */
+    size_t layer_count;
     const vsh_light *lights; /* no two names alike, none empty: channels are named after them */
     size_t light_count;
     const vsh_receiver *receivers;
@@ -95,9 +106,9 @@ VSH_API void vsh_assets_free(vsh_assets *assets); /* NULL does nothing */
 VSH_API const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count);
 VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count);
 
-/* The union of a scene's casters as one level set of scene->grid's voxel size; without one, of the longest
- * side of the box around all casters over scene->grid.resolution. `assets` are those loaded for this scene.
- * Free the grid with vsh_grid_free(). Errors:
+/* The union of all of a scene's casters, whatever their layers, as one level set of scene->grid's voxel size;
+ * without one, of the longest side of the box around all casters over scene->grid.resolution. `assets` are
+ * those loaded for this scene. Free the grid with vsh_grid_free(). Errors:
  * - VSH_ERROR_ARGUMENT: scene, assets or grid NULL, scene->grid out of range, run;
  * - VSH_ERROR_INPUT: no casters, casters without extent, a caster, other than a mesh, whose transform shears
  * or scales unevenly; as vsh_mesh_check(), vsh_sdf_check() and the vsh_grid_from_… calls;
@@ -106,13 +117,20 @@ VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index
 VSH_API vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                                      vsh_grid **grid, vsh_error *error);
 
-/* The triangles of a scene's casters, for VSH_SHADOW_EXACT and VSH_AO_EXACT. Free them with
- * vsh_triangles_free(). Errors:
+/* The same of the casters in `layer`, of its voxel size, or (NULL) of those in none; *grid is NULL where
+ * there are none. Errors: as there; VSH_ERROR_ARGUMENT too where the scene has no such layer. */
+VSH_API vsh_result vsh_scene_layer_casters(const vsh_scene *scene, const vsh_assets *assets,
+                                           const vsh_scene_layer *layer, const vsh_run *run, vsh_grid **grid,
+                                           vsh_error *error);
+
+/* The triangles of a scene's casters in `layer`, or (NULL) in none, for VSH_SHADOW_EXACT and VSH_AO_EXACT;
+ * *triangles is NULL where there are none. Free them with vsh_triangles_free(). Errors:
  * - VSH_ERROR_ARGUMENT: scene, assets or triangles NULL, run;
  * - VSH_ERROR_INPUT: a caster that is neither mesh nor heightfield;
  * - VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED: as
  *   vsh_triangles_create(). */
-VSH_API vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+VSH_API vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
+                                       const vsh_scene_layer *layer, const vsh_run *run,
                                        vsh_triangles **triangles, vsh_error *error);
 
 /* Reach, world units > 0, that a field of `grid` needs for the scene's lights and AO at receivers within a

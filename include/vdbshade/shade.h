@@ -3,6 +3,7 @@
 #define VDBSHADE_SHADE_H
 
 #include "field.h"
+#include "layer.h"
 #include "light.h"
 #include "trace.h"
 
@@ -60,6 +61,9 @@ typedef struct vsh_shade_options {
     int32_t early_rays;    /* rays: where the first so many agree, the rest are not marched; 0: never */
     double max_error;      /* adaptive, exact: standard error that a value may keep, 1e-4 … 1 */
     const vsh_triangles *triangles; /* exact: the casters' triangles; else NULL */
+    const vsh_layer *layers; /* [layer_count]: casters beside those of the field; may be NULL. Each has the
+                                same struct_size */
+    size_t layer_count;
 } vsh_shade_options;
 
 static inline vsh_shade_options vsh_shade_options_default(void) {
@@ -76,7 +80,9 @@ static inline vsh_shade_options vsh_shade_options_default(void) {
                                  0,
                                  0,
                                  0.02,
-                                 NULL};
+                                 NULL,
+                                 NULL,
+                                 0};
     return options;
 }
 

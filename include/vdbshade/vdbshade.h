@@ -14,6 +14,7 @@
 #include "grid.h"
 #include "heights.h"
 #include "image.h"
+#include "layer.h"
 #include "light.h"
 #include "mesh.h"
 #include "query.h"

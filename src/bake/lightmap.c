@@ -4,6 +4,7 @@
 #include "bake/take.h"
 #include "base/floats.h"
 #include "base/parallel.h"
+#include "shade/layers.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -24,6 +25,8 @@ typedef struct baking {
     float *values;     /* [origins.count]: of one light, or AO */
     float *deviation;  /* [origins.count]: of the same; NULL where no plane is for it */
     float *irradiance; /* [origins.count][3] */
+    vsh_layer *layers; /* the options', of points that are lifted already; NULL: none */
+    bool layered_ao;
     vsh_bake_stats stats;
 } baking;
 
@@ -45,12 +48,44 @@ static bool errors_wanted(const vsh_lightmap *lightmap, size_t light_count) {
     return wanted;
 }
 
-/* Whether AO need not be shaded at every texel. `rays` are for those who want just them, taps cost no more.
- */
+/* Whether AO need not be shaded at every texel. `rays` are for those who want just them, taps cost no more;
+ * what is near in a layer is not looked at. */
 static bool interpolates(const baking *bake) {
     const int32_t method = bake->shade.ao_method;
-    return bake->texels->ao_spacing > 1 &&
+    return bake->texels->ao_spacing > 1 && !bake->layered_ao &&
            (method == VSH_AO_CONES || method == VSH_AO_ADAPTIVE || method == VSH_AO_EXACT);
+}
+
+/* The layers for points that are lifted already: what their voxels need beyond that is left. */
+static vsh_result lift_layers(baking *bake, vsh_error *error) {
+    const vsh_shade_options *shade = &bake->shade;
+    const double lifted = shade->start_offset * bake->field->voxel_size + shade->surface_offset;
+    vsh_result result =
+        vshi_allocate((void **)&bake->layers, shade->layer_count, sizeof *bake->layers, "layers", error);
+    for (size_t i = 0; result == VSH_OK && i < shade->layer_count; ++i) {
+        vsh_layer *layer = &bake->layers[i];
+        result = vshi_layer_resolve(shade, i, layer, error);
+        if (result == VSH_OK) {
+            const vsh_field *field = layer->field;
+            const double offset = layer->start_offset < 0.0 ? shade->start_offset : layer->start_offset;
+            const double height =
+                offset * field->voxel_size + 0.5 * field->shell_thickness + shade->surface_offset;
+            layer->start_offset = fmin(16.0, fmax(0.0, (height - lifted) / field->voxel_size));
+            bake->layered_ao = bake->layered_ao || layer->ao != 0;
+        }
+    }
+    return result;
+}
+
+static double fields_bytes(const baking *bake) {
+    vsh_field_info info;
+    vsh_field_get_info(bake->field, &info);
+    double bytes = (double)info.bytes;
+    for (size_t i = 0; i < bake->shade.layer_count; ++i) {
+        vsh_field_get_info(bake->layers[i].field, &info);
+        bytes += (double)info.bytes;
+    }
+    return bytes;
 }
 
 /* Where rays begin: lifted already, but for methods that trace triangles. Those know the surface better than
@@ -61,6 +96,7 @@ static vsh_points points_of(const baking *bake, bool traced, vsh_shade_options *
     if (!traced) {
         shade->start_offset = 0.0;
         shade->surface_offset = 0.0;
+        shade->layers = bake->layers;
     }
     return (vsh_points){origins->count, traced ? origins->surface : origins->position, origins->normal,
                         origins->texel};
@@ -254,8 +290,6 @@ static vsh_result pad(baking *bake, size_t invalid, vsh_error *error) {
 
 static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error *error) {
     const vsh_texels *texels = bake->texels;
-    vsh_field_info field;
-    vsh_field_get_info(bake->field, &field);
     const bool errors = errors_wanted(bake->lightmap, bake->light_count);
     const vshi_bake_need need = {.samples = (double)texels->count,
                                  .texels = (double)vshi_texels_held(texels),
@@ -265,10 +299,16 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
                                  .errors = errors,
                                  .irradiance = irradiance,
                                  .lattice = ao_wanted(bake->lightmap) && interpolates(bake)};
-    const double bytes = (double)field.bytes + (double)texels->info.bytes + vshi_bake_bytes(&need) +
-                         vshi_halo_bytes(texels, bake->lightmap, bake->light_count);
-    vsh_result result = vshi_check_limit(&bake->run, bytes, "lightmap", error);
+    vsh_result result = lift_layers(bake, error);
     if (result != VSH_OK) {
+        free(bake->layers);
+        return result;
+    }
+    const double bytes = fields_bytes(bake) + (double)texels->info.bytes + vshi_bake_bytes(&need) +
+                         vshi_halo_bytes(texels, bake->lightmap, bake->light_count);
+    result = vshi_check_limit(&bake->run, bytes, "lightmap", error);
+    if (result != VSH_OK) {
+        free(bake->layers);
         return result;
     }
     result = vshi_halo_open(texels, bake->lightmap, bake->light_count, &bake->halo, error);
@@ -290,6 +330,7 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     if (result == VSH_OK) {
         vshi_halo_give(texels, &bake->halo);
     }
+    free(bake->layers);
     free(bake->irradiance);
     free(bake->deviation);
     free(bake->values);

@@ -2,6 +2,7 @@
 #include "bake/take.h"
 #include "base/parallel.h"
 #include "shade/kernel/march.h"
+#include "shade/layers.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -19,15 +20,22 @@ static const double CREASE = 0.75;
  * where it should be 0, and those made two thirds of AO's squared error. */
 static const double CLEAR = 0.25;
 
-typedef struct lifting {
+/* A field that samples are looked at in. */
+typedef struct looked_at {
     const vsh_field *field;
+    double probe; /* world units: how far above its surface a sample is looked at for whether it is free */
+    double shell; /* world units, open meshes on top of it */
+} looked_at;
+
+typedef struct lifting {
     const vsh_texels *texels;
     vshi_origins *origins;
     double offset; /* world units, all meshes */
-    double probe;  /* same, for the look whether a sample is free */
-    double shell;  /* world units, open meshes on top of it */
+    size_t field_count;
+    looked_at fields[1 + VSH_MAX_LAYERS]; /* that of the bake, then those of its layers */
     const vshi_kernel *kernel;
-    uint8_t *crease; /* [samples] */
+    uint8_t
+        *crease; /* [samples]: 0, or 1 + the field in whose crease a sample lies, that of the highest probe */
 } lifting;
 
 static size_t block_end(const lifting *l, size_t block) {
@@ -35,41 +43,56 @@ static size_t block_end(const lifting *l, size_t block) {
     return end < l->texels->count ? end : l->texels->count;
 }
 
-static void lift(const lifting *l, size_t i, double offset, double origin[3]) {
+static void lift(const lifting *l, size_t i, double offset, double shell, double origin[3]) {
     const vsh_texels *texels = l->texels;
-    const double height = offset + (texels->open[texels->mesh[i]] ? l->shell : 0.0);
+    const double height = offset + (texels->open[texels->mesh[i]] ? shell : 0.0);
     for (size_t k = 0; k < 3; ++k) {
         origin[k] = texels->position[3 * i + k] + height * (double)texels->geometric[3 * i + k];
     }
 }
 
+/* Looks at samples first … last - 1, at most a block, in one of the fields. */
+static void look(const lifting *l, size_t field, size_t first, size_t last) {
+    const looked_at *in = &l->fields[field];
+    const float radius = (float)(CREASE * in->probe / in->field->voxel_size);
+    float at[3][VSHI_ORIGIN_BLOCK];
+    float *const centres[3] = {at[0], at[1], at[2]};
+    bool is_free[VSHI_ORIGIN_BLOCK];
+    for (size_t i = first; i < last; ++i) {
+        double origin[3];
+        lift(l, i, in->probe, in->shell, origin);
+        const vshi_vec p = vshi_to_field(in->field, origin);
+        at[0][i - first] = (float)p.x;
+        at[1][i - first] = (float)p.y;
+        at[2][i - first] = (float)p.z;
+    }
+    l->kernel->balls(in->field, last - first, centres, radius, is_free);
+    for (size_t i = first; i < last; ++i) {
+        const size_t k = i - first;
+        if (is_free[k]) {
+            continue;
+        }
+        const double distance =
+            in->field->voxel_size *
+            (double)vshi_field_distance(in->field, (float[]){at[0][k], at[1][k], at[2][k]});
+        l->origins->valid[i] = l->origins->valid[i] && distance >= CLEAR * in->probe;
+        const uint8_t crease = l->crease[i];
+        if (distance < CREASE * in->probe && (crease == 0 || in->probe > l->fields[crease - 1].probe)) {
+            l->crease[i] = (uint8_t)(field + 1);
+        }
+    }
+}
+
 static void validate(void *user, size_t begin, size_t end) {
     const lifting *l = user;
-    const float radius = (float)(CREASE * l->probe / l->field->voxel_size);
     for (size_t block = begin; block < end; ++block) {
         const size_t first = block * VSHI_ORIGIN_BLOCK, last = block_end(l, block);
-        float at[3][VSHI_ORIGIN_BLOCK];
-        float *const centres[3] = {at[0], at[1], at[2]};
-        bool is_free[VSHI_ORIGIN_BLOCK];
-        for (size_t i = first; i < last; ++i) {
-            double origin[3];
-            lift(l, i, l->probe, origin);
-            const vshi_vec p = vshi_to_field(l->field, origin);
-            at[0][i - first] = (float)p.x;
-            at[1][i - first] = (float)p.y;
-            at[2][i - first] = (float)p.z;
+        memset(l->origins->valid + first, 1, last - first);
+        for (size_t field = 0; field < l->field_count; ++field) {
+            look(l, field, first, last);
         }
-        l->kernel->balls(l->field, last - first, centres, radius, is_free);
         size_t valid = 0;
         for (size_t i = first; i < last; ++i) {
-            const size_t k = i - first;
-            const double distance =
-                is_free[k]
-                    ? INFINITY
-                    : l->field->voxel_size *
-                          (double)vshi_field_distance(l->field, (float[]){at[0][k], at[1][k], at[2][k]});
-            l->origins->valid[i] = distance >= CLEAR * l->probe;
-            l->crease[i] = distance < CREASE * l->probe;
             valid += l->origins->valid[i];
         }
         l->origins->before[block] = valid;
@@ -96,7 +119,9 @@ static void pack(void *user, size_t begin, size_t end) {
         size_t next = origins->before[block];
         for (size_t i = block * VSHI_ORIGIN_BLOCK; i < block_end(l, block); ++i) {
             if (origins->valid[i]) {
-                lift(l, i, l->crease[i] ? l->probe : l->offset, origins->position + 3 * next);
+                const uint8_t crease = l->crease[i];
+                lift(l, i, crease > 0 ? l->fields[crease - 1].probe : l->offset, l->fields[0].shell,
+                     origins->position + 3 * next);
                 memcpy(origins->normal + 3 * next, l->texels->normal + 3 * i, 3 * sizeof(float));
                 if (origins->surface != NULL) {
                     memcpy(origins->surface + 3 * next, l->texels->position + 3 * i, 3 * sizeof(double));
@@ -125,6 +150,12 @@ static void find_rows(const vsh_texels *texels, vshi_origins *origins) {
                                       .last = band->own_end - band->held_begin};
 }
 
+static void look_in(lifting *l, const vsh_field *field) {
+    l->fields[l->field_count++] = (looked_at){.field = field,
+                                              .probe = fmax(l->offset, PROBE_HEIGHT * field->voxel_size),
+                                              .shell = 0.5 * field->shell_thickness};
+}
+
 double vshi_origins_sample_bytes(bool traced) {
     return 2.0 + (traced ? 6.0 : 3.0) * sizeof(double) + 4.0 * sizeof(float);
 }
@@ -134,16 +165,19 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
                                vsh_error *error) {
     const char *what = "lightmap samples";
     *origins = (vshi_origins){.blocks = (texels->count + VSHI_ORIGIN_BLOCK - 1) / VSHI_ORIGIN_BLOCK};
-    vsh_field_info info;
-    vsh_field_get_info(field, &info);
-    const double offset = options->start_offset * info.voxel_size + options->surface_offset;
-    lifting l = {.field = field,
-                 .texels = texels,
+    lifting l = {.texels = texels,
                  .origins = origins,
                  .kernel = vshi_kernel_of(run->isa),
-                 .offset = offset,
-                 .shell = 0.5 * info.shell_thickness,
-                 .probe = fmax(offset, PROBE_HEIGHT * info.voxel_size)};
+                 .offset = options->start_offset * field->voxel_size + options->surface_offset};
+    look_in(&l, field);
+    for (size_t i = 0; i < options->layer_count; ++i) {
+        vsh_layer layer;
+        const vsh_result result = vshi_layer_resolve(options, i, &layer, error);
+        if (result != VSH_OK) {
+            return result;
+        }
+        look_in(&l, layer.field);
+    }
     vsh_result result = VSH_OK;
     vshi_job *job = vshi_job_begin(run, "validate", 2 * origins->blocks);
     if (job == NULL) {

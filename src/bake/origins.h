@@ -26,8 +26,8 @@ double vshi_origins_sample_bytes(bool traced);
 
 /* Lifts each sample along its geometric normal by the start offset, and by half a shell's thickness where its
  * mesh is open. A sample that ends up inside the field's solid, or all but, is invalid: it lies inside
- * another solid, or shows its back. Free with vshi_origins_free() also after an error. Errors:
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+ * another solid, or shows its back. The layers' fields are looked at as well. Free with vshi_origins_free()
+ * also after an error. Errors: VSH_ERROR_ARGUMENT (a layer), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
                                const vsh_shade_options *options, const vsh_run *run, vshi_origins *origins,
                                vsh_error *error);

@@ -21,7 +21,7 @@ typedef struct bake_work {
     vsh_run run;
     vsh_assets *assets;
     vsh_triangles *triangles; /* of exact methods */
-    vsh_field *field;
+    cli_field made;
     /* of the only receiver; several are rasterised again, so as not to hold all at once */
     vsh_charts *charts;
     vsh_texels *kept; /* NULL where it is baked in bands */
@@ -101,14 +101,15 @@ static int rasterise(bake_work *work) {
 }
 
 static int make_field(bake_work *work) {
-    cli_field made;
-    const int code = cli_field_make(work->scene, work->assets, &work->receivers, &work->run, &made);
-    work->field = made.field;
+    const cli_field *made = &work->made;
+    const int code = cli_field_make(work->scene, work->assets, &work->receivers, &work->run, &work->made);
     if (code == CLI_OK) {
-        work->stats.grid = made.grid;
-        work->stats.field = made.info;
-        work->stats.seconds[CLI_STAGE_VOXELIZE] += made.voxelize_s;
-        work->stats.seconds[CLI_STAGE_FIELD] += made.field_s;
+        work->scene->shade.layers = made->layers;
+        work->scene->shade.layer_count = made->layer_count;
+        work->stats.grid = made->grid;
+        work->stats.field = made->info;
+        work->stats.seconds[CLI_STAGE_VOXELIZE] += made->voxelize_s;
+        work->stats.seconds[CLI_STAGE_FIELD] += made->field_s;
     }
     return code;
 }
@@ -139,7 +140,7 @@ static void say_receiver(const bake_work *work, size_t index, const cli_bands *b
 
 static int bake_receiver(bake_work *work, size_t index) {
     const cli_receiver_job job = receiver_job(work, index);
-    cli_receiver_input input = {.field = work->field};
+    cli_receiver_input input = {.field = work->made.field};
     int code = CLI_OK;
     if (work->charts == NULL) {
         const double start = cli_seconds();
@@ -206,7 +207,7 @@ static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
     vsh_texels_free(work.kept);
     vsh_charts_free(work.charts);
     vsh_triangles_free(work.triangles);
-    vsh_field_free(work.field);
+    cli_field_free(&work.made);
     vsh_assets_free(work.assets);
     return code;
 }

@@ -66,7 +66,7 @@ static int count_texels(forecast *f) {
 typedef struct trial {
     double finer;    /* the scene's resolution over the trial's */
     double sample_s; /* of one texel's sample, all lights and AO */
-    cli_field made;  /* its field is freed when the trial is over */
+    cli_field made;  /* its fields are freed when the trial is over */
 } trial;
 
 static int make_texels(const forecast *f, vsh_texels **texels) {
@@ -127,11 +127,13 @@ static int try_small(const forecast *f, trial *t) {
     if (code == CLI_OK) {
         vsh_shade_options shade = f->scene->shade;
         shade.triangles = triangles;
+        shade.layers = t->made.layers;
+        shade.layer_count = t->made.layer_count;
         t->finer = finer(f->scene, t->made.grid.voxel_size);
         code = bake_part(f, t->made.field, &shade, t);
     }
     vsh_triangles_free(triangles);
-    vsh_field_free(t->made.field);
+    cli_field_free(&t->made);
     return code;
 }
 

@@ -16,18 +16,13 @@ static void set_identity(double transform[12]) {
     }
 }
 
-static int out_of_memory(const char *what) {
-    cli_say("%s: the system refused memory", what);
-    return CLI_LIMIT;
-}
-
 /* The input's casters, then those of --caster. */
 static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
     const size_t own = made->read != NULL ? made->read->caster_count : 1;
     const size_t count = own + s->caster_count;
     made->casters = calloc(count, sizeof *made->casters);
     if (made->casters == NULL) {
-        return out_of_memory("casters");
+        return cli_out_of_memory("casters");
     }
     for (size_t i = 0; i < count; ++i) {
         if (i < own && made->read != NULL) {
@@ -82,7 +77,7 @@ static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     }
     made->receivers = calloc(count, sizeof *made->receivers);
     if (made->receivers == NULL) {
-        return out_of_memory("receivers");
+        return cli_out_of_memory("receivers");
     }
     const vsh_lightmap_options defaults = vsh_lightmap_options_default();
     for (size_t i = 0; i < count; ++i) {

@@ -5,6 +5,7 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <stdlib.h>
 
 cli_box cli_box_empty(void) {
     return (cli_box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
@@ -39,48 +40,152 @@ static double reach_of(const vsh_scene *scene, const vsh_grid *grid, const cli_b
     return reach > CLI_WITHIN_DIAGONALS * diagonal ? reach : vsh_field_options_default().reach;
 }
 
-static int make(const vsh_scene *scene, const vsh_assets *assets, const cli_box *receivers, double within,
-                const vsh_run *run, cli_field *made) {
+/* What is made of one layer's casters, or (layer NULL) of those in none. */
+typedef struct making {
+    const vsh_scene *scene;
+    const vsh_assets *assets;
+    const cli_box *receivers;
+    double within;
+    const vsh_run *run;
+    cli_field *made;
+} making;
+
+/* Adds up what fields and level sets take; sizes are those of the first. */
+static void count(cli_field *made, const vsh_grid_info *grid, const vsh_field_info *info) {
+    if (made->info.bytes == 0) {
+        made->grid = *grid;
+        made->info = *info;
+        return;
+    }
+    made->grid.active_voxels += grid->active_voxels;
+    made->grid.bytes += grid->bytes;
+    made->info.bricks += info->bricks;
+    made->info.bytes += info->bytes;
+    made->info.active_voxels += info->active_voxels;
+}
+
+/* *field is NULL where there are no casters. */
+static int make_one(const making *m, const vsh_scene_layer *layer, vsh_field **field) {
     const double start = cli_seconds();
     vsh_grid *grid = NULL;
     vsh_error error;
-    made->field = NULL;
-    if (vsh_scene_casters(scene, assets, run, &grid, &error) != VSH_OK) {
+    *field = NULL;
+    if (vsh_scene_layer_casters(m->scene, m->assets, layer, m->run, &grid, &error) != VSH_OK) {
         return cli_fail(&error);
     }
-    vsh_grid_get_info(grid, &made->grid);
+    if (grid == NULL) {
+        return CLI_OK;
+    }
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
     const double voxelized = cli_seconds();
     vsh_field_options options = vsh_field_options_default();
-    options.reach = reach_of(scene, grid, receivers, within);
-    const vsh_result result = vsh_field_create(grid, &options, run, &made->field, &error);
+    options.reach = reach_of(m->scene, grid, m->receivers, m->within);
+    if (layer != NULL) {
+        options.reach *= fmax(1.0, layer->shade.softness); /* lights are as much wider */
+    }
+    const vsh_result result = vsh_field_create(grid, &options, m->run, field, &error);
     vsh_grid_free(grid); /* the field does not need it */
     if (result != VSH_OK) {
         return cli_fail(&error);
     }
-    vsh_field_get_info(made->field, &made->info);
-    made->voxelize_s = voxelized - start;
-    made->field_s = cli_seconds() - voxelized;
+    vsh_field_info made;
+    vsh_field_get_info(*field, &made);
+    count(m->made, &info, &made);
+    m->made->voxelize_s += voxelized - start;
+    m->made->field_s += cli_seconds() - voxelized;
     return CLI_OK;
+}
+
+/* Whether exact methods trace a layer's triangles, or (NULL) those of casters in none. */
+static bool traces(const vsh_scene *scene, const vsh_scene_layer *layer) {
+    const int32_t method =
+        layer != NULL && layer->shade.method >= 0 ? layer->shade.method : scene->shade.method;
+    return (scene->light_count > 0 && method == VSH_SHADOW_EXACT) ||
+           (scene->ao && scene->shade.ao_method == VSH_AO_EXACT && (layer == NULL || layer->shade.ao));
+}
+
+static int trace(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
+                 const vsh_run *run, vsh_triangles **triangles) {
+    vsh_error error;
+    *triangles = NULL;
+    if (traces(scene, layer) && vsh_scene_triangles(scene, assets, layer, run, triangles, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    return CLI_OK;
+}
+
+static int make_layers(const making *m) {
+    cli_field *made = m->made;
+    made->layers = calloc(m->scene->layer_count, sizeof *made->layers);
+    made->owned = calloc(m->scene->layer_count, sizeof *made->owned);
+    if (made->layers == NULL || made->owned == NULL) {
+        return cli_out_of_memory("layers");
+    }
+    int code = CLI_OK;
+    for (size_t i = 0; i < m->scene->layer_count && code == CLI_OK; ++i) {
+        const vsh_scene_layer *of_scene = &m->scene->layers[i];
+        cli_layer *own = &made->owned[made->layer_count];
+        code = make_one(m, of_scene, &own->field);
+        if (own->field != NULL) {
+            vsh_layer *layer = &made->layers[made->layer_count++];
+            code = trace(m->scene, m->assets, of_scene, m->run, &own->triangles);
+            *layer = of_scene->shade;
+            layer->field = own->field;
+            layer->triangles = own->triangles;
+        }
+    }
+    return code;
+}
+
+/* Of the finest layer, whose voxels start offsets are then measured in. */
+static int make_empty(cli_field *made) {
+    double finest = INFINITY;
+    for (size_t i = 0; i < made->layer_count; ++i) {
+        vsh_field_info info;
+        vsh_field_get_info(made->layers[i].field, &info);
+        finest = fmin(finest, info.voxel_size);
+    }
+    vsh_error error;
+    return vsh_field_create_empty(finest, &made->field, &error) == VSH_OK ? CLI_OK : cli_fail(&error);
+}
+
+static int make(const making *m) {
+    cli_field *made = m->made;
+    *made = (cli_field){.field = NULL};
+    int code = make_one(m, NULL, &made->field);
+    if (code == CLI_OK && m->scene->layer_count > 0) {
+        code = make_layers(m);
+    }
+    if (code == CLI_OK && made->field == NULL && made->layer_count == 0) {
+        cli_say("the scene has no casters");
+        code = CLI_USAGE;
+    }
+    return code == CLI_OK && made->field == NULL ? make_empty(made) : code;
 }
 
 int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_box *receivers,
                    const vsh_run *run, cli_field *made) {
-    return make(scene, assets, receivers, 0.0, run, made);
+    return make(&(making){scene, assets, receivers, 0.0, run, made});
 }
 
 int cli_field_make_around(const vsh_scene *scene, const vsh_assets *assets, double within, const vsh_run *run,
                           cli_field *made) {
-    return make(scene, assets, NULL, within, run, made);
+    return make(&(making){scene, assets, NULL, within, run, made});
+}
+
+void cli_field_free(cli_field *made) {
+    for (size_t i = 0; i < made->layer_count; ++i) {
+        vsh_field_free(made->owned[i].field);
+        vsh_triangles_free(made->owned[i].triangles);
+    }
+    free(made->owned);
+    free(made->layers);
+    vsh_field_free(made->field);
+    *made = (cli_field){.field = NULL};
 }
 
 int cli_triangles_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                        vsh_triangles **triangles) {
-    *triangles = NULL;
-    const bool lights = scene->light_count > 0 && scene->shade.method == VSH_SHADOW_EXACT;
-    const bool ao = scene->ao && scene->shade.ao_method == VSH_AO_EXACT;
-    vsh_error error;
-    if ((lights || ao) && vsh_scene_triangles(scene, assets, run, triangles, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    return CLI_OK;
+    return trace(scene, assets, NULL, run, triangles);
 }

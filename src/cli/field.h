@@ -12,15 +12,24 @@ typedef struct cli_box {
 cli_box cli_box_empty(void);
 void cli_box_grow(cli_box *box, const vsh_texels_info *info); /* by the samples' box */
 
+/* What a layer refers to. */
+typedef struct cli_layer {
+    vsh_field *field;
+    vsh_triangles *triangles;
+} cli_layer;
+
 typedef struct cli_field {
-    vsh_field *field; /* to be freed */
-    vsh_grid_info grid;
+    vsh_field *field;  /* of the casters in no layer */
+    vsh_layer *layers; /* [layer_count]: for vsh_shade_options */
+    cli_layer *owned;  /* [layer_count] */
+    size_t layer_count;
+    vsh_grid_info grid; /* voxels and bytes of these two are those of all */
     vsh_field_info info;
     double voxelize_s, field_s;
 } cli_field;
 
-/* A field that reaches as far as the scene's lights and AO need at receivers in a box. CLI_OK or an exit
- * code, having said why. */
+/* Fields that reach as far as the scene's lights and AO need at receivers in a box. CLI_OK or an exit code,
+ * having said why. Free them with cli_field_free() also after a failure. */
 int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_box *receivers,
                    const vsh_run *run, cli_field *made);
 
@@ -32,7 +41,9 @@ int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_b
 int cli_field_make_around(const vsh_scene *scene, const vsh_assets *assets, double within, const vsh_run *run,
                           cli_field *made);
 
-/* The casters' triangles where one of the scene's methods traces them, else NULL; likewise. */
+void cli_field_free(cli_field *made);
+
+/* The triangles of casters in no layer where one of the scene's methods traces them, else NULL; likewise. */
 int cli_triangles_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                        vsh_triangles **triangles);
 

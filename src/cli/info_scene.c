@@ -21,6 +21,9 @@ static void print_caster(const vsh_caster *caster, size_t index) {
             printf(", %g × %g, height %g", caster->size[0], caster->size[1], caster->height);
         }
     }
+    if (caster->layer != NULL) {
+        printf(", layer '%s'", caster->layer);
+    }
     putchar('\n');
 }
 
@@ -36,6 +39,26 @@ static void print_light(const vsh_light *light) {
     }
 }
 
+static void print_layer(const vsh_scene_layer *layer) {
+    const vsh_layer *shade = &layer->shade;
+    printf("layer '%s': combine %s", layer->name, vsh_combine_name(shade->combine));
+    if (layer->voxel_size > 0.0) {
+        printf(", voxel size %g", layer->voxel_size);
+    } else if (layer->resolution > 0) {
+        printf(", resolution %d", layer->resolution);
+    }
+    if (shade->method >= 0) {
+        printf(", method %s", vsh_shadow_method_name(shade->method));
+    }
+    if (shade->softness != 1.0) {
+        printf(", softness %g", shade->softness);
+    }
+    if (shade->remap[1] > 0.0) {
+        printf(", remap %g to %g", shade->remap[0], shade->remap[1]);
+    }
+    printf("%s\n", shade->ao ? "" : ", no ao");
+}
+
 int cli_info_scene(const char *path) {
     vsh_scene *scene = NULL;
     vsh_error error;
@@ -44,6 +67,9 @@ int cli_info_scene(const char *path) {
     }
     for (size_t i = 0; i < scene->caster_count; ++i) {
         print_caster(&scene->casters[i], i);
+    }
+    for (size_t i = 0; i < scene->layer_count; ++i) {
+        print_layer(&scene->layers[i]);
     }
     for (size_t i = 0; i < scene->light_count; ++i) {
         print_light(&scene->lights[i]);

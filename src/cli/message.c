@@ -62,6 +62,11 @@ int cli_fail(const vsh_error *error) {
     return CLI_DEFECT;
 }
 
+int cli_out_of_memory(const char *what) {
+    cli_say("%s: the system refused memory", what);
+    return CLI_LIMIT;
+}
+
 const char *cli_bytes_text(uint64_t bytes, char *text, size_t capacity) {
     static const char *const units[] = {"bytes", "KiB", "MiB", "GiB", "TiB"};
     double value = (double)bytes;

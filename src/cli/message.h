@@ -22,6 +22,9 @@ int cli_usage(const char *format, ...) __attribute__((format(printf, 1, 2)));
 /* Says what failed and returns the exit code of its result. */
 int cli_fail(const vsh_error *error);
 
+/* Says that there is no memory for `what` and returns CLI_LIMIT. */
+int cli_out_of_memory(const char *what);
+
 /* "1.5 GiB", into text[capacity], which is returned. */
 const char *cli_bytes_text(uint64_t bytes, char *text, size_t capacity);
 

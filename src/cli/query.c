@@ -238,6 +238,8 @@ static int make_query(query_work *work) {
     work->stats.seconds[CLI_STAGE_VOXELIZE] += work->made.voxelize_s;
     work->stats.seconds[CLI_STAGE_FIELD] += work->made.field_s;
     vsh_shade_options shade = work->scene->shade;
+    shade.layers = work->made.layers;
+    shade.layer_count = work->made.layer_count;
     if (!work->scene->ao) {
         shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
     }
@@ -292,7 +294,7 @@ static int run_query(const query_settings *s, vsh_scene *scene) {
     }
     query_answers_free(&work.answers);
     vsh_query_free(work.query);
-    vsh_field_free(work.made.field);
+    cli_field_free(&work.made);
     vsh_triangles_free(work.triangles);
     vsh_assets_free(work.assets);
     cli_points_close(&work.reader);

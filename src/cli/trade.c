@@ -148,11 +148,6 @@ double trade_left(const trade_work *work) {
     return work->settings->budget - (cli_seconds() - work->measuring);
 }
 
-int trade_out_of_memory(const char *what) {
-    cli_say("%s: the system refused memory", what);
-    return CLI_LIMIT;
-}
-
 /* A measurement that is as short as this is repeated. */
 static const double SHORT_SECONDS = 0.3;
 
@@ -298,6 +293,9 @@ static int check_files(const trade_settings *s, const vsh_scene *scene) {
     const char *const outputs[] = {s->report, s->csv, s->plot};
     static const char *const names[] = {"output", "--csv file", "--plot file"};
     int code = CLI_OK;
+    if (scene->layer_count > 0) {
+        code = cli_usage("%s: trade measures one field, not layers", s->bake.input);
+    }
     for (size_t i = 0; i < sizeof outputs / sizeof outputs[0] && code == CLI_OK; ++i) {
         if (outputs[i] == NULL) {
             continue;

@@ -108,7 +108,6 @@ trade_run *trade_add(trade_work *work, trade_subject *subject, const trade_run *
 
 double trade_now(const trade_work *work);  /* seconds to take differences of */
 double trade_left(const trade_work *work); /* seconds of the budget */
-int trade_out_of_memory(const char *what);
 
 /* A measured time is the median of a few, where they are short. */
 typedef struct trade_clock {

@@ -103,7 +103,7 @@ int trade_bake(const trade_work *work, const vsh_field *field, const vsh_shade_o
     const size_t lights = shadow != NULL ? work->scene->light_count : 0;
     float **planes = calloc(lights + 1, sizeof *planes);
     if (planes == NULL) {
-        return trade_out_of_memory("planes");
+        return cli_out_of_memory("planes");
     }
     vsh_bake_stats baked = vsh_bake_stats_zero();
     int code = CLI_OK;
@@ -168,7 +168,7 @@ static int run_plan(trade_work *work, trade_subject *subject, const plan *p, con
     }
     run.values = calloc(subject->planes * work->texels, sizeof *run.values);
     if (run.values == NULL) {
-        return trade_out_of_memory("values");
+        return cli_out_of_memory("values");
     }
     vsh_field_info info;
     vsh_field_get_info(on->field, &info);
@@ -184,7 +184,7 @@ static int run_plan(trade_work *work, trade_subject *subject, const plan *p, con
         return CLI_OK;
     }
     free(run.values);
-    return code != CLI_OK ? code : trade_out_of_memory("runs");
+    return code != CLI_OK ? code : cli_out_of_memory("runs");
 }
 
 /* The first plans of all come first, on every field: where the budget ends, it is the dear ones that are

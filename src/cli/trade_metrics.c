@@ -113,7 +113,7 @@ int trade_compare(const trade_work *work, const trade_subject *subject, const ui
     trade_metrics m = {0};
     float *errors = calloc(subject->planes * work->common_count + 1, sizeof *errors);
     if (errors == NULL) {
-        return trade_out_of_memory("errors");
+        return cli_out_of_memory("errors");
     }
     double squares = 0.0, penumbra_squares = 0.0, sum = 0.0;
     for (size_t i = 0; i < subject->planes * work->texels; ++i) {

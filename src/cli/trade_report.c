@@ -229,12 +229,12 @@ static int write_text(const trade_work *work, const char *path, void (*compose)(
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
     if (out == NULL) {
-        return trade_out_of_memory(path);
+        return cli_out_of_memory(path);
     }
     compose(out, work);
     if (fclose(out) != 0) {
         free(text);
-        return trade_out_of_memory(path);
+        return cli_out_of_memory(path);
     }
     cli_signals_writing(path);
     const int code = cli_temporary_write(path, text);

@@ -22,7 +22,7 @@ static int load_receivers(trade_work *work) {
     const size_t count = work->scene->receiver_count;
     work->receivers = calloc(count, sizeof *work->receivers);
     if (work->receivers == NULL) {
-        return trade_out_of_memory("receivers");
+        return cli_out_of_memory("receivers");
     }
     for (size_t i = 0; i < count; ++i) {
         trade_receiver *receiver = &work->receivers[i];
@@ -71,7 +71,7 @@ static int load_casters(trade_work *work) {
         free(places);
         free(trees);
         free(views);
-        return trade_out_of_memory("casters");
+        return cli_out_of_memory("casters");
     }
     meshes = solids = 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
@@ -118,7 +118,7 @@ int trade_take_masks(trade_work *work) {
     work->any = calloc(work->texels, 1);
     int code = CLI_OK;
     if (coverage == NULL || work->common == NULL || work->any == NULL) {
-        code = trade_out_of_memory("coverage");
+        code = cli_out_of_memory("coverage");
     } else {
         memset(work->common, 1, work->texels);
     }
@@ -126,7 +126,7 @@ int trade_take_masks(trade_work *work) {
         trade_field *field = &work->fields[f];
         field->mask = calloc(work->texels, 1);
         code = field->mask == NULL
-                   ? trade_out_of_memory("coverage")
+                   ? cli_out_of_memory("coverage")
                    : trade_bake(work, field->field, &work->scene->shade, NULL, NULL, coverage, NULL);
         for (size_t i = 0; i < work->texels && code == CLI_OK; ++i) {
             field->mask[i] = coverage[i] > 0.0f;
@@ -168,7 +168,7 @@ int trade_place_points(trade_work *work) {
     work->normals = calloc(work->points, 3 * sizeof *work->normals);
     work->texel = calloc(work->points, sizeof *work->texel);
     if (work->positions == NULL || work->normals == NULL || work->texel == NULL) {
-        return trade_out_of_memory("points");
+        return cli_out_of_memory("points");
     }
     vsh_field_info info;
     vsh_field_get_info(work->fields[0].field, &info);

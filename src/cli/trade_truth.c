@@ -17,7 +17,7 @@ static int trace(const trade_work *work, const trade_subject *subject, int32_t r
                  double *seconds) {
     float *packed = calloc(work->points, sizeof *packed);
     if (packed == NULL) {
-        return trade_out_of_memory("rays");
+        return cli_out_of_memory("rays");
     }
     int code = CLI_OK;
     *seconds = 0.0;
@@ -95,7 +95,7 @@ int trade_take_truth(trade_work *work, int32_t finest) {
         trade_subject *subject = &work->subjects[s];
         subject->truth = calloc(subject->planes * work->texels, sizeof *subject->truth);
         if (subject->truth == NULL) {
-            return trade_out_of_memory("truth");
+            return cli_out_of_memory("truth");
         }
     }
     const double start = trade_now(work);
@@ -123,7 +123,7 @@ static int measure_rays(trade_work *work, trade_subject *subject, int32_t rays) 
                      .valid = work->points,
                      .values = calloc(subject->planes * work->texels, sizeof *run.values)};
     if (run.values == NULL) {
-        return trade_out_of_memory("values");
+        return cli_out_of_memory("values");
     }
     snprintf(run.options, sizeof run.options, "%d ray%s a texel", rays, rays == 1 ? "" : "s");
     trade_clock clock = {.count = 0};
@@ -137,7 +137,7 @@ static int measure_rays(trade_work *work, trade_subject *subject, int32_t rays) 
         return CLI_OK;
     }
     free(run.values);
-    return code != CLI_OK ? code : trade_out_of_memory("runs");
+    return code != CLI_OK ? code : cli_out_of_memory("runs");
 }
 
 int trade_measure_embree(trade_work *work) {

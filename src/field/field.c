@@ -8,6 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Of an empty field's level, finest voxels. */
+#define EMPTY_SCALE 0x1p60f
+
 /* Without a wish for a reach: what a light of 60° can use at receivers several diagonals away. */
 static const double DEFAULT_REACH = 4.0; /* diagonals of the bounds */
 
@@ -136,6 +139,49 @@ done:
     vsh_field_free(f);
     vshi_job_end(job);
     return result;
+}
+
+/* A level of one block, all of whose values are a band wider than any scene. */
+static vsh_result append_emptiness(vsh_field *f, vsh_error *error) {
+    int32_t no_values = -1;
+    int8_t outside = 1;
+    vshi_blocks blocks = {.size = {1, 1, 1}, .map = &no_values, .signs = &outside, .scale = EMPTY_SCALE};
+    vshi_below below;
+    vshi_blocks_set_band(&blocks, VSHI_COARSE_BAND * EMPTY_SCALE);
+    const vsh_run run = vsh_run_default();
+    vshi_job *job = vshi_job_begin(&run, "field", 1);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "field: the system refused memory");
+    }
+    const vsh_result result = vshi_level_append(f, &blocks, (vshi_budget){&run, 0.0}, job, &below, error);
+    vshi_below_free(&below);
+    vshi_job_end(job);
+    return result;
+}
+
+vsh_result vsh_field_create_empty(double voxel_size, vsh_field **field, vsh_error *error) {
+    VSHI_FLOATS;
+    *field = NULL;
+    if (!(voxel_size >= 1e-12 && voxel_size <= 1e12)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "voxel_size %g is out of range 1e-12 … 1e12", voxel_size);
+    }
+    vsh_field *f = NULL;
+    vsh_result result = vshi_allocate((void **)&f, 1, sizeof *f, "field", error);
+    if (result == VSH_OK) {
+        f->voxel_size = voxel_size;
+        for (int axis = 0; axis < 3; ++axis) {
+            f->to_field[5 * axis] = 1.0 / voxel_size;
+            f->bounds_min[axis] = INFINITY; /* which no cone meets */
+            f->bounds_max[axis] = -INFINITY;
+        }
+        result = append_emptiness(f, error);
+    }
+    if (result != VSH_OK) {
+        vsh_field_free(f);
+        return result;
+    }
+    *field = f;
+    return VSH_OK;
 }
 
 void vsh_field_sample(const vsh_field *field, size_t count, const double *positions, float *distances) {

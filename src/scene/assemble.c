@@ -23,7 +23,8 @@ typedef struct placed_sdf {
 typedef struct assembly {
     const vsh_scene *scene;
     const vsh_assets *assets;
-    vsh_mesh *meshes; /* of all mesh casters */
+    const bool *taken; /* [caster_count] */
+    vsh_mesh *meshes;  /* of all mesh casters */
     size_t mesh_count;
     placed_sdf *sdfs; /* [caster_count]; zero for casters that are none */
     vsh_grid_instance *instances;
@@ -101,6 +102,9 @@ static vsh_result gather(assembly *a, vsh_error *error) {
     vsh_result result = VSH_OK;
     for (size_t i = 0; i < a->scene->caster_count && result == VSH_OK; ++i) {
         const vsh_caster *caster = &a->scene->casters[i];
+        if (!a->taken[i]) {
+            continue;
+        }
         if (caster->type == VSH_CASTER_SDF) {
             result = place_sdf(caster, i, &a->sdfs[i], error);
         } else if (caster->type == VSH_CASTER_VDB && vshi_similarity_scale(caster->transform) <= 0.0) {
@@ -152,6 +156,9 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
     }
     for (size_t i = 0; i < a->scene->caster_count; ++i) {
         const vsh_caster *caster = &a->scene->casters[i];
+        if (!a->taken[i]) {
+            continue;
+        }
         if (caster->type == VSH_CASTER_SDF) {
             double min[3], max[3];
             vsh_sdf_bounds(&a->sdfs[i].sdf, min, max);
@@ -192,6 +199,9 @@ static vsh_result make_grids(assembly *a, const vsh_run *run, vsh_error *error) 
     }
     for (size_t i = 0; i < a->scene->caster_count; ++i) {
         const vsh_caster *caster = &a->scene->casters[i];
+        if (!a->taken[i]) {
+            continue;
+        }
         if (caster->type == VSH_CASTER_VDB) {
             add_instance(a, vshi_assets_grid(a->assets, i), caster->transform);
         } else if (caster->type == VSH_CASTER_SDF) {
@@ -232,20 +242,13 @@ static void free_assembly(assembly *a) {
     free(a->meshes);
 }
 
-vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
-                             vsh_grid **grid, vsh_error *error) {
-    VSHI_FLOATS;
-    if (scene == NULL || assets == NULL || grid == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "vsh_scene_casters: scene, assets and grid must not be NULL");
-    }
-    *grid = NULL;
-    if (scene->caster_count == 0) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters");
-    }
-    assembly a = {.scene = scene, .assets = assets, .options = vsh_grid_options_default()};
+/* The union of the casters that are taken, with these options over the defaults. */
+static vsh_result assemble(const vsh_scene *scene, const vsh_assets *assets, const bool *taken,
+                           const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
+                           vsh_error *error) {
+    assembly a = {.scene = scene, .assets = assets, .taken = taken, .options = vsh_grid_options_default()};
     vsh_result result =
-        vshi_options_resolve(&scene->grid, &a.options, sizeof a.options, "vsh_grid_options", error);
+        vshi_options_resolve(options, &a.options, sizeof a.options, "vsh_grid_options", error);
     if (result != VSH_OK) {
         return result;
     }
@@ -263,5 +266,59 @@ vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, c
         result = unite(&a, run, grid, error);
     }
     free_assembly(&a);
+    return result;
+}
+
+/* Which casters are taken: all, or those of a layer (NULL: of none); returns how many. */
+static size_t take(const vsh_scene *scene, bool all, const vsh_scene_layer *layer, bool *taken) {
+    size_t count = 0;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        taken[i] = all || vshi_caster_in_layer(&scene->casters[i], layer);
+        count += taken[i];
+    }
+    return count;
+}
+
+vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                             vsh_grid **grid, vsh_error *error) {
+    VSHI_FLOATS;
+    if (scene == NULL || assets == NULL || grid == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "vsh_scene_casters: scene, assets and grid must not be NULL");
+    }
+    *grid = NULL;
+    if (scene->caster_count == 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters");
+    }
+    bool *taken;
+    vsh_result result = vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error);
+    if (result == VSH_OK) {
+        take(scene, true, NULL, taken);
+        result = assemble(scene, assets, taken, &scene->grid, run, grid, error);
+    }
+    free(taken);
+    return result;
+}
+
+vsh_result vsh_scene_layer_casters(const vsh_scene *scene, const vsh_assets *assets,
+                                   const vsh_scene_layer *layer, const vsh_run *run, vsh_grid **grid,
+                                   vsh_error *error) {
+    VSHI_FLOATS;
+    if (scene == NULL || assets == NULL || grid == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "vsh_scene_layer_casters: scene, assets and grid must not be NULL");
+    }
+    *grid = NULL;
+    vsh_grid_options options = scene->grid;
+    if (layer != NULL && (layer->voxel_size != 0.0 || layer->resolution != 0)) {
+        options.voxel_size = layer->voxel_size;
+        options.resolution = layer->resolution;
+    }
+    bool *taken;
+    vsh_result result = vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error);
+    if (result == VSH_OK && take(scene, false, layer, taken) > 0) {
+        result = assemble(scene, assets, taken, &options, run, grid, error);
+    }
+    free(taken);
     return result;
 }

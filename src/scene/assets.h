@@ -4,6 +4,14 @@
 
 #include <vdbshade/scene.h>
 
+#include <stdbool.h>
+#include <string.h>
+
+/* Whether a caster is in a layer, or (NULL) in none. */
+static inline bool vshi_caster_in_layer(const vsh_caster *caster, const vsh_scene_layer *layer) {
+    return caster->layer == NULL ? layer == NULL : layer != NULL && strcmp(caster->layer, layer->name) == 0;
+}
+
 /* outer × inner, three rows of four each; inner NULL: identity. */
 void vshi_transform_compose(const double outer[12], const double *inner, double result[12]);
 

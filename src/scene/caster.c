@@ -33,7 +33,6 @@ static const vshi_key caster_keys[] = {
     {.name = "size",
      .kind = VSHI_VECTOR,
      .variants = HEIGHTFIELD,
-     .required = HEIGHTFIELD,
      .offset = offsetof(vsh_caster, size),
      .count = 2,
      .lowest = 1e-12,
@@ -41,7 +40,6 @@ static const vshi_key caster_keys[] = {
     {.name = "height",
      .kind = VSHI_NUMBER,
      .variants = HEIGHTFIELD,
-     .required = HEIGHTFIELD,
      .offset = offsetof(vsh_caster, height),
      .lowest = -1e12,
      .highest = 1e12},
@@ -55,7 +53,9 @@ static const vshi_key caster_keys[] = {
      .kind = VSHI_CUSTOM,
      .offset = offsetof(vsh_caster, transform),
      .read = vshi_read_transform},
+    {.name = "layer", .kind = VSHI_STRING, .offset = offsetof(vsh_caster, layer)},
 };
+static const char *const heightfield_needs[] = {"size", "height"};
 static const vshi_table caster_table = VSHI_TABLE(caster_keys);
 
 vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *member) {
@@ -86,6 +86,12 @@ vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *
     if (caster->type < 0) {
         return vshi_reader_fail(reader, value,
                                 "key \"mesh\", \"sdf\", \"vdb\" or \"heightfield\" is missing");
+    }
+    for (size_t i = 0; caster->type == VSH_CASTER_HEIGHTFIELD && i < 2; ++i) {
+        if (!vshi_member(value, heightfield_needs[i], &given)) {
+            return vshi_reader_fail(reader, value, "key \"%s\" is missing: %s needs it",
+                                    heightfield_needs[i], whats[caster->type]);
+        }
     }
     if (caster->type != VSH_CASTER_MESH && !vshi_transform_is_similarity(caster->transform) &&
         vshi_member(value, "transform", &transform)) {

@@ -29,6 +29,15 @@ static vsh_result read_casters(vshi_reader *reader, const vshi_value *value, voi
     return result;
 }
 
+static vsh_result read_layers(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_scene *scene = member;
+    void *items = NULL;
+    const vsh_result result = vshi_read_list(reader, value, 0, VSH_MAX_LAYERS, sizeof *scene->layers,
+                                             vshi_read_layer, &items, &scene->layer_count);
+    scene->layers = items;
+    return result;
+}
+
 static vsh_result read_lights(vshi_reader *reader, const vshi_value *value, void *member) {
     vsh_scene *scene = member;
     void *items = NULL;
@@ -151,6 +160,7 @@ static const vshi_key scene_keys[] = {
      .offset = offsetof(vsh_scene, grid.shell_thickness),
      .lowest = 1.0,
      .highest = 50.0},
+    {.name = "layers", .kind = VSHI_CUSTOM, .read = read_layers},
     {.name = "lights", .kind = VSHI_CUSTOM, .read = read_lights},
     {.name = "ao", .kind = VSHI_CUSTOM, .read = read_ao},
     {.name = "irradiance", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, irradiance)},
@@ -234,6 +244,9 @@ vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh
     result = vshi_read_object(&reader, &root, &scene_table, 1, "a scene", &made->scene);
     if (result == VSH_OK) {
         result = vshi_reject_both(&reader, &root, "voxel_size", "resolution");
+    }
+    if (result == VSH_OK) {
+        result = vshi_check_layers(&reader, &root, &made->scene);
     }
     made->blocks = reader.blocks;
 done:

@@ -1,13 +1,14 @@
 /* The triangles of a scene's casters. */
 #include "base/memory.h"
 
+#include "scene/assets.h"
+
 #include <stdlib.h>
-#include <vdbshade/scene.h>
 
 static const char *const type_names[] = {"a mesh", "an sdf", "a vdb", "a heightfield"};
 
-vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
-                               vsh_triangles **triangles, vsh_error *error) {
+vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
+                               const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
     if (triangles != NULL) {
         *triangles = NULL;
     }
@@ -20,6 +21,9 @@ vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
     size_t count = 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
+        if (!vshi_caster_in_layer(caster, layer)) {
+            continue;
+        }
         if (caster->type != VSH_CASTER_MESH && caster->type != VSH_CASTER_HEIGHTFIELD) {
             const bool known = caster->type > VSH_CASTER_MESH && caster->type <= VSH_CASTER_HEIGHTFIELD;
             return vshi_fail(error, VSH_ERROR_INPUT,
@@ -31,6 +35,9 @@ vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
         vsh_assets_caster(assets, i, &own);
         count += own;
     }
+    if (count == 0) {
+        return VSH_OK;
+    }
     void *memory;
     vsh_result result = vshi_allocate(&memory, count, sizeof(vsh_mesh), "triangles", error);
     if (result != VSH_OK) {
@@ -41,7 +48,7 @@ vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
     for (size_t i = 0; i < scene->caster_count; ++i) {
         size_t own;
         const vsh_mesh *of_caster = vsh_assets_caster(assets, i, &own);
-        for (size_t m = 0; m < own; ++m) {
+        for (size_t m = 0; vshi_caster_in_layer(&scene->casters[i], layer) && m < own; ++m) {
             meshes[at++] = of_caster[m];
         }
     }

@@ -1,6 +1,7 @@
 /* Ambient occlusion: options, and which method shades the points. */
 #include "shade/ao.h"
 #include "base/floats.h"
+#include "shade/layers.h"
 
 #include <math.h>
 
@@ -47,7 +48,11 @@ void vshi_ao_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *
         task->deviation[i] = NAN;
     }
     for (size_t first = begin; first < end; first += VSHI_AO_GRAIN) {
-        shade(task, first, end - first < VSHI_AO_GRAIN ? end : first + VSHI_AO_GRAIN, stats);
+        const size_t last = end - first < VSHI_AO_GRAIN ? end : first + VSHI_AO_GRAIN;
+        shade(task, first, last, stats);
+        if (task->layers != NULL) {
+            vshi_layers_ao(task->layers, task, first, last, stats);
+        }
     }
 }
 
@@ -88,6 +93,7 @@ vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const
     vshi_ao_task task;
     vshi_ao_cones cones;
     vshi_sampler *sampler = NULL;
+    vshi_layers *layers = NULL;
     vsh_result result = vshi_shade_options_resolve(options, &full, error);
     if (result == VSH_OK) {
         result = vshi_run_resolve(run, &full_run, error);
@@ -98,10 +104,14 @@ vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const
     if (result == VSH_OK) {
         result = vshi_ao_prepare(field, &full, &cones, &task, error);
     }
+    if (result == VSH_OK) {
+        result = vshi_layers_prepare(&full, NULL, &layers, error);
+    }
     if (result == VSH_OK && vshi_ao_has_rays(&full)) {
         result = vshi_shade_sampler(&full, "ao", &sampler, error);
     }
     if (result == VSH_OK) {
+        task.layers = layers;
         task.sampler = sampler;
         task.kernel = vshi_kernel_of(full_run.isa);
         task.points = points;
@@ -112,5 +122,6 @@ vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const
             vshi_shade_run(&full_run, "ao", points->count, rows, grain, vshi_ao_shade, &task, stats, error);
     }
     vshi_sampler_free(sampler);
+    vshi_layers_free(layers);
     return result;
 }

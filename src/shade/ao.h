@@ -18,6 +18,7 @@ typedef struct vshi_ao_cones {
 
 typedef struct vshi_ao_task {
     const vsh_field *field;
+    const struct vshi_layers *layers; /* beside the field; NULL: none */
     const vsh_shade_options *options;
     const vshi_sampler *sampler; /* of rays; else NULL */
     const vshi_ao_cones *cones;  /* of cones */

@@ -18,10 +18,13 @@ static const char *const ao_names[] = {[VSH_AO_TAPS] = "taps",
 static const char *const sampler_names[] = {
     [VSH_SAMPLER_SOBOL] = "sobol", [VSH_SAMPLER_WHITE] = "white", [VSH_SAMPLER_BLUE] = "blue"};
 
+static const char *const combine_names[] = {[VSH_COMBINE_MULTIPLY] = "multiply", [VSH_COMBINE_MIN] = "min"};
+
 enum {
     SHADOW_COUNT = sizeof shadow_names / sizeof shadow_names[0],
     AO_COUNT = sizeof ao_names / sizeof ao_names[0],
     SAMPLER_COUNT = sizeof sampler_names / sizeof sampler_names[0],
+    COMBINE_COUNT = sizeof combine_names / sizeof combine_names[0],
 };
 
 static int32_t find(const char *const *names, int32_t count, const char *name) {
@@ -55,4 +58,12 @@ int32_t vsh_sampler(const char *name) {
 
 const char *vsh_sampler_name(int32_t sampler) {
     return sampler >= 0 && sampler < SAMPLER_COUNT ? sampler_names[sampler] : NULL;
+}
+
+int32_t vsh_combine(const char *name) {
+    return find(combine_names, COMBINE_COUNT, name);
+}
+
+const char *vsh_combine_name(int32_t combine) {
+    return combine >= 0 && combine < COMBINE_COUNT ? combine_names[combine] : NULL;
 }

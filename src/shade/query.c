@@ -4,9 +4,8 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "field/level.h"
-#include "shade/ao.h"
+#include "shade/layers.h"
 #include "shade/order.h"
-#include "shade/shadow.h"
 #include "shade/view.h"
 
 #include <stdlib.h>
@@ -20,6 +19,7 @@ struct vsh_query {
     size_t light_count;
     vsh_light *lights;        /* [light_count] */
     vshi_shadow_task *shadow; /* [light_count] */
+    vshi_layers **layers;     /* [light_count + 1]: of the lights, then of AO */
     vshi_ao_task ao;
     vshi_ao_cones cones;
     vshi_sampler *sampler; /* NULL where no method takes one */
@@ -29,7 +29,11 @@ void vsh_query_free(vsh_query *query) {
     if (query == NULL) {
         return;
     }
+    for (size_t i = 0; query->layers != NULL && i <= query->light_count; ++i) {
+        vshi_layers_free(query->layers[i]);
+    }
     vshi_sampler_free(query->sampler);
+    free(query->layers);
     free(query->shadow);
     free(query->lights);
     free(query);
@@ -43,6 +47,10 @@ static vsh_result prepare(vsh_query *q, const vsh_field *field, const vsh_light 
         result =
             vshi_allocate((void **)&q->shadow, light_count, sizeof *q->shadow, "lights of a query", error);
     }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&q->layers, light_count + 1, sizeof *q->layers, "lights of a query",
+                               error);
+    }
     for (; result == VSH_OK && q->light_count < light_count; ++q->light_count) {
         const size_t l = q->light_count;
         vsh_error why;
@@ -51,9 +59,15 @@ static vsh_result prepare(vsh_query *q, const vsh_field *field, const vsh_light 
         if (result != VSH_OK) {
             return vshi_fail(error, result, "light %zu: %s", l, why.message);
         }
+        result = vshi_layers_prepare(&q->options, &q->lights[l], &q->layers[l], error);
+        q->shadow[l].layers = q->layers[l];
     }
     if (result == VSH_OK) {
         result = vshi_ao_prepare(field, &q->options, &q->cones, &q->ao, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_layers_prepare(&q->options, NULL, &q->layers[light_count], error);
+        q->ao.layers = q->layers[light_count];
     }
     if (result == VSH_OK &&
         ((light_count > 0 && vshi_shadow_has_rays(&q->options)) || vshi_ao_has_rays(&q->options))) {

@@ -1,6 +1,7 @@
 /* Shadow values: the visible fraction of a light, by one cone or ray a point. */
 #include "base/floats.h"
 #include "shade/blocks.h"
+#include "shade/layers.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -81,6 +82,18 @@ void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, 
     vshi_blocks_prove(task, facing, chunk, stats);
 }
 
+double vshi_shadow_above(const vshi_shadow_task *task, size_t i) {
+    const vsh_points *points = task->points;
+    vshi_cone cone;
+    if (points->normals == NULL || !aim(task, i, (vshi_vec){0.0, 0.0, 0.0}, &cone)) {
+        return 1.0;
+    }
+    const vshi_vec normal = vshi_direction_to_field(task->field, vshi_vec_off(points->normals + 3 * i));
+    const double sine = vshi_dot(normal, cone.direction);
+    return (double)remap(task->options->method, sine < cone.sine || cone.sine <= 0.0 ? sine : cone.sine,
+                         cone.sine);
+}
+
 static void shade_points(const vshi_shadow_task *task, size_t begin, size_t end, vsh_shade_stats *stats) {
     const int32_t method = task->options->method;
     vshi_facing facing;
@@ -115,11 +128,14 @@ void vshi_shadow_shade(const void *user, size_t begin, size_t end, vsh_shade_sta
     const vshi_shadow_task *task = user;
     if (vshi_shadow_has_rays(task->options)) {
         vshi_shadow_by_rays(task, begin, end, stats);
-        return;
+    } else {
+        shade_points(task, begin, end, stats);
+        for (size_t i = begin; task->deviation != NULL && i < end; ++i) {
+            task->deviation[i] = NAN;
+        }
     }
-    shade_points(task, begin, end, stats);
-    for (size_t i = begin; task->deviation != NULL && i < end; ++i) {
-        task->deviation[i] = NAN;
+    if (task->layers != NULL) {
+        vshi_layers_shadow(task->layers, task, begin, end, stats);
     }
 }
 
@@ -163,12 +179,16 @@ vsh_result vshi_shade_shadow(const vsh_field *field, const vsh_points *points, c
     vsh_run full_run;
     vshi_shadow_task task;
     vshi_sampler *sampler = NULL;
+    vshi_layers *layers = NULL;
     vsh_result result = vshi_shade_options_resolve(options, &full, error);
     if (result == VSH_OK) {
         result = vshi_run_resolve(run, &full_run, error);
     }
     if (result == VSH_OK) {
         result = vshi_shadow_prepare(field, light, &full, &task, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_layers_prepare(&full, light, &layers, error);
     }
     if (result != VSH_OK) {
         return result;
@@ -179,6 +199,7 @@ vsh_result vshi_shade_shadow(const vsh_field *field, const vsh_points *points, c
         result = vshi_shade_sampler(&full, stage, &sampler, error);
     }
     if (result == VSH_OK) {
+        task.layers = layers;
         task.sampler = sampler;
         task.kernel = vshi_kernel_of(full_run.isa);
         task.points = points;
@@ -188,5 +209,6 @@ vsh_result vshi_shade_shadow(const vsh_field *field, const vsh_points *points, c
                                 stats, error);
     }
     vshi_sampler_free(sampler);
+    vshi_layers_free(layers);
     return result;
 }

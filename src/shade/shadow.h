@@ -7,6 +7,7 @@
 /* A light as the points of one field see it: what holds for all of them, then a call's kernel and arrays. */
 typedef struct vshi_shadow_task {
     const vsh_field *field;
+    const struct vshi_layers *layers; /* beside the field; NULL: none */
     const vsh_light *light;
     const vsh_shade_options *options;
     const vshi_sampler *sampler; /* of rays; else NULL */
@@ -32,6 +33,10 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
 static inline bool vshi_shadow_has_rays(const vsh_shade_options *options) {
     return options->method >= VSH_SHADOW_RAYS;
 }
+
+/* Fraction of the light over the receiver's plane at point i, as the task's method sees an edge: 1 without
+ * normals. */
+double vshi_shadow_above(const vshi_shadow_task *task, size_t i);
 
 /* A vshi_shade_fn of a vshi_shadow_task, at most VSHI_PIECE points at once. */
 void vshi_shadow_shade(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);

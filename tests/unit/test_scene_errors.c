@@ -6,6 +6,8 @@
 
 #define SDF(node) "{\"casters\":[{\"sdf\":" node "}]}"
 
+#define LAYER(layer) CASTERS "\n\"layers\":[" layer "]}"
+
 #define LIGHT(light) CASTERS "\n\"lights\":[" light "]}"
 
 #define RECEIVER(receiver) CASTERS "\n\"receivers\":[{\"mesh\":\"m\",\"output\":\"o\"}," receiver "]}"
@@ -45,6 +47,19 @@ static const struct {
     {CASTERS "\"shell_thickness\":@51}", "shell_thickness: 51 is out of range 1 … 50"},
     {CASTERS "\"max_steps\":@15}", "max_steps: 15 is out of range 16 … 65536"},
     {CASTERS "\"start_offset\":@17}", "start_offset: 17 is out of range 0 … 16"},
+    /* layers */
+    {LAYER("@{}"), "layers[0]: key \"name\" is missing: a layer needs it"},
+    {LAYER("{\"name\":\"a\"},{\"name\":@\"a\"}"), "layers[1].name: \"a\" is the name of layers[0] too"},
+    {LAYER("{\"name\":\"a\",\"remap\":@[0.5,0.5]}"),
+     "layers[0].remap: expected two numbers that rise, found 0.5 and 0.5"},
+    {LAYER("{\"name\":\"a\",\"softness\":@-1}"), "layers[0].softness: -1 is out of range 0 … 1000"},
+    {LAYER("{\"name\":\"a\",\"combine\":@\"max\"}"), "layers[0].combine: \"max\" is none of multiply, min"},
+    {LAYER("{\"name\":\"a\",\"lights\":[@\"sun\"]}"),
+     "layers[0].lights[0]: \"sun\" is none of the scene's lights"},
+    {LAYER("{\"name\":\"a\",\"voxel_size\":1,@\"resolution\":9}"),
+     "layers[0].resolution: cannot stand beside \"voxel_size\""},
+    {"{\"casters\":[{\"mesh\":\"a\",\"layer\":@\"b\"}],\"layers\":[{\"name\":\"a\"}]}",
+     "casters[0].layer: \"b\" is none of the scene's layers"},
     {CASTERS "\"irradiance\":@1}", "irradiance: expected true or false, found a number"},
     {CASTERS "\"irradiance\":@null}", "irradiance: expected true or false, found null"},
     {CASTERS "\"ao\":@{}}", "ao: key \"distance\" is missing: ao needs it"},

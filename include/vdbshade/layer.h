@@ -1,0 +1,52 @@
+/* Layers: groups of casters that are shaded each in its own way, beside those in the field. */
+#ifndef VDBSHADE_LAYER_H
+#define VDBSHADE_LAYER_H
+
+#include "field.h"
+#include "trace.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* How a layer's visibility enters a point's. */
+enum {
+    VSH_COMBINE_MULTIPLY = 0, /* product: what layers hide of a light is independent of each other */
+    VSH_COMBINE_MIN = 1       /* the darker: layers hide the same part of it */
+};
+
+enum { VSH_MAX_LAYERS = 128 };
+
+/* A view; nothing is owned. What it refers to must outlive the calls, and the queries, that it is given to.
+ */
+typedef struct vsh_layer {
+    size_t struct_size;
+    const vsh_field *field; /* its casters */
+    int32_t method;         /* VSH_SHADOW_… of its shadows; -1: that of the options */
+    int32_t combine;        /* VSH_COMBINE_… */
+    double softness; /* factor on the sizes of lights, 0 hard … 1000: some casters hard, some soft in one
+                        scene */
+    double remap[2]; /* its visibility goes through a smoothstep from remap[0], dark, to remap[1], lit, within
+                      * 0 … 1; both 0: as it is. Clouds take it (Quilez, "outdoors lighting", 2013) */
+    double start_offset;            /* voxels of its field, 0 … 16; -1: that of the options */
+    const vsh_triangles *triangles; /* its casters', for exact methods; else NULL */
+    const char *const *lights;      /* [light_count]: names of the lights it casts for; NULL: of all */
+    size_t light_count;
+    int32_t ao; /* nonzero: part of ambient occlusion */
+} vsh_layer;
+
+static inline vsh_layer vsh_layer_default(void) {
+    vsh_layer layer = {
+        sizeof(vsh_layer), NULL, -1, VSH_COMBINE_MULTIPLY, 1.0, {0.0, 0.0}, -1.0, NULL, NULL, 0, 1};
+    return layer;
+}
+
+/* "multiply" to VSH_COMBINE_MULTIPLY and back; -1 and NULL for what is none. Names are static; NULL is none.
+ */
+VSH_API int32_t vsh_combine(const char *name);
+VSH_API const char *vsh_combine_name(int32_t combine);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,123 @@
+#include "scene/assets.h"
+#include "scene/parts.h"
+
+#include <string.h>
+#include <vdbshade/scene.h>
+
+/* Names of lights, each a string that is the name of one. */
+static vsh_result read_light_names(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_scene_layer *layer = member;
+    vsh_result result = vshi_expect(reader, value, JSON_ARRAY);
+    if (result != VSH_OK) {
+        return result;
+    }
+    const vshi_key key = {.kind = VSHI_STRING};
+    void *memory = NULL;
+    layer->shade.light_count = json_array_size(value->json);
+    /* one more: no lights at all are not NULL, which is all of them */
+    result = vshi_reader_allocate(reader, &memory, layer->shade.light_count + 1, sizeof(const char *),
+                                  "lights of a layer");
+    const char **names = memory;
+    for (size_t i = 0; result == VSH_OK && i < layer->shade.light_count; ++i) {
+        const vshi_value name = vshi_item(value, i);
+        result = vshi_read_value(reader, &name, &key, &names[i]);
+    }
+    layer->shade.lights = names;
+    return result;
+}
+
+static const vshi_key layer_keys[] = {
+    {.name = "name", .kind = VSHI_STRING, .required = VSHI_ALL, .offset = offsetof(vsh_scene_layer, name)},
+    {.name = "voxel_size",
+     .kind = VSHI_NUMBER,
+     .offset = offsetof(vsh_scene_layer, voxel_size),
+     .highest = VSHI_LARGEST,
+     .flags = VSHI_ABOVE},
+    {.name = "resolution",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_scene_layer, resolution),
+     .lowest = 2.0,
+     .highest = 65536.0},
+    {.name = "method",
+     .kind = VSHI_NAME,
+     .offset = offsetof(vsh_scene_layer, shade.method),
+     .name_of = vsh_shadow_method_name},
+    {.name = "combine",
+     .kind = VSHI_NAME,
+     .offset = offsetof(vsh_scene_layer, shade.combine),
+     .name_of = vsh_combine_name},
+    {.name = "softness",
+     .kind = VSHI_NUMBER,
+     .offset = offsetof(vsh_scene_layer, shade.softness),
+     .highest = 1000.0},
+    {.name = "remap",
+     .kind = VSHI_VECTOR,
+     .offset = offsetof(vsh_scene_layer, shade.remap),
+     .highest = 1.0,
+     .count = 2},
+    {.name = "start_offset",
+     .kind = VSHI_NUMBER,
+     .offset = offsetof(vsh_scene_layer, shade.start_offset),
+     .highest = 16.0},
+    {.name = "lights", .kind = VSHI_CUSTOM, .read = read_light_names},
+    {.name = "ao", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene_layer, shade.ao)},
+};
+static const vshi_table layer_table = VSHI_TABLE(layer_keys);
+
+vsh_result vshi_read_layer(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_scene_layer *layer = member;
+    layer->shade = vsh_layer_default();
+    vsh_result result = vshi_read_object(reader, value, &layer_table, 1, "a layer", layer);
+    if (result == VSH_OK) {
+        result = vshi_reject_both(reader, value, "voxel_size", "resolution");
+    }
+    vshi_value remap;
+    if (result == VSH_OK && vshi_member(value, "remap", &remap) &&
+        !(layer->shade.remap[0] < layer->shade.remap[1])) {
+        return vshi_reader_fail(reader, &remap, "expected two numbers that rise, found %g and %g",
+                                layer->shade.remap[0], layer->shade.remap[1]);
+    }
+    return result;
+}
+
+/* What names what: casters their layers, layers their lights. */
+vsh_result vshi_check_layers(vshi_reader *reader, const vshi_value *root, const vsh_scene *scene) {
+    vshi_value casters, layers;
+    const bool layered = vshi_member(root, "layers", &layers);
+    for (size_t i = 0; i < scene->caster_count && vshi_member(root, "casters", &casters); ++i) {
+        bool found = scene->casters[i].layer == NULL;
+        for (size_t k = 0; !found && k < scene->layer_count; ++k) {
+            found = vshi_caster_in_layer(&scene->casters[i], &scene->layers[k]);
+        }
+        const vshi_value caster = vshi_item(&casters, i);
+        vshi_value name;
+        if (!found && vshi_member(&caster, "layer", &name)) {
+            return vshi_reader_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
+                                    scene->casters[i].layer);
+        }
+    }
+    for (size_t i = 0; layered && i < scene->layer_count; ++i) {
+        const vsh_scene_layer *layer = &scene->layers[i];
+        const vshi_value at = vshi_item(&layers, i);
+        vshi_value names;
+        for (size_t k = 0; k < i; ++k) {
+            vshi_value name;
+            if (strcmp(layer->name, scene->layers[k].name) == 0 && vshi_member(&at, "name", &name)) {
+                return vshi_reader_fail(reader, &name, "\"%.64s\" is the name of layers[%zu] too",
+                                        layer->name, k);
+            }
+        }
+        for (size_t k = 0; layer->shade.lights != NULL && k < layer->shade.light_count; ++k) {
+            bool found = false;
+            for (size_t l = 0; !found && l < scene->light_count; ++l) {
+                found = strcmp(layer->shade.lights[k], scene->lights[l].name) == 0;
+            }
+            if (!found && vshi_member(&at, "lights", &names)) {
+                const vshi_value name = vshi_item(&names, k);
+                return vshi_reader_fail(reader, &name, "\"%.64s\" is none of the scene's lights",
+                                        layer->shade.lights[k]);
+            }
+        }
+    }
+    return VSH_OK;
+}

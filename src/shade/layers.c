@@ -1,0 +1,242 @@
+#include "shade/layers.h"
+
+#include "base/memory.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A layer as one light or AO sees it. */
+typedef struct prepared {
+    vsh_layer layer;
+    vsh_light light;
+    vsh_shade_options options;
+    vshi_sampler *sampler;
+    vshi_shadow_task shadow; /* refers to the three above */
+    vshi_ao_task ao;
+} prepared;
+
+struct vshi_layers {
+    size_t count;
+    vshi_ao_cones cones; /* of all: they do not depend on the field */
+    prepared items[];
+};
+
+vsh_result vshi_layer_resolve(const vsh_shade_options *options, size_t index, vsh_layer *layer,
+                              vsh_error *error) {
+    *layer = vsh_layer_default();
+    if (options->layers == NULL || options->layer_count > VSH_MAX_LAYERS) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%zu layers%s: expected at most %d", options->layer_count,
+                         options->layers == NULL ? " at NULL" : "", VSH_MAX_LAYERS);
+    }
+    /* programs that were built with a shorter struct step by its size */
+    const char *at = (const char *)options->layers + index * options->layers->struct_size;
+    vsh_error why;
+    vsh_result result = vshi_options_resolve(at, layer, sizeof *layer, "vsh_layer", &why);
+    layer->struct_size = sizeof *layer;
+    const struct {
+        const char *name;
+        double value, low, high;
+    } fields[] = {
+        {"method", layer->method, -1, VSH_SHADOW_EXACT},
+        {"combine", layer->combine, VSH_COMBINE_MULTIPLY, VSH_COMBINE_MIN},
+        {"softness", layer->softness, 0, 1000},
+        {"remap[0]", layer->remap[0], 0, 1},
+        {"remap[1]", layer->remap[1], layer->remap[0], 1},
+        {"start_offset", layer->start_offset, -1, 16},
+    };
+    for (size_t i = 0; result == VSH_OK && i < sizeof fields / sizeof fields[0]; ++i) {
+        if (!(fields[i].value >= fields[i].low && fields[i].value <= fields[i].high)) {
+            result = vshi_fail(&why, VSH_ERROR_ARGUMENT, "%s %g is out of range %g … %g", fields[i].name,
+                               fields[i].value, fields[i].low, fields[i].high);
+        }
+    }
+    if (result == VSH_OK && layer->remap[1] > 0.0 && !(layer->remap[0] < layer->remap[1])) {
+        result = vshi_fail(&why, VSH_ERROR_ARGUMENT, "remap from %g to %g: expected a rise", layer->remap[0],
+                           layer->remap[1]);
+    }
+    if (result == VSH_OK && layer->field == NULL) {
+        result = vshi_fail(&why, VSH_ERROR_ARGUMENT, "field is NULL");
+    }
+    for (size_t i = 0; result == VSH_OK && layer->lights != NULL && i < layer->light_count; ++i) {
+        if (layer->lights[i] == NULL) {
+            result = vshi_fail(&why, VSH_ERROR_ARGUMENT, "lights[%zu] is NULL", i);
+        }
+    }
+    return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "layer %zu: %s", index, why.message);
+}
+
+static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
+    bool casts = layer->lights == NULL;
+    for (size_t i = 0; !casts && i < layer->light_count; ++i) {
+        casts = strncmp(layer->lights[i], light->name, sizeof light->name) == 0;
+    }
+    return casts;
+}
+
+/* A light whose size is `softness` times as large. */
+static vsh_light soften(const vsh_light *light, double softness) {
+    vsh_light soft = *light;
+    if (softness != 1.0) {
+        soft.angle = 2.0 * atan(softness * tan(0.5 * light->angle));
+        soft.radius = softness * light->radius;
+    }
+    return soft;
+}
+
+static vsh_result prepare(prepared *item, size_t index, const vsh_light *light, vshi_ao_cones *cones,
+                          vsh_error *error) {
+    const vsh_layer *layer = &item->layer;
+    vsh_shade_options *options = &item->options;
+    options->layers = NULL;
+    options->layer_count = 0;
+    options->triangles = layer->triangles;
+    options->start_offset = layer->start_offset < 0.0 ? options->start_offset : layer->start_offset;
+    options->method = layer->method < 0 ? options->method : layer->method;
+    vsh_error why;
+    vsh_result result;
+    if (light != NULL) {
+        item->light = soften(light, layer->softness);
+        result = vshi_shadow_prepare(layer->field, &item->light, options, &item->shadow, &why);
+        item->shadow.purpose = 31u * item->shadow.purpose + (uint32_t)index + 1u;
+    } else {
+        result = vshi_ao_prepare(layer->field, options, cones, &item->ao, &why);
+    }
+    if (result == VSH_OK && (light != NULL ? vshi_shadow_has_rays(options) : vshi_ao_has_rays(options))) {
+        result = vshi_shade_sampler(options, "rays", &item->sampler, &why);
+        item->shadow.sampler = item->ao.sampler = item->sampler;
+    }
+    return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "layer %zu: %s", index, why.message);
+}
+
+vsh_result vshi_layers_prepare(const vsh_shade_options *options, const vsh_light *light, vshi_layers **layers,
+                               vsh_error *error) {
+    *layers = NULL;
+    if (options->layer_count == 0) {
+        return VSH_OK;
+    }
+    vsh_layer first;
+    vsh_result result = vshi_layer_resolve(options, 0, &first, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    vshi_layers *made = NULL;
+    result = vshi_allocate((void **)&made, 1, sizeof *made + options->layer_count * sizeof made->items[0],
+                           "layers", error);
+    for (size_t i = 0; result == VSH_OK && i < options->layer_count; ++i) {
+        prepared *item = &made->items[made->count];
+        result = vshi_layer_resolve(options, i, &item->layer, error);
+        if (result == VSH_OK && (light != NULL ? casts_for(&item->layer, light) : item->layer.ao != 0)) {
+            item->options = *options;
+            ++made->count;
+            result = prepare(item, i, light, &made->cones, error);
+        }
+    }
+    if (result != VSH_OK || made->count == 0) {
+        vshi_layers_free(made);
+        return result;
+    }
+    *layers = made;
+    return VSH_OK;
+}
+
+void vshi_layers_free(vshi_layers *layers) {
+    for (size_t i = 0; layers != NULL && i < layers->count; ++i) {
+        vshi_sampler_free(layers->items[i].sampler);
+    }
+    free(layers);
+}
+
+/* The points of a piece as a layer shades them: on their own, from 0 on. */
+typedef struct layer_piece {
+    vsh_points points;
+    uint32_t texels[VSHI_PIECE];
+    float value[VSHI_PIECE], deviation[VSHI_PIECE];
+} layer_piece;
+
+static void cut(layer_piece *piece, const vsh_points *points, size_t begin, size_t end) {
+    piece->points = (vsh_points){end - begin, points->positions + 3 * begin,
+                                 points->normals != NULL ? points->normals + 3 * begin : NULL, piece->texels};
+    for (size_t i = begin; i < end; ++i) {
+        piece->texels[i - begin] = points->texels != NULL ? points->texels[i] : (uint32_t)i;
+    }
+}
+
+/* Of a smoothstep over a unit: what a deviation grows by at most. */
+static const double STEEPEST = 1.5;
+
+static double smoothstep(const double edges[2], double value) {
+    const double x = (value - edges[0]) / (edges[1] - edges[0]);
+    return x <= 0.0 ? 0.0 : x >= 1.0 ? 1.0 : x * x * (3.0 - 2.0 * x); /* NaN stays */
+}
+
+/* Combines what a layer leaves of the part of the light, or sky, that is above a point's own horizon with
+ * what the point has: both `value` and the point's are shares of the whole, `above` is that part. */
+static void combine(const vsh_layer *layer, double value, double deviation, double above, float *of_point,
+                    float *deviation_of_point) {
+    const double before = (double)*of_point;
+    double share = above > 0.0 ? value / above : 0.0;
+    share = share > 1.0 ? 1.0 : share;
+    deviation = above > 0.0 ? deviation / above : 0.0;
+    if (layer->remap[1] > 0.0) {
+        share = smoothstep(layer->remap, share);
+        deviation *= STEEPEST / (layer->remap[1] - layer->remap[0]);
+    }
+    if (layer->combine == VSH_COMBINE_MULTIPLY) {
+        *of_point = (float)(before * share);
+        if (deviation_of_point != NULL) {
+            const double a = share * (double)*deviation_of_point, b = before * deviation;
+            *deviation_of_point = (float)sqrt(a * a + b * b);
+        }
+    } else if (share * above < before) {
+        *of_point = (float)(share * above);
+        if (deviation_of_point != NULL) {
+            *deviation_of_point = (float)(deviation * above);
+        }
+    }
+}
+
+void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task, size_t begin, size_t end,
+                        vsh_shade_stats *stats) {
+    layer_piece piece;
+    cut(&piece, task->points, begin, end);
+    for (size_t k = 0; k < layers->count; ++k) {
+        const prepared *item = &layers->items[k];
+        vshi_shadow_task own = item->shadow;
+        own.kernel = task->kernel;
+        own.points = &piece.points;
+        own.visibility = piece.value;
+        own.deviation = task->deviation != NULL ? piece.deviation : NULL;
+        vshi_shadow_shade(&own, 0, end - begin, stats);
+        for (size_t i = begin; i < end; ++i) {
+            float *value = &task->visibility[i];
+            if (!(*value > 0.0f)) {
+                continue; /* dark already, turned away, or invalid */
+            }
+            combine(&item->layer, (double)piece.value[i - begin],
+                    own.deviation != NULL ? (double)piece.deviation[i - begin] : 0.0,
+                    vshi_shadow_above(&own, i - begin), value,
+                    task->deviation != NULL ? &task->deviation[i] : NULL);
+        }
+    }
+}
+
+void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t begin, size_t end,
+                    vsh_shade_stats *stats) {
+    layer_piece piece;
+    cut(&piece, task->points, begin, end);
+    for (size_t k = 0; k < layers->count; ++k) {
+        const prepared *item = &layers->items[k];
+        vshi_ao_task own = item->ao;
+        own.kernel = task->kernel;
+        own.points = &piece.points;
+        own.ao = piece.value;
+        own.deviation = task->deviation != NULL ? piece.deviation : NULL;
+        vshi_ao_shade(&own, 0, end - begin, stats);
+        for (size_t i = begin; i < end; ++i) {
+            combine(&item->layer, (double)piece.value[i - begin],
+                    own.deviation != NULL ? (double)piece.deviation[i - begin] : 0.0, 1.0, &task->ao[i],
+                    task->deviation != NULL ? &task->deviation[i] : NULL);
+        }
+    }
+}

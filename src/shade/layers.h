@@ -1,0 +1,30 @@
+/* Layers beside the field: prepared for a light or for AO, then combined with what the field gave. */
+#ifndef VSHI_LAYERS_H
+#define VSHI_LAYERS_H
+
+#include "shade/ao.h"
+#include "shade/shadow.h"
+
+/* The layers that take part in one light's shadow, or in AO. */
+typedef struct vshi_layers vshi_layers;
+
+/* Layer `index` of options, resolved and checked. Errors: VSH_ERROR_ARGUMENT, naming number, field, value and
+ * limit. */
+vsh_result vshi_layer_resolve(const vsh_shade_options *options, size_t index, vsh_layer *layer,
+                              vsh_error *error);
+
+/* Checks the options' layers (resolved options) and prepares those that cast for `light`, or NULL for AO.
+ * *layers is NULL where there are none. Free with vshi_layers_free(). Errors: VSH_ERROR_ARGUMENT,
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_layers_prepare(const vsh_shade_options *options, const vsh_light *light, vshi_layers **layers,
+                               vsh_error *error);
+void vshi_layers_free(vshi_layers *layers); /* NULL does nothing */
+
+/* Combines the layers with the values that the task's arrays hold of points begin … end - 1: at most
+ * VSHI_PIECE, of AO VSHI_AO_GRAIN. */
+void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task, size_t begin, size_t end,
+                        vsh_shade_stats *stats);
+void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t begin, size_t end,
+                    vsh_shade_stats *stats);
+
+#endif

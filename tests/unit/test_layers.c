@@ -1,0 +1,393 @@
+/* Layers beside the field: what they hide, and how it is combined. */
+#include "shading.h"
+
+#include <stdlib.h>
+#include <vdbshade/bake.h>
+
+enum { SIZE = 64, COUNT = SIZE * SIZE };
+
+/* The seeds' floor; its solids one by one, and all of them. */
+static const double towards[3] = {-0.5, 0.6, -0.6};
+static double positions[3 * COUNT];
+static float normals[3 * COUNT];
+
+static truth_solid ball(double x, double y, double z, double radius) {
+    return (truth_solid){.shape = TRUTH_SPHERE, .center = {x, y, z}, .radius = radius};
+}
+
+static vsh_field *field_of_ball(double x, double y, double z, double radius, double voxel) {
+    const truth_solid solid = ball(x, y, z, radius);
+    return field_of((truth_scene){&solid, 1}, voxel, 4.0);
+}
+
+static vsh_field *nothing(double voxel) {
+    vsh_field *field = NULL;
+    assert_int_equal(vsh_field_create_empty(voxel, &field, NULL), VSH_OK);
+    return field;
+}
+
+static void shade(const vsh_field *field, const vsh_light *light, const vsh_shade_options *options,
+                  float *values, float *deviation) {
+    const vsh_points points = {COUNT, positions, normals, NULL};
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_shade_shadow(field, &points, light, options, NULL, values, deviation, NULL, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+}
+
+static vsh_shade_options with(const vsh_layer *layers, size_t count) {
+    vsh_shade_options options = vsh_shade_options_default();
+    options.layers = layers;
+    options.layer_count = count;
+    return options;
+}
+
+static vsh_layer layer_of(const vsh_field *field) {
+    vsh_layer layer = vsh_layer_default();
+    layer.field = field;
+    return layer;
+}
+
+/* Where nothing casts, all light arrives that the receiver's horizon lets through. */
+static void test_nothing_hides(void **state) {
+    (void)state;
+    vsh_field *empty = nothing(0.05);
+    const vsh_light above = sun(towards, 0.2);
+    const double level[3] = {1.0, 0.0, 0.0}; /* half of it below the horizon */
+    const vsh_light low = sun(level, 0.2);
+    float values[COUNT];
+    const int32_t methods[] = {VSH_SHADOW_HARD, VSH_SHADOW_SMOOTH, VSH_SHADOW_CONE, VSH_SHADOW_RAYS,
+                               VSH_SHADOW_ADAPTIVE};
+    for (size_t m = 0; m < sizeof methods / sizeof methods[0]; ++m) {
+        vsh_shade_options options = vsh_shade_options_default();
+        options.method = methods[m];
+        shade(empty, &above, &options, values, NULL);
+        for (size_t i = 0; i < COUNT; ++i) {
+            assert_float_equal(values[i], 1.0f, 0.0f);
+        }
+        if (methods[m] != VSH_SHADOW_HARD) {
+            shade(empty, &low, &options, values, NULL);
+            for (size_t i = 0; i < COUNT; ++i) {
+                assert_float_equal(values[i], 0.5f, 0.05f);
+            }
+        }
+    }
+    const vsh_points points = {COUNT, positions, normals, NULL};
+    vsh_shade_options options = vsh_shade_options_default();
+    assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, values, NULL, NULL, NULL), VSH_OK);
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_float_equal(values[i], 1.0f, 1e-6f);
+    }
+    vsh_field_free(empty);
+}
+
+/* All casters in a layer over an empty field: as in the field itself. Light from so low that the horizon cuts
+ * into it, which is not to count twice. */
+static void test_layer_alone(void **state) {
+    (void)state;
+    vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05), *empty = nothing(0.05);
+    const vsh_layer layer = layer_of(field);
+    const double low[3] = {1.0, 0.05, 0.2};
+    const vsh_light lights[2] = {sun(towards, 0.2), sun(low, 0.2)};
+    float alone[COUNT], layered[COUNT];
+    const vsh_shade_options plain = vsh_shade_options_default(), options = with(&layer, 1);
+    for (int l = 0; l < 2; ++l) {
+        shade(field, &lights[l], &plain, alone, NULL);
+        shade(empty, &lights[l], &options, layered, NULL);
+        double most = 0.0, dark = 0.0;
+        for (size_t i = 0; i < COUNT; ++i) {
+            most = fmax(most, fabs((double)(layered[i] - alone[i])));
+            dark = fmax(dark, 1.0 - (double)layered[i]);
+        }
+        assert_true(dark > 0.2);
+        assert_true(most < 2e-6);
+    }
+    vsh_field_free(field);
+    vsh_field_free(empty);
+}
+
+/* Two balls whose shadows do not meet: the product of their layers is the shadow of both. The truth is the
+ * union in one field. Where their discs overlap in the sky, the product is that of independent shares. */
+static void test_product(void **state) {
+    (void)state;
+    vsh_field *a = field_of_ball(-1.0, 0.6, -0.6, 0.3, 0.025), *b = field_of_ball(1.0, 0.6, 0.6, 0.3, 0.025);
+    const truth_solid both[2] = {ball(-1.0, 0.6, -0.6, 0.3), ball(1.0, 0.6, 0.6, 0.3)};
+    vsh_field *all = field_of((truth_scene){both, 2}, 0.025, 4.0);
+    const vsh_light light = sun(towards, 0.2);
+    const vsh_layer layer = layer_of(b);
+    const vsh_shade_options plain = vsh_shade_options_default(), options = with(&layer, 1);
+    float united[COUNT], layered[COUNT];
+    shade(all, &light, &plain, united, NULL);
+    shade(a, &light, &options, layered, NULL);
+    size_t dark = 0;
+    double square = 0.0;
+    for (size_t i = 0; i < COUNT; ++i) {
+        dark += united[i] < 0.1f;
+        square += (double)((layered[i] - united[i]) * (layered[i] - united[i]));
+    }
+    assert_true(dark > 40);
+    assert_true(sqrt(square / COUNT) < 2e-3);
+    vsh_field_free(a);
+    vsh_field_free(b);
+    vsh_field_free(all);
+}
+
+/* A layer that repeats the field: the darker of both is the field alone, bit by bit, the product its square.
+ */
+static void test_combinations(void **state) {
+    (void)state;
+    vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05);
+    const vsh_light light = sun(towards, 0.2);
+    vsh_layer layer = layer_of(field);
+    const vsh_shade_options plain = vsh_shade_options_default(), options = with(&layer, 1);
+    float alone[COUNT], combined[COUNT];
+    shade(field, &light, &plain, alone, NULL);
+    layer.combine = VSH_COMBINE_MIN;
+    shade(field, &light, &options, combined, NULL);
+    assert_memory_equal(alone, combined, sizeof alone);
+    layer.combine = VSH_COMBINE_MULTIPLY;
+    shade(field, &light, &options, combined, NULL);
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_float_equal(combined[i], alone[i] * alone[i], 1e-6);
+    }
+    layer.combine = VSH_COMBINE_MIN;
+    layer.remap[0] = 0.25;
+    layer.remap[1] = 0.75;
+    shade(field, &light, &options, combined, NULL);
+    size_t between_edges = 0;
+    for (size_t i = 0; i < COUNT; ++i) {
+        const double x = fmin(1.0, fmax(0.0, ((double)alone[i] - 0.25) / 0.5));
+        assert_float_equal(combined[i], fmin((double)alone[i], x * x * (3.0 - 2.0 * x)), 1e-6);
+        between_edges += x > 0.0 && x < 1.0;
+    }
+    assert_true(between_edges > 20);
+    vsh_field_free(field);
+}
+
+/* Half the softness is half the light. */
+static void test_softness(void **state) {
+    (void)state;
+    vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05), *empty = nothing(0.05);
+    const vsh_light full = sun(towards, 2.0 * atan(0.1)), half = sun(towards, 2.0 * atan(0.05));
+    vsh_layer layer = layer_of(field);
+    layer.softness = 0.5;
+    const vsh_shade_options plain = vsh_shade_options_default(), options = with(&layer, 1);
+    float smaller[COUNT], layered[COUNT];
+    shade(field, &half, &plain, smaller, NULL);
+    shade(empty, &full, &options, layered, NULL);
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_float_equal(layered[i], smaller[i], 1e-6);
+    }
+    layer.softness = 0.0;
+    shade(empty, &full, &options, layered, NULL);
+    size_t dark = 0;
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_true(layered[i] == 0.0f || layered[i] == 1.0f);
+        dark += layered[i] == 0.0f;
+    }
+    assert_true(dark > 50);
+    vsh_field_free(field);
+    vsh_field_free(empty);
+}
+
+/* A layer casts for the lights it names, and takes part in AO where it says so. */
+static void test_where_it_counts(void **state) {
+    (void)state;
+    vsh_field *field = field_of_ball(0.0, 0.4, 0.0, 0.4, 0.05), *empty = nothing(0.05);
+    vsh_light light = sun(towards, 0.2);
+    const char *const names[] = {"moon", "sun"};
+    vsh_layer layer = layer_of(field);
+    layer.lights = names;
+    layer.light_count = 1;
+    const vsh_shade_options options = with(&layer, 1);
+    float values[COUNT], ao[COUNT], alone[COUNT];
+    shade(empty, &light, &options, values, NULL);
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_float_equal(values[i], 1.0f, 0.0f);
+    }
+    layer.light_count = 2;
+    shade(empty, &light, &options, values, NULL);
+    float least = 1.0f;
+    for (size_t i = 0; i < COUNT; ++i) {
+        least = fminf(least, values[i]);
+    }
+    assert_true(least < 0.01f);
+
+    const vsh_points points = {COUNT, positions, normals, NULL};
+    const vsh_shade_options plain = vsh_shade_options_default();
+    assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, ao, NULL, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_ao(field, &points, &plain, NULL, alone, NULL, NULL, NULL), VSH_OK);
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_float_equal(ao[i], alone[i], 1e-6);
+    }
+    layer.ao = 0;
+    assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, ao, NULL, NULL, NULL), VSH_OK);
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_float_equal(ao[i], 1.0f, 1e-6f);
+    }
+    vsh_field_free(field);
+    vsh_field_free(empty);
+}
+
+/* Deviations of independent values add up. */
+static void test_deviation(void **state) {
+    (void)state;
+    vsh_field *a = field_of_ball(-0.2, 0.8, 0.0, 0.5, 0.05), *b = field_of_ball(0.2, 0.9, 0.1, 0.5, 0.05);
+    const vsh_light light = sun(towards, 0.3);
+    vsh_layer layer = layer_of(b);
+    vsh_shade_options options = vsh_shade_options_default();
+    options.method = VSH_SHADOW_RAYS;
+    float va[COUNT], vb[COUNT], both[COUNT], da[COUNT], db[COUNT], dboth[COUNT];
+    shade(a, &light, &options, va, da);
+    shade(b, &light, &options, vb, db);
+    options.layers = &layer;
+    options.layer_count = 1;
+    shade(a, &light, &options, both, dboth);
+    size_t open = 0;
+    for (size_t i = 0; i < COUNT; ++i) {
+        if (va[i] > 0.0f && va[i] < 1.0f && vb[i] > 0.0f && vb[i] < 1.0f) {
+            /* the layer's rays are others than those of the field's own bake: their errors are not */
+            assert_float_equal(dboth[i], hypot((double)(da[i] * vb[i]), (double)(va[i] * db[i])), 0.02);
+            assert_true(dboth[i] > 0.0f);
+            ++open;
+        }
+    }
+    assert_true(open > 10);
+    vsh_field_free(a);
+    vsh_field_free(b);
+}
+
+/* A lightmap of the floor y = 0 over [-1, 1]², u along x, v along -z. */
+typedef struct floor_bake {
+    float shadow[COUNT], ao[COUNT];
+    vsh_bake_stats stats;
+} floor_bake;
+
+static void bake_floor(const vsh_field *field, const vsh_layer *layers, size_t layer_count,
+                       floor_bake *baked) {
+    static const float corners[12] = {-1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1},
+                       uvs[8] = {0, 0, 1, 0, 1, 1, 0, 1};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    const vsh_mesh mesh = {.name = "floor",
+                           .positions = corners,
+                           .uvs = uvs,
+                           .indices = indices,
+                           .vertex_count = 4,
+                           .triangle_count = 2};
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = SIZE;
+    options.padding = 0;
+    options.ao_spacing = 1;
+    vsh_texels *texels = NULL;
+    assert_int_equal(vsh_texels_create(&mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
+    const double over[3] = {-1.0, 0.7, 0.1};
+    const vsh_light light = sun(over, 0.2);
+    const vsh_shade_options shade = with(layers, layer_count);
+    float *planes[1] = {baked->shadow};
+    const vsh_lightmap lightmap = {.shadow = planes, .ao = baked->ao};
+    baked->stats = vsh_bake_stats_zero();
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_bake_lightmap(field, texels, &light, 1, &shade, NULL, &lightmap, &baked->stats, &error) !=
+        VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    vsh_texels_free(texels);
+}
+
+/* A wall of [-0.2, 0.2] × [0, 1] across the floor's slab: as one field, in a layer of its own, and all of it
+ * in a layer of voxels four times as large as those that start offsets are measured in. The receiver must not
+ * shade itself, and what is under the wall is invalid and filled in each way. */
+static void test_bake(void **state) {
+    (void)state;
+    const truth_solid slab = {.shape = TRUTH_BOX, .center = {0.0, -0.25, 0.0}, .half = {1.5, 0.25, 1.5}};
+    const truth_solid wall = {.shape = TRUTH_BOX, .center = {0.0, 0.4, 0.0}, .half = {0.2, 0.6, 1.5}};
+    const truth_solid both[2] = {slab, wall};
+    vsh_field *united = field_of((truth_scene){both, 2}, 0.04, 4.0);
+    vsh_field *ground = field_of((truth_scene){&slab, 1}, 0.04, 4.0);
+    vsh_field *alone = field_of((truth_scene){&wall, 1}, 0.04, 4.0), *empty = nothing(0.01);
+    floor_bake *plain = malloc(sizeof *plain), *layered = malloc(sizeof *layered);
+    bake_floor(united, NULL, 0, plain);
+    assert_in_range(plain->stats.invalid_texels, SIZE * SIZE / 6, SIZE * SIZE / 4);
+
+    const vsh_layer of_wall = layer_of(alone), of_all = layer_of(united);
+    const struct {
+        const vsh_field *field;
+        const vsh_layer *layer;
+    } ways[2] = {{ground, &of_wall}, {empty, &of_all}};
+    for (int w = 0; w < 2; ++w) {
+        bake_floor(ways[w].field, ways[w].layer, 1, layered);
+        assert_int_equal(layered->stats.invalid_texels, plain->stats.invalid_texels);
+        double shadow = 0.0, ao = 0.0;
+        for (size_t i = 0; i < COUNT; ++i) {
+            shadow = fmax(shadow, fabs((double)(layered->shadow[i] - plain->shadow[i])));
+            ao = fmax(ao, fabs((double)(layered->ao[i] - plain->ao[i])));
+        }
+        assert_true(shadow < 0.05);
+        assert_true(ao < 0.05);
+    }
+    free(plain);
+    free(layered);
+    vsh_field_free(united);
+    vsh_field_free(ground);
+    vsh_field_free(alone);
+    vsh_field_free(empty);
+}
+
+static void test_refused(void **state) {
+    (void)state;
+    vsh_field *empty = nothing(0.05);
+    const vsh_light light = sun(towards, 0.2);
+    const vsh_points points = {1, positions, normals, NULL};
+    float value;
+    vsh_error error;
+    const struct {
+        const char *message;
+        vsh_layer layer;
+    } cases[] = {
+        {"layer 0: field is NULL", vsh_layer_default()},
+        {"layer 0: softness -1 is out of range 0 … 1000", {.softness = -1.0}},
+        {"layer 0: softness nan is out of range 0 … 1000", {.softness = NAN}},
+        {"layer 0: method 9 is out of range -1 … 7", {.method = 9}},
+        {"layer 0: combine 2 is out of range 0 … 1", {.combine = 2}},
+        {"layer 0: remap[1] 0.25 is out of range 0.5 … 1", {.remap = {0.5, 0.25}}},
+        {"layer 0: remap from 0.5 to 0.5: expected a rise", {.remap = {0.5, 0.5}}},
+        {"layer 0: start_offset 17 is out of range -1 … 16", {.start_offset = 17.0}},
+        {"layer 0: method exact: triangles is NULL", {.field = empty, .method = VSH_SHADOW_EXACT}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        vsh_layer layer = cases[i].layer;
+        layer.struct_size = sizeof layer;
+        const vsh_shade_options options = with(&layer, 1);
+        assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, &value, NULL, NULL, &error),
+                         VSH_ERROR_ARGUMENT);
+        assert_string_equal(error.message, cases[i].message);
+    }
+    vsh_shade_options many = with(NULL, 2);
+    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &many, NULL, &value, NULL, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    const vsh_layer fine = layer_of(empty);
+    many = with(&fine, VSH_MAX_LAYERS + 1);
+    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &many, NULL, &value, NULL, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    vsh_field *none;
+    assert_int_equal(vsh_field_create_empty(0.0, &none, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_field_create_empty(NAN, &none, &error), VSH_ERROR_ARGUMENT);
+    vsh_field_free(empty);
+}
+
+static int fill(void **state) {
+    (void)state;
+    floor_texels(SIZE, positions, normals);
+    return 0;
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_nothing_hides), cmocka_unit_test(test_layer_alone),
+        cmocka_unit_test(test_product),       cmocka_unit_test(test_combinations),
+        cmocka_unit_test(test_softness),      cmocka_unit_test(test_where_it_counts),
+        cmocka_unit_test(test_deviation),     cmocka_unit_test(test_bake),
+        cmocka_unit_test(test_refused),
+    };
+    return cmocka_run_group_tests(tests, fill, NULL);
+}
