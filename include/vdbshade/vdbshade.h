@@ -21,6 +21,7 @@
 #include "scene.h"
 #include "sdf.h"
 #include "shade.h"
+#include "spheres.h"
 #include "trace.h"
 
 #endif

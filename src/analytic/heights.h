@@ -5,13 +5,13 @@
 #include <vdbshade/heights.h>
 #include <vdbshade/shade.h>
 
-/* Visible fraction of a light (checked before) at points begin … end - 1 into visibility[end - begin]: what
- * the heightfield leaves of it, the receiver's own horizon not counted. `softness` scales the light's size;
- * with 0, or VSH_SHADOW_HARD, it is its centre, 0 or 1. Every other method is the same: slices of the disc,
- * each above its horizon. Points are first moved `lift` world units along their normals; one up to a quarter
- * of a cell under the surface is taken for one on it, one deeper is dark. Invalid points are NaN. Thread
- * safe. */
-void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, double softness, int32_t method,
+/* Share of a light (checked before) that the heightfield leaves free, of what of it is above a point's own
+ * horizon (all of it without normals), at points begin … end - 1 into visibility[end - begin]; 1 for points
+ * turned away. VSH_SHADOW_HARD, or a light of no size: its centre, 0 or 1; every other method is one:
+ * slices of the disc, each above its horizon. Points are first moved `lift` world units along their
+ * normals; one up to a quarter of a cell under the surface is taken for one on it, one deeper is dark.
+ * Invalid points are NaN. Thread safe. */
+void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, int32_t method,
                          const vsh_points *points, size_t begin, size_t end, double lift, float *visibility,
                          vsh_shade_stats *stats);
 

@@ -2,7 +2,11 @@
 #include "terrain.h"
 
 #include "analytic/heights.h"
+#include "analytic/place.h"
+#include "analytic/slices.h"
 #include "base/vec.h"
+
+#include <vdbshade/trace.h>
 
 enum { SIDE = 129, POINTS = 3000 };
 
@@ -73,10 +77,10 @@ static void tear_down(stage *s) {
     free(s->values);
 }
 
-static void shadow(const stage *s, const vsh_light *light, double softness, int32_t method, float *values) {
+static void shadow(const stage *s, const vsh_light *light, int32_t method, float *values) {
     const vsh_points points = {POINTS, s->positions, NULL, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    vshi_heights_shadow(s->heights, light, softness, method, &points, 0, POINTS, 0.0, values, &stats);
+    vshi_heights_shadow(s->heights, light, method, &points, 0, POINTS, 0.0, values, &stats);
     assert_true(stats.samples > 0);
 }
 
@@ -84,7 +88,7 @@ static double check_sun(const stage *s, const double towards[3], double angle, d
                         const char *what) {
     const vsh_light light = sun(towards, angle);
     float values[POINTS], truth[POINTS];
-    shadow(s, &light, 1.0, VSH_SHADOW_CONE, values);
+    shadow(s, &light, VSH_SHADOW_CONE, values);
     if (s->truth == NULL) {
         return 0.0;
     }
@@ -111,6 +115,129 @@ static void soft_shadows_of_a_low_and_a_high_sun_are_the_rays(void **state) {
     tear_down(&s);
 }
 
+/* Random normals, so that planes cut discs at all angles: of what is above them the terrain leaves a share.
+ */
+static void of_a_disc_that_the_horizon_cuts_the_rest_counts(void **state) {
+    (void)state;
+    stage s = set_up(SIDE, SIDE, 2.0, NULL);
+    uint64_t counter = 9;
+    for (size_t i = 0; i < POINTS; ++i) {
+        double n[3];
+        random_direction(&counter, n);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            s.normals[3 * i + axis] = (float)n[axis];
+        }
+        s.positions[3 * i + 1] += 0.02;
+    }
+    static const double towards[3] = {0.3, 0.3, -0.7};
+    const double angle = RADIANS(60.0);
+    const vsh_light light = sun(towards, angle);
+    float values[POINTS], truth[POINTS], above[POINTS];
+    const vsh_points points = {POINTS, s.positions, s.normals, NULL};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    vshi_heights_shadow(s.heights, &light, VSH_SHADOW_CONE, &points, 0, POINTS, 0.0, values, &stats);
+    if (s.truth != NULL) {
+        static const double far_up[3] = {0.0, 1e6, 0.0};
+        static double sky[3 * POINTS];
+        for (size_t i = 0; i < POINTS; ++i) {
+            memcpy(sky + 3 * i, far_up, sizeof far_up);
+        }
+        const double w = tan(0.5 * angle);
+        truth_mesh_light(s.truth, POINTS, s.positions, s.normals, towards, w, 1024, 0, truth);
+        truth_mesh_light(s.truth, POINTS, sky, s.normals, towards, w, 1024, 0, above);
+        for (size_t i = 0; i < POINTS; ++i) {
+            values[i] *= above[i];
+        }
+        const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
+        truth_metrics_print("cut", &m);
+        assert_true(m.rmse <= 0.01);
+        assert_true(m.penumbra > POINTS / 4);
+    }
+    tear_down(&s);
+}
+
+static void lamps_are_the_rays(void **state) {
+    (void)state;
+    stage s = set_up(SIDE, SIDE, 2.0, NULL);
+    static const double places[3][3] = {{1.0, 3.0, 0.5}, {6.5, 1.6, 0.0}, {0.0, 12.0, 0.0}};
+    static const double radii[3] = {0.3, 0.4, 4.0};
+    vsh_triangles *triangles = NULL;
+    if (vsh_triangles_available()) {
+        assert_int_equal(vsh_triangles_create(&s.mesh, 1, NULL, &triangles, NULL), VSH_OK);
+    }
+    for (size_t l = 0; l < 3; ++l) {
+        const vsh_light light = lamp(places[l], radii[l]);
+        float values[POINTS], truth[POINTS];
+        shadow(&s, &light, VSH_SHADOW_CONE, values);
+        if (triangles != NULL) {
+            assert_int_equal(vsh_trace_shadow(triangles, NULL, POINTS, s.positions, NULL, 0.0, &light, 1024,
+                                              NULL, truth, NULL),
+                             VSH_OK);
+            const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
+            truth_metrics_print("lamp", &m);
+            assert_true(m.rmse <= 0.01);
+        }
+    }
+    vsh_triangles_free(triangles);
+    tear_down(&s);
+}
+
+static void points_that_are_no_points_are_nan_and_buried_ones_dark(void **state) {
+    (void)state;
+    stage s = set_up(SIDE, SIDE, 2.0, NULL);
+    const double positions[12] = {NAN, 0, 0, 0, 5, 0, 0, -0.3, 0, 0, 5, 0};
+    const float normals[12] = {0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0};
+    static const double up[3] = {0, 1, 0};
+    const vsh_light light = sun(up, 0.1);
+    const vsh_points points = {4, positions, normals, NULL};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    float values[3], ao[3];
+    for (size_t begin = 0; begin < 2; ++begin) { /* results begin at 0 whatever the first point */
+        vshi_heights_shadow(s.heights, &light, VSH_SHADOW_CONE, &points, begin, begin + 3, 0.0, values,
+                            &stats);
+        vshi_heights_ao(s.heights, 1.0, &points, begin, begin + 3, 0.0, ao, &stats);
+        assert_true(isnan(values[1 - begin]) && isnan(ao[1 - begin]));
+        assert_true(values[2 - begin] == 0.0f && ao[2 - begin] == 0.0f);
+        assert_true(begin == 0 ? isnan(values[0]) && isnan(ao[0]) : values[2] == 1.0f && ao[2] == 1.0f);
+    }
+    tear_down(&s);
+}
+
+static void every_instruction_set_finds_the_same_bits(void **state) {
+    (void)state;
+    stage s = set_up(SIDE, SIDE, 2.0, NULL);
+    vshi_walk_fn *const walks[] = {
+        vshi_walk_base,
+#if defined(__x86_64__)
+        vsh_isa_available(VSH_ISA_AVX2) ? vshi_walk_avx2 : NULL,
+        vsh_isa_available(VSH_ISA_AVX512) ? vshi_walk_avx512 : NULL
+#endif
+    };
+    vshi_slices slices;
+    vshi_slices_make(vshi_unit((vshi_vec){0.8, 0.3, 0.2}), 0.3, INFINITY, &slices);
+    for (size_t i = 0; i < POINTS; ++i) {
+        const vsh_points points = {POINTS, s.positions, NULL, NULL};
+        double at[3];
+        vshi_vec normal;
+        vshi_heights_stand(s.heights, &points, i, 0.0, at, &normal);
+        vshi_fan first = slices.fan, ranged = slices.fan;
+        ranged.range = 12.0f;
+        vshi_fan expected = ranged;
+        const uint64_t looked = walks[0](&s.heights->relief, at, &first);
+        walks[0](&s.heights->relief, at, &expected);
+        for (size_t w = 1; w < sizeof walks / sizeof walks[0]; ++w) {
+            vshi_fan again = slices.fan, near = ranged;
+            if (walks[w] != NULL) {
+                assert_int_equal(walks[w](&s.heights->relief, at, &again), looked);
+                assert_memory_equal(again.slope, first.slope, sizeof again.slope);
+                walks[w](&s.heights->relief, at, &near);
+                assert_memory_equal(near.slope, expected.slope, sizeof near.slope);
+            }
+        }
+    }
+    tear_down(&s);
+}
+
 static void a_turned_and_mirrored_terrain_casts_as_its_triangles_do(void **state) {
     (void)state;
     static const double turned[12] = {0, -2, 0, 5, -1.2, 0, 1.6, 6, 1.6, 0, 1.2, 7};
@@ -126,8 +253,9 @@ static void hard_shadows_are_the_rays(void **state) {
     static const double towards[3] = {-0.7, 0.4, 0.35};
     const vsh_light light = sun(towards, RADIANS(10.0));
     float values[POINTS], soft[POINTS], truth[POINTS];
-    shadow(&s, &light, 1.0, VSH_SHADOW_HARD, values);
-    shadow(&s, &light, 0.0, VSH_SHADOW_CONE, soft);
+    shadow(&s, &light, VSH_SHADOW_HARD, values);
+    const vsh_light point = sun(towards, 0.0);
+    shadow(&s, &point, VSH_SHADOW_CONE, soft);
     assert_memory_equal(values, soft, sizeof values);
     if (s.truth != NULL) {
         truth_mesh_light(s.truth, POINTS, s.positions, NULL, towards, 0.0, 1, 0, truth);
@@ -180,6 +308,10 @@ static void ambient_occlusion_is_the_rays(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(soft_shadows_of_a_low_and_a_high_sun_are_the_rays),
+        cmocka_unit_test(of_a_disc_that_the_horizon_cuts_the_rest_counts),
+        cmocka_unit_test(lamps_are_the_rays),
+        cmocka_unit_test(points_that_are_no_points_are_nan_and_buried_ones_dark),
+        cmocka_unit_test(every_instruction_set_finds_the_same_bits),
         cmocka_unit_test(a_turned_and_mirrored_terrain_casts_as_its_triangles_do),
         cmocka_unit_test(hard_shadows_are_the_rays),
         cmocka_unit_test(points_beside_and_beneath_the_solid_see_past_it),
