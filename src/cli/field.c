@@ -182,7 +182,10 @@ void cli_field_free(cli_field *made) {
     free(made->owned);
     free(made->layers);
     vsh_field_free(made->field);
-    *made = (cli_field){.field = NULL};
+    made->field = NULL;
+    made->layers = NULL;
+    made->owned = NULL;
+    made->layer_count = 0;
 }
 
 int cli_triangles_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,

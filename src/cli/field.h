@@ -41,7 +41,7 @@ int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_b
 int cli_field_make_around(const vsh_scene *scene, const vsh_assets *assets, double within, const vsh_run *run,
                           cli_field *made);
 
-void cli_field_free(cli_field *made);
+void cli_field_free(cli_field *made); /* what is known of them stays */
 
 /* The triangles of casters in no layer where one of the scene's methods traces them, else NULL; likewise. */
 int cli_triangles_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
