@@ -21,7 +21,7 @@ vshi_cap_kind vshi_cap_of(const double sphere[4], const double origin[3], double
 
 /* Share of a disc of radius `radius`, a unit away in the plane across its axis, that a cap at an angle from
  * the axis, of half angle `half`, covers. Exact for a cap within the disc; else the cap's image, an
- * ellipse, is taken for a circle, to 1e-3 for discs of up to 20°. */
+ * ellipse, is taken for a circle, to 2e-3 for discs of up to 11° around their axis. */
 double vshi_cap_over_disc(double angle, double half, double radius);
 
 /* Cosine-weighted share of the hemisphere around a normal that a cap covers, `cosine` that of the angle from

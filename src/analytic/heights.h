@@ -5,6 +5,8 @@
 #include <vdbshade/heights.h>
 #include <vdbshade/shade.h>
 
+#include <stdbool.h>
+
 /* Share of a light (checked before) that the heightfield leaves free, of what of it is above a point's own
  * horizon (all of it without normals), at points begin … end - 1 into visibility[end - begin]; 1 for points
  * turned away. VSH_SHADOW_HARD, or a light of no size: its centre, 0 or 1; every other method is one:
@@ -19,5 +21,11 @@ void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, int
  * points->normals must be given. */
 void vshi_heights_ao(const vsh_heights *heights, double ao_distance, const vsh_points *points, size_t begin,
                      size_t end, double lift, float *ao, vsh_shade_stats *stats);
+
+/* World units that a layer's start offset is, in cells; -1 stands for 0. */
+double vshi_heights_lift(const vsh_heights *heights, double start_offset);
+
+/* Whether a world position is within the solid, deeper than receivers may be off. */
+bool vshi_heights_hold(const vsh_heights *heights, const double position[3]);
 
 #endif

@@ -73,3 +73,14 @@ double vshi_heights_under(const vshi_relief *r, const double at[3], double x, do
     const double t = at[1] >= r->bottom ? near : far;
     return t > 0.0 ? (r->bottom - at[1]) / t : -INFINITY;
 }
+
+double vshi_heights_lift(const vsh_heights *heights, double start_offset) {
+    return start_offset > 0.0 ? start_offset * heights->unit : 0.0;
+}
+
+bool vshi_heights_hold(const vsh_heights *heights, const double position[3]) {
+    const vsh_points points = {1, position, NULL, NULL};
+    double at[3];
+    vshi_vec normal;
+    return vshi_heights_stand(heights, &points, 0, 0.0, at, &normal) == VSHI_STAND_BURIED;
+}

@@ -26,4 +26,7 @@ void vshi_spheres_ao(const vsh_spheres *spheres, double ao_distance, const vsh_p
  * normal where normals are given. */
 bool vshi_spheres_origin(const vsh_points *points, size_t i, double lift, double origin[3], vshi_vec *normal);
 
+/* Whether a world position is within a sphere, deeper than receivers may be off. */
+bool vshi_spheres_hold(const vsh_spheres *spheres, const double position[3]);
+
 #endif

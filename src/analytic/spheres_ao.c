@@ -7,7 +7,7 @@
 
 #include <string.h>
 
-enum { DIRECTIONS = 256 };
+enum { DIRECTIONS = 512 };
 
 static const double PI = 3.14159265358979323846, TURN = 0.38196601125010515;
 static const double SAME_NORMAL = 0.999;

@@ -12,8 +12,8 @@
 enum { CHORDS = 32, BITS = 64 };
 
 static const double PI = 3.14159265358979323846;
-/* Discs of up to 20° have closed forms for caps that they cut. */
-static const double LARGEST_DISC = 0.35;
+/* Discs of up to 11° around their axis have closed forms for caps that they cut. */
+static const double LARGEST_DISC = 0.2;
 /* A sphere that a point stands on is below its horizon where normals are so near to the sphere's. */
 static const double SAME_NORMAL = 0.999;
 
@@ -271,4 +271,19 @@ void vshi_spheres_shadow(const vsh_spheres *spheres, const vsh_light *light, int
             *value = aim(&c, light, method == VSH_SHADOW_HARD) ? shade_point(spheres, &c, stats) : 1.0f;
         }
     }
+}
+
+static bool is_outside(void *user, const double sphere[4]) {
+    covering *c = user;
+    vshi_cap cap;
+    c->visible = vshi_cap_of(sphere, c->origin, INFINITY, &cap) == VSHI_CAP_INSIDE ? 0.0 : 1.0;
+    return c->visible > 0.0;
+}
+
+bool vshi_spheres_hold(const vsh_spheres *spheres, const double position[3]) {
+    covering c = {.origin = {position[0], position[1], position[2]}, .visible = 1.0};
+    /* whatever bound the point is in, as all directions begin there */
+    const vshi_ball_cone here = {{position[0], position[1], position[2]}, {1.0, 0.0, 0.0}, 1.0, 0.0, 0.0};
+    vshi_balls_search(spheres, &here, is_outside, &c);
+    return c.visible <= 0.0;
 }
