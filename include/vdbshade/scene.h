@@ -5,6 +5,7 @@
 #include "bake.h"
 #include "grid.h"
 #include "heights.h"
+#include "spheres.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -14,13 +15,14 @@ enum {
     VSH_CASTER_MESH = 0,
     VSH_CASTER_SDF = 1,
     VSH_CASTER_VDB = 2,
-    VSH_CASTER_HEIGHTFIELD = 3 /* an image: integers are values 0 … 1, floats values as they are; of R, G and
-                                  B the luminance, else the first channel */
+    VSH_CASTER_HEIGHTFIELD = 3, /* an image: integers are values 0 … 1, floats values as they are; of R, G and
+                                   B the luminance, else the first channel */
+    VSH_CASTER_SPHERES = 4      /* spheres, of a CSV file or given here */
 };
 
 typedef struct vsh_caster {
     int32_t type;         /* VSH_CASTER_… */
-    const char *path;     /* mesh, vdb, heightfield: file */
+    const char *path;     /* mesh, vdb, heightfield: file; spheres: NULL, or a file (vsh_spheres_read()) */
     const char *grid;     /* vdb: name of the grid; NULL: the file's first level set */
     vsh_sdf sdf;          /* sdf: tree */
     double transform[12]; /* local to world, three rows of four; but for meshes no shear, no uneven scale */
@@ -28,6 +30,10 @@ typedef struct vsh_caster {
     double size[2];       /* heightfield, as in vsh_heights_source: these three */
     double height;
     double base;
+    int32_t direct;        /* heightfield: nonzero: cast as it is (vsh_heights), not voxelised */
+    const double *spheres; /* [sphere_count][4], where there is no path: as in vsh_spheres_create() */
+    size_t sphere_count;
+    int32_t voxelised; /* spheres: nonzero: part of the level set; 0: cast as they are (vsh_spheres) */
 } vsh_caster;
 
 /* Casters that are shaded in a way of their own. */
@@ -106,12 +112,19 @@ VSH_API void vsh_assets_free(vsh_assets *assets); /* NULL does nothing */
 VSH_API const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count);
 VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count);
 
-/* The union of all of a scene's casters, whatever their layers, as one level set of scene->grid's voxel size;
- * without one, of the longest side of the box around all casters over scene->grid.resolution. `assets` are
- * those loaded for this scene. Free the grid with vsh_grid_free(). Errors:
+/* What caster `index` casts by where it is not part of a level set: a heightfield that is direct, spheres
+ * that are not voxelised. They belong to the assets; NULL for every other caster, and beyond the scene's. */
+VSH_API const vsh_heights *vsh_assets_heights(const vsh_assets *assets, size_t index);
+VSH_API const vsh_spheres *vsh_assets_spheres(const vsh_assets *assets, size_t index);
+
+/* The union of all of a scene's casters that are voxelised, whatever their layers, as one level set of
+ * scene->grid's voxel size; without one, of the longest side of the box around all casters over
+ * scene->grid.resolution. `assets` are those loaded for this scene. Free the grid with vsh_grid_free().
+ * Errors:
  * - VSH_ERROR_ARGUMENT: scene, assets or grid NULL, scene->grid out of range, run;
- * - VSH_ERROR_INPUT: no casters, casters without extent, a caster, other than a mesh, whose transform shears
- * or scales unevenly; as vsh_mesh_check(), vsh_sdf_check() and the vsh_grid_from_… calls;
+ * - VSH_ERROR_INPUT: no casters that are voxelised, casters without extent, a caster, other than a mesh,
+ * whose transform shears or scales unevenly; as vsh_mesh_check(), vsh_sdf_check() and the vsh_grid_from_…
+ * calls;
  * - VSH_ERROR_LIMIT: as the vsh_grid_from_… calls and vsh_grid_unite();
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,

@@ -345,6 +345,46 @@ uint64_t vshi_balls_search(const vsh_spheres *spheres, const vshi_ball_cone *con
     return looked;
 }
 
+double vshi_balls_distance(const vsh_spheres *spheres, const double position[3]) {
+    struct {
+        double bound;
+        int32_t block;
+    } stack[VSHI_BALLS * VSHI_BALL_DEPTH];
+    int waiting = 0;
+    double nearest = INFINITY;
+    stack[waiting].bound = -INFINITY;
+    stack[waiting++].block = 0;
+    const vshi_vec p = vshi_sub(vshi_vec_of(position), vshi_vec_of(spheres->middle));
+    while (waiting > 0) {
+        --waiting;
+        if (stack[waiting].bound >= nearest) {
+            continue;
+        }
+        const vshi_ball_block *b = &spheres->block[stack[waiting].block];
+        const int first = waiting;
+        for (int k = 0; k < VSHI_BALLS; ++k) {
+            const vshi_vec to = {(double)b->x[k] - p.x, (double)b->y[k] - p.y, (double)b->z[k] - p.z};
+            /* a bound that is wide enough for the rounding of floats; infinite where there is none */
+            const double bound = vshi_length(to) - (double)b->radius[k];
+            if (bound >= nearest) {
+                continue;
+            }
+            if (b->below[k] < 0) {
+                const double *s = spheres->sphere[~b->below[k]];
+                nearest = fmin(nearest, vshi_length(vshi_sub(vshi_vec_of(s), vshi_vec_of(position))) - s[3]);
+                continue;
+            }
+            int at = waiting++; /* nearest on top */
+            for (; at > first && stack[at - 1].bound < bound; --at) {
+                stack[at] = stack[at - 1];
+            }
+            stack[at].bound = bound;
+            stack[at].block = b->below[k];
+        }
+    }
+    return nearest;
+}
+
 bool vshi_spheres_origin(const vsh_points *points, size_t i, double lift, double origin[3],
                          vshi_vec *normal) {
     vshi_vec p = vshi_vec_of(points->positions + 3 * i);

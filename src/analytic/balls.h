@@ -40,4 +40,7 @@ typedef bool vshi_ball_fn(void *user, const double sphere[4]);
 uint64_t vshi_balls_search(const vsh_spheres *spheres, const vshi_ball_cone *cone, vshi_ball_fn *fn,
                            void *user);
 
+/* Signed distance to the nearest sphere, world units, negative within one: true outside of all. */
+double vshi_balls_distance(const vsh_spheres *spheres, const double position[3]);
+
 #endif

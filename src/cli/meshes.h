@@ -14,4 +14,10 @@ static inline bool cli_caster_has_triangles(const vsh_caster *caster) {
     return caster->type == VSH_CASTER_MESH || caster->type == VSH_CASTER_HEIGHTFIELD;
 }
 
+/* Whether a caster stays out of level sets. */
+static inline bool cli_caster_is_direct(const vsh_caster *caster) {
+    return (caster->type == VSH_CASTER_HEIGHTFIELD && caster->direct) ||
+           (caster->type == VSH_CASTER_SPHERES && !caster->voxelised);
+}
+
 #endif

@@ -71,7 +71,7 @@ static int march(trade_work *work, int32_t resolution) {
 static bool traceable(const trade_work *work) {
     for (size_t i = 0; i < work->scene->caster_count; ++i) {
         const vsh_caster *caster = &work->scene->casters[i];
-        if (caster->type == VSH_CASTER_VDB ||
+        if (caster->type == VSH_CASTER_VDB || caster->type == VSH_CASTER_SPHERES ||
             (cli_caster_has_triangles(caster) && !vsh_triangles_available())) {
             return false;
         }

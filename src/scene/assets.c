@@ -32,6 +32,9 @@ typedef struct asset_place {
     size_t count;
     const vsh_grid *grid; /* vdb casters; belongs to the assets' grids */
     vsh_model *made;      /* of heightfields; its meshes are this place's */
+    vsh_heights *heights; /* direct ones */
+    vsh_spheres *spheres;
+    bool direct;
 } asset_place;
 
 struct vsh_assets {
@@ -154,7 +157,7 @@ static vsh_result find_map(vsh_assets *assets, const char *path, const vsh_run *
     return result;
 }
 
-/* `source` is filled but for what the image holds. */
+/* `source` is filled but for what the image holds, and whether it is direct but for its transform. */
 static vsh_result place_heights(vsh_assets *assets, asset_place *place, vsh_heights_source *source,
                                 int32_t what, const double transform[12], const vsh_run *run,
                                 vsh_error *error) {
@@ -164,9 +167,37 @@ static vsh_result place_heights(vsh_assets *assets, asset_place *place, vsh_heig
         source->columns = map->columns;
         source->rows = map->rows;
         source->values = map->values;
+    }
+    if (result == VSH_OK && place->direct) {
+        source->transform = transform;
+        return vsh_heights_create(source, run, &place->heights, error);
+    }
+    if (result == VSH_OK) {
         result = vsh_model_from_heights(source, what, run, &place->made, error);
     }
     return result == VSH_OK ? place_model(place, place->made, 0, transform, error) : result;
+}
+
+static vsh_result place_spheres(asset_place *place, const vsh_caster *caster, size_t index,
+                                const vsh_run *run, vsh_error *error) {
+    const double *spheres = caster->spheres;
+    size_t count = caster->sphere_count;
+    double *read = NULL;
+    vsh_error why;
+    vsh_result result = VSH_OK;
+    if (caster->path != NULL) {
+        result = vsh_spheres_read(caster->path, run, &read, &count, error);
+        spheres = read;
+    }
+    if (result == VSH_OK) {
+        result = vsh_spheres_create(spheres, count, caster->transform, run, &place->spheres, &why);
+        if (result != VSH_OK) {
+            vshi_fail(error, result, "caster %zu: %s%s%s", index, caster->path != NULL ? caster->path : "",
+                      caster->path != NULL ? ": " : "", why.message);
+        }
+    }
+    vsh_spheres_list_free(read);
+    return result;
 }
 
 static vsh_result place_caster(vsh_assets *assets, const vsh_caster *caster, size_t index, const vsh_run *run,
@@ -175,9 +206,13 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_caster *caster, siz
     if (caster->type == VSH_CASTER_SDF) {
         return VSH_OK;
     }
-    if (caster->type < VSH_CASTER_MESH || caster->type > VSH_CASTER_HEIGHTFIELD) {
+    if (caster->type < VSH_CASTER_MESH || caster->type > VSH_CASTER_SPHERES) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: type %d: expected 0 … %d", index,
-                         caster->type, VSH_CASTER_HEIGHTFIELD);
+                         caster->type, VSH_CASTER_SPHERES);
+    }
+    place->direct = vshi_caster_is_direct(caster);
+    if (caster->type == VSH_CASTER_SPHERES) {
+        return place_spheres(place, caster, index, run, error);
     }
     if (caster->path == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: no path", index);
@@ -301,6 +336,8 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
 
 static void free_places(asset_place *places, size_t count) {
     for (size_t i = 0; i < count; ++i) {
+        vsh_spheres_free(places[i].spheres);
+        vsh_heights_free(places[i].heights);
         vsh_model_free(places[i].made);
         free(places[i].transforms);
         free(places[i].meshes);
@@ -349,4 +386,17 @@ const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t
 
 const vsh_grid *vshi_assets_grid(const vsh_assets *assets, size_t index) {
     return index < assets->caster_count ? assets->casters[index].grid : NULL;
+}
+
+const vsh_spheres *vshi_assets_spheres(const vsh_assets *assets, size_t index) {
+    return index < assets->caster_count ? assets->casters[index].spheres : NULL;
+}
+
+const vsh_heights *vsh_assets_heights(const vsh_assets *assets, size_t index) {
+    return index < assets->caster_count ? assets->casters[index].heights : NULL;
+}
+
+const vsh_spheres *vsh_assets_spheres(const vsh_assets *assets, size_t index) {
+    return index < assets->caster_count && assets->casters[index].direct ? assets->casters[index].spheres
+                                                                         : NULL;
 }

@@ -9,16 +9,52 @@ enum {
     SDF = 1 << VSH_CASTER_SDF,
     VDB = 1 << VSH_CASTER_VDB,
     HEIGHTFIELD = 1 << VSH_CASTER_HEIGHTFIELD,
+    SPHERES = 1 << VSH_CASTER_SPHERES,
 };
 
 static const char *const types[] = {[VSH_CASTER_MESH] = "mesh",
                                     [VSH_CASTER_SDF] = "sdf",
                                     [VSH_CASTER_VDB] = "vdb",
-                                    [VSH_CASTER_HEIGHTFIELD] = "heightfield"};
+                                    [VSH_CASTER_HEIGHTFIELD] = "heightfield",
+                                    [VSH_CASTER_SPHERES] = "spheres"};
 static const char *const whats[] = {[VSH_CASTER_MESH] = "a mesh caster",
                                     [VSH_CASTER_SDF] = "an sdf caster",
                                     [VSH_CASTER_VDB] = "a vdb caster",
-                                    [VSH_CASTER_HEIGHTFIELD] = "a heightfield caster"};
+                                    [VSH_CASTER_HEIGHTFIELD] = "a heightfield caster",
+                                    [VSH_CASTER_SPHERES] = "a caster of spheres"};
+
+/* A file's name, or [[x, y, z, radius], …]. */
+static vsh_result read_spheres(vshi_reader *reader, const vshi_value *value, void *member) {
+    static const vshi_key path = {.kind = VSHI_PATH};
+    static const vshi_key sphere = {
+        .kind = VSHI_VECTOR, .count = 4, .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST};
+    vsh_caster *caster = member;
+    if (json_is_string(value->json)) {
+        return vshi_read_value(reader, value, &path, &caster->path);
+    }
+    if (!json_is_array(value->json)) {
+        return vshi_reader_fail(reader, value, "expected a file's name or an array of [x, y, z, radius]");
+    }
+    void *memory = NULL;
+    caster->sphere_count = json_array_size(value->json);
+    if (caster->sphere_count == 0) {
+        return vshi_reader_fail(reader, value, "is empty");
+    }
+    vsh_result result =
+        vshi_reader_allocate(reader, &memory, caster->sphere_count, 4 * sizeof(double), "spheres");
+    double *spheres = memory;
+    for (size_t i = 0; result == VSH_OK && i < caster->sphere_count; ++i) {
+        const vshi_value item = vshi_item(value, i);
+        result = vshi_read_value(reader, &item, &sphere, spheres + 4 * i);
+        if (result == VSH_OK && !(spheres[4 * i + 3] > 0.0)) {
+            const vshi_value radius = vshi_item(&item, 3);
+            return vshi_reader_fail(reader, &radius, "%.9g is out of range 0 (excluded) … %.9g",
+                                    spheres[4 * i + 3], VSHI_LARGEST);
+        }
+    }
+    caster->spheres = spheres;
+    return result;
+}
 
 static const vshi_key caster_keys[] = {
     {.name = "mesh", .kind = VSHI_PATH, .variants = MESH, .offset = offsetof(vsh_caster, path)},
@@ -49,6 +85,9 @@ static const vshi_key caster_keys[] = {
      .offset = offsetof(vsh_caster, base),
      .highest = 1e12,
      .flags = VSHI_ABOVE},
+    {.name = "direct", .kind = VSHI_BOOL, .variants = HEIGHTFIELD, .offset = offsetof(vsh_caster, direct)},
+    {.name = "spheres", .kind = VSHI_CUSTOM, .variants = SPHERES, .read = read_spheres},
+    {.name = "voxelised", .kind = VSHI_BOOL, .variants = SPHERES, .offset = offsetof(vsh_caster, voxelised)},
     {.name = "transform",
      .kind = VSHI_CUSTOM,
      .offset = offsetof(vsh_caster, transform),
@@ -67,7 +106,7 @@ vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *
         return result;
     }
     vshi_value given, transform;
-    for (int32_t i = VSH_CASTER_MESH; i <= VSH_CASTER_HEIGHTFIELD; ++i) {
+    for (int32_t i = VSH_CASTER_MESH; i <= VSH_CASTER_SPHERES; ++i) {
         if (!vshi_member(value, types[i], &given)) {
             continue;
         }
@@ -85,12 +124,12 @@ vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *
     }
     if (caster->type < 0) {
         return vshi_reader_fail(reader, value,
-                                "key \"mesh\", \"sdf\", \"vdb\" or \"heightfield\" is missing");
+                                "key \"mesh\", \"sdf\", \"vdb\", \"heightfield\" or \"spheres\" is missing");
     }
     for (size_t i = 0; caster->type == VSH_CASTER_HEIGHTFIELD && i < 2; ++i) {
         if (!vshi_member(value, heightfield_needs[i], &given)) {
-            return vshi_reader_fail(reader, value, "key \"%s\" is missing: %s needs it",
-                                    heightfield_needs[i], whats[caster->type]);
+            return vshi_reader_fail(reader, value, "key \"%s\" is missing: %s needs it", heightfield_needs[i],
+                                    whats[caster->type]);
         }
     }
     if (caster->type != VSH_CASTER_MESH && !vshi_transform_is_similarity(caster->transform) &&
