@@ -36,8 +36,13 @@ def step(low, high, x):
 
 def height(x, z):
     """0 … 1 over the unit square."""
-    hills = sum(noise(x * 5 * 2**k, z * 5 * 2**k, k) * 0.5**k for k in range(6))
-    ridges = sum((1 - abs(noise(x * 4 * 2**k + 7, z * 4 * 2**k, 20 + k))) ** 2 * 0.5**k for k in range(6))
+    hills = ridges = 0.0
+    u, v = 5 * x, 5 * z
+    for k in range(6):
+        hills += noise(u, v, k) * 0.5**k
+        level = noise(0.8 * u + 7, 0.8 * v, 20 + k)
+        ridges += (1 - (level * level + 0.005) ** 0.5) ** 2 * 0.5**k
+        u, v = 2 * (0.8 * u - 0.6 * v), 2 * (0.6 * u + 0.8 * v)  # no octave's squares lie over another's
     range_of = exp(-((z - 0.35 - 0.1 * sin(6 * x)) / 0.16) ** 2)
     y = 0.17 + 0.05 * hills + range_of * (0.27 * ridges - 0.08)
     crater = hypot(x - 0.73, z - 0.72) + 0.006 * noise(x * 24, z * 24, 50)
