@@ -12,7 +12,7 @@
 #include <unistd.h>
 #include <vdbshade/spheres.h>
 
-enum { POINTS = 2000, RAYS = 1024, MOST = 400 };
+enum { POINTS = 400, RAYS = 1024, MOST = 400 };
 
 typedef struct stage {
     truth_solid solids[MOST];
@@ -87,10 +87,10 @@ static void a_sphere_hides_of_a_disc_what_rays_say(void **state) {
     (void)state;
     stage *small = set_up(1, 0.3, 0.3, 1.0), *large = set_up(1, 3.0, 3.0, 1.0);
     assert_true(check_sun(small, TOWARDS, RADIANS(0.5), "small, the sun's size").max < 0.002);
-    assert_true(check_sun(small, TOWARDS, RADIANS(11.0), "small, 11°").max < 0.004);
+    assert_true(check_sun(small, TOWARDS, RADIANS(11.0), "small, 11°").max < 0.006);
     assert_true(check_sun(small, TOWARDS, RADIANS(38.0), "small, 38°").max < 0.01);
     assert_true(check_sun(small, TOWARDS, RADIANS(100.0), "small, 100°").max < 0.01);
-    assert_true(check_sun(large, TOWARDS, RADIANS(11.0), "large, 11°").max < 0.004);
+    assert_true(check_sun(large, TOWARDS, RADIANS(11.0), "large, 11°").max < 0.006);
     assert_true(check_sun(large, TOWARDS, RADIANS(38.0), "large, 38°").max < 0.01);
     assert_true(check_sun(large, TOWARDS, RADIANS(150.0), "large, 150°").max < 0.015);
     tear_down(large);
