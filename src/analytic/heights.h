@@ -18,9 +18,11 @@ void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, int
                          vsh_shade_stats *stats);
 
 /* Cosine-weighted fraction of the hemisphere that the heightfield leaves free within a distance, likewise;
- * points->normals must be given. */
+ * points->normals must be given. `bent` [end - begin][3], where not NULL, takes the integral of the free
+ * directions so weighted, world space: two thirds of the normal under an open sky; NaN where the point is
+ * invalid. */
 void vshi_heights_ao(const vsh_heights *heights, double ao_distance, const vsh_points *points, size_t begin,
-                     size_t end, double lift, float *ao, vsh_shade_stats *stats);
+                     size_t end, double lift, float *ao, float *bent, vsh_shade_stats *stats);
 
 /* World units that a layer's start offset is, in cells; -1 stands for 0. */
 double vshi_heights_lift(const vsh_heights *heights, double start_offset);

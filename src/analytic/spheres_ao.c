@@ -23,6 +23,7 @@ typedef struct sky {
     double sum;
     size_t counted;
     bool inside;
+    bool all; /* sample the first sphere too: directions are asked for */
 } sky;
 
 /* Vogel's spiral ("A better way to construct the sunflower head", 1979) raised to the hemisphere. */
@@ -68,16 +69,41 @@ static bool meets(void *user, const double sphere[4]) {
     s->sum += share;
     if (++s->caps == 1) {
         s->first = cap;
-        return true;
+        if (!s->all) {
+            return true;
+        }
     }
-    if (s->caps == 2) {
+    if (s->caps == 2 && !s->all) {
         sample(s, &s->first);
     }
     sample(s, &cap);
     return true;
 }
 
-static float shade_point(const vsh_spheres *spheres, sky *s, vsh_shade_stats *stats) {
+/* The integral of free directions: two thirds of the normal, less the mean of those that are covered, at
+ * the length that the exact share has. */
+static void put_bent(const sky *s, double hidden, float *bent) {
+    double sum[3] = {0.0, 0.0, 0.0};
+    int32_t covered = 0;
+    for (int i = 0; i < DIRECTIONS; ++i) {
+        sum[0] += s->covered[i] * (double)s->x[i];
+        sum[1] += s->covered[i] * (double)s->y[i];
+        sum[2] += s->covered[i] * (double)s->z[i];
+        covered += s->covered[i];
+    }
+    vshi_vec mean = s->first.centre; /* too small a sphere to be met */
+    if (covered > 0) {
+        mean = vshi_add(vshi_add(vshi_scale(s->u, sum[0]), vshi_scale(s->v, sum[1])),
+                        vshi_scale(s->normal, sum[2]));
+        mean = vshi_scale(mean, 1.0 / covered);
+    }
+    const vshi_vec open = vshi_sub(vshi_scale(s->normal, 2.0 / 3.0), vshi_scale(mean, hidden));
+    bent[0] = (float)open.x;
+    bent[1] = (float)open.y;
+    bent[2] = (float)open.z;
+}
+
+static float shade_point(const vsh_spheres *spheres, sky *s, float *bent, vsh_shade_stats *stats) {
     s->caps = s->counted = 0;
     s->sum = 0.0;
     s->inside = false;
@@ -91,6 +117,9 @@ static float shade_point(const vsh_spheres *spheres, sky *s, vsh_shade_stats *st
     ++stats->marches;
     stats->samples += vshi_balls_search(spheres, &hemisphere, meets, s);
     if (s->inside) {
+        if (bent != NULL) {
+            bent[0] = bent[1] = bent[2] = 0.0f;
+        }
         return 0.0f;
     }
     double hidden = s->sum;
@@ -101,16 +130,28 @@ static float shade_point(const vsh_spheres *spheres, sky *s, vsh_shade_stats *st
         }
         hidden = together == DIRECTIONS ? 1.0 : s->sum * (double)together / (double)s->counted;
     }
+    if (bent != NULL) {
+        put_bent(s, s->caps > 0 ? fmin(hidden, 1.0) : 0.0, bent);
+    }
     return (float)(1.0 - fmin(hidden, 1.0));
 }
 
 void vshi_spheres_ao(const vsh_spheres *spheres, double ao_distance, const vsh_points *points, size_t begin,
-                     size_t end, double lift, float *ao, vsh_shade_stats *stats) {
+                     size_t end, double lift, float *ao, float *bent, vsh_shade_stats *stats) {
     sky s;
     set_directions(&s);
     s.distance = ao_distance;
+    s.first.centre = (vshi_vec){0.0, 0.0, 0.0};
+    s.all = bent != NULL;
     for (size_t i = begin; i < end; ++i) {
-        ao[i - begin] =
-            vshi_spheres_origin(points, i, lift, s.origin, &s.normal) ? shade_point(spheres, &s, stats) : NAN;
+        float *direction = bent != NULL ? bent + 3 * (i - begin) : NULL;
+        if (vshi_spheres_origin(points, i, lift, s.origin, &s.normal)) {
+            ao[i - begin] = shade_point(spheres, &s, direction, stats);
+            continue;
+        }
+        ao[i - begin] = NAN;
+        if (direction != NULL) {
+            direction[0] = direction[1] = direction[2] = NAN;
+        }
     }
 }

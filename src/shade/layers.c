@@ -235,15 +235,15 @@ static void shade_analytic(const prepared *item, layer_piece *piece, vsh_shade_s
     }
 }
 
-static void occlude_analytic(const prepared *item, layer_piece *piece, vsh_shade_stats *stats) {
+static void occlude_analytic(const prepared *item, layer_piece *piece, float *bent, vsh_shade_stats *stats) {
     const vsh_layer *layer = &item->layer;
     const double distance = item->options.ao_distance;
     const size_t count = piece->points.count;
     if (layer->heights != NULL) {
         vshi_heights_ao(layer->heights, distance, &piece->points, 0, count,
-                        vshi_heights_lift(layer->heights, layer->start_offset), piece->value, stats);
+                        vshi_heights_lift(layer->heights, layer->start_offset), piece->value, bent, stats);
     } else {
-        vshi_spheres_ao(layer->spheres, distance, &piece->points, 0, count, 0.0, piece->value, stats);
+        vshi_spheres_ao(layer->spheres, distance, &piece->points, 0, count, 0.0, piece->value, bent, stats);
     }
 }
 
@@ -298,10 +298,14 @@ void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t 
     for (size_t k = 0; k < layers->count; ++k) {
         const prepared *item = &layers->items[k];
         if (item->layer.field == NULL) {
-            occlude_analytic(item, &piece, stats);
+            occlude_analytic(item, &piece, task->bent != NULL ? piece.bent : NULL, stats);
             for (size_t i = begin; i < end; ++i) {
                 combine(&item->layer, (double)piece.value[i - begin], 0.0, 1.0, &task->ao[i],
                         task->deviation != NULL ? &task->deviation[i] : NULL);
+                if (task->bent != NULL) {
+                    superpose(task->bent + 3 * i, piece.bent + 3 * (i - begin),
+                              task->points->normals + 3 * i);
+                }
             }
             continue;
         }

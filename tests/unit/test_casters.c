@@ -1,6 +1,7 @@
 /* Terrains and spheres through the public calls: as layers of a field, and from scene files to lightmaps. */
 #include "terrain.h"
 #include "truth/analytic.h"
+#include "truth/directions.h"
 
 #include "base/vec.h"
 #include "scene/scene.h"
@@ -163,6 +164,88 @@ static void spheres_in_a_layer_and_in_voxels_cast_the_same(void **state) {
     vsh_assets_free(assets);
 }
 
+/* Mean of the free directions, by the rays of analytic truth. */
+static void bent_by_rays(truth_scene scene, const double point[3], double distance, double mean[3]) {
+    enum { RAYS = 2048 };
+    static const double up[3] = {0, 1, 0};
+    const truth_frame frame = truth_frame_around(up);
+    mean[0] = mean[1] = mean[2] = 0.0;
+    for (size_t i = 0; i < RAYS; ++i) {
+        double d[3];
+        truth_cosine_direction(&frame, i, RAYS, d);
+        for (size_t axis = 0; axis < 3 && !truth_hit(scene, point, d, distance); ++axis) {
+            mean[axis] += d[axis];
+        }
+    }
+    const double length = sqrt(mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+        mean[axis] /= length;
+    }
+}
+
+static void bent_normals_lean_away_from_spheres_and_terrain(void **state) {
+    (void)state;
+    enum { COUNT = 60 };
+    static double positions[3 * COUNT];
+    static float normals[3 * COUNT], ao[COUNT], bent[3 * COUNT];
+    const double spheres[2][4] = {{1.0, 0.6, 0.0, 0.5}, {-0.4, 0.9, 1.0, 0.4}};
+    const truth_solid solids[2] = {{.shape = TRUTH_SPHERE, .center = {1.0, 0.6, 0.0}, .radius = 0.5},
+                                   {.shape = TRUTH_SPHERE, .center = {-0.4, 0.9, 1.0}, .radius = 0.4}};
+    uint64_t counter = 6;
+    for (size_t i = 0; i < COUNT; ++i) {
+        positions[3 * i] = between(&counter, -1.0, 2.0);
+        positions[3 * i + 2] = between(&counter, -1.0, 2.0);
+        normals[3 * i + 1] = 1.0f;
+    }
+    vsh_spheres *made = NULL;
+    assert_int_equal(vsh_spheres_create(spheres[0], 2, NULL, NULL, &made, NULL), VSH_OK);
+    vsh_layer layer = vsh_layer_default();
+    layer.spheres = made;
+    vsh_shade_options options = vsh_shade_options_default();
+    options.layers = &layer;
+    options.layer_count = 1;
+    options.ao_distance = 3.0;
+    vsh_field *empty = empty_field();
+    const vsh_points points = {COUNT, positions, normals, NULL};
+    const truth_scene scene = {solids, 2};
+    assert_int_equal(vsh_shade_bent(empty, &points, &options, NULL, ao, bent, NULL, NULL), VSH_OK);
+    for (size_t i = 0; i < COUNT; ++i) {
+        double mean[3];
+        bent_by_rays(scene, positions + 3 * i, 3.0, mean);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            assert_float_equal(bent[3 * i + axis], mean[axis], 0.02);
+        }
+    }
+    vsh_spheres_free(made);
+    /* a wall along z, whose face a quarter of the terrain's cells make, seen from the ground before it */
+    float values[33 * 33];
+    for (int i = 0; i < 33 * 33; ++i) {
+        values[i] = i % 33 > 16 ? 1.0f : 0.0f;
+    }
+    const vsh_heights_source source = {
+        .columns = 33, .rows = 33, .values = values, .size = {32, 32}, .height = 4, .base = 1};
+    truth_solid wall = {.shape = TRUTH_BOX, .center = {9.0, 0.0, 0.0}, .half = {8.0, 4.0, 16.0}};
+    layer.spheres = NULL;
+    layer.heights = heights_of(&source);
+    options.ao_distance = 10.0;
+    const truth_scene beside = {&wall, 1};
+    for (size_t i = 0; i < COUNT; ++i) {
+        positions[3 * i] = between(&counter, -8.0, -2.0);
+        positions[3 * i + 1] = 1e-3;
+        positions[3 * i + 2] = between(&counter, -3.0, 3.0);
+    }
+    assert_int_equal(vsh_shade_bent(empty, &points, &options, NULL, ao, bent, NULL, NULL), VSH_OK);
+    for (size_t i = 0; i < COUNT; ++i) {
+        double mean[3];
+        bent_by_rays(beside, positions + 3 * i, 10.0, mean);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            assert_float_equal(bent[3 * i + axis], mean[axis], 0.03);
+        }
+    }
+    vsh_heights_free((vsh_heights *)(uintptr_t)layer.heights);
+    vsh_field_free(empty);
+}
+
 /* Bakes the floor under casters given as JSON; coverage of its texels. */
 static void bake_floor(const char *casters, float *shadow, float *coverage, int32_t side) {
     char text[1024];
@@ -235,6 +318,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_horizon),
         cmocka_unit_test(spheres_in_a_layer_and_in_voxels_cast_the_same),
+        cmocka_unit_test(bent_normals_lean_away_from_spheres_and_terrain),
         cmocka_unit_test(texels_within_a_sphere_or_a_terrain_are_not_valid),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
