@@ -13,6 +13,7 @@
 #include "field.h"
 #include "flat.h"
 #include "grid.h"
+#include "heights.h"
 #include "image.h"
 #include "layer.h"
 #include "light.h"
@@ -22,6 +23,7 @@
 #include "scene.h"
 #include "sdf.h"
 #include "shade.h"
+#include "spheres.h"
 #include "trace.h"
 #include "volume.h"
 

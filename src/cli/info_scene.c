@@ -8,13 +8,15 @@
 #include <vdbshade/scene.h>
 
 static void print_caster(const vsh_caster *caster, size_t index) {
-    static const char *const types[] = {"mesh", "sdf", "vdb", "mask", "text"};
+    static const char *const types[] = {"mesh", "sdf", "vdb", "heightfield", "spheres", "mask", "text"};
     printf("caster %zu: %s", index, types[caster->type]);
     if (caster->type == VSH_CASTER_SDF) {
         double min[3], max[3];
         vsh_sdf_bounds(&caster->sdf, min, max);
         printf(", %zu nodes, bounds %g %g %g to %g %g %g", caster->sdf.node_count, min[0], min[1], min[2],
                max[0], max[1], max[2]);
+    } else if (caster->path == NULL) {
+        printf(", %zu", caster->sphere_count);
     } else {
         printf(" %s", caster->path);
         if (caster->grid != NULL) {
@@ -23,6 +25,13 @@ static void print_caster(const vsh_caster *caster, size_t index) {
         if (caster->type == VSH_CASTER_TEXT) {
             printf(", %zu bytes of text", strlen(caster->text));
         }
+        if (caster->type == VSH_CASTER_HEIGHTFIELD) {
+            printf(", %g × %g, height %g%s", caster->size[0], caster->size[1], caster->height,
+                   caster->direct ? ", direct" : "");
+        }
+    }
+    if (caster->type == VSH_CASTER_SPHERES && caster->voxelised) {
+        printf(", voxelised");
     }
     if (caster->layer != NULL) {
         printf(", layer '%s'", caster->layer);

@@ -35,14 +35,40 @@ vsh_result vshi_read_bits(vshi_reader *reader, const vshi_value *value, void *me
     return result;
 }
 
+enum { MESH = 1 << VSH_RECEIVER_MESH, HEIGHTFIELD = 1 << VSH_RECEIVER_HEIGHTFIELD };
+
 static const vshi_key receiver_keys[] = {
-    {.name = "mesh", .kind = VSHI_PATH, .required = VSHI_ALL, .offset = offsetof(vsh_receiver, path)},
+    {.name = "mesh",
+     .kind = VSHI_PATH,
+     .variants = MESH,
+     .required = MESH,
+     .offset = offsetof(vsh_receiver, path)},
+    {.name = "heightfield",
+     .kind = VSHI_PATH,
+     .variants = HEIGHTFIELD,
+     .offset = offsetof(vsh_receiver, path)},
+    {.name = "extent",
+     .kind = VSHI_VECTOR,
+     .variants = HEIGHTFIELD,
+     .required = HEIGHTFIELD,
+     .offset = offsetof(vsh_receiver, extent),
+     .count = 2,
+     .lowest = 1e-12,
+     .highest = 1e12},
+    {.name = "height",
+     .kind = VSHI_NUMBER,
+     .variants = HEIGHTFIELD,
+     .required = HEIGHTFIELD,
+     .offset = offsetof(vsh_receiver, relief),
+     .lowest = -1e12,
+     .highest = 1e12},
     {.name = "transform",
      .kind = VSHI_CUSTOM,
      .offset = offsetof(vsh_receiver, transform),
      .read = vshi_read_transform},
     {.name = "uv_set",
      .kind = VSHI_INTEGER,
+     .variants = MESH,
      .offset = offsetof(vsh_receiver, uv_set),
      .highest = VSH_MAX_UV_SETS - 1},
     {.name = "size", .kind = VSHI_CUSTOM, .read = read_size},
@@ -75,5 +101,16 @@ vsh_result vshi_read_receiver(vshi_reader *reader, const vshi_value *value, void
     receiver->padding = lightmap.padding;
     receiver->ao_spacing = lightmap.ao_spacing;
     receiver->bits = image.bits;
-    return vshi_read_object(reader, value, &receiver_table, 1, "a receiver", receiver);
+    vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
+    if (result == VSH_OK) {
+        result = vshi_reject_both(reader, value, "mesh", "heightfield");
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    vshi_value given;
+    const bool heightfield = vshi_member(value, "heightfield", &given);
+    receiver->type = heightfield ? VSH_RECEIVER_HEIGHTFIELD : VSH_RECEIVER_MESH;
+    return vshi_read_object(reader, value, &receiver_table, 1U << receiver->type,
+                            heightfield ? "a heightfield receiver" : "a receiver", receiver);
 }
