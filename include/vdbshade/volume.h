@@ -103,9 +103,9 @@ typedef struct vsh_volume vsh_volume;
 /* Shades the voxels. Values are those of vsh_query_points() at vsh_voxels_centre(): in free space without
  * normals; in a band with the central differences of vsh_field_sample() half a voxel to either side of the
  * centre along each of the lattice's axes as normals (voxels where they vanish, between two walls, count as
- * inside). Which voxels are inside is decided by the sign of vsh_field_sample(), of the layers too. adaptive and exact
- * values are the same within their error. Runs under the stage
- * "volume"; `stats` are added to. Free the result with vsh_volume_free(). Errors:
+ * inside). Which voxels are inside is decided by the sign of vsh_field_sample(), of the layers too. adaptive
+ * and exact values are the same within their error. Runs under the stage "volume"; `stats` are added to. Free
+ * the result with vsh_volume_free(). Errors:
  * - VSH_ERROR_ARGUMENT: field or voxels NULL, lights NULL with a count above 0, nothing to bake, two lights
  *   of one name or one without, options out of range, VSH_AO_TAPS in free space, run, and as
  *   vsh_query_create();
