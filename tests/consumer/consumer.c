@@ -168,7 +168,8 @@ static void bake_floor(const vsh_field *field, double least_open, double most_op
     static float shadow[SIZE * SIZE], ao[SIZE * SIZE], irradiance[3 * SIZE * SIZE], coverage[SIZE * SIZE];
     float *planes[1] = {shadow};
     const vsh_light light = sun();
-    const vsh_lightmap lightmap = {planes, ao, irradiance, coverage, NULL, NULL};
+    const vsh_lightmap lightmap = {
+        .shadow = planes, .ao = ao, .irradiance = irradiance, .coverage = coverage};
     vsh_bake_stats stats = vsh_bake_stats_zero();
     check("bake", vsh_bake_lightmap(field, texels, &light, 1, &options.shade, NULL, &lightmap, &stats, error),
           error);
