@@ -18,6 +18,7 @@ typedef struct vsh_caster {
     vsh_sdf sdf;          /* sdf: tree */
     double transform[12]; /* local to world, three rows of four; sdf and vdb: without shear or uneven scale */
     const char *layer;    /* name of the layer it is in; NULL: none */
+    double color[3];      /* in pictures, linear RGB, 0 … 1; all 0: 0.7, a light grey */
 } vsh_caster;
 
 /* Casters that are shaded in a way of their own. */

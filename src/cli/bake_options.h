@@ -110,6 +110,9 @@ int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made)
 /* The same without its receivers: for points, which may ask for no light and no AO. */
 int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made);
 
+/* Then adds the receivers, with the options put over them. CLI_OK or an exit code, having said why. */
+int cli_bake_scene_receivers(const cli_bake_settings *settings, cli_bake_scene *made);
+
 /* Refuses an output that is one of the scene's inputs. CLI_OK or an exit code, having said why. */
 int cli_bake_check_output(const cli_bake_settings *settings, const vsh_scene *scene, const char *output);
 void cli_bake_scene_free(cli_bake_scene *made);

@@ -7,7 +7,8 @@
 #include <stdio.h>
 #include <string.h>
 
-static const cli_command *const commands[] = {&cli_bake, &cli_voxelize, &cli_info, &cli_trade, &cli_query};
+static const cli_command *const commands[] = {&cli_bake,  &cli_voxelize, &cli_info,
+                                              &cli_trade, &cli_query,    &cli_render};
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
 static const char help_text[] =
@@ -20,6 +21,7 @@ static const char help_text[] =
     "  voxelize INPUT -o OUT.vdb level set of a mesh's or a scene's casters\n"
     "  info FILE                 what a mesh, .vdb, scene or image holds, and what is wrong with it\n"
     "  query INPUT -o OUT        shadow, AO, distance at points of a CSV, a PLY or raw floats\n"
+    "  render INPUT -o OUT       picture of a scene, or a turntable, to look at a bake\n"
     "  trade INPUT -o OUT.html   error against time by every method, measured on a scene of yours\n"
     "\n"
     "  vdbshade COMMAND --help   options of a command\n"

@@ -62,15 +62,30 @@ int cli_take_integer(const char *name, const char *text, int32_t least, int32_t 
     return CLI_OK;
 }
 
-int cli_take_vector(const char *name, const char *text, double value[3]) {
+static bool read_three(const char *text, double value[3]) {
     const char *at = text;
     bool good = true;
     for (int i = 0; i < 3 && good; ++i) {
         good = read_number(at, &value[i], &at) && *at == (i < 2 ? ',' : '\0');
         ++at;
     }
-    if (!good || (value[0] == 0.0 && value[1] == 0.0 && value[2] == 0.0)) {
+    return good;
+}
+
+int cli_take_vector(const char *name, const char *text, double value[3]) {
+    if (!read_three(text, value) || (value[0] == 0.0 && value[1] == 0.0 && value[2] == 0.0)) {
         return cli_usage("%s '%s': expected X,Y,Z, three numbers that are not all 0", name, text);
+    }
+    return CLI_OK;
+}
+
+int cli_take_point(const char *name, const char *text, double value[3]) {
+    return read_three(text, value) ? CLI_OK : cli_usage("%s '%s': expected X,Y,Z, three numbers", name, text);
+}
+
+int cli_take_color(const char *name, const char *text, double value[3]) {
+    if (!read_three(text, value) || value[0] < 0.0 || value[1] < 0.0 || value[2] < 0.0) {
+        return cli_usage("%s '%s': expected R,G,B, three numbers from 0", name, text);
     }
     return CLI_OK;
 }

@@ -26,6 +26,12 @@ static const vshi_key caster_keys[] = {
      .offset = offsetof(vsh_caster, transform),
      .read = vshi_read_transform},
     {.name = "layer", .kind = VSHI_STRING, .offset = offsetof(vsh_caster, layer)},
+    {.name = "color",
+     .kind = VSHI_VECTOR,
+     .offset = offsetof(vsh_caster, color),
+     .highest = 1.0,
+     .flags = VSHI_NONZERO,
+     .count = 3},
 };
 static const vshi_table caster_table = VSHI_TABLE(caster_keys);
 
