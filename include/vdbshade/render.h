@@ -86,7 +86,7 @@ typedef struct vsh_render_options {
 
 static inline vsh_render_options vsh_render_options_default(void) {
     vsh_render_options options = {sizeof(vsh_render_options), vsh_camera_default(), 1280, 720, 3,    0,
-                                  {0.30, 0.36, 0.45},         {0.55, 0.66, 0.80},   0.0,  8,   NULL, 0,
+                                  {0.22, 0.27, 0.35},         {0.42, 0.52, 0.66},   0.0,  8,   NULL, 0,
                                   vsh_shade_options_default()};
     return options;
 }
@@ -126,10 +126,10 @@ VSH_API vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count,
                               vsh_error *error);
 
 /* A picture of width × height for files of 8 bits: color × 2^exposure through the sRGB curve (IEC 61966-2-1)
- * to 0 … 1 in steps of 1/255, dithered by a blue-noise mask so that gradients do not band, into planes R, G,
- * B and A, [height × width] each. A NULL `alpha` plane keeps the background; else colours are divided by
+ * to 0 … 1 in steps of 1/255, dithered so that gradients do not band, into planes R, G, B
+ * and A, [height × width] each. A NULL `alpha` plane keeps the background; else colours are divided by
  * alpha first, for a picture whose background is 0. `color` and, for alpha, `alpha` of the picture must be
- * there; exposure is -20 … 20. Runs on the calling thread. Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
+ * there; exposure is -20 … 20. Runs on the calling thread. Errors: VSH_ERROR_ARGUMENT. */
 VSH_API vsh_result vsh_picture_encode(const vsh_picture *picture, int32_t width, int32_t height,
                                       double exposure, float *const rgb[3], float *alpha, vsh_error *error);
 

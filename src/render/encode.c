@@ -1,6 +1,5 @@
+#include "base/error.h"
 #include "base/floats.h"
-#include "base/memory.h"
-#include "shade/sampler.h"
 
 #include <math.h>
 #include <vdbshade/render.h>
@@ -11,6 +10,14 @@ static double to_srgb(double linear) {
         return 0.0;
     }
     return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(fmin(linear, 1.0), 1.0 / 2.4) - 0.055;
+}
+
+/* A mask whose neighbourhoods hold all levels (J. Jimenez, "Next generation post processing in Call of Duty:
+ * Advanced Warfare", 2014: interleaved gradient noise), in [0, 1); channels read it from other places. */
+static double mask_at(int32_t column, int32_t row, int channel) {
+    const double place = 0.06711056 * (column + 17 * channel) + 0.00583715 * (row + 31 * channel);
+    const double turn = 52.9829189 * (place - floor(place));
+    return turn - floor(turn);
 }
 
 /* To steps of 1/255, up or down by where the mask stands. */
@@ -32,27 +39,21 @@ vsh_result vsh_picture_encode(const vsh_picture *picture, int32_t width, int32_t
                          "vsh_picture_encode: %d × %d pixels, exposure %g: expected 1 … %d and -20 … 20",
                          width, height, exposure, VSH_MAX_PICTURE_SIZE);
     }
-    vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_BLUE, 1, 0);
-    if (sampler == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "vsh_picture_encode: the system refused memory");
-    }
     const double gain = exp2(exposure);
     for (int32_t row = 0; row < height; ++row) {
         for (int32_t column = 0; column < width; ++column) {
             const size_t pixel = (size_t)row * (size_t)width + (size_t)column;
-            const uint32_t texel = (uint32_t)column + 65536u * (uint32_t)row;
             double over = gain;
             if (alpha != NULL) {
                 const double a = picture->alpha[pixel];
                 alpha[pixel] = (float)(floor(255.0 * fmin(1.0, fmax(0.0, a)) + 0.5) / 255.0);
                 over = a > LEAST_ALPHA ? gain / a : 0.0;
             }
-            for (uint32_t c = 0; c < 3; ++c) {
-                const double mask = vshi_sampler_mask(sampler, texel, c + 1);
-                rgb[c][pixel] = dither(to_srgb(over * (double)picture->color[3 * pixel + c]), mask);
+            for (int c = 0; c < 3; ++c) {
+                const double value = to_srgb(over * (double)picture->color[3 * pixel + (size_t)c]);
+                rgb[c][pixel] = dither(value, mask_at(column, row, c));
             }
         }
     }
-    vshi_sampler_free(sampler);
     return VSH_OK;
 }

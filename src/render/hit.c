@@ -13,6 +13,9 @@ static const double LEAST_STEP = 0.1; /* finest voxels */
 enum { PATIENCE = 256, MOST_STEPS = 4096, REFINEMENTS = 24 };
 static const double BOUNDS_MARGIN = 1.0;
 static const double PRECISION = 1e-3; /* finest voxels */
+/* Of a normal's central differences, finest voxels: narrower ones show the cells, wider ones lean farther
+ * over edges, where they see too much sky. */
+static const float STENCIL = 1.0f;
 
 typedef struct march {
     const vsh_field *field;
@@ -138,13 +141,13 @@ vshi_vec vshi_field_normal(const vsh_field *field, vshi_vec position, vshi_vec o
     const double world[3] = {position.x, position.y, position.z};
     const vshi_vec at = vshi_to_field(field, world);
     const float p[3] = {(float)at.x, (float)at.y, (float)at.z};
-    double g[3];
+    double slope[3];
     for (int axis = 0; axis < 3; ++axis) {
         float low[3] = {p[0], p[1], p[2]}, high[3] = {p[0], p[1], p[2]};
-        low[axis] -= 1.0f;
-        high[axis] += 1.0f;
-        g[axis] = (double)vshi_field_distance(field, high) - (double)vshi_field_distance(field, low);
+        low[axis] -= STENCIL;
+        high[axis] += STENCIL;
+        slope[axis] = (double)vshi_field_distance(field, high) - (double)vshi_field_distance(field, low);
     }
-    const vshi_vec n = vshi_direction_to_world(field, (vshi_vec){g[0], g[1], g[2]});
+    const vshi_vec n = vshi_direction_to_world(field, (vshi_vec){slope[0], slope[1], slope[2]});
     return vshi_dot(n, n) > 0.5 ? n : otherwise;
 }
