@@ -75,8 +75,9 @@ typedef struct vsh_render_options {
     int32_t ao;      /* nonzero: the sky's light is multiplied by ambient occlusion */
     double sky[3];   /* light of the open sky from all sides, linear RGB, ≥ 0 */
     double background[3]; /* where there is nothing, linear RGB, ≥ 0 */
-    double shafts; /* light shafts: optical thickness along the diagonal of the box around all surfaces, which
-                      is filled with a thin, even fog, 0 … 100; 0: none */
+    double
+        shafts; /* light shafts: optical thickness of a thin, even fog along the diagonal of the box around
+                   all surfaces, 0 … 100; it goes a quarter of the diagonal farther on every side. 0: none */
     int32_t shaft_steps;       /* points along each ray at which lights are asked for, 1 … 64 */
     const vsh_lit_meshes *lit; /* [lit_count]: shown in front of surfaces up to 1.5 voxels nearer; may be
                                   NULL */

@@ -9,7 +9,8 @@
 
 /* Samples that are in memory at once. */
 enum { BAND_SAMPLES = 1 << 18, MOST_SIDE = 65000 };
-static const double EXACT_LIFT = 0.5; /* voxels: the triangles lie that far over the surface, at most */
+static const double FOG_AROUND = 0.25; /* diagonals */
+static const double EXACT_LIFT = 0.5;  /* voxels: the triangles lie that far over the surface, at most */
 
 static vsh_result check_colors(const char *name, const double color[3], double most, vsh_error *error) {
     for (int c = 0; c < 3; ++c) {
@@ -215,9 +216,10 @@ static bool place_fog(rendering *r) {
                               fmax(high.z, info.bounds_max[2])};
         }
     }
-    r->scenery.shafts.low = low;
-    r->scenery.shafts.high = high;
-    const double diagonal = vshi_length(vshi_sub(high, low));
+    const double diagonal = vshi_length(vshi_sub(high, low)), around = FOG_AROUND * diagonal;
+    const vshi_vec margin = {around, around, around};
+    r->scenery.shafts.low = vshi_sub(low, margin);
+    r->scenery.shafts.high = vshi_add(high, margin);
     r->scenery.shafts.extinction = low.x <= high.x && diagonal > 0.0 ? s->options->shafts / diagonal : 0.0;
     return r->scenery.shafts.extinction > 0.0;
 }
