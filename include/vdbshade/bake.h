@@ -21,11 +21,12 @@ typedef struct vsh_lightmap_options {
     int32_t ao_spacing;      /* 1, 2, 4 or 8 texels: AO by cones, adaptive or exact is shaded no closer than
                               * this where casters are far enough, and interpolated between. 1: at every texel,
                               * as supersampled lightmaps are always */
+    int32_t tangents;        /* nonzero: keep what bent normals in tangent space need, 16 bytes a sample */
 } vsh_lightmap_options;
 
 static inline vsh_lightmap_options vsh_lightmap_options_default(void) {
     vsh_lightmap_options options = {sizeof(vsh_lightmap_options), 1024, 1024, 1, 4,
-                                    vsh_shade_options_default(),  4};
+                                    vsh_shade_options_default(),  4,    0};
     return options;
 }
 
@@ -109,10 +110,11 @@ VSH_API vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t firs
 
 /* Bytes that baking such a band takes at most, beside charts and field: texels, planes and what
  * vsh_bake_lightmap() takes, with the shading options given to vsh_charts_create(). `floats` is the sum of
- * all planes' channels; `errors` and `irradiance` tell (not 0) whether there are such planes. 0 where the
- * rows are no band. */
+ * all planes' channels; `errors`, `irradiance`, `bent` and `tint` tell (not 0) whether there are such planes.
+ * 0 where the rows are no band. */
 VSH_API uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows,
-                                       int32_t floats, int32_t errors, int32_t irradiance);
+                                       int32_t floats, int32_t errors, int32_t irradiance, int32_t bent,
+                                       int32_t tint);
 
 /* The samples behind a lightmap, in the order in which they are shaded. A view into the texels. Positions are
  * lifted off coarse triangles towards the smooth surface (Hanika, "Hacking the shadow terminator", 2021). */
@@ -127,6 +129,15 @@ typedef struct vsh_texel_samples {
 /* Cannot fail; the arrays belong to the texels. */
 VSH_API vsh_texel_samples vsh_texels_samples(const vsh_texels *texels);
 
+/* What the axes of bent normals are. Tangent space: x along growing u of the lightmap's UVs, orthogonal to
+ * the normal; z along the normal that decides shadow; y across both, towards growing v (as in OpenGL).
+ * Tangents are those of the triangle. */
+enum { VSH_BENT_WORLD = 0, VSH_BENT_TANGENT = 1 };
+
+/* "tangent" to VSH_BENT_TANGENT and back; -1 and NULL for what is none. Names are static; NULL is none. */
+VSH_API int32_t vsh_bent_space(const char *name);
+VSH_API const char *vsh_bent_space_name(int32_t space);
+
 /* A lightmap in the caller's arrays; each plane is [height][width] with row 0 at v = 1, and for the texels of
  * a band [rows][width] from its first row on. NULL planes are not
  * baked and cost nothing. Texels that neither a chart covers nor padding reaches are 0. */
@@ -134,11 +145,18 @@ typedef struct vsh_lightmap {
     float *const *shadow; /* [light_count] planes: visible fraction of each light; may be NULL */
     float *ao;            /* open fraction */
     float *irradiance; /* [height][width][3], linear RGB: Σ visibility × colour × falloff × cosine, × AO where
-                          baked */
+                          baked; or with `ambient` + ambient × AO */
     float *coverage;            /* 1: evaluated and valid; 0 elsewhere */
     float *const *shadow_error; /* [light_count] planes: standard error left in each value, see
                                    vsh_shade_shadow(); not padded; may be NULL */
     float *ao_error;
+    float *bent;        /* [height][width][3]: bent normals, unit, see vsh_shade_bent() */
+    float *const *tint; /* [light_count] planes [height][width][3]: visibility as tint_by colours it, linear
+                           RGB; may be NULL */
+    vsh_tint tint_by;   /* of these planes, and of the visibility in irradiance */
+    const double *ambient; /* [3]: of irradiance: light from all around, linear RGB ≥ 0; NULL: none, and AO
+                              darkens all light */
+    int32_t bent_space;    /* VSH_BENT_…; in tangent space the texels need vsh_lightmap_options.tangents */
 } vsh_lightmap;
 
 typedef struct vsh_bake_stats {

@@ -37,7 +37,8 @@ static inline vsh_image_options vsh_image_options_default(void) {
 }
 
 /* Writes an image; the ending of `path`, in any case, chooses the format (docs/formats.md lists them).
- * Integer formats clamp to 0 … 1 and round to nearest, NaN to 0, with no transfer curve. Atomic: written
+ * Integer formats clamp to 0 … 1 and round to nearest, NaN to 0, with no transfer curve; channels whose name
+ * begins with "bent." hold -1 … 1, and go into integers as (1 + x) / 2. Atomic: written
  * beside `path` and renamed, so a failure leaves an old file alone. Errors:
  * - VSH_ERROR_ARGUMENT: path NULL or empty, no image, sizes or channels out of range, a plane NULL,
  *   options; an unknown ending; bits, a pack or a size that the format does not have;

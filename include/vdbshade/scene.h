@@ -57,7 +57,11 @@ typedef struct vsh_scene {
     vsh_grid_options grid;
     vsh_shade_options shade;
     int32_t ao;         /* nonzero: bake AO, within shade.ao_distance */
+    int32_t bent;       /* with ao: bake bent normals in the space VSH_BENT_… + 1; 0: none */
     int32_t irradiance; /* nonzero: bake irradiance */
+    vsh_tint tint;      /* bake tinted shadows, and irradiance by them; VSH_TINT_NONE: none */
+    int32_t has_ambient;
+    double ambient[3]; /* of irradiance, as in vsh_lightmap; where has_ambient is not 0 */
     int32_t error; /* nonzero: bake the error left in each shadow and AO value too, where methods know it */
 } vsh_scene;
 

@@ -92,6 +92,8 @@ VSH_API int32_t vsh_shadow_method(const char *name);
 VSH_API const char *vsh_shadow_method_name(int32_t method);
 VSH_API int32_t vsh_ao_method(const char *name);
 VSH_API const char *vsh_ao_method_name(int32_t method);
+VSH_API int32_t vsh_tint_type(const char *name);
+VSH_API const char *vsh_tint_type_name(int32_t type);
 VSH_API int32_t vsh_sampler(const char *name);
 VSH_API const char *vsh_sampler_name(int32_t sampler);
 
@@ -151,6 +153,34 @@ VSH_API vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *po
 VSH_API vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points,
                                 const vsh_shade_options *options, const vsh_run *run, float *ao,
                                 float *deviation, vsh_shade_stats *stats, vsh_error *error);
+
+/* AO as above, and bent normals: the mean of the directions that are open, unit, world space, into
+ * bent[count][3]; the normal where none is open, NaN for invalid points (Landis, "Production-ready global
+ * illumination", 2002). Layers' directions are superposed, which is exact where they hide different parts of
+ * the sky. Errors: as above; VSH_ERROR_ARGUMENT too for VSH_AO_TAPS, which knows no directions. */
+VSH_API vsh_result vsh_shade_bent(const vsh_field *field, const vsh_points *points,
+                                  const vsh_shade_options *options, const vsh_run *run, float *ao,
+                                  float *bent, vsh_shade_stats *stats, vsh_error *error);
+
+/* Colour of penumbrae: red bleeds farther into the shadow, as light does through what surrounds it (Quilez,
+ * "outdoors lighting", 2013). 1 stays white, 0 black. */
+enum {
+    VSH_TINT_NONE = 0,      /* (V, V, V) */
+    VSH_TINT_QUADRATIC = 1, /* (V, V²/2 + V/2, V²) */
+    VSH_TINT_POWER = 2      /* V to the power of each channel: (1, 1.2, 1.5), say */
+};
+
+typedef struct vsh_tint {
+    int32_t type;    /* VSH_TINT_… */
+    double power[3]; /* VSH_TINT_POWER: of R, G, B, 1/16 … 16 */
+} vsh_tint;
+
+/* Tinted visibility, linear RGB, into rgb[count][3]; NaN stays. The tint must have passed vsh_tint_check().
+ * Runs on the calling thread. */
+VSH_API void vsh_shade_tint(size_t count, const float *visibility, const vsh_tint *tint, float *rgb);
+
+/* Errors: VSH_ERROR_ARGUMENT (a type or a power out of range). */
+VSH_API vsh_result vsh_tint_check(const vsh_tint *tint, vsh_error *error);
 
 /* Irradiance of one light, linear RGB, added to irradiance[count][3]: visibility[count] × colour × falloff ×
  * the cosine to `shading_normals` [count][3], of any length (NULL: points->normals, which must then be

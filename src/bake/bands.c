@@ -107,13 +107,14 @@ static vsh_result count(counting *all, const vsh_run *run, bool limited, vshi_jo
     vshi_charts *sorted = &charts->sorted;
     const size_t triangles = sorted->first[sorted->mesh_count];
     const double held = (double)charts->info.bytes + (double)triangles + vshi_row_bytes(sorted, run->threads);
+    const double sample = (double)vshi_sample_bytes(charts->tangents);
     vsh_result result = vshi_check_limit(run, held, "texels", error);
     if (result != VSH_OK) {
         return result;
     }
     all->most_samples = !limited || run->memory_limit == 0
                             ? UINT64_MAX
-                            : (uint64_t)(((double)run->memory_limit - held) / VSHI_SAMPLE_BYTES);
+                            : (uint64_t)(((double)run->memory_limit - held) / sample);
     if ((result = vshi_parallel_for(job, sorted->rows, 1, 1, count_rows, all, error)) != VSH_OK) {
         return result;
     }
@@ -124,7 +125,7 @@ static vsh_result count(counting *all, const vsh_run *run, bool limited, vshi_jo
     result = charts->info.samples > all->most_samples ? VSH_ERROR_LIMIT : atomic_load(&all->row_result);
     if (result == VSH_ERROR_LIMIT) {
         const double samples = fmax(estimate_samples(sorted), (double)all->most_samples + 1.0);
-        return vshi_check_limit(run, held + samples * VSHI_SAMPLE_BYTES, "texels", error);
+        return vshi_check_limit(run, held + samples * sample, "texels", error);
     }
     return result == VSH_OK ? VSH_OK
                             : vshi_fail(error, result, "texels: the system refused memory for a row");
@@ -231,6 +232,7 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
         made->info.height = full.height;
         made->padding = full.padding;
         made->ao_spacing = full.supersample == 1 ? full.ao_spacing : 1;
+        made->tangents = full.tangents != 0;
         made->shade = full.shade;
         result = make(meshes, mesh_count, &full, run, limited, job, reports, made, error);
     }
@@ -311,13 +313,14 @@ vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t ro
 double vshi_bake_bytes(const vshi_bake_need *need) {
     double sample = vshi_origins_sample_bytes(need->traced);
     sample += (need->values ? 1 : 0) * sizeof(float) + (need->errors ? 1 : 0) * sizeof(float);
-    sample += (need->irradiance ? 3 : 0) * sizeof(float);
+    sample += (need->irradiance ? 3 : 0) * sizeof(float) + (need->bent ? 3 : 0) * sizeof(float);
+    sample += (need->tint ? 3 : 0) * sizeof(float);
     return need->samples * sample + need->texels * (1.0 + VSHI_PADDING_TEXEL_BYTES) +
-           (need->lattice ? vshi_lattice_bytes(need->samples, need->texels) : 0.0);
+           (need->lattice ? vshi_lattice_bytes(need->samples, need->texels, need->bent) : 0.0);
 }
 
 uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows, int32_t floats,
-                               int32_t errors, int32_t irradiance) {
+                               int32_t errors, int32_t irradiance, int32_t bent, int32_t tint) {
     vshi_band band;
     if (vshi_band_set(charts, first_row, rows, &band, NULL) != VSH_OK) {
         return 0;
@@ -329,11 +332,14 @@ uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int3
                            .values = true,
                            .errors = errors != 0,
                            .irradiance = irradiance != 0,
+                           .bent = bent != 0,
+                           .tint = tint != 0,
                            .lattice = charts->ao_spacing > 1};
     for (size_t row = band.held_begin; row < band.held_end; ++row) {
         need.samples += (double)charts->rows[row].samples;
     }
     const bool halo = band.rows > rows;
     const double planes = width * (rows + (halo ? band.rows : 0)) * (double)floats * sizeof(float);
-    return (uint64_t)(need.samples * VSHI_SAMPLE_BYTES + vshi_bake_bytes(&need) + planes);
+    return (uint64_t)(need.samples * (double)vshi_sample_bytes(charts->tangents) + vshi_bake_bytes(&need) +
+                      planes);
 }

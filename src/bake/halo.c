@@ -17,6 +17,10 @@ static void list(const vsh_lightmap *given, size_t light_count, vshi_halo *halo)
     }
     add(halo, given->ao, 1);
     add(halo, given->irradiance, 3);
+    add(halo, given->bent, 3);
+    for (size_t i = 0; given->tint != NULL && i < light_count; ++i) {
+        add(halo, given->tint[i], 3);
+    }
     halo->padded = halo->count;
     for (size_t i = 0; given->shadow_error != NULL && i < light_count; ++i) {
         add(halo, given->shadow_error[i], 1);
@@ -27,9 +31,10 @@ static void list(const vsh_lightmap *given, size_t light_count, vshi_halo *halo)
 
 double vshi_halo_bytes(const vsh_texels *texels, const vsh_lightmap *given, size_t light_count) {
     size_t floats = (given->ao != NULL) + (given->ao_error != NULL) + (given->coverage != NULL) +
-                    (given->irradiance != NULL ? 3 : 0);
+                    (given->irradiance != NULL ? 3 : 0) + (given->bent != NULL ? 3 : 0);
     for (size_t i = 0; i < light_count; ++i) {
         floats += given->shadow != NULL && given->shadow[i] != NULL;
+        floats += given->tint != NULL && given->tint[i] != NULL ? 3 : 0;
         floats += given->shadow_error != NULL && given->shadow_error[i] != NULL;
     }
     return vshi_texels_has_halo(texels) ? (double)(vshi_texels_held(texels) * floats * sizeof(float)) : 0.0;
@@ -52,6 +57,7 @@ static vsh_result take_planes(const vsh_texels *texels, const vsh_lightmap *give
     }
     halo->shadow = vshi_take(light_count, sizeof *halo->shadow, what, &result, error);
     halo->shadow_error = vshi_take(light_count, sizeof *halo->shadow_error, what, &result, error);
+    halo->tint = vshi_take(light_count, sizeof *halo->tint, what, &result, error);
     halo->memory = vshi_take(texel_count, floats * sizeof(float), what, &result, error);
     if (result != VSH_OK) {
         return result;
@@ -69,6 +75,11 @@ static vsh_result take_planes(const vsh_texels *texels, const vsh_lightmap *give
     own->shadow = given->shadow != NULL ? halo->shadow : NULL;
     own->ao = next_of(halo, given->ao, &next);
     own->irradiance = next_of(halo, given->irradiance, &next);
+    own->bent = next_of(halo, given->bent, &next);
+    for (size_t i = 0; given->tint != NULL && i < light_count; ++i) {
+        halo->tint[i] = next_of(halo, given->tint[i], &next);
+    }
+    own->tint = given->tint != NULL ? halo->tint : NULL;
     for (size_t i = 0; given->shadow_error != NULL && i < light_count; ++i) {
         halo->shadow_error[i] = next_of(halo, given->shadow_error[i], &next);
     }
@@ -81,7 +92,7 @@ static vsh_result take_planes(const vsh_texels *texels, const vsh_lightmap *give
 vsh_result vshi_halo_open(const vsh_texels *texels, const vsh_lightmap *given, size_t light_count,
                           vshi_halo *halo, vsh_error *error) {
     *halo = (vshi_halo){.lightmap = *given};
-    const size_t most = 2 * light_count + 4;
+    const size_t most = 3 * light_count + 5;
     vsh_result result = VSH_OK;
     halo->planes = vshi_take(most, sizeof *halo->planes, "lightmap", &result, error);
     halo->given = vshi_take(most, sizeof *halo->given, "lightmap", &result, error);
@@ -112,6 +123,7 @@ void vshi_halo_give(const vsh_texels *texels, const vshi_halo *halo) {
 
 void vshi_halo_close(vshi_halo *halo) {
     free(halo->memory);
+    free(halo->tint);
     free(halo->shadow_error);
     free(halo->shadow);
     free(halo->given);

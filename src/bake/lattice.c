@@ -34,12 +34,13 @@ typedef struct lattice {
     size_t *before;  /* [blocks + 1]: chosen origins before each block */
     size_t blocks;
     float *values, *deviation;
+    float *bent; /* [origins.count][3], or NULL */
     /* of the chosen */
     uint32_t *number;
     double *position;
     float *normal;
     uint32_t *texel;
-    float *chosen_values, *chosen_deviation;
+    float *chosen_values, *chosen_deviation, *chosen_bent;
     size_t *row_start; /* [rows of the origins + 1] */
 } lattice;
 
@@ -186,6 +187,9 @@ static void unpack(void *user, size_t begin, size_t end) {
         if (l->deviation != NULL) {
             l->deviation[i] = l->chosen_deviation[n];
         }
+        if (l->bent != NULL) {
+            memcpy(l->bent + 3 * i, l->chosen_bent + 3 * n, 3 * sizeof *l->bent);
+        }
         l->state[i] = KNOWN;
     }
 }
@@ -274,6 +278,16 @@ static cell look_at(const lattice *l, uint32_t column, uint32_t row) {
     return c;
 }
 
+/* One of so many channels of the corners' values, at a place of the cell. */
+static float between(const float *values, size_t channels, size_t channel, const cell *c, double x,
+                     double y) {
+    double v[4];
+    for (int k = 0; k < 4; ++k) {
+        v[k] = (double)values[channels * c->corner[k] + channel];
+    }
+    return (float)mix(v, x, y);
+}
+
 /* Interpolates what lies in good cells. Corners are not among it, so none is read that is being written. */
 static void interpolate(void *user, size_t begin, size_t end) {
     const lattice *l = user;
@@ -293,16 +307,12 @@ static void interpolate(void *user, size_t begin, size_t end) {
                 continue;
             }
             const double x = part(column, c.left, c.right), y = part(row, c.top, c.bottom);
-            double v[4];
-            for (int k = 0; k < 4; ++k) {
-                v[k] = (double)l->values[c.corner[k]];
-            }
-            l->values[i] = (float)mix(v, x, y);
-            for (int k = 0; k < 4 && l->deviation != NULL; ++k) {
-                v[k] = (double)l->deviation[c.corner[k]];
-            }
+            l->values[i] = between(l->values, 1, 0, &c, x, y);
             if (l->deviation != NULL) {
-                l->deviation[i] = (float)mix(v, x, y);
+                l->deviation[i] = between(l->deviation, 1, 0, &c, x, y);
+            }
+            for (size_t axis = 0; axis < 3 && l->bent != NULL; ++axis) {
+                l->bent[3 * i + axis] = between(l->bent, 3, axis, &c, x, y);
             }
             l->state[i] = BETWEEN;
         }
@@ -337,6 +347,7 @@ static vsh_result shade_pass(lattice *l, const vsh_shade_options *options, size_
     l->texel = vshi_take(count, sizeof *l->texel, what, &result, error);
     l->chosen_values = vshi_take(count, sizeof(float), what, &result, error);
     l->chosen_deviation = vshi_take(l->deviation != NULL ? count : 0, sizeof(float), what, &result, error);
+    l->chosen_bent = vshi_take(l->bent != NULL ? count : 0, 3 * sizeof(float), what, &result, error);
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, l->blocks, 1, 0, pack, l, error);
     }
@@ -348,11 +359,12 @@ static vsh_result shade_pass(lattice *l, const vsh_shade_options *options, size_
         const vsh_points points = {count, l->position, l->normal, l->texel};
         const vshi_point_rows rows = chosen_rows(l, count);
         result = vshi_shade_ao(l->field, &points, &rows, &shade, run, l->chosen_values, l->chosen_deviation,
-                               stats, error);
+                               l->chosen_bent, stats, error);
     }
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, count, 4096, 0, unpack, l, error);
     }
+    free(l->chosen_bent);
     free(l->chosen_deviation);
     free(l->chosen_values);
     free(l->texel);
@@ -410,20 +422,23 @@ static void add_errors(const lattice *l, vsh_shade_stats *stats) {
     stats->square_error += (double)sum * VSHI_SQUARE_UNIT;
 }
 
-double vshi_lattice_bytes(double samples, double texels) {
-    return texels * sizeof(uint32_t) + samples * (1.0 + 3.0 * sizeof(double) + 8.0 * sizeof(float));
+double vshi_lattice_bytes(double samples, double texels, bool bent) {
+    return texels * sizeof(uint32_t) +
+           samples * (1.0 + 3.0 * sizeof(double) + (bent ? 11.0 : 8.0) * sizeof(float));
 }
 
 vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
                            const vsh_points *points, const vsh_shade_options *options, const vsh_run *run,
-                           float *values, float *deviation, vsh_shade_stats *stats, vsh_error *error) {
+                           float *values, float *deviation, float *bent, vsh_shade_stats *stats,
+                           vsh_error *error) {
     lattice l = {.field = field,
                  .texels = texels,
                  .origins = origins,
                  .points = points,
                  .distance = options->ao_distance / field->voxel_size,
                  .blocks = (origins->count + BLOCK - 1) / BLOCK,
-                 .values = values};
+                 .values = values,
+                 .bent = bent};
     const char *what = "AO texels";
     vsh_run quiet = *run;
     quiet.progress = NULL;

@@ -12,12 +12,13 @@ enum { VSHI_LATTICE_ABOVE = 1, VSHI_LATTICE_BELOW = 2 };
  * lattice of the texels' ao_spacing (1, 2, 4 or 8) are shaded; those between are interpolated where nothing
  * is near enough to change within a cell, else the lattice is halved there (irradiance caching: Ward,
  * Rubinstein and Clear, 1988). Of a band, so many held at either end may have other values than in the
- * whole. `deviation` may be NULL. */
+ * whole. `deviation` and `bent`, as of vshi_ao_task, may be NULL. */
 vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
                            const vsh_points *points, const vsh_shade_options *options, const vsh_run *run,
-                           float *values, float *deviation, vsh_shade_stats *stats, vsh_error *error);
+                           float *values, float *deviation, float *bent, vsh_shade_stats *stats,
+                           vsh_error *error);
 
 /* Bytes that it takes at most for so many samples and texels, beside the origins. */
-double vshi_lattice_bytes(double samples, double texels);
+double vshi_lattice_bytes(double samples, double texels, bool bent);
 
 #endif

@@ -25,18 +25,33 @@ typedef struct baking {
     float *values;     /* [origins.count]: of one light, or AO */
     float *deviation;  /* [origins.count]: of the same; NULL where no plane is for it */
     float *irradiance; /* [origins.count][3] */
+    float *bent;       /* [origins.count][3] */
+    float *tinted;     /* [origins.count][3]: of one light */
     vsh_layer *layers; /* the options', of points that are lifted already; NULL: none */
     bool layered_ao;
     vsh_bake_stats stats;
 } baking;
 
+static float *tint_of(const vsh_lightmap *lightmap, size_t light) {
+    return lightmap->tint != NULL ? lightmap->tint[light] : NULL;
+}
+
+static bool tint_wanted(const vsh_lightmap *lightmap, size_t light_count) {
+    bool wanted = false;
+    for (size_t i = 0; i < light_count; ++i) {
+        wanted = wanted || tint_of(lightmap, i) != NULL;
+    }
+    return wanted;
+}
+
 static bool light_wanted(const vsh_lightmap *lightmap, size_t light) {
-    return lightmap->irradiance != NULL || (lightmap->shadow != NULL && lightmap->shadow[light] != NULL) ||
+    return lightmap->irradiance != NULL || tint_of(lightmap, light) != NULL ||
+           (lightmap->shadow != NULL && lightmap->shadow[light] != NULL) ||
            (lightmap->shadow_error != NULL && lightmap->shadow_error[light] != NULL);
 }
 
 static bool ao_wanted(const vsh_lightmap *lightmap) {
-    return lightmap->ao != NULL || lightmap->ao_error != NULL;
+    return lightmap->ao != NULL || lightmap->ao_error != NULL || lightmap->bent != NULL;
 }
 
 /* Whether any plane of errors is asked for. */
@@ -187,7 +202,26 @@ static void add_irradiance(void *user, size_t begin, size_t end) {
     baking *bake = l->bake;
     const vsh_points points = {end - begin, bake->origins.position + 3 * begin,
                                bake->origins.normal + 3 * begin, NULL};
-    vsh_shade_irradiance(&points, NULL, l->light, bake->values + begin, bake->irradiance + 3 * begin);
+    vshi_shade_irradiance(&points, NULL, l->light, bake->values + begin, &bake->lightmap->tint_by,
+                          bake->irradiance + 3 * begin);
+}
+
+static void tint(void *user, size_t begin, size_t end) {
+    const lighting *l = user;
+    vsh_shade_tint(end - begin, l->bake->values + begin, &l->bake->lightmap->tint_by,
+                   l->bake->tinted + 3 * begin);
+}
+
+/* Runs a step over all samples. */
+static vsh_result over_samples(baking *bake, const char *what, vshi_range_fn *step, void *user,
+                               vsh_error *error) {
+    vshi_job *job = vshi_job_begin(&bake->quiet, what, bake->origins.count);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
+    }
+    const vsh_result result = vshi_parallel_for(job, bake->origins.count, 4096, 1, step, user, error);
+    vshi_job_end(job);
+    return result;
 }
 
 static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
@@ -204,17 +238,89 @@ static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
     if (result == VSH_OK && lightmap->shadow != NULL && lightmap->shadow[index] != NULL) {
         result = average(bake, bake->values, 1, lightmap->shadow[index], error);
     }
+    lighting l = {bake, &bake->lights[index]};
+    if (result == VSH_OK && tint_of(lightmap, index) != NULL) {
+        result = over_samples(bake, "tint", tint, &l, error);
+        result = result == VSH_OK ? average(bake, bake->tinted, 3, tint_of(lightmap, index), error) : result;
+    }
     if (result != VSH_OK || lightmap->irradiance == NULL) {
         return result;
     }
-    lighting l = {bake, &bake->lights[index]};
-    vshi_job *job = vshi_job_begin(&bake->quiet, "irradiance", bake->origins.count);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "irradiance: the system refused memory");
+    return over_samples(bake, "irradiance", add_irradiance, &l, error);
+}
+
+/* To tangent space: the sample's own axes. */
+static void turn_to_tangent(const vsh_texels *texels, size_t sample, float *bent) {
+    const vshi_vec n = vshi_unit(vshi_vec_off(texels->normal + 3 * sample));
+    const float *given = texels->tangent + 4 * sample;
+    vshi_vec t = vshi_vec_off(given), b;
+    t = vshi_sub(t, vshi_scale(n, vshi_dot(n, t)));
+    if (!(vshi_dot(t, t) > 0.0)) {
+        vshi_frame(n, &t, &b);
     }
-    result = vshi_parallel_for(job, bake->origins.count, 4096, 1, add_irradiance, &l, error);
+    t = vshi_unit(t);
+    b = vshi_scale(vshi_cross(n, t), (double)given[3]);
+    const vshi_vec d = vshi_vec_off(bent);
+    bent[0] = (float)vshi_dot(d, t);
+    bent[1] = (float)vshi_dot(d, b);
+    bent[2] = (float)vshi_dot(d, n);
+}
+
+/* Samples' directions become unit, in the space asked for; the means of a texel's samples again. */
+static void bend(void *user, size_t begin, size_t end) {
+    baking *bake = user;
+    const vshi_origins *origins = &bake->origins;
+    const vsh_texels *texels = bake->texels;
+    for (size_t block = begin; block < end; ++block) {
+        size_t next = origins->before[block];
+        const size_t last = (block + 1) * VSHI_ORIGIN_BLOCK;
+        for (size_t i = block * VSHI_ORIGIN_BLOCK; i < last && i < texels->count; ++i) {
+            if (!origins->valid[i]) {
+                continue;
+            }
+            vshi_ao_bend(bake->bent + 3 * next, origins->normal + 3 * next);
+            if (bake->lightmap->bent_space == VSH_BENT_TANGENT) {
+                turn_to_tangent(texels, i, bake->bent + 3 * next);
+            }
+            ++next;
+        }
+    }
+}
+
+static vsh_result bake_bent(baking *bake, vsh_error *error) {
+    vshi_job *job = vshi_job_begin(&bake->quiet, "bent", bake->origins.blocks);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "bent: the system refused memory");
+    }
+    vsh_result result = vshi_parallel_for(job, bake->origins.blocks, 1, 1, bend, bake, error);
     vshi_job_end(job);
+    if (result == VSH_OK) {
+        result = average(bake, bake->bent, 3, bake->lightmap->bent, error);
+    }
+    float *plane = bake->lightmap->bent;
+    for (size_t i = 0; result == VSH_OK && i < vshi_texels_held(bake->texels); ++i) {
+        const vshi_vec d = vshi_unit(vshi_vec_off(plane + 3 * i));
+        plane[3 * i] = (float)d.x;
+        plane[3 * i + 1] = (float)d.y;
+        plane[3 * i + 2] = (float)d.z;
+    }
     return result;
+}
+
+/* What AO and ambient light make of the irradiance of lights. */
+static void compose(const baking *bake) {
+    const vsh_lightmap *lightmap = bake->lightmap;
+    for (size_t i = 0; i < vshi_texels_held(bake->texels); ++i) {
+        const float open = lightmap->ao != NULL ? lightmap->ao[i] : 1.0f;
+        for (size_t c = 0; c < 3; ++c) {
+            float *value = &lightmap->irradiance[3 * i + c];
+            if (lightmap->ambient == NULL) {
+                *value *= open;
+            } else if (bake->state[i] == VSHI_TEXEL_VALID) {
+                *value += (float)lightmap->ambient[c] * open;
+            }
+        }
+    }
 }
 
 static vsh_result bake_planes(baking *bake, vsh_error *error) {
@@ -232,21 +338,23 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
         float *deviation = lightmap->ao_error != NULL ? bake->deviation : NULL;
         result = interpolates(bake)
                      ? vshi_lattice_ao(bake->field, texels, &bake->origins, &points, &shade, &bake->run,
-                                       bake->values, deviation, &bake->stats.shade, error)
+                                       bake->values, deviation, bake->bent, &bake->stats.shade, error)
                      : vshi_shade_ao(bake->field, &points, &bake->origins.rows, &shade, &bake->run,
-                                     bake->values, deviation, &bake->stats.shade, error);
+                                     bake->values, deviation, bake->bent, &bake->stats.shade, error);
         if (result == VSH_OK && lightmap->ao_error != NULL) {
             result = average(bake, bake->deviation, 1, lightmap->ao_error, error);
         }
         if (result == VSH_OK && lightmap->ao != NULL) {
             result = average(bake, bake->values, 1, lightmap->ao, error);
         }
+        if (result == VSH_OK && lightmap->bent != NULL) {
+            result = bake_bent(bake, error);
+        }
     }
     if (result == VSH_OK && lightmap->irradiance != NULL && bake->light_count > 0) {
         result = average(bake, bake->irradiance, 3, lightmap->irradiance, error);
-        for (size_t i = 0; result == VSH_OK && lightmap->ao != NULL && i < 3 * vshi_texels_held(texels);
-             ++i) {
-            lightmap->irradiance[i] *= lightmap->ao[i / 3];
+        if (result == VSH_OK) {
+            compose(bake);
         }
     }
     return result;
@@ -298,6 +406,8 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
                                  .values = values,
                                  .errors = errors,
                                  .irradiance = irradiance,
+                                 .bent = bake->lightmap->bent != NULL,
+                                 .tint = tint_wanted(bake->lightmap, bake->light_count),
                                  .lattice = ao_wanted(bake->lightmap) && interpolates(bake)};
     vsh_result result = lift_layers(bake, error);
     if (result != VSH_OK) {
@@ -321,6 +431,9 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     bake->values = vshi_take(values ? count : 0, sizeof(float), "lightmap", &result, error);
     bake->deviation = vshi_take(errors ? count : 0, sizeof(float), "lightmap", &result, error);
     bake->irradiance = vshi_take(irradiance ? count : 0, 3 * sizeof(float), "lightmap", &result, error);
+    bake->bent =
+        vshi_take(bake->lightmap->bent != NULL ? count : 0, 3 * sizeof(float), "lightmap", &result, error);
+    bake->tinted = vshi_take(need.tint ? count : 0, 3 * sizeof(float), "lightmap", &result, error);
     if (result == VSH_OK) {
         result = bake_planes(bake, error);
     }
@@ -331,6 +444,8 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
         vshi_halo_give(texels, &bake->halo);
     }
     free(bake->layers);
+    free(bake->tinted);
+    free(bake->bent);
     free(bake->irradiance);
     free(bake->deviation);
     free(bake->values);
@@ -384,6 +499,22 @@ vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, c
     }
     bake.quiet = bake.run;
     bake.quiet.progress = NULL;
+    if (result == VSH_OK && lightmap->bent != NULL && lightmap->bent_space != VSH_BENT_WORLD &&
+        (lightmap->bent_space != VSH_BENT_TANGENT || texels->tangent == NULL)) {
+        result = vshi_fail(error, VSH_ERROR_ARGUMENT,
+                           "bent_space %d: expected %d, or %d with texels that have tangents",
+                           lightmap->bent_space, VSH_BENT_WORLD, VSH_BENT_TANGENT);
+    }
+    if (result == VSH_OK) {
+        result = vsh_tint_check(&lightmap->tint_by, error);
+    }
+    for (int c = 0; result == VSH_OK && lightmap->ambient != NULL && c < 3; ++c) {
+        if (!(lightmap->ambient[c] >= 0.0 && isfinite(lightmap->ambient[c]))) {
+            result =
+                vshi_fail(error, VSH_ERROR_ARGUMENT, "ambient[%d] %g: expected a finite number, at least 0",
+                          c, lightmap->ambient[c]);
+        }
+    }
     bool light = false;
     for (size_t i = 0; result == VSH_OK && i < light_count; ++i) {
         result = vsh_light_check(&lights[i], error);

@@ -70,3 +70,22 @@ void vshi_surface_at(const vshi_surface *surface, const double weight[3], vshi_v
     }
     *normal = unit;
 }
+
+vshi_vec vshi_surface_tangent(const vsh_mesh *mesh, size_t triangle, double *handedness) {
+    vshi_vec corner[3];
+    uint32_t vertex[3];
+    vshi_mesh_triangle_of(mesh, triangle, corner, vertex);
+    double u[3], v[3];
+    for (int k = 0; k < 3; ++k) {
+        u[k] = (double)mesh->uvs[2 * (size_t)vertex[k]];
+        v[k] = (double)mesh->uvs[2 * (size_t)vertex[k] + 1];
+    }
+    const vshi_vec a = vshi_sub(corner[1], corner[0]), b = vshi_sub(corner[2], corner[0]);
+    const double area = (u[1] - u[0]) * (v[2] - v[0]) - (u[2] - u[0]) * (v[1] - v[0]);
+    *handedness = area < 0.0 ? -1.0 : 1.0;
+    if (area == 0.0) {
+        return (vshi_vec){0.0, 0.0, 0.0};
+    }
+    return vshi_unit(
+        vshi_scale(vshi_sub(vshi_scale(a, v[2] - v[0]), vshi_scale(b, v[1] - v[0])), *handedness));
+}

@@ -23,4 +23,8 @@ bool vshi_surface_set(const vsh_mesh *mesh, size_t triangle, vshi_surface *surfa
 void vshi_surface_at(const vshi_surface *surface, const double weight[3], vshi_vec *position,
                      vshi_vec *normal);
 
+/* The direction in which a triangle's u grows, unit, and 1 or -1: the side of normal × tangent on which v
+ * grows. A zero vector where the UVs have no area. */
+vshi_vec vshi_surface_tangent(const vsh_mesh *mesh, size_t triangle, double *handedness);
+
 #endif

@@ -29,13 +29,27 @@ typedef struct writer {
     size_t next;
     uint32_t number; /* triangle + 1 that is set up; 0: none */
     vshi_surface surface;
+    float tangent[4]; /* of it, where they are asked for */
 } writer;
+
+static void set_tangent(writer *w, const vsh_mesh *mesh, size_t triangle) {
+    double handedness;
+    const vshi_vec t = vshi_surface_tangent(mesh, triangle, &handedness);
+    w->tangent[0] = (float)t.x;
+    w->tangent[1] = (float)t.y;
+    w->tangent[2] = (float)t.z;
+    w->tangent[3] = (float)handedness;
+}
 
 static void write_sample(writer *w, uint32_t number, uint32_t texel, const double weight[3]) {
     vsh_texels *texels = w->all->texels;
     const uint32_t mesh = w->work->mesh[number - 1];
     if (number != w->number) {
-        vshi_surface_set(&w->all->charts->sorted.meshes[mesh], w->work->local[number - 1], &w->surface);
+        const vsh_mesh *of = &w->all->charts->sorted.meshes[mesh];
+        vshi_surface_set(of, w->work->local[number - 1], &w->surface);
+        if (w->all->charts->tangents) {
+            set_tangent(w, of, w->work->local[number - 1]);
+        }
         w->number = number;
     }
     vshi_vec position, normal;
@@ -58,6 +72,9 @@ static void write_sample(writer *w, uint32_t number, uint32_t texel, const doubl
     }
     texels->texel[i] = texel;
     texels->mesh[i] = mesh;
+    if (texels->tangent != NULL) {
+        memcpy(texels->tangent + 4 * i, w->tangent, sizeof w->tangent);
+    }
 }
 
 /* Every second bit of a number of six. */
@@ -168,7 +185,7 @@ vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, doubl
     return result;
 }
 
-static vsh_result take_samples(vsh_texels *texels, vsh_error *error) {
+static vsh_result take_samples(vsh_texels *texels, bool tangents, vsh_error *error) {
     const char *what = "texels";
     vsh_result result = VSH_OK;
     texels->position = vshi_take(texels->count, 3 * sizeof(double), what, &result, error);
@@ -176,6 +193,7 @@ static vsh_result take_samples(vsh_texels *texels, vsh_error *error) {
     texels->geometric = vshi_take(texels->count, 3 * sizeof(float), what, &result, error);
     texels->texel = vshi_take(texels->count, sizeof(uint32_t), what, &result, error);
     texels->mesh = vshi_take(texels->count, sizeof(uint32_t), what, &result, error);
+    texels->tangent = vshi_take(tangents ? texels->count : 0, 4 * sizeof(float), what, &result, error);
     return result;
 }
 
@@ -198,15 +216,16 @@ static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_te
         texels->info.samples += own ? counted->samples : 0;
     }
     texels->count = texels->row_start[rows];
-    const double samples = (double)texels->count * VSHI_SAMPLE_BYTES;
+    const size_t sample = vshi_sample_bytes(charts->tangents);
+    const double samples = (double)texels->count * (double)sample;
     const double held = (double)charts->info.bytes + vshi_row_bytes(&charts->sorted, run->threads);
     if ((result = vshi_check_limit(run, held + samples, "texels", error)) != VSH_OK) {
         return result;
     }
-    texels->info.bytes = sizeof *texels + texels->count * VSHI_SAMPLE_BYTES + texels->mesh_count +
-                         (rows + 1) * sizeof *texels->row_start;
+    texels->info.bytes =
+        sizeof *texels + texels->count * sample + texels->mesh_count + (rows + 1) * sizeof *texels->row_start;
     creation all = {.charts = charts, .first = band->held_begin, .texels = texels};
-    result = take_samples(texels, error);
+    result = take_samples(texels, charts->tangents, error);
     if (result == VSH_OK) {
         result = rasterise(&all, rows, run, error);
     }
@@ -283,6 +302,7 @@ void vsh_texels_free(vsh_texels *texels) {
         return;
     }
     free(texels->open);
+    free(texels->tangent);
     free(texels->mesh);
     free(texels->texel);
     free(texels->geometric);

@@ -18,13 +18,16 @@ struct vsh_charts {
     vshi_charts sorted;
     int32_t padding;
     int32_t ao_spacing; /* 1 where texels have several samples */
+    bool tangents;
     vsh_shade_options shade;
     vshi_tile_row *rows; /* [sorted.rows] */
     unsigned char *open; /* [mesh_count]: the mesh bounds no solid, so that the field holds its shell */
 };
 
 /* Bytes of one sample in texels. */
-enum { VSHI_SAMPLE_BYTES = 3 * sizeof(double) + 6 * sizeof(float) + 2 * sizeof(uint32_t) };
+static inline size_t vshi_sample_bytes(bool tangents) {
+    return 3 * sizeof(double) + (tangents ? 10 : 6) * sizeof(float) + 2 * sizeof(uint32_t);
+}
 
 /* vsh_charts_create() with all that is checked, but for the memory of samples: VSH_ERROR_LIMIT where there
  * are more than the run's limit allows beside the charts, if `limited`. */
@@ -49,7 +52,7 @@ vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t ro
 typedef struct vshi_bake_need {
     double samples, texels; /* held */
     bool traced;            /* rays against triangles */
-    bool values, errors, irradiance, lattice;
+    bool values, errors, irradiance, bent, tint, lattice;
 } vshi_bake_need;
 
 double vshi_bake_bytes(const vshi_bake_need *need);
@@ -68,6 +71,7 @@ struct vsh_texels {
     float *geometric;        /* [count][3] */
     uint32_t *texel;         /* [count]: in the whole lightmap */
     uint32_t *mesh;          /* [count]: index of the mesh */
+    float *tangent;          /* [count][4]: of the triangle, unit, and its handedness; NULL: not asked for */
     size_t mesh_count;
     unsigned char *open; /* [mesh_count]: as of the charts */
 };

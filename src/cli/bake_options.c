@@ -7,6 +7,9 @@
 
 enum {
     KEY_IRRADIANCE = 0x2000,
+    KEY_AMBIENT,
+    KEY_TINT,
+    KEY_BENT,
     KEY_SIZE,
     KEY_UV_SET,
     KEY_SUPERSAMPLE,
@@ -40,6 +43,16 @@ static const cli_option options[] = {
     CLI_LIGHT_OPTIONS,
     {KEY_IRRADIANCE, "irradiance", NULL,
      "also irradiance.R, .G, .B: visibility × colour ×\nfalloff × cosine, summed, × AO where baked"},
+    {KEY_AMBIENT, "ambient", "R,G,B",
+     "light from all around, linear: irradiance is then that\nof the lights + ambient × AO"},
+    {KEY_TINT, "tint", "TINT",
+     "also tint.NAME.R, .G, .B of each light, its penumbra\ncoloured: quadratic (V, V²/2 + V/2, V²) or "
+     "powers\n"
+     "of V such as 1,1.2,1.5; irradiance takes it too"},
+    {KEY_BENT, "bent-normals", "SPACE",
+     "with --ao also bent.X, .Y, .Z: the mean direction that\nis open, in world or tangent space; -1 to 1, "
+     "in\n"
+     "integer formats (1 + x) / 2"},
     CLI_ACCURACY_OPTIONS,
     CLI_CASTER_OPTIONS,
     CLI_GRID_OPTIONS,
@@ -77,6 +90,26 @@ static int take_bits(const char *name, const char *value, int32_t *bits) {
         }
     }
     return cli_usage("%s '%s': expected 8, 16 or 32", name, value);
+}
+
+static int take_tint(const char *name, const char *value, vsh_tint *tint) {
+    tint->type = vsh_tint_type(value);
+    if (tint->type == VSH_TINT_NONE || tint->type == VSH_TINT_QUADRATIC) {
+        return CLI_OK;
+    }
+    tint->type = VSH_TINT_POWER;
+    vsh_error error;
+    const int code = cli_take_vector(name, value, tint->power);
+    return code != CLI_OK || vsh_tint_check(tint, &error) == VSH_OK
+               ? code
+               : cli_usage("%s '%s': %s", name, value, error.message);
+}
+
+static int take_ambient(const char *name, const char *value, double ambient[3]) {
+    const int code = cli_take_vector(name, value, ambient);
+    const bool dark = ambient[0] < 0.0 || ambient[1] < 0.0 || ambient[2] < 0.0;
+    return code == CLI_OK && dark ? cli_usage("%s '%s': expected three numbers of at least 0", name, value)
+                                  : code;
 }
 
 static int take_caster(cli_bake_settings *s, const char *name, const char *value) {
@@ -150,6 +183,18 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_IRRADIANCE:
         s->irradiance = true;
         return CLI_OK;
+    case KEY_AMBIENT:
+        s->has_ambient = s->irradiance = true;
+        return take_ambient(name, value, s->ambient);
+    case KEY_TINT:
+        s->has_tint = true;
+        return take_tint(name, value, &s->tint);
+    case KEY_BENT: {
+        int32_t space = 0;
+        const int code = cli_take_name(name, value, vsh_bent_space, vsh_bent_space_name, &space);
+        s->bent = 1 + space;
+        return code;
+    }
     case KEY_SIZE:
         s->has_size = true;
         return cli_take_size(name, value, &s->width, &s->height);

@@ -68,6 +68,9 @@ typedef struct cli_bake_settings {
     double sun[3];
     double sun_angle_deg;
     double ao_distance;
+    int32_t bent; /* as of vsh_scene */
+    vsh_tint tint;
+    double ambient[3];
     int32_t ao_method;
     int32_t ao_cones;
     int32_t method;
@@ -84,7 +87,7 @@ typedef struct cli_bake_settings {
     const char *casters[CLI_MAX_EXTRA_CASTERS];
     size_t caster_count;
     bool has_sun, has_sun_angle, has_ao, has_ao_method, has_ao_cones, has_method, has_size, has_uv_set;
-    bool has_supersample, has_padding, has_ao_spacing, has_bits, irradiance;
+    bool has_supersample, has_padding, has_ao_spacing, has_bits, irradiance, has_tint, has_ambient;
     bool dry_run;
     bool has_rays, has_sampler, has_frame, has_early_rays, has_max_error, error;
 } cli_bake_settings;

@@ -204,6 +204,21 @@ static int set_shade(const cli_bake_settings *s, vsh_scene *scene) {
     if (s->irradiance) {
         scene->irradiance = 1;
     }
+    if (s->has_ambient) {
+        scene->has_ambient = 1;
+        memcpy(scene->ambient, s->ambient, sizeof scene->ambient);
+    }
+    if (s->has_tint) {
+        scene->tint = s->tint;
+    }
+    scene->bent = s->bent > 0 ? s->bent : scene->bent;
+    if (scene->bent > 0 && (!scene->ao || scene->shade.ao_method == VSH_AO_TAPS)) {
+        return cli_usage("--bent-normals: %s", scene->ao ? "AO by taps knows no directions; use cones or rays"
+                                                         : "there is no --ao");
+    }
+    if (scene->has_ambient && !scene->irradiance) {
+        return cli_usage("%s: ambient is part of irradiance, which is not baked", s->input);
+    }
     const int code = set_accuracy(s, scene);
     if (code != CLI_OK) {
         return code;

@@ -1,6 +1,7 @@
 #include "bands.h"
 
 #include "message.h"
+#include "planes.h"
 
 #include <stdio.h>
 
@@ -9,6 +10,9 @@ cli_bands_need cli_bands_need_of(const vsh_scene *scene, const vsh_image *image,
     return (cli_bands_need){.channels = image->channel_count,
                             .errors = scene->error != 0,
                             .irradiance = scene->irradiance != 0,
+                            .bent = scene->bent != 0,
+                            .tint = scene->tint.type != VSH_TINT_NONE && scene->light_count > 0,
+                            .interleaved = cli_planes_interleaved(scene),
                             .writer = vsh_image_writer_bytes(output, image, options),
                             .where = output};
 }
@@ -19,11 +23,10 @@ static uint64_t largest(const vsh_charts *charts, const vsh_charts_info *info, c
     uint64_t most = 0;
     for (int32_t first = 0; first < info->height; first += rows) {
         const int32_t left = info->height - first, here = left < rows ? left : rows;
-        uint64_t bytes =
-            vsh_charts_band_bytes(charts, first, here, need->channels, need->errors, need->irradiance);
-        if (need->irradiance) { /* as baked, and as the channels that are written */
-            bytes += 3 * sizeof(float) * (uint64_t)info->width * (uint64_t)here;
-        }
+        uint64_t bytes = vsh_charts_band_bytes(charts, first, here, need->channels, need->errors,
+                                               need->irradiance, need->bent, need->tint);
+        /* as baked, and as the channels that are written */
+        bytes += (uint64_t)need->interleaved * sizeof(float) * (uint64_t)info->width * (uint64_t)here;
         most = bytes > most ? bytes : most;
         if (left <= rows) {
             break;

@@ -7,8 +7,9 @@
 
 /* What a lightmap takes, whatever is baked at a time. */
 typedef struct cli_bands_need {
-    int32_t channels; /* of the image */
-    bool errors, irradiance;
+    int32_t channels;    /* of the image */
+    int32_t interleaved; /* those that are baked interleaved */
+    bool errors, irradiance, bent, tint;
     uint64_t held;     /* bytes: field, triangles, and what else is held meanwhile */
     uint64_t writer;   /* bytes: vsh_image_writer_bytes() */
     uint64_t limit;    /* bytes; 0: none */

@@ -4,26 +4,37 @@
 
 #include <vdbshade/vdbshade.h>
 
+/* Three channels that are baked interleaved. */
+typedef struct cli_triple {
+    float *values; /* [rows][width][3] */
+    size_t first;  /* of their planes */
+} cli_triple;
+
 typedef struct cli_planes {
     vsh_image image;       /* the channels, in order: shadow.NAME …, ao, error.NAME …, error.ao,
-                              irradiance.R, .G, .B, A */
+                              irradiance.R, .G, .B, bent.X, .Y, .Z, tint.NAME.R, .G, .B …, A */
     vsh_lightmap lightmap; /* the same memory, as the bake takes it */
     char (*names)[VSH_CHANNEL_NAME];
     const char **name_list;
     float **planes;
-    float *interleaved; /* irradiance as baked; split by cli_planes_split() */
-    int32_t rows;       /* that there is memory for */
+    cli_triple *triples; /* irradiance, bent normals, tints; split by cli_planes_split() */
+    float **tints;       /* [light_count]: of the last of them */
+    size_t triple_count;
+    int32_t rows; /* that there is memory for */
 } cli_planes;
 
 /* Names the channels of a scene at a size, without memory for values: enough for vsh_image_check(). Returns 0
  * or an exit code, having said why. */
 int cli_planes_name(cli_planes *planes, const vsh_scene *scene, int32_t width, int32_t height);
 
+/* Channels of a scene that are baked interleaved, and take memory twice. */
+int32_t cli_planes_interleaved(const vsh_scene *scene);
+
 /* Takes the memory for the values of `rows` rows, where they stay within `limit` bytes (0: no limit). */
 int cli_planes_allocate(cli_planes *planes, const vsh_scene *scene, int32_t rows, uint64_t limit,
                         const char *output);
 
-/* After the bake: irradiance into its three planes. */
+/* After the bake: what is interleaved into its planes. */
 void cli_planes_split(cli_planes *planes);
 
 void cli_planes_free(cli_planes *planes); /* zeroed ones too */

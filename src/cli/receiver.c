@@ -72,6 +72,7 @@ int cli_receiver_charts(const cli_receiver_job *job, bool warn, vsh_charts **cha
     options.padding = receiver->padding;
     options.ao_spacing = job->scene->ao ? receiver->ao_spacing : 1;
     options.shade = job->scene->shade;
+    options.tangents = job->scene->bent == 1 + VSH_BENT_TANGENT;
     vsh_uv_report *reports = calloc(count, sizeof *reports);
     if (reports == NULL) {
         cli_say("%s: the system refused memory", receiver->path);

@@ -19,6 +19,7 @@ typedef struct vshi_plane {
     const char *name;
     const float *values; /* [height × width]; NULL: `constant` everywhere */
     float constant;
+    bool is_signed; /* -1 … 1, of which integers hold the half, and one half */
 } vshi_plane;
 
 /* The channels of a file, in its order. */

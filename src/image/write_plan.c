@@ -8,6 +8,9 @@
 #include <string.h>
 #include <strings.h>
 
+/* What the names of channels begin with that hold -1 … 1. */
+#define SIGNED "bent."
+
 static vsh_result check_image(const char *path, const vsh_image *image, vsh_error *error) {
     if (image == NULL || image->names == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: no image was given", path);
@@ -116,7 +119,7 @@ static vsh_result plan_planes(const char *path, const vsh_image *image, const ch
     if (plan->exr && text == NULL) {
         planes->count = image->channel_count;
         for (int32_t c = 0; c < image->channel_count; ++c) {
-            planes->planes[c] = (vshi_plane){image->names[c], NULL, 0.0f};
+            planes->planes[c] = (vshi_plane){image->names[c], NULL, 0.0f, false};
             plan->channel[c] = c;
         }
         return VSH_OK;
@@ -136,8 +139,11 @@ static vsh_result plan_planes(const char *path, const vsh_image *image, const ch
         const vshi_pack_entry *entry = &pack.entries[key];
         /* the other formats have R, G and B whether given or not: what is not given is 0 */
         if (entry->given || (!plan->exr && key < (plan->format.grey ? 1 : VSHI_PACK_ALPHA))) {
-            plan->channel[planes->count] = entry->given ? entry->channel : -1;
-            planes->planes[planes->count++] = (vshi_plane){vshi_pack_keys[key], NULL, entry->constant};
+            const int32_t channel = entry->given ? entry->channel : -1;
+            plan->channel[planes->count] = channel;
+            planes->planes[planes->count++] =
+                (vshi_plane){vshi_pack_keys[key], NULL, entry->constant,
+                             channel >= 0 && strncmp(image->names[channel], SIGNED, strlen(SIGNED)) == 0};
         }
     }
     return VSH_OK;

@@ -118,6 +118,7 @@ static const vshi_key ao_keys[] = {
      .offset = offsetof(vsh_shade_options, ao_cones),
      .lowest = 1.0,
      .highest = 256.0},
+    {.name = "bent_normals", .kind = VSHI_LATER, .variants = ~(1U << VSH_AO_TAPS)},
 };
 static const vshi_table ao_table = VSHI_TABLE(ao_keys);
 
@@ -134,8 +135,39 @@ static vsh_result read_ao(vshi_reader *reader, const vshi_value *value, void *me
     static const char *const whats[] = {
         [VSH_AO_TAPS] = "ao by taps", [VSH_AO_RAYS] = "ao by rays", [VSH_AO_EXACT] = "ao"};
     const char *what = whats[scene->shade.ao_method];
-    return vshi_read_object(reader, value, &ao_table, 1U << scene->shade.ao_method,
-                            what != NULL ? what : "ao", &scene->shade);
+    result = vshi_read_object(reader, value, &ao_table, 1U << scene->shade.ao_method,
+                              what != NULL ? what : "ao", &scene->shade);
+    vshi_value bent;
+    if (result == VSH_OK && vshi_member(value, "bent_normals", &bent)) {
+        int32_t space = VSH_BENT_WORLD;
+        result = vshi_read_choice(reader, value, "bent_normals", vsh_bent_space_name, &space);
+        scene->bent = 1 + space;
+    }
+    return result;
+}
+
+/* "quadratic", or the powers of R, G and B. */
+static vsh_result read_tint(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_scene *scene = member;
+    const vshi_key powers = {.kind = VSHI_VECTOR, .lowest = 0.0625, .highest = 16.0, .count = 3};
+    if (json_is_array(value->json)) {
+        scene->tint.type = VSH_TINT_POWER;
+        return vshi_read_value(reader, value, &powers, scene->tint.power);
+    }
+    const vsh_result result = vshi_expect(reader, value, JSON_STRING);
+    scene->tint.type = result == VSH_OK ? vsh_tint_type(json_string_value(value->json)) : VSH_TINT_NONE;
+    if (result == VSH_OK && scene->tint.type != VSH_TINT_NONE && scene->tint.type != VSH_TINT_QUADRATIC) {
+        return vshi_reader_fail(reader, value, "\"%.64s\" is none of none, quadratic, [r, g, b]",
+                                json_string_value(value->json));
+    }
+    return result;
+}
+
+static vsh_result read_ambient(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_scene *scene = member;
+    const vshi_key color = {.kind = VSHI_VECTOR, .highest = VSHI_LARGEST, .count = 3};
+    scene->has_ambient = 1;
+    return vshi_read_value(reader, value, &color, scene->ambient);
 }
 
 static const vshi_key scene_keys[] = {
@@ -164,6 +196,8 @@ static const vshi_key scene_keys[] = {
     {.name = "lights", .kind = VSHI_CUSTOM, .read = read_lights},
     {.name = "ao", .kind = VSHI_CUSTOM, .read = read_ao},
     {.name = "irradiance", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, irradiance)},
+    {.name = "ambient", .kind = VSHI_CUSTOM, .read = read_ambient},
+    {.name = "tint", .kind = VSHI_CUSTOM, .read = read_tint},
     {.name = "method",
      .kind = VSHI_NAME,
      .offset = offsetof(vsh_scene, shade.method),

@@ -30,6 +30,9 @@ bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, 
     if (!vshi_shade_origin(task->field, task->points, i, vshi_shade_lift(task->field, task->options),
                            &frame->origin, &normal)) {
         task->ao[i] = NAN;
+        if (task->bent != NULL) {
+            vshi_ao_set_bent(task, i, (vshi_vec){NAN, NAN, NAN});
+        }
         ++stats->invalid;
         return false;
     }
@@ -81,12 +84,34 @@ vsh_result vshi_ao_check_points(const vsh_points *points, vsh_error *error) {
 vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const vsh_shade_options *options,
                         const vsh_run *run, float *ao, float *deviation, vsh_shade_stats *stats,
                         vsh_error *error) {
-    return vshi_shade_ao(field, points, NULL, options, run, ao, deviation, stats, error);
+    return vshi_shade_ao(field, points, NULL, options, run, ao, deviation, NULL, stats, error);
+}
+
+void vshi_ao_bend(float *bent, const float *normal) {
+    const vshi_vec n = vshi_unit(vshi_vec_off(normal)), d = vshi_vec_off(bent);
+    if (isnan(bent[0])) {
+        return;
+    }
+    const vshi_vec b = vshi_dot(d, n) > 0.0 ? vshi_unit(d) : n;
+    bent[0] = (float)b.x;
+    bent[1] = (float)b.y;
+    bent[2] = (float)b.z;
+}
+
+vsh_result vsh_shade_bent(const vsh_field *field, const vsh_points *points, const vsh_shade_options *options,
+                          const vsh_run *run, float *ao, float *bent, vsh_shade_stats *stats,
+                          vsh_error *error) {
+    VSHI_FLOATS;
+    const vsh_result result = vshi_shade_ao(field, points, NULL, options, run, ao, NULL, bent, stats, error);
+    for (size_t i = 0; result == VSH_OK && i < points->count; ++i) {
+        vshi_ao_bend(bent + 3 * i, points->normals + 3 * i);
+    }
+    return result;
 }
 
 vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
                          const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
-                         vsh_shade_stats *stats, vsh_error *error) {
+                         float *bent, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     vsh_shade_options full;
     vsh_run full_run;
@@ -100,6 +125,10 @@ vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const
     }
     if (result == VSH_OK) {
         result = vshi_ao_check_points(points, error);
+    }
+    if (result == VSH_OK && bent != NULL && full.ao_method == VSH_AO_TAPS) {
+        result = vshi_fail(error, VSH_ERROR_ARGUMENT,
+                           "bent normals: AO by taps knows no directions; use cones or rays");
     }
     if (result == VSH_OK) {
         result = vshi_ao_prepare(field, &full, &cones, &task, error);
@@ -117,6 +146,7 @@ vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const
         task.points = points;
         task.ao = ao;
         task.deviation = deviation;
+        task.bent = bent;
         const size_t grain = full.ao_method == VSH_AO_TAPS ? VSHI_CHUNK : VSHI_AO_GRAIN;
         result =
             vshi_shade_run(&full_run, "ao", points->count, rows, grain, vshi_ao_shade, &task, stats, error);

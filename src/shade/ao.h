@@ -27,7 +27,27 @@ typedef struct vshi_ao_task {
     const vsh_points *points;
     float *ao;
     float *deviation; /* may be NULL */
+    float *bent;      /* [count][3]: the directions that are open, averaged over the whole cosine-weighted
+                       * hemisphere (2/3 of the normal where all is open), world space; may be NULL */
 } vshi_ao_task;
+
+/* Length of what `bent` is under an open sky: the mean cosine. */
+#define VSHI_AO_OPEN (2.0 / 3.0)
+
+/* The mean of `count` directions of which the share `open` is free, with the sum `free`, around a normal.
+ * What the directions lean by, with the sum `all`, is taken out: an open sky has the mean of a whole
+ * hemisphere. */
+static inline vshi_vec vshi_ao_mean(vshi_vec free, vshi_vec all, double open, int32_t count,
+                                    vshi_vec normal) {
+    const vshi_vec lean = vshi_sub(vshi_scale(normal, VSHI_AO_OPEN), vshi_scale(all, 1.0 / count));
+    return vshi_scale(vshi_add(free, vshi_scale(lean, open)), 1.0 / count);
+}
+
+static inline void vshi_ao_set_bent(const vshi_ao_task *task, size_t i, vshi_vec d) {
+    task->bent[3 * i] = (float)d.x;
+    task->bent[3 * i + 1] = (float)d.y;
+    task->bent[3 * i + 2] = (float)d.z;
+}
 
 /* Checks options (resolved ones); fills *task but for sampler, kernel and arrays, and *cones where the method
  * takes them. Errors: VSH_ERROR_ARGUMENT. */
@@ -54,6 +74,10 @@ typedef struct vshi_ao_frame {
 
 /* The frame of point i in field space; false where the point is invalid: it is then NaN and counted. */
 bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, vsh_shade_stats *stats);
+
+/* From an average of open directions to a unit bent normal: `normal` (of any length) where nothing is open.
+ * NaN stays. */
+void vshi_ao_bend(float *bent, const float *normal);
 
 /* What the field's edges are short of, voxels, at a point where rays begin. */
 double vshi_ao_grown(const vsh_field *field, vshi_vec origin);

@@ -79,23 +79,35 @@ int32_t vshi_ao_table_cell(const double evidence[2], double part[2]) {
     return r * VSHI_AO_TABLE_EDGE + c;
 }
 
-/* What all cones of a point see together. Free and hidden cones are so whatever is beside them. */
-static double open_share(const vshi_ao_cones *cones, const float *close) {
-    double open = 0.0;
-    for (int32_t c = 0; c < cones->count; ++c) {
-        const double closeness = (double)close[c], sine = (double)(float)cones->sines[c];
-        if (closeness >= sine) {
-            open += 1.0;
-        } else if (closeness > -sine) {
-            double evidence[2], part[2];
-            vshi_ao_cone_evidence(cones, close, c, evidence);
-            const float *t = &TABLE[0][0] + vshi_ao_table_cell(evidence, part);
-            const float *u = t + VSHI_AO_TABLE_EDGE;
-            const double near = (double)t[0] + ((double)t[1] - (double)t[0]) * part[1];
-            const double far = (double)u[0] + ((double)u[1] - (double)u[0]) * part[1];
-            open += near + (far - near) * part[0];
-        }
+/* What cone c of a point sees. Free and hidden cones are so whatever is beside them. */
+static double cone_share(const vshi_ao_cones *cones, const float *close, int32_t c) {
+    const double closeness = (double)close[c], sine = (double)(float)cones->sines[c];
+    if (closeness >= sine) {
+        return 1.0;
     }
+    if (!(closeness > -sine)) {
+        return 0.0;
+    }
+    double evidence[2], part[2];
+    vshi_ao_cone_evidence(cones, close, c, evidence);
+    const float *t = &TABLE[0][0] + vshi_ao_table_cell(evidence, part);
+    const float *u = t + VSHI_AO_TABLE_EDGE;
+    const double near = (double)t[0] + ((double)t[1] - (double)t[0]) * part[1];
+    const double far = (double)u[0] + ((double)u[1] - (double)u[0]) * part[1];
+    return near + (far - near) * part[0];
+}
+
+/* What all cones of a point see together, and in the mean where (along the frame's axes). */
+static double open_share(const vshi_ao_cones *cones, const float *close, vshi_vec *where) {
+    double open = 0.0;
+    vshi_vec sum = {0.0, 0.0, 0.0}, all = {0.0, 0.0, 0.0};
+    for (int32_t c = 0; c < cones->count; ++c) {
+        const double share = cone_share(cones, close, c);
+        open += share;
+        sum = vshi_add(sum, vshi_scale(cones->directions[c], share));
+        all = vshi_add(all, cones->directions[c]);
+    }
+    *where = vshi_ao_mean(sum, all, open, cones->count, (vshi_vec){0.0, 0.0, 1.0});
     return open / cones->count;
 }
 
@@ -119,6 +131,7 @@ void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stat
     vshi_chunk chunk;
     float close[VSHI_AO_GRAIN * VSHI_AO_MAX_CONES];
     bool valid[VSHI_AO_GRAIN];
+    vshi_vec axes[VSHI_AO_GRAIN][3];
     vshi_chunk_clear(&chunk);
     for (size_t i = begin; i < end; ++i) {
         vshi_ao_frame frame;
@@ -127,6 +140,7 @@ void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stat
             continue;
         }
         frame.grown = vshi_ao_grown(task->field, frame.origin);
+        memcpy(axes[i - begin], frame.axes, sizeof frame.axes);
         ++stats->samples;
         if (chunk.rays.count + count > VSHI_CHUNK) {
             flush(task, &chunk, close, stats);
@@ -150,8 +164,15 @@ void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stat
     }
     flush(task, &chunk, close, stats);
     for (size_t i = begin; i < end; ++i) {
-        if (valid[i - begin]) {
-            task->ao[i] = (float)open_share(cones, close + (i - begin) * count);
+        if (!valid[i - begin]) {
+            continue;
+        }
+        vshi_vec where;
+        task->ao[i] = (float)open_share(cones, close + (i - begin) * count, &where);
+        if (task->bent != NULL) {
+            const double length = vshi_length(where);
+            const vshi_vec d = vshi_ao_direction(axes[i - begin], where);
+            vshi_ao_set_bent(task, i, vshi_scale(vshi_direction_to_world(task->field, d), length));
         }
     }
 }

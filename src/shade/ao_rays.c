@@ -34,6 +34,8 @@ typedef struct ao_point {
     uint32_t texel;
     int32_t taken, free; /* rays */
     int32_t next;        /* rays after this round; 0: done */
+    vshi_vec open;       /* sum of the directions of the free; exact: in world space, else in the field's */
+    vshi_vec all;        /* of all, along the frame's axes */
     int32_t balls;       /* the smallest first */
     ball ball[BALLS];
     vshi_vec world_origin, world_axes[3]; /* exact */
@@ -49,13 +51,20 @@ typedef struct batch {
     vshi_segment_ray segments[VSHI_CHUNK];
 } batch;
 
+static void add_free(ao_point *point, vshi_vec direction) {
+    ++point->free;
+    point->open = vshi_add(point->open, direction);
+}
+
 static void flush(batch *b, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
     if (b->exact) {
         bool blocked[VSHI_CHUNK];
         vshi_triangles_blocked(task->options->triangles, b->segments, b->traced, blocked);
         for (size_t r = 0; r < b->traced; ++r) {
-            b->points[b->chunk.owner[r]].free += !blocked[r];
+            if (!blocked[r]) {
+                add_free(&b->points[b->chunk.owner[r]], vshi_vec_of(b->segments[r].direction));
+            }
         }
         stats->rays += b->traced;
         b->traced = 0;
@@ -67,7 +76,11 @@ static void flush(batch *b, vsh_shade_stats *stats) {
     stats->unfinished += work.unfinished;
     stats->rays += b->chunk.rays.count;
     for (size_t r = 0; r < b->chunk.rays.count; ++r) {
-        b->points[b->chunk.owner[r]].free += b->chunk.rays.close[r] > 0.0f;
+        if (b->chunk.rays.close[r] > 0.0f) {
+            float *const *d = b->chunk.rays.direction;
+            add_free(&b->points[b->chunk.owner[r]],
+                     (vshi_vec){(double)d[0][r], (double)d[1][r], (double)d[2][r]});
+        }
     }
     vshi_chunk_clear(&b->chunk);
 }
@@ -112,22 +125,23 @@ static void march_ray(batch *b, uint32_t owner, vshi_vec local, vsh_shade_stats 
     const vshi_ao_task *task = b->task;
     ao_point *point = &b->points[owner];
     const double begin = free_up_to(point, local.z);
+    const vshi_vec direction = vshi_ao_direction(point->frame.axes, local);
     if (begin >= task->distance) {
-        ++point->free;
+        add_free(point, direction);
         return;
     }
     if (b->chunk.rays.count == VSHI_CHUNK) {
         flush(b, stats);
     }
     const vshi_cone ray = {.origin = point->frame.origin,
-                           .direction = vshi_ao_direction(point->frame.axes, local),
+                           .direction = direction,
                            .end = task->distance,
                            .sine = 0.0,
                            .close = 1.0,
                            .stop = 0.0,
                            .wide = point->frame.grown};
     if (!vshi_chunk_add(&b->chunk, task->field, &ray, owner, stats)) {
-        ++point->free;
+        add_free(point, direction);
         return;
     }
     float *start = &b->chunk.rays.begin[b->chunk.rays.count - 1];
@@ -156,6 +170,7 @@ static void shoot(batch *b, uint32_t owner, vsh_shade_stats *stats) {
         for (int32_t i = 0; i < count; ++i) {
             const double square = 1.0 - disc[i][0] * disc[i][0] - disc[i][1] * disc[i][1];
             const vshi_vec local = {disc[i][0], disc[i][1], sqrt(square > 0.0 ? square : 0.0)};
+            point->all = vshi_add(point->all, local);
             if (b->exact) {
                 trace_ray(b, owner, local, stats);
             } else {
@@ -186,6 +201,9 @@ static bool prepare(batch *b, size_t i, ao_point *point, vsh_shade_stats *stats)
         task->ao[i] = 0.0f;
         if (task->deviation != NULL) {
             task->deviation[i] = 0.0f;
+        }
+        if (task->bent != NULL) {
+            vshi_ao_set_bent(task, i, (vshi_vec){0.0, 0.0, 0.0});
         }
         return false;
     }
@@ -272,6 +290,13 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
         task->ao[i] = (float)((double)point->free / point->taken);
         if (task->deviation != NULL) {
             task->deviation[i] = (float)error;
+        }
+        if (task->bent != NULL) {
+            const vshi_vec *axes = b.exact ? point->world_axes : point->frame.axes;
+            const vshi_vec mean = vshi_ao_mean(point->open, vshi_ao_direction(axes, point->all), point->free,
+                                               point->taken, axes[2]);
+            const vshi_vec d = b.exact ? vshi_unit(mean) : vshi_direction_to_world(task->field, mean);
+            vshi_ao_set_bent(task, i, vshi_scale(d, vshi_length(mean)));
         }
         stats->square_error += fixed ? 0.0 : error * error;
         ++stats->refined;

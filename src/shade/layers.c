@@ -152,6 +152,7 @@ typedef struct layer_piece {
     vsh_points points;
     uint32_t texels[VSHI_PIECE];
     float value[VSHI_PIECE], deviation[VSHI_PIECE];
+    float bent[3 * VSHI_AO_GRAIN];
 } layer_piece;
 
 static void cut(layer_piece *piece, const vsh_points *points, size_t begin, size_t end) {
@@ -221,6 +222,14 @@ void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task,
     }
 }
 
+/* What a layer takes from the open sky is taken from what is left of it. */
+static void superpose(float *bent, const float *of_layer, const float *normal) {
+    const vshi_vec open = vshi_scale(vshi_unit(vshi_vec_off(normal)), VSHI_AO_OPEN);
+    bent[0] += of_layer[0] - (float)open.x;
+    bent[1] += of_layer[1] - (float)open.y;
+    bent[2] += of_layer[2] - (float)open.z;
+}
+
 void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t begin, size_t end,
                     vsh_shade_stats *stats) {
     layer_piece piece;
@@ -232,11 +241,15 @@ void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t 
         own.points = &piece.points;
         own.ao = piece.value;
         own.deviation = task->deviation != NULL ? piece.deviation : NULL;
+        own.bent = task->bent != NULL ? piece.bent : NULL;
         vshi_ao_shade(&own, 0, end - begin, stats);
         for (size_t i = begin; i < end; ++i) {
             combine(&item->layer, (double)piece.value[i - begin],
                     own.deviation != NULL ? (double)piece.deviation[i - begin] : 0.0, 1.0, &task->ao[i],
                     task->deviation != NULL ? &task->deviation[i] : NULL);
+            if (task->bent != NULL) {
+                superpose(task->bent + 3 * i, piece.bent + 3 * (i - begin), task->points->normals + 3 * i);
+            }
         }
     }
 }

@@ -1,5 +1,5 @@
 /* Names of the methods, each in one table that both directions read. */
-#include <vdbshade/shade.h>
+#include <vdbshade/bake.h>
 
 #include <string.h>
 
@@ -20,10 +20,16 @@ static const char *const sampler_names[] = {
 
 static const char *const combine_names[] = {[VSH_COMBINE_MULTIPLY] = "multiply", [VSH_COMBINE_MIN] = "min"};
 
+static const char *const tint_names[] = {
+    [VSH_TINT_NONE] = "none", [VSH_TINT_QUADRATIC] = "quadratic", [VSH_TINT_POWER] = "power"};
+static const char *const space_names[] = {[VSH_BENT_WORLD] = "world", [VSH_BENT_TANGENT] = "tangent"};
+
 enum {
     SHADOW_COUNT = sizeof shadow_names / sizeof shadow_names[0],
     AO_COUNT = sizeof ao_names / sizeof ao_names[0],
     SAMPLER_COUNT = sizeof sampler_names / sizeof sampler_names[0],
+    TINT_COUNT = sizeof tint_names / sizeof tint_names[0],
+    SPACE_COUNT = sizeof space_names / sizeof space_names[0],
     COMBINE_COUNT = sizeof combine_names / sizeof combine_names[0],
 };
 
@@ -66,4 +72,20 @@ int32_t vsh_combine(const char *name) {
 
 const char *vsh_combine_name(int32_t combine) {
     return combine >= 0 && combine < COMBINE_COUNT ? combine_names[combine] : NULL;
+}
+
+int32_t vsh_tint_type(const char *name) {
+    return find(tint_names, TINT_COUNT, name);
+}
+
+const char *vsh_tint_type_name(int32_t type) {
+    return type >= 0 && type < TINT_COUNT ? tint_names[type] : NULL;
+}
+
+int32_t vsh_bent_space(const char *name) {
+    return find(space_names, SPACE_COUNT, name);
+}
+
+const char *vsh_bent_space_name(int32_t space) {
+    return space >= 0 && space < SPACE_COUNT ? space_names[space] : NULL;
 }

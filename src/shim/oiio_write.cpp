@@ -94,9 +94,10 @@ void interleave(const vshi_planes &planes, int32_t first, int32_t last, Value *r
     const size_t texels = static_cast<size_t>(last - first) * width;
     for (size_t c = 0; c < count; ++c) {
         const vshi_plane &plane = planes.planes[c];
+        const bool halve = plane.is_signed && std::is_integral_v<Value>;
         for (size_t i = 0; i < texels; ++i) {
-            rows[i * count + c] =
-                convert<Value>(plane.values != nullptr ? plane.values[begin + i] : plane.constant);
+            const float value = plane.values != nullptr ? plane.values[begin + i] : plane.constant;
+            rows[i * count + c] = convert<Value>(halve ? 0.5F + 0.5F * value : value);
         }
     }
 }

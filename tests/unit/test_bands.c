@@ -285,7 +285,7 @@ static void rows_that_are_no_band_are_refused(void **state) {
                          VSH_ERROR_ARGUMENT);
         assert_null(texels);
         assert_non_null(strstr(error.message, "band"));
-        assert_int_equal(vsh_charts_band_bytes(charts, bad[i][0], bad[i][1], 3, 0, 0), 0);
+        assert_int_equal(vsh_charts_band_bytes(charts, bad[i][0], bad[i][1], 3, 0, 0, 0, 0), 0);
     }
     vsh_charts_free(charts);
 }
@@ -310,8 +310,8 @@ static void a_band_bakes_within_the_bytes_it_is_said_to_take(void **state) {
     vsh_charts_get_info(charts, &counted);
     vsh_field_get_info(s->field, &field);
     const int32_t first = 1024, rows = 64, floats = 4;
-    const uint64_t bytes = vsh_charts_band_bytes(charts, first, rows, floats, 0, 0);
-    assert_true(bytes > vsh_charts_band_bytes(charts, first, rows - 8, floats, 0, 0));
+    const uint64_t bytes = vsh_charts_band_bytes(charts, first, rows, floats, 0, 0, 0, 0);
+    assert_true(bytes > vsh_charts_band_bytes(charts, first, rows - 8, floats, 0, 0, 0, 0));
     assert_int_equal(vsh_texels_create_band(charts, first, rows, &run, &texels, &error), VSH_OK);
     vsh_light lights[2];
     set_lights(lights);

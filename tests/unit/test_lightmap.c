@@ -98,7 +98,8 @@ static planes *new_planes(void) {
     planes *p = malloc(sizeof *p);
     memset(p, 0xff, sizeof *p); /* NaN: whatever is not written shows */
     p->lights[0] = p->shadow;
-    p->all = (vsh_lightmap){p->lights, p->ao, p->irradiance, p->coverage, NULL, NULL};
+    p->all = (vsh_lightmap){
+        .shadow = p->lights, .ao = p->ao, .irradiance = p->irradiance, .coverage = p->coverage};
     return p;
 }
 
@@ -193,7 +194,7 @@ static void irradiance_is_visibility_times_colour_times_cosine_times_ao(void **s
         assert_true(p->irradiance[3 * i + 2] == 0.0f);
     }
     planes *alone = new_planes();
-    alone->all = (vsh_lightmap){NULL, NULL, alone->irradiance, NULL, NULL, NULL};
+    alone->all = (vsh_lightmap){.irradiance = alone->irradiance};
     bake(field, texels, &light, &alone->all, NULL, 0);
     for (size_t i = 0; i < TEXELS; ++i) {
         assert_true(fabs((double)alone->irradiance[3 * i] - 2.0 * sqrt(0.5) * (double)p->shadow[i]) < 1e-5);
@@ -214,16 +215,16 @@ static void planes_that_are_not_asked_for_cost_nothing_and_change_nothing(void *
     bake(field, texels, &light, &all->all, NULL, 0);
 
     vsh_bake_stats stats = vsh_bake_stats_zero();
-    const vsh_lightmap coverage = {NULL, NULL, NULL, some->coverage, NULL, NULL};
+    const vsh_lightmap coverage = {.coverage = some->coverage};
     bake(field, texels, &light, &coverage, &stats, 0);
     assert_int_equal(stats.shade.marches, 0);
     assert_int_equal(stats.shade.samples, 0);
     assert_memory_equal(some->coverage, all->coverage, sizeof all->coverage);
 
-    const vsh_lightmap ao = {NULL, some->ao, NULL, NULL, NULL, NULL};
+    const vsh_lightmap ao = {.ao = some->ao};
     bake(field, texels, NULL, &ao, NULL, 0);
     assert_memory_equal(some->ao, all->ao, sizeof all->ao);
-    const vsh_lightmap shadow = {some->lights, NULL, NULL, NULL, NULL, NULL};
+    const vsh_lightmap shadow = {.shadow = some->lights};
     bake(field, texels, &light, &shadow, NULL, 0);
     assert_memory_equal(some->shadow, all->shadow, sizeof all->shadow);
     free(some);

@@ -1,0 +1,86 @@
+# What a bake can give beside shadow and AO: bent normals, tints, ambient light; casters in layers.
+load helper
+
+@test "bent normals, tints and irradiance have channels of their own" {
+    write_box box.obj
+    run -0 "$VDBSHADE" bake box.obj --sun 1,1,1 --ao 0.5 --size 32 --resolution 32 --bent-normals world --tint quadratic \
+        --ambient 0.1,0.2,0.3 -o box.exr --quiet
+    run -0 "$VDBSHADE" info box.exr
+    for channel in shadow.sun ao irradiance.R irradiance.B bent.X bent.Y bent.Z tint.sun.R tint.sun.G tint.sun.B A; do
+        [[ $output == *"'$channel'"* ]]
+    done
+    # nothing is beside a box: bent normals are those of its sides, of all six directions
+    [[ $output == *"'bent.X': min -1, "*", max 1"* ]]
+    # what is turned away from the sun has the ambient light
+    [[ $output == *"'irradiance.B': min 0.3, "* ]]
+}
+
+@test "eight bits hold half of a bent normal and a half" {
+    write_box box.obj
+    run -0 "$VDBSHADE" bake box.obj --ao 0.5 --size 32 --resolution 32 --bent-normals tangent \
+        --pack R=bent.X,G=bent.Y,B=bent.Z --bits 8 -o box.png --quiet
+    run -0 "$VDBSHADE" info box.png
+    # out of the surface: (0, 0, 1)
+    [[ $output == *"'R': min 0.501961, mean 0.501961, max 0.501961"* ]]
+    [[ $output == *"'B': min 1, mean 1, max 1"* ]]
+}
+
+@test "bands of bent normals and tints are those of the whole" {
+    write_box box.obj
+    options=(--sun 1,1,1 --ao 0.5 --size 64 --resolution 32 --bent-normals tangent --tint 1,1.2,1.5 --quiet)
+    run -0 "$VDBSHADE" bake box.obj "${options[@]}" -o whole.exr
+    run -0 "$VDBSHADE" bake box.obj "${options[@]}" --band-rows 16 -o bands.exr
+    cmp whole.exr bands.exr
+}
+
+@test "what does not go together is told" {
+    write_box box.obj
+    run -2 "$VDBSHADE" bake box.obj --sun 1,1,1 --bent-normals world -o box.exr
+    [ "$output" = "vdbshade: --bent-normals: there is no --ao" ]
+    run -2 "$VDBSHADE" bake box.obj --ao 1 --ao-method taps --bent-normals world -o box.exr
+    [[ $output == *"AO by taps knows no directions"* ]]
+    run -2 "$VDBSHADE" bake box.obj --ao 1 --bent-normals up -o box.exr
+    [[ $output == *"'up'"*"world, tangent"* ]]
+    run -2 "$VDBSHADE" bake box.obj --sun 1,1,1 --tint 0,1,1 -o box.exr
+    [[ $output == *"power[0] 0 is out of range"* ]]
+    run -2 "$VDBSHADE" bake box.obj --sun 1,1,1 --ambient -1,1,1 -o box.exr
+    [[ $output == *"expected three numbers of at least 0"* ]]
+}
+
+# A wall over a floor, in one level set or in a layer, with its own voxels, or hard.
+scene_of() {
+    cat >"$1" <<JSON
+{
+    "casters": [
+        {"sdf": {"shape": "plane", "half_size": [3, 3], "thickness": 0.5}},
+        {"sdf": {"shape": "box", "half_size": [0.2, 1, 2], "translate": [0, 1, 0]}$2}
+    ],
+    "resolution": 96,
+    $3
+    "lights": [{"name": "sun", "type": "directional", "direction": [-1, 1.2, 0], "angle_deg": 20}],
+    "receivers": [{"mesh": "$ASSETS/seeds_floor.obj", "size": 64, "output": "${1%.json}.exr"}]
+}
+JSON
+}
+
+mean() {
+    "$VDBSHADE" info "$1" | sed -n "s/.*'shadow.sun'.*mean \([0-9.]*\),.*/\1/p"
+}
+
+@test "a layer casts as the casters in none do, harder or only for some lights where it says so" {
+    scene_of one.json '' ''
+    scene_of layer.json ', "layer": "wall"' '"layers": [{"name": "wall", "voxel_size": 0.05}],'
+    scene_of hard.json ', "layer": "wall"' '"layers": [{"name": "wall", "softness": 0}],'
+    scene_of none.json ', "layer": "wall"' '"layers": [{"name": "wall", "lights": []}],'
+    for scene in one layer hard none; do
+        run -0 "$VDBSHADE" bake "$scene.json" --quiet
+    done
+    awk -v a="$(mean one.exr)" -v b="$(mean layer.exr)" 'BEGIN {exit !(a > 0.3 && a < 0.9 && (a - b) ^ 2 < 0.01 ^ 2)}'
+    awk -v a="$(mean hard.exr)" 'BEGIN {exit !(a > 0.3 && a < 0.9)}'
+    [ "$(mean none.exr)" = 1 ] || [[ $("$VDBSHADE" info none.exr) == *"'shadow.sun': min 1"* ]] ||
+        awk -v a="$(mean none.exr)" -v b="$(mean one.exr)" 'BEGIN {exit !(a > b + 0.05)}'
+    run -0 "$VDBSHADE" info layer.json
+    [[ $output == *"layer 'wall': combine multiply, voxel size 0.05"* ]]
+    run -2 "$VDBSHADE" trade layer.json -o trade.html
+    [[ $output == *"trade measures one field, not layers"* ]]
+}
