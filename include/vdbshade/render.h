@@ -63,6 +63,7 @@ typedef struct vsh_lit_meshes {
     const vsh_image *lightmap; /* of any size, row 0 at v = 1, looked up bilinearly: either irradiance.R, .G,
                                   .B or shadow.NAME of every light, and `ao` if there is one */
     double color[3];           /* as of a surface */
+    int32_t ambient; /* nonzero: its irradiance has the sky's light in it already (vsh_lightmap.ambient) */
 } vsh_lit_meshes;
 
 typedef struct vsh_render_options {
@@ -82,12 +83,24 @@ typedef struct vsh_render_options {
     const vsh_lit_meshes *lit; /* [lit_count]: shown in front of surfaces up to 1.5 voxels nearer; may be
                                   NULL */
     size_t lit_count;
+    vsh_tint tint; /* of penumbrae */
     vsh_shade_options shade;
 } vsh_render_options;
 
 static inline vsh_render_options vsh_render_options_default(void) {
-    vsh_render_options options = {sizeof(vsh_render_options), vsh_camera_default(), 1280, 720, 3,    0,
-                                  {0.22, 0.27, 0.35},         {0.42, 0.52, 0.66},   0.0,  8,   NULL, 0,
+    vsh_render_options options = {sizeof(vsh_render_options),
+                                  vsh_camera_default(),
+                                  1280,
+                                  720,
+                                  3,
+                                  0,
+                                  {0.22, 0.27, 0.35},
+                                  {0.42, 0.52, 0.66},
+                                  0.0,
+                                  8,
+                                  NULL,
+                                  0,
+                                  {VSH_TINT_NONE, {1.0, 1.0, 1.0}},
                                   vsh_shade_options_default()};
     return options;
 }
@@ -105,7 +118,7 @@ typedef struct vsh_picture {
 /* Renders a picture. Each ray is sphere-traced (J. C. Hart, 1996) to the nearest of `surfaces`
  * [surface_count], and its hit is found to a hundredth of a voxel; normals are central differences over a
  * voxel to each side. There a pixel's colour is the surface's × (sum over lights of colour × falloff × cosine
- * × visibility + sky × AO), with the values of vsh_shade_shadow() and vsh_shade_ao() in `field` and
+ * × tinted visibility + sky × AO), with the values of vsh_shade_shadow() and vsh_shade_ao() in `field` and
  * options->shade.layers. Surfaces are usually those fields; others of the same casters tell more colours
  * apart. Rays that begin within a solid begin where they leave it. For VSH_SHADOW_EXACT and VSH_AO_EXACT
  * points are lifted by half a voxel.

@@ -96,7 +96,8 @@ static int set_options(render_work *work) {
     o->height = s->height;
     o->samples = s->samples;
     o->ao = work->scene->ao;
-    memcpy(o->sky, s->sky, sizeof o->sky);
+    memcpy(o->sky, s->has_sky || !work->scene->has_ambient ? s->sky : work->scene->ambient, sizeof o->sky);
+    o->tint = work->scene->tint;
     memcpy(o->background, s->background, sizeof o->background);
     o->shafts = s->shafts;
     o->shaft_steps = s->shaft_steps;

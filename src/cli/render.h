@@ -19,7 +19,7 @@ typedef struct render_settings {
     const char *lightmaps[RENDER_MOST_LIGHTMAPS];
     size_t lightmap_count;
     const char *pack; /* of the lightmaps, as bake took it; NULL: their own names */
-    bool has_camera, has_look_at, has_fov, has_sky, transparent, page;
+    bool has_camera, has_look_at, has_sky, transparent, page;
 } render_settings;
 
 /* Takes the command line, and checks what can be checked before anything is read. */

@@ -79,6 +79,7 @@ int render_lightmaps_read(const render_settings *s, const vsh_scene *scene, cons
         }
         lit->meshes = vsh_assets_receiver(assets, i, &lit->mesh_count);
         lit->lightmap = &map->image;
+        lit->ambient = scene->has_ambient;
         color_of(scene, scene->receivers[i].path, lit->color);
     }
     return CLI_OK;

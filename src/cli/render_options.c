@@ -42,7 +42,7 @@ static const cli_option options[] = {
     {KEY_TURNTABLE, "turntable", "N", "N pictures of a whole turn, 2 to 1000 (a page: 36)"},
     {0, NULL, NULL, "Light"},
     CLI_LIGHT_OPTIONS,
-    {KEY_SKY, "sky", "R,G,B", "light of the open sky, linear (0.22,0.27,0.35)"},
+    {KEY_SKY, "sky", "R,G,B", "light of the open sky, linear (the scene's ambient, or\n0.22,0.27,0.35)"},
     {KEY_BACKGROUND, "background", "R,G,B", "where nothing is, linear (0.42,0.52,0.66); none:\ntransparent"},
     {KEY_SHAFTS, "shafts", "STRENGTH",
      "light shafts: thickness of a fog around the casters,\n0 to 100 (0: none; 0.3 is much)"},
@@ -115,6 +115,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_SAMPLES:
         return cli_take_integer(name, value, 1, 16, &s->samples);
     case KEY_SKY:
+        s->has_sky = true;
         return cli_take_color(name, value, s->sky);
     case KEY_BACKGROUND:
         return take_background(s, name, value);

@@ -2,6 +2,7 @@
 
 #include "base/memory.h"
 #include "caster/mesh.h"
+#include "shade/shade.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -340,10 +341,11 @@ void vshi_lit_shade(const vshi_lit *lit, uint32_t number, vshi_vec ray, float co
         const vsh_points points = {1, position, front, NULL};
         for (size_t l = 0; l < lit->light_count; ++l) {
             const float visible = blend(&f, map->shadow[l]);
-            vsh_shade_irradiance(&points, NULL, &lit->lights[l], &visible, light);
+            vshi_shade_irradiance(&points, NULL, &lit->lights[l], &visible, &lit->options->tint, light);
         }
     }
-    const double open = map->ao != NULL ? (double)blend(&f, map->ao) : 1.0;
+    const bool done = map->irradiance[0] != NULL && map->of->ambient;
+    const double open = done ? 0.0 : map->ao != NULL ? (double)blend(&f, map->ao) : 1.0;
     for (int c = 0; c < 3; ++c) {
         color[c] = (float)(map->of->color[c] * ((double)light[c] + lit->options->sky[c] * open));
         normal[c] = (float)facing * front[c];

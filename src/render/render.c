@@ -57,6 +57,7 @@ static vsh_result check_options(const vsh_render_options *o, size_t light_count,
     for (size_t i = 0; result == VSH_OK && o->lit != NULL && i < o->lit_count; ++i) {
         result = check_colors("color of lit meshes", o->lit[i].color, 1.0, error);
     }
+    result = result == VSH_OK ? vsh_tint_check(&o->tint, error) : result;
     return result == VSH_OK ? vsh_camera_check(&o->camera, error) : result;
 }
 

@@ -1,6 +1,7 @@
 #include "render/tile.h"
 
 #include "render/hit.h"
+#include "shade/shade.h"
 
 /* How much nearer than a lit mesh a surface of the same shape may be, its voxels. */
 static const double SAME = 1.5;
@@ -68,7 +69,8 @@ static vsh_result light_hits(const vshi_scenery *scenery, hits *h, vsh_shade_sta
         visibility[l] = h->visibility;
         output.visibility = visibility;
         result = vsh_query_points(scenery->query, &points, &scenery->run, &output, stats, error);
-        vsh_shade_irradiance(&points, NULL, &scenery->lights[l], h->visibility, &h->light[0][0]);
+        vshi_shade_irradiance(&points, NULL, &scenery->lights[l], h->visibility, &scenery->options->tint,
+                              &h->light[0][0]);
     }
     for (size_t i = 0; i < h->count && result == VSH_OK; ++i) {
         const double open = !scenery->options->ao ? 1.0 : h->ao[i] > 0.0f ? (double)h->ao[i] : 0.0;

@@ -1,4 +1,4 @@
-# Every scene in docs/scene.md bakes, and every command in docs/query.md runs.
+# Every scene in docs/scene.md bakes, and every command in docs/query.md and docs/render.md runs.
 load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
@@ -9,6 +9,18 @@ setup() {
     awk '/^```json$/ { name = sprintf("example%02d.json", ++n); inside = 1; next }
          /^```$/ { inside = 0 }
          inside { print > name }' "$DOCS/scene.md"
+}
+
+# run_commands FILE LEAST: every command of docs/FILE runs; there are LEAST at least.
+run_commands() {
+    mkdir bin
+    ln -s "$(realpath "$VDBSHADE")" bin/vdbshade
+    ln -s "$(cd "$ASSETS" && pwd)" assets
+    awk '/^```sh$/ { inside = 1; next } /^```$/ { inside = 0 } inside' "$DOCS/$1" >commands
+    [ "$(grep -c vdbshade commands)" -ge "$2" ]
+    while read -r command; do
+        PATH=$PWD/bin:$PATH bash -c "set -o pipefail; $command" >/dev/null 2>err.txt || fail "$command: $(cat err.txt)"
+    done <commands
 }
 
 @test "there are examples" {
@@ -34,16 +46,16 @@ setup() {
 }
 
 @test "every command of docs/query.md" {
-    mkdir bin
-    ln -s "$(realpath "$VDBSHADE")" bin/vdbshade
-    ln -s "$(cd "$ASSETS" && pwd)" assets
     printf '0.5,0.001,0.5,0,1,0\n-1,0.001,1,0,1,0\n' >points.csv
     printf 'ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\n' >props.ply
     printf 'property float nx\nproperty float ny\nproperty float nz\nend_header\n0 0.1 0 0 1 0\n' >>props.ply
-    awk '/^```sh$/ { inside = 1; next } /^```$/ { inside = 0 } inside' "$DOCS/query.md" >commands
-    [ "$(grep -c vdbshade commands)" -ge 3 ]
-    while read -r command; do
-        PATH=$PWD/bin:$PATH bash -c "set -o pipefail; $command" >/dev/null 2>err.txt || fail "$command: $(cat err.txt)"
-    done <commands
+    run_commands query.md 3
     [ -s shaded.csv ] && [ -s props-lit.ply ] && [ "$(wc -l <sorted.csv)" -eq 2 ]
+}
+
+@test "every command of docs/render.md" {
+    run_commands render.md 7
+    for made in view.png court.png baked.png turn.html turn_03.png shafts.exr; do
+        [ -s "$made" ] || fail "no $made"
+    done
 }

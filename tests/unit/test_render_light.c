@@ -55,7 +55,7 @@ static void a_lightmap_is_looked_up_where_it_was_baked(void **state) {
     const float *const planes[] = {ao, shadow};
     const vsh_image image = {N, N, 2, names, planes};
     const vsh_mesh mesh = quad();
-    const vsh_lit_meshes lit = {&mesh, 1, &image, {0.5, 1.0, 0.25}};
+    const vsh_lit_meshes lit = {&mesh, 1, &image, {0.5, 1.0, 0.25}, 0};
     const double z[3] = {0.0, 0.0, 1.0};
     const vsh_light light = sun(z, 0.1);
     vsh_field *field = ball(0.0, 0.0, -3.0, 0.5, 0.05); /* hidden behind it */
@@ -88,7 +88,7 @@ static void a_lightmap_is_looked_up_where_it_was_baked(void **state) {
     assert_true(inside > 300);
     const char *const others[] = {"ao", "shadow.moon"};
     const vsh_image missing = {N, N, 2, others, planes};
-    const vsh_lit_meshes wrong = {&mesh, 1, &missing, {0.5, 0.5, 0.5}};
+    const vsh_lit_meshes wrong = {&mesh, 1, &missing, {0.5, 0.5, 0.5}, 0};
     vsh_error error;
     o.lit = &wrong;
     assert_int_equal(vsh_render(&surface, 1, field, &light, 1, &o, NULL, &picture, NULL, &error),
@@ -104,7 +104,7 @@ static void irradiance_comes_before_shadows(void **state) {
     const float *const planes[] = {blue, green, red, dark};
     const vsh_image image = {1, 1, 4, names, planes};
     const vsh_mesh mesh = quad();
-    const vsh_lit_meshes lit = {&mesh, 1, &image, {1.0, 1.0, 0.5}};
+    const vsh_lit_meshes lit = {&mesh, 1, &image, {1.0, 1.0, 0.5}, 0};
     const vsh_light light = vsh_light_default();
     vsh_field *field = ball(0.0, 0.0, -3.0, 0.5, 0.05);
     vsh_render_options o = small(camera_at(0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 20.0), 1);
