@@ -215,10 +215,9 @@ static int choose_answers(query_work *work) {
 
 static int load(query_work *work) {
     const double start = cli_seconds();
-    vsh_error error;
-    const vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
+    const int code = cli_load_assets(work->scene, &work->run, &work->assets);
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return result == VSH_OK ? cli_warn_meshes(work->scene, work->assets, &work->run) : cli_fail(&error);
+    return code;
 }
 
 static int make_query(query_work *work) {

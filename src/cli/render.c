@@ -37,9 +37,7 @@ typedef struct render_work {
 
 static int load(render_work *work) {
     const double start = cli_seconds();
-    vsh_error error;
-    const vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
-    int code = result == VSH_OK ? cli_warn_meshes(work->scene, work->assets, &work->run) : cli_fail(&error);
+    int code = cli_load_assets(work->scene, &work->run, &work->assets);
     code = code == CLI_OK ? render_lightmaps_read(work->settings, work->scene, work->assets, &work->lightmaps)
                           : code;
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);

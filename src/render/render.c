@@ -252,6 +252,9 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     result = result == VSH_OK ? vshi_run_resolve(run, &r.scenery.run, error) : result;
     result = result == VSH_OK ? check_options(&o, light_count, error) : result;
     result = result == VSH_OK ? check_surfaces(surfaces, surface_count, error) : result;
+    if (result == VSH_OK && lights == NULL && light_count > 0) {
+        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_render: lights is NULL");
+    }
     if (result != VSH_OK) {
         return result;
     }

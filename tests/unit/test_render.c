@@ -255,6 +255,8 @@ static void options_out_of_range_are_refused(void **state) {
                      VSH_ERROR_ARGUMENT);
     assert_int_equal(vsh_render(&none, 1, field, NULL, 0, &good, NULL, &picture, NULL, &error),
                      VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_render(&surface, 1, field, NULL, 1, &good, NULL, &picture, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
     assert_int_equal(vsh_render(&surface, 1, NULL, NULL, 0, &good, NULL, &picture, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     vsh_field_free(field);
