@@ -88,18 +88,49 @@ static void low_rays_do_not_miss_a_floor(void **state) {
     vsh_field_free(field);
 }
 
-/* The documented filter with one sample a pixel: Blackman and Harris' window at -1, 0 and 1 of 1.5. */
-static void a_floor_has_the_shadow_of_its_points(void **state) {
+/* What a sheet two voxels thick, seen from many sides, lets through. */
+static void thin_sheets_stop_every_ray(void **state) {
     (void)state;
-    static float direct[PIXELS];
-    vsh_field *field = field_of(truth_seeds(), 0.03, 0.0);
-    const vsh_surface surface = {field, {0.5, 0.25, 1.0}};
-    vsh_render_options o = small(camera_at(1.0, 5.0, 3.0, 0.0, 0.0, 0.0, 40.0), 1);
-    const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
+    const truth_solid sheet = {.shape = TRUTH_BOX, .half = {2.0, 0.05, 2.0}};
+    vsh_field *field = field_of((truth_scene){&sheet, 1}, 0.05, 0.0);
+    const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
+    for (double height = 0.3; height < 40.0; height *= 1.6) {
+        const vsh_render_options o = small(camera_at(0.9, height, 1.1, 0.0, 0.0, 0.0, 30.0), 1);
+        render(&surface, 1, field, NULL, &o, NULL);
+        const pinhole p = pinhole_of(&o.camera);
+        int hit = 0;
+        for (int i = 0; i < PIXELS; ++i) {
+            double ray[3];
+            ray_of(&p, i % WIDE, i / WIDE, ray);
+            const double t = -p.eye[1] / ray[1], x = p.eye[0] + t * ray[0], z = p.eye[2] + t * ray[2];
+            if (t > 0.0 && fabs(x) < 1.9 && fabs(z) < 1.9) {
+                assert_true(fabs(p.eye[1] + (double)depth[i] * ray[1] - 0.05) < 0.002); /* on its top */
+                ++hit;
+            }
+        }
+        assert_true(hit > 20);
+    }
+    vsh_field_free(field);
+}
+
+/* Visibility × cosine of the seeds' sun, or (NULL) AO. */
+static float floor_light(const vsh_field *field, const vsh_light *light, const double at[3]) {
     const float up[3] = {0.0f, 1.0f, 0.0f};
-    const double cosine = 0.6 / sqrt(0.25 + 0.36 + 0.36);
-    memset(o.sky, 0, sizeof o.sky);
-    render(&surface, 1, field, &light, &o, NULL);
+    if (light != NULL) {
+        return (float)(0.6 / sqrt(0.25 + 0.36 + 0.36)) * shadow_at(field, light, VSH_SHADOW_CONE, at, up);
+    }
+    const vsh_points points = {1, at, up, NULL};
+    float open = -1.0f;
+    assert_int_equal(vsh_shade_ao(field, &points, NULL, NULL, &open, NULL, NULL, NULL), VSH_OK);
+    return open;
+}
+
+/* The documented filter with one sample a pixel: Blackman and Harris' window at -1, 0 and 1 of 1.5. */
+static void check_floor(const vsh_field *field, const vsh_light *light, vsh_render_options o, int *dark,
+                        int *lit, int *between_them) {
+    static float direct[PIXELS];
+    const vsh_surface surface = {field, {0.5, 0.25, 1.0}};
+    render(&surface, 1, field, light, &o, NULL);
     const pinhole p = pinhole_of(&o.camera);
     for (int i = 0; i < PIXELS; ++i) {
         double ray[3], at[3];
@@ -109,7 +140,7 @@ static void a_floor_has_the_shadow_of_its_points(void **state) {
         }
         const bool on_floor =
             isfinite(depth[i]) && fabs(at[1]) < 0.003 && fabs(at[0]) < 2.8 && fabs(at[2]) < 2.8;
-        direct[i] = on_floor ? (float)cosine * shadow_at(field, &light, VSH_SHADOW_CONE, at, up) : NAN;
+        direct[i] = on_floor ? floor_light(field, light, at) : NAN;
     }
     double weight[3], sum = 0.0;
     for (int i = 0; i < 3; ++i) {
@@ -117,7 +148,7 @@ static void a_floor_has_the_shadow_of_its_points(void **state) {
         weight[i] = 0.35875 - 0.48829 * cos(x) + 0.14128 * cos(2.0 * x) - 0.01168 * cos(3.0 * x);
         sum += weight[i];
     }
-    int lit = 0, dark = 0, penumbra = 0;
+    *dark = *lit = *between_them = 0;
     for (int y = 1; y + 1 < HIGH; ++y) {
         for (int x = 1; x + 1 < WIDE; ++x) {
             double expected = 0.0;
@@ -130,13 +161,27 @@ static void a_floor_has_the_shadow_of_its_points(void **state) {
                 assert_true(fabs((double)c[0] - 0.5 * expected) < 0.004);
                 assert_true(fabs((double)c[1] - 0.25 * expected) < 0.002);
                 assert_true(fabs((double)c[2] - expected) < 0.008);
-                lit += expected > 0.99 * cosine;
-                dark += expected < 0.01;
-                penumbra += expected > 0.1 && expected < 0.9 * cosine;
+                *dark += expected < 0.01;
+                *lit += expected > full;
+                *between_them += expected > 0.05 && expected < 0.9 * full;
             }
         }
     }
-    assert_true(lit > 300 && dark > 3 && penumbra > 60);
+}
+
+static void a_floor_has_the_shadow_and_the_ao_of_its_points(void **state) {
+    (void)state;
+    vsh_field *field = field_of(truth_seeds(), 0.03, 0.0);
+    const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
+    vsh_render_options o = small(camera_at(1.0, 5.0, 3.0, 0.0, 0.0, 0.0, 40.0), 1);
+    int dark, lit, between_them;
+    memset(o.sky, 0, sizeof o.sky);
+    check_floor(field, &light, o, 0.6, &dark, &lit, &between_them);
+    assert_true(dark > 3 && lit > 300 && between_them > 60);
+    o.ao = 1;
+    o.sky[0] = o.sky[1] = o.sky[2] = 1.0;
+    check_floor(field, NULL, o, 0.9, &dark, &lit, &between_them);
+    assert_true(lit > 300 && between_them > 10);
     vsh_field_free(field);
 }
 
@@ -267,7 +312,8 @@ int main(void) {
         cmocka_unit_test(a_sphere_is_where_it_is_with_its_normals),
         cmocka_unit_test(a_silhouette_has_its_area_and_soft_edges),
         cmocka_unit_test(low_rays_do_not_miss_a_floor),
-        cmocka_unit_test(a_floor_has_the_shadow_of_its_points),
+        cmocka_unit_test(thin_sheets_stop_every_ray),
+        cmocka_unit_test(a_floor_has_the_shadow_and_the_ao_of_its_points),
         cmocka_unit_test(the_nearest_surface_has_its_own_color),
         cmocka_unit_test(who_looks_from_within_sees_out),
         cmocka_unit_test(threads_and_instruction_sets_change_no_bit),
