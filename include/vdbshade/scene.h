@@ -97,9 +97,11 @@ VSH_API const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t ind
 VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count);
 
 /* The union of all of a scene's casters, whatever their layers, as one level set of scene->grid's voxel size;
- * without one, of the longest side of the box around all casters over scene->grid.resolution. `assets` are
- * those loaded for this scene. Free the grid with vsh_grid_free(). Errors:
- * - VSH_ERROR_ARGUMENT: scene, assets or grid NULL, scene->grid out of range, run;
+ * without one, of the longest side of the box around all casters over scene->grid.resolution; where that is 0
+ * too, of the finest of the level sets among them (one that is alone and stands as it is stays as it is).
+ * `assets` are those loaded for this scene. Free the grid with vsh_grid_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: scene, assets or grid NULL, scene->grid out of range (a resolution of 0 without a
+ *   level set too), run;
  * - VSH_ERROR_INPUT: no casters, casters without extent, an sdf or vdb caster whose transform shears or
  *   scales unevenly; as vsh_mesh_check(), vsh_sdf_check() and the vsh_grid_from_… calls;
  * - VSH_ERROR_LIMIT: as the vsh_grid_from_… calls and vsh_grid_unite();

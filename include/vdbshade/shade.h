@@ -14,16 +14,19 @@ extern "C" {
 /* How a shadow is estimated, cheapest model first. s is the sine of the light's half angle as seen from the
  * point, h the distance to the nearest caster at a distance t along the ray. */
 enum {
-    VSH_SHADOW_HARD = 0,     /* the light's centre: 0 or 1 */
-    VSH_SHADOW_CLASSIC = 1,  /* min h/(s t), outer penumbra only (Quilez, "soft shadows in raymarched SDFs",
-                                2010) */
-    VSH_SHADOW_IMPROVED = 2, /* triangulated closest miss, outer penumbra only (Aaltonen, GDC 2018) */
-    VSH_SHADOW_SMOOTH = 3, /* inner and outer penumbra, cubic remap (Quilez, same article, 2018 extension) */
-    VSH_SHADOW_CONE = 4, /* inner and outer penumbra, circular segment: the share of a disc behind an edge */
-    VSH_SHADOW_RAYS = 5, /* `rays` rays over the light's disc, marched against the field */
+    VSH_SHADOW_HARD = 0,      /* the light's centre: 0 or 1 */
+    VSH_SHADOW_CLASSIC = 1,   /* min h/(s t), outer penumbra only (Quilez, "soft shadows in raymarched SDFs",
+                                 2010) */
+    VSH_SHADOW_PRACTICAL = 2, /* the same x through 3x² - 2x³, a march that ends at x < 0.004 (Quilez,
+                                 "outdoors lighting", 2013) */
+    VSH_SHADOW_IMPROVED = 3,  /* triangulated closest miss, outer penumbra only (Aaltonen, GDC 2018) */
+    VSH_SHADOW_SMOOTH = 4, /* inner and outer penumbra, cubic remap (Quilez, 2018 extension of the article of
+                              2010) */
+    VSH_SHADOW_CONE = 5, /* inner and outer penumbra, circular segment: the share of a disc behind an edge */
+    VSH_SHADOW_RAYS = 6, /* `rays` rays over the light's disc, marched against the field */
     VSH_SHADOW_ADAPTIVE =
-        6,               /* a cone that proves the light fully seen or hidden, else rays until max_error */
-    VSH_SHADOW_EXACT = 7 /* the same cone, the rays traced against `triangles` */
+        7,               /* a cone that proves the light fully seen or hidden, else rays until max_error */
+    VSH_SHADOW_EXACT = 8 /* the same cone, the rays traced against `triangles` */
 };
 
 enum {
@@ -64,6 +67,8 @@ typedef struct vsh_shade_options {
     const vsh_layer *layers; /* [layer_count]: casters beside those of the field; may be NULL. Each has the
                                 same struct_size */
     size_t layer_count;
+    double jitter; /* shadows by one march, but for improved: steps are shortened by a part between 0 and
+                    * this, 0 … 1, another for each texel. What steps have in common, bands, becomes grain */
 } vsh_shade_options;
 
 static inline vsh_shade_options vsh_shade_options_default(void) {
@@ -82,7 +87,8 @@ static inline vsh_shade_options vsh_shade_options_default(void) {
                                  0.02,
                                  NULL,
                                  NULL,
-                                 0};
+                                 0,
+                                 0.0};
     return options;
 }
 

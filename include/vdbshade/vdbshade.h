@@ -1,7 +1,7 @@
 /* vdbshade: soft shadows and ambient occlusion baked from signed distance fields.
  *
  *     casters ─▶ vsh_grid (level set) ─▶ vsh_field (pyramid) ─▶ vsh_shade_… (points), vsh_query_…
- *                                                            ├▶ vsh_bake_…  (lightmaps)
+ *                                                            ├▶ vsh_bake_…  (lightmaps, volumes)
  *                                                            └▶ vsh_render  (pictures)
  *
  * World space is right-handed, in scene units; angles are radians. What holds for every call stands in
@@ -23,5 +23,6 @@
 #include "sdf.h"
 #include "shade.h"
 #include "trace.h"
+#include "volume.h"
 
 #endif

@@ -154,6 +154,9 @@ int cli_shade_take(cli_bake_settings *s, int key, const char *name, const char *
     case CLI_KEY_EARLY_RAYS:
         s->has_early_rays = true;
         return cli_take_integer(name, value, 0, 4096, &s->early_rays);
+    case CLI_KEY_JITTER:
+        s->has_jitter = true;
+        return cli_take_number(name, value, 0.0, 1.0, &s->jitter);
     case CLI_KEY_MAX_ERROR:
         s->has_max_error = true;
         return cli_take_number(name, value, 1e-4, 1.0, &s->max_error);

@@ -19,6 +19,7 @@ enum {
     CLI_KEY_FRAME,
     CLI_KEY_EARLY_RAYS,
     CLI_KEY_MAX_ERROR,
+    CLI_KEY_JITTER,
     CLI_KEY_ERROR,
     CLI_KEY_CASTER
 };
@@ -30,9 +31,9 @@ enum {
         {CLI_KEY_AO_METHOD, "ao-method", "NAME", "taps, cones, rays, adaptive or exact (cones)"},            \
         {CLI_KEY_AO_CONES, "ao-cones", "N", "cones a texel, 1 to 256 (16)"}, {                               \
         CLI_KEY_METHOD, "method", "NAME",                                                                    \
-            "shadow estimate: hard, classic, improved, smooth,\ncone, rays, adaptive, exact (cone); "        \
-            "classic and\n"                                                                                  \
-            "improved have the outer half of the penumbra only"                                              \
+            "shadow estimate: hard, classic, practical,\nimproved, smooth, cone, rays, adaptive, exact "     \
+            "(cone);\n"                                                                                      \
+            "classic, practical and improved have the outer half\nof the penumbra only"                      \
     }
 
 #define CLI_ACCURACY_OPTIONS                                                                                 \
@@ -47,6 +48,8 @@ enum {
         {CLI_KEY_SAMPLER, "sampler", "NAME", "where they go: sobol, white or blue (sobol)"},                 \
         {CLI_KEY_FRAME, "frame", "N",                                                                        \
          "another set of them: bakes of frames 0, 1, 2 … may\nbe averaged (0)"},                             \
+        {CLI_KEY_JITTER, "jitter", "J",                                                                      \
+         "shadows by one march: steps are shortened by a part\nof up to this, another a texel, 0 to 1 (0)"}, \
         {CLI_KEY_EARLY_RAYS, "early-rays", "N",                                                              \
          "with rays: where the first N agree, the rest are not\nmarched, 0 to 4096 (0: never)"},             \
     {                                                                                                        \
@@ -56,7 +59,7 @@ enum {
 
 #define CLI_CASTER_OPTIONS                                                                                   \
     {0, NULL, NULL, "Casters and voxels"}, {                                                                 \
-        CLI_KEY_CASTER, "caster", "FILE", "another mesh that casts shadows; may be repeated"                 \
+        CLI_KEY_CASTER, "caster", "FILE", "another mesh or .vdb that casts shadows; may be\nrepeated"        \
     }
 
 typedef struct cli_bake_settings {
@@ -75,7 +78,7 @@ typedef struct cli_bake_settings {
     int32_t ao_cones;
     int32_t method;
     int32_t rays, sampler, frame, early_rays;
-    double max_error;
+    double max_error, jitter;
     int32_t width, height;
     int32_t uv_set;
     int32_t supersample;
@@ -89,7 +92,7 @@ typedef struct cli_bake_settings {
     bool has_sun, has_sun_angle, has_ao, has_ao_method, has_ao_cones, has_method, has_size, has_uv_set;
     bool has_supersample, has_padding, has_ao_spacing, has_bits, irradiance, has_tint, has_ambient;
     bool dry_run;
-    bool has_rays, has_sampler, has_frame, has_early_rays, has_max_error, error;
+    bool has_rays, has_sampler, has_frame, has_early_rays, has_max_error, has_jitter, error;
 } cli_bake_settings;
 
 /* Takes an option of the tables above; *taken tells whether it was one of them. */
@@ -115,6 +118,9 @@ int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene 
 
 /* Then adds the receivers, with the options put over them. CLI_OK or an exit code, having said why. */
 int cli_bake_scene_receivers(const cli_bake_settings *settings, cli_bake_scene *made);
+
+/* Whether a scene for points has anything to bake: CLI_OK, or CLI_USAGE having said why. */
+int cli_bake_check_work(const cli_bake_settings *settings, const cli_bake_scene *made);
 
 /* Refuses an output that is one of the scene's inputs. CLI_OK or an exit code, having said why. */
 int cli_bake_check_output(const cli_bake_settings *settings, const vsh_scene *scene, const char *output);

@@ -28,8 +28,9 @@ static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
         if (i < own && made->read != NULL) {
             made->casters[i] = made->read->casters[i];
         } else {
-            made->casters[i].type = VSH_CASTER_MESH;
             made->casters[i].path = i < own ? s->input : s->casters[i - own];
+            made->casters[i].type =
+                cli_has_ending(made->casters[i].path, "vdb") ? VSH_CASTER_VDB : VSH_CASTER_MESH;
             set_identity(made->casters[i].transform);
         }
     }
@@ -103,6 +104,9 @@ static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
         return cli_usage("-o '%s': %s has %zu receivers, each with its own output", s->output, s->input,
                          given);
     }
+    if (made->read == NULL && cli_has_ending(s->input, "vdb")) {
+        return cli_usage("%s: a level set has no UVs to bake a lightmap by; see 'vdbshade volume'", s->input);
+    }
     const int code = cli_bake_scene_receivers(s, made);
     if (code == CLI_OK && made->scene.receiver_count == 0) {
         return cli_usage("%s: no receivers to bake", s->input);
@@ -167,6 +171,7 @@ static int set_accuracy(const cli_bake_settings *s, vsh_scene *scene) {
     }
     shade->rays = s->has_rays ? s->rays : shade->rays;
     shade->sampler = s->has_sampler ? s->sampler : shade->sampler;
+    shade->jitter = s->has_jitter ? s->jitter : shade->jitter;
     shade->frame = s->has_frame ? s->frame : shade->frame;
     shade->early_rays = s->has_early_rays ? s->early_rays : shade->early_rays;
     scene->error = scene->error || s->error;
@@ -229,7 +234,7 @@ static int set_shade(const cli_bake_settings *s, vsh_scene *scene) {
     return CLI_OK;
 }
 
-static int check_work(const cli_bake_settings *s, const cli_bake_scene *made) {
+int cli_bake_check_work(const cli_bake_settings *s, const cli_bake_scene *made) {
     if (made->read == NULL && !s->has_sun && !s->has_ao) {
         return cli_usage("%s: nothing to bake; give --sun X,Y,Z or --ao DISTANCE, or both", s->input);
     }
@@ -290,11 +295,14 @@ static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scen
         }
         made->scene.grid = vsh_grid_options_default();
         made->scene.shade = vsh_shade_options_default();
+        if (cli_has_ending(settings->input, "vdb")) {
+            made->scene.grid.resolution = 0; /* its own voxels */
+        }
     }
     cli_grid_apply(&settings->grid, &made->scene.grid);
     int code = add_lights(settings, made);
     code = code == CLI_OK ? set_shade(settings, &made->scene) : code;
-    code = code == CLI_OK && receivers ? check_work(settings, made) : code;
+    code = code == CLI_OK && receivers ? cli_bake_check_work(settings, made) : code;
     return code == CLI_OK ? add_casters(settings, made) : code;
 }
 

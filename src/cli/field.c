@@ -48,6 +48,7 @@ typedef struct making {
     double within;
     const vsh_run *run;
     cli_field *made;
+    const vsh_grid *grid; /* of the casters in no layer, where it is there already */
 } making;
 
 /* Adds up what fields and level sets take; sizes are those of the first. */
@@ -70,21 +71,24 @@ static int make_one(const making *m, const vsh_scene_layer *layer, vsh_field **f
     vsh_grid *grid = NULL;
     vsh_error error;
     *field = NULL;
-    if (vsh_scene_layer_casters(m->scene, m->assets, layer, m->run, &grid, &error) != VSH_OK) {
+    const vsh_grid *given = layer == NULL ? m->grid : NULL;
+    if (given == NULL &&
+        vsh_scene_layer_casters(m->scene, m->assets, layer, m->run, &grid, &error) != VSH_OK) {
         return cli_fail(&error);
     }
-    if (grid == NULL) {
+    const vsh_grid *casters = given != NULL ? given : grid;
+    if (casters == NULL) {
         return CLI_OK;
     }
     vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
+    vsh_grid_get_info(casters, &info);
     const double voxelized = cli_seconds();
     vsh_field_options options = vsh_field_options_default();
-    options.reach = reach_of(m->scene, grid, m->receivers, m->within);
+    options.reach = reach_of(m->scene, casters, m->receivers, m->within);
     if (layer != NULL) {
         options.reach *= fmax(1.0, layer->shade.softness); /* lights are as much wider */
     }
-    const vsh_result result = vsh_field_create(grid, &options, m->run, field, &error);
+    const vsh_result result = vsh_field_create(casters, &options, m->run, field, &error);
     vsh_grid_free(grid); /* the field does not need it */
     if (result != VSH_OK) {
         return cli_fail(&error);
@@ -166,12 +170,17 @@ static int make(const making *m) {
 
 int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_box *receivers,
                    const vsh_run *run, cli_field *made) {
-    return make(&(making){scene, assets, receivers, 0.0, run, made});
+    return make(&(making){scene, assets, receivers, 0.0, run, made, NULL});
+}
+
+int cli_field_make_of(const vsh_scene *scene, const vsh_assets *assets, const vsh_grid *grid,
+                      const cli_box *receivers, const vsh_run *run, cli_field *made) {
+    return make(&(making){scene, assets, receivers, 0.0, run, made, grid});
 }
 
 int cli_field_make_around(const vsh_scene *scene, const vsh_assets *assets, double within, const vsh_run *run,
                           cli_field *made) {
-    return make(&(making){scene, assets, NULL, within, run, made});
+    return make(&(making){scene, assets, NULL, within, run, made, NULL});
 }
 
 void cli_field_free(cli_field *made) {

@@ -33,6 +33,10 @@ typedef struct cli_field {
 int cli_field_make(const vsh_scene *scene, const vsh_assets *assets, const cli_box *receivers,
                    const vsh_run *run, cli_field *made);
 
+/* The same of casters that are voxelised already: `grid` stands for those in no layer. */
+int cli_field_make_of(const vsh_scene *scene, const vsh_assets *assets, const vsh_grid *grid,
+                      const cli_box *receivers, const vsh_run *run, cli_field *made);
+
 /* Diagonals of the casters' box. */
 #define CLI_WITHIN_DIAGONALS 4.0
 

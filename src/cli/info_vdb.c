@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <vdbshade/grid.h>
 
 enum { MAX_LISTED = 4096 };
@@ -16,7 +17,7 @@ static void print_grid(const vsh_vdb_entry *grid) {
     printf("  voxel size: %g %g %g\n", grid->voxel_size[0], grid->voxel_size[1], grid->voxel_size[2]);
     if (grid->background != 0.0) {
         printf("  background: %g", grid->background);
-        if (grid->voxel_size[0] > 0.0) {
+        if (grid->voxel_size[0] > 0.0 && strcmp(grid->grid_class, "level set") == 0) {
             printf(" (%.3g voxels)", fabs(grid->background) / grid->voxel_size[0]);
         }
         putchar('\n');

@@ -7,8 +7,8 @@
 #include <stdio.h>
 #include <string.h>
 
-static const cli_command *const commands[] = {&cli_bake,  &cli_voxelize, &cli_info,
-                                              &cli_trade, &cli_query,    &cli_render};
+static const cli_command *const commands[] = {&cli_bake,  &cli_voxelize, &cli_info,  &cli_trade,
+                                              &cli_query, &cli_volume,   &cli_render};
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
 static const char help_text[] =
@@ -20,6 +20,7 @@ static const char help_text[] =
     "  bake INPUT -o OUT         lightmap of a mesh or a scene (.json)\n"
     "  voxelize INPUT -o OUT.vdb level set of a mesh's or a scene's casters\n"
     "  info FILE                 what a mesh, .vdb, scene or image holds, and what is wrong with it\n"
+    "  volume INPUT -o OUT.vdb   grids of shadow and AO: a surface's band, a box, a fog's voxels\n"
     "  query INPUT -o OUT        shadow, AO, distance at points of a CSV, a PLY or raw floats\n"
     "  render INPUT -o OUT       picture of a scene, or a turntable, to look at a bake\n"
     "  trade INPUT -o OUT.html   error against time by every method, measured on a scene of yours\n"

@@ -66,10 +66,9 @@ const cli_command cli_query = {
     "query",
     "INPUT --points FILE -o OUT [options]",
     "Answers at points what a light's shadow, ambient occlusion and the distance are there. INPUT is a\n"
-    "mesh file or a scene file (.json; its lights and ao, not its receivers). Rows that are bad are told by\n"
-    "number and answered nan. Formats and columns: docs/query.md. Numbers in brackets are what holds "
-    "without\n"
-    "the option.",
+    "mesh file, a .vdb level set or a scene file (.json; its lights and ao, not its receivers). Bad rows\n"
+    "are told by number and answered nan. Formats and columns: docs/query.md. Numbers in brackets are\n"
+    "what holds without the option.",
     options,
     sizeof options / sizeof options[0],
     query_main};
@@ -269,7 +268,7 @@ static void say_results(const query_work *work) {
 
 static int run_query(const query_settings *s, vsh_scene *scene) {
     query_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
-    work.stats.of_points = true;
+    work.stats.of = CLI_STATS_POINTS;
     work.stats.shade = vsh_shade_stats_zero();
     const long cores = sysconf(_SC_NPROCESSORS_ONLN);
     work.stats.threads = s->bake.common.threads > 0 ? s->bake.common.threads : (int32_t)cores;

@@ -175,7 +175,7 @@ static void say_results(const render_work *work) {
 
 static int run_render(const render_settings *s, vsh_scene *scene) {
     render_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
-    work.stats.of_points = true;
+    work.stats.of = CLI_STATS_POINTS;
     work.stats.shade = vsh_shade_stats_zero();
     const long cores = sysconf(_SC_NPROCESSORS_ONLN);
     work.stats.threads = s->bake.common.threads > 0 ? s->bake.common.threads : (int32_t)cores;

@@ -34,13 +34,24 @@ int cli_stats_write(const cli_stats *stats, const char *path) {
     for (int i = 0; i < CLI_STAGE_COUNT; ++i) {
         json_object_set_new(stages, stage_names[i], json_real(stats->seconds[i]));
     }
-    const bool points = stats->of_points;
-    const struct {
+    typedef struct count {
         const char *name;
         uint64_t value;
-    } counts[] = {
-        {points ? "points" : "texels", points ? stats->points : stats->texels},
-        {points ? "bad_rows" : "invalid_texels", points ? stats->bad_rows : stats->invalid_texels},
+    } count;
+    const count own[][3] = {
+        [CLI_STATS_TEXELS] = {{"texels", stats->texels},
+                              {"invalid_texels", stats->invalid_texels},
+                              {"bands", stats->bands}},
+        [CLI_STATS_POINTS] = {{"points", stats->points},
+                              {"bad_rows", stats->bad_rows},
+                              {"beyond_reach", stats->shade.beyond_reach}},
+        [CLI_STATS_VOXELS] = {{"voxels", stats->voxels},
+                              {"inside_voxels", stats->inside_voxels},
+                              {"tiles", stats->tiles}},
+    };
+    const count counts[] = {
+        own[stats->of][0],
+        own[stats->of][1],
         {"samples", stats->shade.samples},
         {"marches", stats->shade.marches},
         {"certified", stats->shade.certified},
@@ -49,7 +60,7 @@ int cli_stats_write(const cli_stats *stats, const char *path) {
         {"rays", stats->shade.rays},
         {"refined", stats->shade.refined},
         {"peak_bytes", peak_bytes()},
-        {points ? "beyond_reach" : "bands", points ? stats->shade.beyond_reach : stats->bands},
+        own[stats->of][2],
         {"threads", (uint64_t)stats->threads},
         {"levels", (uint64_t)stats->field.levels},
         {"field_bytes", stats->field.bytes},
@@ -92,6 +103,6 @@ void cli_stats_say(const cli_stats *stats) {
             cli_bytes_text(peak_bytes(), peak, sizeof peak));
     const double *s = stats->seconds;
     cli_say("load %.2f s, voxelize %.2f s, field %.2f s, %s %.2f s, write %.2f s", s[CLI_STAGE_LOAD],
-            s[CLI_STAGE_VOXELIZE], s[CLI_STAGE_FIELD], stats->of_points ? "shade" : "bake", s[CLI_STAGE_BAKE],
-            s[CLI_STAGE_WRITE]);
+            s[CLI_STAGE_VOXELIZE], s[CLI_STAGE_FIELD], stats->of == CLI_STATS_POINTS ? "shade" : "bake",
+            s[CLI_STAGE_BAKE], s[CLI_STAGE_WRITE]);
 }

@@ -14,12 +14,15 @@ enum {
     CLI_STAGE_COUNT
 };
 
+enum { CLI_STATS_TEXELS, CLI_STATS_POINTS, CLI_STATS_VOXELS };
+
 typedef struct cli_stats {
     double seconds[CLI_STAGE_COUNT];
     uint64_t texels;
     uint64_t invalid_texels;
-    bool of_points; /* the counts are points, not texels */
+    int of; /* CLI_STATS_…: what is counted */
     uint64_t points, bad_rows;
+    uint64_t voxels, inside_voxels, tiles;
     uint64_t bands; /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
     double estimated_values; /* behind shade.square_error and shade.refined, by adaptive and exact methods */

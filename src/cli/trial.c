@@ -81,6 +81,7 @@ int cli_isolated(const char *path, uint64_t memory, int (*work)(void *user), voi
 typedef struct trial {
     const char *path;
     const char *name;
+    uint64_t memory;
 } trial;
 
 static int read_grid(void *user) {
@@ -93,7 +94,7 @@ static int read_grid(void *user) {
 }
 
 static int trial_read(const char *path, const char *name, uint64_t memory) {
-    trial t = {path, name};
+    trial t = {path, name, memory};
     return cli_isolated(path, memory, read_grid, &t);
 }
 
@@ -106,4 +107,19 @@ int cli_trial_casters(const vsh_scene *scene, uint64_t memory) {
         }
     }
     return code;
+}
+
+static int read_voxels(void *user) {
+    const trial *t = user;
+    vsh_voxels *voxels = NULL;
+    vsh_error error;
+    vsh_run run = vsh_run_default();
+    run.memory_limit = t->memory;
+    const vsh_result result = vsh_voxels_from_vdb(t->path, t->name, &run, &voxels, &error);
+    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+}
+
+int cli_trial_voxels(const char *path, const char *name, uint64_t memory) {
+    trial t = {path, name, memory};
+    return cli_isolated(path, memory, read_voxels, &t);
 }

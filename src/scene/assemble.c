@@ -143,9 +143,21 @@ static void grow_box(world_box *all, const double min[3], const double max[3], c
 
 static const world_box empty_box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 
+/* A resolution of 0: the voxels of the finest level set, which stays as it is where there is nothing else. */
+static vsh_result take_own_voxels(assembly *a, double finest, vsh_error *error) {
+    if (!isfinite(finest)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "resolution 0: no caster is a level set, whose voxel size it stands for");
+    }
+    a->options.resolution = vsh_grid_options_default().resolution; /* not looked at */
+    a->options.voxel_size = a->scene->caster_count > 1 ? finest : 0.0;
+    return VSH_OK;
+}
+
 /* The voxel size on which casters of several kinds must agree before the first is voxelised. */
 static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
     world_box all = empty_box;
+    double finest = INFINITY; /* of the level sets */
     for (size_t i = 0; i < a->mesh_count; ++i) {
         vsh_mesh_report report;
         const vsh_result result = vsh_mesh_check(&a->meshes[i], &report, error);
@@ -167,7 +179,11 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
             vsh_grid_info info;
             vsh_grid_get_info(vshi_assets_grid(a->assets, i), &info);
             grow_box(&all, info.bounds_min, info.bounds_max, caster->transform);
+            finest = fmin(finest, info.voxel_size * vshi_similarity_scale(caster->transform));
         }
+    }
+    if (a->options.resolution == 0) {
+        return take_own_voxels(a, finest, error);
     }
     const vshi_vec sides = vshi_sub(all.max, all.min);
     const double longest = fmax(sides.x, fmax(sides.y, sides.z));

@@ -221,6 +221,7 @@ static const vshi_key scene_keys[] = {
      .offset = offsetof(vsh_scene, shade.max_error),
      .lowest = 1e-4,
      .highest = 1.0},
+    {.name = "jitter", .kind = VSHI_NUMBER, .offset = offsetof(vsh_scene, shade.jitter), .highest = 1.0},
     {.name = "error", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, error)},
     {.name = "max_steps",
      .kind = VSHI_INTEGER,

@@ -26,6 +26,14 @@ double vshi_ao_grown(const vsh_field *field, vshi_vec origin) {
 }
 
 bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, vsh_shade_stats *stats) {
+    if (task->sphere) {
+        frame->origin = vshi_to_field(task->field, task->points->positions + 3 * i);
+        vshi_ao_axes((vshi_vec){0.0, 0.0, 1.0}, frame->axes);
+        frame->grown = 0.0;
+        task->ao[i] = NAN;
+        stats->invalid += !vshi_finite(frame->origin);
+        return vshi_finite(frame->origin);
+    }
     vshi_vec normal;
     if (!vshi_shade_origin(task->field, task->points, i, vshi_shade_lift(task->field, task->options),
                            &frame->origin, &normal)) {
@@ -71,6 +79,17 @@ vsh_result vshi_ao_prepare(const vsh_field *field, const vsh_shade_options *opti
                            .options = options,
                            .cones = cones,
                            .distance = options->ao_distance / field->voxel_size};
+    return VSH_OK;
+}
+
+vsh_result vshi_ao_prepare_sphere(vshi_ao_cones *cones, vshi_ao_task *task, vsh_error *error) {
+    if (task->options->ao_method == VSH_AO_TAPS) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO method taps: free space has no normals to tap along");
+    }
+    if (task->options->ao_method == VSH_AO_CONES) {
+        vshi_ao_cones_place_sphere(cones, task->options->ao_cones);
+    }
+    task->sphere = true;
     return VSH_OK;
 }
 

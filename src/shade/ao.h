@@ -23,6 +23,7 @@ typedef struct vshi_ao_task {
     const vshi_sampler *sampler; /* of rays; else NULL */
     const vshi_ao_cones *cones;  /* of cones */
     double distance;             /* finest voxels */
+    bool sphere;                 /* in free space: all directions alike, no normals, no start offset */
     const vshi_kernel *kernel;   /* of a call, as what follows */
     const vsh_points *points;
     float *ao;
@@ -53,6 +54,10 @@ static inline void vshi_ao_set_bent(const vshi_ao_task *task, size_t i, vshi_vec
  * takes them. Errors: VSH_ERROR_ARGUMENT. */
 vsh_result vshi_ao_prepare(const vsh_field *field, const vsh_shade_options *options, vshi_ao_cones *cones,
                            vshi_ao_task *task, vsh_error *error);
+
+/* Makes a prepared task one of free space: the free share of all directions around a point, each counting
+ * alike. Errors: VSH_ERROR_ARGUMENT (taps, which go along a normal). */
+vsh_result vshi_ao_prepare_sphere(vshi_ao_cones *cones, vshi_ao_task *task, vsh_error *error);
 
 /* Points without normals have no AO. Errors: VSH_ERROR_ARGUMENT. */
 vsh_result vshi_ao_check_points(const vsh_points *points, vsh_error *error);
@@ -96,6 +101,9 @@ vshi_shade_fn vshi_ao_by_cones;
 vshi_shade_fn vshi_ao_by_rays;
 
 void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count);
+
+/* The same over the whole sphere, each an equal share of its solid angle. */
+void vshi_ao_cones_place_sphere(vshi_ao_cones *cones, int32_t count);
 
 /* What is known of cone c of a point whose cones have the closenesses `close`: its own over its sine, and the
  * mean of its neighbours' where they are free, both clamped, in [-1, 1] and [0, 1]. */

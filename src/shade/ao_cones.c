@@ -39,11 +39,12 @@ static void find_neighbours(vshi_ao_cones *cones) {
     }
 }
 
+static const double GOLDEN_ANGLE = 2.39996322972865332, WIDEST = 0.95;
+
 /* Directions of equal weight: a golden-angle spiral over the disc, lifted to the hemisphere (Malley's
  * method). No cone dips below the receiver's plane, which is the receiver's own and hides nothing of what is
  * counted. */
 void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count) {
-    static const double GOLDEN_ANGLE = 2.39996322972865332, WIDEST = 0.95;
     cones->count = count;
     const double cosine = 1.0 - 1.0 / count;
     const double share = fmin(WIDTH * sqrt(1.0 - cosine * cosine), WIDEST);
@@ -53,6 +54,19 @@ void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count) {
         cones->directions[i] =
             (vshi_vec){radius * cos(i * GOLDEN_ANGLE), radius * sin(i * GOLDEN_ANGLE), height};
         cones->sines[i] = share < height ? share : height;
+    }
+    find_neighbours(cones);
+}
+
+void vshi_ao_cones_place_sphere(vshi_ao_cones *cones, int32_t count) {
+    cones->count = count;
+    const double cosine = fmax(0.0, 1.0 - 2.0 / count);
+    const double share = fmin(WIDTH * sqrt(1.0 - cosine * cosine), WIDEST);
+    for (int32_t i = 0; i < count; ++i) {
+        const double height = 1.0 - (2.0 * i + 1.0) / count, radius = sqrt(1.0 - height * height);
+        cones->directions[i] =
+            (vshi_vec){radius * cos(i * GOLDEN_ANGLE), radius * sin(i * GOLDEN_ANGLE), height};
+        cones->sines[i] = share;
     }
     find_neighbours(cones);
 }

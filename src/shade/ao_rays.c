@@ -160,6 +160,15 @@ static void trace_ray(batch *b, uint32_t owner, vshi_vec local, vsh_shade_stats 
     b->chunk.owner[b->traced++] = owner;
 }
 
+/* From a place on the disc: by its cosine over the hemisphere (Malley), or evenly over the sphere (Lambert's
+ * azimuthal projection, 1772). */
+static vshi_vec direction_of(const vshi_ao_task *task, const double disc[2]) {
+    const double square = 1.0 - disc[0] * disc[0] - disc[1] * disc[1];
+    const double height = sqrt(square > 0.0 ? square : 0.0);
+    return task->sphere ? (vshi_vec){2.0 * height * disc[0], 2.0 * height * disc[1], 2.0 * square - 1.0}
+                        : (vshi_vec){disc[0], disc[1], height};
+}
+
 static void shoot(batch *b, uint32_t owner, vsh_shade_stats *stats) {
     ao_point *point = &b->points[owner];
     double disc[AT_ONCE][2];
@@ -168,8 +177,7 @@ static void shoot(batch *b, uint32_t owner, vsh_shade_stats *stats) {
         const int32_t count = left < AT_ONCE ? left : AT_ONCE;
         vshi_sampler_disc(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
         for (int32_t i = 0; i < count; ++i) {
-            const double square = 1.0 - disc[i][0] * disc[i][0] - disc[i][1] * disc[i][1];
-            const vshi_vec local = {disc[i][0], disc[i][1], sqrt(square > 0.0 ? square : 0.0)};
+            const vshi_vec local = direction_of(b->task, disc[i]);
             point->all = vshi_add(point->all, local);
             if (b->exact) {
                 trace_ray(b, owner, local, stats);
@@ -208,11 +216,12 @@ static bool prepare(batch *b, size_t i, ao_point *point, vsh_shade_stats *stats)
         return false;
     }
     if (b->exact) {
-        const vshi_vec normal = vshi_unit(vshi_vec_off(points->normals + 3 * i));
-        const double offset = TRACE_LIFT * task->field->voxel_size;
+        const vshi_vec normal =
+            task->sphere ? point->frame.axes[2] : vshi_unit(vshi_vec_off(points->normals + 3 * i));
+        const double offset = TRACE_LIFT * task->field->voxel_size + task->options->surface_offset;
         vshi_ao_axes(normal, point->world_axes);
-        point->world_origin = vshi_add(vshi_vec_of(points->positions + 3 * i),
-                                       vshi_scale(normal, offset + task->options->surface_offset));
+        point->world_origin =
+            vshi_add(vshi_vec_of(points->positions + 3 * i), vshi_scale(normal, task->sphere ? 0.0 : offset));
     } else {
         point->frame.grown = vshi_ao_grown(task->field, point->frame.origin);
         ++stats->samples;

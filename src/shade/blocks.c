@@ -277,3 +277,52 @@ void vshi_blocks_prove(const vshi_shadow_task *task, vshi_facing *facing, vshi_c
     }
     vshi_chunk_clear(chunk);
 }
+
+/* --- balls of free space */
+
+/* The beam around the cones of all points of a ball; false where there is none worth a look. */
+static bool aim_ball(const vshi_shadow_task *task, vshi_vec centre, double radius, vshi_cone *beam) {
+    const bool hard = task->options->method == VSH_SHADOW_HARD;
+    *beam = (vshi_cone){.origin = centre, .wide = radius + 1e-3, .end = INFINITY};
+    if (!(beam->wide <= WIDEST)) {
+        return false;
+    }
+    if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
+        beam->direction = task->towards;
+        beam->sine = hard ? 0.0 : task->sine;
+        return true;
+    }
+    const vshi_vec to = vshi_sub(task->centre, centre);
+    const double distance = vshi_length(to), lamp = hard ? 0.0 : task->radius;
+    if (!(distance > lamp + 4.0 * beam->wide)) {
+        return false;
+    }
+    beam->direction = vshi_scale(to, 1.0 / distance);
+    beam->sine = fmax(0.0, (lamp - beam->wide) / distance);
+    beam->end = distance + beam->wide; /* no cone goes on behind the lamp's middle */
+    return true;
+}
+
+void vshi_blocks_prove_balls(const vshi_shadow_task *task, size_t count, const vshi_vec *centre,
+                             const double *radius, int8_t *proof, vsh_shade_stats *stats) {
+    vshi_chunk chunk;
+    vshi_chunk_clear(&chunk);
+    const bool parallel = task->light->type == VSH_LIGHT_DIRECTIONAL;
+    for (size_t i = 0; i < count; ++i) {
+        vshi_cone beam;
+        proof[i] = VSHI_UNPROVED;
+        if (aim_ball(task, centre[i], radius[i], &beam) &&
+            !vshi_chunk_add(&chunk, task->field, &beam, (uint32_t)i, stats)) {
+            proof[i] = VSHI_PROVED_FREE;
+        }
+    }
+    march_beams(task, &chunk, stats);
+    for (size_t r = 0; r < chunk.rays.count; ++r) {
+        if (chunk.rays.proof[r] == VSHI_PROVED_FULL) {
+            /* what hides a lamp may stand behind it, as seen from some of the points */
+            proof[chunk.owner[r]] = parallel ? VSHI_PROVED_FULL : VSHI_UNPROVED;
+        } else if (chunk.rays.clear[r] <= chunk.rays.begin[r]) {
+            proof[chunk.owner[r]] = VSHI_PROVED_FREE;
+        }
+    }
+}

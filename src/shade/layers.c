@@ -140,6 +140,14 @@ vsh_result vshi_layers_prepare(const vsh_shade_options *options, const vsh_light
     return VSH_OK;
 }
 
+vsh_result vshi_layers_prepare_sphere(vshi_layers *layers, vsh_error *error) {
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; layers != NULL && i < layers->count && result == VSH_OK; ++i) {
+        result = vshi_ao_prepare_sphere(&layers->cones, &layers->items[i].ao, error);
+    }
+    return result;
+}
+
 void vshi_layers_free(vshi_layers *layers) {
     for (size_t i = 0; layers != NULL && i < layers->count; ++i) {
         vshi_sampler_free(layers->items[i].sampler);

@@ -20,6 +20,10 @@ vsh_result vshi_layers_prepare(const vsh_shade_options *options, const vsh_light
                                vsh_error *error);
 void vshi_layers_free(vshi_layers *layers); /* NULL does nothing */
 
+/* Makes layers that are prepared for AO those of free space, see vshi_ao_prepare_sphere(). NULL does nothing.
+ * Errors: VSH_ERROR_ARGUMENT. */
+vsh_result vshi_layers_prepare_sphere(vshi_layers *layers, vsh_error *error);
+
 /* Combines the layers with the values that the task's arrays hold of points begin … end - 1: at most
  * VSHI_PIECE, of AO VSHI_AO_GRAIN. */
 void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task, size_t begin, size_t end,

@@ -4,9 +4,11 @@
 #include <string.h>
 
 static const char *const shadow_names[] = {
-    [VSH_SHADOW_HARD] = "hard",         [VSH_SHADOW_CLASSIC] = "classic", [VSH_SHADOW_IMPROVED] = "improved",
-    [VSH_SHADOW_SMOOTH] = "smooth",     [VSH_SHADOW_CONE] = "cone",       [VSH_SHADOW_RAYS] = "rays",
-    [VSH_SHADOW_ADAPTIVE] = "adaptive", [VSH_SHADOW_EXACT] = "exact",
+    [VSH_SHADOW_HARD] = "hard",           [VSH_SHADOW_CLASSIC] = "classic",
+    [VSH_SHADOW_PRACTICAL] = "practical", [VSH_SHADOW_IMPROVED] = "improved",
+    [VSH_SHADOW_SMOOTH] = "smooth",       [VSH_SHADOW_CONE] = "cone",
+    [VSH_SHADOW_RAYS] = "rays",           [VSH_SHADOW_ADAPTIVE] = "adaptive",
+    [VSH_SHADOW_EXACT] = "exact",
 };
 
 static const char *const ao_names[] = {[VSH_AO_TAPS] = "taps",

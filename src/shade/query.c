@@ -4,8 +4,10 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "field/level.h"
+#include "shade/blocks.h"
 #include "shade/layers.h"
 #include "shade/order.h"
+#include "shade/query.h"
 #include "shade/view.h"
 
 #include <stdlib.h>
@@ -82,6 +84,12 @@ static vsh_result prepare(vsh_query *q, const vsh_field *field, const vsh_light 
 
 vsh_result vsh_query_create(const vsh_field *field, const vsh_light *lights, size_t light_count,
                             const vsh_shade_options *options, vsh_query **query, vsh_error *error) {
+    return vshi_query_create(field, lights, light_count, options, false, query, error);
+}
+
+vsh_result vshi_query_create(const vsh_field *field, const vsh_light *lights, size_t light_count,
+                             const vsh_shade_options *options, bool sphere, vsh_query **query,
+                             vsh_error *error) {
     VSHI_FLOATS;
     vsh_query *q = NULL;
     *query = NULL;
@@ -92,12 +100,35 @@ vsh_result vsh_query_create(const vsh_field *field, const vsh_light *lights, siz
     if (result == VSH_OK) {
         result = prepare(q, field, lights, light_count, error);
     }
+    if (result == VSH_OK && sphere) {
+        result = vshi_ao_prepare_sphere(&q->cones, &q->ao, error);
+    }
+    if (result == VSH_OK && sphere) {
+        result = vshi_layers_prepare_sphere(q->layers[light_count], error);
+    }
     if (result != VSH_OK) {
         vsh_query_free(q);
         return result;
     }
     *query = q;
     return VSH_OK;
+}
+
+void vshi_query_prove(const vsh_query *query, int32_t isa, size_t light, size_t count,
+                      const double (*centre)[3], const double *radius, int8_t *proof,
+                      vsh_shade_stats *stats) {
+    vshi_shadow_task task = query->shadow[light];
+    task.kernel = vshi_kernel_of(isa);
+    vshi_vec at[VSHI_QUERY_BALLS];
+    double voxels[VSHI_QUERY_BALLS];
+    for (size_t i = 0; i < count; ++i) {
+        at[i] = vshi_to_field(task.field, centre[i]);
+        voxels[i] = radius[i] / task.field->voxel_size;
+    }
+    vshi_blocks_prove_balls(&task, count, at, voxels, proof, stats);
+    for (size_t i = 0; i < count && task.layers != NULL; ++i) {
+        proof[i] = proof[i] == VSHI_PROVED_FREE ? VSHI_UNPROVED : proof[i]; /* layers may hide the light */
+    }
 }
 
 /* --- points */
@@ -312,8 +343,9 @@ static vsh_result check_output(const vsh_query *query, const vshi_view *view, co
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: stride %zu: expected 0 or bytes, %zu, %zu …",
                          output->stride, least, least + sizeof(float));
     }
-    return output->ao != NULL && view->normals == NULL ? vshi_ao_check_points(&(vsh_points){0}, error)
-                                                       : VSH_OK;
+    return output->ao != NULL && view->normals == NULL && !query->ao.sphere
+               ? vshi_ao_check_points(&(vsh_points){0}, error)
+               : VSH_OK;
 }
 
 /* `packed`: the points, where they are without gaps; else NULL. */

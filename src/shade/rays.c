@@ -25,6 +25,7 @@ void vshi_chunk_clear(vshi_chunk *chunk) {
                               .horizon = lane[11],
                               .wide = lane[12],
                               .clear = lane[13],
+                              .pace = lane[11], /* no march takes horizons and a pace */
                               .proof = chunk->proof};
 }
 

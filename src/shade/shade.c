@@ -30,6 +30,7 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
         {"frame", full->frame, 0, INT32_MAX},
         {"early_rays", full->early_rays, 0, 4096},
         {"max_error", full->max_error, 1e-4, 1},
+        {"jitter", full->jitter, 0, 1},
     };
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; ++i) {
         if (!(fields[i].value >= fields[i].low && fields[i].value <= fields[i].high)) {
@@ -45,6 +46,19 @@ vsh_result vshi_shade_sampler(const vsh_shade_options *options, const char *what
     *sampler = vshi_sampler_create(options->sampler, options->rays, options->frame);
     return *sampler != NULL ? VSH_OK
                             : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
+}
+
+void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more) {
+    stats->marches += more->marches;
+    stats->samples += more->samples;
+    stats->skipped += more->skipped;
+    stats->certified += more->certified;
+    stats->unfinished += more->unfinished;
+    stats->invalid += more->invalid;
+    stats->beyond_reach += more->beyond_reach;
+    stats->rays += more->rays;
+    stats->refined += more->refined;
+    stats->square_error += more->square_error;
 }
 
 typedef struct shade_run {
@@ -114,16 +128,17 @@ vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows 
     const vsh_result result = vshi_parallel_for(job, before[rows->count], 1, 0, run_piece, &pieces, error);
     free(memory);
     if (stats != NULL) {
-        stats->marches += pieces.marches;
-        stats->samples += pieces.samples;
-        stats->skipped += pieces.skipped;
-        stats->certified += pieces.certified;
-        stats->unfinished += pieces.unfinished;
-        stats->invalid += pieces.invalid;
-        stats->beyond_reach += pieces.beyond_reach;
-        stats->rays += pieces.rays;
-        stats->refined += pieces.refined;
-        stats->square_error += (double)pieces.square_error * VSHI_SQUARE_UNIT;
+        const vsh_shade_stats done = {.marches = pieces.marches,
+                                      .samples = pieces.samples,
+                                      .skipped = pieces.skipped,
+                                      .certified = pieces.certified,
+                                      .unfinished = pieces.unfinished,
+                                      .invalid = pieces.invalid,
+                                      .beyond_reach = pieces.beyond_reach,
+                                      .rays = pieces.rays,
+                                      .refined = pieces.refined,
+                                      .square_error = (double)pieces.square_error * VSHI_SQUARE_UNIT};
+        vshi_shade_stats_add(stats, &done);
     }
     return result;
 }

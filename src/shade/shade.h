@@ -16,6 +16,9 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
 /* Shades points begin … end - 1; adds what it did to *stats. */
 typedef void vshi_shade_fn(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);
 
+/* Adds what `more` counts. */
+void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more);
+
 /* The sampler of methods by rays, for `what`. */
 vsh_result vshi_shade_sampler(const vsh_shade_options *options, const char *what, vshi_sampler **sampler,
                               vsh_error *error);

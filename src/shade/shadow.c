@@ -1,10 +1,14 @@
 /* Shadow values: the visible fraction of a light, by one cone or ray a point. */
 #include "base/floats.h"
+#include "base/hash.h"
 #include "shade/blocks.h"
 #include "shade/layers.h"
 
 #include <math.h>
 #include <stdio.h>
+
+/* Of a march by practical: what is less is dark. */
+static const double PRACTICAL_END = 0.004;
 
 /* Turns a closeness into a visible fraction, by method. */
 static float remap(int32_t method, double closeness, double sine) {
@@ -16,6 +20,8 @@ static float remap(int32_t method, double closeness, double sine) {
     case VSH_SHADOW_CLASSIC:
     case VSH_SHADOW_IMPROVED:
         return (float)(x <= 0.0 ? 0.0 : x >= 1.0 ? 1.0 : x);
+    case VSH_SHADOW_PRACTICAL:
+        return (float)(x < PRACTICAL_END ? 0.0 : x >= 1.0 ? 1.0 : x * x * (3.0 - 2.0 * x));
     case VSH_SHADOW_SMOOTH:
         return (float)(x <= -1.0 ? 0.0 : x >= 1.0 ? 1.0 : 0.25 * (1.0 + x) * (1.0 + x) * (2.0 - x));
     default:
@@ -94,6 +100,15 @@ double vshi_shadow_above(const vshi_shadow_task *task, size_t i) {
                          cone.sine);
 }
 
+/* What the steps of a point are shortened to. */
+static float pace_of(const vshi_shadow_task *task, size_t point) {
+    const vsh_points *points = task->points;
+    const uint64_t texel = points->texels != NULL ? points->texels[point] : point;
+    const uint64_t bits =
+        vshi_mix((texel + 1) * UINT64_C(0x9e3779b97f4a7c15) + (uint64_t)task->options->frame);
+    return (float)(1.0 - task->options->jitter * (double)(bits >> 11) * 0x1p-53);
+}
+
 static void shade_points(const vshi_shadow_task *task, size_t begin, size_t end, vsh_shade_stats *stats) {
     const int32_t method = task->options->method;
     vshi_facing facing;
@@ -104,15 +119,21 @@ static void shade_points(const vshi_shadow_task *task, size_t begin, size_t end,
         const bool hard = cone->sine <= 0.0;
         /* the receiver's own horizon is an edge like any other: its sine is the closeness of a plane */
         cone->close = hard ? 1.0 : cone->horizon < cone->sine ? cone->horizon : cone->sine;
-        cone->stop = -task->lowest * cone->sine;
+        cone->stop = method == VSH_SHADOW_PRACTICAL ? PRACTICAL_END * cone->sine : -task->lowest * cone->sine;
         if (!vshi_chunk_add(&chunk, task->field, cone, (uint32_t)i, stats)) {
             task->visibility[facing.point[i]] = remap(method, cone->close, cone->sine);
             stats->certified += cone->close >= cone->sine;
         }
     }
     vshi_march_stats work = {0, 0};
+    const bool jittered = task->options->jitter > 0.0 && method != VSH_SHADOW_IMPROVED;
+    for (size_t r = 0; jittered && r < chunk.rays.count; ++r) {
+        chunk.rays.pace[r] = pace_of(task, facing.point[chunk.owner[r]]);
+    }
     task->kernel->march(task->field, &chunk.rays,
-                        method == VSH_SHADOW_IMPROVED ? VSHI_MARCH_TRIANGULATED : VSHI_MARCH_PLAIN,
+                        jittered                        ? VSHI_MARCH_JITTERED
+                        : method == VSH_SHADOW_IMPROVED ? VSHI_MARCH_TRIANGULATED
+                                                        : VSHI_MARCH_PLAIN,
                         task->options->max_steps, &work);
     stats->samples += work.samples;
     stats->unfinished += work.unfinished;

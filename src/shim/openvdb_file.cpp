@@ -1,8 +1,8 @@
-// .vdb files. The reader of OpenVDB 10.0.1 crashes on some damaged files (it writes past its buffers where
-// Blosc data lie about their size): positions and sizes are checked here and a short file shows as an error,
-// but damage inside the packed data cannot be seen beforehand. Who reads untrusted files makes a trial read
-// in a child process first, as the command line does.
-#include "base/file.h"
+// Reading .vdb files. The reader of OpenVDB 10.0.1 crashes on some damaged files (it writes past its buffers
+// where Blosc data lie about their size): positions and sizes are checked here and a short file shows as an
+// error, but damage inside the packed data cannot be seen beforehand. Who reads untrusted files makes a trial
+// read in a child process first, as the command line does.
+#include "shim/openvdb_file.h"
 #include "shim/openvdb_examine.h"
 
 #include <cerrno>
@@ -15,11 +15,15 @@
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/Stream.h>
-#include <streambuf>
 #include <sys/stat.h>
 #include <vector>
 
 namespace vshi {
+
+void initialize() {
+    static const bool once = (openvdb::initialize(), true);
+    static_cast<void>(once);
+}
 
 namespace {
 
@@ -27,18 +31,8 @@ using openvdb::GridBase;
 using openvdb::MetaMap;
 using openvdb::io::GridDescriptor;
 
-constexpr const char *SHELL_THICKNESS = "vdbshade_shell_thickness"; // metadata, world units
-
-// Magic number (8 bytes), version of the format (4) and of the library (8), 1 byte, and the file's UUID.
-constexpr size_t UUID_AT = 21;
-constexpr size_t UUID_LENGTH = 36;
 constexpr size_t HEADER = UUID_AT + UUID_LENGTH;
 constexpr unsigned char MAGIC[8] = {0x20, 0x42, 0x44, 0x56, 0, 0, 0, 0};
-
-void initialize() {
-    static const bool once = (openvdb::initialize(), true);
-    static_cast<void>(once);
-}
 
 // The file's size, once it is known to be a .vdb file that OpenVDB has a chance to read.
 uint64_t check_file(const char *path, vsh_error *error) {
@@ -212,6 +206,10 @@ GridBase::Ptr Reader::grid(size_t i) {
     return result;
 }
 
+vsh_result fail_cut_short(const char *path, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_READ, "%s: cut short or damaged", path);
+}
+
 // Reading past the end of the file shows as this exception, whose own words are of no use.
 template <typename Body> vsh_result guard_file(vsh_error *error, const char *path, Body &&body) {
     return guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
@@ -219,7 +217,7 @@ template <typename Body> vsh_result guard_file(vsh_error *error, const char *pat
             initialize();
             return body();
         } catch (const std::ios_base::failure &) {
-            return vshi_fail(error, VSH_ERROR_READ, "%s: cut short or damaged", path);
+            return fail_cut_short(path, error);
         }
     });
 }
@@ -229,21 +227,22 @@ std::string class_of(const MetaMap &metadata) {
     return text ? text->value() : "";
 }
 
-size_t choose(Reader &reader, const char *path, const char *name, vsh_error *error) {
+// The first grid of that name, or (nullptr) that `wanted(i)` holds for; else the first one, to be refused
+// with its reason.
+template <typename Wanted>
+size_t choose(Reader &reader, const char *path, const char *name, vsh_error *error, Wanted &&wanted) {
     if (reader.count() == 0) {
         throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no grids", path)};
     }
     std::string names;
     for (size_t i = 0; i < reader.count(); ++i) {
-        if (name != nullptr
-                ? reader.is_named(i, name)
-                : class_of(reader.metadata(i)) == GridBase::gridClassToString(openvdb::GRID_LEVEL_SET)) {
+        if (name != nullptr ? reader.is_named(i, name) : wanted(i)) {
             return i;
         }
         names += (i > 0 ? ", '" : "'") + reader.name(i) + "'";
     }
     if (name == nullptr) {
-        return 0; // to be refused with its reason
+        return 0;
     }
     throw Failure{
         vshi_fail(error, VSH_ERROR_INPUT, "%s: no grid '%s'; it holds %.700s", path, name, names.c_str())};
@@ -305,7 +304,9 @@ vsh_result read(const char *path, const char *name, const vsh_run &run, vsh_grid
     Stage stage(run, "load", error);
     stage.check();
     Reader reader(path, run, error);
-    const size_t chosen = choose(reader, path, name, error);
+    const size_t chosen = choose(reader, path, name, error, [&](size_t i) {
+        return class_of(reader.metadata(i)) == GridBase::gridClassToString(openvdb::GRID_LEVEL_SET);
+    });
     const Named named{path, reader.name(chosen)};
     refuse_large(named, run, reader.bytes(chosen), error);
 
@@ -325,149 +326,8 @@ vsh_result read(const char *path, const char *name, const vsh_run &run, vsh_grid
     return VSH_OK;
 }
 
-// Writes through a sink: OpenVDB's own file writing does not look whether the last bytes arrived.
-class SinkBuffer final : public std::streambuf {
-  public:
-    explicit SinkBuffer(const char *path) : sink(vshi_sink_open(path)), bytes(size_t(1) << 20) {}
-    ~SinkBuffer() override { finish(); }
-    SinkBuffer(const SinkBuffer &) = delete;
-    SinkBuffer &operator=(const SinkBuffer &) = delete;
-
-    int finish() { // the errno of the first failure, or 0
-        flush();
-        return vshi_sink_close(&sink);
-    }
-
-  protected:
-    std::streamsize xsputn(const char *data, std::streamsize count) override {
-        if (size_t(count) > bytes.size() - used) {
-            flush();
-        }
-        if (size_t(count) > bytes.size()) {
-            vshi_sink_write(&sink, data, size_t(count), at);
-            at += uint64_t(count);
-        } else {
-            std::memcpy(bytes.data() + used, data, size_t(count));
-            used += size_t(count);
-        }
-        return count; // failures are told by finish()
-    }
-    int_type overflow(int_type value) override {
-        const char byte = traits_type::to_char_type(value);
-        xsputn(&byte, 1);
-        return traits_type::not_eof(value);
-    }
-    int sync() override {
-        flush();
-        return 0;
-    }
-    pos_type seekpos(pos_type position, std::ios_base::openmode) override {
-        flush();
-        at = uint64_t(std::streamoff(position));
-        return position;
-    }
-    pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode mode) override {
-        if (from == std::ios_base::end) {
-            return pos_type(off_type(-1)); // never asked for
-        }
-        const off_type now = off_type(at + used);
-        return from == std::ios_base::cur && offset == 0
-                   ? pos_type(now)
-                   : seekpos(pos_type(from == std::ios_base::cur ? now + offset : offset), mode);
-    }
-
-  private:
-    void flush() {
-        if (used > 0 && sink.file >= 0) {
-            vshi_sink_write(&sink, bytes.data(), used, at);
-        }
-        at += used;
-        used = 0;
-    }
-
-    vshi_sink sink;
-    std::vector<char> bytes;
-    size_t used = 0;
-    uint64_t at = 0; // of the first byte of `bytes`
-};
-
-class Writer final : public openvdb::io::Archive {
-  public:
-    Writer() {
-        setCompression(openvdb::io::COMPRESS_ACTIVE_MASK |
-                       (hasBloscCompression()  ? openvdb::io::COMPRESS_BLOSC
-                        : hasZLibCompression() ? openvdb::io::COMPRESS_ZIP
-                                               : openvdb::io::COMPRESS_NONE));
-    }
-    void put(std::ostream &out, const FloatGrid::ConstPtr &grid) const {
-        Archive::write(out, openvdb::GridCPtrVec{grid}, true);
-    }
-};
-
-// In place of OpenVDB's random one: the same grid gives the same bytes. FNV-1a over the values.
-std::string content_uuid(const vsh_grid &grid) {
-    uint64_t hash[2] = {0xcbf29ce484222325u, 0x84222325cbf29ce4u};
-    const auto add = [&](uint64_t word) {
-        for (uint64_t &h : hash) {
-            h = (h ^ word) * 0x100000001b3u;
-        }
-        hash[1] ^= hash[1] >> 29;
-    };
-    for (auto leaf = grid.level_set->tree().cbeginLeaf(); leaf; ++leaf) {
-        const float *values = leaf->buffer().data();
-        for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
-            uint32_t bits;
-            std::memcpy(&bits, values + i, sizeof bits);
-            add(bits);
-        }
-    }
-    char text[UUID_LENGTH + 1];
-    std::snprintf(text, sizeof text, "%08x-%04x-4%03x-8%03x-%012llx", unsigned(hash[0] >> 32),
-                  unsigned(hash[0] >> 16) & 0xffffu, unsigned(hash[0]) & 0xfffu,
-                  unsigned(hash[1] >> 48) & 0xfffu,
-                  static_cast<unsigned long long>(hash[1] & 0xffffffffffffu));
-    return text;
-}
-
-struct Output {
-    vshi_output file{nullptr, nullptr};
-    ~Output() { vshi_output_abandon(&file); } // nothing, once committed
-};
-
-// Below, OpenVDB takes a voxel's volume for 0 while it copies what it writes.
-constexpr double SMALLEST_WRITTEN = 1.45e-5;
-
-vsh_result write(const vsh_grid &grid, const char *path, const char *name, vsh_error *error) {
-    if (grid.info.voxel_size < SMALLEST_WRITTEN) {
-        return vshi_fail(error, VSH_ERROR_LIMIT,
-                         "%s: voxel size %g: OpenVDB writes %g and more; scale the scene", path,
-                         grid.info.voxel_size, SMALLEST_WRITTEN);
-    }
-    Output output;
-    const vsh_result result = vshi_output_begin(&output.file, path, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    const FloatGrid::Ptr named = FloatGrid::create(grid.level_set->treePtr()); // shares the tree
-    named->setTransform(grid.level_set->transform().copy());
-    named->setName(name);
-    named->setGridClass(openvdb::GRID_LEVEL_SET);
-    named->setCreator(std::string("vdbshade ") + vsh_version());
-    if (grid.info.shell_thickness > 0.0) {
-        named->insertMeta(SHELL_THICKNESS, openvdb::DoubleMetadata(grid.info.shell_thickness));
-    }
-    SinkBuffer buffer(output.file.temporary);
-    std::ostream stream(&buffer);
-    Writer().put(stream, named);
-    stream.seekp(std::streamoff(UUID_AT));
-    stream << content_uuid(grid);
-    const bool good = stream.good();
-    const int number = buffer.finish();
-    if (number != 0 || !good) {
-        return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", path,
-                         number != 0 ? std::strerror(number) : "OpenVDB gave no reason");
-    }
-    return vshi_output_commit(&output.file, error);
+bool has_numbers(const GridBase &grid) {
+    return grid.apply<NumberGrids>([](const auto &) {});
 }
 
 template <size_t Capacity> void copy_text(char (&to)[Capacity], const std::string &from) {
@@ -544,6 +404,27 @@ vsh_result list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, si
 
 } // namespace
 
+GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &run, vsh_error *error) {
+    initialize();
+    try {
+        Reader reader(path, run, error);
+        const size_t chosen =
+            choose(reader, path, name, error, [&](size_t i) { return has_numbers(*reader.without_tree(i)); });
+        const Named named{path, reader.name(chosen)};
+        const GridBase::Ptr bare = reader.without_tree(chosen);
+        if (!has_numbers(*bare)) {
+            throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s is a %s, expected a grid of numbers",
+                                    named.text().c_str(), bare->type().c_str())};
+        }
+        refuse_large(named, run, reader.bytes(chosen), error);
+        const GridBase::Ptr grid = reader.grid(chosen);
+        refuse_large(named, run, double(grid->memUsage()), error);
+        return grid;
+    } catch (const std::ios_base::failure &) {
+        throw Failure{fail_cut_short(path, error)};
+    }
+}
+
 } // namespace vshi
 
 vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run, vsh_grid **grid,
@@ -555,13 +436,6 @@ vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run,
         return result;
     }
     return vshi::guard_file(error, path, [&] { return vshi::read(path, name, full, grid, error); });
-}
-
-vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name, vsh_error *error) {
-    return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
-        vshi::initialize();
-        return vshi::write(*grid, path, name != nullptr ? name : "surface", error);
-    });
 }
 
 vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,

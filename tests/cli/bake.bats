@@ -58,7 +58,7 @@ setup() {
 }
 
 @test "every method bakes" {
-    for method in hard classic improved smooth cone; do
+    for method in hard classic practical improved smooth cone; do
         shade bake box.obj "${SMALL[@]}" --method "$method" --quiet -o "$method.exr"
         done_well
     done

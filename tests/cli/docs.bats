@@ -1,4 +1,4 @@
-# Every scene in docs/scene.md bakes, and every command in docs/query.md and docs/render.md runs.
+# Every scene in docs/scene.md bakes, and every command in docs/query.md, docs/volume.md and docs/render.md runs.
 load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
@@ -51,6 +51,15 @@ run_commands() {
     printf 'property float nx\nproperty float ny\nproperty float nz\nend_header\n0 0.1 0 0 1 0\n' >>props.ply
     run_commands query.md 3
     [ -s shaded.csv ] && [ -s props-lit.ply ] && [ "$(wc -l <sorted.csv)" -eq 2 ]
+}
+
+@test "every command of docs/volume.md" {
+    "$VDBSHADE" volume seeds.json --box -1,0,-1,1,1,1 --box-voxel-size 0.2 -o fog.vdb --quiet
+    sed "s/fog.vdb:density/fog.vdb:ao/" "$DOCS/volume.md" >volume.md
+    DOCS=. run_commands volume.md 3
+    for made in band box lit; do
+        "$VDBSHADE" info $made.vdb | grep -q "grid 'shadow.sun'" || fail "$made.vdb"
+    done
 }
 
 @test "every command of docs/render.md" {

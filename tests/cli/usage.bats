@@ -24,7 +24,7 @@ fits() {
 }
 
 @test "every command has its own help, which fits 100 columns" {
-    for command in bake voxelize info trade render; do
+    for command in bake voxelize info trade query volume render; do
         shade "$command" --help
         done_well
         [[ $output == "Usage: vdbshade $command "* ]] || fail "no usage line"
@@ -148,7 +148,7 @@ LIST
     old_output out.exr
     for method in magic ray; do
         shade bake box.obj -o out.exr "${SMALL[@]}" --method "$method"
-        refused 2 "$method" 'hard, classic, improved, smooth, cone, rays, adaptive, exact'
+        refused 2 "$method" 'hard, classic, practical, improved, smooth, cone, rays, adaptive, exact'
     done
     untouched out.exr
 }

@@ -118,10 +118,11 @@ static void more_rays_are_never_farther_from_the_truth(void **state) {
  * may be three of its root-2-folds apart; triangulation takes two samples for one surface; and
  * taps add up five samples, of levels that are good to a part of their own voxels. */
 static double rise_of_shadow(int32_t method) {
-    return method == VSH_SHADOW_IMPROVED   ? 0.05
-           : method == VSH_SHADOW_RAYS     ? 1.1 / 64.0
-           : method >= VSH_SHADOW_ADAPTIVE ? 3.0 * 1.4143 * 0.02
-                                           : 1e-3;
+    return method == VSH_SHADOW_IMPROVED    ? 0.05
+           : method == VSH_SHADOW_PRACTICAL ? 1.5e-3
+           : method == VSH_SHADOW_RAYS      ? 1.1 / 64.0
+           : method >= VSH_SHADOW_ADAPTIVE  ? 3.0 * 1.4143 * 0.02
+                                            : 1e-3;
 }
 
 static double rise_of_ao(int32_t method) {

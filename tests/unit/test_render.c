@@ -125,9 +125,10 @@ static float floor_light(const vsh_field *field, const vsh_light *light, const d
     return open;
 }
 
-/* The documented filter with one sample a pixel: Blackman and Harris' window at -1, 0 and 1 of 1.5. */
-static void check_floor(const vsh_field *field, const vsh_light *light, vsh_render_options o, int *dark,
-                        int *lit, int *between_them) {
+/* `full`: of a point that is lit. The documented filter with one sample a pixel: Blackman and Harris' window
+ * at -1, 0 and 1 of 1.5. */
+static void check_floor(const vsh_field *field, const vsh_light *light, vsh_render_options o, double full,
+                        int *dark, int *lit, int *between_them) {
     static float direct[PIXELS];
     const vsh_surface surface = {field, {0.5, 0.25, 1.0}};
     render(&surface, 1, field, light, &o, NULL);

@@ -32,7 +32,7 @@ static const struct {
     {"{\n\t@\"castors\": []}", "castors: unknown key; did you mean \"casters\"?"},
     {CASTERS "@\"é\":1,\"xyzzy\":1}", "é: unknown key"},
     {CASTERS "\"method\":@\"ré\",\"xyzzy\":1}",
-     "method: \"ré\" is none of hard, classic, improved, smooth, cone, rays, adaptive, exact"},
+     "method: \"ré\" is none of hard, classic, practical, improved, smooth, cone, rays, adaptive, exact"},
     {CASTERS "\"method\":\"cone\",@\"xyzzy\":1}", "xyzzy: unknown key"},
     {"{\"receivers\":[],\"\\u0061o\":{\"distance\":1,@\"cone\":1}}",
      "ao.cone: unknown key; did you mean \"cones\"?"},

@@ -32,6 +32,7 @@ static void the_seeds_floor_is_as_near_to_the_truth_as_promised(void **state) {
     } cases[] = {{VSH_SHADOW_CONE, 0.022},
                  {VSH_SHADOW_SMOOTH, 0.022},
                  {VSH_SHADOW_CLASSIC, 0.16},
+                 {VSH_SHADOW_PRACTICAL, 0.16},
                  {VSH_SHADOW_IMPROVED, 0.16}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
         const vsh_shade_stats stats =
@@ -236,7 +237,8 @@ static void a_point_near_the_shadow_sees_less_of_larger_lights(void **state) {
         }
         print_message("%s: rises by %.4f at most\n", vsh_shadow_method_name(method), (double)rise);
         /* samples of a ray lie h apart, so how near they come to the least h / t changes with the angle */
-        assert_true(rise <= (method == VSH_SHADOW_IMPROVED ? 0.025f : 0.015f));
+        assert_true(rise <=
+                    (method == VSH_SHADOW_IMPROVED || method == VSH_SHADOW_PRACTICAL ? 0.025f : 0.015f));
     }
     vsh_field_free(field);
 }
@@ -245,8 +247,8 @@ static void a_larger_occluder_hides_more(void **state) {
     (void)state;
     const double up[3] = {0.0, 1.0, 0.0};
     const vsh_light light = sun(up, RADIANS(20.0));
-    float last[5][8];
-    for (int32_t method = 0; method < 5; ++method) {
+    float last[VSH_SHADOW_CONE + 1][8];
+    for (int32_t method = 0; method <= VSH_SHADOW_CONE; ++method) {
         for (int i = 0; i < 8; ++i) {
             last[method][i] = 1.0f;
         }
@@ -265,6 +267,74 @@ static void a_larger_occluder_hides_more(void **state) {
         vsh_field_free(field);
     }
     assert_true(last[VSH_SHADOW_CONE][0] == 0.0f);
+}
+
+/* practical is classic through a smoothstep, but for what its march no longer looks at. */
+static void practical_is_classic_smoothed(void **state) {
+    (void)state;
+    enum { COUNT = 64 * 64 };
+    static double positions[3 * COUNT];
+    static float normals[3 * COUNT], classic[COUNT], practical[COUNT];
+    floor_texels(64, positions, normals);
+    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
+    const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
+    const vsh_shade_stats a = shadows(field, &light, VSH_SHADOW_CLASSIC, COUNT, positions, normals, classic);
+    const vsh_shade_stats b =
+        shadows(field, &light, VSH_SHADOW_PRACTICAL, COUNT, positions, normals, practical);
+    size_t between_ends = 0;
+    for (size_t i = 0; i < COUNT; ++i) {
+        const double x = (double)classic[i];
+        assert_float_equal(practical[i], x < 0.004 ? 0.0 : x * x * (3.0 - 2.0 * x), 1e-5);
+        between_ends += x > 0.1 && x < 0.9;
+    }
+    assert_true(between_ends > 20);
+    assert_true(b.samples <= a.samples);
+    vsh_field_free(field);
+}
+
+/* Shorter steps find what lies between the samples of whole ones: values change from texel to texel, by a
+ * part that another frame changes again, and never for a worse error. */
+static void jittered_steps_leave_grain(void **state) {
+    (void)state;
+    enum { COUNT = 128 * 128 };
+    static double positions[3 * COUNT];
+    static float normals[3 * COUNT], truth[COUNT], plain[COUNT], jittered[COUNT], again[COUNT], other[COUNT];
+    floor_texels(128, positions, normals);
+    const double normal[3] = {0.0, 1.0, 0.0};
+    assert_int_equal(truth_lights(truth_seeds(), COUNT, positions, normal, truth_seeds_sun, truth_seeds_w,
+                                  (double)INFINITY, 64, truth),
+                     0);
+    vsh_field *field = field_of(truth_seeds(), 0.02, 0.0);
+    const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
+    vsh_shade_options options = vsh_shade_options_default();
+    const vsh_points points = {COUNT, positions, normals, NULL};
+    vsh_shade_stats whole = vsh_shade_stats_zero(), shorter = vsh_shade_stats_zero();
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, plain, NULL, &whole, NULL),
+                     VSH_OK);
+    options.jitter = 0.5;
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, jittered, NULL, &shorter, NULL),
+                     VSH_OK);
+    vsh_run one = vsh_run_default();
+    one.threads = 1;
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, &one, again, NULL, NULL, NULL),
+                     VSH_OK);
+    assert_memory_equal(jittered, again, sizeof again);
+    options.frame = 1;
+    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, other, NULL, NULL, NULL),
+                     VSH_OK);
+    size_t changed = 0, moved = 0, grey = 0;
+    for (size_t i = 0; i < COUNT; ++i) {
+        grey += plain[i] > 0.05f && plain[i] < 0.95f;
+        changed += jittered[i] != plain[i];
+        moved += jittered[i] != other[i];
+        assert_true(fabsf(jittered[i] - plain[i]) < 0.1f);
+    }
+    assert_true(changed > grey / 2 && moved > grey / 2);
+    assert_true(shorter.samples > whole.samples);
+    const truth_metrics before = truth_compare(COUNT, plain, truth, NULL);
+    const truth_metrics after = truth_compare(COUNT, jittered, truth, NULL);
+    assert_true(after.rmse <= 1.02 * before.rmse);
+    vsh_field_free(field);
 }
 
 static void a_light_without_size_is_hard_in_every_method(void **state) {
@@ -398,6 +468,8 @@ int main(void) {
         cmocka_unit_test(a_straight_edge_casts_the_penumbra_of_a_disc),
         cmocka_unit_test(a_point_near_the_shadow_sees_less_of_larger_lights),
         cmocka_unit_test(a_larger_occluder_hides_more),
+        cmocka_unit_test(practical_is_classic_smoothed),
+        cmocka_unit_test(jittered_steps_leave_grain),
         cmocka_unit_test(a_light_without_size_is_hard_in_every_method),
         cmocka_unit_test(a_far_sphere_light_is_a_directional_one),
         cmocka_unit_test(a_light_inside_a_caster_lights_nothing),

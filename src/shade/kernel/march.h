@@ -23,6 +23,7 @@ typedef struct vshi_rays {
                      * one */
     int8_t *proof;  /* out */
     float *wide;    /* of beams: radius at t = 0, to which that of the cone is added; see VSHI_MARCH_GROWN */
+    float *pace;    /* of VSHI_MARCH_JITTERED: 0 … 1 */
     float *clear;   /* out, of beams: the t from which on it is free; past `end` or infinite: nowhere */
 } vshi_rays;
 
@@ -32,7 +33,8 @@ enum {
     VSHI_MARCH_TRIANGULATED = 1, /* the closest miss between two samples (Aaltonen, GDC 2018) */
     VSHI_MARCH_PROOF = 2,        /* not at all: whether the cone is free or full for certain */
     VSHI_MARCH_BEAM = 3,         /* nor here: from where on a beam of them is free, or whether it is full */
-    VSHI_MARCH_GROWN = 4         /* (h - wide) / t: of casters grown by `wide` */
+    VSHI_MARCH_GROWN = 4,        /* (h - wide) / t: of casters grown by `wide` */
+    VSHI_MARCH_JITTERED = 5      /* h / t, after steps of `pace` of what is free */
 };
 
 enum { VSHI_UNPROVED = 0, VSHI_PROVED_FREE = 1, VSHI_PROVED_FULL = 2 };

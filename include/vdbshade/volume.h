@@ -1,0 +1,164 @@
+/* Volumes: shadow and ambient occlusion on voxels, as sparse OpenVDB grids. */
+#ifndef VDBSHADE_VOLUME_H
+#define VDBSHADE_VOLUME_H
+
+#include "shade.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* --- where: which voxels of which lattice */
+
+/* Voxels to be shaded, and where they lie in the world; their values belong to their centres. */
+typedef struct vsh_voxels vsh_voxels;
+
+/* The narrow band of a level set, on its own lattice: the voxels within `band` voxels of the surface, on both
+ * sides of it (0: all of the grid's band). They have normals: shadow has a horizon, and AO is that of the
+ * surface. The grid need not outlive the call. Free with vsh_voxels_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: band negative, not finite or wider than the grid's, run;
+ * - VSH_ERROR_INPUT: no voxel is so near to the surface;
+ * - VSH_ERROR_LIMIT: run->memory_limit, or the machine's memory;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_voxels_from_grid(const vsh_grid *grid, double band, const vsh_run *run,
+                                        vsh_voxels **voxels, vsh_error *error);
+
+/* A box of cubes of voxel_size, as many along each axis as cover it from box_min on (a millionth of a voxel
+ * is no reason for one more): voxel (i, j, k), from 0, has its centre at box_min + voxel_size × (i + 1/2, j +
+ * 1/2, k + 1/2). Errors:
+ * - VSH_ERROR_ARGUMENT: bounds that are not finite, box_max not above box_min, voxel_size not finite or not
+ *   above 0, run;
+ * - VSH_ERROR_LIMIT: voxels below 1.45e-5 world units, which OpenVDB cannot write, more than 2^28 along a
+ *   side or 1e12 from the origin; run->memory_limit, or the machine's memory;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_voxels_from_box(const double box_min[3], const double box_max[3], double voxel_size,
+                                       const vsh_run *run, vsh_voxels **voxels, vsh_error *error);
+
+/* The active voxels of a grid of numbers (or a mask) in a .vdb file, those of active tiles too, on its own
+ * lattice, whatever its transform. `name` NULL: the file's first such grid. Files from strangers are to be
+ * read in a process of their own first, see vsh_grid_read(). Errors:
+ * - VSH_ERROR_ARGUMENT: run;
+ * - VSH_ERROR_READ: as vsh_grid_read();
+ * - VSH_ERROR_INPUT: no grids, none of that name, one that holds no numbers (vectors, points, text), has no
+ *   active voxels, a voxel beyond ±2^28 or a transform that is not finite;
+ * - VSH_ERROR_LIMIT: the grid, or its tiles' voxels, pass run->memory_limit or the machine's memory;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_voxels_from_vdb(const char *path, const char *name, const vsh_run *run,
+                                       vsh_voxels **voxels, vsh_error *error);
+VSH_API void vsh_voxels_free(vsh_voxels *voxels); /* NULL does nothing */
+
+typedef struct vsh_voxels_info {
+    uint64_t count;
+    uint64_t blocks;      /* of 8³ voxels that hold them */
+    int32_t index_min[3]; /* of the voxels, both inclusive */
+    int32_t index_max[3];
+    double bounds_min[3]; /* world box of their centres: what a field's `receivers` are to hold */
+    double bounds_max[3];
+    double voxel_size[3]; /* world units along the lattice's own axes; of a frustum, at its middle */
+    int32_t has_normals;  /* 1: the band of a surface; 0: free space */
+    uint64_t bytes;       /* in memory */
+} vsh_voxels_info;
+
+/* Cannot fail. */
+VSH_API void vsh_voxels_get_info(const vsh_voxels *voxels, vsh_voxels_info *info);
+
+/* World position of a voxel's centre: where it is shaded, bit by bit. Cannot fail. */
+VSH_API void vsh_voxels_centre(const vsh_voxels *voxels, const int32_t index[3], double centre[3]);
+
+/* --- what: visibility and AO on them */
+
+/* Voxels whose centre lies inside a solid, where light never comes. */
+enum {
+    VSH_INSIDE_NEAREST = 0, /* take the value of the nearest voxel that was shaded, up to four voxels off, so
+                               that interpolating at the surface darkens nothing; deeper ones are left off */
+    VSH_INSIDE_OFF = 1      /* are left off: inactive, background */
+};
+
+typedef struct vsh_volume_options {
+    size_t struct_size;
+    int32_t inside;          /* VSH_INSIDE_… */
+    int32_t ao;              /* nonzero: AO within shade.ao_distance, too. In free space, where there is no
+                                surface, it is the free share of all directions, each counting alike (the
+                                ambient light of a fog): shade.ao_cones cones or shade.rays rays over the whole
+                                sphere; VSH_AO_TAPS has no meaning there */
+    int32_t error;           /* nonzero: the standard error left in each value, too, where methods know it */
+    vsh_shade_options shade; /* start_offset and surface_offset count in a band only */
+} vsh_volume_options;
+
+static inline vsh_volume_options vsh_volume_options_default(void) {
+    vsh_volume_options options = {sizeof(vsh_volume_options), VSH_INSIDE_NEAREST, 0, 0,
+                                  vsh_shade_options_default()};
+    return options;
+}
+
+/* "nearest" to VSH_INSIDE_NEAREST and back; -1 and NULL for what is none. Names are static strings; NULL is
+ * none. */
+VSH_API int32_t vsh_inside(const char *name);
+VSH_API const char *vsh_inside_name(int32_t inside);
+
+/* The grids of a bake: shadow.NAME of each light, then ao, then error.NAME of each light, then error.ao,
+ * where asked for. Floats, background 1 (what was not shaded is not dark), uniform regions as tiles. */
+typedef struct vsh_volume vsh_volume;
+
+/* Shades the voxels. Values are those of vsh_query_points() at vsh_voxels_centre(): in free space without
+ * normals; in a band with the central differences of vsh_field_sample() half a voxel to either side of the
+ * centre along each of the lattice's axes as normals (voxels where they vanish, between two walls, count as
+ * inside). Which voxels are inside is decided by the sign of vsh_field_sample(), of the layers too. Beyond
+ * the casters' bounds a march's first step depends on what its neighbours prove, so that a few values in
+ * penumbrae differ, by up to 0.05; adaptive and exact values within their error. Runs under the stage
+ * "volume"; `stats` are added to. Free the result with vsh_volume_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: field or voxels NULL, lights NULL with a count above 0, nothing to bake, two lights
+ *   of one name or one without, options out of range, VSH_AO_TAPS in free space, run, and as
+ *   vsh_query_create();
+ * - VSH_ERROR_LIMIT: run->memory_limit, or the machine's memory, for field, voxels and all grids without
+ *   tiles;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_bake_volume(const vsh_field *field, const vsh_voxels *voxels, const vsh_light *lights,
+                                   size_t light_count, const vsh_volume_options *options, const vsh_run *run,
+                                   vsh_volume **volume, vsh_shade_stats *stats, vsh_error *error);
+VSH_API void vsh_volume_free(vsh_volume *volume); /* NULL does nothing */
+
+typedef struct vsh_volume_info {
+    size_t grids;
+    uint64_t shaded; /* voxels whose values were found at their centres */
+    uint64_t filled; /* inside ones that took the nearest */
+    uint64_t off;    /* inside ones that were left off */
+    uint64_t bytes;  /* in memory, all grids */
+} vsh_volume_info;
+
+/* One grid of a volume. */
+typedef struct vsh_volume_grid {
+    char name[80]; /* "shadow.sun", "ao", … */
+    uint64_t active_voxels;
+    uint64_t leaves; /* of 8³ values */
+    uint64_t tiles;  /* active ones: regions of 8³ voxels and more that have one value */
+} vsh_volume_grid;
+
+/* Cannot fail; of a grid beyond the last, an empty name and zeros. */
+VSH_API void vsh_volume_get_info(const vsh_volume *volume, vsh_volume_info *info);
+VSH_API void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vsh_volume_grid *info);
+
+/* Values of a grid at `count` world positions ([count][3]) into values[count], interpolated between the
+ * eight voxels around each, as renderers do; the background where there are none, NaN for positions that are
+ * not finite, or beyond ±2^31 voxels. Runs on the calling thread. Errors: VSH_ERROR_ARGUMENT (no such grid).
+ */
+VSH_API vsh_result vsh_volume_sample(const vsh_volume *volume, size_t grid, size_t count,
+                                     const double *positions, float *values, vsh_error *error);
+
+/* A dense copy: the values of size[0] × size[1] × size[2] voxels from `index_min` on into values, z fastest;
+ * the background where they are not active. Runs on the calling thread. Errors: VSH_ERROR_ARGUMENT (no such
+ * grid, a size below 1, indices beyond 32 bits). */
+VSH_API vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const int32_t index_min[3],
+                                   const int32_t size[3], float *values, vsh_error *error);
+
+/* Writes all grids as one .vdb file, `half` (nonzero) as 16-bit floats; the same volume gives the same bytes.
+ * Metadata tell method, light and voxel size (docs/volume.md). Atomic, as vsh_grid_write(). Errors:
+ * VSH_ERROR_ARGUMENT (path NULL or empty), VSH_ERROR_LIMIT (as vsh_grid_write()), VSH_ERROR_WRITE,
+ * VSH_ERROR_MEMORY. */
+VSH_API vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t half,
+                                    vsh_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

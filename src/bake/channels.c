@@ -1,0 +1,61 @@
+#include "bake/channels.h"
+
+#include <stdio.h>
+
+static const double DEGREES = 57.295779513082323;
+
+static void describe_light(const vsh_light *light, char *text, size_t size) {
+    const double *p = light->type == VSH_LIGHT_DIRECTIONAL ? light->direction : light->position;
+    switch (light->type) {
+    case VSH_LIGHT_DIRECTIONAL:
+        snprintf(text, size, "directional towards %g %g %g, %g degrees across", p[0], p[1], p[2],
+                 DEGREES * light->angle);
+        break;
+    case VSH_LIGHT_SPHERE:
+        snprintf(text, size, "sphere at %g %g %g, radius %g", p[0], p[1], p[2], light->radius);
+        break;
+    default:
+        snprintf(text, size, "spot at %g %g %g, radius %g", p[0], p[1], p[2], light->radius);
+        break;
+    }
+}
+
+static vshi_channel *next_of(vshi_channel **next, const vshi_channels *what, const char *method) {
+    vshi_channel *channel = (*next)++;
+    *channel = (vshi_channel){.method = method, .caster_voxel_size = what->caster_voxel_size};
+    return channel;
+}
+
+static void describe_shadow(const vshi_channels *what, bool error, vshi_channel **next) {
+    const char *method = vsh_shadow_method_name(what->options->shade.method);
+    for (size_t l = 0; l < what->light_count; ++l) {
+        const vsh_light *light = &what->lights[l];
+        vshi_channel *c = next_of(next, what, method);
+        snprintf(c->name, sizeof c->name, "%s.%s", error ? "error" : "shadow", light->name);
+        snprintf(c->description, sizeof c->description, "%s light '%s', 1 lit, 0 dark",
+                 error ? "standard error of the visible fraction of" : "visible fraction of", light->name);
+        describe_light(light, c->light, sizeof c->light);
+    }
+}
+
+static void describe_ao(const vshi_channels *what, bool error, vshi_channel **next) {
+    const vsh_shade_options *shade = &what->options->shade;
+    vshi_channel *c = next_of(next, what, vsh_ao_method_name(shade->ao_method));
+    snprintf(c->name, sizeof c->name, "%s", error ? "error.ao" : "ao");
+    snprintf(c->description, sizeof c->description, "%s within %g, 1 open, 0 closed",
+             error ? "standard error of ambient occlusion" : "ambient occlusion", shade->ao_distance);
+}
+
+void vshi_channels_describe(const vshi_channels *what, vshi_channel *channels) {
+    vshi_channel *next = channels;
+    describe_shadow(what, false, &next);
+    if (what->options->ao != 0) {
+        describe_ao(what, false, &next);
+    }
+    if (what->shadow_error) {
+        describe_shadow(what, true, &next);
+    }
+    if (what->ao_error) {
+        describe_ao(what, true, &next);
+    }
+}

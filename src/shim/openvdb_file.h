@@ -1,0 +1,38 @@
+// What the shims that read and write .vdb files share.
+#pragma once
+
+#include "shim/openvdb_grid.h"
+
+#include <string>
+
+namespace vshi {
+
+constexpr const char *SHELL_THICKNESS = "vdbshade_shell_thickness"; // metadata, world units
+
+// Magic number (8 bytes), version of the format (4) and of the library (8), 1 byte, and the file's UUID.
+constexpr size_t UUID_AT = 21;
+constexpr size_t UUID_LENGTH = 36;
+
+// Voxels below, world units, OpenVDB cannot write: it takes their volume for 0 while it copies what it
+// writes.
+constexpr double SMALLEST_WRITTEN = 1.45e-5;
+
+// Once a process, before anything is read or written.
+void initialize();
+
+// Grids with a number, or a bit, in each voxel.
+using NumberGrids = openvdb::NumericGridTypes::Append<openvdb::BoolGrid, openvdb::MaskGrid>;
+
+// Grid `name` of a .vdb file (nullptr: the first of NumberGrids), its tree read within the run's memory
+// limit; throws Failure where there is none, and where it is none of them.
+openvdb::GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &run, vsh_error *error);
+
+// A grid of ours: shares the tree.
+FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Transform &transform,
+                          const std::string &name, openvdb::GridClass grid_class);
+
+// Writes float grids as one file, atomically; the same grids give the same bytes.
+vsh_result write_grids(const openvdb::GridCPtrVec &grids, const char *path, double voxel_size,
+                       vsh_error *error);
+
+} // namespace vshi

@@ -1,0 +1,190 @@
+# volume: shadow and AO on voxels, from the command line.
+load helper
+
+# The seeds' scene, coarse.
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    sed 's/"voxel_size": 0.02/"voxel_size": 0.1/' "$ASSETS/seeds.json" >scene.json
+    ln -s "$(cd "$ASSETS" && pwd)/seeds_floor.obj" .
+    write_box box.obj
+    SUN=(--sun 0.3,1,0.2 --sun-angle 5)
+}
+
+info() {
+    shade info "$1"
+    done_well
+}
+
+@test "a scene's band has a grid for each light, and ao" {
+    shade volume scene.json -o out.vdb
+    done_well
+    [[ $stderr == *"out.vdb: 2 grids of "*" voxels"* ]] || fail "no summary"
+    info out.vdb
+    [[ $output == *"grid 'shadow.sun'"*"class: unknown"*"voxel size: 0.1 0.1 0.1"*"background: 1"*"grid 'ao'"* ]] || fail "not what was asked for"
+}
+
+@test "a mesh's band is the level set's, or narrower" {
+    shade voxelize box.obj -o box.vdb --resolution 24 --quiet
+    info box.vdb
+    [[ $output =~ active\ voxels:\ ([0-9]+) ]]
+    band=${BASH_REMATCH[1]}
+    shade volume box.obj "${SUN[@]}" -o out.vdb --resolution 24 --quiet
+    done_well
+    info out.vdb
+    [[ $output =~ active\ voxels:\ ([0-9]+) ]]
+    [ "${BASH_REMATCH[1]}" -eq "$band" ] || fail "not $band"
+    shade volume box.obj "${SUN[@]}" -o out.vdb --resolution 24 --band 1 --quiet
+    info out.vdb
+    [[ $output =~ active\ voxels:\ ([0-9]+) ]]
+    [ "${BASH_REMATCH[1]}" -lt "$((band * 3 / 4))" ] || fail "no narrower band"
+    shade volume box.obj "${SUN[@]}" -o out.vdb --resolution 24 --band 6 --quiet
+    info out.vdb
+    [[ $output =~ active\ voxels:\ ([0-9]+) ]]
+    [ "${BASH_REMATCH[1]}" -gt "$((band * 3 / 2))" ] || fail "no wider band"
+}
+
+@test "a level set is shaded on its own voxels, and inside voxels are left off where that is asked for" {
+    shade voxelize box.obj -o asset.vdb --voxel-size 0.07 --quiet
+    info asset.vdb
+    box=$(grep 'active voxels' <<<"$output" | sed 's/.*: //')
+    shade volume asset.vdb "${SUN[@]}" -o out.vdb --quiet
+    done_well
+    info out.vdb
+    [[ $output == *"voxel size: 0.07 0.07 0.07"*"active voxels: $box"* ]] || fail "other voxels than $box"
+    shade volume asset.vdb "${SUN[@]}" -o off.vdb --inside off --stats stats.json
+    done_well
+    [[ $stderr == *" 0 of them filled"* ]] || fail "some were filled"
+    grep -q '"inside_voxels": [1-9]' stats.json && grep -q '"voxels": [1-9]' stats.json
+    info off.vdb
+    [[ $output != *"active voxels: $box"* ]] || fail "none was left off"
+}
+
+@test "a box has its own voxels" {
+    shade volume scene.json -o out.vdb --box -2,-0.2,-2,2,1.8,2 --box-voxel-size 0.25 --quiet
+    done_well
+    info out.vdb
+    [[ $output == *"voxel size: 0.25 0.25 0.25"*"0 0 0 to 15 7 15"* ]] || fail "another box"
+    shade volume scene.json -o out.vdb --box 0,3,0,1,4,1 --quiet
+    done_well
+    info out.vdb
+    [[ $output == *"voxel size: 0.1 0.1 0.1"*"active voxels: 1000,"* ]] || fail "not the casters' voxels"
+}
+
+@test "a fog's voxels are those of its grid, and of no other file's" {
+    shade volume scene.json -o fog.vdb --box -1,0.5,-1,1,1.5,1 --box-voxel-size 0.1 --quiet
+    info fog.vdb
+    for like in fog.vdb fog.vdb:ao fog.vdb:shadow.sun ./fog.vdb:ao; do
+        shade volume scene.json -o lit.vdb --like "$like" --quiet
+        done_well
+        cmp fog.vdb lit.vdb || fail "$like: other voxels or values"
+    done
+}
+
+@test "half floats take less room, and values are the same for any number of threads" {
+    shade volume scene.json -o 1.vdb --threads 1 --quiet
+    shade volume scene.json -o 5.vdb --threads 5 --isa base --quiet
+    cmp 1.vdb 5.vdb
+    shade volume scene.json -o half.vdb --half --quiet
+    done_well
+    [ "$(stat -c %s half.vdb)" -lt "$(($(stat -c %s 1.vdb) * 19 / 20))" ] || fail "not smaller"
+    info half.vdb
+    [[ $output == *"Tree_float_5_4_3"* ]] || fail "no floats"
+}
+
+@test "errors have grids of their own" {
+    shade volume scene.json -o out.vdb --max-error 0.1 --error --quiet
+    done_well
+    info out.vdb
+    [[ $output == *"shadow.sun"*"'ao'"*"error.sun"*"error.ao"* ]] || fail "no errors"
+}
+
+@test "bad options are refused, and the old file stays" {
+    old_output out.vdb
+    shade volume scene.json
+    refused 2 -o
+    shade volume scene.json -o out.exr
+    refused 2 out.exr
+    shade volume box.obj -o out.vdb
+    refused 2 'nothing to bake'
+    for box in 0,0,0,1,1 0,0,0,1,0,1 0,0,0,1,-1,1 0,0,nan,1,1,1 0,0,0,1,1,1,1 a; do
+        shade volume scene.json -o out.vdb --box "$box"
+        refused 2 --box "$box"
+    done
+    for size in 0 -1 nan 1x; do
+        shade volume scene.json -o out.vdb --box 0,0,0,1,1,1 --box-voxel-size "$size"
+        refused 2 --box-voxel-size
+    done
+    shade volume scene.json -o out.vdb --box-voxel-size 1
+    refused 2 'no --box'
+    shade volume scene.json -o out.vdb --box 0,0,0,1,1,1 --band 2
+    refused 2 'one of'
+    shade volume scene.json -o out.vdb --box 0,0,0,1,1,1 --like a.vdb
+    refused 2 'one of'
+    shade volume scene.json -o out.vdb --band 0
+    refused 2 --band
+    shade volume scene.json -o out.vdb --band 101
+    refused 2 --band
+    shade volume scene.json -o out.vdb --inside maybe
+    refused 2 'nearest, off'
+    shade volume scene.json -o out.vdb --box 0,3,0,1,4,1 --ao-method taps
+    refused 2 taps
+    shade volume scene.json -o none/out.vdb
+    refused 3 none/out.vdb
+    untouched out.vdb
+}
+
+@test "a bad --like is refused with its reason" {
+    old_output out.vdb
+    shade voxelize box.obj -o ls.vdb --resolution 24 --quiet
+    shade volume scene.json -o out.vdb --like none.vdb
+    refused 3 none.vdb
+    shade volume scene.json -o out.vdb --like ls.vdb:density
+    refused 2 ls.vdb "no grid 'density'" "'surface'"
+    shade volume scene.json -o out.vdb --like ls.vdb:
+    refused 2 --like
+    shade volume scene.json -o out.vdb --like scene.json
+    refused 3 scene.json
+    head -c 300 ls.vdb >cut.vdb
+    shade volume scene.json -o out.vdb --like cut.vdb
+    refused 3 cut.vdb
+    shade volume scene.json -o ls.vdb --like ls.vdb
+    refused 2 ls.vdb --like
+    untouched out.vdb
+}
+
+@test "too many voxels are a limit, named before memory is taken" {
+    old_output out.vdb
+    shade volume scene.json -o out.vdb --box -5,-5,-5,5,5,5 --box-voxel-size 0.0077 --memory-limit 2G
+    refused 4 '1299 x 1299 x 1299' 'limit'
+    shade volume scene.json -o out.vdb --box -5,-5,-5,5,5,5 --box-voxel-size 0.05 --memory-limit 40M
+    refused 4 'limit'
+    shade volume scene.json -o out.vdb --box -5,-5,-5,5,5,5 --box-voxel-size 1e-6
+    refused 4 1e-06
+    untouched out.vdb
+}
+
+@test "a bake of a lightmap refuses a level set, and says what takes it" {
+    shade voxelize box.obj -o asset.vdb --resolution 24 --quiet
+    shade bake asset.vdb "${SUN[@]}" -o out.exr
+    refused 2 asset.vdb 'vdbshade volume'
+}
+
+@test "a signal ends it, and leaves the old file" {
+    old_output out.vdb
+    rm -f err.txt
+    (
+        ulimit -t 60
+        exec "$VDBSHADE" volume scene.json -o out.vdb --box -4,-4,-4,4,4,4 --box-voxel-size 0.04 --ao 3 --ao-cones 256 \
+            --progress 2>err.txt
+    ) &
+    local pid=$!
+    until grep -q volume err.txt 2>/dev/null; do
+        sleep 0.02
+    done
+    kill -INT "$pid"
+    status=0
+    wait "$pid" || status=$?
+    output= stderr=$(cat err.txt)
+    [ "$status" -eq 130 ] || fail "expected 130"
+    untouched out.vdb
+}

@@ -1,0 +1,354 @@
+// Volumes and .vdb files: the voxels of other grids, and what OpenVDB reads of what is written. In C++, to
+// write and read with OpenVDB what the library's own calls do not.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <openvdb/io/File.h>
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/Dense.h>
+#include <string>
+#include <unistd.h>
+#include <vdbshade/volume.h>
+#include <vector>
+
+// Last: it has macros named as OpenVDB's members are.
+#include <csetjmp>
+#include <cstdarg>
+#include <cstddef>
+#include <cstdint>
+
+extern "C" {
+#include <cmocka.h>
+}
+
+namespace {
+
+using openvdb::Coord;
+using openvdb::CoordBBox;
+using openvdb::FloatGrid;
+using openvdb::Vec3d;
+
+std::string folder;
+vsh_error failure;
+
+std::string in_folder(const char *name) {
+    return folder + "/" + name;
+}
+
+std::string content(const std::string &path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+std::string save(const char *name, const openvdb::GridPtrVec &grids) {
+    const std::string path = in_folder(name);
+    openvdb::io::File(path).write(grids);
+    return path;
+}
+
+vsh_voxels *like(const std::string &path, const char *name) {
+    vsh_voxels *voxels = nullptr;
+    if (vsh_voxels_from_vdb(path.c_str(), name, nullptr, &voxels, &failure) != VSH_OK) {
+        fail_msg("%s", failure.message);
+    }
+    return voxels;
+}
+
+vsh_voxels_info info_of(const vsh_voxels *voxels) {
+    vsh_voxels_info info;
+    vsh_voxels_get_info(voxels, &info);
+    return info;
+}
+
+// A unit ball at the origin.
+vsh_field *ball() {
+    vsh_sdf_node node = vsh_sdf_node_default();
+    const vsh_sdf tree = {&node, 1};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = 0.1;
+    vsh_grid *grid = nullptr;
+    vsh_field *field = nullptr;
+    assert_int_equal(vsh_grid_from_sdf(&tree, &options, nullptr, &grid, &failure), VSH_OK);
+    assert_int_equal(vsh_field_create(grid, nullptr, nullptr, &field, &failure), VSH_OK);
+    vsh_grid_free(grid);
+    return field;
+}
+
+vsh_volume *bake(const vsh_field *field, const vsh_voxels *voxels, bool ao) {
+    vsh_light light = vsh_light_default();
+    light.angle = 0.1;
+    vsh_volume_options options = vsh_volume_options_default();
+    options.ao = ao;
+    vsh_volume *volume = nullptr;
+    if (vsh_bake_volume(field, voxels, &light, 1, &options, nullptr, &volume, nullptr, &failure) != VSH_OK) {
+        fail_msg("%s", failure.message);
+    }
+    return volume;
+}
+
+// The first grid of a written volume, by OpenVDB's own reader.
+FloatGrid::Ptr written(const vsh_volume *volume, const char *name, const char *grid, bool as_half) {
+    const std::string path = in_folder(name);
+    assert_int_equal(vsh_volume_write(volume, path.c_str(), as_half, &failure), VSH_OK);
+    openvdb::io::File file(path);
+    file.open(false);
+    return openvdb::gridPtrCast<FloatGrid>(file.readGrid(grid));
+}
+
+// A fog of some voxels and of active tiles, turned, scaled unevenly and moved.
+FloatGrid::Ptr fog() {
+    const FloatGrid::Ptr grid = FloatGrid::create(0.0f);
+    grid->setName("density");
+    grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+    grid->fill(CoordBBox(-3, 0, 0, 4, 5, 6), 0.5f);
+    grid->tree().addTile(1, Coord(16, 16, 16), 0.7f, true);
+    grid->tree().addTile(2, Coord(0, -128, 0), 0.9f, true); // 128³
+    grid->tree().addTile(1, Coord(32, 16, 16), 0.0f, false);
+    const auto transform = openvdb::math::Transform::createLinearTransform(0.05);
+    transform->postScale(Vec3d(1.0, 2.0, 1.0));
+    transform->postRotate(0.4, openvdb::math::Y_AXIS);
+    transform->postTranslate(Vec3d(-2.0, -1.5, 0.3));
+    grid->setTransform(transform);
+    return grid;
+}
+
+// ---- Claims ----
+
+void a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles(void **) {
+    const FloatGrid::Ptr source = fog();
+    const std::string path = save("fog.vdb", {source});
+    vsh_voxels *voxels = like(path, "density");
+    const vsh_voxels_info info = info_of(voxels);
+    const uint64_t expected = 8 * 6 * 7 + 512 + 128 * 128 * 128;
+    assert_int_equal(source->activeVoxelCount(), expected);
+    assert_int_equal(info.count, expected);
+    assert_true(info.index_min[0] == -3 && info.index_max[0] == 127 && info.has_normals == 0);
+    assert_true(std::fabs(info.voxel_size[1] / info.voxel_size[0] - 2.0) < 1e-12);
+    const int32_t index[3] = {17, 18, 19};
+    double centre[3];
+    vsh_voxels_centre(voxels, index, centre);
+    assert_true((Vec3d(centre) - source->indexToWorld(Coord(17, 18, 19))).length() < 1e-12);
+
+    vsh_field *field = ball();
+    vsh_volume *volume = bake(field, voxels, false);
+    const FloatGrid::Ptr lit = written(volume, "lit.vdb", "shadow.sun", false);
+    assert_true(lit->transform() == source->transform());
+    vsh_volume_info done;
+    vsh_volume_get_info(volume, &done);
+    assert_int_equal(lit->activeVoxelCount() + done.off, expected);
+    // active where the fog is, and nowhere else
+    FloatGrid::Ptr beyond = lit->deepCopy();
+    beyond->topologyDifference(*source);
+    assert_int_equal(beyond->activeVoxelCount(), 0);
+    // the fog's large tile is not one value: the ball's shadow passes it, or does not, voxel by voxel
+    size_t dark = 0, light = 0;
+    for (auto value = lit->cbeginValueOn(); value; ++value) {
+        const Vec3d p = lit->indexToWorld(value.getCoord());
+        const double aside = std::hypot(p[0], p[2]);
+        if (value.isVoxelValue() && p.length() > 1.1 && p[1] < -0.2) {
+            const double edge = 0.05 * -p[1] + 0.2;
+            assert_true(aside < 1.0 - edge ? *value < 0.02f : aside < 1.0 + edge || *value == 1.0f);
+            dark += aside < 1.0 - edge;
+            light += aside > 1.0 + edge;
+        }
+    }
+    assert_true(dark > 1000 && light > 100);
+    vsh_volume_free(volume);
+    vsh_field_free(field);
+    vsh_voxels_free(voxels);
+}
+
+void grids_of_any_numbers_will_do_and_the_first_is_taken(void **) {
+    const auto vectors = openvdb::Vec3SGrid::create();
+    vectors->setName("velocity");
+    vectors->fill(CoordBBox(0, 0, 0, 3, 3, 3), openvdb::Vec3s(1.0f));
+    const auto integers = openvdb::Int32Grid::create();
+    integers->setName("id");
+    integers->fill(CoordBBox(0, 0, 0, 9, 9, 9), 3);
+    const auto doubles = openvdb::DoubleGrid::create();
+    doubles->setName("heat");
+    doubles->fill(CoordBBox(0, 0, 0, 4, 4, 4), 3.0);
+    const auto mask = openvdb::MaskGrid::create();
+    mask->setName("mask");
+    mask->fill(CoordBBox(0, 0, 0, 15, 1, 1), true);
+    const std::string path = save("many.vdb", {vectors, integers, doubles, mask});
+    static const struct {
+        const char *name;
+        uint64_t count;
+    } grids[] = {{nullptr, 1000}, {"id", 1000}, {"heat", 125}, {"mask", 64}};
+    for (const auto &grid : grids) {
+        vsh_voxels *voxels = like(path, grid.name);
+        assert_int_equal(info_of(voxels).count, grid.count);
+        vsh_voxels_free(voxels);
+    }
+}
+
+void a_frustum_keeps_its_map(void **) {
+    const FloatGrid::Ptr source = FloatGrid::create(0.0f);
+    source->setName("camera");
+    source->fill(CoordBBox(0, 0, 0, 31, 31, 31), 1.0f);
+    const openvdb::math::NonlinearFrustumMap map(Vec3d(0.0, 4.0, 4.0), Vec3d(0.0, -0.83, -0.55),
+                                                 Vec3d(0.0, 0.275, -0.415), 0.5, 8.0, 32, 32, 32);
+    source->setTransform(std::make_shared<openvdb::math::Transform>(map.copy()));
+    vsh_voxels *voxels = like(save("frustum.vdb", {source}), nullptr);
+    vsh_field *field = ball();
+    vsh_volume *volume = bake(field, voxels, false);
+    const FloatGrid::Ptr lit = written(volume, "frustum-lit.vdb", "shadow.sun", false);
+    assert_true(lit->transform() == source->transform());
+    size_t dark = 0;
+    for (auto value = lit->cbeginValueOn(); value; ++value) {
+        const Vec3d p = source->indexToWorld(value.getCoord());
+        if (value.isVoxelValue() && p.length() > 1.2 && p[1] < -0.2 && std::hypot(p[0], p[2]) < 0.6) {
+            assert_true(*value < 0.02f);
+            ++dark;
+        }
+        assert_true(!value.isVoxelValue() || p[1] < 0.0 || p.length() < 1.1 || *value == 1.0f ||
+                    std::hypot(p[0], p[2]) < 1.3);
+    }
+    assert_true(dark > 10);
+    vsh_volume_free(volume);
+    vsh_field_free(field);
+    vsh_voxels_free(voxels);
+}
+
+void what_has_no_voxels_is_refused(void **) {
+    vsh_voxels *voxels = nullptr;
+    const auto refused = [&](const std::string &path, const char *name, vsh_result code,
+                             std::initializer_list<const char *> parts) {
+        assert_int_equal(vsh_voxels_from_vdb(path.c_str(), name, nullptr, &voxels, &failure), code);
+        assert_null(voxels);
+        for (const char *part : parts) {
+            if (std::strstr(failure.message, part) == nullptr) {
+                fail_msg("'%s' is not in '%s'", part, failure.message);
+            }
+        }
+    };
+    const auto vectors = openvdb::Vec3SGrid::create();
+    vectors->setName("velocity");
+    const FloatGrid::Ptr empty = FloatGrid::create(1.0f);
+    empty->setName("empty");
+    const std::string path = save("refused.vdb", {vectors, empty});
+    refused(path, "velocity", VSH_ERROR_INPUT, {path.c_str(), "'velocity'", "Tree_vec3s_5_4_3", "numbers"});
+    refused(path, "empty", VSH_ERROR_INPUT, {path.c_str(), "'empty'", "no active voxels"});
+    refused(path, "Empty", VSH_ERROR_INPUT, {"no grid 'Empty'", "'velocity', 'empty'"});
+    refused(save("vectors.vdb", {vectors}), nullptr, VSH_ERROR_INPUT, {"'velocity'", "numbers"});
+    refused(save("none.vdb", {}), nullptr, VSH_ERROR_INPUT, {"holds no grids"});
+    refused(in_folder("nothing.vdb"), nullptr, VSH_ERROR_READ, {"nothing.vdb"});
+    std::ofstream(in_folder("short.vdb"), std::ios::binary) << content(path).substr(0, 400);
+    refused(in_folder("short.vdb"), nullptr, VSH_ERROR_READ, {"short.vdb"});
+    // one tile of the root holds 4096³ voxels
+    const FloatGrid::Ptr huge = FloatGrid::create(0.0f);
+    huge->setName("huge");
+    huge->tree().addTile(3, Coord(0), 1.0f, true);
+    const std::string huge_path = save("huge.vdb", {huge});
+    vsh_run run = vsh_run_default();
+    run.memory_limit = uint64_t(1) << 30;
+    assert_int_equal(vsh_voxels_from_vdb(huge_path.c_str(), nullptr, &run, &voxels, &failure),
+                     VSH_ERROR_LIMIT);
+    assert_non_null(std::strstr(failure.message, "'huge'"));
+}
+
+void other_programs_read_names_class_metadata_and_halves(void **) {
+    vsh_field *field = ball();
+    const double low[3] = {-2, -2, -2}, high[3] = {2, 2, 2};
+    vsh_voxels *voxels = nullptr;
+    assert_int_equal(vsh_voxels_from_box(low, high, 0.1, nullptr, &voxels, &failure), VSH_OK);
+    vsh_volume *volume = bake(field, voxels, true);
+    const FloatGrid::Ptr full = written(volume, "full.vdb", "shadow.sun", false);
+    const FloatGrid::Ptr rounded = written(volume, "half.vdb", "shadow.sun", true);
+    assert_true(!full->saveFloatAsHalf() && rounded->saveFloatAsHalf());
+    assert_int_equal(full->getGridClass(), openvdb::GRID_UNKNOWN);
+    assert_true(full->background() == 1.0f);
+    assert_true(full->tree().activeTileCount() > 50);
+    assert_true(full->metaValue<std::string>("vdbshade_method") == "cone");
+    assert_non_null(
+        std::strstr(full->metaValue<std::string>("description").c_str(), "visible fraction of light 'sun'"));
+    assert_non_null(std::strstr(full->metaValue<std::string>("vdbshade_light").c_str(), "directional"));
+    assert_true(full->metaValue<double>("vdbshade_caster_voxel_size") == 0.1);
+    for (auto meta = full->beginMeta(); meta != full->endMeta(); ++meta) {
+        const std::string text = meta->second->str();
+        const std::string &name = meta->first;
+        assert_true(name == "name" || name == "class" || name == "creator" || name == "description" ||
+                    name == "is_saved_as_half_float" || name.rfind("vdbshade_", 0) == 0 ||
+                    name.rfind("file_", 0) == 0); // no date
+        assert_null(std::strstr(text.c_str(), folder.c_str()));
+    }
+    size_t halves = 0;
+    for (auto value = full->cbeginValueOn(); value; ++value) {
+        const float other = rounded->tree().getValue(value.getCoord());
+        assert_true(std::fabs(other - *value) < 1.0f / 2048.0f);
+        halves += other != *value;
+    }
+    assert_true(halves > 100 &&
+                content(in_folder("half.vdb")).size() < content(in_folder("full.vdb")).size());
+
+    vsh_vdb_entry entries[2];
+    size_t count = 0;
+    assert_int_equal(vsh_vdb_list(in_folder("full.vdb").c_str(), nullptr, entries, 2, &count, &failure),
+                     VSH_OK);
+    assert_int_equal(count, 2);
+    assert_string_equal(entries[0].name, "shadow.sun");
+    assert_string_equal(entries[1].name, "ao");
+    assert_string_equal(entries[1].grid_class, "unknown");
+    assert_int_equal(entries[1].active_voxels, full->activeVoxelCount());
+
+    // what the library copies is what OpenVDB reads
+    const int32_t from[3] = {0, 0, 0}, size[3] = {40, 40, 40};
+    std::vector<float> values(40 * 40 * 40);
+    assert_int_equal(vsh_volume_copy(volume, 0, from, size, values.data(), &failure), VSH_OK);
+    for (size_t i = 0; i < values.size(); ++i) {
+        const int32_t n = int32_t(i);
+        assert_true(values[i] == full->tree().getValue(Coord(n / 1600, n / 40 % 40, n % 40)));
+    }
+    vsh_volume_free(volume);
+    vsh_voxels_free(voxels);
+    vsh_field_free(field);
+}
+
+void a_failed_write_leaves_the_old_file(void **) {
+    vsh_field *field = ball();
+    const double low[3] = {-1.5, -1.5, -1.5}, high[3] = {1.5, 1.5, 1.5};
+    vsh_voxels *voxels = nullptr;
+    assert_int_equal(vsh_voxels_from_box(low, high, 0.1, nullptr, &voxels, &failure), VSH_OK);
+    vsh_volume *volume = bake(field, voxels, false);
+    const std::string inner = in_folder("closed"), path = inner + "/out.vdb";
+    assert_int_equal(std::system(("mkdir '" + inner + "'").c_str()), 0);
+    assert_int_equal(vsh_volume_write(volume, inner.c_str(), 0, &failure), VSH_ERROR_WRITE); // a folder
+    std::ofstream(path) << "old";
+    assert_int_equal(std::system(("ln -s /dev/full '" + inner + "/full.vdb'").c_str()), 0);
+    assert_int_equal(vsh_volume_write(volume, (inner + "/full.vdb").c_str(), 0, &failure), VSH_ERROR_WRITE);
+    assert_int_equal(vsh_volume_write(volume, "", 0, &failure), VSH_ERROR_ARGUMENT);
+    assert_true(content(path) == "old");
+    assert_int_equal(vsh_volume_write(volume, path.c_str(), 0, &failure), VSH_OK);
+    assert_true(content(path) != "old");
+    vsh_volume_free(volume);
+    vsh_voxels_free(voxels);
+    vsh_field_free(field);
+}
+
+int remove_folder(void **) {
+    return std::system(("rm -r '" + folder + "'").c_str());
+}
+
+} // namespace
+
+int main() {
+    const char *place = std::getenv("TMPDIR");
+    folder = std::string(place != nullptr ? place : ".") + "/vdbshade-volume-file-XXXXXX";
+    if (mkdtemp(folder.data()) == nullptr) {
+        return 1;
+    }
+    openvdb::initialize();
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles),
+        cmocka_unit_test(grids_of_any_numbers_will_do_and_the_first_is_taken),
+        cmocka_unit_test(a_frustum_keeps_its_map),
+        cmocka_unit_test(what_has_no_voxels_is_refused),
+        cmocka_unit_test(other_programs_read_names_class_metadata_and_halves),
+        cmocka_unit_test(a_failed_write_leaves_the_old_file),
+    };
+    return cmocka_run_group_tests(tests, nullptr, remove_folder);
+}

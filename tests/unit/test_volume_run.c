@@ -1,0 +1,452 @@
+/* Volumes: voxels inside solids, sparseness, threads, limits, cancelling, and what is refused. */
+#include "volumes.h"
+
+#include <float.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static const double UP[3] = {0.0, 1.0, 0.0};
+static const double LOW[3] = {-3.0, -0.4, -3.0}, HIGH[3] = {3.0, 4.0, 3.0};
+
+static vsh_error failure;
+
+static void assert_fails(vsh_result result, vsh_result expected, const char *part) {
+    if (result != expected || strstr(failure.message, part) == NULL) {
+        fail_msg("%s '%s': expected %s '%s'", vsh_result_name(result), failure.message,
+                 vsh_result_name(expected), part);
+    }
+}
+
+static truth_scene ball(void) {
+    static const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 1.0};
+    return (truth_scene){&solid, 1};
+}
+
+/* --- inside */
+
+/* On the lit side of a ball a renderer that interpolates between voxels sees what the surface's own points
+ * see; it does not where inside voxels are dark. */
+static void interpolating_at_the_surface_darkens_nothing(void **state) {
+    (void)state;
+    vsh_grid *grid = grid_of(ball(), 0.05);
+    vsh_voxels *voxels = band_of(grid, 0.0);
+    vsh_field *field = field_of_grid(grid, 1.0);
+    const vsh_light light = sun(UP, RADIANS(5.0));
+    vsh_volume *volume = bake(field, voxels, &light, 1, NULL, NULL);
+    uint64_t counter = 5;
+    size_t lit = 0, dark = 0;
+    for (int i = 0; i < 4000; ++i) {
+        double p[3];
+        float value;
+        random_direction(&counter, p);
+        assert_int_equal(vsh_volume_sample(volume, 0, 1, p, &value, NULL), VSH_OK);
+        if (p[1] > 0.2) { /* beyond the voxels that the terminator passes */
+            assert_true(value == 1.0f);
+            ++lit;
+        } else if (p[1] < -0.2) {
+            assert_true(value == 0.0f);
+            ++dark;
+        }
+    }
+    assert_true(lit > 1000 && dark > 1000);
+    vsh_volume_free(volume);
+    vsh_voxels_free(voxels);
+    vsh_field_free(field);
+}
+
+/* By looking at every voxel within five: what a filled one holds is held by one of the nearest outside. */
+static void inside_voxels_take_the_nearest_outside_value_or_are_off(void **state) {
+    (void)state;
+    const double low[3] = {-1.4, -1.4, -1.4}, high[3] = {1.4, 1.4, 1.4};
+    vsh_grid *grid = grid_of(ball(), 0.05);
+    vsh_voxels *all[2] = {band_of(grid, 0.0), box_of(low, high, 0.07)};
+    vsh_field *field = field_of_grid(grid, 2.0);
+    const double towards[3] = {0.4, 1.0, 0.1};
+    const vsh_light light = sun(towards, RADIANS(60.0));
+    for (int v = 0; v < 2; ++v) {
+        vsh_volume_options options = vsh_volume_options_default();
+        vsh_volume *nearest = bake(field, all[v], &light, 1, &options, NULL);
+        options.inside = VSH_INSIDE_OFF;
+        vsh_volume *off = bake(field, all[v], &light, 1, &options, NULL);
+        vsh_volume_info filled, left;
+        vsh_volume_get_info(nearest, &filled);
+        vsh_volume_get_info(off, &left);
+        vsh_volume_grid grids[2];
+        vsh_volume_get_grid(nearest, 0, &grids[0]);
+        vsh_volume_get_grid(off, 0, &grids[1]);
+        assert_true(filled.filled > 1000 && filled.shaded == left.shaded && left.filled == 0);
+        assert_true(left.off == filled.filled + filled.off);
+        assert_true(grids[0].active_voxels == filled.shaded + filled.filled);
+        assert_true(grids[1].active_voxels == left.shaded);
+        dense d = copy_of(nearest, 0, all[v]), e = copy_of(off, 0, all[v]);
+        double *centre = centres_of(&d, all[v]);
+        float *distance = distances_of(field, d.count, centre);
+        size_t checked = 0;
+        for (size_t i = 0; i < d.count; ++i) {
+            if (!(distance[i] < 0.0f && distance[i] > -0.14f)) {
+                continue;
+            }
+            assert_true(e.values[i] == 1.0f); /* the background */
+            int32_t at[3];
+            index_of(&d, i, at);
+            int best = INT32_MAX;
+            bool found = false;
+            for (int k = 0; k < 11 * 11 * 11; ++k) {
+                const int step[3] = {k / 121 - 5, k / 11 % 11 - 5, k % 11 - 5};
+                size_t n = 0;
+                bool within = true;
+                for (int axis = 0; axis < 3; ++axis) {
+                    const int32_t place = at[axis] - d.low[axis] + step[axis];
+                    within = within && place >= 0 && place < d.size[axis];
+                    n = n * (size_t)d.size[axis] + (size_t)place;
+                }
+                const int square = step[0] * step[0] + step[1] * step[1] + step[2] * step[2];
+                if (!within || distance[n] < 0.0f || (v == 0 && distance[n] > 0.1499f) || square > best) {
+                    continue;
+                }
+                found = (square == best && found) || d.values[n] == d.values[i];
+                best = square;
+            }
+            assert_true(best > 16 || found);
+            checked += best <= 16;
+        }
+        assert_true(checked > 1000);
+        free(distance);
+        free(centre);
+        free(e.values);
+        free(d.values);
+        vsh_volume_free(off);
+        vsh_volume_free(nearest);
+    }
+    vsh_voxels_free(all[1]);
+    vsh_voxels_free(all[0]);
+    vsh_field_free(field);
+}
+
+static void a_narrower_band_holds_only_voxels_so_near(void **state) {
+    (void)state;
+    vsh_grid *grid = grid_of(ball(), 0.05);
+    vsh_voxels *whole = band_of(grid, 0.0), *narrow = band_of(grid, 1.0), *widest = band_of(grid, 3.0);
+    vsh_voxels_info info[3];
+    vsh_voxels_get_info(whole, &info[0]);
+    vsh_voxels_get_info(narrow, &info[1]);
+    vsh_voxels_get_info(widest, &info[2]);
+    vsh_grid_info of_grid;
+    vsh_grid_get_info(grid, &of_grid);
+    assert_true(info[0].count == of_grid.active_voxels && info[2].count == info[0].count);
+    const double shell = 4.0 * PI * 400.0; /* voxel² of the surface */
+    assert_true(fabs((double)info[1].count - 2.0 * shell) < 0.1 * shell);
+    assert_true(info[0].has_normals == 1);
+    vsh_field *field = field_of_grid(grid, 1.0);
+    const vsh_light light = sun(UP, 0.1);
+    vsh_volume *volume = bake(field, narrow, &light, 1, NULL, NULL);
+    dense d = copy_of(volume, 0, narrow);
+    vsh_volume_grid made;
+    vsh_volume_get_grid(volume, 0, &made);
+    assert_true(made.active_voxels == info[1].count);
+    free(d.values);
+    vsh_volume_free(volume);
+    vsh_voxels_free(widest);
+    vsh_voxels_free(narrow);
+    vsh_voxels_free(whole);
+    vsh_field_free(field);
+}
+
+/* --- sparse, and the same */
+
+static void uniform_regions_are_tiles(void **state) {
+    (void)state;
+    const double low[3] = {-6.4, -6.4, -6.4}, high[3] = {6.4, 6.4, 6.4};
+    vsh_field *field = field_of(ball(), 0.05, 4.0);
+    vsh_voxels *voxels = box_of(low, high, 0.1);
+    const vsh_light light = sun(UP, RADIANS(3.0));
+    vsh_volume *volume = bake(field, voxels, &light, 1, NULL, NULL);
+    vsh_volume_grid grid;
+    vsh_volume_info info;
+    vsh_volume_get_grid(volume, 0, &grid);
+    vsh_volume_get_info(volume, &info);
+    const uint64_t solid = 128 * 128 * 128;
+    assert_true(grid.active_voxels + info.off == solid);
+    assert_true(grid.tiles > 1000 && grid.leaves < 700); /* of 4096 blocks */
+    assert_true(info.bytes < solid * sizeof(float) / 3);
+    assert_string_equal(grid.name, "shadow.sun");
+    vsh_volume_get_grid(volume, 1, &grid);
+    assert_true(grid.name[0] == '\0' && grid.active_voxels == 0);
+    vsh_volume_free(volume);
+    vsh_voxels_free(voxels);
+    vsh_field_free(field);
+}
+
+static long size_of_file(const char *path, unsigned char **bytes) {
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    fseek(file, 0, SEEK_END);
+    const long size = ftell(file);
+    rewind(file);
+    *bytes = malloc((size_t)size);
+    assert_int_equal(fread(*bytes, 1, (size_t)size, file), size);
+    fclose(file);
+    return size;
+}
+
+static void the_same_file_for_any_number_of_threads_and_instruction_set(void **state) {
+    (void)state;
+    char path[] = "/tmp/vsh_volumeXXXXXX";
+    const int file = mkstemp(path);
+    assert_true(file >= 0);
+    close(file);
+    vsh_grid *grid = grid_of(truth_seeds(), 0.08);
+    vsh_voxels *all[2] = {band_of(grid, 0.0), box_of(LOW, HIGH, 0.1)};
+    vsh_field *field = field_of_grid(grid, 4.0);
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    static const int32_t methods[] = {VSH_SHADOW_CONE, VSH_SHADOW_ADAPTIVE};
+    for (int v = 0; v < 2; ++v) {
+        for (int m = 0; m < 2; ++m) {
+            vsh_volume_options options = vsh_volume_options_default();
+            options.ao = 1;
+            options.error = 1;
+            options.shade.method = methods[m];
+            options.shade.ao_method = m == 0 ? VSH_AO_CONES : VSH_AO_RAYS;
+            options.shade.ao_distance = 0.3;
+            options.shade.rays = 16;
+            unsigned char *first = NULL;
+            long first_size = 0;
+            for (int n = 0; n < 3; ++n) {
+                vsh_run run = vsh_run_default();
+                run.threads = n == 0 ? 1 : 7;
+                run.isa = n == 2 ? VSH_ISA_BASE : VSH_ISA_BEST;
+                vsh_volume *volume = bake(field, all[v], &light, 1, &options, &run);
+                vsh_volume_info info;
+                vsh_volume_get_info(volume, &info);
+                assert_int_equal(info.grids, m == 0 ? 2 : 4);
+                assert_int_equal(vsh_volume_write(volume, path, 0, NULL), VSH_OK);
+                vsh_volume_free(volume);
+                unsigned char *bytes;
+                const long size = size_of_file(path, &bytes);
+                if (n == 0) {
+                    first = bytes;
+                    first_size = size;
+                    continue;
+                }
+                assert_int_equal(size, first_size);
+                assert_memory_equal(bytes, first, (size_t)size);
+                free(bytes);
+            }
+            free(first);
+        }
+    }
+    remove(path);
+    vsh_voxels_free(all[1]);
+    vsh_voxels_free(all[0]);
+    vsh_field_free(field);
+}
+
+/* --- values read back */
+
+static void samples_are_interpolated_between_voxels(void **state) {
+    (void)state;
+    vsh_field *field = field_of(ball(), 0.1, 4.0);
+    vsh_voxels *voxels = cube_of(2.0, 0.25);
+    const vsh_light light = sun(UP, RADIANS(40.0));
+    vsh_volume *volume = bake(field, voxels, &light, 1, NULL, NULL);
+    dense d = copy_of(volume, 0, voxels);
+    assert_true(d.size[0] == 16 && d.size[1] == 16 && d.size[2] == 16);
+    float value;
+    for (size_t i = 0; i + 1 < d.count; i += 7) {
+        int32_t index[3], next[3];
+        double a[3], b[3];
+        index_of(&d, i, index);
+        vsh_voxels_centre(voxels, index, a);
+        for (int axis = 0; axis < 3; ++axis) {
+            assert_true(fabs(a[axis] - (-2.0 + 0.25 * (index[axis] + 0.5))) < 1e-12);
+        }
+        vsh_volume_sample(volume, 0, 1, a, &value, NULL);
+        assert_true(fabsf(value - d.values[i]) < 1e-6f);
+        if (i % 16 == 15) {
+            continue;
+        }
+        memcpy(next, index, sizeof next);
+        ++next[2];
+        vsh_voxels_centre(voxels, next, b);
+        const double between_them[3] = {a[0], a[1], 0.75 * a[2] + 0.25 * b[2]};
+        vsh_volume_sample(volume, 0, 1, between_them, &value, NULL);
+        assert_true(fabsf(value - (0.75f * d.values[i] + 0.25f * d.values[i + 1])) < 1e-6f);
+    }
+    const double outside[3][3] = {{50.0, 0.0, 0.0}, {NAN, 0.0, 0.0}, {0.0, 1e300, 0.0}};
+    float values[3];
+    vsh_volume_sample(volume, 0, 3, &outside[0][0], values, NULL);
+    assert_true(values[0] == 1.0f && isnan(values[1]) && isnan(values[2]));
+    assert_fails(vsh_volume_sample(volume, 1, 1, outside[0], &value, &failure), VSH_ERROR_ARGUMENT, "grid 1");
+    const int32_t zero[3] = {4, 0, 4}, last[3] = {INT32_MAX, 0, 0}, two[3] = {2, 1, 1};
+    assert_fails(vsh_volume_copy(volume, 0, d.low, zero, &value, &failure), VSH_ERROR_ARGUMENT, "along y");
+    assert_fails(vsh_volume_copy(volume, 0, last, two, values, &failure), VSH_ERROR_ARGUMENT, "along x");
+    free(d.values);
+    vsh_volume_free(volume);
+    vsh_voxels_free(voxels);
+    vsh_field_free(field);
+}
+
+/* --- limits, cancelling, bad input */
+
+typedef struct watch {
+    double last, stop;
+} watch;
+
+static int32_t watch_progress(void *user, const char *stage, double fraction) {
+    watch *w = user;
+    assert_string_equal(stage, "volume");
+    assert_true(fraction >= w->last && fraction <= 1.0);
+    w->last = fraction;
+    return fraction >= w->stop;
+}
+
+static void progress_goes_to_one_and_cancels_anywhere(void **state) {
+    (void)state;
+    vsh_field *field = field_of(ball(), 0.1, 4.0);
+    vsh_voxels *voxels = cube_of(2.0, 0.05);
+    const vsh_light light = sun(UP, 0.1);
+    const double stops[] = {2.0, 0.0, 0.3, 0.97, 1.0};
+    for (size_t i = 0; i < sizeof stops / sizeof stops[0]; ++i) {
+        watch w = {0.0, stops[i]};
+        vsh_run run = vsh_run_default();
+        run.threads = 2;
+        run.progress = watch_progress;
+        run.user = &w;
+        vsh_volume *volume = NULL;
+        vsh_shade_stats stats = vsh_shade_stats_zero();
+        const vsh_result result =
+            vsh_bake_volume(field, voxels, &light, 1, NULL, &run, &volume, &stats, &failure);
+        if (i == 0) {
+            assert_int_equal(result, VSH_OK);
+            assert_true(w.last == 1.0 && stats.samples > 0);
+        } else {
+            assert_fails(result, VSH_ERROR_CANCELLED, "volume");
+            assert_null(volume);
+        }
+        vsh_volume_free(volume);
+    }
+    vsh_voxels_free(voxels);
+    vsh_field_free(field);
+}
+
+static void memory_is_estimated_before_it_is_taken(void **state) {
+    (void)state;
+    vsh_grid *grid = grid_of(ball(), 0.1);
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 1000000;
+    vsh_voxels *voxels = NULL;
+    const double low[3] = {0, 0, 0}, high[3] = {1, 1, 1};
+    assert_fails(vsh_voxels_from_box(low, high, 0.001, &run, &voxels, &failure), VSH_ERROR_LIMIT,
+                 "box of 1000 x 1000 x 1000 voxels");
+    assert_non_null(strstr(failure.message, "limit"));
+    run.memory_limit = 1000;
+    assert_fails(vsh_voxels_from_grid(grid, 0.0, &run, &voxels, &failure), VSH_ERROR_LIMIT, "band");
+    voxels = cube_of(2.0, 0.05);
+    vsh_field *field = field_of_grid(grid, 4.0);
+    vsh_light lights[2] = {sun(UP, 0.1), sun(UP, 0.2)};
+    strcpy(lights[1].name, "moon");
+    vsh_volume *volume = NULL;
+    run.memory_limit = 1600000; /* 1000 blocks: enough for the one, not for its values */
+    assert_fails(vsh_bake_volume(field, voxels, lights, 2, NULL, &run, &volume, NULL, &failure),
+                 VSH_ERROR_LIMIT, "2 grids of 512000 voxels");
+    run.memory_limit = 0;
+    /* 2^31 voxels and more: refused by memory, or by what indices hold, wherever it runs */
+    run.memory_limit = (uint64_t)4 << 30;
+    vsh_voxels *none = NULL;
+    assert_fails(vsh_voxels_from_box(low, high, 1.0 / 1291.0, &run, &none, &failure), VSH_ERROR_LIMIT,
+                 "1291 x 1291 x 1291");
+    const double far_away[3] = {1e5, 1.0, 1.0};
+    assert_fails(vsh_voxels_from_box(low, far_away, 1e-4, &run, &none, &failure), VSH_ERROR_LIMIT, "along x");
+    assert_null(none);
+    vsh_voxels_free(voxels);
+    vsh_field_free(field);
+}
+
+static void bad_boxes_bands_and_options_are_refused(void **state) {
+    (void)state;
+    static const struct {
+        double low[3], high[3], voxel;
+        vsh_result code;
+        const char *part;
+    } boxes[] = {
+        {{0, 0, 0}, {1, 1, 0}, 0.1, VSH_ERROR_ARGUMENT, "along z"},
+        {{0, 2, 0}, {1, 1, 1}, 0.1, VSH_ERROR_ARGUMENT, "2 … 1 along y"},
+        {{NAN, 0, 0}, {1, 1, 1}, 0.1, VSH_ERROR_ARGUMENT, "along x"},
+        {{0, 0, 0}, {INFINITY, 1, 1}, 0.1, VSH_ERROR_ARGUMENT, "along x"},
+        {{0, 0, 0}, {1, 1, 1}, 0.0, VSH_ERROR_ARGUMENT, "voxel size 0"},
+        {{0, 0, 0}, {1, 1, 1}, -1.0, VSH_ERROR_ARGUMENT, "voxel size -1"},
+        {{0, 0, 0}, {1, 1, 1}, NAN, VSH_ERROR_ARGUMENT, "voxel size"},
+        {{0, 0, 0}, {1e-5, 1e-5, 1e-5}, 1e-6, VSH_ERROR_LIMIT, "voxel size 1e-06"},
+        {{1e15, 0, 0}, {1.1e15, 1, 1}, 100.0, VSH_ERROR_LIMIT, "from the origin"},
+    };
+    vsh_voxels *voxels = NULL;
+    for (size_t i = 0; i < sizeof boxes / sizeof boxes[0]; ++i) {
+        assert_fails(
+            vsh_voxels_from_box(boxes[i].low, boxes[i].high, boxes[i].voxel, NULL, &voxels, &failure),
+            boxes[i].code, boxes[i].part);
+        assert_null(voxels);
+    }
+    vsh_grid *grid = grid_of(ball(), 0.1);
+    const double bands[] = {-1.0, 3.5, NAN, INFINITY};
+    for (int i = 0; i < 4; ++i) {
+        assert_fails(vsh_voxels_from_grid(grid, bands[i], NULL, &voxels, &failure), VSH_ERROR_ARGUMENT,
+                     "0 … 3");
+    }
+    voxels = cube_of(0.3, 0.1);
+    vsh_field *field = field_of_grid(grid, 1.0);
+    vsh_volume *volume = NULL;
+    vsh_volume_options options = vsh_volume_options_default();
+    vsh_light lights[2] = {sun(UP, 0.1), sun(UP, 0.2)};
+    assert_fails(vsh_bake_volume(field, voxels, NULL, 0, NULL, NULL, &volume, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "nothing to bake");
+    assert_fails(vsh_bake_volume(field, voxels, lights, 2, NULL, NULL, &volume, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "both named 'sun'");
+    lights[1].name[0] = '\0';
+    assert_fails(vsh_bake_volume(field, voxels, lights, 2, NULL, NULL, &volume, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "light 1: no name");
+    lights[0].angle = -1.0;
+    assert_fails(vsh_bake_volume(field, voxels, lights, 1, NULL, NULL, &volume, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "light 0");
+    lights[0].angle = 0.1;
+    options.inside = 7;
+    assert_fails(vsh_bake_volume(field, voxels, lights, 1, &options, NULL, &volume, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "inside 7");
+    options = vsh_volume_options_default();
+    options.shade.rays = 0;
+    assert_fails(vsh_bake_volume(field, voxels, lights, 1, &options, NULL, &volume, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "rays 0");
+    options = vsh_volume_options_default();
+    options.ao = 1;
+    options.shade.ao_method = VSH_AO_TAPS;
+    assert_fails(vsh_bake_volume(field, voxels, lights, 1, &options, NULL, &volume, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "taps");
+    options.ao = 0; /* not asked for */
+    vsh_volume *made = bake(field, voxels, lights, 1, &options, NULL);
+    assert_fails(vsh_bake_volume(NULL, voxels, lights, 1, NULL, NULL, &volume, NULL, &failure),
+                 VSH_ERROR_ARGUMENT, "field is NULL");
+    assert_null(volume);
+    assert_fails(vsh_volume_write(made, "/nowhere/at/all/x.vdb", 0, &failure), VSH_ERROR_WRITE, "/nowhere");
+    vsh_volume_free(made);
+    assert_int_equal(vsh_inside("off"), VSH_INSIDE_OFF);
+    assert_int_equal(vsh_inside("none"), -1);
+    assert_string_equal(vsh_inside_name(VSH_INSIDE_NEAREST), "nearest");
+    assert_null(vsh_inside_name(2));
+    vsh_voxels_free(voxels);
+    vsh_field_free(field);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(interpolating_at_the_surface_darkens_nothing),
+        cmocka_unit_test(inside_voxels_take_the_nearest_outside_value_or_are_off),
+        cmocka_unit_test(a_narrower_band_holds_only_voxels_so_near),
+        cmocka_unit_test(uniform_regions_are_tiles),
+        cmocka_unit_test(the_same_file_for_any_number_of_threads_and_instruction_set),
+        cmocka_unit_test(samples_are_interpolated_between_voxels),
+        cmocka_unit_test(progress_goes_to_one_and_cancels_anywhere),
+        cmocka_unit_test(memory_is_estimated_before_it_is_taken),
+        cmocka_unit_test(bad_boxes_bands_and_options_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

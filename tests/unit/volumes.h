@@ -1,0 +1,93 @@
+/* Short ways to bake volumes, for their tests. */
+#ifndef TESTS_VOLUMES_H
+#define TESTS_VOLUMES_H
+
+#include "shading.h"
+
+#include <stdlib.h>
+#include <vdbshade/query.h>
+#include <vdbshade/volume.h>
+
+static inline vsh_voxels *box_of(const double low[3], const double high[3], double voxel) {
+    vsh_voxels *voxels = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_voxels_from_box(low, high, voxel, NULL, &voxels, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return voxels;
+}
+
+static inline vsh_voxels *cube_of(double half, double voxel) {
+    const double low[3] = {-half, -half, -half}, high[3] = {half, half, half};
+    return box_of(low, high, voxel);
+}
+
+static inline vsh_voxels *band_of(const vsh_grid *grid, double band) {
+    vsh_voxels *voxels = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_voxels_from_grid(grid, band, NULL, &voxels, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return voxels;
+}
+
+static inline vsh_volume *bake(const vsh_field *field, const vsh_voxels *voxels, const vsh_light *lights,
+                               size_t count, const vsh_volume_options *options, const vsh_run *run) {
+    vsh_volume *volume = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_bake_volume(field, voxels, lights, count, options, run, &volume, NULL, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return volume;
+}
+
+/* A grid's values over the voxels' box, z fastest. */
+typedef struct dense {
+    int32_t low[3], size[3];
+    size_t count;
+    float *values;
+} dense;
+
+static inline dense copy_of(const vsh_volume *volume, size_t grid, const vsh_voxels *voxels) {
+    vsh_voxels_info info;
+    vsh_voxels_get_info(voxels, &info);
+    dense d = {.count = 1};
+    for (int axis = 0; axis < 3; ++axis) {
+        d.low[axis] = info.index_min[axis];
+        d.size[axis] = info.index_max[axis] - info.index_min[axis] + 1;
+        d.count *= (size_t)d.size[axis];
+    }
+    d.values = malloc(d.count * sizeof *d.values);
+    assert_non_null(d.values);
+    assert_int_equal(vsh_volume_copy(volume, grid, d.low, d.size, d.values, NULL), VSH_OK);
+    return d;
+}
+
+/* Index of the i-th value. */
+static inline void index_of(const dense *d, size_t i, int32_t index[3]) {
+    const size_t row = (size_t)d->size[2], plane = row * (size_t)d->size[1];
+    index[0] = d->low[0] + (int32_t)(i / plane);
+    index[1] = d->low[1] + (int32_t)(i % plane / row);
+    index[2] = d->low[2] + (int32_t)(i % row);
+}
+
+/* The centres of all of them, [count][3]; to be freed. */
+static inline double *centres_of(const dense *d, const vsh_voxels *voxels) {
+    double *centres = malloc(3 * d->count * sizeof *centres);
+    assert_non_null(centres);
+    for (size_t i = 0; i < d->count; ++i) {
+        int32_t index[3];
+        index_of(d, i, index);
+        vsh_voxels_centre(voxels, index, centres + 3 * i);
+    }
+    return centres;
+}
+
+static inline float *distances_of(const vsh_field *field, size_t count, const double *positions) {
+    float *distances = malloc(count * sizeof *distances);
+    assert_non_null(distances);
+    vsh_field_sample(field, count, positions, distances);
+    return distances;
+}
+
+#endif
