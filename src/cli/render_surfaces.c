@@ -41,31 +41,29 @@ static size_t group_of(const vsh_scene *scene, size_t index) {
     return first;
 }
 
-/* The field of a layer (NULL: of none), and whether its casters have one colour. */
-static const vsh_field *field_of(const vsh_scene *scene, const cli_field *made, const char *layer,
-                                 bool *plain) {
-    size_t group = scene->caster_count, at = 0;
-    *plain = true;
+/* The field of a layer, or (NULL) of casters in none. */
+static const vsh_field *field_of(const cli_field *made, const char *layer) {
+    const vsh_field *field = layer == NULL ? made->field : NULL;
+    for (size_t l = 0; layer != NULL && field == NULL && l < made->layer_count; ++l) {
+        const cli_layer *own = &made->owned[l];
+        field = own->field != NULL && strcmp(own->name, layer) == 0 ? own->field : NULL;
+    }
+    return field;
+}
+
+/* Whether all casters of a layer have one colour. */
+static bool is_plain(const vsh_scene *scene, const char *layer) {
+    const vsh_caster *first = NULL;
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        if (same_layer(scene->casters[i].layer, layer)) {
-            *plain = *plain && (group == scene->caster_count || group_of(scene, i) == group);
-            group = group == scene->caster_count ? group_of(scene, i) : group;
+        const vsh_caster *caster = &scene->casters[i];
+        if (same_layer(caster->layer, layer)) {
+            first = first == NULL ? caster : first;
+            if (!same_color(first, caster)) {
+                return false;
+            }
         }
     }
-    if (layer == NULL) {
-        return made->field;
-    }
-    for (size_t l = 0; l < scene->layer_count; ++l) { /* layers without casters have no field */
-        bool any = false;
-        for (size_t i = 0; i < scene->caster_count; ++i) {
-            any = any || same_layer(scene->casters[i].layer, scene->layers[l].name);
-        }
-        if (strcmp(scene->layers[l].name, layer) == 0) {
-            return made->layers[at].field;
-        }
-        at += any;
-    }
-    return NULL;
+    return true;
 }
 
 static void add(render_surfaces *s, const vsh_field *field, const vsh_caster *caster) {
@@ -92,13 +90,12 @@ typedef struct split {
 static int make_split(const vsh_scene *scene, const vsh_assets *assets, const cli_field *made,
                       const vsh_run *run, split *p, render_surfaces *s) {
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        bool plain;
-        const vsh_field *field = field_of(scene, made, scene->casters[i].layer, &plain);
+        const vsh_field *field = field_of(made, scene->casters[i].layer);
         const size_t group = group_of(scene, i);
         p->casters[i] = scene->casters[i];
         snprintf(p->names[i], sizeof p->names[i], "%zu", group);
         p->casters[i].layer = p->names[i];
-        if (plain && group == i) {
+        if (group == i && is_plain(scene, scene->casters[i].layer)) {
             add(s, field, &scene->casters[i]);
         } else if (group == i) {
             vsh_field_info info;
