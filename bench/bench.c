@@ -92,16 +92,14 @@ typedef struct table {
 static table tables[] = {{"", bench_header, NULL},
                          {"-ratios", ratio_header, NULL},
                          {"-scaling", bench_scaling_header, NULL},
-                         {"-features", bench_features_header, NULL}};
+                         {"-features", bench_features_header, NULL},
+                         {"-terrain", bench_header, NULL}};
 
 static table *table_of(const char *part) {
     static const struct {
         const char *part, *suffix;
-    } others[] = {{"intersector", "-ratios"},
-                  {"nanovdb", "-ratios"},
-                  {"cores", "-ratios"},
-                  {"scaling", "-scaling"},
-                  {"features", "-features"}};
+    } others[] = {{"intersector", "-ratios"}, {"nanovdb", "-ratios"},    {"cores", "-ratios"},
+                  {"scaling", "-scaling"},    {"features", "-features"}, {"terrain", "-terrain"}};
     const char *suffix = "";
     for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i) {
         suffix = strcmp(part, others[i].part) == 0 ? others[i].suffix : suffix;
@@ -154,7 +152,8 @@ int main(int argc, char **argv) {
                  {"nanovdb", bench_nanovdb},
                  {"cores", bench_all_cores},
                  {"scaling", bench_scaling},
-                 {"features", bench_features}};
+                 {"features", bench_features},
+                 {"terrain", bench_terrain}};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
         if (only == NULL || strcmp(only, parts[i].name) == 0) {
             parts[i].run(begin_table(table_of(parts[i].name), path));

@@ -38,4 +38,12 @@ function(vsh_add_kernels target)
                                 COMPILE_OPTIONS "-O3;${VSH_KERNEL_${kind}_FLAGS}"
                                 OBJECT_DEPENDS ${folder}/lanes.inc)
   endforeach()
+  set(folder ${PROJECT_SOURCE_DIR}/src/analytic/kernel)
+  list(REMOVE_ITEM kinds few)
+  foreach(kind ${kinds})
+    target_sources(${target} PRIVATE ${folder}/walk_${kind}.c)
+    set_source_files_properties(${folder}/walk_${kind}.c PROPERTIES
+                                COMPILE_OPTIONS "-O3;${VSH_KERNEL_${kind}_FLAGS}"
+                                OBJECT_DEPENDS ${folder}/walk.inc)
+  endforeach()
 endfunction()

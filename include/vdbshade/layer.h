@@ -3,6 +3,8 @@
 #define VDBSHADE_LAYER_H
 
 #include "field.h"
+#include "heights.h"
+#include "spheres.h"
 #include "trace.h"
 
 #ifdef __cplusplus
@@ -21,23 +23,39 @@ enum { VSH_MAX_LAYERS = 128 };
  */
 typedef struct vsh_layer {
     size_t struct_size;
-    const vsh_field *field; /* its casters */
-    int32_t method;         /* VSH_SHADOW_… of its shadows; -1: that of the options */
+    const vsh_field *field; /* its casters; or NULL, and one of heights and spheres in its place */
+    int32_t method;         /* VSH_SHADOW_… of its shadows; -1: that of the options. heights know
+                               VSH_SHADOW_HARD, spheres VSH_SHADOW_CLASSIC too; every other is their one soft
+                               method, and VSH_AO_… theirs */
     int32_t combine;        /* VSH_COMBINE_… */
     double softness; /* factor on the sizes of lights, 0 hard … 1000: some casters hard, some soft in one
                         scene */
     double remap[2]; /* its visibility goes through a smoothstep from remap[0], dark, to remap[1], lit, within
                       * 0 … 1; both 0: as it is. Clouds take it (Quilez, "outdoors lighting", 2013) */
-    double start_offset;            /* voxels of its field, 0 … 16; -1: that of the options */
+    double start_offset; /* voxels of its field, 0 … 16; -1: that of the options. Cells of heights, -1: 0;
+                            of no account for spheres */
     const vsh_triangles *triangles; /* its casters', for exact methods; else NULL */
     const char *const *lights;      /* [light_count]: names of the lights it casts for; NULL: of all */
     size_t light_count;
-    int32_t ao; /* nonzero: part of ambient occlusion */
+    int32_t ao;                 /* nonzero: part of ambient occlusion */
+    const vsh_heights *heights; /* a heightfield as it is */
+    const vsh_spheres *spheres; /* spheres as they are */
 } vsh_layer;
 
 static inline vsh_layer vsh_layer_default(void) {
-    vsh_layer layer = {
-        sizeof(vsh_layer), NULL, -1, VSH_COMBINE_MULTIPLY, 1.0, {0.0, 0.0}, -1.0, NULL, NULL, 0, 1};
+    vsh_layer layer = {sizeof(vsh_layer),
+                       NULL,
+                       -1,
+                       VSH_COMBINE_MULTIPLY,
+                       1.0,
+                       {0.0, 0.0},
+                       -1.0,
+                       NULL,
+                       NULL,
+                       0,
+                       1,
+                       NULL,
+                       NULL};
     return layer;
 }
 

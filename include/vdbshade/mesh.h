@@ -51,7 +51,8 @@ typedef struct vsh_model vsh_model;
  * - VSH_ERROR_ARGUMENT: path or model NULL, run;
  * - VSH_ERROR_READ: no such file, no permission, no regular file, empty, cut short, not understood by
  *   Assimp;
- * - VSH_ERROR_INPUT: no ending, or one of no format that is read; no triangles; vertices that are not
+ * - VSH_ERROR_INPUT: no ending, or one of no format that is read (Alembic and USD files, by their first bytes
+ *   too); no triangles; vertices that are not
  *   finite, indices out of range, a damaged header or JSON;
  * - VSH_ERROR_LIMIT: run->memory_limit (about six bytes for one of the file), nodes nested more than 1024
  *   deep;

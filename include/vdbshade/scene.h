@@ -4,21 +4,45 @@
 
 #include "bake.h"
 #include "grid.h"
+#include "heights.h"
+#include "outline.h"
+#include "spheres.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-enum { VSH_CASTER_MESH = 0, VSH_CASTER_SDF = 1, VSH_CASTER_VDB = 2 };
+enum {
+    VSH_CASTER_MESH = 0,
+    VSH_CASTER_SDF = 1,
+    VSH_CASTER_VDB = 2,
+    VSH_CASTER_HEIGHTFIELD = 3, /* an image: integers are values 0 … 1, floats values as they are; of R, G and
+                                   B the luminance, else the first channel */
+    VSH_CASTER_SPHERES = 4,     /* spheres, of a CSV file or given here */
+    VSH_CASTER_MASK = 5,        /* an image, extruded: vsh_outline_from_image(), vsh_grid_from_outline() */
+    VSH_CASTER_TEXT = 6         /* text, likewise */
+};
 
 typedef struct vsh_caster {
     int32_t type;         /* VSH_CASTER_… */
-    const char *path;     /* mesh, vdb: file */
+    const char *path;     /* mesh, vdb, heightfield, mask: file; text: font; spheres: NULL, or a file
+                             (vsh_spheres_read()) */
     const char *grid;     /* vdb: name of the grid; NULL: the file's first level set */
     vsh_sdf sdf;          /* sdf: tree */
-    double transform[12]; /* local to world, three rows of four; sdf and vdb: without shear or uneven scale */
+    double transform[12]; /* local to world, three rows of four; but for meshes no shear, no uneven scale */
     const char *layer;    /* name of the layer it is in; NULL: none */
-    double color[3];      /* in pictures, linear RGB, 0 … 1; all 0: 0.7, a light grey */
+    double size[2];       /* heightfield, as in vsh_heights_source: these three */
+    double height;
+    double base;
+    int32_t direct;        /* heightfield: nonzero: cast as it is (vsh_heights), not voxelised */
+    const double *spheres; /* [sphere_count][4], where there is no path: as in vsh_spheres_create() */
+    size_t sphere_count;
+    int32_t voxelised; /* spheres: nonzero: part of the level set; 0: cast as they are (vsh_spheres) */
+    vsh_mask_options mask;
+    const char *text;
+    vsh_text_options letters; /* text */
+    double thickness;         /* mask, text: along z, local units, > 0 */
+    double color[3];          /* in pictures, linear RGB, 0 … 1; all 0: 0.7, a light grey */
 } vsh_caster;
 
 /* Casters that are shaded in a way of their own. */
@@ -29,8 +53,10 @@ typedef struct vsh_scene_layer {
     vsh_layer shade; /* field and triangles NULL */
 } vsh_scene_layer;
 
+enum { VSH_RECEIVER_MESH = 0, VSH_RECEIVER_HEIGHTFIELD = 1 };
+
 typedef struct vsh_receiver {
-    const char *path;     /* mesh file */
+    const char *path;     /* mesh file, or a heightfield's image */
     double transform[12]; /* local to world */
     int32_t uv_set; /* from 0 to VSH_MAX_UV_SETS - 1; -1: the second where there is one, else the first */
     int32_t width;  /* these four as in vsh_lightmap_options */
@@ -41,6 +67,9 @@ typedef struct vsh_receiver {
     const char *output; /* image file */
     int32_t bits;       /* as in vsh_image_options */
     const char *pack;   /* as in vsh_image_options; may be NULL */
+    int32_t type;       /* VSH_RECEIVER_…; a heightfield is made as VSH_HEIGHTS_SURFACE, its UV set is 0 */
+    double extent[2];   /* heightfield: size and height in vsh_heights_source */
+    double relief;
 } vsh_receiver;
 
 /* A whole scene, read from a file or filled by the caller. Paths are as the system takes them (the reader has
@@ -83,27 +112,34 @@ typedef struct vsh_assets vsh_assets;
  * scene need not outlive the call. Free the result with vsh_assets_free(). Errors:
  * - VSH_ERROR_ARGUMENT: scene or assets NULL, a caster of no type, a caster or receiver without a path, a
  *   UV set outside -1 … VSH_MAX_UV_SETS - 1, run;
- * - VSH_ERROR_INPUT: a receiver's mesh without UVs or without the set asked for; as vsh_model_read() and
- *   vsh_grid_read();
- * - VSH_ERROR_READ, VSH_ERROR_LIMIT (for each file alone): as vsh_model_read() and vsh_grid_read();
+ * - VSH_ERROR_INPUT: a receiver's mesh without UVs or without the set asked for; as vsh_model_read(),
+ *   vsh_grid_read(), vsh_image_read(), vsh_model_from_heights() and vsh_outline_from_…(); an image of no
+ *   more than a pixel across;
+ * - VSH_ERROR_READ, VSH_ERROR_LIMIT (for each file alone), VSH_ERROR_UNSUPPORTED: as these;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
                                    vsh_error *error);
 VSH_API void vsh_assets_free(vsh_assets *assets); /* NULL does nothing */
 
 /* The meshes of receiver (caster) `index`, transforms composed, UVs of the receiver's set; views that belong
- * to the assets. NULL and a count of 0 for an index beyond the scene's, and for a caster that is no mesh. */
+ * to assets. NULL and a count of 0 for an index beyond the scene's, and for a caster without triangles. */
 VSH_API const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count);
 VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count);
 
-/* The union of all of a scene's casters, whatever their layers, as one level set of scene->grid's voxel size;
- * without one, of the longest side of the box around all casters over scene->grid.resolution; where that is 0
- * too, of the finest of the level sets among them (one that is alone and stands as it is stays as it is).
- * `assets` are those loaded for this scene. Free the grid with vsh_grid_free(). Errors:
+/* What caster `index` casts by where it is not part of a level set: a heightfield that is direct, spheres
+ * that are not voxelised. They belong to the assets; NULL for every other caster, and beyond the scene's. */
+VSH_API const vsh_heights *vsh_assets_heights(const vsh_assets *assets, size_t index);
+VSH_API const vsh_spheres *vsh_assets_spheres(const vsh_assets *assets, size_t index);
+
+/* The union of all of a scene's casters that are voxelised, whatever their layers, as one level set of
+ * scene->grid's voxel size; without one, of the longest side of the box around all casters over
+ * scene->grid.resolution; where that is 0 too, of the finest of the level sets among them (one that is alone
+ * and stands as it is stays as it is). `assets` are those loaded for this scene. Free the grid with
+ * vsh_grid_free(). Errors:
  * - VSH_ERROR_ARGUMENT: scene, assets or grid NULL, scene->grid out of range (a resolution of 0 without a
  *   level set too), run;
- * - VSH_ERROR_INPUT: no casters, casters without extent, an sdf or vdb caster whose transform shears or
- *   scales unevenly; as vsh_mesh_check(), vsh_sdf_check() and the vsh_grid_from_… calls;
+ * - VSH_ERROR_INPUT: no casters that are voxelised, casters without extent, a caster other than a mesh whose
+ *   transform shears or scales unevenly; as vsh_mesh_check(), vsh_sdf_check() and the vsh_grid_from_… calls;
  * - VSH_ERROR_LIMIT: as the vsh_grid_from_… calls and vsh_grid_unite();
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
@@ -118,7 +154,7 @@ VSH_API vsh_result vsh_scene_layer_casters(const vsh_scene *scene, const vsh_ass
 /* The triangles of a scene's casters in `layer`, or (NULL) in none, for VSH_SHADOW_EXACT and VSH_AO_EXACT;
  * *triangles is NULL where there are none. Free them with vsh_triangles_free(). Errors:
  * - VSH_ERROR_ARGUMENT: scene, assets or triangles NULL, run;
- * - VSH_ERROR_INPUT: a caster that is no mesh;
+ * - VSH_ERROR_INPUT: a caster that is neither mesh nor heightfield;
  * - VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED: as
  *   vsh_triangles_create(). */
 VSH_API vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,

@@ -81,12 +81,14 @@ static vsh_result lift_layers(baking *bake, vsh_error *error) {
         vsh_layer *layer = &bake->layers[i];
         result = vshi_layer_resolve(shade, i, layer, error);
         if (result == VSH_OK) {
+            bake->layered_ao = bake->layered_ao || layer->ao != 0;
+        }
+        if (result == VSH_OK && layer->field != NULL) {
             const vsh_field *field = layer->field;
             const double offset = layer->start_offset < 0.0 ? shade->start_offset : layer->start_offset;
             const double height =
                 offset * field->voxel_size + 0.5 * field->shell_thickness + shade->surface_offset;
             layer->start_offset = fmin(16.0, fmax(0.0, (height - lifted) / field->voxel_size));
-            bake->layered_ao = bake->layered_ao || layer->ao != 0;
         }
     }
     return result;
@@ -97,8 +99,7 @@ static double fields_bytes(const baking *bake) {
     vsh_field_get_info(bake->field, &info);
     double bytes = (double)info.bytes;
     for (size_t i = 0; i < bake->shade.layer_count; ++i) {
-        vsh_field_get_info(bake->layers[i].field, &info);
-        bytes += (double)info.bytes;
+        bytes += vshi_layer_bytes(&bake->layers[i]);
     }
     return bytes;
 }

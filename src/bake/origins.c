@@ -1,4 +1,6 @@
 #include "bake/origins.h"
+#include "analytic/heights.h"
+#include "analytic/spheres.h"
 #include "bake/take.h"
 #include "base/parallel.h"
 #include "shade/kernel/march.h"
@@ -33,6 +35,9 @@ typedef struct lifting {
     double offset; /* world units, all meshes */
     size_t field_count;
     looked_at fields[1 + VSH_MAX_LAYERS]; /* that of the bake, then those of its layers */
+    size_t solid_count;
+    const vsh_heights *heights[VSH_MAX_LAYERS]; /* layers without a field: one of these two */
+    const vsh_spheres *spheres[VSH_MAX_LAYERS];
     const vshi_kernel *kernel;
     uint8_t
         *crease; /* [samples]: 0, or 1 + the field in whose crease a sample lies, that of the highest probe */
@@ -83,6 +88,16 @@ static void look(const lifting *l, size_t field, size_t first, size_t last) {
     }
 }
 
+/* Samples within a heightfield or a sphere that are none of their surfaces. */
+static void look_at_solid(const lifting *l, size_t solid, size_t first, size_t last) {
+    for (size_t i = first; i < last; ++i) {
+        const double *at = l->texels->position + 3 * i;
+        const bool held = l->heights[solid] != NULL ? vshi_heights_hold(l->heights[solid], at)
+                                                    : vshi_spheres_hold(l->spheres[solid], at);
+        l->origins->valid[i] = l->origins->valid[i] && !held;
+    }
+}
+
 static void validate(void *user, size_t begin, size_t end) {
     const lifting *l = user;
     for (size_t block = begin; block < end; ++block) {
@@ -90,6 +105,9 @@ static void validate(void *user, size_t begin, size_t end) {
         memset(l->origins->valid + first, 1, last - first);
         for (size_t field = 0; field < l->field_count; ++field) {
             look(l, field, first, last);
+        }
+        for (size_t solid = 0; solid < l->solid_count; ++solid) {
+            look_at_solid(l, solid, first, last);
         }
         size_t valid = 0;
         for (size_t i = first; i < last; ++i) {
@@ -176,7 +194,12 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
         if (result != VSH_OK) {
             return result;
         }
-        look_in(&l, layer.field);
+        if (layer.field != NULL) {
+            look_in(&l, layer.field);
+        } else {
+            l.heights[l.solid_count] = layer.heights;
+            l.spheres[l.solid_count++] = layer.spheres;
+        }
     }
     vsh_result result = VSH_OK;
     vshi_job *job = vshi_job_begin(run, "validate", 2 * origins->blocks);

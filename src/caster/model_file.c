@@ -1,6 +1,7 @@
 #include "caster/model_file.h"
 
 #include "base/memory.h"
+#include "caster/foreign.h"
 #include "caster/scan.h"
 
 #include <assimp/scene.h>
@@ -182,7 +183,10 @@ vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *
     if (stat(path, &status) != 0) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: %s", path, strerror(errno));
     }
-    vsh_result result = check_ending(path, &ending, error);
+    vsh_result result = vshi_foreign_check(path, error);
+    if (result == VSH_OK) {
+        result = check_ending(path, &ending, error);
+    }
     if (result == VSH_OK) {
         result = scan_file(path, ending, run, job, &faces, error);
     }

@@ -81,17 +81,6 @@ const cli_command cli_bake = {
     sizeof options / sizeof options[0],
     cli_bake_main};
 
-static int take_bits(const char *name, const char *value, int32_t *bits) {
-    static const char *const widths[] = {"8", "16", "32"};
-    for (int i = 0; i < 3; ++i) {
-        if (strcmp(value, widths[i]) == 0) {
-            *bits = 8 << i;
-            return CLI_OK;
-        }
-    }
-    return cli_usage("%s '%s': expected 8, 16 or 32", name, value);
-}
-
 static int take_tint(const char *name, const char *value, vsh_tint *tint) {
     tint->type = vsh_tint_type(value);
     if (tint->type == VSH_TINT_NONE || tint->type == VSH_TINT_QUADRATIC) {
@@ -217,7 +206,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return cli_take_integer(name, value, 1, VSH_MAX_LIGHTMAP_SIZE, &s->band_rows);
     case KEY_BITS:
         s->has_bits = true;
-        return take_bits(name, value, &s->bits);
+        return cli_take_bits(name, value, &s->bits);
     case KEY_PACK:
         s->pack = value;
         return CLI_OK;

@@ -1,11 +1,16 @@
 #include "field.h"
 
 #include "clock.h"
+#include "meshes.h"
 #include "message.h"
 
 #include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
+#include <string.h>
+
+/* Of a scene's extent: positions of floats are off by a hundredth of it. */
+static const double FLOAT_STEPS = 1e-5;
 
 cli_box cli_box_empty(void) {
     return (cli_box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
@@ -119,10 +124,35 @@ static int trace(const vsh_scene *scene, const vsh_assets *assets, const vsh_sce
     return CLI_OK;
 }
 
-static int make_layers(const making *m) {
+/* Casters without voxels, each shaded as its layer is. */
+static void add_direct(const making *m) {
     cli_field *made = m->made;
-    made->layers = calloc(m->scene->layer_count, sizeof *made->layers);
-    made->owned = calloc(m->scene->layer_count, sizeof *made->owned);
+    for (size_t i = 0; i < m->scene->caster_count; ++i) {
+        const vsh_caster *caster = &m->scene->casters[i];
+        if (!cli_caster_is_direct(caster)) {
+            continue;
+        }
+        vsh_layer *layer = &made->layers[made->layer_count++];
+        *layer = vsh_layer_default();
+        for (size_t k = 0; caster->layer != NULL && k < m->scene->layer_count; ++k) {
+            if (strcmp(m->scene->layers[k].name, caster->layer) == 0) {
+                *layer = m->scene->layers[k].shade;
+            }
+        }
+        layer->heights = vsh_assets_heights(m->assets, i);
+        layer->spheres = vsh_assets_spheres(m->assets, i);
+    }
+}
+
+static int make_layers(const making *m, size_t direct) {
+    cli_field *made = m->made;
+    const size_t most = m->scene->layer_count + direct;
+    if (most > VSH_MAX_LAYERS) {
+        return cli_usage("%zu layers and %zu casters that are not voxelised: at most %d together",
+                         m->scene->layer_count, direct, VSH_MAX_LAYERS);
+    }
+    made->layers = calloc(most, sizeof *made->layers);
+    made->owned = calloc(most, sizeof *made->owned);
     if (made->layers == NULL || made->owned == NULL) {
         return cli_out_of_memory("layers");
     }
@@ -140,16 +170,37 @@ static int make_layers(const making *m) {
             layer->triangles = own->triangles;
         }
     }
+    add_direct(m);
     return code;
 }
 
-/* Of the finest layer, whose voxels start offsets are then measured in. */
+/* Of the finest layer, whose voxels start offsets are then measured in; beside casters without voxels alone,
+ * whose surface is exact, as fine as a float tells positions of the scene apart. */
+static double extent(const vsh_layer *layer) {
+    vsh_heights_info heights;
+    vsh_spheres_info spheres;
+    const double *low = heights.bounds_min, *high = heights.bounds_max;
+    if (layer->heights != NULL) {
+        vsh_heights_get_info(layer->heights, &heights);
+    } else {
+        vsh_spheres_get_info(layer->spheres, &spheres);
+        low = spheres.bounds_min;
+        high = spheres.bounds_max;
+    }
+    return fmax(high[0] - low[0], fmax(high[1] - low[1], high[2] - low[2]));
+}
+
 static int make_empty(cli_field *made) {
     double finest = INFINITY;
     for (size_t i = 0; i < made->layer_count; ++i) {
-        vsh_field_info info;
-        vsh_field_get_info(made->layers[i].field, &info);
-        finest = fmin(finest, info.voxel_size);
+        if (made->layers[i].field != NULL) {
+            vsh_field_info info;
+            vsh_field_get_info(made->layers[i].field, &info);
+            finest = fmin(finest, info.voxel_size);
+        }
+    }
+    for (size_t i = 0; i < made->layer_count && isinf(finest); ++i) {
+        finest = fmin(fmax(FLOAT_STEPS * extent(&made->layers[i]), 1e-12), 1e12);
     }
     vsh_error error;
     return vsh_field_create_empty(finest, &made->field, &error) == VSH_OK ? CLI_OK : cli_fail(&error);
@@ -159,8 +210,12 @@ static int make(const making *m) {
     cli_field *made = m->made;
     *made = (cli_field){.field = NULL};
     int code = make_one(m, NULL, &made->field);
-    if (code == CLI_OK && m->scene->layer_count > 0) {
-        code = make_layers(m);
+    size_t direct = 0;
+    for (size_t i = 0; i < m->scene->caster_count; ++i) {
+        direct += cli_caster_is_direct(&m->scene->casters[i]);
+    }
+    if (code == CLI_OK && m->scene->layer_count + direct > 0) {
+        code = make_layers(m, direct);
     }
     if (code == CLI_OK && made->field == NULL && made->layer_count == 0) {
         cli_say("the scene has no casters");

@@ -1,22 +1,37 @@
 #include "info.h"
 #include "message.h"
 
+#include <stdbool.h>
 #include <stdio.h>
+#include <string.h>
+#include <vdbshade/flat.h>
 #include <vdbshade/scene.h>
 
 static void print_caster(const vsh_caster *caster, size_t index) {
-    static const char *const types[] = {"mesh", "sdf", "vdb"};
+    static const char *const types[] = {"mesh", "sdf", "vdb", "heightfield", "spheres", "mask", "text"};
     printf("caster %zu: %s", index, types[caster->type]);
     if (caster->type == VSH_CASTER_SDF) {
         double min[3], max[3];
         vsh_sdf_bounds(&caster->sdf, min, max);
         printf(", %zu nodes, bounds %g %g %g to %g %g %g", caster->sdf.node_count, min[0], min[1], min[2],
                max[0], max[1], max[2]);
+    } else if (caster->path == NULL) {
+        printf(", %zu", caster->sphere_count);
     } else {
         printf(" %s", caster->path);
         if (caster->grid != NULL) {
             printf(", grid '%s'", caster->grid);
         }
+        if (caster->type == VSH_CASTER_TEXT) {
+            printf(", %zu bytes of text", strlen(caster->text));
+        }
+        if (caster->type == VSH_CASTER_HEIGHTFIELD) {
+            printf(", %g × %g, height %g%s", caster->size[0], caster->size[1], caster->height,
+                   caster->direct ? ", direct" : "");
+        }
+    }
+    if (caster->type == VSH_CASTER_SPHERES && caster->voxelised) {
+        printf(", voxelised");
     }
     if (caster->layer != NULL) {
         printf(", layer '%s'", caster->layer);
@@ -56,11 +71,35 @@ static void print_layer(const vsh_scene_layer *layer) {
     printf("%s\n", shade->ao ? "" : ", no ao");
 }
 
+/* False where the file is no flat scene. */
+static bool print_flat(const char *path) {
+    static const char *const casters[] = {"mask", "text", "circle", "box", "polygon"};
+    static const char *const lights[] = {"directional", "disc", "spot"};
+    vsh_flat_scene *scene = NULL;
+    vsh_error error;
+    if (vsh_flat_scene_read(path, &scene, &error) != VSH_OK) {
+        return false;
+    }
+    const vsh_flat_options *o = &scene->options;
+    printf("flat scene: %g %g to %g %g, %d × %d, method %s\n", o->region_min[0], o->region_min[1],
+           o->region_max[0], o->region_max[1], o->width, o->height, vsh_flat_method_name(o->method));
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const char *file = scene->casters[i].path;
+        printf("caster %zu: %s%s%s\n", i, casters[scene->casters[i].type], file != NULL ? " " : "",
+               file != NULL ? file : "");
+    }
+    for (size_t i = 0; i < scene->light_count; ++i) {
+        printf("light '%s': %s\n", scene->lights[i].name, lights[scene->lights[i].type]);
+    }
+    vsh_flat_scene_free(scene);
+    return true;
+}
+
 int cli_info_scene(const char *path) {
     vsh_scene *scene = NULL;
     vsh_error error;
     if (vsh_scene_read(path, &scene, &error) != VSH_OK) {
-        return cli_fail(&error);
+        return error.code == VSH_ERROR_INPUT && print_flat(path) ? CLI_OK : cli_fail(&error);
     }
     for (size_t i = 0; i < scene->caster_count; ++i) {
         print_caster(&scene->casters[i], i);

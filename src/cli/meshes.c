@@ -66,7 +66,8 @@ int cli_warn_meshes(const vsh_scene *scene, const vsh_assets *assets, const vsh_
     for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
         size_t count;
         const vsh_mesh *meshes = vsh_assets_receiver(assets, i, &count);
-        if (!seen(scene, scene->caster_count, i, scene->receivers[i].path)) {
+        if (scene->receivers[i].type == VSH_RECEIVER_MESH &&
+            !seen(scene, scene->caster_count, i, scene->receivers[i].path)) {
             code = warn_file(scene->receivers[i].path, meshes, count, run);
         }
     }

@@ -1,6 +1,7 @@
 /* Which casters have which colour: a field for each. Those of a layer are all in one field, which knows
  * nothing of casters; where they differ in colour, each colour gets a field of its own, for camera rays
  * alone. */
+#include "meshes.h"
 #include "message.h"
 #include "render.h"
 
@@ -19,8 +20,12 @@ void render_color_of(const vsh_caster *caster, double color[3]) {
     }
 }
 
+/* Whether the same field can show both. */
 static bool same_color(const vsh_caster *a, const vsh_caster *b) {
     double one[3], other[3];
+    if (cli_caster_is_direct(a) != cli_caster_is_direct(b)) {
+        return false;
+    }
     render_color_of(a, one);
     render_color_of(b, other);
     return memcmp(one, other, sizeof one) == 0;
@@ -51,14 +56,14 @@ static const vsh_field *field_of(const cli_field *made, const char *layer) {
     return field;
 }
 
-/* Whether all casters of a layer have one colour. */
+/* Whether all casters of a layer have one colour, and are in its field. */
 static bool is_plain(const vsh_scene *scene, const char *layer) {
     const vsh_caster *first = NULL;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
         if (same_layer(caster->layer, layer)) {
             first = first == NULL ? caster : first;
-            if (!same_color(first, caster)) {
+            if (cli_caster_is_direct(caster) || !same_color(first, caster)) {
                 return false;
             }
         }
@@ -98,8 +103,10 @@ static int make_split(const vsh_scene *scene, const vsh_assets *assets, const cl
         if (group == i && is_plain(scene, scene->casters[i].layer)) {
             add(s, field, &scene->casters[i]);
         } else if (group == i) {
-            vsh_field_info info;
-            vsh_field_get_info(field, &info);
+            vsh_field_info info = {.voxel_size = 0.0}; /* the scene's, or by its resolution */
+            if (!cli_caster_is_direct(&scene->casters[i])) {
+                vsh_field_get_info(field, &info);
+            }
             p->first[p->count] = i;
             p->layers[p->count++] = (vsh_scene_layer){
                 .name = p->names[i], .voxel_size = info.voxel_size, .shade = vsh_layer_default()};
@@ -114,7 +121,17 @@ static int make_split(const vsh_scene *scene, const vsh_assets *assets, const cl
     colored.layer_count = p->count;
     colored.light_count = 0;
     colored.ao = 0;
-    const int code = cli_field_make_around(&colored, assets, 0.0, run, &s->own);
+    bool direct = false;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        direct = direct || cli_caster_is_direct(&p->casters[i]);
+        p->casters[i].direct = 0;
+        p->casters[i].voxelised = 1;
+    }
+    vsh_assets *again = NULL; /* what is direct was not read as something to voxelise */
+    int code = direct ? cli_load_assets(&colored, run, &again) : CLI_OK;
+    code =
+        code == CLI_OK ? cli_field_make_around(&colored, direct ? again : assets, 0.0, run, &s->own) : code;
+    vsh_assets_free(again);
     for (size_t k = 0; code == CLI_OK && k < s->own.layer_count; ++k) {
         add(s, s->own.layers[k].field, &scene->casters[p->first[k]]);
     }

@@ -94,13 +94,18 @@ int cli_stats_write(const cli_stats *stats, const char *path) {
 
 void cli_stats_say(const cli_stats *stats) {
     char field[32], peak[32];
-    cli_say("voxel %.4g, %" PRIu64
-            " active voxels, field of %d level%s in %s (%.1f bytes a voxel), %d thread%s, "
-            "peak %s",
-            stats->grid.voxel_size, stats->grid.active_voxels, stats->field.levels,
-            stats->field.levels == 1 ? "" : "s", cli_bytes_text(stats->field.bytes, field, sizeof field),
-            bytes_per_voxel(stats), stats->threads, stats->threads == 1 ? "" : "s",
-            cli_bytes_text(peak_bytes(), peak, sizeof peak));
+    if (stats->field.bytes == 0) {
+        cli_say("no voxels, %d thread%s, peak %s", stats->threads, stats->threads == 1 ? "" : "s",
+                cli_bytes_text(peak_bytes(), peak, sizeof peak));
+    } else {
+        cli_say("voxel %.4g, %" PRIu64
+                " active voxels, field of %d level%s in %s (%.1f bytes a voxel), %d thread%s, "
+                "peak %s",
+                stats->grid.voxel_size, stats->grid.active_voxels, stats->field.levels,
+                stats->field.levels == 1 ? "" : "s", cli_bytes_text(stats->field.bytes, field, sizeof field),
+                bytes_per_voxel(stats), stats->threads, stats->threads == 1 ? "" : "s",
+                cli_bytes_text(peak_bytes(), peak, sizeof peak));
+    }
     const double *s = stats->seconds;
     cli_say("load %.2f s, voxelize %.2f s, field %.2f s, %s %.2f s, write %.2f s", s[CLI_STAGE_LOAD],
             s[CLI_STAGE_VOXELIZE], s[CLI_STAGE_FIELD], stats->of == CLI_STATS_POINTS ? "shade" : "bake",

@@ -1,6 +1,7 @@
 /* vdbshade trade: speed against accuracy, measured on the user's own scene. */
 #include "trade.h"
 #include "clock.h"
+#include "meshes.h"
 #include "message.h"
 #include "paths.h"
 #include "progress.h"
@@ -295,6 +296,12 @@ static int check_files(const trade_settings *s, const vsh_scene *scene) {
     int code = CLI_OK;
     if (scene->layer_count > 0) {
         code = cli_usage("%s: trade measures one field, not layers", s->bake.input);
+    }
+    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
+        if (cli_caster_is_direct(&scene->casters[i])) {
+            code =
+                cli_usage("%s: trade measures one field, and caster %zu is not part of it", s->bake.input, i);
+        }
     }
     for (size_t i = 0; i < sizeof outputs / sizeof outputs[0] && code == CLI_OK; ++i) {
         if (outputs[i] == NULL) {

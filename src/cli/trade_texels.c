@@ -62,7 +62,7 @@ static int load_casters(trade_work *work) {
         vsh_assets_caster(work->assets, i, &own);
         meshes += own;
         solids += scene->casters[i].type == VSH_CASTER_SDF;
-        work->meshes = work->meshes && scene->casters[i].type == VSH_CASTER_MESH;
+        work->meshes = work->meshes && cli_caster_has_triangles(&scene->casters[i]);
     }
     vsh_mesh *views = calloc(meshes + 1, sizeof *views);
     vsh_sdf *trees = calloc(solids + 1, sizeof *trees);

@@ -1,6 +1,7 @@
 /* What a scene's values are: rays against its casters themselves, or, where some caster is only a level set,
  * rays against a field finer than all that are measured. And Embree's own curve, which every method has to
  * beat. */
+#include "meshes.h"
 #include "message.h"
 #include "trade.h"
 
@@ -62,15 +63,17 @@ static int march(trade_work *work, int32_t resolution) {
     snprintf(work->truth_text, sizeof work->truth_text,
              "%d rays a texel marched against a field of %d voxels along the longest side, as %s", shade.rays,
              resolution,
-             vsh_triangles_available() ? "a caster is a .vdb level set" : "this build has no Embree");
+             vsh_triangles_available() ? "a caster is neither a mesh nor procedural"
+                                       : "this build has no Embree");
     return code;
 }
 
 /* Whether rays can meet all casters. */
 static bool traceable(const trade_work *work) {
     for (size_t i = 0; i < work->scene->caster_count; ++i) {
-        const int32_t type = work->scene->casters[i].type;
-        if (type == VSH_CASTER_VDB || (type == VSH_CASTER_MESH && !vsh_triangles_available())) {
+        const vsh_caster *caster = &work->scene->casters[i];
+        if ((caster->type != VSH_CASTER_SDF && !cli_caster_has_triangles(caster)) ||
+            (cli_caster_has_triangles(caster) && !vsh_triangles_available())) {
             return false;
         }
     }

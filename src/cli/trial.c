@@ -98,12 +98,49 @@ static int trial_read(const char *path, const char *name, uint64_t memory) {
     return cli_isolated(path, memory, read_grid, &t);
 }
 
+/* An outline's file and how it is read; text NULL: an image. */
+typedef struct outline_trial {
+    const char *path, *text;
+    const vsh_mask_options *mask;
+    const vsh_text_options *letters;
+} outline_trial;
+
+static int read_outline(void *user) {
+    const outline_trial *t = user;
+    vsh_outline *outline = NULL;
+    vsh_error error;
+    const vsh_run run = vsh_run_default();
+    const vsh_result result =
+        t->text == NULL ? vsh_outline_from_image(t->path, t->mask, &run, &outline, &error)
+                        : vsh_outline_from_text(t->text, t->path, t->letters, &run, &outline, &error);
+    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+}
+
+static int trial_outline(outline_trial t, uint64_t memory) {
+    return cli_isolated(t.path, memory, read_outline, &t);
+}
+
+int cli_trial_flat(const vsh_flat_scene *scene, uint64_t memory) {
+    int code = CLI_OK;
+    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
+        const vsh_flat_caster *caster = &scene->casters[i];
+        if (caster->type == VSH_FLAT_MASK || caster->type == VSH_FLAT_TEXT) {
+            code = trial_outline((outline_trial){caster->path, caster->text, &caster->mask, &caster->letters},
+                                 memory);
+        }
+    }
+    return code;
+}
+
 int cli_trial_casters(const vsh_scene *scene, uint64_t memory) {
     int code = CLI_OK;
     for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
         const vsh_caster *caster = &scene->casters[i];
         if (caster->type == VSH_CASTER_VDB) {
             code = trial_read(caster->path, caster->grid, memory);
+        } else if (caster->type == VSH_CASTER_MASK || caster->type == VSH_CASTER_TEXT) {
+            code = trial_outline((outline_trial){caster->path, caster->text, &caster->mask, &caster->letters},
+                                 memory);
         }
     }
     return code;

@@ -152,3 +152,14 @@ int cli_take_name(const char *option, const char *text, int32_t (*value_of)(cons
     }
     return cli_usage("%s '%s': expected one of %s", option, text, list);
 }
+
+int cli_take_bits(const char *name, const char *value, int32_t *bits) {
+    static const char *const widths[] = {"8", "16", "32"};
+    for (int i = 0; i < 3; ++i) {
+        if (strcmp(value, widths[i]) == 0) {
+            *bits = 8 << i;
+            return CLI_OK;
+        }
+    }
+    return cli_usage("%s '%s': expected 8, 16 or 32", name, value);
+}

@@ -133,7 +133,7 @@ static int voxelize_main(int argc, char **argv) {
         return cli_usage("%s: give -o OUT.vdb", s.output != NULL ? s.output : s.input);
     }
     cli_progress_begin(s.common.progress, s.common.quiet);
-    vsh_caster mesh = {
+    const vsh_caster mesh = {
         .type = VSH_CASTER_MESH, .path = s.input, .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
     vsh_scene scene = {.casters = &mesh, .caster_count = 1, .grid = vsh_grid_options_default()};
     vsh_scene *read = NULL;

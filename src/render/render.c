@@ -4,13 +4,15 @@
 #include "base/parallel.h"
 #include "field/level.h"
 #include "render/tile.h"
+#include "shade/layers.h"
 
 #include <stdlib.h>
 
 /* Samples that are in memory at once. */
 enum { BAND_SAMPLES = 1 << 18, MOST_SIDE = 65000 };
 static const double FOG_AROUND = 0.25; /* diagonals */
-static const double EXACT_LIFT = 0.5;  /* voxels: the triangles lie that far over the surface, at most */
+/* Voxels: triangles, and casters that are not voxelised, lie that far over what is seen of them, about. */
+static const double LIFT = 0.5;
 
 static vsh_result check_colors(const char *name, const double color[3], double most, vsh_error *error) {
     for (int c = 0; c < 3; ++c) {
@@ -234,6 +236,18 @@ static vsh_result check_memory(const rendering *r, const vsh_surface *surfaces, 
     return vshi_check_limit(&r->scenery.run, bytes, "render", error);
 }
 
+/* Whether light is asked of something else than the fields that are seen. */
+static bool needs_lift(const vsh_render_options *o, size_t light_count) {
+    const vsh_shade_options *shade = &o->shade;
+    bool lift =
+        (light_count > 0 && shade->method == VSH_SHADOW_EXACT) || (o->ao && shade->ao_method == VSH_AO_EXACT);
+    for (size_t i = 0; i < shade->layer_count && !lift; ++i) {
+        vsh_layer layer;
+        lift = vshi_layer_resolve(shade, i, &layer, NULL) == VSH_OK && layer.field == NULL;
+    }
+    return lift;
+}
+
 vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const vsh_field *field,
                       const vsh_light *lights, size_t light_count, const vsh_render_options *options,
                       const vsh_run *run, const vsh_picture *picture, vsh_shade_stats *stats,
@@ -258,9 +272,6 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     if (result != VSH_OK) {
         return result;
     }
-    const vsh_shade_options *shade = &o.shade;
-    const bool exact =
-        (light_count > 0 && shade->method == VSH_SHADOW_EXACT) || (o.ao && shade->ao_method == VSH_AO_EXACT);
     r.grid = vshi_sample_grid_of(&o);
     r.scenery.options = &o;
     r.scenery.grid = &r.grid;
@@ -268,14 +279,15 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     r.scenery.surface_count = surface_count;
     r.scenery.lights = lights;
     r.scenery.light_count = light_count;
-    r.scenery.lift = exact ? EXACT_LIFT : 0.0;
     result = check_memory(&r, surfaces, surface_count, field, error);
-    result = result == VSH_OK ? vsh_query_create(field, lights, light_count, shade, &query, error) : result;
+    result =
+        result == VSH_OK ? vsh_query_create(field, lights, light_count, &o.shade, &query, error) : result;
     result = result == VSH_OK ? vshi_lit_create(&o, lights, light_count, &r.grid, &lit, error) : result;
     r.scenery.query = query;
+    r.scenery.lift = result == VSH_OK && needs_lift(&o, light_count) ? LIFT : 0.0;
     r.scenery.lit = lit;
     if (result == VSH_OK && o.shafts > 0.0 && light_count > 0 && place_fog(&r)) {
-        sampler = vshi_sampler_create(VSH_SAMPLER_BLUE, 1, shade->frame);
+        sampler = vshi_sampler_create(VSH_SAMPLER_BLUE, 1, o.shade.frame);
         result = sampler != NULL ? VSH_OK
                                  : vshi_fail(error, VSH_ERROR_MEMORY, "render: the system refused memory");
         r.scenery.shafts.query = query;

@@ -1,4 +1,5 @@
 /* From a scene's casters to one level set. */
+#include "analytic/balls.h"
 #include "base/floats.h"
 #include "base/similarity.h"
 #include "scene/assets.h"
@@ -113,6 +114,12 @@ static vsh_result gather(assembly *a, vsh_error *error) {
                                "unevenly",
                                i, caster->path);
         }
+        if (vshi_assets_outline(a->assets, i) != NULL && vshi_similarity_scale(caster->transform) <= 0.0) {
+            result = vshi_fail(error, VSH_ERROR_INPUT,
+                               "caster %zu: the transform of a mask or text must neither shear nor scale "
+                               "unevenly",
+                               i);
+        }
         size_t count = 0;
         const vsh_mesh *views = vsh_assets_caster(a->assets, i, &count);
         for (size_t k = 0; k < count; ++k) {
@@ -180,6 +187,16 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
             vsh_grid_get_info(vshi_assets_grid(a->assets, i), &info);
             grow_box(&all, info.bounds_min, info.bounds_max, caster->transform);
             finest = fmin(finest, info.voxel_size * vshi_similarity_scale(caster->transform));
+        } else if (vshi_assets_outline(a->assets, i) != NULL) {
+            vsh_outline_info info;
+            vsh_outline_get_info(vshi_assets_outline(a->assets, i), &info);
+            const double half = 0.5 * caster->thickness;
+            grow_box(&all, (const double[]){info.bounds_min[0], info.bounds_min[1], -half},
+                     (const double[]){info.bounds_max[0], info.bounds_max[1], half}, caster->transform);
+        } else if (caster->type == VSH_CASTER_SPHERES) {
+            vsh_spheres_info info;
+            vsh_spheres_get_info(vshi_assets_spheres(a->assets, i), &info);
+            grow_box(&all, info.bounds_min, info.bounds_max, NULL);
         }
     }
     if (a->options.resolution == 0) {
@@ -200,6 +217,30 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
 
 static void add_instance(assembly *a, const vsh_grid *grid, const double *transform) {
     a->instances[a->instance_count++] = (vsh_grid_instance){grid, transform};
+}
+
+static double spheres_distance(void *user, const double position[3]) {
+    return vshi_balls_distance(user, position);
+}
+
+/* Distances to a union are true outside of it, and a bound within. */
+static vsh_result voxelise_spheres(assembly *a, const vsh_spheres *spheres, const vsh_run *run,
+                                   vsh_error *error) {
+    vsh_spheres_info info;
+    vsh_spheres_get_info(spheres, &info);
+    vsh_distance field = {.distance = spheres_distance,
+                          .user = (void *)(uintptr_t)spheres, /* which is only read */
+                          .lipschitz = 1.0,
+                          .exact = info.count == 1};
+    memcpy(field.bounds_min, info.bounds_min, sizeof field.bounds_min);
+    memcpy(field.bounds_max, info.bounds_max, sizeof field.bounds_max);
+    vsh_grid **made = &a->made[a->made_count];
+    const vsh_result result = vsh_grid_from_distance(&field, &a->options, run, made, error);
+    if (result == VSH_OK) {
+        a->made_count++;
+        add_instance(a, *made, NULL);
+    }
+    return result;
 }
 
 static vsh_result make_grids(assembly *a, const vsh_run *run, vsh_error *error) {
@@ -231,6 +272,21 @@ static vsh_result make_grids(assembly *a, const vsh_run *run, vsh_error *error) 
             }
             a->made_count++;
             add_instance(a, *made, placed->transform);
+        } else if (vshi_assets_outline(a->assets, i) != NULL) {
+            vsh_grid **made = &a->made[a->made_count];
+            const vsh_result result =
+                vsh_grid_from_outline(vshi_assets_outline(a->assets, i), caster->thickness, caster->transform,
+                                      &a->options, run, made, error);
+            if (result != VSH_OK) {
+                return result;
+            }
+            a->made_count++;
+            add_instance(a, *made, NULL);
+        } else if (caster->type == VSH_CASTER_SPHERES) {
+            const vsh_result result = voxelise_spheres(a, vshi_assets_spheres(a->assets, i), run, error);
+            if (result != VSH_OK) {
+                return result;
+            }
         }
     }
     return VSH_OK;
@@ -285,11 +341,12 @@ static vsh_result assemble(const vsh_scene *scene, const vsh_assets *assets, con
     return result;
 }
 
-/* Which casters are taken: all, or those of a layer (NULL: of none); returns how many. */
+/* Which casters are taken: all that are voxelised, or those of a layer (NULL: of none); returns how many. */
 static size_t take(const vsh_scene *scene, bool all, const vsh_scene_layer *layer, bool *taken) {
     size_t count = 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        taken[i] = all || vshi_caster_in_layer(&scene->casters[i], layer);
+        const vsh_caster *caster = &scene->casters[i];
+        taken[i] = (all || vshi_caster_in_layer(caster, layer)) && !vshi_caster_is_direct(caster);
         count += taken[i];
     }
     return count;
@@ -309,7 +366,11 @@ vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, c
     bool *taken;
     vsh_result result = vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error);
     if (result == VSH_OK) {
-        take(scene, true, NULL, taken);
+        result = take(scene, true, NULL, taken) > 0
+                     ? VSH_OK
+                     : vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters that are voxelised");
+    }
+    if (result == VSH_OK) {
         result = assemble(scene, assets, taken, &scene->grid, run, grid, error);
     }
     free(taken);

@@ -1,6 +1,7 @@
 /* The files behind a scene: each read once, its meshes put where casters and receivers stand. */
 #include "scene/assets.h"
 
+#include "analytic/heightmap.h"
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/memory.h"
@@ -19,12 +20,22 @@ typedef struct asset_grid {
     vsh_grid *grid;
 } asset_grid;
 
+typedef struct asset_map {
+    char *path;
+    vshi_heightmap map;
+} asset_map;
+
 /* One caster or receiver: the file's meshes with its transform in front of theirs. */
 typedef struct asset_place {
     vsh_mesh *meshes;
     double *transforms; /* [count][12] */
     size_t count;
     const vsh_grid *grid; /* vdb casters; belongs to the assets' grids */
+    vsh_outline *outline; /* mask and text casters */
+    vsh_model *made;      /* of heightfields; its meshes are this place's */
+    vsh_heights *heights; /* direct ones */
+    vsh_spheres *spheres;
+    bool direct;
 } asset_place;
 
 struct vsh_assets {
@@ -32,6 +43,8 @@ struct vsh_assets {
     size_t model_count;
     asset_grid *grids;
     size_t grid_count;
+    asset_map *maps;
+    size_t map_count;
     asset_place *casters;
     size_t caster_count;
     asset_place *receivers;
@@ -128,21 +141,99 @@ static vsh_result place_model(asset_place *place, const vsh_model *model, int32_
     return VSH_OK;
 }
 
+static vsh_result find_map(vsh_assets *assets, const char *path, const vsh_run *run,
+                           const vshi_heightmap **map, vsh_error *error) {
+    for (size_t i = 0; i < assets->map_count; ++i) {
+        if (strcmp(assets->maps[i].path, path) == 0) {
+            *map = &assets->maps[i].map;
+            return VSH_OK;
+        }
+    }
+    asset_map *entry = &assets->maps[assets->map_count++];
+    vsh_result result = copy_text(path, &entry->path, error);
+    if (result == VSH_OK) {
+        result = vshi_heightmap_read(path, run, &entry->map, error);
+    }
+    *map = &entry->map;
+    return result;
+}
+
+/* `source` is filled but for what the image holds, and whether it is direct but for its transform. */
+static vsh_result place_heights(vsh_assets *assets, asset_place *place, vsh_heights_source *source,
+                                int32_t what, const double transform[12], const vsh_run *run,
+                                vsh_error *error) {
+    const vshi_heightmap *map = NULL;
+    vsh_result result = find_map(assets, source->name, run, &map, error);
+    if (result == VSH_OK) {
+        source->columns = map->columns;
+        source->rows = map->rows;
+        source->values = map->values;
+    }
+    if (result == VSH_OK && place->direct) {
+        source->transform = transform;
+        return vsh_heights_create(source, run, &place->heights, error);
+    }
+    if (result == VSH_OK) {
+        result = vsh_model_from_heights(source, what, run, &place->made, error);
+    }
+    return result == VSH_OK ? place_model(place, place->made, 0, transform, error) : result;
+}
+
+static vsh_result place_spheres(asset_place *place, const vsh_caster *caster, size_t index,
+                                const vsh_run *run, vsh_error *error) {
+    const double *spheres = caster->spheres;
+    size_t count = caster->sphere_count;
+    double *read = NULL;
+    vsh_error why;
+    vsh_result result = VSH_OK;
+    if (caster->path != NULL) {
+        result = vsh_spheres_read(caster->path, run, &read, &count, error);
+        spheres = read;
+    }
+    if (result == VSH_OK) {
+        result = vsh_spheres_create(spheres, count, caster->transform, run, &place->spheres, &why);
+        if (result != VSH_OK) {
+            vshi_fail(error, result, "caster %zu: %s%s%s", index, caster->path != NULL ? caster->path : "",
+                      caster->path != NULL ? ": " : "", why.message);
+        }
+    }
+    vsh_spheres_list_free(read);
+    return result;
+}
+
 static vsh_result place_caster(vsh_assets *assets, const vsh_caster *caster, size_t index, const vsh_run *run,
                                vsh_error *error) {
     asset_place *place = &assets->casters[index];
     if (caster->type == VSH_CASTER_SDF) {
         return VSH_OK;
     }
-    if (caster->type != VSH_CASTER_MESH && caster->type != VSH_CASTER_VDB) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: type %d: expected 0 … 2", index,
-                         caster->type);
+    if (caster->type < VSH_CASTER_MESH || caster->type > VSH_CASTER_TEXT) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: type %d: expected 0 … %d", index,
+                         caster->type, VSH_CASTER_TEXT);
+    }
+    place->direct = vshi_caster_is_direct(caster);
+    if (caster->type == VSH_CASTER_SPHERES) {
+        return place_spheres(place, caster, index, run, error);
     }
     if (caster->path == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: no path", index);
     }
     if (caster->type == VSH_CASTER_VDB) {
         return find_grid(assets, caster->path, caster->grid, run, &place->grid, error);
+    }
+    if (caster->type == VSH_CASTER_MASK) {
+        return vsh_outline_from_image(caster->path, &caster->mask, run, &place->outline, error);
+    }
+    if (caster->type == VSH_CASTER_TEXT) {
+        return vsh_outline_from_text(caster->text, caster->path, &caster->letters, run, &place->outline,
+                                     error);
+    }
+    if (caster->type == VSH_CASTER_HEIGHTFIELD) {
+        vsh_heights_source source = {.name = caster->path,
+                                     .size = {caster->size[0], caster->size[1]},
+                                     .height = caster->height,
+                                     .base = caster->base};
+        return place_heights(assets, place, &source, VSH_HEIGHTS_SOLID, caster->transform, run, error);
     }
     const vsh_model *model = NULL;
     const vsh_result result = find_model(assets, caster->path, run, &model, error);
@@ -174,6 +265,14 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_receiver *receive
     if (receiver->path == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "receiver %zu: no path", index);
     }
+    if (receiver->type == VSH_RECEIVER_HEIGHTFIELD) {
+        vsh_heights_source source = {.name = receiver->path,
+                                     .size = {receiver->extent[0], receiver->extent[1]},
+
+                                     .height = receiver->relief};
+        return place_heights(assets, &assets->receivers[index], &source, VSH_HEIGHTS_SURFACE,
+                             receiver->transform, run, error);
+    }
     const vsh_model *model = NULL;
     vsh_result result = find_model(assets, receiver->path, run, &model, error);
     if (result == VSH_OK) {
@@ -186,7 +285,7 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_receiver *receive
 }
 
 static vsh_result allocate_places(vsh_assets *assets, const vsh_scene *scene, vsh_error *error) {
-    void *memory[4] = {NULL, NULL, NULL, NULL};
+    void *memory[5] = {NULL, NULL, NULL, NULL, NULL};
     const size_t files = scene->caster_count + scene->receiver_count;
     vsh_result result = vshi_allocate(&memory[0], files, sizeof *assets->models, "models", error);
     if (result == VSH_OK) {
@@ -199,6 +298,10 @@ static vsh_result allocate_places(vsh_assets *assets, const vsh_scene *scene, vs
         result =
             vshi_allocate(&memory[3], scene->receiver_count, sizeof *assets->receivers, "receivers", error);
     }
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory[4], files, sizeof *assets->maps, "heightfields", error);
+    }
+    assets->maps = memory[4];
     assets->models = memory[0];
     assets->grids = memory[1];
     assets->casters = memory[2];
@@ -241,8 +344,12 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
 
 static void free_places(asset_place *places, size_t count) {
     for (size_t i = 0; i < count; ++i) {
+        vsh_spheres_free(places[i].spheres);
+        vsh_heights_free(places[i].heights);
+        vsh_model_free(places[i].made);
         free(places[i].transforms);
         free(places[i].meshes);
+        vsh_outline_free(places[i].outline);
     }
     free(places);
 }
@@ -253,6 +360,11 @@ void vsh_assets_free(vsh_assets *assets) {
     }
     free_places(assets->receivers, assets->receiver_count);
     free_places(assets->casters, assets->caster_count);
+    for (size_t i = 0; i < assets->map_count; ++i) {
+        free(assets->maps[i].map.values);
+        free(assets->maps[i].path);
+    }
+    free(assets->maps);
     for (size_t i = 0; i < assets->grid_count; ++i) {
         vsh_grid_free(assets->grids[i].grid);
         free(assets->grids[i].name);
@@ -283,4 +395,21 @@ const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t
 
 const vsh_grid *vshi_assets_grid(const vsh_assets *assets, size_t index) {
     return index < assets->caster_count ? assets->casters[index].grid : NULL;
+}
+
+const vsh_outline *vshi_assets_outline(const vsh_assets *assets, size_t index) {
+    return index < assets->caster_count ? assets->casters[index].outline : NULL;
+}
+
+const vsh_spheres *vshi_assets_spheres(const vsh_assets *assets, size_t index) {
+    return index < assets->caster_count ? assets->casters[index].spheres : NULL;
+}
+
+const vsh_heights *vsh_assets_heights(const vsh_assets *assets, size_t index) {
+    return index < assets->caster_count ? assets->casters[index].heights : NULL;
+}
+
+const vsh_spheres *vsh_assets_spheres(const vsh_assets *assets, size_t index) {
+    return index < assets->caster_count && assets->casters[index].direct ? assets->casters[index].spheres
+                                                                         : NULL;
 }

@@ -12,10 +12,22 @@ static inline bool vshi_caster_in_layer(const vsh_caster *caster, const vsh_scen
     return caster->layer == NULL ? layer == NULL : layer != NULL && strcmp(caster->layer, layer->name) == 0;
 }
 
+/* Whether a caster stays out of level sets. */
+static inline bool vshi_caster_is_direct(const vsh_caster *caster) {
+    return (caster->type == VSH_CASTER_HEIGHTFIELD && caster->direct != 0) ||
+           (caster->type == VSH_CASTER_SPHERES && caster->voxelised == 0);
+}
+
 /* outer × inner, three rows of four each; inner NULL: identity. */
 void vshi_transform_compose(const double outer[12], const double *inner, double result[12]);
 
 /* The level set of vdb caster `index`, or NULL. Belongs to the assets. */
 const vsh_grid *vshi_assets_grid(const vsh_assets *assets, size_t index);
+
+/* The outline of mask or text caster `index`, or NULL. Belongs to the assets. */
+const vsh_outline *vshi_assets_outline(const vsh_assets *assets, size_t index);
+
+/* The spheres of a caster, voxelised or not; NULL for every other. */
+const vsh_spheres *vshi_assets_spheres(const vsh_assets *assets, size_t index);
 
 #endif

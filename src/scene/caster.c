@@ -1,16 +1,66 @@
+#include "scene/outline_keys.h"
 #include "scene/parts.h"
 #include "scene/transform.h"
 #include "scene/tree.h"
 
 #include <vdbshade/scene.h>
 
-enum { MESH = 1 << VSH_CASTER_MESH, SDF = 1 << VSH_CASTER_SDF, VDB = 1 << VSH_CASTER_VDB };
+enum {
+    MESH = 1 << VSH_CASTER_MESH,
+    SDF = 1 << VSH_CASTER_SDF,
+    VDB = 1 << VSH_CASTER_VDB,
+    HEIGHTFIELD = 1 << VSH_CASTER_HEIGHTFIELD,
+    SPHERES = 1 << VSH_CASTER_SPHERES,
+    MASK = 1 << VSH_CASTER_MASK,
+    TEXT = 1 << VSH_CASTER_TEXT
+};
 
 static const char *const types[] = {
-    [VSH_CASTER_MESH] = "mesh", [VSH_CASTER_SDF] = "sdf", [VSH_CASTER_VDB] = "vdb"};
+    [VSH_CASTER_MESH] = "mesh",       [VSH_CASTER_SDF] = "sdf",
+    [VSH_CASTER_VDB] = "vdb",         [VSH_CASTER_HEIGHTFIELD] = "heightfield",
+    [VSH_CASTER_SPHERES] = "spheres", [VSH_CASTER_MASK] = "mask",
+    [VSH_CASTER_TEXT] = "text"};
+enum { TYPE_COUNT = sizeof types / sizeof types[0] };
 static const char *const whats[] = {[VSH_CASTER_MESH] = "a mesh caster",
                                     [VSH_CASTER_SDF] = "an sdf caster",
-                                    [VSH_CASTER_VDB] = "a vdb caster"};
+                                    [VSH_CASTER_VDB] = "a vdb caster",
+                                    [VSH_CASTER_HEIGHTFIELD] = "a heightfield caster",
+                                    [VSH_CASTER_SPHERES] = "a caster of spheres",
+                                    [VSH_CASTER_MASK] = "a mask caster",
+                                    [VSH_CASTER_TEXT] = "a text caster"};
+
+/* A file's name, or [[x, y, z, radius], …]. */
+static vsh_result read_spheres(vshi_reader *reader, const vshi_value *value, void *member) {
+    static const vshi_key path = {.kind = VSHI_PATH};
+    static const vshi_key sphere = {
+        .kind = VSHI_VECTOR, .count = 4, .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST};
+    vsh_caster *caster = member;
+    if (json_is_string(value->json)) {
+        return vshi_read_value(reader, value, &path, &caster->path);
+    }
+    if (!json_is_array(value->json)) {
+        return vshi_reader_fail(reader, value, "expected a file's name or an array of [x, y, z, radius]");
+    }
+    void *memory = NULL;
+    caster->sphere_count = json_array_size(value->json);
+    if (caster->sphere_count == 0) {
+        return vshi_reader_fail(reader, value, "is empty");
+    }
+    vsh_result result =
+        vshi_reader_allocate(reader, &memory, caster->sphere_count, 4 * sizeof(double), "spheres");
+    double *spheres = memory;
+    for (size_t i = 0; result == VSH_OK && i < caster->sphere_count; ++i) {
+        const vshi_value item = vshi_item(value, i);
+        result = vshi_read_value(reader, &item, &sphere, spheres + 4 * i);
+        if (result == VSH_OK && !(spheres[4 * i + 3] > 0.0)) {
+            const vshi_value radius = vshi_item(&item, 3);
+            return vshi_reader_fail(reader, &radius, "%.9g is out of range 0 (excluded) … %.9g",
+                                    spheres[4 * i + 3], VSHI_LARGEST);
+        }
+    }
+    caster->spheres = spheres;
+    return result;
+}
 
 static const vshi_key caster_keys[] = {
     {.name = "mesh", .kind = VSHI_PATH, .variants = MESH, .offset = offsetof(vsh_caster, path)},
@@ -21,6 +71,31 @@ static const vshi_key caster_keys[] = {
      .read = vshi_read_sdf},
     {.name = "vdb", .kind = VSHI_PATH, .variants = VDB, .offset = offsetof(vsh_caster, path)},
     {.name = "grid", .kind = VSHI_STRING, .variants = VDB, .offset = offsetof(vsh_caster, grid)},
+    {.name = "heightfield", .kind = VSHI_PATH, .variants = HEIGHTFIELD, .offset = offsetof(vsh_caster, path)},
+    {.name = "size",
+     .kind = VSHI_VECTOR,
+     .variants = HEIGHTFIELD,
+     .required = HEIGHTFIELD,
+     .offset = offsetof(vsh_caster, size),
+     .count = 2,
+     .lowest = 1e-12,
+     .highest = 1e12},
+    {.name = "height",
+     .kind = VSHI_NUMBER,
+     .variants = HEIGHTFIELD,
+     .required = HEIGHTFIELD,
+     .offset = offsetof(vsh_caster, height),
+     .lowest = -1e12,
+     .highest = 1e12},
+    {.name = "base",
+     .kind = VSHI_NUMBER,
+     .variants = HEIGHTFIELD,
+     .offset = offsetof(vsh_caster, base),
+     .highest = 1e12,
+     .flags = VSHI_ABOVE},
+    {.name = "direct", .kind = VSHI_BOOL, .variants = HEIGHTFIELD, .offset = offsetof(vsh_caster, direct)},
+    {.name = "spheres", .kind = VSHI_CUSTOM, .variants = SPHERES, .read = read_spheres},
+    {.name = "voxelised", .kind = VSHI_BOOL, .variants = SPHERES, .offset = offsetof(vsh_caster, voxelised)},
     {.name = "transform",
      .kind = VSHI_CUSTOM,
      .offset = offsetof(vsh_caster, transform),
@@ -32,6 +107,14 @@ static const vshi_key caster_keys[] = {
      .highest = 1.0,
      .flags = VSHI_NONZERO,
      .count = 3},
+    VSHI_OUTLINE_KEYS(vsh_caster, MASK, TEXT),
+    {.name = "thickness",
+     .kind = VSHI_NUMBER,
+     .variants = MASK | TEXT,
+     .required = MASK | TEXT,
+     .offset = offsetof(vsh_caster, thickness),
+     .highest = VSHI_LARGEST,
+     .flags = VSHI_ABOVE},
 };
 static const vshi_table caster_table = VSHI_TABLE(caster_keys);
 
@@ -39,12 +122,14 @@ vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *
     vsh_caster *caster = member;
     caster->type = -1;
     vshi_transform_identity(caster->transform);
+    caster->mask = vsh_mask_options_default();
+    caster->letters = vsh_text_options_default();
     vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
     if (result != VSH_OK) {
         return result;
     }
     vshi_value given, transform;
-    for (int32_t i = VSH_CASTER_MESH; i <= VSH_CASTER_VDB; ++i) {
+    for (int32_t i = VSH_CASTER_MESH; i < TYPE_COUNT; ++i) {
         if (!vshi_member(value, types[i], &given)) {
             continue;
         }
@@ -61,7 +146,9 @@ vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *
         return result;
     }
     if (caster->type < 0) {
-        return vshi_reader_fail(reader, value, "key \"mesh\", \"sdf\" or \"vdb\" is missing");
+        return vshi_reader_fail(reader, value,
+                                "key \"mesh\", \"sdf\", \"vdb\", \"heightfield\", \"spheres\", \"mask\" "
+                                "or \"text\" is missing");
     }
     if (caster->type != VSH_CASTER_MESH && !vshi_transform_is_similarity(caster->transform) &&
         vshi_member(value, "transform", &transform)) {

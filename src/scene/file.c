@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "base/floats.h"
+#include "caster/foreign.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -43,20 +44,30 @@ static vsh_result read_all(const char *path, FILE *file, char **text, size_t *si
     return VSH_OK;
 }
 
+vsh_result vshi_scene_text(const char *path, char **text, size_t *size, vsh_error *error) {
+    *text = NULL;
+    *size = 0;
+    FILE *file = fopen(path, "rb");
+    if (file == NULL) {
+        return fail_read(path, errno, error);
+    }
+    vsh_result result = vshi_foreign_check(path, error);
+    if (result == VSH_OK) {
+        result = read_all(path, file, text, size, error);
+    }
+    fclose(file);
+    return result;
+}
+
 vsh_result vsh_scene_read(const char *path, vsh_scene **scene, vsh_error *error) {
     VSHI_FLOATS;
     if (path == NULL || scene == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_scene_read: path or scene is NULL");
     }
     *scene = NULL;
-    FILE *file = fopen(path, "rb");
-    if (file == NULL) {
-        return fail_read(path, errno, error);
-    }
-    char *text = NULL;
-    size_t size = 0;
-    vsh_result result = read_all(path, file, &text, &size, error);
-    fclose(file);
+    char *text;
+    size_t size;
+    vsh_result result = vshi_scene_text(path, &text, &size, error);
     if (result == VSH_OK) {
         result = vshi_scene_parse(path, text, size, scene, error);
     }

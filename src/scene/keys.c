@@ -209,7 +209,9 @@ vsh_result vshi_read_object(vshi_reader *reader, const vshi_value *object, const
     }
     for (size_t k = 0; k < table->key_count; ++k) {
         const vshi_key *key = &table->keys[k];
-        if ((key->required & variant) != 0 && json_object_get(object->json, key->name) == NULL) {
+        /* of an object that is no variant yet, only what all need */
+        const bool needed = variant == VSHI_ALL ? key->required == VSHI_ALL : (key->required & variant) != 0;
+        if (needed && json_object_get(object->json, key->name) == NULL) {
             return vshi_reader_fail(reader, object, "key \"%s\" is missing: %s needs it", key->name, what);
         }
     }

@@ -26,7 +26,7 @@ static const char *falloff_name(int32_t i) {
     return names[i];
 }
 
-static vsh_result read_light_name(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_light_name(vshi_reader *reader, const vshi_value *value, void *member) {
     const vsh_result result = vshi_expect(reader, value, JSON_STRING);
     if (result != VSH_OK) {
         return result;
@@ -52,7 +52,7 @@ static const vshi_key light_keys[] = {
      .kind = VSHI_CUSTOM,
      .required = VSHI_ALL,
      .offset = offsetof(vsh_light, name),
-     .read = read_light_name},
+     .read = vshi_read_light_name},
     {.name = "type",
      .kind = VSHI_NAME,
      .required = VSHI_ALL,
@@ -141,6 +141,21 @@ vsh_result vshi_read_light(vshi_reader *reader, const vshi_value *value, void *m
     vsh_error error;
     if (vsh_light_check(light, &error) != VSH_OK) { /* a limit that the table above does not know of */
         return vshi_reader_fail(reader, value, "%.400s", error.message);
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_check_light_names(vshi_reader *reader, const vshi_value *value, const vsh_light *lights,
+                                  size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        for (size_t j = 0; j < i; ++j) {
+            const vshi_value light = vshi_item(value, i);
+            vshi_value name;
+            if (strcmp(lights[i].name, lights[j].name) == 0 && vshi_member(&light, "name", &name)) {
+                return vshi_reader_fail(reader, &name, "\"%s\" is the name of lights[%zu] too",
+                                        lights[i].name, j);
+            }
+        }
     }
     return VSH_OK;
 }

@@ -15,4 +15,20 @@ vsh_result vshi_read_receiver(vshi_reader *reader, const vshi_value *value, void
 /* Fails where casters name layers, or layers lights, that the scene does not have. */
 vsh_result vshi_check_layers(vshi_reader *reader, const vshi_value *root, const vsh_scene *scene);
 
+/* What flat scenes list as well. */
+
+/* Texels: 1024, or [width, height]. */
+vsh_result vshi_read_size(vshi_reader *reader, const vshi_value *value, int32_t *width, int32_t *height);
+vsh_result vshi_read_bits(vshi_reader *reader, const vshi_value *value, void *bits); /* int32_t */
+
+/* A light's name into a vsh_light's. */
+vsh_result vshi_read_light_name(vshi_reader *reader, const vshi_value *value, void *name);
+
+/* Fails where two lights of the array `value` have one name. */
+vsh_result vshi_check_light_names(vshi_reader *reader, const vshi_value *value, const vsh_light *lights,
+                                  size_t count);
+
+vsh_result vshi_read_flat_caster(vshi_reader *reader, const vshi_value *value, void *caster);
+vsh_result vshi_read_flat_light(vshi_reader *reader, const vshi_value *value, void *light);
+
 #endif

@@ -151,3 +151,23 @@ vsh_result vshi_reader_copy(vshi_reader *reader, size_t prefix, const char *stri
     *copy = memory;
     return VSH_OK;
 }
+
+vsh_result vshi_reader_load(vshi_reader *reader, json_t **json) {
+    static const char byte_order_mark[] = "\xef\xbb\xbf"; /* editors on Windows put it in front of UTF-8 */
+    if (reader->size >= 3 && memcmp(reader->text, byte_order_mark, 3) == 0) {
+        reader->text += 3;
+        reader->size -= 3;
+    }
+    json_error_t failure;
+    *json =
+        json_loadb(reader->text, reader->size, JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, &failure);
+    if (*json != NULL) {
+        return VSH_OK;
+    }
+    if (json_error_code(&failure) == json_error_out_of_memory) {
+        return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
+    }
+    return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%d:%d: %s", reader->path,
+                     failure.line > 1 ? failure.line : 1, failure.column > 1 ? failure.column : 1,
+                     failure.text);
+}

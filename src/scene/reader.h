@@ -30,6 +30,10 @@ typedef struct vshi_value {
     json_t *json;
 } vshi_value;
 
+/* The text as JSON, or an error with Jansson's line and column. Numbers are all read as doubles, so that one
+ * too large for an integer is out of range like any other. Free with json_decref(). */
+vsh_result vshi_reader_load(vshi_reader *reader, json_t **json);
+
 /* "FILE:LINE:COLUMN: lights[0].angle_deg: …", with the place of the value, or of its key. */
 vsh_result vshi_reader_fail(const vshi_reader *reader, const vshi_value *value, const char *format, ...)
     __attribute__((format(printf, 3, 4)));

@@ -4,25 +4,28 @@
 #include <vdbshade/image.h>
 #include <vdbshade/scene.h>
 
-/* 1024, or [width, height]. */
-static vsh_result read_size(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_size(vshi_reader *reader, const vshi_value *value, int32_t *width, int32_t *height) {
     const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 1.0, .highest = VSH_MAX_LIGHTMAP_SIZE};
-    vsh_receiver *receiver = member;
     if (!json_is_array(value->json)) {
-        const vsh_result result = vshi_read_value(reader, value, &key, &receiver->width);
-        receiver->height = receiver->width;
+        const vsh_result result = vshi_read_value(reader, value, &key, width);
+        *height = *width;
         return result;
     }
     const size_t count = json_array_size(value->json);
     if (count != 2) {
         return vshi_reader_fail(reader, value, "expected 2 numbers, found %zu", count);
     }
-    const vshi_value width = vshi_item(value, 0), height = vshi_item(value, 1);
-    const vsh_result result = vshi_read_value(reader, &width, &key, &receiver->width);
-    return result == VSH_OK ? vshi_read_value(reader, &height, &key, &receiver->height) : result;
+    const vshi_value first = vshi_item(value, 0), second = vshi_item(value, 1);
+    const vsh_result result = vshi_read_value(reader, &first, &key, width);
+    return result == VSH_OK ? vshi_read_value(reader, &second, &key, height) : result;
 }
 
-static vsh_result read_bits(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_size(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_receiver *receiver = member;
+    return vshi_read_size(reader, value, &receiver->width, &receiver->height);
+}
+
+vsh_result vshi_read_bits(vshi_reader *reader, const vshi_value *value, void *member) {
     const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 0.0, .highest = 32.0};
     int32_t *bits = member;
     const vsh_result result = vshi_read_value(reader, value, &key, bits);
@@ -32,14 +35,40 @@ static vsh_result read_bits(vshi_reader *reader, const vshi_value *value, void *
     return result;
 }
 
+enum { MESH = 1 << VSH_RECEIVER_MESH, HEIGHTFIELD = 1 << VSH_RECEIVER_HEIGHTFIELD };
+
 static const vshi_key receiver_keys[] = {
-    {.name = "mesh", .kind = VSHI_PATH, .required = VSHI_ALL, .offset = offsetof(vsh_receiver, path)},
+    {.name = "mesh",
+     .kind = VSHI_PATH,
+     .variants = MESH,
+     .required = MESH,
+     .offset = offsetof(vsh_receiver, path)},
+    {.name = "heightfield",
+     .kind = VSHI_PATH,
+     .variants = HEIGHTFIELD,
+     .offset = offsetof(vsh_receiver, path)},
+    {.name = "extent",
+     .kind = VSHI_VECTOR,
+     .variants = HEIGHTFIELD,
+     .required = HEIGHTFIELD,
+     .offset = offsetof(vsh_receiver, extent),
+     .count = 2,
+     .lowest = 1e-12,
+     .highest = 1e12},
+    {.name = "height",
+     .kind = VSHI_NUMBER,
+     .variants = HEIGHTFIELD,
+     .required = HEIGHTFIELD,
+     .offset = offsetof(vsh_receiver, relief),
+     .lowest = -1e12,
+     .highest = 1e12},
     {.name = "transform",
      .kind = VSHI_CUSTOM,
      .offset = offsetof(vsh_receiver, transform),
      .read = vshi_read_transform},
     {.name = "uv_set",
      .kind = VSHI_INTEGER,
+     .variants = MESH,
      .offset = offsetof(vsh_receiver, uv_set),
      .highest = VSH_MAX_UV_SETS - 1},
     {.name = "size", .kind = VSHI_CUSTOM, .read = read_size},
@@ -55,7 +84,7 @@ static const vshi_key receiver_keys[] = {
      .lowest = 1.0,
      .highest = 8.0},
     {.name = "output", .kind = VSHI_PATH, .required = VSHI_ALL, .offset = offsetof(vsh_receiver, output)},
-    {.name = "bits", .kind = VSHI_CUSTOM, .offset = offsetof(vsh_receiver, bits), .read = read_bits},
+    {.name = "bits", .kind = VSHI_CUSTOM, .offset = offsetof(vsh_receiver, bits), .read = vshi_read_bits},
     {.name = "pack", .kind = VSHI_STRING, .offset = offsetof(vsh_receiver, pack)},
 };
 static const vshi_table receiver_table = VSHI_TABLE(receiver_keys);
@@ -72,5 +101,16 @@ vsh_result vshi_read_receiver(vshi_reader *reader, const vshi_value *value, void
     receiver->padding = lightmap.padding;
     receiver->ao_spacing = lightmap.ao_spacing;
     receiver->bits = image.bits;
-    return vshi_read_object(reader, value, &receiver_table, 1, "a receiver", receiver);
+    vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
+    if (result == VSH_OK) {
+        result = vshi_reject_both(reader, value, "mesh", "heightfield");
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    vshi_value given;
+    const bool heightfield = vshi_member(value, "heightfield", &given);
+    receiver->type = heightfield ? VSH_RECEIVER_HEIGHTFIELD : VSH_RECEIVER_MESH;
+    return vshi_read_object(reader, value, &receiver_table, 1U << receiver->type,
+                            heightfield ? "a heightfield receiver" : "a receiver", receiver);
 }

@@ -44,18 +44,8 @@ static vsh_result read_lights(vshi_reader *reader, const vshi_value *value, void
     const vsh_result result = vshi_read_list(reader, value, 0, MAX_LIGHTS, sizeof *scene->lights,
                                              vshi_read_light, &items, &scene->light_count);
     scene->lights = items;
-    for (size_t i = 0; result == VSH_OK && i < scene->light_count; ++i) {
-        for (size_t j = 0; j < i; ++j) {
-            const vshi_value light = vshi_item(value, i);
-            vshi_value name;
-            if (strcmp(scene->lights[i].name, scene->lights[j].name) == 0 &&
-                vshi_member(&light, "name", &name)) {
-                return vshi_reader_fail(reader, &name, "\"%s\" is the name of lights[%zu] too",
-                                        scene->lights[i].name, j);
-            }
-        }
-    }
-    return result;
+    return result == VSH_OK ? vshi_check_light_names(reader, value, scene->lights, scene->light_count)
+                            : result;
 }
 
 static int by_output(const void *a, const void *b) {
@@ -236,35 +226,13 @@ static const vshi_key scene_keys[] = {
 };
 static const vshi_table scene_table = VSHI_TABLE(scene_keys);
 
-/* The text as JSON, or an error with Jansson's line and column. Numbers are all read as doubles, so that one
- * too large for an integer is out of range like any other. */
-static vsh_result load(const vshi_reader *reader, json_t **json) {
-    json_error_t failure;
-    *json =
-        json_loadb(reader->text, reader->size, JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, &failure);
-    if (*json != NULL) {
-        return VSH_OK;
-    }
-    if (json_error_code(&failure) == json_error_out_of_memory) {
-        return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
-    }
-    return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%d:%d: %s", reader->path,
-                     failure.line > 1 ? failure.line : 1, failure.column > 1 ? failure.column : 1,
-                     failure.text);
-}
-
 vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh_scene **scene,
                             vsh_error *error) {
     *scene = NULL;
-    static const char byte_order_mark[] = "\xef\xbb\xbf"; /* editors on Windows put it in front of UTF-8 */
-    if (size >= 3 && memcmp(text, byte_order_mark, 3) == 0) {
-        text += 3;
-        size -= 3;
-    }
     vshi_reader reader = {path, text, size, NULL, error};
     json_t *json = NULL;
     owner *made = NULL;
-    vsh_result result = load(&reader, &json);
+    vsh_result result = vshi_reader_load(&reader, &json);
     if (result != VSH_OK) {
         return result;
     }

@@ -5,7 +5,8 @@
 
 #include <stdlib.h>
 
-static const char *const type_names[] = {"a mesh", "an sdf", "a vdb"};
+static const char *const type_names[] = {"a mesh",  "an sdf", "a vdb", "a heightfield",
+                                         "spheres", "a mask", "a text"};
 
 vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
                                const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
@@ -21,14 +22,14 @@ vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
     size_t count = 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        if (!vshi_caster_in_layer(caster, layer)) {
+        if (!vshi_caster_in_layer(caster, layer) || vshi_caster_is_direct(caster)) {
             continue;
         }
-        if (caster->type != VSH_CASTER_MESH) {
-            const bool known = caster->type > VSH_CASTER_MESH && caster->type <= VSH_CASTER_VDB;
+        if (caster->type != VSH_CASTER_MESH && caster->type != VSH_CASTER_HEIGHTFIELD) {
+            const bool known = caster->type > VSH_CASTER_MESH && caster->type <= VSH_CASTER_TEXT;
             return vshi_fail(error, VSH_ERROR_INPUT,
                              "casters[%zu] is %s: exact methods trace triangles, and need casters that are "
-                             "all meshes",
+                             "all meshes or heightfields",
                              i, known ? type_names[caster->type] : "of no type");
         }
         size_t own;

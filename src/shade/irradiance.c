@@ -1,32 +1,10 @@
 /* Irradiance: what the shadow value leaves out. */
 #include "base/floats.h"
 #include "base/vec.h"
+#include "shade/light.h"
 #include "shade/shade.h"
 
 #include <math.h>
-
-static double smoothstep(double from, double to, double x) {
-    const double t = fmin(1.0, fmax(0.0, (x - from) / (to - from)));
-    return t * t * (3.0 - 2.0 * t);
-}
-
-static double falloff(const vsh_light *light, double distance) {
-    if (light->falloff == VSH_FALLOFF_INVERSE_SQUARE) {
-        return 1.0 / (distance * distance);
-    }
-    if (light->falloff == VSH_FALLOFF_QUADRATIC) {
-        const double left = 1.0 - fmin(1.0, distance / light->reach);
-        return left * left;
-    }
-    return 1.0;
-}
-
-/* Smooth edge between the cosines of the outer and the inner angle. */
-static double spot(const vsh_light *light, vshi_vec to_light) {
-    const double cosine = -vshi_dot(vshi_unit(vshi_vec_of(light->direction)), to_light);
-    const double outer = cos(light->outer_angle), inner = cos(light->inner_angle);
-    return inner > outer ? smoothstep(outer, inner, cosine) : (cosine >= outer ? 1.0 : 0.0);
-}
 
 static void tint_one(const vsh_tint *tint, double v, double rgb[3]) {
     rgb[0] = rgb[1] = rgb[2] = v;
@@ -85,8 +63,7 @@ void vshi_shade_irradiance(const vsh_points *points, const float *shading_normal
             const double distance = vshi_length(to);
             to = vshi_unit(to);
             /* not nearer than the light's own surface, so that the square stays finite */
-            gain *= falloff(light, fmax(distance, fmax(light->radius, 1e-30)));
-            gain *= light->type == VSH_LIGHT_SPOT ? spot(light, to) : 1.0;
+            gain *= vshi_light_gain(light, to, fmax(distance, fmax(light->radius, 1e-30)));
         }
         gain *= fmax(0.0, vshi_dot(vshi_unit(vshi_vec_off(normals + 3 * i)), to));
         if (gain * tinted[0] > 0.0) {

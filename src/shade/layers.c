@@ -1,5 +1,8 @@
 #include "shade/layers.h"
 
+#include "analytic/heights.h"
+#include "analytic/relief.h"
+#include "analytic/spheres.h"
 #include "base/memory.h"
 
 #include <math.h>
@@ -55,8 +58,10 @@ vsh_result vshi_layer_resolve(const vsh_shade_options *options, size_t index, vs
         result = vshi_fail(&why, VSH_ERROR_ARGUMENT, "remap from %g to %g: expected a rise", layer->remap[0],
                            layer->remap[1]);
     }
-    if (result == VSH_OK && layer->field == NULL) {
-        result = vshi_fail(&why, VSH_ERROR_ARGUMENT, "field is NULL");
+    const int casters = (layer->field != NULL) + (layer->heights != NULL) + (layer->spheres != NULL);
+    if (result == VSH_OK && casters != 1) {
+        result = vshi_fail(&why, VSH_ERROR_ARGUMENT, "%s of field, heights and spheres: expected one",
+                           casters == 0 ? "none" : "several");
     }
     for (size_t i = 0; result == VSH_OK && layer->lights != NULL && i < layer->light_count; ++i) {
         if (layer->lights[i] == NULL) {
@@ -64,6 +69,20 @@ vsh_result vshi_layer_resolve(const vsh_shade_options *options, size_t index, vs
         }
     }
     return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "layer %zu: %s", index, why.message);
+}
+
+double vshi_layer_bytes(const vsh_layer *layer) {
+    if (layer->heights != NULL) {
+        return (double)layer->heights->info.bytes;
+    }
+    if (layer->spheres != NULL) {
+        vsh_spheres_info info;
+        vsh_spheres_get_info(layer->spheres, &info);
+        return (double)info.bytes;
+    }
+    vsh_field_info info;
+    vsh_field_get_info(layer->field, &info);
+    return (double)info.bytes;
 }
 
 static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
@@ -94,9 +113,15 @@ static vsh_result prepare(prepared *item, size_t index, const vsh_light *light, 
     options->start_offset = layer->start_offset < 0.0 ? options->start_offset : layer->start_offset;
     options->method = layer->method < 0 ? options->method : layer->method;
     vsh_error why;
-    vsh_result result;
+    vsh_result result = VSH_OK;
     if (light != NULL) {
         item->light = soften(light, layer->softness);
+    }
+    if (layer->field == NULL) { /* needs no preparing */
+        result = light != NULL ? vsh_light_check(&item->light, &why) : VSH_OK;
+        return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "layer %zu: %s", index, why.message);
+    }
+    if (light != NULL) {
         result = vshi_shadow_prepare(layer->field, &item->light, options, &item->shadow, &why);
         item->shadow.purpose = 31u * item->shadow.purpose + (uint32_t)index + 1u;
     } else {
@@ -205,12 +230,48 @@ static void combine(const vsh_layer *layer, double value, double deviation, doub
     }
 }
 
+/* What heights or spheres leave of the light, of what is above the points' own horizons. */
+static void shade_analytic(const prepared *item, layer_piece *piece, vsh_shade_stats *stats) {
+    const vsh_layer *layer = &item->layer;
+    const size_t count = piece->points.count;
+    if (layer->heights != NULL) {
+        vshi_heights_shadow(layer->heights, &item->light, item->options.method, &piece->points, 0, count,
+                            vshi_heights_lift(layer->heights, layer->start_offset), piece->value, stats);
+    } else {
+        vshi_spheres_shadow(layer->spheres, &item->light, item->options.method, &piece->points, 0, count, 0.0,
+                            piece->value, stats);
+    }
+}
+
+static void occlude_analytic(const prepared *item, layer_piece *piece, float *bent, vsh_shade_stats *stats) {
+    const vsh_layer *layer = &item->layer;
+    const double distance = item->options.ao_distance;
+    const size_t count = piece->points.count;
+    if (layer->heights != NULL) {
+        vshi_heights_ao(layer->heights, distance, &piece->points, 0, count,
+                        vshi_heights_lift(layer->heights, layer->start_offset), piece->value, bent, stats);
+    } else {
+        vshi_spheres_ao(layer->spheres, distance, &piece->points, 0, count, 0.0, piece->value, bent, stats);
+    }
+}
+
 void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task, size_t begin, size_t end,
                         vsh_shade_stats *stats) {
     layer_piece piece;
     cut(&piece, task->points, begin, end);
     for (size_t k = 0; k < layers->count; ++k) {
         const prepared *item = &layers->items[k];
+        if (item->layer.field == NULL) {
+            shade_analytic(item, &piece, stats);
+            for (size_t i = begin; i < end; ++i) {
+                if (task->visibility[i] > 0.0f) {
+                    const double above = vshi_shadow_above(task, i);
+                    combine(&item->layer, above * (double)piece.value[i - begin], 0.0, above,
+                            &task->visibility[i], task->deviation != NULL ? &task->deviation[i] : NULL);
+                }
+            }
+            continue;
+        }
         vshi_shadow_task own = item->shadow;
         own.kernel = task->kernel;
         own.points = &piece.points;
@@ -244,6 +305,18 @@ void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t 
     cut(&piece, task->points, begin, end);
     for (size_t k = 0; k < layers->count; ++k) {
         const prepared *item = &layers->items[k];
+        if (item->layer.field == NULL) {
+            occlude_analytic(item, &piece, task->bent != NULL ? piece.bent : NULL, stats);
+            for (size_t i = begin; i < end; ++i) {
+                combine(&item->layer, (double)piece.value[i - begin], 0.0, 1.0, &task->ao[i],
+                        task->deviation != NULL ? &task->deviation[i] : NULL);
+                if (task->bent != NULL) {
+                    superpose(task->bent + 3 * i, piece.bent + 3 * (i - begin),
+                              task->points->normals + 3 * i);
+                }
+            }
+            continue;
+        }
         vshi_ao_task own = item->ao;
         own.kernel = task->kernel;
         own.points = &piece.points;

@@ -13,6 +13,9 @@ typedef struct vshi_layers vshi_layers;
 vsh_result vshi_layer_resolve(const vsh_shade_options *options, size_t index, vsh_layer *layer,
                               vsh_error *error);
 
+/* Bytes of what a resolved layer refers to, triangles aside. */
+double vshi_layer_bytes(const vsh_layer *layer);
+
 /* Checks the options' layers (resolved options) and prepares those that cast for `light`, or NULL for AO.
  * *layers is NULL where there are none. Free with vshi_layers_free(). Errors: VSH_ERROR_ARGUMENT,
  * VSH_ERROR_MEMORY. */

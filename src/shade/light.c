@@ -107,3 +107,33 @@ vsh_result vsh_light_check(const vsh_light *light, vsh_error *error) {
     }
     return VSH_OK;
 }
+
+static double smoothstep(double from, double to, double x) {
+    const double t = fmin(1.0, fmax(0.0, (x - from) / (to - from)));
+    return t * t * (3.0 - 2.0 * t);
+}
+
+static double falloff(const vsh_light *light, double distance) {
+    if (light->falloff == VSH_FALLOFF_INVERSE_SQUARE) {
+        return 1.0 / (distance * distance);
+    }
+    if (light->falloff == VSH_FALLOFF_QUADRATIC) {
+        const double left = 1.0 - fmin(1.0, distance / light->reach);
+        return left * left;
+    }
+    return 1.0;
+}
+
+/* Smooth edge between the cosines of the outer and the inner angle. */
+static double spot(const vsh_light *light, vshi_vec to_light) {
+    const double cosine = -vshi_dot(vshi_unit(vshi_vec_of(light->direction)), to_light);
+    const double outer = cos(light->outer_angle), inner = cos(light->inner_angle);
+    return inner > outer ? smoothstep(outer, inner, cosine) : (cosine >= outer ? 1.0 : 0.0);
+}
+
+double vshi_light_gain(const vsh_light *light, vshi_vec to_light, double distance) {
+    if (light->type == VSH_LIGHT_DIRECTIONAL) {
+        return 1.0;
+    }
+    return falloff(light, distance) * (light->type == VSH_LIGHT_SPOT ? spot(light, to_light) : 1.0);
+}

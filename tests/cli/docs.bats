@@ -1,4 +1,5 @@
-# Every scene in docs/scene.md bakes, and every command in docs/query.md, docs/volume.md and docs/render.md runs.
+# Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/volume.md and
+# docs/render.md runs.
 load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
@@ -42,6 +43,18 @@ run_commands() {
         for output in $(grep -o '"output": *"[^"]*"' "$scene" | sed 's/.*"\([^"]*\)"$/\1/'); do
             [ -s "$output" ] || fail "$scene: no $output"
         done
+    done
+}
+
+@test "every flat scene of docs/flat.md" {
+    awk '/^```json$/ { name = sprintf("flat%02d.json", ++n); inside = 1; next }
+         /^```$/ { inside = 0 }
+         inside { print > name }' "$DOCS/flat.md"
+    [ -e flat02.json ]
+    for scene in flat??.json; do
+        shade flat "$scene" --quiet
+        done_well || fail "$scene: $(cat "$scene")"
+        [ -s "$(sed -n 's/.*"output": *"\([^"]*\)".*/\1/p' "$scene")" ] || fail "$scene: no output"
     done
 }
 

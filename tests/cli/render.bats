@@ -15,11 +15,6 @@ png_size() {
     echo "$(od -An -tu1 -j16 -N8 "$1" | awk '{ print $3 * 256 + $4, $7 * 256 + $8 }')"
 }
 
-# value FILE CHANNEL: that channel's mean, as info has it.
-info_of() {
-    "$VDBSHADE" info "$1"
-}
-
 @test "a picture of a mesh, of the size asked for" {
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" --ao 0.5 -o view.png --stats stats.json
     done_well
@@ -41,7 +36,7 @@ info_of() {
 @test "an EXR has linear colours, coverage, depth and normals" {
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o view.exr --quiet
     done_well
-    info_of view.exr >info.txt
+    "$VDBSHADE" info view.exr >info.txt
     for channel in R G B A Z N.X N.Y N.Z; do
         grep -qw "$channel" info.txt || fail "no $channel: $(cat info.txt)"
     done
@@ -183,11 +178,9 @@ scene() {
 JSON
 }
 
-# pixel FILE X Y: R G B of a pixel, through an ASCII-free binary PPM.
+# pixel FILE X Y: R G B of a pixel of a PPM of 60 × 20, whose header takes 13 bytes.
 pixel() {
-    local header=15 # P6\n60 20\n255\n has 13; found out below
-    header=$(head -c 64 "$1" | awk 'NR <= 3 { n += length($0) + 1 } END { print n }' RS='\n')
-    od -An -tu1 -j$((header + 3 * ($3 * 60 + $2))) -N3 "$1" | tr -s ' ' | sed 's/^ //'
+    od -An -v -tu1 -w3 -j$((13 + 3 * ($3 * 60 + $2))) -N3 "$1"
 }
 
 @test "casters have their colours, in a layer or in none" {
@@ -221,4 +214,23 @@ pixel() {
     cmp one.png two.png || fail "threads show"
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o none.png --quiet
     ! cmp -s one.png none.png || fail "no shafts"
+}
+
+@test "casters without voxels are seen, and in the light that they give as solids" {
+    ln -s "$(cd "$ASSETS" && pwd)/terrain.png" .
+    for direct in true false; do
+        cat >terrain.json <<JSON
+{"casters": [{"heightfield": "terrain.png", "size": [10, 10], "height": 2, "base": 1, "direct": $direct},
+             {"spheres": [[0, 4, 0, 1]], "voxelised": $([ $direct = true ] && echo false || echo true), "color": [0.9, 0.05, 0.05]}],
+ "resolution": 64, "ao": {"distance": 1},
+ "lights": [{"name": "sun", "type": "directional", "direction": [0.6, 0.5, 0.3], "angle_deg": 3}]}
+JSON
+        shade render terrain.json --size 60x40 --samples 2 --camera 6,8,16 --look-at 0,1.5,0 -o $direct.ppm --quiet
+        done_well
+    done
+    # Both see the same; light differs by what voxels lose.
+    paste <(od -An -v -tu1 -w1 -j13 true.ppm) <(od -An -v -tu1 -w1 -j13 false.ppm) |
+        awk '{ sum += ($1 - $2) ^ 2 } END { exit sqrt(sum / NR) < 6 ? 0 : 1 }' ||
+        fail "the pictures differ"
+    [ "$(od -An -v -tu1 -w3 -j13 true.ppm | awk '$1 > 120 && $2 < 90' | wc -l)" -gt 20 ] || fail "no red sphere"
 }

@@ -344,7 +344,7 @@ static void test_refused(void **state) {
         const char *message;
         vsh_layer layer;
     } cases[] = {
-        {"layer 0: field is NULL", vsh_layer_default()},
+        {"layer 0: none of field, heights and spheres: expected one", vsh_layer_default()},
         {"layer 0: softness -1 is out of range 0 … 1000", {.softness = -1.0}},
         {"layer 0: softness nan is out of range 0 … 1000", {.softness = NAN}},
         {"layer 0: method 9 is out of range -1 … 8", {.method = 9}},

@@ -50,6 +50,30 @@ static void bad_ply_and_stl_are_refused(void **state) {
     assert_non_null(strstr(error.message, "nan"));
 }
 
+/* By their endings, and by their first bytes whatever the ending. */
+static void alembic_and_usd_are_refused_by_name(void **state) {
+    (void)state;
+    static const char *const endings[] = {"a.usd", "a.usda", "a.USDC", "a.usdz"};
+    for (size_t i = 0; i < sizeof endings / sizeof endings[0]; ++i) {
+        refused(endings[i], "anything", VSH_ERROR_INPUT, "is a USD file", "OBJ, glTF, GLB, PLY, STL or FBX");
+    }
+    refused("a.abc", "anything", VSH_ERROR_INPUT, "is an Alembic file", "OBJ");
+    refused("a.obj", "Ogawa and more", VSH_ERROR_INPUT, "a.obj: is an Alembic file", "OBJ");
+    refused("a.obj", "\x89HDF\r\n\x1a\n and more", VSH_ERROR_INPUT, "is an Alembic file", "OBJ");
+    refused("a.obj", "#usda 1.0\n", VSH_ERROR_INPUT, "is a USD file", "OBJ");
+    refused("a", "PXR-USDC and more", VSH_ERROR_INPUT, "is a USD file", "OBJ");
+    unsigned char zip[64] = "PK\x03\x04";
+    zip[26] = 6;
+    memcpy(zip + 30, "a.usdc", 6);
+    vsh_model *model = NULL;
+    vsh_error error = {0};
+    assert_int_equal(read_bytes("b.obj", zip, sizeof zip, &model, &error), VSH_ERROR_INPUT);
+    assert_non_null(strstr(error.message, "is a USD file"));
+    memcpy(zip + 30, "a.text", 6); /* any other Zip file is what its ending says */
+    assert_int_equal(read_bytes("b.obj", zip, sizeof zip, &model, &error), VSH_ERROR_INPUT);
+    assert_null(strstr(error.message, "USD"));
+}
+
 static void bad_gltf_is_refused(void **state) {
     (void)state;
     char gltf[4096];
@@ -185,6 +209,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bad_obj_is_refused_with_line_and_value),
         cmocka_unit_test(bad_ply_and_stl_are_refused),
+        cmocka_unit_test(alembic_and_usd_are_refused_by_name),
         cmocka_unit_test(bad_gltf_is_refused),
         cmocka_unit_test(files_that_cannot_be_read_say_why),
         cmocka_unit_test(the_memory_limit_is_checked),

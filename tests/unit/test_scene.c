@@ -75,7 +75,7 @@ static void the_seeds_scene_is_the_one_of_the_techniques(void **state) {
 static void every_key_lands_in_its_field(void **state) {
     (void)state;
     vsh_scene *scene = parse("dir/x/scene.json", full_scene);
-    assert_int_equal(scene->caster_count, 4);
+    assert_int_equal(scene->caster_count, 6);
     const vsh_caster *c = scene->casters;
     assert_int_equal(c[0].type, VSH_CASTER_MESH);
     assert_string_equal(c[0].path, "dir/x/a.glb");
@@ -91,6 +91,17 @@ static void every_key_lands_in_its_field(void **state) {
     assert_point(c[2].transform, unit, 1.0, 1.0, 1.0);
     assert_int_equal(c[3].type, VSH_CASTER_SDF);
     assert_point(c[3].transform, unit, -0.5, 0.5, 0.5);
+    assert_int_equal(c[4].type, VSH_CASTER_MASK);
+    assert_string_equal(c[4].path, "dir/x/m.png");
+    assert_true(c[4].mask.width == 2.0 && c[4].mask.height == 3.0 && c[4].thickness == 0.5);
+    assert_true(c[4].mask.threshold == 0.25 && c[4].mask.invert != 0);
+    assert_string_equal(c[4].mask.channel, "red");
+    assert_point(c[4].transform, unit, 2.0, 2.0, 2.0);
+    assert_int_equal(c[5].type, VSH_CASTER_TEXT);
+    assert_string_equal(c[5].path, "dir/x/f.ttf");
+    assert_string_equal(c[5].text, "a\nb");
+    assert_true(c[5].letters.height == 2.0 && c[5].letters.line_spacing == 1.5 && c[5].thickness == 0.25);
+    assert_int_equal(c[5].letters.align, VSH_ALIGN_RIGHT);
 
     assert_int_equal(c[3].sdf.node_count, 9);
     const vsh_sdf_node *n = c[3].sdf.nodes;

@@ -1,0 +1,11 @@
+/* Scene formats that are not read, told by name so that nobody looks for the fault in his file. */
+#ifndef VSHI_CASTER_FOREIGN_H
+#define VSHI_CASTER_FOREIGN_H
+
+#include "base/error.h"
+
+/* VSH_ERROR_INPUT, with the formats that are read, where a file is Alembic or USD by its ending or its first
+ * bytes. A file that cannot be read is told apart by its ending only. Thread safe. */
+vsh_result vshi_foreign_check(const char *path, vsh_error *error);
+
+#endif

@@ -1,0 +1,214 @@
+/* Flat scenes: their file, and the outline of their casters. */
+#include "base/floats.h"
+#include "base/memory.h"
+#include "scene/parts.h"
+#include "scene/scene.h"
+
+#include <vdbshade/flat.h>
+#include <vdbshade/image.h>
+
+#include <math.h>
+#include <stdlib.h>
+
+enum {
+    MAX_ITEMS = 65536,
+    MAX_LIGHTS = VSH_MAX_CHANNELS - 4, /* A and three of irradiance must fit into the image too */
+    CIRCLE_SIDES = 256
+};
+
+/* What vsh_flat_scene_free() gets is the first member. */
+typedef struct owner {
+    vsh_flat_scene scene;
+    vshi_block *blocks;
+} owner;
+
+static vsh_result read_casters(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_flat_scene *scene = member;
+    void *items = NULL;
+    const vsh_result result = vshi_read_list(reader, value, 0, MAX_ITEMS, sizeof *scene->casters,
+                                             vshi_read_flat_caster, &items, &scene->caster_count);
+    scene->casters = items;
+    return result;
+}
+
+static vsh_result read_lights(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_flat_scene *scene = member;
+    void *items = NULL;
+    const vsh_result result = vshi_read_list(reader, value, 1, MAX_LIGHTS, sizeof *scene->lights,
+                                             vshi_read_flat_light, &items, &scene->light_count);
+    scene->lights = items;
+    return result == VSH_OK ? vshi_check_light_names(reader, value, scene->lights, scene->light_count)
+                            : result;
+}
+
+static vsh_result read_size(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_flat_scene *scene = member;
+    return vshi_read_size(reader, value, &scene->options.width, &scene->options.height);
+}
+
+/* [x0, y0, x1, y1] */
+static vsh_result read_region(vshi_reader *reader, const vshi_value *value, void *member) {
+    static const vshi_key key = {
+        .kind = VSHI_VECTOR, .count = 4, .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST};
+    vsh_flat_scene *scene = member;
+    double r[4];
+    const vsh_result result = vshi_read_value(reader, value, &key, r);
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (!(r[0] < r[2] && r[1] < r[3])) {
+        return vshi_reader_fail(reader, value, "is empty: expected [left, bottom, right, top]");
+    }
+    for (int axis = 0; axis < 2; ++axis) {
+        scene->options.region_min[axis] = r[axis];
+        scene->options.region_max[axis] = r[axis + 2];
+    }
+    return VSH_OK;
+}
+
+static const vshi_key scene_keys[] = {
+    {.name = "casters", .kind = VSHI_CUSTOM, .read = read_casters},
+    {.name = "lights", .kind = VSHI_CUSTOM, .required = VSHI_ALL, .read = read_lights},
+    {.name = "region", .kind = VSHI_CUSTOM, .required = VSHI_ALL, .read = read_region},
+    {.name = "size", .kind = VSHI_CUSTOM, .read = read_size},
+    {.name = "method",
+     .kind = VSHI_NAME,
+     .offset = offsetof(vsh_flat_scene, options.method),
+     .name_of = vsh_flat_method_name},
+    {.name = "supersample",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_flat_scene, options.supersample),
+     .lowest = 1.0,
+     .highest = 16.0},
+    {.name = "padding",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_flat_scene, options.padding),
+     .highest = 4096.0},
+    {.name = "max_steps",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_flat_scene, options.max_steps),
+     .lowest = 16.0,
+     .highest = 65536.0},
+    {.name = "output", .kind = VSHI_PATH, .offset = offsetof(vsh_flat_scene, output)},
+    {.name = "bits", .kind = VSHI_CUSTOM, .offset = offsetof(vsh_flat_scene, bits), .read = vshi_read_bits},
+    {.name = "pack", .kind = VSHI_STRING, .offset = offsetof(vsh_flat_scene, pack)},
+};
+static const vshi_table scene_table = VSHI_TABLE(scene_keys);
+
+static vsh_result parse(vshi_reader *reader, owner *made) {
+    json_t *json = NULL;
+    vsh_result result = vshi_reader_load(reader, &json);
+    if (result == VSH_OK) {
+        const vshi_value root = {NULL, NULL, 0, 0, json};
+        made->scene.options = vsh_flat_options_default();
+        result = vshi_read_object(reader, &root, &scene_table, 1, "a flat scene", &made->scene);
+    }
+    made->blocks = reader->blocks;
+    json_decref(json);
+    return result;
+}
+
+vsh_result vsh_flat_scene_read(const char *path, vsh_flat_scene **scene, vsh_error *error) {
+    VSHI_FLOATS;
+    if (path == NULL || scene == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_flat_scene_read: path or scene is NULL");
+    }
+    *scene = NULL;
+    char *text;
+    size_t size;
+    vsh_result result = vshi_scene_text(path, &text, &size, error);
+    owner *made = result == VSH_OK ? calloc(1, sizeof *made) : NULL;
+    if (result == VSH_OK && made == NULL) {
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
+    }
+    if (result == VSH_OK) {
+        vshi_reader reader = {path, text, size, NULL, error};
+        result = parse(&reader, made);
+    }
+    free(text);
+    if (result != VSH_OK) {
+        vsh_flat_scene_free(made == NULL ? NULL : &made->scene);
+        return result;
+    }
+    *scene = &made->scene;
+    return VSH_OK;
+}
+
+void vsh_flat_scene_free(vsh_flat_scene *scene) {
+    if (scene != NULL) {
+        owner *made = (owner *)scene;
+        vshi_blocks_free(made->blocks);
+        free(made);
+    }
+}
+
+/* --- casters */
+
+/* As many-sided that it is off by 1e-4 of the radius at most, and of the circle's area. */
+static vsh_result make_circle(double radius, const vsh_run *run, vsh_outline **outline, vsh_error *error) {
+    const double step = 2.0 * VSHI_PI / CIRCLE_SIDES, reach = radius * sqrt(step / sin(step));
+    double points[2 * CIRCLE_SIDES];
+    for (int i = 0; i < CIRCLE_SIDES; ++i) {
+        points[2 * i] = reach * cos(step * i);
+        points[2 * i + 1] = reach * sin(step * i);
+    }
+    const size_t count = CIRCLE_SIDES;
+    return vsh_outline_from_polygons(points, &count, 1, run, outline, error);
+}
+
+static vsh_result make_caster(const vsh_flat_caster *caster, const vsh_run *run, vsh_outline **outline,
+                              vsh_error *error) {
+    const double x = caster->half_size[0], y = caster->half_size[1];
+    const double corners[8] = {-x, -y, x, -y, x, y, -x, y};
+    const size_t four = 4;
+    switch (caster->type) {
+    case VSH_FLAT_MASK:
+        return vsh_outline_from_image(caster->path, &caster->mask, run, outline, error);
+    case VSH_FLAT_TEXT:
+        return vsh_outline_from_text(caster->text, caster->path, &caster->letters, run, outline, error);
+    case VSH_FLAT_CIRCLE:
+        return make_circle(caster->radius, run, outline, error);
+    case VSH_FLAT_BOX:
+        return vsh_outline_from_polygons(corners, &four, 1, run, outline, error);
+    case VSH_FLAT_POLYGON:
+        return vsh_outline_from_polygons(caster->points, &caster->point_count, 1, run, outline, error);
+    default:
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "type %d: expected 0 … %d", caster->type,
+                         VSH_FLAT_POLYGON);
+    }
+}
+
+vsh_result vsh_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *run, vsh_outline **outline,
+                                  vsh_error *error) {
+    VSHI_FLOATS;
+    if (scene == NULL || outline == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_flat_scene_casters: %s is NULL",
+                         scene == NULL ? "scene" : "outline");
+    }
+    *outline = NULL;
+    const size_t count = scene->caster_count;
+    void *memory[2] = {NULL, NULL};
+    vsh_result result = vshi_allocate(&memory[0], count, sizeof(vsh_outline *), "casters", error);
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory[1], count, sizeof(vsh_outline_instance), "casters", error);
+    }
+    vsh_outline **made = memory[0];
+    vsh_outline_instance *instances = memory[1];
+    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+        vsh_error reason;
+        result = make_caster(&scene->casters[i], run, &made[i], &reason);
+        if (result != VSH_OK) {
+            vshi_fail(error, result, "casters[%zu]: %.960s", i, reason.message);
+        }
+        instances[i] = (vsh_outline_instance){made[i], scene->casters[i].transform};
+    }
+    if (result == VSH_OK && count > 0) {
+        result = vsh_outline_unite(instances, count, run, outline, error);
+    }
+    for (size_t i = 0; made != NULL && i < count; ++i) {
+        vsh_outline_free(made[i]);
+    }
+    free(instances);
+    free(made);
+    return result;
+}

@@ -1,0 +1,110 @@
+# Casters without voxels, from scene files: terrains and spheres. What is wrong with their files is told by its place.
+load helper
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    ln -s "$(cd "$ASSETS" && pwd)"/{terrain.png,spheres.csv,seeds_floor.obj} .
+}
+
+SUN='"lights": [{"name": "sun", "type": "directional", "direction": [-0.7, 0.4, 0.3], "angle_deg": 4}]'
+LAND='"heightfield": "terrain.png", "size": [10, 10], "height": 2'
+OVER='"receivers": [{"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 96, "output": "out.exr"}]'
+FLOOR='"receivers": [{"mesh": "seeds_floor.obj", "size": 64, "output": "out.exr"}]'
+
+scene() { # casters, receivers, more keys
+    printf '{"casters": [%s], %s, %s%s}\n' "$1" "$SUN" "$2" "${3:+, $3}" >scene.json
+}
+
+
+@test "a direct terrain makes no voxel, and the same bits for any number of threads" {
+    scene "{$LAND, \"direct\": true}" "$OVER" '"ao": {"distance": 1}'
+    shade bake scene.json --threads 1 --stats stats.json
+    done_well
+    grep -q '"active_voxels": 0' stats.json
+    one=$(sha256sum <out.exr)
+    shade bake scene.json --threads 4
+    done_well
+    [ "$(sha256sum <out.exr)" = "$one" ]
+}
+
+@test "a direct terrain and spheres are shaded by query as by bake" {
+    scene "{$LAND, \"direct\": true}, {\"spheres\": [[0, 2, 0, 0.5]]}" "$OVER"
+    # above all, beneath the terrain, in the sphere's shadow, and as far away on its other side
+    printf 'x,y,z\n0,5,0\n2,-1,0\n1.05,1.4,-0.45\n-1.05,2.6,0.45\n' >points.csv
+    shade query scene.json --points points.csv -o answers.csv --quiet
+    done_well
+    [ "$(cut -d, -f4 answers.csv | tr '\n' ' ')" = "shadow.sun 1 0 0 1 " ] || fail "$(cat answers.csv)"
+}
+
+@test "voxelize takes a terrain and spheres that are voxelised, and no others" {
+    scene "{$LAND}, {\"spheres\": [[0, 3, 0, 0.5]], \"voxelised\": true}" "$OVER" '"resolution": 48'
+    shade voxelize scene.json -o out.vdb --quiet
+    done_well
+    scene "{$LAND, \"direct\": true}" "$OVER"
+    shade voxelize scene.json -o out.vdb
+    refused 2 "no casters that are voxelised"
+}
+
+@test "info tells of terrains and spheres" {
+    scene "{$LAND, \"direct\": true}, {\"spheres\": \"spheres.csv\"}, {\"spheres\": [[0, 0, 0, 1]], \"voxelised\": true}" "$OVER"
+    shade info scene.json
+    done_well
+    [[ $output == *"heightfield"*"terrain.png, 10 × 10, height 2, direct"* ]]
+    [[ $output == *"spheres"*"spheres.csv"* ]]
+    [[ $output == *"spheres, 1, voxelised"* ]]
+}
+
+@test "a missing image or list of spheres" {
+    scene '{"heightfield": "none.png", "size": [1, 1], "height": 1}' "$OVER"
+    shade bake scene.json
+    refused 3 none.png
+    scene '{"spheres": "none.csv"}' "$FLOOR"
+    shade bake scene.json
+    refused 3 none.csv
+}
+
+@test "an image that is none" {
+    echo nothing >bad.png
+    scene '{"heightfield": "bad.png", "size": [1, 1], "height": 1, "direct": true}' "$OVER"
+    shade bake scene.json
+    refused 2 bad.png
+}
+
+@test "zero and huge sizes are refused by line and column" {
+    scene '{"heightfield": "terrain.png", "size": [0, 1], "height": 1}' "$OVER"
+    shade bake scene.json
+    refused 2 'scene.json:1:' 'size[0]' 'out of range'
+    scene '{"heightfield": "terrain.png", "size": [1, 2147483648e9], "height": 1}' "$OVER"
+    shade bake scene.json
+    refused 2 'size[1]' 'out of range'
+}
+
+@test "bad rows of spheres are told by their number" {
+    printf 'x,y,z,r\n0,1,0,0.5\n0,1,0\n' >bad.csv
+    scene '{"spheres": "bad.csv"}' "$FLOOR"
+    shade bake scene.json
+    refused 2 'bad.csv:3:' 'four numbers'
+    printf '0,1,0,0.5\n0,1,0,-1\n' >bad.csv
+    shade bake scene.json
+    refused 2 'bad.csv:2:' 'radius -1'
+}
+
+@test "a memory limit holds for terrains and spheres" {
+    scene "{$LAND, \"direct\": true}" "$FLOOR"
+    shade bake scene.json --memory-limit 200000
+    refused 4 terrain.png
+}
+
+@test "an output over a caster's file is refused" {
+    cp "$ASSETS/spheres.csv" own.csv
+    scene '{"spheres": "own.csv"}' "$FLOOR"
+    shade bake scene.json -o own.csv
+    [ "$status" -eq 2 ]
+    cmp own.csv "$ASSETS/spheres.csv"
+}
+
+@test "trade refuses casters without voxels" {
+    scene '{"spheres": "spheres.csv"}' "$FLOOR"
+    shade trade scene.json -o report.html
+    refused 2 "not part of it"
+}

@@ -1,0 +1,65 @@
+/* Terrains for tests: rolling hills with terraces whose risers are steep, and a few towers one sample wide.
+ */
+#ifndef TESTS_TERRAIN_H
+#define TESTS_TERRAIN_H
+
+#include "shading.h"
+#include "truth/embree.h"
+#include "truth/metrics.h"
+
+#include <stdlib.h>
+#include <vdbshade/heights.h>
+
+/* Height 0 … 1 of sample (i, j) of `n`, the same hills whatever n. */
+static inline float hill(int i, int j, int n) {
+    const double x = (double)j / (n - 1), z = (double)i / (n - 1);
+    double y = 0.5 + 0.25 * sin(9.0 * x + 2.0 * z) * cos(7.0 * z - x) + 0.12 * sin(23.0 * x - 11.0 * z) +
+               0.05 * cos(41.0 * z + 17.0 * x);
+    const double terrace = floor(y * 6.0) / 6.0;
+    y = 0.4 * y + 0.6 * (terrace + fmin(6.0 * (y - terrace), 1.0) / 6.0 * 0.3);
+    if (i * 7 % n < 7 && j * 5 % n < 5 && i > 0 && j > 0) {
+        y += 0.4; /* a tower */
+    }
+    return (float)y;
+}
+
+static inline float *hills(int columns, int rows) {
+    float *values = malloc((size_t)columns * (size_t)rows * sizeof *values);
+    assert_non_null(values);
+    for (int i = 0; i < rows; ++i) {
+        for (int j = 0; j < columns; ++j) {
+            values[i * columns + j] = hill(i, j, columns);
+        }
+    }
+    return values;
+}
+
+static inline vsh_heights_source source_of(const float *values, int columns, int rows, double size,
+                                           double height) {
+    return (vsh_heights_source){.name = "hills",
+                                .columns = columns,
+                                .rows = rows,
+                                .values = values,
+                                .size = {size, size * (rows - 1) / (columns - 1)},
+                                .height = height};
+}
+
+static inline vsh_model *model_of(const vsh_heights_source *source, int32_t what) {
+    vsh_model *model = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_model_from_heights(source, what, NULL, &model, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return model;
+}
+
+static inline vsh_heights *heights_of(const vsh_heights_source *source) {
+    vsh_heights *heights = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_heights_create(source, NULL, &heights, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return heights;
+}
+
+#endif

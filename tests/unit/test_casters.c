@@ -1,0 +1,325 @@
+/* Terrains and spheres through the public calls: as layers of a field, and from scene files to lightmaps. */
+#include "terrain.h"
+#include "truth/analytic.h"
+#include "truth/directions.h"
+
+#include "base/vec.h"
+#include "scene/scene.h"
+
+#include <stdio.h>
+#include <vdbshade/vdbshade.h>
+
+enum { SIDE = 65, POINTS = 1000 };
+
+static vsh_field *empty_field(void) {
+    vsh_field *field = NULL;
+    assert_int_equal(vsh_field_create_empty(1e-5, &field, NULL), VSH_OK);
+    return field;
+}
+
+/* On the terrain, each with its facet's normal, lifted a little. */
+static void points_on(const vsh_mesh *mesh, double *positions, float *normals) {
+    uint64_t counter = 2;
+    for (size_t i = 0; i < POINTS; ++i) {
+        const size_t t = (size_t)between(&counter, 0.0, 2.0 * (SIDE - 1) * (SIDE - 1) - 0.01);
+        vshi_vec c[3];
+        for (int k = 0; k < 3; ++k) {
+            c[k] = vshi_vec_off(mesh->positions + 3 * mesh->indices[3 * t + (size_t)k]);
+        }
+        const vshi_vec n = vshi_unit(vshi_cross(vshi_sub(c[1], c[0]), vshi_sub(c[2], c[0])));
+        const vshi_vec p =
+            vshi_add(vshi_scale(vshi_add(vshi_add(c[0], c[1]), c[2]), 1.0 / 3.0), vshi_scale(n, 1e-4));
+        const double at[3] = {p.x, p.y, p.z};
+        const float normal[3] = {(float)n.x, (float)n.y, (float)n.z};
+        memcpy(positions + 3 * i, at, sizeof at);
+        memcpy(normals + 3 * i, normal, sizeof normal);
+    }
+}
+
+static void a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_horizon(void **state) {
+    (void)state;
+    static double positions[3 * POINTS];
+    static float normals[3 * POINTS], values[POINTS], truth[POINTS];
+    float *heights = hills(SIDE, SIDE);
+    const vsh_heights_source source = source_of(heights, SIDE, SIDE, 10.0, 1.5);
+    vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
+    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    points_on(&mesh, positions, normals);
+    vsh_layer layer = vsh_layer_default();
+    layer.heights = heights_of(&source);
+    vsh_field *empty = empty_field();
+    vsh_shade_options options = vsh_shade_options_default();
+    options.layers = &layer;
+    options.layer_count = 1;
+    options.ao_distance = 1.0;
+    const vsh_points points = {POINTS, positions, normals, NULL};
+    static const double towards[3] = {-0.8, 0.3, 0.4};
+    const double angle = RADIANS(30.0);
+    const vsh_light light = sun(towards, angle);
+    vsh_error error = {VSH_OK, ""};
+    truth_mesh *rays = truth_mesh_create(&mesh, 1);
+    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, values, NULL, NULL, &error),
+                     VSH_OK);
+    if (rays != NULL) {
+        truth_mesh_light(rays, POINTS, positions, normals, towards, tan(0.5 * angle), 1024, 0, truth);
+        const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
+        truth_metrics_print("shadow", &m);
+        assert_true(m.rmse < 0.006);
+        assert_true(m.penumbra > POINTS / 4);
+    }
+    assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, values, NULL, NULL, &error), VSH_OK);
+    if (rays != NULL) {
+        truth_mesh_ao(rays, POINTS, positions, normals, 1.0, 1024, 0, truth);
+        const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
+        truth_metrics_print("ao", &m);
+        assert_true(m.rmse < 0.006);
+    }
+    /* a layer that is hard, or that casts for another light */
+    layer.softness = 0.0;
+    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, values, NULL, NULL, &error),
+                     VSH_OK);
+    layer.softness = 1.0;
+    layer.method = VSH_SHADOW_HARD;
+    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, truth, NULL, NULL, &error),
+                     VSH_OK);
+    assert_memory_equal(values, truth, sizeof values);
+    static const char *const lamp_name[] = {"lamp"};
+    layer.lights = lamp_name;
+    layer.light_count = 1;
+    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, values, NULL, NULL, &error),
+                     VSH_OK);
+    options.layer_count = 0;
+    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, truth, NULL, NULL, &error),
+                     VSH_OK);
+    assert_memory_equal(values, truth, sizeof values);
+    truth_mesh_free(rays);
+    vsh_field_free(empty);
+    vsh_heights_free((vsh_heights *)(uintptr_t)layer.heights);
+    vsh_model_free(model);
+    free(heights);
+}
+
+static void spheres_in_a_layer_and_in_voxels_cast_the_same(void **state) {
+    (void)state;
+    static double positions[3 * POINTS];
+    static float normals[3 * POINTS], analytic[POINTS], voxels[POINTS], truth[POINTS];
+    static const double up[3] = {0, 1, 0}, towards[3] = {-0.5, 0.6, -0.6};
+    double spheres[20][4];
+    truth_solid solids[20] = {{.shape = TRUTH_SPHERE}};
+    uint64_t counter = 3;
+    for (size_t i = 0; i < 20; ++i) {
+        spheres[i][3] = between(&counter, 0.1, 0.3);
+        spheres[i][0] = between(&counter, -1.0, 1.0);
+        spheres[i][1] = between(&counter, 0.5, 1.5);
+        spheres[i][2] = between(&counter, -1.0, 1.0);
+        solids[i].shape = TRUTH_SPHERE;
+        memcpy(solids[i].center, spheres[i], sizeof solids[i].center);
+        solids[i].radius = spheres[i][3];
+    }
+    for (size_t i = 0; i < POINTS; ++i) {
+        positions[3 * i] = between(&counter, -1.5, 2.0);
+        positions[3 * i + 2] = between(&counter, -1.5, 2.0);
+        normals[3 * i + 1] = 1.0f;
+    }
+    const vsh_caster caster = {.type = VSH_CASTER_SPHERES,
+                               .spheres = spheres[0],
+                               .sphere_count = 20,
+                               .voxelised = 1,
+                               .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+    vsh_scene scene = {.casters = &caster, .caster_count = 1, .grid = vsh_grid_options_default()};
+    scene.grid.voxel_size = 0.02;
+    vsh_assets *assets = NULL;
+    vsh_grid *grid = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_assets_load(&scene, NULL, &assets, &error) != VSH_OK ||
+        vsh_scene_casters(&scene, assets, NULL, &grid, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    assert_null(vsh_assets_spheres(assets, 0)); /* it does not cast by itself */
+    vsh_field *field = field_of_grid(grid, 0.6), *empty = empty_field();
+    const vsh_light light = sun(towards, RADIANS(11.0));
+    shadows(field, &light, VSH_SHADOW_ADAPTIVE, POINTS, positions, normals, voxels);
+    vsh_spheres *made = NULL;
+    assert_int_equal(vsh_spheres_create(spheres[0], 20, NULL, NULL, &made, &error), VSH_OK);
+    vsh_layer layer = vsh_layer_default();
+    layer.spheres = made;
+    vsh_shade_options options = vsh_shade_options_default();
+    options.layers = &layer;
+    options.layer_count = 1;
+    const vsh_points points = {POINTS, positions, normals, NULL};
+    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, analytic, NULL, NULL, &error),
+                     VSH_OK);
+    const truth_scene rays = {solids, 20};
+    truth_lights(rays, POINTS, positions, up, towards, tan(RADIANS(5.5)), INFINITY, 1024, truth);
+    const truth_metrics exact = truth_compare(POINTS, analytic, truth, NULL);
+    const truth_metrics same = truth_compare(POINTS, analytic, voxels, NULL);
+    truth_metrics_print("spheres", &exact);
+    truth_metrics_print("to voxels", &same);
+    assert_true(exact.rmse < 0.003);
+    assert_true(same.rmse < 0.02);
+    assert_true(exact.penumbra > POINTS / 5);
+    vsh_spheres_free(made);
+    vsh_field_free(empty);
+    vsh_field_free(field);
+    vsh_assets_free(assets);
+}
+
+/* Mean of the free directions, by the rays of analytic truth. */
+static void bent_by_rays(truth_scene scene, const double point[3], double distance, double mean[3]) {
+    enum { RAYS = 2048 };
+    static const double up[3] = {0, 1, 0};
+    const truth_frame frame = truth_frame_around(up);
+    mean[0] = mean[1] = mean[2] = 0.0;
+    for (size_t i = 0; i < RAYS; ++i) {
+        double d[3];
+        truth_cosine_direction(&frame, i, RAYS, d);
+        for (size_t axis = 0; axis < 3 && !truth_hit(scene, point, d, distance); ++axis) {
+            mean[axis] += d[axis];
+        }
+    }
+    const double length = sqrt(mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+        mean[axis] /= length;
+    }
+}
+
+static void bent_normals_lean_away_from_spheres_and_terrain(void **state) {
+    (void)state;
+    enum { COUNT = 60 };
+    static double positions[3 * COUNT];
+    static float normals[3 * COUNT], ao[COUNT], bent[3 * COUNT];
+    const double spheres[2][4] = {{1.0, 0.6, 0.0, 0.5}, {-0.4, 0.9, 1.0, 0.4}};
+    const truth_solid solids[2] = {{.shape = TRUTH_SPHERE, .center = {1.0, 0.6, 0.0}, .radius = 0.5},
+                                   {.shape = TRUTH_SPHERE, .center = {-0.4, 0.9, 1.0}, .radius = 0.4}};
+    uint64_t counter = 6;
+    for (size_t i = 0; i < COUNT; ++i) {
+        positions[3 * i] = between(&counter, -1.0, 2.0);
+        positions[3 * i + 2] = between(&counter, -1.0, 2.0);
+        normals[3 * i + 1] = 1.0f;
+    }
+    vsh_spheres *made = NULL;
+    assert_int_equal(vsh_spheres_create(spheres[0], 2, NULL, NULL, &made, NULL), VSH_OK);
+    vsh_layer layer = vsh_layer_default();
+    layer.spheres = made;
+    vsh_shade_options options = vsh_shade_options_default();
+    options.layers = &layer;
+    options.layer_count = 1;
+    options.ao_distance = 3.0;
+    vsh_field *empty = empty_field();
+    const vsh_points points = {COUNT, positions, normals, NULL};
+    const truth_scene scene = {solids, 2};
+    assert_int_equal(vsh_shade_bent(empty, &points, &options, NULL, ao, bent, NULL, NULL), VSH_OK);
+    for (size_t i = 0; i < COUNT; ++i) {
+        double mean[3];
+        bent_by_rays(scene, positions + 3 * i, 3.0, mean);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            assert_float_equal(bent[3 * i + axis], mean[axis], 0.02);
+        }
+    }
+    vsh_spheres_free(made);
+    /* a wall along z, whose face a quarter of the terrain's cells make, seen from the ground before it */
+    float values[33 * 33];
+    for (int i = 0; i < 33 * 33; ++i) {
+        values[i] = i % 33 > 16 ? 1.0f : 0.0f;
+    }
+    const vsh_heights_source source = {
+        .columns = 33, .rows = 33, .values = values, .size = {32, 32}, .height = 4, .base = 1};
+    truth_solid wall = {.shape = TRUTH_BOX, .center = {9.0, 0.0, 0.0}, .half = {8.0, 4.0, 16.0}};
+    layer.spheres = NULL;
+    layer.heights = heights_of(&source);
+    options.ao_distance = 10.0;
+    const truth_scene beside = {&wall, 1};
+    for (size_t i = 0; i < COUNT; ++i) {
+        positions[3 * i] = between(&counter, -8.0, -2.0);
+        positions[3 * i + 1] = 1e-3;
+        positions[3 * i + 2] = between(&counter, -3.0, 3.0);
+    }
+    assert_int_equal(vsh_shade_bent(empty, &points, &options, NULL, ao, bent, NULL, NULL), VSH_OK);
+    for (size_t i = 0; i < COUNT; ++i) {
+        double mean[3];
+        bent_by_rays(beside, positions + 3 * i, 10.0, mean);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            assert_float_equal(bent[3 * i + axis], mean[axis], 0.03);
+        }
+    }
+    vsh_heights_free((vsh_heights *)(uintptr_t)layer.heights);
+    vsh_field_free(empty);
+}
+
+/* Bakes the floor under casters given as JSON; coverage of its texels. */
+static void bake_floor(const char *casters, float *shadow, float *coverage, int32_t side) {
+    char text[1024];
+    snprintf(text, sizeof text,
+             "{\"casters\":[%s],\"receivers\":[{\"mesh\":\"seeds_floor.obj\",\"output\":\"none.exr\"}]}",
+             casters);
+    vsh_scene *scene = NULL;
+    vsh_assets *assets = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vshi_scene_parse(VSH_ASSETS "/scene.json", text, strlen(text), &scene, &error) != VSH_OK ||
+        vsh_assets_load(scene, NULL, &assets, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    vsh_layer layer = vsh_layer_default();
+    layer.heights = vsh_assets_heights(assets, 0);
+    layer.spheres = vsh_assets_spheres(assets, 0);
+    vsh_shade_options shade = vsh_shade_options_default();
+    shade.layers = &layer;
+    shade.layer_count = 1;
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = side;
+    options.padding = 0;
+    size_t count = 0;
+    const vsh_mesh *meshes = vsh_assets_receiver(assets, 0, &count);
+    vsh_texels *texels = NULL;
+    assert_int_equal(vsh_texels_create(meshes, count, &options, NULL, NULL, &texels, &error), VSH_OK);
+    static const double high[3] = {0.0, 1.0, 0.0};
+    const vsh_light light = sun(high, 0.1);
+    float *const planes[1] = {shadow};
+    vsh_lightmap lightmap = {.shadow = planes, .coverage = coverage};
+    vsh_field *empty = empty_field();
+    if (vsh_bake_lightmap(empty, texels, &light, 1, &shade, NULL, &lightmap, NULL, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    vsh_field_free(empty);
+    vsh_texels_free(texels);
+    vsh_assets_free(assets);
+    vsh_scene_free(scene);
+}
+
+static void texels_within_a_sphere_or_a_terrain_are_not_valid(void **state) {
+    (void)state;
+    enum { TEXELS = 64 };
+    static float shadow[TEXELS * TEXELS], coverage[TEXELS * TEXELS];
+    /* a ball through the floor: its section is a disc of radius 1 of the floor's 5 × 5 */
+    bake_floor("{\"spheres\":[[0,0.75,0,1.25]]}", shadow, coverage, TEXELS);
+    size_t invalid = 0, dark = 0;
+    for (size_t i = 0; i < TEXELS * TEXELS; ++i) {
+        invalid += coverage[i] == 0.0f;
+        dark += coverage[i] == 1.0f && shadow[i] == 0.0f;
+    }
+    const double texel = 25.0 / (TEXELS * TEXELS);
+    assert_true(fabs((double)invalid * texel - PI) < 0.1);
+    /* the umbra's edge is where a line that touches ball and sun meets the floor */
+    const double umbra = 1.25 / cos(0.05) - 0.75 * tan(0.05);
+    assert_true(fabs((double)(dark + invalid) * texel - PI * umbra * umbra) < 0.05);
+    /* a terrain that is higher than the floor all over one side of it */
+    bake_floor("{\"heightfield\":\"terrain.png\",\"size\":[5,20],\"height\":1,\"direct\":true,"
+               "\"transform\":{\"translate\":[2.5,-0.05,0]}}",
+               shadow, coverage, TEXELS);
+    invalid = 0;
+    for (size_t i = 0; i < TEXELS * TEXELS; ++i) {
+        invalid += coverage[i] == 0.0f;
+    }
+    print_message("%zu\n", invalid);
+    assert_true(invalid > TEXELS * TEXELS * 2 / 5 && invalid < TEXELS * TEXELS * 3 / 5);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_horizon),
+        cmocka_unit_test(spheres_in_a_layer_and_in_voxels_cast_the_same),
+        cmocka_unit_test(bent_normals_lean_away_from_spheres_and_terrain),
+        cmocka_unit_test(texels_within_a_sphere_or_a_terrain_are_not_valid),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

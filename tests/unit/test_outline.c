@@ -1,0 +1,356 @@
+/* Outlines of polygons and of text against closed forms. */
+#include "outlines.h"
+
+static void a_square_s_distance(void **state) {
+    (void)state;
+    vsh_outline *square = box(-1.0, -1.0, 1.0, 1.0);
+    for (int i = 0; i < 2000; ++i) {
+        const double p[2] = {6.0 * any(2 * (uint64_t)i) - 3.0, 6.0 * any(2 * (uint64_t)i + 1) - 3.0};
+        const double x = fabs(p[0]) - 1.0, y = fabs(p[1]) - 1.0;
+        const double expected = x > 0.0 && y > 0.0 ? hypot(x, y) : fmax(x, y);
+        assert_true(fabs(vsh_outline_distance(square, p) - expected) < 1e-14);
+    }
+    assert_true(isnan(vsh_outline_distance(square, (const double[]){NAN, 0.0})));
+    assert_true(isnan(vsh_outline_distance(square, (const double[]){0.0, INFINITY})));
+    vsh_outline_free(square);
+}
+
+static void the_tree_finds_what_looking_at_all_finds(void **state) {
+    (void)state;
+    vsh_outline *letters = text("R&8\nqi%", 1.0);
+    int inside = 0;
+    for (int i = 0; i < 2000; ++i) {
+        const double p[2] = {5.0 * any(2 * (uint64_t)i) - 2.5, 4.0 * any(2 * (uint64_t)i + 1) - 2.5};
+        const double distance = vsh_outline_distance(letters, p);
+        assert_true(fabs(fabs(distance) - sqrt(truth_square(letters, p[0], p[1]))) < 1e-12);
+        assert_int_equal(distance < 0.0, truth_inside(letters, p[0], p[1]));
+        inside += distance < 0.0;
+    }
+    assert_true(inside > 100);
+    vsh_outline_free(letters);
+}
+
+/* --- the area that contours wind around */
+
+static vsh_outline *polygons(const double *points, const size_t *counts, size_t count) {
+    vsh_outline *outline = NULL;
+    assert_ok(vsh_outline_from_polygons(points, counts, count, NULL, &outline, &failure));
+    return outline;
+}
+
+static void overlapping_squares_are_one_area(void **state) {
+    (void)state;
+    /* one runs backwards; their overlap, 1 × 1, is inside all the same, as each is given alone and they are
+     * united */
+    const double first[8] = {0, 0, 2, 0, 2, 2, 0, 2}, second[8] = {1, 1, 1, 3, 3, 3, 3, 1};
+    vsh_outline *a = polygon(first, 4), *b = polygon(second, 4), *both = NULL;
+    const vsh_outline_instance instances[2] = {{a, NULL}, {b, NULL}};
+    assert_ok(vsh_outline_unite(instances, 2, NULL, &both, &failure));
+    assert_true(fabs(info_of(both).area - 7.0) < 1e-14);
+    assert_int_equal(info_of(both).contours, 1);
+    assert_int_equal(info_of(both).points, 8);
+    /* what lies inside is no border: the overlap's middle is as far from the area's edge as that is */
+    assert_true(fabs(vsh_outline_distance(both, (const double[]){1.5, 1.5}) + sqrt(0.5)) < 1e-14);
+    assert_true(fabs(vsh_outline_distance(both, (const double[]){2.5, 0.5}) - 0.5) < 1e-14);
+    vsh_outline_free(both);
+    vsh_outline_free(a);
+    vsh_outline_free(b);
+}
+
+static void squares_that_share_an_edge_are_one_area(void **state) {
+    (void)state;
+    const double points[16] = {0, 0, 1, 0, 1, 1, 0, 1, 1, 0.25, 2, 0.25, 2, 0.75, 1, 0.75};
+    const size_t counts[2] = {4, 4};
+    vsh_outline *both = polygons(points, counts, 2);
+    assert_true(fabs(info_of(both).area - 1.5) < 1e-14);
+    assert_true(fabs(vsh_outline_distance(both, (const double[]){1.0, 0.5}) + 0.25) < 1e-14);
+    vsh_outline_free(both);
+}
+
+static void a_contour_the_other_way_is_a_hole(void **state) {
+    (void)state;
+    const double points[24] = {0, 0, 4, 0, 4,   4,   0,   4,   1,   1,   1,   3,
+                               3, 3, 3, 1, 1.5, 1.5, 2.5, 1.5, 2.5, 2.5, 1.5, 2.5};
+    const size_t counts[3] = {4, 4, 4};
+    vsh_outline *island = polygons(points, counts, 3);
+    assert_true(fabs(info_of(island).area - 13.0) < 1e-14);
+    assert_true(vsh_outline_distance(island, (const double[]){1.2, 2.0}) > 0.0);
+    assert_true(vsh_outline_distance(island, (const double[]){2.0, 2.0}) == -0.5);
+    size_t count;
+    for (size_t c = 0; c < 3; ++c) { /* the area to the left, everywhere */
+        const double *p = vsh_outline_contour(island, c, &count);
+        const double x = 0.5 * (p[0] + p[2]) - 1e-3 * (p[3] - p[1]),
+                     y = 0.5 * (p[1] + p[3]) + 1e-3 * (p[2] - p[0]);
+        assert_true(vsh_outline_distance(island, (const double[]){x, y}) < 0.0);
+    }
+    assert_null(vsh_outline_contour(island, 3, &count));
+    assert_int_equal(count, 0);
+    vsh_outline_free(island);
+    /* a filled disc in it that runs the same way changes nothing */
+    const double inner[16] = {0, 0, 4, 0, 4, 4, 0, 4, 1, 1, 3, 1, 3, 3, 1, 3};
+    vsh_outline *filled = polygons(inner, counts, 2);
+    assert_true(info_of(filled).area == 16.0 && info_of(filled).contours == 1);
+    vsh_outline_free(filled);
+}
+
+/* Five lines that cross: wound around twice in the middle. */
+static void a_pentagram_is_filled(void **state) {
+    (void)state;
+    double points[10];
+    for (int i = 0; i < 5; ++i) {
+        points[2 * i] = cos(4.0 * PI * i / 5.0);
+        points[2 * i + 1] = sin(4.0 * PI * i / 5.0);
+    }
+    vsh_outline *star = polygon(points, 5);
+    /* ten triangles between the centre, a tip, and an inner corner at (3 - √5)/2 */
+    const double inner = 0.5 * (3.0 - sqrt(5.0));
+    assert_true(fabs(info_of(star).area - 5.0 * inner * sin(PI / 5.0)) < 1e-13);
+    assert_int_equal(info_of(star).points, 10);
+    assert_true(fabs(vsh_outline_distance(star, (const double[]){0.0, 0.0}) + inner) < 1e-12);
+    vsh_outline_free(star);
+}
+
+static void many_overlaps_leave_the_union(void **state) {
+    (void)state;
+    enum { COUNT = 40 };
+    double points[8 * COUNT];
+    size_t counts[COUNT];
+    for (size_t i = 0; i < COUNT; ++i) {
+        const double x = 2.0 * any(5 * i), y = 2.0 * any(5 * i + 1), w = 0.1 + 0.5 * any(5 * i + 2),
+                     turn = any(5 * i + 3);
+        for (int k = 0; k < 4; ++k) {
+            points[8 * i + 2 * (size_t)k] = x + w * cos(turn + 0.5 * PI * k);
+            points[8 * i + 2 * (size_t)k + 1] = y + w * sin(turn + 0.5 * PI * k);
+        }
+        counts[i] = 4;
+    }
+    vsh_outline *all = polygons(points, counts, COUNT);
+    for (uint64_t i = 0; i < 3000; ++i) {
+        const double p[2] = {4.0 * any(900 + 2 * i) - 1.0, 4.0 * any(901 + 2 * i) - 1.0};
+        double nearest = INFINITY; /* distance of the union, where that is known: outside */
+        for (size_t k = 0; k < COUNT; ++k) {
+            vsh_outline *one = polygon(points + 8 * k, 4);
+            nearest = fmin(nearest, vsh_outline_distance(one, p));
+            vsh_outline_free(one);
+        }
+        const double distance = vsh_outline_distance(all, p);
+        assert_int_equal(distance < 0.0, nearest < 0.0);
+        assert_true(nearest < 0.0 ? distance <= nearest + 1e-12 : fabs(distance - nearest) < 1e-12);
+        /* the border is a border: just beside it are inside and outside */
+    }
+    size_t count;
+    const double *p;
+    for (size_t c = 0; (p = vsh_outline_contour(all, c, &count)) != NULL; ++c) {
+        for (size_t i = 0; i < count; ++i) {
+            const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count);
+            const double dx = 1e-6 * (b[0] - a[0]), dy = 1e-6 * (b[1] - a[1]);
+            const double middle[2] = {0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])};
+            assert_true(vsh_outline_distance(all, (const double[]){middle[0] - dy, middle[1] + dx}) < 0.0);
+            assert_true(vsh_outline_distance(all, (const double[]){middle[0] + dy, middle[1] - dx}) > 0.0);
+        }
+    }
+    vsh_outline_free(all);
+}
+
+/* --- text */
+
+static vsh_outline *lines_of(const char *letters, int32_t align) {
+    vsh_text_options options = vsh_text_options_default();
+    options.align = align;
+    vsh_outline *outline = NULL;
+    assert_ok(vsh_outline_from_text(letters, FONT, &options, NULL, &outline, &failure));
+    return outline;
+}
+
+static double width_of(const char *letters) {
+    vsh_outline *outline = lines_of(letters, VSH_ALIGN_LEFT);
+    const vsh_outline_info info = info_of(outline);
+    vsh_outline_free(outline);
+    return info.bounds_max[0] - info.bounds_min[0];
+}
+
+/* DejaVu Sans: 2048 units an em; l is a bar from 193 to 377 and to 1556, of exact lines. */
+static void letters_have_the_font_s_measures(void **state) {
+    (void)state;
+    vsh_outline *bar = lines_of("l", VSH_ALIGN_LEFT);
+    const vsh_outline_info info = info_of(bar);
+    assert_int_equal(info.points, 4);
+    assert_true(info.bounds_min[0] == 193.0 / 2048.0 && info.bounds_max[0] == 377.0 / 2048.0);
+    assert_true(info.bounds_min[1] == 0.0 && info.bounds_max[1] == 1556.0 / 2048.0);
+    vsh_outline_free(bar);
+    vsh_outline *o = lines_of("o", VSH_ALIGN_LEFT); /* a ring, with x-height 1120 */
+    assert_int_equal(info_of(o).contours, 2);
+    const vsh_outline_info ring = info_of(o);
+    assert_true(vsh_outline_distance(o, (const double[]){0.5 * (ring.bounds_min[0] + ring.bounds_max[0]),
+                                                         560.0 / 2048.0}) > 0.1);
+    vsh_outline_free(o);
+}
+
+static void letters_are_kerned(void **state) {
+    (void)state;
+    assert_true(width_of("AVA") < width_of("AHA") - 0.05);
+    /* H is 1540 units wide, and pairs of them are not kerned */
+    assert_true(fabs(width_of("HH") - width_of("H") - 1540.0 / 2048.0) < 1e-9);
+    assert_true(width_of("AV") - width_of("V") < 1401.0 / 2048.0 - 0.02);
+}
+
+static void lines_lie_as_they_are_told_to(void **state) {
+    (void)state;
+    vsh_outline *lines = lines_of("l\r\nlll\n\nl", VSH_ALIGN_LEFT);
+    /* three line heights of 2384 units below */
+    assert_true(fabs(info_of(lines).bounds_min[1] + 3.0 * 2384.0 / 2048.0) < 1e-12);
+    assert_int_equal(info_of(lines).contours, 5);
+    vsh_outline_free(lines);
+    const struct {
+        int32_t align;
+        double x;
+    } cases[] = {{VSH_ALIGN_LEFT, 285.0},
+                 {VSH_ALIGN_CENTER, 0.5 * (2 * 285.0 - 569.0)},
+                 {VSH_ALIGN_RIGHT, 285.0 - 569.0}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) { /* l is 569 wide, its bar's middle at 285 */
+        vsh_outline *bar = lines_of("l", cases[i].align);
+        const vsh_outline_info info = info_of(bar);
+        assert_true(fabs(0.5 * (info.bounds_min[0] + info.bounds_max[0]) - cases[i].x / 2048.0) < 1e-12);
+        vsh_outline_free(bar);
+    }
+}
+
+/* Å is A with a ring, which other fonts let overlap; the same letter over itself adds nothing. */
+static void letters_that_overlap_are_one_area(void **state) {
+    (void)state;
+    vsh_outline *o = lines_of("o", VSH_ALIGN_LEFT), *both = NULL;
+    const double aside[6] = {1.0, 0.0, 0.3, 0.0, 1.0, 0.0};
+    const vsh_outline_instance instances[3] = {{o, NULL}, {o, aside}, {o, NULL}};
+    assert_ok(vsh_outline_unite(instances, 3, NULL, &both, &failure));
+    for (uint64_t i = 0; i < 2000; ++i) {
+        const double p[2] = {1.2 * any(2 * i) - 0.1, 0.8 * any(2 * i + 1) - 0.1};
+        const double a = vsh_outline_distance(o, p);
+        const double b = vsh_outline_distance(o, (const double[]){p[0] - 0.3, p[1]});
+        const double distance = vsh_outline_distance(both, p);
+        assert_true(a > 0.0 && b > 0.0 ? fabs(distance - fmin(a, b)) < 1e-12 : distance < fmin(a, b) + 1e-12);
+    }
+    /* the border lies on one of the two, and never in the other */
+    size_t count;
+    const double *p;
+    for (size_t c = 0; (p = vsh_outline_contour(both, c, &count)) != NULL; ++c) {
+        for (size_t i = 0; i < count; ++i) {
+            const double a = vsh_outline_distance(o, p + 2 * i);
+            const double b = vsh_outline_distance(o, (const double[]){p[2 * i] - 0.3, p[2 * i + 1]});
+            assert_true(fmin(a, b) > -1e-12);
+        }
+    }
+    vsh_outline_free(both);
+    vsh_outline_free(o);
+}
+
+/* Cut eight times as fine the outline's area changes by less than the tolerance times its length. */
+static void curves_are_followed(void **state) {
+    (void)state;
+    /* the outer contour of O: its points lie on the curve, so the polygon's error is in its area */
+    vsh_outline *o = lines_of("O", VSH_ALIGN_LEFT);
+    const vsh_outline_info info = info_of(o);
+    assert_true(info.points > 100 && info.points < 2000);
+    double longest = 0.0, sharpest = 0.0;
+    size_t count;
+    const double *p = vsh_outline_contour(o, 0, &count);
+    for (size_t i = 0; i < count; ++i) {
+        const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count), *c = p + 2 * ((i + 2) % count);
+        const double first = atan2(b[1] - a[1], b[0] - a[0]), second = atan2(c[1] - b[1], c[0] - b[0]);
+        const double length = hypot(b[0] - a[0], b[1] - a[1]);
+        longest = fmax(longest, length);
+        sharpest = fmax(sharpest, fabs(remainder(second - first, 2.0 * PI)) * length / 8.0); /* sagitta */
+    }
+    print_message("O: %zu points, at most %.2g em from its curves\n", info.points, sharpest);
+    assert_true(sharpest < 3e-5);
+    vsh_outline_free(o);
+}
+
+static void bad_text_is_refused(void **state) {
+    (void)state;
+    vsh_outline *outline = NULL;
+    const struct {
+        const char *text;
+        const char *font;
+        vsh_result result;
+        const char *part;
+    } cases[] = {{"", FONT, VSH_ERROR_INPUT, "empty"},
+                 {"a\tb", FONT, VSH_ERROR_INPUT, "U+0009, at byte 1"},
+                 {"a\rb", FONT, VSH_ERROR_INPUT, "U+000D"},
+                 {"\xc3", FONT, VSH_ERROR_INPUT, "no UTF-8 at byte 0"},
+                 {"ab\xff", FONT, VSH_ERROR_INPUT, "no UTF-8 at byte 2"},
+                 {"\xed\xa0\x80", FONT, VSH_ERROR_INPUT, "no UTF-8"},
+                 {"\xc0\xaf", FONT, VSH_ERROR_INPUT, "no UTF-8"},
+                 {"\xf4\x90\x80\x80", FONT, VSH_ERROR_INPUT, "no UTF-8"},
+                 {"  \n ", FONT, VSH_ERROR_INPUT, "no outline"},
+                 {"\xe5\xad\x97", FONT, VSH_ERROR_INPUT, "no letter for U+5B57"},
+                 {"a", "none.ttf", VSH_ERROR_READ, "none.ttf"},
+                 {"a", ".", VSH_ERROR_READ, "."},
+                 {"a", VSH_ASSETS "/seeds.json", VSH_ERROR_INPUT, "no font"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        assert_fails(vsh_outline_from_text(cases[i].text, cases[i].font, NULL, NULL, &outline, &failure),
+                     cases[i].result, cases[i].part);
+        assert_null(outline);
+    }
+    vsh_text_options options = vsh_text_options_default();
+    options.height = NAN;
+    assert_fails(vsh_outline_from_text("a", FONT, &options, NULL, &outline, &failure), VSH_ERROR_ARGUMENT,
+                 "height");
+    options.height = 1.0;
+    options.align = 3;
+    assert_fails(vsh_outline_from_text("a", FONT, &options, NULL, &outline, &failure), VSH_ERROR_ARGUMENT,
+                 "align");
+    options.align = 0;
+    options.line_spacing = 0.0;
+    assert_fails(vsh_outline_from_text("a", FONT, &options, NULL, &outline, &failure), VSH_ERROR_ARGUMENT,
+                 "line_spacing");
+    char *huge = calloc(1, (1 << 20) + 2);
+    memset(huge, 'o', (1 << 20) + 1);
+    assert_fails(vsh_outline_from_text(huge, FONT, NULL, NULL, &outline, &failure), VSH_ERROR_LIMIT, "bytes");
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 1 << 20;
+    huge[10000] = '\0';
+    assert_fails(vsh_outline_from_text(huge, FONT, NULL, &run, &outline, &failure), VSH_ERROR_LIMIT, "limit");
+    free(huge);
+}
+
+static void bad_polygons_are_refused(void **state) {
+    (void)state;
+    vsh_outline *outline = NULL;
+    const double line[8] = {0, 0, 1, 0, 2, 0, 3, 0}, bad[6] = {0, 0, 1, NAN, 0, 1},
+                 far[6] = {0, 0, 1e16, 0, 0, 1};
+    const size_t four = 4, three = 3, two = 2;
+    assert_fails(vsh_outline_from_polygons(line, &four, 1, NULL, &outline, &failure), VSH_ERROR_INPUT,
+                 "no outline");
+    assert_fails(vsh_outline_from_polygons(line, &two, 1, NULL, &outline, &failure), VSH_ERROR_INPUT,
+                 "no outline");
+    assert_fails(vsh_outline_from_polygons(bad, &three, 1, NULL, &outline, &failure), VSH_ERROR_INPUT, "nan");
+    assert_fails(vsh_outline_from_polygons(far, &three, 1, NULL, &outline, &failure), VSH_ERROR_INPUT,
+                 "1e+16");
+    assert_fails(vsh_outline_unite(NULL, 0, NULL, &outline, &failure), VSH_ERROR_ARGUMENT, "no instances");
+    vsh_outline *square = box(0, 0, 1, 1);
+    const double flat[6] = {1, 1, 0, 1, 1, 0};
+    const vsh_outline_instance instance = {square, flat};
+    assert_fails(vsh_outline_unite(&instance, 1, NULL, &outline, &failure), VSH_ERROR_ARGUMENT, "flattens");
+    vsh_outline_free(square);
+    vsh_outline_free(NULL);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_square_s_distance),
+        cmocka_unit_test(the_tree_finds_what_looking_at_all_finds),
+        cmocka_unit_test(overlapping_squares_are_one_area),
+        cmocka_unit_test(squares_that_share_an_edge_are_one_area),
+        cmocka_unit_test(a_contour_the_other_way_is_a_hole),
+        cmocka_unit_test(a_pentagram_is_filled),
+        cmocka_unit_test(many_overlaps_leave_the_union),
+        cmocka_unit_test(letters_have_the_font_s_measures),
+        cmocka_unit_test(letters_are_kerned),
+        cmocka_unit_test(lines_lie_as_they_are_told_to),
+        cmocka_unit_test(letters_that_overlap_are_one_area),
+        cmocka_unit_test(curves_are_followed),
+        cmocka_unit_test(bad_text_is_refused),
+        cmocka_unit_test(bad_polygons_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,416 @@
+/* Spheres that cast by themselves, against analytic rays. */
+#include "shading.h"
+#include "truth/analytic.h"
+#include "truth/directions.h"
+#include "truth/metrics.h"
+
+#include "analytic/caps.h"
+#include "analytic/spheres.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <unistd.h>
+#include <vdbshade/spheres.h>
+
+enum { POINTS = 400, RAYS = 1024, MOST = 400 };
+
+typedef struct stage {
+    truth_solid solids[MOST];
+    double spheres[MOST][4];
+    size_t count;
+    vsh_spheres *made;
+    double positions[3 * POINTS];
+    float normals[3 * POINTS];
+} stage;
+
+static vsh_spheres *spheres_of(const double *list, size_t count, const double *transform) {
+    vsh_spheres *made = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_spheres_create(list, count, transform, NULL, &made, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return made;
+}
+
+/* `count` spheres of radii low … high in a box over a floor, which the points are on. */
+static stage *set_up(size_t count, double low, double high, double side) {
+    stage *s = calloc(1, sizeof *s);
+    assert_non_null(s);
+    uint64_t counter = count;
+    s->count = count;
+    for (size_t i = 0; i < count; ++i) {
+        double *sphere = s->spheres[i];
+        sphere[3] = between(&counter, low, high);
+        sphere[0] = between(&counter, -side, side);
+        sphere[1] = sphere[3] + between(&counter, 0.0, side);
+        sphere[2] = between(&counter, -side, side);
+        s->solids[i].shape = TRUTH_SPHERE;
+        memcpy(s->solids[i].center, sphere, 3 * sizeof *sphere);
+        s->solids[i].radius = sphere[3];
+    }
+    for (size_t i = 0; i < POINTS; ++i) {
+        s->positions[3 * i] = between(&counter, -1.3 * side, 1.3 * side);
+        s->positions[3 * i + 2] = between(&counter, -1.3 * side, 1.3 * side);
+        s->normals[3 * i + 1] = 1.0f;
+    }
+    s->made = spheres_of(s->spheres[0], count, NULL);
+    return s;
+}
+
+static void tear_down(stage *s) {
+    vsh_spheres_free(s->made);
+    free(s);
+}
+
+static void shadow(const stage *s, const vsh_light *light, int32_t method, bool normals, float *values) {
+    const vsh_points points = {POINTS, s->positions, normals ? s->normals : NULL, NULL};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    vshi_spheres_shadow(s->made, light, method, &points, 0, POINTS, 0.0, values, &stats);
+    assert_true(stats.samples > 0);
+}
+
+static truth_metrics check_sun(const stage *s, const double towards[3], double angle, const char *what) {
+    static float values[POINTS], truth[POINTS];
+    const vsh_light light = sun(towards, angle);
+    shadow(s, &light, VSH_SHADOW_CONE, false, values);
+    const truth_scene scene = {s->solids, s->count};
+    assert_int_equal(
+        truth_lights(scene, POINTS, s->positions, NULL, towards, tan(0.5 * angle), INFINITY, RAYS, truth), 0);
+    const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
+    truth_metrics_print(what, &m);
+    return m;
+}
+
+static const double TOWARDS[3] = {-0.5, 0.6, -0.6};
+
+static void a_sphere_hides_of_a_disc_what_rays_say(void **state) {
+    (void)state;
+    stage *small = set_up(1, 0.3, 0.3, 1.0), *large = set_up(1, 3.0, 3.0, 1.0);
+    assert_true(check_sun(small, TOWARDS, RADIANS(0.5), "small, the sun's size").max < 0.002);
+    assert_true(check_sun(small, TOWARDS, RADIANS(11.0), "small, 11°").max < 0.006);
+    assert_true(check_sun(small, TOWARDS, RADIANS(38.0), "small, 38°").max < 0.01);
+    assert_true(check_sun(small, TOWARDS, RADIANS(100.0), "small, 100°").max < 0.01);
+    assert_true(check_sun(large, TOWARDS, RADIANS(11.0), "large, 11°").max < 0.006);
+    assert_true(check_sun(large, TOWARDS, RADIANS(38.0), "large, 38°").max < 0.01);
+    assert_true(check_sun(large, TOWARDS, RADIANS(150.0), "large, 150°").max < 0.015);
+    tear_down(large);
+    tear_down(small);
+}
+
+static void many_spheres_hide_what_rays_say(void **state) {
+    (void)state;
+    stage *some = set_up(40, 0.05, 0.3, 2.0), *many = set_up(MOST, 0.05, 0.15, 2.0),
+          *dust = set_up(MOST, 0.005, 0.02, 2.0);
+    assert_true(check_sun(some, TOWARDS, RADIANS(5.0), "40, 5°").rmse < 0.003);
+    assert_true(check_sun(some, TOWARDS, RADIANS(25.0), "40, 25°").rmse < 0.004);
+    assert_true(check_sun(many, TOWARDS, RADIANS(5.0), "400, 5°").rmse < 0.006);
+    assert_true(check_sun(many, TOWARDS, RADIANS(25.0), "400, 25°").rmse < 0.006);
+    assert_true(check_sun(many, TOWARDS, RADIANS(70.0), "400, 70°").rmse < 0.006);
+    assert_true(check_sun(dust, TOWARDS, RADIANS(11.0), "400 small, 11°").rmse < 0.003);
+    tear_down(dust);
+    tear_down(many);
+    tear_down(some);
+}
+
+static void of_a_disc_that_the_horizon_cuts_the_rest_counts(void **state) {
+    (void)state;
+    stage *s = set_up(100, 0.05, 0.4, 2.0);
+    static float values[POINTS], truth[POINTS];
+    static const double low[3] = {-0.9, 0.1, 0.3};
+    static const double up[3] = {0.0, 1.0, 0.0};
+    const double angle = RADIANS(30.0);
+    const vsh_light light = sun(low, angle);
+    shadow(s, &light, VSH_SHADOW_CONE, true, values);
+    const truth_scene scene = {s->solids, s->count}, none = {s->solids, 0};
+    truth_lights(scene, POINTS, s->positions, up, low, tan(0.5 * angle), INFINITY, RAYS, truth);
+    const double above = truth_light(none, s->positions, up, low, tan(0.5 * angle), INFINITY, RAYS);
+    assert_true(above > 0.5 && above < 0.95);
+    for (size_t i = 0; i < POINTS; ++i) {
+        values[i] *= (float)above;
+    }
+    const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
+    truth_metrics_print("cut", &m);
+    assert_true(m.rmse < 0.006);
+    tear_down(s);
+}
+
+static void hard_shadows_are_the_rays(void **state) {
+    (void)state;
+    stage *s = set_up(MOST, 0.05, 0.15, 2.0);
+    static float values[POINTS], truth[POINTS];
+    const vsh_light light = sun(TOWARDS, RADIANS(5.0));
+    shadow(s, &light, VSH_SHADOW_HARD, false, values);
+    const truth_scene scene = {s->solids, s->count};
+    truth_lights(scene, POINTS, s->positions, NULL, TOWARDS, 0.0, INFINITY, 1, truth);
+    size_t hidden = 0;
+    for (size_t i = 0; i < POINTS; ++i) {
+        assert_true(values[i] == truth[i]);
+        hidden += values[i] == 0.0f;
+    }
+    assert_true(hidden > POINTS / 4 && hidden < POINTS);
+    tear_down(s);
+}
+
+static void the_classic_method_is_the_nearest_miss(void **state) {
+    (void)state;
+    stage *s = set_up(30, 0.05, 0.3, 2.0);
+    static float values[POINTS];
+    const double w = 0.1, length = sqrt(0.97);
+    const vsh_light light = sun(TOWARDS, 2.0 * atan(w));
+    shadow(s, &light, VSH_SHADOW_CLASSIC, false, values);
+    for (size_t i = 0; i < POINTS; ++i) {
+        double expected = 1.0;
+        for (size_t k = 0; k < s->count; ++k) {
+            double along = 0.0, square = 0.0;
+            for (size_t axis = 0; axis < 3; ++axis) {
+                const double d = s->spheres[k][axis] - s->positions[3 * i + axis];
+                along += d * TOWARDS[axis] / length;
+                square += d * d;
+            }
+            const double miss = sqrt(square - along * along) - s->spheres[k][3];
+            if (along > 0.0) {
+                expected = fmin(expected, fmax(miss, 0.0) / (w * along));
+            }
+        }
+        assert_float_equal(values[i], expected, 1e-5);
+    }
+    tear_down(s);
+}
+
+static void lamps_are_the_rays_up_to_the_lamp(void **state) {
+    (void)state;
+    stage *s = set_up(60, 0.05, 0.3, 2.0);
+    static const double place[3] = {0.4, 1.2, 0.1};
+    const vsh_light light = lamp(place, 0.2);
+    static float values[POINTS], truth[POINTS], mask[POINTS];
+    shadow(s, &light, VSH_SHADOW_CONE, false, values);
+    const truth_scene scene = {s->solids, s->count};
+    for (size_t i = 0; i < POINTS; ++i) {
+        double to[3], square = 0.0;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            to[axis] = place[axis] - s->positions[3 * i + axis];
+            square += to[axis] * to[axis];
+        }
+        const double sine = 0.2 / sqrt(square);
+        truth[i] = (float)truth_light(scene, s->positions + 3 * i, NULL, to, sine / sqrt(1.0 - sine * sine),
+                                      sqrt(square) * (1.0 - sine * sine), RAYS);
+        mask[i] = truth_distance(scene, s->positions + 3 * i) > 0.0 ? 1.0f : 0.0f;
+    }
+    const truth_metrics m = truth_compare(POINTS, values, truth, mask);
+    truth_metrics_print("lamp", &m);
+    assert_true(m.rmse < 0.006);
+    tear_down(s);
+}
+
+static void ambient_occlusion_is_the_rays(void **state) {
+    (void)state;
+    static float values[POINTS], truth[POINTS];
+    static const size_t counts[] = {1, 40, MOST};
+    static const double distances[] = {0.3, 1.0, 30.0};
+    static const double up[3] = {0.0, 1.0, 0.0};
+    for (size_t c = 0; c < 3; ++c) {
+        stage *s = set_up(counts[c], 0.05, 0.3, c == 0 ? 0.5 : 2.0);
+        const truth_scene scene = {s->solids, s->count};
+        for (size_t d = 0; d < 3; ++d) {
+            const vsh_points points = {POINTS, s->positions, s->normals, NULL};
+            vsh_shade_stats stats = vsh_shade_stats_zero();
+            vshi_spheres_ao(s->made, distances[d], &points, 0, POINTS, 0.0, values, NULL, &stats);
+            for (size_t i = 0; i < POINTS; ++i) {
+                truth[i] = (float)truth_ao(scene, s->positions + 3 * i, up, distances[d], RAYS);
+            }
+            const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
+            char what[40];
+            snprintf(what, sizeof what, "ao, %zu within %g", counts[c], distances[d]);
+            truth_metrics_print(what, &m);
+            assert_true(m.rmse < (c == 0 ? 0.002 : 0.01));
+        }
+        tear_down(s);
+    }
+}
+
+/* Half of a sphere is below its own tangent plane, and does not shade it. */
+static void a_sphere_leaves_its_own_surface_open(void **state) {
+    (void)state;
+    const double sphere[4] = {1.0, 2.0, 3.0, 0.7};
+    vsh_spheres *made = spheres_of(sphere, 1, NULL);
+    uint64_t counter = 4;
+    for (int i = 0; i < 200; ++i) {
+        double n[3], towards[3], position[3];
+        float normal[3], value = -1.0f;
+        random_direction(&counter, n);
+        random_direction(&counter, towards);
+        for (int axis = 0; axis < 3; ++axis) {
+            normal[axis] = (float)n[axis];
+            position[axis] = (double)(float)(sphere[axis] + 0.7 * n[axis]);
+        }
+        const vsh_points points = {1, position, normal, NULL};
+        const vsh_light light = sun(towards, 0.3);
+        vsh_shade_stats stats = vsh_shade_stats_zero();
+        vshi_spheres_shadow(made, &light, VSH_SHADOW_CONE, &points, 0, 1, 0.0, &value, &stats);
+        assert_true(value == 1.0f);
+        vshi_spheres_ao(made, 1.0, &points, 0, 1, 0.0, &value, NULL, &stats);
+        assert_true(value == 1.0f);
+    }
+    vsh_spheres_free(made);
+}
+
+static void bounds_lose_no_sphere_of_many(void **state) {
+    (void)state;
+    enum { MANY = 20000 };
+    double *list = malloc(4 * MANY * sizeof *list);
+    assert_non_null(list);
+    uint64_t counter = 8;
+    for (size_t i = 0; i < MANY; ++i) {
+        for (size_t k = 0; k < 3; ++k) {
+            /* a third of them at one place: nothing to part them by */
+            list[4 * i + k] = i % 3 == 0 ? 1e4 : 1e4 + between(&counter, -50.0, 50.0);
+        }
+        list[4 * i + 3] = between(&counter, 0.01, 0.3);
+    }
+    static const double moved[12] = {0, -2, 0, 7, 0, 0, 2, -3, -2, 0, 0, 1};
+    vsh_spheres *made = spheres_of(list, MANY, moved);
+    vsh_spheres_info info;
+    vsh_spheres_get_info(made, &info);
+    assert_int_equal(info.count, MANY);
+    assert_true(info.bytes <= 100 * MANY);
+    for (int p = 0; p < 200; ++p) {
+        double towards[3], position[3];
+        random_direction(&counter, towards);
+        position[0] = -2e4 + 7 + between(&counter, -120.0, 120.0);
+        position[1] = 2e4 - 3 + between(&counter, -120.0, 120.0);
+        position[2] = -2e4 + 1 + between(&counter, -120.0, 120.0);
+        bool hidden = false;
+        for (size_t i = 0; i < MANY; ++i) {
+            const double *s = list + 4 * i;
+            const double d[3] = {-2.0 * s[1] + 7 - position[0], 2.0 * s[2] - 3 - position[1],
+                                 -2.0 * s[0] + 1 - position[2]};
+            const double along = d[0] * towards[0] + d[1] * towards[1] + d[2] * towards[2];
+            const double square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            hidden = hidden || square < 4.0 * s[3] * s[3] ||
+                     (along > 0.0 && square - along * along < 4.0 * s[3] * s[3]);
+        }
+        const vsh_points points = {1, position, NULL, NULL};
+        const vsh_light light = sun(towards, 0.1);
+        vsh_shade_stats stats = vsh_shade_stats_zero();
+        float value = -1.0f;
+        vshi_spheres_shadow(made, &light, VSH_SHADOW_HARD, &points, 0, 1, 0.0, &value, &stats);
+        assert_true(value == (hidden ? 0.0f : 1.0f));
+    }
+    vsh_spheres_free(made);
+    free(list);
+}
+
+static void points_that_are_no_points_are_nan_and_inner_ones_dark(void **state) {
+    (void)state;
+    const double sphere[4] = {0, 0, 0, 1};
+    vsh_spheres *made = spheres_of(sphere, 1, NULL);
+    const double positions[12] = {NAN, 0, 0, 0, 5, 0, 0, 0.3, 0, 0, 5, 0};
+    const float normals[12] = {0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0};
+    static const double up[3] = {0, 1, 0};
+    const vsh_light light = sun(up, 0.1);
+    const vsh_points points = {4, positions, normals, NULL};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    float values[3], ao[3];
+    for (size_t begin = 0; begin < 2; ++begin) {
+        vshi_spheres_shadow(made, &light, VSH_SHADOW_CONE, &points, begin, begin + 3, 0.0, values, &stats);
+        vshi_spheres_ao(made, 1.0, &points, begin, begin + 3, 0.0, ao, NULL, &stats);
+        assert_true(isnan(values[1 - begin]) && isnan(ao[1 - begin]));
+        assert_true(values[2 - begin] == 0.0f && ao[2 - begin] == 0.0f);
+        assert_true(begin == 0 ? isnan(values[0]) && isnan(ao[0]) : values[2] == 1.0f && ao[2] == 1.0f);
+    }
+    vsh_spheres_free(made);
+}
+
+static void bad_spheres_are_refused_by_number(void **state) {
+    (void)state;
+    static const double shear[12] = {1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    double list[8] = {0, 0, 0, 1, 1, 1, 1, 1};
+    vsh_spheres *made = NULL;
+    vsh_error error = {VSH_OK, ""};
+    static const double bad[] = {0.0, -1.0, INFINITY, NAN, 1e16};
+    for (size_t i = 0; i < 5; ++i) {
+        list[7] = bad[i];
+        assert_int_equal(vsh_spheres_create(list, 2, NULL, NULL, &made, &error), VSH_ERROR_INPUT);
+        assert_non_null(strstr(error.message, "sphere 1: radius"));
+        assert_null(made);
+    }
+    list[7] = 1.0;
+    list[1] = NAN;
+    assert_int_equal(vsh_spheres_create(list, 2, NULL, NULL, &made, &error), VSH_ERROR_INPUT);
+    assert_non_null(strstr(error.message, "sphere 0: y nan"));
+    list[1] = 0.0;
+    assert_int_equal(vsh_spheres_create(list, 2, shear, NULL, &made, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_spheres_create(list, 0, NULL, NULL, &made, &error), VSH_ERROR_INPUT);
+    assert_int_equal(vsh_spheres_create(NULL, 2, NULL, NULL, &made, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_spheres_create(list, (size_t)1 << 31, NULL, NULL, &made, &error), VSH_ERROR_LIMIT);
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 150;
+    assert_int_equal(vsh_spheres_create(list, 2, NULL, &run, &made, &error), VSH_ERROR_LIMIT);
+}
+
+static vsh_result read_text(const char *text, double **spheres, size_t *count, vsh_error *error) {
+    char path[] = "spheres-XXXXXX";
+    const int file = mkstemp(path);
+    assert_true(file >= 0);
+    assert_true(write(file, text, strlen(text)) == (ssize_t)strlen(text));
+    close(file);
+    const vsh_result result = vsh_spheres_read(path, NULL, spheres, count, error);
+    unlink(path);
+    return result;
+}
+
+static void rows_of_a_file_are_read_or_refused_by_number(void **state) {
+    (void)state;
+    double *spheres = NULL;
+    size_t count = 0;
+    vsh_error error = {VSH_OK, ""};
+    static const double expected[12] = {1, -2.5, 3e2, 0.5, 4, 5, 6, 7, 0.25, 0, 1, 2};
+    assert_int_equal(read_text("x,y,z,radius\r\n1,-2.5,3e2,0.5\r\n\n# none\n4; 5; 6; 7\n.25 0\t1 2", &spheres,
+                               &count, &error),
+                     VSH_OK);
+    assert_int_equal(count, 3);
+    assert_memory_equal(spheres, expected, sizeof expected);
+    vsh_spheres_list_free(spheres);
+    static const struct {
+        const char *text, *message;
+    } bad[] = {
+        {"1,2,3,4\n1,2,3\n", ":2: '1,2,3': expected four numbers"},
+        {"1,2,3,4\n\n1,2,3,-4\n", ":3: radius -4 is out of range 0 (excluded)"},
+        {"1,2,3,0\n", ":1: radius 0 is out of range"},
+        {"1,2,3,4,5\n", ":1: '1,2,3,4,5': expected four numbers"},
+        {"1,2,3,4\nx,y,z,r\n", ":2: 'x,y,z,r': expected four numbers"},
+        {"1,2,nan,4\n", ":1: '1,2,nan,4': expected four numbers"},
+        {"1,2,1e999,4\n", ":1: z inf is out of range"},
+        {"1,2,0x10,4\n", ":1: '1,2,0x10,4'"},
+        {"1,,2,3,4\n", ":1: '1,,2,3,4'"},
+        {"# nothing\n", ": no spheres"},
+        {"", ": no spheres"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+        assert_int_equal(read_text(bad[i].text, &spheres, &count, &error), VSH_ERROR_INPUT);
+        if (strstr(error.message, bad[i].message) == NULL) {
+            fail_msg("%s: %s", bad[i].message, error.message);
+        }
+        assert_null(spheres);
+    }
+    assert_int_equal(vsh_spheres_read("no such file.csv", NULL, &spheres, &count, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_spheres_read(".", NULL, &spheres, &count, &error), VSH_ERROR_READ);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_sphere_hides_of_a_disc_what_rays_say),
+        cmocka_unit_test(many_spheres_hide_what_rays_say),
+        cmocka_unit_test(of_a_disc_that_the_horizon_cuts_the_rest_counts),
+        cmocka_unit_test(hard_shadows_are_the_rays),
+        cmocka_unit_test(the_classic_method_is_the_nearest_miss),
+        cmocka_unit_test(lamps_are_the_rays_up_to_the_lamp),
+        cmocka_unit_test(ambient_occlusion_is_the_rays),
+        cmocka_unit_test(a_sphere_leaves_its_own_surface_open),
+        cmocka_unit_test(bounds_lose_no_sphere_of_many),
+        cmocka_unit_test(points_that_are_no_points_are_nan_and_inner_ones_dark),
+        cmocka_unit_test(bad_spheres_are_refused_by_number),
+        cmocka_unit_test(rows_of_a_file_are_read_or_refused_by_number),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
