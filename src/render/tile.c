@@ -19,20 +19,22 @@ typedef struct hits {
     float light[VSHI_TILE_SAMPLES][3];
 } hits;
 
-/* The nearest surface before `end`, NULL where there is none. */
-static const vsh_surface *find_surface(const vshi_scenery *scenery, const vshi_eye_ray *ray, double *distance,
-                                       vsh_shade_stats *stats) {
+/* The nearest surface, NULL where there is none or a lit mesh at `lit` stands for it. */
+static const vsh_surface *find_surface(const vshi_scenery *scenery, const vshi_eye_ray *ray, double lit,
+                                       double *distance, vsh_shade_stats *stats) {
     const vsh_surface *nearest = NULL;
-    *distance = INFINITY;
+    *distance = lit;
     for (size_t i = 0; i < scenery->surface_count; ++i) {
-        bool finished;
+        const vsh_surface *surface = &scenery->surfaces[i];
+        const double end = fmin(*distance, lit - SAME * surface->field->voxel_size);
+        bool finished = true;
         const double t =
-            vshi_field_hit(scenery->surfaces[i].field, ray, *distance, &stats->samples, &finished);
+            end > 0.0 ? vshi_field_hit(surface->field, ray, end, &stats->samples, &finished) : end;
         ++stats->marches;
         stats->unfinished += !finished;
-        if (t < *distance) {
+        if (t < end) {
             *distance = t;
-            nearest = &scenery->surfaces[i];
+            nearest = surface;
         }
     }
     return nearest;
@@ -99,13 +101,11 @@ vsh_result vshi_tile_render(const vshi_scenery *scenery, const vshi_rows *rows, 
             const uint32_t texel = (uint32_t)x + 65536u * (uint32_t)y;
             vshi_seen *seen = &rows->seen[at];
             *seen = (vshi_seen){.depth = INFINITY};
-            double distance;
-            const vsh_surface *surface = find_surface(scenery, &ray, &distance, stats);
             const double lit = scenery->lit != NULL ? rows->lit.depth[at] * slant : INFINITY;
-            if (lit < INFINITY && (surface == NULL || lit <= distance + SAME * surface->field->voxel_size)) {
+            double distance;
+            const vsh_surface *surface = find_surface(scenery, &ray, lit, &distance, stats);
+            if (surface == NULL && lit < INFINITY) {
                 vshi_lit_shade(scenery->lit, rows->lit.triangle[at], through, seen->color, seen->normal);
-                surface = NULL;
-                distance = lit;
             }
             if (surface != NULL) {
                 add_hit(scenery, &h, surface, &ray, distance, texel, seen);
