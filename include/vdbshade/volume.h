@@ -103,9 +103,8 @@ typedef struct vsh_volume vsh_volume;
 /* Shades the voxels. Values are those of vsh_query_points() at vsh_voxels_centre(): in free space without
  * normals; in a band with the central differences of vsh_field_sample() half a voxel to either side of the
  * centre along each of the lattice's axes as normals (voxels where they vanish, between two walls, count as
- * inside). Which voxels are inside is decided by the sign of vsh_field_sample(), of the layers too. Beyond
- * the casters' bounds a march's first step depends on what its neighbours prove, so that a few values in
- * penumbrae differ, by up to 0.05; adaptive and exact values within their error. Runs under the stage
+ * inside). Which voxels are inside is decided by the sign of vsh_field_sample(), of the layers too. adaptive and exact
+ * values are the same within their error. Runs under the stage
  * "volume"; `stats` are added to. Free the result with vsh_volume_free(). Errors:
  * - VSH_ERROR_ARGUMENT: field or voxels NULL, lights NULL with a count above 0, nothing to bake, two lights
  *   of one name or one without, options out of range, VSH_AO_TAPS in free space, run, and as

@@ -79,13 +79,26 @@ static void clip_to_bounds(const vsh_field *field, const vshi_cone *cone, double
     }
 }
 
+/* Whether a cone begins where bounds do not make it begin later. */
+static bool within_bounds(const vsh_field *field, const vshi_cone *cone) {
+    const double o[3] = {cone->origin.x, cone->origin.y, cone->origin.z};
+    const double margin = BOUNDS_MARGIN + cone->wide;
+    bool within = true;
+    for (int axis = 0; axis < 3; ++axis) {
+        within = within && o[axis] >= (double)field->bounds_min[axis] - margin &&
+                 o[axis] <= (double)field->bounds_max[axis] + margin;
+    }
+    return within;
+}
+
 bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *cone, uint32_t owner,
                     vsh_shade_stats *stats) {
     double begin = cone->begin > FIRST_STEP ? cone->begin : FIRST_STEP, end = cone->end;
     if (!(begin < end)) {
         return false;
     }
-    if (end > SHORT) {
+    /* what was proved of a cone does not change where it begins, or values would tell its neighbours */
+    if (end > SHORT || (cone->whole > SHORT && !within_bounds(field, cone))) {
         clip_to_bounds(field, cone, &begin, &end);
         if (!(begin < end)) {
             return false;

@@ -26,6 +26,7 @@ typedef struct vshi_cone {
     vshi_vec direction; /* unit */
     double begin;       /* what is before is free; 0 where nothing is known */
     double end;         /* what is after is free; may be infinite, or before `begin` */
+    double whole;       /* of shadows: the end before anything was proved; else 0 */
     double sine;        /* of the half angle; 0: a ray */
     double close;       /* what is known of its closeness already: at most `sine`; 1 for rays */
     double stop;

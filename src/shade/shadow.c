@@ -53,6 +53,7 @@ static bool aim(const vshi_shadow_task *task, size_t i, vshi_vec origin, vshi_co
     if (task->options->method == VSH_SHADOW_HARD) {
         cone->sine = 0.0;
     }
+    cone->whole = cone->end;
     return true;
 }
 
