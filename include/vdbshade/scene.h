@@ -42,6 +42,7 @@ typedef struct vsh_caster {
     const char *text;
     vsh_text_options letters; /* text */
     double thickness;         /* mask, text: along z, local units, > 0 */
+    double color[3];          /* in pictures, linear RGB, 0 … 1; all 0: 0.7, a light grey */
 } vsh_caster;
 
 /* Casters that are shaded in a way of their own. */

@@ -1,7 +1,8 @@
 /* vdbshade: soft shadows and ambient occlusion baked from signed distance fields.
  *
  *     casters ─▶ vsh_grid (level set) ─▶ vsh_field (pyramid) ─▶ vsh_shade_… (points), vsh_query_…
- *                                                            └▶ vsh_bake_…  (lightmaps, volumes)
+ *                                                            ├▶ vsh_bake_…  (lightmaps, volumes)
+ *                                                            └▶ vsh_render  (pictures)
  *
  * World space is right-handed, in scene units; angles are radians. What holds for every call stands in
  * base.h. */
@@ -20,6 +21,7 @@
 #include "mesh.h"
 #include "outline.h"
 #include "query.h"
+#include "render.h"
 #include "scene.h"
 #include "sdf.h"
 #include "shade.h"

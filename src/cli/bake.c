@@ -41,10 +41,9 @@ static int check_files(const cli_bake_settings *settings, const vsh_scene *scene
 
 static int load(bake_work *work) {
     const double start = cli_seconds();
-    vsh_error error;
-    const vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
+    const int code = cli_load_assets(work->scene, &work->run, &work->assets);
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return result == VSH_OK ? cli_warn_meshes(work->scene, work->assets, &work->run) : cli_fail(&error);
+    return code;
 }
 
 static cli_receiver_job receiver_job(const bake_work *work, size_t index) {

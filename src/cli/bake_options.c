@@ -110,7 +110,7 @@ static int take_caster(cli_bake_settings *s, const char *name, const char *value
     return CLI_OK;
 }
 
-int cli_shade_take(cli_bake_settings *s, int key, const char *name, const char *value, bool *taken) {
+static int take_shade(cli_bake_settings *s, int key, const char *name, const char *value, bool *taken) {
     *taken = true;
     switch (key) {
     case CLI_KEY_SUN:
@@ -158,6 +158,13 @@ int cli_shade_take(cli_bake_settings *s, int key, const char *name, const char *
         *taken = false;
         return CLI_OK;
     }
+}
+
+int cli_shared_take(cli_bake_settings *s, int key, const char *name, const char *value) {
+    bool taken;
+    int code = take_shade(s, key, name, value, &taken);
+    code = taken ? code : cli_grid_take(&s->grid, key, name, value, &taken);
+    return taken ? code : cli_common_take(&s->common, key, name, value, &taken);
 }
 
 static int take(void *settings, int key, const char *name, const char *value) {
@@ -213,10 +220,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
     default:
         break;
     }
-    bool taken;
-    int code = cli_shade_take(s, key, name, value, &taken);
-    code = taken ? code : cli_grid_take(&s->grid, key, name, value, &taken);
-    return taken ? code : cli_common_take(&s->common, key, name, value, &taken);
+    return cli_shared_take(s, key, name, value);
 }
 
 int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help) {

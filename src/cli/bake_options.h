@@ -95,8 +95,8 @@ typedef struct cli_bake_settings {
     bool has_rays, has_sampler, has_frame, has_early_rays, has_max_error, has_jitter, error;
 } cli_bake_settings;
 
-/* Takes an option of the tables above; *taken tells whether it was one of them. */
-int cli_shade_take(cli_bake_settings *settings, int key, const char *name, const char *value, bool *taken);
+/* Takes an option of the tables above, of the grid's or of the common ones. */
+int cli_shared_take(cli_bake_settings *settings, int key, const char *name, const char *value);
 
 /* Takes the command line. */
 int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help);
@@ -115,6 +115,9 @@ int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made)
 
 /* The same without its receivers: for points, which may ask for no light and no AO. */
 int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made);
+
+/* Then adds the receivers, with the options put over them. CLI_OK or an exit code, having said why. */
+int cli_bake_scene_receivers(const cli_bake_settings *settings, cli_bake_scene *made);
 
 /* Whether a scene for points has anything to bake: CLI_OK, or CLI_USAGE having said why. */
 int cli_bake_check_work(const cli_bake_settings *settings, const cli_bake_scene *made);

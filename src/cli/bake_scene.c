@@ -67,17 +67,10 @@ static void override_receiver(const cli_bake_settings *s, vsh_receiver *receiver
     }
 }
 
-static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
+int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     const size_t count = made->read != NULL ? made->read->receiver_count : 1;
     if (count == 0) {
-        return cli_usage("%s: no receivers to bake", s->input);
-    }
-    if (made->read == NULL && cli_has_ending(s->input, "vdb")) {
-        return cli_usage("%s: a level set has no UVs to bake a lightmap by; see 'vdbshade volume'", s->input);
-    }
-    if (made->read != NULL && count > 1 && s->output != NULL) {
-        return cli_usage("-o '%s': %s has %zu receivers, each with its own output", s->output, s->input,
-                         count);
+        return CLI_OK;
     }
     made->receivers = calloc(count, sizeof *made->receivers);
     if (made->receivers == NULL) {
@@ -99,13 +92,31 @@ static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
             receiver->ao_spacing = defaults.ao_spacing;
         }
         override_receiver(s, receiver);
-        if (receiver->output == NULL) {
-            return cli_usage("%s: no output; give -o OUT", s->input);
-        }
     }
     made->scene.receivers = made->receivers;
     made->scene.receiver_count = count;
     return CLI_OK;
+}
+
+static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
+    const size_t given = made->read != NULL ? made->read->receiver_count : 1;
+    if (given > 1 && s->output != NULL) {
+        return cli_usage("-o '%s': %s has %zu receivers, each with its own output", s->output, s->input,
+                         given);
+    }
+    if (made->read == NULL && cli_has_ending(s->input, "vdb")) {
+        return cli_usage("%s: a level set has no UVs to bake a lightmap by; see 'vdbshade volume'", s->input);
+    }
+    const int code = cli_bake_scene_receivers(s, made);
+    if (code == CLI_OK && made->scene.receiver_count == 0) {
+        return cli_usage("%s: no receivers to bake", s->input);
+    }
+    for (size_t i = 0; code == CLI_OK && i < made->scene.receiver_count; ++i) {
+        if (made->scene.receivers[i].output == NULL) {
+            return cli_usage("%s: no output; give -o OUT", s->input);
+        }
+    }
+    return code;
 }
 
 static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {

@@ -9,9 +9,11 @@ extern const cli_command cli_voxelize;
 extern const cli_command cli_info;
 extern const cli_command cli_trade;
 extern const cli_command cli_query;
+extern const cli_command cli_render;
 extern const cli_command cli_volume;
 extern const cli_command cli_flat;
 
 int cli_bake_main(int argc, char **argv);
+int cli_render_main(int argc, char **argv);
 
 #endif

@@ -161,6 +161,7 @@ static int make_layers(const making *m, size_t direct) {
         const vsh_scene_layer *of_scene = &m->scene->layers[i];
         cli_layer *own = &made->owned[made->layer_count];
         code = make_one(m, of_scene, &own->field);
+        own->name = of_scene->name;
         if (own->field != NULL) {
             vsh_layer *layer = &made->layers[made->layer_count++];
             code = trace(m->scene, m->assets, of_scene, m->run, &own->triangles);

@@ -14,6 +14,7 @@ void cli_box_grow(cli_box *box, const vsh_texels_info *info); /* by the samples'
 
 /* What a layer refers to. */
 typedef struct cli_layer {
+    const char *name; /* the scene's, which it belongs to */
     vsh_field *field;
     vsh_triangles *triangles;
 } cli_layer;

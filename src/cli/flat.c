@@ -45,10 +45,10 @@ static int flat_main(int argc, char **argv);
 const cli_command cli_flat = {
     "flat",
     "SCENE.json -o OUT [options]",
-    "Bakes a light map of a plane, for 2D games: for each light the share of it that is seen, soft shadows\n"
-    "of areas, images and text included, the irradiance by all, and where solids are. The scene's file is "
-    "one of\n"
-    "its own kind: docs/flat.md. Numbers in brackets are what holds without the option.",
+    "Bakes a light map of a plane, for 2D games: for each light the share of it that is seen, soft\n"
+    "shadows of areas, images and text included, the irradiance by all, and where solids are. The\n"
+    "scene's file is one of its own kind: docs/flat.md. Numbers in brackets are what holds without the\n"
+    "option.",
     options,
     sizeof options / sizeof options[0],
     flat_main};

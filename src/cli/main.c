@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const cli_command *const commands[] = {&cli_bake,  &cli_voxelize, &cli_info, &cli_trade,
-                                              &cli_query, &cli_volume,   &cli_flat};
+                                              &cli_query, &cli_volume,   &cli_flat, &cli_render};
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
 static const char help_text[] =
@@ -22,6 +22,7 @@ static const char help_text[] =
     "  info FILE                 what a mesh, .vdb, scene or image holds, and what is wrong with it\n"
     "  volume INPUT -o OUT.vdb   grids of shadow and AO: a surface's band, a box, a fog's voxels\n"
     "  query INPUT -o OUT        shadow, AO, distance at points of a CSV, a PLY or raw floats\n"
+    "  render INPUT -o OUT       picture of a scene, or a turntable, to look at a bake\n"
     "  flat SCENE -o OUT         light map of a plane, for 2D games\n"
     "  trade INPUT -o OUT.html   error against time by every method, measured on a scene of yours\n"
     "\n"

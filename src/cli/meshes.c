@@ -73,3 +73,9 @@ int cli_warn_meshes(const vsh_scene *scene, const vsh_assets *assets, const vsh_
     }
     return code;
 }
+
+int cli_load_assets(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets) {
+    vsh_error error;
+    return vsh_assets_load(scene, run, assets, &error) == VSH_OK ? cli_warn_meshes(scene, *assets, run)
+                                                                 : cli_fail(&error);
+}

@@ -9,6 +9,9 @@
  * voxeliser. CLI_OK or an exit code, having said why. */
 int cli_warn_meshes(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run);
 
+/* vsh_assets_load(), and the same. */
+int cli_load_assets(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets);
+
 /* Whether a caster is triangles to rays: a mesh, or a heightfield. */
 static inline bool cli_caster_has_triangles(const vsh_caster *caster) {
     return caster->type == VSH_CASTER_MESH || caster->type == VSH_CASTER_HEIGHTFIELD;

@@ -40,7 +40,9 @@ const char *cli_nearest(const char *text, const char *const *candidates, size_t 
 int cli_take_number(const char *name, const char *text, double least, double most, double *value);
 int cli_take_positive(const char *name, const char *text, double *value); /* > 0 */
 int cli_take_integer(const char *name, const char *text, int32_t least, int32_t most, int32_t *value);
-int cli_take_vector(const char *name, const char *text, double value[3]);           /* X,Y,Z */
+int cli_take_vector(const char *name, const char *text, double value[3]);           /* X,Y,Z, not all 0 */
+int cli_take_point(const char *name, const char *text, double value[3]);            /* X,Y,Z */
+int cli_take_color(const char *name, const char *text, double value[3]);            /* R,G,B, >= 0 */
 int cli_take_box(const char *name, const char *text, double min[3], double max[3]); /* X0,Y0,Z0,X1,Y1,Z1 */
 int cli_take_size(const char *name, const char *text, int32_t *w, int32_t *h);      /* W[xH] */
 int cli_take_bytes(const char *name, const char *text, uint64_t *value);            /* 500M, 2GiB */

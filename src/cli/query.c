@@ -115,10 +115,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
     default:
         break;
     }
-    bool taken;
-    int code = cli_shade_take(&s->bake, key, name, value, &taken);
-    code = taken ? code : cli_grid_take(&s->bake.grid, key, name, value, &taken);
-    return taken ? code : cli_common_take(&s->bake.common, key, name, value, &taken);
+    return cli_shared_take(&s->bake, key, name, value);
 }
 
 static bool is_standard(const char *path) {
@@ -214,10 +211,9 @@ static int choose_answers(query_work *work) {
 
 static int load(query_work *work) {
     const double start = cli_seconds();
-    vsh_error error;
-    const vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
+    const int code = cli_load_assets(work->scene, &work->run, &work->assets);
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return result == VSH_OK ? cli_warn_meshes(work->scene, work->assets, &work->run) : cli_fail(&error);
+    return code;
 }
 
 static int make_query(query_work *work) {

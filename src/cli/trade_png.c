@@ -1,5 +1,7 @@
 #include "trade_png.h"
 
+#include "base64.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,43 +9,16 @@ enum { MOST = 255, STORED_MOST = 65535 };
 
 /* A PNG grown byte by byte, turned into base64 on the way out. */
 typedef struct writer {
-    FILE *out;
+    cli_base64 to;
     uint32_t crc;
-    uint32_t held; /* of three bytes that wait for base64 */
-    int holding;
 } writer;
-
-static void put_base64(writer *w, uint8_t byte) {
-    static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    w->held = w->held << 8 | byte;
-    if (++w->holding == 3) {
-        for (int shift = 18; shift >= 0; shift -= 6) {
-            fputc(letters[w->held >> shift & 63], w->out);
-        }
-        w->held = 0;
-        w->holding = 0;
-    }
-}
-
-static void end_base64(writer *w) {
-    const int rest = w->holding;
-    if (rest == 0) {
-        return;
-    }
-    static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    const uint32_t held = w->held << (8 * (3 - rest));
-    for (int i = 0; i <= rest; ++i) {
-        fputc(letters[held >> (18 - 6 * i) & 63], w->out);
-    }
-    fputs(rest == 1 ? "==" : "=", w->out);
-}
 
 static void put(writer *w, uint8_t byte) {
     w->crc ^= byte;
     for (int bit = 0; bit < 8; ++bit) {
         w->crc = w->crc >> 1 ^ (0xedb88320u & (0u - (w->crc & 1u)));
     }
-    put_base64(w, byte);
+    cli_base64_put(&w->to, byte);
 }
 
 static void put_word(writer *w, uint32_t word) {
@@ -99,7 +74,7 @@ void trade_png_write(FILE *out, int width, int height, const uint8_t *pixels, co
     }
     fprintf(out, "<img alt=\"%s\" width=\"%d\" height=\"%d\" src=\"data:image/png;base64,", alt, width,
             height);
-    writer w = {.out = out};
+    writer w = {.to = {.out = out}};
     for (size_t i = 0; i < sizeof signature; ++i) {
         put(&w, signature[i]);
     }
@@ -108,7 +83,7 @@ void trade_png_write(FILE *out, int width, int height, const uint8_t *pixels, co
     put_chunk(&w, "PLTE", &palette[0][0], 768);
     put_chunk(&w, "IDAT", bytes, store(width, height, pixels, bytes));
     put_chunk(&w, "IEND", bytes, 0);
-    end_base64(&w);
+    cli_base64_end(&w.to);
     fputs("\">", out);
     free(bytes);
 }

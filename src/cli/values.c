@@ -62,26 +62,40 @@ int cli_take_integer(const char *name, const char *text, int32_t least, int32_t 
     return CLI_OK;
 }
 
-int cli_take_vector(const char *name, const char *text, double value[3]) {
+static bool read_numbers(const char *text, int count, double *value) {
     const char *at = text;
     bool good = true;
-    for (int i = 0; i < 3 && good; ++i) {
-        good = read_number(at, &value[i], &at) && *at == (i < 2 ? ',' : '\0');
+    for (int i = 0; i < count && good; ++i) {
+        good = read_number(at, &value[i], &at) && *at == (i + 1 < count ? ',' : '\0');
         ++at;
     }
-    if (!good || (value[0] == 0.0 && value[1] == 0.0 && value[2] == 0.0)) {
+    return good;
+}
+
+int cli_take_vector(const char *name, const char *text, double value[3]) {
+    if (!read_numbers(text, 3, value) || (value[0] == 0.0 && value[1] == 0.0 && value[2] == 0.0)) {
         return cli_usage("%s '%s': expected X,Y,Z, three numbers that are not all 0", name, text);
     }
     return CLI_OK;
 }
 
-int cli_take_box(const char *name, const char *text, double min[3], double max[3]) {
-    const char *at = text;
-    bool good = true;
-    for (int i = 0; i < 6 && good; ++i) {
-        good = read_number(at, i < 3 ? &min[i] : &max[i - 3], &at) && *at == (i < 5 ? ',' : '\0');
-        ++at;
+int cli_take_point(const char *name, const char *text, double value[3]) {
+    return read_numbers(text, 3, value) ? CLI_OK
+                                        : cli_usage("%s '%s': expected X,Y,Z, three numbers", name, text);
+}
+
+int cli_take_color(const char *name, const char *text, double value[3]) {
+    if (!read_numbers(text, 3, value) || value[0] < 0.0 || value[1] < 0.0 || value[2] < 0.0) {
+        return cli_usage("%s '%s': expected R,G,B, three numbers from 0", name, text);
     }
+    return CLI_OK;
+}
+
+int cli_take_box(const char *name, const char *text, double min[3], double max[3]) {
+    double value[6] = {0.0};
+    const bool good = read_numbers(text, 6, value);
+    memcpy(min, value, 3 * sizeof *min);
+    memcpy(max, value + 3, 3 * sizeof *max);
     if (!good || !(min[0] < max[0] && min[1] < max[1] && min[2] < max[2])) {
         return cli_usage(
             "%s '%s': expected X0,Y0,Z0,X1,Y1,Z1, the second corner above the first on every axis", name,

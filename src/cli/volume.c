@@ -112,10 +112,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
     default:
         break;
     }
-    bool taken;
-    int code = cli_shade_take(&s->bake, key, name, value, &taken);
-    code = taken ? code : cli_grid_take(&s->bake.grid, key, name, value, &taken);
-    return taken ? code : cli_common_take(&s->bake.common, key, name, value, &taken);
+    return cli_shared_take(&s->bake, key, name, value);
 }
 
 static int check_options(const volume_settings *s) {

@@ -99,10 +99,9 @@ static int voxelize(const voxelize_settings *s, const vsh_scene *scene) {
     vsh_assets *assets = NULL;
     vsh_grid *grid = NULL;
     vsh_error error;
-    vsh_result result = vsh_assets_load(scene, &run, &assets, &error);
-    int code = result == VSH_OK ? cli_warn_meshes(scene, assets, &run) : cli_fail(&error);
+    int code = cli_load_assets(scene, &run, &assets);
     if (code == CLI_OK) {
-        result = vsh_scene_casters(scene, assets, &run, &grid, &error);
+        const vsh_result result = vsh_scene_casters(scene, assets, &run, &grid, &error);
         code = result == VSH_OK ? write_grid(s, grid) : cli_fail(&error);
     }
     if (code == CLI_OK) {

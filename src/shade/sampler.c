@@ -231,8 +231,7 @@ static void turn(double part, double point[2]) {
     point[1] = y;
 }
 
-static void blue_point(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t index,
-                       double point[2]) {
+double vshi_sampler_mask(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose) {
     static const double GOLDEN = 0.61803398874989485;
     /* each purpose reads the mask from another place, and each frame has its ranks moved on by the golden
      * ratio */
@@ -240,9 +239,14 @@ static void blue_point(const vshi_sampler *sampler, uint32_t texel, uint32_t pur
     const uint32_t column = ((texel & 0xffffu) + shift) % MASK_EDGE,
                    row = ((texel >> 16) + (shift >> 16)) % MASK_EDGE;
     const double part = (double)sampler->mask[row][column] + GOLDEN * (double)sampler->frame;
+    return part - floor(part);
+}
+
+static void blue_point(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t index,
+                       double point[2]) {
     point[0] = sampler->points[index][0];
     point[1] = sampler->points[index][1];
-    turn(part - floor(part), point);
+    turn(vshi_sampler_mask(sampler, texel, purpose), point);
 }
 
 /* --- the sampler */

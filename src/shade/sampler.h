@@ -19,4 +19,7 @@ void vshi_sampler_free(vshi_sampler *sampler); /* NULL does nothing */
 void vshi_sampler_disc(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t first,
                        int32_t count, double (*points)[2]);
 
+/* Blue noise: a number in [0, 1) that neighbouring texels have far apart. Of VSH_SAMPLER_BLUE. */
+double vshi_sampler_mask(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose);
+
 #endif

@@ -1,4 +1,5 @@
-# Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md and docs/volume.md runs.
+# Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/volume.md and
+# docs/render.md runs.
 load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
@@ -71,5 +72,12 @@ run_commands() {
     DOCS=. run_commands volume.md 3
     for made in band box lit; do
         "$VDBSHADE" info $made.vdb | grep -q "grid 'shadow.sun'" || fail "$made.vdb"
+    done
+}
+
+@test "every command of docs/render.md" {
+    run_commands render.md 7
+    for made in view.png court.png baked.png turn.html turn_03.png shafts.exr; do
+        [ -s "$made" ] || fail "no $made"
     done
 }

@@ -1,0 +1,245 @@
+/* vdbshade render: pictures of a scene, to look at what bake makes of it. */
+#include "render.h"
+#include "clock.h"
+#include "meshes.h"
+#include "message.h"
+#include "overall.h"
+#include "paths.h"
+#include "progress.h"
+#include "signals.h"
+#include "stats.h"
+#include "trial.h"
+
+#include <inttypes.h>
+#include <limits.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static const double degree = 0.017453292519943295;
+/* A three-quarter view from a little above. */
+static const double azimuth_deg = 35.0, elevation_deg = 25.0;
+
+typedef struct render_work {
+    const render_settings *settings;
+    vsh_scene *scene;
+    vsh_run run;
+    vsh_assets *assets;
+    vsh_triangles *triangles;
+    cli_field made;
+    render_surfaces surfaces;
+    render_lightmaps lightmaps;
+    vsh_render_options options;
+    render_picture picture;
+    render_page *page;
+    cli_stats stats;
+} render_work;
+
+static int load(render_work *work) {
+    const double start = cli_seconds();
+    int code = cli_load_assets(work->scene, &work->run, &work->assets);
+    code = code == CLI_OK ? render_lightmaps_read(work->settings, work->scene, work->assets, &work->lightmaps)
+                          : code;
+    cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
+    return code;
+}
+
+static int make_fields(render_work *work) {
+    double start = cli_seconds();
+    int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
+    cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
+    code = code == CLI_OK ? cli_field_make_around(work->scene, work->assets, 0.0, &work->run, &work->made)
+                          : code;
+    work->stats.grid = work->made.grid;
+    work->stats.field = work->made.info;
+    work->stats.seconds[CLI_STAGE_VOXELIZE] += work->made.voxelize_s;
+    work->stats.seconds[CLI_STAGE_FIELD] += work->made.field_s;
+    start = cli_seconds();
+    code = code == CLI_OK
+               ? render_surfaces_make(work->scene, work->assets, &work->made, &work->run, &work->surfaces)
+               : code;
+    cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
+    return code;
+}
+
+static int place_camera(render_work *work) {
+    const render_settings *s = work->settings;
+    const render_surfaces *seen = &work->surfaces;
+    vsh_camera *camera = &work->options.camera;
+    vsh_error error;
+    memcpy(camera->up, s->up, sizeof camera->up);
+    camera->fov = s->fov_deg * degree;
+    vsh_result result =
+        vsh_camera_frame(camera, seen->bounds_min, seen->bounds_max, azimuth_deg * degree,
+                         elevation_deg * degree, (double)s->width / (double)s->height, &error);
+    if (s->has_camera) {
+        memcpy(camera->position, s->camera, sizeof camera->position);
+    }
+    if (s->has_look_at) {
+        memcpy(camera->target, s->look_at, sizeof camera->target);
+    }
+    result = result == VSH_OK ? vsh_camera_check(camera, &error) : result;
+    if (result != VSH_OK) {
+        return cli_fail(&error);
+    }
+    vsh_camera_orbit(camera, s->orbit_deg * degree);
+    return CLI_OK;
+}
+
+static int set_options(render_work *work) {
+    const render_settings *s = work->settings;
+    vsh_render_options *o = &work->options;
+    *o = vsh_render_options_default();
+    o->width = s->width;
+    o->height = s->height;
+    o->samples = s->samples;
+    o->ao = work->scene->ao;
+    memcpy(o->sky, s->has_sky || !work->scene->has_ambient ? s->sky : work->scene->ambient, sizeof o->sky);
+    o->tint = work->scene->tint;
+    memcpy(o->background, s->background, sizeof o->background);
+    o->shafts = s->shafts;
+    o->shaft_steps = s->shaft_steps;
+    o->lit = work->lightmaps.lit;
+    o->lit_count = work->lightmaps.count;
+    o->shade = work->scene->shade;
+    o->shade.triangles = work->triangles;
+    o->shade.layers = work->made.layers;
+    o->shade.layer_count = work->made.layer_count;
+    if (!work->scene->ao) {
+        o->shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
+    }
+    return place_camera(work);
+}
+
+static int render_frame(render_work *work, int32_t index, const vsh_run *run) {
+    const render_settings *s = work->settings;
+    double start = cli_seconds();
+    vsh_error error;
+    vsh_render_options o = work->options;
+    if (s->frames > 0) {
+        vsh_camera_orbit(&o.camera, 360.0 * degree * index / s->frames);
+    }
+    const vsh_result result =
+        vsh_render(work->surfaces.surfaces, work->surfaces.count, work->made.field, work->scene->lights,
+                   work->scene->light_count, &o, run, &work->picture.picture, &work->stats.shade, &error);
+    start = cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
+    if (result != VSH_OK) {
+        return cli_fail(&error);
+    }
+    work->stats.points += (uint64_t)s->width * (uint64_t)s->height * (uint64_t)(s->samples * s->samples);
+    char path[PATH_MAX];
+    render_output_path(s, index, path, sizeof path);
+    const int code =
+        s->page ? render_page_add(work->page, &work->picture) : render_output_write(s, &work->picture, path);
+    cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
+    return code;
+}
+
+static int render_frames(render_work *work) {
+    const render_settings *s = work->settings;
+    const int32_t count = s->frames > 0 ? s->frames : 1;
+    int code = render_picture_create(s, &work->picture);
+    if (code == CLI_OK && s->page) {
+        work->page = render_page_begin(s);
+        code = work->page != NULL ? CLI_OK : cli_out_of_memory("page");
+    }
+    cli_overall overall;
+    cli_overall_begin(&overall, &work->run, "render", 1);
+    for (int32_t i = 0; i < count && code == CLI_OK; ++i) {
+        const vsh_run run = cli_overall_round(&overall, 1.0 / count);
+        code = render_frame(work, i, &run);
+        cli_overall_next(&overall);
+    }
+    if (code == CLI_OK && s->page) {
+        const double start = cli_seconds();
+        code = render_page_end(work->page);
+        work->page = NULL;
+        cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
+    }
+    return code;
+}
+
+static void say_results(const render_work *work) {
+    const render_settings *s = work->settings;
+    if (s->bake.common.quiet) {
+        return;
+    }
+    if (work->stats.shade.unfinished > 0) {
+        cli_say("warning: %" PRIu64 " rays ran out of steps", work->stats.shade.unfinished);
+    }
+    const double *at = work->options.camera.position, *to = work->options.camera.target;
+    cli_say("%s: %d × %d, camera %.5g,%.5g,%.5g looking at %.5g,%.5g,%.5g", s->bake.output, s->width,
+            s->height, at[0], at[1], at[2], to[0], to[1], to[2]);
+    cli_stats_say(&work->stats);
+}
+
+static int run_render(const render_settings *s, vsh_scene *scene) {
+    render_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
+    work.stats.of = CLI_STATS_POINTS;
+    work.stats.shade = vsh_shade_stats_zero();
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    work.stats.threads = s->bake.common.threads > 0 ? s->bake.common.threads : (int32_t)cores;
+    int code = load(&work);
+    code = code == CLI_OK ? make_fields(&work) : code;
+    code = code == CLI_OK ? set_options(&work) : code;
+    code = code == CLI_OK ? render_frames(&work) : code;
+    if (code == CLI_OK && s->bake.stats != NULL) {
+        cli_signals_writing(s->bake.stats);
+        code = cli_stats_write(&work.stats, s->bake.stats);
+        cli_signals_writing(NULL);
+    }
+    if (code == CLI_OK) {
+        cli_signals_end();
+        say_results(&work);
+    }
+    render_page_abandon(work.page);
+    render_picture_free(&work.picture);
+    render_lightmaps_free(&work.lightmaps);
+    render_surfaces_free(&work.surfaces);
+    cli_field_free(&work.made);
+    vsh_triangles_free(work.triangles);
+    vsh_assets_free(work.assets);
+    return code;
+}
+
+/* What can be refused before anything is read but the scene. */
+static int check_files(const render_settings *s, const vsh_scene *scene) {
+    const int32_t count = s->frames > 0 && !s->page ? s->frames : 1;
+    int code = CLI_OK;
+    for (int32_t i = 0; i < count && code == CLI_OK; ++i) {
+        char path[PATH_MAX];
+        render_output_path(s, i, path, sizeof path);
+        code = cli_bake_check_output(&s->bake, scene, path);
+    }
+    if (code == CLI_OK && s->bake.stats != NULL) {
+        code = cli_bake_check_output(&s->bake, scene, s->bake.stats);
+    }
+    if (code == CLI_OK && scene->light_count == 0 && !scene->ao && s->lightmap_count == 0) {
+        return cli_usage("%s: no lights and no ao; give --sun X,Y,Z or --ao DISTANCE, or both",
+                         s->bake.input);
+    }
+    return code == CLI_OK ? cli_trial_casters(scene, s->bake.common.memory_limit) : code;
+}
+
+int cli_render_main(int argc, char **argv) {
+    render_settings s;
+    bool help;
+    int code = render_parse(argc, argv, &s, &help);
+    if (code != CLI_OK || help) {
+        return code;
+    }
+    cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
+    cli_bake_scene made;
+    code = cli_bake_scene_for_points(&s.bake, &made);
+    if (code == CLI_OK && s.lightmap_count > 0) {
+        code = cli_bake_scene_receivers(&s.bake, &made);
+    }
+    code = code == CLI_OK ? check_files(&s, &made.scene) : code;
+    if (code == CLI_OK) {
+        cli_signals_watch();
+        code = run_render(&s, &made.scene);
+    }
+    cli_bake_scene_free(&made);
+    cli_progress_end();
+    return code;
+}

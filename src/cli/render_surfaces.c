@@ -1,0 +1,164 @@
+/* Which casters have which colour: a field for each. Those of a layer are all in one field, which knows
+ * nothing of casters; where they differ in colour, each colour gets a field of its own, for camera rays
+ * alone. */
+#include "meshes.h"
+#include "message.h"
+#include "render.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double default_color = 0.7;
+
+void render_color_of(const vsh_caster *caster, double color[3]) {
+    const bool given =
+        caster != NULL && (caster->color[0] > 0.0 || caster->color[1] > 0.0 || caster->color[2] > 0.0);
+    for (int c = 0; c < 3; ++c) {
+        color[c] = given ? caster->color[c] : default_color;
+    }
+}
+
+/* Whether the same field can show both. */
+static bool same_color(const vsh_caster *a, const vsh_caster *b) {
+    double one[3], other[3];
+    if (cli_caster_is_direct(a) != cli_caster_is_direct(b)) {
+        return false;
+    }
+    render_color_of(a, one);
+    render_color_of(b, other);
+    return memcmp(one, other, sizeof one) == 0;
+}
+
+static bool same_layer(const char *a, const char *b) {
+    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
+}
+
+/* Caster `index`'s group: that of the first caster in its layer of its colour. */
+static size_t group_of(const vsh_scene *scene, size_t index) {
+    const vsh_caster *caster = &scene->casters[index];
+    size_t first = 0;
+    while (!same_layer(scene->casters[first].layer, caster->layer) ||
+           !same_color(&scene->casters[first], caster)) {
+        ++first;
+    }
+    return first;
+}
+
+/* The field of a layer, or (NULL) of casters in none. */
+static const vsh_field *field_of(const cli_field *made, const char *layer) {
+    const vsh_field *field = layer == NULL ? made->field : NULL;
+    for (size_t l = 0; layer != NULL && field == NULL && l < made->layer_count; ++l) {
+        const cli_layer *own = &made->owned[l];
+        field = own->field != NULL && strcmp(own->name, layer) == 0 ? own->field : NULL;
+    }
+    return field;
+}
+
+/* Whether all casters of a layer have one colour, and are in its field. */
+static bool is_plain(const vsh_scene *scene, const char *layer) {
+    const vsh_caster *first = NULL;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        if (same_layer(caster->layer, layer)) {
+            first = first == NULL ? caster : first;
+            if (cli_caster_is_direct(caster) || !same_color(first, caster)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+static void add(render_surfaces *s, const vsh_field *field, const vsh_caster *caster) {
+    vsh_surface *surface = &s->surfaces[s->count++];
+    surface->field = field;
+    render_color_of(caster, surface->color);
+    vsh_field_info info;
+    vsh_field_get_info(field, &info);
+    for (int axis = 0; axis < 3; ++axis) {
+        s->bounds_min[axis] = fmin(s->bounds_min[axis], info.bounds_min[axis]);
+        s->bounds_max[axis] = fmax(s->bounds_max[axis], info.bounds_max[axis]);
+    }
+}
+
+/* Casters of a scene that is split by colours: a group is a layer. */
+typedef struct split {
+    vsh_caster *casters;
+    vsh_scene_layer *layers;
+    char (*names)[24];
+    size_t *first; /* caster of each layer */
+    size_t count;
+} split;
+
+static int make_split(const vsh_scene *scene, const vsh_assets *assets, const cli_field *made,
+                      const vsh_run *run, split *p, render_surfaces *s) {
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const vsh_field *field = field_of(made, scene->casters[i].layer);
+        const size_t group = group_of(scene, i);
+        p->casters[i] = scene->casters[i];
+        snprintf(p->names[i], sizeof p->names[i], "%zu", group);
+        p->casters[i].layer = p->names[i];
+        if (group == i && is_plain(scene, scene->casters[i].layer)) {
+            add(s, field, &scene->casters[i]);
+        } else if (group == i) {
+            vsh_field_info info = {.voxel_size = 0.0}; /* the scene's, or by its resolution */
+            if (!cli_caster_is_direct(&scene->casters[i])) {
+                vsh_field_get_info(field, &info);
+            }
+            p->first[p->count] = i;
+            p->layers[p->count++] = (vsh_scene_layer){
+                .name = p->names[i], .voxel_size = info.voxel_size, .shade = vsh_layer_default()};
+        }
+    }
+    if (p->count == 0) {
+        return CLI_OK;
+    }
+    vsh_scene colored = *scene;
+    colored.casters = p->casters;
+    colored.layers = p->layers;
+    colored.layer_count = p->count;
+    colored.light_count = 0;
+    colored.ao = 0;
+    bool direct = false;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        direct = direct || cli_caster_is_direct(&p->casters[i]);
+        p->casters[i].direct = 0;
+        p->casters[i].voxelised = 1;
+    }
+    vsh_assets *again = NULL; /* what is direct was not read as something to voxelise */
+    int code = direct ? cli_load_assets(&colored, run, &again) : CLI_OK;
+    code =
+        code == CLI_OK ? cli_field_make_around(&colored, direct ? again : assets, 0.0, run, &s->own) : code;
+    vsh_assets_free(again);
+    for (size_t k = 0; code == CLI_OK && k < s->own.layer_count; ++k) {
+        add(s, s->own.layers[k].field, &scene->casters[p->first[k]]);
+    }
+    return code;
+}
+
+int render_surfaces_make(const vsh_scene *scene, const vsh_assets *assets, const cli_field *made,
+                         const vsh_run *run, render_surfaces *s) {
+    *s = (render_surfaces){.bounds_min = {INFINITY, INFINITY, INFINITY},
+                           .bounds_max = {-INFINITY, -INFINITY, -INFINITY}};
+    const size_t count = scene->caster_count;
+    split p = {.casters = calloc(count, sizeof *p.casters),
+               .layers = calloc(count, sizeof *p.layers),
+               .names = calloc(count, sizeof *p.names),
+               .first = calloc(count, sizeof *p.first)};
+    s->surfaces = calloc(count, sizeof *s->surfaces);
+    const bool room =
+        p.casters != NULL && p.layers != NULL && p.names != NULL && p.first != NULL && s->surfaces != NULL;
+    const int code = room ? make_split(scene, assets, made, run, &p, s) : cli_out_of_memory("surfaces");
+    free(p.first);
+    free(p.names);
+    free(p.layers);
+    free(p.casters);
+    return code;
+}
+
+void render_surfaces_free(render_surfaces *s) {
+    cli_field_free(&s->own);
+    free(s->surfaces);
+}

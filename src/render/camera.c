@@ -1,0 +1,140 @@
+#include "render/camera.h"
+
+#include "base/error.h"
+#include "base/floats.h"
+#include "base/job.h"
+
+#include <string.h>
+
+static const double FOV_LEAST = 0.001, FOV_MOST = 3.0;
+/* Sine of the angle between view and up below which there is no telling what is up. */
+static const double PARALLEL = 1e-6;
+/* Of the picture's edge that a framed box leaves free. */
+static const double MARGIN = 1.06;
+
+static vsh_result check_vector(const char *name, const double v[3], vsh_error *error) {
+    return vshi_finite(vshi_vec_of(v))
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: %s (%g, %g, %g) is not finite", name, v[0],
+                           v[1], v[2]);
+}
+
+/* What does not concern where the camera is. */
+static vsh_result check_lens(const vsh_camera *camera, vsh_error *error) {
+    const double *up = camera->up;
+    vsh_result result = check_vector("up", up, error);
+    if (result == VSH_OK && up[0] == 0.0 && up[1] == 0.0 && up[2] == 0.0) {
+        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: up is (0, 0, 0)");
+    }
+    if (result == VSH_OK && !(camera->fov >= FOV_LEAST && camera->fov <= FOV_MOST)) {
+        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: fov %g is out of range %g … %g", camera->fov,
+                           FOV_LEAST, FOV_MOST);
+    }
+    return result;
+}
+
+/* Copies the caller's struct over defaults. */
+static vsh_result resolve(const vsh_camera *camera, vsh_camera *full, vsh_error *error) {
+    *full = vsh_camera_default();
+    return camera == NULL ? vshi_fail(error, VSH_ERROR_ARGUMENT, "camera is NULL")
+                          : vshi_options_resolve(camera, full, sizeof *full, "vsh_camera", error);
+}
+
+vsh_result vsh_camera_check(const vsh_camera *camera, vsh_error *error) {
+    VSHI_FLOATS;
+    vsh_camera full;
+    vsh_result result = resolve(camera, &full, error);
+    result = result == VSH_OK ? check_vector("position", full.position, error) : result;
+    result = result == VSH_OK ? check_vector("target", full.target, error) : result;
+    result = result == VSH_OK ? check_lens(&full, error) : result;
+    if (result != VSH_OK) {
+        return result;
+    }
+    const vshi_vec view = vshi_unit(vshi_sub(vshi_vec_of(full.target), vshi_vec_of(full.position)));
+    if (!(vshi_dot(view, view) > 0.5)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: position and target are both (%g, %g, %g)",
+                         full.position[0], full.position[1], full.position[2]);
+    }
+    const vshi_vec across = vshi_cross(view, vshi_unit(vshi_vec_of(full.up)));
+    if (!(vshi_length(across) > PARALLEL)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: up (%g, %g, %g) lies along the view", full.up[0],
+                         full.up[1], full.up[2]);
+    }
+    return VSH_OK;
+}
+
+/* Two horizontal axes: to the front, where azimuths begin, and to the right of who looks back from there. */
+static void horizon(vshi_vec up, vshi_vec *front, vshi_vec *right) {
+    const vshi_vec z = {0.0, 0.0, 1.0}, y = {0.0, -1.0, 0.0};
+    const vshi_vec wish = fabs(up.z) < 0.9 ? z : y;
+    *front = vshi_unit(vshi_sub(wish, vshi_scale(up, vshi_dot(wish, up))));
+    *right = vshi_cross(up, *front);
+}
+
+vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], const double bounds_max[3],
+                            double azimuth, double elevation, double aspect, vsh_error *error) {
+    VSHI_FLOATS;
+    vsh_camera full;
+    vsh_result result = resolve(camera, &full, error);
+    result = result == VSH_OK ? check_lens(&full, error) : result;
+    if (result != VSH_OK) {
+        return result;
+    }
+    const vshi_vec low = vshi_vec_of(bounds_min), high = vshi_vec_of(bounds_max);
+    const vshi_vec size = vshi_sub(high, low);
+    if (!vshi_finite(low) || !vshi_finite(high) || !vshi_finite(size) || size.x < 0.0 || size.y < 0.0 ||
+        size.z < 0.0 || !(vshi_length(size) > 0.0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "camera: the box from (%g, %g, %g) to (%g, %g, %g) is none", low.x, low.y, low.z,
+                         high.x, high.y, high.z);
+    }
+    if (!isfinite(azimuth) || !(fabs(elevation) <= 1.57) || !(aspect > 0.0) || !isfinite(aspect)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "camera: azimuth %g, elevation %g, aspect %g: expected a number, -1.57 … 1.57 and a "
+                         "number above 0",
+                         azimuth, elevation, aspect);
+    }
+    const vshi_vec up = vshi_unit(vshi_vec_of(full.up));
+    vshi_vec front, right;
+    horizon(up, &front, &right);
+    const vshi_vec level = vshi_add(vshi_scale(front, cos(azimuth)), vshi_scale(right, sin(azimuth)));
+    const vshi_vec back = vshi_add(vshi_scale(level, cos(elevation)), vshi_scale(up, sin(elevation)));
+    const vshi_vec across = vshi_unit(vshi_cross(up, back)), over = vshi_cross(back, across);
+    const double tangent = tan(0.5 * full.fov) / MARGIN;
+    double away = 0.0;
+    for (int corner = 0; corner < 8; ++corner) {
+        const vshi_vec c = {(corner & 1 ? 0.5 : -0.5) * size.x, (corner & 2 ? 0.5 : -0.5) * size.y,
+                            (corner & 4 ? 0.5 : -0.5) * size.z};
+        const double tall = fabs(vshi_dot(c, over)), wide = fabs(vshi_dot(c, across)) / aspect;
+        away = fmax(away, vshi_dot(c, back) + fmax(tall, wide) / tangent);
+    }
+    const vshi_vec middle = vshi_add(low, vshi_scale(size, 0.5));
+    const vshi_vec eye = vshi_add(middle, vshi_scale(back, away));
+    const double position[3] = {eye.x, eye.y, eye.z}, target[3] = {middle.x, middle.y, middle.z};
+    memcpy(camera->position, position, sizeof position);
+    memcpy(camera->target, target, sizeof target);
+    return VSH_OK;
+}
+
+/* Rodrigues' rotation. */
+void vsh_camera_orbit(vsh_camera *camera, double angle) {
+    VSHI_FLOATS;
+    const vshi_vec axis = vshi_unit(vshi_vec_of(camera->up)), target = vshi_vec_of(camera->target);
+    const vshi_vec arm = vshi_sub(vshi_vec_of(camera->position), target);
+    const double c = cos(angle), s = sin(angle);
+    const vshi_vec turned = vshi_add(vshi_add(vshi_scale(arm, c), vshi_scale(vshi_cross(axis, arm), s)),
+                                     vshi_scale(axis, vshi_dot(axis, arm) * (1.0 - c)));
+    const vshi_vec at = vshi_add(target, turned);
+    const double position[3] = {at.x, at.y, at.z};
+    memcpy(camera->position, position, sizeof position);
+}
+
+vshi_view_frame vshi_camera_frame(const vsh_camera *camera, int32_t width, int32_t height) {
+    vshi_view_frame frame = {.eye = vshi_vec_of(camera->position), .middle = {0.5 * width, 0.5 * height}};
+    frame.forward = vshi_unit(vshi_sub(vshi_vec_of(camera->target), frame.eye));
+    const double pixel = 2.0 * tan(0.5 * camera->fov) / height;
+    const vshi_vec right = vshi_unit(vshi_cross(frame.forward, vshi_unit(vshi_vec_of(camera->up))));
+    frame.right = vshi_scale(right, pixel);
+    frame.down = vshi_scale(vshi_cross(frame.forward, right), pixel);
+    return frame;
+}

@@ -1,0 +1,127 @@
+#include "render/tile.h"
+
+#include "render/hit.h"
+#include "shade/shade.h"
+
+/* How much nearer than a lit mesh a surface of the same shape may be, its voxels. */
+static const double SAME = 1.5;
+
+/* The hits on surfaces in a tile, to be shaded together. */
+typedef struct hits {
+    size_t count;
+    vshi_seen *seen[VSHI_TILE_SAMPLES];
+    const vsh_surface *surface[VSHI_TILE_SAMPLES];
+    double positions[VSHI_TILE_SAMPLES][3];
+    float normals[VSHI_TILE_SAMPLES][3];
+    uint32_t texels[VSHI_TILE_SAMPLES];
+    float visibility[VSHI_TILE_SAMPLES];
+    float ao[VSHI_TILE_SAMPLES];
+    float light[VSHI_TILE_SAMPLES][3];
+} hits;
+
+/* The nearest surface, NULL where there is none or a lit mesh at `lit` stands for it. */
+static const vsh_surface *find_surface(const vshi_scenery *scenery, const vshi_eye_ray *ray, double lit,
+                                       double *distance, vsh_shade_stats *stats) {
+    const vsh_surface *nearest = NULL;
+    *distance = lit;
+    for (size_t i = 0; i < scenery->surface_count; ++i) {
+        const vsh_surface *surface = &scenery->surfaces[i];
+        const double end = fmin(*distance, lit - SAME * surface->field->voxel_size);
+        bool finished = true;
+        const double t =
+            end > 0.0 ? vshi_field_hit(surface->field, ray, end, &stats->samples, &finished) : end;
+        ++stats->marches;
+        stats->unfinished += !finished;
+        if (t < end) {
+            *distance = t;
+            nearest = surface;
+        }
+    }
+    return nearest;
+}
+
+static void add_hit(const vshi_scenery *scenery, hits *h, const vsh_surface *surface, const vshi_eye_ray *ray,
+                    double distance, uint32_t texel, vshi_seen *seen) {
+    const size_t i = h->count++;
+    const vshi_vec at = vshi_add(ray->origin, vshi_scale(ray->direction, distance));
+    const vshi_vec n = vshi_field_normal(surface->field, at, vshi_scale(ray->direction, -1.0));
+    const vshi_vec point = vshi_add(at, vshi_scale(n, scenery->lift * surface->field->voxel_size));
+    h->seen[i] = seen;
+    h->surface[i] = surface;
+    h->positions[i][0] = point.x, h->positions[i][1] = point.y, h->positions[i][2] = point.z;
+    h->normals[i][0] = (float)n.x, h->normals[i][1] = (float)n.y, h->normals[i][2] = (float)n.z;
+    h->texels[i] = texel;
+    for (int c = 0; c < 3; ++c) {
+        seen->normal[c] = h->normals[i][c];
+    }
+}
+
+/* Light at the hits, one after the other of the lights, so that room for one is enough. */
+static vsh_result light_hits(const vshi_scenery *scenery, hits *h, vsh_shade_stats *stats, vsh_error *error) {
+    const vsh_points points = {h->count, &h->positions[0][0], &h->normals[0][0], h->texels};
+    vsh_result result = VSH_OK;
+    vsh_query_output output = vsh_query_output_default();
+    if (scenery->options->ao) {
+        output.ao = h->ao;
+        result = vsh_query_points(scenery->query, &points, &scenery->run, &output, stats, error);
+        output.ao = NULL;
+    }
+    for (size_t l = 0; l < scenery->light_count && result == VSH_OK; ++l) {
+        float *visibility[VSHI_MOST_LIGHTS] = {NULL};
+        visibility[l] = h->visibility;
+        output.visibility = visibility;
+        result = vsh_query_points(scenery->query, &points, &scenery->run, &output, stats, error);
+        vshi_shade_irradiance(&points, NULL, &scenery->lights[l], h->visibility, &scenery->options->tint,
+                              &h->light[0][0]);
+    }
+    for (size_t i = 0; i < h->count && result == VSH_OK; ++i) {
+        const double open = !scenery->options->ao ? 1.0 : h->ao[i] > 0.0f ? (double)h->ao[i] : 0.0;
+        for (int c = 0; c < 3; ++c) {
+            h->seen[i]->color[c] =
+                (float)(h->surface[i]->color[c] * ((double)h->light[i][c] + scenery->options->sky[c] * open));
+        }
+    }
+    return result;
+}
+
+vsh_result vshi_tile_render(const vshi_scenery *scenery, const vshi_rows *rows, int32_t column, int32_t row,
+                            vsh_shade_stats *stats, vsh_error *error) {
+    const vshi_sample_grid *grid = scenery->grid;
+    const vsh_render_options *o = scenery->options;
+    hits h = {.count = 0};
+    vshi_shaft_ray shafts[VSHI_TILE_SAMPLES];
+    vshi_seen *all[VSHI_TILE_SAMPLES];
+    size_t count = 0;
+    for (int32_t y = row; y < row + VSHI_TILE && y < rows->first + rows->count; ++y) {
+        for (int32_t x = column; x < column + VSHI_TILE && x < grid->columns; ++x) {
+            const size_t at = (size_t)(y - rows->first) * (size_t)grid->columns + (size_t)x;
+            const vshi_vec through = vshi_sample_ray(grid, x, y);
+            const double slant = vshi_length(through);
+            const vshi_eye_ray ray = {grid->frame.eye, vshi_scale(through, 1.0 / slant)};
+            const uint32_t texel = (uint32_t)x + 65536u * (uint32_t)y;
+            vshi_seen *seen = &rows->seen[at];
+            *seen = (vshi_seen){.depth = INFINITY};
+            const double lit = scenery->lit != NULL ? rows->lit.depth[at] * slant : INFINITY;
+            double distance;
+            const vsh_surface *surface = find_surface(scenery, &ray, lit, &distance, stats);
+            if (surface == NULL && lit < INFINITY) {
+                vshi_lit_shade(scenery->lit, rows->lit.triangle[at], through, seen->color, seen->normal);
+            }
+            if (surface != NULL) {
+                add_hit(scenery, &h, surface, &ray, distance, texel, seen);
+            }
+            seen->alpha = distance < INFINITY ? 1.0f : 0.0f;
+            seen->depth = (float)(distance / slant);
+            for (int c = 0; c < 3 && !(distance < INFINITY); ++c) {
+                seen->color[c] = (float)o->background[c];
+            }
+            shafts[count] = (vshi_shaft_ray){ray.origin, ray.direction, distance, texel};
+            all[count++] = seen;
+        }
+    }
+    vsh_result result = h.count > 0 ? light_hits(scenery, &h, stats, error) : VSH_OK;
+    if (result == VSH_OK && scenery->shafts.extinction > 0.0) {
+        result = vshi_shafts_add(&scenery->shafts, count, shafts, all, stats, error);
+    }
+    return result;
+}

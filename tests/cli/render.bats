@@ -1,0 +1,236 @@
+# vdbshade render: pictures and turntables.
+load helper
+
+SUN=(--sun 0.3,1,0.2 --sun-angle 5)
+QUICK=(--size 40x24 --samples 1 --resolution 24)
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    write_box box.obj
+}
+
+# png_size FILE: width and height out of its header.
+png_size() {
+    [ "$(head -c 8 "$1" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ] || fail "$1 is no PNG"
+    echo "$(od -An -tu1 -j16 -N8 "$1" | awk '{ print $3 * 256 + $4, $7 * 256 + $8 }')"
+}
+
+@test "a picture of a mesh, of the size asked for" {
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --ao 0.5 -o view.png --stats stats.json
+    done_well
+    [ "$(png_size view.png)" = "40 24" ] || fail "size: $(png_size view.png)"
+    [[ $stderr == *"40 × 24, camera "* ]] || fail "the camera is not told"
+    grep -q '"points": 960' stats.json || fail "$(cat stats.json)"
+    no_leftovers
+}
+
+@test "quiet says nothing; threads change no byte" {
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --ao 0.5 -o one.png --threads 1 --quiet
+    done_well
+    [ -z "$stderr" ] || fail "something on standard error"
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --ao 0.5 -o three.png --threads 3 --quiet
+    done_well
+    cmp one.png three.png || fail "threads show"
+}
+
+@test "an EXR has linear colours, coverage, depth and normals" {
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o view.exr --quiet
+    done_well
+    "$VDBSHADE" info view.exr >info.txt
+    for channel in R G B A Z N.X N.Y N.Z; do
+        grep -qw "$channel" info.txt || fail "no $channel: $(cat info.txt)"
+    done
+}
+
+@test "without a background a PNG is transparent" {
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o view.png --background none --quiet
+    done_well
+    [ "$(od -An -tu1 -j25 -N1 view.png | tr -d ' ')" = 6 ] || fail "no alpha"
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o view.png --quiet
+    [ "$(od -An -tu1 -j25 -N1 view.png | tr -d ' ')" = 2 ] || fail "alpha with a background"
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o x.png --background none --shafts 0.2
+    refused 2 --background --shafts
+}
+
+@test "a turntable's frames are numbered from 0, and all differ" {
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --turntable 3 -o view_%03d.png --quiet
+    done_well
+    [ "$(ls view_*.png | tr '\n' ' ')" = "view_000.png view_001.png view_002.png " ] || fail "$(ls)"
+    ! cmp -s view_000.png view_001.png || fail "it does not turn"
+    ! cmp -s view_001.png view_002.png || fail "it does not turn"
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --orbit 120 -o turned.png --quiet
+    cmp turned.png view_001.png || fail "--orbit is not a turntable's turn"
+}
+
+@test "a turntable without a place for the number, or with two, is refused" {
+    for output in view.png view_%d_%d.png view_%s.png view_%; do
+        shade render box.obj "${SUN[@]}" "${QUICK[@]}" --turntable 3 -o "$output"
+        refused 2 %d
+    done
+}
+
+@test "a page holds its frames, and needs nothing beside it" {
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --turntable 4 -o turn.html --quiet
+    done_well
+    [ "$(grep -c '^"iVBOR' turn.html)" -eq 4 ] || fail "frames: $(grep -c '^"iVBOR' turn.html)"
+    ! grep -qE '(src|href)="?(https?:|/|\.)' turn.html || fail "the page needs something beside it"
+    no_leftovers
+    # A frame is the PNG that a turntable of files has.
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --turntable 4 -o view_%d.png --quiet
+    grep '^"iVBOR' turn.html | sed -n 2p | tr -d '",' | base64 -d | cmp - view_1.png || fail "another frame"
+}
+
+@test "cameras that see nothing are refused" {
+    shade render box.obj "${SUN[@]}" --camera nan,0,0 -o view.png
+    refused 2 --camera
+    shade render box.obj "${SUN[@]}" --camera 1,2 -o view.png
+    refused 2 --camera
+    shade render box.obj "${SUN[@]}" --camera 1,2,3 --look-at 1,2,3 -o view.png
+    refused 2 'position and target'
+    shade render box.obj "${SUN[@]}" --camera 0,5,0 --look-at 0,0,0 -o view.png
+    refused 2 'along the view'
+    shade render box.obj "${SUN[@]}" --camera 0.5,5,0.5 --resolution 24 -o view.png --quiet
+    refused 2 'along the view'
+    shade render box.obj "${SUN[@]}" --up 0,0,0 -o view.png
+    refused 2 --up
+    shade render box.obj "${SUN[@]}" --fov 180 -o view.png
+    refused 2 --fov
+    shade render box.obj "${SUN[@]}" --look-at 0,0,0 -o view.png
+    refused 2 --look-at
+    [ ! -e view.png ] || fail "a picture all the same"
+}
+
+@test "outputs that cannot be written are refused before the work" {
+    shade render box.obj "${SUN[@]}" -o missing/view.png
+    refused 3 missing
+    shade render box.obj "${SUN[@]}" -o view.xyz
+    refused 2 view.xyz
+    shade render box.obj "${SUN[@]}" -o box.obj
+    [ "$status" -eq 2 ] || fail "the input would be replaced"
+    shade render box.obj "${SUN[@]}" -o view.png --stats view.png
+    refused 2 view.png
+    shade render box.obj "${SUN[@]}"
+    refused 2 'no output'
+    shade render box.obj -o view.png
+    refused 2 --sun
+}
+
+@test "a memory limit ends it with code 4, and the old picture stays" {
+    old_output view.png
+    shade render box.obj "${SUN[@]}" --memory-limit 1M -o view.png
+    refused 4
+    untouched view.png
+}
+
+@test "a lightmap of any size is shown on the receiver" {
+    shade bake box.obj "${SUN[@]}" --size 64x32 --resolution 24 -o box.exr --quiet
+    done_well
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.exr -o lit.png --quiet
+    done_well
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o computed.png --quiet
+    ! cmp -s lit.png computed.png || fail "the lightmap is not what is shown"
+    # With other sizes the picture is nearly the same; a lightmap that is all dark is not.
+    shade bake box.obj "${SUN[@]}" --irradiance --size 256 --resolution 24 -o fine.exr --quiet
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap fine.exr -o fine.png --quiet
+    done_well
+}
+
+@test "a packed lightmap is told what it holds" {
+    shade bake box.obj "${SUN[@]}" --size 64 --resolution 24 -o box.png --pack R=shadow.sun --bits 16 --quiet
+    done_well
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png -o lit.png
+    [ "$status" -eq 2 ] && [[ $stderr == *shadow.sun* ]] || fail "channels without names"
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png --lightmap-pack R=shadow.sun -o lit.png --quiet
+    done_well
+    shade bake box.obj "${SUN[@]}" --size 64 --resolution 24 -o box.exr --quiet
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.exr -o same.exr --quiet
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png --lightmap-pack R=shadow.sun -o lit.exr --quiet
+    done_well
+    for pack in shadow.sun RG=ao R= Q=ao; do
+        shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.png --lightmap-pack "$pack" -o x.png
+        refused 2 --lightmap-pack
+    done
+}
+
+@test "lightmaps that do not fit are refused" {
+    shade bake box.obj --ao 0.5 --size 16 --resolution 24 -o ao.exr --quiet
+    done_well
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap ao.exr -o view.png --quiet
+    refused 2 shadow.sun
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap gone.exr -o view.png --quiet
+    refused 3 gone.exr
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap ao.exr --lightmap ao.exr -o view.png --quiet
+    refused 2 receivers
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap ao.exr -o ao.exr --quiet
+    refused 2 lightmap
+    # Without lights its AO is what there is to show.
+    shade render box.obj "${QUICK[@]}" --lightmap ao.exr -o view.png --quiet
+    done_well
+}
+
+scene() {
+    cat >scene.json <<JSON
+{"casters": [{"sdf": {"shape": "sphere", "radius": 0.5}, "color": [0.9, 0.05, 0.05]},
+             {"sdf": {"shape": "sphere", "radius": 0.5, "translate": [1.2, 0, 0]}$1}],
+ "layers": [{"name": "other"}],
+ "resolution": 32, "ao": {"distance": 0.2},
+ "lights": [{"name": "sun", "type": "directional", "direction": [0, 0, 1]}]}
+JSON
+}
+
+# pixel FILE X Y: R G B of a pixel of a PPM of 60 × 20, whose header takes 13 bytes.
+pixel() {
+    od -An -v -tu1 -w3 -j$((13 + 3 * ($3 * 60 + $2))) -N3 "$1"
+}
+
+@test "casters have their colours, in a layer or in none" {
+    for second in ', "color": [0.05, 0.05, 0.9]' ', "color": [0.05, 0.05, 0.9], "layer": "other"'; do
+        scene "$second"
+        shade render scene.json --size 60x20 --samples 2 --camera 0.6,0,6 --look-at 0.6,0,0 --fov 12 -o view.ppm --quiet
+        done_well
+        read -r r _ b <<<"$(pixel view.ppm 20 10)"
+        [ "$r" -gt 180 ] && [ "$b" -lt 100 ] || fail "left: $r $b"
+        read -r r _ b <<<"$(pixel view.ppm 40 10)"
+        [ "$b" -gt 180 ] && [ "$r" -lt 100 ] || fail "right: $r $b"
+    done
+}
+
+@test "a colour out of range is refused with its place" {
+    scene ', "color": [0.5, 1.5, 0]'
+    shade render scene.json -o view.png
+    refused 2 scene.json:2: color 1.5
+    scene ', "color": [0, 0, 0]'
+    shade render scene.json -o view.png
+    refused 2 color
+    scene ', "colour": [0, 0, 0]'
+    shade render scene.json -o view.png
+    refused 2 'did you mean "color"?'
+}
+
+@test "light shafts show, and are the same for any number of threads" {
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --shafts 0.5 -o one.png --threads 1 --quiet
+    done_well
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --shafts 0.5 -o two.png --threads 2 --quiet
+    cmp one.png two.png || fail "threads show"
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o none.png --quiet
+    ! cmp -s one.png none.png || fail "no shafts"
+}
+
+@test "casters without voxels are seen, and in the light that they give as solids" {
+    ln -s "$(cd "$ASSETS" && pwd)/terrain.png" .
+    for direct in true false; do
+        cat >terrain.json <<JSON
+{"casters": [{"heightfield": "terrain.png", "size": [10, 10], "height": 2, "base": 1, "direct": $direct},
+             {"spheres": [[0, 4, 0, 1]], "voxelised": $([ $direct = true ] && echo false || echo true), "color": [0.9, 0.05, 0.05]}],
+ "resolution": 64, "ao": {"distance": 1},
+ "lights": [{"name": "sun", "type": "directional", "direction": [0.6, 0.5, 0.3], "angle_deg": 3}]}
+JSON
+        shade render terrain.json --size 60x40 --samples 2 --camera 6,8,16 --look-at 0,1.5,0 -o $direct.ppm --quiet
+        done_well
+    done
+    # Both see the same; light differs by what voxels lose.
+    paste <(od -An -v -tu1 -w1 -j13 true.ppm) <(od -An -v -tu1 -w1 -j13 false.ppm) |
+        awk '{ sum += ($1 - $2) ^ 2 } END { exit sqrt(sum / NR) < 6 ? 0 : 1 }' ||
+        fail "the pictures differ"
+    [ "$(od -An -v -tu1 -w3 -j13 true.ppm | awk '$1 > 120 && $2 < 90' | wc -l)" -gt 20 ] || fail "no red sphere"
+}

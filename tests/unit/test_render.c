@@ -1,0 +1,325 @@
+/* Pictures against closed forms: what a pinhole sees of spheres and planes, and the light there. */
+#include "pictures.h"
+
+static void a_sphere_is_where_it_is_with_its_normals(void **state) {
+    (void)state;
+    enum { VOXELS = 50 };
+    const double centre[3] = {0.1, -0.2, 0.3}, voxel = 1.0 / VOXELS;
+    vsh_field *field = ball(centre[0], centre[1], centre[2], 1.0, voxel);
+    const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
+    const vsh_render_options o = small(camera_at(3.0, 2.0, 4.0, 0.0, 0.0, 0.0, 35.0), 1);
+    render(&surface, 1, field, NULL, &o, NULL);
+    const pinhole p = pinhole_of(&o.camera);
+    int seen = 0, missed = 0;
+    for (int y = 0; y < HIGH; ++y) {
+        for (int x = 0; x < WIDE; ++x) {
+            const int at = y * WIDE + x;
+            double ray[3], out[3] = {0.0}, to[3];
+            ray_of(&p, x, y, ray);
+            for (int i = 0; i < 3; ++i) {
+                to[i] = centre[i] - p.eye[i];
+            }
+            const double length = sqrt(dot(ray, ray)), along = dot(to, ray) / length;
+            const double miss = sqrt(dot(to, to) - along * along);
+            if (miss > 1.0 + 0.1 * voxel) {
+                assert_true(isinf(depth[at]));
+                ++missed;
+            } else if (miss < 1.0 - 0.1 * voxel) {
+                for (int i = 0; i < 3; ++i) {
+                    out[i] = p.eye[i] + (double)depth[at] * ray[i] - centre[i];
+                }
+                assert_true(fabs(sqrt(dot(out, out)) - 1.0) < 0.02 * voxel);
+                assert_true(dot(out, ray) < 0.0); /* the near side */
+                ++seen;
+            }
+            if (miss < 0.9) { /* normals are filtered: away from the edge */
+                const double n[3] = {normal[3 * at], normal[3 * at + 1], normal[3 * at + 2]};
+                assert_true(dot(n, out) / sqrt(dot(out, out)) > cos(RADIANS(0.7)));
+            }
+        }
+    }
+    assert_true(seen > 300 && missed > 300);
+    vsh_field_free(field);
+}
+
+static void a_silhouette_has_its_area_and_soft_edges(void **state) {
+    (void)state;
+    vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.02);
+    const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
+    for (int32_t samples = 1; samples <= 4; samples += 3) {
+        const vsh_render_options o = small(camera_at(0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 30.0), samples);
+        render(&surface, 1, field, NULL, &o, NULL);
+        const double radius = tan(asin(1.0 / 5.0)) / (2.0 * tan(RADIANS(15.0)) / HIGH);
+        double area = 0.0;
+        int between_them = 0;
+        for (int i = 0; i < PIXELS; ++i) {
+            assert_true(alpha[i] >= 0.0f && alpha[i] <= 1.0f);
+            area += (double)alpha[i];
+            between_them += alpha[i] > 0.1f && alpha[i] < 0.9f;
+        }
+        assert_true(fabs(area / (PI * radius * radius) - 1.0) < (samples > 1 ? 0.003 : 0.02));
+        /* one ray a pixel hits or misses; more make an edge of about a pixel */
+        assert_true(samples == 1 || between_them > 2.0 * PI * radius * 0.5);
+    }
+    vsh_field_free(field);
+}
+
+static void low_rays_do_not_miss_a_floor(void **state) {
+    (void)state;
+    vsh_field *field = field_of(truth_seeds(), 0.05, 0.0);
+    const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
+    for (double height = 0.002; height < 0.2; height *= 1.7) {
+        const vsh_render_options o = small(camera_at(-2.4, height, 2.9, 2.9, height, 2.6, 20.0), 1);
+        render(&surface, 1, field, NULL, &o, NULL);
+        const pinhole p = pinhole_of(&o.camera);
+        int hit = 0;
+        for (int i = 0; i < PIXELS; ++i) {
+            double ray[3];
+            ray_of(&p, i % WIDE, i / WIDE, ray);
+            const double t = -p.eye[1] / ray[1], x = p.eye[0] + t * ray[0], z = p.eye[2] + t * ray[2];
+            if (t > 0.0 && fabs(x) < 2.9 && fabs(z) < 2.9) {
+                const double above = p.eye[1] + (double)depth[i] * ray[1];
+                assert_true(isfinite(depth[i]) && above > -0.002); /* on the floor, or on what stands on it */
+                ++hit;
+            }
+        }
+        assert_true(hit > 500);
+    }
+    vsh_field_free(field);
+}
+
+/* What a sheet two voxels thick, seen from many sides, lets through. */
+static void thin_sheets_stop_every_ray(void **state) {
+    (void)state;
+    const truth_solid sheet = {.shape = TRUTH_BOX, .half = {2.0, 0.05, 2.0}};
+    vsh_field *field = field_of((truth_scene){&sheet, 1}, 0.05, 0.0);
+    const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
+    for (double height = 0.3; height < 40.0; height *= 1.6) {
+        const vsh_render_options o = small(camera_at(0.9, height, 1.1, 0.0, 0.0, 0.0, 30.0), 1);
+        render(&surface, 1, field, NULL, &o, NULL);
+        const pinhole p = pinhole_of(&o.camera);
+        int hit = 0;
+        for (int i = 0; i < PIXELS; ++i) {
+            double ray[3];
+            ray_of(&p, i % WIDE, i / WIDE, ray);
+            const double t = -p.eye[1] / ray[1], x = p.eye[0] + t * ray[0], z = p.eye[2] + t * ray[2];
+            if (t > 0.0 && fabs(x) < 1.9 && fabs(z) < 1.9) {
+                assert_true(fabs(p.eye[1] + (double)depth[i] * ray[1] - 0.05) < 0.002); /* on its top */
+                ++hit;
+            }
+        }
+        assert_true(hit > 20);
+    }
+    vsh_field_free(field);
+}
+
+/* Visibility × cosine of the seeds' sun, or (NULL) AO. */
+static float floor_light(const vsh_field *field, const vsh_light *light, const double at[3]) {
+    const float up[3] = {0.0f, 1.0f, 0.0f};
+    if (light != NULL) {
+        return (float)(0.6 / sqrt(0.25 + 0.36 + 0.36)) * shadow_at(field, light, VSH_SHADOW_CONE, at, up);
+    }
+    const vsh_points points = {1, at, up, NULL};
+    float open = -1.0f;
+    assert_int_equal(vsh_shade_ao(field, &points, NULL, NULL, &open, NULL, NULL, NULL), VSH_OK);
+    return open;
+}
+
+/* `full`: of a point that is lit. The documented filter with one sample a pixel: Blackman and Harris' window
+ * at -1, 0 and 1 of 1.5. */
+static void check_floor(const vsh_field *field, const vsh_light *light, vsh_render_options o, double full,
+                        int *dark, int *lit, int *between_them) {
+    static float direct[PIXELS];
+    const vsh_surface surface = {field, {0.5, 0.25, 1.0}};
+    render(&surface, 1, field, light, &o, NULL);
+    const pinhole p = pinhole_of(&o.camera);
+    for (int i = 0; i < PIXELS; ++i) {
+        double ray[3], at[3];
+        ray_of(&p, i % WIDE, i / WIDE, ray);
+        for (int k = 0; k < 3; ++k) {
+            at[k] = p.eye[k] + (double)depth[i] * ray[k];
+        }
+        const bool on_floor =
+            isfinite(depth[i]) && fabs(at[1]) < 0.003 && fabs(at[0]) < 2.8 && fabs(at[2]) < 2.8;
+        direct[i] = on_floor ? floor_light(field, light, at) : NAN;
+    }
+    double weight[3], sum = 0.0;
+    for (int i = 0; i < 3; ++i) {
+        const double x = 2.0 * PI * (i + 0.5) / 3.0;
+        weight[i] = 0.35875 - 0.48829 * cos(x) + 0.14128 * cos(2.0 * x) - 0.01168 * cos(3.0 * x);
+        sum += weight[i];
+    }
+    *dark = *lit = *between_them = 0;
+    for (int y = 1; y + 1 < HIGH; ++y) {
+        for (int x = 1; x + 1 < WIDE; ++x) {
+            double expected = 0.0;
+            for (int k = 0; k < 9; ++k) {
+                expected += weight[k / 3] * weight[k % 3] / (sum * sum) *
+                            (double)direct[(y + k / 3 - 1) * WIDE + x + k % 3 - 1];
+            }
+            if (isfinite(expected)) {
+                const float *c = color + 3 * (y * WIDE + x);
+                assert_true(fabs((double)c[0] - 0.5 * expected) < 0.004);
+                assert_true(fabs((double)c[1] - 0.25 * expected) < 0.002);
+                assert_true(fabs((double)c[2] - expected) < 0.008);
+                *dark += expected < 0.01;
+                *lit += expected > full;
+                *between_them += expected > 0.05 && expected < 0.9 * full;
+            }
+        }
+    }
+}
+
+static void a_floor_has_the_shadow_and_the_ao_of_its_points(void **state) {
+    (void)state;
+    vsh_field *field = field_of(truth_seeds(), 0.03, 0.0);
+    const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
+    vsh_render_options o = small(camera_at(1.0, 5.0, 3.0, 0.0, 0.0, 0.0, 40.0), 1);
+    int dark, lit, between_them;
+    memset(o.sky, 0, sizeof o.sky);
+    check_floor(field, &light, o, 0.6, &dark, &lit, &between_them);
+    assert_true(dark > 3 && lit > 300 && between_them > 60);
+    o.ao = 1;
+    o.sky[0] = o.sky[1] = o.sky[2] = 1.0;
+    check_floor(field, NULL, o, 0.9, &dark, &lit, &between_them);
+    assert_true(lit > 300 && between_them > 10);
+    vsh_field_free(field);
+}
+
+static void the_nearest_surface_has_its_own_color(void **state) {
+    (void)state;
+    vsh_field *front = ball(0.0, 0.0, 1.0, 0.5, 0.05), *back = ball(0.4, 0.0, -1.0, 0.8, 0.05);
+    const vsh_surface surfaces[2] = {{back, {0.9, 0.1, 0.2}}, {front, {0.1, 0.8, 0.3}}};
+    vsh_render_options o = small(camera_at(0.0, 0.0, 6.0, 0.0, 0.0, 0.0, 25.0), 2);
+    const double sky[3] = {0.5, 1.0, 2.0};
+    memcpy(o.sky, sky, sizeof sky);
+    render(surfaces, 2, front, NULL, &o, NULL);
+    const float *middle = color + 3 * (HIGH / 2 * WIDE + WIDE / 2);
+    const float *beside = color + 3 * (HIGH / 2 * WIDE + WIDE / 2 + 16);
+    const float *nothing = color;
+    for (int c = 0; c < 3; ++c) {
+        assert_true(fabs((double)middle[c] - surfaces[1].color[c] * sky[c]) < 1e-5);
+        assert_true(fabs((double)beside[c] - surfaces[0].color[c] * sky[c]) < 1e-5);
+        assert_true(fabs((double)nothing[c] - o.background[c]) < 1e-5);
+    }
+    vsh_field_free(front);
+    vsh_field_free(back);
+}
+
+static void who_looks_from_within_sees_out(void **state) {
+    (void)state;
+    vsh_field *within = ball(0.0, 0.0, 0.0, 1.0, 0.05), *beyond = ball(4.0, 0.0, 0.0, 1.0, 0.05);
+    const vsh_surface surfaces[2] = {{within, {0.5, 0.5, 0.5}}, {beyond, {0.5, 0.5, 0.5}}};
+    const vsh_render_options o = small(camera_at(0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 20.0), 1);
+    render(surfaces, 2, within, NULL, &o, NULL);
+    assert_true(fabs((double)depth[HIGH / 2 * WIDE + WIDE / 2] - 3.0) < 0.01);
+    vsh_field_free(within);
+    vsh_field_free(beyond);
+}
+
+/* --- what holds for all */
+
+static void threads_and_instruction_sets_change_no_bit(void **state) {
+    (void)state;
+    static float first[3 * PIXELS];
+    vsh_field *field = field_of(truth_seeds(), 0.05, 0.0);
+    const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
+    vsh_render_options o = small(camera_at(3.0, 3.0, 4.0, 0.0, 0.5, 0.0, 40.0), 2);
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    o.ao = 1;
+    o.shafts = 0.3;
+    o.shaft_steps = 3;
+    const struct { int32_t threads, isa; } runs[] = {{1, VSH_ISA_BASE}, {3, VSH_ISA_BASE}, {2, VSH_ISA_BEST}};
+    for (size_t i = 0; i < sizeof runs / sizeof runs[0]; ++i) {
+        vsh_run run = vsh_run_default();
+        run.threads = runs[i].threads;
+        run.isa = runs[i].isa;
+        render(&surface, 1, field, &light, &o, &run);
+        if (i == 0) {
+            memcpy(first, color, sizeof first);
+        }
+        assert_memory_equal(first, color, sizeof first);
+    }
+    vsh_field_free(field);
+}
+
+static int32_t stop(void *user, const char *stage, double fraction) {
+    (void)stage;
+    double *seen = user;
+    assert_true(fraction >= *seen && fraction <= 1.0);
+    *seen = fraction;
+    return fraction > 0.3;
+}
+
+static void a_render_can_be_cancelled_and_limited(void **state) {
+    (void)state;
+    vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.1);
+    const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
+    const vsh_render_options o = small(camera_at(0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 30.0), 4);
+    vsh_run run = vsh_run_default();
+    vsh_error error;
+    double seen = 0.0;
+    run.progress = stop;
+    run.user = &seen;
+    assert_int_equal(vsh_render(&surface, 1, field, NULL, 0, &o, &run, &picture, NULL, &error),
+                     VSH_ERROR_CANCELLED);
+    run = vsh_run_default();
+    run.memory_limit = 100000;
+    assert_int_equal(vsh_render(&surface, 1, field, NULL, 0, &o, &run, &picture, NULL, &error),
+                     VSH_ERROR_LIMIT);
+    vsh_field_free(field);
+}
+
+static void options_out_of_range_are_refused(void **state) {
+    (void)state;
+    vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.1);
+    const vsh_surface surface = {field, {0.5, 0.5, 0.5}}, bright = {field, {0.5, 1.5, 0.5}},
+                      none = {NULL, {0.5, 0.5, 0.5}};
+    const vsh_render_options good = small(camera_at(0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 30.0), 1);
+    vsh_render_options bad[8];
+    const char *const parts[] = {"width", "height",     "samples",     "shafts",
+                                 "sky",   "background", "shaft_steps", "fov"};
+    for (int i = 0; i < 8; ++i) {
+        bad[i] = good;
+    }
+    bad[0].width = 0;
+    bad[1].height = VSH_MAX_PICTURE_SIZE + 1;
+    bad[2].width = VSH_MAX_PICTURE_SIZE;
+    bad[2].samples = 8;
+    bad[3].shafts = NAN;
+    bad[4].sky[1] = -1.0;
+    bad[5].background[2] = INFINITY;
+    bad[6].shaft_steps = 65;
+    bad[7].camera.fov = 4.0;
+    vsh_error error;
+    for (int i = 0; i < 8; ++i) {
+        assert_int_equal(vsh_render(&surface, 1, field, NULL, 0, &bad[i], NULL, &picture, NULL, &error),
+                         VSH_ERROR_ARGUMENT);
+        assert_non_null(strstr(error.message, parts[i]));
+    }
+    assert_int_equal(vsh_render(&bright, 1, field, NULL, 0, &good, NULL, &picture, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_render(&none, 1, field, NULL, 0, &good, NULL, &picture, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_render(&surface, 1, field, NULL, 1, &good, NULL, &picture, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_render(&surface, 1, NULL, NULL, 0, &good, NULL, &picture, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    vsh_field_free(field);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_sphere_is_where_it_is_with_its_normals),
+        cmocka_unit_test(a_silhouette_has_its_area_and_soft_edges),
+        cmocka_unit_test(low_rays_do_not_miss_a_floor),
+        cmocka_unit_test(thin_sheets_stop_every_ray),
+        cmocka_unit_test(a_floor_has_the_shadow_and_the_ao_of_its_points),
+        cmocka_unit_test(the_nearest_surface_has_its_own_color),
+        cmocka_unit_test(who_looks_from_within_sees_out),
+        cmocka_unit_test(threads_and_instruction_sets_change_no_bit),
+        cmocka_unit_test(a_render_can_be_cancelled_and_limited),
+        cmocka_unit_test(options_out_of_range_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
