@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Makes docs/images/terrain.png and docs/images/spheres.png from the assets: casters without voxels.
+"""Makes docs/images/terrain.png and docs/images/spheres.png, casters without voxels, and docs/images/light.png, bent
+normals, tinted penumbrae and layers, from the assets.
 
 Usage: tools/picture_casters.py [VDBSHADE]     the program; build/vdbshade where none is given. Needs Python 3 only.
 """
@@ -17,6 +18,7 @@ SIDE, GAP = 256, 4
 SUN = {"name": "sun", "type": "directional", "direction": [-0.7, 0.4, 0.3], "angle_deg": 4}
 LAND = {"heightfield": os.path.join(ASSETS, "terrain.png"), "height": 2}
 SHADOW, AO = "R=shadow.sun,G=shadow.sun,B=shadow.sun", "R=ao,G=ao,B=ao"
+TINT, BENT = "R=tint.sun.R,G=tint.sun.G,B=tint.sun.B", "R=bent.X,G=bent.Y,B=bent.Z"
 LIT = "R=irradiance.R,G=irradiance.G,B=irradiance.B"
 
 
@@ -82,6 +84,21 @@ def main():
                        [bake(program, folder, [land], top, SHADOW, resolution=384)]))
         write_png(os.path.join(ROOT, "docs", "images", "spheres.png"),
                   join([bake(program, folder, [balls], floor, pack) for pack in (LIT, SHADOW, AO)]))
+        light(program, folder)
+
+
+def light(program, folder):
+    """The seeds' floor: bent normals; penumbrae in red; every second solid in a hard layer; a blue sky."""
+    with open(os.path.join(ASSETS, "seeds.json")) as file:
+        casters = [{"sdf": solid} for solid in json.load(file)["casters"][0]["sdf"]["of"]]
+    floor = {"mesh": os.path.join(ASSETS, "seeds_floor.obj")}
+    layers = {"layers": [{"name": "hard", "softness": 0}]}
+    parted = [{**caster, "layer": "hard"} if i % 2 else caster for i, caster in enumerate(casters)]
+    panels = [bake(program, folder, casters, floor, BENT, ao={"distance": 1.5, "bent_normals": "tangent", "cones": 64}),
+              bake(program, folder, casters, floor, TINT, tint=[0.6, 1.2, 1.8]),
+              bake(program, folder, parted, floor, SHADOW, **layers),
+              bake(program, folder, casters, floor, LIT, ambient=[0.15, 0.25, 0.45])]
+    write_png(os.path.join(ROOT, "docs", "images", "light.png"), join(panels))
 
 
 if __name__ == "__main__":

@@ -1,3 +1,4 @@
+#include "bake/bend.h"
 #include "bake/halo.h"
 #include "bake/lattice.h"
 #include "bake/origins.h"
@@ -250,60 +251,15 @@ static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
     return over_samples(bake, "irradiance", add_irradiance, &l, error);
 }
 
-/* To tangent space: the sample's own axes. */
-static void turn_to_tangent(const vsh_texels *texels, size_t sample, float *bent) {
-    const vshi_vec n = vshi_unit(vshi_vec_off(texels->normal + 3 * sample));
-    const float *given = texels->tangent + 4 * sample;
-    vshi_vec t = vshi_vec_off(given), b;
-    t = vshi_sub(t, vshi_scale(n, vshi_dot(n, t)));
-    if (!(vshi_dot(t, t) > 0.0)) {
-        vshi_frame(n, &t, &b);
-    }
-    t = vshi_unit(t);
-    b = vshi_scale(vshi_cross(n, t), (double)given[3]);
-    const vshi_vec d = vshi_vec_off(bent);
-    bent[0] = (float)vshi_dot(d, t);
-    bent[1] = (float)vshi_dot(d, b);
-    bent[2] = (float)vshi_dot(d, n);
-}
-
-/* Samples' directions become unit, in the space asked for; the means of a texel's samples again. */
-static void bend(void *user, size_t begin, size_t end) {
-    baking *bake = user;
-    const vshi_origins *origins = &bake->origins;
-    const vsh_texels *texels = bake->texels;
-    for (size_t block = begin; block < end; ++block) {
-        size_t next = origins->before[block];
-        const size_t last = (block + 1) * VSHI_ORIGIN_BLOCK;
-        for (size_t i = block * VSHI_ORIGIN_BLOCK; i < last && i < texels->count; ++i) {
-            if (!origins->valid[i]) {
-                continue;
-            }
-            vshi_ao_bend(bake->bent + 3 * next, origins->normal + 3 * next);
-            if (bake->lightmap->bent_space == VSH_BENT_TANGENT) {
-                turn_to_tangent(texels, i, bake->bent + 3 * next);
-            }
-            ++next;
-        }
-    }
-}
-
 static vsh_result bake_bent(baking *bake, vsh_error *error) {
-    vshi_job *job = vshi_job_begin(&bake->quiet, "bent", bake->origins.blocks);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "bent: the system refused memory");
-    }
-    vsh_result result = vshi_parallel_for(job, bake->origins.blocks, 1, 1, bend, bake, error);
-    vshi_job_end(job);
-    if (result == VSH_OK) {
-        result = average(bake, bake->bent, 3, bake->lightmap->bent, error);
-    }
     float *plane = bake->lightmap->bent;
-    for (size_t i = 0; result == VSH_OK && i < vshi_texels_held(bake->texels); ++i) {
-        const vshi_vec d = vshi_unit(vshi_vec_off(plane + 3 * i));
-        plane[3 * i] = (float)d.x;
-        plane[3 * i + 1] = (float)d.y;
-        plane[3 * i + 2] = (float)d.z;
+    vsh_result result =
+        vshi_bend(bake->texels, &bake->origins, bake->lightmap->bent_space, &bake->quiet, bake->bent, error);
+    if (result == VSH_OK) {
+        result = average(bake, bake->bent, 3, plane, error);
+    }
+    if (result == VSH_OK) {
+        vshi_bend_again(vshi_texels_held(bake->texels), plane);
     }
     return result;
 }
