@@ -27,12 +27,14 @@ using NumberGrids = openvdb::NumericGridTypes::Append<openvdb::BoolGrid, openvdb
 // limit; throws Failure where there is none, and where it is none of them.
 openvdb::GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &run, vsh_error *error);
 
+// Refuses voxels that OpenVDB cannot write, before a grid is copied.
+vsh_result check_writable(const char *path, double voxel_size, vsh_error *error);
+
 // A grid of ours: shares the tree.
 FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Transform &transform,
                           const std::string &name, openvdb::GridClass grid_class);
 
 // Writes float grids as one file, atomically; the same grids give the same bytes.
-vsh_result write_grids(const openvdb::GridCPtrVec &grids, const char *path, double voxel_size,
-                       vsh_error *error);
+vsh_result write_grids(const openvdb::GridCPtrVec &grids, const char *path, vsh_error *error);
 
 } // namespace vshi

@@ -237,10 +237,14 @@ vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const int32_t 
 vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t as_half, vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
         vshi::initialize();
+        const vsh_result result = vshi::check_writable(path, volume->set->least_axis, error);
+        if (result != VSH_OK) {
+            return result;
+        }
         openvdb::GridCPtrVec grids;
         for (const vshi::Channel &channel : volume->channels) {
             grids.push_back(vshi::to_grid(channel, *volume->set, as_half != 0));
         }
-        return vshi::write_grids(grids, path, volume->set->least_axis, error);
+        return vshi::write_grids(grids, path, error);
     });
 }

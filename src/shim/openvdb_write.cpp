@@ -138,13 +138,15 @@ struct Output {
 
 } // namespace
 
-vsh_result write_grids(const openvdb::GridCPtrVec &grids, const char *path, double voxel_size,
-                       vsh_error *error) {
-    if (voxel_size < SMALLEST_WRITTEN) {
-        return vshi_fail(error, VSH_ERROR_LIMIT,
-                         "%s: voxel size %g: OpenVDB writes %g and more; scale the scene", path, voxel_size,
-                         SMALLEST_WRITTEN);
-    }
+vsh_result check_writable(const char *path, double voxel_size, vsh_error *error) {
+    return voxel_size >= SMALLEST_WRITTEN
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_LIMIT,
+                           "%s: voxel size %g: OpenVDB writes %g and more; scale the scene", path, voxel_size,
+                           SMALLEST_WRITTEN);
+}
+
+vsh_result write_grids(const openvdb::GridCPtrVec &grids, const char *path, vsh_error *error) {
     Output output;
     const vsh_result result = vshi_output_begin(&output.file, path, error);
     if (result != VSH_OK) {
@@ -183,6 +185,10 @@ FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Trans
 vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name, vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
         vshi::initialize();
+        const vsh_result result = vshi::check_writable(path, grid->info.voxel_size, error);
+        if (result != VSH_OK) {
+            return result;
+        }
         const openvdb::FloatGrid &level_set = *grid->level_set;
         const openvdb::FloatGrid::Ptr named =
             vshi::named_grid(grid->level_set->treePtr(), level_set.transform(),
@@ -190,6 +196,6 @@ vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *na
         if (grid->info.shell_thickness > 0.0) {
             named->insertMeta(vshi::SHELL_THICKNESS, openvdb::DoubleMetadata(grid->info.shell_thickness));
         }
-        return vshi::write_grids({named}, path, grid->info.voxel_size, error);
+        return vshi::write_grids({named}, path, error);
     });
 }
