@@ -80,44 +80,132 @@ vsh_result vshi_read_layer(vshi_reader *reader, const vshi_value *value, void *m
     return result;
 }
 
-/* What names what: casters their layers, layers their lights. */
-vsh_result vshi_check_layers(vshi_reader *reader, const vshi_value *root, const vsh_scene *scene) {
-    vshi_value casters, layers;
-    const bool layered = vshi_member(root, "layers", &layers);
+static vsh_result check_casters(vshi_reader *reader, const vshi_value *root, const vsh_scene *scene) {
+    vshi_value casters, name;
     for (size_t i = 0; i < scene->caster_count && vshi_member(root, "casters", &casters); ++i) {
         bool found = scene->casters[i].layer == NULL;
         for (size_t k = 0; !found && k < scene->layer_count; ++k) {
             found = vshi_caster_in_layer(&scene->casters[i], &scene->layers[k]);
         }
         const vshi_value caster = vshi_item(&casters, i);
-        vshi_value name;
         if (!found && vshi_member(&caster, "layer", &name)) {
             return vshi_reader_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
                                     scene->casters[i].layer);
         }
     }
-    for (size_t i = 0; layered && i < scene->layer_count; ++i) {
-        const vsh_scene_layer *layer = &scene->layers[i];
-        const vshi_value at = vshi_item(&layers, i);
-        vshi_value names;
-        for (size_t k = 0; k < i; ++k) {
-            vshi_value name;
-            if (strcmp(layer->name, scene->layers[k].name) == 0 && vshi_member(&at, "name", &name)) {
-                return vshi_reader_fail(reader, &name, "\"%.64s\" is the name of layers[%zu] too",
-                                        layer->name, k);
-            }
+    return VSH_OK;
+}
+
+/* Whether a light is among those that a layer casts for. */
+static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
+    bool casts = layer->lights == NULL;
+    for (size_t i = 0; !casts && i < layer->light_count; ++i) {
+        casts = strcmp(layer->lights[i], light->name) == 0;
+    }
+    return casts;
+}
+
+static vsh_result check_lights(vshi_reader *reader, const vshi_value *layers, const vsh_scene *scene,
+                               size_t i) {
+    const vsh_layer *layer = &scene->layers[i].shade;
+    const vshi_value at = vshi_item(layers, i);
+    vshi_value names;
+    for (size_t k = 0; layer->lights != NULL && k < layer->light_count; ++k) {
+        bool found = false;
+        for (size_t l = 0; !found && l < scene->light_count; ++l) {
+            found = strcmp(layer->lights[k], scene->lights[l].name) == 0;
         }
-        for (size_t k = 0; layer->shade.lights != NULL && k < layer->shade.light_count; ++k) {
-            bool found = false;
-            for (size_t l = 0; !found && l < scene->light_count; ++l) {
-                found = strcmp(layer->shade.lights[k], scene->lights[l].name) == 0;
-            }
-            if (!found && vshi_member(&at, "lights", &names)) {
-                const vshi_value name = vshi_item(&names, k);
-                return vshi_reader_fail(reader, &name, "\"%.64s\" is none of the scene's lights",
-                                        layer->shade.lights[k]);
-            }
+        if (!found && vshi_member(&at, "lights", &names)) {
+            const vshi_value name = vshi_item(&names, k);
+            return vshi_reader_fail(reader, &name, "\"%.64s\" is none of the scene's lights",
+                                    layer->lights[k]);
         }
     }
     return VSH_OK;
+}
+
+/* Takes a light from those that a layer casts for. */
+static vsh_result take_out(vshi_reader *reader, const vsh_scene *scene, const vsh_light *light,
+                           vsh_layer *layer) {
+    void *memory = NULL;
+    size_t count = 0;
+    const vsh_result result = vshi_reader_allocate(reader, &memory, scene->light_count + 1,
+                                                   sizeof(const char *), "lights of a layer");
+    const char **left = memory;
+    for (size_t l = 0; result == VSH_OK && l < scene->light_count; ++l) {
+        if (&scene->lights[l] != light && casts_for(layer, &scene->lights[l])) {
+            left[count++] = scene->lights[l].name;
+        }
+    }
+    layer->lights = left;
+    layer->light_count = count;
+    return result;
+}
+
+/* A light that names layers: the others do not cast for it. */
+static vsh_result choose_layers(vshi_reader *reader, const vshi_value *names, const vsh_light *light,
+                                const vsh_scene *scene, vsh_scene_layer *layers) {
+    bool named[VSH_MAX_LAYERS] = {false};
+    vsh_result result = vshi_expect(reader, names, JSON_ARRAY);
+    for (size_t n = 0; result == VSH_OK && n < json_array_size(names->json); ++n) {
+        const vshi_value name = vshi_item(names, n);
+        result = vshi_expect(reader, &name, JSON_STRING);
+        bool found = false;
+        for (size_t k = 0; result == VSH_OK && k < scene->layer_count; ++k) {
+            const bool is = strcmp(json_string_value(name.json), layers[k].name) == 0;
+            named[k] = named[k] || is;
+            found = found || is;
+        }
+        if (result == VSH_OK && !found) {
+            return vshi_reader_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
+                                    json_string_value(name.json));
+        }
+    }
+    for (size_t k = 0; result == VSH_OK && k < scene->layer_count; ++k) {
+        if (!named[k] && casts_for(&layers[k].shade, light)) {
+            result = take_out(reader, scene, light, &layers[k].shade);
+        }
+    }
+    return result;
+}
+
+static vsh_result choose_all(vshi_reader *reader, const vshi_value *root, vsh_scene *scene) {
+    vshi_value lights, names;
+    void *memory = NULL;
+    if (!vshi_member(root, "lights", &lights)) {
+        return VSH_OK;
+    }
+    vsh_result result =
+        vshi_reader_allocate(reader, &memory, scene->layer_count + 1, sizeof *scene->layers, "layers");
+    vsh_scene_layer *layers = memory;
+    if (result == VSH_OK && scene->layer_count > 0) {
+        memcpy(layers, scene->layers, scene->layer_count * sizeof *layers);
+    }
+    for (size_t l = 0; result == VSH_OK && l < scene->light_count; ++l) {
+        const vshi_value light = vshi_item(&lights, l);
+        if (vshi_member(&light, "layers", &names)) {
+            result = choose_layers(reader, &names, &scene->lights[l], scene, layers);
+        }
+    }
+    scene->layers = layers;
+    return result;
+}
+
+/* What names what: casters their layers, layers their lights, lights their layers. */
+vsh_result vshi_check_layers(vshi_reader *reader, const vshi_value *root, vsh_scene *scene) {
+    vshi_value layers, name;
+    vsh_result result = check_casters(reader, root, scene);
+    const bool layered = vshi_member(root, "layers", &layers);
+    for (size_t i = 0; result == VSH_OK && layered && i < scene->layer_count; ++i) {
+        const vshi_value at = vshi_item(&layers, i);
+        for (size_t k = 0; k < i; ++k) {
+            if (strcmp(scene->layers[i].name, scene->layers[k].name) == 0 &&
+                vshi_member(&at, "name", &name)) {
+                return vshi_reader_fail(reader, &name, "\"%.64s\" is the name of layers[%zu] too",
+                                        scene->layers[i].name, k);
+            }
+        }
+        result = check_lights(reader, &layers, scene, i);
+    }
+    return result == VSH_OK ? choose_all(reader, root, scene) : result;
 }

@@ -95,6 +95,7 @@ static const vshi_key light_keys[] = {
      .offset = offsetof(vsh_light, reach),
      .highest = VSHI_LARGEST,
      .flags = VSHI_ABOVE},
+    {.name = "layers", .kind = VSHI_LATER},
     {.name = "color",
      .kind = VSHI_VECTOR,
      .offset = offsetof(vsh_light, color),

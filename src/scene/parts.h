@@ -12,8 +12,9 @@ vsh_result vshi_read_layer(vshi_reader *reader, const vshi_value *value, void *l
 vsh_result vshi_read_light(vshi_reader *reader, const vshi_value *value, void *light);
 vsh_result vshi_read_receiver(vshi_reader *reader, const vshi_value *value, void *receiver);
 
-/* Fails where casters name layers, or layers lights, that the scene does not have. */
-vsh_result vshi_check_layers(vshi_reader *reader, const vshi_value *root, const vsh_scene *scene);
+/* Fails where casters and lights name layers, or layers lights, that the scene does not have; layers that a
+ * light does not name where it names some cast for it no more. */
+vsh_result vshi_check_layers(vshi_reader *reader, const vshi_value *root, vsh_scene *scene);
 
 /* What flat scenes list as well. */
 

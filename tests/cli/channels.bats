@@ -72,9 +72,13 @@ mean() {
     scene_of layer.json ', "layer": "wall"' '"layers": [{"name": "wall", "voxel_size": 0.05}],'
     scene_of hard.json ', "layer": "wall"' '"layers": [{"name": "wall", "softness": 0}],'
     scene_of none.json ', "layer": "wall"' '"layers": [{"name": "wall", "lights": []}],'
-    for scene in one layer hard none; do
+    scene_of named.json ', "layer": "wall"' '"layers": [{"name": "wall"}, {"name": "other"}],'
+    sed -i 's/"angle_deg": 20/"angle_deg": 20, "layers": ["other"]/' named.json
+    for scene in one layer hard none named; do
         run -0 "$VDBSHADE" bake "$scene.json" --quiet
     done
+    # a layer for no light, and a light with another layer, are the same
+    cmp none.exr named.exr
     awk -v a="$(mean one.exr)" -v b="$(mean layer.exr)" 'BEGIN {exit !(a > 0.3 && a < 0.9 && (a - b) ^ 2 < 0.01 ^ 2)}'
     awk -v a="$(mean hard.exr)" 'BEGIN {exit !(a > 0.3 && a < 0.9)}'
     [ "$(mean none.exr)" = 1 ] || [[ $("$VDBSHADE" info none.exr) == *"'shadow.sun': min 1"* ]] ||
