@@ -31,7 +31,8 @@ typedef struct vsh_layer {
     double softness; /* factor on the sizes of lights, 0 hard … 1000: some casters hard, some soft in one
                         scene */
     double remap[2]; /* its visibility goes through a smoothstep from remap[0], dark, to remap[1], lit, within
-                      * 0 … 1; both 0: as it is. Clouds take it (Quilez, "outdoors lighting", 2013) */
+                      * 0 … 1; both 0: as it is. Of shadows only. Clouds take it (Quilez, "outdoors lighting",
+                      * 2013) */
     double start_offset; /* voxels of its field, 0 … 16; -1: that of the options. Cells of heights, -1: 0;
                             of no account for spheres */
     const vsh_triangles *triangles; /* its casters', for exact methods; else NULL */

@@ -185,6 +185,8 @@ typedef struct layer_piece {
     vsh_points points;
     uint32_t texels[VSHI_PIECE];
     float value[VSHI_PIECE], deviation[VSHI_PIECE];
+    double above[VSHI_PIECE]; /* part of the light over a point's own horizon, */
+    double share[VSHI_PIECE]; /* and what of it the layer leaves */
     float bent[3 * VSHI_AO_GRAIN];
 } layer_piece;
 
@@ -204,19 +206,12 @@ static double smoothstep(const double edges[2], double value) {
     return x <= 0.0 ? 0.0 : x >= 1.0 ? 1.0 : x * x * (3.0 - 2.0 * x); /* NaN stays */
 }
 
-/* Combines what a layer leaves of the part of the light, or sky, that is above a point's own horizon with
- * what the point has: both `value` and the point's are shares of the whole, `above` is that part. */
-static void combine(const vsh_layer *layer, double value, double deviation, double above, float *of_point,
+/* Combines a layer's share of the part of the light, or sky, that is above a point's own horizon with what
+ * the point has, a share of the whole. */
+static void combine(int32_t how, double share, double deviation, double above, float *of_point,
                     float *deviation_of_point) {
     const double before = (double)*of_point;
-    double share = above > 0.0 ? value / above : 0.0;
-    share = share > 1.0 ? 1.0 : share;
-    deviation = above > 0.0 ? deviation / above : 0.0;
-    if (layer->remap[1] > 0.0) {
-        share = smoothstep(layer->remap, share);
-        deviation *= STEEPEST / (layer->remap[1] - layer->remap[0]);
-    }
-    if (layer->combine == VSH_COMBINE_MULTIPLY) {
+    if (how == VSH_COMBINE_MULTIPLY) {
         *of_point = (float)(before * share);
         if (deviation_of_point != NULL) {
             const double a = share * (double)*deviation_of_point, b = before * deviation;
@@ -230,8 +225,28 @@ static void combine(const vsh_layer *layer, double value, double deviation, doub
     }
 }
 
-/* What heights or spheres leave of the light, of what is above the points' own horizons. */
-static void shade_analytic(const prepared *item, layer_piece *piece, vsh_shade_stats *stats) {
+/* What a layer's field leaves of the light: values of the whole become shares of what is above the horizon,
+ * which is in every layer's value. */
+static void shade_field(const prepared *item, const vshi_shadow_task *task, layer_piece *piece,
+                        vsh_shade_stats *stats) {
+    vshi_shadow_task own = item->shadow;
+    own.kernel = task->kernel;
+    own.points = &piece->points;
+    own.visibility = piece->value;
+    own.deviation = task->deviation != NULL ? piece->deviation : NULL;
+    vshi_shadow_shade(&own, 0, piece->points.count, stats);
+    for (size_t i = 0; i < piece->points.count; ++i) {
+        const double above = vshi_shadow_above(&own, i), scale = above > 0.0 ? 1.0 / above : 0.0;
+        const double share = scale * (double)piece->value[i];
+        piece->above[i] = above;
+        piece->share[i] = share > 1.0 ? 1.0 : share; /* NaN stays */
+        piece->deviation[i] = own.deviation != NULL ? (float)(scale * (double)piece->deviation[i]) : 0.0f;
+    }
+}
+
+/* What heights or spheres leave of it: shares already, and exact. */
+static void shade_analytic(const prepared *item, const vshi_shadow_task *task, size_t begin,
+                           layer_piece *piece, vsh_shade_stats *stats) {
     const vsh_layer *layer = &item->layer;
     const size_t count = piece->points.count;
     if (layer->heights != NULL) {
@@ -241,17 +256,10 @@ static void shade_analytic(const prepared *item, layer_piece *piece, vsh_shade_s
         vshi_spheres_shadow(layer->spheres, &item->light, item->options.method, &piece->points, 0, count, 0.0,
                             piece->value, stats);
     }
-}
-
-static void occlude_analytic(const prepared *item, layer_piece *piece, float *bent, vsh_shade_stats *stats) {
-    const vsh_layer *layer = &item->layer;
-    const double distance = item->options.ao_distance;
-    const size_t count = piece->points.count;
-    if (layer->heights != NULL) {
-        vshi_heights_ao(layer->heights, distance, &piece->points, 0, count,
-                        vshi_heights_lift(layer->heights, layer->start_offset), piece->value, bent, stats);
-    } else {
-        vshi_spheres_ao(layer->spheres, distance, &piece->points, 0, count, 0.0, piece->value, bent, stats);
+    for (size_t i = 0; i < count; ++i) {
+        piece->above[i] = vshi_shadow_above(task, begin + i);
+        piece->share[i] = (double)piece->value[i];
+        piece->deviation[i] = 0.0f;
     }
 }
 
@@ -261,33 +269,48 @@ void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task,
     cut(&piece, task->points, begin, end);
     for (size_t k = 0; k < layers->count; ++k) {
         const prepared *item = &layers->items[k];
-        if (item->layer.field == NULL) {
-            shade_analytic(item, &piece, stats);
-            for (size_t i = begin; i < end; ++i) {
-                if (task->visibility[i] > 0.0f) {
-                    const double above = vshi_shadow_above(task, i);
-                    combine(&item->layer, above * (double)piece.value[i - begin], 0.0, above,
-                            &task->visibility[i], task->deviation != NULL ? &task->deviation[i] : NULL);
-                }
-            }
-            continue;
+        const double *remap = item->layer.remap;
+        if (item->layer.field != NULL) {
+            shade_field(item, task, &piece, stats);
+        } else {
+            shade_analytic(item, task, begin, &piece, stats);
         }
-        vshi_shadow_task own = item->shadow;
-        own.kernel = task->kernel;
-        own.points = &piece.points;
-        own.visibility = piece.value;
-        own.deviation = task->deviation != NULL ? piece.deviation : NULL;
-        vshi_shadow_shade(&own, 0, end - begin, stats);
-        for (size_t i = begin; i < end; ++i) {
-            float *value = &task->visibility[i];
-            if (!(*value > 0.0f)) {
+        for (size_t i = begin, n = 0; i < end; ++i, ++n) {
+            if (!(task->visibility[i] > 0.0f)) {
                 continue; /* dark already, turned away, or invalid */
             }
-            combine(&item->layer, (double)piece.value[i - begin],
-                    own.deviation != NULL ? (double)piece.deviation[i - begin] : 0.0,
-                    vshi_shadow_above(&own, i - begin), value,
+            double share = piece.share[n], deviation = (double)piece.deviation[n];
+            if (remap[1] > 0.0) {
+                share = smoothstep(remap, share);
+                deviation *= STEEPEST / (remap[1] - remap[0]);
+            }
+            combine(item->layer.combine, share, deviation, piece.above[n], &task->visibility[i],
                     task->deviation != NULL ? &task->deviation[i] : NULL);
         }
+    }
+}
+
+/* What a layer leaves of the sky; values of heights and spheres are exact. */
+static void occlude(const prepared *item, const vshi_ao_task *task, layer_piece *piece,
+                    vsh_shade_stats *stats) {
+    const vsh_layer *layer = &item->layer;
+    const size_t count = piece->points.count;
+    float *bent = task->bent != NULL ? piece->bent : NULL;
+    memset(piece->deviation, 0, count * sizeof *piece->deviation);
+    if (layer->heights != NULL) {
+        vshi_heights_ao(layer->heights, item->options.ao_distance, &piece->points, 0, count,
+                        vshi_heights_lift(layer->heights, layer->start_offset), piece->value, bent, stats);
+    } else if (layer->spheres != NULL) {
+        vshi_spheres_ao(layer->spheres, item->options.ao_distance, &piece->points, 0, count, 0.0,
+                        piece->value, bent, stats);
+    } else {
+        vshi_ao_task own = item->ao;
+        own.kernel = task->kernel;
+        own.points = &piece->points;
+        own.ao = piece->value;
+        own.deviation = task->deviation != NULL ? piece->deviation : NULL;
+        own.bent = bent;
+        vshi_ao_shade(&own, 0, count, stats);
     }
 }
 
@@ -304,32 +327,12 @@ void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t 
     layer_piece piece;
     cut(&piece, task->points, begin, end);
     for (size_t k = 0; k < layers->count; ++k) {
-        const prepared *item = &layers->items[k];
-        if (item->layer.field == NULL) {
-            occlude_analytic(item, &piece, task->bent != NULL ? piece.bent : NULL, stats);
-            for (size_t i = begin; i < end; ++i) {
-                combine(&item->layer, (double)piece.value[i - begin], 0.0, 1.0, &task->ao[i],
-                        task->deviation != NULL ? &task->deviation[i] : NULL);
-                if (task->bent != NULL) {
-                    superpose(task->bent + 3 * i, piece.bent + 3 * (i - begin),
-                              task->points->normals + 3 * i);
-                }
-            }
-            continue;
-        }
-        vshi_ao_task own = item->ao;
-        own.kernel = task->kernel;
-        own.points = &piece.points;
-        own.ao = piece.value;
-        own.deviation = task->deviation != NULL ? piece.deviation : NULL;
-        own.bent = task->bent != NULL ? piece.bent : NULL;
-        vshi_ao_shade(&own, 0, end - begin, stats);
-        for (size_t i = begin; i < end; ++i) {
-            combine(&item->layer, (double)piece.value[i - begin],
-                    own.deviation != NULL ? (double)piece.deviation[i - begin] : 0.0, 1.0, &task->ao[i],
-                    task->deviation != NULL ? &task->deviation[i] : NULL);
+        occlude(&layers->items[k], task, &piece, stats);
+        for (size_t i = begin, n = 0; i < end; ++i, ++n) {
+            combine(layers->items[k].layer.combine, (double)piece.value[n], (double)piece.deviation[n], 1.0,
+                    &task->ao[i], task->deviation != NULL ? &task->deviation[i] : NULL);
             if (task->bent != NULL) {
-                superpose(task->bent + 3 * i, piece.bent + 3 * (i - begin), task->points->normals + 3 * i);
+                superpose(task->bent + 3 * i, piece.bent + 3 * n, task->points->normals + 3 * i);
             }
         }
     }

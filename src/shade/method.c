@@ -44,12 +44,16 @@ static int32_t find(const char *const *names, int32_t count, const char *name) {
     return -1;
 }
 
+static const char *name_at(const char *const *names, int32_t count, int32_t i) {
+    return i >= 0 && i < count ? names[i] : NULL;
+}
+
 int32_t vsh_shadow_method(const char *name) {
     return find(shadow_names, SHADOW_COUNT, name);
 }
 
 const char *vsh_shadow_method_name(int32_t method) {
-    return method >= 0 && method < SHADOW_COUNT ? shadow_names[method] : NULL;
+    return name_at(shadow_names, SHADOW_COUNT, method);
 }
 
 int32_t vsh_ao_method(const char *name) {
@@ -57,7 +61,7 @@ int32_t vsh_ao_method(const char *name) {
 }
 
 const char *vsh_ao_method_name(int32_t method) {
-    return method >= 0 && method < AO_COUNT ? ao_names[method] : NULL;
+    return name_at(ao_names, AO_COUNT, method);
 }
 
 int32_t vsh_sampler(const char *name) {
@@ -65,7 +69,7 @@ int32_t vsh_sampler(const char *name) {
 }
 
 const char *vsh_sampler_name(int32_t sampler) {
-    return sampler >= 0 && sampler < SAMPLER_COUNT ? sampler_names[sampler] : NULL;
+    return name_at(sampler_names, SAMPLER_COUNT, sampler);
 }
 
 int32_t vsh_combine(const char *name) {
@@ -73,7 +77,7 @@ int32_t vsh_combine(const char *name) {
 }
 
 const char *vsh_combine_name(int32_t combine) {
-    return combine >= 0 && combine < COMBINE_COUNT ? combine_names[combine] : NULL;
+    return name_at(combine_names, COMBINE_COUNT, combine);
 }
 
 int32_t vsh_tint_type(const char *name) {
@@ -81,7 +85,7 @@ int32_t vsh_tint_type(const char *name) {
 }
 
 const char *vsh_tint_type_name(int32_t type) {
-    return type >= 0 && type < TINT_COUNT ? tint_names[type] : NULL;
+    return name_at(tint_names, TINT_COUNT, type);
 }
 
 int32_t vsh_bent_space(const char *name) {
@@ -89,5 +93,5 @@ int32_t vsh_bent_space(const char *name) {
 }
 
 const char *vsh_bent_space_name(int32_t space) {
-    return space >= 0 && space < SPACE_COUNT ? space_names[space] : NULL;
+    return name_at(space_names, SPACE_COUNT, space);
 }

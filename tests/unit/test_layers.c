@@ -220,6 +220,13 @@ static void test_where_it_counts(void **state) {
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(ao[i], alone[i], 1e-6);
     }
+    /* a remap is of shadows */
+    layer.remap[0] = 0.4;
+    layer.remap[1] = 0.6;
+    assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, ao, NULL, NULL, NULL), VSH_OK);
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_float_equal(ao[i], alone[i], 1e-6);
+    }
     layer.ao = 0;
     assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, ao, NULL, NULL, NULL), VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
