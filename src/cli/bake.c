@@ -13,7 +13,6 @@
 
 #include <inttypes.h>
 #include <stdio.h>
-#include <unistd.h>
 
 typedef struct bake_work {
     const cli_bake_settings *settings;
@@ -179,9 +178,7 @@ static int bake_receivers(bake_work *work) {
 
 static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
     bake_work work = {.settings = settings, .scene = scene, .run = cli_common_run(&settings->common)};
-    work.stats.shade = vsh_shade_stats_zero();
-    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    work.stats.threads = settings->common.threads > 0 ? settings->common.threads : (int32_t)cores;
+    work.stats = cli_stats_begin(CLI_STATS_TEXELS, work.run.threads);
     int code = load(&work);
     if (code == CLI_OK && settings->dry_run) {
         code = cli_bake_forecast(scene, work.assets, &work.run, settings->band_rows);
@@ -192,13 +189,8 @@ static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
     code = code == CLI_OK ? make_triangles(&work) : code;
     code = code == CLI_OK ? make_field(&work) : code;
     code = code == CLI_OK ? bake_receivers(&work) : code;
-    if (code == CLI_OK && settings->stats != NULL) {
-        cli_signals_writing(settings->stats);
-        code = cli_stats_write(&work.stats, settings->stats);
-        cli_signals_writing(NULL);
-    }
+    code = code == CLI_OK ? cli_stats_finish(&work.stats, settings->stats) : code;
     if (code == CLI_OK) {
-        cli_signals_end();
         if (!settings->common.quiet) {
             cli_stats_say(&work.stats);
         }

@@ -12,7 +12,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 enum { KEY_SIZE = 0x2000, KEY_METHOD, KEY_SUPERSAMPLE, KEY_PADDING, KEY_BITS, KEY_PACK, KEY_STATS };
 
@@ -246,9 +245,7 @@ static int run_flat(const flat_settings *s, const vsh_flat_scene *scene) {
     image.bits = scene->bits;
     image.pack = scene->pack;
     flat_planes planes = {.count = 0};
-    cli_stats stats = {.shade = vsh_shade_stats_zero()};
-    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    stats.threads = s->common.threads > 0 ? s->common.threads : (int32_t)cores;
+    cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, s->common.threads);
     stats.texels = (uint64_t)scene->options.width * (uint64_t)scene->options.height;
     int code = name_planes(scene, &planes);
     code = code == CLI_OK ? check_files(s, scene, &planes.image, &image) : code;
@@ -257,13 +254,8 @@ static int run_flat(const flat_settings *s, const vsh_flat_scene *scene) {
         cli_signals_watch();
         code = bake(s, scene, &planes, &image, &stats);
     }
-    if (code == CLI_OK && s->stats != NULL) {
-        cli_signals_writing(s->stats);
-        code = cli_stats_write(&stats, s->stats);
-        cli_signals_writing(NULL);
-    }
+    code = code == CLI_OK ? cli_stats_finish(&stats, s->stats) : code;
     if (code == CLI_OK) {
-        cli_signals_end();
         say_summary(s, scene, &stats);
     }
     free_planes(&planes);

@@ -12,7 +12,6 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 enum {
     KEY_POINTS = 0x2000,
@@ -265,10 +264,7 @@ static void say_results(const query_work *work) {
 
 static int run_query(const query_settings *s, vsh_scene *scene) {
     query_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
-    work.stats.of = CLI_STATS_POINTS;
-    work.stats.shade = vsh_shade_stats_zero();
-    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    work.stats.threads = s->bake.common.threads > 0 ? s->bake.common.threads : (int32_t)cores;
+    work.stats = cli_stats_begin(CLI_STATS_POINTS, work.run.threads);
     int code = cli_points_open(s->points, s->points_format, s->normals, s->strict, &work.reader);
     code = code == CLI_OK ? choose_answers(&work) : code;
     code = code == CLI_OK ? load(&work) : code;
@@ -278,13 +274,8 @@ static int run_query(const query_settings *s, vsh_scene *scene) {
             work.made.info.bytes + (work.triangles != NULL ? vsh_triangles_bytes(work.triangles) : 0);
         code = query_stream(s, work.query, &work.answers, held, &work.run, &work.reader, &work.stats);
     }
-    if (code == CLI_OK && s->bake.stats != NULL) {
-        cli_signals_writing(s->bake.stats);
-        code = cli_stats_write(&work.stats, s->bake.stats);
-        cli_signals_writing(NULL);
-    }
+    code = code == CLI_OK ? cli_stats_finish(&work.stats, s->bake.stats) : code;
     if (code == CLI_OK) {
-        cli_signals_end();
         say_results(&work);
     }
     query_answers_free(&work.answers);

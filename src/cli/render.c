@@ -14,7 +14,6 @@
 #include <limits.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 static const double degree = 0.017453292519943295;
 /* A three-quarter view from a little above. */
@@ -175,21 +174,13 @@ static void say_results(const render_work *work) {
 
 static int run_render(const render_settings *s, vsh_scene *scene) {
     render_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
-    work.stats.of = CLI_STATS_POINTS;
-    work.stats.shade = vsh_shade_stats_zero();
-    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    work.stats.threads = s->bake.common.threads > 0 ? s->bake.common.threads : (int32_t)cores;
+    work.stats = cli_stats_begin(CLI_STATS_POINTS, work.run.threads);
     int code = load(&work);
     code = code == CLI_OK ? make_fields(&work) : code;
     code = code == CLI_OK ? set_options(&work) : code;
     code = code == CLI_OK ? render_frames(&work) : code;
-    if (code == CLI_OK && s->bake.stats != NULL) {
-        cli_signals_writing(s->bake.stats);
-        code = cli_stats_write(&work.stats, s->bake.stats);
-        cli_signals_writing(NULL);
-    }
+    code = code == CLI_OK ? cli_stats_finish(&work.stats, s->bake.stats) : code;
     if (code == CLI_OK) {
-        cli_signals_end();
         say_results(&work);
     }
     render_page_abandon(work.page);

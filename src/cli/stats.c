@@ -2,6 +2,7 @@
 
 #include "clock.h"
 #include "message.h"
+#include "signals.h"
 #include "temporary.h"
 
 #include <inttypes.h>
@@ -10,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 static const char *const stage_names[CLI_STAGE_COUNT] = {"load", "voxelize", "field", "bake", "write"};
 
@@ -29,7 +31,8 @@ static double bytes_per_voxel(const cli_stats *stats) {
     return (double)stats->field.bytes / fmax(1.0, (double)stats->field.active_voxels);
 }
 
-int cli_stats_write(const cli_stats *stats, const char *path) {
+/* The JSON file. */
+static int write_file(const cli_stats *stats, const char *path) {
     json_t *stages = json_object();
     for (int i = 0; i < CLI_STAGE_COUNT; ++i) {
         json_object_set_new(stages, stage_names[i], json_real(stats->seconds[i]));
@@ -89,6 +92,25 @@ int cli_stats_write(const cli_stats *stats, const char *path) {
     }
     const int code = cli_temporary_write(path, text);
     free(text);
+    return code;
+}
+
+cli_stats cli_stats_begin(int32_t of, int32_t threads) {
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    return (cli_stats){
+        .of = of, .shade = vsh_shade_stats_zero(), .threads = threads > 0 ? threads : (int32_t)cores};
+}
+
+int cli_stats_finish(const cli_stats *stats, const char *path) {
+    int code = CLI_OK;
+    if (path != NULL) {
+        cli_signals_writing(path);
+        code = write_file(stats, path);
+        cli_signals_writing(NULL);
+    }
+    if (code == CLI_OK) {
+        cli_signals_end();
+    }
     return code;
 }
 

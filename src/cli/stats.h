@@ -34,8 +34,12 @@ typedef struct cli_stats {
 /* Adds the seconds since `since` to a stage and returns the time now. */
 double cli_stats_stage(cli_stats *stats, int stage, double since);
 
-/* Writes the JSON file. CLI_OK or an exit code, having said why. */
-int cli_stats_write(const cli_stats *stats, const char *path);
+/* Nothing yet; `threads` as of vsh_run. */
+cli_stats cli_stats_begin(int32_t of, int32_t threads);
+
+/* The end of a run that went well: writes the JSON file where `path` is not NULL; signals then end nothing
+ * any more. CLI_OK or an exit code, having said why. */
+int cli_stats_finish(const cli_stats *stats, const char *path);
 
 /* Two lines on standard error. */
 void cli_stats_say(const cli_stats *stats);

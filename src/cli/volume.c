@@ -14,7 +14,6 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 enum { KEY_BAND = 0x2000, KEY_BOX, KEY_BOX_VOXEL_SIZE, KEY_LIKE, KEY_INSIDE, KEY_HALF, KEY_STATS };
 
@@ -290,10 +289,7 @@ static void say_results(const volume_work *work, const vsh_volume_info *info) {
 
 static int run_volume(const volume_settings *s, vsh_scene *scene) {
     volume_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
-    work.stats.of = CLI_STATS_VOXELS;
-    work.stats.shade = vsh_shade_stats_zero();
-    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    work.stats.threads = s->bake.common.threads > 0 ? s->bake.common.threads : (int32_t)cores;
+    work.stats = cli_stats_begin(CLI_STATS_VOXELS, work.run.threads);
     vsh_volume_info info;
     int code = load(&work);
     code = code == CLI_OK ? make_field(&work) : code;
@@ -302,13 +298,8 @@ static int run_volume(const volume_settings *s, vsh_scene *scene) {
     if (code == CLI_OK) {
         count_voxels(&work, &info);
     }
-    if (code == CLI_OK && s->bake.stats != NULL) {
-        cli_signals_writing(s->bake.stats);
-        code = cli_stats_write(&work.stats, s->bake.stats);
-        cli_signals_writing(NULL);
-    }
+    code = code == CLI_OK ? cli_stats_finish(&work.stats, s->bake.stats) : code;
     if (code == CLI_OK) {
-        cli_signals_end();
         say_results(&work, &info);
     }
     vsh_volume_free(work.volume);
@@ -320,7 +311,7 @@ static int run_volume(const volume_settings *s, vsh_scene *scene) {
 }
 
 static int volume_main(int argc, char **argv) {
-    static volume_settings s; /* the path of --like is in it */
+    volume_settings s;
     memset(&s, 0, sizeof s);
     s.bake.common = cli_common_default();
     s.bake.grid.options = vsh_grid_options_default();
