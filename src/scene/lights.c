@@ -18,6 +18,11 @@ static const char *type_name(int32_t i) {
     return names[i];
 }
 
+/* Lights in a plane are discs. */
+static const char *flat_type_name(int32_t i) {
+    return i == VSH_LIGHT_SPHERE ? "disc" : type_name(i);
+}
+
 static const char *falloff_name(int32_t i) {
     static const char *const names[] = {[VSH_FALLOFF_NONE] = "none",
                                         [VSH_FALLOFF_INVERSE_SQUARE] = "inverse_square",
@@ -26,7 +31,7 @@ static const char *falloff_name(int32_t i) {
     return names[i];
 }
 
-vsh_result vshi_read_light_name(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_name(vshi_reader *reader, const vshi_value *value, void *member) {
     const vsh_result result = vshi_expect(reader, value, JSON_STRING);
     if (result != VSH_OK) {
         return result;
@@ -40,88 +45,113 @@ vsh_result vshi_read_light_name(vshi_reader *reader, const vshi_value *value, vo
     return VSH_OK;
 }
 
-#define COORDINATES(key, bits, must, member, more)                                                           \
+#define COORDINATES(key, bits, member, dimensions, more)                                                     \
     {                                                                                                        \
-        .name = key, .kind = VSHI_VECTOR, .variants = bits, .required = must,                                \
-        .offset = offsetof(vsh_light, member), .count = 3, .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST, \
-        .flags = more                                                                                        \
+        .name = key, .kind = VSHI_VECTOR, .variants = bits, .required = bits,                                \
+        .offset = offsetof(vsh_light, member), .count = dimensions, .lowest = -VSHI_LARGEST,                 \
+        .highest = VSHI_LARGEST, .flags = more                                                               \
+    }
+
+/* What lights in space and in a plane have in common. */
+#define LIGHT_KEYS(dimensions, types)                                                                        \
+    {.name = "name",                                                                                         \
+     .kind = VSHI_CUSTOM,                                                                                    \
+     .required = VSHI_ALL,                                                                                   \
+     .offset = offsetof(vsh_light, name),                                                                    \
+     .read = read_name},                                                                                     \
+        {.name = "type",                                                                                     \
+         .kind = VSHI_NAME,                                                                                  \
+         .required = VSHI_ALL,                                                                               \
+         .offset = offsetof(vsh_light, type),                                                                \
+         .name_of = types},                                                                                  \
+        COORDINATES("direction", DIRECTIONAL | SPOT, direction, dimensions, VSHI_NONZERO),                   \
+        COORDINATES("position", SPHERE | SPOT, position, dimensions, 0),                                     \
+        {.name = "angle_deg",                                                                                \
+         .kind = VSHI_DEGREES,                                                                               \
+         .variants = DIRECTIONAL,                                                                            \
+         .offset = offsetof(vsh_light, angle),                                                               \
+         .highest = 180.0,                                                                                   \
+         .flags = VSHI_BELOW},                                                                               \
+        {.name = "radius",                                                                                   \
+         .kind = VSHI_NUMBER,                                                                                \
+         .variants = SPHERE | SPOT,                                                                          \
+         .offset = offsetof(vsh_light, radius),                                                              \
+         .highest = VSHI_LARGEST},                                                                           \
+        {.name = "inner_deg",                                                                                \
+         .kind = VSHI_DEGREES,                                                                               \
+         .variants = SPOT,                                                                                   \
+         .required = SPOT,                                                                                   \
+         .offset = offsetof(vsh_light, inner_angle),                                                         \
+         .highest = 180.0},                                                                                  \
+        {.name = "outer_deg",                                                                                \
+         .kind = VSHI_DEGREES,                                                                               \
+         .variants = SPOT,                                                                                   \
+         .required = SPOT,                                                                                   \
+         .offset = offsetof(vsh_light, outer_angle),                                                         \
+         .highest = 180.0,                                                                                   \
+         .flags = VSHI_ABOVE},                                                                               \
+        {.name = "reach",                                                                                    \
+         .kind = VSHI_NUMBER,                                                                                \
+         .variants = SPHERE | SPOT,                                                                          \
+         .offset = offsetof(vsh_light, reach),                                                               \
+         .highest = VSHI_LARGEST,                                                                            \
+         .flags = VSHI_ABOVE},                                                                               \
+    {                                                                                                        \
+        .name = "color", .kind = VSHI_VECTOR, .offset = offsetof(vsh_light, color), .count = 3,              \
+        .highest = VSHI_LARGEST                                                                              \
     }
 
 static const vshi_key light_keys[] = {
-    {.name = "name",
-     .kind = VSHI_CUSTOM,
-     .required = VSHI_ALL,
-     .offset = offsetof(vsh_light, name),
-     .read = vshi_read_light_name},
-    {.name = "type",
-     .kind = VSHI_NAME,
-     .required = VSHI_ALL,
-     .offset = offsetof(vsh_light, type),
-     .name_of = type_name},
-    COORDINATES("direction", DIRECTIONAL | SPOT, DIRECTIONAL | SPOT, direction, VSHI_NONZERO),
-    COORDINATES("position", SPHERE | SPOT, SPHERE | SPOT, position, 0),
-    {.name = "angle_deg",
-     .kind = VSHI_DEGREES,
-     .variants = DIRECTIONAL,
-     .offset = offsetof(vsh_light, angle),
-     .highest = 180.0,
-     .flags = VSHI_BELOW},
-    {.name = "radius",
-     .kind = VSHI_NUMBER,
-     .variants = SPHERE | SPOT,
-     .offset = offsetof(vsh_light, radius),
-     .highest = VSHI_LARGEST},
-    {.name = "inner_deg",
-     .kind = VSHI_DEGREES,
-     .variants = SPOT,
-     .required = SPOT,
-     .offset = offsetof(vsh_light, inner_angle),
-     .highest = 180.0},
-    {.name = "outer_deg",
-     .kind = VSHI_DEGREES,
-     .variants = SPOT,
-     .required = SPOT,
-     .offset = offsetof(vsh_light, outer_angle),
-     .highest = 180.0,
-     .flags = VSHI_ABOVE},
+    LIGHT_KEYS(3, type_name),
     {.name = "falloff",
      .kind = VSHI_NAME,
      .variants = SPHERE | SPOT,
      .offset = offsetof(vsh_light, falloff),
      .name_of = falloff_name},
-    {.name = "reach",
-     .kind = VSHI_NUMBER,
-     .variants = SPHERE | SPOT,
-     .offset = offsetof(vsh_light, reach),
-     .highest = VSHI_LARGEST,
-     .flags = VSHI_ABOVE},
     {.name = "layers", .kind = VSHI_LATER},
-    {.name = "color",
-     .kind = VSHI_VECTOR,
-     .offset = offsetof(vsh_light, color),
-     .count = 3,
-     .highest = VSHI_LARGEST},
 };
 static const vshi_table light_table = VSHI_TABLE(light_keys);
 
-vsh_result vshi_read_light(vshi_reader *reader, const vshi_value *value, void *member) {
-    vsh_light *light = member;
-    *light = vsh_light_default();
-    vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
-    if (result != VSH_OK) {
-        return result;
-    }
+static const vshi_key flat_keys[] = {LIGHT_KEYS(2, flat_type_name)};
+static const vshi_table flat_table = VSHI_TABLE(flat_keys);
+
+static vsh_result read_keys(vshi_reader *reader, const vshi_value *value, const vshi_table *table,
+                            vshi_name_fn *types, vsh_light *light) {
     int32_t type = -1;
-    result = vshi_read_choice(reader, value, "type", type_name, &type);
+    vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
+    if (result == VSH_OK) {
+        result = vshi_read_choice(reader, value, "type", types, &type);
+    }
     if (result != VSH_OK) {
         return result;
     }
     /* A light without a type still has its keys looked over: "type" may be what is misspelt. */
     char what[32] = "a light";
     if (type >= 0) {
-        snprintf(what, sizeof what, "a %s light", type_name(type));
+        snprintf(what, sizeof what, "a %s light", types(type));
     }
-    result = vshi_read_object(reader, value, &light_table, type < 0 ? VSHI_ALL : 1U << type, what, light);
+    return vshi_read_object(reader, value, table, type < 0 ? VSHI_ALL : 1U << type, what, light);
+}
+
+/* What no key alone can tell. */
+static vsh_result check(vshi_reader *reader, const vshi_value *value, const vsh_light *light) {
+    vshi_value inner, outer;
+    if (light->inner_angle > light->outer_angle && light->type == VSH_LIGHT_SPOT &&
+        vshi_member(value, "inner_deg", &inner) && vshi_member(value, "outer_deg", &outer)) {
+        return vshi_reader_fail(reader, &inner, "%.9g is over outer_deg, %.9g", json_number_value(inner.json),
+                                json_number_value(outer.json));
+    }
+    vsh_error error;
+    if (vsh_light_check(light, &error) != VSH_OK) { /* a limit that the tables above do not know of */
+        return vshi_reader_fail(reader, value, "%.400s", error.message);
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_read_light(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_light *light = member;
+    *light = vsh_light_default();
+    const vsh_result result = read_keys(reader, value, &light_table, type_name, light);
     if (result != VSH_OK) {
         return result;
     }
@@ -133,17 +163,22 @@ vsh_result vshi_read_light(vshi_reader *reader, const vshi_value *value, void *m
     if (light->falloff != VSH_FALLOFF_QUADRATIC && has_reach) {
         return vshi_reader_fail_key(reader, &reach, "is of no use without falloff \"quadratic\"");
     }
-    vshi_value inner, outer;
-    if (light->inner_angle > light->outer_angle && light->type == VSH_LIGHT_SPOT &&
-        vshi_member(value, "inner_deg", &inner) && vshi_member(value, "outer_deg", &outer)) {
-        return vshi_reader_fail(reader, &inner, "%.9g is over outer_deg, %.9g", json_number_value(inner.json),
-                                json_number_value(outer.json));
+    return check(reader, value, light);
+}
+
+vsh_result vshi_read_flat_light(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_light *light = member;
+    *light = vsh_light_default();
+    light->direction[1] = 0.0; /* so that what is read is all there is */
+    const vsh_result result = read_keys(reader, value, &flat_table, flat_type_name, light);
+    if (result != VSH_OK) {
+        return result;
     }
-    vsh_error error;
-    if (vsh_light_check(light, &error) != VSH_OK) { /* a limit that the table above does not know of */
-        return vshi_reader_fail(reader, value, "%.400s", error.message);
+    vshi_value reach;
+    if (vshi_member(value, "reach", &reach)) {
+        light->falloff = VSH_FALLOFF_QUADRATIC;
     }
-    return VSH_OK;
+    return check(reader, value, light);
 }
 
 vsh_result vshi_check_light_names(vshi_reader *reader, const vshi_value *value, const vsh_light *lights,

@@ -22,9 +22,6 @@ vsh_result vshi_check_layers(vshi_reader *reader, const vshi_value *root, vsh_sc
 vsh_result vshi_read_size(vshi_reader *reader, const vshi_value *value, int32_t *width, int32_t *height);
 vsh_result vshi_read_bits(vshi_reader *reader, const vshi_value *value, void *bits); /* int32_t */
 
-/* A light's name into a vsh_light's. */
-vsh_result vshi_read_light_name(vshi_reader *reader, const vshi_value *value, void *name);
-
 /* Fails where two lights of the array `value` have one name. */
 vsh_result vshi_check_light_names(vshi_reader *reader, const vshi_value *value, const vsh_light *lights,
                                   size_t count);

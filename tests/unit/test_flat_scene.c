@@ -103,6 +103,9 @@ static const struct {
      "lights[0]: key \"position\" is missing: a disc light needs it"},
     {LIT("{\"name\":\"a\",\"type\":\"directional\",\"direction\":@[0,0]}"),
      "lights[0].direction: is zero, and so points nowhere"},
+    {LIT("{\"name\":\"a\",\"type\":\"spot\",\"position\":[1,2],\"direction\":[0,1],\"inner_deg\":@50,"
+         "\"outer_deg\":40}"),
+     "lights[0].inner_deg: 50 is over outer_deg, 40"},
     {LIT("{\"name\":\"a\",\"type\":\"disc\",\"position\":[1,2],\"reach\":@0}"),
      "lights[0].reach: 0 is out of range 0 (excluded) … 1e+15"},
     {LIT("{\"name\":\"a\",\"type\":\"disc\",\"position\":[1,2],@\"falloff\":\"none\"}"),
