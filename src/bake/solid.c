@@ -1,21 +1,30 @@
 #include "bake/solid.h"
 
+#include "analytic/balls.h"
+#include "analytic/heights.h"
 #include "shade/layers.h"
 
 #include <math.h>
 
 vsh_result vshi_solid_of(const vsh_field *field, const vsh_shade_options *options, vshi_solid *solid,
                          vsh_error *error) {
-    *solid = (vshi_solid){.fields = {field}, .count = 1};
+    *solid = (vshi_solid){.fields = {field}, .field_count = 1};
     vsh_result result = VSH_OK;
     for (size_t i = 0; i < options->layer_count && result == VSH_OK; ++i) {
         vsh_layer layer;
         result = vshi_layer_resolve(options, i, &layer, error);
-        if (result == VSH_OK) {
-            solid->fields[solid->count++] = layer.field;
+        if (result != VSH_OK) {
+            break;
+        }
+        if (layer.field != NULL) {
+            solid->fields[solid->field_count++] = layer.field;
+        } else if (layer.spheres != NULL) {
+            solid->spheres[solid->spheres_count++] = layer.spheres;
+        } else {
+            solid->heights[solid->heights_count++] = layer.heights;
         }
     }
-    for (size_t i = 0; i < solid->count; ++i) {
+    for (size_t i = 0; i < solid->field_count; ++i) {
         vsh_field_info info;
         vsh_field_get_info(solid->fields[i], &info);
         solid->voxel_size = fmax(solid->voxel_size, info.voxel_size);
@@ -23,13 +32,47 @@ vsh_result vshi_solid_of(const vsh_field *field, const vsh_shade_options *option
     return result;
 }
 
+static void lower(float *distance, float other) {
+    *distance = other < *distance ? other : *distance; /* NaN stays */
+}
+
 void vshi_solid_sample(const vshi_solid *solid, size_t count, const double *positions, float *distances) {
     vsh_field_sample(solid->fields[0], count, positions, distances);
-    for (size_t f = 1; f < solid->count; ++f) {
+    for (size_t f = 1; f < solid->field_count; ++f) {
         float other[VSHI_SOLID_MOST];
         vsh_field_sample(solid->fields[f], count, positions, other);
         for (size_t i = 0; i < count; ++i) {
-            distances[i] = other[i] < distances[i] ? other[i] : distances[i]; /* NaN stays */
+            lower(&distances[i], other[i]);
         }
     }
+    for (size_t s = 0; s < solid->spheres_count; ++s) {
+        for (size_t i = 0; i < count; ++i) {
+            lower(&distances[i], (float)vshi_balls_distance(solid->spheres[s], positions + 3 * i));
+        }
+    }
+}
+
+void vshi_solid_bound(const vshi_solid *solid, size_t count, const double *positions, float *distances) {
+    vshi_solid_sample(solid, count, positions, distances);
+    for (size_t h = 0; h < solid->heights_count; ++h) {
+        vsh_heights_info info;
+        vsh_heights_get_info(solid->heights[h], &info);
+        for (size_t i = 0; i < count; ++i) {
+            double square = 0.0;
+            for (int axis = 0; axis < 3; ++axis) {
+                const double p = positions[3 * i + (size_t)axis];
+                const double off = fmax(info.bounds_min[axis] - p, p - info.bounds_max[axis]);
+                square += off > 0.0 ? off * off : 0.0;
+            }
+            lower(&distances[i], (float)sqrt(square));
+        }
+    }
+}
+
+bool vshi_solid_buries(const vshi_solid *solid, const double position[3]) {
+    bool buries = false;
+    for (size_t h = 0; h < solid->heights_count && !buries; ++h) {
+        buries = vshi_heights_hold(solid->heights[h], position);
+    }
+    return buries;
 }

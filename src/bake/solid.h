@@ -2,11 +2,14 @@
 #ifndef VSHI_BAKE_SOLID_H
 #define VSHI_BAKE_SOLID_H
 
+#include <stdbool.h>
 #include <vdbshade/shade.h>
 
 typedef struct vshi_solid {
     const vsh_field *fields[VSH_MAX_LAYERS + 1];
-    size_t count;
+    const vsh_spheres *spheres[VSH_MAX_LAYERS];
+    const vsh_heights *heights[VSH_MAX_LAYERS];
+    size_t field_count, spheres_count, heights_count;
     double voxel_size; /* the largest, world units */
 } vshi_solid;
 
@@ -16,7 +19,14 @@ enum { VSHI_SOLID_MOST = 512 }; /* positions at a time */
 vsh_result vshi_solid_of(const vsh_field *field, const vsh_shade_options *options, vshi_solid *solid,
                          vsh_error *error);
 
-/* vsh_field_sample() of whichever is nearest, at most VSHI_SOLID_MOST positions [count][3]. */
+/* Signed distance, world units, to whichever field or sphere is nearest, as vsh_field_sample(); at most
+ * VSHI_SOLID_MOST positions [count][3]. Heights have none. */
 void vshi_solid_sample(const vshi_solid *solid, size_t count, const double *positions, float *distances);
+
+/* The same, or less: no more than the distance to the box of any heights, 0 within it. */
+void vshi_solid_bound(const vshi_solid *solid, size_t count, const double *positions, float *distances);
+
+/* Whether a position is within heights. */
+bool vshi_solid_buries(const vshi_solid *solid, const double position[3]);
 
 #endif

@@ -4,6 +4,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "shade/layers.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -94,8 +95,15 @@ static vsh_result begin_volume(vshi_volume_bake *bake, const vsh_light *lights, 
     const vshi_channels what = {lights,         bake->light_count, &bake->options, bake->shadow_error,
                                 bake->ao_error, info.voxel_size};
     vshi_channels_describe(&what, channels);
+    double layers = 0.0;
+    for (size_t i = 0; i < bake->options.shade.layer_count; ++i) {
+        vsh_layer layer;
+        if (vshi_layer_resolve(&bake->options.shade, i, &layer, NULL) == VSH_OK) {
+            layers += vshi_layer_bytes(&layer);
+        }
+    }
     const double held =
-        (double)info.bytes + 2.0 * (double)bake->block_count * sizeof *bake->fill.shaded +
+        (double)info.bytes + layers + 2.0 * (double)bake->block_count * sizeof *bake->fill.shaded +
         (bake->options.shade.triangles != NULL ? (double)vsh_triangles_bytes(bake->options.shade.triangles)
                                                : 0.0);
     result = vshi_volume_begin(bake->voxels, channels, bake->channel_count, run, held, &bake->volume, error);
@@ -109,8 +117,9 @@ static vsh_result bake_all(vshi_volume_bake *bake, const vsh_light *lights, cons
     if (bake->options.ao == 0) {
         shade.ao_method = VSH_AO_CONES; /* not asked for: it may want what is not there */
     }
-    vsh_result result = vshi_query_create(bake->field, lights, bake->light_count, &shade, !bake->normals,
-                                          &bake->query, error);
+    const bool around = !bake->normals && bake->options.ao != 0; /* AO over all directions */
+    vsh_result result =
+        vshi_query_create(bake->field, lights, bake->light_count, &shade, around, &bake->query, error);
     if (result == VSH_OK) {
         result = begin_volume(bake, lights, run, error);
     }

@@ -46,7 +46,7 @@ static void keep_outside(const vshi_volume_bake *bake, piece *p) {
     vshi_solid_sample(&bake->solid, p->count, &p->centre[0][0], distance);
     size_t kept = 0;
     for (size_t i = 0; i < p->count; ++i) {
-        if (distance[i] >= 0.0f) {
+        if (distance[i] >= 0.0f && !vshi_solid_buries(&bake->solid, p->centre[i])) {
             p->voxel[kept] = p->voxel[i];
             memmove(p->centre[kept++], p->centre[i], sizeof p->centre[i]);
         }
@@ -242,7 +242,7 @@ static void look_around(const vshi_volume_bake *bake, size_t begin, size_t count
     for (size_t i = 0; i < count; ++i) {
         vshi_voxels_ball(bake->voxels, begin + i, centre[i], &radius[i]);
     }
-    vshi_solid_sample(&bake->solid, count, &centre[0][0], distance);
+    vshi_solid_bound(&bake->solid, count, &centre[0][0], distance);
     for (size_t i = 0; i < count; ++i) {
         const double sure = SURE * fabs((double)distance[i]) - bake->solid.voxel_size - radius[i];
         known[i].inside = sure > 0.0 && distance[i] < 0.0f;
@@ -284,6 +284,8 @@ void vshi_volume_shade_blocks(void *user, size_t begin, size_t end) {
     if (!good) {
         atomic_store(&bake->out_of_memory, true);
     }
+    /* in units, so that the order of threads changes no bit */
+    stats.square_error = floor(stats.square_error / VSHI_SQUARE_UNIT) * VSHI_SQUARE_UNIT;
     pthread_mutex_lock(&bake->lock);
     vshi_shade_stats_add(&bake->stats, &stats);
     pthread_mutex_unlock(&bake->lock);

@@ -195,10 +195,11 @@ static int choose_voxels(volume_work *work) {
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }
 
-/* The union of all casters: what has the band, and without layers what casts. */
+/* The union of all casters in voxels: what has the band, or tells the size of a box's voxels; and without
+ * layers what casts. */
 static int make_grid(volume_work *work) {
     const volume_settings *s = work->settings;
-    if (work->scene->layer_count > 0 && (s->like != NULL || s->box_voxel_size > 0.0)) {
+    if (s->like != NULL || s->box_voxel_size > 0.0) {
         return CLI_OK;
     }
     const double start = cli_seconds();

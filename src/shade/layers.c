@@ -168,6 +168,10 @@ vsh_result vshi_layers_prepare(const vsh_shade_options *options, const vsh_light
 vsh_result vshi_layers_prepare_sphere(vshi_layers *layers, vsh_error *error) {
     vsh_result result = VSH_OK;
     for (size_t i = 0; layers != NULL && i < layers->count && result == VSH_OK; ++i) {
+        if (layers->items[i].layer.field == NULL) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                             "AO in free space: heightfields and spheres know of none without voxels");
+        }
         result = vshi_ao_prepare_sphere(&layers->cones, &layers->items[i].ao, error);
     }
     return result;

@@ -364,12 +364,95 @@ static void a_lightmap_and_a_band_agree_where_texel_and_voxel_meet(void **state)
     vsh_field_free(field);
 }
 
+/* A sphere and a terrain beside the field, neither in voxels: values are those of queries, what is within
+ * them is inside, and free space has no AO that they would know of. */
+static void casters_without_voxels_hide_light_and_are_solid(void **state) {
+    (void)state;
+    static const double high_ball[4] = {1.6, 1.6, 0.0, 0.4},
+                        down[12] = {1, 0, 0, 0, 0, 1, 0, -2.0, 0, 0, 1, 0};
+    static const float values[9] = {0.0f, 0.2f, 0.0f, 0.3f, 1.0f, 0.1f, 0.0f, 0.4f, 0.0f};
+    const vsh_heights_source source = {.columns = 3,
+                                       .rows = 3,
+                                       .values = values,
+                                       .size = {2.0, 2.0},
+                                       .height = 0.4,
+                                       .base = 0.3,
+                                       .transform = down};
+    vsh_heights *heights = NULL;
+    vsh_spheres *spheres = NULL;
+    assert_int_equal(vsh_heights_create(&source, NULL, &heights, NULL), VSH_OK);
+    assert_int_equal(vsh_spheres_create(high_ball, 1, NULL, NULL, &spheres, NULL), VSH_OK);
+    vsh_field *field = field_of(ball(), 0.05, 4.0);
+    vsh_layer layers[2] = {vsh_layer_default(), vsh_layer_default()};
+    layers[0].spheres = spheres;
+    layers[1].heights = heights;
+    vsh_voxels *voxels = cube_of(2.6, 0.05);
+    vsh_volume_options options = vsh_volume_options_default();
+    options.shade.layers = layers;
+    options.shade.layer_count = 2;
+    const vsh_light light = sun(TOWARDS, 0.1);
+    vsh_volume *volume = bake(field, voxels, &light, 1, &options, NULL);
+    vsh_query *query = NULL;
+    assert_int_equal(vsh_query_create(field, &light, 1, &options.shade, &query, NULL), VSH_OK);
+    dense d = copy_of(volume, 0, voxels);
+    double *centre = centres_of(&d, voxels);
+    float *distance = distances_of(field, d.count, centre), *answer = malloc(d.count * sizeof *answer);
+    float *const visibility[1] = {answer};
+    vsh_query_output output = vsh_query_output_default();
+    output.visibility = visibility;
+    const vsh_points points = {d.count, centre, NULL, NULL};
+    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    size_t outside = 0, in_ball = 0, in_sphere = 0, in_heights = 0, shaded_by_sphere = 0;
+    for (size_t i = 0; i < d.count; ++i) {
+        const double *p = centre + 3 * i;
+        const double to[3] = {p[0] - high_ball[0], p[1] - high_ball[1], p[2] - high_ball[2]};
+        const bool within = length(to) < high_ball[3];
+        /* the terrain's middle is 0.4 over its foot at y = -2; below its least height it is solid all over */
+        const bool buried = fabs(p[0]) < 0.9 && fabs(p[2]) < 0.9 && p[1] < -2.05 && p[1] > -2.25;
+        if (distance[i] >= 0.0f && !within && p[1] > -1.55) {
+            assert_int_equal(bits_of(d.values[i]), bits_of(answer[i]));
+            ++outside;
+            shaded_by_sphere += d.values[i] < 0.5f && p[0] > 1.3 && p[1] > 0.0 && p[1] < 1.2;
+        }
+        in_ball += distance[i] < 0.0f;
+        in_sphere += within;
+        in_heights += buried;
+    }
+    vsh_volume_info info;
+    vsh_volume_get_info(volume, &info);
+    print_message("%zu outside, %zu dark, %zu in the sphere, %zu buried\n", outside, shaded_by_sphere,
+                  in_sphere, in_heights);
+    assert_true(outside > 10000 && shaded_by_sphere > 100 && in_sphere > 500 && in_heights > 3000);
+    assert_true(info.filled + info.off > in_ball + in_sphere + in_heights);
+    vsh_volume_free(volume);
+
+    options.ao = 1;
+    vsh_error error;
+    assert_int_equal(vsh_bake_volume(field, voxels, &light, 1, &options, NULL, &volume, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    assert_string_equal(error.message,
+                        "AO in free space: heightfields and spheres know of none without voxels");
+    layers[0].ao = layers[1].ao = 0;
+    volume = bake(field, voxels, &light, 1, &options, NULL);
+    vsh_volume_free(volume);
+    free(answer);
+    free(distance);
+    free(centre);
+    free(d.values);
+    vsh_query_free(query);
+    vsh_voxels_free(voxels);
+    vsh_field_free(field);
+    vsh_spheres_free(spheres);
+    vsh_heights_free(heights);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_box_around_a_ball_holds_its_umbra_its_penumbra_and_light),
         cmocka_unit_test(ao_of_free_space_is_the_free_share_of_all_directions),
         cmocka_unit_test(values_are_those_of_queries_at_the_voxels_centres),
         cmocka_unit_test(layers_hide_light_and_are_solid),
+        cmocka_unit_test(casters_without_voxels_hide_light_and_are_solid),
         cmocka_unit_test(blocks_that_are_proved_open_are_open),
         cmocka_unit_test(a_lightmap_and_a_band_agree_where_texel_and_voxel_meet),
     };
