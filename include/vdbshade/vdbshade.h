@@ -21,6 +21,7 @@
 #include "mesh.h"
 #include "outline.h"
 #include "query.h"
+#include "reader.h"
 #include "render.h"
 #include "scene.h"
 #include "sdf.h"

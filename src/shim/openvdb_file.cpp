@@ -1,9 +1,8 @@
 // Reading .vdb files. The reader of OpenVDB 10.0.1 crashes on some damaged files (it writes past its buffers
 // where Blosc data lie about their size): positions and sizes are checked here and a short file shows as an
-// error, but damage inside the packed data cannot be seen beforehand. Who reads untrusted files makes a trial
-// read in a child process first, as the command line does.
+// error, but damage inside the packed data cannot be seen beforehand. Untrusted files are for a reader
+// (vsh_run.reader), which runs what stands here in a process of its own.
 #include "shim/openvdb_file.h"
-#include "shim/openvdb_examine.h"
 
 #include <cerrno>
 #include <cmath>
@@ -211,17 +210,6 @@ vsh_result fail_cut_short(const char *path, vsh_error *error) {
 }
 
 // Reading past the end of the file shows as this exception, whose own words are of no use.
-template <typename Body> vsh_result guard_file(vsh_error *error, const char *path, Body &&body) {
-    return guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
-        try {
-            initialize();
-            return body();
-        } catch (const std::ios_base::failure &) {
-            return fail_cut_short(path, error);
-        }
-    });
-}
-
 std::string class_of(const MetaMap &metadata) {
     const auto text = metadata.getMetadata<openvdb::StringMetadata>(GridBase::META_GRID_CLASS);
     return text ? text->value() : "";
@@ -257,7 +245,7 @@ FloatGrid::Ptr to_floats(const GridBase::Ptr &grid) {
         tree = openvdb::gridPtrCast<FloatGrid>(grid)->treePtr();
     }
     const FloatGrid::Ptr floats = FloatGrid::create(tree);
-    floats->setTransform(grid->transform().copy());
+    floats->setTransform(restore_transform(describe_transform(grid->transform())));
     return floats;
 }
 
@@ -266,72 +254,13 @@ double shell_of(const GridBase &grid) {
     return shell && std::isfinite(shell->value()) && shell->value() > 0.0 ? shell->value() : 0.0;
 }
 
-// A grid of a file, as messages name it.
-struct Named {
-    const char *path;
-    std::string grid;
-
-    std::string text() const { return std::string(path) + ": grid '" + grid + "'"; }
-};
-
-void refuse_bad(const Named &named, const Finding &finding, vsh_error *error) {
-    if (finding.kind == Finding::BAD) {
-        throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s cannot cast shadows: %s", named.text().c_str(),
-                                finding.text.c_str())};
-    }
-}
-
-void refuse_large(const Named &named, const vsh_run &run, double bytes, vsh_error *error) {
-    const vsh_result result = check_bytes(&run, bytes, named.text().c_str(), error);
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
-}
-
-FloatGrid::Ptr mend_named(const Named &named, const FloatGrid &grid, Stage &stage, vsh_error *error) {
-    vsh_error why;
-    try {
-        return mend(grid, stage, &why);
-    } catch (const Failure &failure) {
-        if (failure.code != VSH_ERROR_CANCELLED) { // which the stage has told already
-            vshi_fail(error, failure.code, "%s: %.700s", named.text().c_str(), why.message);
-        }
-        throw;
-    }
-}
-
-vsh_result read(const char *path, const char *name, const vsh_run &run, vsh_grid **grid, vsh_error *error) {
-    Stage stage(run, "load", error);
-    stage.check();
-    Reader reader(path, run, error);
-    const size_t chosen = choose(reader, path, name, error, [&](size_t i) {
-        return class_of(reader.metadata(i)) == GridBase::gridClassToString(openvdb::GRID_LEVEL_SET);
-    });
-    const Named named{path, reader.name(chosen)};
-    refuse_large(named, run, reader.bytes(chosen), error);
-
-    const GridBase::Ptr found = reader.grid(chosen);
-    stage.reach(0.3);
-    stage.check();
-    refuse_bad(named, examine_kind(*found), error);
-    FloatGrid::Ptr floats = to_floats(found);
-    refuse_large(named, run, double(floats->memUsage()), error);
-    const Finding finding = examine_values(*floats, stage);
-    refuse_bad(named, finding, error);
-    if (finding.kind == Finding::ODD) {
-        vshi_warn(&run, "%s: %s: its distances were made anew", named.text().c_str(), finding.text.c_str());
-        floats = mend_named(named, *floats, stage, error);
-    }
-    *grid = close_grid(floats, shell_of(*found), stage);
-    return VSH_OK;
-}
-
 bool has_numbers(const GridBase &grid) {
     return grid.apply<NumberGrids>([](const auto &) {});
 }
 
 template <size_t Capacity> void copy_text(char (&to)[Capacity], const std::string &from) {
     std::snprintf(to, Capacity, "%s", from.c_str());
+    vshi_one_line(to);
 }
 
 void describe_kind(const GridBase &grid, vsh_vdb_entry &entry) {
@@ -389,20 +318,57 @@ void describe(Reader &reader, size_t i, const vsh_run &run, Stage &stage, vsh_vd
     }
 }
 
-vsh_result list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, size_t capacity, size_t *count,
-                vsh_error *error) {
-    Reader reader(path, run, error);
-    for (size_t i = 0; i < std::min(capacity, reader.count()); ++i) {
-        Stage stage(run, "load", error);
-        stage.check();
-        entries[i] = {};
-        describe(reader, i, run, stage, entries[i]);
+} // namespace
+
+void refuse_bad(const Named &named, const Finding &finding, vsh_error *error) {
+    if (finding.kind == Finding::BAD) {
+        throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s cannot cast shadows: %s", named.text().c_str(),
+                                finding.text.c_str())};
     }
-    *count = reader.count();
-    return VSH_OK;
 }
 
-} // namespace
+void refuse_large(const Named &named, const vsh_run &run, double bytes, vsh_error *error) {
+    const vsh_result result = check_bytes(&run, bytes, named.text().c_str(), error);
+    if (result != VSH_OK) {
+        throw Failure{result};
+    }
+}
+
+LevelSet load_level_set(const char *path, const char *name, Stage &stage, vsh_error *error) {
+    initialize();
+    try {
+        Reader reader(path, stage.options, error);
+        const size_t chosen = choose(reader, path, name, error, [&](size_t i) {
+            return class_of(reader.metadata(i)) == GridBase::gridClassToString(openvdb::GRID_LEVEL_SET);
+        });
+        LevelSet loaded{{path, reader.name(chosen)}, nullptr, 0.0};
+        refuse_large(loaded.named, stage.options, reader.bytes(chosen), error);
+        const GridBase::Ptr found = reader.grid(chosen);
+        refuse_bad(loaded.named, examine_kind(*found), error);
+        loaded.grid = to_floats(found);
+        loaded.shell = shell_of(*found);
+        return loaded;
+    } catch (const std::ios_base::failure &) {
+        throw Failure{fail_cut_short(path, error)};
+    }
+}
+
+void list_grids(const char *path, const vsh_run &run, std::vector<vsh_vdb_entry> &entries, size_t capacity,
+                size_t &count, vsh_error *error) {
+    initialize();
+    try {
+        Reader reader(path, run, error);
+        for (size_t i = 0; i < std::min(capacity, reader.count()); ++i) {
+            Stage stage(run, "load", error);
+            stage.check();
+            entries.push_back({});
+            describe(reader, i, run, stage, entries.back());
+        }
+        count = reader.count();
+    } catch (const std::ios_base::failure &) {
+        throw Failure{fail_cut_short(path, error)};
+    }
+}
 
 GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &run, vsh_error *error) {
     initialize();
@@ -419,6 +385,7 @@ GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &ru
         refuse_large(named, run, reader.bytes(chosen), error);
         const GridBase::Ptr grid = reader.grid(chosen);
         refuse_large(named, run, double(grid->memUsage()), error);
+        grid->setTransform(restore_transform(describe_transform(grid->transform())));
         return grid;
     } catch (const std::ios_base::failure &) {
         throw Failure{fail_cut_short(path, error)};
@@ -426,26 +393,3 @@ GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &ru
 }
 
 } // namespace vshi
-
-vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run, vsh_grid **grid,
-                         vsh_error *error) {
-    *grid = nullptr;
-    vsh_run full;
-    const vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    return vshi::guard_file(error, path, [&] { return vshi::read(path, name, full, grid, error); });
-}
-
-vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,
-                        size_t *count, vsh_error *error) {
-    *count = 0;
-    vsh_run full;
-    const vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    return vshi::guard_file(error, path,
-                            [&] { return vshi::list(path, full, entries, capacity, count, error); });
-}
