@@ -42,8 +42,8 @@ if(NOT TARGET vsh::openexr)
   add_library(vsh::openexr INTERFACE IMPORTED)
   target_link_libraries(vsh::openexr INTERFACE OpenEXR::OpenEXRCore)
   add_library(vsh::dependencies INTERFACE IMPORTED)
-  target_link_libraries(vsh::dependencies INTERFACE vsh::openvdb vsh::openexr vsh::openimageio vsh::assimp
-                                                    vsh::jansson vsh::seccomp Freetype::Freetype m)
+  target_link_libraries(vsh::dependencies INTERFACE vsh::openvdb vsh::openexr vsh::png vsh::assimp
+                                                    vsh::jansson vsh::seccomp Freetype::Freetype ${CMAKE_DL_LIBS} m)
   if(TARGET embree)
     add_library(vsh::embree INTERFACE IMPORTED)
     target_link_libraries(vsh::embree INTERFACE embree)
