@@ -2,7 +2,7 @@
 #include "base/memory.h"
 #include "caster/mesh.h"
 #include "caster/model.h"
-#include "read/reader.h"
+#include "read/takers.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -138,7 +138,7 @@ static vsh_result take_entry(vshi_take *take, vsh_model *model, size_t index, co
                : vshi_answer_fail(path, why.message, error);
 }
 
-static vsh_result take_model(vshi_take *take, vsh_model *model, const char *path, vsh_error *error) {
+static vsh_result take_meshes(vshi_take *take, vsh_model *model, const char *path, vsh_error *error) {
     enum { LEAST_SHAPE = 24, LEAST_ENTRY = 112 }; /* bytes of the message */
     const size_t shapes = vshi_take_count(take, (uint64_t)(take->end - take->at) / LEAST_SHAPE);
     if (shapes == 0) {
@@ -167,6 +167,18 @@ static vsh_result take_model(vshi_take *take, vsh_model *model, const char *path
     return result;
 }
 
+vsh_result vshi_model_take(vshi_take *take, const char *path, vsh_model **model, vsh_error *error) {
+    vsh_model *made = NULL;
+    vsh_result result = vshi_allocate((void **)&made, 1, sizeof *made, path, error);
+    result = result == VSH_OK ? take_meshes(take, made, path, error) : result;
+    if (result == VSH_OK) {
+        *model = made;
+    } else {
+        vsh_model_free(made);
+    }
+    return result;
+}
+
 vsh_result vshi_model_from_reader(const char *path, const vsh_run *run, vshi_job *job, size_t units,
                                   vsh_model **model, vsh_error *error) {
     vshi_ask ask;
@@ -178,14 +190,7 @@ vsh_result vshi_model_from_reader(const char *path, const vsh_run *run, vshi_job
     if (result != VSH_OK) {
         return result;
     }
-    vsh_model *made = NULL;
-    result = vshi_allocate((void **)&made, 1, sizeof *made, path, error);
-    result = result == VSH_OK ? take_model(&answer.payload, made, path, error) : result;
+    result = vshi_model_take(&answer.payload, path, model, error);
     vshi_answer_free(&answer);
-    if (result == VSH_OK) {
-        *model = made;
-    } else {
-        vsh_model_free(made);
-    }
     return result;
 }

@@ -11,6 +11,10 @@
 
 #include <vdbshade/outline.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct vshi_point {
     double x, y;
 } vshi_point;
@@ -85,4 +89,7 @@ vsh_result vshi_contours_from_reader(const char *text, const char *path, const v
  * that touch along lines that are nearly the same; `result` is then of no use. */
 bool vshi_outline_resolve(const vsh_outline *outline, vshi_contours *result);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

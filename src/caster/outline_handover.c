@@ -1,6 +1,6 @@
 /* The contours of a text between a reader and its caller. */
 #include "caster/outline.h"
-#include "read/reader.h"
+#include "read/takers.h"
 
 #include <string.h>
 
@@ -30,8 +30,7 @@ vsh_result vshi_serve_text(const char *path, vshi_take *request, const vsh_run *
 }
 
 /* Each point goes through the checks of one that was drawn here. */
-static vsh_result take_contours(vshi_take *take, vshi_contours *contours, const char *path,
-                                vsh_error *error) {
+vsh_result vshi_contours_take(vshi_take *take, vshi_contours *contours, const char *path, vsh_error *error) {
     const uint64_t count = vshi_take_count(take, UINT32_MAX);
     for (uint64_t c = 0; c < count && !take->bad && contours->result == VSH_OK; ++c) {
         const uint64_t size = vshi_take_count(take, UINT32_MAX);
@@ -66,7 +65,7 @@ vsh_result vshi_contours_from_reader(const char *text, const char *path, const v
         result = vshi_ask_send_job(&ask, job, UNITS, &answer, error);
     }
     if (result == VSH_OK) {
-        result = take_contours(&answer.payload, contours, path, error);
+        result = vshi_contours_take(&answer.payload, contours, path, error);
         vshi_answer_free(&answer);
     }
     vshi_job_end(job);

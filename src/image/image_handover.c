@@ -1,7 +1,7 @@
 /* An image between a reader and its caller. */
 #include "base/memory.h"
 #include "image/planes.h"
-#include "read/reader.h"
+#include "read/takers.h"
 
 #include <string.h>
 
@@ -26,7 +26,7 @@ vsh_result vshi_serve_image(const char *path, vshi_take *request, const vsh_run 
     return VSH_OK;
 }
 
-static vsh_result take_image(vshi_take *take, const char *path, vsh_image_file **file, vsh_error *error) {
+vsh_result vshi_image_take(vshi_take *take, const char *path, vsh_image_file **file, vsh_error *error) {
     const uint64_t width = vshi_take_count(take, INT32_MAX), height = vshi_take_count(take, INT32_MAX);
     const uint64_t channels = vshi_take_count(take, VSH_MAX_CHANNELS);
     const char *names[VSH_MAX_CHANNELS];
@@ -67,7 +67,7 @@ vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_imag
         result = vshi_ask_send_job(&ask, job, UNITS, &answer, error);
     }
     if (result == VSH_OK) {
-        result = take_image(&answer.payload, path, file, error);
+        result = vshi_image_take(&answer.payload, path, file, error);
         vshi_answer_free(&answer);
     }
     vshi_job_end(job);

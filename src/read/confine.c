@@ -23,7 +23,8 @@ static void limit(int what, rlim_t most) {
     if (getrlimit((__rlimit_resource_t)what, &now) == 0 && most > now.rlim_max) {
         most = now.rlim_max;
     }
-    const struct rlimit limits = {most, most};
+    /* who passes both limits of time at once is killed, and does not say of what */
+    const struct rlimit limits = {most, what == RLIMIT_CPU && most < now.rlim_max ? most + 1 : most};
     setrlimit((__rlimit_resource_t)what, &limits);
 }
 

@@ -292,7 +292,6 @@ LevelSet take_level_set(vshi_take *take, const char *path, vsh_error *error) {
         fail(path, "the level set's size", error);
     }
     set.grid = FloatGrid::create(tree);
-    set.grid->setGridClass(openvdb::GRID_LEVEL_SET);
     set.grid->setTransform(transform);
     return set;
 }

@@ -63,7 +63,9 @@ vsh_result read(const char *path, const char *name, const vsh_run &run, vsh_grid
     if (run.reader != nullptr) {
         Answer answer;
         set = take_level_set(answer.ask(VSHI_READ_GRID, path, name, 0, stage, error), path, error);
+        set.grid->setGridClass(openvdb::GRID_LEVEL_SET); // which the reader saw
         refuse_bad(set.named, examine_kind(*set.grid), error);
+        set.grid->clearGridClass(); // as one that was read here: its mesh is turned by it
     } else {
         set = load_level_set(path, name, stage, error);
     }
