@@ -4,11 +4,12 @@
 // (vsh_run.reader), which runs what stands here in a process of its own.
 #include "shim/openvdb_file.h"
 
+#include "shim/openvdb_stream.h"
+
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <openvdb/io/Archive.h>
@@ -88,24 +89,28 @@ class Reader final : public openvdb::io::Archive {
     MetaMap metadata(size_t i);
     double bytes(size_t i);               // in memory, by what the file says of it
     GridBase::Ptr without_tree(size_t i); // metadata and transform
-    GridBase::Ptr grid(size_t i);
+    GridBase::Ptr grid(size_t i, const char *path, vsh_error *error);
 
     const uint64_t size;
 
   private:
     void list(std::istream &in, const char *path, vsh_error *error);
+    GridBase::Ptr read_tree(size_t i);
 
     // The stream keeps this pointer's address.
     openvdb::io::StreamMetadata::Ptr state = std::make_shared<openvdb::io::StreamMetadata>();
-    std::ifstream stream;
+    CheckedFile file;
+    std::istream stream{&file};
     std::vector<GridDescriptor> entries;
     std::vector<GridBase::Ptr> grids; // without a tree yet, but for streamed files
     bool streamed = false;
 };
 
 Reader::Reader(const char *path, const vsh_run &run, vsh_error *error) : size(check_file(path, error)) {
+    if (file.open(path, std::ios::in | std::ios::binary) == nullptr) {
+        throw Failure{vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, std::strerror(errno))};
+    }
     stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
-    stream.open(path, std::ios::binary);
     openvdb::io::setStreamMetadataPtr(stream, state, false);
     readHeader(stream);
     setFormatVersion(stream); // what is read from it from here on depends on these
@@ -182,10 +187,17 @@ GridBase::Ptr Reader::without_tree(size_t i) {
     return result;
 }
 
-GridBase::Ptr Reader::grid(size_t i) {
-    if (streamed) {
-        return grids[i];
+GridBase::Ptr Reader::grid(size_t i, const char *path, vsh_error *error) {
+    const GridBase::Ptr result = streamed ? grids[i] : read_tree(i);
+    if (!file.sound()) {
+        throw Failure{vshi_fail(error, VSH_ERROR_READ,
+                                "%s: damaged: grid '%s': Zip data that do not fit their check sum", path,
+                                name(i).c_str())};
     }
+    return result;
+}
+
+GridBase::Ptr Reader::read_tree(size_t i) {
     const GridDescriptor &entry = entries[i];
     const GridBase::Ptr result = grids[i]->copyGrid();
     entry.seekToGrid(stream);
@@ -296,14 +308,15 @@ void describe_unread(Reader &reader, size_t i, const char *why, vsh_vdb_entry &e
     }
 }
 
-void describe(Reader &reader, size_t i, const vsh_run &run, Stage &stage, vsh_vdb_entry &entry) {
+void describe(Reader &reader, size_t i, const char *path, const vsh_run &run, Stage &stage,
+              vsh_vdb_entry &entry, vsh_error *error) {
     copy_text(entry.name, reader.name(i));
     vsh_error over;
     if (check_bytes(&run, reader.bytes(i), "its values were not read", &over) != VSH_OK) {
         describe_unread(reader, i, over.message, entry);
         return;
     }
-    const GridBase::Ptr grid = reader.grid(i);
+    const GridBase::Ptr grid = reader.grid(i, path, error);
     describe_kind(*grid, entry);
     describe_box(grid->evalActiveVoxelBoundingBox(), entry);
     entry.active_voxels = grid->activeVoxelCount();
@@ -343,7 +356,7 @@ LevelSet load_level_set(const char *path, const char *name, Stage &stage, vsh_er
         });
         LevelSet loaded{{path, reader.name(chosen)}, nullptr, 0.0};
         refuse_large(loaded.named, stage.options, reader.bytes(chosen), error);
-        const GridBase::Ptr found = reader.grid(chosen);
+        const GridBase::Ptr found = reader.grid(chosen, path, error);
         refuse_bad(loaded.named, examine_kind(*found), error);
         loaded.grid = to_floats(found);
         loaded.shell = shell_of(*found);
@@ -362,7 +375,7 @@ void list_grids(const char *path, const vsh_run &run, std::vector<vsh_vdb_entry>
             Stage stage(run, "load", error);
             stage.check();
             entries.push_back({});
-            describe(reader, i, run, stage, entries.back());
+            describe(reader, i, path, run, stage, entries.back(), error);
         }
         count = reader.count();
     } catch (const std::ios_base::failure &) {
@@ -383,7 +396,7 @@ GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &ru
                                     named.text().c_str(), bare->type().c_str())};
         }
         refuse_large(named, run, reader.bytes(chosen), error);
-        const GridBase::Ptr grid = reader.grid(chosen);
+        const GridBase::Ptr grid = reader.grid(chosen, path, error);
         refuse_large(named, run, double(grid->memUsage()), error);
         grid->setTransform(restore_transform(describe_transform(grid->transform())));
         return grid;

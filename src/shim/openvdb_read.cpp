@@ -74,6 +74,9 @@ vsh_result read(const char *path, const char *name, const vsh_run &run, vsh_grid
     refuse_large(set.named, run, double(set.grid->memUsage()), error);
     const Finding finding = examine_values(*set.grid, stage);
     refuse_bad(set.named, finding, error);
+    if (finding.kind == Finding::NOTED) {
+        vshi_warn(&run, "%s: %s", set.named.text().c_str(), finding.text.c_str());
+    }
     if (finding.kind == Finding::ODD) {
         vshi_warn(&run, "%s: %s: its distances were made anew", set.named.text().c_str(),
                   finding.text.c_str());
