@@ -87,7 +87,7 @@ void compare(const vsh_grid *sound, const vsh_grid *read, Tally &tally) {
                     ++beside[axis];
                     const float c = value_at(read, beside);
                     const bool whole = std::fabs(b) < background && std::fabs(c) < background;
-                    if ((whole || std::signbit(b) != std::signbit(c)) && std::fabs(b - c) > 3.5f * voxel) {
+                    if ((whole || std::signbit(b) != std::signbit(c)) && std::fabs(b - c) > 4.5f * voxel) {
                         ((beside[axis] & 7) != 0 ? steep : border) = true;
                     } else if (whole && std::fabs(b - c) > TOO_STEEP * voxel) {
                         ((beside[axis] & 7) != 0 ? steep : border) = true;
