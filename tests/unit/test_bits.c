@@ -459,7 +459,7 @@ static void every_part_has_its_bits_for_any_threads_and_instruction_set(void **s
     bool wrong = false;
     const bool once = getenv("VSH_BITS") != NULL;
     for (int32_t isa = VSH_ISA_BASE; isa <= (once ? VSH_ISA_BASE : VSH_ISA_AVX512); ++isa) {
-        for (int32_t threads = 1; threads <= (once ? 1 : 5) && vsh_isa_available(isa); threads += 2) {
+        for (int32_t threads = 1; threads <= (once ? 1 : 5) && vsh_isa_available(isa); threads += 4) {
             vsh_run run = vsh_run_default();
             run.threads = threads;
             run.isa = isa;
