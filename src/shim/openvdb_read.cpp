@@ -88,10 +88,11 @@ vsh_result read(const char *path, const char *name, const vsh_run &run, vsh_grid
 
 // --- lists: plain structs, with texts that end
 
-template <size_t Capacity> bool is_line(const char (&text)[Capacity]) {
+template <size_t Capacity> bool is_text(const char (&text)[Capacity], bool lines = false) {
     const size_t length = strnlen(text, Capacity);
     for (size_t i = 0; i < length; ++i) {
-        if (static_cast<unsigned char>(text[i]) < 0x20 || text[i] == 0x7f) {
+        const bool end = lines && text[i] == '\n';
+        if (!end && (static_cast<unsigned char>(text[i]) < 0x20 || text[i] == 0x7f)) {
             return false;
         }
     }
@@ -110,8 +111,8 @@ void take_list(vshi_take *take, const char *path, vsh_vdb_entry *entries, size_t
     }
     for (size_t i = 0; i < listed; ++i) {
         const vsh_vdb_entry &entry = entries[i];
-        if (!is_line(entry.name) || !is_line(entry.type) || !is_line(entry.grid_class) ||
-            !is_line(entry.problem)) {
+        if (!is_text(entry.name) || !is_text(entry.type) || !is_text(entry.grid_class) ||
+            !is_text(entry.problem) || !is_text(entry.attributes, true)) {
             throw Failure{vshi_answer_fail(path, "a text", error)};
         }
     }

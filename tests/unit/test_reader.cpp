@@ -133,6 +133,14 @@ void images_lists_voxels_and_texts_are_the_same(void **) {
         assert_int_equal(vsh_image_read_run(path.c_str(), &plain, &image[0], &failure), VSH_OK);
         assert_int_equal(vsh_image_read_run(path.c_str(), &run, &image[1], &failure), VSH_OK);
         const vsh_image a = vsh_image_view(image[0]), b = vsh_image_view(image[1]);
+        size_t attributes[2];
+        const vsh_attribute *left = vsh_image_attributes(image[0], &attributes[0]);
+        const vsh_attribute *right = vsh_image_attributes(image[1], &attributes[1]);
+        assert_int_equal(attributes[0], attributes[1]);
+        for (size_t i = 0; i < attributes[0]; ++i) {
+            assert_string_equal(left[i].name, right[i].name);
+            assert_string_equal(left[i].value, right[i].value);
+        }
         assert_true(a.width == b.width && a.height == b.height && a.channel_count == b.channel_count);
         for (int32_t c = 0; c < a.channel_count; ++c) {
             assert_string_equal(a.names[c], b.names[c]);
