@@ -17,7 +17,7 @@
  *
  * Not promised: that the reader cannot read other files of the user (models name files beside them), or that
  * what a file shows is right. Scene files, lists of spheres and points are parsed in this process always, by
- * code of ours and Jansson. */
+ * code of ours and Jansson. docs/reliability.md has what it costs and what was tried. */
 #ifndef VDBSHADE_READER_H
 #define VDBSHADE_READER_H
 
