@@ -116,6 +116,11 @@ static bool abbreviated(const cli_option *option, char **argv, const char *value
 
 int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
               const char *what, const char **operand, bool *help) {
+    return cli_parse_operands(command, argc, argv, take, settings, &what, operand, 1, help);
+}
+
+int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
+                       const char *const *what, const char **operands, int count, bool *help) {
     struct option longs[MAX_OPTIONS];
     char shorts[2 * MAX_OPTIONS + 2];
     make_getopt_tables(command, longs, shorts);
@@ -152,13 +157,16 @@ int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *
             return code;
         }
     }
-    if (optind >= argc) {
-        return cli_usage("%s: no %s; see 'vdbshade %s --help'", command->name, what, command->name);
+    for (int i = 0; i < count; ++i) {
+        if (optind + i >= argc) {
+            return cli_usage("%s: no %s; see 'vdbshade %s --help'", command->name, what[i], command->name);
+        }
+        operands[i] = argv[optind + i];
     }
-    if (optind + 1 < argc) {
-        return cli_usage("%s: one %s is taken, not also '%s'", command->name, what, argv[optind + 1]);
+    if (optind + count < argc) {
+        return cli_usage("%s: one %s is taken, not also '%s'", command->name, what[count - 1],
+                         argv[optind + count]);
     }
-    *operand = argv[optind];
     return CLI_OK;
 }
 

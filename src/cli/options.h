@@ -31,6 +31,10 @@ typedef int cli_option_fn(void *settings, int key, const char *name, const char 
 int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
               const char *what, const char **operand, bool *help);
 
+/* The same with `count` operands, one or more. */
+int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
+                       const char *const *what, const char **operands, int count, bool *help);
+
 void cli_print_help(const cli_command *command);
 
 /* The candidate nearest to `text`, or NULL where none is near. */
