@@ -5,8 +5,8 @@
 #include <math.h>
 #include <stdarg.h>
 
-/* By what names a fault best: a shadow that stands elsewhere changes nearly every measure,
- * but one says so. Penumbrae that got narrower darken and lighten regions without any caster. */
+/* By what names a fault best: a bake that is shifted changes nearly every measure, but one says so; penumbrae
+ * that got narrower darken and lighten regions too, without any caster. */
 static const int by_meaning[] = {
     VSH_MEASURE_NONFINITE, VSH_MEASURE_SHIFT, VSH_MEASURE_PENUMBRA, VSH_MEASURE_LOST, VSH_MEASURE_GAINED,
     VSH_MEASURE_WIDTHS,    VSH_MEASURE_EDGES, VSH_MEASURE_SSIM,     VSH_MEASURE_BIAS, VSH_MEASURE_RMSE,
@@ -59,11 +59,12 @@ static void add_nonfinite(text *t, const cli_channel *channel) {
 
 static void add_region(text *t, const cli_channel *channel, const vsh_region *region, double limit,
                        const char *caster) {
+    const uint32_t others = UINT32_C(1) << VSH_MEASURE_SHIFT | UINT32_C(1) << VSH_MEASURE_PENUMBRA;
     char place[64];
     add(t, "%" PRIu64 " %ss around %s got %s by up to %.2f with nothing like it nearby%s (limit %g)",
         region->count, texel(channel), cli_channel_place(channel, region->worst, place),
         region->by > 0.0 ? "lighter" : "darker", fabs(region->by),
-        (channel->failed & moved) == 0 ? caster : "", limit);
+        (channel->failed & others) == 0 ? caster : "", limit);
 }
 
 static void add_shift(text *t, const cli_channel *channel) {
