@@ -58,7 +58,7 @@ static double length_between(const line *l, double a, double b) {
     return most > least ? (most - least) / fabs(b - a) : 0.0;
 }
 
-/* Change of the values along another axis at a texel: central where both neighbours are there. */
+/* Change of the values along an axis at a texel: central where both neighbours are there. */
 static double slope(const line *l, int which, size_t i, int axis) {
     const vshi_pair *pair = l->pair;
     const size_t at = l->first + i * l->stride, step = pair->stride[axis];
@@ -86,20 +86,18 @@ static edge measure_edge(const line *l, int which, size_t begin, size_t end) {
     }
     const double share = lit / (l->high - l->low); /* texels of the way that are past the edge, if it rises */
     e.at = e.rises > 0 ? (double)end - share : (double)begin + share;
-    double along = fabs(last - first), across = 0.0, widest = 0.0;
+    double along = 0.0, squares = 0.0, widest = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
-        if (axis == l->axis || l->pair->size[axis] == 1) {
-            continue;
-        }
-        double sum = 0.0; /* over the same way, by trapezia */
-        for (size_t i = begin; i <= end; ++i) {
+        double sum = 0.0; /* over the same way, by trapezia, along the line as across it: errors cancel */
+        for (size_t i = begin; i <= end && l->pair->size[axis] > 1; ++i) {
             sum += (i == begin || i == end ? 0.5 : 1.0) * slope(l, which, i, axis);
         }
-        across += sum * sum;
+        along = axis == l->axis ? fabs(sum) : along;
+        squares += sum * sum;
         widest = fmax(widest, fabs(sum));
     }
     e.own = along >= widest;
-    e.width = width * along / sqrt(along * along + across);
+    e.width = squares > 0.0 ? width * along / sqrt(squares) : width;
     return e;
 }
 
