@@ -157,6 +157,12 @@ VSH_API vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const 
 VSH_API vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t half,
                                     vsh_error *error);
 
+/* The same with lines of text as metadata of every grid. VSH_ERROR_ARGUMENT too where they are not as
+ * vsh_attribute says. */
+VSH_API vsh_result vsh_volume_write_with(const vsh_volume *volume, const char *path, int32_t half,
+                                         const vsh_attribute *attributes, size_t attribute_count,
+                                         vsh_error *error);
+
 /* --- what is in a file */
 
 /* A dense copy of a grid of numbers (or a mask) of a .vdb file: the values of size[0] × size[1] × size[2]

@@ -25,6 +25,7 @@ typedef struct bake_work {
     vsh_charts *charts;
     vsh_texels *kept; /* NULL where it is baked in bands */
     cli_box receivers;
+    cli_origin origin;
     cli_stats stats;
 } bake_work;
 
@@ -46,7 +47,8 @@ static int load(bake_work *work) {
 }
 
 static cli_receiver_job receiver_job(const bake_work *work, size_t index) {
-    return (cli_receiver_job){work->scene, work->assets, &work->run, index, work->settings->band_rows};
+    return (cli_receiver_job){work->scene,  work->assets, &work->run, index, work->settings->band_rows,
+                              &work->origin};
 }
 
 /* Where its samples are: all of them are made, where they go into memory at once, or looked at in passing. */
@@ -121,6 +123,14 @@ static int make_triangles(bake_work *work) {
     return code;
 }
 
+static int find_origin(bake_work *work) {
+    const double start = cli_seconds();
+    const int code = cli_origin_make(work->scene, &work->settings->input, 1, work->made.grid.voxel_size,
+                                     &work->run, &work->origin);
+    cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
+    return code;
+}
+
 static void say_receiver(const bake_work *work, size_t index, const cli_bands *bands,
                          const cli_stats *before) {
     if (work->settings->common.quiet) {
@@ -188,6 +198,7 @@ static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
     code = code == CLI_OK ? rasterise(&work) : code;
     code = code == CLI_OK ? make_triangles(&work) : code;
     code = code == CLI_OK ? make_field(&work) : code;
+    code = code == CLI_OK ? find_origin(&work) : code;
     code = code == CLI_OK ? bake_receivers(&work) : code;
     code = code == CLI_OK ? cli_stats_finish(&work.stats, settings->stats) : code;
     if (code == CLI_OK) {
@@ -198,6 +209,7 @@ static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
     vsh_texels_free(work.kept);
     vsh_charts_free(work.charts);
     vsh_triangles_free(work.triangles);
+    cli_origin_free(&work.origin);
     cli_field_free(&work.made);
     vsh_assets_free(work.assets);
     return code;

@@ -224,7 +224,9 @@ static int write_band(receiver_work *work, int32_t rows) {
     vsh_error error;
     vsh_result result = VSH_OK;
     if (work->writer == NULL) {
-        const vsh_image_options options = image_options(receiver);
+        vsh_image_options options = image_options(receiver);
+        options.attributes = work->job->origin->attributes;
+        options.attribute_count = work->job->origin->count;
         cli_signals_writing(receiver->output);
         result =
             vsh_image_writer_create(receiver->output, &work->planes.image, &options, &work->writer, &error);

@@ -4,6 +4,7 @@
 #include "field.h"
 #include "meshes.h"
 #include "message.h"
+#include "origin.h"
 #include "paths.h"
 #include "progress.h"
 #include "signals.h"
@@ -258,10 +259,18 @@ static int write_volume(volume_work *work) {
         const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
         return cli_fail(&cancelled);
     }
+    const char *const files[] = {work->settings->bake.input, work->settings->like};
+    cli_origin origin;
+    const int code = cli_origin_make(work->scene, files, 2, work->made.grid.voxel_size, &work->run, &origin);
+    if (code != CLI_OK) {
+        return code;
+    }
     vsh_error error;
     cli_signals_writing(output);
-    const vsh_result result = vsh_volume_write(work->volume, output, work->settings->half, &error);
+    const vsh_result result = vsh_volume_write_with(work->volume, output, work->settings->half,
+                                                    origin.attributes, origin.count, &error);
     cli_signals_writing(NULL);
+    cli_origin_free(&origin);
     cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }
