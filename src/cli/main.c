@@ -7,9 +7,9 @@
 #include <stdio.h>
 #include <string.h>
 
-static const cli_command *const commands[] = {&cli_bake,  &cli_voxelize, &cli_info,
-                                              &cli_trade, &cli_query,    &cli_volume,
-                                              &cli_flat,  &cli_render,   &cli_compare};
+static const cli_command *const commands[] = {&cli_bake,    &cli_voxelize, &cli_info, &cli_trade,
+                                              &cli_query,   &cli_volume,   &cli_flat, &cli_render,
+                                              &cli_compare, &cli_regress};
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
 static const char help_text[] =
@@ -26,6 +26,7 @@ static const char help_text[] =
     "  render INPUT -o OUT       picture of a scene, or a turntable, to look at a bake\n"
     "  flat SCENE -o OUT         light map of a plane, for 2D games\n"
     "  compare GOLDEN NEW        whether a bake is like its golden one, and in what it is not\n"
+    "  regress DIR               bakes of a folder's scenes against their golden ones\n"
     "  trade INPUT -o OUT.html   error against time by every method, measured on a scene of yours\n"
     "\n"
     "  vdbshade COMMAND --help   options of a command\n"
