@@ -1,4 +1,5 @@
 /* vdbshade regress: a folder of scenes, baked where something changed and held against their golden bakes. */
+#define _GNU_SOURCE /* asprintf, dladdr */
 #include "regress.h"
 #include "commands.h"
 #include "message.h"

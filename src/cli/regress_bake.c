@@ -43,18 +43,22 @@ int regress_bake(const regress_work *work, const regress_case *one) {
     if (one->output != NULL && output == NULL) {
         return cli_out_of_memory(work->folder);
     }
-    c.words[c.count++] = (char *)one->command->name;
+    /* words of their own: getopt_long() takes them as what may be written to */
+    char name[32], file[] = "--output", folder[] = "--output-folder", quiet[] = "--quiet";
+    char limit[] = "--memory-limit", pool[] = "--threads";
+    snprintf(name, sizeof name, "%s", one->command->name);
+    c.words[c.count++] = name;
     c.words[c.count++] = one->scene;
     for (size_t i = 0; i < one->options.count; ++i) {
         c.words[c.count++] = one->options.line[i];
     }
-    c.words[c.count++] = (char *)(output != NULL ? "--output" : "--output-folder");
+    c.words[c.count++] = output != NULL ? file : folder;
     c.words[c.count++] = output != NULL ? output : work->bakes;
-    c.words[c.count++] = (char *)"--quiet";
-    c.words[c.count++] = (char *)"--memory-limit";
+    c.words[c.count++] = quiet;
+    c.words[c.count++] = limit;
     c.words[c.count++] = memory;
     if (common->threads > 0) {
-        c.words[c.count++] = (char *)"--threads";
+        c.words[c.count++] = pool;
         c.words[c.count++] = threads;
     }
     c.words[c.count] = NULL;

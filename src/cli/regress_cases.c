@@ -1,4 +1,5 @@
 /* What there is to bake in a folder: its scenes, and what its regress.json says of them. */
+#define _GNU_SOURCE /* asprintf */
 #include "commands.h"
 #include "message.h"
 #include "paths.h"
@@ -166,14 +167,14 @@ static int read_options(const regress_work *work, const json_t *options, size_t 
     return CLI_OK;
 }
 
-static int read_case(regress_work *work, const json_t *json, size_t i) {
+static int read_case(regress_work *work, json_t *json, size_t i) {
     static const char *const keys[] = {"name", "scene", "command", "options", "output"};
     const char *key;
     json_t *value;
     if (!json_is_object(json)) {
         return bad_list(work, i, "expected an object");
     }
-    json_object_foreach((json_t *)json, key, value) {
+    json_object_foreach(json, key, value) {
         bool known = false;
         for (size_t k = 0; k < sizeof keys / sizeof keys[0]; ++k) {
             known = known || strcmp(keys[k], key) == 0;

@@ -1,4 +1,5 @@
 /* What a bake and its verdict depend on, and what of it changed since it last was alike. */
+#define _GNU_SOURCE /* asprintf */
 #include "commands.h"
 #include "message.h"
 #include "regress.h"
@@ -157,10 +158,10 @@ int regress_list_inputs(const regress_work *work, regress_case *one) {
 
 /* --- the cache: for each case that was alike the lines above */
 
-static bool has_line(const json_t *lines, const char *text) {
+static bool has_line(json_t *lines, const char *text) {
     size_t i;
     json_t *line;
-    json_array_foreach((json_t *)lines, i, line) {
+    json_array_foreach(lines, i, line) {
         const char *one = json_string_value(line);
         if (one != NULL && strcmp(one, text) == 0) {
             return true;
@@ -179,7 +180,7 @@ static char *name_of(const char *line) {
                         : strndup(line, colon != NULL ? (size_t)(colon - line) : strlen(line));
 }
 
-static void look_up(const json_t *lines, regress_case *one) {
+static void look_up(json_t *lines, regress_case *one) {
     if (!json_is_array(lines)) {
         return;
     }
