@@ -22,8 +22,8 @@ cli_compare_settings cli_compare_settings_default(void) {
 int cli_compare_take(cli_compare_settings *s, int key, const char *name, const char *value) {
     if (key >= CLI_KEY_LIMIT && key < CLI_KEY_LIMIT + VSH_MEASURE_COUNT) {
         const int32_t measure = key - CLI_KEY_LIMIT;
-        return cli_take_number(name, value, vsh_measure_at_least(measure) ? -1.0 : 0.0, 1e15,
-                               &s->limits[measure]);
+        const bool least = vsh_measure_at_least(measure) != 0;
+        return cli_take_number(name, value, least ? -1.0 : 0.0, least ? 1.0 : 1e15, &s->limits[measure]);
     }
     switch (key) {
     case CLI_KEY_TOLERANCES:

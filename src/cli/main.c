@@ -32,9 +32,10 @@ static const char help_text[] =
     "  vdbshade COMMAND --help   options of a command\n"
     "  vdbshade --version        version\n"
     "\n"
-    "Exit codes: 0 done; 1 a comparison did not hold; 2 bad usage or bad input; 3 a file could not be read\n"
-    "or written; 4 a limit (memory, size) would be passed; 70 a defect of vdbshade; 130 interrupted. Errors\n"
-    "are one line on standard error; a failed or interrupted run leaves the old output as it was.\n";
+    "Exit codes: 0 done; 1 a comparison did not hold; 2 bad usage or bad input; 3 a file could not be\n"
+    "read or written; 4 a limit (memory, size) would be passed; 70 a defect of vdbshade; 130\n"
+    "interrupted. Errors are one line on standard error; a failed or interrupted run leaves the old\n"
+    "output as it was.\n";
 
 static int unknown_command(const char *text) {
     if (text[0] == '-') {
