@@ -21,11 +21,11 @@ static int compare_main(int argc, char **argv);
 const cli_command cli_compare = {
     "compare",
     "GOLDEN NEW [options]",
-    "Compares two images or two .vdb files, channel by channel and grid by grid, over the texels that both\n"
-    "cover: values, structure, widths of penumbrae, displacement, lost shadows. One line a channel. Ends\n"
-    "with 0 where they are alike, 1 where they are not: also by size, channels, voxels or format, which are\n"
-    "told as such. What the measures are: docs/regression.md. Numbers in brackets are what holds without\n"
-    "the option.",
+    "Compares two images or two .vdb files, channel by channel and grid by grid, over the texels that\n"
+    "both cover: values, structure, widths of penumbrae, displacement, lost shadows. One line a channel.\n"
+    "Ends with 0 where they are alike, 1 where they are not: also by size, channels, voxels or format,\n"
+    "which are told as such. What the measures are: docs/regression.md. Numbers in brackets are what\n"
+    "holds without the option.",
     options,
     sizeof options / sizeof options[0],
     compare_main};

@@ -39,10 +39,10 @@ static int regress_main(int argc, char **argv);
 const cli_command cli_regress = {
     "regress",
     "DIR [options]",
-    "Bakes the scenes of a folder whose inputs, options or golden bakes changed, and compares as 'vdbshade\n"
-    "compare' does with DIR/golden. Scenes are DIR/*.json; DIR/regress.json names cases with commands and\n"
-    "options of their own. Ends with 0 where all are alike, 1 where one is not or has no golden bake. See\n"
-    "docs/regression.md. Numbers in brackets are what holds without the option.",
+    "Bakes the scenes of a folder whose inputs, options or golden bakes changed, and compares as\n"
+    "'vdbshade compare' does with DIR/golden. Scenes are DIR/*.json; DIR/regress.json names cases with\n"
+    "commands and options of their own. Ends with 0 where all are alike, 1 where one is not or has no\n"
+    "golden bake. See docs/regression.md. Numbers in brackets are what holds without the option.",
     options,
     sizeof options / sizeof options[0],
     regress_main};
