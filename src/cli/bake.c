@@ -7,6 +7,7 @@
 #include "message.h"
 #include "progress.h"
 #include "receiver.h"
+#include "resume.h"
 #include "signals.h"
 #include "temporary.h"
 #include "trial.h"
@@ -47,8 +48,9 @@ static int load(bake_work *work) {
 }
 
 static cli_receiver_job receiver_job(const bake_work *work, size_t index) {
-    return (cli_receiver_job){work->scene,  work->assets, &work->run, index, work->settings->band_rows,
-                              &work->origin};
+    return (cli_receiver_job){
+        work->scene,   work->assets,          &work->run, index, work->settings->band_rows,
+        &work->origin, work->settings->resume};
 }
 
 /* Where its samples are: all of them are made, where they go into memory at once, or looked at in passing. */
@@ -137,13 +139,17 @@ static void say_receiver(const bake_work *work, size_t index, const cli_bands *b
         return;
     }
     const vsh_receiver *receiver = &work->scene->receivers[index];
-    char banded[64] = "";
+    char banded[64] = "", taken[64] = "";
     if (bands->count > 1) {
         snprintf(banded, sizeof banded, ", in %d bands of %d rows", bands->count, bands->rows);
     }
-    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid%s", receiver->output,
+    if (work->stats.resumed_rows > before->resumed_rows) {
+        snprintf(taken, sizeof taken, ", %" PRIu64 " rows of them from before",
+                 work->stats.resumed_rows - before->resumed_rows);
+    }
+    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid%s%s", receiver->output,
             receiver->width, receiver->height, work->stats.texels - before->texels,
-            work->stats.invalid_texels - before->invalid_texels, banded);
+            work->stats.invalid_texels - before->invalid_texels, banded, taken);
 }
 
 static int bake_receiver(bake_work *work, size_t index) {
@@ -179,9 +185,14 @@ static int bake_receiver(bake_work *work, size_t index) {
 }
 
 static int bake_receivers(bake_work *work) {
+    const vsh_scene *scene = work->scene;
     int code = CLI_OK;
-    for (size_t i = 0; i < work->scene->receiver_count && code == CLI_OK; ++i) {
+    for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
         code = bake_receiver(work, i);
+    }
+    /* not before all are whole: a bake that goes on writes those that were again */
+    for (size_t i = 0; i < scene->receiver_count && code == CLI_OK && work->settings->resume; ++i) {
+        cli_resume_remove(scene->receivers[i].output);
     }
     return code;
 }

@@ -20,6 +20,7 @@ enum {
     KEY_PACK,
     KEY_STATS,
     KEY_DRY_RUN,
+    KEY_RESUME,
     KEY_OUTPUT_FOLDER
 };
 
@@ -42,6 +43,9 @@ static const cli_option options[] = {
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {KEY_DRY_RUN, "dry-run", NULL,
      "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},
+    {KEY_RESUME, "resume", NULL,
+     "keep finished rows in OUT.resume until all are there,\nand go on from them where a bake with this "
+     "option was\nended; the result is the same, bit by bit"},
     {0, NULL, NULL, "Light and occlusion"},
     CLI_LIGHT_OPTIONS,
     {KEY_IRRADIANCE, "irradiance", NULL,
@@ -184,6 +188,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_DRY_RUN:
         s->dry_run = true;
+        return CLI_OK;
+    case KEY_RESUME:
+        s->resume = true;
         return CLI_OK;
     case KEY_IRRADIANCE:
         s->irradiance = true;

@@ -32,8 +32,10 @@ static double reach_of(const vsh_scene *scene, const vsh_grid *grid, const cli_b
     vsh_grid_get_info(grid, &info);
     double diagonal = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
-        diagonal = hypot(diagonal, info.bounds_max[axis] - info.bounds_min[axis]);
+        const double side = info.bounds_max[axis] - info.bounds_min[axis];
+        diagonal += side * side;
     }
+    diagonal = sqrt(diagonal);
     cli_box around;
     const double margin = within > 0.0 ? within : CLI_WITHIN_DIAGONALS * diagonal;
     for (int axis = 0; axis < 3; ++axis) {

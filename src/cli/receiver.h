@@ -14,7 +14,8 @@ typedef struct cli_receiver_job {
     const vsh_run *run;
     size_t index;             /* of the receiver */
     int32_t band_rows;        /* wanted; 0: as many as go */
-    const cli_origin *origin; /* of its file */
+    const cli_origin *origin; /* of its file; NULL where none is written */
+    bool resume;              /* bands are kept, and taken where they are there */
 } cli_receiver_job;
 
 /* Whether its image can be written. Needs no assets. CLI_OK or an exit code, having said why. */

@@ -2,6 +2,7 @@
  * to structural similarity", 2004): means, variances and covariance under a Gaussian of 1.5 texels cut to 11
  * × 11, K1 = 0.01, K2 = 0.03, and a dynamic range of 1 after scaling. What is masked out has no weight, and
  * the weights that are left are normalised. A grid of voxels is taken slice by slice along z. */
+#include "base/elementary.h"
 #include "compare/pair.h"
 
 #include <math.h>
@@ -19,7 +20,7 @@ typedef double sums[SUMS];
 
 static void make_taps(double taps[TAPS]) {
     for (int k = -RADIUS; k <= RADIUS; ++k) {
-        taps[k + RADIUS] = exp(-0.5 * k * k / (SIGMA * SIGMA));
+        taps[k + RADIUS] = vshi_exp(-0.5 * k * k / (SIGMA * SIGMA));
     }
 }
 

@@ -1,5 +1,6 @@
 #include "shade/light.h"
 
+#include "base/elementary.h"
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/numbers.h"
@@ -129,7 +130,7 @@ static double falloff(const vsh_light *light, double distance) {
 /* Smooth edge between the cosines of the outer and the inner angle. */
 static double spot(const vsh_light *light, vshi_vec to_light) {
     const double cosine = -vshi_dot(vshi_unit(vshi_vec_of(light->direction)), to_light);
-    const double outer = cos(light->outer_angle), inner = cos(light->inner_angle);
+    const double outer = vshi_cos(light->outer_angle), inner = vshi_cos(light->inner_angle);
     return inner > outer ? smoothstep(outer, inner, cosine) : (cosine >= outer ? 1.0 : 0.0);
 }
 
