@@ -146,10 +146,6 @@ static int prepare(regress_work *work) {
 
 /* --- baking, before there are threads; then comparing */
 
-static bool is_interrupted(int code) {
-    return code == CLI_INTERRUPTED;
-}
-
 static int bake_all(regress_work *work) {
     for (size_t i = 0; i < work->case_count; ++i) {
         regress_case *one = &work->cases[i];
@@ -162,7 +158,7 @@ static int bake_all(regress_work *work) {
             return cli_fail(&cancelled);
         }
         one->code = regress_bake(work, one);
-        if (is_interrupted(one->code)) {
+        if (one->code == CLI_INTERRUPTED) {
             return one->code;
         }
         one->status = one->code == CLI_OK ? one->status : REGRESS_FAILED;
@@ -252,77 +248,6 @@ static int update_all(regress_work *work) {
     return code;
 }
 
-/* --- how it is told */
-
-static const char *const status_names[] = {"unchanged", "alike", "not alike", "failed", "updated"};
-
-static void print_lines(const regress_work *work) {
-    for (size_t i = 0; i < work->case_count; ++i) {
-        const regress_case *one = &work->cases[i];
-        printf("%s: %s", one->name, status_names[one->status]);
-        if (one->changed != NULL) {
-            printf(" (changed: %s)", one->changed);
-        }
-        putchar('\n');
-        for (size_t k = 0; k < one->outputs.count; ++k) {
-            if (one->status == REGRESS_FAILED) {
-                printf("  %s: the bake ended with exit code %d\n", one->outputs.line[k], one->code);
-            } else if (one->status != REGRESS_UNCHANGED && !one->comparisons[k].alike) {
-                char prefix[300];
-                snprintf(prefix, sizeof prefix, "  %.250s: ", one->outputs.line[k]);
-                cli_comparison_print(stdout, &one->comparisons[k], prefix);
-            }
-        }
-    }
-}
-
-static int print_json(const regress_work *work) {
-    json_t *cases = json_array();
-    for (size_t i = 0; i < work->case_count; ++i) {
-        const regress_case *one = &work->cases[i];
-        json_t *outputs = json_array();
-        for (size_t k = 0; k < one->outputs.count && one->comparisons[k].name != NULL; ++k) {
-            json_array_append_new(outputs, cli_comparison_json(&one->comparisons[k]));
-        }
-        json_array_append_new(cases, json_pack("{s:s,s:s,s:s?,s:o}", "name", one->name, "status",
-                                               status_names[one->status], "changed", one->changed, "outputs",
-                                               outputs));
-    }
-    json_t *root = json_pack("{s:o}", "cases", cases);
-    const bool whole = root != NULL && json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;
-    json_decref(root);
-    putchar('\n');
-    return whole ? CLI_OK : cli_out_of_memory(work->folder);
-}
-
-/* One entry an output, also of cases that were not baked. */
-static int write_reports(const regress_work *work) {
-    const cli_compare_settings *s = &work->settings->compare;
-    size_t count = 0, at = 0;
-    for (size_t i = 0; i < work->case_count; ++i) {
-        count += work->cases[i].outputs.count;
-    }
-    cli_comparison *all = calloc(count + 1, sizeof *all);
-    bool good = all != NULL;
-    for (size_t i = 0; i < work->case_count && good; ++i) {
-        regress_case *one = &work->cases[i];
-        for (size_t k = 0; k < one->outputs.count && good; ++k) {
-            cli_comparison *c = &one->comparisons[k];
-            if (c->name == NULL) {
-                good = asprintf(&c->name, "%s/%s", one->name, one->outputs.line[k]) >= 0;
-                c->alike = one->status == REGRESS_UNCHANGED;
-            }
-            if (good && one->status == REGRESS_FAILED && c->problem_count == 0) {
-                good = cli_comparison_add_problem(c, "the bake ended with exit code %d", one->code);
-            }
-            all[at++] = *c;
-        }
-    }
-    const int code = good ? cli_comparison_report(s, all, at) : cli_out_of_memory(work->folder);
-    free(all);
-    return code;
-}
-
 static int verdict(const regress_work *work) {
     int code = CLI_OK;
     for (size_t i = 0; i < work->case_count; ++i) {
@@ -352,13 +277,7 @@ static int run(regress_work *work) {
         code = s->update ? update_all(work) : CLI_OK;
     }
     code = code == CLI_OK ? regress_write_cache(work) : code;
-    if (code == CLI_OK && s->compare.json) {
-        code = print_json(work);
-    } else if (code == CLI_OK && !s->compare.common.quiet) {
-        print_lines(work);
-    }
-    code =
-        code == CLI_OK && (s->compare.junit != NULL || s->compare.html != NULL) ? write_reports(work) : code;
+    code = code == CLI_OK ? regress_report(work) : code;
     return code == CLI_OK ? verdict(work) : code;
 }
 

@@ -69,6 +69,9 @@ int regress_write_cache(const regress_work *work);
 /* Bakes a case in a child process. CLI_OK or an exit code, having said why. */
 int regress_bake(const regress_work *work, const regress_case *one);
 
+/* Tells of all cases on standard output, and in the files that were asked for. */
+int regress_report(const regress_work *work);
+
 /* Puts a new bake in the place of its golden one: whole, or not at all. */
 int regress_update(const regress_work *work, const char *output);
 

@@ -40,7 +40,7 @@ int32_t vsh_measure_at_least(int32_t measure) {
 }
 
 vsh_limits vsh_limits_default(void) {
-    vsh_limits limits = {.struct_size = sizeof limits, .options = vsh_compare_options_default()};
+    vsh_limits limits = {.options = vsh_compare_options_default()};
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         limits.value[i] = vshi_limits[i].value;
     }

@@ -35,7 +35,8 @@ static void a_ramp_is_as_wide_as_it_is_in_every_direction(void **unused) {
             const vsh_measures m =
                 compare_ramps((ramp){width, angles[i], 0.0}, (ramp){width, angles[i], 0.0});
             assert_true(m.pairs >= SIDE / 2 && m.pairs == m.edges[0] && m.pairs == m.edges[1]);
-            assert_near(m.width[0], 0.8 * width, 0.2); /* from 10 % to 90 % */
+            assert_true(angles[i] != 0.3 || m.pairs == SIDE); /* rows cross it, columns do not count */
+            assert_near(m.width[0], 0.8 * width, 0.2);        /* from 10 % to 90 % */
             assert_true(m.value[VSH_MEASURE_PENUMBRA] == 0.0 && m.value[VSH_MEASURE_WIDTHS] == 0.0);
         }
     }
