@@ -170,6 +170,37 @@ between() {
     [ "$output" = "not alike: format: golden is 'exr', new is 'vdb'" ] || fail "kind"
 }
 
+@test "a value that is not a number never passes, and its place is told" {
+    local build
+    build=$(dirname "$(realpath "$VDBSHADE")")
+    cat >nan.c <<'C'
+#include <math.h>
+#include <vdbshade/vdbshade.h>
+int main(void) {
+    float values[16] = {0}, other[16] = {0};
+    const char *const names[1] = {"ao"};
+    const float *const planes[1] = {values}, *const others[1] = {other};
+    const vsh_image image = {4, 4, 1, names, planes}, clean = {4, 4, 1, names, others};
+    values[6] = NAN;
+    values[9] = INFINITY;
+    return vsh_image_write("nan.exr", &image, NULL, NULL) != VSH_OK ||
+           vsh_image_write("clean.exr", &clean, NULL, NULL) != VSH_OK;
+}
+C
+    "${CC:-cc}" -std=c11 -Wall -Werror ${CFLAGS-} -I"$BATS_TEST_DIRNAME/../../include" nan.c -L"$build" -lvdbshade \
+        -Wl,-rpath,"$build" -lm -o nan
+    ./nan
+    local one
+    for one in 'clean nan new' 'nan clean golden' 'nan nan golden'; do
+        set -- $one
+        compare "$1.exr" "$2.exr" --max-rmse 1e15 --max-difference 1e15 --max-share 1
+        [ "$status" -eq 1 ] || fail "$one passed"
+        [[ $output == "ao: not alike: 2 $3 values are NaN or infinite, the first at (2, 1)"* ]] || fail "$one"
+    done
+    compare clean.exr clean.exr
+    done_well
+}
+
 @test "limits come from the command line, or from a file beside the golden" {
     cp golden.exr mine.exr
     compare mine.exr narrower.exr --max-penumbra 0.2 --max-widths 0.2 --max-rmse 0.1 --max-p99 0.2 --max-share 0.2 --max-edges 0.1
