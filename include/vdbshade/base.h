@@ -77,9 +77,9 @@ typedef struct vsh_attribute {
 } vsh_attribute;
 
 /* Told the stage ("load", "outline", "voxelize", "field", "charts", "texels", "validate", "shadow.NAME",
- * "ao", "padding", "volume", "flat", "hash") and the fraction of it that is done, 0 … 1, never falling within
- * a stage. Called by one thread at a time, from any of the pool's threads. Return 0 to go on; anything else
- * cancels: the call frees what it took and returns VSH_ERROR_CANCELLED. */
+ * "ao", "padding", "volume", "flat", "hash", "compare") and the fraction of it that is done, 0 … 1, never
+ * falling within a stage. Called by one thread at a time, from any of the pool's threads. Return 0 to go on;
+ * anything else cancels: the call frees what it took and returns VSH_ERROR_CANCELLED. */
 typedef int32_t vsh_progress_fn(void *user, const char *stage, double fraction);
 
 /* Bad things that were worked around: one line each, without a newline ("mesh 'sail': 4 open edges: …"). Same

@@ -11,6 +11,7 @@
 
 #include "bake.h"
 #include "base.h"
+#include "compare.h"
 #include "field.h"
 #include "flat.h"
 #include "grid.h"

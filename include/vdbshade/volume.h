@@ -80,7 +80,7 @@ typedef struct vsh_volume_options {
     int32_t ao;              /* nonzero: AO within shade.ao_distance, too. In free space, where there is no
                                 surface, it is the free share of all directions, each counting alike (the
                                 ambient light of a fog): shade.ao_cones cones or shade.rays rays over the whole
-                                sphere; VSH_AO_TAPS has no meaning there */
+                                sphere; VSH_AO_TAPS has no meaning there, nor have layers of heights and spheres */
     int32_t error;           /* nonzero: the standard error left in each value, too, where methods know it */
     vsh_shade_options shade; /* start_offset and surface_offset count in a band only */
 } vsh_volume_options;
@@ -107,7 +107,8 @@ typedef struct vsh_volume vsh_volume;
  * and exact values are the same within their error. Runs under the stage "volume"; `stats` are added to. Free
  * the result with vsh_volume_free(). Errors:
  * - VSH_ERROR_ARGUMENT: field or voxels NULL, lights NULL with a count above 0, nothing to bake, two lights
- *   of one name or one without, options out of range, VSH_AO_TAPS in free space, run, and as
+ *   of one name or one without, options out of range, VSH_AO_TAPS, or layers of
+ *   heights or spheres with AO, in free space, run, and as
  *   vsh_query_create();
  * - VSH_ERROR_LIMIT: run->memory_limit, or the machine's memory, for field, voxels and all grids without
  *   tiles;
@@ -162,6 +163,21 @@ VSH_API vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, 
 VSH_API vsh_result vsh_volume_write_with(const vsh_volume *volume, const char *path, int32_t half,
                                          const vsh_attribute *attributes, size_t attribute_count,
                                          vsh_error *error);
+
+/* --- what is in a file */
+
+/* A dense copy of a grid of numbers (or a mask) of a .vdb file: the values of size[0] × size[1] × size[2]
+ * voxels from `index_min` on into values, x fastest; the background where they are not active. And 1 for the
+ * active ones, 0 for the others, into active, in the same order. Either may be NULL. `name` as of
+ * vsh_voxels_from_vdb(); vsh_vdb_list() tells names and the box of the active voxels. Errors:
+ * - VSH_ERROR_ARGUMENT: a size below 1, indices beyond 32 bits, more than 2^31 - 1 voxels, run;
+ * - VSH_ERROR_READ: as vsh_grid_read();
+ * - VSH_ERROR_INPUT: no grids, none of that name, one that holds no numbers;
+ * - VSH_ERROR_LIMIT: the grid passes run->memory_limit or the machine's memory;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_vdb_copy(const char *path, const char *name, const int32_t index_min[3],
+                                const int32_t size[3], const vsh_run *run, float *values, float *active,
+                                vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -35,6 +35,10 @@ int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *
  * limits, output, …), and files by their names alone. Belongs to the parser; "" where memory was short. */
 const char *cli_parsed_command(void);
 
+/* The same with `count` operands, one or more. */
+int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
+                       const char *const *what, const char **operands, int count, bool *help);
+
 void cli_print_help(const cli_command *command);
 
 /* The candidate nearest to `text`, or NULL where none is near. */

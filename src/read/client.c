@@ -61,7 +61,8 @@ static vsh_result fail_start(const vshi_ask *ask, int reason, vsh_error *error) 
     const char *why = strerrordesc_np(reason);
     const bool missing = reason == ENOENT || reason == EACCES || reason == ENOEXEC || reason == ENOTDIR;
     return vshi_fail(error, missing ? VSH_ERROR_ARGUMENT : VSH_ERROR_MEMORY,
-                     "%s: no process to read it in: '%s': %s", ask->path, ask->run->reader, why != NULL ? why : "?");
+                     "%s: no process to read it in: '%s': %s", ask->path, ask->run->reader,
+                     why != NULL ? why : "?");
 }
 
 /* Moves a descriptor up, and keeps it from other programs that the host may start meanwhile. */

@@ -17,7 +17,8 @@ enum {
     VSHI_READ_MODEL = 3,
     VSHI_READ_IMAGE = 4,
     VSHI_READ_TEXT = 5,
-    VSHI_READ_KINDS = 6
+    VSHI_READ_COPY = 6,
+    VSHI_READ_KINDS = 7
 };
 
 /* --- the caller */
@@ -66,7 +67,7 @@ typedef vsh_result vshi_serve_fn(const char *path, vshi_take *request, const vsh
                                  vsh_error *error);
 
 vshi_serve_fn vshi_serve_grid, vshi_serve_list, vshi_serve_voxels, vshi_serve_model, vshi_serve_image,
-    vshi_serve_text;
+    vshi_serve_text, vshi_serve_copy;
 
 /* --- both */
 

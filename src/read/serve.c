@@ -26,6 +26,7 @@ static vshi_serve_fn *const servers[VSHI_READ_KINDS] = {
     [VSHI_READ_GRID] = vshi_serve_grid,     [VSHI_READ_LIST] = vshi_serve_list,
     [VSHI_READ_VOXELS] = vshi_serve_voxels, [VSHI_READ_MODEL] = vshi_serve_model,
     [VSHI_READ_IMAGE] = vshi_serve_image,   [VSHI_READ_TEXT] = vshi_serve_text,
+    [VSHI_READ_COPY] = vshi_serve_copy,
 };
 
 typedef struct serving {
