@@ -1,6 +1,6 @@
 // Level sets with changed bits, in each compression, through a reader: no crash comes here, and no damage
-// that can be told is passed over. The test run takes 40 of each; `test_bitflips N` takes N and prints what
-// became of them.
+// that can be told is passed over. The test run takes 40 of each; `test_bitflips N [zip]` takes N and prints
+// what became of them.
 #include "readers.h"
 
 #include <map>
@@ -136,13 +136,19 @@ Tally run_sample(const Sample &sample, int count, uint64_t first) {
     const std::string path = in_folder("sound.vdb"), damaged = in_folder("damaged.vdb");
     const FloatGrid::Ptr grid = sphere();
     grid->setSaveFloatAsHalf(sample.half);
+    // OpenVDB packs no level sets with Zip; other writers may, so this one is no level set until it is
+    // written
+    constexpr const char *CLASS = "level set", *OTHER = "level_set";
+    grid->insertMeta(openvdb::GridBase::META_GRID_CLASS, openvdb::StringMetadata(OTHER));
     openvdb::io::File file(path);
     file.setCompression(sample.compression);
     file.write(openvdb::GridPtrVec{grid});
     file.close();
+    std::string bytes = content(path);
+    bytes.replace(bytes.find(OTHER), std::strlen(CLASS), CLASS);
+    put(path, bytes);
     vsh_grid *sound = nullptr;
     assert_int_equal(vsh_grid_read(path.c_str(), nullptr, nullptr, &sound, &failure), VSH_OK);
-    const std::string bytes = content(path);
     Tally tally;
     for (int i = 0; i < count; ++i) {
         put(damaged, mutate(bytes, first + uint64_t(i)));
@@ -186,6 +192,9 @@ int main(int argc, char **argv) {
                     "borders | worst, voxels |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n");
         int steep = 0;
         for (size_t i = 0; i < sizeof samples / sizeof samples[0]; ++i) {
+            if (argc > 2 && std::strstr(samples[i].name, argv[2]) == nullptr) {
+                continue;
+            }
             const Tally tally = run_sample(samples[i], std::atoi(argv[1]), 1000000 * i);
             print(samples[i], tally);
             steep += tally.steep;
