@@ -141,11 +141,11 @@ void bench_read(FILE *csv) {
         snprintf(path[i], sizeof path[i], "%s/%s", folder, names[i]);
     }
     write_ball(path[0], 0.1);
-    write_ball(path[1], 0.0025);
+    write_ball(path[1], 0.005);
     write_sheet(path[2]);
     write_picture(path[3]);
     measure(csv, "a ball of 20 voxels", path[0], read_grid);
-    measure(csv, "a ball of 800 voxels", path[1], read_grid);
+    measure(csv, "a ball of 400 voxels", path[1], read_grid);
     measure(csv, "thin.glb", VSH_ASSETS "/thin.glb", read_model);
     measure(csv, "a million triangles", path[2], read_model);
     measure(csv, "terrain.png", VSH_ASSETS "/terrain.png", read_image);
