@@ -257,5 +257,12 @@ void cli_field_free(cli_field *made) {
 
 int cli_triangles_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                        vsh_triangles **triangles) {
-    return trace(scene, assets, NULL, run, triangles);
+    const int code = trace(scene, assets, NULL, run, triangles);
+    vsh_error error;
+    /* no caster outside of layers: none, where the library wants to be given those that there are */
+    if (code == CLI_OK && *triangles == NULL && traces(scene, NULL) &&
+        vsh_triangles_create(NULL, 0, run, triangles, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    return code;
 }

@@ -203,6 +203,16 @@ static int make_grid(volume_work *work) {
     if (s->like != NULL || s->box_voxel_size > 0.0) {
         return CLI_OK;
     }
+    size_t voxelised = 0;
+    for (size_t i = 0; i < work->scene->caster_count; ++i) {
+        voxelised += !cli_caster_is_direct(&work->scene->casters[i]);
+    }
+    if (voxelised == 0) {
+        return cli_usage(
+            "%s: no casters that are voxelised, whose band or voxel size is to be taken: give --box "
+            "and --box-voxel-size, or --like",
+            s->bake.input);
+    }
     const double start = cli_seconds();
     vsh_error error;
     const vsh_result result = vsh_scene_casters(work->scene, work->assets, &work->run, &work->grid, &error);
