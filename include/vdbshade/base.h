@@ -15,6 +15,11 @@
  *   more than this library knows.
  * - Calls compute in the default floating-point environment (round to nearest, denormals kept, no traps),
  *   whatever the caller has set, which is given back. Callbacks are called in the default one.
+ * - Files that somebody else made: the libraries that parse .vdb files, meshes, images and fonts can crash on
+ *   damaged ones. With vsh_run.reader they run in a child process, confined, that hands over plain arrays;
+ *   everything in these is checked, and a crash, a hang or hunger there is an error here (reader.h). The
+ *   child comes by posix_spawn(), which runs nothing of this process between fork and exec, so it is safe in
+ *   a host with threads, handlers and locks. Calls without a reader are for files that are trusted.
  * - VSH_ERROR_MEMORY (the system refused memory) and VSH_ERROR_INTERNAL can come from every call that returns
  *   a vsh_result, VSH_ERROR_CANCELLED from every one that takes a run; the rest is listed at each call. */
 #ifndef VDBSHADE_BASE_H
@@ -108,10 +113,15 @@ typedef struct vsh_run {
     void *user;                /* handed to both */
     int32_t isa; /* VSH_ISA_…, to test one; VSH_ERROR_ARGUMENT where this machine lacks it. No result depends
                     on it */
+    const char *reader; /* program that parses files, found as by execvp(); its main calls vsh_reader_serve()
+                           (reader.h), as vdbshade's own does. NULL: files are parsed in this process, where a
+                           damaged one can crash it. No result depends on it */
+    double reader_seconds; /* that the reader may take for one file, by the clock, > 0; else VSH_ERROR_LIMIT.
+                              0: 60, and one more for each MB of the file */
 } vsh_run;
 
 static inline vsh_run vsh_run_default(void) {
-    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST};
+    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST, NULL, 0.0};
     return run;
 }
 

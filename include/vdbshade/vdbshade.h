@@ -23,6 +23,7 @@
 #include "outline.h"
 #include "provenance.h"
 #include "query.h"
+#include "reader.h"
 #include "render.h"
 #include "scene.h"
 #include "sdf.h"

@@ -35,8 +35,8 @@ VSH_API vsh_result vsh_voxels_from_box(const double box_min[3], const double box
                                        const vsh_run *run, vsh_voxels **voxels, vsh_error *error);
 
 /* The active voxels of a grid of numbers (or a mask) in a .vdb file, those of active tiles too, on its own
- * lattice, whatever its transform. `name` NULL: the file's first such grid. Files from strangers are to be
- * read in a process of their own first, see vsh_grid_read(). Errors:
+ * lattice, whatever its transform. `name` NULL: the file's first such grid. Files from strangers are
+ * for run->reader (base.h). Errors:
  * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_READ: as vsh_grid_read();
  * - VSH_ERROR_INPUT: no grids, none of that name, one that holds no numbers (vectors, points, text), has no

@@ -60,7 +60,6 @@ static int compare_main(int argc, char **argv) {
     }
     cli_progress_begin(s.common.progress, s.common.quiet);
     code = cli_compare_check_reports(&s, files, 2);
-    code = code == CLI_OK ? cli_comparison_trial(files[0], files[1], s.common.memory_limit) : code;
     cli_comparison comparison = {.alike = false};
     if (code == CLI_OK) {
         cli_signals_watch();

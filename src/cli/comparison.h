@@ -108,10 +108,6 @@ typedef struct cli_comparison {
     bool alike;
 } cli_comparison;
 
-/* Looks at both files in a child process first, where their readers may crash. To be called before there are
- * threads. CLI_OK or an exit code, having said why. */
-int cli_comparison_trial(const char *golden, const char *fresh, uint64_t memory);
-
 /* Compares. CLI_OK whether they are alike or not; else an exit code, having said why. Free in each case. */
 int cli_comparison_make(const cli_compare_settings *settings, const char *golden, const char *fresh,
                         cli_comparison *comparison);

@@ -1,11 +1,14 @@
 /* vdbshade: the command line. Which subcommand, and the exit code. */
 #include "commands.h"
 #include "message.h"
+#include "self.h"
 #include "signals.h"
 
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
+#include <vdbshade/reader.h>
 
 static const cli_command *const commands[] = {&cli_bake,    &cli_voxelize, &cli_info, &cli_trade,
                                               &cli_query,   &cli_volume,   &cli_flat, &cli_render,
@@ -73,6 +76,11 @@ static int dispatch(int argc, char **argv) {
 }
 
 int main(int argc, char **argv) {
+    const int served = vsh_reader_serve(argc, argv);
+    if (served >= 0) {
+        _exit(served); /* what it holds goes with it */
+    }
+    cli_reader_begin(argv[0]);
     cli_signals_begin();
     int code = dispatch(argc, argv);
     if ((fflush(stdout) != 0 || ferror(stdout)) && code == CLI_OK) {

@@ -192,15 +192,6 @@ static int each_output(regress_work *work, output_fn *fn) {
     return code;
 }
 
-static int try_output(regress_work *work, regress_case *one, size_t output, const char *golden,
-                      const char *fresh) {
-    (void)one;
-    (void)output;
-    return access(golden, F_OK) == 0
-               ? cli_comparison_trial(golden, fresh, work->settings->compare.common.memory_limit)
-               : CLI_OK;
-}
-
 static int compare_output(regress_work *work, regress_case *one, size_t output, const char *golden,
                           const char *fresh) {
     cli_comparison *c = &one->comparisons[output];
@@ -270,7 +261,6 @@ static int run(regress_work *work) {
     regress_read_cache(work);
     code = make_bakes(work);
     code = code == CLI_OK ? bake_all(work) : code;
-    code = code == CLI_OK ? each_output(work, try_output) : code;
     code = code == CLI_OK ? each_output(work, compare_output) : code;
     if (code == CLI_OK) {
         judge(work);

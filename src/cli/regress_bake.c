@@ -1,9 +1,9 @@
 /* Bakes in child processes, and golden bakes that are replaced. */
+#include "child.h"
 #include "commands.h"
 #include "message.h"
 #include "regress.h"
 #include "temporary.h"
-#include "trial.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -45,7 +45,7 @@ int regress_bake(const regress_work *work, const regress_case *one) {
     }
     /* words of their own: getopt_long() takes them as what may be written to */
     char name[32], file[] = "--output", folder[] = "--output-folder", quiet[] = "--quiet";
-    char limit[] = "--memory-limit", pool[] = "--threads";
+    char limit[] = "--memory-limit", pool[] = "--threads", trusted[] = "--trusted";
     snprintf(name, sizeof name, "%s", one->command->name);
     c.words[c.count++] = name;
     c.words[c.count++] = one->scene;
@@ -61,8 +61,11 @@ int regress_bake(const regress_work *work, const regress_case *one) {
         c.words[c.count++] = pool;
         c.words[c.count++] = threads;
     }
+    if (common->trusted) {
+        c.words[c.count++] = trusted;
+    }
     c.words[c.count] = NULL;
-    const int code = cli_isolated(one->scene, 0, run_child, &c);
+    const int code = cli_in_child(one->scene, run_child, &c);
     free(output);
     return code;
 }
