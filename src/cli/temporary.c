@@ -4,11 +4,16 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+
+enum { NAME_KEPT = 200 /* bytes of a target's name in that of its temporary */ };
 
 /* The folder of the path into folder[PATH_MAX]; links are followed, as the library follows them. Returns the
  * path's last part. */
@@ -23,24 +28,71 @@ static const char *split(const char *path, char *real, char *folder) {
     return slash + 1;
 }
 
+/* The process in ".STEM.PID.tmpEND" or ".STEM.PID-N.tmpEND"; 0: the name is none of these. */
+static long process_of(const char *entry, const char *stem, size_t stem_length, const char *end) {
+    if (entry[0] != '.' || strncmp(entry + 1, stem, stem_length) != 0 || entry[1 + stem_length] != '.') {
+        return 0;
+    }
+    const char *at = entry + 2 + stem_length;
+    const size_t digits = strspn(at, "0123456789");
+    const long process = digits > 0 && digits <= 10 ? strtol(at, NULL, 10) : 0;
+    at += digits;
+    at += *at == '-' ? 1 + strspn(at + 1, "0123456789") : 0;
+    const size_t tag = strlen(".tmp");
+    return strncmp(at, ".tmp", tag) == 0 && strcmp(at + tag, end) == 0 ? process : 0;
+}
+
+/* The program's own names, ".out.csv.PID.tmp", and those of the library, ".out.PID.tmp.csv". */
+static bool is_of_process(const char *entry, const char *name, long process) {
+    const char *dot = strrchr(name, '.');
+    const size_t length = strlen(name);
+    dot = dot != NULL && dot != name ? dot : name + length;
+    const size_t stem = (size_t)(dot - name);
+    return process_of(entry, name, length < NAME_KEPT ? length : NAME_KEPT, "") == process ||
+           process_of(entry, name, stem < NAME_KEPT ? stem : NAME_KEPT, dot) == process;
+}
+
 void cli_temporary_remove(const char *target) {
-    char real[PATH_MAX], folder[PATH_MAX], tag[32];
-    split(target, real, folder);
-    const int tag_length = snprintf(tag, sizeof tag, ".%ld", (long)getpid());
+    char real[PATH_MAX], folder[PATH_MAX];
+    const char *name = split(target, real, folder);
     DIR *listing = opendir(folder);
     if (listing == NULL) {
         return;
     }
     const struct dirent *entry;
     while ((entry = readdir(listing)) != NULL) {
-        const char *at = entry->d_name[0] == '.' ? strstr(entry->d_name + 1, tag) : NULL;
-        if (at != NULL) {
-            at += tag_length;
-            at += *at == '-' ? 1 + strspn(at + 1, "0123456789") : 0;
-            if (strncmp(at, ".tmp", 4) == 0) {
-                unlinkat(dirfd(listing), entry->d_name, 0);
-            }
+        if (is_of_process(entry->d_name, name, (long)getpid())) {
+            unlinkat(dirfd(listing), entry->d_name, 0);
         }
+    }
+    closedir(listing);
+}
+
+/* What a killed run has left of this target: as the library does, what no process holds the lock of. */
+static void clean(const char *folder, const char *name) {
+    DIR *listing = opendir(folder);
+    if (listing == NULL) {
+        return;
+    }
+    const size_t length = strnlen(name, NAME_KEPT);
+    const struct dirent *entry;
+    while ((entry = readdir(listing)) != NULL) {
+        const long process = process_of(entry->d_name, name, length, "");
+        const int file = process > 0 ? openat(dirfd(listing), entry->d_name,
+                                              O_WRONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)
+                                     : -1;
+        if (file < 0) {
+            continue;
+        }
+        struct stat status;
+        const bool ours = fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid();
+        const bool locked = flock(file, LOCK_EX | LOCK_NB) == 0;
+        const bool unknown =
+            !locked && errno != EWOULDBLOCK && errno != EINTR; /* no locks on this file system */
+        if (ours && (locked || (unknown && kill((pid_t)process, 0) != 0 && errno == ESRCH))) {
+            unlinkat(dirfd(listing), entry->d_name, 0);
+        }
+        close(file);
     }
     closedir(listing);
 }
@@ -65,10 +117,17 @@ int cli_temporary_begin(cli_temporary *t, const char *target) {
     char real[PATH_MAX], folder[PATH_MAX];
     const char *name = split(target, real, folder);
     *t = (cli_temporary){.target = target};
-    snprintf(t->temporary, sizeof t->temporary, "%s/.%.200s.%ld.tmp", folder, name, (long)getpid());
+    clean(folder, name);
+    snprintf(t->temporary, sizeof t->temporary, "%s/.%.*s.%ld.tmp", folder, NAME_KEPT, name, (long)getpid());
     snprintf(t->final, sizeof t->final, "%s/%s", folder, name);
     t->file = fopen(t->temporary, "wbx");
-    return t->file != NULL ? CLI_OK : fail(target);
+    if (t->file == NULL) {
+        return fail(target);
+    }
+    if (flock(fileno(t->file), LOCK_EX | LOCK_NB) != 0) {
+        errno = 0; /* some file systems have no locks; the process's number then tells that it lives */
+    }
+    return CLI_OK;
 }
 
 void cli_temporary_abandon(cli_temporary *t) {
@@ -82,19 +141,23 @@ void cli_temporary_abandon(cli_temporary *t) {
 int cli_temporary_commit(cli_temporary *t) {
     const bool written = fflush(t->file) == 0 && !ferror(t->file);
     const int write_error = errno;
+    const int held = dup(fileno(t->file)); /* with its lock, until the file is in its place */
     const bool closed = fclose(t->file) == 0;
     t->file = NULL;
     struct stat old;
     if (written && closed && stat(t->final, &old) == 0 && chmod(t->temporary, old.st_mode & 0777) != 0) {
         errno = 0; /* some file systems have no modes */
     }
+    int code = CLI_OK;
     if (!written || !closed || rename(t->temporary, t->final) != 0) {
         errno = written ? errno : write_error;
-        const int code = fail(t->target);
+        code = fail(t->target);
         unlink(t->temporary);
-        return code;
     }
-    return CLI_OK;
+    if (held >= 0) {
+        close(held);
+    }
+    return code;
 }
 
 int cli_temporary_write(const char *target, const char *text) {
