@@ -166,7 +166,7 @@ static vsh_result box_field(const vsh_run *run, vsh_grid **grid, vsh_field **fie
                                        3, 7, 6, 3, 6, 2, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5};
     const vsh_mesh mesh = {"box", corners, NULL, NULL, indices, 8, 12, NULL};
     vsh_grid_options options = vsh_grid_options_default();
-    options.resolution = 10;
+    options.resolution = 6;
     vsh_field_options wide = vsh_field_options_default();
     wide.reach = 1.0;
     *grid = NULL;
@@ -419,6 +419,7 @@ static vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
     vsh_shade_options adaptive = vsh_shade_options_default();
     adaptive.method = VSH_SHADOW_ADAPTIVE;
     adaptive.ao_method = VSH_AO_ADAPTIVE;
+    adaptive.rays = 16;
     const vsh_lightmap some = {
         .shadow = shadow, .ao = planes[4], .coverage = planes[6], .ao_error = planes[7]};
     TRY(vsh_bake_lightmap(field, texels, lights, 2, &adaptive, run, &some, NULL, error));

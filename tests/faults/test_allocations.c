@@ -14,10 +14,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
-enum { MOST = 20000 };
+enum { MOST = 20000, STEP = 5 };
 
 static char folder[256];
 
@@ -53,9 +52,10 @@ static void check_failure(const scenario *s, uint64_t n, int all, vsh_result res
     }
 }
 
-static uint64_t fail_each(const scenario *s, int all) {
+/* Returns the number of allocations, to within `step`. */
+static uint64_t fail_each(const scenario *s, int all, uint64_t step) {
     const vsh_run run = one_thread();
-    for (uint64_t n = 1; n < MOST; ++n) {
+    for (uint64_t n = 1; n < MOST; n += step) {
         const uint64_t before = faults_live();
         vsh_error error = {-1, ""};
         uint64_t failed;
@@ -92,12 +92,12 @@ static void every_allocation_may_fail(void **state) {
             }
         }
         scenarios_untouched(); /* no: it has written */
-        const uint64_t alone = fail_each(s, 0);
+        const uint64_t alone = fail_each(s, 0, 1);
         scenarios_untouched();
-        const uint64_t all = fail_each(s, 1);
+        const uint64_t all = fail_each(s, 1, STEP);
         scenarios_untouched();
-        print_message("%-24s %6" PRIu64 " allocations (%.2f s)\n", s->name, alone, (double)clock() / CLOCKS_PER_SEC);
-        assert_int_equal(alone, all);
+        print_message("%-24s %6" PRIu64 " allocations\n", s->name, alone);
+        assert_true(all >= alone && all < alone + STEP);
         assert_true(alone > 0);
         sum += alone;
         if (s->run(&run, &error) != VSH_OK) {
