@@ -23,6 +23,8 @@ vsh_find(openimageio_util OpenImageIO/filesystem.h OpenImageIO_Util)
 vsh_find(png png.h png)
 vsh_find(assimp assimp/cimport.h assimp)
 vsh_find(jansson jansson.h jansson)
+vsh_find(md sha256.h md)
+vsh_find(sleef sleef.h sleef)
 vsh_find(half Imath/half.h Imath-3_1)
 
 # Rays against triangles: optional, and what needs it says where it is missing.
@@ -33,7 +35,7 @@ endif()
 
 find_package_handle_standard_args(vdbshade_dependencies REQUIRED_VARS VSH_openvdb_LIBRARY VSH_openimageio_LIBRARY
                                   VSH_openimageio_util_LIBRARY VSH_png_LIBRARY
-                                  VSH_assimp_LIBRARY VSH_jansson_LIBRARY VSH_half_LIBRARY)
+                                  VSH_assimp_LIBRARY VSH_jansson_LIBRARY VSH_half_LIBRARY VSH_md_LIBRARY VSH_sleef_LIBRARY)
 
 if(NOT TARGET vsh::openexr)
   set_property(TARGET vsh::openvdb PROPERTY INTERFACE_LINK_LIBRARIES TBB::tbb vsh::half)
@@ -42,7 +44,7 @@ if(NOT TARGET vsh::openexr)
   target_link_libraries(vsh::openexr INTERFACE OpenEXR::OpenEXRCore)
   add_library(vsh::dependencies INTERFACE IMPORTED)
   target_link_libraries(vsh::dependencies INTERFACE vsh::openvdb vsh::openexr vsh::openimageio vsh::assimp
-                                                    vsh::jansson Freetype::Freetype m)
+                                                    vsh::jansson vsh::md vsh::sleef Freetype::Freetype m)
   if(TARGET embree)
     add_library(vsh::embree INTERFACE IMPORTED)
     target_link_libraries(vsh::embree INTERFACE embree)

@@ -65,9 +65,15 @@ typedef struct vsh_error {
     char message[1020];
 } vsh_error;
 
+/* A line of text that a file carries beside its values (provenance.h makes some). */
+typedef struct vsh_attribute {
+    const char *name; /* "vdbshade_version"; 1 … 79 bytes of printable ASCII without blanks, no two alike */
+    const char *value; /* UTF-8 without control characters, at most 65535 bytes */
+} vsh_attribute;
+
 /* Told the stage ("load", "outline", "voxelize", "field", "charts", "texels", "validate", "shadow.NAME",
- * "ao", "padding", "volume", "flat") and the fraction of it that is done, 0 … 1, never falling within a
- * stage. Called by one thread at a time, from any of the pool's threads. Return 0 to go on; anything else
+ * "ao", "padding", "volume", "flat", "hash") and the fraction of it that is done, 0 … 1, never falling within
+ * a stage. Called by one thread at a time, from any of the pool's threads. Return 0 to go on; anything else
  * cancels: the call frees what it took and returns VSH_ERROR_CANCELLED. At 1 a stage's work may be done, and
  * what is returned be left alone: who wants to cancel says so at every call from then on. */
 typedef int32_t vsh_progress_fn(void *user, const char *stage, double fraction);

@@ -96,6 +96,12 @@ VSH_API vsh_result vsh_grid_read(const char *path, const char *name, const vsh_r
  * VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name, vsh_error *error);
 
+/* The same with lines of text beside the values, as the grid's metadata. VSH_ERROR_ARGUMENT too where they
+ * are not as vsh_attribute says. */
+VSH_API vsh_result vsh_grid_write_with(const vsh_grid *grid, const char *path, const char *name,
+                                       const vsh_attribute *attributes, size_t attribute_count,
+                                       vsh_error *error);
+
 /* A caster for vsh_grid_unite(): a grid and where it stands. A view; nothing is owned. */
 typedef struct vsh_grid_instance {
     const vsh_grid *grid;
@@ -139,8 +145,9 @@ typedef struct vsh_vdb_entry {
     int32_t index_min[3]; /* of the active voxels; 0 where there are none */
     int32_t index_max[3];
     uint64_t active_voxels;
-    uint64_t bytes;    /* in memory */
-    char problem[256]; /* why it cannot cast shadows, or what is odd about it; empty: nothing */
+    uint64_t bytes;        /* in memory */
+    char problem[256];     /* why it cannot cast shadows, or what is odd about it; empty: nothing */
+    char attributes[8192]; /* metadata that vdbshade wrote: lines "NAME: VALUE", each with a newline */
 } vsh_vdb_entry;
 
 /* Lists up to `capacity` grids of a .vdb file into `entries` (may be NULL where that is 0), and their

@@ -29,10 +29,13 @@ typedef struct vsh_image_options {
                          channels or the numbers 0 and 1. R, G and B that are missing are 0; without A there
                          is no alpha. NULL: vsh_image_default_pack(). In EXR, NULL writes every channel by
                          name, and a pack only what it names */
+    const vsh_attribute *attributes; /* [attribute_count]: written as string attributes into EXR and as text
+                                        into PNG; other formats have no place for them */
+    size_t attribute_count;
 } vsh_image_options;
 
 static inline vsh_image_options vsh_image_options_default(void) {
-    vsh_image_options options = {sizeof(vsh_image_options), 0, NULL};
+    vsh_image_options options = {sizeof(vsh_image_options), 0, NULL, NULL, 0};
     return options;
 }
 
@@ -41,7 +44,8 @@ static inline vsh_image_options vsh_image_options_default(void) {
  * begins with "bent." hold -1 … 1, and go into integers as (1 + x) / 2. Atomic: written
  * beside `path` and renamed, so a failure leaves an old file alone. Errors:
  * - VSH_ERROR_ARGUMENT: path NULL or empty, no image, sizes or channels out of range, a plane NULL,
- *   options; an unknown ending; bits, a pack or a size that the format does not have;
+ *   options; attributes other than vsh_attribute says; an unknown ending; bits, a pack or a size that the
+ * format does not have;
  * - VSH_ERROR_LIMIT: more than 2^31 values, or than OpenEXR's 2 GiB in 16 rows;
  * - VSH_ERROR_WRITE: no such folder, no permission, a folder or device in the way, disk full;
  * - VSH_ERROR_UNSUPPORTED: this OpenImageIO cannot write the format;
@@ -107,6 +111,10 @@ VSH_API vsh_result vsh_image_read(const char *path, vsh_image_file **file, vsh_e
 /* The planes and names of a file, which they belong to; names are the file's own in EXR, else R, G, B, A or
  * Y. NULL is an image of 0 × 0. */
 VSH_API vsh_image vsh_image_view(const vsh_image_file *file);
+
+/* Lines of text that an EXR (string attributes) or PNG file carries, which belong to `file`; none of NULL and
+ * of other formats. */
+VSH_API const vsh_attribute *vsh_image_attributes(const vsh_image_file *file, size_t *count);
 VSH_API void vsh_image_free(vsh_image_file *file); /* NULL does nothing */
 
 #ifdef __cplusplus

@@ -20,6 +20,7 @@
 #include "light.h"
 #include "mesh.h"
 #include "outline.h"
+#include "provenance.h"
 #include "query.h"
 #include "render.h"
 #include "scene.h"

@@ -80,7 +80,7 @@ typedef struct vsh_volume_options {
     int32_t ao;              /* nonzero: AO within shade.ao_distance, too. In free space, where there is no
                                 surface, it is the free share of all directions, each counting alike (the
                                 ambient light of a fog): shade.ao_cones cones or shade.rays rays over the whole
-                                sphere; VSH_AO_TAPS has no meaning there */
+                                sphere; VSH_AO_TAPS has no meaning there, nor have layers of heights and spheres */
     int32_t error;           /* nonzero: the standard error left in each value, too, where methods know it */
     vsh_shade_options shade; /* start_offset and surface_offset count in a band only */
 } vsh_volume_options;
@@ -107,7 +107,8 @@ typedef struct vsh_volume vsh_volume;
  * and exact values are the same within their error. Runs under the stage "volume"; `stats` are added to. Free
  * the result with vsh_volume_free(). Errors:
  * - VSH_ERROR_ARGUMENT: field or voxels NULL, lights NULL with a count above 0, nothing to bake, two lights
- *   of one name or one without, options out of range, VSH_AO_TAPS in free space, run, and as
+ *   of one name or one without, options out of range, VSH_AO_TAPS, or layers of
+ *   heights or spheres with AO, in free space, run, and as
  *   vsh_query_create();
  * - VSH_ERROR_LIMIT: run->memory_limit, or the machine's memory, for field, voxels and all grids without
  *   tiles;
@@ -156,6 +157,12 @@ VSH_API vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const 
  * VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t half,
                                     vsh_error *error);
+
+/* The same with lines of text as metadata of every grid. VSH_ERROR_ARGUMENT too where they are not as
+ * vsh_attribute says. */
+VSH_API vsh_result vsh_volume_write_with(const vsh_volume *volume, const char *path, int32_t half,
+                                         const vsh_attribute *attributes, size_t attribute_count,
+                                         vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -1,5 +1,7 @@
 #include "analytic/caps.h"
 
+#include "base/elementary.h"
+
 static const double PI = 3.14159265358979323846;
 /* So near to the surface, in radii, a point is on it: receivers are made of floats. */
 static const double ON_SURFACE = 1e-4;
@@ -35,7 +37,7 @@ vshi_cap_kind vshi_cap_of(const double sphere[4], const double origin[3], double
 /* Area of a circle's segment beyond a line at a distance from its centre. */
 static double segment(double radius, double distance) {
     const double x = fmin(fmax(distance / radius, -1.0), 1.0);
-    return radius * radius * (acos(x) - x * sqrt((1.0 - x) * (1.0 + x)));
+    return radius * radius * (vshi_acos(x) - x * sqrt((1.0 - x) * (1.0 + x)));
 }
 
 /* Area that circles of radii a and b, `distance` apart, have in common. */
@@ -52,23 +54,23 @@ static double lens(double a, double b, double distance) {
 }
 
 double vshi_cap_over_disc(double angle, double half, double radius) {
-    const double disc = PI * radius * radius, near = tan(angle - half);
+    const double disc = PI * radius * radius, near = vshi_tan(angle - half);
     if (near >= radius) {
         return 0.0;
     }
     double circle, centre;
     const bool ellipse = angle + half < MOST_ANGLE;
-    const double beyond = ellipse ? tan(angle + half) : INFINITY;
+    const double beyond = ellipse ? vshi_tan(angle + half) : INFINITY;
     const double along = 0.5 * (beyond - near);
     if (ellipse && along < radius) {
-        const double across = sin(half) / sqrt(cos(angle + half) * cos(angle - half));
+        const double across = vshi_sin(half) / sqrt(vshi_cos(angle + half) * vshi_cos(angle - half));
         if (beyond <= radius) {
             return along * across / (radius * radius);
         }
         circle = sqrt(along * across);
         centre = 0.5 * (near + beyond);
     } else {
-        circle = half < MOST_ANGLE ? tan(half) : INFINITY; /* that of the ellipse's near end */
+        circle = half < MOST_ANGLE ? vshi_tan(half) : INFINITY; /* that of the ellipse's near end */
         centre = near + circle;
     }
     const double share =
@@ -88,7 +90,7 @@ double vshi_cap_over_hemisphere(double cosine, double sine) {
     const double up = (1.0 - cosine) * (1.0 + cosine), cut = fmax(square - cosine * cosine, 0.0);
     /* the horizon cuts the cap's rim at two points; `turn` is half the angle between them, around its centre
      */
-    const double turn = acos(fmin(fmax(-cosine * sqrt(flat / (square * up)), -1.0), 1.0));
-    const double share = square * cosine * turn - sqrt(cut * flat) + atan2(sqrt(cut), sqrt(flat));
+    const double turn = vshi_acos(fmin(fmax(-cosine * sqrt(flat / (square * up)), -1.0), 1.0));
+    const double share = square * cosine * turn - sqrt(cut * flat) + vshi_atan2(sqrt(cut), sqrt(flat));
     return fmin(fmax(share / PI, 0.0), 1.0);
 }

@@ -4,6 +4,7 @@
  * occlusion", 2016; there around the view direction, here around the ground's). */
 #include "analytic/heights.h"
 #include "analytic/place.h"
+#include "base/elementary.h"
 
 enum { WALKS = 2, AZIMUTHS = WALKS * VSHI_FAN };
 
@@ -25,8 +26,8 @@ static double light_between(double along, double up, double from, double to) {
     if (!(to > from)) {
         return 0.0;
     }
-    const double a = sin(from), b = sin(to);
-    return 0.5 * (along * (to - from + b * cos(to) - a * cos(from)) + up * (b * b - a * a));
+    const double a = vshi_sin(from), b = vshi_sin(to);
+    return 0.5 * (along * (to - from + b * vshi_cos(to) - a * vshi_cos(from)) + up * (b * b - a * a));
 }
 
 /* Integral of the same times the direction, along the azimuth and up. */
@@ -34,7 +35,7 @@ static void directions_between(double along, double up, double from, double to, 
     if (!(to > from)) {
         return;
     }
-    const double s0 = sin(from), s1 = sin(to), c0 = cos(from), c1 = cos(to);
+    const double s0 = vshi_sin(from), s1 = vshi_sin(to), c0 = vshi_cos(from), c1 = vshi_cos(to);
     const double cubes = (s1 * s1 * s1 - s0 * s0 * s0) / 3.0, mixed = (c0 * c0 * c0 - c1 * c1 * c1) / 3.0;
     sum[0] += along * (s1 - s0 - cubes) + up * mixed;
     sum[1] += along * mixed + up * cubes;
@@ -49,9 +50,9 @@ typedef struct half_plane {
 static half_plane over(vshi_vec normal, double x, double z) {
     half_plane p = {normal.x * x + normal.z * z, normal.y, -0.5 * PI, 0.5 * PI};
     if (p.up > 0.0) {
-        p.low = atan(-p.along / p.up);
+        p.low = vshi_atan(-p.along / p.up);
     } else if (p.up < 0.0) {
-        p.high = atan(-p.along / p.up);
+        p.high = vshi_atan(-p.along / p.up);
     } else if (p.along <= 0.0) {
         p.high = p.low;
     }
@@ -59,7 +60,7 @@ static half_plane over(vshi_vec normal, double x, double z) {
 }
 
 static double slope_of(double elevation) {
-    return elevation <= -0.5 * PI ? -STEEP : elevation >= 0.5 * PI ? STEEP : tan(elevation);
+    return elevation <= -0.5 * PI ? -STEEP : elevation >= 0.5 * PI ? STEEP : vshi_tan(elevation);
 }
 
 static float shade_point(const vsh_heights *heights, vshi_walk_fn *walk, double distance, const double at[3],
@@ -74,8 +75,8 @@ static float shade_point(const vsh_heights *heights, vshi_walk_fn *walk, double 
         fan.range = (float)distance;
         for (int k = 0; k < VSHI_FAN; ++k) {
             const double azimuth = 2.0 * PI * (w * VSHI_FAN + k + 0.5) / AZIMUTHS;
-            x[k] = cos(azimuth);
-            z[k] = sin(azimuth);
+            x[k] = vshi_cos(azimuth);
+            z[k] = vshi_sin(azimuth);
             planes[k] = over(normal, x[k], z[k]);
             vshi_fan_set(&fan, k, x[k], z[k]);
             fan.slope[k] = least[k] = (float)slope_of(planes[k].low);
@@ -91,8 +92,8 @@ static float shade_point(const vsh_heights *heights, vshi_walk_fn *walk, double 
                 open += full;
                 continue;
             }
-            const double horizon = atan((double)fan.slope[k]);
-            const double under = atan(vshi_heights_under(&heights->relief, at, x[k], z[k]));
+            const double horizon = vshi_atan((double)fan.slope[k]);
+            const double under = vshi_atan(vshi_heights_under(&heights->relief, at, x[k], z[k]));
             if (bent != NULL && under < horizon) {
                 double sum[2] = {0.0, 0.0};
                 directions_between(p->along, p->up, fmax(under, p->low), fmin(horizon, p->high), sum);

@@ -7,6 +7,7 @@
 #include "analytic/heights.h"
 #include "analytic/place.h"
 #include "analytic/slices.h"
+#include "base/elementary.h"
 
 /* Slopes of a slice's directions over the plane of a normal: from low to high. */
 typedef struct span {
@@ -98,7 +99,7 @@ void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, int
     vshi_slices slices;
     if (!lamp) {
         const vshi_vec axis = vshi_heights_direction(heights, vshi_vec_of(light->direction));
-        vshi_slices_make(axis, hard ? 0.0 : tan(0.5 * light->angle), INFINITY, &slices);
+        vshi_slices_make(axis, hard ? 0.0 : vshi_tan(0.5 * light->angle), INFINITY, &slices);
     }
     for (size_t i = begin; i < end; ++i) {
         float *value = &visibility[i - begin];

@@ -5,6 +5,8 @@
  * is within the disc, slices are sectors around it. */
 #include "analytic/slices.h"
 
+#include "base/elementary.h"
+
 #include <math.h>
 
 static const double PI = 3.14159265358979323846;
@@ -20,14 +22,14 @@ static double slope_at(const vshi_slices *s, double u, double v) {
 }
 
 static void set_chord(vshi_slices *s, int k, double radius) {
-    const double angle = PI * (k + 1) / (VSHI_FAN + 1), x = cos(angle), tangent = s->sine / s->cosine;
+    const double angle = PI * (k + 1) / (VSHI_FAN + 1), x = vshi_cos(angle), tangent = s->sine / s->cosine;
     vshi_slice *slice = &s->slice[k];
     slice->sine = radius * x * tangent;
     slice->cosine = sqrt((1.0 - slice->sine) * (1.0 + slice->sine));
     slice->middle = radius * x * slice->sine;
-    slice->half = radius * sin(angle);
+    slice->half = radius * vshi_sin(angle);
     slice->spread = slice->half * tangent / slice->cosine;
-    slice->weight = sin(angle) * sin(angle) * 2.0 / (VSHI_FAN + 1);
+    slice->weight = vshi_sin(angle) * vshi_sin(angle) * 2.0 / (VSHI_FAN + 1);
     const double u = radius * x * slice->cosine, along = s->cosine - slice->middle * s->sine;
     const double length = sqrt(along * along + u * u);
     slice->azimuth = along / length;
@@ -41,8 +43,8 @@ static void set_chord(vshi_slices *s, int k, double radius) {
 static void set_sector(vshi_slices *s, int k, double radius) {
     const double angle = 2.0 * PI * (k + 0.5) / VSHI_FAN, zenith = s->cosine / s->sine;
     vshi_slice *slice = &s->slice[k];
-    slice->sine = sin(angle);
-    slice->cosine = cos(angle);
+    slice->sine = vshi_sin(angle);
+    slice->cosine = vshi_cos(angle);
     const double across = zenith * slice->sine;
     slice->half = zenith * slice->cosine + sqrt(fmax(radius * radius - across * across, 0.0));
     slice->weight = slice->half * slice->half / (VSHI_FAN * radius * radius);

@@ -4,6 +4,7 @@
 #include "analytic/balls.h"
 #include "analytic/caps.h"
 #include "analytic/spheres.h"
+#include "base/elementary.h"
 
 #include <string.h>
 
@@ -30,8 +31,8 @@ typedef struct sky {
 static void set_directions(sky *s) {
     for (int i = 0; i < DIRECTIONS; ++i) {
         const double square = (i + 0.5) / DIRECTIONS, angle = 2.0 * PI * fmod(i * TURN, 1.0);
-        s->x[i] = (float)(sqrt(square) * cos(angle));
-        s->y[i] = (float)(sqrt(square) * sin(angle));
+        s->x[i] = (float)(sqrt(square) * vshi_cos(angle));
+        s->y[i] = (float)(sqrt(square) * vshi_sin(angle));
         s->z[i] = (float)sqrt(1.0 - square);
     }
 }

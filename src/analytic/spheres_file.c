@@ -3,9 +3,9 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/numbers.h"
 
 #include <errno.h>
-#include <locale.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -159,12 +159,9 @@ vsh_result vsh_spheres_read(const char *path, const vsh_run *run, double **spher
         fclose(file);
         return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: it is a folder", path);
     }
-    /* decimal points, whatever the process has set */
-    const locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0), old = uselocale(c);
+    VSHI_NUMBERS;
     list l = {NULL, 0, 0};
     result = read_rows(path, file, &full, &l, error);
-    uselocale(old);
-    freelocale(c);
     fclose(file);
     if (result != VSH_OK) {
         free(l.values);

@@ -6,6 +6,7 @@
 #include "analytic/balls.h"
 #include "analytic/caps.h"
 #include "analytic/spheres.h"
+#include "base/elementary.h"
 
 #include <float.h>
 
@@ -26,8 +27,8 @@ static void set_chords(chords *c) {
     double total = 0.0;
     for (int k = 0; k < CHORDS; ++k) {
         const double angle = PI * (k + 1) / (CHORDS + 1);
-        c->at[k] = cos(angle);
-        c->half[k] = sin(angle);
+        c->at[k] = vshi_cos(angle);
+        c->half[k] = vshi_sin(angle);
         c->share[k] = c->half[k] * c->half[k] / BITS;
         total += c->share[k] * BITS;
     }
@@ -135,7 +136,8 @@ static bool meets_disc(void *user, const double sphere[4]) {
         return true;
     }
     const double across = vshi_length(vshi_cross(cap.centre, c->axis));
-    const double angle = atan2(across, vshi_dot(cap.centre, c->axis)), half = atan2(cap.sine, cap.cosine);
+    const double angle = vshi_atan2(across, vshi_dot(cap.centre, c->axis)),
+                 half = vshi_atan2(cap.sine, cap.cosine);
     if (angle >= half + c->half) {
         return true;
     }
@@ -144,7 +146,7 @@ static bool meets_disc(void *user, const double sphere[4]) {
         return false;
     }
     ++c->caps;
-    const double beyond = atan(c->radius);
+    const double beyond = vshi_atan(c->radius);
     const bool within = angle + half <= beyond;
     const bool closed = !c->cut && (within || c->radius <= LARGEST_DISC);
     const double share = closed ? vshi_cap_over_disc(angle, half, c->radius) : 0.0;
@@ -185,7 +187,7 @@ static bool meets_ray(void *user, const double sphere[4]) {
 /* Samples above the plane of the normal; false where there are none. */
 static bool set_above(covering *c) {
     const vshi_vec n = {vshi_dot(c->normal, c->u), vshi_dot(c->normal, c->v), vshi_dot(c->normal, c->axis)};
-    const double sine = sin(c->half);
+    const double sine = vshi_sin(c->half);
     c->all = 1.0;
     c->cut = vshi_dot(c->normal, c->normal) > 0.0 && n.z < sine;
     for (int k = 0; k < CHORDS; ++k) {
@@ -218,8 +220,8 @@ static float shade_point(const vsh_spheres *spheres, covering *c, vsh_shade_stat
     }
     const vshi_ball_cone cone = {{c->origin[0], c->origin[1], c->origin[2]},
                                  {c->axis.x, c->axis.y, c->axis.z},
-                                 sin(c->half),
-                                 cos(c->half),
+                                 vshi_sin(c->half),
+                                 vshi_cos(c->half),
                                  c->far};
     ++stats->marches;
     stats->samples += vshi_balls_search(spheres, &cone, ray ? meets_ray : meets_disc, c);
@@ -249,10 +251,10 @@ static bool aim(covering *c, const vsh_light *light, bool hard) {
         }
         const double sine = light->radius / distance;
         c->axis = vshi_unit(to);
-        c->half = hard ? 0.0 : asin(sine);
+        c->half = hard ? 0.0 : vshi_asin(sine);
         c->far = distance * (1.0 - sine * sine); /* where the cone touches the lamp */
     }
-    c->radius = tan(c->half);
+    c->radius = vshi_tan(c->half);
     vshi_frame(c->axis, &c->u, &c->v);
     return true;
 }

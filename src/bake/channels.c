@@ -1,24 +1,9 @@
 #include "bake/channels.h"
 
+#include "base/numbers.h"
+#include "shade/light.h"
+
 #include <stdio.h>
-
-static const double DEGREES = 57.295779513082323;
-
-static void describe_light(const vsh_light *light, char *text, size_t size) {
-    const double *p = light->type == VSH_LIGHT_DIRECTIONAL ? light->direction : light->position;
-    switch (light->type) {
-    case VSH_LIGHT_DIRECTIONAL:
-        snprintf(text, size, "directional towards %g %g %g, %g degrees across", p[0], p[1], p[2],
-                 DEGREES * light->angle);
-        break;
-    case VSH_LIGHT_SPHERE:
-        snprintf(text, size, "sphere at %g %g %g, radius %g", p[0], p[1], p[2], light->radius);
-        break;
-    default:
-        snprintf(text, size, "spot at %g %g %g, radius %g", p[0], p[1], p[2], light->radius);
-        break;
-    }
-}
 
 static vshi_channel *next_of(vshi_channel **next, const vshi_channels *what, const char *method) {
     vshi_channel *channel = (*next)++;
@@ -34,7 +19,7 @@ static void describe_shadow(const vshi_channels *what, bool error, vshi_channel 
         snprintf(c->name, sizeof c->name, "%s.%s", error ? "error" : "shadow", light->name);
         snprintf(c->description, sizeof c->description, "%s light '%s', 1 lit, 0 dark",
                  error ? "standard error of the visible fraction of" : "visible fraction of", light->name);
-        describe_light(light, c->light, sizeof c->light);
+        vshi_light_text(light, c->light, sizeof c->light);
     }
 }
 
@@ -47,6 +32,7 @@ static void describe_ao(const vshi_channels *what, bool error, vshi_channel **ne
 }
 
 void vshi_channels_describe(const vshi_channels *what, vshi_channel *channels) {
+    VSHI_NUMBERS;
     vshi_channel *next = channels;
     describe_shadow(what, false, &next);
     if (what->options->ao != 0) {

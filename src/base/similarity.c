@@ -1,5 +1,6 @@
 #include "base/similarity.h"
 
+#include "base/elementary.h"
 #include "base/vec.h"
 
 #include <string.h>
@@ -12,7 +13,7 @@ double vshi_similarity_scale(const double m[12]) {
     const vshi_vec x = {m[0], m[4], m[8]};
     const vshi_vec y = {m[1], m[5], m[9]};
     const vshi_vec z = {m[2], m[6], m[10]};
-    const double scale = cbrt(fabs(vshi_transform_determinant(m)));
+    const double scale = vshi_cbrt(fabs(vshi_transform_determinant(m)));
     if (!(scale > 0.0) || !isfinite(scale)) {
         return 0.0;
     }

@@ -1,4 +1,5 @@
 /* An outline extruded: its distance in closed form from that to the outline. */
+#include "base/elementary.h"
 #include "caster/outline.h"
 
 #include "base/floats.h"
@@ -21,7 +22,7 @@ static double distance(void *user, const double position[3]) {
     const double above = fabs(p.z) - e->half;
     double beside = sqrt(vshi_outline_square(e->outline, flat, INFINITY));
     beside = vshi_outline_winding(e->outline, flat) != 0 ? -beside : beside;
-    const double d = beside > 0.0 && above > 0.0 ? hypot(beside, above) : fmax(beside, above);
+    const double d = beside > 0.0 && above > 0.0 ? vshi_hypot(beside, above) : fmax(beside, above);
     return e->scale * d;
 }
 

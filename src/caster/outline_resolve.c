@@ -1,5 +1,6 @@
 /* The border of what contours wind around: cut where they cross, kept where one side only is inside, joined
  * again. Quadratic at worst, near-linear where few contours cross, as letters do. */
+#include "base/elementary.h"
 #include "caster/outline.h"
 
 #include "base/memory.h"
@@ -156,7 +157,7 @@ static int by_place(const void *a, const void *b) {
 
 /* Keeps a piece where one of its sides is inside, the inside to its left. */
 static bool add_piece(work *w, vshi_point a, vshi_point b) {
-    const double dx = b.x - a.x, dy = b.y - a.y, length = hypot(dx, dy);
+    const double dx = b.x - a.x, dy = b.y - a.y, length = vshi_hypot(dx, dy);
     if (!(length > 0.0)) {
         return true;
     }

@@ -1,4 +1,5 @@
 /* The border of a text's letters: laid out in lines, curves cut into lines. */
+#include "base/elementary.h"
 #include "caster/outline.h"
 
 #include "base/floats.h"
@@ -93,7 +94,7 @@ static void cubic_to(void *user, const double c1[2], const double c2[2], const d
     double bend = 0.0;
     for (int i = 0; i < 2; ++i) {
         const double first = fabs(from[i] - 2.0 * c1[i] + c2[i]), second = fabs(c1[i] - 2.0 * c2[i] + to[i]);
-        bend = hypot(bend, 6.0 * fmax(first, second));
+        bend = vshi_hypot(bend, 6.0 * fmax(first, second));
     }
     const int count = line_count(bend);
     for (int k = 1; k < count; ++k) {
@@ -112,7 +113,7 @@ static void conic_to(void *user, const double control[2], const double to[2]) {
     layout *l = user;
     const double from[2] = {l->last[0], l->last[1]};
     const int count =
-        line_count(2.0 * hypot(from[0] - 2.0 * control[0] + to[0], from[1] - 2.0 * control[1] + to[1]));
+        line_count(2.0 * vshi_hypot(from[0] - 2.0 * control[0] + to[0], from[1] - 2.0 * control[1] + to[1]));
     for (int k = 1; k < count; ++k) {
         const double t = (double)k / count, s = 1.0 - t;
         double p[2];

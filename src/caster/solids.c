@@ -3,6 +3,7 @@
  * per unit (caster/sdf.c), so a step of that length meets nothing. */
 #include "caster/solids.h"
 
+#include "base/elementary.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/similarity.h"
@@ -96,7 +97,7 @@ static void add_members(vsh_solids *solids, const vsh_sdf_node *nodes, int32_t r
     }
     member *m = &solids->members[solids->count++];
     m->sdf = (vsh_sdf){nodes, (size_t)root + 1};
-    m->scale = cbrt(fabs(vshi_transform_determinant(transform)));
+    m->scale = vshi_cbrt(fabs(vshi_transform_determinant(transform)));
     m->low = (vshi_vec){INFINITY, INFINITY, INFINITY};
     m->high = (vshi_vec){-INFINITY, -INFINITY, -INFINITY};
     invert(transform, m->inverse);

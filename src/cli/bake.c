@@ -7,6 +7,7 @@
 #include "message.h"
 #include "progress.h"
 #include "receiver.h"
+#include "resume.h"
 #include "signals.h"
 #include "temporary.h"
 #include "trial.h"
@@ -25,6 +26,7 @@ typedef struct bake_work {
     vsh_charts *charts;
     vsh_texels *kept; /* NULL where it is baked in bands */
     cli_box receivers;
+    cli_origin origin;
     cli_stats stats;
 } bake_work;
 
@@ -46,7 +48,9 @@ static int load(bake_work *work) {
 }
 
 static cli_receiver_job receiver_job(const bake_work *work, size_t index) {
-    return (cli_receiver_job){work->scene, work->assets, &work->run, index, work->settings->band_rows};
+    return (cli_receiver_job){
+        work->scene,   work->assets,          &work->run, index, work->settings->band_rows,
+        &work->origin, work->settings->resume};
 }
 
 /* Where its samples are: all of them are made, where they go into memory at once, or looked at in passing. */
@@ -121,19 +125,31 @@ static int make_triangles(bake_work *work) {
     return code;
 }
 
+static int find_origin(bake_work *work) {
+    const double start = cli_seconds();
+    const int code = cli_origin_make(work->scene, &work->settings->input, 1, work->made.grid.voxel_size,
+                                     &work->run, &work->origin);
+    cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
+    return code;
+}
+
 static void say_receiver(const bake_work *work, size_t index, const cli_bands *bands,
                          const cli_stats *before) {
     if (work->settings->common.quiet) {
         return;
     }
     const vsh_receiver *receiver = &work->scene->receivers[index];
-    char banded[64] = "";
+    char banded[64] = "", taken[64] = "";
     if (bands->count > 1) {
         snprintf(banded, sizeof banded, ", in %d bands of %d rows", bands->count, bands->rows);
     }
-    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid%s", receiver->output,
+    if (work->stats.resumed_rows > before->resumed_rows) {
+        snprintf(taken, sizeof taken, ", %" PRIu64 " rows of them from before",
+                 work->stats.resumed_rows - before->resumed_rows);
+    }
+    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid%s%s", receiver->output,
             receiver->width, receiver->height, work->stats.texels - before->texels,
-            work->stats.invalid_texels - before->invalid_texels, banded);
+            work->stats.invalid_texels - before->invalid_texels, banded, taken);
 }
 
 static int bake_receiver(bake_work *work, size_t index) {
@@ -169,9 +185,14 @@ static int bake_receiver(bake_work *work, size_t index) {
 }
 
 static int bake_receivers(bake_work *work) {
+    const vsh_scene *scene = work->scene;
     int code = CLI_OK;
-    for (size_t i = 0; i < work->scene->receiver_count && code == CLI_OK; ++i) {
+    for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
         code = bake_receiver(work, i);
+    }
+    /* not before all are whole: a bake that goes on writes those that were again */
+    for (size_t i = 0; i < scene->receiver_count && code == CLI_OK && work->settings->resume; ++i) {
+        cli_resume_remove(scene->receivers[i].output);
     }
     return code;
 }
@@ -188,6 +209,7 @@ static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
     code = code == CLI_OK ? rasterise(&work) : code;
     code = code == CLI_OK ? make_triangles(&work) : code;
     code = code == CLI_OK ? make_field(&work) : code;
+    code = code == CLI_OK ? find_origin(&work) : code;
     code = code == CLI_OK ? bake_receivers(&work) : code;
     code = code == CLI_OK ? cli_stats_finish(&work.stats, settings->stats) : code;
     if (code == CLI_OK) {
@@ -198,6 +220,7 @@ static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
     vsh_texels_free(work.kept);
     vsh_charts_free(work.charts);
     vsh_triangles_free(work.triangles);
+    cli_origin_free(&work.origin);
     cli_field_free(&work.made);
     vsh_assets_free(work.assets);
     return code;

@@ -35,7 +35,7 @@ typedef struct forecast {
 } forecast;
 
 static cli_receiver_job receiver_job(const forecast *f, size_t index) {
-    return (cli_receiver_job){f->scene, f->assets, f->run, index, f->band_rows};
+    return (cli_receiver_job){f->scene, f->assets, f->run, index, f->band_rows, NULL, false};
 }
 
 static int count_texels(forecast *f) {

@@ -19,7 +19,8 @@ enum {
     KEY_BITS,
     KEY_PACK,
     KEY_STATS,
-    KEY_DRY_RUN
+    KEY_DRY_RUN,
+    KEY_RESUME
 };
 
 static const cli_option options[] = {
@@ -39,6 +40,9 @@ static const cli_option options[] = {
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {KEY_DRY_RUN, "dry-run", NULL,
      "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},
+    {KEY_RESUME, "resume", NULL,
+     "keep finished rows in OUT.resume until all are there,\nand go on from them where a bake with this "
+     "option was\nended; the result is the same, bit by bit"},
     {0, NULL, NULL, "Light and occlusion"},
     CLI_LIGHT_OPTIONS,
     {KEY_IRRADIANCE, "irradiance", NULL,
@@ -178,6 +182,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_DRY_RUN:
         s->dry_run = true;
+        return CLI_OK;
+    case KEY_RESUME:
+        s->resume = true;
         return CLI_OK;
     case KEY_IRRADIANCE:
         s->irradiance = true;

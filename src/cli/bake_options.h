@@ -91,7 +91,7 @@ typedef struct cli_bake_settings {
     size_t caster_count;
     bool has_sun, has_sun_angle, has_ao, has_ao_method, has_ao_cones, has_method, has_size, has_uv_set;
     bool has_supersample, has_padding, has_ao_spacing, has_bits, irradiance, has_tint, has_ambient;
-    bool dry_run;
+    bool dry_run, resume;
     bool has_rays, has_sampler, has_frame, has_early_rays, has_max_error, has_jitter, error;
 } cli_bake_settings;
 

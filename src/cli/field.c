@@ -32,8 +32,10 @@ static double reach_of(const vsh_scene *scene, const vsh_grid *grid, const cli_b
     vsh_grid_get_info(grid, &info);
     double diagonal = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
-        diagonal = hypot(diagonal, info.bounds_max[axis] - info.bounds_min[axis]);
+        const double side = info.bounds_max[axis] - info.bounds_min[axis];
+        diagonal += side * side;
     }
+    diagonal = sqrt(diagonal);
     cli_box around;
     const double margin = within > 0.0 ? within : CLI_WITHIN_DIAGONALS * diagonal;
     for (int axis = 0; axis < 3; ++axis) {
@@ -255,5 +257,12 @@ void cli_field_free(cli_field *made) {
 
 int cli_triangles_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                        vsh_triangles **triangles) {
-    return trace(scene, assets, NULL, run, triangles);
+    const int code = trace(scene, assets, NULL, run, triangles);
+    vsh_error error;
+    /* no caster outside of layers: none, where the library wants to be given those that there are */
+    if (code == CLI_OK && *triangles == NULL && traces(scene, NULL) &&
+        vsh_triangles_create(NULL, 0, run, triangles, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    return code;
 }

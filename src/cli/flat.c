@@ -2,6 +2,7 @@
 #include "clock.h"
 #include "commands.h"
 #include "message.h"
+#include "origin.h"
 #include "paths.h"
 #include "progress.h"
 #include "signals.h"
@@ -202,6 +203,40 @@ static int check_files(const flat_settings *s, const vsh_flat_scene *scene, cons
     return code == CLI_OK ? cli_trial_flat(scene, s->common.memory_limit) : code;
 }
 
+/* Inputs are the scene's file and those that it names. */
+static int make_origin(const flat_settings *s, const vsh_flat_scene *scene, const vsh_run *run,
+                       cli_origin *origin) {
+    const size_t count = 1 + scene->caster_count;
+    const char **files = calloc(count, sizeof *files);
+    if (files == NULL) {
+        return out_of_memory(scene->output);
+    }
+    files[0] = s->input;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        files[1 + i] = scene->casters[i].path;
+    }
+    const int code = cli_origin_make(NULL, files, count, 0.0, run, origin);
+    free(files);
+    return code;
+}
+
+static int write_map(const flat_settings *s, const vsh_flat_scene *scene, const flat_planes *planes,
+                     const vsh_image_options *image, const vsh_run *run) {
+    cli_origin origin = {NULL, NULL, 0};
+    int code = make_origin(s, scene, run, &origin);
+    vsh_image_options told = *image;
+    told.attributes = origin.attributes;
+    told.attribute_count = origin.count;
+    vsh_error error;
+    cli_signals_writing(scene->output);
+    if (code == CLI_OK && vsh_image_write(scene->output, &planes->image, &told, &error) != VSH_OK) {
+        code = cli_fail(&error);
+    }
+    cli_signals_writing(NULL);
+    cli_origin_free(&origin);
+    return code;
+}
+
 static int bake(const flat_settings *s, const vsh_flat_scene *scene, const flat_planes *planes,
                 const vsh_image_options *image, cli_stats *stats) {
     const vsh_run run = cli_common_run(&s->common);
@@ -221,13 +256,10 @@ static int bake(const flat_settings *s, const vsh_flat_scene *scene, const flat_
         result = VSH_ERROR_CANCELLED;
         error = (vsh_error){VSH_ERROR_CANCELLED, "write: cancelled"};
     }
-    if (result == VSH_OK) {
-        cli_signals_writing(scene->output);
-        result = vsh_image_write(scene->output, &planes->image, image, &error);
-        cli_signals_writing(NULL);
-        cli_stats_stage(stats, CLI_STAGE_WRITE, now);
-    }
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    int code = result == VSH_OK ? CLI_OK : cli_fail(&error);
+    code = code == CLI_OK ? write_map(s, scene, planes, image, &run) : code;
+    cli_stats_stage(stats, CLI_STAGE_WRITE, now);
+    return code;
 }
 
 static void say_summary(const flat_settings *s, const vsh_flat_scene *scene, const cli_stats *stats) {

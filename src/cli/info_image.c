@@ -38,6 +38,11 @@ int cli_info_image(const char *path) {
     for (int32_t i = 0; i < image.channel_count; ++i) {
         print_channel(image.names[i], image.planes[i], (size_t)image.width * (size_t)image.height);
     }
+    size_t count = 0;
+    const vsh_attribute *attributes = vsh_image_attributes(file, &count);
+    for (size_t i = 0; i < count; ++i) {
+        printf("%s: %s\n", attributes[i].name, attributes[i].value);
+    }
     vsh_image_free(file);
     return CLI_OK;
 }

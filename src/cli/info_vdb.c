@@ -26,6 +26,11 @@ static void print_grid(const vsh_vdb_entry *grid) {
            grid->index_min[1], grid->index_min[2], grid->index_max[0], grid->index_max[1],
            grid->index_max[2]);
     printf("  memory: %s\n", cli_bytes_text(grid->bytes, bytes, sizeof bytes));
+    for (const char *line = grid->attributes; *line != '\0';) {
+        const size_t length = strcspn(line, "\n");
+        printf("  %.*s\n", (int)length, line);
+        line += length + (line[length] != '\0');
+    }
     if (grid->problem[0] != '\0') {
         printf("  problem: %s\n", grid->problem);
     }

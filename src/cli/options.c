@@ -114,6 +114,65 @@ static bool abbreviated(const cli_option *option, char **argv, const char *value
     return length != strlen(option->name) || strncmp(*word + 2, option->name, length) != 0;
 }
 
+/* --- the command line as outputs tell it */
+
+static char *parsed_command; /* of the process's one command line at a time */
+
+const char *cli_parsed_command(void) {
+    return parsed_command != NULL ? parsed_command : "";
+}
+
+static void append(const char *text, size_t length) {
+    const size_t used = strlen(cli_parsed_command());
+    char *longer = realloc(parsed_command, used + length + 1);
+    if (longer != NULL) {
+        memcpy(longer + used, text, length);
+        longer[used + length] = '\0';
+        parsed_command = longer;
+    }
+}
+
+/* A word behind a blank, quoted as a shell would have it. */
+static void append_word(const char *word) {
+    static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=.,:/@%";
+    append(" ", 1);
+    if (word[0] != '\0' && strspn(word, plain) == strlen(word)) {
+        append(word, strlen(word));
+        return;
+    }
+    append("'", 1);
+    for (const char *c = word; *c != '\0'; ++c) {
+        if (*c == '\'') {
+            append("'\\''", 4);
+        } else {
+            append(c, 1);
+        }
+    }
+    append("'", 1);
+}
+
+static const char *without_folder(const char *path) {
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+static void append_option(const cli_option *option, const char *value) {
+    static const char *const changes_nothing[] = {"output",    "stats",   "threads",  "memory-limit",
+                                                  "isa",       "quiet",   "progress", "json",
+                                                  "band-rows", "dry-run", "resume",   "help"};
+    for (size_t i = 0; i < sizeof changes_nothing / sizeof changes_nothing[0]; ++i) {
+        if (strcmp(option->name, changes_nothing[i]) == 0) {
+            return;
+        }
+    }
+    char name[64];
+    snprintf(name, sizeof name, "--%s", option->name);
+    append_word(name);
+    if (value != NULL) {
+        append_word(strncmp(option->value, "FILE", 4) == 0 ? without_folder(value) : value);
+    }
+}
+
 int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
               const char *what, const char **operand, bool *help) {
     struct option longs[MAX_OPTIONS];
@@ -122,6 +181,9 @@ int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *
     *help = false;
     opterr = 0;
     optind = 1;
+    free(parsed_command);
+    parsed_command = NULL;
+    append(command->name, strlen(command->name));
     int key;
     while ((key = getopt_long(argc, argv, shorts, longs, NULL)) != -1) {
         if (key == ':') {
@@ -147,6 +209,7 @@ int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *
         }
         char name[64];
         snprintf(name, sizeof name, "--%s", option->name);
+        append_option(option, optarg);
         const int code = take(settings, key, key < 256 ? word : name, optarg);
         if (code != CLI_OK) {
             return code;
@@ -159,6 +222,7 @@ int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *
         return cli_usage("%s: one %s is taken, not also '%s'", command->name, what, argv[optind + 1]);
     }
     *operand = argv[optind];
+    append_word(without_folder(*operand));
     return CLI_OK;
 }
 

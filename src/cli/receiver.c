@@ -5,11 +5,14 @@
 #include "overall.h"
 #include "planes.h"
 #include "progress.h"
+#include "resume.h"
 #include "signals.h"
 
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
+
+enum { RESUME_BANDS = 16 }; /* a bake that is ended loses a sixteenth of a lightmap at most */
 
 static void warn_line(const vsh_run *run, const char *line) {
     run->warning(run->user, line);
@@ -104,6 +107,11 @@ int cli_receiver_plan(const cli_receiver_job *job, const vsh_charts *charts, uin
         need.limit = job->run->memory_limit;
         need.rows = job->band_rows;
         code = cli_bands_plan(charts, &need, bands);
+        const int32_t kept = (receiver->height + RESUME_BANDS - 1) / RESUME_BANDS;
+        if (code == CLI_OK && job->resume && job->band_rows == 0 && bands->rows > kept) {
+            need.rows = kept;
+            code = cli_bands_plan(charts, &need, bands);
+        }
     }
     cli_planes_free(&planes);
     return code;
@@ -180,6 +188,7 @@ typedef struct receiver_work {
     size_t mesh_count;
     cli_overall overall;      /* where there are several bands */
     vsh_image_writer *writer; /* NULL: no row has been written */
+    cli_resume resume;
 } receiver_work;
 
 static int bake_band(receiver_work *work, int32_t first, int32_t rows, const vsh_run *run) {
@@ -220,11 +229,12 @@ static int write_band(receiver_work *work, int32_t rows) {
         const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
         return cli_fail(&cancelled);
     }
-    cli_planes_split(&work->planes);
     vsh_error error;
     vsh_result result = VSH_OK;
     if (work->writer == NULL) {
-        const vsh_image_options options = image_options(receiver);
+        vsh_image_options options = image_options(receiver);
+        options.attributes = work->job->origin->attributes;
+        options.attribute_count = work->job->origin->count;
         cli_signals_writing(receiver->output);
         result =
             vsh_image_writer_create(receiver->output, &work->planes.image, &options, &work->writer, &error);
@@ -261,7 +271,15 @@ static int bake_bands(receiver_work *work) {
         double now = cli_seconds();
         const vsh_run run =
             several ? cli_overall_round(&work->overall, (double)rows / (double)height) : *job->run;
-        code = bake_band(work, first, rows, &run);
+        if (cli_resume_take(&work->resume, first, rows, &work->planes, &work->baked, work->mesh_count)) {
+            work->stats->resumed_rows += (uint64_t)rows;
+        } else {
+            code = bake_band(work, first, rows, &run);
+            if (code == CLI_OK) {
+                cli_planes_split(&work->planes);
+                cli_resume_keep(&work->resume, first, rows, &work->planes, &work->baked, work->mesh_count);
+            }
+        }
         if (several) {
             cli_overall_next(&work->overall);
         }
@@ -294,12 +312,17 @@ int cli_receiver_bake(const cli_receiver_job *job, const cli_receiver_input *inp
         cli_say("%s: the system refused memory", receiver->path);
         code = CLI_LIMIT;
     }
+    if (code == CLI_OK && job->resume) {
+        code = cli_resume_open(&work.resume, receiver->output, job->origin, &work.planes.image,
+                               input->bands.rows);
+    }
     if (code == CLI_OK) {
         code = bake_bands(&work);
         const double now = cli_seconds();
         code = finish_image(&work, code);
         cli_stats_stage(stats, CLI_STAGE_WRITE, now);
     }
+    cli_resume_close(&work.resume, receiver->output, receiver->height, code);
     if (code == CLI_OK) {
         add_stats(stats, &work.baked);
         add_values(stats, scene, input->charts, &work.baked);

@@ -3,6 +3,7 @@
 #define CLI_RECEIVER_H
 
 #include "bands.h"
+#include "origin.h"
 #include "stats.h"
 
 #include <stdbool.h>
@@ -11,8 +12,10 @@ typedef struct cli_receiver_job {
     const vsh_scene *scene;
     const vsh_assets *assets;
     const vsh_run *run;
-    size_t index;      /* of the receiver */
-    int32_t band_rows; /* wanted; 0: as many as go */
+    size_t index;             /* of the receiver */
+    int32_t band_rows;        /* wanted; 0: as many as go */
+    const cli_origin *origin; /* of its file; NULL where none is written */
+    bool resume;              /* bands are kept, and taken where they are there */
 } cli_receiver_job;
 
 /* Whether its image can be written. Needs no assets. CLI_OK or an exit code, having said why. */

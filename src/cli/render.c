@@ -29,6 +29,7 @@ typedef struct render_work {
     render_surfaces surfaces;
     render_lightmaps lightmaps;
     vsh_render_options options;
+    cli_origin origin;
     render_picture picture;
     render_page *page;
     cli_stats stats;
@@ -137,7 +138,7 @@ static int render_frame(render_work *work, int32_t index, const vsh_run *run) {
 static int render_frames(render_work *work) {
     const render_settings *s = work->settings;
     const int32_t count = s->frames > 0 ? s->frames : 1;
-    int code = render_picture_create(s, &work->picture);
+    int code = render_picture_create(s, &work->origin, &work->picture);
     if (code == CLI_OK && s->page) {
         work->page = render_page_begin(s);
         code = work->page != NULL ? CLI_OK : cli_out_of_memory("page");
@@ -156,6 +157,15 @@ static int render_frames(render_work *work) {
         cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
     }
     return code;
+}
+
+/* Lightmaps that are shown are inputs, too. */
+static int find_origin(render_work *work) {
+    const render_settings *s = work->settings;
+    const char *files[1 + RENDER_MOST_LIGHTMAPS] = {s->bake.input};
+    memcpy(files + 1, s->lightmaps, s->lightmap_count * sizeof *files);
+    return cli_origin_make(work->scene, files, 1 + s->lightmap_count, work->made.grid.voxel_size, &work->run,
+                           &work->origin);
 }
 
 static void say_results(const render_work *work) {
@@ -178,6 +188,7 @@ static int run_render(const render_settings *s, vsh_scene *scene) {
     int code = load(&work);
     code = code == CLI_OK ? make_fields(&work) : code;
     code = code == CLI_OK ? set_options(&work) : code;
+    code = code == CLI_OK ? find_origin(&work) : code;
     code = code == CLI_OK ? render_frames(&work) : code;
     code = code == CLI_OK ? cli_stats_finish(&work.stats, s->bake.stats) : code;
     if (code == CLI_OK) {
@@ -185,6 +196,7 @@ static int run_render(const render_settings *s, vsh_scene *scene) {
     }
     render_page_abandon(work.page);
     render_picture_free(&work.picture);
+    cli_origin_free(&work.origin);
     render_lightmaps_free(&work.lightmaps);
     render_surfaces_free(&work.surfaces);
     cli_field_free(&work.made);

@@ -4,6 +4,7 @@
 
 #include "bake_options.h"
 #include "field.h"
+#include "origin.h"
 
 enum { RENDER_MOST_LIGHTMAPS = 64, RENDER_MOST_FRAMES = 1000, RENDER_PAGE_FRAMES = 36 };
 
@@ -71,9 +72,10 @@ typedef struct render_picture {
     float *memory;
     vsh_picture picture;
     float *encoded[4];
+    const cli_origin *origin; /* of the file */
 } render_picture;
 
-int render_picture_create(const render_settings *settings, render_picture *picture);
+int render_picture_create(const render_settings *settings, const cli_origin *origin, render_picture *picture);
 void render_picture_free(render_picture *picture);
 
 /* Whether pictures can go to the output: CLI_OK or an exit code, having said why. */

@@ -79,9 +79,9 @@ int render_output_check(const render_settings *s) {
     return cli_temporary_check(path);
 }
 
-int render_picture_create(const render_settings *s, render_picture *p) {
+int render_picture_create(const render_settings *s, const cli_origin *origin, render_picture *p) {
     const size_t pixels = (size_t)s->width * (size_t)s->height;
-    *p = (render_picture){.memory = calloc(pixels * (FLOATS + ENCODED), sizeof(float))};
+    *p = (render_picture){.memory = calloc(pixels * (FLOATS + ENCODED), sizeof(float)), .origin = origin};
     if (p->memory == NULL) {
         return cli_out_of_memory("picture");
     }
@@ -99,10 +99,12 @@ void render_picture_free(render_picture *p) {
     free(p->memory);
 }
 
-static int write_image(const char *path, const vsh_image *image, int32_t bits) {
+static int write_image(const char *path, const vsh_image *image, int32_t bits, const cli_origin *origin) {
     vsh_image_options options = vsh_image_options_default();
     vsh_error error;
     options.bits = bits;
+    options.attributes = origin->attributes;
+    options.attribute_count = origin->count;
     cli_signals_writing(path);
     const vsh_result result = vsh_image_write(path, image, &options, &error);
     cli_signals_writing(NULL);
@@ -127,7 +129,7 @@ static int write_linear(const render_settings *s, const render_picture *p, const
     }
     const vsh_image image = {s->width, s->height, cli_has_ending(path, "exr") ? FLOATS : 4, linear_names,
                              planes};
-    const int code = write_image(path, &image, 0);
+    const int code = write_image(path, &image, 0, p->origin);
     free(memory);
     return code;
 }
@@ -143,5 +145,5 @@ int render_output_write(const render_settings *s, const render_picture *p, const
                            s->transparent ? p->encoded[3] : NULL, &error) != VSH_OK) {
         return cli_fail(&error);
     }
-    return write_image(path, &image, 8);
+    return write_image(path, &image, 8, p->origin);
 }

@@ -75,6 +75,9 @@ static int write_file(const cli_stats *stats, const char *path) {
     for (size_t i = 0; i < sizeof counts / sizeof counts[0]; ++i) {
         json_object_set_new(root, counts[i].name, json_integer((json_int_t)counts[i].value));
     }
+    if (stats->of == CLI_STATS_TEXELS) {
+        json_object_set_new(root, "resumed_rows", json_integer((json_int_t)stats->resumed_rows));
+    }
     /* what adaptive and exact methods say of themselves; null where no such method ran */
     const double values = stats->estimated_values;
     json_object_set_new(root, "certified_share",

@@ -23,7 +23,8 @@ typedef struct cli_stats {
     int of; /* CLI_STATS_…: what is counted */
     uint64_t points, bad_rows;
     uint64_t voxels, inside_voxels, tiles;
-    uint64_t bands; /* that lightmaps were baked in: one each where they were baked whole */
+    uint64_t resumed_rows; /* of lightmaps, that an earlier bake had kept */
+    uint64_t bands;        /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
     double estimated_values; /* behind shade.square_error and shade.refined, by adaptive and exact methods */
     int32_t threads;

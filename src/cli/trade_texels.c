@@ -26,7 +26,7 @@ static int load_receivers(trade_work *work) {
     }
     for (size_t i = 0; i < count; ++i) {
         trade_receiver *receiver = &work->receivers[i];
-        const cli_receiver_job job = {work->scene, work->assets, &work->run, i, 0};
+        const cli_receiver_job job = {work->scene, work->assets, &work->run, i, 0, NULL, false};
         vsh_charts *charts = NULL;
         int code = cli_receiver_charts(&job, true, &charts);
         if (code == CLI_OK) {

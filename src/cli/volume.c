@@ -4,6 +4,7 @@
 #include "field.h"
 #include "meshes.h"
 #include "message.h"
+#include "origin.h"
 #include "paths.h"
 #include "progress.h"
 #include "signals.h"
@@ -202,6 +203,16 @@ static int make_grid(volume_work *work) {
     if (s->like != NULL || s->box_voxel_size > 0.0) {
         return CLI_OK;
     }
+    size_t voxelised = 0;
+    for (size_t i = 0; i < work->scene->caster_count; ++i) {
+        voxelised += !cli_caster_is_direct(&work->scene->casters[i]);
+    }
+    if (voxelised == 0) {
+        return cli_usage(
+            "%s: no casters that are voxelised, whose band or voxel size is to be taken: give --box "
+            "and --box-voxel-size, or --like",
+            s->bake.input);
+    }
     const double start = cli_seconds();
     vsh_error error;
     const vsh_result result = vsh_scene_casters(work->scene, work->assets, &work->run, &work->grid, &error);
@@ -258,10 +269,18 @@ static int write_volume(volume_work *work) {
         const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
         return cli_fail(&cancelled);
     }
+    const char *const files[] = {work->settings->bake.input, work->settings->like};
+    cli_origin origin;
+    const int code = cli_origin_make(work->scene, files, 2, work->made.grid.voxel_size, &work->run, &origin);
+    if (code != CLI_OK) {
+        return code;
+    }
     vsh_error error;
     cli_signals_writing(output);
-    const vsh_result result = vsh_volume_write(work->volume, output, work->settings->half, &error);
+    const vsh_result result = vsh_volume_write_with(work->volume, output, work->settings->half,
+                                                    origin.attributes, origin.count, &error);
     cli_signals_writing(NULL);
+    cli_origin_free(&origin);
     cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }

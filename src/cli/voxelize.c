@@ -3,6 +3,7 @@
 #include "commands.h"
 #include "meshes.h"
 #include "message.h"
+#include "origin.h"
 #include "paths.h"
 #include "progress.h"
 #include "signals.h"
@@ -73,15 +74,27 @@ static int check_files(const voxelize_settings *s, const vsh_scene *scene) {
     return code == CLI_OK ? cli_temporary_check(s->output) : code;
 }
 
-static int write_grid(const voxelize_settings *s, const vsh_grid *grid) {
+static int write_grid(const voxelize_settings *s, const vsh_scene *scene, const vsh_run *run,
+                      const vsh_grid *grid) {
+    const vsh_scene casters = {.casters = scene->casters, .caster_count = scene->caster_count};
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    cli_origin origin;
+    const int code = cli_origin_make(&casters, &s->input, 1, info.voxel_size, run, &origin);
+    if (code != CLI_OK) {
+        return code;
+    }
     if (cli_progress_report(NULL, "write", 0.0) != 0) {
         const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
+        cli_origin_free(&origin);
         return cli_fail(&cancelled);
     }
     vsh_error error;
     cli_signals_writing(s->output);
-    const vsh_result result = vsh_grid_write(grid, s->output, s->name, &error);
+    const vsh_result result =
+        vsh_grid_write_with(grid, s->output, s->name, origin.attributes, origin.count, &error);
     cli_signals_writing(NULL);
+    cli_origin_free(&origin);
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }
 
@@ -102,7 +115,7 @@ static int voxelize(const voxelize_settings *s, const vsh_scene *scene) {
     int code = cli_load_assets(scene, &run, &assets);
     if (code == CLI_OK) {
         const vsh_result result = vsh_scene_casters(scene, assets, &run, &grid, &error);
-        code = result == VSH_OK ? write_grid(s, grid) : cli_fail(&error);
+        code = result == VSH_OK ? write_grid(s, scene, &run, grid) : cli_fail(&error);
     }
     if (code == CLI_OK) {
         cli_signals_end();

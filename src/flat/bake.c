@@ -1,5 +1,6 @@
 /* Light maps of a plane, texel by texel. */
 #include "bake/padding.h"
+#include "base/elementary.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -72,7 +73,7 @@ static vsh_result check_lights(const vsh_light *lights, size_t count, vsh_error 
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "light %zu: %.900s", i, reason.message);
         }
         if (lights[i].type != VSH_LIGHT_SPHERE &&
-            !(hypot(lights[i].direction[0], lights[i].direction[1]) > 0.0)) {
+            !(vshi_hypot(lights[i].direction[0], lights[i].direction[1]) > 0.0)) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT,
                              "light %zu: '%s': its direction has no length in the plane", i, lights[i].name);
         }
@@ -213,7 +214,7 @@ static double margin_of(const bake *b) {
     for (size_t i = 0; i < b->light_count; ++i) {
         const vsh_light *light = &b->lights[i];
         margin = fmax(margin, light->type == VSH_LIGHT_DIRECTIONAL
-                                  ? sin(0.5 * light->angle) * hypot(sides[0], sides[1])
+                                  ? vshi_sin(0.5 * light->angle) * vshi_hypot(sides[0], sides[1])
                                   : light->radius);
     }
     return margin;

@@ -9,6 +9,8 @@
  * exact. */
 #include "flat/visible.h"
 
+#include "base/elementary.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -46,15 +48,15 @@ static vshi_point unit_normal(const vshi_flat_view *v, double slope, double sign
 bool vshi_flat_look(const vsh_light *light, vshi_point point, vshi_flat_view *view) {
     view->point = point;
     if (light->type == VSH_LIGHT_DIRECTIONAL) {
-        const double length = hypot(light->direction[0], light->direction[1]);
+        const double length = vshi_hypot(light->direction[0], light->direction[1]);
         view->towards = (vshi_point){light->direction[0] / length, light->direction[1] / length};
         view->distance = INFINITY;
         view->radius = 0.0;
-        view->slope = tan(0.5 * light->angle);
+        view->slope = vshi_tan(0.5 * light->angle);
         return true;
     }
     const double x = light->position[0] - point.x, y = light->position[1] - point.y;
-    view->distance = hypot(x, y);
+    view->distance = vshi_hypot(x, y);
     view->radius = light->radius;
     if (!(view->distance > light->radius)) {
         view->towards = (vshi_point){0.0, 0.0};
@@ -267,9 +269,9 @@ static double free_angle(hiding *h, double low, double high, int halvings) {
     h->count = 0;
     h->overflow = false;
     walk(h);
-    const double from = atan(low), to = atan(high);
+    const double from = vshi_atan(low), to = vshi_atan(high);
     if (h->overflow && halvings < MAX_HALVINGS) {
-        const double middle = tan(0.5 * (from + to));
+        const double middle = vshi_tan(0.5 * (from + to));
         return free_angle(h, low, middle, halvings + 1) + free_angle(h, middle, high, halvings + 1);
     }
     if (h->count == 0) {
@@ -277,8 +279,8 @@ static double free_angle(hiding *h, double low, double high, int halvings) {
     }
     double sum = 0.0, at = from;
     for (size_t i = 0; i < h->count; ++i) {
-        sum += fmax(0.0, atan(h->hidden[i].low) - at);
-        at = atan(h->hidden[i].high);
+        sum += fmax(0.0, vshi_atan(h->hidden[i].low) - at);
+        at = vshi_atan(h->hidden[i].high);
     }
     return sum + fmax(0.0, to - at);
 }
@@ -295,7 +297,7 @@ double vshi_flat_visible(const vsh_outline *casters, const vshi_flat_view *view)
                 .view = view,
                 .sure2 = before * before,
                 .tangent2 = before * (view->distance + view->radius)};
-    const double share = free_angle(&h, -view->slope, view->slope, 0) / (2.0 * atan(view->slope));
+    const double share = free_angle(&h, -view->slope, view->slope, 0) / (2.0 * vshi_atan(view->slope));
     return share < 1.0 ? share : 1.0;
 }
 

@@ -130,6 +130,22 @@ static vsh_result read_header(exr_reader *reader, const char *path, exr_storage_
     return result;
 }
 
+/* String attributes, in the file's order. */
+static exr_result_t read_attributes(exr_reader *reader) {
+    int32_t count = 0;
+    exr_result_t status = exr_get_attribute_count(reader->context, PART, &count);
+    for (int32_t i = 0; i < count && status == EXR_ERR_SUCCESS; ++i) {
+        const exr_attribute_t *attribute = NULL;
+        status = exr_get_attribute_by_index(reader->context, PART, EXR_ATTR_LIST_FILE_ORDER, i, &attribute);
+        if (status == EXR_ERR_SUCCESS && attribute->type == EXR_ATTR_STRING &&
+            strcmp(attribute->name, "type") != 0 /* of storage */ &&
+            !vshi_attributes_add(&reader->image->attributes, attribute->name, attribute->string->str)) {
+            status = EXR_ERR_OUT_OF_MEMORY;
+        }
+    }
+    return status;
+}
+
 static vsh_result code_of(exr_result_t status) {
     switch (status) {
     case EXR_ERR_OUT_OF_MEMORY:
@@ -174,7 +190,10 @@ vsh_result vshi_exr_read(const char *path, vsh_image_file **file, vsh_error *err
     if (result != VSH_OK) {
         goto done;
     }
-    status = storage == EXR_STORAGE_TILED ? read_tiles(&reader) : read_lines(&reader);
+    status = read_attributes(&reader);
+    if (status == EXR_ERR_SUCCESS) {
+        status = storage == EXR_STORAGE_TILED ? read_tiles(&reader) : read_lines(&reader);
+    }
 
 done:
     if (reader.pipeline_ready) {

@@ -74,6 +74,10 @@ static exr_result_t write_header(vshi_exr_writer *writer, const vshi_planes *pla
         snprintf(software, sizeof software, "vdbshade %s", vsh_version());
         status = exr_attr_set_string(writer->context, writer->part, "software", software);
     }
+    for (size_t i = 0; status == EXR_ERR_SUCCESS && i < planes->attribute_count; ++i) {
+        status = exr_attr_set_string(writer->context, writer->part, planes->attributes[i].name,
+                                     planes->attributes[i].value);
+    }
     for (int32_t c = 0; status == EXR_ERR_SUCCESS && c < planes->count; ++c) {
         status = exr_add_channel(writer->context, writer->part, planes->planes[writer->order[c]].name,
                                  writer->type, EXR_PERCEPTUALLY_LINEAR, 1, 1);

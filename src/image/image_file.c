@@ -69,10 +69,16 @@ vsh_image vsh_image_view(const vsh_image_file *file) {
     return (vsh_image){file->width, file->height, file->channel_count, file->names, file->planes};
 }
 
+const vsh_attribute *vsh_image_attributes(const vsh_image_file *file, size_t *count) {
+    *count = file != NULL ? file->attributes.count : 0;
+    return file != NULL ? file->attributes.list : NULL;
+}
+
 void vsh_image_free(vsh_image_file *file) {
     if (file == NULL) {
         return;
     }
+    vshi_attributes_free(&file->attributes);
     free(file->text);
     free(file->values);
     free(file);

@@ -2,7 +2,7 @@
 #ifndef VSHI_PLANES_H
 #define VSHI_PLANES_H
 
-#include "base/error.h"
+#include "base/attributes.h"
 
 #include <vdbshade/image.h>
 
@@ -28,6 +28,8 @@ typedef struct vshi_planes {
     int32_t height;
     int32_t count;
     vshi_plane planes[VSH_MAX_CHANNELS];
+    const vsh_attribute *attributes; /* [attribute_count]: looked at when the file is begun */
+    size_t attribute_count;
 } vshi_planes;
 
 enum { VSHI_FILE_NAME = 256 }; /* EXR's longest channel name is 255 bytes */
@@ -40,6 +42,7 @@ struct vsh_image_file {
     char (*text)[VSHI_FILE_NAME];
     const char *names[VSH_MAX_CHANNELS];
     const float *planes[VSH_MAX_CHANNELS];
+    vshi_attributes attributes;
 };
 
 /* VSH_ERROR_LIMIT where the product passes VSHI_MAX_VALUES; all three are positive. */

@@ -102,6 +102,19 @@ static void read_rows(png_reader *reader) {
     png_read_end(reader->png, NULL);
 }
 
+/* The text that stands before the image. */
+static vsh_result read_texts(png_reader *reader) {
+    png_textp texts = NULL;
+    const int count = png_get_text(reader->png, reader->info, &texts, NULL);
+    for (int i = 0; i < count; ++i) {
+        const char *value = texts[i].text != NULL ? texts[i].text : "";
+        if (!vshi_attributes_add(&reader->image->attributes, texts[i].key, value)) {
+            return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
+        }
+    }
+    return VSH_OK;
+}
+
 static vsh_result read_all(png_reader *reader) {
     reader->png = png_create_read_struct(PNG_LIBPNG_VER_STRING, reader, on_error, on_warning);
     reader->info = reader->png != NULL ? png_create_info_struct(reader->png) : NULL;
@@ -112,7 +125,10 @@ static vsh_result read_all(png_reader *reader) {
         return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s: could not be read as png: %s", reader->path,
                          reader->message);
     }
-    const vsh_result result = read_header(reader);
+    vsh_result result = read_header(reader);
+    if (result == VSH_OK) {
+        result = read_texts(reader);
+    }
     if (result == VSH_OK) {
         read_rows(reader);
     }

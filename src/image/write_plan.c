@@ -1,6 +1,7 @@
 /* What may be written into which file. */
 #include "image/write_plan.h"
 
+#include "base/attributes.h"
 #include "base/file.h"
 #include "base/job.h"
 #include "image/pack.h"
@@ -171,6 +172,11 @@ vsh_result vshi_write_plan_make(const char *path, const vsh_image *image, const 
     }
     if (result == VSH_OK) {
         result = plan_planes(path, image, full.pack, plan, error);
+    }
+    if (result == VSH_OK) {
+        plan->planes.attributes = full.attributes;
+        plan->planes.attribute_count = full.attribute_count;
+        result = vshi_attributes_check(path, full.attributes, full.attribute_count, error);
     }
     return result;
 }

@@ -1,5 +1,6 @@
 #include "render/camera.h"
 
+#include "base/elementary.h"
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/job.h"
@@ -97,10 +98,12 @@ vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], cons
     const vshi_vec up = vshi_unit(vshi_vec_of(full.up));
     vshi_vec front, right;
     horizon(up, &front, &right);
-    const vshi_vec level = vshi_add(vshi_scale(front, cos(azimuth)), vshi_scale(right, sin(azimuth)));
-    const vshi_vec back = vshi_add(vshi_scale(level, cos(elevation)), vshi_scale(up, sin(elevation)));
+    const vshi_vec level =
+        vshi_add(vshi_scale(front, vshi_cos(azimuth)), vshi_scale(right, vshi_sin(azimuth)));
+    const vshi_vec back =
+        vshi_add(vshi_scale(level, vshi_cos(elevation)), vshi_scale(up, vshi_sin(elevation)));
     const vshi_vec across = vshi_unit(vshi_cross(up, back)), over = vshi_cross(back, across);
-    const double tangent = tan(0.5 * full.fov) / MARGIN;
+    const double tangent = vshi_tan(0.5 * full.fov) / MARGIN;
     double away = 0.0;
     for (int corner = 0; corner < 8; ++corner) {
         const vshi_vec c = {(corner & 1 ? 0.5 : -0.5) * size.x, (corner & 2 ? 0.5 : -0.5) * size.y,
@@ -121,7 +124,7 @@ void vsh_camera_orbit(vsh_camera *camera, double angle) {
     VSHI_FLOATS;
     const vshi_vec axis = vshi_unit(vshi_vec_of(camera->up)), target = vshi_vec_of(camera->target);
     const vshi_vec arm = vshi_sub(vshi_vec_of(camera->position), target);
-    const double c = cos(angle), s = sin(angle);
+    const double c = vshi_cos(angle), s = vshi_sin(angle);
     const vshi_vec turned = vshi_add(vshi_add(vshi_scale(arm, c), vshi_scale(vshi_cross(axis, arm), s)),
                                      vshi_scale(axis, vshi_dot(axis, arm) * (1.0 - c)));
     const vshi_vec at = vshi_add(target, turned);
@@ -132,7 +135,7 @@ void vsh_camera_orbit(vsh_camera *camera, double angle) {
 vshi_view_frame vshi_camera_frame(const vsh_camera *camera, int32_t width, int32_t height) {
     vshi_view_frame frame = {.eye = vshi_vec_of(camera->position), .middle = {0.5 * width, 0.5 * height}};
     frame.forward = vshi_unit(vshi_sub(vshi_vec_of(camera->target), frame.eye));
-    const double pixel = 2.0 * tan(0.5 * camera->fov) / height;
+    const double pixel = 2.0 * vshi_tan(0.5 * camera->fov) / height;
     const vshi_vec right = vshi_unit(vshi_cross(frame.forward, vshi_unit(vshi_vec_of(camera->up))));
     frame.right = vshi_scale(right, pixel);
     frame.down = vshi_scale(vshi_cross(frame.forward, right), pixel);

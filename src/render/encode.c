@@ -1,3 +1,4 @@
+#include "base/elementary.h"
 #include "base/error.h"
 #include "base/floats.h"
 
@@ -9,7 +10,7 @@ static double to_srgb(double linear) {
     if (!(linear > 0.0)) {
         return 0.0;
     }
-    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(fmin(linear, 1.0), 1.0 / 2.4) - 0.055;
+    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * vshi_pow(fmin(linear, 1.0), 1.0 / 2.4) - 0.055;
 }
 
 /* A mask whose neighbourhoods hold all levels (J. Jimenez, "Next generation post processing in Call of Duty:
@@ -39,7 +40,7 @@ vsh_result vsh_picture_encode(const vsh_picture *picture, int32_t width, int32_t
                          "vsh_picture_encode: %d × %d pixels, exposure %g: expected 1 … %d and -20 … 20",
                          width, height, exposure, VSH_MAX_PICTURE_SIZE);
     }
-    const double gain = exp2(exposure);
+    const double gain = vshi_exp2(exposure);
     for (int32_t row = 0; row < height; ++row) {
         for (int32_t column = 0; column < width; ++column) {
             const size_t pixel = (size_t)row * (size_t)width + (size_t)column;

@@ -2,6 +2,7 @@
  * harmonic analysis with the discrete Fourier transform", 1978): edges without steps or ringing. */
 #include "render/film.h"
 
+#include "base/elementary.h"
 #include "base/parallel.h"
 
 #include <string.h>
@@ -14,7 +15,8 @@ void vshi_film_begin(vshi_film *film, const vshi_sample_grid *grid, const vsh_pi
     double sum = 0.0;
     for (int32_t i = 0; i < count; ++i) {
         const double x = 2.0 * PI * (i + 0.5) / count;
-        film->weight[i] = 0.35875 - 0.48829 * cos(x) + 0.14128 * cos(2.0 * x) - 0.01168 * cos(3.0 * x);
+        film->weight[i] =
+            0.35875 - 0.48829 * vshi_cos(x) + 0.14128 * vshi_cos(2.0 * x) - 0.01168 * vshi_cos(3.0 * x);
         sum += film->weight[i];
     }
     for (int32_t i = 0; i < count; ++i) {

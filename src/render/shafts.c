@@ -1,5 +1,7 @@
 #include "render/shafts.h"
 
+#include "base/elementary.h"
+
 /* The part of a ray within the box. */
 static bool clip(const vshi_shafts *shafts, const vshi_shaft_ray *ray, double *begin, double *end) {
     const double o[3] = {ray->origin.x, ray->origin.y, ray->origin.z};
@@ -69,7 +71,7 @@ vsh_result vshi_shafts_add(const vshi_shafts *shafts, size_t count, const vshi_s
             length[i] = end - begin[i];
             jitter[i] = vshi_sampler_mask(shafts->sampler, rays[i].texel, 0);
             in[passing++] = i;
-            const float left = (float)exp(-shafts->extinction * length[i]);
+            const float left = (float)vshi_exp(-shafts->extinction * length[i]);
             for (int c = 0; c < 3; ++c) {
                 seen[i]->color[c] *= left;
             }
@@ -83,7 +85,7 @@ vsh_result vshi_shafts_add(const vshi_shafts *shafts, size_t count, const vshi_s
             const double stretch = length[i] / shafts->steps, along = (k + jitter[i]) * stretch;
             const vshi_vec at = vshi_add(rays[i].origin, vshi_scale(rays[i].direction, begin[i] + along));
             s.positions[j][0] = at.x, s.positions[j][1] = at.y, s.positions[j][2] = at.z;
-            s.share[j] = exp(-shafts->extinction * along) * shafts->extinction * stretch;
+            s.share[j] = vshi_exp(-shafts->extinction * along) * shafts->extinction * stretch;
         }
         result = light_step(shafts, &s, stats, error);
         for (size_t j = 0; j < passing && result == VSH_OK; ++j) {

@@ -1,4 +1,5 @@
 /* Flat scenes: their file, and the outline of their casters. */
+#include "base/elementary.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "scene/parts.h"
@@ -146,11 +147,11 @@ void vsh_flat_scene_free(vsh_flat_scene *scene) {
 
 /* As many-sided that it is off by 1e-4 of the radius at most, and of the circle's area. */
 static vsh_result make_circle(double radius, const vsh_run *run, vsh_outline **outline, vsh_error *error) {
-    const double step = 2.0 * VSHI_PI / CIRCLE_SIDES, reach = radius * sqrt(step / sin(step));
+    const double step = 2.0 * VSHI_PI / CIRCLE_SIDES, reach = radius * sqrt(step / vshi_sin(step));
     double points[2 * CIRCLE_SIDES];
     for (int i = 0; i < CIRCLE_SIDES; ++i) {
-        points[2 * i] = reach * cos(step * i);
-        points[2 * i + 1] = reach * sin(step * i);
+        points[2 * i] = reach * vshi_cos(step * i);
+        points[2 * i + 1] = reach * vshi_sin(step * i);
     }
     const size_t count = CIRCLE_SIDES;
     return vsh_outline_from_polygons(points, &count, 1, run, outline, error);

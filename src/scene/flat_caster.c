@@ -1,3 +1,4 @@
+#include "base/elementary.h"
 #include "scene/outline_keys.h"
 #include "scene/parts.h"
 
@@ -89,7 +90,7 @@ static const vshi_table caster_table = VSHI_TABLE(caster_keys);
 
 static void compose(const placed *p, double m[6]) {
     const double angle = remainder(p->rotate, 360.0) / 180.0 * VSHI_PI;
-    const double c = p->scale * cos(angle), s = p->scale * sin(angle);
+    const double c = p->scale * vshi_cos(angle), s = p->scale * vshi_sin(angle);
     const double transform[6] = {c, -s, p->translate[0], s, c, p->translate[1]};
     for (int i = 0; i < 6; ++i) {
         m[i] = transform[i];

@@ -1,6 +1,7 @@
 /* How far from a surface a scene's field must be able to tell distances apart. */
 #include <vdbshade/scene.h>
 
+#include "base/elementary.h"
 #include "base/floats.h"
 #include "base/vec.h"
 
@@ -23,8 +24,8 @@ double vsh_scene_reach(const vsh_scene *scene, const vsh_grid *grid, const doubl
     for (size_t i = 0; i < scene->light_count; ++i) {
         const vsh_light *light = &scene->lights[i];
         if (light->type == VSH_LIGHT_DIRECTIONAL) {
-            const double half_angle = fmin(0.5 * light->angle, atan(widest_tangent));
-            reach = fmax(reach, tan(half_angle) * longest);
+            const double half_angle = fmin(0.5 * light->angle, vshi_atan(widest_tangent));
+            reach = fmax(reach, vshi_tan(half_angle) * longest);
         } else {
             /* At t of the distance d to a sphere of radius r, the cone is r t/d wide: never wider than r. */
             reach = fmax(reach, fmin(light->radius, widest_tangent * longest));

@@ -1,5 +1,6 @@
 #include "scene/transform.h"
 
+#include "base/elementary.h"
 #include "base/vec.h"
 
 #include <math.h>
@@ -23,8 +24,8 @@ vsh_result vshi_read_rotation(vshi_reader *reader, const vshi_value *value, void
     double s[3], c[3];
     for (int i = 0; i < 3; ++i) {
         const double half = remainder(degrees[i], 720.0) / 360.0 * VSHI_PI;
-        s[i] = sin(half);
-        c[i] = cos(half);
+        s[i] = vshi_sin(half);
+        c[i] = vshi_cos(half);
     }
     /* The product of the quaternions about z, y, x, as they act on a vector from the right. */
     double *q = quaternion;

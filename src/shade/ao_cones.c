@@ -5,6 +5,7 @@
  * wherever it is, so closed rooms of thin walls were half lit. Beside an edge some cones are free, within a
  * room none. The table holds the mean of what cones of such evidence saw, by analytic rays, on scenes
  * of boxes, slats, spheres and rooms: bench/fit_ao.c makes and prints it. */
+#include "base/elementary.h"
 #include "shade/ao.h"
 
 #include <math.h>
@@ -52,7 +53,7 @@ void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count) {
         const double square = (i + 0.5) / count; /* of the disc's radius there */
         const double radius = sqrt(square), height = sqrt(1.0 - square);
         cones->directions[i] =
-            (vshi_vec){radius * cos(i * GOLDEN_ANGLE), radius * sin(i * GOLDEN_ANGLE), height};
+            (vshi_vec){radius * vshi_cos(i * GOLDEN_ANGLE), radius * vshi_sin(i * GOLDEN_ANGLE), height};
         cones->sines[i] = share < height ? share : height;
     }
     find_neighbours(cones);
@@ -65,7 +66,7 @@ void vshi_ao_cones_place_sphere(vshi_ao_cones *cones, int32_t count) {
     for (int32_t i = 0; i < count; ++i) {
         const double height = 1.0 - (2.0 * i + 1.0) / count, radius = sqrt(1.0 - height * height);
         cones->directions[i] =
-            (vshi_vec){radius * cos(i * GOLDEN_ANGLE), radius * sin(i * GOLDEN_ANGLE), height};
+            (vshi_vec){radius * vshi_cos(i * GOLDEN_ANGLE), radius * vshi_sin(i * GOLDEN_ANGLE), height};
         cones->sines[i] = share;
     }
     find_neighbours(cones);

@@ -1,4 +1,5 @@
 /* Irradiance: what the shadow value leaves out. */
+#include "base/elementary.h"
 #include "base/floats.h"
 #include "base/vec.h"
 #include "shade/light.h"
@@ -13,7 +14,7 @@ static void tint_one(const vsh_tint *tint, double v, double rgb[3]) {
         rgb[2] = v * v;
     } else if (tint->type == VSH_TINT_POWER) {
         for (int c = 0; c < 3; ++c) {
-            rgb[c] = v > 0.0 ? pow(v, tint->power[c]) : v;
+            rgb[c] = v > 0.0 ? vshi_pow(v, tint->power[c]) : v;
         }
     }
 }

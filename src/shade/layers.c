@@ -3,6 +3,7 @@
 #include "analytic/heights.h"
 #include "analytic/relief.h"
 #include "analytic/spheres.h"
+#include "base/elementary.h"
 #include "base/memory.h"
 
 #include <math.h>
@@ -97,7 +98,7 @@ static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
 static vsh_light soften(const vsh_light *light, double softness) {
     vsh_light soft = *light;
     if (softness != 1.0) {
-        soft.angle = 2.0 * atan(softness * tan(0.5 * light->angle));
+        soft.angle = 2.0 * vshi_atan(softness * vshi_tan(0.5 * light->angle));
         soft.radius = softness * light->radius;
     }
     return soft;

@@ -1,9 +1,12 @@
 #include "shade/light.h"
 
+#include "base/elementary.h"
 #include "base/error.h"
 #include "base/floats.h"
+#include "base/numbers.h"
 #include "base/vec.h"
 
+#include <stdio.h>
 #include <string.h>
 
 #define PI 3.14159265358979323846
@@ -127,7 +130,7 @@ static double falloff(const vsh_light *light, double distance) {
 /* Smooth edge between the cosines of the outer and the inner angle. */
 static double spot(const vsh_light *light, vshi_vec to_light) {
     const double cosine = -vshi_dot(vshi_unit(vshi_vec_of(light->direction)), to_light);
-    const double outer = cos(light->outer_angle), inner = cos(light->inner_angle);
+    const double outer = vshi_cos(light->outer_angle), inner = vshi_cos(light->inner_angle);
     return inner > outer ? smoothstep(outer, inner, cosine) : (cosine >= outer ? 1.0 : 0.0);
 }
 
@@ -136,4 +139,36 @@ double vshi_light_gain(const vsh_light *light, vshi_vec to_light, double distanc
         return 1.0;
     }
     return falloff(light, distance) * (light->type == VSH_LIGHT_SPOT ? spot(light, to_light) : 1.0);
+}
+
+static int describe_shape(const vsh_light *light, char *text, size_t size) {
+    const double degrees = 180.0 / PI, *d = light->direction, *p = light->position;
+    switch (light->type) {
+    case VSH_LIGHT_DIRECTIONAL:
+        return snprintf(text, size, "directional towards %.9g %.9g %.9g, %.9g degrees across", d[0], d[1],
+                        d[2], degrees * light->angle);
+    case VSH_LIGHT_SPHERE:
+        return snprintf(text, size, "sphere at %.9g %.9g %.9g, radius %.9g", p[0], p[1], p[2], light->radius);
+    default:
+        return snprintf(text, size,
+                        "spot at %.9g %.9g %.9g towards %.9g %.9g %.9g, radius %.9g, %.9g to %.9g degrees",
+                        p[0], p[1], p[2], d[0], d[1], d[2], light->radius, degrees * light->inner_angle,
+                        degrees * light->outer_angle);
+    }
+}
+
+void vshi_light_text(const vsh_light *light, char *text, size_t size) {
+    VSHI_NUMBERS;
+    const double *c = light->color;
+    char shape[256], color[80] = "", falloff[48] = "";
+    describe_shape(light, shape, sizeof shape);
+    if (c[0] != 1.0 || c[1] != 1.0 || c[2] != 1.0) {
+        snprintf(color, sizeof color, ", color %.9g %.9g %.9g", c[0], c[1], c[2]);
+    }
+    if (light->type != VSH_LIGHT_DIRECTIONAL && light->falloff == VSH_FALLOFF_INVERSE_SQUARE) {
+        snprintf(falloff, sizeof falloff, ", inverse square");
+    } else if (light->type != VSH_LIGHT_DIRECTIONAL && light->falloff == VSH_FALLOFF_QUADRATIC) {
+        snprintf(falloff, sizeof falloff, ", quadratic to %.9g", light->reach);
+    }
+    snprintf(text, size, "%s%s%s", shape, color, falloff);
 }

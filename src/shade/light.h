@@ -7,10 +7,15 @@
 #include <vdbshade/light.h>
 
 #include <stdbool.h>
+#include <stddef.h>
 
 /* Whether a name can be part of a channel's name and of a packing ("R=shadow.sun,A=A"): letters, digits, '_'
  * and '-', 1 … 63 of them. */
 bool vshi_light_name_valid(const char *name);
+
+/* Type, place and size in words, colour and falloff where they are not the plain ones: one line, cut to
+ * `size` bytes. */
+void vshi_light_text(const vsh_light *light, char *text, size_t size);
 
 /* What reaches a point of the light's colour, but for visibility and cosine: falloff at a distance > 0, and a
  * spot's edge towards it. `to_light` is unit, to the light's centre. */

@@ -1,4 +1,5 @@
 /* Shadow values: the visible fraction of a light, by one cone or ray a point. */
+#include "base/elementary.h"
 #include "base/floats.h"
 #include "base/hash.h"
 #include "shade/blocks.h"
@@ -168,7 +169,7 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
         return result;
     }
     if (options->method == VSH_SHADOW_EXACT && options->triangles == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "method exact: triangles is NULL");
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "method exact: triangles is NULL: it traces those of the casters");
     }
     const bool inner = vshi_shadow_has_rays(options) || options->method == VSH_SHADOW_SMOOTH ||
                        options->method == VSH_SHADOW_CONE;
@@ -176,7 +177,7 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
         (vshi_shadow_task){.field = field, .light = light, .options = options, .lowest = inner ? 1.0 : 0.0};
     if (light->type == VSH_LIGHT_DIRECTIONAL) {
         task->towards = vshi_direction_to_field(field, vshi_unit(vshi_vec_of(light->direction)));
-        task->sine = sin(0.5 * light->angle);
+        task->sine = vshi_sin(0.5 * light->angle);
     } else {
         task->centre = vshi_to_field(field, light->position);
         task->radius = light->radius / field->voxel_size;

@@ -1,5 +1,6 @@
 /* Lights and open sky seen from points, by rays against the casters themselves: no field, no estimate but the
  * number of rays. */
+#include "base/elementary.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -39,8 +40,8 @@ static void place(tracing *task) {
     static const double PI = 3.14159265358979323846, TURN = 0.38196601125010515;
     for (int32_t i = 0; i < task->rays; ++i) {
         const double radius = sqrt((i + 0.5) / task->rays), angle = 2.0 * PI * fmod(i * TURN, 1.0);
-        task->disc[i][0] = radius * cos(angle);
-        task->disc[i][1] = radius * sin(angle);
+        task->disc[i][0] = radius * vshi_cos(angle);
+        task->disc[i][1] = radius * vshi_sin(angle);
     }
 }
 
@@ -50,7 +51,7 @@ static bool aim(const vsh_light *light, vshi_vec from, target *t) {
     t->size = 0.0;
     if (light->type == VSH_LIGHT_DIRECTIONAL) {
         t->axis = vshi_unit(vshi_vec_of(light->direction));
-        t->radius = tan(0.5 * light->angle);
+        t->radius = vshi_tan(0.5 * light->angle);
     } else {
         const vshi_vec to = vshi_sub(vshi_vec_of(light->position), from);
         t->distance = vshi_length(to);

@@ -135,6 +135,10 @@ OIIO::ImageSpec make_spec(const vshi_planes &planes, const char *path, const std
         spec.attribute("ImageDescription", software); // else 80 bytes that nobody set
     } else if (format == "rla") {
         spec.attribute("oiio:ColorSpace", "Linear");
+    } else if (format == "png") {
+        for (size_t i = 0; i < planes.attribute_count; ++i) {
+            spec.attribute(planes.attributes[i].name, planes.attributes[i].value);
+        }
     }
     return spec;
 }

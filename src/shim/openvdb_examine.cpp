@@ -3,6 +3,7 @@
 // voxel at the surface, and reach the background where the band ends.
 #include "shim/openvdb_examine.h"
 
+#include "base/elementary.h"
 #include "shim/openvdb_redistance.h"
 
 #include <cmath>
@@ -70,7 +71,7 @@ Finding examine_transform(const openvdb::math::Transform &transform) {
         if (std::fabs(cosine) > UNEVEN) {
             return finding(Finding::BAD,
                            "it is sheared: its axes %c and %c meet at %.3f degrees, expected 90", "xyz"[i],
-                           "xyz"[(i + 1) % 3], std::acos(cosine) * (180.0 / M_PI));
+                           "xyz"[(i + 1) % 3], vshi_acos(cosine) * (180.0 / M_PI));
         }
     }
     return {};

@@ -334,7 +334,22 @@ template <size_t Capacity> void copy_text(char (&to)[Capacity], const std::strin
     std::snprintf(to, Capacity, "%s", from.c_str());
 }
 
+// What begins with our name, one line each.
+std::string attributes_of(const MetaMap &metadata) {
+    std::string lines;
+    for (auto item = metadata.beginMeta(); item != metadata.endMeta(); ++item) {
+        if (item->second != nullptr && item->first.compare(0, 9, "vdbshade_") == 0) {
+            std::string line = item->first + ": " + item->second->str();
+            std::replace_if(
+                line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+            lines += line + '\n';
+        }
+    }
+    return lines;
+}
+
 void describe_kind(const GridBase &grid, vsh_vdb_entry &entry) {
+    copy_text(entry.attributes, attributes_of(grid));
     copy_text(entry.type, grid.type());
     copy_text(entry.grid_class, GridBase::gridClassToString(grid.getGridClass()));
     for (int axis = 0; axis < 3; ++axis) {

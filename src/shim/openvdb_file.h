@@ -34,6 +34,9 @@ vsh_result check_writable(const char *path, double voxel_size, vsh_error *error)
 FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Transform &transform,
                           const std::string &name, openvdb::GridClass grid_class);
 
+// Lines of text as metadata; those that are there under such a name are replaced.
+void put_attributes(FloatGrid &grid, const vsh_attribute *attributes, size_t count);
+
 // Writes float grids as one file, atomically; the same grids give the same bytes.
 vsh_result write_grids(const openvdb::GridCPtrVec &grids, const char *path, vsh_error *error);
 

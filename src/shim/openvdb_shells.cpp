@@ -2,6 +2,7 @@
 // shells are rooms is told by the way their triangles face.
 #include "shim/openvdb_shells.h"
 
+#include "base/elementary.h"
 #include "caster/mesh.h"
 
 #include <cfloat>
@@ -104,7 +105,7 @@ double winding(const vsh_mesh &mesh, const Lattice &lattice, const Shell &shell,
         const Vec3d a = corners.at[0] - point, b = corners.at[1] - point, c = corners.at[2] - point;
         const double la = a.length(), lb = b.length(), lc = c.length();
         angle +=
-            2.0 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+            2.0 * vshi_atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
     }
     return angle / (4.0 * 3.14159265358979323846);
 }

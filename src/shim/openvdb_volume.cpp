@@ -1,4 +1,5 @@
 // The grids of a volume: leaves that are filled block by block, and the trees made of them.
+#include "base/attributes.h"
 #include "shim/openvdb_file.h"
 #include "shim/openvdb_voxels.h"
 
@@ -235,15 +236,25 @@ vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const int32_t 
 }
 
 vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t as_half, vsh_error *error) {
+    return vsh_volume_write_with(volume, path, as_half, nullptr, 0, error);
+}
+
+vsh_result vsh_volume_write_with(const vsh_volume *volume, const char *path, int32_t as_half,
+                                 const vsh_attribute *attributes, size_t attribute_count, vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
         vshi::initialize();
-        const vsh_result result = vshi::check_writable(path, volume->set->least_axis, error);
+        vsh_result result = vshi_attributes_check(path, attributes, attribute_count, error);
+        if (result == VSH_OK) {
+            result = vshi::check_writable(path, volume->set->least_axis, error);
+        }
         if (result != VSH_OK) {
             return result;
         }
         openvdb::GridCPtrVec grids;
         for (const vshi::Channel &channel : volume->channels) {
-            grids.push_back(vshi::to_grid(channel, *volume->set, as_half != 0));
+            const vshi::FloatGrid::Ptr grid = vshi::to_grid(channel, *volume->set, as_half != 0);
+            vshi::put_attributes(*grid, attributes, attribute_count);
+            grids.push_back(grid);
         }
         return vshi::write_grids(grids, path, error);
     });

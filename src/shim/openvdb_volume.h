@@ -40,7 +40,7 @@ typedef struct vshi_channel {
     char name[80];
     char description[200];
     const char *method;
-    char light[128]; /* empty: none */
+    char light[384]; /* empty: none */
     double caster_voxel_size;
 } vshi_channel;
 

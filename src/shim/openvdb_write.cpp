@@ -1,4 +1,5 @@
 // Writing .vdb files: whole, or not at all, and the same bytes for the same grids.
+#include "base/attributes.h"
 #include "base/file.h"
 #include "shim/openvdb_file.h"
 
@@ -180,12 +181,26 @@ FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Trans
     return grid;
 }
 
+void put_attributes(FloatGrid &grid, const vsh_attribute *attributes, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        grid.insertMeta(attributes[i].name, openvdb::StringMetadata(attributes[i].value));
+    }
+}
+
 } // namespace vshi
 
 vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name, vsh_error *error) {
+    return vsh_grid_write_with(grid, path, name, nullptr, 0, error);
+}
+
+vsh_result vsh_grid_write_with(const vsh_grid *grid, const char *path, const char *name,
+                               const vsh_attribute *attributes, size_t attribute_count, vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
         vshi::initialize();
-        const vsh_result result = vshi::check_writable(path, grid->info.voxel_size, error);
+        vsh_result result = vshi_attributes_check(path, attributes, attribute_count, error);
+        if (result == VSH_OK) {
+            result = vshi::check_writable(path, grid->info.voxel_size, error);
+        }
         if (result != VSH_OK) {
             return result;
         }
@@ -196,6 +211,7 @@ vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *na
         if (grid->info.shell_thickness > 0.0) {
             named->insertMeta(vshi::SHELL_THICKNESS, openvdb::DoubleMetadata(grid->info.shell_thickness));
         }
+        vshi::put_attributes(*named, attributes, attribute_count);
         return vshi::write_grids({named}, path, error);
     });
 }

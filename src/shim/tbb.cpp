@@ -32,14 +32,18 @@ struct Loop {
     }
 };
 
-// More threads than cores are allowed for as long as one of these lasts; TBB would complain on standard
-// error.
+// More threads than cores are allowed for as long as one of these lasts, and no more than the host allows: TBB
+// would complain on standard error.
 class Arena {
   public:
-    explicit Arena(int threads) : arena(threads > 0 ? threads : tbb::task_arena::automatic) {
+    explicit Arena(int threads) {
+        using control = tbb::global_control;
         if (threads > tbb::info::default_concurrency()) {
-            more.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
+            more.emplace(control::max_allowed_parallelism, static_cast<size_t>(threads));
         }
+        const size_t allowed = control::active_value(control::max_allowed_parallelism);
+        const int wanted = threads > 0 ? threads : tbb::info::default_concurrency();
+        arena.initialize(static_cast<int>(std::min(static_cast<size_t>(wanted), allowed)));
     }
     template <typename Fn> void run(const Fn &fn) { arena.execute(fn); }
 

@@ -188,3 +188,29 @@ info() {
     [ "$status" -eq 130 ] || fail "expected 130"
     untouched out.vdb
 }
+
+@test "spheres without voxels cast into a box, and their AO in free space is refused with the reason" {
+    cat >scene.json <<'JSON'
+{"casters": [{"spheres": [[0, 1, 0, 0.25]]}, {"sdf": {"shape": "plane", "half_size": [1, 1], "thickness": 0.25}}],
+ "voxel_size": 0.05, "lights": [{"name": "top", "type": "directional", "direction": [0, 1, 0], "angle_deg": 2}]}
+JSON
+    run -0 "$VDBSHADE" volume scene.json --box -1,0.1,-1,1,0.6,1 -o fog.vdb --quiet
+    run -0 "$VDBSHADE" info fog.vdb
+    [[ $output == *"grid 'shadow.top'"* ]]
+    # the column under the ball is dark: 1 - pi / 64 of the box is lit
+    printf '0 0.5 0\n0.5 0.5 0.5\n' >points.csv
+    run --separate-stderr -0 "$VDBSHADE" query scene.json --points points.csv -o - --answers-only --quiet
+    [[ $output == *$'\n0'* ]]
+    [[ $output == *$'\n1'* ]]
+    run --separate-stderr "$VDBSHADE" volume scene.json --box -1,0.1,-1,1,0.6,1 --ao 0.5 -o ao.vdb
+    refused 2 "AO in free space" "spheres" "without voxels"
+    [ ! -e ao.vdb ]
+    # spheres alone have no band, but a box
+    cat >alone.json <<'JSON'
+{"casters": [{"spheres": [[0, 1, 0, 0.25]]}],
+ "lights": [{"name": "top", "type": "directional", "direction": [0, 1, 0], "angle_deg": 2}]}
+JSON
+    run -0 "$VDBSHADE" volume alone.json --box -1,0,-1,1,0.5,1 --box-voxel-size 0.05 -o alone.vdb --quiet
+    run --separate-stderr "$VDBSHADE" volume alone.json -o band.vdb
+    refused 2 "no casters that are voxelised" "--box"
+}

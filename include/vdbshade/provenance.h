@@ -1,0 +1,62 @@
+/* Where an output comes from: version, settings and a hash of every input, as text that the output carries.
+ */
+#ifndef VDBSHADE_PROVENANCE_H
+#define VDBSHADE_PROVENANCE_H
+
+#include "scene.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { VSH_DIGEST_TEXT = 65 }; /* bytes of a digest as text, NUL included */
+
+/* SHA-256 (FIPS 180-4) of a file's bytes, as 64 hexadecimal digits: what `sha256sum` prints. Errors:
+ * VSH_ERROR_ARGUMENT (path NULL or empty), VSH_ERROR_READ (no such file, no permission, no regular file). */
+VSH_API vsh_result vsh_file_digest(const char *path, char digest[VSH_DIGEST_TEXT], vsh_error *error);
+
+/* What an output was made of. A view. */
+typedef struct vsh_provenance_source {
+    size_t struct_size;
+    const vsh_scene *scene;   /* with the options put over it; may be NULL */
+    const char *const *files; /* [file_count]: inputs beside those that the scene names, its own file first */
+    size_t file_count;
+    const char *command;             /* how it was asked for, where it was by a command; may be NULL */
+    double voxel_size;               /* of the level set that casts, scene units; 0: there is none */
+    const vsh_attribute *attributes; /* [attribute_count]: what else there is to be told; values are cut to
+                                        one line */
+    size_t attribute_count;
+} vsh_provenance_source;
+
+static inline vsh_provenance_source vsh_provenance_source_default(void) {
+    vsh_provenance_source source = {sizeof(vsh_provenance_source), NULL, NULL, 0, NULL, 0.0, NULL, 0};
+    return source;
+}
+
+/* Attributes that do not vary between two runs: no date, host, path or number of threads is in them. In this
+ * order, where there is something to tell:
+ * - vdbshade_version: "0.1.0";
+ * - vdbshade_command;
+ * - vdbshade_shadow: "exact, max error 0.02, 64 rays, sobol"; vdbshade_ao: "cones, 16 within 2";
+ * - vdbshade_light_NAME: type, place and size of each light;
+ * - vdbshade_voxel_size;
+ * - those of the source;
+ * - vdbshade_input_N: "sha256:… NAME" of each input, from N = 0: the source's files, then those of casters
+ *   and receivers, then the .bin files of glTF among them, each file once. */
+typedef struct vsh_provenance vsh_provenance;
+
+/* Reads every input once, to hash it. Free the result with vsh_provenance_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: source or provenance NULL, run;
+ * - VSH_ERROR_READ: as vsh_file_digest();
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (under the stage "hash"). */
+VSH_API vsh_result vsh_provenance_create(const vsh_provenance_source *source, const vsh_run *run,
+                                         vsh_provenance **provenance, vsh_error *error);
+
+/* The attributes, which belong to the provenance; none of NULL. Cannot fail. */
+VSH_API const vsh_attribute *vsh_provenance_attributes(const vsh_provenance *provenance, size_t *count);
+VSH_API void vsh_provenance_free(vsh_provenance *provenance); /* NULL does nothing */
+
+#ifdef __cplusplus
+}
+#endif
+#endif

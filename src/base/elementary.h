@@ -1,0 +1,36 @@
+/* Elementary functions that give the same bits on every machine. The C library's do not: glibc's choose code
+ * with or without fused multiply-add by the processor, and the last bit differs. SLEEF's deterministic
+ * variants (N. Shibata and F. Petrogalli, "SLEEF: a portable vectorized library of C standard mathematical
+ * functions", 2020) are within 1 ulp and take 1 to 2.5 times as long. sqrt(), fmod() and ldexp() are exact
+ * everywhere. */
+#ifndef VSHI_ELEMENTARY_H
+#define VSHI_ELEMENTARY_H
+
+#include <sleef.h>
+
+#define VSHI_ELEMENTARY(name, variant)                                                                       \
+    static inline double vshi_##name(double x) {                                                             \
+        return Sleef_cinz_##name##d1_##variant##purec(x);                                                    \
+    }
+#define VSHI_ELEMENTARY_2(name, variant)                                                                     \
+    static inline double vshi_##name(double x, double y) {                                                   \
+        return Sleef_cinz_##name##d1_##variant##purec(x, y);                                                 \
+    }
+
+VSHI_ELEMENTARY(sin, u10)
+VSHI_ELEMENTARY(cos, u10)
+VSHI_ELEMENTARY(tan, u10)
+VSHI_ELEMENTARY(asin, u10)
+VSHI_ELEMENTARY(acos, u10)
+VSHI_ELEMENTARY(atan, u10)
+VSHI_ELEMENTARY(exp, u10)
+VSHI_ELEMENTARY(exp2, u10)
+VSHI_ELEMENTARY(cbrt, u10)
+VSHI_ELEMENTARY_2(atan2, u10)
+VSHI_ELEMENTARY_2(pow, u10)
+VSHI_ELEMENTARY_2(hypot, u05)
+
+#undef VSHI_ELEMENTARY
+#undef VSHI_ELEMENTARY_2
+
+#endif

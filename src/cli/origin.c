@@ -1,0 +1,26 @@
+#include "origin.h"
+
+#include "message.h"
+#include "options.h"
+
+int cli_origin_make(const vsh_scene *scene, const char *const *files, size_t file_count, double voxel_size,
+                    const vsh_run *run, cli_origin *origin) {
+    *origin = (cli_origin){NULL, NULL, 0};
+    vsh_provenance_source source = vsh_provenance_source_default();
+    source.scene = scene;
+    source.command = cli_parsed_command();
+    source.voxel_size = voxel_size;
+    source.files = files;
+    source.file_count = file_count;
+    vsh_error error;
+    if (vsh_provenance_create(&source, run, &origin->made, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    origin->attributes = vsh_provenance_attributes(origin->made, &origin->count);
+    return CLI_OK;
+}
+
+void cli_origin_free(cli_origin *origin) {
+    vsh_provenance_free(origin->made);
+    *origin = (cli_origin){NULL, NULL, 0};
+}

@@ -1,0 +1,21 @@
+/* The files that a scene is made of. */
+#ifndef VSHI_SCENE_INPUTS_H
+#define VSHI_SCENE_INPUTS_H
+
+#include "base/error.h"
+
+#include <vdbshade/scene.h>
+
+typedef struct vshi_inputs {
+    char **paths;
+    size_t count, capacity;
+} vshi_inputs;
+
+/* `files`, then what casters and receivers name, then the buffers of glTF among them; each path once. `scene`
+ * may be NULL. Files that cannot be read are listed all the same. To be freed also where it fails. Errors:
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, size_t file_count,
+                            vshi_inputs *inputs, vsh_error *error);
+void vshi_inputs_free(vshi_inputs *inputs);
+
+#endif

@@ -1,0 +1,190 @@
+/* What an output was made of, as lines of text: settings as they are in force, and hashes of all inputs. */
+#include "base/attributes.h"
+#include "base/floats.h"
+#include "base/job.h"
+#include "base/memory.h"
+#include "base/numbers.h"
+#include "scene/inputs.h"
+#include "shade/light.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <vdbshade/provenance.h>
+
+enum { NAME_SIZE = 96, LINE_SIZE = 512, HASH_PREFIX = sizeof "sha256:" - 1 };
+
+struct vsh_provenance {
+    vshi_attributes attributes;
+};
+
+static vsh_result out_of_memory(vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_MEMORY, "provenance: the system refused memory");
+}
+
+static vsh_result add(vsh_provenance *p, const char *name, const char *value, vsh_error *error) {
+    return vshi_attributes_add(&p->attributes, name, value) ? VSH_OK : out_of_memory(error);
+}
+
+/* Of methods that cast rays: how many, which, and to what error. */
+static void describe_rays(const vsh_shade_options *o, bool adaptive, char *text, size_t size) {
+    int used = 0;
+    if (adaptive) {
+        used = snprintf(text, size, ", max error %.9g", o->max_error);
+    }
+    used +=
+        snprintf(text + used, size - (size_t)used, ", %d rays, %s", o->rays, vsh_sampler_name(o->sampler));
+    if (o->frame != 0) {
+        used += snprintf(text + used, size - (size_t)used, ", frame %d", o->frame);
+    }
+    if (!adaptive && o->early_rays > 0) {
+        snprintf(text + used, size - (size_t)used, ", early rays %d", o->early_rays);
+    }
+}
+
+static vsh_result add_shadow(vsh_provenance *p, const vsh_shade_options *o, vsh_error *error) {
+    char text[LINE_SIZE], more[LINE_SIZE / 2] = "";
+    if (o->method >= VSH_SHADOW_RAYS) {
+        describe_rays(o, o->method >= VSH_SHADOW_ADAPTIVE, more, sizeof more);
+    } else if (o->jitter > 0.0) {
+        snprintf(more, sizeof more, ", jitter %.9g", o->jitter);
+    }
+    snprintf(text, sizeof text, "%s%s", vsh_shadow_method_name(o->method), more);
+    return add(p, "vdbshade_shadow", text, error);
+}
+
+static vsh_result add_ao(vsh_provenance *p, const vsh_shade_options *o, vsh_error *error) {
+    char text[LINE_SIZE], more[LINE_SIZE / 2] = "";
+    if (o->ao_method >= VSH_AO_RAYS) {
+        describe_rays(o, o->ao_method >= VSH_AO_ADAPTIVE, more, sizeof more);
+    } else if (o->ao_method == VSH_AO_CONES) {
+        snprintf(more, sizeof more, ", %d cones", o->ao_cones);
+    }
+    snprintf(text, sizeof text, "%s within %.9g%s", vsh_ao_method_name(o->ao_method), o->ao_distance, more);
+    return add(p, "vdbshade_ao", text, error);
+}
+
+static vsh_result add_scene(vsh_provenance *p, const vsh_scene *scene, vsh_error *error) {
+    vsh_result result = VSH_OK;
+    if (scene->light_count > 0) {
+        result = add_shadow(p, &scene->shade, error);
+    }
+    if (result == VSH_OK && scene->ao) {
+        result = add_ao(p, &scene->shade, error);
+    }
+    for (size_t i = 0; i < scene->light_count && result == VSH_OK; ++i) {
+        char name[NAME_SIZE], text[LINE_SIZE];
+        snprintf(name, sizeof name, "vdbshade_light_%.64s", scene->lights[i].name);
+        vshi_light_text(&scene->lights[i], text, sizeof text);
+        result = add(p, name, text, error);
+    }
+    return result;
+}
+
+static vsh_result add_settings(vsh_provenance *p, const vsh_provenance_source *source, vsh_error *error) {
+    vsh_result result = add(p, "vdbshade_version", vsh_version(), error);
+    if (result == VSH_OK && source->command != NULL) {
+        result = add(p, "vdbshade_command", source->command, error);
+    }
+    if (result == VSH_OK && source->scene != NULL) {
+        result = add_scene(p, source->scene, error);
+    }
+    if (result == VSH_OK && source->voxel_size > 0.0) {
+        char text[LINE_SIZE];
+        snprintf(text, sizeof text, "%.9g", source->voxel_size);
+        result = add(p, "vdbshade_voxel_size", text, error);
+    }
+    for (size_t i = 0; i < source->attribute_count && result == VSH_OK; ++i) {
+        result = add(p, source->attributes[i].name, source->attributes[i].value, error);
+    }
+    return result;
+}
+
+static vsh_result add_inputs(vsh_provenance *p, const vshi_inputs *inputs, vshi_job *job, vsh_error *error) {
+    for (size_t i = 0; i < inputs->count; ++i) {
+        const char *path = inputs->paths[i];
+        const char *slash = strrchr(path, '/');
+        char name[NAME_SIZE], digest[VSH_DIGEST_TEXT];
+        vsh_result result = vsh_file_digest(path, digest, error);
+        if (result != VSH_OK) {
+            return result;
+        }
+        const char *last = slash != NULL ? slash + 1 : path;
+        const size_t size = HASH_PREFIX + VSH_DIGEST_TEXT + 1 + strlen(last);
+        char *text = malloc(size);
+        if (text == NULL) {
+            return out_of_memory(error);
+        }
+        snprintf(text, size, "sha256:%s %s", digest, last);
+        snprintf(name, sizeof name, "vdbshade_input_%zu", i);
+        result = add(p, name, text, error);
+        free(text);
+        if (result != VSH_OK) {
+            return result;
+        }
+        if (vshi_job_advance(job, 1)) {
+            return vshi_job_fail_cancelled(job, error);
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result fill(vsh_provenance *p, const vsh_provenance_source *source, const vsh_run *run,
+                       vsh_error *error) {
+    VSHI_NUMBERS;
+    vsh_result result = add_settings(p, source, error);
+    vshi_inputs inputs = {NULL, 0, 0};
+    if (result == VSH_OK) {
+        result = vshi_inputs_find(source->scene, source->files, source->file_count, &inputs, error);
+    }
+    if (result == VSH_OK) {
+        vshi_job *job = vshi_job_begin(run, "hash", inputs.count);
+        result = job != NULL ? add_inputs(p, &inputs, job, error) : out_of_memory(error);
+        vshi_job_end(job);
+    }
+    vshi_inputs_free(&inputs);
+    return result;
+}
+
+vsh_result vsh_provenance_create(const vsh_provenance_source *source, const vsh_run *run,
+                                 vsh_provenance **provenance, vsh_error *error) {
+    VSHI_FLOATS;
+    if (source == NULL || provenance == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "vsh_provenance_create: source and provenance must not be NULL");
+    }
+    *provenance = NULL;
+    vsh_provenance_source full = vsh_provenance_source_default();
+    vsh_run settings;
+    vsh_result result = vshi_options_resolve(source, &full, sizeof full, "provenance source", error);
+    if (result == VSH_OK) {
+        result = vshi_run_resolve(run, &settings, error);
+    }
+    void *memory = NULL;
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory, 1, sizeof(vsh_provenance), "provenance", error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_provenance *made = memory;
+    result = fill(made, &full, &settings, error);
+    if (result != VSH_OK) {
+        vsh_provenance_free(made);
+        return result;
+    }
+    *provenance = made;
+    return VSH_OK;
+}
+
+const vsh_attribute *vsh_provenance_attributes(const vsh_provenance *provenance, size_t *count) {
+    *count = provenance != NULL ? provenance->attributes.count : 0;
+    return provenance != NULL ? provenance->attributes.list : NULL;
+}
+
+void vsh_provenance_free(vsh_provenance *provenance) {
+    if (provenance != NULL) {
+        vshi_attributes_free(&provenance->attributes);
+        free(provenance);
+    }
+}

@@ -1,0 +1,98 @@
+# `bake --resume`: finished rows are kept, and a bake that was ended goes on from them to the same bytes.
+load helper
+
+options=(--sun -0.5,0.8,-0.6 --sun-angle 10 --ao 2 --irradiance --size 256 --resolution 96 --method adaptive --quiet)
+
+bake() { # OUT [options]
+    local out=$1
+    shift
+    "$VDBSHADE" bake "$ASSETS/cloister.glb" "${options[@]}" -o "$out" "$@"
+}
+
+# Begins a bake with --resume, and sets pid once OUT.resume has so many bytes.
+begin() { # OUT BYTES
+    "$VDBSHADE" bake "$ASSETS/cloister.glb" "${options[@]}" -o "$1" --resume --threads 1 2>err.txt &
+    pid=$!
+    while kill -0 "$pid" 2>/dev/null && [ "$(stat -c %s "$1.resume" 2>/dev/null || echo 0)" -lt "$2" ]; do
+        sleep 0.01
+    done
+}
+
+end() { # SIGNAL
+    kill -s "$1" "$pid"
+    status=0
+    wait "$pid" || status=$?
+}
+
+@test "a bake that was killed goes on from its finished rows, to the same bytes" {
+    bake whole.exr
+    for kept in 2000 200000 1000000; do
+        old_output out.exr
+        begin out.exr "$kept"
+        end KILL
+        [ "$(cat out.exr)" = old ] || fail "the old output was changed"
+        [ -s out.exr.resume ] || fail "nothing was kept"
+        run -0 bake out.exr --resume --stats s.json
+        cmp whole.exr out.exr
+        [ ! -e out.exr.resume ] || fail "the rows are still there"
+        [ "$kept" -lt 200000 ] || [ "$(grep -o '"resumed_rows": [0-9]*' s.json | cut -d' ' -f2)" -ge 16 ]
+    done
+}
+
+@test "statistics go on, too" {
+    bake whole.exr --stats whole.json
+    begin out.exr 500000
+    end KILL
+    bake out.exr --resume --stats resumed.json
+    for key in texels invalid_texels samples rays; do
+        [ "$(grep -o "\"$key\": [0-9]*" whole.json | head -1)" = "$(grep -o "\"$key\": [0-9]*" resumed.json | head -1)" ] ||
+            fail "$key"
+    done
+}
+
+@test "rows of another bake, and damaged ones, are baked again" {
+    bake whole.exr
+    begin out.exr 500000
+    end KILL
+    cp out.exr.resume kept
+    run --separate-stderr -0 bake other.exr --max-error 0.1
+    cp kept other.exr.resume
+    cp other.exr expected.exr
+    run --separate-stderr -0 bake other.exr --max-error 0.1 --resume
+    [[ $stderr == *"other.exr.resume: is of another bake, of other inputs or options; begun anew"* ]]
+    cmp expected.exr other.exr
+    # a flipped bit within the first band, and a file that was cut within the last
+    size=$(stat -c %s kept)
+    printf '\xff' | dd of=kept bs=1 seek=$((size / 4)) conv=notrunc status=none
+    head -c $((size - 1000)) kept >out.exr.resume
+    run -0 bake out.exr --resume
+    cmp whole.exr out.exr
+}
+
+@test "an interrupt says what is kept" {
+    begin out.exr 300000
+    end TERM
+    [ "$status" -eq 130 ]
+    grep -Eq "out.exr: [0-9]+ of 256 rows are kept in out.exr.resume; the same command goes on from there" err.txt
+    [ ! -e out.exr ]
+}
+
+@test "two bakes of one output do not share their rows" {
+    begin out.exr 1
+    kill -STOP "$pid"
+    run --separate-stderr -3 bake out.exr --resume
+    kill -CONT "$pid"
+    [[ $stderr == *"out.exr.resume: another run has it open"* ]]
+    end TERM
+}
+
+@test "rows that cannot be kept are no reason to fail" {
+    bake whole.exr
+    (
+        ulimit -f $(($(stat -c %s whole.exr) / 1024 + 50)) # KiB: the lightmap is smaller than its rows
+        bake out.exr --resume 2>err.txt
+    )
+    grep -q "warning: out.exr.resume: could not be written: File too large; nothing is kept any more" err.txt
+    cmp whole.exr out.exr
+    [ ! -e out.exr.resume ]
+}

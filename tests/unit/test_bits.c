@@ -1,0 +1,493 @@
+/* The same bits: hashes of what every part computes, checked in. They hold for any number of threads,
+ * instruction set, compiler (gcc, clang) and level of optimisation; `tools/bits` tries those. What depends on
+ * libraries is apart: a mesh's level set on OpenVDB, what is traced on Embree (docs/reliability.md). A change
+ * of a method changes its hash: VSH_BITS=print prints the table, VSH_BITS=once checks it for one thread and
+ * the base set. */
+#include "grids.h"
+
+#include <stdbool.h>
+#include <vdbshade/vdbshade.h>
+
+#include "base/hash.h"
+
+/* --- hashing */
+
+typedef struct bits {
+    uint64_t hash;
+    size_t values;  /* floats that were hashed */
+    size_t changes; /* of them unlike the one before */
+} bits;
+
+static void add_floats(bits *b, const float *values, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        uint32_t word;
+        memcpy(&word, &values[i], sizeof word);
+        b->hash = vshi_mix(b->hash + word + 0x9e3779b97f4a7c15u);
+        b->changes += i > 0 && values[i] != values[i - 1];
+    }
+    b->values += count;
+}
+
+static void check(vsh_result result, const vsh_error *error) {
+    if (result != VSH_OK) {
+        fail_msg("%s: %s", vsh_result_name(result), error->message);
+    }
+}
+
+/* --- what is baked: numbers that need no function of the C library */
+
+enum { SIDE = 40, POINTS = SIDE * SIDE };
+
+static double positions[3 * POINTS];
+static float normals[3 * POINTS];
+static uint32_t texels[POINTS];
+
+static double random_unit(uint64_t *counter) {
+    return (double)(vshi_mix(++*counter * 0x9e3779b97f4a7c15u) >> 11) * 0x1p-53;
+}
+
+/* Rows over the floor, every third point anywhere with a normal to any side. */
+static void place_points(void) {
+    uint64_t counter = 1;
+    for (size_t i = 0; i < POINTS; ++i) {
+        double *p = positions + 3 * i;
+        float *n = normals + 3 * i;
+        p[0] = -2.0 + 4.0 * ((double)(i % SIDE) + 0.5) / SIDE;
+        p[1] = 0.001;
+        p[2] = -2.0 + 4.0 * ((double)(i / SIDE) + 0.5) / SIDE;
+        n[0] = n[2] = 0.0f;
+        n[1] = 1.0f;
+        texels[i] = (uint32_t)(i % SIDE + 65536 * (i / SIDE));
+        for (int axis = 0; axis < 3 && i % 3 == 0; ++axis) {
+            p[axis] = -2.0 + 4.0 * random_unit(&counter) + (axis == 1);
+            n[axis] = (float)(random_unit(&counter) - 0.4);
+        }
+    }
+}
+
+static vsh_grid *solids(const vsh_run *run) {
+    vsh_sdf_node nodes[5];
+    for (int i = 0; i < 5; ++i) {
+        nodes[i] = vsh_sdf_node_default();
+    }
+    nodes[0].shape = VSH_SDF_PLANE;
+    nodes[0].size[0] = nodes[0].size[2] = 2.5;
+    nodes[0].size[1] = 0.25;
+    nodes[1].radius = 0.5;
+    nodes[1].translation[1] = 0.875;
+    nodes[2].shape = VSH_SDF_UNION;
+    nodes[2].left = 0;
+    nodes[2].right = 1;
+    nodes[3].shape = VSH_SDF_TORUS;
+    nodes[3].radius = 0.5;
+    nodes[3].minor_radius = 0.125;
+    nodes[3].rotation[0] = 0.25;
+    nodes[3].translation[0] = 1.0;
+    nodes[3].translation[1] = 0.75;
+    nodes[4].shape = VSH_SDF_UNION;
+    nodes[4].left = 2;
+    nodes[4].right = 3;
+    const vsh_sdf sdf = {nodes, 5};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = 0.0625;
+    vsh_grid *grid = NULL;
+    vsh_error error;
+    check(vsh_grid_from_sdf(&sdf, &options, run, &grid, &error), &error);
+    return grid;
+}
+
+static vsh_light sun(void) {
+    vsh_light light = vsh_light_default();
+    light.direction[0] = 0.5;
+    light.direction[2] = 0.25;
+    light.angle = 0.25;
+    return light;
+}
+
+static vsh_light spot(void) {
+    vsh_light light = vsh_light_default();
+    light.type = VSH_LIGHT_SPOT;
+    light.falloff = VSH_FALLOFF_INVERSE_SQUARE;
+    light.direction[1] = -1.0;
+    light.position[0] = 0.75;
+    light.position[1] = 2.5;
+    light.position[2] = -0.5;
+    light.radius = 0.25;
+    strcpy(light.name, "spot");
+    return light;
+}
+
+static void add_leaves(bits *b, const vsh_grid *grid) {
+    leaves all = leaves_of(grid);
+    for (size_t i = 0; i < all.count; ++i) {
+        add_floats(b, all.leaf[i].values, 512);
+    }
+    free(all.leaf);
+}
+
+/* --- the parts */
+
+typedef struct context {
+    vsh_run run;
+    vsh_grid *grid; /* of the solids */
+    vsh_field *field;
+} context;
+
+static void level_set_of_solids(const context *c, int32_t unused, bits *b) {
+    (void)unused;
+    add_leaves(b, c->grid);
+}
+
+static void field_samples(const context *c, int32_t unused, bits *b) {
+    (void)unused;
+    float distance[POINTS];
+    vsh_field_sample(c->field, POINTS, positions, distance);
+    for (size_t i = 0; i < POINTS; ++i) {
+        distance[i] = 0.5f + 0.1f * distance[i];
+    }
+    add_floats(b, distance, POINTS);
+}
+
+static void shade(const context *c, const vsh_light *light, vsh_shade_options *options, bits *b) {
+    float value[POINTS], deviation[POINTS];
+    const vsh_points points = {POINTS, positions, normals, texels};
+    options->rays = 16;
+    options->ao_distance = 0.75;
+    vsh_error error;
+    check(light != NULL
+              ? vsh_shade_shadow(c->field, &points, light, options, &c->run, value, deviation, NULL, &error)
+              : vsh_shade_ao(c->field, &points, options, &c->run, value, deviation, NULL, &error),
+          &error);
+    add_floats(b, value, POINTS);
+    for (size_t i = 0; i < POINTS; ++i) { /* NaN has many bits */
+        deviation[i] = deviation[i] == deviation[i] ? deviation[i] : -1.0f;
+    }
+    add_floats(b, deviation, POINTS);
+}
+
+static void shadow(const context *c, int32_t method, bits *b) {
+    vsh_shade_options options = vsh_shade_options_default();
+    options.method = method;
+    const vsh_light lights[] = {sun(), spot()};
+    for (int i = 0; i < 2; ++i) {
+        shade(c, &lights[i], &options, b);
+    }
+}
+
+static void ao(const context *c, int32_t method, bits *b) {
+    vsh_shade_options options = vsh_shade_options_default();
+    options.ao_method = method;
+    shade(c, NULL, &options, b);
+}
+
+static void samplers(const context *c, int32_t sampler, bits *b) {
+    vsh_shade_options options = vsh_shade_options_default();
+    options.method = VSH_SHADOW_RAYS;
+    options.sampler = sampler;
+    options.frame = 3;
+    const vsh_light light = sun();
+    shade(c, &light, &options, b);
+}
+
+static void bent_normals(const context *c, int32_t method, bits *b) {
+    float value[POINTS], bent[3 * POINTS];
+    const vsh_points points = {POINTS, positions, normals, texels};
+    vsh_shade_options options = vsh_shade_options_default();
+    options.ao_method = method;
+    options.rays = 16;
+    vsh_error error;
+    check(vsh_shade_bent(c->field, &points, &options, &c->run, value, bent, NULL, &error), &error);
+    add_floats(b, value, POINTS);
+    add_floats(b, bent, sizeof bent / sizeof bent[0]);
+}
+
+static void irradiance_and_tint(const context *c, int32_t unused, bits *b) {
+    (void)unused;
+    float value[POINTS], rgb[3 * POINTS] = {0.0f}, tinted[3 * POINTS];
+    const vsh_points points = {POINTS, positions, normals, texels};
+    const vsh_light light = spot();
+    const vsh_tint tint = {VSH_TINT_POWER, {1.0, 1.25, 1.5}};
+    vsh_error error;
+    check(vsh_shade_shadow(c->field, &points, &light, NULL, &c->run, value, NULL, NULL, &error), &error);
+    vsh_shade_irradiance(&points, NULL, &light, value, rgb);
+    vsh_shade_tint(POINTS, value, &tint, tinted);
+    add_floats(b, rgb, sizeof rgb / sizeof rgb[0]);
+    add_floats(b, tinted, sizeof tinted / sizeof tinted[0]);
+}
+
+static void lightmap(const context *c, int32_t method, bits *b) {
+    static const float corners[12] = {-2, 0, 2, 2, 0, 2, 2, 0, -2, -2, 0, -2};
+    static const float uvs[8] = {0.125f, 0.125f, 0.875f, 0.125f, 0.875f, 0.875f, 0.125f, 0.875f};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    const vsh_mesh floor = {
+        .positions = corners, .uvs = uvs, .indices = indices, .vertex_count = 4, .triangle_count = 2};
+    enum { SIZE = 64, TEXELS = SIZE * SIZE };
+    static float shadow_plane[TEXELS], ao_plane[TEXELS], rgb[3 * TEXELS], coverage[TEXELS];
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = SIZE;
+    options.shade.method = method;
+    options.shade.ao_method = VSH_AO_CONES;
+    options.shade.ao_distance = 0.75;
+    float *planes[1] = {shadow_plane};
+    vsh_lightmap map = {.shadow = planes, .ao = ao_plane, .irradiance = rgb, .coverage = coverage};
+    vsh_texels *made = NULL;
+    const vsh_light light = sun();
+    vsh_error error;
+    check(vsh_texels_create(&floor, 1, &options, &c->run, NULL, &made, &error), &error);
+    check(vsh_bake_lightmap(c->field, made, &light, 1, &options.shade, &c->run, &map, NULL, &error), &error);
+    vsh_texels_free(made);
+    add_floats(b, shadow_plane, TEXELS);
+    add_floats(b, ao_plane, TEXELS);
+    add_floats(b, rgb, 3 * TEXELS);
+    add_floats(b, coverage, TEXELS);
+}
+
+static void volume_of_band(const context *c, int32_t unused, bits *b) {
+    (void)unused;
+    vsh_voxels *voxels = NULL;
+    vsh_volume *volume = NULL;
+    vsh_volume_options options = vsh_volume_options_default();
+    options.ao = 1;
+    options.shade.ao_distance = 0.75;
+    const vsh_light light = sun();
+    vsh_error error;
+    check(vsh_voxels_from_grid(c->grid, 0.0, &c->run, &voxels, &error), &error);
+    check(vsh_bake_volume(c->field, voxels, &light, 1, &options, &c->run, &volume, NULL, &error), &error);
+    float *values = malloc(48 * 48 * 48 * sizeof *values);
+    assert_non_null(values);
+    const int32_t low[3] = {-24, -8, -24}, size[3] = {48, 48, 48};
+    for (size_t grid = 0; grid < 2; ++grid) {
+        check(vsh_volume_copy(volume, grid, low, size, values, &error), &error);
+        add_floats(b, values, 48 * 48 * 48);
+    }
+    free(values);
+    vsh_volume_free(volume);
+    vsh_voxels_free(voxels);
+}
+
+/* Casters without voxels, as the one layer beside an empty field. */
+static void shade_layer(const context *c, const vsh_heights *heights, const vsh_spheres *spheres, bits *b) {
+    vsh_field *empty = NULL;
+    vsh_error error;
+    check(vsh_field_create_empty(0.0625, &empty, &error), &error);
+    vsh_layer layer = vsh_layer_default();
+    layer.heights = heights;
+    layer.spheres = spheres;
+    vsh_shade_options options = vsh_shade_options_default();
+    options.layers = &layer;
+    options.layer_count = 1;
+    const context here = {c->run, NULL, empty};
+    const vsh_light lights[] = {sun(), spot()};
+    for (int i = 0; i < 2; ++i) {
+        shade(&here, &lights[i], &options, b);
+    }
+    shade(&here, NULL, &options, b);
+    vsh_field_free(empty);
+}
+
+enum { COLUMNS = 33 };
+
+static vsh_heights_source hills(void) {
+    static float values[COLUMNS * COLUMNS];
+    uint64_t counter = 7;
+    for (size_t i = 0; i < sizeof values / sizeof values[0]; ++i) {
+        values[i] = (float)random_unit(&counter);
+    }
+    return (vsh_heights_source){
+        .columns = COLUMNS, .rows = COLUMNS, .values = values, .size = {5.0, 5.0}, .height = 0.75};
+}
+
+static void heightfield(const context *c, int32_t unused, bits *b) {
+    (void)unused;
+    const vsh_heights_source source = hills();
+    vsh_heights *heights = NULL;
+    vsh_error error;
+    check(vsh_heights_create(&source, &c->run, &heights, &error), &error);
+    shade_layer(c, heights, NULL, b);
+    vsh_heights_free(heights);
+}
+
+static void spheres(const context *c, int32_t unused, bits *b) {
+    (void)unused;
+    double list[4 * 60];
+    uint64_t counter = 9;
+    for (size_t i = 0; i < sizeof list / sizeof list[0]; ++i) {
+        list[i] = i % 4 == 3 ? 0.05 + 0.2 * random_unit(&counter) : -2.0 + 4.0 * random_unit(&counter);
+    }
+    vsh_spheres *made = NULL;
+    vsh_error error;
+    check(vsh_spheres_create(list, 60, NULL, &c->run, &made, &error), &error);
+    shade_layer(c, NULL, made, b);
+    vsh_spheres_free(made);
+}
+
+static void flat_map(const context *c, int32_t method, bits *b) {
+    enum { SIZE = 64, TEXELS = SIZE * SIZE };
+    static const double points[] = {-0.5, -0.5, 0.25, -0.5, 0.25, 0.25, 0.5, 0.5, 0.75, 0.5, 0.625, 0.875};
+    static const size_t counts[] = {3, 3};
+    static float planes[5][TEXELS];
+    vsh_outline *outline = NULL;
+    vsh_error error;
+    check(vsh_outline_from_polygons(points, counts, 2, &c->run, &outline, &error), &error);
+    vsh_flat_options options = vsh_flat_options_default();
+    options.width = options.height = SIZE;
+    options.method = method;
+    vsh_light light = spot();
+    light.type = VSH_LIGHT_SPHERE;
+    light.position[0] = -0.75;
+    light.position[1] = 0.75;
+    float *const shadows[] = {planes[0]}, *const rgb[] = {planes[1], planes[2], planes[3]};
+    const vsh_flat_map map = {shadows, rgb, planes[4]};
+    check(vsh_flat_bake(outline, &light, 1, &options, &c->run, &map, &error), &error);
+    add_floats(b, planes[0], 5 * TEXELS);
+    vsh_outline_free(outline);
+}
+
+static void picture(const context *c, int32_t unused, bits *b) {
+    (void)unused;
+    enum { WIDE = 48, HIGH = 32, PIXELS = WIDE * HIGH };
+    static float color[3 * PIXELS], alpha[PIXELS], depth[PIXELS], normal[3 * PIXELS], encoded[3][PIXELS];
+    const vsh_picture made = {color, alpha, depth, normal};
+    const vsh_surface surface = {.field = c->field, .color = {0.7, 0.7, 0.7}};
+    vsh_render_options options = vsh_render_options_default();
+    options.width = WIDE;
+    options.height = HIGH;
+    options.samples = 2;
+    options.shafts = 0.05;
+    options.ao = 1;
+    const double low[3] = {-2.0, 0.0, -2.0}, high[3] = {2.0, 1.5, 2.0};
+    const vsh_light light = spot();
+    vsh_error error;
+    check(vsh_camera_frame(&options.camera, low, high, 0.5, 0.5, 1.5, &error), &error);
+    check(vsh_render(&surface, 1, c->field, &light, 1, &options, &c->run, &made, NULL, &error), &error);
+    float *const planes[3] = {encoded[0], encoded[1], encoded[2]};
+    check(vsh_picture_encode(&made, WIDE, HIGH, 0.5, planes, NULL, &error), &error);
+    add_floats(b, color, 3 * PIXELS);
+    add_floats(b, normal, 3 * PIXELS);
+    add_floats(b, encoded[0], 3 * PIXELS);
+}
+
+/* --- what depends on libraries */
+
+static vsh_model *cloister(const vsh_run *run) {
+    vsh_model *model = NULL;
+    vsh_error error;
+    check(vsh_model_read(VSH_ASSETS "/cloister.glb", run, &model, &error), &error);
+    return model;
+}
+
+static void level_set_of_a_mesh(const context *c, int32_t unused, bits *b) {
+    (void)unused;
+    vsh_model *model = cloister(&c->run);
+    vsh_mesh meshes[64];
+    const size_t count = vsh_model_mesh_count(model);
+    assert_in_range(count, 1, 64);
+    for (size_t i = 0; i < count; ++i) {
+        meshes[i] = vsh_model_mesh(model, i, -1);
+    }
+    vsh_grid_options options = vsh_grid_options_default();
+    options.resolution = 96;
+    vsh_grid *grid = NULL;
+    vsh_error error;
+    check(vsh_grid_from_meshes(meshes, count, &options, &c->run, &grid, &error), &error);
+    add_leaves(b, grid);
+    vsh_grid_free(grid);
+    vsh_model_free(model);
+}
+
+/* Rays are Embree's. */
+static void exact(const context *c, int32_t is_ao, bits *b) {
+    const vsh_heights_source source = hills();
+    vsh_model *model = NULL;
+    vsh_grid *grid = NULL;
+    vsh_triangles *triangles = NULL;
+    context here = {c->run, NULL, NULL};
+    vsh_error error;
+    check(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &c->run, &model, &error), &error);
+    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    vsh_grid_options options = vsh_grid_options_default();
+    options.resolution = 64;
+    check(vsh_grid_from_meshes(&mesh, 1, &options, &c->run, &grid, &error), &error);
+    check(vsh_field_create(grid, NULL, &c->run, &here.field, &error), &error);
+    check(vsh_triangles_create(&mesh, 1, &c->run, &triangles, &error), &error);
+    vsh_shade_options shading = vsh_shade_options_default();
+    shading.method = VSH_SHADOW_EXACT;
+    shading.ao_method = VSH_AO_EXACT;
+    shading.triangles = triangles;
+    const vsh_light light = sun();
+    shade(&here, is_ao ? NULL : &light, &shading, b);
+    vsh_triangles_free(triangles);
+    vsh_field_free(here.field);
+    vsh_grid_free(grid);
+    vsh_model_free(model);
+}
+
+/* --- the table */
+
+typedef struct part {
+    const char *name;
+    void (*bake)(const context *c, int32_t what, bits *b);
+    int32_t what;
+    uint64_t hash;
+} part;
+
+static const part parts[] = {
+#include "bits.inc"
+};
+
+static void bake_part(const part *p, const vsh_run *run, bits *b) {
+    context c = {*run, solids(run), NULL};
+    vsh_error error;
+    check(vsh_field_create(c.grid, NULL, run, &c.field, &error), &error);
+    *b = (bits){0, 0, 0};
+    p->bake(&c, p->what, b);
+    vsh_field_free(c.field);
+    vsh_grid_free(c.grid);
+}
+
+static void print_table(void) {
+    const vsh_run run = vsh_run_default();
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
+        bits b;
+        bake_part(&parts[i], &run, &b);
+        printf("%-28s 0x%016llx\n", parts[i].name, (unsigned long long)b.hash);
+    }
+}
+
+static void every_part_has_its_bits_for_any_threads_and_instruction_set(void **state) {
+    (void)state;
+    bool wrong = false;
+    const bool once = getenv("VSH_BITS") != NULL;
+    for (int32_t isa = VSH_ISA_BASE; isa <= (once ? VSH_ISA_BASE : VSH_ISA_AVX512); ++isa) {
+        for (int32_t threads = 1; threads <= (once ? 1 : 5) && vsh_isa_available(isa); threads += 4) {
+            vsh_run run = vsh_run_default();
+            run.threads = threads;
+            run.isa = isa;
+            for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
+                bits b;
+                bake_part(&parts[i], &run, &b);
+                assert_true(b.changes > 20);
+                if (b.hash != parts[i].hash) {
+                    wrong = true;
+                    print_error("%s: 0x%016llx, expected 0x%016llx (%s, %d threads)\n", parts[i].name,
+                                (unsigned long long)b.hash, (unsigned long long)parts[i].hash,
+                                vsh_isa_name(isa), threads);
+                }
+            }
+        }
+    }
+    assert_false(wrong);
+}
+
+int main(void) {
+    place_points();
+    const char *how = getenv("VSH_BITS");
+    if (how != NULL && strcmp(how, "print") == 0) {
+        print_table();
+        return 0;
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_part_has_its_bits_for_any_threads_and_instruction_set),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,311 @@
+// Hosts that have set something: rounding, flush to zero, a locale with a decimal comma, arenas and threads
+// of their own. Every call gives the same bits as in a plain program, and gives back what the host had set.
+#include <clocale>
+#include <csetjmp>
+#include <cstdarg>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <thread>
+#include <vector>
+
+extern "C" {
+#include <cmocka.h>
+}
+
+#include "base/floats.h"
+#include "base/hash.h"
+
+#include <cfenv>
+#include <sys/stat.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+#include <unistd.h>
+#include <vdbshade/vdbshade.h>
+
+namespace {
+
+std::string folder;
+
+// A failure on another thread than the test's is told by its text, not by cmocka.
+struct Outcome {
+    uint64_t hash = 0;
+    std::string failure;
+
+    void check(vsh_result result, const vsh_error &error) {
+        if (result != VSH_OK && failure.empty()) {
+            failure = error.message;
+        }
+    }
+    template <typename Value> void add(const Value *values, size_t count) {
+        const auto *bytes = reinterpret_cast<const unsigned char *>(values);
+        for (size_t i = 0; i < count * sizeof(Value); ++i) {
+            hash = vshi_mix(hash + bytes[i] + 0x9e3779b97f4a7c15u);
+        }
+    }
+};
+
+void write_text(const char *name, const char *text) {
+    FILE *file = std::fopen((folder + "/" + name).c_str(), "wb");
+    assert_non_null(file);
+    std::fputs(text, file);
+    assert_int_equal(std::fclose(file), 0);
+}
+
+// Everything that reads numbers, computes with them or writes them.
+Outcome work(int32_t threads = 0) {
+    Outcome o;
+    vsh_error error{};
+    vsh_run run = vsh_run_default();
+    run.threads = threads;
+    vsh_scene *scene = nullptr;
+    vsh_assets *assets = nullptr;
+    vsh_grid *grid = nullptr;
+    vsh_field *field = nullptr;
+    vsh_provenance *provenance = nullptr;
+    const std::string path = folder + "/scene.json";
+    o.check(vsh_scene_read(path.c_str(), &scene, &error), error);
+    if (o.failure.empty()) {
+        o.check(vsh_assets_load(scene, &run, &assets, &error), error);
+    }
+    if (o.failure.empty()) {
+        o.check(vsh_scene_casters(scene, assets, &run, &grid, &error), error);
+    }
+    if (o.failure.empty()) {
+        o.check(vsh_field_create(grid, nullptr, &run, &field, &error), error);
+    }
+    if (o.failure.empty()) {
+        constexpr size_t COUNT = 400;
+        std::vector<double> positions;
+        std::vector<float> normals, visible(COUNT), ao(COUNT);
+        for (size_t i = 0; i < COUNT; ++i) {
+            positions.insert(positions.end(),
+                             {-1.4 + 0.15 * double(i % 20), 0.01, -1.4 + 0.15 * double(i / 20)});
+            normals.insert(normals.end(), {0.0f, 1.0f, 0.0f});
+        }
+        const vsh_points points = {COUNT, positions.data(), normals.data(), nullptr};
+        vsh_shade_options options = scene->shade;
+        options.rays = 16;
+        for (const int32_t method : {VSH_SHADOW_CONE, VSH_SHADOW_ADAPTIVE}) {
+            options.method = method;
+            o.check(vsh_shade_shadow(field, &points, &scene->lights[0], &options, &run, visible.data(),
+                                     nullptr, nullptr, &error),
+                    error);
+            o.add(visible.data(), COUNT);
+        }
+        o.check(vsh_shade_ao(field, &points, &options, &run, ao.data(), nullptr, nullptr, &error), error);
+        o.add(ao.data(), COUNT);
+        vsh_provenance_source source = vsh_provenance_source_default();
+        source.scene = scene;
+        source.voxel_size = 0.0625;
+        o.check(vsh_provenance_create(&source, &run, &provenance, &error), error);
+        size_t count = 0;
+        const vsh_attribute *list = vsh_provenance_attributes(provenance, &count);
+        for (size_t i = 0; i < count; ++i) {
+            o.add(list[i].value, std::strlen(list[i].value));
+        }
+    }
+    vsh_provenance_free(provenance);
+    vsh_field_free(field);
+    vsh_grid_free(grid);
+    vsh_assets_free(assets);
+    vsh_scene_free(scene);
+    return o;
+}
+
+void expect_same(const Outcome &plain, const Outcome &other, const char *host) {
+    if (!other.failure.empty()) {
+        fail_msg("%s: %s", host, other.failure.c_str());
+    }
+    if (plain.hash != other.hash) {
+        fail_msg("%s: other bits", host);
+    }
+}
+
+Outcome plain() {
+    const Outcome o = work(1);
+    if (!o.failure.empty()) {
+        fail_msg("%s", o.failure.c_str());
+    }
+    return o;
+}
+
+void rounding_of_the_host_changes_nothing_and_is_given_back(void **) {
+    const Outcome expected = plain();
+    for (const int mode : {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO}) {
+        assert_int_equal(std::fesetround(mode), 0);
+        const Outcome there = work();
+        const int kept = std::fegetround();
+        std::fesetround(FE_TONEAREST);
+        assert_int_equal(kept, mode);
+        expect_same(expected, there, "rounding");
+    }
+}
+
+void flushing_to_zero_changes_nothing_and_is_given_back(void **) {
+#if defined(__x86_64__)
+    constexpr vshi_floats FLUSH = 0x8040; // FTZ and DAZ
+    const Outcome expected = plain();
+    const vshi_floats host = vshi_floats_get();
+    vshi_floats_set(host | FLUSH);
+    const Outcome there = work();
+    const vshi_floats kept = vshi_floats_get();
+    vshi_floats_set(host);
+    assert_int_equal(kept & FLUSH, FLUSH);
+    expect_same(expected, there, "flush to zero");
+#else
+    skip();
+#endif
+}
+
+void a_decimal_comma_changes_nothing_and_is_given_back(void **) {
+    const Outcome expected = plain();
+    const std::string make =
+        "localedef -i de_DE -f UTF-8 " + folder + "/de_DE.UTF-8 >" + folder + "/log 2>&1";
+    const int made = std::system(make.c_str());
+    setenv("LOCPATH", folder.c_str(), 1);
+    if (std::setlocale(LC_ALL, "de_DE.UTF-8") == nullptr) {
+        print_message("skipped: no locale with a comma could be made (%d)\n", made);
+        unsetenv("LOCPATH");
+        skip();
+    }
+    char text[8];
+    std::snprintf(text, sizeof text, "%.1f", 0.5);
+    assert_string_equal(text, "0,5"); // or this would test nothing
+    const Outcome there = work();
+    std::snprintf(text, sizeof text, "%.1f", 0.5);
+    std::setlocale(LC_ALL, "C");
+    unsetenv("LOCPATH");
+    assert_string_equal(text, "0,5");
+    expect_same(expected, there, "decimal comma");
+}
+
+void arenas_of_the_host_change_nothing(void **) {
+    const Outcome expected = plain();
+    Outcome there;
+    {
+        tbb::task_arena one(1);
+        one.execute([&] { there = work(); });
+        expect_same(expected, there, "an arena of one slot");
+        tbb::task_arena many(7);
+        many.execute([&] { there = work(3); });
+        expect_same(expected, there, "an arena of seven");
+    }
+    {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+        expect_same(expected, work(5), "a limit of one thread");
+    }
+    std::vector<Outcome> all(6);
+    tbb::parallel_for(size_t{0}, all.size(), [&](size_t i) { all[i] = work(int32_t(i)); });
+    for (const Outcome &o : all) {
+        expect_same(expected, o, "within the host's own loop");
+    }
+}
+
+void many_threads_with_fields_of_their_own_get_the_same_bits(void **) {
+    const Outcome expected = plain();
+    std::vector<Outcome> all(8);
+    std::vector<std::thread> threads;
+    for (size_t i = 0; i < all.size(); ++i) {
+        threads.emplace_back([&all, i] { all[i] = work(int32_t(i % 3)); });
+    }
+    for (std::thread &thread : threads) {
+        thread.join();
+    }
+    for (const Outcome &o : all) {
+        expect_same(expected, o, "a thread");
+    }
+}
+
+// One field, one query handle, one grid: shared by threads that shade, sample and bake volumes at once.
+void many_threads_share_one_field(void **) {
+    vsh_sdf_node node = vsh_sdf_node_default();
+    const vsh_sdf sdf = {&node, 1};
+    vsh_grid_options grid_options = vsh_grid_options_default();
+    grid_options.voxel_size = 0.0625;
+    vsh_grid *grid = nullptr;
+    vsh_field *field = nullptr;
+    vsh_error error{};
+    assert_int_equal(vsh_grid_from_sdf(&sdf, &grid_options, nullptr, &grid, &error), VSH_OK);
+    assert_int_equal(vsh_field_create(grid, nullptr, nullptr, &field, &error), VSH_OK);
+    const vsh_light light = vsh_light_default();
+    const auto bake = [&](int32_t threads) {
+        Outcome o;
+        vsh_error why{};
+        vsh_run run = vsh_run_default();
+        run.threads = threads;
+        vsh_voxels *voxels = nullptr;
+        vsh_volume *volume = nullptr;
+        o.check(vsh_voxels_from_grid(grid, 2.0, &run, &voxels, &why), why);
+        o.check(vsh_bake_volume(field, voxels, &light, 1, nullptr, &run, &volume, nullptr, &why), why);
+        std::vector<float> values(40 * 40 * 40);
+        const int32_t low[3] = {-20, -20, -20}, size[3] = {40, 40, 40};
+        o.check(vsh_volume_copy(volume, 0, low, size, values.data(), &why), why);
+        o.add(values.data(), values.size());
+        vsh_volume_free(volume);
+        vsh_voxels_free(voxels);
+        return o;
+    };
+    const Outcome expected = bake(1);
+    assert_true(expected.failure.empty());
+    std::vector<Outcome> all(12);
+    std::vector<std::thread> threads;
+    for (size_t i = 0; i < all.size(); ++i) {
+        threads.emplace_back([&, i] { all[i] = bake(int32_t(i % 4)); });
+    }
+    for (std::thread &thread : threads) {
+        thread.join();
+    }
+    for (const Outcome &o : all) {
+        expect_same(expected, o, "a thread");
+    }
+    vsh_field_free(field);
+    vsh_grid_free(grid);
+}
+
+int make_folder(void **) {
+    char name[512], here[400];
+    const char *place = std::getenv("TMPDIR");
+    std::snprintf(name, sizeof name, "%s/vdbshade-host-XXXXXX",
+                  place != nullptr                       ? place
+                  : getcwd(here, sizeof here) != nullptr ? here
+                                                         : ".");
+    if (mkdtemp(name) == nullptr) {
+        return 1;
+    }
+    folder = name;
+    write_text("post.obj", "v -0.25 0 -0.25\nv 0.25 0 -0.25\nv 0.25 0 0.25\nv -0.25 0 0.25\n"
+                           "v -0.25 1.5 -0.25\nv 0.25 1.5 -0.25\nv 0.25 1.5 0.25\nv -0.25 1.5 0.25\n"
+                           "f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n");
+    write_text("balls.csv", "0.75, 0.5, 0.75, 0.25\n-0.75 0.5 -0.75 0.125\n");
+    write_text(
+        "scene.json",
+        "{\"casters\": [{\"mesh\": \"post.obj\"}, {\"spheres\": \"balls.csv\", \"voxelised\": true},"
+        " {\"sdf\": {\"shape\": \"plane\", \"half_size\": [1.5, 1.5], \"thickness\": 0.25}}],"
+        " \"voxel_size\": 0.0625, \"ao\": {\"distance\": 0.75},"
+        " \"lights\": [{\"name\": \"sun\", \"type\": \"directional\", \"direction\": [0.5, 0.75, 0.25],"
+        " \"angle_deg\": 12.5}]}");
+    return 0;
+}
+
+int remove_folder(void **) {
+    return std::system(("rm -rf '" + folder + "'").c_str());
+}
+
+} // namespace
+
+int main() {
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(rounding_of_the_host_changes_nothing_and_is_given_back),
+        cmocka_unit_test(flushing_to_zero_changes_nothing_and_is_given_back),
+        cmocka_unit_test(a_decimal_comma_changes_nothing_and_is_given_back),
+        cmocka_unit_test(arenas_of_the_host_change_nothing),
+        cmocka_unit_test(many_threads_with_fields_of_their_own_get_the_same_bits),
+        cmocka_unit_test(many_threads_share_one_field),
+    };
+    return cmocka_run_group_tests_name("host", tests, make_folder, remove_folder);
+}

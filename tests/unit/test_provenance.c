@@ -1,0 +1,234 @@
+/* What outputs tell of where they come from, and the files that carry it. */
+#include "images.h"
+
+#include <vdbshade/provenance.h>
+#include <vdbshade/volume.h>
+
+static void digests_are_those_of_the_standard(void **state) {
+    (void)state;
+    /* FIPS 180-4's examples, and a million times 'a' (NIST, "SHA examples") */
+    static const struct {
+        const char *text;
+        size_t times;
+        const char *digest;
+    } cases[] = {
+        {"", 1, "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"},
+        {"abc", 1, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"},
+        {"abcdbcdecdefdefgefghfghighijhijkijkljklmklmnlmnomnopnopq", 1,
+         "248d6a61d20638b8e5c026930c3e6039a33ce45964ff2167f6ecedd419db06c1"},
+        {"a", 1000000, "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        FILE *file = fopen(at("digest.bin"), "wb");
+        assert_non_null(file);
+        for (size_t k = 0; k < cases[i].times; ++k) {
+            fputs(cases[i].text, file);
+        }
+        assert_int_equal(fclose(file), 0);
+        char digest[VSH_DIGEST_TEXT];
+        vsh_error error;
+        assert_ok(vsh_file_digest(at("digest.bin"), digest, &error), &error);
+        assert_string_equal(digest, cases[i].digest);
+    }
+}
+
+static void digests_of_what_is_no_file_are_refused(void **state) {
+    (void)state;
+    char digest[VSH_DIGEST_TEXT];
+    vsh_error error;
+    assert_int_equal(vsh_file_digest(at("nothing"), digest, &error), VSH_ERROR_READ);
+    assert_non_null(strstr(error.message, "nothing: cannot be read: No such file"));
+    assert_int_equal(vsh_file_digest(folder, digest, &error), VSH_ERROR_READ);
+    assert_non_null(strstr(error.message, "it is a folder"));
+    assert_int_equal(mkfifo(at("pipe"), 0600), 0);
+    assert_int_equal(vsh_file_digest(at("pipe"), digest, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_file_digest(NULL, digest, &error), VSH_ERROR_ARGUMENT);
+}
+
+static const char *value_of(const vsh_attribute *list, size_t count, const char *name) {
+    for (size_t i = 0; i < count; ++i) {
+        if (strcmp(list[i].name, name) == 0) {
+            return list[i].value;
+        }
+    }
+    return NULL;
+}
+
+static void write_text(const char *name, const char *text) {
+    write_all(at(name), (const unsigned char *)text, strlen(text));
+}
+
+/* A glTF with a buffer beside it, one within, and one behind an escaped name. */
+static void settings_and_inputs_are_told_in_order_and_once(void **state) {
+    (void)state;
+    write_text("scene.json", "{}");
+    write_text("one.bin", "1");
+    write_text("two parts.bin", "2");
+    write_text("mesh.gltf", "{\"buffers\": [{\"uri\": \"one.bin\"}, {\"uri\": \"data:,x\"}, {\"uri\": "
+                            "\"two%20parts.bin\"}, {\"byteLength\": 1}]}");
+    const vsh_caster casters[] = {{.type = VSH_CASTER_MESH, .path = at("mesh.gltf")},
+                                  {.type = VSH_CASTER_SDF},
+                                  {.type = VSH_CASTER_MESH, .path = casters[0].path}};
+    vsh_light sun = vsh_light_default();
+    sun.angle = 0.1;
+    const vsh_receiver receiver = {.path = casters[0].path};
+    vsh_scene scene = {.casters = casters,
+                       .caster_count = 3,
+                       .lights = &sun,
+                       .light_count = 1,
+                       .receivers = &receiver,
+                       .receiver_count = 1,
+                       .shade = vsh_shade_options_default(),
+                       .ao = 1};
+    scene.shade.method = VSH_SHADOW_EXACT;
+    scene.shade.max_error = 0.05;
+    scene.shade.ao_distance = 2.5;
+    const char *const file = at("scene.json");
+    const vsh_attribute own = {"studio_shot", "12\n13"};
+    vsh_provenance_source source = vsh_provenance_source_default();
+    source.scene = &scene;
+    source.files = &file;
+    source.file_count = 1;
+    source.command = "bake scene.json";
+    source.voxel_size = 0.125;
+    source.attributes = &own;
+    source.attribute_count = 1;
+    vsh_provenance *made = NULL;
+    vsh_error error;
+    assert_ok(vsh_provenance_create(&source, NULL, &made, &error), &error);
+    size_t count = 0;
+    const vsh_attribute *list = vsh_provenance_attributes(made, &count);
+    static const char *const expected[][2] = {
+        {"vdbshade_version", "0.1.0"},
+        {"vdbshade_command", "bake scene.json"},
+        {"vdbshade_shadow", "exact, max error 0.05, 64 rays, sobol"},
+        {"vdbshade_ao", "cones within 2.5, 16 cones"},
+        {"vdbshade_light_sun", "directional towards 0 1 0, 5.72957795 degrees across"},
+        {"vdbshade_voxel_size", "0.125"},
+        {"studio_shot", "12?13"},
+        {"vdbshade_input_0",
+         "sha256:44136fa355b3678a1146ad16f7e8649e94fb4fc21fe77e8310c060f61caaff8a scene.json"},
+        {"vdbshade_input_1", NULL},
+        {"vdbshade_input_2",
+         "sha256:6b86b273ff34fce19d6b804eff5a3f5747ada4eaa22f1d49c01e52ddb7875b4b one.bin"},
+        {"vdbshade_input_3",
+         "sha256:d4735e3a265e16eee03f59718b9b5d03019c07d8b6c51f90da3a666eec13ab35 two parts.bin"},
+    };
+    assert_int_equal(count, sizeof expected / sizeof expected[0]);
+    for (size_t i = 0; i < count; ++i) {
+        assert_string_equal(list[i].name, expected[i][0]);
+        if (expected[i][1] != NULL) {
+            assert_string_equal(list[i].value, expected[i][1]);
+        }
+    }
+    vsh_provenance_free(made);
+
+    assert_int_equal(unlink(at("one.bin")), 0);
+    assert_int_equal(vsh_provenance_create(&source, NULL, &made, &error), VSH_ERROR_READ);
+    assert_null(made);
+    assert_non_null(strstr(error.message, "one.bin: cannot be read"));
+}
+
+static void images_carry_them_and_give_them_back(void **state) {
+    (void)state;
+    static const char *const files[] = {"told.exr", "told.png"};
+    static const vsh_attribute told[] = {{"vdbshade_version", "0.1.0"}, {"long", "a line, with = and ;"}};
+    sample s;
+    make(&s, 5, 4, 3, LIGHTMAP);
+    for (size_t f = 0; f < 2; ++f) {
+        vsh_image_options options = vsh_image_options_default();
+        options.attributes = told;
+        options.attribute_count = 2;
+        vsh_error error;
+        vsh_image_file *file = NULL;
+        assert_ok(vsh_image_write(at(files[f]), &s.image, &options, &error), &error);
+        assert_ok(vsh_image_read(at(files[f]), &file, &error), &error);
+        size_t count = 0;
+        const vsh_attribute *list = vsh_image_attributes(file, &count);
+        for (size_t i = 0; i < 2; ++i) {
+            const char *value = value_of(list, count, told[i].name);
+            assert_non_null(value);
+            assert_string_equal(value, told[i].value);
+        }
+        assert_null(value_of(list, count, "type"));
+        vsh_image_free(file);
+    }
+    unmake(&s);
+}
+
+static void level_sets_and_volumes_carry_them(void **state) {
+    (void)state;
+    const vsh_sdf_node ball = vsh_sdf_node_default();
+    const vsh_sdf sdf = {&ball, 1};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.resolution = 16;
+    vsh_grid *grid = NULL;
+    vsh_field *field = NULL;
+    vsh_voxels *voxels = NULL;
+    vsh_volume *volume = NULL;
+    vsh_error error;
+    const vsh_light sun = vsh_light_default();
+    const vsh_attribute told = {"vdbshade_command", "voxelize ball"};
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &error), &error);
+    assert_ok(vsh_grid_write_with(grid, at("told.vdb"), NULL, &told, 1, &error), &error);
+    assert_ok(vsh_field_create(grid, NULL, NULL, &field, &error), &error);
+    assert_ok(vsh_voxels_from_grid(grid, 0.0, NULL, &voxels, &error), &error);
+    assert_ok(vsh_bake_volume(field, voxels, &sun, 1, NULL, NULL, &volume, NULL, &error), &error);
+    assert_ok(vsh_volume_write_with(volume, at("volume.vdb"), 0, &told, 1, &error), &error);
+    static const char *const files[] = {"told.vdb", "volume.vdb"};
+    for (size_t f = 0; f < 2; ++f) {
+        vsh_vdb_entry entry;
+        size_t count = 0;
+        assert_ok(vsh_vdb_list(at(files[f]), NULL, &entry, 1, &count, &error), &error);
+        assert_int_equal(count, 1);
+        assert_non_null(strstr(entry.attributes, "vdbshade_command: voxelize ball\n"));
+    }
+    vsh_volume_free(volume);
+    vsh_voxels_free(voxels);
+    vsh_field_free(field);
+    vsh_grid_free(grid);
+}
+
+static void attributes_that_no_file_could_hold_are_refused(void **state) {
+    (void)state;
+    static const char long_name[] =
+        "an_attribute_name_of_eighty_letters_which_is_one_more_than_PNG_has_room_for_"
+        "1234";
+    static const struct {
+        vsh_attribute list[2];
+        size_t count;
+        const char *message;
+    } cases[] = {
+        {{{"", "x"}}, 1, "attribute 0 '': expected a name of 1 … 79"},
+        {{{NULL, "x"}}, 1, "attribute 0 '': expected a name"},
+        {{{"two words", "x"}}, 1, "attribute 0 'two words': expected a name"},
+        {{{long_name, "x"}}, 1, "attribute 0"},
+        {{{"a", "two\nlines"}}, 1, "attribute 'a': expected a line of text"},
+        {{{"a", NULL}}, 1, "attribute 'a': expected a line of text"},
+        {{{"a", "1"}, {"a", "2"}}, 2, "attribute 'a' is given twice"},
+    };
+    sample s;
+    make(&s, 2, 2, 3, LIGHTMAP);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        vsh_image_options options = vsh_image_options_default();
+        options.attributes = cases[i].list;
+        options.attribute_count = cases[i].count;
+        vsh_error error;
+        assert_int_equal(vsh_image_write(at("refused.exr"), &s.image, &options, &error), VSH_ERROR_ARGUMENT);
+        assert_non_null(strstr(error.message, cases[i].message));
+        assert_int_not_equal(access(at("refused.exr"), F_OK), 0);
+    }
+    unmake(&s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(digests_are_those_of_the_standard),
+        cmocka_unit_test(digests_of_what_is_no_file_are_refused),
+        cmocka_unit_test(settings_and_inputs_are_told_in_order_and_once),
+        cmocka_unit_test(images_carry_them_and_give_them_back),
+        cmocka_unit_test(level_sets_and_volumes_carry_them),
+        cmocka_unit_test(attributes_that_no_file_could_hold_are_refused),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
