@@ -61,8 +61,8 @@ render_page *render_page_begin(const render_settings *s) {
 static void name_frame(const char *output, char *path, size_t capacity) {
     const char *slash = strrchr(output, '/');
     const int folder = slash != NULL ? (int)(slash + 1 - output) : 0;
-    snprintf(path, capacity, "%.*s.%.200s.%ld.tmp-frame.png", folder, output, output + folder,
-             (long)getpid());
+    snprintf(path, capacity, "%.*s.%.200s.%ld.tmp" CLI_TEMPORARY_FRAME ".png", folder, output,
+             output + folder, (long)getpid());
 }
 
 static int embed(const char *path, FILE *out) {

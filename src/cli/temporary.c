@@ -28,28 +28,35 @@ static const char *split(const char *path, char *real, char *folder) {
     return slash + 1;
 }
 
-/* The process in ".STEM.PID.tmpEND" or ".STEM.PID-N.tmpEND"; 0: the name is none of these. */
-static long process_of(const char *entry, const char *stem, size_t stem_length, const char *end) {
-    if (entry[0] != '.' || strncmp(entry + 1, stem, stem_length) != 0 || entry[1 + stem_length] != '.') {
+/* The process in ".STEM.PID.tmpREST" or ".STEM.PID-N.tmpREST", and *rest; 0: the name is none of these. What
+ * the library writes on the way to a temporary of ours has one dot more. */
+static long process_of(const char *entry, const char *stem, size_t stem_length, const char **rest) {
+    const size_t dots = strspn(entry, ".");
+    const char *at = entry + dots;
+    if (dots < 1 || dots > 2 || strncmp(at, stem, stem_length) != 0 || at[stem_length] != '.') {
         return 0;
     }
-    const char *at = entry + 2 + stem_length;
+    at += stem_length + 1;
     const size_t digits = strspn(at, "0123456789");
     const long process = digits > 0 && digits <= 10 ? strtol(at, NULL, 10) : 0;
     at += digits;
     at += *at == '-' ? 1 + strspn(at + 1, "0123456789") : 0;
-    const size_t tag = strlen(".tmp");
-    return strncmp(at, ".tmp", tag) == 0 && strcmp(at + tag, end) == 0 ? process : 0;
+    *rest = at + strlen(".tmp");
+    return strncmp(at, ".tmp", strlen(".tmp")) == 0 ? process : 0;
+}
+
+static bool is_frame(const char *rest) {
+    return strncmp(rest, CLI_TEMPORARY_FRAME, strlen(CLI_TEMPORARY_FRAME)) == 0;
 }
 
 /* The program's own names, ".out.csv.PID.tmp", and those of the library, ".out.PID.tmp.csv". */
 static bool is_of_process(const char *entry, const char *name, long process) {
-    const char *dot = strrchr(name, '.');
-    const size_t length = strlen(name);
-    dot = dot != NULL && dot != name ? dot : name + length;
-    const size_t stem = (size_t)(dot - name);
-    return process_of(entry, name, length < NAME_KEPT ? length : NAME_KEPT, "") == process ||
-           process_of(entry, name, stem < NAME_KEPT ? stem : NAME_KEPT, dot) == process;
+    const char *dot = strrchr(name, '.'), *rest;
+    const size_t length = strnlen(name, NAME_KEPT);
+    dot = dot != NULL && dot != name ? dot : name + strlen(name);
+    const size_t stem = dot - name < NAME_KEPT ? (size_t)(dot - name) : NAME_KEPT;
+    return (process_of(entry, name, length, &rest) == process && (*rest == '\0' || is_frame(rest))) ||
+           (process_of(entry, name, stem, &rest) == process && strcmp(rest, dot) == 0);
 }
 
 void cli_temporary_remove(const char *target) {
@@ -68,7 +75,19 @@ void cli_temporary_remove(const char *target) {
     closedir(listing);
 }
 
-/* What a killed run has left of this target: as the library does, what no process holds the lock of. */
+static bool is_dead(long process) {
+    return kill((pid_t)process, 0) != 0 && errno == ESRCH;
+}
+
+/* Whether no process writes the file: as in the library, nobody holds its lock, or where there are no locks
+ * (as on pages' frames) its process is dead. */
+static bool is_left(int file, long process, bool frame) {
+    const bool locked = flock(file, LOCK_EX | LOCK_NB) == 0;
+    const bool unknown = !locked && errno != EWOULDBLOCK && errno != EINTR;
+    return locked && !frame ? true : (locked || unknown) && is_dead(process);
+}
+
+/* What a killed run has left of this target. */
 static void clean(const char *folder, const char *name) {
     DIR *listing = opendir(folder);
     if (listing == NULL) {
@@ -77,22 +96,21 @@ static void clean(const char *folder, const char *name) {
     const size_t length = strnlen(name, NAME_KEPT);
     const struct dirent *entry;
     while ((entry = readdir(listing)) != NULL) {
-        const long process = process_of(entry->d_name, name, length, "");
-        const int file = process > 0 ? openat(dirfd(listing), entry->d_name,
-                                              O_WRONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)
-                                     : -1;
-        if (file < 0) {
+        const char *rest;
+        const long process = process_of(entry->d_name, name, length, &rest);
+        if (process == 0 || !(*rest == '\0' || is_frame(rest))) {
             continue;
         }
+        const int file =
+            openat(dirfd(listing), entry->d_name, O_WRONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
         struct stat status;
-        const bool ours = fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid();
-        const bool locked = flock(file, LOCK_EX | LOCK_NB) == 0;
-        const bool unknown =
-            !locked && errno != EWOULDBLOCK && errno != EINTR; /* no locks on this file system */
-        if (ours && (locked || (unknown && kill((pid_t)process, 0) != 0 && errno == ESRCH))) {
-            unlinkat(dirfd(listing), entry->d_name, 0);
+        if (file >= 0) {
+            if (fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid() &&
+                is_left(file, process, is_frame(rest))) {
+                unlinkat(dirfd(listing), entry->d_name, 0);
+            }
+            close(file);
         }
-        close(file);
     }
     closedir(listing);
 }

@@ -5,6 +5,9 @@
 #include <limits.h>
 #include <stdio.h>
 
+/* Behind ".tmp": pictures on their way into a page, which are closed and opened again. */
+#define CLI_TEMPORARY_FRAME "-frame"
+
 /* Removes this process's temporary files of `target`, the library's too. */
 void cli_temporary_remove(const char *target);
 

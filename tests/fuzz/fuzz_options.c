@@ -72,7 +72,8 @@ static void take(fuzz_input *input, void *to, size_t size) {
     for (int changes = how % 8; changes > 0; --changes) {
         uint16_t place;
         fuzz_fill(input, &place, sizeof place);
-        const size_t width = (size_t)1 << place % 4; /* 1 to 8 bytes, aligned as members are */
+        size_t width = (size_t)1 << place % 4; /* 1 to 8 bytes, aligned as members are */
+        width = width < size ? width : size;
         const size_t at = place / 4 % (size / width) * width;
         fuzz_fill(input, (char *)to + at, width);
     }
