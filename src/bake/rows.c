@@ -19,7 +19,8 @@ double vshi_row_bytes(const vshi_charts *charts, int32_t threads) {
 vsh_result vshi_row_open(const vshi_charts *charts, size_t row, vshi_row *work, vsh_error *error) {
     const vshi_raster *raster = &charts->raster;
     *work = (vshi_row){.row = row, .tiles = ((size_t)raster->width + VSHI_TILE - 1) / VSHI_TILE};
-    const uint32_t *number = charts->row_triangle + charts->row_start[row];
+    const uint32_t *number =
+        charts->row_triangle != NULL ? charts->row_triangle + charts->row_start[row] : NULL;
     const size_t count = charts->row_start[row + 1] - charts->row_start[row];
     const size_t side = (size_t)VSHI_TILE * (size_t)raster->supersample;
     const char *what = "row of texels";

@@ -1,18 +1,14 @@
 #include "base/file.h"
 
+#include "base/temporary.h"
+
 #include <errno.h>
 #include <fcntl.h>
-#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-enum {
-    NAME_ROOM = 48,        /* bytes that the temporary's name adds: dots, process, number, "tmp" */
-    MAX_TEMPORARIES = 1000 /* of one target and process at a time */
-};
 
 static const char *last_part(const char *path) {
     const char *slash = strrchr(path, '/');
@@ -78,35 +74,8 @@ vsh_result vshi_output_check(const char *path, vsh_error *error) {
     return result;
 }
 
-/* Creates ".NAME.PID.tmp.ENDING" beside the target (with a number where that name is taken) and returns its
- * descriptor, or -1 with errno. `text` has room for the target and NAME_ROOM more. */
-static int create_beside(const char *target, char *text, size_t capacity) {
-    const char *name = last_part(target);
-    const char *ending = vshi_path_ending(target);
-    const size_t ending_length = strlen(ending);
-    const int folder_length = (int)(name - target);
-    size_t stem_length = ending_length > 0 ? (size_t)(ending - name) - 1 : strlen(name);
-    const size_t room = ending_length + NAME_ROOM < NAME_MAX ? NAME_MAX - ending_length - NAME_ROOM : 0;
-    stem_length = stem_length < room ? stem_length : room;
-    for (int number = 0; number < MAX_TEMPORARIES; ++number) {
-        char tag[NAME_ROOM];
-        if (number == 0) {
-            snprintf(tag, sizeof tag, "%ld", (long)getpid());
-        } else {
-            snprintf(tag, sizeof tag, "%ld-%d", (long)getpid(), number);
-        }
-        snprintf(text, capacity, "%.*s.%.*s.%s.tmp%s%s", folder_length, target, (int)stem_length, name, tag,
-                 ending_length > 0 ? "." : "", ending);
-        const int file = open(text, O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
-        if (file >= 0 || errno != EEXIST) {
-            return file;
-        }
-    }
-    return -1;
-}
-
 vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *error) {
-    *output = (vshi_output){NULL, NULL};
+    *output = (vshi_output){NULL, NULL, 0};
     vsh_result result = vshi_output_check(path, error);
     if (result != VSH_OK) {
         return result;
@@ -114,26 +83,27 @@ vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *e
     struct stat old;
     const bool replaces = stat(path, &old) == 0;
     output->target = replaces ? realpath(path, NULL) : strdup(path);
-    const size_t capacity = output->target != NULL ? strlen(output->target) + NAME_ROOM : 0;
+    const size_t capacity = output->target != NULL ? strlen(output->target) + VSHI_TEMPORARY_ROOM : 0;
     output->temporary = output->target != NULL ? malloc(capacity) : NULL;
     if (output->temporary == NULL) {
         free(output->target);
         output->target = NULL;
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
     }
-    const int file = create_beside(output->target, output->temporary, capacity);
+    vshi_temporary_clean(output->target);
+    const int file = vshi_temporary_create(output->target, output->temporary, capacity);
     if (file < 0) {
         result = vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", path, strerror(errno));
         free(output->temporary);
         free(output->target);
-        *output = (vshi_output){NULL, NULL};
+        *output = (vshi_output){NULL, NULL, 0};
         return result;
     }
     if (replaces && fchmod(file, old.st_mode & 0777) != 0) {
         /* some file systems have no modes; the new file then has the usual ones */
         errno = 0;
     }
-    close(file);
+    output->held = file + 1;
     return VSH_OK;
 }
 
@@ -170,9 +140,12 @@ void vshi_output_abandon(vshi_output *output) {
     if (output->temporary != NULL) {
         unlink(output->temporary);
     }
+    if (output->held > 0) {
+        close(output->held - 1);
+    }
     free(output->temporary);
     free(output->target);
-    *output = (vshi_output){NULL, NULL};
+    *output = (vshi_output){NULL, NULL, 0};
 }
 
 vshi_sink vshi_sink_open(const char *path) {

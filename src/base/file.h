@@ -15,6 +15,7 @@ extern "C" {
 typedef struct vshi_output {
     char *target;    /* what commit puts in place; a link is followed */
     char *temporary; /* write here; NULL when nothing is under way */
+    int held;        /* 1 + a descriptor that tells other processes that this one lives; 0: none */
 } vshi_output;
 
 /* Text after the last dot of the last part of the path, "exr"; "" where there is none. Points into `path`. */
@@ -24,8 +25,9 @@ const char *vshi_path_ending(const char *path);
  * path), VSH_ERROR_WRITE (no such folder, not writable, a folder or device is in the way). Thread safe. */
 vsh_result vshi_output_check(const char *path, vsh_error *error);
 
-/* Takes a new temporary file for `path`. Same errors, and VSH_ERROR_MEMORY. After success, end with commit or
- * abandon. Thread safe, also for the same path: the last commit stays. */
+/* Takes a new temporary file for `path`, and removes those that killed processes have left for it. Same
+ * errors, and VSH_ERROR_MEMORY. After success, end with commit or abandon. Thread safe, also for the same
+ * path: the last commit stays. */
 vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *error);
 
 /* Flushes the temporary to the disk and renames it over the target. A failure abandons. Errors:

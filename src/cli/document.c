@@ -55,8 +55,8 @@ void cli_document_escape(FILE *out, const char *text) {
 void cli_document_part(const char *document, const char *part, char *path, size_t capacity) {
     const char *slash = strrchr(document, '/');
     const int folder = slash != NULL ? (int)(slash + 1 - document) : 0;
-    snprintf(path, capacity, "%.*s.%.200s.%ld.tmp-%s", folder, document, document + folder, (long)getpid(),
-             part);
+    snprintf(path, capacity, "%.*s.%.200s.%ld.tmp" CLI_TEMPORARY_PART "%s", folder, document,
+             document + folder, (long)getpid(), part);
 }
 
 int cli_document_embed(FILE *out, const char *path) {

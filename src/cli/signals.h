@@ -4,8 +4,8 @@
 
 #include <stdbool.h>
 
-/* From here on the signals only ask. SIGXFSZ is ignored, so that a file-size limit is an error of the write
- * and not the process's end. */
+/* From here on the signals only ask. SIGXFSZ and SIGPIPE are ignored, so that a file-size limit and a pipe
+ * that nobody reads are errors of the write and not the process's end. */
 void cli_signals_begin(void);
 
 bool cli_interrupted(void);

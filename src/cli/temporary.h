@@ -5,7 +5,10 @@
 #include <limits.h>
 #include <stdio.h>
 
-/* Removes this process's temporary files from the folder of `target`. */
+/* Behind ".tmp": pictures on their way into a document, which are closed and opened again. */
+#define CLI_TEMPORARY_PART "-part-"
+
+/* Removes this process's temporary files of `target`, the library's too. */
 void cli_temporary_remove(const char *target);
 
 /* A file under way, written through `file`. */
@@ -15,8 +18,9 @@ typedef struct cli_temporary {
     char temporary[2 * PATH_MAX], final[2 * PATH_MAX];
 } cli_temporary;
 
-/* CLI_OK or, having said why, CLI_FILE. After success, end with commit, which also returns one of them and
- * puts the file in its place, or with abandon. */
+/* Removes what killed runs have left of `target`, and begins it. CLI_OK or, having said why, CLI_FILE. After
+ * success, end with commit, which also returns one of them and puts the file in its place, or with abandon.
+ */
 int cli_temporary_begin(cli_temporary *temporary, const char *target);
 int cli_temporary_commit(cli_temporary *temporary);
 void cli_temporary_abandon(cli_temporary *temporary);

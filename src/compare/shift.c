@@ -4,9 +4,9 @@
  * next.
  *
  * Penumbrae of another width and a shadow that is missing are even about their edges and cancel. A
- * displacement counts only where undoing it takes a good part of the difference away. Limits: it finds what
- * is nearest, within about the width of the penumbrae and SHIFT_LARGEST texels; edges along one direction
- * tell nothing of a displacement along themselves, which is then taken for 0. */
+ * displacement counts only where undoing it takes a quarter of the squared difference away. Limits: it finds
+ * what is nearest, within about the width of the penumbrae and SHIFT_LARGEST texels; edges along one
+ * direction tell nothing of a displacement along themselves, which is then taken for 0. */
 #include "compare/pair.h"
 
 #include <math.h>
@@ -15,7 +15,7 @@ enum { STEPS = 10 };
 
 static const double SHIFT_LARGEST = 8.0; /* texels: beyond it the values are simply others */
 static const double SMALL_STEP = 1e-3;   /* texels, after which it has settled */
-static const double LEAST_EXPLAINED = 0.1;
+static const double LEAST_EXPLAINED = 0.25;
 static const double NOTHING =
     0.01; /* added to the sums of squared gradients: an edge of less decides nothing */
 

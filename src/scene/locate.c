@@ -50,9 +50,9 @@ static void skip_value(cursor *c) {
             }
             ++c->at;
         } else {
-            while (peek(c) > ' ' && peek(c) != ',' && peek(c) != '}' && peek(c) != ']') {
+            do { /* one at least, whatever it is */
                 ++c->at;
-            }
+            } while (peek(c) > ' ' && peek(c) != ',' && peek(c) != '}' && peek(c) != ']');
         }
     } while (open > 0);
 }
@@ -87,6 +87,19 @@ static bool enter(cursor *c, size_t ordinal, size_t *key) {
     }
 }
 
+vshi_place vshi_place_of(const char *text, size_t size, size_t at) {
+    vshi_place place = {1, 1};
+    for (size_t i = 0; i < at && i < size; ++i) {
+        if (text[i] == '\n') {
+            ++place.line;
+            place.column = 1;
+        } else if (((unsigned char)text[i] & 0xc0) != 0x80) { /* not inside a UTF-8 character */
+            ++place.column;
+        }
+    }
+    return place;
+}
+
 vshi_place vshi_locate(const char *text, size_t size, const size_t *ordinals, size_t depth, bool key) {
     cursor c = {text, size, 0};
     skip_space(&c);
@@ -98,14 +111,5 @@ vshi_place vshi_locate(const char *text, size_t size, const size_t *ordinals, si
         }
         found = key && i + 1 == depth ? key_at : c.at;
     }
-    vshi_place place = {1, 1};
-    for (size_t i = 0; i < found && i < size; ++i) {
-        if (text[i] == '\n') {
-            ++place.line;
-            place.column = 1;
-        } else if (((unsigned char)text[i] & 0xc0) != 0x80) { /* not inside a UTF-8 character */
-            ++place.column;
-        }
-    }
-    return place;
+    return vshi_place_of(text, size, found);
 }

@@ -17,4 +17,7 @@ typedef struct vshi_place {
  */
 vshi_place vshi_locate(const char *text, size_t size, const size_t *ordinals, size_t depth, bool key);
 
+/* Line and column of byte `at`. */
+vshi_place vshi_place_of(const char *text, size_t size, size_t at);
+
 #endif

@@ -158,6 +158,12 @@ vsh_result vshi_reader_load(vshi_reader *reader, json_t **json) {
         reader->text += 3;
         reader->size -= 3;
     }
+    const char *zero = memchr(reader->text, '\0', reader->size);
+    if (zero != NULL) { /* Jansson passes over some */
+        const vshi_place place = vshi_place_of(reader->text, reader->size, (size_t)(zero - reader->text));
+        return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%zu:%zu: a byte of 0, expected text",
+                         reader->path, place.line, place.column);
+    }
     json_error_t failure;
     *json =
         json_loadb(reader->text, reader->size, JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, &failure);

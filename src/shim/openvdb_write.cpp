@@ -133,7 +133,7 @@ class ContentHash {
 };
 
 struct Output {
-    vshi_output file{nullptr, nullptr};
+    vshi_output file{nullptr, nullptr, 0};
     ~Output() { vshi_output_abandon(&file); } // nothing, once committed
 };
 

@@ -183,6 +183,39 @@ static void a_larger_shadow_is_no_displacement(void **unused) {
     free(b.values);
 }
 
+/* --- rounding */
+
+/* The nearest number of 11 bits, as a half float holds it; of values down to 2^-14. */
+static float as_half(float value) {
+    int exponent;
+    const double mantissa = frexp((double)value, &exponent);
+    return (float)ldexp(nearbyint(ldexp(mantissa, 11)), exponent - 11);
+}
+
+static void bakes_that_differ_by_rounding_are_alike(void **unused) {
+    (void)unused;
+    const vsh_limits limits = vsh_limits_default();
+    for (double soft = 0.01; soft < 10.0; soft *= 4.0) { /* from hard edges to wide ones */
+        const ball golden = {{40.0, 45.0, 0.0}, 18.0, soft};
+        plane a = make_plane(SIDE, SIDE, 1, ball_at, &golden),
+              b = make_plane(SIDE, SIDE, 1, ball_at, &golden);
+        for (uint32_t i = 0; i < SIDE * SIDE; ++i) {
+            b.values[i] = nextafterf(b.values[i], noise(i) > 0.0 ? 2.0f : -2.0f);
+        }
+        vsh_measures m = measure(&a, &b, NULL);
+        assert_true(m.value[VSH_MEASURE_MAX] > 0.0);
+        assert_int_equal(vsh_compare_judge(&m, &limits), 0);
+        for (uint32_t i = 0; i < SIDE * SIDE; ++i) {
+            b.values[i] = as_half(b.values[i]);
+        }
+        m = measure(&a, &b, NULL);
+        assert_true(soft < 1.0 || m.value[VSH_MEASURE_MAX] > 1e-4);
+        assert_int_equal(vsh_compare_judge(&m, &limits), 0);
+        free(a.values);
+        free(b.values);
+    }
+}
+
 /* --- what is gone: a bar of shadow, `wide` texels from x = 30 on, 20 long from y = 40 on */
 
 typedef struct bar {
@@ -276,6 +309,7 @@ int main(void) {
         cmocka_unit_test(a_displacement_is_found_in_space),
         cmocka_unit_test(hard_edges_are_found_to_have_moved_by_a_texel),
         cmocka_unit_test(a_larger_shadow_is_no_displacement),
+        cmocka_unit_test(bakes_that_differ_by_rounding_are_alike),
         cmocka_unit_test(a_lost_bar_is_a_lost_region_of_its_size_however_thin),
         cmocka_unit_test(what_moved_within_reach_is_not_lost),
         cmocka_unit_test(a_shadow_below_the_step_is_not_seen),

@@ -268,6 +268,17 @@ static void what_is_wrong_is_told_with_line_column_and_key(void **state) {
     assert_int_equal(wrong, 0);
 }
 
+/* Jansson takes a byte of 0 behind a number for the end of what it has read so far, and goes on. */
+static void bytes_of_zero_are_told_with_their_place(void **state) {
+    (void)state;
+    static const char text[] = "{\"casters\": [],\n \"resolution\": 6\0, \"ck\": 0}";
+    vsh_scene *scene = NULL;
+    vsh_error error = {VSH_OK, ""};
+    assert_int_equal(vshi_scene_parse("s.json", text, sizeof text - 1, &scene, &error), VSH_ERROR_INPUT);
+    assert_string_equal(error.message, "s.json:2:17: a byte of 0, expected text");
+    assert_null(scene);
+}
+
 static void a_seeds_scene_cut_anywhere_is_an_error(void **state) {
     (void)state;
     size_t size;
@@ -431,6 +442,7 @@ static void a_file_without_end_is_over_the_limit(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_wrong_is_told_with_line_column_and_key),
+        cmocka_unit_test(bytes_of_zero_are_told_with_their_place),
         cmocka_unit_test(a_seeds_scene_cut_anywhere_is_an_error),
         cmocka_unit_test(a_scene_with_any_byte_changed_is_read_or_refused),
         cmocka_unit_test(trees_nest_64_levels_and_no_more),

@@ -1,0 +1,140 @@
+/* Cancelling from the callback, in every stage of every scenario at 0, a tenth, a half and nearly all of it:
+ * the call says so, leaks nothing, leaves outputs as they were, and works when it is asked again. How soon it
+ * answers is measured by bench/cancel.c. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "allocations.h"
+#include "scenarios.h"
+
+#include <inttypes.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { MOST_STAGES = 256 };
+
+static char folder[256];
+
+static int make_folder(void **state) {
+    (void)state;
+    const char *place = getenv("TMPDIR");
+    snprintf(folder, sizeof folder, "%s/vdbshade-faults-XXXXXX", place != NULL ? place : "/tmp");
+    if (mkdtemp(folder) == NULL || chdir(folder) != 0) {
+        return -1;
+    }
+    scenarios_make_files();
+    return 0;
+}
+
+static int remove_folder(void **state) {
+    (void)state;
+    scenarios_remove_files();
+    return chdir("/") != 0 || rmdir(folder) != 0;
+}
+
+/* Stages are counted as they begin: a scenario makes several calls, some of one name. Called by one thread at
+ * a time, but by any. */
+typedef struct watch {
+    int stage; /* under way; -1: none yet */
+    double last;
+    char name[80];
+    int stop_stage; /* -1: never */
+    double stop_at;
+    int asked; /* to stop, within the stage */
+    double asked_at;
+} watch;
+
+static int32_t progress(void *user, const char *stage, double fraction) {
+    watch *w = user;
+    if (w->stage < 0 || strcmp(w->name, stage) != 0 || fraction < w->last) {
+        ++w->stage;
+        snprintf(w->name, sizeof w->name, "%s", stage);
+    }
+    w->last = fraction;
+    if (w->stage == w->stop_stage && fraction >= w->stop_at) {
+        ++w->asked;
+        w->asked_at = fraction;
+    }
+    return w->asked > 0;
+}
+
+static vsh_result run_watched(const scenario *s, int32_t threads, watch *w, vsh_error *error) {
+    vsh_run run = vsh_run_default();
+    run.threads = threads;
+    run.progress = progress;
+    run.user = w;
+    *error = (vsh_error){-1, ""};
+    return s->run(&run, error);
+}
+
+static void stop_at(const scenario *s, int32_t threads, int stage, double fraction, uint64_t *stopped) {
+    const uint64_t before = faults_live();
+    watch w = {.stage = -1, .stop_stage = stage, .stop_at = fraction};
+    vsh_error error;
+    const vsh_result result = run_watched(s, threads, &w, &error);
+    if (w.asked == 0 || (result == VSH_OK && w.asked_at >= 1.0)) {
+        scenarios_untouched(); /* no: the stage's work, the call's last, was done */
+        return;
+    }
+    ++*stopped;
+    if (result != VSH_ERROR_CANCELLED || error.code != result || strchr(error.message, '\n') != NULL ||
+        error.message[0] == '\0') {
+        fail_msg("%s: stage %d '%s' at %g: %s '%s'", s->name, stage, w.name, fraction,
+                 vsh_result_name(result), error.message);
+    }
+    if (w.asked > 1) {
+        fail_msg("%s: stage %d '%s' at %g: asked %d times more", s->name, stage, w.name, fraction,
+                 w.asked - 1);
+    }
+    if (faults_live() != before) {
+        fail_msg("%s: stage %d '%s' at %g: %" PRIu64 " blocks before, %" PRIu64 " after", s->name, stage,
+                 w.name, fraction, before, faults_live());
+    }
+    if (!scenarios_untouched()) {
+        fail_msg("%s: stage %d '%s' at %g: files are not as they were", s->name, stage, w.name, fraction);
+    }
+}
+
+static void every_stage_can_be_cancelled(void **state) {
+    (void)state;
+    static const double fractions[] = {0.0, 0.1, 0.5, 0.99};
+    uint64_t stopped = 0;
+    for (size_t i = 0; i < scenario_count; ++i) {
+        const scenario *s = &scenarios[i];
+        watch all = {.stage = -1, .stop_stage = -1};
+        vsh_error error;
+        assert_int_equal(run_watched(s, 1, &all, &error), VSH_OK);
+        assert_true(all.stage < MOST_STAGES);
+        scenarios_untouched(); /* no: it has written */
+        for (int stage = 0; stage <= all.stage; ++stage) {
+            uint64_t here = 0;
+            for (size_t f = 0; f < sizeof fractions / sizeof fractions[0]; ++f) {
+                stop_at(s, 1 + (stage + (int)f) % 2, stage, fractions[f], &here);
+            }
+            if (here < 3) {
+                fail_msg("%s: stage %d of %d: only %d callbacks", s->name, stage, all.stage + 1, (int)here);
+            }
+            stopped += here;
+        }
+        if (run_watched(s, 2, &all, &error) != VSH_OK) {
+            fail_msg("%s afterwards: %s", s->name, error.message);
+        }
+        scenarios_untouched();
+        print_message("%-24s %4d stages\n", s->name, all.stage + 1);
+    }
+    print_message("cancelled %" PRIu64 " times\n", stopped);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_stage_can_be_cancelled),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

@@ -1,0 +1,234 @@
+/* Every system call of writing fails in turn, or the process is killed in its place: the old file is intact,
+ * no temporary stays (after a kill: none after the next run), and the error says why. All work is done in
+ * children, as a process that has begun threads cannot be forked. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "base/file.h"
+#include "scenarios.h"
+#include "writes.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <inttypes.h>
+#include <signal.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+enum { MOST = 2000, FINE = 0, BAD = 1, NOTHING_FAILED = 2 };
+
+static char folder[256];
+
+static int make_folder(void **state) {
+    (void)state;
+    const char *place = getenv("TMPDIR");
+    snprintf(folder, sizeof folder, "%s/vdbshade-faults-XXXXXX", place != NULL ? place : "/tmp");
+    if (mkdtemp(folder) == NULL || chdir(folder) != 0) {
+        return -1;
+    }
+    scenarios_make_files();
+    return 0;
+}
+
+static int remove_folder(void **state) {
+    (void)state;
+    scenarios_remove_files();
+    return chdir("/") != 0 || rmdir(folder) != 0;
+}
+
+static bool writes(const scenario *s) {
+    return strstr(s->name, "written") != NULL;
+}
+
+/* --- in a child */
+
+static int run_failing(const scenario *s, uint64_t n) {
+    const vsh_run run = vsh_run_default();
+    vsh_error error = {-1, ""};
+    const char *what;
+    writes_begin(n, WRITES_FAIL);
+    const vsh_result result = s->run(&run, &error);
+    writes_end(&what);
+    if (what == NULL) {
+        return result == VSH_OK ? NOTHING_FAILED : BAD;
+    }
+    const bool said =
+        result == VSH_ERROR_WRITE && error.code == result && strchr(error.message, '\n') == NULL &&
+        strstr(error.message, strerror(ENOSPC)) != NULL && strstr(error.message, "out.") != NULL;
+    const bool untouched = scenarios_untouched();
+    if (!said || !untouched) {
+        fprintf(stderr, "%s: %s, call %" PRIu64 ": %s '%s'%s\n", s->name, what, n, vsh_result_name(result),
+                error.message, untouched ? "" : "; files are not as they were");
+        return BAD;
+    }
+    return FINE;
+}
+
+static int run_short(const scenario *s, uint64_t n) {
+    (void)n;
+    const vsh_run run = vsh_run_default();
+    vsh_error error = {-1, ""};
+    writes_begin(1, WRITES_SHORT);
+    const vsh_result result = s->run(&run, &error);
+    if (result != VSH_OK) {
+        fprintf(stderr, "%s: %s\n", s->name, error.message);
+    }
+    return result == VSH_OK ? FINE : BAD;
+}
+
+static int run_killed(const scenario *s, uint64_t n) {
+    const vsh_run run = vsh_run_default();
+    writes_begin(n, WRITES_KILL);
+    return s->run(&run, NULL) == VSH_OK ? NOTHING_FAILED : BAD;
+}
+
+static int run_well(const scenario *s, uint64_t n) {
+    (void)n;
+    const vsh_run run = vsh_run_default();
+    return s->run(&run, NULL) == VSH_OK ? FINE : BAD;
+}
+
+/* --- here */
+
+/* The child's exit status; -1: it was killed. */
+static int in_child(int (*work)(const scenario *, uint64_t), const scenario *s, uint64_t n) {
+    fflush(NULL);
+    const pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        _exit(work(s, n));
+    }
+    int status;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    if (WIFSIGNALED(status)) {
+        assert_int_equal(WTERMSIG(status), SIGKILL);
+        return -1;
+    }
+    return WEXITSTATUS(status);
+}
+
+static size_t temporaries(void) {
+    DIR *listing = opendir(".");
+    assert_non_null(listing);
+    size_t count = 0;
+    for (const struct dirent *entry = readdir(listing); entry != NULL; entry = readdir(listing)) {
+        count += strstr(entry->d_name, ".tmp") != NULL;
+    }
+    closedir(listing);
+    return count;
+}
+
+static void every_write_may_fail(void **state) {
+    (void)state;
+    uint64_t sum = 0;
+    for (size_t i = 0; i < scenario_count; ++i) {
+        const scenario *s = &scenarios[i];
+        uint64_t n = 1;
+        int status = writes(s) ? FINE : NOTHING_FAILED;
+        for (; status == FINE && n < MOST; ++n) {
+            status = in_child(run_failing, s, n);
+        }
+        assert_int_equal(status, NOTHING_FAILED);
+        scenarios_untouched(); /* no: the last one has written */
+        if (writes(s)) {
+            print_message("%-24s %4" PRIu64 " calls\n", s->name, n - 2);
+            assert_true(n > 5);
+            sum += n - 2;
+        }
+    }
+    print_message("%" PRIu64 " calls in all\n", sum);
+}
+
+static void short_and_interrupted_writes_are_gone_on_with(void **state) {
+    (void)state;
+    for (size_t i = 0; i < scenario_count; ++i) {
+        if (writes(&scenarios[i])) {
+            assert_int_equal(in_child(run_short, &scenarios[i], 0), FINE);
+            assert_int_equal(temporaries(), 0);
+            scenarios_untouched();
+        }
+    }
+}
+
+static void a_kill_at_every_write_leaves_the_old_file_and_the_next_run_tidies_up(void **state) {
+    (void)state;
+    for (size_t i = 0; i < scenario_count; ++i) {
+        const scenario *s = &scenarios[i];
+        size_t left = 0;
+        for (uint64_t n = 1; writes(s) && n < MOST; ++n) {
+            const int status = in_child(run_killed, s, n);
+            if (status != -1) {
+                assert_int_equal(status, NOTHING_FAILED);
+                break;
+            }
+            const size_t here = temporaries();
+            left += here;
+            assert_true(here <= 1);
+            if (here == 1) {
+                assert_int_equal(in_child(run_well, s, 0), FINE);
+                assert_int_equal(temporaries(), 0);
+            } else {
+                assert_true(scenarios_untouched());
+            }
+            scenarios_untouched();
+        }
+        assert_int_equal(left > 0, writes(s)); /* kills did hit */
+        scenarios_untouched();
+    }
+}
+
+static void touch(const char *name) {
+    FILE *file = fopen(name, "wb");
+    assert_non_null(file);
+    fclose(file);
+}
+
+static void what_a_process_still_writes_and_other_files_stay(void **state) {
+    (void)state;
+    static const char *const others[] = {".out.7.tmp.png",     ".out.tmp.exr",   ".out.x.tmp.exr",
+                                         ".out.7.tmp.exr.bak", "out.7.tmp.exr",  ".out2.7.tmp.exr",
+                                         ".out.7.exr",         ".out.7-.tmp.exr"};
+    static const char *const dead[] = {".out.7.tmp.exr", ".out.7-12.tmp.exr", ".out.2147483647.tmp.exr"};
+    enum { OTHERS = sizeof others / sizeof others[0], DEAD = sizeof dead / sizeof dead[0] };
+    const scenario *exr = NULL;
+    for (size_t i = 0; i < scenario_count; ++i) {
+        exr = strstr(scenarios[i].name, "EXR") != NULL ? &scenarios[i] : exr;
+    }
+    assert_non_null(exr);
+    vshi_output live;
+    assert_int_equal(vshi_output_begin(&live, "out.exr", NULL), VSH_OK);
+    for (size_t i = 0; i < OTHERS; ++i) {
+        touch(others[i]);
+    }
+    for (size_t i = 0; i < DEAD; ++i) {
+        touch(dead[i]);
+    }
+    assert_int_equal(in_child(run_well, exr, 0), FINE);
+    assert_int_equal(access(live.temporary, F_OK), 0);
+    assert_int_equal(vshi_output_commit(&live, NULL), VSH_OK);
+    for (size_t i = 0; i < DEAD; ++i) {
+        assert_int_equal(access(dead[i], F_OK), -1);
+    }
+    for (size_t i = 0; i < OTHERS; ++i) {
+        assert_int_equal(unlink(others[i]), 0);
+    }
+    scenarios_untouched();
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_write_may_fail),
+        cmocka_unit_test(short_and_interrupted_writes_are_gone_on_with),
+        cmocka_unit_test(a_kill_at_every_write_leaves_the_old_file_and_the_next_run_tidies_up),
+        cmocka_unit_test(what_a_process_still_writes_and_other_files_stay),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

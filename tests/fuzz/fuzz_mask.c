@@ -1,0 +1,84 @@
+/* Pixels of masks and heightfields, whatever their numbers: the input is width, threshold and the pixels'
+ * bits. The image is written and read by the public calls; the outline that is made of it is one of an area.
+ */
+#include "fuzz.h"
+
+#include <vdbshade/heights.h>
+#include <vdbshade/image.h>
+#include <vdbshade/outline.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST = 24, LEVELS = 4 };
+
+static void check_outline(const vsh_outline *outline) {
+    vsh_outline_info info;
+    vsh_outline_get_info(outline, &info);
+    const double inside[2] = {0.5 * (info.bounds_min[0] + info.bounds_max[0]),
+                              0.5 * (info.bounds_min[1] + info.bounds_max[1])};
+    if (info.contours == 0 || !(info.area > 0.0) || !isfinite(vsh_outline_distance(outline, inside))) {
+        abort();
+    }
+    for (size_t i = 0; i < info.contours; ++i) {
+        size_t count;
+        if (vsh_outline_contour(outline, i, &count) == NULL || count < 3) {
+            abort();
+        }
+    }
+}
+
+static void make_outline(const char *path, const vsh_mask_options *options, const vsh_run *run) {
+    vsh_error error;
+    vsh_outline *outline;
+    const vsh_result result = vsh_outline_from_image(path, options, run, &outline, fuzz_error(&error));
+    fuzz_ended(result, &error, outline);
+    if (result == VSH_OK) {
+        check_outline(outline);
+        vsh_grid_options grid_options = vsh_grid_options_default();
+        grid_options.resolution = 8;
+        vsh_grid *grid;
+        fuzz_ended(vsh_grid_from_outline(outline, 0.5, NULL, &grid_options, run, &grid, fuzz_error(&error)),
+                   &error, grid);
+        vsh_grid_free(grid);
+    }
+    vsh_outline_free(outline);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    fuzz_input input = {data, size};
+    const int width = 1 + fuzz_byte(&input) % MOST;
+    const int kind = fuzz_byte(&input);
+    vsh_mask_options options = vsh_mask_options_default();
+    options.invert = kind >> 1 & 1;
+    if (kind >> 2 & 1) {
+        fuzz_fill(&input, &options.threshold, sizeof options.threshold);
+    }
+    float pixels[MOST * MOST] = {0};
+    int count = 0;
+    while (input.left > 0 && count < MOST * width) {
+        if (kind & 1) {
+            fuzz_fill(&input, &pixels[count++], sizeof pixels[0]);
+        } else { /* few levels, so that equal and opposite neighbours are common */
+            pixels[count++] = (float)(fuzz_byte(&input) % (LEVELS + 1)) / LEVELS;
+        }
+    }
+    const int height = count / width > 0 ? count / width : 1;
+    static const char *const name = "Y";
+    const float *plane = pixels;
+    const vsh_image image = {width, height, 1, &name, &plane};
+    const char *path = fuzz_file("a.exr", "", 0);
+    vsh_error error;
+    if (vsh_image_write(path, &image, NULL, fuzz_error(&error)) != VSH_OK) {
+        abort();
+    }
+    const vsh_run run = fuzz_run();
+    make_outline(path, &options, &run);
+    const vsh_heights_source source = {
+        .name = path, .columns = width, .rows = height, .values = pixels, .size = {1.0, 1.0}, .height = 1.0};
+    vsh_heights *heights;
+    fuzz_ended(vsh_heights_create(&source, &run, &heights, fuzz_error(&error)), &error, heights);
+    vsh_heights_free(heights);
+    return 0;
+}

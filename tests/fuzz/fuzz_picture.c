@@ -1,0 +1,18 @@
+/* Images that OpenImageIO reads; the first byte chooses the format. */
+#include "fuzz.h"
+
+#include <vdbshade/image.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    static const char *const names[] = {"a.tif", "a.jpg", "a.tga", "a.bmp", "a.hdr", "a.ppm",
+                                        "a.dpx", "a.sgi", "a.rla", "a.ico", "a.gif", "a.psd"};
+    if (size == 0) {
+        return 0;
+    }
+    const char *path = fuzz_file(names[data[0] % (sizeof names / sizeof names[0])], data + 1, size - 1);
+    vsh_error error;
+    vsh_image_file *file;
+    fuzz_ended(vsh_image_read(path, &file, fuzz_error(&error)), &error, file);
+    vsh_image_free(file);
+    return 0;
+}

@@ -1,0 +1,81 @@
+/* Point files of every format: read in small batches, kept or not, and written with answers beside them, as
+ * the query command does. The first byte chooses formats and how. What is written in full must be read again
+ * without a bad row more. */
+#include "fuzz.h"
+
+#include "../../src/cli/message.h"
+#include "../../src/cli/points.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { ROWS = 7, MOST_KEPT = 256 };
+
+static int copy(cli_points_reader *reader, int32_t format, bool answers_only, const char *to) {
+    const bool keep = !answers_only && format == reader->format && cli_points_can_keep(reader);
+    float values[2 * ROWS] = {1.0f, 0.5f, 1e-30f};
+    const cli_points_column columns[] = {{"shadow.fuzz", values, 2}, {"fuzz", values + 1, 2}};
+    cli_points points = {0};
+    cli_points_writer writer = {0};
+    int code = cli_points_create(ROWS, reader->has_normals, keep, &points);
+    code =
+        code == CLI_OK ? cli_points_writer_open(to, format, answers_only, reader, columns, 2, &writer) : code;
+    while (code == CLI_OK) {
+        code = cli_points_read(reader, MOST_KEPT, &points);
+        if (code != CLI_OK || points.count == 0) {
+            break;
+        }
+        code = cli_points_write(&writer, &points);
+    }
+    code = code == CLI_OK ? cli_points_writer_commit(&writer, reader) : code;
+    cli_points_writer_free(&writer);
+    cli_points_free(&points);
+    return code;
+}
+
+static void read_back(const char *path, int32_t format, const cli_points_reader *written) {
+    fuzz_run(); /* the time begins anew */
+    cli_points_reader reader;
+    cli_points points = {0};
+    int code = cli_points_open(path, format, -1, false, &reader);
+    code = code == CLI_OK ? cli_points_create(ROWS, reader.has_normals, false, &points) : code;
+    while (code == CLI_OK) {
+        code = cli_points_read(&reader, MOST_KEPT, &points);
+        if (points.count == 0) {
+            break;
+        }
+    }
+    if (code != CLI_INTERRUPTED &&
+        (code != CLI_OK || reader.rows != written->rows || reader.bad > written->bad)) {
+        fprintf(stderr, "fuzz: written %d rows, %d bad; read %d, %d bad; code %d\n", (int)written->rows,
+                (int)written->bad, (int)reader.rows, (int)reader.bad, code);
+        abort();
+    }
+    cli_points_free(&points);
+    cli_points_close(&reader);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    if (size == 0) {
+        return 0;
+    }
+    fuzz_run(); /* the time begins */
+    const int32_t from = data[0] % 3, to = data[0] / 3 % 3;
+    const int normals = data[0] / 9 % 3 - 1;
+    const bool strict = data[0] / 27 % 2 != 0, answers_only = data[0] / 54 % 2 != 0;
+    char output[512];
+    snprintf(output, sizeof output, "%s/out", fuzz_folder());
+    cli_points_reader reader;
+    int code = cli_points_open(fuzz_file("in", data + 1, size - 1), from, normals, strict, &reader);
+    code = code == CLI_OK ? copy(&reader, to, answers_only, output) : code;
+    if (code != CLI_OK && code != CLI_USAGE && code != CLI_FILE && code != CLI_LIMIT &&
+        code != CLI_INTERRUPTED) {
+        abort();
+    }
+    if (code == CLI_OK && !answers_only && from != to && to != CLI_POINTS_RAW) {
+        read_back(output, to, &reader);
+    }
+    cli_points_close(&reader);
+    return 0;
+}

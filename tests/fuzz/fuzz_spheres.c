@@ -1,0 +1,22 @@
+/* Files of spheres, and what is made of them. */
+#include "fuzz.h"
+
+#include <vdbshade/spheres.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    const char *path = fuzz_file("a.csv", data, size);
+    const vsh_run run = fuzz_run();
+    vsh_error error;
+    double *list;
+    size_t count;
+    const vsh_result result = vsh_spheres_read(path, &run, &list, &count, fuzz_error(&error));
+    fuzz_ended(result, &error, list);
+    if (result == VSH_OK) {
+        vsh_spheres *spheres;
+        fuzz_ended(vsh_spheres_create(list, count, NULL, &run, &spheres, fuzz_error(&error)), &error,
+                   spheres);
+        vsh_spheres_free(spheres);
+    }
+    vsh_spheres_list_free(list);
+    return 0;
+}

@@ -1,0 +1,21 @@
+/* Signals of the command line, for targets: an interrupt comes when the time of an input is over, and no
+ * thread waits for one. */
+#include "../../src/cli/signals.h"
+
+#include "fuzz.h"
+
+void cli_signals_begin(void) {}
+
+bool cli_interrupted(void) {
+    return fuzz_is_late() != 0;
+}
+
+void cli_signals_tell(void) {}
+
+void cli_signals_watch(void) {}
+
+void cli_signals_writing(const char *path) {
+    (void)path;
+}
+
+void cli_signals_end(void) {}
