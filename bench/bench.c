@@ -3,6 +3,7 @@
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 void bench_header(FILE *csv) {
     fprintf(csv, "scene,what,us_per_texel,samples_per_texel,embree_rays,rmse,penumbra_rmse,bias,p99,max\n");
@@ -93,13 +94,15 @@ static table tables[] = {{"", bench_header, NULL},
                          {"-ratios", ratio_header, NULL},
                          {"-scaling", bench_scaling_header, NULL},
                          {"-features", bench_features_header, NULL},
-                         {"-terrain", bench_header, NULL}};
+                         {"-terrain", bench_header, NULL},
+                         {"-read", bench_read_header, NULL}};
 
 static table *table_of(const char *part) {
     static const struct {
         const char *part, *suffix;
     } others[] = {{"intersector", "-ratios"}, {"nanovdb", "-ratios"},    {"cores", "-ratios"},
-                  {"scaling", "-scaling"},    {"features", "-features"}, {"terrain", "-terrain"}};
+                  {"scaling", "-scaling"},    {"features", "-features"}, {"terrain", "-terrain"},
+                  {"read", "-read"}};
     const char *suffix = "";
     for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i) {
         suffix = strcmp(part, others[i].part) == 0 ? others[i].suffix : suffix;
@@ -132,6 +135,10 @@ static FILE *begin_table(table *t, const char *path) {
 }
 
 int main(int argc, char **argv) {
+    const int served = vsh_reader_serve(argc, argv);
+    if (served >= 0) {
+        _exit(served);
+    }
     const char *path = argc > 1 ? argv[1] : NULL;
     const char *only = argc > 2 ? argv[2] : NULL; /* one of the parts */
     if (argc == 3 && strcmp(argv[1], BENCH_FEATURE) == 0) {
@@ -153,7 +160,8 @@ int main(int argc, char **argv) {
                  {"cores", bench_all_cores},
                  {"scaling", bench_scaling},
                  {"features", bench_features},
-                 {"terrain", bench_terrain}};
+                 {"terrain", bench_terrain},
+                 {"read", bench_read}};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
         if (only == NULL || strcmp(only, parts[i].name) == 0) {
             parts[i].run(begin_table(table_of(parts[i].name), path));

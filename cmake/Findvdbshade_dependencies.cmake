@@ -5,6 +5,7 @@ find_package(TBB REQUIRED CONFIG)
 find_package(OpenEXR 3.1 REQUIRED CONFIG)
 find_package(PkgConfig REQUIRED)
 find_package(Freetype REQUIRED)
+find_package(ZLIB REQUIRED)
 
 function(vsh_find name header library)
   find_path(VSH_${name}_INCLUDE ${header})
@@ -23,6 +24,7 @@ vsh_find(openimageio_util OpenImageIO/filesystem.h OpenImageIO_Util)
 vsh_find(png png.h png)
 vsh_find(assimp assimp/cimport.h assimp)
 vsh_find(jansson jansson.h jansson)
+vsh_find(seccomp seccomp.h seccomp)
 vsh_find(md sha256.h md)
 vsh_find(sleef sleef.h sleef)
 vsh_find(half Imath/half.h Imath-3_1)
@@ -35,7 +37,8 @@ endif()
 
 find_package_handle_standard_args(vdbshade_dependencies REQUIRED_VARS VSH_openvdb_LIBRARY VSH_openimageio_LIBRARY
                                   VSH_openimageio_util_LIBRARY VSH_png_LIBRARY
-                                  VSH_assimp_LIBRARY VSH_jansson_LIBRARY VSH_half_LIBRARY VSH_md_LIBRARY VSH_sleef_LIBRARY)
+                                  VSH_assimp_LIBRARY VSH_jansson_LIBRARY VSH_seccomp_LIBRARY VSH_half_LIBRARY
+                                  VSH_md_LIBRARY VSH_sleef_LIBRARY)
 
 if(NOT TARGET vsh::openexr)
   set_property(TARGET vsh::openvdb PROPERTY INTERFACE_LINK_LIBRARIES TBB::tbb vsh::half)
@@ -43,8 +46,9 @@ if(NOT TARGET vsh::openexr)
   add_library(vsh::openexr INTERFACE IMPORTED)
   target_link_libraries(vsh::openexr INTERFACE OpenEXR::OpenEXRCore)
   add_library(vsh::dependencies INTERFACE IMPORTED)
-  target_link_libraries(vsh::dependencies INTERFACE vsh::openvdb vsh::openexr vsh::openimageio vsh::assimp
-                                                    vsh::jansson vsh::md vsh::sleef Freetype::Freetype m)
+  target_link_libraries(vsh::dependencies INTERFACE vsh::openvdb vsh::openexr vsh::png vsh::assimp vsh::jansson
+                                                    vsh::md vsh::sleef vsh::seccomp Freetype::Freetype ZLIB::ZLIB
+                                                    ${CMAKE_DL_LIBS} m)
   if(TARGET embree)
     add_library(vsh::embree INTERFACE IMPORTED)
     target_link_libraries(vsh::embree INTERFACE embree)

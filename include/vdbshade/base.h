@@ -15,6 +15,11 @@
  *   more than this library knows.
  * - Calls compute in the default floating-point environment (round to nearest, denormals kept, no traps),
  *   whatever the caller has set, which is given back. Callbacks are called in the default one.
+ * - Files that somebody else made: the libraries that parse .vdb files, meshes, images and fonts can crash on
+ *   damaged ones. With vsh_run.reader they run in a child process, confined, that hands over plain arrays;
+ *   everything in these is checked, and a crash, a hang or hunger there is an error here (reader.h). The
+ *   child comes by posix_spawn(), which runs nothing of this process between fork and exec, so it is safe in
+ *   a host with threads, handlers and locks. Calls without a reader are for files that are trusted.
  * - VSH_ERROR_MEMORY (the system refused memory) and VSH_ERROR_INTERNAL can come from every call that returns
  *   a vsh_result, VSH_ERROR_CANCELLED from every one that takes a run; the rest is listed at each call. */
 #ifndef VDBSHADE_BASE_H
@@ -72,10 +77,10 @@ typedef struct vsh_attribute {
 } vsh_attribute;
 
 /* Told the stage ("load", "outline", "voxelize", "field", "charts", "texels", "validate", "shadow.NAME",
- * "ao", "padding", "volume", "flat", "hash") and the fraction of it that is done, 0 … 1, never falling within
- * a stage. Called by one thread at a time, from any of the pool's threads. Return 0 to go on; anything else
- * cancels: the call frees what it took and returns VSH_ERROR_CANCELLED. At 1 a stage's work may be done, and
- * what is returned be left alone: who wants to cancel says so at every call from then on. */
+ * "ao", "padding", "volume", "flat", "hash", "compare") and the fraction of it that is done, 0 … 1, never
+ * falling within a stage. Called by one thread at a time, from any of the pool's threads. Return 0 to go on;
+ * anything else cancels: the call frees what it took and returns VSH_ERROR_CANCELLED. At 1 a stage's work may
+ * be done, and what is returned be left alone: who wants to cancel says so at every call from then on. */
 typedef int32_t vsh_progress_fn(void *user, const char *stage, double fraction);
 
 /* Bad things that were worked around: one line each, without a newline ("mesh 'sail': 4 open edges: …"). Same
@@ -109,10 +114,15 @@ typedef struct vsh_run {
     void *user;                /* handed to both */
     int32_t isa; /* VSH_ISA_…, to test one; VSH_ERROR_ARGUMENT where this machine lacks it. No result depends
                     on it */
+    const char *reader; /* program that parses files, found as by execvp(); its main calls vsh_reader_serve()
+                           (reader.h), as vdbshade's own does. NULL: files are parsed in this process, where a
+                           damaged one can crash it. No result depends on it */
+    double reader_seconds; /* that the reader may take for one file, by the clock, > 0; else VSH_ERROR_LIMIT.
+                              0: 60, and one more for each MB of the file */
 } vsh_run;
 
 static inline vsh_run vsh_run_default(void) {
-    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST};
+    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST, NULL, 0.0};
     return run;
 }
 

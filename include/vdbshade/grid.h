@@ -76,8 +76,8 @@ VSH_API vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_g
 /* Reads level set `name` of a .vdb file; NULL: the first grid of class level set. Translated, rotated,
  * mirrored and uniformly scaled transforms are kept, with voxels of 1e-5 … 1e12 world units. Where the
  * values are no distances, or the band is narrower than 3 voxels, distances are made anew from the zero
- * surface, with a warning. OpenVDB's reader can crash on damaged files: files from strangers are to be read
- * in a process of their own first. Errors:
+ * surface, with a warning; one is given, too, where values show damage. OpenVDB's reader can crash on damaged
+ * files: those from strangers are for run->reader (base.h). Errors:
  * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_READ: no such file, no permission, no .vdb file, cut short, of a newer format, damaged;
  * - VSH_ERROR_INPUT: no grids, none of that name, or, with the reason, a grid that is no level set of

@@ -33,7 +33,7 @@ static inline vsh_mask_options vsh_mask_options_default(void) {
  * row on top. Its border runs where values interpolated between the pixels' centres cross the threshold
  * (marching squares: Lorensen and Cline, 1987, in the plane), so that the edges of anti-aliased masks are
  * found to 0.09 pixels; an area that reaches the image's edge ends there. Values are taken as they are
- * stored, without a transfer curve. OpenImageIO's readers can crash on damaged files, see vsh_image_read().
+ * stored, without a transfer curve. Files from strangers are for run->reader (base.h).
  * Errors:
  * - VSH_ERROR_ARGUMENT: path or outline NULL, options out of range, run;
  * - VSH_ERROR_INPUT: no channel of that name, a pixel that is not finite, nothing solid; as vsh_image_read();

@@ -11,6 +11,7 @@
 
 #include "bake.h"
 #include "base.h"
+#include "compare.h"
 #include "field.h"
 #include "flat.h"
 #include "grid.h"
@@ -22,6 +23,7 @@
 #include "outline.h"
 #include "provenance.h"
 #include "query.h"
+#include "reader.h"
 #include "render.h"
 #include "scene.h"
 #include "sdf.h"

@@ -35,8 +35,8 @@ VSH_API vsh_result vsh_voxels_from_box(const double box_min[3], const double box
                                        const vsh_run *run, vsh_voxels **voxels, vsh_error *error);
 
 /* The active voxels of a grid of numbers (or a mask) in a .vdb file, those of active tiles too, on its own
- * lattice, whatever its transform. `name` NULL: the file's first such grid. Files from strangers are to be
- * read in a process of their own first, see vsh_grid_read(). Errors:
+ * lattice, whatever its transform. `name` NULL: the file's first such grid. Files from strangers are
+ * for run->reader (base.h). Errors:
  * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_READ: as vsh_grid_read();
  * - VSH_ERROR_INPUT: no grids, none of that name, one that holds no numbers (vectors, points, text), has no
@@ -163,6 +163,21 @@ VSH_API vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, 
 VSH_API vsh_result vsh_volume_write_with(const vsh_volume *volume, const char *path, int32_t half,
                                          const vsh_attribute *attributes, size_t attribute_count,
                                          vsh_error *error);
+
+/* --- what is in a file */
+
+/* A dense copy of a grid of numbers (or a mask) of a .vdb file: the values of size[0] × size[1] × size[2]
+ * voxels from `index_min` on into values, x fastest; the background where they are not active. And 1 for the
+ * active ones, 0 for the others, into active, in the same order. Either may be NULL. `name` as of
+ * vsh_voxels_from_vdb(); vsh_vdb_list() tells names and the box of the active voxels. Errors:
+ * - VSH_ERROR_ARGUMENT: a size below 1, indices beyond 32 bits, more than 2^31 - 1 voxels, run;
+ * - VSH_ERROR_READ: as vsh_grid_read();
+ * - VSH_ERROR_INPUT: no grids, none of that name, one that holds no numbers;
+ * - VSH_ERROR_LIMIT: the grid passes run->memory_limit or the machine's memory;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_vdb_copy(const char *path, const char *name, const int32_t index_min[3],
+                                const int32_t size[3], const vsh_run *run, float *values, float *active,
+                                vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -40,10 +40,14 @@ vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...)
     if (written < 0) {
         error->message[0] = '\0';
     }
-    for (char *c = error->message; *c != '\0'; ++c) {
-        if ((unsigned char)*c < 0x20 || *c == 0x7f) {
-            *c = '?';
+    vshi_one_line(error->message);
+    return code;
+}
+
+void vshi_one_line(char *text) {
+    for (; *text != '\0'; ++text) {
+        if ((unsigned char)*text < 0x20 || *text == 0x7f) {
+            *text = '?';
         }
     }
-    return code;
 }

@@ -13,6 +13,9 @@ extern "C" {
 vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
+/* Control characters become '?'. */
+void vshi_one_line(char *text);
+
 #ifdef __cplusplus
 }
 #endif

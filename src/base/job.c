@@ -98,6 +98,10 @@ vsh_result vshi_run_resolve(const vsh_run *run, vsh_run *full, vsh_error *error)
     if (full->threads < 0 || full->threads > 1024) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "threads %d: expected 0 … 1024", full->threads);
     }
+    if (!(full->reader_seconds >= 0.0 && full->reader_seconds <= 1e9)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "reader_seconds %g: expected more than 0, at most 1e9, or 0", full->reader_seconds);
+    }
     return vshi_isa_check(full->isa, error);
 }
 
@@ -110,5 +114,6 @@ void vshi_warn(const vsh_run *run, const char *format, ...) {
     va_start(arguments, format);
     vsnprintf(line.message, sizeof line.message, format, arguments);
     va_end(arguments);
+    vshi_one_line(line.message);
     run->warning(run->user, line.message);
 }

@@ -63,6 +63,18 @@ static bool wants_normals(const char *path) {
     return dot == NULL || (strcmp(dot, ".stl") != 0 && strcmp(dot, ".STL") != 0);
 }
 
+static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job, vsh_model **model,
+                            vsh_error *error) {
+    vshi_import *import = NULL;
+    vsh_result result = vshi_model_file_read(path, run, job, &import, error);
+    if (result == VSH_OK) {
+        const vshi_model_source source = {path, run, job, vshi_import_scene(import), wants_normals(path)};
+        result = vshi_model_build(&source, model, error);
+    }
+    vshi_import_free(import);
+    return result;
+}
+
 vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error) {
     VSHI_FLOATS;
     enum { BUILD_UNITS = 100 };
@@ -80,13 +92,9 @@ vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **mode
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
     }
-    vshi_import *import = NULL;
-    result = vshi_model_file_read(path, &full, job, &import, error);
-    if (result == VSH_OK) {
-        const vshi_model_source source = {path, &full, job, vshi_import_scene(import), wants_normals(path)};
-        result = vshi_model_build(&source, model, error);
-    }
-    vshi_import_free(import);
+    result = full.reader != NULL
+                 ? vshi_model_from_reader(path, &full, job, VSHI_MODEL_FILE_UNITS, model, error)
+                 : read_here(path, &full, job, model, error);
     if (result == VSH_OK && vshi_job_advance(job, BUILD_UNITS)) {
         vsh_model_free(*model);
         *model = NULL;

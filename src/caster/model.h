@@ -44,4 +44,8 @@ typedef struct vshi_model_source {
 /* Builds the model of a scene that vshi_model_file_read() has passed. */
 vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **model, vsh_error *error);
 
+/* Has run->reader read the file, for `units` of the job. Errors: as vsh_model_read() with a reader. */
+vsh_result vshi_model_from_reader(const char *path, const vsh_run *run, vshi_job *job, size_t units,
+                                  vsh_model **model, vsh_error *error);
+
 #endif

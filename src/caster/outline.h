@@ -11,6 +11,10 @@
 
 #include <vdbshade/outline.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 typedef struct vshi_point {
     double x, y;
 } vshi_point;
@@ -73,9 +77,19 @@ void vshi_contours_close(vshi_contours *contours);
  * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 vsh_result vshi_contours_finish(vshi_contours *contours, bool clean, const char *what, vsh_outline **outline);
 
+/* Draws a text (checked before) with a font, in this process or in run->reader. Errors: as
+ * vsh_outline_from_text(); vshi_contours_free() also then. */
+vsh_result vshi_contours_draw(const char *text, const char *path, const vsh_text_options *options,
+                              const vsh_run *run, vshi_contours *contours, vsh_error *error);
+vsh_result vshi_contours_from_reader(const char *text, const char *path, const vsh_text_options *options,
+                                     const vsh_run *run, vshi_contours *contours, vsh_error *error);
+
 /* Cuts contours where they cross and keeps what has the area on one side only, area to the left, into
  * `result`. `outline` holds them, with its tree. False where rounding leaves ends that fit nothing: contours
  * that touch along lines that are nearly the same; `result` is then of no use. */
 bool vshi_outline_resolve(const vsh_outline *outline, vshi_contours *result);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -242,8 +242,8 @@ static vsh_result check_options(const vsh_text_options *options, vsh_error *erro
     return VSH_OK;
 }
 
-static vsh_result draw(const char *text, const char *path, const vsh_text_options *options,
-                       const vsh_run *run, vshi_contours *contours, vsh_error *error) {
+vsh_result vshi_contours_draw(const char *text, const char *path, const vsh_text_options *options,
+                              const vsh_run *run, vshi_contours *contours, vsh_error *error) {
     layout l = {.path = path, .scale = options->height, .contours = contours};
     vsh_result result = vshi_font_open(path, &l.font, error);
     if (result != VSH_OK) {
@@ -283,7 +283,9 @@ vsh_result vsh_outline_from_text(const char *text, const char *font, const vsh_t
         return result;
     }
     vshi_contours contours = {.run = &full_run, .error = error};
-    result = draw(text, font, &full, &full_run, &contours, error);
+    result = full_run.reader != NULL
+                 ? vshi_contours_from_reader(text, font, &full, &full_run, &contours, error)
+                 : vshi_contours_draw(text, font, &full, &full_run, &contours, error);
     if (result != VSH_OK) {
         vshi_contours_free(&contours);
         return result;

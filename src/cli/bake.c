@@ -10,7 +10,6 @@
 #include "resume.h"
 #include "signals.h"
 #include "temporary.h"
-#include "trial.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -30,10 +29,9 @@ typedef struct bake_work {
     cli_stats stats;
 } bake_work;
 
-/* What can be refused before anything is read, and before there are threads. */
+/* What can be refused before anything is read. */
 static int check_files(const cli_bake_settings *settings, const vsh_scene *scene) {
     int code = settings->stats != NULL ? cli_temporary_check(settings->stats) : CLI_OK;
-    code = code == CLI_OK ? cli_trial_casters(scene, settings->common.memory_limit) : code;
     for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
         code = cli_receiver_check(scene, i);
     }

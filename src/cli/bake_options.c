@@ -20,7 +20,8 @@ enum {
     KEY_PACK,
     KEY_STATS,
     KEY_DRY_RUN,
-    KEY_RESUME
+    KEY_RESUME,
+    KEY_OUTPUT_FOLDER
 };
 
 static const cli_option options[] = {
@@ -30,6 +31,8 @@ static const cli_option options[] = {
      ".png .tif .dpx .sgi .jp2 .tga .bmp .ico .iff .rla\n"
      ".hdr .ppm .pgm .jpg .webp .heic .avif .gif; what each\n"
      "can hold, and what is not written: docs/formats.md"},
+    {KEY_OUTPUT_FOLDER, "output-folder", "FOLDER",
+     "write there what a scene's file says is written, under\nthe same names"},
     {KEY_SIZE, "size", "W[xH]", "texels of the lightmap, 1 to 65536 (1024)"},
     {KEY_BITS, "bits", "N",
      "8, 16 or 32 bits a channel (32 for EXR, else 16\nwhere the format has it, else 8)"},
@@ -176,6 +179,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
     switch (key) {
     case 'o':
         s->output = value;
+        return CLI_OK;
+    case KEY_OUTPUT_FOLDER:
+        s->output_folder = value;
         return CLI_OK;
     case KEY_STATS:
         s->stats = value;

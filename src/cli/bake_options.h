@@ -65,6 +65,7 @@ enum {
 typedef struct cli_bake_settings {
     const char *input;
     const char *output;
+    const char *output_folder; /* for the outputs of a scene, by their names; NULL: where it says */
     const char *stats;
     cli_common common;
     cli_grid_settings grid;
@@ -107,6 +108,7 @@ typedef struct cli_bake_scene {
     vsh_scene *read; /* the scene file's; NULL for a mesh */
     vsh_caster *casters;
     vsh_receiver *receivers;
+    char **outputs; /* [receiver_count], where they are not the scene's own; NULL: none is */
     vsh_light sun;
 } cli_bake_scene;
 

@@ -67,6 +67,26 @@ static void override_receiver(const cli_bake_settings *s, vsh_receiver *receiver
     }
 }
 
+/* The scene's outputs, by their names, in a folder of the user's. */
+static int move_outputs(const char *folder, cli_bake_scene *made) {
+    made->outputs = calloc(made->scene.receiver_count, sizeof *made->outputs);
+    if (made->outputs == NULL) {
+        return cli_out_of_memory("outputs");
+    }
+    for (size_t i = 0; i < made->scene.receiver_count; ++i) {
+        const char *path = made->receivers[i].output, *slash = strrchr(path, '/');
+        const char *name = slash != NULL ? slash + 1 : path;
+        const size_t size = strlen(folder) + strlen(name) + 2;
+        made->outputs[i] = malloc(size);
+        if (made->outputs[i] == NULL) {
+            return cli_out_of_memory("outputs");
+        }
+        snprintf(made->outputs[i], size, "%s/%s", folder, name);
+        made->receivers[i].output = made->outputs[i];
+    }
+    return CLI_OK;
+}
+
 int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     const size_t count = made->read != NULL ? made->read->receiver_count : 1;
     if (count == 0) {
@@ -100,6 +120,10 @@ int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
 
 static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     const size_t given = made->read != NULL ? made->read->receiver_count : 1;
+    if (s->output_folder != NULL && (s->output != NULL || made->read == NULL)) {
+        return cli_usage("--output-folder '%s': %s", s->output_folder,
+                         s->output != NULL ? "there is also -o" : "for the outputs that a scene names");
+    }
     if (given > 1 && s->output != NULL) {
         return cli_usage("-o '%s': %s has %zu receivers, each with its own output", s->output, s->input,
                          given);
@@ -116,7 +140,7 @@ static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
             return cli_usage("%s: no output; give -o OUT", s->input);
         }
     }
-    return code;
+    return code == CLI_OK && s->output_folder != NULL ? move_outputs(s->output_folder, made) : code;
 }
 
 static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
@@ -320,6 +344,10 @@ int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made)
 }
 
 void cli_bake_scene_free(cli_bake_scene *made) {
+    for (size_t i = 0; made->outputs != NULL && i < made->scene.receiver_count; ++i) {
+        free(made->outputs[i]);
+    }
+    free(made->outputs);
     free(made->receivers);
     free(made->casters);
     vsh_scene_free(made->read);

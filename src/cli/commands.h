@@ -12,6 +12,8 @@ extern const cli_command cli_query;
 extern const cli_command cli_render;
 extern const cli_command cli_volume;
 extern const cli_command cli_flat;
+extern const cli_command cli_compare;
+extern const cli_command cli_regress;
 
 int cli_bake_main(int argc, char **argv);
 int cli_render_main(int argc, char **argv);

@@ -2,6 +2,7 @@
 #include "message.h"
 #include "options.h"
 #include "progress.h"
+#include "self.h"
 
 #include <stdio.h>
 #include <sys/resource.h>
@@ -34,7 +35,7 @@ static uint64_t machine_memory(void) {
 }
 
 cli_common cli_common_default(void) {
-    return (cli_common){0, machine_memory() / 4 * 3, false, false, VSH_ISA_BEST};
+    return (cli_common){0, machine_memory() / 4 * 3, false, false, VSH_ISA_BEST, false};
 }
 
 vsh_run cli_common_run(const cli_common *common) {
@@ -42,6 +43,7 @@ vsh_run cli_common_run(const cli_common *common) {
     run.threads = common->threads;
     run.memory_limit = common->memory_limit;
     run.isa = common->isa;
+    run.reader = common->trusted ? NULL : cli_reader();
     run.progress = cli_progress_report;
     run.warning = cli_progress_warning;
     return run;
@@ -56,6 +58,9 @@ int cli_common_take(cli_common *common, int key, const char *name, const char *v
         return cli_take_bytes(name, value, &common->memory_limit);
     case CLI_KEY_ISA:
         return cli_take_name(name, value, vsh_isa, vsh_isa_name, &common->isa);
+    case CLI_KEY_TRUSTED:
+        common->trusted = true;
+        return CLI_OK;
     case CLI_KEY_QUIET:
         common->quiet = true;
         return CLI_OK;

@@ -8,7 +8,6 @@
 #include "signals.h"
 #include "stats.h"
 #include "temporary.h"
-#include "trial.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -186,7 +185,7 @@ static int check_output(const flat_settings *s, const vsh_flat_scene *scene, con
     return CLI_OK;
 }
 
-/* What can be refused before anything is read, and before there are threads. */
+/* What can be refused before anything is read. */
 static int check_files(const flat_settings *s, const vsh_flat_scene *scene, const vsh_image *image,
                        const vsh_image_options *options_of_image) {
     int code = check_output(s, scene, scene->output);
@@ -200,7 +199,7 @@ static int check_files(const flat_settings *s, const vsh_flat_scene *scene, cons
     if (code == CLI_OK && vsh_image_check(scene->output, image, options_of_image, &error) != VSH_OK) {
         code = cli_fail(&error);
     }
-    return code == CLI_OK ? cli_trial_flat(scene, s->common.memory_limit) : code;
+    return code;
 }
 
 /* Inputs are the scene's file and those that it names. */

@@ -5,12 +5,11 @@
 #include "message.h"
 #include "paths.h"
 #include "progress.h"
-#include "trial.h"
-
-#include <stdio.h>
+#include "signals.h"
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Options"},
+    CLI_TRUSTED_OPTION,
     {'h', "help", NULL, "show this help"},
 };
 
@@ -28,43 +27,39 @@ const cli_command cli_info = {
     info_main};
 
 static int take(void *settings, int key, const char *name, const char *value) {
-    (void)settings;
-    (void)key;
-    (void)value;
-    return cli_usage("%s: no such option", name);
+    bool taken;
+    const int code = cli_common_take(settings, key, name, value, &taken);
+    return taken ? code : cli_usage("%s: no such option", name);
 }
 
-static int print_info(void *user) {
+static int print_info(const char *path, const vsh_run *run) {
     static const char *const image_endings[] = {
         "exr", "png", "tif", "tiff", "jpg", "jpeg", "hdr", "tga", "bmp", "webp", "dpx",  "psd",  "pgm",
         "ppm", "pnm", "pfm", "gif",  "jp2", "j2k",  "sgi", "rgb", "rla", "ico",  "heic", "heif", "avif"};
-    const char *path = user;
     if (cli_has_ending(path, "vdb")) {
-        return cli_info_vdb(path);
+        return cli_info_vdb(path, run);
     }
     if (cli_has_ending(path, "json")) {
         return cli_info_scene(path);
     }
     for (size_t i = 0; i < sizeof image_endings / sizeof image_endings[0]; ++i) {
         if (cli_has_ending(path, image_endings[i])) {
-            return cli_info_image(path);
+            return cli_info_image(path, run);
         }
     }
-    return cli_info_mesh(path);
+    return cli_info_mesh(path, run);
 }
 
-/* Everything is read in a child: a file that is looked at is a file that is not trusted yet. */
 static int info_main(int argc, char **argv) {
+    cli_common common = cli_common_default();
     const char *path = NULL;
     bool help;
-    const int code = cli_parse(&cli_info, argc, argv, take, NULL, "FILE", &path, &help);
+    const int code = cli_parse(&cli_info, argc, argv, take, &common, "FILE", &path, &help);
     if (code != CLI_OK || help) {
         return code;
     }
     cli_progress_begin(false, true);
-    char copy[4096];
-    if (snprintf(copy, sizeof copy, "%s", path) >= (int)sizeof copy) {
-        return cli_usage("%.64s…: the name is too long", path);
-    }
-    return cli_isolated(path, cli_common_default().memory_limit, print_info, copy);
+    cli_signals_watch();
+    const vsh_run run = cli_common_run(&common);
+    return print_info(path, &run);
 }

@@ -3,9 +3,11 @@
 #ifndef CLI_INFO_H
 #define CLI_INFO_H
 
-int cli_info_mesh(const char *path);
-int cli_info_vdb(const char *path);
+#include <vdbshade/base.h>
+
+int cli_info_mesh(const char *path, const vsh_run *run);
+int cli_info_vdb(const char *path, const vsh_run *run);
 int cli_info_scene(const char *path);
-int cli_info_image(const char *path);
+int cli_info_image(const char *path, const vsh_run *run);
 
 #endif

@@ -78,11 +78,10 @@ static int print_uvs(const vsh_mesh *meshes, size_t count) {
     return CLI_OK;
 }
 
-int cli_info_mesh(const char *path) {
+int cli_info_mesh(const char *path, const vsh_run *run) {
     vsh_model *model = NULL;
     vsh_error error;
-    const vsh_run run = vsh_run_default();
-    if (vsh_model_read(path, &run, &model, &error) != VSH_OK) {
+    if (vsh_model_read(path, run, &model, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     const size_t count = vsh_model_mesh_count(model);

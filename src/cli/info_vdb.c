@@ -36,17 +36,15 @@ static void print_grid(const vsh_vdb_entry *grid) {
     }
 }
 
-int cli_info_vdb(const char *path) {
+int cli_info_vdb(const char *path, const vsh_run *run) {
     vsh_vdb_entry *entries = calloc(MAX_LISTED, sizeof *entries);
     if (entries == NULL) {
         cli_say("%s: the system refused memory", path);
         return CLI_LIMIT;
     }
-    vsh_run run = vsh_run_default();
-    run.memory_limit = cli_common_default().memory_limit;
     size_t count = 0;
     vsh_error error;
-    if (vsh_vdb_list(path, &run, entries, MAX_LISTED, &count, &error) != VSH_OK) {
+    if (vsh_vdb_list(path, run, entries, MAX_LISTED, &count, &error) != VSH_OK) {
         free(entries);
         return cli_fail(&error);
     }

@@ -1,14 +1,18 @@
 /* vdbshade: the command line. Which subcommand, and the exit code. */
 #include "commands.h"
 #include "message.h"
+#include "self.h"
 #include "signals.h"
 
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
+#include <vdbshade/reader.h>
 
-static const cli_command *const commands[] = {&cli_bake,  &cli_voxelize, &cli_info, &cli_trade,
-                                              &cli_query, &cli_volume,   &cli_flat, &cli_render};
+static const cli_command *const commands[] = {&cli_bake,    &cli_voxelize, &cli_info, &cli_trade,
+                                              &cli_query,   &cli_volume,   &cli_flat, &cli_render,
+                                              &cli_compare, &cli_regress};
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
 static const char help_text[] =
@@ -24,14 +28,17 @@ static const char help_text[] =
     "  query INPUT -o OUT        shadow, AO, distance at points of a CSV, a PLY or raw floats\n"
     "  render INPUT -o OUT       picture of a scene, or a turntable, to look at a bake\n"
     "  flat SCENE -o OUT         light map of a plane, for 2D games\n"
+    "  compare GOLDEN NEW        whether a bake is like its golden one, and in what it is not\n"
+    "  regress DIR               bakes of a folder's scenes against their golden ones\n"
     "  trade INPUT -o OUT.html   error against time by every method, measured on a scene of yours\n"
     "\n"
     "  vdbshade COMMAND --help   options of a command\n"
     "  vdbshade --version        version\n"
     "\n"
-    "Exit codes: 0 done; 2 bad usage or bad input; 3 a file could not be read or written; 4 a limit\n"
-    "(memory, size) would be passed; 70 a defect of vdbshade; 130 interrupted. Errors are one line on\n"
-    "standard error; a failed or interrupted run leaves the old output as it was.\n";
+    "Exit codes: 0 done; 1 a comparison did not hold; 2 bad usage or bad input; 3 a file could not be\n"
+    "read or written; 4 a limit (memory, size) would be passed; 70 a defect of vdbshade; 130\n"
+    "interrupted. Errors are one line on standard error; a failed or interrupted run leaves the old\n"
+    "output as it was.\n";
 
 static int unknown_command(const char *text) {
     if (text[0] == '-') {
@@ -69,6 +76,11 @@ static int dispatch(int argc, char **argv) {
 }
 
 int main(int argc, char **argv) {
+    const int served = vsh_reader_serve(argc, argv);
+    if (served >= 0) {
+        _exit(served); /* what it holds goes with it */
+    }
+    cli_reader_begin(argv[0]);
     cli_signals_begin();
     int code = dispatch(argc, argv);
     if ((fflush(stdout) != 0 || ferror(stdout)) && code == CLI_OK) {

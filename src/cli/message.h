@@ -6,6 +6,7 @@
 
 enum {
     CLI_OK = 0,
+    CLI_UNLIKE = 1, /* a comparison did not hold */
     CLI_USAGE = 2,
     CLI_FILE = 3,
     CLI_LIMIT = 4,

@@ -157,9 +157,9 @@ static const char *without_folder(const char *path) {
 }
 
 static void append_option(const cli_option *option, const char *value) {
-    static const char *const changes_nothing[] = {"output",    "stats",   "threads",  "memory-limit",
-                                                  "isa",       "quiet",   "progress", "json",
-                                                  "band-rows", "dry-run", "resume",   "help"};
+    static const char *const changes_nothing[] = {
+        "output", "output-folder", "stats", "threads",   "memory-limit", "isa",    "trusted",
+        "quiet",  "progress",      "json",  "band-rows", "dry-run",      "resume", "help"};
     for (size_t i = 0; i < sizeof changes_nothing / sizeof changes_nothing[0]; ++i) {
         if (strcmp(option->name, changes_nothing[i]) == 0) {
             return;
@@ -175,6 +175,11 @@ static void append_option(const cli_option *option, const char *value) {
 
 int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
               const char *what, const char **operand, bool *help) {
+    return cli_parse_operands(command, argc, argv, take, settings, &what, operand, 1, help);
+}
+
+int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
+                       const char *const *what, const char **operands, int count, bool *help) {
     struct option longs[MAX_OPTIONS];
     char shorts[2 * MAX_OPTIONS + 2];
     make_getopt_tables(command, longs, shorts);
@@ -215,14 +220,17 @@ int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *
             return code;
         }
     }
-    if (optind >= argc) {
-        return cli_usage("%s: no %s; see 'vdbshade %s --help'", command->name, what, command->name);
+    for (int i = 0; i < count; ++i) {
+        if (optind + i >= argc) {
+            return cli_usage("%s: no %s; see 'vdbshade %s --help'", command->name, what[i], command->name);
+        }
+        operands[i] = argv[optind + i];
+        append_word(without_folder(operands[i]));
     }
-    if (optind + 1 < argc) {
-        return cli_usage("%s: one %s is taken, not also '%s'", command->name, what, argv[optind + 1]);
+    if (optind + count < argc) {
+        return cli_usage("%s: one %s is taken, not also '%s'", command->name, what[count - 1],
+                         argv[optind + count]);
     }
-    *operand = argv[optind];
-    append_word(without_folder(*operand));
     return CLI_OK;
 }
 

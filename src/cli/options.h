@@ -35,6 +35,10 @@ int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *
  * limits, output, …), and files by their names alone. Belongs to the parser; "" where memory was short. */
 const char *cli_parsed_command(void);
 
+/* The same with `count` operands, one or more. */
+int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
+                       const char *const *what, const char **operands, int count, bool *help);
+
 void cli_print_help(const cli_command *command);
 
 /* The candidate nearest to `text`, or NULL where none is near. */
@@ -63,7 +67,8 @@ typedef struct cli_common {
     uint64_t memory_limit;
     bool quiet;
     bool progress;
-    int32_t isa; /* of commands that shade */
+    int32_t isa;  /* of commands that shade */
+    bool trusted; /* files are parsed in this process */
 } cli_common;
 
 cli_common cli_common_default(void);
@@ -75,11 +80,19 @@ enum {
     CLI_KEY_QUIET,
     CLI_KEY_PROGRESS,
     CLI_KEY_ISA,
+    CLI_KEY_TRUSTED,
     CLI_KEY_RESOLUTION,
     CLI_KEY_VOXEL_SIZE,
     CLI_KEY_HALF_WIDTH,
     CLI_KEY_SHELL_THICKNESS
 };
+
+#define CLI_TRUSTED_OPTION                                                                                   \
+    {                                                                                                        \
+        CLI_KEY_TRUSTED, "trusted", NULL,                                                                    \
+            "parse files in this process, not in a confined one: a\nlittle faster, and a damaged file may "  \
+            "crash it"                                                                                       \
+    }
 
 #define CLI_COMMON_OPTIONS                                                                                   \
     {0, NULL, NULL, "Running"},                                                                              \
@@ -87,6 +100,7 @@ enum {
          "threads, 1 to 1024 (all cores); the result is\nthe same for any number"},                          \
         {CLI_KEY_MEMORY_LIMIT, "memory-limit", "BYTES",                                                      \
          "memory that a step may take; with k, M, G or KiB,\nMiB, GiB; 0: no limit (3/4 of the machine's)"}, \
+        CLI_TRUSTED_OPTION,                                                                                  \
         {CLI_KEY_PROGRESS, "progress", NULL, "show progress even where it is no terminal"},                  \
         {CLI_KEY_QUIET, "quiet", NULL, "say nothing but errors"}, {                                          \
         'h', "help", NULL, "show this help"                                                                  \

@@ -7,7 +7,6 @@
 #include "paths.h"
 #include "progress.h"
 #include "signals.h"
-#include "trial.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -153,7 +152,7 @@ static int check_output(const query_settings *s, const vsh_scene *scene, const c
     return code == CLI_OK ? cli_temporary_check(output) : code;
 }
 
-/* What can be refused before anything is read, and before there are threads. */
+/* What can be refused before anything is read. */
 static int check_files(const query_settings *s, const vsh_scene *scene) {
     const char *output = s->bake.output, *stats = s->bake.stats;
     if (stats != NULL && cli_same_file(output, stats)) {
@@ -161,7 +160,7 @@ static int check_files(const query_settings *s, const vsh_scene *scene) {
     }
     int code = is_standard(output) ? CLI_OK : check_output(s, scene, output);
     code = code == CLI_OK && stats != NULL ? check_output(s, scene, stats) : code;
-    return code == CLI_OK ? cli_trial_casters(scene, s->bake.common.memory_limit) : code;
+    return code;
 }
 
 /* --- the work */

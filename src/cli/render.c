@@ -8,7 +8,6 @@
 #include "progress.h"
 #include "signals.h"
 #include "stats.h"
-#include "trial.h"
 
 #include <inttypes.h>
 #include <limits.h>
@@ -38,7 +37,8 @@ typedef struct render_work {
 static int load(render_work *work) {
     const double start = cli_seconds();
     int code = cli_load_assets(work->scene, &work->run, &work->assets);
-    code = code == CLI_OK ? render_lightmaps_read(work->settings, work->scene, work->assets, &work->lightmaps)
+    code = code == CLI_OK ? render_lightmaps_read(work->settings, work->scene, work->assets, &work->run,
+                                                  &work->lightmaps)
                           : code;
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
     return code;
@@ -221,7 +221,7 @@ static int check_files(const render_settings *s, const vsh_scene *scene) {
         return cli_usage("%s: no lights and no ao; give --sun X,Y,Z or --ao DISTANCE, or both",
                          s->bake.input);
     }
-    return code == CLI_OK ? cli_trial_casters(scene, s->bake.common.memory_limit) : code;
+    return code;
 }
 
 int cli_render_main(int argc, char **argv) {

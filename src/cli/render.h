@@ -62,7 +62,7 @@ typedef struct render_lightmaps {
 /* Reads the lightmaps of the scene's first receivers. CLI_OK or an exit code, having said why; free also
  * after a failure. */
 int render_lightmaps_read(const render_settings *settings, const vsh_scene *scene, const vsh_assets *assets,
-                          render_lightmaps *lightmaps);
+                          const vsh_run *run, render_lightmaps *lightmaps);
 void render_lightmaps_free(render_lightmaps *lightmaps);
 
 /* --- files (render_output.c) */

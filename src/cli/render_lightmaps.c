@@ -51,7 +51,7 @@ static void color_of(const vsh_scene *scene, const char *path, double color[3]) 
 }
 
 int render_lightmaps_read(const render_settings *s, const vsh_scene *scene, const vsh_assets *assets,
-                          render_lightmaps *lightmaps) {
+                          const vsh_run *run, render_lightmaps *lightmaps) {
     *lightmaps = (render_lightmaps){.count = s->lightmap_count};
     if (s->lightmap_count > scene->receiver_count) {
         return cli_usage("--lightmap '%s': %s has %zu receivers", s->lightmaps[scene->receiver_count],
@@ -69,7 +69,7 @@ int render_lightmaps_read(const render_settings *s, const vsh_scene *scene, cons
         render_lightmap *map = &lightmaps->maps[i];
         vsh_lit_meshes *lit = &lightmaps->lit[i];
         vsh_error error;
-        if (vsh_image_read(s->lightmaps[i], &map->file, &error) != VSH_OK) {
+        if (vsh_image_read_run(s->lightmaps[i], run, &map->file, &error) != VSH_OK) {
             return cli_fail(&error);
         }
         map->image = vsh_image_view(map->file);

@@ -1,14 +1,12 @@
 /* A turntable in one page that needs nothing beside it. */
-#include "base64.h"
+#include "document.h"
 #include "message.h"
 #include "render.h"
 #include "signals.h"
 #include "temporary.h"
 
-#include <errno.h>
 #include <limits.h>
 #include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
 struct render_page {
@@ -57,40 +55,15 @@ render_page *render_page_begin(const render_settings *s) {
     return page;
 }
 
-/* A file beside the page, under a name that an interrupted run takes away. */
-static void name_frame(const char *output, char *path, size_t capacity) {
-    const char *slash = strrchr(output, '/');
-    const int folder = slash != NULL ? (int)(slash + 1 - output) : 0;
-    snprintf(path, capacity, "%.*s.%.200s.%ld.tmp" CLI_TEMPORARY_FRAME ".png", folder, output,
-             output + folder, (long)getpid());
-}
-
-static int embed(const char *path, FILE *out) {
-    FILE *file = fopen(path, "rb");
-    if (file == NULL) {
-        cli_say("%s: cannot be read: %s", path, strerror(errno));
-        return CLI_FILE;
-    }
-    cli_base64 to = {.out = out};
-    fputc('"', out);
-    for (int byte; (byte = fgetc(file)) != EOF;) {
-        cli_base64_put(&to, (uint8_t)byte);
-    }
-    cli_base64_end(&to);
-    fputs("\",\n", out);
-    const bool good = !ferror(file);
-    fclose(file);
-    if (!good) {
-        cli_say("%s: cannot be read", path);
-    }
-    return good ? CLI_OK : CLI_FILE;
-}
-
 int render_page_add(render_page *page, const render_picture *picture) {
     char path[PATH_MAX + 64];
-    name_frame(page->settings->bake.output, path, sizeof path);
+    cli_document_part(page->settings->bake.output, "frame.png", path, sizeof path);
     int code = render_output_write(page->settings, picture, path);
-    code = code == CLI_OK ? embed(path, page->out) : code;
+    if (code == CLI_OK) {
+        fputc('"', page->out);
+        code = cli_document_embed(page->out, path);
+        fputs("\",\n", page->out);
+    }
     unlink(path);
     ++page->frames;
     return code == CLI_OK && ferror(page->out) ? cli_out_of_memory("page") : code;

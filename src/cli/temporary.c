@@ -45,8 +45,8 @@ static long process_of(const char *entry, const char *stem, size_t stem_length, 
     return strncmp(at, ".tmp", strlen(".tmp")) == 0 ? process : 0;
 }
 
-static bool is_frame(const char *rest) {
-    return strncmp(rest, CLI_TEMPORARY_FRAME, strlen(CLI_TEMPORARY_FRAME)) == 0;
+static bool is_part(const char *rest) {
+    return strncmp(rest, CLI_TEMPORARY_PART, strlen(CLI_TEMPORARY_PART)) == 0;
 }
 
 /* The program's own names, ".out.csv.PID.tmp", and those of the library, ".out.PID.tmp.csv". */
@@ -55,7 +55,7 @@ static bool is_of_process(const char *entry, const char *name, long process) {
     const size_t length = strnlen(name, NAME_KEPT);
     dot = dot != NULL && dot != name ? dot : name + strlen(name);
     const size_t stem = dot - name < NAME_KEPT ? (size_t)(dot - name) : NAME_KEPT;
-    return (process_of(entry, name, length, &rest) == process && (*rest == '\0' || is_frame(rest))) ||
+    return (process_of(entry, name, length, &rest) == process && (*rest == '\0' || is_part(rest))) ||
            (process_of(entry, name, stem, &rest) == process && strcmp(rest, dot) == 0);
 }
 
@@ -80,11 +80,11 @@ static bool is_dead(long process) {
 }
 
 /* Whether no process writes the file: as in the library, nobody holds its lock, or where there are no locks
- * (as on pages' frames) its process is dead. */
-static bool is_left(int file, long process, bool frame) {
+ * (as on parts of documents) its process is dead. */
+static bool is_left(int file, long process, bool part) {
     const bool locked = flock(file, LOCK_EX | LOCK_NB) == 0;
     const bool unknown = !locked && errno != EWOULDBLOCK && errno != EINTR;
-    return locked && !frame ? true : (locked || unknown) && is_dead(process);
+    return locked && !part ? true : (locked || unknown) && is_dead(process);
 }
 
 /* What a killed run has left of this target. */
@@ -98,7 +98,7 @@ static void clean(const char *folder, const char *name) {
     while ((entry = readdir(listing)) != NULL) {
         const char *rest;
         const long process = process_of(entry->d_name, name, length, &rest);
-        if (process == 0 || !(*rest == '\0' || is_frame(rest))) {
+        if (process == 0 || !(*rest == '\0' || is_part(rest))) {
             continue;
         }
         const int file =
@@ -106,7 +106,7 @@ static void clean(const char *folder, const char *name) {
         struct stat status;
         if (file >= 0) {
             if (fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid() &&
-                is_left(file, process, is_frame(rest))) {
+                is_left(file, process, is_part(rest))) {
                 unlinkat(dirfd(listing), entry->d_name, 0);
             }
             close(file);

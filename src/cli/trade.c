@@ -7,7 +7,6 @@
 #include "progress.h"
 #include "signals.h"
 #include "temporary.h"
-#include "trial.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -289,7 +288,7 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
 
 /* --- beforehand */
 
-/* What can be refused before anything is read, and before there are threads. */
+/* What can be refused before anything is read. */
 static int check_files(const trade_settings *s, const vsh_scene *scene) {
     const char *const outputs[] = {s->report, s->csv, s->plot};
     static const char *const names[] = {"output", "--csv file", "--plot file"};
@@ -315,7 +314,7 @@ static int check_files(const trade_settings *s, const vsh_scene *scene) {
         code = code == CLI_OK ? cli_bake_check_output(&s->bake, scene, outputs[i]) : code;
         code = code == CLI_OK ? cli_temporary_check(outputs[i]) : code;
     }
-    return code == CLI_OK ? cli_trial_casters(scene, s->bake.common.memory_limit) : code;
+    return code;
 }
 
 /* Leaves the scene with the one receiver that was asked for. */

@@ -1,7 +1,6 @@
 /* The report: one page that needs nothing beside it, and the same numbers as CSV. */
+#include "document.h"
 #include "message.h"
-#include "signals.h"
-#include "temporary.h"
 #include "trade_parts.h"
 #include "trade_plot.h"
 
@@ -31,27 +30,6 @@ static const char head[] =
     "dl{display:grid;grid-template-columns:max-content 1fr;gap:.2em 1em;font-size:14px}dt{font-weight:600}"
     "dd{margin:0}\n"
     "@media(max-width:600px){dl{display:block}dd{margin:0 0 .6em}}\n</style>\n";
-
-static void write_escaped(FILE *out, const char *text) {
-    for (; *text != '\0'; ++text) {
-        switch (*text) {
-        case '<':
-            fputs("&lt;", out);
-            break;
-        case '>':
-            fputs("&gt;", out);
-            break;
-        case '&':
-            fputs("&amp;", out);
-            break;
-        case '"':
-            fputs("&quot;", out);
-            break;
-        default:
-            fputc(*text, out);
-        }
-    }
-}
 
 void trade_options_write(FILE *out, const char *options) {
     fputs("<code><span>", out);
@@ -148,12 +126,12 @@ static void write_table(FILE *out, const trade_subject *subject) {
 /* What is measured, and what is not. */
 static void write_texels(FILE *out, const trade_work *work) {
     fputs("<dl><dt>Input</dt><dd><code>", out);
-    write_escaped(out, work->settings->bake.input);
+    cli_document_escape(out, work->settings->bake.input);
     fputs("</code></dd>\n<dt>Receivers</dt><dd>", out);
     for (size_t r = 0; r < work->receiver_count; ++r) {
         const trade_receiver *receiver = &work->receivers[r];
         fputs(r > 0 ? "; " : "", out);
-        write_escaped(out, receiver->path);
+        cli_document_escape(out, receiver->path);
         fprintf(out, ", %d × %d", receiver->info.width, receiver->info.height);
     }
     if (work->settings->receiver >= 0) {
@@ -193,10 +171,11 @@ static void write_texels(FILE *out, const trade_work *work) {
     fprintf(out, "<dt>Made by</dt><dd>vdbshade %s</dd></dl>\n", vsh_version());
 }
 
-static void write_page(FILE *out, const trade_work *work) {
+static void write_page(FILE *out, const void *user) {
+    const trade_work *work = user;
     fputs(head, out);
     fputs("<title>Speed against accuracy: ", out);
-    write_escaped(out, work->settings->bake.input);
+    cli_document_escape(out, work->settings->bake.input);
     fputs("</title>\n<h1>Speed against accuracy</h1>\n", out);
     write_texels(out, work);
     for (size_t s = 0; s < work->subject_count; ++s) {
@@ -219,38 +198,21 @@ static void write_page(FILE *out, const trade_work *work) {
 }
 
 /* Of the shadow, or of AO where there are no lights. */
-static void write_picture(FILE *out, const trade_work *work) {
+static void write_picture(FILE *out, const void *user) {
+    const trade_work *work = user;
     trade_plot_write(out, work, &work->subjects[0]);
 }
 
-/* Composes a text and writes it, whole or not at all. */
-static int write_text(const trade_work *work, const char *path, void (*compose)(FILE *, const trade_work *)) {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
-    if (out == NULL) {
-        return cli_out_of_memory(path);
-    }
-    compose(out, work);
-    if (fclose(out) != 0) {
-        free(text);
-        return cli_out_of_memory(path);
-    }
-    cli_signals_writing(path);
-    const int code = cli_temporary_write(path, text);
-    cli_signals_writing(NULL);
-    free(text);
-    return code;
-}
-
 int trade_write_report(const trade_work *work) {
-    return write_text(work, work->settings->report, write_page);
+    return cli_document_write(work->settings->report, write_page, work);
 }
 
 int trade_write_csv(const trade_work *work) {
-    return work->settings->csv != NULL ? write_text(work, work->settings->csv, trade_rows_write) : CLI_OK;
+    return work->settings->csv != NULL ? cli_document_write(work->settings->csv, trade_rows_write, work)
+                                       : CLI_OK;
 }
 
 int trade_write_plot(const trade_work *work) {
-    return work->settings->plot != NULL ? write_text(work, work->settings->plot, write_picture) : CLI_OK;
+    return work->settings->plot != NULL ? cli_document_write(work->settings->plot, write_picture, work)
+                                        : CLI_OK;
 }

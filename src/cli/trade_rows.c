@@ -11,7 +11,8 @@ static const char names[] = "subject,method,options,resolution,build_s,bake_s,us
                             "invalid,left_out,texels,rmse,"
                             "penumbra_rmse,bias,p95,p99,max,width_error,certified,front,valid_rmse\n";
 
-void trade_rows_write(FILE *out, const trade_work *work) {
+void trade_rows_write(FILE *out, const void *user) {
+    const trade_work *work = user;
     fputs(names, out);
     for (size_t s = 0; s < work->subject_count; ++s) {
         const trade_subject *subject = &work->subjects[s];

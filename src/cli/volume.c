@@ -10,7 +10,6 @@
 #include "signals.h"
 #include "stats.h"
 #include "temporary.h"
-#include "trial.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -137,18 +136,14 @@ static int check_output(const volume_settings *s, const vsh_scene *scene, const 
     return code == CLI_OK ? cli_temporary_check(output) : code;
 }
 
-/* What can be refused before anything is read, and before there are threads. */
+/* What can be refused before anything is read. */
 static int check_files(const volume_settings *s, const vsh_scene *scene) {
     const char *output = s->bake.output, *stats = s->bake.stats;
     if (stats != NULL && cli_same_file(output, stats)) {
         return cli_usage("%s: both the output and the --stats file", output);
     }
-    int code = check_output(s, scene, output);
-    code = code == CLI_OK && stats != NULL ? check_output(s, scene, stats) : code;
-    code = code == CLI_OK ? cli_trial_casters(scene, s->bake.common.memory_limit) : code;
-    return code == CLI_OK && s->like != NULL
-               ? cli_trial_voxels(s->like, s->like_grid, s->bake.common.memory_limit)
-               : code;
+    const int code = check_output(s, scene, output);
+    return code == CLI_OK && stats != NULL ? check_output(s, scene, stats) : code;
 }
 
 /* --- the work */

@@ -8,7 +8,6 @@
 #include "progress.h"
 #include "signals.h"
 #include "temporary.h"
-#include "trial.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -59,7 +58,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
     return taken ? code : cli_common_take(&s->common, key, name, value, &taken);
 }
 
-/* What can be refused before anything is read, and before there are threads. */
+/* What can be refused before anything is read. */
 static int check_files(const voxelize_settings *s, const vsh_scene *scene) {
     if (cli_same_file(s->output, s->input)) {
         return cli_usage("%s: the output is the input", s->output);
@@ -70,8 +69,7 @@ static int check_files(const voxelize_settings *s, const vsh_scene *scene) {
             return cli_usage("%s: the output is also a caster's file", s->output);
         }
     }
-    const int code = cli_trial_casters(scene, s->common.memory_limit);
-    return code == CLI_OK ? cli_temporary_check(s->output) : code;
+    return cli_temporary_check(s->output);
 }
 
 static int write_grid(const voxelize_settings *s, const vsh_scene *scene, const vsh_run *run,

@@ -60,6 +60,7 @@ vsh_result vshi_image_file_new(const char *path, int64_t width, int64_t height, 
 
 void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *name) {
     snprintf(file->text[channel], sizeof file->text[channel], "%s", name);
+    vshi_one_line(file->text[channel]);
 }
 
 vsh_image vsh_image_view(const vsh_image_file *file) {

@@ -1,6 +1,7 @@
 /* Which reader a file is for. */
 #include "base/file.h"
 #include "base/floats.h"
+#include "base/job.h"
 #include "image/exr.h"
 #include "image/png.h"
 #include "shim/oiio.h"
@@ -19,8 +20,9 @@ static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *err
     static const unsigned char png[] = {0x89, 'P', 'N', 'G'};
     unsigned char start[4] = {0};
     struct stat status;
-    if (stat(path, &status) == 0 && S_ISDIR(status.st_mode)) {
-        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: it is a folder", path);
+    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode)) { /* a pipe would be waited for */
+        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: it is %s", path,
+                         S_ISDIR(status.st_mode) ? "a folder" : "no regular file");
     }
     FILE *file = fopen(path, "rb");
     if (file == NULL) {
@@ -43,13 +45,22 @@ static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *err
 }
 
 vsh_result vsh_image_read(const char *path, vsh_image_file **file, vsh_error *error) {
+    return vsh_image_read_run(path, NULL, file, error);
+}
+
+vsh_result vsh_image_read_run(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     VSHI_FLOATS;
     if (file == NULL || path == NULL || path[0] == '\0') {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_image_read: no %s was given",
                          file == NULL ? "place for the image" : "path");
     }
     *file = NULL;
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result == VSH_OK && full.reader != NULL) {
+        return vshi_image_from_reader(path, &full, file, error);
+    }
     read_fn *reader = NULL;
-    const vsh_result result = find_reader(path, &reader, error);
+    result = result == VSH_OK ? find_reader(path, &reader, error) : result;
     return result == VSH_OK ? reader(path, file, error) : result;
 }

@@ -54,8 +54,12 @@ vsh_result vshi_check_values(const char *path, int64_t width, int64_t height, in
 vsh_result vshi_image_file_new(const char *path, int64_t width, int64_t height, int64_t channels,
                                vsh_image_file **file, vsh_error *error);
 
-/* Cut to VSHI_FILE_NAME. */
+/* Cut to VSHI_FILE_NAME, without control characters. */
 void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *name);
+
+/* Has run->reader read the file. Errors: as vsh_image_read_run(). */
+vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_image_file **file,
+                                  vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -22,7 +22,9 @@ constexpr double SMALLEST_READ = 1e-5;   // voxel size, world units; OpenVDB wri
 constexpr double NARROWEST = 3.0 - 1e-3; // half width, voxels; background is a float
 constexpr double LEAST_NORM = 0.8, GREATEST_NORM = 1.2; // of a distance's gradient, on a lattice
 constexpr float PLATEAU = 1.0f - 1e-4f; // of the background: an inactive value below was meant to differ
+constexpr float BEYOND = 1.0f + 1e-3f;  // of the background: a half-float's rounding is below
 constexpr float CLIFF = 1.5f;           // voxels from a voxel to the next, where a distance changes by 1
+constexpr float JUMP = 2.5f;            // the same, of damage: sheets thinner than a voxel make up to 1.9
 constexpr double CLIFF_SHARE = 0.1;     // of the band's rim; conversions of meshes leave some
 constexpr int32_t LARGEST_INDEX = 1 << 28;
 
@@ -103,6 +105,8 @@ struct Census {
     size_t flat = 0, steep = 0, norms = 0; // norms of gradients below, above, and all
     size_t rim = 0, cliffs = 0;            // steps from the band to the background; those far too high
     size_t plateaus = 0;                   // inactive values inside the band
+    size_t jumps = 0;                      // between neighbours that no distances can have
+    size_t outer = 0;                      // values beyond the background
     openvdb::Index bad = Leaf::SIZE;       // first value that is not finite
 
     void add(const Census &other) {
@@ -114,6 +118,8 @@ struct Census {
         rim += other.rim;
         cliffs += other.cliffs;
         plateaus += other.plateaus;
+        jumps += other.jumps;
+        outer += other.outer;
     }
 };
 
@@ -132,7 +138,18 @@ double norm(const float *value, double voxel) {
     return std::sqrt(sum);
 }
 
-void visit_rim(Census &census, const float *values, openvdb::Index i, float background, float voxel) {
+// Whether no distance changes so from a voxel to the next: too far, or from deep inside to the outside.
+bool is_jump(float a, float b, float background, float voxel) {
+    const bool in_a = std::fabs(a) < background, in_b = std::fabs(b) < background;
+    if (in_a && in_b) {
+        return std::fabs(a - b) > JUMP * voxel;
+    }
+    // a background stands for what is beyond the band
+    return std::signbit(a) != std::signbit(b) &&
+           ((!in_a && !in_b) || std::fabs(in_a ? a : b) > (JUMP - 1.0f) * voxel);
+}
+
+void visit_pairs(Census &census, const float *values, openvdb::Index i, float background, float voxel) {
     constexpr openvdb::Index strides[3] = {64, 8, 1};
     for (const openvdb::Index stride : strides) {
         if ((i / stride) % 8 == 7) {
@@ -140,13 +157,38 @@ void visit_rim(Census &census, const float *values, openvdb::Index i, float back
         }
         const float a = values[i], b = values[i + stride];
         const bool in_a = std::fabs(a) < background, in_b = std::fabs(b) < background;
-        if (in_a == in_b) {
-            continue;
+        census.jumps += is_jump(a, b, background, voxel);
+        if (in_a != in_b) {
+            const float outer = std::copysign(background, in_a ? b : a);
+            ++census.rim;
+            census.cliffs += std::fabs(outer - (in_a ? a : b)) > CLIFF * voxel;
         }
-        const float outer = std::copysign(background, in_a ? b : a);
-        ++census.rim;
-        census.cliffs += std::fabs(outer - (in_a ? a : b)) > CLIFF * voxel;
     }
+}
+
+// Jumps to what is beside the leaf: each leaf looks ahead, and back where there is a tile.
+size_t jumps_beside(const Leaf &leaf, const FloatTree &tree, float background, float voxel) {
+    constexpr openvdb::Index strides[3] = {64, 8, 1};
+    size_t jumps = 0;
+    for (int side = 0; side < 6; ++side) {
+        const int axis = side / 2;
+        const bool ahead = side % 2 != 0;
+        Coord at = leaf.origin();
+        at[axis] += ahead ? 8 : -1;
+        const Leaf *beside = tree.probeConstLeaf(at);
+        if (beside != nullptr && !ahead) {
+            continue; // it looks this way
+        }
+        const float tile = beside == nullptr ? tree.getValue(at) : 0.0f;
+        const openvdb::Index stride = strides[axis], u = strides[(axis + 1) % 3], v = strides[(axis + 2) % 3];
+        for (openvdb::Index k = 0; k < 64; ++k) {
+            const openvdb::Index first = k / 8 * u + k % 8 * v;
+            const float value = leaf.buffer().data()[first + (ahead ? 7 * stride : 0)];
+            jumps +=
+                is_jump(value, beside != nullptr ? beside->buffer().data()[first] : tile, background, voxel);
+        }
+    }
+    return jumps;
 }
 
 Census visit(const Leaf &leaf, float background, float voxel) {
@@ -160,8 +202,9 @@ Census visit(const Leaf &leaf, float background, float voxel) {
         }
         census.negative += value < 0.0f;
         census.positive += value > 0.0f;
+        census.outer += std::fabs(value) > BEYOND * background;
         census.plateaus += !leaf.isValueOn(i) && std::fabs(value) < PLATEAU * background;
-        visit_rim(census, values, i, background, voxel);
+        visit_pairs(census, values, i, background, voxel);
         const Coord at = Leaf::offsetToLocalCoord(i);
         const bool surrounded = std::min({at[0], at[1], at[2]}) > 0 && std::max({at[0], at[1], at[2]}) < 7;
         if (surrounded && std::fabs(value) < voxel) {
@@ -247,8 +290,10 @@ Finding examine_values(const FloatGrid &grid, Stage &stage) {
         }
     }
     std::vector<Census> each(leaves.size());
-    stage.loop(leaves.size(), 64, 0.3, 0.5,
-               [&](size_t i) { each[i] = visit(*leaves[i], background, float(voxel)); });
+    stage.loop(leaves.size(), 64, 0.3, 0.5, [&](size_t i) {
+        each[i] = visit(*leaves[i], background, float(voxel));
+        each[i].jumps += jumps_beside(*leaves[i], grid.tree(), background, float(voxel));
+    });
     Census all;
     for (size_t i = 0; i < each.size(); ++i) {
         if (each[i].bad < Leaf::SIZE) {
@@ -282,6 +327,15 @@ Finding examine_values(const FloatGrid &grid, Stage &stage) {
     }
     if (double(all.cliffs) > CLIFF_SHARE * double(all.rim)) {
         return finding(Finding::ODD, "its values end before they reach the background %g",
+                       double(background));
+    }
+    if (all.jumps > 0) {
+        return finding(Finding::NOTED,
+                       "damaged? %zu times its values jump by more than %g voxels from a voxel to the next",
+                       all.jumps, double(JUMP));
+    }
+    if (all.outer > 0) {
+        return finding(Finding::NOTED, "damaged? %zu values are beyond the background %g", all.outer,
                        double(background));
     }
     return {};

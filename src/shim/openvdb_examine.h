@@ -9,7 +9,8 @@ namespace vshi {
 
 // What is wrong with a grid; `text` is empty where nothing is.
 struct Finding {
-    enum Kind { FINE, ODD, BAD } kind = FINE; // ODD: the surface is there, the distances must be made anew
+    // NOTED: to be told, and used as it is. ODD: the surface is there, the distances must be made anew.
+    enum Kind { FINE, NOTED, ODD, BAD } kind = FINE;
     std::string text;
 };
 

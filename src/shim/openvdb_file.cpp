@@ -1,15 +1,15 @@
 // Reading .vdb files. The reader of OpenVDB 10.0.1 crashes on some damaged files (it writes past its buffers
 // where Blosc data lie about their size): positions and sizes are checked here and a short file shows as an
-// error, but damage inside the packed data cannot be seen beforehand. Who reads untrusted files makes a trial
-// read in a child process first, as the command line does.
+// error, but damage inside the packed data cannot be seen beforehand. Untrusted files are for a reader
+// (vsh_run.reader), which runs what stands here in a process of its own.
 #include "shim/openvdb_file.h"
-#include "shim/openvdb_examine.h"
+
+#include "shim/openvdb_stream.h"
 
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <openvdb/io/Archive.h>
@@ -89,24 +89,28 @@ class Reader final : public openvdb::io::Archive {
     MetaMap metadata(size_t i);
     double bytes(size_t i);               // in memory, by what the file says of it
     GridBase::Ptr without_tree(size_t i); // metadata and transform
-    GridBase::Ptr grid(size_t i);
+    GridBase::Ptr grid(size_t i, const char *path, vsh_error *error);
 
     const uint64_t size;
 
   private:
     void list(std::istream &in, const char *path, vsh_error *error);
+    GridBase::Ptr read_tree(size_t i);
 
     // The stream keeps this pointer's address.
     openvdb::io::StreamMetadata::Ptr state = std::make_shared<openvdb::io::StreamMetadata>();
-    std::ifstream stream;
+    CheckedFile file;
+    std::istream stream{&file};
     std::vector<GridDescriptor> entries;
     std::vector<GridBase::Ptr> grids; // without a tree yet, but for streamed files
     bool streamed = false;
 };
 
 Reader::Reader(const char *path, const vsh_run &run, vsh_error *error) : size(check_file(path, error)) {
+    if (file.open(path, std::ios::in | std::ios::binary) == nullptr) {
+        throw Failure{vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, std::strerror(errno))};
+    }
     stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
-    stream.open(path, std::ios::binary);
     openvdb::io::setStreamMetadataPtr(stream, state, false);
     readHeader(stream);
     setFormatVersion(stream); // what is read from it from here on depends on these
@@ -183,10 +187,17 @@ GridBase::Ptr Reader::without_tree(size_t i) {
     return result;
 }
 
-GridBase::Ptr Reader::grid(size_t i) {
-    if (streamed) {
-        return grids[i];
+GridBase::Ptr Reader::grid(size_t i, const char *path, vsh_error *error) {
+    const GridBase::Ptr result = streamed ? grids[i] : read_tree(i);
+    if (!file.sound()) {
+        throw Failure{vshi_fail(error, VSH_ERROR_READ,
+                                "%s: damaged: grid '%s': Zip data that do not fit their check sum", path,
+                                name(i).c_str())};
     }
+    return result;
+}
+
+GridBase::Ptr Reader::read_tree(size_t i) {
     const GridDescriptor &entry = entries[i];
     const GridBase::Ptr result = grids[i]->copyGrid();
     entry.seekToGrid(stream);
@@ -211,17 +222,6 @@ vsh_result fail_cut_short(const char *path, vsh_error *error) {
 }
 
 // Reading past the end of the file shows as this exception, whose own words are of no use.
-template <typename Body> vsh_result guard_file(vsh_error *error, const char *path, Body &&body) {
-    return guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
-        try {
-            initialize();
-            return body();
-        } catch (const std::ios_base::failure &) {
-            return fail_cut_short(path, error);
-        }
-    });
-}
-
 std::string class_of(const MetaMap &metadata) {
     const auto text = metadata.getMetadata<openvdb::StringMetadata>(GridBase::META_GRID_CLASS);
     return text ? text->value() : "";
@@ -257,7 +257,7 @@ FloatGrid::Ptr to_floats(const GridBase::Ptr &grid) {
         tree = openvdb::gridPtrCast<FloatGrid>(grid)->treePtr();
     }
     const FloatGrid::Ptr floats = FloatGrid::create(tree);
-    floats->setTransform(grid->transform().copy());
+    floats->setTransform(restore_transform(describe_transform(grid->transform())));
     return floats;
 }
 
@@ -266,72 +266,13 @@ double shell_of(const GridBase &grid) {
     return shell && std::isfinite(shell->value()) && shell->value() > 0.0 ? shell->value() : 0.0;
 }
 
-// A grid of a file, as messages name it.
-struct Named {
-    const char *path;
-    std::string grid;
-
-    std::string text() const { return std::string(path) + ": grid '" + grid + "'"; }
-};
-
-void refuse_bad(const Named &named, const Finding &finding, vsh_error *error) {
-    if (finding.kind == Finding::BAD) {
-        throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s cannot cast shadows: %s", named.text().c_str(),
-                                finding.text.c_str())};
-    }
-}
-
-void refuse_large(const Named &named, const vsh_run &run, double bytes, vsh_error *error) {
-    const vsh_result result = check_bytes(&run, bytes, named.text().c_str(), error);
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
-}
-
-FloatGrid::Ptr mend_named(const Named &named, const FloatGrid &grid, Stage &stage, vsh_error *error) {
-    vsh_error why;
-    try {
-        return mend(grid, stage, &why);
-    } catch (const Failure &failure) {
-        if (failure.code != VSH_ERROR_CANCELLED) { // which the stage has told already
-            vshi_fail(error, failure.code, "%s: %.700s", named.text().c_str(), why.message);
-        }
-        throw;
-    }
-}
-
-vsh_result read(const char *path, const char *name, const vsh_run &run, vsh_grid **grid, vsh_error *error) {
-    Stage stage(run, "load", error);
-    stage.check();
-    Reader reader(path, run, error);
-    const size_t chosen = choose(reader, path, name, error, [&](size_t i) {
-        return class_of(reader.metadata(i)) == GridBase::gridClassToString(openvdb::GRID_LEVEL_SET);
-    });
-    const Named named{path, reader.name(chosen)};
-    refuse_large(named, run, reader.bytes(chosen), error);
-
-    const GridBase::Ptr found = reader.grid(chosen);
-    stage.reach(0.3);
-    stage.check();
-    refuse_bad(named, examine_kind(*found), error);
-    FloatGrid::Ptr floats = to_floats(found);
-    refuse_large(named, run, double(floats->memUsage()), error);
-    const Finding finding = examine_values(*floats, stage);
-    refuse_bad(named, finding, error);
-    if (finding.kind == Finding::ODD) {
-        vshi_warn(&run, "%s: %s: its distances were made anew", named.text().c_str(), finding.text.c_str());
-        floats = mend_named(named, *floats, stage, error);
-    }
-    *grid = close_grid(floats, shell_of(*found), stage);
-    return VSH_OK;
-}
-
 bool has_numbers(const GridBase &grid) {
     return grid.apply<NumberGrids>([](const auto &) {});
 }
 
 template <size_t Capacity> void copy_text(char (&to)[Capacity], const std::string &from) {
     std::snprintf(to, Capacity, "%s", from.c_str());
+    vshi_one_line(to);
 }
 
 // What begins with our name, one line each.
@@ -349,7 +290,7 @@ std::string attributes_of(const MetaMap &metadata) {
 }
 
 void describe_kind(const GridBase &grid, vsh_vdb_entry &entry) {
-    copy_text(entry.attributes, attributes_of(grid));
+    std::snprintf(entry.attributes, sizeof entry.attributes, "%s", attributes_of(grid).c_str());
     copy_text(entry.type, grid.type());
     copy_text(entry.grid_class, GridBase::gridClassToString(grid.getGridClass()));
     for (int axis = 0; axis < 3; ++axis) {
@@ -382,14 +323,15 @@ void describe_unread(Reader &reader, size_t i, const char *why, vsh_vdb_entry &e
     }
 }
 
-void describe(Reader &reader, size_t i, const vsh_run &run, Stage &stage, vsh_vdb_entry &entry) {
+void describe(Reader &reader, size_t i, const char *path, const vsh_run &run, Stage &stage,
+              vsh_vdb_entry &entry, vsh_error *error) {
     copy_text(entry.name, reader.name(i));
     vsh_error over;
     if (check_bytes(&run, reader.bytes(i), "its values were not read", &over) != VSH_OK) {
         describe_unread(reader, i, over.message, entry);
         return;
     }
-    const GridBase::Ptr grid = reader.grid(i);
+    const GridBase::Ptr grid = reader.grid(i, path, error);
     describe_kind(*grid, entry);
     describe_box(grid->evalActiveVoxelBoundingBox(), entry);
     entry.active_voxels = grid->activeVoxelCount();
@@ -404,20 +346,57 @@ void describe(Reader &reader, size_t i, const vsh_run &run, Stage &stage, vsh_vd
     }
 }
 
-vsh_result list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, size_t capacity, size_t *count,
-                vsh_error *error) {
-    Reader reader(path, run, error);
-    for (size_t i = 0; i < std::min(capacity, reader.count()); ++i) {
-        Stage stage(run, "load", error);
-        stage.check();
-        entries[i] = {};
-        describe(reader, i, run, stage, entries[i]);
+} // namespace
+
+void refuse_bad(const Named &named, const Finding &finding, vsh_error *error) {
+    if (finding.kind == Finding::BAD) {
+        throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s cannot cast shadows: %s", named.text().c_str(),
+                                finding.text.c_str())};
     }
-    *count = reader.count();
-    return VSH_OK;
 }
 
-} // namespace
+void refuse_large(const Named &named, const vsh_run &run, double bytes, vsh_error *error) {
+    const vsh_result result = check_bytes(&run, bytes, named.text().c_str(), error);
+    if (result != VSH_OK) {
+        throw Failure{result};
+    }
+}
+
+LevelSet load_level_set(const char *path, const char *name, Stage &stage, vsh_error *error) {
+    initialize();
+    try {
+        Reader reader(path, stage.options, error);
+        const size_t chosen = choose(reader, path, name, error, [&](size_t i) {
+            return class_of(reader.metadata(i)) == GridBase::gridClassToString(openvdb::GRID_LEVEL_SET);
+        });
+        LevelSet loaded{{path, reader.name(chosen)}, nullptr, 0.0};
+        refuse_large(loaded.named, stage.options, reader.bytes(chosen), error);
+        const GridBase::Ptr found = reader.grid(chosen, path, error);
+        refuse_bad(loaded.named, examine_kind(*found), error);
+        loaded.grid = to_floats(found);
+        loaded.shell = shell_of(*found);
+        return loaded;
+    } catch (const std::ios_base::failure &) {
+        throw Failure{fail_cut_short(path, error)};
+    }
+}
+
+void list_grids(const char *path, const vsh_run &run, std::vector<vsh_vdb_entry> &entries, size_t capacity,
+                size_t &count, vsh_error *error) {
+    initialize();
+    try {
+        Reader reader(path, run, error);
+        for (size_t i = 0; i < std::min(capacity, reader.count()); ++i) {
+            Stage stage(run, "load", error);
+            stage.check();
+            entries.push_back({});
+            describe(reader, i, path, run, stage, entries.back(), error);
+        }
+        count = reader.count();
+    } catch (const std::ios_base::failure &) {
+        throw Failure{fail_cut_short(path, error)};
+    }
+}
 
 GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &run, vsh_error *error) {
     initialize();
@@ -432,8 +411,9 @@ GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &ru
                                     named.text().c_str(), bare->type().c_str())};
         }
         refuse_large(named, run, reader.bytes(chosen), error);
-        const GridBase::Ptr grid = reader.grid(chosen);
+        const GridBase::Ptr grid = reader.grid(chosen, path, error);
         refuse_large(named, run, double(grid->memUsage()), error);
+        grid->setTransform(restore_transform(describe_transform(grid->transform())));
         return grid;
     } catch (const std::ios_base::failure &) {
         throw Failure{fail_cut_short(path, error)};
@@ -441,26 +421,3 @@ GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &ru
 }
 
 } // namespace vshi
-
-vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run, vsh_grid **grid,
-                         vsh_error *error) {
-    *grid = nullptr;
-    vsh_run full;
-    const vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    return vshi::guard_file(error, path, [&] { return vshi::read(path, name, full, grid, error); });
-}
-
-vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,
-                        size_t *count, vsh_error *error) {
-    *count = 0;
-    vsh_run full;
-    const vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    return vshi::guard_file(error, path,
-                            [&] { return vshi::list(path, full, entries, capacity, count, error); });
-}

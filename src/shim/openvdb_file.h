@@ -1,9 +1,12 @@
 // What the shims that read and write .vdb files share.
 #pragma once
 
+#include "shim/openvdb_examine.h"
 #include "shim/openvdb_grid.h"
+#include "shim/openvdb_handover.h"
 
 #include <string>
+#include <vector>
 
 namespace vshi {
 
@@ -26,6 +29,18 @@ using NumberGrids = openvdb::NumericGridTypes::Append<openvdb::BoolGrid, openvdb
 // Grid `name` of a .vdb file (nullptr: the first of NumberGrids), its tree read within the run's memory
 // limit; throws Failure where there is none, and where it is none of them.
 openvdb::GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &run, vsh_error *error);
+
+// Level set `name` (nullptr: the first of that class) of a .vdb file, of a sound kind, within the run's
+// memory limit. Throws Failure.
+LevelSet load_level_set(const char *path, const char *name, Stage &stage, vsh_error *error);
+
+// Up to `capacity` grids of a file, described; `count` is that of the file's. Throws Failure.
+void list_grids(const char *path, const vsh_run &run, std::vector<vsh_vdb_entry> &entries, size_t capacity,
+                size_t &count, vsh_error *error);
+
+// Throw Failure for what is BAD, and what passes the memory limit.
+void refuse_bad(const Named &named, const Finding &finding, vsh_error *error);
+void refuse_large(const Named &named, const vsh_run &run, double bytes, vsh_error *error);
 
 // Refuses voxels that OpenVDB cannot write, before a grid is copied.
 vsh_result check_writable(const char *path, double voxel_size, vsh_error *error);

@@ -262,18 +262,58 @@ struct Topology {
     }
 };
 
-vsh_voxels *from_vdb(const char *path, const char *name, const vsh_run &run, vsh_error *error) {
-    Stage stage(run, "load", error);
-    stage.check();
-    const openvdb::GridBase::Ptr grid = read_numbers(path, name, run, error);
-    const std::string what = std::string(path) + ": grid '" + grid->getName() + "'";
-    VoxelSet set;
-    set.transform = grid->transform().copy();
-    grid->apply<NumberGrids>(Topology{set.blocks, run, what.c_str(), error});
-    std::sort(set.blocks.begin(), set.blocks.end(), [](const vshi_block &a, const vshi_block &b) {
+// The blocks of a grid's active voxels, sorted.
+std::vector<vshi_block> blocks_of(const openvdb::GridBase &grid, const char *what, const vsh_run &run,
+                                  vsh_error *error) {
+    std::vector<vshi_block> blocks;
+    grid.apply<NumberGrids>(Topology{blocks, run, what, error});
+    std::sort(blocks.begin(), blocks.end(), [](const vshi_block &a, const vshi_block &b) {
         return std::lexicographical_compare(a.origin, a.origin + 3, b.origin, b.origin + 3);
     });
-    stage.check();
+    return blocks;
+}
+
+// The same by run.reader.
+VoxelSet ask_voxels(const char *path, const char *name, vshi_job *job, const vsh_run &run, std::string &grid,
+                    vsh_error *error) {
+    const auto request = std::make_unique<vshi_ask>();
+    vshi_answer answer;
+    vsh_result result = vshi_ask_begin(request.get(), VSHI_READ_VOXELS, path, &run, error);
+    if (result == VSH_OK) {
+        vshi_put_text(&request->put, name);
+        result = vshi_ask_send_job(request.get(), job, 1, &answer, error);
+    }
+    if (result != VSH_OK) {
+        throw Failure{result};
+    }
+    const std::unique_ptr<vshi_answer, void (*)(vshi_answer *)> owner(&answer, vshi_answer_free);
+    VoxelSet set;
+    set.blocks = take_blocks(&answer.payload, path, grid, set.transform, error);
+    return set;
+}
+
+vsh_voxels *from_vdb(const char *path, const char *name, const vsh_run &run, vsh_error *error) {
+    VoxelSet set;
+    std::string what = std::string(path) + ": grid '";
+    if (run.reader != nullptr) {
+        const std::unique_ptr<vshi_job, void (*)(vshi_job *)> job(vshi_job_begin(&run, "load", 1),
+                                                                  vshi_job_end);
+        if (job == nullptr) {
+            throw std::bad_alloc();
+        }
+        std::string grid;
+        set = ask_voxels(path, name, job.get(), run, grid, error);
+        what += grid + "'";
+        check_blocks(run, double(set.blocks.size()), what.c_str(), error);
+    } else {
+        Stage stage(run, "load", error);
+        stage.check();
+        const openvdb::GridBase::Ptr grid = read_numbers(path, name, run, error);
+        what += grid->getName() + "'";
+        set.transform = grid->transform().copy();
+        set.blocks = blocks_of(*grid, what.c_str(), run, error);
+        stage.check();
+    }
     return close_voxels(std::move(set), false, what.c_str(), error);
 }
 
@@ -315,6 +355,19 @@ vsh_result vsh_voxels_from_vdb(const char *path, const char *name, const vsh_run
                                vsh_error *error) {
     return vshi::call(run, VSH_ERROR_READ, path, voxels, error,
                       [&](const vsh_run &full) { return vshi::from_vdb(path, name, full, error); });
+}
+
+vsh_result vshi_serve_voxels(const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload,
+                             vsh_error *error) {
+    return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
+        vshi::initialize();
+        const char *name = vshi_take_text(request, false);
+        const openvdb::GridBase::Ptr grid = vshi::read_numbers(path, name, *run, error);
+        const std::string what = std::string(path) + ": grid '" + grid->getName() + "'";
+        vshi::put_blocks(payload, grid->getName(), grid->transform(),
+                         vshi::blocks_of(*grid, what.c_str(), *run, error));
+        return VSH_OK;
+    });
 }
 
 void vsh_voxels_free(vsh_voxels *voxels) {

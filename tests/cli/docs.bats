@@ -1,5 +1,5 @@
-# Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/volume.md and
-# docs/render.md runs.
+# Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/volume.md,
+# docs/render.md and docs/regression.md runs.
 load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
@@ -80,4 +80,8 @@ run_commands() {
     for made in view.png court.png baked.png turn.html turn_03.png shafts.exr; do
         [ -s "$made" ] || fail "no $made"
     done
+}
+
+@test "every command of docs/regression.md" {
+    run_commands regression.md 5
 }

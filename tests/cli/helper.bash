@@ -71,6 +71,11 @@ old_output() {
     printf 'old' >"$1"
 }
 
+# Whether two images or level sets hold the same values, whatever they tell of where they come from.
+same_values() {
+    "$VDBSHADE" compare "$1" "$2" --max-difference 0 --max-coverage 0 --quiet
+}
+
 fail() {
     echo "$*"
     echo "status: $status"

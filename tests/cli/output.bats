@@ -93,3 +93,24 @@ bake_to() {
     [ -z "$stderr" ] || fail "--quiet said something"
     no_leftovers
 }
+
+@test "--output-folder takes all outputs of a scene by their names, and nothing else" {
+    write_box box.obj
+    mkdir -p elsewhere maps
+    cat >two.json <<'JSON'
+{"casters": [{"mesh": "box.obj"}], "resolution": 16, "ao": {"distance": 1},
+ "receivers": [{"mesh": "box.obj", "size": 16, "output": "maps/one.exr"},
+               {"mesh": "box.obj", "size": 8, "output": "two.png"}]}
+JSON
+    shade bake two.json --output-folder elsewhere --quiet
+    done_well
+    [ -s elsewhere/one.exr ] && [ -s elsewhere/two.png ] || fail "not there"
+    [ ! -e maps/one.exr ] && [ ! -e two.png ] || fail "in both places"
+    shade bake two.json --output-folder nowhere --quiet
+    refused 3 nowhere/one.exr
+    shade bake box.obj --ao 1 --output-folder elsewhere -o out.exr
+    refused 2 --output-folder
+    sed -i 's/two.png/one.exr/' two.json
+    shade bake two.json --output-folder elsewhere --quiet
+    refused 2 elsewhere/one.exr 'two receivers'
+}

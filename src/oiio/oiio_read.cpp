@@ -1,5 +1,5 @@
 // Reading every image format but OpenEXR and PNG.
-#include "shim/oiio_formats.h"
+#include "oiio_formats.h"
 
 #include "shim/guard.h"
 

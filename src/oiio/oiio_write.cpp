@@ -1,7 +1,7 @@
 // Writing every image format but OpenEXR. Integers are made by us, and no value is multiplied by alpha or
 // sent through a transfer curve. Bytes go through a file of ours where the writer takes one; where it does
 // not, the file is read again, because those writers do not look whether their bytes arrived.
-#include "shim/oiio_formats.h"
+#include "oiio_formats.h"
 
 #include "base/file.h"
 #include "base/hash.h"

@@ -1,6 +1,6 @@
 // Which formats are written and read. OpenImageIO chooses nothing here: the table is of what was found to
 // keep data, with OpenImageIO 2.4. docs/formats.md shows it to users.
-#include "shim/oiio_formats.h"
+#include "oiio_formats.h"
 
 #include "base/file.h"
 #include "shim/guard.h"
@@ -139,8 +139,4 @@ bool vshi_oiio_format(const char *path, vshi_format *format) {
         return VSH_OK;
     });
     return found;
-}
-
-const char *vshi_oiio_endings(void) {
-    return "png, tif, jpg, tga, bmp, hdr, ppm, pgm, webp, jp2, dpx, gif, sgi, iff, rla, ico, heic, avif";
 }

@@ -1,0 +1,111 @@
+/* Bakes in child processes, and golden bakes that are replaced. */
+#include "child.h"
+#include "commands.h"
+#include "message.h"
+#include "regress.h"
+#include "temporary.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { MOST_WORDS = 1024 };
+
+typedef struct child {
+    const regress_work *work;
+    const regress_case *one;
+    char *words[MOST_WORDS];
+    int count;
+} child;
+
+/* In the folder of the scenes, which the files in options are relative to. */
+static int run_child(void *user) {
+    child *c = user;
+    if (chdir(c->work->folder) != 0) {
+        cli_say("%s: %s", c->work->folder, strerror(errno));
+        return CLI_FILE;
+    }
+    return c->one->command->main(c->count, c->words);
+}
+
+int regress_bake(const regress_work *work, const regress_case *one) {
+    const cli_common *common = &work->settings->compare.common;
+    char threads[32], memory[48];
+    snprintf(threads, sizeof threads, "%d", common->threads);
+    snprintf(memory, sizeof memory, "%llu", (unsigned long long)common->memory_limit);
+    child c = {.work = work, .one = one};
+    if (one->options.count > MOST_WORDS - 16) {
+        return cli_usage("%s: '%s' has more than %d options", work->folder, one->name, MOST_WORDS - 16);
+    }
+    char *output = one->output != NULL ? regress_path(work->bakes, one->output) : NULL;
+    if (one->output != NULL && output == NULL) {
+        return cli_out_of_memory(work->folder);
+    }
+    /* words of their own: getopt_long() takes them as what may be written to */
+    char name[32], file[] = "--output", folder[] = "--output-folder", quiet[] = "--quiet";
+    char limit[] = "--memory-limit", pool[] = "--threads", trusted[] = "--trusted";
+    snprintf(name, sizeof name, "%s", one->command->name);
+    c.words[c.count++] = name;
+    c.words[c.count++] = one->scene;
+    for (size_t i = 0; i < one->options.count; ++i) {
+        c.words[c.count++] = one->options.line[i];
+    }
+    c.words[c.count++] = output != NULL ? file : folder;
+    c.words[c.count++] = output != NULL ? output : work->bakes;
+    c.words[c.count++] = quiet;
+    c.words[c.count++] = limit;
+    c.words[c.count++] = memory;
+    if (common->threads > 0) {
+        c.words[c.count++] = pool;
+        c.words[c.count++] = threads;
+    }
+    if (common->trusted) {
+        c.words[c.count++] = trusted;
+    }
+    c.words[c.count] = NULL;
+    const int code = cli_in_child(one->scene, run_child, &c);
+    free(output);
+    return code;
+}
+
+static int copy(const char *from, const char *to) {
+    FILE *file = fopen(from, "rb");
+    if (file == NULL) {
+        cli_say("%s: cannot be read: %s", from, strerror(errno));
+        return CLI_FILE;
+    }
+    cli_temporary target;
+    int code = cli_temporary_begin(&target, to);
+    if (code != CLI_OK) {
+        fclose(file);
+        return code;
+    }
+    char bytes[65536];
+    size_t count;
+    while ((count = fread(bytes, 1, sizeof bytes, file)) > 0 &&
+           fwrite(bytes, 1, count, target.file) == count) {
+    }
+    if (ferror(file)) {
+        cli_say("%s: cannot be read", from);
+        cli_temporary_abandon(&target);
+        code = CLI_FILE;
+    } else {
+        code = cli_temporary_commit(&target);
+    }
+    fclose(file);
+    return code;
+}
+
+int regress_update(const regress_work *work, const char *output) {
+    if (mkdir(work->golden, 0777) != 0 && errno != EEXIST) {
+        cli_say("%s: cannot be made: %s", work->golden, strerror(errno));
+        return CLI_FILE;
+    }
+    char *from = regress_path(work->bakes, output), *to = regress_path(work->golden, output);
+    const int code = from != NULL && to != NULL ? copy(from, to) : cli_out_of_memory(output);
+    free(from);
+    free(to);
+    return code;
+}

@@ -1,0 +1,64 @@
+/* What the measures are called, what they may come to, and whether they do. */
+#include "compare/limits.h"
+
+#include "base/floats.h"
+
+#include <math.h>
+#include <string.h>
+
+const vshi_limit vshi_limits[VSH_MEASURE_COUNT] = {
+    [VSH_MEASURE_NONFINITE] = {"nonfinite", 0, 0.0},
+    [VSH_MEASURE_RMSE] = {"rmse", 0, 0.004},
+    [VSH_MEASURE_BIAS] = {"bias", 0, 0.002},
+    [VSH_MEASURE_MAX] = {"max", 0, 0.25},
+    [VSH_MEASURE_P99] = {"p99", 0, 0.02},
+    [VSH_MEASURE_SHARE] = {"share", 0, 0.01},
+    [VSH_MEASURE_SSIM] = {"ssim", 1, 0.98},
+    [VSH_MEASURE_PENUMBRA] = {"penumbra", 0, 0.03},
+    [VSH_MEASURE_WIDTHS] = {"widths", 0, 0.05},
+    [VSH_MEASURE_EDGES] = {"edges", 0, 0.02},
+    [VSH_MEASURE_SHIFT] = {"shift", 0, 0.1},
+    [VSH_MEASURE_LOST] = {"lost", 0, 3.0},
+    [VSH_MEASURE_GAINED] = {"gained", 0, 3.0},
+};
+
+int32_t vsh_measure(const char *name) {
+    for (int32_t i = 0; name != NULL && i < VSH_MEASURE_COUNT; ++i) {
+        if (strcmp(vshi_limits[i].name, name) == 0) {
+            return i;
+        }
+    }
+    return -1;
+}
+
+const char *vsh_measure_name(int32_t measure) {
+    return measure >= 0 && measure < VSH_MEASURE_COUNT ? vshi_limits[measure].name : NULL;
+}
+
+int32_t vsh_measure_at_least(int32_t measure) {
+    return measure >= 0 && measure < VSH_MEASURE_COUNT ? vshi_limits[measure].at_least : 0;
+}
+
+vsh_limits vsh_limits_default(void) {
+    vsh_limits limits = {.options = vsh_compare_options_default()};
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        limits.value[i] = vshi_limits[i].value;
+    }
+    return limits;
+}
+
+uint32_t vsh_compare_judge(const vsh_measures *measures, const vsh_limits *limits) {
+    VSHI_FLOATS;
+    if (measures->count == 0) {
+        return (UINT32_C(1) << VSH_MEASURE_COUNT) - 1;
+    }
+    uint32_t failed = measures->nonfinite[0] + measures->nonfinite[1] > 0 ? 1 << VSH_MEASURE_NONFINITE : 0;
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        const double value = measures->value[i], limit = limits->value[i];
+        const bool holds = vshi_limits[i].at_least ? value >= limit : value <= limit;
+        if (i != VSH_MEASURE_NONFINITE && !isnan(value) && !holds) {
+            failed |= UINT32_C(1) << i;
+        }
+    }
+    return failed;
+}

@@ -1,0 +1,44 @@
+/* Golden values and new ones on one lattice, as the measures see them. */
+#ifndef VSHI_PAIR_H
+#define VSHI_PAIR_H
+
+#include <vdbshade/compare.h>
+
+#include <stdbool.h>
+
+typedef struct vshi_pair {
+    size_t size[3];
+    size_t stride[3]; /* from a value to the next along an axis */
+    size_t count;
+    const float *plane[2]; /* golden, new */
+    const uint8_t *mask;   /* 1 where both are finite and asked for */
+    double scale;          /* 1 / range */
+} vshi_pair;
+
+enum { VSHI_GOLDEN, VSHI_NEW };
+
+static inline double vshi_value_at(const vshi_pair *pair, int which, size_t i) {
+    return (double)pair->plane[which][i] * pair->scale;
+}
+
+/* x, y, z of a value. */
+static inline void vshi_place_of(const vshi_pair *pair, size_t i, size_t place[3]) {
+    place[0] = i % pair->size[0];
+    place[1] = i / pair->stride[1] % pair->size[1];
+    place[2] = i / pair->stride[2];
+}
+
+/* Each fills its own members of the measures. Work takes `scratch` bytes a value, below, and returns false
+ * where the system refuses what it needs besides. */
+typedef bool vshi_measure_fn(const vshi_pair *pair, const vsh_compare_options *options, void *scratch,
+                             vsh_measures *measures);
+
+vshi_measure_fn vshi_measure_values;  /* RMSE, bias, maximum, p99, share */
+vshi_measure_fn vshi_measure_ssim;    /* structural similarity */
+vshi_measure_fn vshi_measure_edges;   /* penumbra, widths, edges */
+vshi_measure_fn vshi_measure_shift;   /* displacement */
+vshi_measure_fn vshi_measure_regions; /* lost, gained */
+
+enum { VSHI_SHIFT_SCRATCH = 5, VSHI_REGIONS_SCRATCH = 16 }; /* bytes a value; the others take none */
+
+#endif

@@ -1,0 +1,170 @@
+/* Limits from a file of JSON, read as scenes are. */
+#include "base/floats.h"
+#include "compare/limits.h"
+#include "scene/keys.h"
+#include "scene/scene.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST_REACH = 16 };
+
+static const double MOST = 1e15; /* of a limit: nothing is held to it */
+
+/* What stands in an object; NaN and -1: it does not. */
+typedef struct entry {
+    const char *channel; /* a name, or the beginning of names and '*' */
+    double value[VSH_MEASURE_COUNT];
+    double threshold, step, coverage;
+    int32_t reach;
+} entry;
+
+struct vsh_tolerances {
+    entry all;
+    entry *channels; /* in the file's order */
+    size_t channel_count;
+    vshi_block *blocks;
+};
+
+static entry no_entry(const char *channel) {
+    entry e = {.channel = channel, .threshold = NAN, .step = NAN, .coverage = NAN, .reach = -1};
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        e.value[i] = NAN;
+    }
+    return e;
+}
+
+#define LIMIT(key, measure)                                                                                  \
+    { .name = key, .kind = VSHI_NUMBER, .offset = offsetof(entry, value[measure]), .highest = 1e15 }
+#define LIMITS                                                                                               \
+    LIMIT("rmse", VSH_MEASURE_RMSE), LIMIT("bias", VSH_MEASURE_BIAS), LIMIT("max", VSH_MEASURE_MAX),         \
+        LIMIT("p99", VSH_MEASURE_P99), LIMIT("share", VSH_MEASURE_SHARE),                                    \
+        LIMIT("penumbra", VSH_MEASURE_PENUMBRA), LIMIT("widths", VSH_MEASURE_WIDTHS),                        \
+        LIMIT("edges", VSH_MEASURE_EDGES), LIMIT("shift", VSH_MEASURE_SHIFT),                                \
+        LIMIT("lost", VSH_MEASURE_LOST), LIMIT("gained", VSH_MEASURE_GAINED),                                \
+        {.name = "ssim",                                                                                     \
+         .kind = VSHI_NUMBER,                                                                                \
+         .offset = offsetof(entry, value[VSH_MEASURE_SSIM]),                                                 \
+         .lowest = -1.0,                                                                                     \
+         .highest = 1.0},                                                                                    \
+        {.name = "threshold", .kind = VSHI_NUMBER, .offset = offsetof(entry, threshold), .highest = 1.0},    \
+        {.name = "step",                                                                                     \
+         .kind = VSHI_NUMBER,                                                                                \
+         .offset = offsetof(entry, step),                                                                    \
+         .highest = 1.0,                                                                                     \
+         .flags = VSHI_ABOVE},                                                                               \
+    {                                                                                                        \
+        .name = "reach", .kind = VSHI_INTEGER, .offset = offsetof(entry, reach), .highest = MOST_REACH       \
+    }
+
+static const vshi_key channel_keys[] = {LIMITS};
+static const vshi_table channel_table = VSHI_TABLE(channel_keys);
+
+static vsh_result read_channels(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_tolerances *made = member;
+    vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
+    void *memory = NULL;
+    const size_t count = result == VSH_OK ? json_object_size(value->json) : 0;
+    result =
+        result == VSH_OK ? vshi_reader_allocate(reader, &memory, count, sizeof(entry), "channels") : result;
+    made->channels = memory;
+    for (void *i = json_object_iter(value->json); i != NULL && result == VSH_OK;
+         i = json_object_iter_next(value->json, i)) {
+        const vshi_value item = {value, json_object_iter_key(i), made->channel_count, value->depth + 1,
+                                 json_object_iter_value(i)};
+        entry *e = &made->channels[made->channel_count];
+        const char *name;
+        result = vshi_reader_copy(reader, 0, item.key, &name);
+        if (result == VSH_OK) {
+            *e = no_entry(name);
+            result = vshi_read_object(reader, &item, &channel_table, 1, "a channel's tolerances", e);
+            ++made->channel_count;
+        }
+    }
+    return result;
+}
+
+static const vshi_key file_keys[] = {
+    LIMITS,
+    {.name = "coverage", .kind = VSHI_NUMBER, .offset = offsetof(entry, coverage), .highest = 1.0},
+    {.name = "channels", .kind = VSHI_CUSTOM, .read = read_channels},
+};
+static const vshi_table file_table = VSHI_TABLE(file_keys);
+_Static_assert(offsetof(vsh_tolerances, all) == 0, "the keys' offsets are those of an entry");
+
+vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vsh_error *error) {
+    VSHI_FLOATS;
+    if (path == NULL || tolerances == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_tolerances_read: path or tolerances is NULL");
+    }
+    *tolerances = NULL;
+    char *text;
+    size_t size;
+    vsh_result result = vshi_scene_text(path, &text, &size, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_tolerances *made = calloc(1, sizeof *made);
+    json_t *json = NULL;
+    if (made == NULL) {
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
+    } else {
+        vshi_reader reader = {path, text, size, NULL, error};
+        made->all = no_entry(NULL);
+        result = vshi_reader_load(&reader, &json);
+        if (result == VSH_OK) {
+            const vshi_value root = {NULL, NULL, 0, 0, json};
+            result = vshi_read_object(&reader, &root, &file_table, 1, "tolerances", made);
+        }
+        made->blocks = reader.blocks;
+    }
+    json_decref(json);
+    free(text);
+    if (result != VSH_OK) {
+        vsh_tolerances_free(made);
+        return result;
+    }
+    *tolerances = made;
+    return VSH_OK;
+}
+
+void vsh_tolerances_free(vsh_tolerances *tolerances) {
+    if (tolerances != NULL) {
+        vshi_blocks_free(tolerances->blocks);
+        free(tolerances);
+    }
+}
+
+static void apply(const entry *e, vsh_limits *limits) {
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        if (!isnan(e->value[i])) {
+            limits->value[i] = e->value[i] < MOST ? e->value[i] : INFINITY;
+        }
+    }
+    limits->options.threshold = isnan(e->threshold) ? limits->options.threshold : e->threshold;
+    limits->options.step = isnan(e->step) ? limits->options.step : e->step;
+    limits->options.reach = e->reach < 0 ? limits->options.reach : e->reach;
+}
+
+static bool is_for(const entry *e, const char *channel) {
+    const size_t length = strlen(e->channel);
+    return length > 0 && e->channel[length - 1] == '*' ? strncmp(e->channel, channel, length - 1) == 0
+                                                       : strcmp(e->channel, channel) == 0;
+}
+
+void vsh_tolerances_apply(const vsh_tolerances *tolerances, const char *channel, vsh_limits *limits,
+                          double *coverage) {
+    if (tolerances == NULL) {
+        return;
+    }
+    apply(&tolerances->all, limits);
+    for (size_t i = 0; i < tolerances->channel_count; ++i) {
+        if (is_for(&tolerances->channels[i], channel)) {
+            apply(&tolerances->channels[i], limits);
+        }
+    }
+    if (coverage != NULL && !isnan(tolerances->all.coverage)) {
+        *coverage = tolerances->all.coverage;
+    }
+}

@@ -1,0 +1,138 @@
+/* The reader's side: takes the request, limits itself, parses, answers. */
+#include "read/confine.h"
+#include "read/reader.h"
+
+#include <vdbshade/reader.h>
+
+#include <errno.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+enum {
+    CANNOT_SERVE = 87,
+    MOST_WARNINGS = 1 << 20 /* bytes of all that are passed on */
+};
+
+/* Between two reports of progress, seconds. */
+static const double report_interval = 0.01;
+
+static vshi_serve_fn *const servers[VSHI_READ_KINDS] = {
+    [VSHI_READ_GRID] = vshi_serve_grid,     [VSHI_READ_LIST] = vshi_serve_list,
+    [VSHI_READ_VOXELS] = vshi_serve_voxels, [VSHI_READ_MODEL] = vshi_serve_model,
+    [VSHI_READ_IMAGE] = vshi_serve_image,   [VSHI_READ_TEXT] = vshi_serve_text,
+    [VSHI_READ_COPY] = vshi_serve_copy,
+};
+
+typedef struct serving {
+    char *warnings; /* texts, one behind the other with their ends */
+    size_t used, count;
+    double reported;
+} serving;
+
+/* May come from any thread of the pool, one at a time. */
+static void keep_warning(void *user, const char *message) {
+    serving *s = user;
+    const size_t size = strlen(message) + 1;
+    if (size <= MOST_WARNINGS - s->used) {
+        memcpy(s->warnings + s->used, message, size);
+        s->used += size;
+        ++s->count;
+    }
+}
+
+/* The pipe blocks nobody: what finds no room is left out. */
+static int32_t report(void *user, const char *stage, double fraction) {
+    serving *s = user;
+    (void)stage;
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    const double seconds = (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+    if (seconds - s->reported >= report_interval) {
+        s->reported = seconds;
+        if (write(VSHI_READER_PROGRESS, &fraction, sizeof fraction) < 0) {
+            errno = 0;
+        }
+    }
+    return 0;
+}
+
+static bool map_request(vshi_take *take) {
+    struct stat status;
+    if (fstat(VSHI_READER_REQUEST, &status) != 0 || status.st_size <= 0) {
+        return false;
+    }
+    const void *map = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_PRIVATE, VSHI_READER_REQUEST, 0);
+    if (map == MAP_FAILED) {
+        return false;
+    }
+    *take = (vshi_take){map, (const unsigned char *)map + status.st_size, false};
+    return true;
+}
+
+static bool write_head(const vshi_answer_head *head) {
+    return pwrite(VSHI_READER_ANSWER, head, sizeof *head, 0) == (ssize_t)sizeof *head;
+}
+
+static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_take *request,
+                  const vsh_run *run) {
+    static vshi_put put;
+    vshi_answer_head head = {
+        .magic = VSHI_ANSWER_MAGIC, .protocol = VSHI_READER_PROTOCOL, .code = VSHI_ANSWER_BEGUN};
+    if (!write_head(&head)) {
+        return CANNOT_SERVE;
+    }
+    vsh_error error = {VSH_OK, ""};
+    vshi_put_begin(&put, VSHI_READER_ANSWER, sizeof head);
+    vsh_result result = serve(path, request, run, &put, &error);
+    head.payload = put.size - sizeof head;
+    const char *text = s->warnings;
+    for (size_t i = 0; i < s->count; ++i) {
+        vshi_put_text(&put, text);
+        text += strlen(text) + 1;
+    }
+    if (!vshi_put_flush(&put)) { /* EFBIG: more than the caller could hold */
+        return VSHI_READER_HUNGRY;
+    }
+    head.code = result;
+    head.warnings = s->count;
+    snprintf(head.message, sizeof head.message, "%s", error.message);
+    return write_head(&head) ? 0 : CANNOT_SERVE;
+}
+
+int32_t vsh_reader_serve(int argc, char **argv) {
+    vshi_take request;
+    if (argc < 2 || strcmp(argv[1], VSH_READER_ARGUMENT) != 0) {
+        return -1;
+    }
+    if (!map_request(&request) || vshi_take_count(&request, UINT64_MAX) != VSHI_REQUEST_MAGIC ||
+        vshi_take_count(&request, UINT64_MAX) != VSHI_READER_PROTOCOL) {
+        return CANNOT_SERVE;
+    }
+    const uint64_t kind = vshi_take_count(&request, VSHI_READ_KINDS - 1);
+    const uint64_t parent = vshi_take_count(&request, INT32_MAX);
+    vsh_run run = vsh_run_default();
+    run.memory_limit = vshi_take_count(&request, UINT64_MAX);
+    const double seconds = vshi_take_number(&request);
+    const char *path = vshi_take_text(&request, false);
+    serving s = {.warnings = malloc(MOST_WARNINGS)};
+    if (request.bad || path == NULL || s.warnings == NULL) {
+        return CANNOT_SERVE;
+    }
+    run.threads = 1;
+    run.progress = report;
+    run.warning = keep_warning;
+    run.user = &s;
+    vshi_confine_resources(run.memory_limit, seconds);
+    if ((uint64_t)getppid() != parent) {
+        return CANNOT_SERVE; /* it died before its death would have been ours */
+    }
+    vshi_confine_hunger();
+    vshi_confine_calls();
+    return answer(&s, servers[kind], path, &request, &run);
+}

@@ -1,0 +1,81 @@
+/* OpenImageIO is loaded when the first file needs it: with it come 240 libraries of formats, which take
+ * longer to load (0.2 s) than a small bake takes, and most runs read and write EXR alone. */
+#define _GNU_SOURCE
+
+#include "shim/oiio.h"
+
+#include "shim/oiio_table.h"
+
+#include <dlfcn.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <string.h>
+
+static const char module_name[] = "libvdbshade_oiio.so." VSHI_OIIO_SOVERSION;
+
+/* Written once, by load(). */
+static const vshi_oiio_table *table;
+static char reason[512];
+
+/* Searched for as every library is, from this one on, which is beside it. */
+static void load(void) {
+    void *module = dlopen(module_name, RTLD_LAZY | RTLD_LOCAL);
+    const vshi_oiio_table *found = module != NULL ? dlsym(module, "vshi_oiio_module") : NULL;
+    if (found == NULL) {
+        const char *why = dlerror();
+        snprintf(reason, sizeof reason, "%s", why != NULL ? why : "it has no table");
+    } else if (strcmp(found->version, vsh_version()) != 0) {
+        snprintf(reason, sizeof reason, "%s is of version %s", module_name, found->version);
+    } else {
+        table = found;
+    }
+}
+
+static const vshi_oiio_table *module_table(void) {
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, load);
+    return table;
+}
+
+static vsh_result fail(const char *path, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: formats other than EXR and PNG cannot be had: %s",
+                     path, reason);
+}
+
+bool vshi_oiio_format(const char *path, vshi_format *format) {
+    return module_table() != NULL && table->format(path, format);
+}
+
+const char *vshi_oiio_refusal(const char *path) {
+    return module_table() != NULL ? table->refusal(path) : reason;
+}
+
+const char *vshi_oiio_endings(void) {
+    return "png, tif, jpg, tga, bmp, hdr, ppm, pgm, webp, jp2, dpx, gif, sgi, iff, rla, ico, heic, avif";
+}
+
+vsh_result vshi_oiio_begin(const char *temporary, const char *path, const vshi_format *format,
+                           const vshi_planes *planes, int32_t bits, vshi_oiio_writer **writer,
+                           vsh_error *error) {
+    *writer = NULL;
+    return module_table() != NULL ? table->begin(temporary, path, format, planes, bits, writer, error)
+                                  : fail(path, error);
+}
+
+vsh_result vshi_oiio_add(vshi_oiio_writer *writer, const vshi_planes *planes, int32_t rows,
+                         vsh_error *error) {
+    return table->add(writer, planes, rows, error);
+}
+
+vsh_result vshi_oiio_end(vshi_oiio_writer *writer, vsh_error *error) {
+    return writer != NULL ? table->end(writer, error) : VSH_OK;
+}
+
+double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits) {
+    return module_table() != NULL ? table->writer_bytes(format, planes, bits) : 0.0;
+}
+
+vsh_result vshi_oiio_read(const char *path, vsh_image_file **file, vsh_error *error) {
+    *file = NULL;
+    return module_table() != NULL ? table->read(path, file, error) : fail(path, error);
+}

@@ -1,0 +1,261 @@
+# A bake against its golden one: every way in which bakes go wrong is told by the measure that is for it.
+load helper
+
+POST='{"sdf": {"shape": "capsule", "half_height": 0.5, "radius": 0.05, "translate": [-1, 0.55, -1.3]}},'
+
+# scene NAME [ANGLE] [POST] [FLOOR]: a ball, a box, a ring and (POST not empty) a thin post on a floor, under a sun.
+scene() {
+    local post=${3-$POST}
+    cat >"$1.json" <<JSON
+{"casters": [$post
+  {"sdf": {"shape": "plane", "half_size": [2.5, 2.5], "thickness": 0.4}},
+  {"sdf": {"shape": "sphere", "radius": 0.5, "translate": [-0.8, 0.7, 0.3]}},
+  {"sdf": {"shape": "box", "half_size": [0.4, 0.3, 0.3], "translate": [0.9, 0.3, -0.6]}},
+  {"sdf": {"shape": "torus", "radius": 0.5, "tube_radius": 0.15, "translate": [0.6, 0.5, 1.1]}}],
+ "voxel_size": 0.05,
+ "lights": [{"name": "sun", "type": "directional", "direction": [-0.5, 0.6, -0.6], "angle_deg": ${2:-10}}],
+ "ao": {"distance": 0.6},
+ "receivers": [{"mesh": "${4:-$ASSETS/seeds_floor.obj}", "size": 96, "output": "$1.exr"}]}
+JSON
+}
+
+# The bakes are made once, and kept for all tests of this file.
+setup_file() {
+    cd "$BATS_FILE_TMPDIR" || return 1
+    scene golden
+    scene wider 11
+    scene narrower 9
+    scene half 5
+    scene lost 10 ''
+    awk '$1 == "vt" { printf "vt %.9g %s\n", $2 + 1 / 96, $3; next } { print }' "$ASSETS/seeds_floor.obj" >moved.obj
+    scene shifted 10 "$POST" moved.obj
+    local one
+    for one in golden wider narrower half lost shifted; do
+        "$VDBSHADE" bake $one.json --quiet || return 1
+        "$VDBSHADE" volume $one.json --box -2.5,0,-2.5,2.5,1.5,2.5 --box-voxel-size 0.125 --quiet -o $one.vdb || return 1
+    done
+    "$VDBSHADE" bake golden.json --bits 16 --quiet -o half_float.exr
+    "$VDBSHADE" bake golden.json --threads 1 --isa base --quiet -o again.exr
+    "$VDBSHADE" bake golden.json --bits 16 --quiet -o golden.png
+    "$VDBSHADE" bake golden.json --bits 8 --quiet -o eight.png
+    "$VDBSHADE" volume golden.json --box -2.5,0,-2.5,2.5,1.5,2.5 --box-voxel-size 0.125 --half --quiet -o half_float.vdb
+}
+
+setup() {
+    cd "$BATS_FILE_TMPDIR" || return 1
+}
+
+compare() {
+    shade compare "$@"
+}
+
+# line CHANNEL: what was said of it.
+line() {
+    local one
+    for one in "${lines[@]}"; do
+        [[ $one != "$1: "* ]] || echo "$one"
+    done
+}
+
+
+# names: the failed measures of one file against golden, as a list that is easy to look into.
+names() {
+    compare golden.exr "$1" --json
+    [ "$status" -eq 1 ] || fail "$1: expected 1"
+    awk '/"name": "shadow.sun"/ { inside = 1 } inside && /"failed": \[/ { listing = 1; next }
+         listing && /\]/ { exit } listing { gsub(/[ ",]/, ""); printf " %s", $0 } END { print " " }' <<<"$output"
+}
+
+# value MEASURE: of shadow.sun, from the JSON on standard output.
+value() {
+    awk -v key="\"$1\":" '/"name": "shadow.sun"/ { inside = 1 } inside && $1 == key { gsub(",", "", $2); print $2; exit }' \
+        <<<"$output"
+}
+
+# between LEAST VALUE MOST
+between() {
+    awk -v a="$1" -v v="$2" -v b="$3" 'BEGIN { exit !(v != "" && v >= a && v <= b) }' || fail "$2 is not within $1 … $3"
+}
+
+@test "a bake is like itself, like the one of another instruction set, and like its half floats" {
+    local one
+    for one in golden again half_float; do
+        compare golden.exr "$one.exr"
+        done_well
+        [ "${#lines[@]}" -eq 3 ] || fail "$one: not a line a channel"
+        [[ $(line A) == "A: alike; "* && $(line ao) == "ao: alike; "* ]] || fail "$one"
+        [[ $(line shadow.sun) == "shadow.sun: alike; rmse "*"ssim "*"penumbrae "*"shift 0.00, lost 0, gained 0" ]] || fail "$one"
+    done
+    compare golden.vdb half_float.vdb
+    done_well
+    compare golden.png eight.png
+    done_well
+}
+
+@test "a light's angle a tenth off is told by the width of penumbrae alone among shapes" {
+    local one names
+    for one in wider narrower; do
+        names=$(names $one.exr)
+        [[ $names == *" penumbra "* ]] || fail "$one: $names"
+        [[ $names != *" shift "* && $names != *" lost "* && $names != *" gained "* && $names != *" ssim "* ]] || fail "$one: $names"
+    done
+    compare golden.exr wider.exr --json
+    between 0.07 "$(value penumbra)" 0.13
+    between 0 "$(value shift)" 0.05
+    compare golden.exr wider.exr
+    [[ $(line shadow.sun) == "shadow.sun: not alike: penumbrae 1."*" times as wide, "*" (limit ±3 %); "* ]] || fail "not named"
+    [[ $(line ao) == "ao: alike; "* ]] || fail "AO knows no sun"
+}
+
+@test "halved penumbrae are told as such" {
+    [[ $(names half.exr) == *" penumbra widths "* ]] || fail "$(names half.exr)"
+    compare golden.exr half.exr --json
+    between 0.6 "$(value penumbra)" 1.1
+    between 0 "$(value shift)" 0.05
+    compare golden.exr half.exr
+    [[ $(line shadow.sun) == "shadow.sun: not alike: penumbrae 0.5"* ]] || fail "not named first"
+}
+
+@test "a shift by a texel is told with its length, and by coverage" {
+    local names
+    names=$(names shifted.exr)
+    [[ $names == *" shift "* ]] || fail "$names"
+    [[ $names != *" penumbra "* && $names != *" lost "* && $names != *" gained "* ]] || fail "$names"
+    compare golden.exr shifted.exr --json
+    between 0.95 "$(value shift)" 1.05
+    compare golden.exr shifted.exr
+    [[ $(line shadow.sun) == "shadow.sun: not alike: shifted by (1.0"*" texels, which explains "* ||
+        $(line shadow.sun) == "shadow.sun: not alike: shifted by (0.9"*" texels, which explains "* ]] || fail "not named first"
+    [[ $(line A) == "A: not alike: coverage differs in "* ]] || fail "coverage"
+}
+
+@test "a lost thin caster is told with its place, and where it comes back as a new one" {
+    local names
+    names=$(names lost.exr)
+    [[ $names == *" lost "* ]] || fail "$names"
+    [[ $names != *" penumbra "* && $names != *" shift "* && $names != *" gained "* ]] || fail "$names"
+    compare golden.exr lost.exr
+    [[ $(line shadow.sun) == "shadow.sun: not alike: "*" texels around ("*") got lighter by up to "*": a lost caster? (limit 3)"* ]] ||
+        fail "not named first"
+    compare lost.exr golden.exr
+    [[ $(line shadow.sun) == "shadow.sun: not alike: "*" got darker by up to "*": a new caster? (limit 3)"* ]] || fail "not named"
+}
+
+@test "the same of grids of voxels" {
+    local one
+    for one in half lost; do
+        compare golden.vdb $one.vdb
+        [ "$status" -eq 1 ] || fail "$one"
+    done
+    [[ $(line shadow.sun) == *" voxels around ("*") got lighter "*": a lost caster?"* ]] || fail "not named"
+    compare golden.vdb half.vdb
+    [[ $(line shadow.sun) == *"not alike: penumbrae 0."* ]] || fail "not named"
+    "$VDBSHADE" volume golden.json --box -2.375,0,-2.5,2.5,1.5,2.5 --box-voxel-size 0.125 --quiet -o elsewhere.vdb
+    compare golden.vdb elsewhere.vdb
+    [ "$status" -eq 1 ] || fail "another place"
+    [[ $output == *"grid 'shadow.sun': other voxels"* ]] || fail "not told"
+}
+
+@test "sizes, channels and formats that differ are told as such" {
+    "$VDBSHADE" bake golden.json --size 48 --quiet -o small.exr
+    compare golden.exr small.exr
+    [ "$status" -eq 1 ] || fail "size"
+    [ "$output" = "not alike: size: golden is 96 × 96, new is 48 × 48" ] || fail "size"
+    compare golden.exr golden.png
+    [ "$status" -eq 1 ] || fail "format"
+    [[ $output == *"not alike: format: golden is 'exr', new is 'png'"* ]] || fail "format"
+    [[ $output == *"not alike: channel 'shadow.sun': in golden alone"* ]] || fail "channels"
+    compare golden.exr golden.vdb
+    [ "$status" -eq 1 ] || fail "kind"
+    [ "$output" = "not alike: format: golden is 'exr', new is 'vdb'" ] || fail "kind"
+}
+
+@test "a value that is not a number never passes, and its place is told" {
+    local build
+    build=$(dirname "$(realpath "$VDBSHADE")")
+    cat >nan.c <<'C'
+#include <math.h>
+#include <vdbshade/vdbshade.h>
+int main(void) {
+    float values[16] = {0}, other[16] = {0};
+    const char *const names[1] = {"ao"};
+    const float *const planes[1] = {values}, *const others[1] = {other};
+    const vsh_image image = {4, 4, 1, names, planes}, clean = {4, 4, 1, names, others};
+    values[6] = NAN;
+    values[9] = INFINITY;
+    return vsh_image_write("nan.exr", &image, NULL, NULL) != VSH_OK ||
+           vsh_image_write("clean.exr", &clean, NULL, NULL) != VSH_OK;
+}
+C
+    "${CC:-cc}" -std=c11 -Wall -Werror ${CFLAGS-} -I"$BATS_TEST_DIRNAME/../../include" nan.c -L"$build" -lvdbshade \
+        -Wl,-rpath,"$build" -lm -o nan
+    ./nan
+    local one
+    for one in 'clean nan new' 'nan clean golden' 'nan nan golden'; do
+        set -- $one
+        compare "$1.exr" "$2.exr" --max-rmse 1e15 --max-difference 1e15 --max-share 1
+        [ "$status" -eq 1 ] || fail "$one passed"
+        [[ $output == "ao: not alike: 2 $3 values are NaN or infinite, the first at (2, 1)"* ]] || fail "$one"
+    done
+    compare clean.exr clean.exr
+    done_well
+}
+
+@test "limits come from the command line, or from a file beside the golden" {
+    cp golden.exr mine.exr
+    compare mine.exr narrower.exr --max-penumbra 0.2 --max-widths 0.2 --max-rmse 0.1 --max-p99 0.2 --max-share 0.2 --max-edges 0.1
+    done_well
+    cat >mine.exr.tolerance.json <<'JSON'
+{"coverage": 0.1, "channels": {"shadow.*": {"penumbra": 0.2, "widths": 0.2, "rmse": 0.1, "p99": 0.2, "share": 0.2, "edges": 0.1}}}
+JSON
+    compare mine.exr narrower.exr
+    done_well
+    compare mine.exr narrower.exr --max-penumbra 0.01
+    [ "$status" -eq 1 ] || fail "the command line is over the file"
+    [[ $(line shadow.sun) == *"not alike: penumbrae "*" (limit ±1 %)"* ]] || fail "limit"
+    cp mine.exr.tolerance.json other.json
+    echo '{"rms": 1}' >mine.exr.tolerance.json
+    compare mine.exr narrower.exr
+    refused 2 'mine.exr.tolerance.json:1:2: rms: unknown key' 'rmse'
+    compare mine.exr narrower.exr --tolerances other.json
+    done_well
+    compare golden.exr golden.exr --min-ssim 2
+    refused 2 "--min-ssim '2'" '1'
+}
+
+@test "reports: JSON, JUnit, and a page that needs nothing beside it" {
+    compare golden.exr lost.exr --json --junit out.xml --html out.html
+    [ "$status" -eq 1 ] || fail "expected 1"
+    [[ $output == '{'*'}' ]] || fail "no JSON"
+    [[ $output == *'"alike": false'* ]] || fail "no verdict"
+    [ "$(grep -c '<testcase ' out.xml)" -eq 4 ] || fail "not a test case a channel, and one of the files"
+    grep -q '<testsuites tests="4" failures="2">' out.xml || fail "counts"
+    grep -q '<failure message="[^"<]*a lost caster?' out.xml || fail "no reason"
+    [ "$(grep -o 'data:image/png;base64,iVBORw0KGgo[^"]*' out.html | wc -l)" -eq 6 ] || fail "not three pictures a channel"
+    ! grep -qE '(src|href)="?(https?:|/|\.)' out.html || fail "the page needs something beside it"
+    grep -q '</html>' out.html || fail "cut short"
+    [ -z "$(find . -name '*.tmp*')" ] || fail "left behind"
+    compare golden.exr golden.exr --quiet --junit out.xml
+    done_well
+    [ -z "$output$stderr" ] || fail "not quiet"
+    grep -q '<testsuites tests="4" failures="0">' out.xml || fail "counts"
+}
+
+@test "what cannot be compared is an error of its own" {
+    compare golden.exr nowhere.exr
+    refused 3 nowhere.exr
+    echo text >text.exr
+    compare text.exr golden.exr
+    refused 2 text.exr
+    head -c 3000 golden.vdb >cut.vdb
+    compare golden.vdb cut.vdb
+    refused 3 cut.vdb
+    compare golden.exr
+    refused 2 'no NEW'
+    compare golden.exr half.exr wider.exr
+    refused 2 wider.exr
+    compare golden.exr half.exr --html half.exr
+    refused 2 'half.exr: the report is an input'
+    compare golden.exr half.exr --html same.xml --junit same.xml
+    refused 2 same.xml
+}

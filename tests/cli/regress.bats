@@ -1,0 +1,161 @@
+# A folder of scenes and their golden bakes.
+load helper
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    export TMPDIR=$BATS_TEST_TMPDIR
+    mkdir scenes
+    write_box scenes/box.obj
+    scene box 10
+}
+
+# scene NAME ANGLE
+scene() {
+    cat >"scenes/$1.json" <<JSON
+{"casters": [{"sdf": {"shape": "sphere", "radius": 0.25, "translate": [0.5, 1.5, 0.5]}}, {"mesh": "box.obj"}],
+ "resolution": 32,
+ "lights": [{"name": "sun", "type": "directional", "direction": [0.2, 1, 0.1], "angle_deg": $2}],
+ "receivers": [{"mesh": "box.obj", "size": 64, "output": "$1.exr"}]}
+JSON
+}
+
+regress() {
+    shade regress scenes "$@"
+}
+
+# clean: nothing was left behind, here or among the scenes.
+clean() {
+    no_leftovers
+    [ -z "$(find . -name 'vdbshade-regress-*')" ] || fail "bakes were left behind"
+}
+
+@test "a scene without a golden bake is told, and made by --update; then nothing is to be done" {
+    regress
+    [ "$status" -eq 1 ] || fail "expected 1"
+    [[ $output == "box: not alike"*"no golden bake scenes/golden/box.exr"*"--update"* ]] || fail "no hint"
+    [ ! -e scenes/golden ] || fail "made a golden bake"
+    regress --update
+    done_well
+    [ -s scenes/golden/box.exr ] || fail "no golden bake"
+    [ ! -e scenes/box.exr ] || fail "baked into the scenes' folder"
+    regress
+    done_well
+    [ "$output" = "box: unchanged" ] || fail "baked again"
+    regress --all
+    done_well
+    [ "$output" = "box: alike" ] || fail "not baked"
+    clean
+}
+
+@test "what changed is baked, told, and put in the golden one's place when asked for" {
+    regress --update
+    scene other 8
+    regress --update
+    done_well
+    [[ ${lines[0]} == "box: unchanged" && ${lines[1]} == "other: updated" ]] || fail "all were baked"
+    cp scenes/golden/box.exr old.exr
+    scene box 20
+    regress
+    [ "$status" -eq 1 ] || fail "expected 1"
+    [[ ${lines[0]} == "box: not alike (changed: vdbshade_light_sun)" ]] || fail "what changed"
+    [[ $output == *"  box.exr: shadow.sun: not alike: "*penumbrae* ]] || fail "in what"
+    [[ $output == *"other: unchanged"* ]] || fail "the other was baked"
+    cmp -s scenes/golden/box.exr old.exr || fail "the golden bake was touched"
+    regress
+    [ "$status" -eq 1 ] || fail "what was not alike is baked again"
+    regress --update
+    done_well
+    [[ $output == *"box: updated"*"  box.exr: shadow.sun: not alike: "* ]] || fail "what moved"
+    ! cmp -s scenes/golden/box.exr old.exr || fail "the golden bake stayed"
+    regress
+    done_well
+    clean
+}
+
+@test "meshes, golden bakes, tolerances and limits count as inputs" {
+    regress --update
+    echo '# a comment' >>scenes/box.obj
+    regress
+    done_well
+    [ "$output" = "box: alike (changed: box.obj)" ] || fail "mesh"
+    echo '{"rmse": 0.5}' >scenes/golden/box.exr.tolerance.json
+    regress
+    done_well
+    [ "$output" = "box: alike (changed: golden box.exr.tolerance.json)" ] || fail "tolerances"
+    regress --max-shift 0.5
+    done_well
+    [[ $output == "box: alike (changed: limit of shift)" ]] || fail "limits"
+    regress --max-shift 0.5
+    [ "$output" = "box: unchanged" ] || fail "the same limits"
+    "$VDBSHADE" bake scenes/box.json --method hard --quiet -o scenes/golden/box.exr
+    regress --max-shift 0.5
+    [ "$status" -eq 1 ] || fail "another golden bake"
+    [[ ${lines[0]} == "box: not alike (changed: golden box.exr)" ]] || fail "another golden bake"
+}
+
+@test "a list names cases with commands and options of their own" {
+    cat >scenes/regress.json <<'JSON'
+{"cases": [{"scene": "box.json", "name": "rough", "options": ["--method", "hard", "--caster", "box.obj"], "output": "rough.exr"},
+           {"scene": "box.json", "name": "air", "command": "volume", "output": "air.vdb",
+            "options": ["--box", "0,1,0,1,2,1", "--box-voxel-size", "0.125"]}]}
+JSON
+    scene more 4
+    regress --update
+    done_well
+    [[ $output == "rough: updated"*"air: updated"*"more: updated"* ]] || fail "cases"
+    [ -s scenes/golden/rough.exr ] && [ -s scenes/golden/air.vdb ] && [ -s scenes/golden/more.exr ] || fail "bakes"
+    regress --only air --all
+    done_well
+    [ "$output" = "air: alike" ] || fail "others too"
+    regress --only more
+    [ "$output" = "more: unchanged" ] || fail "the cache forgot the others"
+    "$VDBSHADE" compare scenes/golden/rough.exr scenes/golden/more.exr --quiet && fail "the options did nothing"
+    sed -i 's/"output": "rough.exr"/"output": "more.exr"/' scenes/regress.json
+    regress
+    refused 2 "both 'rough' and 'more' write 'more.exr'"
+    echo '{"cases": [{"scene": "box.json", "optoins": []}]}' >scenes/regress.json
+    regress
+    refused 2 'cases[0]: optoins: unknown key; did you mean "options"?'
+    echo '{"cases": [{"scene": "box.json", "command": "volume"}]}' >scenes/regress.json
+    regress
+    refused 2 "nothing says what 'box' writes"
+}
+
+@test "a scene that cannot be baked fails alone, with the code of its bake" {
+    scene broken 5
+    sed -i 's/"mesh": "box.obj", "size"/"mesh": "gone.obj", "size"/' scenes/broken.json
+    regress --update
+    [ "$status" -eq 3 ] || fail "expected 3"
+    [[ $stderr == *gone.obj* ]] || fail "no reason"
+    sed -i 's/gone.obj/box.obj/; s/"resolution": 32/"voxel_size": 1e-9/' scenes/broken.json
+    regress --update --junit out.xml
+    [ "$status" -eq 4 ] || fail "expected 4"
+    [[ $output == "box: "*"broken: failed"*"exit code 4"* ]] || fail "not told"
+    [ -s scenes/golden/box.exr ] || fail "the other was not baked"
+    grep -q 'name="broken/broken.exr" tests="1" failures="1"' out.xml || fail "JUnit"
+    clean
+}
+
+@test "reports of all cases, and new bakes that are kept" {
+    scene other 8
+    regress --update
+    scene other 16
+    regress --all --json --junit out.xml --html out.html --bakes new
+    [ "$status" -eq 1 ] || fail "expected 1"
+    [[ $output == *'"name": "box"'*'"status": "alike"'*'"name": "other"'*'"status": "not alike"'* ]] || fail "JSON"
+    grep -q '<testsuite name="box/box.exr" tests="3" failures="0"' out.xml || fail "JUnit"
+    grep -q '<testsuite name="other/other.exr" tests="3" failures="1"' out.xml || fail "JUnit"
+    [ "$(grep -o 'data:image/png' out.html | wc -l)" -eq 6 ] || fail "pictures"
+    [ -s new/box.exr ] && [ -s new/other.exr ] || fail "bakes"
+    "$VDBSHADE" compare scenes/golden/box.exr new/box.exr --quiet || fail "bakes"
+}
+
+@test "a folder without scenes, or none, is refused" {
+    mkdir empty
+    shade regress empty
+    refused 2 'empty: no scenes'
+    shade regress nowhere
+    [ "$status" -eq 3 ] || fail "expected 3"
+    regress --only nothing
+    refused 2 "'nothing'"
+}

@@ -1,0 +1,82 @@
+/* Pictures of known content, compared, for the tests of the measures. */
+#ifndef TESTS_COMPARED_H
+#define TESTS_COMPARED_H
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <vdbshade/compare.h>
+
+#include <math.h>
+#include <stdbool.h>
+
+#define PI 3.14159265358979323846
+
+/* A plane of two or three dimensions. */
+typedef struct plane {
+    int32_t size[3];
+    size_t count;
+    float *values;
+} plane;
+
+/* Value at a place, texels; `user` is the test's own. */
+typedef double plane_fn(const void *user, double x, double y, double z);
+
+static inline plane make_plane(int32_t width, int32_t height, int32_t depth, plane_fn *fn, const void *user) {
+    plane p = {{width, height, depth}, (size_t)width * (size_t)height * (size_t)depth, NULL};
+    p.values = malloc(p.count * sizeof *p.values);
+    assert_non_null(p.values);
+    for (size_t i = 0; i < p.count; ++i) {
+        const size_t x = i % (size_t)width, y = i / (size_t)width % (size_t)height;
+        p.values[i] = (float)fn(user, (double)x, (double)y, (double)(i / (size_t)width / (size_t)height));
+    }
+    return p;
+}
+
+static inline double flat(const void *user, double x, double y, double z) {
+    (void)x;
+    (void)y;
+    (void)z;
+    return *(const double *)user;
+}
+
+static inline vsh_compared pair_of(const plane *golden, const plane *values, const uint8_t *mask) {
+    assert_memory_equal(golden->size, values->size, sizeof golden->size);
+    vsh_compared c = {{0}, golden->values, values->values, mask};
+    memcpy(c.size, golden->size, sizeof c.size);
+    return c;
+}
+
+static inline vsh_measures measure(const plane *golden, const plane *values, const uint8_t *mask) {
+    const vsh_compared c = pair_of(golden, values, mask);
+    vsh_measures m;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_compare(&c, NULL, NULL, &m, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return m;
+}
+
+/* -1 … 1, the same for the same counter. */
+static inline double noise(uint32_t counter) {
+    uint32_t x = counter * 2654435761u + 1u;
+    x ^= x >> 15;
+    x *= 2246822519u;
+    x ^= x >> 13;
+    return (double)x / 2147483647.5 - 1.0;
+}
+
+static inline void assert_near(double value, double expected, double off) {
+    if (!(fabs(value - expected) <= off)) {
+        fail_msg("%.9g is not within %g of %.9g", value, off, expected);
+    }
+}
+
+#endif

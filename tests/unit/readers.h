@@ -1,0 +1,150 @@
+// A test that is its own reader (vsh_run.reader), and one that misbehaves where it is told to.
+#ifndef TESTS_READERS_H
+#define TESTS_READERS_H
+
+#include "grid_files.h"
+
+#include "caster/model.h"
+#include "caster/outline.h"
+#include "read/confine.h"
+#include "read/reader.h"
+#include "read/takers.h"
+#include "shim/openvdb_file.h"
+#include "shim/openvdb_handover.h"
+#include "shim/openvdb_volume.h"
+
+#include <chrono>
+#include <string>
+#include <sys/mman.h>
+#include <thread>
+#include <vdbshade/vdbshade.h>
+#include <vector>
+
+// How the next readers fail: set in the environment, which they inherit.
+constexpr const char *MISBEHAVE = "VSH_TEST_READER";
+
+inline void misbehave(const char *how) {
+    if (how != nullptr) {
+        setenv(MISBEHAVE, how, 1);
+    } else {
+        unsetenv(MISBEHAVE);
+    }
+}
+
+inline int as_reader(int argc, char **argv) {
+    const char *told = getenv(MISBEHAVE);
+    const std::string how = told != nullptr ? told : "";
+    if (argc < 2 || std::strcmp(argv[1], VSH_READER_ARGUMENT) != 0) {
+        return -1;
+    }
+    if (how == "crash") {
+        signal(SIGSEGV, SIG_DFL);
+        raise(SIGSEGV);
+    } else if (how == "hang") {
+        for (;;) {
+            pause();
+        }
+    } else if (how == "close") { // and live on
+        for (int file = 3; file < 16; ++file) {
+            close(file);
+        }
+        pause();
+    } else if (how == "spin") {
+        vshi_confine_resources(0, 0.0);
+        for (volatile uint64_t i = 0;; i = i + 1) {
+        }
+    } else if (how == "hungry") {
+        vshi_confine_resources(uint64_t(1) << 20, 60.0);
+        vshi_confine_hunger();
+        std::vector<char *> kept;
+        for (;;) {
+            kept.push_back(new char[size_t(64) << 20]);
+        }
+    } else if (how == "silent") {
+        return 0;
+    } else if (how == "ends") {
+        return 7;
+    }
+    const int code = vsh_reader_serve(argc, argv);
+    if (how == "long") {
+        const uint64_t size = uint64_t(1) << 40;
+        return pwrite(VSHI_READER_ANSWER, &size, sizeof size, offsetof(vshi_answer_head, payload)) != 8;
+    }
+    if (how == "code") {
+        const int32_t unknown = 77;
+        return pwrite(VSHI_READER_ANSWER, &unknown, sizeof unknown, offsetof(vshi_answer_head, code)) != 4;
+    }
+    return code;
+}
+
+inline std::vector<std::string> warned;
+
+inline vsh_run with_reader(bool wanted = true) {
+    vsh_run run = vsh_run_default();
+    run.reader = wanted ? "/proc/self/exe" : nullptr;
+    run.reader_seconds = wanted ? 120.0 : 0.0;
+    run.warning = [](void *, const char *message) { warned.push_back(message); };
+    return run;
+}
+
+// What a reader would send for a file; `request` is what follows the path in its request.
+template <typename Request>
+std::vector<unsigned char> payload_of(vshi_serve_fn *serve, const std::string &path, Request &&request) {
+    static vshi_put put;
+    const int asked = memfd_create("request", 0), sent = memfd_create("payload", 0);
+    vshi_put_begin(&put, asked, 0);
+    request(&put);
+    assert_true(vshi_put_flush(&put));
+    const auto bytes_of = [](int file, uint64_t size) {
+        std::vector<unsigned char> bytes(size + 8); // never empty
+        assert_int_equal(pread(file, bytes.data(), size, 0), ssize_t(size));
+        bytes.resize(size);
+        return bytes;
+    };
+    const std::vector<unsigned char> question = bytes_of(asked, put.size);
+    vshi_take take = {question.data(), question.data() + question.size(), false};
+    const vsh_run run = vsh_run_default();
+    vshi_put_begin(&put, sent, 0);
+    assert_int_equal(serve(path.c_str(), &take, &run, &put, &failure), VSH_OK);
+    assert_true(vshi_put_flush(&put));
+    const std::vector<unsigned char> bytes = bytes_of(sent, put.size);
+    close(asked);
+    close(sent);
+    return bytes;
+}
+
+// Calls `use(take)` for a payload that is cut, and changed in one to four places, `count` times, counted and
+// not drawn.
+template <typename Use> void damage(const std::vector<unsigned char> &whole, int count, Use &&use) {
+    static const uint64_t values[] = {
+        0, 1, UINT64_MAX, uint64_t(1) << 63, uint64_t(1) << 32, 0x7fc00000, 0x7ff0000000000000u};
+    uint64_t state = 1;
+    const auto next = [&] {
+        state = state * 6364136223846793005u + 1442695040888963407u;
+        return state >> 33;
+    };
+    for (int i = 0; i < count; ++i) {
+        // of its own size, so that a sanitizer sees what is read behind it
+        std::vector<unsigned char> bytes(whole);
+        for (uint64_t k = next() % 4 + 1; k > 0; --k) {
+            // half of them near the beginning, where the counts are
+            const size_t reach = next() % 2 == 0 ? std::min<size_t>(bytes.size(), 256) : bytes.size();
+            const size_t at = next() % reach;
+            if (next() % 2 == 0) {
+                bytes[at] ^= static_cast<unsigned char>(1u << next() % 8);
+            } else {
+                const uint64_t value = values[next() % (sizeof values / sizeof values[0])];
+                const size_t aligned = at / 8 * 8;
+                std::memcpy(bytes.data() + aligned, &value, std::min<size_t>(8, bytes.size() - aligned));
+            }
+        }
+        if (next() % 4 == 0) {
+            bytes.resize(next() % bytes.size() / 8 * 8);
+            bytes.shrink_to_fit();
+        }
+        vshi_take take = {bytes.data(), bytes.data() + bytes.size(), false};
+        use(&take);
+    }
+}
+
+#endif

@@ -1,0 +1,310 @@
+/* Comparing values: what the formulas say, what is refused, and what never passes. */
+#include "compared.h"
+
+enum { WIDTH = 40, HEIGHT = 25, COUNT = WIDTH * HEIGHT };
+
+static double wavy(const void *user, double x, double y, double z) {
+    (void)user;
+    (void)z;
+    return 0.5 + 0.3 * sin(0.4 * x) * cos(0.3 * y) + 0.1 * noise((uint32_t)(y * WIDTH + x));
+}
+
+static void differences_are_summed_as_their_formulas_say(void **unused) {
+    (void)unused;
+    const double half = 0.5;
+    plane golden = make_plane(WIDTH, HEIGHT, 1, flat, &half),
+          values = make_plane(WIDTH, HEIGHT, 1, flat, &half);
+    for (size_t i = 0; i < 30; ++i) { /* 30 of 1000 values are off, by 1/64 to 30/64 */
+        values.values[31 * i + 7] += (float)(i + 1) / 64.0f;
+    }
+    const vsh_measures m = measure(&golden, &values, NULL);
+    double sum = 0.0, squares = 0.0;
+    for (int i = 1; i <= 30; ++i) {
+        sum += i / 64.0;
+        squares += i / 64.0 * i / 64.0;
+    }
+    assert_int_equal(m.count, COUNT);
+    assert_true(m.range == 1.0);
+    assert_near(m.value[VSH_MEASURE_RMSE], sqrt(squares / COUNT), 1e-12);
+    assert_near(m.bias, sum / COUNT, 1e-12);
+    assert_near(m.value[VSH_MEASURE_BIAS], sum / COUNT, 1e-12);
+    assert_true(m.value[VSH_MEASURE_MAX] == 30.0 / 64.0);
+    assert_int_equal(m.worst, 31 * 29 + 7);
+    assert_true(m.worst_value[0] == 0.5 && m.worst_value[1] == 0.5 + 30.0 / 64.0);
+    assert_true(m.value[VSH_MEASURE_P99] == 20.0 / 64.0);         /* ten of the thousand are larger */
+    assert_near(m.value[VSH_MEASURE_SHARE], 29.0 / COUNT, 1e-12); /* 1/64 is below 0.02 */
+    free(golden.values);
+    free(values.values);
+}
+
+static void masked_values_count_for_nothing(void **unused) {
+    (void)unused;
+    plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
+          values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
+    uint8_t mask[COUNT];
+    for (size_t i = 0; i < COUNT; ++i) {
+        mask[i] = i % WIDTH < 20;
+        values.values[i] += mask[i] ? 0.0f : 0.5f;
+    }
+    const vsh_measures m = measure(&golden, &values, mask);
+    assert_int_equal(m.count, 20 * HEIGHT);
+    assert_true(m.value[VSH_MEASURE_MAX] == 0.0 && m.value[VSH_MEASURE_SSIM] == 1.0);
+    assert_true(m.value[VSH_MEASURE_LOST] == 0.0 && m.value[VSH_MEASURE_SHIFT] == 0.0);
+    const vsh_limits limits = vsh_limits_default();
+    assert_int_equal(vsh_compare_judge(&m, &limits), 0);
+    free(golden.values);
+    free(values.values);
+}
+
+static void values_past_one_are_taken_by_the_largest_golden_one(void **unused) {
+    (void)unused;
+    plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
+          values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
+    for (size_t i = 0; i < COUNT; ++i) {
+        values.values[i] = (float)(values.values[i] + 0.01 * noise((uint32_t)(i + 5000)));
+    }
+    golden.values[0] = values.values[0] = 1.0f;
+    const vsh_measures one = measure(&golden, &values, NULL);
+    for (size_t i = 0; i < COUNT; ++i) {
+        golden.values[i] *= 8.0f;
+        values.values[i] *= 8.0f;
+    }
+    const vsh_measures eight = measure(&golden, &values, NULL);
+    assert_true(eight.range == 8.0);
+    assert_memory_equal(one.value, eight.value, sizeof one.value);
+    free(golden.values);
+    free(values.values);
+}
+
+/* --- structural similarity */
+
+static void two_flat_pictures_are_as_similar_as_their_means(void **unused) {
+    (void)unused;
+    const double a = 0.5, b = 0.75, c1 = 1e-4;
+    plane golden = make_plane(WIDTH, HEIGHT, 1, flat, &a), values = make_plane(WIDTH, HEIGHT, 1, flat, &b);
+    const vsh_measures m = measure(&golden, &values, NULL);
+    assert_near(m.value[VSH_MEASURE_SSIM], (2.0 * a * b + c1) / (a * a + b * b + c1), 1e-12);
+    free(golden.values);
+    free(values.values);
+}
+
+/* The definition, window by window. */
+static double similarity_at(const plane *golden, const plane *values, const uint8_t *mask, int x, int y) {
+    double w = 0.0, a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
+    for (int pass = 0; pass < 2; ++pass) {
+        for (int v = y - 5; v <= y + 5; ++v) {
+            for (int u = x - 5; u <= x + 5; ++u) {
+                if (u < 0 || v < 0 || u >= WIDTH || v >= HEIGHT || !mask[v * WIDTH + u]) {
+                    continue;
+                }
+                const double g = exp(-((u - x) * (u - x) + (v - y) * (v - y)) / (2.0 * 1.5 * 1.5));
+                const double p = (double)golden->values[v * WIDTH + u],
+                             q = (double)values->values[v * WIDTH + u];
+                if (pass == 0) {
+                    w += g;
+                    a += g * p;
+                    b += g * q;
+                } else {
+                    aa += g * (p - a / w) * (p - a / w) / w;
+                    bb += g * (q - b / w) * (q - b / w) / w;
+                    ab += g * (p - a / w) * (q - b / w) / w;
+                }
+            }
+        }
+    }
+    a /= w;
+    b /= w;
+    return (2.0 * a * b + 1e-4) * (2.0 * ab + 9e-4) / ((a * a + b * b + 1e-4) * (aa + bb + 9e-4));
+}
+
+static void similarity_is_that_of_its_definition(void **unused) {
+    (void)unused;
+    plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
+          values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
+    uint8_t mask[COUNT];
+    double sum = 0.0, count = 0.0;
+    for (uint32_t i = 0; i < COUNT; ++i) {
+        values.values[i] = (float)(0.8 * (double)values.values[i] + 0.1 * noise(7 * i + 3));
+        mask[i] = noise(i + 99) > -0.6;
+    }
+    for (int i = 0; i < COUNT; ++i) {
+        if (mask[i]) {
+            sum += similarity_at(&golden, &values, mask, i % WIDTH, i / WIDTH);
+            count += 1.0;
+        }
+    }
+    const vsh_measures m = measure(&golden, &values, mask);
+    assert_true(sum / count < 0.9);
+    assert_near(m.value[VSH_MEASURE_SSIM], sum / count, 1e-9);
+    free(golden.values);
+    free(values.values);
+}
+
+/* --- what never passes */
+
+static void a_value_that_is_not_finite_never_passes(void **unused) {
+    (void)unused;
+    vsh_limits limits = vsh_limits_default();
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        limits.value[i] = vsh_measure_at_least(i) ? -1.0 : INFINITY;
+    }
+    const float bad[] = {NAN, INFINITY, -INFINITY};
+    for (size_t k = 0; k < 12; ++k) {
+        plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
+              values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
+        plane *one = k % 2 == 0 ? &golden : &values;
+        uint8_t mask[COUNT];
+        memset(mask, 1, sizeof mask);
+        mask[123] = k < 6; /* in padding, too */
+        one->values[123] = one->values[700] = bad[k / 2 % 3];
+        const vsh_measures m = measure(&golden, &values, mask);
+        assert_int_equal(m.nonfinite[k % 2], 2);
+        assert_int_equal(m.nonfinite[1 - k % 2], 0);
+        assert_int_equal(m.nonfinite_first[k % 2], 123);
+        assert_int_equal(m.count, COUNT - 2);
+        assert_true(m.value[VSH_MEASURE_RMSE] == 0.0);
+        assert_int_equal(vsh_compare_judge(&m, &limits), 1 << VSH_MEASURE_NONFINITE);
+        free(golden.values);
+        free(values.values);
+    }
+}
+
+static void nothing_compared_is_nothing_held(void **unused) {
+    (void)unused;
+    plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
+    uint8_t mask[COUNT] = {0};
+    const vsh_measures m = measure(&golden, &golden, mask);
+    const vsh_limits limits = vsh_limits_default();
+    assert_int_equal(m.count, 0);
+    assert_true(vsh_compare_judge(&m, &limits) != 0);
+    free(golden.values);
+}
+
+static void each_measure_is_held_to_its_own_limit(void **unused) {
+    (void)unused;
+    const vsh_limits limits = vsh_limits_default();
+    vsh_measures m = {.count = 1};
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        m.value[i] = limits.value[i]; /* what comes just to the limit holds */
+    }
+    assert_int_equal(vsh_compare_judge(&m, &limits), 0);
+    for (int i = 1; i < VSH_MEASURE_COUNT; ++i) {
+        vsh_measures off = m;
+        off.value[i] = nextafter(limits.value[i], vsh_measure_at_least(i) ? -INFINITY : INFINITY);
+        assert_int_equal(vsh_compare_judge(&off, &limits), 1 << i);
+        off.value[i] = NAN; /* does not apply */
+        assert_int_equal(vsh_compare_judge(&off, &limits), 0);
+        assert_int_equal(vsh_measure(vsh_measure_name(i)), i);
+    }
+    assert_int_equal(vsh_measure("rms"), -1);
+    assert_int_equal(vsh_measure(NULL), -1);
+    assert_null(vsh_measure_name(VSH_MEASURE_COUNT));
+    assert_null(vsh_measure_name(-1));
+}
+
+/* --- coverage */
+
+static void coverage_is_counted_and_becomes_a_mask(void **unused) {
+    (void)unused;
+    const float golden[6] = {1, 1, 1, 0, 0, 0.5f}, values[6] = {1, 0, 1, 1, 0, 0.75f};
+    uint8_t mask[6];
+    vsh_coverage c;
+    vsh_compare_coverage(6, golden, values, mask, &c);
+    assert_int_equal(c.golden, 3);
+    assert_int_equal(c.values, 4);
+    assert_int_equal(c.both, 2);
+    assert_int_equal(c.differs, 3);
+    assert_int_equal(c.first, 1);
+    assert_near(c.share, 3.0 / 5.0, 1e-15);
+    assert_memory_equal(mask, ((const uint8_t[6]){1, 0, 1, 0, 0, 0}), 6);
+    vsh_compare_coverage(6, NULL, NULL, mask, &c);
+    assert_true(c.both == 6 && c.differs == 0 && c.first == 6 && c.share == 0.0);
+}
+
+/* --- calls */
+
+static void the_same_bits_for_any_number_of_threads(void **unused) {
+    (void)unused;
+    plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
+          values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
+    for (uint32_t i = 0; i < COUNT; ++i) {
+        values.values[i] = (float)((double)values.values[i] + 0.2 * noise(i));
+    }
+    const vsh_compared c = pair_of(&golden, &values, NULL);
+    vsh_measures first, other;
+    memset(&first, 0, sizeof first);
+    vsh_run run = vsh_run_default();
+    run.threads = 1;
+    assert_int_equal(vsh_compare(&c, NULL, &run, &first, NULL), VSH_OK);
+    for (run.threads = 2; run.threads <= 8; run.threads *= 2) {
+        memset(&other, 0, sizeof other);
+        assert_int_equal(vsh_compare(&c, NULL, &run, &other, NULL), VSH_OK);
+        assert_memory_equal(&first, &other, sizeof first);
+    }
+    free(golden.values);
+    free(values.values);
+}
+
+static int32_t stop(void *user, const char *stage, double fraction) {
+    (void)fraction;
+    *(int *)user += strcmp(stage, "compare") == 0;
+    return 1;
+}
+
+static void bad_calls_are_refused_by_name(void **unused) {
+    (void)unused;
+    plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
+    const vsh_compared good = pair_of(&golden, &golden, NULL);
+    vsh_measures m;
+    vsh_error error;
+    const struct {
+        double threshold, step;
+        int32_t reach, side;
+        bool lacks;
+        const char *word;
+    } cases[] = {{-0.1, 0.1, 2, WIDTH, false, "threshold"}, {1.1, 0.1, 2, WIDTH, false, "threshold"},
+                 {0.1, 0.0, 2, WIDTH, false, "step"},       {0.1, NAN, 2, WIDTH, false, "step"},
+                 {0.1, 0.1, -1, WIDTH, false, "reach"},     {0.1, 0.1, 17, WIDTH, false, "reach"},
+                 {0.1, 0.1, 2, 0, false, "0 × "},           {0.1, 0.1, 2, INT32_MAX, false, "2147483647 × "},
+                 {0.1, 0.1, 2, WIDTH, true, "NULL"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        vsh_compared c = good;
+        c.size[0] = cases[i].side;
+        c.values = cases[i].lacks ? NULL : c.values;
+        vsh_compare_options options = vsh_compare_options_default();
+        options.threshold = cases[i].threshold;
+        options.step = cases[i].step;
+        options.reach = cases[i].reach;
+        assert_int_equal(vsh_compare(&c, &options, NULL, &m, &error), VSH_ERROR_ARGUMENT);
+        assert_non_null(strstr(error.message, cases[i].word));
+    }
+    assert_int_equal(vsh_compare(NULL, NULL, NULL, &m, NULL), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_compare(&good, NULL, NULL, NULL, NULL), VSH_ERROR_ARGUMENT);
+    vsh_run run = vsh_run_default();
+    run.memory_limit = COUNT * 20;
+    assert_int_equal(vsh_compare(&good, NULL, &run, &m, &error), VSH_ERROR_LIMIT);
+    int asked = 0;
+    run = vsh_run_default();
+    run.progress = stop;
+    run.user = &asked;
+    assert_int_equal(vsh_compare(&good, NULL, &run, &m, &error), VSH_ERROR_CANCELLED);
+    assert_int_equal(asked, 1);
+    free(golden.values);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(differences_are_summed_as_their_formulas_say),
+        cmocka_unit_test(masked_values_count_for_nothing),
+        cmocka_unit_test(values_past_one_are_taken_by_the_largest_golden_one),
+        cmocka_unit_test(two_flat_pictures_are_as_similar_as_their_means),
+        cmocka_unit_test(similarity_is_that_of_its_definition),
+        cmocka_unit_test(a_value_that_is_not_finite_never_passes),
+        cmocka_unit_test(nothing_compared_is_nothing_held),
+        cmocka_unit_test(each_measure_is_held_to_its_own_limit),
+        cmocka_unit_test(coverage_is_counted_and_becomes_a_mask),
+        cmocka_unit_test(the_same_bits_for_any_number_of_threads),
+        cmocka_unit_test(bad_calls_are_refused_by_name),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

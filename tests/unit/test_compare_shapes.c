@@ -1,0 +1,319 @@
+/* Comparing shapes: penumbrae of known width, displacements of known length, shadows that are gone. */
+#include "compared.h"
+
+enum { SIDE = 96 };
+
+/* --- penumbrae: a linear ramp from 0 to 1 over `width` texels, across an edge at `angle` */
+
+typedef struct ramp {
+    double width, angle, noise;
+} ramp;
+
+static double ramp_at(const void *user, double x, double y, double z) {
+    const ramp *r = user;
+    (void)z;
+    const double across = (x - 0.5 * SIDE + 0.3) * cos(r->angle) + (y - 0.5 * SIDE) * sin(r->angle);
+    const double off = r->noise > 0.0 ? r->noise * noise((uint32_t)(y * SIDE + x)) : 0.0;
+    return fmin(1.0, fmax(0.0, 0.5 + across / r->width)) + off;
+}
+
+static vsh_measures compare_ramps(ramp golden, ramp values) {
+    plane a = make_plane(SIDE, SIDE, 1, ramp_at, &golden), b = make_plane(SIDE, SIDE, 1, ramp_at, &values);
+    const vsh_measures m = measure(&a, &b, NULL);
+    free(a.values);
+    free(b.values);
+    return m;
+}
+
+static const double angles[] = {0.0, 0.3, PI / 4.0, 1.1, PI / 2.0, 2.5, PI, 4.0, 5.7};
+enum { ANGLES = sizeof angles / sizeof angles[0] };
+
+static void a_ramp_is_as_wide_as_it_is_in_every_direction(void **unused) {
+    (void)unused;
+    for (size_t i = 0; i < ANGLES; ++i) {
+        for (double width = 6.0; width <= 24.0; width *= 2.0) {
+            const vsh_measures m =
+                compare_ramps((ramp){width, angles[i], 0.0}, (ramp){width, angles[i], 0.0});
+            assert_true(m.pairs >= SIDE / 2 && m.pairs == m.edges[0] && m.pairs == m.edges[1]);
+            assert_true(angles[i] != 0.3 || m.pairs == SIDE); /* rows cross it, columns do not count */
+            assert_near(m.width[0], 0.8 * width, 0.2);        /* from 10 % to 90 % */
+            assert_true(m.value[VSH_MEASURE_PENUMBRA] == 0.0 && m.value[VSH_MEASURE_WIDTHS] == 0.0);
+        }
+    }
+}
+
+static void wider_and_narrower_penumbrae_are_told_by_how_much(void **unused) {
+    (void)unused;
+    const double factors[] = {0.5, 0.9, 1.1, 2.0};
+    for (size_t i = 0; i < ANGLES; ++i) {
+        for (size_t k = 0; k < sizeof factors / sizeof factors[0]; ++k) {
+            const ramp golden = {10.0, angles[i], 0.0}, values = {10.0 * factors[k], angles[i], 0.0};
+            const vsh_measures m = compare_ramps(golden, values);
+            const double ratio = factors[k] > 1.0 ? factors[k] : 1.0 / factors[k];
+            assert_near(m.width[1] / m.width[0], factors[k], 0.02);
+            assert_near(m.value[VSH_MEASURE_PENUMBRA], ratio - 1.0, 0.04);
+            assert_near(m.value[VSH_MEASURE_WIDTHS], fabs(factors[k] - 1.0), 0.02);
+            assert_true(m.value[VSH_MEASURE_EDGES] <
+                        (factors[k] < 2.0 ? 0.07 : 0.2)); /* cut at the corners */
+            assert_near(m.value[VSH_MEASURE_SHIFT], 0.0, 0.1);
+        }
+    }
+}
+
+static void noise_does_not_change_a_penumbras_width(void **unused) {
+    (void)unused;
+    for (size_t i = 0; i < ANGLES; ++i) {
+        const vsh_measures m = compare_ramps((ramp){12.0, angles[i], 0.0}, (ramp){12.0, angles[i], 0.04});
+        assert_near(m.value[VSH_MEASURE_PENUMBRA], 0.0, 0.03);
+        assert_near(m.value[VSH_MEASURE_EDGES], 0.0, 0.02);
+        assert_near(m.value[VSH_MEASURE_SHIFT], 0.0, 0.05);
+    }
+}
+
+static void an_edge_that_is_cut_off_is_no_edge(void **unused) {
+    (void)unused;
+    const ramp r = {30.0, 0.0, 0.0};
+    plane golden = make_plane(SIDE, SIDE, 1, ramp_at, &r), values = make_plane(SIDE, SIDE, 1, ramp_at, &r);
+    uint8_t mask[SIDE * SIDE];
+    for (size_t i = 0; i < SIDE * SIDE; ++i) {
+        mask[i] = i % SIDE < SIDE / 2 || i / SIDE < 8; /* up to the middle of the ramp, but for eight rows */
+    }
+    const vsh_measures m = measure(&golden, &values, mask);
+    assert_int_equal(m.edges[0], 8);
+    assert_true(isnan(m.value[VSH_MEASURE_PENUMBRA])); /* too few to say anything */
+    free(golden.values);
+    free(values.values);
+}
+
+static void part_of_the_penumbrae_shows_in_the_widths(void **unused) {
+    (void)unused;
+    const ramp soft = {8.0, 0.0, 0.0}, wider = {9.6, 0.0, 0.0}, narrower = {6.4, 0.0, 0.0};
+    plane golden = make_plane(SIDE, SIDE, 1, ramp_at, &soft),
+          values = make_plane(SIDE, SIDE, 1, ramp_at, &wider);
+    plane other = make_plane(SIDE, SIDE, 1, ramp_at, &narrower);
+    memcpy(values.values, other.values, SIDE * SIDE / 2 * sizeof(float)); /* the upper half the other way */
+    const vsh_measures m = measure(&golden, &values, NULL);
+    assert_near(m.value[VSH_MEASURE_PENUMBRA], 0.0, 0.01);
+    assert_near(m.value[VSH_MEASURE_WIDTHS], 0.2, 0.02);
+    free(golden.values);
+    free(values.values);
+    free(other.values);
+}
+
+static void an_edge_without_a_counterpart_is_told(void **unused) {
+    (void)unused;
+    const ramp r = {4.0, 0.0, 0.0};
+    plane golden = make_plane(SIDE, SIDE, 1, ramp_at, &r), values = make_plane(SIDE, SIDE, 1, ramp_at, &r);
+    for (size_t i = 0; i < SIDE * SIDE / 4; ++i) {
+        values.values[i] = 1.0f; /* the upper quarter has no shadow */
+    }
+    const vsh_measures m = measure(&golden, &values, NULL);
+    assert_int_equal(m.edges[0], SIDE);
+    assert_near(m.value[VSH_MEASURE_EDGES], 48.0 / 120.0, 0.01); /* of the new ones: below it, one along x */
+    assert_near(m.value[VSH_MEASURE_PENUMBRA], 0.0, 0.01);
+    free(golden.values);
+    free(values.values);
+}
+
+/* --- displacement: a soft ball */
+
+typedef struct ball {
+    double middle[3], radius, soft;
+} ball;
+
+static double ball_at(const void *user, double x, double y, double z) {
+    const ball *b = user;
+    const double off =
+        sqrt((x - b->middle[0]) * (x - b->middle[0]) + (y - b->middle[1]) * (y - b->middle[1]) +
+             (z - b->middle[2]) * (z - b->middle[2]));
+    return 0.5 + 0.5 * tanh((off - b->radius) / b->soft);
+}
+
+static void a_displacement_is_found_with_its_direction(void **unused) {
+    (void)unused;
+    const double shifts[][2] = {{1.0, 0.0}, {0.0, -1.0}, {0.3, -0.7}, {0.1, 0.05}, {-2.0, 1.5}};
+    for (size_t i = 0; i < sizeof shifts / sizeof shifts[0]; ++i) {
+        const ball golden = {{40.0, 45.0, 0.0}, 18.0, 2.5};
+        const ball moved = {{40.0 + shifts[i][0], 45.0 + shifts[i][1], 0.0}, 18.0, 2.5};
+        plane a = make_plane(SIDE, SIDE, 1, ball_at, &golden), b = make_plane(SIDE, SIDE, 1, ball_at, &moved);
+        const vsh_measures m = measure(&a, &b, NULL);
+        assert_near(m.shift[0], shifts[i][0], 0.02);
+        assert_near(m.shift[1], shifts[i][1], 0.02);
+        assert_true(m.shift[2] == 0.0);
+        assert_near(m.value[VSH_MEASURE_SHIFT], hypot(shifts[i][0], shifts[i][1]), 0.03);
+        assert_true(m.explained > 0.95);
+        assert_near(m.value[VSH_MEASURE_PENUMBRA], 0.0, 0.02);
+        free(a.values);
+        free(b.values);
+    }
+}
+
+static void a_displacement_is_found_in_space(void **unused) {
+    (void)unused;
+    const ball golden = {{15.0, 14.0, 12.0}, 7.0, 2.0}, moved = {{15.5, 13.0, 12.25}, 7.0, 2.0};
+    plane a = make_plane(32, 28, 24, ball_at, &golden), b = make_plane(32, 28, 24, ball_at, &moved);
+    const vsh_measures m = measure(&a, &b, NULL);
+    assert_near(m.shift[0], 0.5, 0.02);
+    assert_near(m.shift[1], -1.0, 0.02);
+    assert_near(m.shift[2], 0.25, 0.02);
+    free(a.values);
+    free(b.values);
+}
+
+static void hard_edges_are_found_to_have_moved_by_a_texel(void **unused) {
+    (void)unused;
+    const ball golden = {{40.0, 45.0, 0.0}, 18.0, 0.01}, moved = {{41.0, 45.0, 0.0}, 18.0, 0.01};
+    plane a = make_plane(SIDE, SIDE, 1, ball_at, &golden), b = make_plane(SIDE, SIDE, 1, ball_at, &moved);
+    const vsh_measures m = measure(&a, &b, NULL);
+    assert_near(m.shift[0], 1.0, 0.1);
+    assert_near(m.shift[1], 0.0, 0.05);
+    assert_true(m.lost.count == 0 && m.gained.count == 0);
+    free(a.values);
+    free(b.values);
+}
+
+static void a_larger_shadow_is_no_displacement(void **unused) {
+    (void)unused;
+    const ball golden = {{40.0, 45.0, 0.0}, 18.0, 2.5}, larger = {{40.0, 45.0, 0.0}, 18.6, 2.5};
+    plane a = make_plane(SIDE, SIDE, 1, ball_at, &golden), b = make_plane(SIDE, SIDE, 1, ball_at, &larger);
+    const vsh_measures m = measure(&a, &b, NULL);
+    assert_true(m.value[VSH_MEASURE_RMSE] > 0.01);
+    assert_near(m.value[VSH_MEASURE_SHIFT], 0.0, 0.05);
+    free(a.values);
+    free(b.values);
+}
+
+/* --- rounding */
+
+/* The nearest number of 11 bits, as a half float holds it; of values down to 2^-14. */
+static float as_half(float value) {
+    int exponent;
+    const double mantissa = frexp((double)value, &exponent);
+    return (float)ldexp(nearbyint(ldexp(mantissa, 11)), exponent - 11);
+}
+
+static void bakes_that_differ_by_rounding_are_alike(void **unused) {
+    (void)unused;
+    const vsh_limits limits = vsh_limits_default();
+    for (double soft = 0.01; soft < 10.0; soft *= 4.0) { /* from hard edges to wide ones */
+        const ball golden = {{40.0, 45.0, 0.0}, 18.0, soft};
+        plane a = make_plane(SIDE, SIDE, 1, ball_at, &golden),
+              b = make_plane(SIDE, SIDE, 1, ball_at, &golden);
+        for (uint32_t i = 0; i < SIDE * SIDE; ++i) {
+            b.values[i] = nextafterf(b.values[i], noise(i) > 0.0 ? 2.0f : -2.0f);
+        }
+        vsh_measures m = measure(&a, &b, NULL);
+        assert_true(m.value[VSH_MEASURE_MAX] > 0.0);
+        assert_int_equal(vsh_compare_judge(&m, &limits), 0);
+        for (uint32_t i = 0; i < SIDE * SIDE; ++i) {
+            b.values[i] = as_half(b.values[i]);
+        }
+        m = measure(&a, &b, NULL);
+        assert_true(soft < 1.0 || m.value[VSH_MEASURE_MAX] > 1e-4);
+        assert_int_equal(vsh_compare_judge(&m, &limits), 0);
+        free(a.values);
+        free(b.values);
+    }
+}
+
+/* --- what is gone: a bar of shadow, `wide` texels from x = 30 on, 20 long from y = 40 on */
+
+typedef struct bar {
+    double wide, dark, moved;
+} bar;
+
+static double bar_at(const void *user, double x, double y, double z) {
+    const bar *b = user;
+    (void)z;
+    const bool within = x >= 30.0 + b->moved && x < 30.0 + b->moved + b->wide && y >= 40.0 && y < 60.0;
+    const bool other = x + y < 40.0; /* another shadow, that stays */
+    return within ? b->dark : other ? 0.0 : 1.0;
+}
+
+static vsh_measures compare_bars(bar golden, bar values) {
+    plane a = make_plane(SIDE, SIDE, 1, bar_at, &golden), b = make_plane(SIDE, SIDE, 1, bar_at, &values);
+    const vsh_measures m = measure(&a, &b, NULL);
+    free(a.values);
+    free(b.values);
+    return m;
+}
+
+static void check_region(const vsh_region *region, int wide, double by) {
+    const int32_t min[3] = {30, 40, 0}, max[3] = {30 + wide - 1, 59, 0};
+    assert_int_equal(region->count, 20 * wide);
+    assert_memory_equal(region->min, min, sizeof min);
+    assert_memory_equal(region->max, max, sizeof max);
+    assert_near(region->by, by, 1e-6);
+}
+
+static void a_lost_bar_is_a_lost_region_of_its_size_however_thin(void **unused) {
+    (void)unused;
+    for (int wide = 1; wide <= 12; ++wide) {
+        const bar there = {wide, 0.25, 0.0}, gone = {0.0, 0.25, 0.0};
+        const vsh_measures lost = compare_bars(there, gone), gained = compare_bars(gone, there);
+        check_region(&lost.lost, wide, 0.75);
+        assert_int_equal(lost.gained.count, 0);
+        assert_true(lost.value[VSH_MEASURE_LOST] == 20.0 * wide);
+        check_region(&gained.gained, wide, -0.75);
+        assert_int_equal(gained.lost.count, 0);
+        assert_near(lost.value[VSH_MEASURE_SHIFT], 0.0, 0.02);
+    }
+}
+
+static void what_moved_within_reach_is_not_lost(void **unused) {
+    (void)unused;
+    for (double moved = 0.0; moved <= 4.0; moved += 1.0) {
+        const vsh_measures m = compare_bars((bar){2.0, 0.0, 0.0}, (bar){2.0, 0.0, moved});
+        const double far = moved > 2.0 ? moved < 4.0 ? moved - 2.0 : 2.0 : 0.0; /* columns past the reach */
+        assert_int_equal(m.lost.count, 20 * far);
+        assert_int_equal(m.gained.count, 20 * far);
+    }
+}
+
+static void a_shadow_below_the_step_is_not_seen(void **unused) {
+    (void)unused;
+    const bar gone = {0.0, 1.0, 0.0};
+    assert_int_equal(compare_bars((bar){3.0, 0.92, 0.0}, gone).lost.count, 0);
+    assert_int_equal(compare_bars((bar){3.0, 0.88, 0.0}, gone).lost.count, 60);
+}
+
+static double ball_in_a_corner(const void *user, double x, double y, double z) {
+    (void)user;
+    return x * x + y * y + z * z < 16.0 ? 0.0 : 1.0;
+}
+
+static void a_region_in_space_is_counted_in_voxels(void **unused) {
+    (void)unused;
+    const double lit = 1.0;
+    plane a = make_plane(12, 11, 10, ball_in_a_corner, NULL), b = make_plane(12, 11, 10, flat, &lit);
+    const vsh_measures m = measure(&a, &b, NULL);
+    uint64_t voxels = 0;
+    for (size_t i = 0; i < a.count; ++i) {
+        voxels += a.values[i] == 0.0f;
+    }
+    assert_int_equal(m.lost.count, voxels);
+    assert_memory_equal(m.lost.max, ((const int32_t[3]){3, 3, 3}), sizeof m.lost.max);
+    free(a.values);
+    free(b.values);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_ramp_is_as_wide_as_it_is_in_every_direction),
+        cmocka_unit_test(wider_and_narrower_penumbrae_are_told_by_how_much),
+        cmocka_unit_test(noise_does_not_change_a_penumbras_width),
+        cmocka_unit_test(an_edge_that_is_cut_off_is_no_edge),
+        cmocka_unit_test(part_of_the_penumbrae_shows_in_the_widths),
+        cmocka_unit_test(an_edge_without_a_counterpart_is_told),
+        cmocka_unit_test(a_displacement_is_found_with_its_direction),
+        cmocka_unit_test(a_displacement_is_found_in_space),
+        cmocka_unit_test(hard_edges_are_found_to_have_moved_by_a_texel),
+        cmocka_unit_test(a_larger_shadow_is_no_displacement),
+        cmocka_unit_test(bakes_that_differ_by_rounding_are_alike),
+        cmocka_unit_test(a_lost_bar_is_a_lost_region_of_its_size_however_thin),
+        cmocka_unit_test(what_moved_within_reach_is_not_lost),
+        cmocka_unit_test(a_shadow_below_the_step_is_not_seen),
+        cmocka_unit_test(a_region_in_space_is_counted_in_voxels),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

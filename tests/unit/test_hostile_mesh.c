@@ -1,0 +1,201 @@
+/* Meshes that nobody should make: each becomes the right solid, with a warning where there is a doubt, or is
+ * refused with the reason. */
+#include "grids.h"
+
+static const float positions[24] = {-1, -1, -1, 1, -1, -1, 1, 1, -1, -1, 1, -1,
+                                    -1, -1, 1,  1, -1, 1,  1, 1, 1,  -1, 1, 1};
+static const uint32_t outward[36] = {0, 3, 2, 0, 2, 1, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
+                                     3, 7, 6, 3, 6, 2, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5};
+
+enum { MANY = 1000000 };
+
+static char warned[4096];
+
+static void keep_warning(void *user, const char *message) {
+    (void)user;
+    snprintf(warned + strlen(warned), sizeof warned - strlen(warned), "%s\n", message);
+}
+
+static vsh_mesh cube_of(const float *at, const uint32_t *indices, size_t triangles) {
+    return (vsh_mesh){
+        .name = "cube", .positions = at, .indices = indices, .vertex_count = 8, .triangle_count = triangles};
+}
+
+static vsh_grid *grid_of(const vsh_mesh *mesh) {
+    const vsh_grid_options options = with_voxel(0.1);
+    vsh_run run = vsh_run_default();
+    run.warning = keep_warning;
+    warned[0] = '\0';
+    vsh_grid *grid = NULL;
+    if (vsh_grid_from_meshes(mesh, 1, &options, &run, &grid, &failure) != VSH_OK) {
+        fail_msg("%s", failure.message);
+    }
+    return grid;
+}
+
+static double cube_truth(const double p[3]) {
+    double outside = 0.0, inside = -INFINITY;
+    for (int i = 0; i < 3; ++i) {
+        const double d = fabs(p[i]) - 1.0;
+        outside += d > 0.0 ? d * d : 0.0;
+        inside = fmax(inside, d);
+    }
+    return outside > 0.0 ? sqrt(outside) : inside;
+}
+
+/* The cube's own field, to a fraction of a voxel. */
+static void assert_cube(const vsh_grid *grid) {
+    assert_true(worst_error(grid, cube_truth, 2.9, 2.9) < 0.02);
+    assert_int_equal(wrong_blocks(grid, cube_truth, 4), 0);
+}
+
+static void faces_given_twice_change_nothing(void **state) {
+    (void)state;
+    uint32_t twice[72];
+    memcpy(twice, outward, sizeof outward);
+    memcpy(twice + 36, outward, sizeof outward);
+    const vsh_mesh mesh = cube_of(positions, twice, 24);
+    vsh_grid *grid = grid_of(&mesh);
+    assert_cube(grid);
+    vsh_grid_free(grid);
+}
+
+static void a_face_given_twice_among_others_is_the_same_solid(void **state) {
+    (void)state;
+    uint32_t more[39];
+    memcpy(more, outward, sizeof outward);
+    memcpy(more + 36, outward, 3 * sizeof *more);
+    const vsh_mesh mesh = cube_of(positions, more, 13);
+    vsh_mesh_report report;
+    assert_int_equal(vsh_mesh_check(&mesh, &report, &failure), VSH_OK);
+    vsh_grid *grid = grid_of(&mesh);
+    if (report.open_edges == 0) {
+        assert_cube(grid);
+    } else { /* edges with three triangles are told */
+        assert_non_null(strstr(warned, "open edges"));
+    }
+    vsh_grid_free(grid);
+}
+
+static void an_inverted_mesh_is_the_same_solid(void **state) {
+    (void)state;
+    uint32_t inward[36];
+    for (size_t t = 0; t < 12; ++t) {
+        const uint32_t *from = outward + 3 * t;
+        memcpy(inward + 3 * t, (uint32_t[3]){from[0], from[2], from[1]}, sizeof(uint32_t[3]));
+    }
+    const vsh_mesh mesh = cube_of(positions, inward, 12);
+    vsh_grid *grid = grid_of(&mesh);
+    assert_cube(grid); /* what cannot be reached from outside is inside */
+    vsh_grid_free(grid);
+}
+
+static void faces_that_disagree_are_told_and_are_the_same_solid(void **state) {
+    (void)state;
+    uint32_t mixed[36];
+    memcpy(mixed, outward, sizeof mixed);
+    for (size_t t = 0; t < 12; t += 3) {
+        mixed[3 * t + 1] = outward[3 * t + 2];
+        mixed[3 * t + 2] = outward[3 * t + 1];
+    }
+    const vsh_mesh mesh = cube_of(positions, mixed, 12);
+    vsh_grid *grid = grid_of(&mesh);
+    assert_cube(grid);
+    assert_non_null(strstr(warned, "disagree"));
+    vsh_grid_free(grid);
+}
+
+static void missing_faces_are_told_and_make_a_shell(void **state) {
+    (void)state;
+    const vsh_mesh mesh = cube_of(positions, outward, 10);
+    vsh_grid *grid = grid_of(&mesh);
+    assert_non_null(strstr(warned, "open edges"));
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    assert_true(info.shell_thickness > 0.0);
+    vsh_grid_free(grid);
+}
+
+static void a_million_triangles_without_area_change_nothing(void **state) {
+    (void)state;
+    uint32_t *indices = calloc(MANY * 3 + 36, sizeof *indices);
+    assert_non_null(indices);
+    memcpy(indices, outward, sizeof outward);
+    for (size_t t = 0; t < MANY; ++t) { /* points, and edges there and back */
+        const uint32_t a = (uint32_t)t % 8;
+        memcpy(indices + 36 + 3 * t, (uint32_t[3]){a, a, t % 2 != 0 ? a : (a + 1) % 8}, sizeof(uint32_t[3]));
+    }
+    const vsh_mesh mesh = cube_of(positions, indices, MANY + 12);
+    vsh_mesh_report report;
+    assert_int_equal(vsh_mesh_check(&mesh, &report, &failure), VSH_OK);
+    assert_int_equal(report.degenerate_triangles, MANY);
+    assert_int_equal(report.open_edges, 0);
+    vsh_grid *grid = grid_of(&mesh);
+    assert_cube(grid);
+    vsh_grid_free(grid);
+    free(indices);
+}
+
+static void vertices_out_of_the_world_are_refused(void **state) {
+    (void)state;
+    static const struct {
+        float value;
+        vsh_result expected;
+    } cases[] = {{1e30f, VSH_ERROR_LIMIT}, {-1e30f, VSH_ERROR_LIMIT},   {3e38f, VSH_ERROR_LIMIT},
+                 {NAN, VSH_ERROR_INPUT},   {INFINITY, VSH_ERROR_INPUT}, {-INFINITY, VSH_ERROR_INPUT}};
+    const vsh_grid_options fixed = with_voxel(0.1), resolved = vsh_grid_options_default();
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        for (size_t v = 0; v < 24; v += 7) {
+            float bad[24];
+            memcpy(bad, positions, sizeof bad);
+            bad[v] = cases[i].value;
+            const vsh_mesh mesh = cube_of(bad, outward, 12);
+            for (int k = 0; k < 2; ++k) {
+                vsh_grid *grid = NULL;
+                const vsh_result result =
+                    vsh_grid_from_meshes(&mesh, 1, k == 0 ? &fixed : &resolved, NULL, &grid, &failure);
+                assert_int_equal(result, cases[i].expected);
+                assert_null(grid);
+            }
+        }
+    }
+    /* and all of it out there: a cube of 1e30, whose voxels would be too large */
+    float large[24];
+    for (size_t v = 0; v < 24; ++v) {
+        large[v] = 1e30f * positions[v];
+    }
+    const vsh_mesh mesh = cube_of(large, outward, 12);
+    vsh_grid *grid = NULL;
+    assert_fails(vsh_grid_from_meshes(&mesh, 1, &resolved, NULL, &grid, &failure), VSH_ERROR_LIMIT,
+                 "voxel size");
+}
+
+static void indices_out_of_range_are_refused(void **state) {
+    (void)state;
+    static const uint32_t bad[] = {8, 9, 1u << 20, 1u << 31, UINT32_MAX};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+        for (size_t k = 0; k < 36; k += 5) {
+            uint32_t indices[36];
+            memcpy(indices, outward, sizeof indices);
+            indices[k] = bad[i];
+            const vsh_mesh mesh = cube_of(positions, indices, 12);
+            vsh_grid *grid = NULL;
+            assert_fails(vsh_grid_from_meshes(&mesh, 1, NULL, NULL, &grid, &failure), VSH_ERROR_INPUT,
+                         "there are only 8");
+        }
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(faces_given_twice_change_nothing),
+        cmocka_unit_test(a_face_given_twice_among_others_is_the_same_solid),
+        cmocka_unit_test(an_inverted_mesh_is_the_same_solid),
+        cmocka_unit_test(faces_that_disagree_are_told_and_are_the_same_solid),
+        cmocka_unit_test(missing_faces_are_told_and_make_a_shell),
+        cmocka_unit_test(a_million_triangles_without_area_change_nothing),
+        cmocka_unit_test(vertices_out_of_the_world_are_refused),
+        cmocka_unit_test(indices_out_of_range_are_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,391 @@
+// Files parsed by a reader: the same bits as in this process, and nothing of a reader's failures reaches it.
+#include "readers.h"
+
+#include <dirent.h>
+
+#include <map>
+#include <openvdb/tools/LevelSetSphere.h>
+
+namespace {
+
+const std::string ASSETS = VSH_ASSETS;
+
+std::string ball_file() {
+    return save("ball.vdb", {sphere()});
+}
+
+// --- the same bits
+
+void grids_are_the_same_for_every_kind_of_transform(void **) {
+    using namespace openvdb::math;
+    Mat4d turned = Mat4d::identity();
+    turned.setToRotation(openvdb::Vec3d(1.0, 2.0, -0.5), 0.7);
+    Mat4d affine = turned;
+    affine.preScale(openvdb::Vec3d(-0.05));
+    affine.setTranslation(openvdb::Vec3d(1e3, -7.0, 0.1));
+    const Mat3d rotation = turned.getMat3();
+    const std::map<std::string, MapBase::Ptr> maps{
+        {"translation", MapBase::Ptr(new TranslationMap(openvdb::Vec3d(0.1, 0.2, 0.3)))},
+        {"scale", MapBase::Ptr(new ScaleMap(openvdb::Vec3d(0.05, -0.05, 0.05)))},
+        {"uniform", MapBase::Ptr(new UniformScaleMap(0.05))},
+        {"moved", MapBase::Ptr(new UniformScaleTranslateMap(0.05, openvdb::Vec3d(1.0 / 3.0)))},
+        {"mirrored", MapBase::Ptr(new ScaleTranslateMap(openvdb::Vec3d(-0.05, 0.05, 0.05),
+                                                        openvdb::Vec3d(0.0, 1.0, 0.0)))},
+        {"unitary", MapBase::Ptr(new UnitaryMap(rotation))},
+        {"affine", MapBase::Ptr(new AffineMap(affine))},
+    };
+    for (const auto &[name, map] : maps) {
+        const FloatGrid::Ptr grid = sphere();
+        grid->setTransform(std::make_shared<Transform>(map));
+        const std::string path = save((name + ".vdb").c_str(), {grid});
+        vsh_grid *read[2] = {nullptr, nullptr};
+        std::vector<std::string> said[2];
+        for (int i = 0; i < 2; ++i) {
+            const vsh_run run = with_reader(i == 1);
+            warned.clear();
+            assert_int_equal(vsh_grid_read(path.c_str(), nullptr, &run, &read[i], &failure), VSH_OK);
+            said[i] = warned;
+        }
+        assert_same(read[0], read[1]);
+        assert_true(said[0] == said[1]);
+        vsh_grid_info info[2];
+        vsh_grid_get_info(read[0], &info[0]);
+        vsh_grid_get_info(read[1], &info[1]);
+        assert_memory_equal(&info[0], &info[1], sizeof info[0]);
+        const openvdb::Vec3d at(0.3, -0.4, 0.5); // what is not in the info: the map's inverse
+        assert_true(read[0]->level_set->transform().worldToIndex(at) ==
+                    read[1]->level_set->transform().worldToIndex(at));
+        vsh_grid_free(read[0]);
+        vsh_grid_free(read[1]);
+    }
+}
+
+void mended_grids_and_doubles_and_tiles_are_the_same(void **) {
+    const FloatGrid::Ptr narrow = ball<FloatGrid>(RADIUS, 2.0f);
+    const FloatGrid::Ptr tiled = sphere();
+    tiled->tree().addTile(3, openvdb::Coord(1 << 13, 0, 0), tiled->background(), false);
+    tiled->tree().addTile(2, openvdb::Coord(1 << 14, 0, 0), tiled->background(), true);
+    tiled->tree().addTile(1, openvdb::Coord(-(1 << 14), 8, 0), -tiled->background(), false);
+    const FloatGrid::Ptr wide = ball<FloatGrid>(9.0, 3.0f); // with tiles inside
+    const openvdb::DoubleGrid::Ptr doubles = ball<openvdb::DoubleGrid>(RADIUS, 3.0f);
+    doubles->setName("doubles");
+    const openvdb::GridPtrVec grids{narrow, tiled, wide, doubles};
+    for (const openvdb::GridBase::Ptr &grid : grids) {
+        const std::string path = save("kind.vdb", {grid});
+        vsh_grid *here = nullptr, *there = nullptr;
+        const vsh_run plain = with_reader(false), run = with_reader();
+        assert_int_equal(vsh_grid_read(path.c_str(), nullptr, &plain, &here, &failure), VSH_OK);
+        assert_int_equal(vsh_grid_read(path.c_str(), nullptr, &run, &there, &failure), VSH_OK);
+        assert_same(here, there);
+        assert_true(here->level_set->tree().hasSameTopology(there->level_set->tree()));
+        assert_int_equal(here->info.bytes, there->info.bytes);
+        vsh_grid_free(here);
+        vsh_grid_free(there);
+    }
+}
+
+void models_are_the_same(void **) {
+    for (const char *name : {"/cloister.glb", "/cloister.obj", "/thin.glb", "/seeds_floor.obj"}) {
+        const std::string path = ASSETS + name;
+        vsh_model *here = nullptr, *there = nullptr;
+        const vsh_run plain = with_reader(false), run = with_reader();
+        assert_int_equal(vsh_model_read(path.c_str(), &plain, &here, &failure), VSH_OK);
+        assert_int_equal(vsh_model_read(path.c_str(), &run, &there, &failure), VSH_OK);
+        const size_t count = vsh_model_mesh_count(here);
+        assert_int_equal(vsh_model_mesh_count(there), count);
+        for (size_t i = 0; i < count; ++i) {
+            assert_int_equal(vsh_model_uv_sets(there, i), vsh_model_uv_sets(here, i));
+            for (int32_t set = -1; set < vsh_model_uv_sets(here, i); ++set) {
+                const vsh_mesh a = vsh_model_mesh(here, i, set), b = vsh_model_mesh(there, i, set);
+                assert_int_equal(a.vertex_count, b.vertex_count);
+                assert_int_equal(a.triangle_count, b.triangle_count);
+                assert_string_equal(a.name, b.name);
+                assert_memory_equal(a.positions, b.positions, a.vertex_count * 12);
+                assert_memory_equal(a.indices, b.indices, a.triangle_count * 12);
+                assert_memory_equal(a.transform, b.transform, 96);
+                assert_int_equal(a.normals != nullptr, b.normals != nullptr);
+                assert_int_equal(a.uvs != nullptr, b.uvs != nullptr);
+                if (a.normals != nullptr) {
+                    assert_memory_equal(a.normals, b.normals, a.vertex_count * 12);
+                }
+                if (a.uvs != nullptr) {
+                    assert_memory_equal(a.uvs, b.uvs, a.vertex_count * 8);
+                }
+            }
+        }
+        vsh_model_free(here);
+        vsh_model_free(there);
+    }
+}
+
+void images_lists_voxels_and_texts_are_the_same(void **) {
+    const vsh_run plain = with_reader(false), run = with_reader();
+    vsh_image_file *image[2] = {nullptr, nullptr};
+    const std::string png = ASSETS + "/terrain.png", exr = in_folder("image.exr"),
+                      tif = in_folder("image.tif");
+    assert_int_equal(vsh_image_read(png.c_str(), &image[0], &failure), VSH_OK);
+    vsh_image view = vsh_image_view(image[0]);
+    for (const std::string &copy : {exr, tif}) {
+        assert_int_equal(vsh_image_write(copy.c_str(), &view, nullptr, &failure), VSH_OK);
+    }
+    vsh_image_free(image[0]);
+    for (const std::string &path : {png, exr, tif}) {
+        assert_int_equal(vsh_image_read_run(path.c_str(), &plain, &image[0], &failure), VSH_OK);
+        assert_int_equal(vsh_image_read_run(path.c_str(), &run, &image[1], &failure), VSH_OK);
+        const vsh_image a = vsh_image_view(image[0]), b = vsh_image_view(image[1]);
+        size_t attributes[2];
+        const vsh_attribute *left = vsh_image_attributes(image[0], &attributes[0]);
+        const vsh_attribute *right = vsh_image_attributes(image[1], &attributes[1]);
+        assert_int_equal(attributes[0], attributes[1]);
+        for (size_t i = 0; i < attributes[0]; ++i) {
+            assert_string_equal(left[i].name, right[i].name);
+            assert_string_equal(left[i].value, right[i].value);
+        }
+        assert_true(a.width == b.width && a.height == b.height && a.channel_count == b.channel_count);
+        for (int32_t c = 0; c < a.channel_count; ++c) {
+            assert_string_equal(a.names[c], b.names[c]);
+            assert_memory_equal(a.planes[c], b.planes[c], size_t(a.width) * size_t(a.height) * sizeof(float));
+        }
+        vsh_image_free(image[0]);
+        vsh_image_free(image[1]);
+    }
+
+    const std::string path = ball_file();
+    vsh_vdb_entry entries[2][2] = {};
+    size_t counts[2];
+    assert_int_equal(vsh_vdb_list(path.c_str(), &plain, entries[0], 2, &counts[0], &failure), VSH_OK);
+    assert_int_equal(vsh_vdb_list(path.c_str(), &run, entries[1], 2, &counts[1], &failure), VSH_OK);
+    assert_int_equal(counts[0], counts[1]);
+    assert_memory_equal(&entries[0], &entries[1], sizeof entries[0]);
+
+    vsh_voxels *voxels[2] = {nullptr, nullptr};
+    assert_int_equal(vsh_voxels_from_vdb(path.c_str(), nullptr, &plain, &voxels[0], &failure), VSH_OK);
+    assert_int_equal(vsh_voxels_from_vdb(path.c_str(), nullptr, &run, &voxels[1], &failure), VSH_OK);
+    size_t blocks[2];
+    const vshi_block *left = vshi_voxels_blocks(voxels[0], &blocks[0]);
+    const vshi_block *right = vshi_voxels_blocks(voxels[1], &blocks[1]);
+    assert_int_equal(blocks[0], blocks[1]);
+    for (size_t i = 0; i < blocks[0]; ++i) {
+        assert_memory_equal(left[i].origin, right[i].origin, sizeof left[i].origin);
+        assert_memory_equal(left[i].mask, right[i].mask, sizeof left[i].mask);
+    }
+    vsh_voxels_info info[2];
+    vsh_voxels_get_info(voxels[0], &info[0]);
+    vsh_voxels_get_info(voxels[1], &info[1]);
+    assert_memory_equal(info[0].bounds_min, info[1].bounds_min, sizeof info[0].bounds_min);
+    assert_memory_equal(info[0].voxel_size, info[1].voxel_size, sizeof info[0].voxel_size);
+    vsh_voxels_free(voxels[0]);
+    vsh_voxels_free(voxels[1]);
+
+    vsh_outline *outline[2] = {nullptr, nullptr};
+    const char *font = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
+    for (int i = 0; i < 2; ++i) {
+        assert_int_equal(
+            vsh_outline_from_text("Ag&8\nx", font, nullptr, i == 0 ? &plain : &run, &outline[i], &failure),
+            VSH_OK);
+    }
+    assert_int_equal(outline[0]->contour_count, outline[1]->contour_count);
+    assert_memory_equal(outline[0]->points, outline[1]->points,
+                        outline[0]->starts[outline[0]->contour_count] * sizeof *outline[0]->points);
+    vsh_outline_free(outline[0]);
+    vsh_outline_free(outline[1]);
+}
+
+void errors_are_the_same(void **) {
+    const std::string nothing = in_folder("none.vdb"), text = in_folder("text.vdb"),
+                      obj = in_folder("bad.obj");
+    put(text, "v 0 0 0\n");
+    put(obj, "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n");
+    for (const std::string &path : {nothing, text, ball_file()}) {
+        vsh_error said[2];
+        vsh_result results[2];
+        for (int i = 0; i < 2; ++i) {
+            const vsh_run run = with_reader(i == 1);
+            vsh_grid *grid = nullptr;
+            results[i] = vsh_grid_read(path.c_str(), "missing", &run, &grid, &said[i]);
+            assert_null(grid);
+        }
+        assert_true(results[0] != VSH_OK && results[0] == results[1]);
+        assert_string_equal(said[0].message, said[1].message);
+    }
+    for (const std::string &path : {obj, in_folder("none.obj")}) {
+        vsh_error said[2];
+        for (int i = 0; i < 2; ++i) {
+            const vsh_run run = with_reader(i == 1);
+            vsh_model *model = nullptr;
+            vsh_model_read(path.c_str(), &run, &model, &said[i]);
+            assert_null(model);
+        }
+        assert_int_equal(said[0].code, said[1].code);
+        assert_string_equal(said[0].message, said[1].message);
+    }
+}
+
+// --- readers that fail
+
+size_t open_files() {
+    size_t count = 0;
+    DIR *files = opendir("/proc/self/fd");
+    while (files != nullptr && readdir(files) != nullptr) {
+        ++count;
+    }
+    closedir(files);
+    return count;
+}
+
+void assert_no_child() {
+    assert_int_equal(waitpid(-1, nullptr, WNOHANG), -1);
+    assert_int_equal(errno, ECHILD);
+}
+
+void a_reader_that_fails_is_an_error_with_its_reason(void **) {
+    const struct {
+        const char *how;
+        double seconds;
+        vsh_result expected;
+        const char *reason;
+    } cases[] = {
+        {"crash", 120.0, VSH_ERROR_READ, "ball.vdb: damaged: the reader crashed (SIGSEGV)"},
+        {"hang", 0.3, VSH_ERROR_LIMIT, "ball.vdb: reading it takes longer than the limit of 0.3 s"},
+        {"close", 0.3, VSH_ERROR_LIMIT, "ball.vdb: reading it takes longer than the limit of 0.3 s"},
+        {"spin", 60.0, VSH_ERROR_LIMIT, "ball.vdb: reading it takes longer than the limit"},
+        {"hungry", 120.0, VSH_ERROR_LIMIT, "more than the memory limit of 100 MB"},
+        {"silent", 120.0, VSH_ERROR_ARGUMENT, "'/proc/self/exe' is no reader of vdbshade"},
+        {"ends", 120.0, VSH_ERROR_ARGUMENT, "is no reader"},
+        {"long", 120.0, VSH_ERROR_READ, "ball.vdb: damaged: what its reader sent does not hold"},
+        {"code", 120.0, VSH_ERROR_READ, "an unknown result"},
+    };
+    const std::string path = ball_file();
+    const size_t files = open_files();
+    for (const auto &one : cases) {
+        if (VSHI_SANITIZED && std::string(one.how) == "hungry") {
+            continue; // nothing limits its memory
+        }
+        misbehave(one.how);
+        vsh_run run = with_reader();
+        run.reader_seconds = one.seconds;
+        run.memory_limit = 100000000;
+        vsh_grid *grid = nullptr;
+        assert_said(vsh_grid_read(path.c_str(), nullptr, &run, &grid, &failure), one.expected, {one.reason});
+        assert_null(grid);
+        vsh_model *model = nullptr;
+        assert_int_equal(vsh_model_read((ASSETS + "/thin.glb").c_str(), &run, &model, &failure),
+                         one.expected);
+        assert_no_child();
+        assert_int_equal(open_files(), files);
+    }
+    misbehave(nullptr);
+}
+
+void a_program_that_is_missing_or_no_reader_is_an_argument(void **) {
+    const std::string path = ball_file();
+    for (const char *program : {"/nowhere/reader", "/bin/true", "/tmp"}) {
+        vsh_run run = with_reader();
+        run.reader = program;
+        vsh_grid *grid = nullptr;
+        assert_said(vsh_grid_read(path.c_str(), nullptr, &run, &grid, &failure), VSH_ERROR_ARGUMENT,
+                    {program, "ball.vdb"});
+        assert_no_child();
+    }
+    vsh_run run = with_reader();
+    run.reader_seconds = -1.0;
+    vsh_grid *grid = nullptr;
+    assert_int_equal(vsh_grid_read(path.c_str(), nullptr, &run, &grid, &failure), VSH_ERROR_ARGUMENT);
+}
+
+void cancelling_kills_the_reader(void **) {
+    misbehave("hang");
+    const std::string path = ball_file();
+    static int calls;
+    for (const int after : {1, 2, 5}) {
+        vsh_run run = with_reader();
+        calls = after;
+        run.progress = [](void *, const char *, double) { return int32_t(--calls <= 0); };
+        vsh_grid *grid = nullptr;
+        assert_int_equal(vsh_grid_read(path.c_str(), nullptr, &run, &grid, &failure), VSH_ERROR_CANCELLED);
+        calls = after;
+        vsh_model *model = nullptr;
+        assert_int_equal(vsh_model_read((ASSETS + "/thin.glb").c_str(), &run, &model, &failure),
+                         VSH_ERROR_CANCELLED);
+        calls = after;
+        vsh_image_file *image = nullptr;
+        assert_int_equal(vsh_image_read_run((ASSETS + "/terrain.png").c_str(), &run, &image, &failure),
+                         VSH_ERROR_CANCELLED);
+        assert_no_child();
+    }
+    misbehave(nullptr);
+}
+
+void a_host_may_ignore_its_children_and_have_threads(void **) {
+    const std::string path = ball_file();
+    const vsh_run run = with_reader();
+    void (*const before)(int) = signal(SIGCHLD, SIG_IGN);
+    std::vector<std::thread> threads;
+    std::atomic<int> good{0};
+    for (int i = 0; i < 4; ++i) {
+        threads.emplace_back([&] {
+            vsh_grid *grid = nullptr;
+            vsh_error error;
+            good += vsh_grid_read(path.c_str(), nullptr, &run, &grid, &error) == VSH_OK;
+            vsh_grid_free(grid);
+        });
+    }
+    for (std::thread &thread : threads) {
+        thread.join();
+    }
+    signal(SIGCHLD, before);
+    assert_int_equal(good.load(), 4);
+}
+
+void an_older_program_reads_in_its_own_process(void **) {
+    misbehave("crash");
+    vsh_run run = with_reader();
+    run.struct_size = offsetof(vsh_run, reader); // what it does not know is not looked at
+    run.reader_seconds = -1.0;
+    vsh_grid *grid = nullptr;
+    assert_int_equal(vsh_grid_read(ball_file().c_str(), nullptr, &run, &grid, &failure), VSH_OK);
+    vsh_grid_free(grid);
+    misbehave(nullptr);
+}
+
+void the_memory_limit_holds_whatever_the_file_says_of_itself(void **) {
+    const std::string path = save("large.vdb", {ball<FloatGrid>(5.0, 3.0f)});
+    std::string bytes = content(path);
+    const size_t at = bytes.find("file_mem_bytes");
+    assert_true(at != std::string::npos);
+    const size_t value = bytes.find("int64", at) + 5 + 4; // type's name, size, value
+    std::memset(&bytes[value], 0, 8);
+    put(path, bytes);
+    for (const uint64_t limit : {uint64_t(4) << 20, uint64_t(1) << 10}) {
+        for (int i = 0; i < 2; ++i) {
+            vsh_run run = with_reader(i == 1);
+            run.memory_limit = limit;
+            vsh_grid *grid = nullptr;
+            assert_said(vsh_grid_read(path.c_str(), nullptr, &run, &grid, &failure), VSH_ERROR_LIMIT,
+                        {"large.vdb"});
+        }
+    }
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+    const int served = as_reader(argc, argv);
+    if (served >= 0) {
+        _exit(served);
+    }
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(grids_are_the_same_for_every_kind_of_transform),
+        cmocka_unit_test(mended_grids_and_doubles_and_tiles_are_the_same),
+        cmocka_unit_test(models_are_the_same),
+        cmocka_unit_test(images_lists_voxels_and_texts_are_the_same),
+        cmocka_unit_test(errors_are_the_same),
+        cmocka_unit_test(a_reader_that_fails_is_an_error_with_its_reason),
+        cmocka_unit_test(a_program_that_is_missing_or_no_reader_is_an_argument),
+        cmocka_unit_test(cancelling_kills_the_reader),
+        cmocka_unit_test(a_host_may_ignore_its_children_and_have_threads),
+        cmocka_unit_test(an_older_program_reads_in_its_own_process),
+        cmocka_unit_test(the_memory_limit_holds_whatever_the_file_says_of_itself),
+    };
+    return make_folder() ? cmocka_run_group_tests(tests, nullptr, remove_folder) : 1;
+}

@@ -1,0 +1,205 @@
+// What a reader may send, and do: no answer, however damaged, harms the caller, and a confined process is
+// one.
+#include "readers.h"
+
+#include <fcntl.h>
+#include <sys/ptrace.h>
+#include <sys/socket.h>
+
+namespace {
+
+constexpr int DAMAGES = 4000;
+
+// Runs body(); what it throws as a Failure is counted.
+template <typename Body> void counted(int &refused, Body &&body) {
+    const vsh_result result = vshi::guard(&failure, VSH_ERROR_INTERNAL, "answer", body);
+    assert_int_not_equal(result, VSH_ERROR_INTERNAL);
+    refused += result != VSH_OK;
+}
+
+void damaged_level_sets_are_refused_or_are_trees(void **) {
+    const std::string path = save("ball.vdb", {sphere()});
+    const std::vector<unsigned char> whole = payload_of(vshi_serve_grid, path, [](vshi_put *put) {
+        vshi_put_text(put, nullptr);
+        vshi_put_count(put, 0);
+    });
+    int refused = 0;
+    damage(whole, DAMAGES, [&](vshi_take *take) {
+        counted(refused, [&]() -> vsh_result {
+            const vshi::LevelSet set = vshi::take_level_set(take, "a.vdb", &failure);
+            const vsh_run run = vsh_run_default();
+            vshi::Stage stage(run, "load", &failure);
+            const vshi::Finding kind = vshi::examine_kind(*set.grid);
+            if (kind.kind != vshi::Finding::BAD) {
+                vshi::examine_values(*set.grid, stage);
+            }
+            return VSH_OK;
+        });
+    });
+    assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
+}
+
+void damaged_voxels_are_refused_or_sorted(void **) {
+    const std::string path = save("ball.vdb", {sphere()});
+    const std::vector<unsigned char> whole =
+        payload_of(vshi_serve_voxels, path, [](vshi_put *put) { vshi_put_text(put, nullptr); });
+    int refused = 0;
+    damage(whole, DAMAGES, [&](vshi_take *take) {
+        counted(refused, [&]() -> vsh_result {
+            std::string grid;
+            openvdb::math::Transform::Ptr transform;
+            const auto blocks = vshi::take_blocks(take, "a.vdb", grid, transform, &failure);
+            for (size_t i = 1; i < blocks.size(); ++i) {
+                assert_true(std::lexicographical_compare(blocks[i - 1].origin, blocks[i - 1].origin + 3,
+                                                         blocks[i].origin, blocks[i].origin + 3));
+            }
+            return VSH_OK;
+        });
+    });
+    assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
+}
+
+void damaged_models_are_refused_or_sound(void **) {
+    const std::vector<unsigned char> whole =
+        payload_of(vshi_serve_model, std::string(VSH_ASSETS) + "/thin.glb", [](vshi_put *) {});
+    int refused = 0;
+    damage(whole, DAMAGES, [&](vshi_take *take) {
+        vsh_model *model = nullptr;
+        if (vshi_model_take(take, "a.glb", &model, &failure) != VSH_OK) {
+            ++refused;
+            return;
+        }
+        for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+            const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
+            vsh_mesh_report report;
+            const vsh_result result = vsh_mesh_check(&mesh, &report, &failure);
+            assert_true(result == VSH_OK || result == VSH_ERROR_INPUT); // beyond numbers once moved
+        }
+        vsh_model_free(model);
+    });
+    assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
+}
+
+void damaged_images_and_contours_are_refused_or_sound(void **) {
+    const char *font = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
+    std::vector<unsigned char> whole =
+        payload_of(vshi_serve_image, std::string(VSH_ASSETS) + "/emblem.png", [](vshi_put *) {});
+    int refused = 0;
+    damage(whole, DAMAGES / 8, [&](vshi_take *take) {
+        vsh_image_file *file = nullptr;
+        refused += vshi_image_take(take, "a.png", &file, &failure) != VSH_OK;
+        const vsh_image image = vsh_image_view(file);
+        for (int32_t c = 0; c < image.channel_count; ++c) {
+            assert_in_range(std::strlen(image.names[c]), 0, 255);
+        }
+        vsh_image_free(file);
+    });
+    assert_in_range(refused, DAMAGES / 64, DAMAGES / 8 - 1);
+    whole = payload_of(vshi_serve_text, font, [](vshi_put *put) {
+        vshi_put_text(put, "A8");
+        vshi_put_number(put, 1.0);
+        vshi_put_number(put, 1.0);
+        vshi_put_count(put, 0);
+    });
+    refused = 0;
+    damage(whole, DAMAGES, [&](vshi_take *take) {
+        const vsh_run run = vsh_run_default();
+        vshi_contours contours = {};
+        contours.run = &run;
+        contours.error = &failure;
+        vsh_outline *outline = nullptr;
+        if (vshi_contours_take(take, &contours, "a.ttf", &failure) != VSH_OK) {
+            vshi_contours_free(&contours);
+            ++refused;
+        } else if (vshi_contours_finish(&contours, false, "text", &outline) != VSH_OK) {
+            ++refused;
+        }
+        vsh_outline_free(outline);
+    });
+    assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
+}
+
+void a_message_is_not_read_past_its_end(void **) {
+    alignas(8) const uint64_t words[] = {16, 0x4242424242424242, 0x0042424242424242, UINT64_MAX, 5, 0};
+    const auto *bytes = reinterpret_cast<const unsigned char *>(words);
+    vshi_take take = {bytes, bytes + 24, false};
+    assert_string_equal(vshi_take_text(&take, true), "BBBBBBBBBBBBBBB");
+    assert_true(vshi_take_ends(&take));
+    take = {bytes, bytes + 16, false}; // the text ends behind it
+    assert_null(vshi_take_text(&take, true));
+    assert_true(take.bad);
+    take = {bytes + 8, bytes + 24, false}; // a size out of the world
+    assert_null(vshi_take_text(&take, true));
+    assert_true(take.bad);
+    take = {bytes + 24, bytes + 40, false};
+    assert_null(vshi_take_text(&take, true)); // NULL that was put
+    assert_false(take.bad);
+    assert_null(vshi_take_array(&take, uint64_t(1) << 62, 8)); // a product out of range
+    assert_true(take.bad);
+    take = {bytes + 32, bytes + 48, false};
+    assert_int_equal(vshi_take_count(&take, 4), 0);
+    assert_true(take.bad);
+}
+
+// What a confined process has tried and was let do, as bits of its exit code.
+int forbidden_things() {
+    int done = 0;
+    vshi_confine_resources(uint64_t(1) << 30, 60.0);
+    if (!vshi_confine_calls()) {
+        return 128;
+    }
+    const std::string mine = in_folder("mine"), there = in_folder("ball.vdb");
+    char *const arguments[] = {nullptr};
+    done |= socket(AF_INET, SOCK_STREAM, 0) >= 0 || socket(AF_UNIX, SOCK_STREAM, 0) >= 0 ? 1 : 0;
+    done |= open(mine.c_str(), O_CREAT | O_WRONLY, 0600) >= 0 || open(there.c_str(), O_RDWR) >= 0 ? 2 : 0;
+    done |= kill(getppid(), 0) == 0 ? 4 : 0;
+    done |= ptrace(PTRACE_ATTACH, getppid(), nullptr, nullptr) == 0 ? 8 : 0;
+    done |= unlink(there.c_str()) == 0 ? 16 : 0;
+    const pid_t child = fork();
+    if (child == 0) {
+        _exit(0);
+    }
+    done |= child > 0 ? 32 : 0;
+    execve("/bin/true", arguments, arguments); // its exit code would be 0
+    done |= open(there.c_str(), O_RDONLY) < 0 ? 64 : 0;
+    void *memory =
+        mmap(nullptr, size_t(8) << 30, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    return memory != MAP_FAILED ? 127 : 200 + done;
+}
+
+void a_confined_process_reads_and_nothing_else(void **) {
+    if (VSHI_SANITIZED) {
+        skip();
+    }
+    save("ball.vdb", {sphere()});
+    const pid_t child = fork();
+    if (child == 0) {
+        _exit(forbidden_things());
+    }
+    int status = 0;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFEXITED(status));
+    if (WEXITSTATUS(status) == 128) {
+        print_message("this host allows no filter of system calls\n");
+        skip();
+    }
+    assert_int_equal(WEXITSTATUS(status), 200);
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+    const int served = as_reader(argc, argv);
+    if (served >= 0) {
+        _exit(served);
+    }
+    const CMUnitTest tests[] = {
+        cmocka_unit_test(a_message_is_not_read_past_its_end),
+        cmocka_unit_test(damaged_level_sets_are_refused_or_are_trees),
+        cmocka_unit_test(damaged_voxels_are_refused_or_sorted),
+        cmocka_unit_test(damaged_models_are_refused_or_sound),
+        cmocka_unit_test(damaged_images_and_contours_are_refused_or_sound),
+        cmocka_unit_test(a_confined_process_reads_and_nothing_else),
+    };
+    return make_folder() ? cmocka_run_group_tests(tests, nullptr, remove_folder) : 1;
+}
