@@ -37,4 +37,11 @@ vsh_error *fuzz_error(vsh_error *error);
 /* Aborts where a call's result, its error and its handle do not fit together. */
 void fuzz_ended(vsh_result result, const vsh_error *error, const void *handle);
 
+/* Makes a handle by a call that is given fuzz_error(&error), and looks at all three once it has ended. */
+#define FUZZ_MAKE(handle, call)                                                                              \
+    do {                                                                                                     \
+        const vsh_result fuzz_made = (call);                                                                 \
+        fuzz_ended(fuzz_made, &error, handle);                                                               \
+    } while (0)
+
 #endif

@@ -16,15 +16,14 @@ static void use(const vsh_image *image, const char *path) {
                                        .size = {1.0, 2.0},
                                        .height = 0.5};
     vsh_heights *heights;
-    fuzz_ended(vsh_heights_create(&source, &run, &heights, fuzz_error(&error)), &error, heights);
+    FUZZ_MAKE(heights, vsh_heights_create(&source, &run, &heights, fuzz_error(&error)));
     vsh_heights_free(heights);
     vsh_model *model;
-    fuzz_ended(vsh_model_from_heights(&source, image->width % 2, &run, &model, fuzz_error(&error)), &error,
-               model);
+    FUZZ_MAKE(model, vsh_model_from_heights(&source, image->width % 2, &run, &model, fuzz_error(&error)));
     vsh_model_free(model);
     run = fuzz_run();
     vsh_outline *outline;
-    fuzz_ended(vsh_outline_from_image(path, NULL, &run, &outline, fuzz_error(&error)), &error, outline);
+    FUZZ_MAKE(outline, vsh_outline_from_image(path, NULL, &run, &outline, fuzz_error(&error)));
     vsh_outline_free(outline);
 }
 

@@ -39,8 +39,8 @@ static void make_outline(const char *path, const vsh_mask_options *options, cons
         vsh_grid_options grid_options = vsh_grid_options_default();
         grid_options.resolution = 8;
         vsh_grid *grid;
-        fuzz_ended(vsh_grid_from_outline(outline, 0.5, NULL, &grid_options, run, &grid, fuzz_error(&error)),
-                   &error, grid);
+        FUZZ_MAKE(grid,
+                  vsh_grid_from_outline(outline, 0.5, NULL, &grid_options, run, &grid, fuzz_error(&error)));
         vsh_grid_free(grid);
     }
     vsh_outline_free(outline);
@@ -78,7 +78,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const vsh_heights_source source = {
         .name = path, .columns = width, .rows = height, .values = pixels, .size = {1.0, 1.0}, .height = 1.0};
     vsh_heights *heights;
-    fuzz_ended(vsh_heights_create(&source, &run, &heights, fuzz_error(&error)), &error, heights);
+    FUZZ_MAKE(heights, vsh_heights_create(&source, &run, &heights, fuzz_error(&error)));
     vsh_heights_free(heights);
     return 0;
 }

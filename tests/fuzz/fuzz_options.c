@@ -153,12 +153,12 @@ static void grid(fuzz_input *input) {
     mesh.transform = fuzz_byte(input) & 1 ? transform : NULL;
     vsh_error error;
     vsh_grid *result;
-    fuzz_ended(vsh_grid_from_meshes(&mesh, 1, &options, &run, &result, fuzz_error(&error)), &error, result);
+    FUZZ_MAKE(result, vsh_grid_from_meshes(&mesh, 1, &options, &run, &result, fuzz_error(&error)));
     if (result != NULL) {
         vsh_field_options wide = vsh_field_options_default();
         take(input, &wide, sizeof wide);
         vsh_field *field;
-        fuzz_ended(vsh_field_create(result, &wide, &run, &field, fuzz_error(&error)), &error, field);
+        FUZZ_MAKE(field, vsh_field_create(result, &wide, &run, &field, fuzz_error(&error)));
         vsh_field_free(field);
     }
     vsh_grid_free(result);
@@ -173,11 +173,10 @@ static void unite(fuzz_input *input) {
     const vsh_grid_instance instances[] = {{made.grid, NULL}, {made.grid, transform}};
     vsh_error error;
     vsh_grid *result;
-    fuzz_ended(vsh_grid_unite(instances, 2, &options, &run, &result, fuzz_error(&error)), &error, result);
+    FUZZ_MAKE(result, vsh_grid_unite(instances, 2, &options, &run, &result, fuzz_error(&error)));
     vsh_grid_free(result);
-    fuzz_ended(vsh_grid_from_outline(made.outline, transform[3], transform, &options, &run, &result,
-                                     fuzz_error(&error)),
-               &error, result);
+    FUZZ_MAKE(result, vsh_grid_from_outline(made.outline, transform[3], transform, &options, &run, &result,
+                                            fuzz_error(&error)));
     vsh_grid_free(result);
 }
 
@@ -198,12 +197,12 @@ static void sdf(fuzz_input *input) {
     const vsh_run run = take_run(input);
     vsh_error error;
     vsh_grid *result;
-    fuzz_ended(vsh_grid_from_sdf(&tree, &options, &run, &result, fuzz_error(&error)), &error, result);
+    FUZZ_MAKE(result, vsh_grid_from_sdf(&tree, &options, &run, &result, fuzz_error(&error)));
     vsh_grid_free(result);
     vsh_solids *solids;
     double transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     take(input, transform, sizeof transform);
-    fuzz_ended(vsh_solids_create(&tree, transform, 1, &solids, fuzz_error(&error)), &error, solids);
+    FUZZ_MAKE(solids, vsh_solids_create(&tree, transform, 1, &solids, fuzz_error(&error)));
     if (solids != NULL) {
         double position[3] = {1, 1, 1}, lift = 0.01;
         float normal[3] = {0, 1, 0}, value;
@@ -261,8 +260,7 @@ static void query(fuzz_input *input) {
     const vsh_light light = take_light(input);
     vsh_query *made_query;
     vsh_error error;
-    fuzz_ended(vsh_query_create(made.field, &light, 1, &options, &made_query, fuzz_error(&error)), &error,
-               made_query);
+    FUZZ_MAKE(made_query, vsh_query_create(made.field, &light, 1, &options, &made_query, fuzz_error(&error)));
     if (made_query == NULL) {
         return;
     }
@@ -317,17 +315,14 @@ static void lightmap(fuzz_input *input) {
     mesh.normals = fuzz_byte(input) & 1 ? corners : NULL;
     vsh_error error;
     vsh_texels *texels;
-    fuzz_ended(vsh_texels_create(&mesh, 1, &options, &run, NULL, &texels, fuzz_error(&error)), &error,
-               texels);
+    FUZZ_MAKE(texels, vsh_texels_create(&mesh, 1, &options, &run, NULL, &texels, fuzz_error(&error)));
     vsh_charts *charts;
-    fuzz_ended(vsh_charts_create(&mesh, 1, &options, &run, NULL, &charts, fuzz_error(&error)), &error,
-               charts);
+    FUZZ_MAKE(charts, vsh_charts_create(&mesh, 1, &options, &run, NULL, &charts, fuzz_error(&error)));
     if (charts != NULL) {
         int32_t rows[2] = {0, 8};
         take(input, rows, sizeof rows);
         vsh_texels *band;
-        fuzz_ended(vsh_texels_create_band(charts, rows[0], rows[1], &run, &band, fuzz_error(&error)), &error,
-                   band);
+        FUZZ_MAKE(band, vsh_texels_create_band(charts, rows[0], rows[1], &run, &band, fuzz_error(&error)));
         vsh_texels_free(band);
         vsh_charts_band_bytes(charts, rows[0], rows[1], 4, 1, 1, 1, 1);
     }
@@ -375,15 +370,14 @@ static void volume(fuzz_input *input) {
     take(input, box, sizeof box);
     take(input, &size, sizeof size);
     vsh_voxels *voxels;
-    fuzz_ended(vsh_voxels_from_box(box, box + 3, size, &run, &voxels, fuzz_error(&error)), &error, voxels);
+    FUZZ_MAKE(voxels, vsh_voxels_from_box(box, box + 3, size, &run, &voxels, fuzz_error(&error)));
     vsh_volume *baked;
-    fuzz_ended(vsh_bake_volume(made.field, voxels != NULL ? voxels : made.voxels, &light, 1, &options, &run,
-                               &baked, NULL, fuzz_error(&error)),
-               &error, baked);
+    FUZZ_MAKE(baked, vsh_bake_volume(made.field, voxels != NULL ? voxels : made.voxels, &light, 1, &options,
+                                     &run, &baked, NULL, fuzz_error(&error)));
     vsh_volume_free(baked);
     vsh_voxels_free(voxels);
     take(input, &size, sizeof size);
-    fuzz_ended(vsh_voxels_from_grid(made.grid, size, &run, &voxels, fuzz_error(&error)), &error, voxels);
+    FUZZ_MAKE(voxels, vsh_voxels_from_grid(made.grid, size, &run, &voxels, fuzz_error(&error)));
     vsh_voxels_free(voxels);
 }
 
@@ -444,15 +438,14 @@ static void flat(fuzz_input *input) {
     take(input, points, sizeof points);
     const size_t counts[] = {3, 5, 4};
     vsh_outline *outline;
-    fuzz_ended(vsh_outline_from_polygons(points, counts, 1 + fuzz_byte(input) % 3, &run, &outline,
-                                         fuzz_error(&error)),
-               &error, outline);
+    FUZZ_MAKE(outline, vsh_outline_from_polygons(points, counts, 1 + fuzz_byte(input) % 3, &run, &outline,
+                                                 fuzz_error(&error)));
     ended(vsh_flat_bake(outline, lights, 2, &options, &run, &map, fuzz_error(&error)), &error);
     vsh_outline_free(outline);
     double matrix[6] = {1, 0, 0, 0, 1, 0};
     take(input, matrix, sizeof matrix);
     const vsh_outline_instance instances[] = {{made.outline, matrix}, {made.outline, NULL}};
-    fuzz_ended(vsh_outline_unite(instances, 2, &run, &outline, fuzz_error(&error)), &error, outline);
+    FUZZ_MAKE(outline, vsh_outline_unite(instances, 2, &run, &outline, fuzz_error(&error)));
     vsh_outline_free(outline);
 }
 
@@ -474,17 +467,17 @@ static void heights(fuzz_input *input) {
     }
     vsh_error error;
     vsh_heights *result;
-    fuzz_ended(vsh_heights_create(&source, &run, &result, fuzz_error(&error)), &error, result);
+    FUZZ_MAKE(result, vsh_heights_create(&source, &run, &result, fuzz_error(&error)));
     vsh_heights_free(result);
     int32_t what = 0;
     take(input, &what, sizeof what);
     vsh_model *model;
-    fuzz_ended(vsh_model_from_heights(&source, what, &run, &model, fuzz_error(&error)), &error, model);
+    FUZZ_MAKE(model, vsh_model_from_heights(&source, what, &run, &model, fuzz_error(&error)));
     vsh_model_free(model);
     double balls[8] = {0, 0, 0, 1, 2, 0, 0, 1};
     take(input, balls, sizeof balls);
     vsh_spheres *spheres;
-    fuzz_ended(vsh_spheres_create(balls, 2, transform, &run, &spheres, fuzz_error(&error)), &error, spheres);
+    FUZZ_MAKE(spheres, vsh_spheres_create(balls, 2, transform, &run, &spheres, fuzz_error(&error)));
     vsh_spheres_free(spheres);
 }
 
@@ -544,14 +537,13 @@ static void mask(fuzz_input *input) {
     const vsh_run run = take_run(input);
     vsh_error error;
     vsh_outline *outline;
-    fuzz_ended(vsh_outline_from_image(path, &options, &run, &outline, fuzz_error(&error)), &error, outline);
+    FUZZ_MAKE(outline, vsh_outline_from_image(path, &options, &run, &outline, fuzz_error(&error)));
     vsh_outline_free(outline);
     vsh_text_options letters = vsh_text_options_default();
     take(input, &letters, sizeof letters);
     char text[24] = "text";
     take(input, text, sizeof text - 1);
-    fuzz_ended(vsh_outline_from_text(text, path, &letters, &run, &outline, fuzz_error(&error)), &error,
-               outline);
+    FUZZ_MAKE(outline, vsh_outline_from_text(text, path, &letters, &run, &outline, fuzz_error(&error)));
     vsh_outline_free(outline);
 }
 

@@ -12,7 +12,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const char *path = fuzz_file(names[data[0] % (sizeof names / sizeof names[0])], data + 1, size - 1);
     vsh_error error;
     vsh_image_file *file;
-    fuzz_ended(vsh_image_read(path, &file, fuzz_error(&error)), &error, file);
+    FUZZ_MAKE(file, vsh_image_read(path, &file, fuzz_error(&error)));
     vsh_image_free(file);
     return 0;
 }

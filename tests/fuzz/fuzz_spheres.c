@@ -13,8 +13,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     fuzz_ended(result, &error, list);
     if (result == VSH_OK) {
         vsh_spheres *spheres;
-        fuzz_ended(vsh_spheres_create(list, count, NULL, &run, &spheres, fuzz_error(&error)), &error,
-                   spheres);
+        FUZZ_MAKE(spheres, vsh_spheres_create(list, count, NULL, &run, &spheres, fuzz_error(&error)));
         vsh_spheres_free(spheres);
     }
     vsh_spheres_list_free(list);

@@ -16,14 +16,14 @@ static void list(const char *path, const vsh_run *run) {
 static void read_grid(const char *path, const vsh_run *run) {
     vsh_error error;
     vsh_grid *grid;
-    fuzz_ended(vsh_grid_read(path, NULL, run, &grid, fuzz_error(&error)), &error, grid);
+    FUZZ_MAKE(grid, vsh_grid_read(path, NULL, run, &grid, fuzz_error(&error)));
     vsh_grid_free(grid);
 }
 
 static void read_voxels(const char *path, const vsh_run *run) {
     vsh_error error;
     vsh_voxels *voxels;
-    fuzz_ended(vsh_voxels_from_vdb(path, NULL, run, &voxels, fuzz_error(&error)), &error, voxels);
+    FUZZ_MAKE(voxels, vsh_voxels_from_vdb(path, NULL, run, &voxels, fuzz_error(&error)));
     vsh_voxels_free(voxels);
 }
 

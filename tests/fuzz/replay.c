@@ -20,7 +20,7 @@ static int replay_file(const char *path) {
     const int whole = (bytes != NULL || size == 0) && fread(bytes, 1, size, file) == size;
     fclose(file);
     if (whole) {
-        fprintf(stderr, "%s\n", path);
+        fprintf(stderr, "%s\n", path); /* standard output is the target's */
         LLVMFuzzerTestOneInput(bytes, size);
     }
     free(bytes);
