@@ -364,6 +364,7 @@ int main(int argc, char **argv) {
                     fprintf(csv, ",%.1f", 1e3 * seconds);
                     printf(" %8.1f", 1e3 * seconds);
                 }
+                fflush(stdout);
             }
             fputs("\n", csv);
             printf("\n");

@@ -308,6 +308,7 @@ vsh_result unite(const vsh_grid_instance *instances, size_t count, const vsh_gri
     std::vector<Part> parts;
     double shell = 0.0;
     for (size_t i = 0; i < count; ++i) {
+        stage.check(); // meshing, the first step of resampling, asks nobody
         Part part{placed[i].grid->level_set, Coord(0)};
         if (!lies_on(placed[i], lattice, part.shift)) {
             part = {resample(placed[i], i, lattice, 0.9 * double(i) / double(count),
