@@ -140,7 +140,8 @@ static void every_write_may_fail(void **state) {
         scenarios_untouched(); /* no: the last one has written */
         if (writes(s)) {
             print_message("%-24s %4" PRIu64 " calls\n", s->name, n - 2);
-            assert_true(n > 5);
+            assert_true(
+                n > 4); /* one to open, flush and rename at least: what a module writes is not seen here */
             sum += n - 2;
         }
     }
