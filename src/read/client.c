@@ -256,6 +256,12 @@ static vsh_result fail_end(const vshi_ask *ask, int status, bool begun, vsh_erro
     if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_HUNGRY) {
         return fail_memory(ask, error);
     }
+    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_CRAMPED) {
+        return vshi_fail(error, VSH_ERROR_LIMIT,
+                         "%s: what its reader sends is more than this process's limit on the size of files "
+                         "(ulimit -f); raise it, or read without a reader",
+                         ask->path);
+    }
     if (!begun) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: '%s' is no reader of vdbshade %s", ask->path,
                          ask->run->reader, vsh_version());

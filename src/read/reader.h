@@ -75,7 +75,10 @@ vshi_serve_fn vshi_serve_grid, vshi_serve_list, vshi_serve_voxels, vshi_serve_mo
 enum { VSHI_READER_ANSWER = 3, VSHI_READER_REQUEST = 4, VSHI_READER_PROGRESS = 5 };
 
 /* A reader's exit code where memory was refused. */
-enum { VSHI_READER_HUNGRY = 86 };
+enum {
+    VSHI_READER_HUNGRY = 86,
+    VSHI_READER_CRAMPED = 87 /* the caller's limit on the size of files does not let the answer through */
+};
 
 #define VSHI_REQUEST_MAGIC UINT64_C(0x6b7361687376)
 #define VSHI_ANSWER_MAGIC UINT64_C(0x726577736e61)

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
@@ -33,6 +34,7 @@ typedef struct serving {
     char *warnings; /* texts, one behind the other with their ends */
     size_t used, count;
     double reported;
+    bool limited; /* the size of files, by the caller's own limit */
 } serving;
 
 /* May come from any thread of the pool, one at a time. */
@@ -79,13 +81,19 @@ static bool write_head(const vshi_answer_head *head) {
     return pwrite(VSHI_READER_ANSWER, head, sizeof *head, 0) == (ssize_t)sizeof *head;
 }
 
+/* Why an answer could not be written: the size of files is the memory that the caller has room for, or less
+ * where it has a limit of its own (ulimit -f), which holds for memory that is a file, too. */
+static int exit_code_of_write(const serving *s) {
+    return s->limited ? VSHI_READER_CRAMPED : VSHI_READER_HUNGRY;
+}
+
 static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_take *request,
                   const vsh_run *run) {
     static vshi_put put;
     vshi_answer_head head = {
         .magic = VSHI_ANSWER_MAGIC, .protocol = VSHI_READER_PROTOCOL, .code = VSHI_ANSWER_BEGUN};
     if (!write_head(&head)) {
-        return CANNOT_SERVE;
+        return s->limited ? VSHI_READER_CRAMPED : CANNOT_SERVE;
     }
     vsh_error error = {VSH_OK, ""};
     vshi_put_begin(&put, VSHI_READER_ANSWER, sizeof head);
@@ -96,8 +104,8 @@ static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_take 
         vshi_put_text(&put, text);
         text += strlen(text) + 1;
     }
-    if (!vshi_put_flush(&put)) { /* EFBIG: more than the caller could hold */
-        return VSHI_READER_HUNGRY;
+    if (!vshi_put_flush(&put)) {
+        return exit_code_of_write(s);
     }
     head.code = result;
     head.warnings = s->count;
@@ -124,6 +132,8 @@ int32_t vsh_reader_serve(int argc, char **argv) {
     if (request.bad || path == NULL || s.warnings == NULL) {
         return CANNOT_SERVE;
     }
+    struct rlimit size_limit;
+    s.limited = getrlimit(RLIMIT_FSIZE, &size_limit) == 0 && size_limit.rlim_cur != RLIM_INFINITY;
     run.threads = 1;
     run.progress = report;
     run.warning = keep_warning;

@@ -67,20 +67,27 @@ bake_to() {
 @test "a full disk leaves the old output" {
     old_output out.exr
     # The limit counts blocks of 1 KiB; the lightmap takes more.
-    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" bake box.obj "${SMALL[@]}" \
+    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" bake box.obj --trusted "${SMALL[@]}" \
         --size 256 --ao 1 --quiet -o out.exr
     refused 3 out.exr
     untouched out.exr
 }
 
+@test "a limit on the size of files that a reader's answer passes is told" {
+    old_output out.exr
+    run --separate-stderr bash -c 'ulimit -f 2; exec "$@"' - "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o out.exr
+    refused 4 box.obj "ulimit -f"
+    untouched out.exr
+}
+
 @test "a full disk leaves the old PNG and the old level set" {
     old_output out.png
-    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" bake box.obj "${SMALL[@]}" \
+    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" bake box.obj --trusted "${SMALL[@]}" \
         --size 256 --ao 1 --bits 16 --quiet -o out.png
     refused 3 out.png
     untouched out.png
     old_output out.vdb
-    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" voxelize box.obj --quiet -o out.vdb
+    run --separate-stderr bash -c 'ulimit -f 1; exec "$@"' - "$VDBSHADE" voxelize box.obj --trusted --quiet -o out.vdb
     refused 3 out.vdb
     untouched out.vdb
 }
