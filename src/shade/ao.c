@@ -70,7 +70,8 @@ void vshi_ao_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *
 vsh_result vshi_ao_prepare(const vsh_field *field, const vsh_shade_options *options, vshi_ao_cones *cones,
                            vshi_ao_task *task, vsh_error *error) {
     if (options->ao_method == VSH_AO_EXACT && options->triangles == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO method exact: triangles is NULL: it traces those of the casters");
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "AO method exact: triangles is NULL: it traces those of the casters");
     }
     if (options->ao_method == VSH_AO_CONES) {
         vshi_ao_cones_place(cones, options->ao_cones);

@@ -169,7 +169,8 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
         return result;
     }
     if (options->method == VSH_SHADOW_EXACT && options->triangles == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "method exact: triangles is NULL: it traces those of the casters");
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "method exact: triangles is NULL: it traces those of the casters");
     }
     const bool inner = vshi_shadow_has_rays(options) || options->method == VSH_SHADOW_SMOOTH ||
                        options->method == VSH_SHADOW_CONE;

@@ -32,8 +32,8 @@ struct Loop {
     }
 };
 
-// More threads than cores are allowed for as long as one of these lasts, and no more than the host allows: TBB
-// would complain on standard error.
+// More threads than cores are allowed for as long as one of these lasts, and no more than the host allows:
+// TBB would complain on standard error.
 class Arena {
   public:
     explicit Arena(int threads) {

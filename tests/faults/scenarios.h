@@ -16,12 +16,13 @@ typedef struct scenario {
 extern const scenario scenarios[];
 extern const size_t scenario_count;
 
-/* The files that scenarios read and write, in the working directory; outputs hold "old". */
-void scenarios_make_files(void);
+/* Makes a folder with the files that scenarios read and write, outputs holding "old", and enters it; takes it
+ * away again. cmocka's way of setting up a group. */
+int scenarios_begin(void **state);
+int scenarios_end(void **state);
 
 /* Whether the outputs of a scenario that failed are as they were, and no other file is there; then they are
  * made so anew. */
 int scenarios_untouched(void);
-void scenarios_remove_files(void);
 
 #endif

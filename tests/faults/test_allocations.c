@@ -18,25 +18,6 @@
 
 enum { MOST = 20000, STEP = 5 };
 
-static char folder[256];
-
-static int make_folder(void **state) {
-    (void)state;
-    const char *place = getenv("TMPDIR");
-    snprintf(folder, sizeof folder, "%s/vdbshade-faults-XXXXXX", place != NULL ? place : "/tmp");
-    if (mkdtemp(folder) == NULL || chdir(folder) != 0) {
-        return -1;
-    }
-    scenarios_make_files();
-    return 0;
-}
-
-static int remove_folder(void **state) {
-    (void)state;
-    scenarios_remove_files();
-    return chdir("/") != 0 || rmdir(folder) != 0;
-}
-
 static vsh_run one_thread(void) {
     vsh_run run = vsh_run_default();
     run.threads = 1; /* so that the n-th allocation is the same one each time */
@@ -112,5 +93,5 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_allocation_may_fail),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, scenarios_begin, scenarios_end);
 }

@@ -20,25 +20,6 @@
 
 enum { MOST_STAGES = 256 };
 
-static char folder[256];
-
-static int make_folder(void **state) {
-    (void)state;
-    const char *place = getenv("TMPDIR");
-    snprintf(folder, sizeof folder, "%s/vdbshade-faults-XXXXXX", place != NULL ? place : "/tmp");
-    if (mkdtemp(folder) == NULL || chdir(folder) != 0) {
-        return -1;
-    }
-    scenarios_make_files();
-    return 0;
-}
-
-static int remove_folder(void **state) {
-    (void)state;
-    scenarios_remove_files();
-    return chdir("/") != 0 || rmdir(folder) != 0;
-}
-
 /* Stages are counted as they begin: a scenario makes several calls, some of one name. Called by one thread at
  * a time, but by any. */
 typedef struct watch {
@@ -136,5 +117,5 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_stage_can_be_cancelled),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, scenarios_begin, scenarios_end);
 }

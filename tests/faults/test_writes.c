@@ -25,25 +25,6 @@
 
 enum { MOST = 2000, FINE = 0, BAD = 1, NOTHING_FAILED = 2 };
 
-static char folder[256];
-
-static int make_folder(void **state) {
-    (void)state;
-    const char *place = getenv("TMPDIR");
-    snprintf(folder, sizeof folder, "%s/vdbshade-faults-XXXXXX", place != NULL ? place : "/tmp");
-    if (mkdtemp(folder) == NULL || chdir(folder) != 0) {
-        return -1;
-    }
-    scenarios_make_files();
-    return 0;
-}
-
-static int remove_folder(void **state) {
-    (void)state;
-    scenarios_remove_files();
-    return chdir("/") != 0 || rmdir(folder) != 0;
-}
-
 static bool writes(const scenario *s) {
     return strstr(s->name, "written") != NULL;
 }
@@ -231,5 +212,5 @@ int main(void) {
         cmocka_unit_test(a_kill_at_every_write_leaves_the_old_file_and_the_next_run_tidies_up),
         cmocka_unit_test(what_a_process_still_writes_and_other_files_stay),
     };
-    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+    return cmocka_run_group_tests(tests, scenarios_begin, scenarios_end);
 }

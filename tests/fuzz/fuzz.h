@@ -40,8 +40,8 @@ void fuzz_ended(vsh_result result, const vsh_error *error, const void *handle);
 /* Makes a handle by a call that is given fuzz_error(&error), and looks at all three once it has ended. */
 #define FUZZ_MAKE(handle, call)                                                                              \
     do {                                                                                                     \
-        const vsh_result fuzz_made = (call);                                                                 \
-        fuzz_ended(fuzz_made, &error, handle);                                                               \
+        const vsh_result fuzz_result = (call);                                                               \
+        fuzz_ended(fuzz_result, &error, handle);                                                             \
     } while (0)
 
 #endif

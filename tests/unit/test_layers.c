@@ -359,7 +359,8 @@ static void test_refused(void **state) {
         {"layer 0: remap[1] 0.25 is out of range 0.5 … 1", {.remap = {0.5, 0.25}}},
         {"layer 0: remap from 0.5 to 0.5: expected a rise", {.remap = {0.5, 0.5}}},
         {"layer 0: start_offset 17 is out of range -1 … 16", {.start_offset = 17.0}},
-        {"layer 0: method exact: triangles is NULL: it traces those of the casters", {.field = empty, .method = VSH_SHADOW_EXACT}},
+        {"layer 0: method exact: triangles is NULL: it traces those of the casters",
+         {.field = empty, .method = VSH_SHADOW_EXACT}},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
         vsh_layer layer = cases[i].layer;

@@ -1,0 +1,46 @@
+/* What scenarios are made of. */
+#ifndef FAULTS_PARTS_H
+#define FAULTS_PARTS_H
+
+#include "scenarios.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+/* Runs a call; ends the scenario where it fails, and the test where it then left a handle. */
+#define TRY(call)                                                                                            \
+    do {                                                                                                     \
+        result = (call);                                                                                     \
+        if (result != VSH_OK) {                                                                              \
+            goto end;                                                                                        \
+        }                                                                                                    \
+    } while (0)
+
+#define MAKE(handle, call)                                                                                   \
+    do {                                                                                                     \
+        result = (call);                                                                                     \
+        if ((result == VSH_OK) != ((handle) != NULL)) {                                                      \
+            fprintf(stderr, "%s: %s with%s a handle\n", #handle, vsh_result_name(result),                    \
+                    (handle) != NULL ? "" : "out");                                                          \
+            abort();                                                                                         \
+        }                                                                                                    \
+        if (result != VSH_OK) {                                                                              \
+            goto end;                                                                                        \
+        }                                                                                                    \
+    } while (0)
+
+enum { SIDE = 12, POINTS = 80 };
+
+/* Values 0 … 1, no two neighbours alike. */
+void parts_fill(float *values, size_t count);
+
+/* A cube of 1 in a few voxels. */
+vsh_result parts_field(const vsh_run *run, vsh_grid **grid, vsh_field **field, vsh_error *error);
+
+/* Points around it, with normals up. */
+void parts_place(double positions[3 * POINTS], float normals[3 * POINTS]);
+
+/* Scenarios that bake and write (bakes.c). */
+scenario_fn bake_lightmap, bake_volume, draw, bake_flat, write_exr, write_png, write_tif, read_image;
+
+#endif

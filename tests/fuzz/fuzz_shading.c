@@ -1,0 +1,244 @@
+/* Structs of what is shaded and baked, of any bytes: a code comes back, and no crash. */
+#include "parts.h"
+
+#include <string.h>
+
+enum { POINTS = 12, MOST_TEXELS = 1 << 14 };
+
+static void shade(fuzz_input *input) {
+    vsh_shade_options options = vsh_shade_options_default();
+    vsh_layer layer;
+    options.rays = 4;
+    fuzz_take_shade(input, &options, &layer);
+    const vsh_run run = fuzz_take_run(input);
+    const vsh_light light = fuzz_take_light(input);
+    double positions[3 * POINTS];
+    float normals[3 * POINTS], values[3 * POINTS], deviation[POINTS], ao[POINTS];
+    uint32_t texels[POINTS] = {0};
+    for (int i = 0; i < 3 * POINTS; ++i) {
+        positions[i] = 0.1 * i - 1.5;
+        normals[i] = (float)(i % 3 == 1);
+    }
+    fuzz_take(input, positions, sizeof positions);
+    fuzz_take(input, normals, sizeof normals);
+    fuzz_take(input, texels, sizeof texels);
+    const uint8_t how = fuzz_byte(input);
+    const vsh_points points = {POINTS, positions, how & 1 ? normals : NULL, how & 2 ? texels : NULL};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    fuzz_take(input, &stats, sizeof stats.struct_size);
+    vsh_error error;
+    fuzz_ended_plain(vsh_shade_shadow(fuzz_made()->field, &points, &light, &options, &run, values,
+                                      how & 4 ? deviation : NULL, &stats, fuzz_error(&error)),
+                     &error);
+    fuzz_ended_plain(vsh_shade_ao(fuzz_made()->field, &points, &options, &run, values,
+                                  how & 4 ? deviation : NULL, &stats, fuzz_error(&error)),
+                     &error);
+    fuzz_ended_plain(
+        vsh_shade_bent(fuzz_made()->field, &points, &options, &run, ao, values, &stats, fuzz_error(&error)),
+        &error);
+}
+
+static void query(fuzz_input *input) {
+    vsh_shade_options options = vsh_shade_options_default();
+    vsh_layer layer;
+    fuzz_take_shade(input, &options, &layer);
+    const vsh_run run = fuzz_take_run(input);
+    const vsh_light light = fuzz_take_light(input);
+    vsh_query *made_query;
+    vsh_error error;
+    FUZZ_MAKE(made_query,
+              vsh_query_create(fuzz_made()->field, &light, 1, &options, &made_query, fuzz_error(&error)));
+    if (made_query == NULL) {
+        return;
+    }
+    /* strides as long as they can be wished, within these */
+    enum { ROOM = 1 << 12, MOST_STRIDE = 256 };
+    static double positions[ROOM];
+    static float normals[ROOM], visibility[ROOM], ao[ROOM], distance[ROOM], gradient[ROOM];
+    vsh_strided_points points = vsh_strided_points_default();
+    points.count = POINTS;
+    fuzz_take(input, &points, sizeof points);
+    vsh_query_output output = vsh_query_output_default();
+    fuzz_take(input, &output, sizeof output);
+    points.count %= POINTS + 1;
+    if (points.position_stride > MOST_STRIDE || points.normal_stride > MOST_STRIDE ||
+        points.texel_stride > MOST_STRIDE || output.stride > MOST_STRIDE) {
+        vsh_query_free(made_query);
+        return;
+    }
+    const uint8_t how = fuzz_byte(input);
+    points.positions = how & 1 ? positions : NULL;
+    points.float_positions = how & 2 ? normals : NULL;
+    points.normals = how & 4 ? normals : NULL;
+    points.texels = how & 8 ? (const uint32_t *)fuzz_indices : NULL;
+    points.texel_stride = 4;
+    float *const planes[] = {visibility};
+    output.visibility = how & 16 ? planes : NULL;
+    output.deviation = NULL;
+    output.ao = how & 32 ? ao : NULL;
+    output.ao_deviation = NULL;
+    output.distance = how & 64 ? distance : NULL;
+    output.gradient = how & 128 ? gradient : NULL;
+    fuzz_fill(input, positions, 3 * POINTS * sizeof *positions);
+    fuzz_fill(input, normals, 3 * POINTS * sizeof *normals);
+    fuzz_ended_plain(vsh_query_strided(made_query, &points, &run, &output, NULL, fuzz_error(&error)), &error);
+    vsh_query_free(made_query);
+}
+
+static void lightmap(fuzz_input *input) {
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = FUZZ_SIDE;
+    fuzz_take(input, &options, sizeof options);
+    const vsh_run run = fuzz_take_run(input);
+    vsh_layer layer;
+    options.shade.layers = NULL;
+    options.shade.layer_count = 0;
+    options.shade.triangles = NULL;
+    float places[16];
+    memcpy(places, fuzz_uvs, sizeof places);
+    fuzz_take(input, places, sizeof places);
+    vsh_mesh mesh = fuzz_made()->mesh;
+    mesh.uvs = places;
+    mesh.normals = fuzz_byte(input) & 1 ? fuzz_corners : NULL;
+    vsh_error error;
+    vsh_texels *texels;
+    FUZZ_MAKE(texels, vsh_texels_create(&mesh, 1, &options, &run, NULL, &texels, fuzz_error(&error)));
+    vsh_charts *charts;
+    FUZZ_MAKE(charts, vsh_charts_create(&mesh, 1, &options, &run, NULL, &charts, fuzz_error(&error)));
+    if (charts != NULL) {
+        int32_t rows[2] = {0, 8};
+        fuzz_take(input, rows, sizeof rows);
+        vsh_texels *band;
+        FUZZ_MAKE(band, vsh_texels_create_band(charts, rows[0], rows[1], &run, &band, fuzz_error(&error)));
+        vsh_texels_free(band);
+        vsh_charts_band_bytes(charts, rows[0], rows[1], 4, 1, 1, 1, 1);
+    }
+    vsh_charts_free(charts);
+    if (texels != NULL && (int64_t)options.width * options.height <= MOST_TEXELS) {
+        static float planes[6][3 * MOST_TEXELS];
+        vsh_shade_options shading = vsh_shade_options_default();
+        shading.ao_cones = 4;
+        fuzz_take_shade(input, &shading, &layer);
+        const vsh_light light = fuzz_take_light(input);
+        double ambient[3] = {0.1, 0.2, 0.3};
+        fuzz_take(input, ambient, sizeof ambient);
+        float *const shadow[] = {planes[0]}, *const tint[] = {planes[1]};
+        vsh_lightmap map = {0};
+        fuzz_take(input, &map, sizeof map);
+        const uint8_t how = fuzz_byte(input);
+        map.shadow = how & 1 ? shadow : NULL;
+        map.ao = how & 2 ? planes[2] : NULL;
+        map.irradiance = how & 4 ? planes[3] : NULL;
+        map.coverage = planes[4];
+        map.shadow_error = NULL;
+        map.ao_error = NULL;
+        map.bent = how & 8 ? planes[5] : NULL;
+        map.tint = how & 16 ? tint : NULL;
+        map.ambient = how & 32 ? ambient : NULL;
+        fuzz_ended_plain(vsh_bake_lightmap(fuzz_made()->field, texels, &light, 1, &shading, &run, &map, NULL,
+                                           fuzz_error(&error)),
+                         &error);
+    }
+    vsh_texels_free(texels);
+}
+
+static void volume(fuzz_input *input) {
+    vsh_volume_options options = vsh_volume_options_default();
+    options.shade.ao_cones = 4;
+    fuzz_take(input, &options, sizeof options);
+    vsh_layer layer;
+    options.shade.triangles = NULL;
+    options.shade.layers = fuzz_byte(input) & 1 ? fuzz_take_layer(input, &layer) : NULL;
+    options.shade.layer_count = options.shade.layers != NULL;
+    const vsh_run run = fuzz_take_run(input);
+    const vsh_light light = fuzz_take_light(input);
+    vsh_error error;
+    double box[6] = {-1, -1, -1, 1, 1, 1}, size = 0.5;
+    fuzz_take(input, box, sizeof box);
+    fuzz_take(input, &size, sizeof size);
+    vsh_voxels *voxels;
+    FUZZ_MAKE(voxels, vsh_voxels_from_box(box, box + 3, size, &run, &voxels, fuzz_error(&error)));
+    vsh_volume *baked;
+    FUZZ_MAKE(baked, vsh_bake_volume(fuzz_made()->field, voxels != NULL ? voxels : fuzz_made()->voxels,
+                                     &light, 1, &options, &run, &baked, NULL, fuzz_error(&error)));
+    vsh_volume_free(baked);
+    vsh_voxels_free(voxels);
+    fuzz_take(input, &size, sizeof size);
+    FUZZ_MAKE(voxels, vsh_voxels_from_grid(fuzz_made()->grid, size, &run, &voxels, fuzz_error(&error)));
+    vsh_voxels_free(voxels);
+}
+
+static void render(fuzz_input *input) {
+    vsh_render_options options = vsh_render_options_default();
+    options.width = options.height = FUZZ_SIDE;
+    options.samples = 1;
+    fuzz_take(input, &options, sizeof options);
+    options.lit = NULL;
+    options.lit_count = 0;
+    options.shade.layers = NULL;
+    options.shade.layer_count = 0;
+    options.shade.triangles = NULL;
+    const vsh_run run = fuzz_take_run(input);
+    const vsh_light light = fuzz_take_light(input);
+    vsh_surface surface = {fuzz_made()->field, {0.5, 0.5, 0.5}};
+    fuzz_take(input, surface.color, sizeof surface.color);
+    static float planes[4][3 * MOST_TEXELS];
+    const vsh_picture picture = {planes[0], planes[1], planes[2], planes[3]};
+    vsh_error error;
+    double bounds[6] = {-1, -1, -1, 1, 1, 1}, angles[3] = {0.5, 0.5, 1.0};
+    fuzz_take(input, bounds, sizeof bounds);
+    fuzz_take(input, angles, sizeof angles);
+    if (fuzz_byte(input) & 1) {
+        vsh_camera camera = options.camera;
+        fuzz_ended_plain(vsh_camera_frame(&camera, bounds, bounds + 3, angles[0], angles[1], angles[2],
+                                          fuzz_error(&error)),
+                         &error);
+        if (error.code == -1) {
+            vsh_camera_orbit(&camera, angles[0]);
+            options.camera = camera;
+        }
+    }
+    const int fits = (int64_t)options.width * options.height <= MOST_TEXELS;
+    const vsh_picture none = {NULL, NULL, NULL, NULL};
+    fuzz_ended_plain(vsh_render(&surface, 1, fuzz_made()->field, &light, 1, &options, &run,
+                                fits ? &picture : &none, NULL, fuzz_error(&error)),
+                     &error);
+    float *const rgb[] = {planes[1], planes[2], planes[3]};
+    fuzz_ended_plain(
+        vsh_picture_encode(&picture, FUZZ_SIDE, FUZZ_SIDE, angles[2], rgb, NULL, fuzz_error(&error)), &error);
+}
+
+static void flat(fuzz_input *input) {
+    vsh_flat_options options = vsh_flat_options_default();
+    options.width = options.height = FUZZ_SIDE;
+    options.region_min[0] = options.region_min[1] = -3;
+    options.region_max[0] = options.region_max[1] = 3;
+    fuzz_take(input, &options, sizeof options);
+    const vsh_run run = fuzz_take_run(input);
+    vsh_light lights[2] = {fuzz_take_light(input), fuzz_take_light(input)};
+    static float planes[6][MOST_TEXELS];
+    float *const shadow[] = {planes[0], planes[1]}, *const irradiance[] = {planes[2], planes[3], planes[4]};
+    const int fits = (int64_t)options.width * options.height <= MOST_TEXELS;
+    const vsh_flat_map map = {fits ? shadow : NULL, fits ? irradiance : NULL, fits ? planes[5] : NULL};
+    vsh_error error;
+    double points[24] = {-1, -1, 1,  -1, 1,   1,   -1, 1,   -2, -2, 0,   -2,
+                         0,  0,  -2, 0,  0.5, 0.5, 2,  0.5, 2,  2,  0.5, 2};
+    fuzz_take(input, points, sizeof points);
+    const size_t counts[] = {3, 5, 4};
+    vsh_outline *outline;
+    FUZZ_MAKE(outline, vsh_outline_from_polygons(points, counts, 1 + fuzz_byte(input) % 3, &run, &outline,
+                                                 fuzz_error(&error)));
+    fuzz_ended_plain(vsh_flat_bake(outline, lights, 2, &options, &run, &map, fuzz_error(&error)), &error);
+    vsh_outline_free(outline);
+    double matrix[6] = {1, 0, 0, 0, 1, 0};
+    fuzz_take(input, matrix, sizeof matrix);
+    const vsh_outline_instance instances[] = {{fuzz_made()->outline, matrix}, {fuzz_made()->outline, NULL}};
+    FUZZ_MAKE(outline, vsh_outline_unite(instances, 2, &run, &outline, fuzz_error(&error)));
+    vsh_outline_free(outline);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    static fuzz_call *const calls[] = {shade, query, lightmap, volume, render, flat};
+    fuzz_choose(data, size, calls, sizeof calls / sizeof calls[0]);
+    return 0;
+}
