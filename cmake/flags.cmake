@@ -8,8 +8,9 @@ set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_C_VISIBILITY_PRESET hidden)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 
+set(VSH_SANITIZE_FLAGS -fno-omit-frame-pointer -fno-sanitize-recover=all)
 if(VSH_SANITIZE)
-  add_compile_options(-fsanitize=${VSH_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  add_compile_options(-fsanitize=${VSH_SANITIZE} ${VSH_SANITIZE_FLAGS})
   add_link_options(-fsanitize=${VSH_SANITIZE})
 endif()
 if(VSH_FUZZ) # what an input reaches is counted; OpenVDB's classes have types of their own in each library

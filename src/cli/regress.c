@@ -134,12 +134,16 @@ static int prepare(regress_work *work) {
     if (work->folder == NULL || work->golden == NULL || work->cache == NULL) {
         return cli_out_of_memory(s->folder);
     }
-    int code = cli_compare_check_reports(&s->compare, (const char *const *)&work->cache, 1);
+    int code = regress_find_cases(work);
+    code =
+        code == CLI_OK ? cli_compare_check_reports(&s->compare, (const char *const *)&work->cache, 1) : code;
     code = code == CLI_OK ? cli_temporary_check(work->cache) : code;
     code = code == CLI_OK ? hash_program(work) : code;
-    code = code == CLI_OK ? regress_find_cases(work) : code;
     for (size_t i = 0; i < work->case_count && code == CLI_OK; ++i) {
-        code = regress_list_inputs(work, &work->cases[i]);
+        regress_case *one = &work->cases[i];
+        if (one->status != REGRESS_FAILED) {
+            code = regress_failed(one, regress_list_inputs(work, one));
+        }
     }
     return code;
 }
@@ -149,7 +153,7 @@ static int prepare(regress_work *work) {
 static int bake_all(regress_work *work) {
     for (size_t i = 0; i < work->case_count; ++i) {
         regress_case *one = &work->cases[i];
-        if (one->status == REGRESS_UNCHANGED && !work->settings->all) {
+        if (one->status == REGRESS_FAILED || (one->status == REGRESS_UNCHANGED && !work->settings->all)) {
             continue;
         }
         one->status = REGRESS_UNLIKE;

@@ -56,6 +56,10 @@ char *regress_path(const char *folder, const char *name);
 int regress_find_cases(regress_work *work);
 void regress_free_case(regress_case *one);
 
+/* A case that cannot be read or written fails by itself, and the others go on: marks it and gives CLI_OK;
+ * other codes, which end all, as they are. */
+int regress_failed(regress_case *one, int code);
+
 /* Lists what a case depends on, new. */
 int regress_list_inputs(const regress_work *work, regress_case *one);
 

@@ -322,6 +322,15 @@ static int check_unique(const regress_work *work) {
     return CLI_OK;
 }
 
+int regress_failed(regress_case *one, int code) {
+    if (code != CLI_USAGE && code != CLI_FILE) {
+        return code;
+    }
+    one->status = REGRESS_FAILED;
+    one->code = code;
+    return CLI_OK;
+}
+
 int regress_find_cases(regress_work *work) {
     int code = read_list(work);
     code = code == CLI_OK ? add_scenes(work) : code;
@@ -335,7 +344,11 @@ int regress_find_cases(regress_work *work) {
         }
         work->cases[kept] = *one;
         one = &work->cases[kept++];
-        code = code == CLI_OK ? list_outputs(work, one) : code;
+        code = code == CLI_OK ? regress_failed(one, list_outputs(work, one)) : code;
+        if (code == CLI_OK && one->status == REGRESS_FAILED) { /* to be told of by the scene's own name */
+            regress_lines_free(&one->outputs);
+            code = regress_lines_add(&one->outputs, "%s", one->scene) ? CLI_OK : no_memory(work);
+        }
         if (code == CLI_OK) {
             one->comparisons = calloc(one->outputs.count, sizeof *one->comparisons);
             code = one->comparisons != NULL ? CLI_OK : no_memory(work);

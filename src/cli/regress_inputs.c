@@ -199,6 +199,9 @@ void regress_read_cache(regress_work *work) {
     json_t *root = json_load_file(work->cache, 0, NULL);
     for (size_t i = 0; i < work->case_count; ++i) {
         regress_case *one = &work->cases[i];
+        if (one->status == REGRESS_FAILED) {
+            continue;
+        }
         one->status = REGRESS_UNLIKE;
         look_up(json_object_get(json_object_get(root, "alike"), one->name), one);
     }

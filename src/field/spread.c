@@ -329,7 +329,9 @@ vsh_result vshi_feet_spread(vshi_derivation *d, vshi_job *job, vsh_error *error)
     for (size_t block = 0; block < count; ++block) {
         order[block] = (place){place_key(d, block), block};
     }
-    qsort(order, count, sizeof *order, by_key);
+    if (count > 0) { /* else there is no array */
+        qsort(order, count, sizeof *order, by_key);
+    }
     for (size_t i = 0; i < count; ++i) {
         if (i == 0 || order[i].key != order[i - 1].key) {
             groups[group_count++] = i;

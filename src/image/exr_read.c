@@ -102,7 +102,7 @@ static exr_result_t read_tiles(exr_reader *reader) {
 }
 
 /* Makes the image from the header, once that is known to be one we read. */
-static vsh_result read_header(exr_reader *reader, const char *path, exr_storage_t storage,
+static vsh_result read_header(exr_reader *reader, const char *path, const vsh_run *run, exr_storage_t storage,
                               const exr_attr_chlist_t *channels, vsh_error *error) {
     if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED) {
         return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: deep images are not read", path);
@@ -123,7 +123,7 @@ static vsh_result read_header(exr_reader *reader, const char *path, exr_storage_
                          (long long)width, INT32_MAX / (int32_t)sizeof(float));
     }
     const vsh_result result =
-        vshi_image_file_new(path, width, height, channels->num_channels, &reader->image, error);
+        vshi_image_file_new(path, run, width, height, channels->num_channels, &reader->image, error);
     for (int32_t c = 0; result == VSH_OK && c < channels->num_channels; ++c) {
         vshi_image_file_name(reader->image, c, channels->entries[c].name.str);
     }
@@ -160,7 +160,7 @@ static vsh_result code_of(exr_result_t status) {
     }
 }
 
-vsh_result vshi_exr_read(const char *path, vsh_image_file **file, vsh_error *error) {
+vsh_result vshi_exr_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     *file = NULL;
     exr_log log = {""};
     exr_reader reader = {0};
@@ -186,7 +186,7 @@ vsh_result vshi_exr_read(const char *path, vsh_image_file **file, vsh_error *err
     if (status != EXR_ERR_SUCCESS) {
         goto done;
     }
-    result = read_header(&reader, path, storage, channels, error);
+    result = read_header(&reader, path, run, storage, channels, error);
     if (result != VSH_OK) {
         goto done;
     }

@@ -15,8 +15,8 @@ vsh_result vshi_check_values(const char *path, int64_t width, int64_t height, in
                      path, (long long)width, (long long)height, (long long)channels);
 }
 
-vsh_result vshi_image_file_new(const char *path, int64_t width, int64_t height, int64_t channels,
-                               vsh_image_file **file, vsh_error *error) {
+vsh_result vshi_image_file_new(const char *path, const vsh_run *run, int64_t width, int64_t height,
+                               int64_t channels, vsh_image_file **file, vsh_error *error) {
     *file = NULL;
     if (width < 1 || width > INT32_MAX || height < 1 || height > INT32_MAX || channels < 1) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: %lld × %lld pixels of %lld channels: damaged or empty",
@@ -29,6 +29,11 @@ vsh_result vshi_image_file_new(const char *path, int64_t width, int64_t height, 
     if (channels > VSH_MAX_CHANNELS) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %lld channels, expected at most %d", path,
                          (long long)channels, VSH_MAX_CHANNELS);
+    }
+    const double bytes = (double)width * (double)height * (double)channels * sizeof(float);
+    result = vshi_check_limit(run, bytes, path, error);
+    if (result != VSH_OK) {
+        return result;
     }
     void *memory;
     result = vshi_allocate(&memory, 1, sizeof **file, path, error);

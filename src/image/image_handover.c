@@ -65,9 +65,10 @@ vsh_result vshi_image_take(vshi_take *take, const char *path, vsh_image_file **f
     const double values = (double)width * (double)height * (double)channels;
     const uint64_t count = values <= (double)VSHI_MAX_VALUES ? width * height * channels : UINT64_MAX;
     const float *from = vshi_take_array(take, count, sizeof *from);
-    result = from != NULL && vshi_take_ends(take)
-                 ? vshi_image_file_new(path, (int64_t)width, (int64_t)height, (int64_t)channels, file, error)
-                 : vshi_answer_fail(path, "the image's size", error);
+    result =
+        from != NULL && vshi_take_ends(take)
+            ? vshi_image_file_new(path, NULL, (int64_t)width, (int64_t)height, (int64_t)channels, file, error)
+            : vshi_answer_fail(path, "the image's size", error);
     if (result != VSH_OK) {
         vshi_attributes_free(&attributes);
     } else {

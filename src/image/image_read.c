@@ -12,7 +12,7 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-typedef vsh_result read_fn(const char *path, vsh_image_file **file, vsh_error *error);
+typedef vsh_result read_fn(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error);
 
 /* Looks at the first bytes: an EXR file is one whatever its ending says. */
 static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *error) {
@@ -62,5 +62,5 @@ vsh_result vsh_image_read_run(const char *path, const vsh_run *run, vsh_image_fi
     }
     read_fn *reader = NULL;
     result = result == VSH_OK ? find_reader(path, &reader, error) : result;
-    return result == VSH_OK ? reader(path, file, error) : result;
+    return result == VSH_OK ? reader(path, &full, file, error) : result;
 }

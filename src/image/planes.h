@@ -49,10 +49,10 @@ struct vsh_image_file {
 vsh_result vshi_check_values(const char *path, int64_t width, int64_t height, int64_t channels,
                              vsh_error *error);
 
-/* An image of zeros with empty names. Errors: VSH_ERROR_INPUT (an extent that is not positive),
- * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-vsh_result vshi_image_file_new(const char *path, int64_t width, int64_t height, int64_t channels,
-                               vsh_image_file **file, vsh_error *error);
+/* An image of zeros with empty names, within run->memory_limit; NULL is none. Errors: VSH_ERROR_INPUT (an
+ * extent that is not positive), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+vsh_result vshi_image_file_new(const char *path, const vsh_run *run, int64_t width, int64_t height,
+                               int64_t channels, vsh_image_file **file, vsh_error *error);
 
 /* Cut to VSHI_FILE_NAME, without control characters. */
 void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *name);

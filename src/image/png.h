@@ -7,6 +7,6 @@
 
 /* Values are 0 … 1 as they stand in the file: no gamma, no alpha multiplied in. Channels are Y, Y A, R G B or
  * R G B A. Errors: VSH_ERROR_READ, VSH_ERROR_INPUT, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Thread safe. */
-vsh_result vshi_png_read(const char *path, vsh_image_file **file, vsh_error *error);
+vsh_result vshi_png_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error);
 
 #endif

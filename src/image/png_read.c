@@ -12,6 +12,7 @@
 /* All that lives across libpng's longjmp: no local variable does. */
 typedef struct png_reader {
     const char *path;
+    const vsh_run *run;
     vsh_error *error;
     FILE *stream;
     png_structp png;
@@ -54,8 +55,8 @@ static vsh_result read_header(png_reader *reader) {
     }
     const png_uint_32 height = png_get_image_height(reader->png, reader->info);
     const vsh_result result =
-        vshi_image_file_new(reader->path, png_get_image_width(reader->png, reader->info), height, channels,
-                            &reader->image, reader->error);
+        vshi_image_file_new(reader->path, reader->run, png_get_image_width(reader->png, reader->info), height,
+                            channels, &reader->image, reader->error);
     if (result != VSH_OK) {
         return result;
     }
@@ -135,9 +136,9 @@ static vsh_result read_all(png_reader *reader) {
     return result;
 }
 
-vsh_result vshi_png_read(const char *path, vsh_image_file **file, vsh_error *error) {
+vsh_result vshi_png_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     *file = NULL;
-    png_reader reader = {.path = path, .error = error, .stream = fopen(path, "rb")};
+    png_reader reader = {.path = path, .run = run, .error = error, .stream = fopen(path, "rb")};
     if (reader.stream == NULL) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, strerror(errno));
     }

@@ -1,33 +1,27 @@
-// Telling ThreadSanitizer of a handover that it cannot see, as TBB's library is not built with it. Nothing
-// otherwise.
+// Telling ThreadSanitizer of a handover that it cannot see, as TBB's library is not built with it. Nothing in
+// a program without that sanitizer.
 #ifndef VSHI_HANDOVER_H
 #define VSHI_HANDOVER_H
 
-#if defined(__SANITIZE_THREAD__)
-#define VSHI_TSAN 1
-#elif defined(__has_feature)
-#if __has_feature(thread_sanitizer)
-#define VSHI_TSAN 1
-#endif
-#endif
-
-#ifdef VSHI_TSAN
-#include <sanitizer/tsan_interface.h>
-#endif
+// Of the sanitizer's runtime, whatever this file was compiled with; null where the program has none.
+extern "C" {
+__attribute__((weak)) void __tsan_acquire(void *);
+__attribute__((weak)) void __tsan_release(void *);
+}
 
 namespace vshi {
 
 // What this thread did before give(at) is seen by a thread after its take(at).
-inline void give([[maybe_unused]] const void *at) {
-#ifdef VSHI_TSAN
-    __tsan_release(const_cast<void *>(at));
-#endif
+inline void give(const void *at) {
+    if (__tsan_release != nullptr) {
+        __tsan_release(const_cast<void *>(at));
+    }
 }
 
-inline void take([[maybe_unused]] const void *at) {
-#ifdef VSHI_TSAN
-    __tsan_acquire(const_cast<void *>(at));
-#endif
+inline void take(const void *at) {
+    if (__tsan_acquire != nullptr) {
+        __tsan_acquire(const_cast<void *>(at));
+    }
 }
 
 } // namespace vshi

@@ -17,9 +17,23 @@ static const char module_name[] = "libvdbshade_oiio.so." VSHI_OIIO_SOVERSION;
 static const vshi_oiio_table *table;
 static char reason[512];
 
-/* Searched for as every library is, from this one on, which is beside it. */
+/* Beside this library, and then as every library is searched for: in a host with a sanitizer, whose dlopen()
+ * is not libc's, the search does not begin at this one. */
+static void *open_module(void) {
+    Dl_info here;
+    char path[4096];
+    const char *end =
+        dladdr(module_name, &here) != 0 && here.dli_fname != NULL ? strrchr(here.dli_fname, '/') : NULL;
+    void *module = NULL;
+    if (end != NULL && (size_t)snprintf(path, sizeof path, "%.*s/%s", (int)(end - here.dli_fname),
+                                        here.dli_fname, module_name) < sizeof path) {
+        module = dlopen(path, RTLD_LAZY | RTLD_LOCAL);
+    }
+    return module != NULL ? module : dlopen(module_name, RTLD_LAZY | RTLD_LOCAL);
+}
+
 static void load(void) {
-    void *module = dlopen(module_name, RTLD_LAZY | RTLD_LOCAL);
+    void *module = open_module();
     const vshi_oiio_table *found = module != NULL ? dlsym(module, "vshi_oiio_module") : NULL;
     if (found == NULL) {
         const char *why = dlerror();
@@ -75,7 +89,7 @@ double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *plan
     return module_table() != NULL ? table->writer_bytes(format, planes, bits) : 0.0;
 }
 
-vsh_result vshi_oiio_read(const char *path, vsh_image_file **file, vsh_error *error) {
+vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     *file = NULL;
-    return module_table() != NULL ? table->read(path, file, error) : fail(path, error);
+    return module_table() != NULL ? table->read(path, run, file, error) : fail(path, error);
 }

@@ -58,7 +58,7 @@ vsh_result vshi_oiio_end(vshi_oiio_writer *writer, vsh_error *error);
 double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits);
 
 /* Errors: VSH_ERROR_INPUT, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Thread safe. */
-vsh_result vshi_oiio_read(const char *path, vsh_image_file **file, vsh_error *error);
+vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -118,7 +118,8 @@ JSON
     refused 2 'cases[0]: optoins: unknown key; did you mean "options"?'
     echo '{"cases": [{"scene": "box.json", "command": "volume"}]}' >scenes/regress.json
     regress
-    refused 2 "nothing says what 'box' writes"
+    [ "$status" -eq 2 ] || fail "expected 2"
+    [[ $stderr == *"nothing says what 'box' writes"* && $output == "box: failed"* ]] || fail "not told"
 }
 
 @test "a scene that cannot be baked fails alone, with the code of its bake" {
@@ -158,4 +159,20 @@ JSON
     [ "$status" -eq 3 ] || fail "expected 3"
     regress --only nothing
     refused 2 "'nothing'"
+}
+
+@test "a scene that cannot be read fails by itself, a folder that is not there all" {
+    regress --update
+    done_well
+    echo '{"casters": [' >scenes/aa.json
+    scene other 8
+    regress --junit out.xml
+    [ "$status" -eq 2 ] || fail "expected 2"
+    [[ $stderr == *"scenes/aa.json:2:"* ]] || fail "no place"
+    [[ $output == "aa: failed"*"aa.json: the bake ended with exit code 2"*"box: unchanged"*"other: not alike"* ]] ||
+        fail "not told, or the others were left out"
+    [[ $(<out.xml) == *'name="aa'*"failure"* ]] || fail "not in the report"
+    shade regress nowhere
+    refused 3 "nowhere: cannot be read: No such file or directory"
+    clean
 }

@@ -10,9 +10,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         return 0;
     }
     const char *path = fuzz_file(names[data[0] % (sizeof names / sizeof names[0])], data + 1, size - 1);
+    const vsh_run run = fuzz_run();
     vsh_error error;
     vsh_image_file *file;
-    FUZZ_MAKE(file, vsh_image_read(path, &file, fuzz_error(&error)));
+    FUZZ_MAKE(file, vsh_image_read_run(path, &run, &file, fuzz_error(&error)));
     vsh_image_free(file);
     return 0;
 }

@@ -18,6 +18,7 @@ extern "C" {
 
 #include "base/floats.h"
 #include "base/hash.h"
+#include "shim/handover.h"
 
 #include <cfenv>
 #include <sys/stat.h>
@@ -200,7 +201,13 @@ void arenas_of_the_host_change_nothing(void **) {
         expect_same(expected, work(5), "a limit of one thread");
     }
     std::vector<Outcome> all(6);
-    tbb::parallel_for(size_t{0}, all.size(), [&](size_t i) { all[i] = work(int32_t(i)); });
+    vshi::give(&all);
+    tbb::parallel_for(size_t{0}, all.size(), [&](size_t i) {
+        vshi::take(&all);
+        all[i] = work(int32_t(i));
+        vshi::give(&all);
+    });
+    vshi::take(&all);
     for (const Outcome &o : all) {
         expect_same(expected, o, "within the host's own loop");
     }

@@ -209,9 +209,9 @@ static vsh_image_file *write_and_read_iff(const char *path, const vsh_image *ima
     assert_int_equal(big_endian(bytes + 4, 4), size - 8);
     assert_memory_equal(bytes + 8, "CIMGTBHD", 8);
     vsh_image_file *file;
-    assert_ok(
-        vshi_image_file_new(path, big_endian(bytes + 20, 4), big_endian(bytes + 24, 4), 4, &file, &error),
-        &error);
+    assert_ok(vshi_image_file_new(path, NULL, big_endian(bytes + 20, 4), big_endian(bytes + 24, 4), 4, &file,
+                                  &error),
+              &error);
     const size_t header = 20 + big_endian(bytes + 16, 4), tiles = big_endian(bytes + 38, 2);
     assert_memory_equal(bytes + header, "FOR4", 4);
     assert_memory_equal(bytes + header + 8, "TBMP", 4);

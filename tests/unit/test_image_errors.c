@@ -317,6 +317,30 @@ static void unreadable_paths_are_read_errors(void **state) {
     vsh_image_free(NULL);
 }
 
+static void the_memory_limit_holds_without_a_reader(void **state) {
+    (void)state;
+    static const char *const names[] = {"m.exr", "m.png", "m.tif"};
+    sample s;
+    make(&s, 33, 40, 3, LIGHTMAP);
+    for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
+        vsh_error error = {0};
+        assert_ok(vsh_image_write(at(names[n]), &s.image, NULL, &error), &error);
+        vsh_run run = vsh_run_default();
+        vsh_image_file *file = NULL;
+        assert_ok(vsh_image_read_run(at(names[n]), &run, &file, &error), &error);
+        const vsh_image image = vsh_image_view(file);
+        run.memory_limit = (uint64_t)(image.width * image.height * image.channel_count) * sizeof(float);
+        vsh_image_free(file);
+        assert_ok(vsh_image_read_run(at(names[n]), &run, &file, &error), &error);
+        vsh_image_free(file);
+        --run.memory_limit;
+        assert_int_equal(vsh_image_read_run(at(names[n]), &run, &file, &error), VSH_ERROR_LIMIT);
+        assert_null(file);
+        assert_non_null(strstr(error.message, names[n]));
+    }
+    unmake(&s);
+}
+
 static void a_written_file_follows_links_and_keeps_its_mode(void **state) {
     (void)state;
     sample s;
@@ -384,6 +408,7 @@ int main(void) {
         cmocka_unit_test(cut_files_are_errors),
         cmocka_unit_test(damaged_files_do_no_harm),
         cmocka_unit_test(unreadable_paths_are_read_errors),
+        cmocka_unit_test(the_memory_limit_holds_without_a_reader),
         cmocka_unit_test(a_written_file_follows_links_and_keeps_its_mode),
         cmocka_unit_test(outputs_are_made_beside_the_target_and_keep_its_ending),
         cmocka_unit_test(no_temporary_is_left),

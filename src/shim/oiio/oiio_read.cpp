@@ -69,7 +69,7 @@ vsh_result read_rows(OIIO::ImageInput &input, const char *path, vsh_image_file &
     return VSH_OK;
 }
 
-vsh_result read_file(const char *path, vsh_image_file **file, vsh_error *error) {
+vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     const std::string ending = ending_of(path);
     const std::string name = format_of_ending(ending);
     if (!is_readable(name)) {
@@ -99,7 +99,8 @@ vsh_result read_file(const char *path, vsh_image_file **file, vsh_error *error) 
         return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: deep and volume images are not read", path);
     }
     vsh_image_file *image = nullptr;
-    vsh_result result = vshi_image_file_new(path, spec.width, spec.height, spec.nchannels, &image, error);
+    vsh_result result =
+        vshi_image_file_new(path, run, spec.width, spec.height, spec.nchannels, &image, error);
     if (result != VSH_OK) {
         return result;
     }
@@ -118,7 +119,7 @@ vsh_result read_file(const char *path, vsh_image_file **file, vsh_error *error) 
 
 } // namespace vshi
 
-vsh_result vshi_oiio_read(const char *path, vsh_image_file **file, vsh_error *error) {
+vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     *file = nullptr;
-    return vshi::guard(error, VSH_ERROR_INPUT, path, [&] { return vshi::read_file(path, file, error); });
+    return vshi::guard(error, VSH_ERROR_INPUT, path, [&] { return vshi::read_file(path, run, file, error); });
 }

@@ -1,0 +1,89 @@
+# Tests, and the sanitizers that watch them in every test run.
+#
+# Our sources, but for those that are compiled against OpenVDB's headers, and the tests in C are compiled once more with
+# each sanitizer; the tests run as NAME, address.NAME and thread.NAME. tools/sanitize compiles everything with them.
+if(NOT VSH_SANITIZE AND NOT VSH_FUZZ)
+  set(VSH_WATCHES address thread)
+endif()
+set(VSH_WATCH_address address,undefined)
+set(VSH_WATCH_thread thread)
+
+# `address` leaves out what takes minutes with it, and what is compiled against OpenVDB's headers; `thread` is for what has
+# threads of ours meet. tools/sanitize leaves out nothing.
+set(VSH_WATCH_address_NOT test_ao test_ao_rays test_bits test_field test_grid test_grid_mesh test_image_errors test_lattice
+    test_light_ranges test_magnitudes test_monotone test_query test_relations test_shadow test_shadow_rays
+    test_shadow_run test_share test_thin test_bitflips test_grid_file test_grid_values test_reader test_reader_checks
+    test_scene_grids test_volume_file)
+set(VSH_WATCH_thread_ONLY test_compare test_flat test_heights test_host test_layers test_lightmap test_render
+    test_spheres test_texels test_volume_run)
+
+set(suppressions ${PROJECT_SOURCE_DIR}/tests/suppressions)
+set(VSH_WATCH_address_ENVIRONMENT
+    "ASAN_OPTIONS=detect_leaks=1:strict_string_checks=1:detect_stack_use_after_return=1:allocator_may_return_null=1:exitcode=99"
+    "LSAN_OPTIONS=suppressions=${suppressions}/lsan.txt:print_suppressions=0"
+    "UBSAN_OPTIONS=suppressions=${suppressions}/ubsan.txt:print_stacktrace=1" VSH_SLOWER=10)
+# Libraries that were not built with the sanitizer are not judged for their calls of free, memcpy and the like.
+set(VSH_WATCH_thread_ENVIRONMENT
+    "TSAN_OPTIONS=suppressions=${suppressions}/tsan.txt:ignore_noninstrumented_modules=1:history_size=7:allocator_may_return_null=1:exitcode=99"
+    VSH_SLOWER=10)
+
+function(vsh_watch target watch)
+  target_compile_options(${target} PRIVATE -O1 -g1 -fsanitize=${VSH_WATCH_${watch}} ${VSH_SANITIZE_FLAGS})
+  target_link_options(${target} PRIVATE -fsanitize=${VSH_WATCH_${watch}})
+endfunction()
+
+# vsh_add_watched(NAME SOURCE…): object libraries SANITIZER.NAME, compiled as NAME is and with the sanitizer.
+function(vsh_add_watched name)
+  foreach(watch ${VSH_WATCHES})
+    vsh_add_objects(${watch}.${name} ${ARGN})
+    vsh_watch(${watch}.${name} ${watch})
+  endforeach()
+endfunction()
+
+vsh_add_watched(vdbshade_objects ${VSH_SOURCES})
+foreach(watch ${VSH_WATCHES})
+  vsh_add_kernels(${watch}.vdbshade_objects)
+  target_sources(${watch}.vdbshade_objects INTERFACE $<TARGET_OBJECTS:vdbshade_openvdb>)
+endforeach()
+
+# vsh_add_program(NAME WATCH SOURCES … FOLDERS … LIBRARIES … WRAP …): a program of the library's own objects and other
+# libraries; FOLDERS are those of headers, calls in WRAP are sent through it by the linker. With WATCH, not "", it and
+# those of the libraries that exist as WATCH.LIBRARY are compiled with that sanitizer.
+function(vsh_add_program name watch)
+  cmake_parse_arguments(PARSE_ARGV 2 given "" "" "SOURCES;FOLDERS;LIBRARIES;WRAP")
+  add_executable(${name} ${given_SOURCES})
+  vsh_set_flags(${name})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/src ${given_FOLDERS})
+  target_compile_definitions(${name} PRIVATE VSH_ASSETS="${PROJECT_SOURCE_DIR}/assets")
+  foreach(library vdbshade_objects ${given_LIBRARIES})
+    if(watch AND TARGET ${watch}.${library})
+      set(library ${watch}.${library})
+    endif()
+    target_link_libraries(${name} PRIVATE ${library})
+  endforeach()
+  target_link_libraries(${name} PRIVATE vsh::dependencies)
+  set_target_properties(${name} PROPERTIES LINKER_LANGUAGE CXX)
+  foreach(call ${given_WRAP})
+    target_link_options(${name} PRIVATE LINKER:--wrap=${call})
+  endforeach()
+  if(watch)
+    vsh_watch(${name} ${watch})
+  endif()
+endfunction()
+
+# vsh_add_test(NAME SOURCES … [ARGUMENTS …] …): such a program, run as a test with ARGUMENTS; and with every sanitizer
+# where its sources are in C.
+function(vsh_add_test name)
+  cmake_parse_arguments(PARSE_ARGV 1 given "" "" "SOURCES;FOLDERS;LIBRARIES;WRAP;ARGUMENTS")
+  set(parts SOURCES ${given_SOURCES} FOLDERS ${given_FOLDERS} LIBRARIES ${given_LIBRARIES} WRAP ${given_WRAP})
+  vsh_add_program(${name} "" ${parts})
+  add_test(NAME ${name} COMMAND ${name} ${given_ARGUMENTS})
+  foreach(watch ${VSH_WATCHES})
+    if(name IN_LIST VSH_WATCH_${watch}_ONLY OR (NOT VSH_WATCH_${watch}_ONLY AND NOT name IN_LIST VSH_WATCH_${watch}_NOT))
+      vsh_add_program(${watch}.${name} ${watch} ${parts})
+      add_test(NAME ${watch}.${name} COMMAND ${watch}.${name} ${given_ARGUMENTS})
+      set_property(TEST ${watch}.${name} PROPERTY ENVIRONMENT ${VSH_WATCH_${watch}_ENVIRONMENT}
+                   LD_LIBRARY_PATH=${PROJECT_BINARY_DIR}) # of the module: with a sanitizer no RUNPATH leads there
+    endif()
+  endforeach()
+endfunction()

@@ -1,0 +1,55 @@
+// Libraries that believe a size in a file ask for it: past 1 GiB they are refused here as the confined
+// reader's address space refuses them, and the target goes on to what follows. (The sanitizer's own operator
+// new ends the process.)
+#include <cstdlib>
+#include <new>
+
+namespace {
+
+constexpr std::size_t MOST = std::size_t(1) << 30;
+
+void *take(std::size_t size) {
+    return size <= MOST ? std::malloc(size > 0 ? size : 1) : nullptr;
+}
+
+void *take_or_throw(std::size_t size) {
+    void *memory = take(size);
+    if (memory == nullptr) {
+        throw std::bad_alloc();
+    }
+    return memory;
+}
+
+} // namespace
+
+void *operator new(std::size_t size) {
+    return take_or_throw(size);
+}
+
+void *operator new[](std::size_t size) {
+    return take_or_throw(size);
+}
+
+void *operator new(std::size_t size, const std::nothrow_t &) noexcept {
+    return take(size);
+}
+
+void *operator new[](std::size_t size, const std::nothrow_t &) noexcept {
+    return take(size);
+}
+
+void operator delete(void *memory) noexcept {
+    std::free(memory);
+}
+
+void operator delete[](void *memory) noexcept {
+    std::free(memory);
+}
+
+void operator delete(void *memory, std::size_t) noexcept {
+    std::free(memory);
+}
+
+void operator delete[](void *memory, std::size_t) noexcept {
+    std::free(memory);
+}
