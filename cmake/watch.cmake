@@ -1,8 +1,8 @@
 # Tests, and the sanitizers that watch them in every test run.
 #
-# Our sources, but for those that are compiled against OpenVDB's headers, and the tests in C are compiled once more with
-# each sanitizer; the tests run as NAME, address.NAME and thread.NAME. tools/sanitize compiles everything with them.
-if(NOT VSH_SANITIZE AND NOT VSH_FUZZ)
+# Our sources, but for those that are compiled against OpenVDB's headers, and the tests are compiled once more with each
+# sanitizer; the tests run as NAME, address.NAME and thread.NAME. tools/sanitize compiles everything with them.
+if(VSH_WATCH AND NOT VSH_SANITIZE)
   set(VSH_WATCHES address thread)
 endif()
 set(VSH_WATCH_address address,undefined)
@@ -14,8 +14,7 @@ set(VSH_WATCH_address_NOT test_ao test_ao_rays test_bits test_field test_grid te
     test_light_ranges test_magnitudes test_monotone test_query test_relations test_shadow test_shadow_rays
     test_shadow_run test_share test_thin test_bitflips test_grid_file test_grid_values test_reader test_reader_checks
     test_scene_grids test_volume_file)
-set(VSH_WATCH_thread_ONLY test_compare test_flat test_heights test_host test_layers test_lightmap test_render
-    test_spheres test_texels test_volume_run)
+set(VSH_WATCH_thread_ONLY test_compare test_host test_layers test_lightmap test_texels)
 
 set(suppressions ${PROJECT_SOURCE_DIR}/tests/suppressions)
 set(VSH_WATCH_address_ENVIRONMENT
@@ -37,6 +36,7 @@ function(vsh_add_watched name)
   foreach(watch ${VSH_WATCHES})
     vsh_add_objects(${watch}.${name} ${ARGN})
     vsh_watch(${watch}.${name} ${watch})
+    set_target_properties(${watch}.${name} PROPERTIES EXCLUDE_FROM_ALL ON)
   endforeach()
 endfunction()
 
@@ -71,8 +71,8 @@ function(vsh_add_program name watch)
   endif()
 endfunction()
 
-# vsh_add_test(NAME SOURCES … [ARGUMENTS …] …): such a program, run as a test with ARGUMENTS; and with every sanitizer
-# where its sources are in C.
+# vsh_add_test(NAME SOURCES … [ARGUMENTS …] …): such a program, run as a test with ARGUMENTS; and again with each
+# sanitizer whose lists above have it.
 function(vsh_add_test name)
   cmake_parse_arguments(PARSE_ARGV 1 given "" "" "SOURCES;FOLDERS;LIBRARIES;WRAP;ARGUMENTS")
   set(parts SOURCES ${given_SOURCES} FOLDERS ${given_FOLDERS} LIBRARIES ${given_LIBRARIES} WRAP ${given_WRAP})
@@ -82,6 +82,9 @@ function(vsh_add_test name)
     if(name IN_LIST VSH_WATCH_${watch}_ONLY OR (NOT VSH_WATCH_${watch}_ONLY AND NOT name IN_LIST VSH_WATCH_${watch}_NOT))
       vsh_add_program(${watch}.${name} ${watch} ${parts})
       add_test(NAME ${watch}.${name} COMMAND ${watch}.${name} ${given_ARGUMENTS})
+      # kernels that place memory at random further than the runtime of an older compiler can follow
+      set_property(TEST ${watch}.${name} PROPERTY SKIP_REGULAR_EXPRESSION "Sanitizer: unexpected memory mapping"
+                   "Shadow memory range interleaves with an existing memory mapping")
       set_property(TEST ${watch}.${name} PROPERTY ENVIRONMENT ${VSH_WATCH_${watch}_ENVIRONMENT}
                    LD_LIBRARY_PATH=${PROJECT_BINARY_DIR}) # of the module: with a sanitizer no RUNPATH leads there
     endif()
