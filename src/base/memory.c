@@ -28,7 +28,7 @@ vsh_result vshi_check_limit(const vsh_run *run, double bytes, const char *what, 
     if (run == NULL || run->memory_limit == 0 || bytes <= (double)run->memory_limit) {
         return VSH_OK;
     }
-    const int decimals = run->memory_limit < 10000000 ? 3 : 0;
+    const int decimals = run->memory_limit < 1000000 ? 3 : 0;
     return vshi_fail(error, VSH_ERROR_LIMIT, "%s: about %.*f MB are needed, over the memory limit of %.*f MB",
                      what, decimals, bytes / 1e6, decimals, (double)run->memory_limit / 1e6);
 }
