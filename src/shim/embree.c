@@ -231,8 +231,11 @@ static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t
                         vsh_error *error) {
     triangles->device = rtcNewDevice(NULL);
     if (triangles->device == NULL) {
-        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "triangles: Embree refuses this machine, error %d",
-                         (int)rtcGetDeviceError(NULL));
+        const enum RTCError code = rtcGetDeviceError(NULL);
+        return code == RTC_ERROR_OUT_OF_MEMORY
+                   ? vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory")
+                   : vshi_fail(error, VSH_ERROR_UNSUPPORTED,
+                               "triangles: Embree refuses this machine, error %d", (int)code);
     }
     rtcSetDeviceMemoryMonitorFunction(triangles->device, watch_memory, triangles);
     triangles->scene = rtcNewScene(triangles->device);
