@@ -24,8 +24,8 @@ vsh_result vshi_exr_end(vshi_exr_writer *writer, vsh_error *error);
 double vshi_exr_writer_bytes(const vshi_planes *planes, int32_t bits);
 
 /* Reads the first part of a file, scan lines or the finest level of tiles; half and integers become float.
- * Errors: VSH_ERROR_READ, VSH_ERROR_INPUT, VSH_ERROR_UNSUPPORTED (deep data, subsampled channels, DWA),
- * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Thread safe. */
+ * Within run->memory_limit; NULL is none. Errors: VSH_ERROR_READ, VSH_ERROR_INPUT, VSH_ERROR_UNSUPPORTED
+ * (deep data, subsampled channels, DWA), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Thread safe. */
 vsh_result vshi_exr_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error);
 
 #endif

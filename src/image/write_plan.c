@@ -50,6 +50,10 @@ static vsh_result plan_format(const char *path, const vsh_image *image, vshi_wri
     if (plan->exr) {
         return VSH_OK;
     }
+    const vsh_result had = vshi_oiio_have(path, error);
+    if (had != VSH_OK) {
+        return had;
+    }
     const char *refusal = vshi_oiio_refusal(path);
     if (refusal != NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: '%s' is not written: %s; expected one of exr, %s",

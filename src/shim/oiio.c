@@ -22,8 +22,9 @@ static char reason[512];
 static void *open_module(void) {
     Dl_info here;
     char path[4096];
-    const char *end =
-        dladdr(module_name, &here) != 0 && here.dli_fname != NULL ? strrchr(here.dli_fname, '/') : NULL;
+    const bool known = dladdr(module_name, &here) != 0 && here.dli_fname != NULL;
+    /* a path that is not absolute would be looked for where the host is by now */
+    const char *end = known && here.dli_fname[0] == '/' ? strrchr(here.dli_fname, '/') : NULL;
     void *module = NULL;
     if (end != NULL && (size_t)snprintf(path, sizeof path, "%.*s/%s", (int)(end - here.dli_fname),
                                         here.dli_fname, module_name) < sizeof path) {
@@ -51,17 +52,19 @@ static const vshi_oiio_table *module_table(void) {
     return table;
 }
 
-static vsh_result fail(const char *path, vsh_error *error) {
-    return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: formats other than EXR and PNG cannot be had: %s",
-                     path, reason);
+vsh_result vshi_oiio_have(const char *path, vsh_error *error) {
+    return module_table() != NULL
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_UNSUPPORTED,
+                           "%s: needs the module of image formats, which cannot be had: %s", path, reason);
 }
 
 bool vshi_oiio_format(const char *path, vshi_format *format) {
-    return module_table() != NULL && table->format(path, format);
+    return table->format(path, format);
 }
 
 const char *vshi_oiio_refusal(const char *path) {
-    return module_table() != NULL ? table->refusal(path) : reason;
+    return table->refusal(path);
 }
 
 const char *vshi_oiio_endings(void) {
@@ -71,9 +74,7 @@ const char *vshi_oiio_endings(void) {
 vsh_result vshi_oiio_begin(const char *temporary, const char *path, const vshi_format *format,
                            const vshi_planes *planes, int32_t bits, vshi_oiio_writer **writer,
                            vsh_error *error) {
-    *writer = NULL;
-    return module_table() != NULL ? table->begin(temporary, path, format, planes, bits, writer, error)
-                                  : fail(path, error);
+    return table->begin(temporary, path, format, planes, bits, writer, error);
 }
 
 vsh_result vshi_oiio_add(vshi_oiio_writer *writer, const vshi_planes *planes, int32_t rows,
@@ -86,10 +87,11 @@ vsh_result vshi_oiio_end(vshi_oiio_writer *writer, vsh_error *error) {
 }
 
 double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits) {
-    return module_table() != NULL ? table->writer_bytes(format, planes, bits) : 0.0;
+    return table->writer_bytes(format, planes, bits);
 }
 
 vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     *file = NULL;
-    return module_table() != NULL ? table->read(path, run, file, error) : fail(path, error);
+    const vsh_result result = vshi_oiio_have(path, error);
+    return result == VSH_OK ? table->read(path, run, file, error) : result;
 }

@@ -27,6 +27,10 @@ typedef struct vshi_format {
     double held;      /* bytes a value that the writer keeps until the end, over those of the value itself */
 } vshi_format;
 
+/* Loads what the others but vshi_oiio_read() need, once for the process. Errors: VSH_ERROR_UNSUPPORTED (it is
+ * not installed, or of another version). Thread safe. */
+vsh_result vshi_oiio_have(const char *path, vsh_error *error);
+
 /* The format that the path's ending stands for, if it can be written. Thread safe. */
 bool vshi_oiio_format(const char *path, vshi_format *format);
 
@@ -57,7 +61,8 @@ vsh_result vshi_oiio_end(vshi_oiio_writer *writer, vsh_error *error);
 /* Bytes that writing takes at most. */
 double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits);
 
-/* Errors: VSH_ERROR_INPUT, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Thread safe. */
+/* Within run->memory_limit; NULL is none. Errors: VSH_ERROR_INPUT, VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY. Thread safe. */
 vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error);
 
 #ifdef __cplusplus

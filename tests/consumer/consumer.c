@@ -1,6 +1,6 @@
 /* What a user of the C library does, against the installed package: grids from four sources, a field of each,
  * shadow and AO at points, a lightmap. Ends with 0 where every value is as a sphere (or a box) over a floor
- * has it. Usage: consumer FOLDER (for the .vdb file it writes). */
+ * has it. Usage: consumer FOLDER (for the files it writes). */
 #include <vdbshade/vdbshade.h>
 
 #include <math.h>
@@ -206,6 +206,26 @@ static void ask_all(const char *what, vsh_grid *grid, double least_open, double 
     vsh_field_free(field);
 }
 
+/* By the module of image formats, which is installed beside the library. */
+static void write_picture(const char *folder, vsh_error *error) {
+    printf("an image\n");
+    char path[4096];
+    snprintf(path, sizeof path, "%s/ramp.png", folder);
+    float values[SIZE];
+    for (int i = 0; i < SIZE; i++) {
+        values[i] = (float)i / 255.0F;
+    }
+    const char *const name = "shadow";
+    const float *const plane = values;
+    const vsh_image image = {SIZE, 1, 1, &name, &plane};
+    check("write an image", vsh_image_write(path, &image, NULL, error), error);
+    vsh_image_file *file = NULL;
+    check("read an image", vsh_image_read(path, &file, error), error);
+    expect("its last value", vsh_image_view(file).planes[0][SIZE - 1], 31.0 / 255.0 - 1e-6,
+           31.0 / 255.0 + 1e-6);
+    vsh_image_free(file);
+}
+
 static void ask_for_errors(void) {
     printf("errors\n");
     vsh_error error = {VSH_OK, ""};
@@ -229,6 +249,7 @@ int main(int argc, char **argv) {
     ask_all("a callback", from_callback(&error), 0.65, 0.85, &error);
     ask_all("a procedural tree", from_tree(&error), 0.65, 0.85, &error);
     ask_all("a .vdb file", from_file(argv[1], &error), 0.65, 0.85, &error);
+    write_picture(argv[1], &error);
     ask_for_errors();
     if (failures > 0) {
         fprintf(stderr, "consumer: %d values are wrong\n", failures);

@@ -42,6 +42,12 @@ eval "$cc -std=c11 -pedantic -Wall -Wextra -Werror '$here/consumer.c' -o '$work/
 LD_LIBRARY_PATH=$library "$work/plain" "$work/output" >"$work/plain.log" || { cat "$work/plain.log"; exit 1; }
 echo "the same values"
 
+say "a host with a sanitizer, whose dlopen() is not libc's"
+eval "$cc -std=c11 -g -fsanitize=address '$here/consumer.c' -o '$work/watched' \
+    $(pkg-config --cflags --libs vdbshade) -lm -Wl,-rpath,'$library'"
+ASAN_OPTIONS=detect_leaks=0 "$work/watched" "$work/output" >"$work/watched.log" 2>&1 || { cat "$work/watched.log"; exit 1; }
+echo "the same values"
+
 say "C++"
 eval "$cxx -std=c++11 -pedantic -Wall -Wextra -Werror '$here/header.cpp' -o '$work/plus' \
     $(pkg-config --cflags --libs vdbshade)"
