@@ -63,6 +63,7 @@ function(vsh_add_program name watch)
     target_link_libraries(${name} PRIVATE ${library})
   endforeach()
   target_link_libraries(${name} PRIVATE vsh::dependencies)
+  add_dependencies(${name} vdbshade_oiio) # which is loaded, not linked
   set_target_properties(${name} PROPERTIES LINKER_LANGUAGE CXX)
   foreach(call ${given_WRAP})
     target_link_options(${name} PRIVATE LINKER:--wrap=${call})

@@ -11,8 +11,8 @@
  * - Arrays and structs that are passed in stay the caller's and are not used after the call.
  * - A call that makes a handle leaves NULL in its place where it fails.
  * - Structs that begin with struct_size are filled by their …_default() or …_zero() function; programs that
- *   were compiled against an older header then go on working. VSH_ERROR_ARGUMENT where struct_size is 0 or
- *   more than this library knows.
+ *   were compiled against an older header then go on working. VSH_ERROR_ARGUMENT where struct_size is 0,
+ *   more than this library knows, or the size of no such struct.
  * - Calls compute in the default floating-point environment (round to nearest, denormals kept, no traps),
  *   whatever the caller has set, which is given back. Callbacks are called in the default one.
  * - Files that somebody else made: the libraries that parse .vdb files, meshes, images and fonts can crash on

@@ -108,7 +108,7 @@ typedef struct vsh_image_file vsh_image_file;
  * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_image_read(const char *path, vsh_image_file **file, vsh_error *error);
 
-/* The same with a run: by run->reader where there is one (base.h), with progress ("load") then, and within
+/* The same with a run: by run->reader where there is one (base.h), with progress ("load") and within
  * run->memory_limit. Errors: the same; VSH_ERROR_ARGUMENT (run), VSH_ERROR_READ (the reader crashed),
  * VSH_ERROR_LIMIT (memory, time), VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_image_read_run(const char *path, const vsh_run *run, vsh_image_file **file,

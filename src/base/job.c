@@ -80,7 +80,9 @@ vsh_result vshi_options_resolve(const void *given, void *defaults, size_t size, 
     }
     size_t given_size;
     memcpy(&given_size, given, sizeof given_size);
-    if (given_size <= sizeof given_size || given_size > size) {
+    /* the size of a struct whose first member is a size: another one would cut a member, or a pointer, in two */
+    const bool whole = given_size % sizeof given_size == 0;
+    if (given_size <= sizeof given_size || given_size > size || !whole) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "%s: struct_size %zu, expected %zu; fill it with its default function", what,
                          given_size, size);

@@ -36,7 +36,8 @@ vsh_result vshi_run_resolve(const vsh_run *run, vsh_run *full, vsh_error *error)
 void vshi_warn(const vsh_run *run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /* Copies a versioned struct (its first member is its size) over *defaults, whatever version it has. Errors:
- * VSH_ERROR_ARGUMENT where the size is smaller than the first member or larger than `size`, naming `what`. */
+ * VSH_ERROR_ARGUMENT where the size is no larger than the first member, larger than `size` or no multiple of
+ * size_t's, naming `what`. */
 vsh_result vshi_options_resolve(const void *given, void *defaults, size_t size, const char *what,
                                 vsh_error *error);
 

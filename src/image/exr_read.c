@@ -30,6 +30,7 @@ typedef struct exr_reader {
     bool pipeline_ready;
     exr_attr_box2i_t window; /* the data window: the pixels that the file has */
     vsh_image_file *image;
+    vshi_job *job; /* in rows */
 } exr_reader;
 
 enum { PART = 0 };
@@ -65,18 +66,23 @@ static exr_result_t read_chunk(exr_reader *reader, const exr_chunk_info_t *info,
     return status == EXR_ERR_SUCCESS ? exr_decoding_run(reader->context, PART, pipeline) : status;
 }
 
+static bool is_going_on(const exr_reader *reader, exr_result_t status, int64_t row) {
+    return status == EXR_ERR_SUCCESS && row < reader->image->height && !vshi_job_cancelled(reader->job);
+}
+
 static exr_result_t read_lines(exr_reader *reader) {
     int32_t lines = 0;
     exr_result_t status = exr_get_scanlines_per_chunk(reader->context, PART, &lines);
     if (status == EXR_ERR_SUCCESS && lines < 1) {
         status = EXR_ERR_FILE_BAD_HEADER;
     }
-    for (int64_t y = 0; status == EXR_ERR_SUCCESS && y < reader->image->height; y += lines) {
+    for (int64_t y = 0; is_going_on(reader, status, y); y += lines) {
         exr_chunk_info_t info;
         status = exr_read_scanline_chunk_info(reader->context, PART, (int)(y + reader->window.min.y), &info);
         if (status == EXR_ERR_SUCCESS) {
             status = read_chunk(reader, &info, 0, y);
         }
+        vshi_job_advance(reader->job, (size_t)lines);
     }
     return status;
 }
@@ -88,7 +94,7 @@ static exr_result_t read_tiles(exr_reader *reader) {
     if (status == EXR_ERR_SUCCESS && (width < 1 || height < 1)) {
         status = EXR_ERR_FILE_BAD_HEADER;
     }
-    for (int64_t y = 0; status == EXR_ERR_SUCCESS && y < reader->image->height; y += height) {
+    for (int64_t y = 0; is_going_on(reader, status, y); y += height) {
         for (int64_t x = 0; status == EXR_ERR_SUCCESS && x < reader->image->width; x += width) {
             exr_chunk_info_t info;
             status = exr_read_tile_chunk_info(reader->context, PART, (int)(x / width), (int)(y / height), 0,
@@ -97,6 +103,7 @@ static exr_result_t read_tiles(exr_reader *reader) {
                 status = read_chunk(reader, &info, x, y);
             }
         }
+        vshi_job_advance(reader->job, (size_t)height);
     }
     return status;
 }
@@ -127,7 +134,7 @@ static vsh_result read_header(exr_reader *reader, const char *path, const vsh_ru
     for (int32_t c = 0; result == VSH_OK && c < channels->num_channels; ++c) {
         vshi_image_file_name(reader->image, c, channels->entries[c].name.str);
     }
-    return result;
+    return result == VSH_OK ? vshi_image_job(path, run, height, &reader->job, error) : result;
 }
 
 /* String attributes, in the file's order. */
@@ -195,7 +202,12 @@ vsh_result vshi_exr_read(const char *path, const vsh_run *run, vsh_image_file **
         status = storage == EXR_STORAGE_TILED ? read_tiles(&reader) : read_lines(&reader);
     }
 
+    if (vshi_job_cancelled(reader.job)) {
+        result = vshi_job_fail_cancelled(reader.job, error);
+    }
+
 done:
+    vshi_job_end(reader.job);
     if (reader.pipeline_ready) {
         exr_decoding_destroy(reader.context, &reader.pipeline);
     }

@@ -63,6 +63,12 @@ vsh_result vshi_image_file_new(const char *path, const vsh_run *run, int64_t wid
     return VSH_OK;
 }
 
+vsh_result vshi_image_job(const char *path, const vsh_run *run, int64_t units, vshi_job **job,
+                          vsh_error *error) {
+    *job = vshi_job_begin(run, "load", (size_t)units);
+    return *job != NULL ? VSH_OK : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+}
+
 void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *name) {
     snprintf(file->text[channel], sizeof file->text[channel], "%s", name);
     vshi_one_line(file->text[channel]);

@@ -86,10 +86,11 @@ vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_imag
     enum { UNITS = 1000 };
     vshi_ask ask;
     vshi_answer answer;
-    vshi_job *job = vshi_job_begin(run, "load", UNITS);
-    vsh_result result = job != NULL
-                            ? vshi_ask_begin(&ask, VSHI_READ_IMAGE, path, run, error)
-                            : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    vshi_job *job = NULL;
+    vsh_result result = vshi_image_job(path, run, UNITS, &job, error);
+    if (result == VSH_OK) {
+        result = vshi_ask_begin(&ask, VSHI_READ_IMAGE, path, run, error);
+    }
     if (result == VSH_OK) {
         result = vshi_ask_send_job(&ask, job, UNITS, &answer, error);
     }

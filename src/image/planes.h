@@ -3,6 +3,7 @@
 #define VSHI_PLANES_H
 
 #include "base/attributes.h"
+#include "base/job.h"
 
 #include <vdbshade/image.h>
 
@@ -53,6 +54,10 @@ vsh_result vshi_check_values(const char *path, int64_t width, int64_t height, in
  * extent that is not positive), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 vsh_result vshi_image_file_new(const char *path, const vsh_run *run, int64_t width, int64_t height,
                                int64_t channels, vsh_image_file **file, vsh_error *error);
+
+/* The stage "load" of so many units. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_image_job(const char *path, const vsh_run *run, int64_t units, vshi_job **job,
+                          vsh_error *error);
 
 /* Cut to VSHI_FILE_NAME, without control characters. */
 void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *name);

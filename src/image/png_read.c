@@ -18,6 +18,7 @@ typedef struct png_reader {
     png_structp png;
     png_infop info;
     vsh_image_file *image;
+    vshi_job *job;       /* in rows of all passes */
     unsigned char *rows; /* one, or all of an interlaced image */
     size_t row_bytes;
     int bits;
@@ -65,7 +66,8 @@ static vsh_result read_header(png_reader *reader) {
     }
     /* its pages are taken when they are first written, as those of the image */
     reader->rows = calloc(reader->passes > 1 ? height : 1, reader->row_bytes);
-    return reader->rows != NULL ? VSH_OK
+    return reader->rows != NULL ? vshi_image_job(reader->path, reader->run, (int64_t)height * reader->passes,
+                                                 &reader->job, reader->error)
                                 : vshi_fail(reader->error, VSH_ERROR_MEMORY,
                                             "%s: the system refused memory for rows of %zu bytes",
                                             reader->path, reader->row_bytes);
@@ -89,7 +91,7 @@ static void store_row(const png_reader *reader, const unsigned char *row, int32_
     }
 }
 
-static void read_rows(png_reader *reader) {
+static vsh_result read_rows(png_reader *reader) {
     const size_t step = reader->passes > 1 ? reader->row_bytes : 0;
     for (int pass = 0; pass < reader->passes; ++pass) {
         for (int32_t y = 0; y < reader->image->height; ++y) {
@@ -98,9 +100,13 @@ static void read_rows(png_reader *reader) {
             if (pass == reader->passes - 1) {
                 store_row(reader, row, y);
             }
+            if (vshi_job_advance(reader->job, 1)) {
+                return vshi_job_fail_cancelled(reader->job, reader->error);
+            }
         }
     }
     png_read_end(reader->png, NULL);
+    return VSH_OK;
 }
 
 /* The text that stands before the image. */
@@ -130,10 +136,7 @@ static vsh_result read_all(png_reader *reader) {
     if (result == VSH_OK) {
         result = read_texts(reader);
     }
-    if (result == VSH_OK) {
-        read_rows(reader);
-    }
-    return result;
+    return result == VSH_OK ? read_rows(reader) : result;
 }
 
 vsh_result vshi_png_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
@@ -143,6 +146,7 @@ vsh_result vshi_png_read(const char *path, const vsh_run *run, vsh_image_file **
         return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, strerror(errno));
     }
     const vsh_result result = read_all(&reader);
+    vshi_job_end(reader.job);
     png_destroy_read_struct(&reader.png, &reader.info, NULL);
     free(reader.rows);
     fclose(reader.stream);

@@ -182,11 +182,14 @@ vsh_result write_tif(const vsh_run *run, vsh_error *error) {
     return write_image("out.tif", error);
 }
 
-vsh_result read_image(const vsh_run *run, vsh_error *error) {
-    (void)run;
+vsh_result read_images(const vsh_run *run, vsh_error *error) {
     vsh_image_file *file = NULL;
-    vsh_result result;
-    MAKE(file, vsh_image_read("mask.png", &file, error));
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < IMAGES; ++i) {
+        MAKE(file, vsh_image_read_run(images[i], run, &file, error));
+        vsh_image_free(file);
+        file = NULL;
+    }
 end:
     vsh_image_free(file);
     return result;

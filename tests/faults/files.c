@@ -56,8 +56,10 @@ static void write_text(const char *name, const char *text) {
     }
 }
 
+const char *const images[IMAGES] = {"mask.png", "mask.exr", "mask.tif"};
+
 /* An image whose middle is 1 and whose border is 0. */
-static void write_mask(void) {
+static void write_images(void) {
     float pixels[SIDE * SIDE] = {0};
     for (int i = 0; i < SIDE * SIDE; ++i) {
         const int x = i % SIDE, y = i / SIDE;
@@ -66,8 +68,10 @@ static void write_mask(void) {
     static const char *const name = "Y";
     const float *const plane = pixels;
     const vsh_image image = {SIDE, SIDE, 1, &name, &plane};
-    if (vsh_image_write("mask.png", &image, NULL, NULL) != VSH_OK) {
-        abort();
+    for (size_t i = 0; i < IMAGES; ++i) {
+        if (vsh_image_write(images[i], &image, NULL, NULL) != VSH_OK) {
+            abort();
+        }
     }
 }
 
@@ -78,7 +82,7 @@ static void make_files(void) {
     for (size_t i = 0; i < OUTPUTS; ++i) {
         write_text(outputs[i], "old");
     }
-    write_mask();
+    write_images();
 }
 
 static void remove_files(void) {
@@ -88,7 +92,9 @@ static void remove_files(void) {
     for (size_t i = 0; i < OUTPUTS; ++i) {
         unlink(outputs[i]);
     }
-    unlink("mask.png");
+    for (size_t i = 0; i < IMAGES; ++i) {
+        unlink(images[i]);
+    }
 }
 
 static int is_old(const char *name) {
@@ -118,7 +124,7 @@ int scenarios_untouched(void) {
         }
     }
     closedir(listing);
-    return good && files == INPUTS + OUTPUTS + 1;
+    return good && files == INPUTS + OUTPUTS + IMAGES;
 }
 
 static char folder[256];

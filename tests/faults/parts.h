@@ -29,7 +29,10 @@
         }                                                                                                    \
     } while (0)
 
-enum { SIDE = 12, POINTS = 80 };
+enum { SIDE = 12, POINTS = 80, IMAGES = 3 };
+
+/* Of SIDE by SIDE pixels, one of each reader. */
+extern const char *const images[IMAGES];
 
 /* Values 0 … 1, no two neighbours alike. */
 void parts_fill(float *values, size_t count);
@@ -41,6 +44,6 @@ vsh_result parts_field(const vsh_run *run, vsh_grid **grid, vsh_field **field, v
 void parts_place(double positions[3 * POINTS], float normals[3 * POINTS]);
 
 /* Scenarios that bake and write (bakes.c). */
-scenario_fn bake_lightmap, bake_volume, draw, bake_flat, write_exr, write_png, write_tif, read_image;
+scenario_fn bake_lightmap, bake_volume, draw, bake_flat, write_exr, write_png, write_tif, read_images;
 
 #endif

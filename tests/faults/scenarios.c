@@ -283,7 +283,7 @@ const scenario scenarios[] = {
     {"an EXR file written", write_exr},
     {"a PNG file written", write_png},
     {"a TIFF file written", write_tif},
-    {"an image read", read_image},
+    {"images read", read_images},
     {"an output's origin", tell_origin},
     {"a comparison", compare},
 };

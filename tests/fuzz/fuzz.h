@@ -24,8 +24,10 @@ const char *fuzz_folder(void);
 /* Writes a file there; the path, which holds until the next call. */
 const char *fuzz_file(const char *name, const void *data, size_t size);
 
-/* One thread, 64 MiB, warnings looked at, and a progress callback that cancels after a tenth of a second:
- * inputs that ask for much are not to stop the fuzzer. */
+enum { FUZZ_MEMORY = 64 << 20 };
+
+/* One thread, that much memory, warnings looked at, and a progress callback that cancels after 30 ms: inputs
+ * that ask for much are not to stop the fuzzer. */
 vsh_run fuzz_run(void);
 
 /* True once that time is over; fuzz_run() starts it. */

@@ -5,6 +5,11 @@
 
 enum { POINTS = 12, MOST_TEXELS = 1 << 14 };
 
+/* Whether the planes hold what options ask for: members past struct_size do not count, defaults do. */
+#define FITS(options)                                                                                        \
+    ((options).struct_size >= (size_t)((const char *)(&(options).height + 1) - (const char *)&(options)) &&  \
+     (int64_t)(options).width * (options).height <= MOST_TEXELS)
+
 static void shade(fuzz_input *input) {
     vsh_shade_options options = vsh_shade_options_default();
     vsh_layer layer;
@@ -114,7 +119,7 @@ static void lightmap(fuzz_input *input) {
         vsh_charts_band_bytes(charts, rows[0], rows[1], 4, 1, 1, 1, 1);
     }
     vsh_charts_free(charts);
-    if (texels != NULL && (int64_t)options.width * options.height <= MOST_TEXELS) {
+    if (texels != NULL && FITS(options)) {
         static float planes[6][3 * MOST_TEXELS];
         vsh_shade_options shading = vsh_shade_options_default();
         shading.ao_cones = 4;
@@ -198,7 +203,7 @@ static void render(fuzz_input *input) {
             options.camera = camera;
         }
     }
-    const int fits = (int64_t)options.width * options.height <= MOST_TEXELS;
+    const int fits = FITS(options);
     const vsh_picture none = {NULL, NULL, NULL, NULL};
     fuzz_ended_plain(vsh_render(&surface, 1, fuzz_made()->field, &light, 1, &options, &run,
                                 fits ? &picture : &none, NULL, fuzz_error(&error)),
@@ -218,7 +223,7 @@ static void flat(fuzz_input *input) {
     vsh_light lights[2] = {fuzz_take_light(input), fuzz_take_light(input)};
     static float planes[6][MOST_TEXELS];
     float *const shadow[] = {planes[0], planes[1]}, *const irradiance[] = {planes[2], planes[3], planes[4]};
-    const int fits = (int64_t)options.width * options.height <= MOST_TEXELS;
+    const int fits = FITS(options);
     const vsh_flat_map map = {fits ? shadow : NULL, fits ? irradiance : NULL, fits ? planes[5] : NULL};
     vsh_error error;
     double points[24] = {-1, -1, 1,  -1, 1,   1,   -1, 1,   -2, -2, 0,   -2,

@@ -1,12 +1,14 @@
-// Libraries that believe a size in a file ask for it: past 1 GiB they are refused here as the confined
-// reader's address space refuses them, and the target goes on to what follows. (The sanitizer's own operator
-// new ends the process.)
+// Libraries that believe a size in a file ask for it: past the targets' memory limit they are refused here as
+// the confined reader's address space refuses them (sooner, for pages that are touched take time), and the
+// target goes on to what follows. (The sanitizer's own operator new ends the process.)
+#include "fuzz.h"
+
 #include <cstdlib>
 #include <new>
 
 namespace {
 
-constexpr std::size_t MOST = std::size_t(1) << 30;
+constexpr std::size_t MOST = std::size_t(FUZZ_MEMORY);
 
 void *take(std::size_t size) {
     return size <= MOST ? std::malloc(size > 0 ? size : 1) : nullptr;

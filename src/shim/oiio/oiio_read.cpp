@@ -36,7 +36,8 @@ vsh_result check_ico(const char *path, vsh_error *error) {
 }
 
 // Rows of the file, interleaved, into the planes of the image.
-vsh_result read_rows(OIIO::ImageInput &input, const char *path, vsh_image_file &image, vsh_error *error) {
+vsh_result read_rows(OIIO::ImageInput &input, const char *path, vsh_image_file &image, vshi_job *job,
+                     vsh_error *error) {
     const OIIO::ImageSpec &spec = input.spec();
     const bool tiled = spec.tile_width > 0;
     const int step = tiled ? spec.tile_height : rows_of_band(image.width, image.height, image.channel_count);
@@ -64,6 +65,9 @@ vsh_result read_rows(OIIO::ImageInput &input, const char *path, vsh_image_file &
             for (size_t i = 0; i < (static_cast<size_t>(last) * width - begin); ++i) {
                 plane[i] = rows[i * count + c];
             }
+        }
+        if (vshi_job_advance(job, static_cast<size_t>(step))) {
+            return vshi_job_fail_cancelled(job, error);
         }
     }
     return VSH_OK;
@@ -108,7 +112,12 @@ vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file **file
     for (int32_t c = 0; c < image->channel_count; ++c) {
         vshi_image_file_name(image, c, std::string(spec.channel_name(c)).c_str());
     }
-    result = read_rows(*input, path, *image, error);
+    vshi_job *begun = nullptr;
+    result = vshi_image_job(path, run, image->height, &begun, error);
+    const std::unique_ptr<vshi_job, void (*)(vshi_job *)> job(begun, vshi_job_end);
+    if (result == VSH_OK) {
+        result = read_rows(*input, path, *image, job.get(), error);
+    }
     if (result == VSH_OK) {
         *file = owner.release();
     }
