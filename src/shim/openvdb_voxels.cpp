@@ -40,14 +40,21 @@ Vec3d axes_at(const VoxelSet &set, const Vec3d &index) {
 }
 
 void grow_index_box(vsh_voxels_info &info, const vshi_block &block) {
-    for (int v = 0; v < VSHI_BLOCK_VOXELS; ++v) {
-        if ((block.mask[v >> 6] >> (v & 63) & 1) != 0) {
-            const int32_t at[3] = {block.origin[0] + (v >> 6), block.origin[1] + (v >> 3 & 7),
-                                   block.origin[2] + (v & 7)};
-            for (int axis = 0; axis < 3; ++axis) {
-                info.index_min[axis] = std::min(info.index_min[axis], at[axis]);
-                info.index_max[axis] = std::max(info.index_max[axis], at[axis]);
-            }
+    const auto grow = [&](int axis, int offset) {
+        info.index_min[axis] = std::min(info.index_min[axis], block.origin[axis] + offset);
+        info.index_max[axis] = std::max(info.index_max[axis], block.origin[axis] + offset);
+    };
+    uint64_t seen = 0; // looking along x
+    for (int x = 0; x < 8; ++x) {
+        seen |= block.mask[x];
+        if (block.mask[x] != 0) {
+            grow(0, x);
+        }
+    }
+    for (int v = 0; v < 64; ++v) {
+        if ((seen >> v & 1) != 0) {
+            grow(1, v >> 3);
+            grow(2, v & 7);
         }
     }
 }
