@@ -102,6 +102,11 @@ vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file **file
     if (spec.deep || spec.depth > 1) {
         return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: deep and volume images are not read", path);
     }
+    const int64_t ends[] = {int64_t(spec.x) + spec.width, int64_t(spec.y) + spec.height, int64_t(spec.z) + 1};
+    if (*std::max_element(ends, ends + 3) > INT32_MAX) { // OpenImageIO counts by int
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: its data window begins at (%d, %d, %d): damaged", path,
+                         spec.x, spec.y, spec.z);
+    }
     vsh_image_file *image = nullptr;
     vsh_result result =
         vshi_image_file_new(path, run, spec.width, spec.height, spec.nchannels, &image, error);
