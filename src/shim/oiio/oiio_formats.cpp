@@ -68,6 +68,7 @@ const char *const readable_only[] = {"cineon", "dds", "psd", "softimage"};
 const char *const written_only[] = {"iff"};
 
 constexpr int64_t BAND = int64_t(1) << 20; // values, but a row at least
+constexpr int64_t MOST_ROWS = 1024;        // some formats seek for each
 
 } // namespace
 
@@ -104,7 +105,7 @@ bool is_readable(const std::string &name) {
 }
 
 int rows_of_band(int64_t width, int64_t height, int64_t count) {
-    return static_cast<int>(std::clamp<int64_t>(BAND / (width * count), 1, height));
+    return static_cast<int>(std::clamp<int64_t>(BAND / (width * count), 1, std::min(height, MOST_ROWS)));
 }
 
 } // namespace vshi

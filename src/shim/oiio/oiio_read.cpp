@@ -35,6 +35,9 @@ vsh_result check_ico(const char *path, vsh_error *error) {
     return VSH_OK;
 }
 
+// Of a data window: OpenImageIO counts rows by int, and up to 2^26 ahead.
+constexpr int64_t LARGEST_END = int64_t(1) << 30;
+
 // Rows of the file, interleaved, into the planes of the image.
 vsh_result read_rows(OIIO::ImageInput &input, const char *path, vsh_image_file &image, vshi_job *job,
                      vsh_error *error) {
@@ -103,7 +106,7 @@ vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file **file
         return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: deep and volume images are not read", path);
     }
     const int64_t ends[] = {int64_t(spec.x) + spec.width, int64_t(spec.y) + spec.height, int64_t(spec.z) + 1};
-    if (*std::max_element(ends, ends + 3) > INT32_MAX) { // OpenImageIO counts by int
+    if (*std::max_element(ends, ends + 3) > LARGEST_END) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: its data window begins at (%d, %d, %d): damaged", path,
                          spec.x, spec.y, spec.z);
     }
