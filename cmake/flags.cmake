@@ -12,6 +12,10 @@ set(VSH_SANITIZE_FLAGS -fno-omit-frame-pointer -fno-sanitize-recover=all)
 if(VSH_SANITIZE)
   add_compile_options(-fsanitize=${VSH_SANITIZE} ${VSH_SANITIZE_FLAGS})
   add_link_options(-fsanitize=${VSH_SANITIZE})
+  if(CMAKE_C_COMPILER_ID MATCHES Clang) # programs in C link what is in C++
+    add_link_options(-fsanitize-link-c++-runtime)
+    link_libraries(stdc++)
+  endif()
 endif()
 if(VSH_FUZZ) # what an input reaches is counted; OpenVDB's classes have types of their own in each library
   add_compile_options(-fsanitize=fuzzer-no-link -fno-sanitize=vptr)
