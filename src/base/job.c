@@ -80,7 +80,7 @@ vsh_result vshi_options_resolve(const void *given, void *defaults, size_t size, 
     }
     size_t given_size;
     memcpy(&given_size, given, sizeof given_size);
-    /* the size of a struct whose first member is a size: another one would cut a member, or a pointer, in two */
+    /* every version's size is a multiple of its first member's: another would cut a pointer in two */
     const bool whole = given_size % sizeof given_size == 0;
     if (given_size <= sizeof given_size || given_size > size || !whole) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
