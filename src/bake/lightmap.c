@@ -412,19 +412,6 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     return result;
 }
 
-/* The ranges that the bake itself relies on; the shading calls check the rest. */
-static vsh_result check_offsets(const vsh_shade_options *options, vsh_error *error) {
-    if (!(options->start_offset >= 0.0 && options->start_offset <= 16.0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "start_offset %g: expected 0 … 16 voxels",
-                         options->start_offset);
-    }
-    if (!(options->surface_offset >= 0.0 && isfinite(options->surface_offset))) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "surface_offset %g: expected a finite number, at least 0",
-                         options->surface_offset);
-    }
-    return VSH_OK;
-}
-
 vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, const vsh_light *lights,
                              size_t light_count, const vsh_shade_options *options, const vsh_run *run,
                              const vsh_lightmap *lightmap, vsh_bake_stats *stats, vsh_error *error) {
@@ -440,19 +427,15 @@ vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, c
                    .texels = texels,
                    .lights = lights,
                    .light_count = light_count,
-                   .shade = vsh_shade_options_default(),
                    .lightmap = lightmap,
                    .stats = vsh_bake_stats_zero()};
-    vsh_result result = vshi_options_resolve(options != NULL ? options : &texels->shade, &bake.shade,
-                                             sizeof bake.shade, "vsh_shade_options", error);
+    vsh_result result =
+        vshi_shade_options_resolve(options != NULL ? options : &texels->shade, &bake.shade, error);
     if (result == VSH_OK) {
         result = vshi_run_resolve(run, &bake.run, error);
     }
     if (result == VSH_OK) {
         result = vshi_options_resolve(stats, &bake.stats, sizeof bake.stats, "vsh_bake_stats", error);
-    }
-    if (result == VSH_OK) {
-        result = check_offsets(&bake.shade, error);
     }
     bake.quiet = bake.run;
     bake.quiet.progress = NULL;

@@ -29,10 +29,6 @@ struct vshi_layers {
 vsh_result vshi_layer_resolve(const vsh_shade_options *options, size_t index, vsh_layer *layer,
                               vsh_error *error) {
     *layer = vsh_layer_default();
-    if (options->layers == NULL || options->layer_count > VSH_MAX_LAYERS) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%zu layers%s: expected at most %d", options->layer_count,
-                         options->layers == NULL ? " at NULL" : "", VSH_MAX_LAYERS);
-    }
     /* programs that were built with a shorter struct step by its size */
     const char *at = (const char *)options->layers + index * options->layers->struct_size;
     vsh_error why;

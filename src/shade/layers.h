@@ -8,8 +8,8 @@
 /* The layers that take part in one light's shadow, or in AO. */
 typedef struct vshi_layers vshi_layers;
 
-/* Layer `index` of options, resolved and checked. Errors: VSH_ERROR_ARGUMENT, naming number, field, value and
- * limit. */
+/* Layer `index` of resolved options, itself resolved and checked. Errors: VSH_ERROR_ARGUMENT, naming number,
+ * field, value and limit. */
 vsh_result vshi_layer_resolve(const vsh_shade_options *options, size_t index, vsh_layer *layer,
                               vsh_error *error);
 

@@ -38,6 +38,10 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
                              fields[i].value, fields[i].low, fields[i].high);
         }
     }
+    if (full->layer_count > VSH_MAX_LAYERS || (full->layer_count > 0 && full->layers == NULL)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%zu layers%s: expected at most %d", full->layer_count,
+                         full->layers == NULL ? " at NULL" : "", VSH_MAX_LAYERS);
+    }
     return VSH_OK;
 }
 

@@ -103,6 +103,11 @@ static void bad_options_limits_and_cancelling_are_reported(void **state) {
     options.surface_offset = -1.0;
     assert_int_equal(vsh_bake_lightmap(field, texels, &light, 1, &options, NULL, &p->all, NULL, &error),
                      VSH_ERROR_ARGUMENT);
+    options = vsh_shade_options_default();
+    options.layer_count = (size_t)1 << 40; /* is no reason to ask for memory */
+    assert_int_equal(vsh_bake_lightmap(field, texels, &light, 1, &options, NULL, &p->all, NULL, &error),
+                     VSH_ERROR_ARGUMENT);
+    assert_string_equal(error.message, "1099511627776 layers at NULL: expected at most 128");
     vsh_run run = vsh_run_default();
     run.memory_limit = 1000;
     assert_int_equal(vsh_bake_lightmap(field, texels, &light, 1, NULL, &run, &p->all, NULL, &error),
