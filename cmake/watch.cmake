@@ -1,7 +1,8 @@
 # Tests, and the sanitizers that watch them in every test run.
 #
 # Our sources, but for those that are compiled against OpenVDB's headers, and the tests are compiled once more with each
-# sanitizer; the tests run as NAME, address.NAME and thread.NAME. tools/sanitize compiles everything with them.
+# sanitizer; the tests run as NAME, address.NAME and thread.NAME, and the command line's with a vdbshade that is made of
+# those objects. tools/sanitize compiles everything with them.
 if(VSH_WATCH AND NOT VSH_SANITIZE)
   set(VSH_WATCHES address thread)
 endif()
@@ -13,6 +14,7 @@ set(VSH_WATCH_thread thread)
 set(VSH_WATCH_address_NOT
     test_bits test_grid test_image_errors test_lattice test_magnitudes test_relations test_share # minutes
     test_bitflips test_grid_file test_grid_values test_reader test_reader_checks test_scene_grids test_volume_file)
+set(VSH_WATCH_address_CLI accuracy casters channels flat hostile info input masks output provenance regress usage voxelize)
 set(VSH_WATCH_thread_ONLY test_compare test_host test_layers test_lightmap test_texels)
 
 set(suppressions ${PROJECT_SOURCE_DIR}/tests/suppressions)
@@ -71,6 +73,15 @@ function(vsh_add_program name watch)
   endif()
 endfunction()
 
+# vsh_set_watched(TEST WATCH): how a test of a program with that sanitizer is run.
+function(vsh_set_watched test watch)
+  # kernels that place memory at random further than the runtime of an older compiler can follow
+  set_property(TEST ${test} PROPERTY SKIP_REGULAR_EXPRESSION "Sanitizer: unexpected memory mapping"
+               "Shadow memory range interleaves with an existing memory mapping")
+  set_property(TEST ${test} APPEND PROPERTY ENVIRONMENT ${VSH_WATCH_${watch}_ENVIRONMENT}
+               LD_LIBRARY_PATH=${PROJECT_BINARY_DIR}) # of the module: with a sanitizer no RUNPATH leads there
+endfunction()
+
 # vsh_add_test(NAME SOURCES … [ARGUMENTS …] …): such a program, run as a test with ARGUMENTS; and again with each
 # sanitizer whose lists above have it.
 function(vsh_add_test name)
@@ -82,11 +93,33 @@ function(vsh_add_test name)
     if(name IN_LIST VSH_WATCH_${watch}_ONLY OR (NOT VSH_WATCH_${watch}_ONLY AND NOT name IN_LIST VSH_WATCH_${watch}_NOT))
       vsh_add_program(${watch}.${name} ${watch} ${parts})
       add_test(NAME ${watch}.${name} COMMAND ${watch}.${name} ${given_ARGUMENTS})
-      # kernels that place memory at random further than the runtime of an older compiler can follow
-      set_property(TEST ${watch}.${name} PROPERTY SKIP_REGULAR_EXPRESSION "Sanitizer: unexpected memory mapping"
-                   "Shadow memory range interleaves with an existing memory mapping")
-      set_property(TEST ${watch}.${name} PROPERTY ENVIRONMENT ${VSH_WATCH_${watch}_ENVIRONMENT}
-                   LD_LIBRARY_PATH=${PROJECT_BINARY_DIR}) # of the module: with a sanitizer no RUNPATH leads there
+      vsh_set_watched(${watch}.${name} ${watch})
+    endif()
+  endforeach()
+endfunction()
+
+# vsh_add_cli_test(NAME FILE): a Bats file that runs the command line, as a test cli_NAME; and again with each sanitizer
+# whose list above has it. What it compiles, it compiles as the library is.
+function(vsh_add_cli_test name file)
+  set(environment "ASSETS=${PROJECT_SOURCE_DIR}/assets" "DOCS=${PROJECT_SOURCE_DIR}/docs" "CC=${CMAKE_C_COMPILER}")
+  add_test(NAME cli_${name} COMMAND ${VSH_BATS} ${file})
+  if(VSH_SANITIZE)
+    set(flags "-fsanitize=${VSH_SANITIZE}")
+    if(CMAKE_C_COMPILER_ID MATCHES Clang) # see cmake/flags.cmake
+      string(APPEND flags " -fsanitize-link-c++-runtime -lstdc++")
+    endif()
+  endif()
+  set_property(TEST cli_${name} PROPERTY ENVIRONMENT ${environment} "VDBSHADE=$<TARGET_FILE:vdbshade_cli>" "CFLAGS=${flags}")
+  foreach(watch ${VSH_WATCHES})
+    if(name IN_LIST VSH_WATCH_${watch}_CLI)
+      if(NOT TARGET ${watch}.vdbshade_cli)
+        vsh_add_program(${watch}.vdbshade_cli ${watch} SOURCES ${VSH_CLI_SOURCES} LIBRARIES vsh::jansson)
+        set_target_properties(${watch}.vdbshade_cli PROPERTIES OUTPUT_NAME vdbshade RUNTIME_OUTPUT_DIRECTORY ${watch})
+      endif()
+      add_test(NAME ${watch}.cli_${name} COMMAND ${VSH_BATS} ${file})
+      set_property(TEST ${watch}.cli_${name} PROPERTY ENVIRONMENT ${environment}
+                   "VDBSHADE=$<TARGET_FILE:${watch}.vdbshade_cli>")
+      vsh_set_watched(${watch}.cli_${name} ${watch})
     endif()
   endforeach()
 endfunction()

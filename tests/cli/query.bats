@@ -81,6 +81,11 @@ int main(int argc, char **argv) {
     output.stride = sizeof answers[0];
     CHECK(vsh_query_strided(query, &points, NULL, &output, NULL, &error));
     fwrite(answers, sizeof answers[0], points.count, stdout);
+    vsh_query_free(query);
+    vsh_field_free(field);
+    vsh_grid_free(grid);
+    vsh_assets_free(assets);
+    vsh_scene_free(scene);
     return 0;
 }
 C

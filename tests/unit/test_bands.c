@@ -115,11 +115,12 @@ static void bake_rows(const stage *s, const vsh_texels *texels, const vsh_shade_
     vsh_light lights[2];
     set_lights(lights);
     const size_t at = (size_t)first * WIDTH;
+    float *const irradiance = (float *)p->values + 5 * (size_t)TEXELS; /* planes 5 … 7 are one */
     float *const shadow[2] = {p->values[0] + at, p->values[1] + at};
     float *const shadow_error[2] = {p->values[2] + at, p->values[3] + at};
     const vsh_lightmap lightmap = {.shadow = shadow,
                                    .ao = p->values[4] + at,
-                                   .irradiance = p->values[5] + 3 * at,
+                                   .irradiance = irradiance + 3 * at,
                                    .coverage = p->values[8] + at,
                                    .shadow_error = shadow_error,
                                    .ao_error = p->values[9] + at};
