@@ -157,62 +157,56 @@ static int32_t extreme(const double *energy, const uint8_t *set, bool cluster) {
 /* Ulichney, "The void-and-cluster method for dither array generation", 1993. */
 static bool place_mask(vshi_sampler *sampler) {
     enum { TEXELS = MASK_EDGE * MASK_EDGE, FIRST = TEXELS / 10 };
-    double *energy = calloc(2 * TEXELS, sizeof *energy), *kernel = energy + TEXELS;
-    uint8_t *set = calloc(2 * TEXELS, 1), *first = set + TEXELS;
-    if (energy == NULL || set == NULL) {
-        free(energy);
-        free(set);
+    struct {
+        double kernel[TEXELS], energy[TEXELS];
+        uint8_t set[TEXELS];
+        double first_energy[TEXELS]; /* of the first bits, evened out */
+        uint8_t first[TEXELS];
+    } *p = calloc(1, sizeof *p);
+    if (p == NULL) {
         return false;
     }
     for (int32_t i = 0; i < TEXELS; ++i) {
         const int32_t y = i / MASK_EDGE, x = i % MASK_EDGE;
         const int32_t dy = y < MASK_EDGE / 2 ? y : MASK_EDGE - y, dx = x < MASK_EDGE / 2 ? x : MASK_EDGE - x;
         /* 2^-(r²/5) is the Gaussian of 1.9 texels, in arithmetic that has the same bits everywhere */
-        kernel[i] = ldexp(1.0 - 0.129449436703875 * ((dx * dx + dy * dy) % 5), -((dx * dx + dy * dy) / 5));
+        p->kernel[i] = ldexp(1.0 - 0.129449436703875 * ((dx * dx + dy * dy) % 5), -((dx * dx + dy * dy) / 5));
     }
     for (uint32_t i = 0, placed = 0; placed < FIRST; ++i) {
         const int32_t at = (int32_t)(hash(i) % TEXELS);
-        if (!set[at]) {
-            set[at] = 1;
-            add_energy(energy, kernel, at, 1.0);
+        if (!p->set[at]) {
+            p->set[at] = 1;
+            add_energy(p->energy, p->kernel, at, 1.0);
             ++placed;
         }
     }
     for (;;) { /* even out: from the tightest cluster to the largest void, until it would go back */
-        const int32_t from = extreme(energy, set, true);
-        set[from] = 0;
-        add_energy(energy, kernel, from, -1.0);
-        const int32_t to = extreme(energy, set, false);
-        set[to] = 1;
-        add_energy(energy, kernel, to, 1.0);
+        const int32_t from = extreme(p->energy, p->set, true);
+        p->set[from] = 0;
+        add_energy(p->energy, p->kernel, from, -1.0);
+        const int32_t to = extreme(p->energy, p->set, false);
+        p->set[to] = 1;
+        add_energy(p->energy, p->kernel, to, 1.0);
         if (to == from) {
             break;
         }
     }
     float *mask = &sampler->mask[0][0];
-    memcpy(first, set, TEXELS);
-    double *even = malloc(TEXELS * sizeof *even);
-    if (even == NULL) {
-        free(energy);
-        free(set);
-        return false;
-    }
-    memcpy(even, energy, TEXELS * sizeof *even);
+    memcpy(p->first, p->set, sizeof p->first);
+    memcpy(p->first_energy, p->energy, sizeof p->first_energy);
     for (int32_t rank = FIRST - 1; rank >= 0; --rank) {
-        const int32_t at = extreme(energy, set, true);
-        set[at] = 0;
-        add_energy(energy, kernel, at, -1.0);
+        const int32_t at = extreme(p->energy, p->set, true);
+        p->set[at] = 0;
+        add_energy(p->energy, p->kernel, at, -1.0);
         mask[at] = (float)rank / TEXELS;
     }
     for (int32_t rank = FIRST; rank < TEXELS; ++rank) {
-        const int32_t at = extreme(even, first, false);
-        first[at] = 1;
-        add_energy(even, kernel, at, 1.0);
+        const int32_t at = extreme(p->first_energy, p->first, false);
+        p->first[at] = 1;
+        add_energy(p->first_energy, p->kernel, at, 1.0);
         mask[at] = (float)rank / TEXELS;
     }
-    free(even);
-    free(energy);
-    free(set);
+    free(p);
     return true;
 }
 
