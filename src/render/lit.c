@@ -115,6 +115,18 @@ static vsh_result check_meshes(const vsh_lit_meshes *of, size_t index, vsh_error
     return VSH_OK;
 }
 
+vsh_result vshi_lit_check(const vsh_render_options *options, vsh_error *error) {
+    if (options->lit == NULL && options->lit_count > 0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lit is NULL with a lit_count of %zu",
+                         options->lit_count);
+    }
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; result == VSH_OK && i < options->lit_count; ++i) {
+        result = check_meshes(&options->lit[i], i, error);
+    }
+    return result;
+}
+
 /* --- triangles on the samples */
 
 static int32_t within(double x, int32_t count) {
@@ -174,17 +186,8 @@ vsh_result vshi_lit_create(const vsh_render_options *options, const vsh_light *l
     if (options->lit_count == 0) {
         return VSH_OK;
     }
-    vsh_result result =
-        options->lit != NULL
-            ? VSH_OK
-            : vshi_fail(error, VSH_ERROR_ARGUMENT, "lit is NULL with a lit_count of %zu", options->lit_count);
-    for (size_t i = 0; result == VSH_OK && i < options->lit_count; ++i) {
-        result = check_meshes(&options->lit[i], i, error);
-    }
     vshi_lit *made = NULL;
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&made, 1, sizeof *made, "lit meshes", error);
-    }
+    vsh_result result = vshi_allocate((void **)&made, 1, sizeof *made, "lit meshes", error);
     if (result != VSH_OK) {
         return result;
     }

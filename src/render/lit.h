@@ -7,11 +7,15 @@
 
 typedef struct vshi_lit vshi_lit;
 
-/* Bytes that it takes at most. */
+/* Whether the options' lit meshes are whole, but for what their lightmaps hold. Errors: VSH_ERROR_ARGUMENT,
+ * VSH_ERROR_INPUT, naming the mesh. */
+vsh_result vshi_lit_check(const vsh_render_options *options, vsh_error *error);
+
+/* Bytes that those of checked options take at most. */
 double vshi_lit_bytes(const vsh_render_options *options);
 
-/* Checks the options' lit meshes and makes them ready; *lit is NULL where there are none. Lights and options
- * must outlive it. Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_INPUT, VSH_ERROR_MEMORY. */
+/* Makes those of checked options ready; *lit is NULL where there are none. Lights and options must outlive
+ * it. Errors: VSH_ERROR_INPUT where a lightmap lacks a channel, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 vsh_result vshi_lit_create(const vsh_render_options *options, const vsh_light *lights, size_t light_count,
                            const vshi_sample_grid *grid, vshi_lit **lit, vsh_error *error);
 void vshi_lit_free(vshi_lit *lit); /* NULL does nothing */

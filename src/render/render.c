@@ -56,7 +56,8 @@ static vsh_result check_options(const vsh_render_options *o, size_t light_count,
     }
     vsh_result result = check_colors("sky", o->sky, BRIGHTEST, error);
     result = result == VSH_OK ? check_colors("background", o->background, BRIGHTEST, error) : result;
-    for (size_t i = 0; result == VSH_OK && o->lit != NULL && i < o->lit_count; ++i) {
+    result = result == VSH_OK ? vshi_lit_check(o, error) : result;
+    for (size_t i = 0; result == VSH_OK && i < o->lit_count; ++i) {
         result = check_colors("color of lit meshes", o->lit[i].color, 1.0, error);
     }
     result = result == VSH_OK ? vsh_tint_check(&o->tint, error) : result;

@@ -97,7 +97,6 @@ static void lightmap(fuzz_input *input) {
     const vsh_run run = fuzz_take_run(input);
     vsh_layer layer;
     options.shade.layers = NULL;
-    options.shade.layer_count = 0;
     options.shade.triangles = NULL;
     float places[16];
     memcpy(places, fuzz_uvs, sizeof places);
@@ -178,10 +177,8 @@ static void render(fuzz_input *input) {
     options.width = options.height = FUZZ_SIDE;
     options.samples = 1;
     fuzz_take(input, &options, sizeof options);
-    options.lit = NULL;
-    options.lit_count = 0;
+    options.lit = NULL; /* as layers: a count of what is not there is refused */
     options.shade.layers = NULL;
-    options.shade.layer_count = 0;
     options.shade.triangles = NULL;
     const vsh_run run = fuzz_take_run(input);
     const vsh_light light = fuzz_take_light(input);
@@ -193,7 +190,21 @@ static void render(fuzz_input *input) {
     double bounds[6] = {-1, -1, -1, 1, 1, 1}, angles[3] = {0.5, 0.5, 1.0};
     fuzz_take(input, bounds, sizeof bounds);
     fuzz_take(input, angles, sizeof angles);
-    if (fuzz_byte(input) & 1) {
+    const uint8_t how = fuzz_byte(input);
+    const float light_map[4][4] = {{1.0f, 0.5f}, {0.25f}, {0.0f, 1.0f}, {0.75f}};
+    const float *const map_planes[] = {light_map[0], light_map[1], light_map[2], light_map[3]};
+    static const char *const names[] = {"ao", "irradiance.R", "irradiance.G", "irradiance.B"};
+    const vsh_image image = {2, 2, 4, names, map_planes};
+    vsh_lit_meshes lit = {&fuzz_made()->mesh, 1, &image, {0.5, 0.5, 0.5}, 0};
+    if (how & 2) {
+        fuzz_take(input, &lit, sizeof lit);
+        lit.meshes = how & 4 ? &fuzz_made()->mesh : NULL;
+        lit.mesh_count = how & 4 ? lit.mesh_count % 2 : lit.mesh_count;
+        lit.lightmap = how & 8 ? &image : NULL;
+        options.lit = &lit;
+        options.lit_count = 1;
+    }
+    if (how & 1) {
         vsh_camera camera = options.camera;
         fuzz_ended_plain(vsh_camera_frame(&camera, bounds, bounds + 3, angles[0], angles[1], angles[2],
                                           fuzz_error(&error)),
