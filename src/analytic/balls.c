@@ -260,11 +260,11 @@ static vsh_result make(vsh_spheres *made, const double *spheres, const double *t
 vsh_result vsh_spheres_create(const double *spheres, size_t count, const double *transform,
                               const vsh_run *run, vsh_spheres **made, vsh_error *error) {
     VSHI_FLOATS;
-    if (made == NULL || (spheres == NULL && count > 0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_spheres_create: %s is NULL",
-                         made == NULL ? "made" : "spheres");
-    }
+    VSHI_NEEDS(made);
     *made = NULL;
+    if (count > 0) {
+        VSHI_NEEDS(spheres);
+    }
     vsh_run full;
     double scale = 1.0;
     void *memory = NULL;

@@ -150,9 +150,7 @@ static vsh_result check_transform(const vshi_terrain *t, double *scale, vsh_erro
 vsh_result vsh_heights_create(const vsh_heights_source *source, const vsh_run *run, vsh_heights **heights,
                               vsh_error *error) {
     VSHI_FLOATS;
-    if (heights == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_heights_create: heights is NULL");
-    }
+    VSHI_NEEDS(heights);
     *heights = NULL;
     vsh_run full;
     vshi_terrain terrain;

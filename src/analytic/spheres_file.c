@@ -137,13 +137,10 @@ static vsh_result read_rows(const char *path, FILE *file, const vsh_run *run, li
 vsh_result vsh_spheres_read(const char *path, const vsh_run *run, double **spheres, size_t *count,
                             vsh_error *error) {
     VSHI_FLOATS;
-    if (path == NULL || spheres == NULL || count == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_spheres_read: %s is NULL",
-                         path == NULL      ? "path"
-                         : spheres == NULL ? "spheres"
-                                           : "count");
-    }
+    VSHI_NEEDS(spheres);
     *spheres = NULL;
+    VSHI_NEEDS(path);
+    VSHI_NEEDS(count);
     *count = 0;
     vsh_run full;
     vsh_result result = vshi_run_resolve(run, &full, error);

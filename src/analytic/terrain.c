@@ -187,9 +187,7 @@ static void build(const vshi_terrain *t, int32_t what, vsh_model *model) {
 vsh_result vsh_model_from_heights(const vsh_heights_source *source, int32_t what, const vsh_run *run,
                                   vsh_model **model, vsh_error *error) {
     VSHI_FLOATS;
-    if (model == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_model_from_heights: model is NULL");
-    }
+    VSHI_NEEDS(model);
     *model = NULL;
     vsh_run full;
     vshi_terrain terrain;

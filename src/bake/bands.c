@@ -253,11 +253,11 @@ vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count, const vs
                              const vsh_run *run, vsh_uv_report *uv_reports, vsh_charts **charts,
                              vsh_error *error) {
     VSHI_FLOATS;
-    if (charts == NULL || (meshes == NULL && mesh_count > 0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_charts_create: %s is NULL",
-                         charts == NULL ? "charts" : "meshes");
-    }
+    VSHI_NEEDS(charts);
     *charts = NULL;
+    if (mesh_count > 0) {
+        VSHI_NEEDS(meshes);
+    }
     vsh_run full;
     const vsh_result result = vshi_run_resolve(run, &full, error);
     return result == VSH_OK

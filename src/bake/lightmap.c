@@ -416,12 +416,11 @@ vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, c
                              size_t light_count, const vsh_shade_options *options, const vsh_run *run,
                              const vsh_lightmap *lightmap, vsh_bake_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
-    if (field == NULL || texels == NULL || lightmap == NULL || (lights == NULL && light_count > 0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_lightmap: %s is NULL",
-                         field == NULL                       ? "field"
-                         : texels == NULL                    ? "texels"
-                         : lights == NULL && light_count > 0 ? "lights"
-                                                             : "lightmap");
+    VSHI_NEEDS(field);
+    VSHI_NEEDS(texels);
+    VSHI_NEEDS(lightmap);
+    if (light_count > 0) {
+        VSHI_NEEDS(lights);
     }
     baking bake = {.field = field,
                    .texels = texels,

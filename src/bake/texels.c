@@ -170,6 +170,9 @@ static void join(const box *boxes, size_t begin, size_t end, double low[3], doub
 vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
                              double bounds_max[3], vsh_error *error) {
     VSHI_FLOATS;
+    VSHI_NEEDS(charts);
+    VSHI_NEEDS(bounds_min);
+    VSHI_NEEDS(bounds_max);
     vsh_run full;
     vsh_result result = vshi_run_resolve(run, &full, error);
     if (result != VSH_OK) {
@@ -264,11 +267,9 @@ static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t ro
 vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t first_row, int32_t rows,
                                   const vsh_run *run, vsh_texels **texels, vsh_error *error) {
     VSHI_FLOATS;
-    if (texels == NULL || charts == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_texels_create_band: %s is NULL",
-                         texels == NULL ? "texels" : "charts");
-    }
+    VSHI_NEEDS(texels);
     *texels = NULL;
+    VSHI_NEEDS(charts);
     vsh_run full;
     const vsh_result result = vshi_run_resolve(run, &full, error);
     return result == VSH_OK ? create(charts, first_row, rows, &full, texels, error) : result;
@@ -278,11 +279,11 @@ vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count, const vs
                              const vsh_run *run, vsh_uv_report *uv_reports, vsh_texels **texels,
                              vsh_error *error) {
     VSHI_FLOATS;
-    if (texels == NULL || (meshes == NULL && mesh_count > 0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_texels_create: %s is NULL",
-                         texels == NULL ? "texels" : "meshes");
-    }
+    VSHI_NEEDS(texels);
     *texels = NULL;
+    if (mesh_count > 0) {
+        VSHI_NEEDS(meshes);
+    }
     vsh_run full;
     vsh_result result = vshi_run_resolve(run, &full, error);
     if (result != VSH_OK) {

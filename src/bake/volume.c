@@ -172,12 +172,12 @@ vsh_result vsh_bake_volume(const vsh_field *field, const vsh_voxels *voxels, con
                            size_t light_count, const vsh_volume_options *options, const vsh_run *run,
                            vsh_volume **volume, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
+    VSHI_NEEDS(volume);
     *volume = NULL;
-    if (field == NULL || voxels == NULL || (lights == NULL && light_count > 0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_volume: %s is NULL",
-                         field == NULL    ? "field"
-                         : voxels == NULL ? "voxels"
-                                          : "lights");
+    VSHI_NEEDS(field);
+    VSHI_NEEDS(voxels);
+    if (light_count > 0) {
+        VSHI_NEEDS(lights);
     }
     vsh_run full;
     vshi_volume_bake bake = {.field = field,

@@ -4,6 +4,8 @@
 
 #include <vdbshade/base.h>
 
+#include <stddef.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -12,6 +14,14 @@ extern "C" {
  * Control characters in the message (from file names, say) become '?', so that it stays one line. */
 vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
+
+/* Ends a function of the API, whose `error` it fills, where a pointer that it needs is NULL. */
+#define VSHI_NEEDS(pointer)                                                                                  \
+    do {                                                                                                     \
+        if ((pointer) == NULL) {                                                                             \
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %s is NULL", __func__, #pointer);               \
+        }                                                                                                    \
+    } while (0)
 
 /* Control characters become '?'. */
 void vshi_one_line(char *text);

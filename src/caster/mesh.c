@@ -110,10 +110,8 @@ static void grow(vsh_mesh_report *report, vshi_vec p) {
 
 vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error) {
     VSHI_FLOATS;
-    if (mesh == NULL || report == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_mesh_check: %s is NULL",
-                         mesh == NULL ? "mesh" : "report");
-    }
+    VSHI_NEEDS(mesh);
+    VSHI_NEEDS(report);
     vsh_result result = vshi_mesh_check_data(mesh, VSHI_MESH_ALONE, error);
     if (result != VSH_OK) {
         return result;

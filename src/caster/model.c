@@ -78,11 +78,9 @@ static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job,
 vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error) {
     VSHI_FLOATS;
     enum { BUILD_UNITS = 100 };
-    if (path == NULL || model == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_model_read: %s is NULL",
-                         path == NULL ? "path" : "model");
-    }
+    VSHI_NEEDS(model);
     *model = NULL;
+    VSHI_NEEDS(path);
     vsh_run full;
     vsh_result result = vshi_run_resolve(run, &full, error);
     if (result != VSH_OK) {

@@ -197,13 +197,10 @@ void vsh_outline_free(vsh_outline *o) {
 vsh_result vsh_outline_from_polygons(const double *points, const size_t *counts, size_t contour_count,
                                      const vsh_run *run, vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
-    if (outline == NULL || points == NULL || counts == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_outline_from_polygons: %s is NULL",
-                         outline == NULL  ? "outline"
-                         : points == NULL ? "points"
-                                          : "counts");
-    }
+    VSHI_NEEDS(outline);
     *outline = NULL;
+    VSHI_NEEDS(points);
+    VSHI_NEEDS(counts);
     vsh_run full;
     const vsh_result result = vshi_run_resolve(run, &full, error);
     if (result != VSH_OK) {
@@ -222,11 +219,11 @@ vsh_result vsh_outline_from_polygons(const double *points, const size_t *counts,
 vsh_result vsh_outline_unite(const vsh_outline_instance *instances, size_t instance_count, const vsh_run *run,
                              vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
-    if (outline == NULL || instances == NULL || instance_count == 0) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_outline_unite: %s",
-                         outline == NULL ? "outline is NULL" : "no instances");
-    }
+    VSHI_NEEDS(outline);
     *outline = NULL;
+    if (instances == NULL || instance_count == 0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_outline_unite: no instances");
+    }
     vsh_run full;
     const vsh_result result = vshi_run_resolve(run, &full, error);
     if (result != VSH_OK) {

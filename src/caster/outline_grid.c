@@ -44,11 +44,9 @@ vsh_result vsh_grid_from_outline(const vsh_outline *outline, double thickness, c
                                  vsh_error *error) {
     VSHI_FLOATS;
     static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    if (outline == NULL || grid == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_grid_from_outline: %s is NULL",
-                         outline == NULL ? "outline" : "grid");
-    }
+    VSHI_NEEDS(grid);
     *grid = NULL;
+    VSHI_NEEDS(outline);
     if (!(thickness > 0.0 && thickness <= VSHI_OUTLINE_LARGEST)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "outline: thickness %.9g: expected more than 0, at most %g", thickness,

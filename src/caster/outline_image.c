@@ -337,11 +337,9 @@ static vsh_result check_options(const vsh_mask_options *options, vsh_error *erro
 vsh_result vsh_outline_from_image(const char *path, const vsh_mask_options *options, const vsh_run *run,
                                   vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
-    if (path == NULL || outline == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_outline_from_image: %s is NULL",
-                         path == NULL ? "path" : "outline");
-    }
+    VSHI_NEEDS(outline);
     *outline = NULL;
+    VSHI_NEEDS(path);
     vsh_mask_options full = vsh_mask_options_default();
     vsh_run full_run;
     vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_mask_options", error);

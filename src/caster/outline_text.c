@@ -260,13 +260,10 @@ vsh_result vshi_contours_draw(const char *text, const char *path, const vsh_text
 vsh_result vsh_outline_from_text(const char *text, const char *font, const vsh_text_options *options,
                                  const vsh_run *run, vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
-    if (text == NULL || font == NULL || outline == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_outline_from_text: %s is NULL",
-                         text == NULL   ? "text"
-                         : font == NULL ? "font"
-                                        : "outline");
-    }
+    VSHI_NEEDS(outline);
     *outline = NULL;
+    VSHI_NEEDS(text);
+    VSHI_NEEDS(font);
     vsh_text_options full = vsh_text_options_default();
     vsh_run full_run;
     vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_text_options", error);

@@ -132,9 +132,10 @@ static vsh_result check_operands(const vsh_sdf *sdf, size_t index, int32_t *dept
 
 vsh_result vsh_sdf_check(const vsh_sdf *sdf, vsh_error *error) {
     VSHI_FLOATS;
-    if (sdf == NULL || sdf->nodes == NULL || sdf->node_count < 1 || sdf->node_count > MAX_NODES) {
+    VSHI_NEEDS(sdf);
+    if (sdf->nodes == NULL || sdf->node_count < 1 || sdf->node_count > MAX_NODES) {
         return vshi_fail(error, VSH_ERROR_INPUT, "sdf: %zu nodes: expected 1 … %d",
-                         sdf == NULL || sdf->nodes == NULL ? (size_t)0 : sdf->node_count, MAX_NODES);
+                         sdf->nodes == NULL ? (size_t)0 : sdf->node_count, MAX_NODES);
     }
     int32_t *depth;
     vsh_result result = vshi_allocate((void **)&depth, sdf->node_count, sizeof *depth, "sdf check", error);

@@ -148,12 +148,10 @@ static vsh_result check(const vsh_sdf *sdfs, const double *transforms, size_t co
 vsh_result vsh_solids_create(const vsh_sdf *sdfs, const double *transforms, size_t count, vsh_solids **solids,
                              vsh_error *error) {
     VSHI_FLOATS;
-    if (solids != NULL) {
-        *solids = NULL;
-    }
-    if (solids == NULL || (sdfs == NULL && count > 0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_solids_create: %s is NULL",
-                         solids == NULL ? "solids" : "sdfs");
+    VSHI_NEEDS(solids);
+    *solids = NULL;
+    if (count > 0) {
+        VSHI_NEEDS(sdfs);
     }
     static const double identity[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
     size_t nodes;

@@ -141,10 +141,8 @@ static vsh_result take_all(work *w, const vsh_run *run, vsh_error *error) {
 vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *options, const vsh_run *run,
                        vsh_measures *measures, vsh_error *error) {
     VSHI_FLOATS;
-    if (compared == NULL || measures == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_compare: %s is NULL",
-                         compared == NULL ? "compared" : "measures");
-    }
+    VSHI_NEEDS(compared);
+    VSHI_NEEDS(measures);
     vsh_run full;
     vsh_compare_options chosen;
     vsh_result result = vshi_run_resolve(run, &full, error);

@@ -95,10 +95,9 @@ _Static_assert(offsetof(vsh_tolerances, all) == 0, "the keys' offsets are those 
 
 vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vsh_error *error) {
     VSHI_FLOATS;
-    if (path == NULL || tolerances == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_tolerances_read: path or tolerances is NULL");
-    }
+    VSHI_NEEDS(tolerances);
     *tolerances = NULL;
+    VSHI_NEEDS(path);
     char *text;
     size_t size;
     vsh_result result = vshi_scene_text(path, &text, &size, error);

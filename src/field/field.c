@@ -59,13 +59,15 @@ static bool find_bounds(vsh_field *field, const vshi_below *finest) {
 vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *options, const vsh_run *run,
                             vsh_field **field, vsh_error *error) {
     VSHI_FLOATS;
+    VSHI_NEEDS(field);
+    *field = NULL;
+    VSHI_NEEDS(grid);
     vsh_field_options o = vsh_field_options_default();
     vsh_run r;
     vshi_blocks blocks = {.map = NULL};
     vshi_below below = {.bricks = NULL};
     vshi_job *job = NULL;
     vsh_field *f = NULL;
-    *field = NULL;
     vsh_result result = vshi_options_resolve(options, &o, sizeof o, "vsh_field_options", error);
     if (result == VSH_OK) {
         result = vshi_run_resolve(run, &r, error);
@@ -161,6 +163,7 @@ static vsh_result append_emptiness(vsh_field *f, vsh_error *error) {
 
 vsh_result vsh_field_create_empty(double voxel_size, vsh_field **field, vsh_error *error) {
     VSHI_FLOATS;
+    VSHI_NEEDS(field);
     *field = NULL;
     if (!(voxel_size >= 1e-12 && voxel_size <= 1e12)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "voxel_size %g is out of range 1e-12 … 1e12", voxel_size);

@@ -64,9 +64,6 @@ static vsh_result check_options(const vsh_flat_options *o, vsh_error *error) {
 }
 
 static vsh_result check_lights(const vsh_light *lights, size_t count, vsh_error *error) {
-    if (lights == NULL && count > 0) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_flat_bake: lights is NULL");
-    }
     for (size_t i = 0; i < count; ++i) {
         vsh_error reason;
         if (vsh_light_check(&lights[i], &reason) != VSH_OK) {
@@ -258,8 +255,9 @@ vsh_result vsh_flat_bake(const vsh_outline *casters, const vsh_light *lights, si
                          const vsh_flat_options *options, const vsh_run *run, const vsh_flat_map *map,
                          vsh_error *error) {
     VSHI_FLOATS;
-    if (map == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_flat_bake: map is NULL");
+    VSHI_NEEDS(map);
+    if (light_count > 0) {
+        VSHI_NEEDS(lights);
     }
     bake b = {.casters = casters,
               .lights = lights,

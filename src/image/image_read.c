@@ -50,11 +50,12 @@ vsh_result vsh_image_read(const char *path, vsh_image_file **file, vsh_error *er
 
 vsh_result vsh_image_read_run(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     VSHI_FLOATS;
-    if (file == NULL || path == NULL || path[0] == '\0') {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_image_read: no %s was given",
-                         file == NULL ? "place for the image" : "path");
-    }
+    VSHI_NEEDS(file);
     *file = NULL;
+    VSHI_NEEDS(path);
+    if (path[0] == '\0') {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_image_read: no path was given");
+    }
     vsh_run full;
     vsh_result result = vshi_run_resolve(run, &full, error);
     if (result == VSH_OK && full.reader != NULL) {

@@ -63,9 +63,7 @@ static vsh_result copy_texts(vsh_image_writer *writer, const char *path, const v
 vsh_result vsh_image_writer_create(const char *path, const vsh_image *image, const vsh_image_options *options,
                                    vsh_image_writer **writer, vsh_error *error) {
     VSHI_FLOATS;
-    if (writer == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_image_writer_create: writer is NULL");
-    }
+    VSHI_NEEDS(writer);
     *writer = NULL;
     void *memory = NULL;
     vsh_result result = vshi_allocate(&memory, 1, sizeof **writer, "image", error);

@@ -75,6 +75,8 @@ static void horizon(vshi_vec up, vshi_vec *front, vshi_vec *right) {
 vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], const double bounds_max[3],
                             double azimuth, double elevation, double aspect, vsh_error *error) {
     VSHI_FLOATS;
+    VSHI_NEEDS(bounds_min);
+    VSHI_NEEDS(bounds_max);
     vsh_camera full;
     vsh_result result = resolve(camera, &full, error);
     result = result == VSH_OK ? check_lens(&full, error) : result;

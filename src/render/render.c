@@ -260,16 +260,15 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     vshi_lit *lit = NULL;
     vshi_sampler *sampler = NULL;
     vsh_shade_stats own = vsh_shade_stats_zero();
-    vsh_result result = picture != NULL && field != NULL
-                            ? vshi_options_resolve(options, &o, sizeof o, "vsh_render_options", error)
-                            : vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_render: %s is NULL",
-                                        picture == NULL ? "picture" : "field");
+    VSHI_NEEDS(picture);
+    VSHI_NEEDS(field);
+    if (light_count > 0) {
+        VSHI_NEEDS(lights);
+    }
+    vsh_result result = vshi_options_resolve(options, &o, sizeof o, "vsh_render_options", error);
     result = result == VSH_OK ? vshi_run_resolve(run, &r.scenery.run, error) : result;
     result = result == VSH_OK ? check_options(&o, light_count, error) : result;
     result = result == VSH_OK ? check_surfaces(surfaces, surface_count, error) : result;
-    if (result == VSH_OK && lights == NULL && light_count > 0) {
-        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_render: lights is NULL");
-    }
     if (result != VSH_OK) {
         return result;
     }

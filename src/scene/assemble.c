@@ -355,11 +355,10 @@ static size_t take(const vsh_scene *scene, bool all, const vsh_scene_layer *laye
 vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                              vsh_grid **grid, vsh_error *error) {
     VSHI_FLOATS;
-    if (scene == NULL || assets == NULL || grid == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "vsh_scene_casters: scene, assets and grid must not be NULL");
-    }
+    VSHI_NEEDS(grid);
     *grid = NULL;
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS(assets);
     if (scene->caster_count == 0) {
         return vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters");
     }
@@ -381,11 +380,10 @@ vsh_result vsh_scene_layer_casters(const vsh_scene *scene, const vsh_assets *ass
                                    const vsh_scene_layer *layer, const vsh_run *run, vsh_grid **grid,
                                    vsh_error *error) {
     VSHI_FLOATS;
-    if (scene == NULL || assets == NULL || grid == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "vsh_scene_layer_casters: scene, assets and grid must not be NULL");
-    }
+    VSHI_NEEDS(grid);
     *grid = NULL;
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS(assets);
     vsh_grid_options options = scene->grid;
     if (layer != NULL && (layer->voxel_size != 0.0 || layer->resolution != 0)) {
         options.voxel_size = layer->voxel_size;

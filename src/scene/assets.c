@@ -316,10 +316,9 @@ static vsh_result allocate_places(vsh_assets *assets, const vsh_scene *scene, vs
 vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
                            vsh_error *error) {
     VSHI_FLOATS;
-    if (scene == NULL || assets == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_assets_load: scene and assets must not be NULL");
-    }
+    VSHI_NEEDS(assets);
     *assets = NULL;
+    VSHI_NEEDS(scene);
     void *memory = NULL;
     vsh_result result = vshi_allocate(&memory, 1, sizeof(vsh_assets), "assets", error);
     if (result != VSH_OK) {

@@ -61,10 +61,9 @@ vsh_result vshi_scene_text(const char *path, char **text, size_t *size, vsh_erro
 
 vsh_result vsh_scene_read(const char *path, vsh_scene **scene, vsh_error *error) {
     VSHI_FLOATS;
-    if (path == NULL || scene == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_scene_read: path or scene is NULL");
-    }
+    VSHI_NEEDS(scene);
     *scene = NULL;
+    VSHI_NEEDS(path);
     char *text;
     size_t size;
     vsh_result result = vshi_scene_text(path, &text, &size, error);

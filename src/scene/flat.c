@@ -111,10 +111,9 @@ static vsh_result parse(vshi_reader *reader, owner *made) {
 
 vsh_result vsh_flat_scene_read(const char *path, vsh_flat_scene **scene, vsh_error *error) {
     VSHI_FLOATS;
-    if (path == NULL || scene == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_flat_scene_read: path or scene is NULL");
-    }
+    VSHI_NEEDS(scene);
     *scene = NULL;
+    VSHI_NEEDS(path);
     char *text;
     size_t size;
     vsh_result result = vshi_scene_text(path, &text, &size, error);
@@ -182,11 +181,9 @@ static vsh_result make_caster(const vsh_flat_caster *caster, const vsh_run *run,
 vsh_result vsh_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *run, vsh_outline **outline,
                                   vsh_error *error) {
     VSHI_FLOATS;
-    if (scene == NULL || outline == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_flat_scene_casters: %s is NULL",
-                         scene == NULL ? "scene" : "outline");
-    }
+    VSHI_NEEDS(outline);
     *outline = NULL;
+    VSHI_NEEDS(scene);
     const size_t count = scene->caster_count;
     void *memory[2] = {NULL, NULL};
     vsh_result result = vshi_allocate(&memory[0], count, sizeof(vsh_outline *), "casters", error);

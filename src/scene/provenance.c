@@ -149,11 +149,9 @@ static vsh_result fill(vsh_provenance *p, const vsh_provenance_source *source, c
 vsh_result vsh_provenance_create(const vsh_provenance_source *source, const vsh_run *run,
                                  vsh_provenance **provenance, vsh_error *error) {
     VSHI_FLOATS;
-    if (source == NULL || provenance == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "vsh_provenance_create: source and provenance must not be NULL");
-    }
+    VSHI_NEEDS(provenance);
     *provenance = NULL;
+    VSHI_NEEDS(source);
     vsh_provenance_source full = vsh_provenance_source_default();
     vsh_run settings;
     vsh_result result = vshi_options_resolve(source, &full, sizeof full, "provenance source", error);

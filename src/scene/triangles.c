@@ -10,15 +10,10 @@ static const char *const type_names[] = {"a mesh",  "an sdf", "a vdb", "a height
 
 vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
                                const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
-    if (triangles != NULL) {
-        *triangles = NULL;
-    }
-    if (scene == NULL || assets == NULL || triangles == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_scene_triangles: %s is NULL",
-                         scene == NULL    ? "scene"
-                         : assets == NULL ? "assets"
-                                          : "triangles");
-    }
+    VSHI_NEEDS(triangles);
+    *triangles = NULL;
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS(assets);
     size_t count = 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];

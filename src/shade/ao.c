@@ -104,6 +104,12 @@ vsh_result vshi_ao_check_points(const vsh_points *points, vsh_error *error) {
 vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const vsh_shade_options *options,
                         const vsh_run *run, float *ao, float *deviation, vsh_shade_stats *stats,
                         vsh_error *error) {
+    VSHI_NEEDS(field);
+    VSHI_NEEDS(points);
+    if (points->count > 0) {
+        VSHI_NEEDS(points->positions);
+        VSHI_NEEDS(ao);
+    }
     return vshi_shade_ao(field, points, NULL, options, run, ao, deviation, NULL, stats, error);
 }
 
@@ -122,6 +128,13 @@ vsh_result vsh_shade_bent(const vsh_field *field, const vsh_points *points, cons
                           const vsh_run *run, float *ao, float *bent, vsh_shade_stats *stats,
                           vsh_error *error) {
     VSHI_FLOATS;
+    VSHI_NEEDS(field);
+    VSHI_NEEDS(points);
+    if (points->count > 0) {
+        VSHI_NEEDS(points->positions);
+        VSHI_NEEDS(ao);
+        VSHI_NEEDS(bent);
+    }
     const vsh_result result = vshi_shade_ao(field, points, NULL, options, run, ao, NULL, bent, stats, error);
     for (size_t i = 0; result == VSH_OK && i < points->count; ++i) {
         vshi_ao_bend(bent + 3 * i, points->normals + 3 * i);

@@ -20,6 +20,7 @@ static void tint_one(const vsh_tint *tint, double v, double rgb[3]) {
 }
 
 vsh_result vsh_tint_check(const vsh_tint *tint, vsh_error *error) {
+    VSHI_NEEDS(tint);
     if (tint->type < VSH_TINT_NONE || tint->type > VSH_TINT_POWER) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "tint: type %d is out of range 0 … %d", tint->type,
                          VSH_TINT_POWER);

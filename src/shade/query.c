@@ -84,6 +84,12 @@ static vsh_result prepare(vsh_query *q, const vsh_field *field, const vsh_light 
 
 vsh_result vsh_query_create(const vsh_field *field, const vsh_light *lights, size_t light_count,
                             const vsh_shade_options *options, vsh_query **query, vsh_error *error) {
+    VSHI_NEEDS(query);
+    *query = NULL;
+    VSHI_NEEDS(field);
+    if (light_count > 0) {
+        VSHI_NEEDS(lights);
+    }
     return vshi_query_create(field, lights, light_count, options, false, query, error);
 }
 
@@ -388,6 +394,11 @@ static vsh_result answer(const vsh_query *query, const vshi_view *view, const vs
 vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, const vsh_run *run,
                             const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
+    VSHI_NEEDS(query);
+    VSHI_NEEDS(points);
+    if (points->count > 0) {
+        VSHI_NEEDS(points->positions);
+    }
     const vshi_view view = vshi_view_of(points);
     return answer(query, &view, points, run, output, stats, error);
 }
@@ -406,6 +417,7 @@ static vsh_result resolve_stride(const char *name, size_t unit, size_t packed, s
 vsh_result vsh_query_strided(const vsh_query *query, const vsh_strided_points *points, const vsh_run *run,
                              const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
+    VSHI_NEEDS(query);
     vsh_strided_points p = vsh_strided_points_default();
     vsh_result result = vshi_options_resolve(points, &p, sizeof p, "vsh_strided_points", error);
     if (result != VSH_OK) {

@@ -192,6 +192,12 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
 vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
                             const vsh_shade_options *options, const vsh_run *run, float *visibility,
                             float *deviation, vsh_shade_stats *stats, vsh_error *error) {
+    VSHI_NEEDS(field);
+    VSHI_NEEDS(points);
+    if (points->count > 0) {
+        VSHI_NEEDS(points->positions);
+        VSHI_NEEDS(visibility);
+    }
     return vshi_shade_shadow(field, points, NULL, light, options, run, visibility, deviation, stats, error);
 }
 

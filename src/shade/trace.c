@@ -240,8 +240,8 @@ vsh_result vsh_trace_ao(const vsh_triangles *triangles, const vsh_solids *solids
     if (result != VSH_OK) {
         return result;
     }
-    if (normals == NULL && count > 0) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_trace_ao: normals is NULL");
+    if (count > 0) {
+        VSHI_NEEDS(normals);
     }
     if (!(distance > 0.0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_trace_ao: distance %g: expected more than 0",

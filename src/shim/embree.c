@@ -276,12 +276,10 @@ static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t
 vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
                                 vsh_triangles **triangles, vsh_error *error) {
     VSHI_FLOATS;
-    if (triangles != NULL) {
-        *triangles = NULL;
-    }
-    if (triangles == NULL || (meshes == NULL && mesh_count > 0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_triangles_create: %s is NULL",
-                         triangles == NULL ? "triangles" : "meshes");
+    VSHI_NEEDS(triangles);
+    *triangles = NULL;
+    if (mesh_count > 0) {
+        VSHI_NEEDS(meshes);
     }
     vsh_run full;
     vsh_result result = vshi_run_resolve(run, &full, error);

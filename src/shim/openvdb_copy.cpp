@@ -148,6 +148,9 @@ vsh_result vshi_serve_copy(const char *path, vshi_take *request, const vsh_run *
 
 vsh_result vsh_vdb_copy(const char *path, const char *name, const int32_t index_min[3], const int32_t size[3],
                         const vsh_run *run, float *values, float *active, vsh_error *error) {
+    VSHI_NEEDS(path);
+    VSHI_NEEDS(index_min);
+    VSHI_NEEDS(size);
     vsh_run full;
     const vsh_result result = vshi_run_resolve(run, &full, error);
     if (result != VSH_OK) {

@@ -325,6 +325,7 @@ double tree_distance(void *user, const double position[3]) {
 
 vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_grid_options *options,
                                   const vsh_run *run, vsh_grid **grid, vsh_error *error) {
+    VSHI_NEEDS(grid);
     *grid = nullptr;
     return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize",
                        [&] { return vshi::from_distance(field, options, run, grid, error); });
@@ -333,6 +334,7 @@ vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_grid_opti
 vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options *options, const vsh_run *run,
                              vsh_grid **grid, vsh_error *error) {
     VSHI_FLOATS;
+    VSHI_NEEDS(grid);
     *grid = nullptr;
     const vsh_result result = vsh_sdf_check(sdf, error);
     if (result != VSH_OK) {

@@ -207,6 +207,7 @@ vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_option
 
 vsh_result vsh_grid_from_meshes(const vsh_mesh *meshes, size_t mesh_count, const vsh_grid_options *options,
                                 const vsh_run *run, vsh_grid **grid, vsh_error *error) {
+    VSHI_NEEDS(grid);
     *grid = nullptr;
     return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize",
                        [&] { return vshi::from_meshes(meshes, mesh_count, options, run, grid, error); });

@@ -185,14 +185,21 @@ vsh_result vshi_serve_list(const char *path, vshi_take *request, const vsh_run *
 
 vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run, vsh_grid **grid,
                          vsh_error *error) {
+    VSHI_NEEDS(grid);
     *grid = nullptr;
+    VSHI_NEEDS(path);
     return vshi::call(run, path, error,
                       [&](const vsh_run &full) { return vshi::read(path, name, full, grid, error); });
 }
 
 vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,
                         size_t *count, vsh_error *error) {
+    VSHI_NEEDS(count);
     *count = 0;
+    VSHI_NEEDS(path);
+    if (capacity > 0) {
+        VSHI_NEEDS(entries);
+    }
     return vshi::call(run, path, error, [&](const vsh_run &full) {
         return vshi::list(path, full, entries, capacity, count, error);
     });

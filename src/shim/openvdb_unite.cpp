@@ -329,6 +329,7 @@ vsh_result unite(const vsh_grid_instance *instances, size_t count, const vsh_gri
 vsh_result vsh_grid_unite(const vsh_grid_instance *instances, size_t instance_count,
                           const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
                           vsh_error *error) {
+    VSHI_NEEDS(grid);
     *grid = nullptr;
     return vshi::guard(error, VSH_ERROR_INTERNAL, "unite",
                        [&] { return vshi::unite(instances, instance_count, options, run, grid, error); });

@@ -199,6 +199,11 @@ void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vsh_volume_grid 
 
 vsh_result vsh_volume_sample(const vsh_volume *volume, size_t grid, size_t count, const double *positions,
                              float *values, vsh_error *error) {
+    VSHI_NEEDS(volume);
+    if (count > 0) {
+        VSHI_NEEDS(positions);
+        VSHI_NEEDS(values);
+    }
     return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&]() -> vsh_result {
         const vshi::FloatTree &tree = *vshi::channel_of(*volume, grid, error).tree;
         const openvdb::tree::ValueAccessor<const vshi::FloatTree> at(tree);
@@ -219,6 +224,10 @@ vsh_result vsh_volume_sample(const vsh_volume *volume, size_t grid, size_t count
 
 vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const int32_t index_min[3],
                            const int32_t size[3], float *values, vsh_error *error) {
+    VSHI_NEEDS(volume);
+    VSHI_NEEDS(index_min);
+    VSHI_NEEDS(size);
+    VSHI_NEEDS(values);
     return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&]() -> vsh_result {
         const vshi::FloatTree &tree = *vshi::channel_of(*volume, grid, error).tree;
         for (int axis = 0; axis < 3; ++axis) {
@@ -241,6 +250,7 @@ vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t 
 
 vsh_result vsh_volume_write_with(const vsh_volume *volume, const char *path, int32_t as_half,
                                  const vsh_attribute *attributes, size_t attribute_count, vsh_error *error) {
+    VSHI_NEEDS(volume);
     return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
         vshi::initialize();
         vsh_result result = vshi_attributes_check(path, attributes, attribute_count, error);

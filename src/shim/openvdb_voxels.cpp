@@ -347,12 +347,19 @@ vsh_result call(const vsh_run *run, vsh_result code, const char *what, vsh_voxel
 
 vsh_result vsh_voxels_from_grid(const vsh_grid *grid, double band, const vsh_run *run, vsh_voxels **voxels,
                                 vsh_error *error) {
+    VSHI_NEEDS(voxels);
+    *voxels = nullptr;
+    VSHI_NEEDS(grid);
     return vshi::call(run, VSH_ERROR_INTERNAL, "band", voxels, error,
                       [&](const vsh_run &full) { return vshi::from_grid(*grid, band, full, error); });
 }
 
 vsh_result vsh_voxels_from_box(const double box_min[3], const double box_max[3], double voxel_size,
                                const vsh_run *run, vsh_voxels **voxels, vsh_error *error) {
+    VSHI_NEEDS(voxels);
+    *voxels = nullptr;
+    VSHI_NEEDS(box_min);
+    VSHI_NEEDS(box_max);
     return vshi::call(run, VSH_ERROR_INTERNAL, "box", voxels, error, [&](const vsh_run &full) {
         return vshi::from_box(box_min, box_max, voxel_size, full, error);
     });
@@ -360,6 +367,9 @@ vsh_result vsh_voxels_from_box(const double box_min[3], const double box_max[3],
 
 vsh_result vsh_voxels_from_vdb(const char *path, const char *name, const vsh_run *run, vsh_voxels **voxels,
                                vsh_error *error) {
+    VSHI_NEEDS(voxels);
+    *voxels = nullptr;
+    VSHI_NEEDS(path);
     return vshi::call(run, VSH_ERROR_READ, path, voxels, error,
                       [&](const vsh_run &full) { return vshi::from_vdb(path, name, full, error); });
 }

@@ -195,6 +195,7 @@ vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *na
 
 vsh_result vsh_grid_write_with(const vsh_grid *grid, const char *path, const char *name,
                                const vsh_attribute *attributes, size_t attribute_count, vsh_error *error) {
+    VSHI_NEEDS(grid);
     return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
         vshi::initialize();
         vsh_result result = vshi_attributes_check(path, attributes, attribute_count, error);

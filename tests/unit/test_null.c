@@ -1,0 +1,284 @@
+/* Every call that returns a code refuses NULL where it needs something else, says so, and leaves NULL in the
+ * place of a handle. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include <vdbshade/vdbshade.h>
+
+enum { SIDE = 4, COUNT = SIDE * SIDE };
+
+static vsh_error error;
+static void *made;
+
+static void expect_refused(const char *call, vsh_result result) {
+    if (result != VSH_ERROR_ARGUMENT || error.message[0] == '\0' || made != NULL) {
+        fail_msg("%s: %s%s", call, vsh_result_name(result),
+                 made != NULL ? ", and its place is as it was" : "");
+    }
+    error.message[0] = '\0';
+}
+
+/* A call that makes no handle. */
+#define REFUSED(call) (made = NULL, expect_refused(#call, (call)))
+
+/* One that would make a handle in PLACE, which holds something else before. */
+#define MAKES_NONE(call) (made = &error, expect_refused(#call, (call)))
+#define PLACE (void *)&made
+
+static double far_away(void *user, const double position[3]) {
+    (void)user;
+    return position[0];
+}
+
+static void casters_are_not_made_of_nothing(void **state) {
+    (void)state;
+    const double square[8] = {-1, -1, 1, -1, 1, 1, -1, 1},
+                 transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    const size_t corners = 4;
+    const vsh_grid_instance instance = {NULL, transform};
+    const vsh_outline_instance none = {NULL, transform};
+    vsh_distance distance = {0};
+    const vsh_mesh mesh = {.name = "empty", .vertex_count = 3, .triangle_count = 1};
+    vsh_mesh_report report;
+    vsh_heights_source heights = {.columns = 2, .rows = 2, .size = {1, 1}, .height = 1};
+    size_t count;
+    MAKES_NONE(vsh_grid_from_meshes(NULL, 1, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_grid_from_meshes(&mesh, 1, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_grid_from_meshes(&mesh, 1, NULL, NULL, NULL, &error));
+    MAKES_NONE(vsh_grid_from_sdf(NULL, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_grid_from_sdf(NULL, NULL, NULL, NULL, &error));
+    REFUSED(vsh_sdf_check(NULL, &error));
+    MAKES_NONE(vsh_grid_from_distance(NULL, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_grid_from_distance(&distance, NULL, NULL, PLACE, &error));
+    distance.distance = far_away;
+    REFUSED(vsh_grid_from_distance(&distance, NULL, NULL, NULL, &error));
+    MAKES_NONE(vsh_grid_unite(NULL, 1, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_grid_unite(&instance, 1, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_grid_unite(&instance, 1, NULL, NULL, NULL, &error));
+    MAKES_NONE(vsh_grid_from_outline(NULL, 1.0, NULL, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_mesh_check(NULL, &report, &error));
+    REFUSED(vsh_mesh_check(&mesh, NULL, &error));
+    MAKES_NONE(vsh_model_read(NULL, NULL, PLACE, &error));
+    REFUSED(vsh_model_read("a.obj", NULL, NULL, &error));
+    MAKES_NONE(vsh_model_from_heights(NULL, 0, NULL, PLACE, &error));
+    MAKES_NONE(vsh_model_from_heights(&heights, 0, NULL, PLACE, &error));
+    REFUSED(vsh_model_from_heights(&heights, 0, NULL, NULL, &error));
+    MAKES_NONE(vsh_heights_create(NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_heights_create(&heights, NULL, PLACE, &error));
+    REFUSED(vsh_heights_create(&heights, NULL, NULL, &error));
+    MAKES_NONE(vsh_spheres_create(NULL, 1, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_spheres_create(square, 1, NULL, NULL, NULL, &error));
+    MAKES_NONE(vsh_spheres_read(NULL, NULL, PLACE, &count, &error));
+    MAKES_NONE(vsh_spheres_read("a.csv", NULL, PLACE, NULL, &error));
+    REFUSED(vsh_spheres_read("a.csv", NULL, NULL, &count, &error));
+    MAKES_NONE(vsh_solids_create(NULL, NULL, 1, PLACE, &error));
+    REFUSED(vsh_solids_create(NULL, NULL, 1, NULL, &error));
+    MAKES_NONE(vsh_triangles_create(NULL, 1, NULL, PLACE, &error));
+    REFUSED(vsh_triangles_create(&mesh, 1, NULL, NULL, &error));
+    MAKES_NONE(vsh_outline_from_polygons(NULL, &corners, 1, NULL, PLACE, &error));
+    MAKES_NONE(vsh_outline_from_polygons(square, NULL, 1, NULL, PLACE, &error));
+    REFUSED(vsh_outline_from_polygons(square, &corners, 1, NULL, NULL, &error));
+    MAKES_NONE(vsh_outline_unite(NULL, 1, NULL, PLACE, &error));
+    MAKES_NONE(vsh_outline_unite(&none, 1, NULL, PLACE, &error));
+    REFUSED(vsh_outline_unite(&none, 1, NULL, NULL, &error));
+    MAKES_NONE(vsh_outline_from_text(NULL, "a.ttf", NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_outline_from_text("a", NULL, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_outline_from_text("a", "a.ttf", NULL, NULL, NULL, &error));
+    MAKES_NONE(vsh_outline_from_image(NULL, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_outline_from_image("a.png", NULL, NULL, NULL, &error));
+}
+
+static void files_have_paths_and_places(void **state) {
+    (void)state;
+    const int32_t low[3] = {0, 0, 0}, size[3] = {1, 1, 1};
+    vsh_vdb_entry entry;
+    size_t count;
+    float value;
+    char digest[VSH_DIGEST_TEXT];
+    const char *const name = "ao";
+    const vsh_image unnamed = {1, 1, 1, NULL, NULL}, empty = {1, 1, 1, &name, NULL};
+    MAKES_NONE(vsh_grid_read(NULL, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_grid_read("a.vdb", NULL, NULL, NULL, &error));
+    REFUSED(vsh_grid_write(NULL, "a.vdb", NULL, &error));
+    REFUSED(vsh_grid_write_with(NULL, "a.vdb", NULL, NULL, 0, &error));
+    REFUSED(vsh_vdb_list(NULL, NULL, &entry, 1, &count, &error));
+    REFUSED(vsh_vdb_list("a.vdb", NULL, NULL, 1, &count, &error));
+    REFUSED(vsh_vdb_list("a.vdb", NULL, &entry, 1, NULL, &error));
+    REFUSED(vsh_vdb_copy(NULL, NULL, low, size, NULL, &value, NULL, &error));
+    REFUSED(vsh_vdb_copy("a.vdb", NULL, NULL, size, NULL, &value, NULL, &error));
+    REFUSED(vsh_vdb_copy("a.vdb", NULL, low, NULL, NULL, &value, NULL, &error));
+    MAKES_NONE(vsh_voxels_from_vdb(NULL, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_voxels_from_vdb("a.vdb", NULL, NULL, NULL, &error));
+    REFUSED(vsh_volume_write(NULL, "a.vdb", 0, &error));
+    MAKES_NONE(vsh_scene_read(NULL, PLACE, &error));
+    REFUSED(vsh_scene_read("a.json", NULL, &error));
+    MAKES_NONE(vsh_flat_scene_read(NULL, PLACE, &error));
+    REFUSED(vsh_flat_scene_read("a.json", NULL, &error));
+    MAKES_NONE(vsh_tolerances_read(NULL, PLACE, &error));
+    REFUSED(vsh_tolerances_read("a.json", NULL, &error));
+    REFUSED(vsh_file_digest(NULL, digest, &error));
+    MAKES_NONE(vsh_image_read(NULL, PLACE, &error));
+    REFUSED(vsh_image_read("a.exr", NULL, &error));
+    REFUSED(vsh_image_write(NULL, &empty, NULL, &error));
+    REFUSED(vsh_image_write("a.exr", NULL, NULL, &error));
+    REFUSED(vsh_image_write("a.exr", &unnamed, NULL, &error));
+    REFUSED(vsh_image_write("a.exr", &empty, NULL, &error));
+    MAKES_NONE(vsh_image_writer_create("a.exr", NULL, NULL, PLACE, &error));
+    REFUSED(vsh_image_writer_create("a.exr", &empty, NULL, NULL, &error));
+    REFUSED(vsh_image_check("a.exr", NULL, NULL, &error));
+}
+
+static void scenes_are_not_made_of_nothing(void **state) {
+    (void)state;
+    const vsh_scene scene = {0};
+    MAKES_NONE(vsh_assets_load(NULL, NULL, PLACE, &error));
+    REFUSED(vsh_assets_load(&scene, NULL, NULL, &error));
+    MAKES_NONE(vsh_scene_casters(NULL, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_scene_casters(&scene, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_scene_layer_casters(&scene, NULL, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_scene_triangles(&scene, NULL, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_flat_scene_casters(NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_provenance_create(NULL, NULL, PLACE, &error));
+}
+
+static void nothing_is_shaded_without_what_it_takes(void **state) {
+    (void)state;
+    vsh_field *field = NULL;
+    assert_int_equal(vsh_field_create_empty(1.0, &field, &error), VSH_OK);
+    const vsh_light light = vsh_light_default();
+    const double positions[3] = {0, 0, 0};
+    const float normals[3] = {0, 1, 0};
+    const vsh_points points = {1, positions, normals, NULL}, nowhere = {1, NULL, normals, NULL},
+                     turned = {1, positions, NULL, NULL};
+    float value, direction[3];
+    REFUSED(vsh_light_check(NULL, &error));
+    REFUSED(vsh_tint_check(NULL, &error));
+    MAKES_NONE(vsh_field_create(NULL, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_field_create_empty(1.0, NULL, &error));
+    REFUSED(vsh_shade_shadow(NULL, &points, &light, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_shadow(field, NULL, &light, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_shadow(field, &nowhere, &light, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_shadow(field, &points, NULL, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_shadow(field, &points, &light, NULL, NULL, NULL, NULL, NULL, &error));
+    REFUSED(vsh_shade_ao(NULL, &points, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_ao(field, NULL, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_ao(field, &nowhere, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_ao(field, &turned, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_ao(field, &points, NULL, NULL, NULL, NULL, NULL, &error));
+    REFUSED(vsh_shade_bent(NULL, &points, NULL, NULL, &value, direction, NULL, &error));
+    REFUSED(vsh_shade_bent(field, &points, NULL, NULL, NULL, direction, NULL, &error));
+    REFUSED(vsh_shade_bent(field, &points, NULL, NULL, &value, NULL, NULL, &error));
+    MAKES_NONE(vsh_query_create(NULL, &light, 1, NULL, PLACE, &error));
+    MAKES_NONE(vsh_query_create(field, NULL, 1, NULL, PLACE, &error));
+    REFUSED(vsh_query_create(field, &light, 1, NULL, NULL, &error));
+    vsh_query *query = NULL;
+    assert_int_equal(vsh_query_create(field, &light, 1, NULL, &query, &error), VSH_OK);
+    const vsh_query_output output = vsh_query_output_default();
+    vsh_strided_points strided = vsh_strided_points_default();
+    strided.count = 1;
+    REFUSED(vsh_query_points(NULL, &points, NULL, &output, NULL, &error));
+    REFUSED(vsh_query_points(query, NULL, NULL, &output, NULL, &error));
+    REFUSED(vsh_query_points(query, &nowhere, NULL, &output, NULL, &error));
+    REFUSED(vsh_query_strided(NULL, &strided, NULL, &output, NULL, &error));
+    REFUSED(vsh_query_strided(query, &strided, NULL, &output, NULL, &error));
+    vsh_query_free(query);
+    REFUSED(vsh_trace_shadow(NULL, NULL, 1, positions, normals, 0.0, &light, 1, NULL, &value, &error));
+    REFUSED(vsh_trace_ao(NULL, NULL, 1, positions, normals, 0.0, 1.0, 1, NULL, &value, &error));
+    vsh_field_free(field);
+}
+
+static void nothing_is_baked_without_what_it_takes(void **state) {
+    (void)state;
+    vsh_field *field = NULL;
+    vsh_voxels *voxels = NULL;
+    vsh_volume *volume = NULL;
+    const double low[3] = {0, 0, 0}, high[3] = {1, 1, 1};
+    const int32_t index[3] = {0, 0, 0}, size[3] = {1, 1, 1};
+    const vsh_light light = vsh_light_default();
+    const vsh_lightmap lightmap = {0};
+    const vsh_flat_map flat = {NULL, NULL, NULL};
+    vsh_flat_options plane = vsh_flat_options_default();
+    plane.width = plane.height = SIDE;
+    float values[COUNT];
+    double bounds[3];
+    const vsh_mesh mesh = {.name = "none", .vertex_count = 3, .triangle_count = 1};
+    assert_int_equal(vsh_field_create_empty(1.0, &field, &error), VSH_OK);
+    assert_int_equal(vsh_voxels_from_box(low, high, 0.5, NULL, &voxels, &error), VSH_OK);
+    assert_int_equal(vsh_bake_volume(field, voxels, &light, 1, NULL, NULL, &volume, NULL, &error), VSH_OK);
+    MAKES_NONE(vsh_texels_create(NULL, 1, NULL, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_texels_create(&mesh, 1, NULL, NULL, NULL, NULL, &error));
+    MAKES_NONE(vsh_charts_create(NULL, 1, NULL, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_charts_create(&mesh, 1, NULL, NULL, NULL, NULL, &error));
+    REFUSED(vsh_charts_bounds(NULL, NULL, bounds, bounds, &error));
+    MAKES_NONE(vsh_texels_create_band(NULL, 0, 1, NULL, PLACE, &error));
+    REFUSED(vsh_bake_lightmap(field, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));
+    REFUSED(vsh_bake_lightmap(NULL, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));
+    REFUSED(vsh_flat_bake(NULL, NULL, 1, &plane, NULL, &flat, &error));
+    REFUSED(vsh_flat_bake(NULL, &light, 1, &plane, NULL, NULL, &error));
+    MAKES_NONE(vsh_voxels_from_grid(NULL, 1.0, NULL, PLACE, &error));
+    MAKES_NONE(vsh_voxels_from_box(NULL, high, 0.5, NULL, PLACE, &error));
+    MAKES_NONE(vsh_voxels_from_box(low, NULL, 0.5, NULL, PLACE, &error));
+    REFUSED(vsh_voxels_from_box(low, high, 0.5, NULL, NULL, &error));
+    MAKES_NONE(vsh_bake_volume(NULL, voxels, &light, 1, NULL, NULL, PLACE, NULL, &error));
+    MAKES_NONE(vsh_bake_volume(field, NULL, &light, 1, NULL, NULL, PLACE, NULL, &error));
+    MAKES_NONE(vsh_bake_volume(field, voxels, NULL, 1, NULL, NULL, PLACE, NULL, &error));
+    REFUSED(vsh_bake_volume(field, voxels, &light, 1, NULL, NULL, NULL, NULL, &error));
+    REFUSED(vsh_volume_sample(NULL, 0, 1, low, values, &error));
+    REFUSED(vsh_volume_sample(volume, 0, 1, NULL, values, &error));
+    REFUSED(vsh_volume_sample(volume, 0, 1, low, NULL, &error));
+    REFUSED(vsh_volume_copy(NULL, 0, index, size, values, &error));
+    REFUSED(vsh_volume_copy(volume, 0, NULL, size, values, &error));
+    REFUSED(vsh_volume_copy(volume, 0, index, NULL, values, &error));
+    REFUSED(vsh_volume_copy(volume, 0, index, size, NULL, &error));
+    vsh_volume_free(volume);
+    vsh_voxels_free(voxels);
+    vsh_field_free(field);
+}
+
+static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
+    (void)state;
+    vsh_field *field = NULL;
+    assert_int_equal(vsh_field_create_empty(1.0, &field, &error), VSH_OK);
+    const vsh_surface nothing = {NULL, {0.5, 0.5, 0.5}};
+    const vsh_light light = vsh_light_default();
+    vsh_render_options options = vsh_render_options_default();
+    options.width = options.height = SIDE;
+    float color[3 * COUNT], depth[COUNT], alpha[COUNT], normal[3 * COUNT];
+    const vsh_picture picture = {color, depth, alpha, normal}, none = {NULL, NULL, NULL, NULL};
+    float *const rgb[3] = {depth, depth, depth}, *const no_green[3] = {depth, NULL, depth};
+    const double bounds[3] = {0, 0, 0};
+    vsh_measures measures;
+    const vsh_compared compared = {0};
+    REFUSED(vsh_render(NULL, 1, field, &light, 1, &options, NULL, &picture, NULL, &error));
+    REFUSED(vsh_render(&nothing, 1, field, &light, 1, &options, NULL, &picture, NULL, &error));
+    REFUSED(vsh_render(NULL, 0, NULL, &light, 1, &options, NULL, &picture, NULL, &error));
+    REFUSED(vsh_render(NULL, 0, field, NULL, 1, &options, NULL, &picture, NULL, &error));
+    REFUSED(vsh_render(NULL, 0, field, &light, 1, &options, NULL, NULL, NULL, &error));
+    REFUSED(vsh_camera_check(NULL, &error));
+    REFUSED(vsh_camera_frame(NULL, bounds, bounds, 0.0, 0.0, 1.0, &error));
+    REFUSED(vsh_camera_frame(&options.camera, NULL, bounds, 0.0, 0.0, 1.0, &error));
+    REFUSED(vsh_camera_frame(&options.camera, bounds, NULL, 0.0, 0.0, 1.0, &error));
+    REFUSED(vsh_picture_encode(NULL, SIDE, SIDE, 1.0, rgb, NULL, &error));
+    REFUSED(vsh_picture_encode(&none, SIDE, SIDE, 1.0, rgb, NULL, &error));
+    REFUSED(vsh_picture_encode(&picture, SIDE, SIDE, 1.0, NULL, NULL, &error));
+    REFUSED(vsh_picture_encode(&picture, SIDE, SIDE, 1.0, no_green, NULL, &error));
+    REFUSED(vsh_compare(NULL, NULL, NULL, &measures, &error));
+    REFUSED(vsh_compare(&compared, NULL, NULL, NULL, &error));
+    vsh_field_free(field);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(casters_are_not_made_of_nothing),
+        cmocka_unit_test(files_have_paths_and_places),
+        cmocka_unit_test(scenes_are_not_made_of_nothing),
+        cmocka_unit_test(nothing_is_shaded_without_what_it_takes),
+        cmocka_unit_test(nothing_is_baked_without_what_it_takes),
+        cmocka_unit_test(nothing_is_drawn_or_compared_without_what_it_takes),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
