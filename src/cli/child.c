@@ -12,7 +12,20 @@
 #include <time.h>
 #include <unistd.h>
 
-int cli_in_child(const char *what, int (*work)(void *user), void *user) {
+/* Between fork and exec: the threads of the libraries are not there, whatever they were in the middle of. */
+static void become(const char *folder, char **words, pid_t parent) {
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != parent) {
+        _exit(CLI_INTERRUPTED);
+    }
+    if (chdir(folder) == 0) {
+        execv("/proc/self/exe", words);
+    }
+    static const char text[] = "vdbshade: a process of its own cannot be begun\n";
+    _exit(write(STDERR_FILENO, text, sizeof text - 1) > 0 ? CLI_FILE : CLI_DEFECT);
+}
+
+int cli_in_child(const char *what, const char *folder, char **words) {
     fflush(NULL);
     const pid_t parent = getpid();
     const pid_t child = fork();
@@ -21,13 +34,7 @@ int cli_in_child(const char *what, int (*work)(void *user), void *user) {
         return CLI_LIMIT;
     }
     if (child == 0) {
-        prctl(PR_SET_PDEATHSIG, SIGKILL);
-        if (getppid() != parent) {
-            _exit(CLI_INTERRUPTED);
-        }
-        const int code = work(user);
-        const int flushed = fflush(NULL);
-        _exit(flushed == 0 ? code : CLI_FILE);
+        become(folder, words, parent);
     }
     int status = 0;
     while (waitpid(child, &status, WNOHANG) != child) {

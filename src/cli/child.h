@@ -1,9 +1,9 @@
-/* Work in a child process of this program. */
+/* This program in a child process. */
 #ifndef CLI_CHILD_H
 #define CLI_CHILD_H
 
-/* Runs `work` in a child and returns its exit code. Where the child dies instead, says so of `what` and
- * returns CLI_DEFECT. To be called while the process has no threads that hold locks. */
-int cli_in_child(const char *what, int (*work)(void *user), void *user);
+/* Runs it in `folder` by the command line `words`, NULL behind the last, and returns its exit code. Where the
+ * child dies instead, says so of `what` and returns CLI_DEFECT. */
+int cli_in_child(const char *what, const char *folder, char **words);
 
 #endif

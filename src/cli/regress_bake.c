@@ -13,29 +13,11 @@
 
 enum { MOST_WORDS = 1024 };
 
-typedef struct child {
-    const regress_work *work;
-    const regress_case *one;
-    char *words[MOST_WORDS];
-    int count;
-} child;
-
-/* In the folder of the scenes, which the files in options are relative to. */
-static int run_child(void *user) {
-    child *c = user;
-    if (chdir(c->work->folder) != 0) {
-        cli_say("%s: %s", c->work->folder, strerror(errno));
-        return CLI_FILE;
-    }
-    return c->one->command->main(c->count, c->words);
-}
-
 int regress_bake(const regress_work *work, const regress_case *one) {
     const cli_common *common = &work->settings->compare.common;
     char threads[32], memory[48];
     snprintf(threads, sizeof threads, "%d", common->threads);
     snprintf(memory, sizeof memory, "%llu", (unsigned long long)common->memory_limit);
-    child c = {.work = work, .one = one};
     if (one->options.count > MOST_WORDS - 16) {
         return cli_usage("%s: '%s' has more than %d options", work->folder, one->name, MOST_WORDS - 16);
     }
@@ -43,29 +25,34 @@ int regress_bake(const regress_work *work, const regress_case *one) {
     if (one->output != NULL && output == NULL) {
         return cli_out_of_memory(work->folder);
     }
-    /* words of their own: getopt_long() takes them as what may be written to */
-    char name[32], file[] = "--output", folder[] = "--output-folder", quiet[] = "--quiet";
+    /* arrays: words of a command line may be written to */
+    char program[] = "vdbshade", name[32], file[] = "--output", folder[] = "--output-folder",
+         quiet[] = "--quiet";
     char limit[] = "--memory-limit", pool[] = "--threads", trusted[] = "--trusted";
     snprintf(name, sizeof name, "%s", one->command->name);
-    c.words[c.count++] = name;
-    c.words[c.count++] = one->scene;
+    char *words[MOST_WORDS];
+    size_t count = 0;
+    words[count++] = program;
+    words[count++] = name;
+    words[count++] = one->scene;
     for (size_t i = 0; i < one->options.count; ++i) {
-        c.words[c.count++] = one->options.line[i];
+        words[count++] = one->options.line[i];
     }
-    c.words[c.count++] = output != NULL ? file : folder;
-    c.words[c.count++] = output != NULL ? output : work->bakes;
-    c.words[c.count++] = quiet;
-    c.words[c.count++] = limit;
-    c.words[c.count++] = memory;
+    words[count++] = output != NULL ? file : folder;
+    words[count++] = output != NULL ? output : work->bakes;
+    words[count++] = quiet;
+    words[count++] = limit;
+    words[count++] = memory;
     if (common->threads > 0) {
-        c.words[c.count++] = pool;
-        c.words[c.count++] = threads;
+        words[count++] = pool;
+        words[count++] = threads;
     }
     if (common->trusted) {
-        c.words[c.count++] = trusted;
+        words[count++] = trusted;
     }
-    c.words[c.count] = NULL;
-    const int code = cli_in_child(one->scene, run_child, &c);
+    words[count] = NULL;
+    /* in the folder of the scenes, which the files in options are relative to */
+    const int code = cli_in_child(one->scene, work->folder, words);
     free(output);
     return code;
 }
