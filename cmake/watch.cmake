@@ -103,6 +103,7 @@ endfunction()
 function(vsh_add_cli_test name file)
   set(environment "ASSETS=${PROJECT_SOURCE_DIR}/assets" "DOCS=${PROJECT_SOURCE_DIR}/docs" "CC=${CMAKE_C_COMPILER}")
   add_test(NAME cli_${name} COMMAND ${VSH_BATS} ${file})
+  set(flags "")
   if(VSH_SANITIZE)
     set(flags "-fsanitize=${VSH_SANITIZE}")
     if(CMAKE_C_COMPILER_ID MATCHES Clang) # see cmake/flags.cmake

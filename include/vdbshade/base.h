@@ -6,9 +6,9 @@
  *   vsh_result and fills the caller's vsh_error.
  * - Every function may be called by several threads at once. Handles are immutable once made and may be
  *   shared by threads; each is freed once, when no call uses it any more.
- * - Pointers must not be NULL but where that is said, and for parameters named options, run, stats or error;
- *   arrays of none may be. A call that returns a vsh_result refuses them with VSH_ERROR_ARGUMENT. NULL
- * options and a NULL run stand for what their …_default() function gives.
+ * - Pointers must not be NULL but where that is said, for arrays of no elements, and for parameters named
+ *   options, run, stats or error: NULL options and a NULL run stand for what their …_default() gives. A call
+ *   that returns a vsh_result answers any other NULL with VSH_ERROR_ARGUMENT, and says which it is.
  * - Arrays and structs that are passed in stay the caller's and are not used after the call.
  * - A call that makes a handle leaves NULL in its place where it fails.
  * - Structs that begin with struct_size are filled by their …_default() or …_zero() function; programs that

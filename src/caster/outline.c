@@ -199,8 +199,10 @@ vsh_result vsh_outline_from_polygons(const double *points, const size_t *counts,
     VSHI_FLOATS;
     VSHI_NEEDS(outline);
     *outline = NULL;
-    VSHI_NEEDS(points);
-    VSHI_NEEDS(counts);
+    if (contour_count > 0) {
+        VSHI_NEEDS(points);
+        VSHI_NEEDS(counts);
+    }
     vsh_run full;
     const vsh_result result = vshi_run_resolve(run, &full, error);
     if (result != VSH_OK) {
