@@ -262,9 +262,7 @@ vsh_result vsh_spheres_create(const double *spheres, size_t count, const double 
     VSHI_FLOATS;
     VSHI_NEEDS(made);
     *made = NULL;
-    if (count > 0) {
-        VSHI_NEEDS(spheres);
-    }
+    VSHI_NEEDS_OF(count, spheres);
     vsh_run full;
     double scale = 1.0;
     void *memory = NULL;

@@ -255,9 +255,7 @@ vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count, const vs
     VSHI_FLOATS;
     VSHI_NEEDS(charts);
     *charts = NULL;
-    if (mesh_count > 0) {
-        VSHI_NEEDS(meshes);
-    }
+    VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full;
     const vsh_result result = vshi_run_resolve(run, &full, error);
     return result == VSH_OK

@@ -419,9 +419,7 @@ vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, c
     VSHI_NEEDS(field);
     VSHI_NEEDS(texels);
     VSHI_NEEDS(lightmap);
-    if (light_count > 0) {
-        VSHI_NEEDS(lights);
-    }
+    VSHI_NEEDS_OF(light_count, lights);
     baking bake = {.field = field,
                    .texels = texels,
                    .lights = lights,

@@ -281,9 +281,7 @@ vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count, const vs
     VSHI_FLOATS;
     VSHI_NEEDS(texels);
     *texels = NULL;
-    if (mesh_count > 0) {
-        VSHI_NEEDS(meshes);
-    }
+    VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full;
     vsh_result result = vshi_run_resolve(run, &full, error);
     if (result != VSH_OK) {

@@ -176,9 +176,7 @@ vsh_result vsh_bake_volume(const vsh_field *field, const vsh_voxels *voxels, con
     *volume = NULL;
     VSHI_NEEDS(field);
     VSHI_NEEDS(voxels);
-    if (light_count > 0) {
-        VSHI_NEEDS(lights);
-    }
+    VSHI_NEEDS_OF(light_count, lights);
     vsh_run full;
     vshi_volume_bake bake = {.field = field,
                              .voxels = voxels,

@@ -39,7 +39,9 @@ static vsh_result digest_file(int file, const char *path, char *digest, vsh_erro
 }
 
 vsh_result vsh_file_digest(const char *path, char digest[VSH_DIGEST_TEXT], vsh_error *error) {
-    if (path == NULL || path[0] == '\0') {
+    VSHI_NEEDS(path);
+    VSHI_NEEDS(digest);
+    if (path[0] == '\0') {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "digest: no path");
     }
     const int file = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK); /* a pipe would wait for its writer */

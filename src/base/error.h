@@ -23,6 +23,14 @@ vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...)
         }                                                                                                    \
     } while (0)
 
+/* The same of an array of `count`, which may be NULL where that is 0. */
+#define VSHI_NEEDS_OF(count, array)                                                                          \
+    do {                                                                                                     \
+        if ((count) > 0) {                                                                                   \
+            VSHI_NEEDS(array);                                                                               \
+        }                                                                                                    \
+    } while (0)
+
 /* Control characters become '?'. */
 void vshi_one_line(char *text);
 

@@ -199,10 +199,8 @@ vsh_result vsh_outline_from_polygons(const double *points, const size_t *counts,
     VSHI_FLOATS;
     VSHI_NEEDS(outline);
     *outline = NULL;
-    if (contour_count > 0) {
-        VSHI_NEEDS(points);
-        VSHI_NEEDS(counts);
-    }
+    VSHI_NEEDS_OF(contour_count, points);
+    VSHI_NEEDS_OF(contour_count, counts);
     vsh_run full;
     const vsh_result result = vshi_run_resolve(run, &full, error);
     if (result != VSH_OK) {

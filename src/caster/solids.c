@@ -150,9 +150,7 @@ vsh_result vsh_solids_create(const vsh_sdf *sdfs, const double *transforms, size
     VSHI_FLOATS;
     VSHI_NEEDS(solids);
     *solids = NULL;
-    if (count > 0) {
-        VSHI_NEEDS(sdfs);
-    }
+    VSHI_NEEDS_OF(count, sdfs);
     static const double identity[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
     size_t nodes;
     vsh_result result = check(sdfs, transforms, count, &nodes, error);

@@ -41,11 +41,14 @@ int cli_in_child(const char *what, const char *folder, char **words) {
         if (cli_interrupted()) {
             kill(child, SIGKILL);
             waitpid(child, &status, 0);
-            const vsh_error cancelled = {VSH_ERROR_CANCELLED, ""};
-            return cli_fail(&cancelled);
+            break;
         }
         const struct timespec pause = {0, 2000000};
         nanosleep(&pause, NULL);
+    }
+    if (cli_interrupted()) { /* as the child was, maybe before it could take a signal */
+        const vsh_error cancelled = {VSH_ERROR_CANCELLED, ""};
+        return cli_fail(&cancelled);
     }
     if (WIFEXITED(status)) {
         return WEXITSTATUS(status);

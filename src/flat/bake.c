@@ -256,9 +256,7 @@ vsh_result vsh_flat_bake(const vsh_outline *casters, const vsh_light *lights, si
                          vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(map);
-    if (light_count > 0) {
-        VSHI_NEEDS(lights);
-    }
+    VSHI_NEEDS_OF(light_count, lights);
     bake b = {.casters = casters,
               .lights = lights,
               .light_count = light_count,

@@ -262,9 +262,7 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     vsh_shade_stats own = vsh_shade_stats_zero();
     VSHI_NEEDS(picture);
     VSHI_NEEDS(field);
-    if (light_count > 0) {
-        VSHI_NEEDS(lights);
-    }
+    VSHI_NEEDS_OF(light_count, lights);
     vsh_result result = vshi_options_resolve(options, &o, sizeof o, "vsh_render_options", error);
     result = result == VSH_OK ? vshi_run_resolve(run, &r.scenery.run, error) : result;
     result = result == VSH_OK ? check_options(&o, light_count, error) : result;

@@ -106,10 +106,8 @@ vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const 
                         vsh_error *error) {
     VSHI_NEEDS(field);
     VSHI_NEEDS(points);
-    if (points->count > 0) {
-        VSHI_NEEDS(points->positions);
-        VSHI_NEEDS(ao);
-    }
+    VSHI_NEEDS_OF(points->count, points->positions);
+    VSHI_NEEDS_OF(points->count, ao);
     return vshi_shade_ao(field, points, NULL, options, run, ao, deviation, NULL, stats, error);
 }
 
@@ -130,11 +128,9 @@ vsh_result vsh_shade_bent(const vsh_field *field, const vsh_points *points, cons
     VSHI_FLOATS;
     VSHI_NEEDS(field);
     VSHI_NEEDS(points);
-    if (points->count > 0) {
-        VSHI_NEEDS(points->positions);
-        VSHI_NEEDS(ao);
-        VSHI_NEEDS(bent);
-    }
+    VSHI_NEEDS_OF(points->count, points->positions);
+    VSHI_NEEDS_OF(points->count, ao);
+    VSHI_NEEDS_OF(points->count, bent);
     const vsh_result result = vshi_shade_ao(field, points, NULL, options, run, ao, NULL, bent, stats, error);
     for (size_t i = 0; result == VSH_OK && i < points->count; ++i) {
         vshi_ao_bend(bent + 3 * i, points->normals + 3 * i);

@@ -87,9 +87,7 @@ vsh_result vsh_query_create(const vsh_field *field, const vsh_light *lights, siz
     VSHI_NEEDS(query);
     *query = NULL;
     VSHI_NEEDS(field);
-    if (light_count > 0) {
-        VSHI_NEEDS(lights);
-    }
+    VSHI_NEEDS_OF(light_count, lights);
     return vshi_query_create(field, lights, light_count, options, false, query, error);
 }
 
@@ -396,9 +394,8 @@ vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, co
     VSHI_FLOATS;
     VSHI_NEEDS(query);
     VSHI_NEEDS(points);
-    if (points->count > 0) {
-        VSHI_NEEDS(points->positions);
-    }
+    VSHI_NEEDS_OF(points->count, points->positions);
+    VSHI_NEEDS(output);
     const vshi_view view = vshi_view_of(points);
     return answer(query, &view, points, run, output, stats, error);
 }
@@ -418,6 +415,8 @@ vsh_result vsh_query_strided(const vsh_query *query, const vsh_strided_points *p
                              const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(query);
+    VSHI_NEEDS(points);
+    VSHI_NEEDS(output);
     vsh_strided_points p = vsh_strided_points_default();
     vsh_result result = vshi_options_resolve(points, &p, sizeof p, "vsh_strided_points", error);
     if (result != VSH_OK) {

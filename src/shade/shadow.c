@@ -194,10 +194,8 @@ vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, co
                             float *deviation, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_NEEDS(field);
     VSHI_NEEDS(points);
-    if (points->count > 0) {
-        VSHI_NEEDS(points->positions);
-        VSHI_NEEDS(visibility);
-    }
+    VSHI_NEEDS_OF(points->count, points->positions);
+    VSHI_NEEDS_OF(points->count, visibility);
     return vshi_shade_shadow(field, points, NULL, light, options, run, visibility, deviation, stats, error);
 }
 

@@ -240,9 +240,7 @@ vsh_result vsh_trace_ao(const vsh_triangles *triangles, const vsh_solids *solids
     if (result != VSH_OK) {
         return result;
     }
-    if (count > 0) {
-        VSHI_NEEDS(normals);
-    }
+    VSHI_NEEDS_OF(count, normals);
     if (!(distance > 0.0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_trace_ao: distance %g: expected more than 0",
                          distance);

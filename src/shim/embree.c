@@ -278,9 +278,7 @@ vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const
     VSHI_FLOATS;
     VSHI_NEEDS(triangles);
     *triangles = NULL;
-    if (mesh_count > 0) {
-        VSHI_NEEDS(meshes);
-    }
+    VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full;
     vsh_result result = vshi_run_resolve(run, &full, error);
     double bytes = 0.0;

@@ -197,9 +197,7 @@ vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *ent
     VSHI_NEEDS(count);
     *count = 0;
     VSHI_NEEDS(path);
-    if (capacity > 0) {
-        VSHI_NEEDS(entries);
-    }
+    VSHI_NEEDS_OF(capacity, entries);
     return vshi::call(run, path, error, [&](const vsh_run &full) {
         return vshi::list(path, full, entries, capacity, count, error);
     });

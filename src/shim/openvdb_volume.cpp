@@ -200,10 +200,8 @@ void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vsh_volume_grid 
 vsh_result vsh_volume_sample(const vsh_volume *volume, size_t grid, size_t count, const double *positions,
                              float *values, vsh_error *error) {
     VSHI_NEEDS(volume);
-    if (count > 0) {
-        VSHI_NEEDS(positions);
-        VSHI_NEEDS(values);
-    }
+    VSHI_NEEDS_OF(count, positions);
+    VSHI_NEEDS_OF(count, values);
     return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&]() -> vsh_result {
         const vshi::FloatTree &tree = *vshi::channel_of(*volume, grid, error).tree;
         const openvdb::tree::ValueAccessor<const vshi::FloatTree> at(tree);

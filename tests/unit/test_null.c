@@ -121,6 +121,7 @@ static void files_have_paths_and_places(void **state) {
     MAKES_NONE(vsh_tolerances_read(NULL, PLACE, &error));
     REFUSED(vsh_tolerances_read("a.json", NULL, &error));
     REFUSED(vsh_file_digest(NULL, digest, &error));
+    REFUSED(vsh_file_digest("a.exr", NULL, &error));
     MAKES_NONE(vsh_image_read(NULL, PLACE, &error));
     REFUSED(vsh_image_read("a.exr", NULL, &error));
     REFUSED(vsh_image_write(NULL, &empty, NULL, &error));
@@ -183,6 +184,9 @@ static void nothing_is_shaded_without_what_it_takes(void **state) {
     REFUSED(vsh_query_points(NULL, &points, NULL, &output, NULL, &error));
     REFUSED(vsh_query_points(query, NULL, NULL, &output, NULL, &error));
     REFUSED(vsh_query_points(query, &nowhere, NULL, &output, NULL, &error));
+    REFUSED(vsh_query_points(query, &points, NULL, NULL, NULL, &error));
+    REFUSED(vsh_query_strided(query, NULL, NULL, &output, NULL, &error));
+    REFUSED(vsh_query_strided(query, &strided, NULL, NULL, NULL, &error));
     REFUSED(vsh_query_strided(NULL, &strided, NULL, &output, NULL, &error));
     REFUSED(vsh_query_strided(query, &strided, NULL, &output, NULL, &error));
     vsh_query_free(query);
