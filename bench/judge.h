@@ -1,0 +1,69 @@
+/* What tools/judge-assets asks: the truth of a model's lightmap, and what a bake is off by. Reading models
+ * and images is the library's, all else is of its own: texels, solids, rays. */
+#ifndef JUDGE_H
+#define JUDGE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <vdbshade/mesh.h>
+
+/* What truth says of a texel. */
+enum {
+    JUDGE_EMPTY = 0,   /* of no chart, or within a thousandth of a texel of a chart's border */
+    JUDGE_VALID = 1,   /* fewer than FEW of its rays first meet the back of a solid */
+    JUDGE_INVALID = 2, /* more than MOST of them do: inside a solid, or behind a wall */
+    JUDGE_UNCLEAR = 3, /* between them, or where two solids touch: not judged */
+    JUDGE_VERDICTS = 4
+};
+
+typedef struct judge_question {
+    int32_t size; /* texels, of both sides */
+    double towards[3];
+    double angle; /* degrees, diameter */
+    double distance;
+    int32_t rays;
+    const char *solids; /* an OBJ of what is solid, which may be NULL: all triangles of the model */
+} judge_question;
+
+/* Planes of [size × size], row 0 at v = 1. */
+typedef struct judge_truth {
+    float *verdict;
+    float *shadow;
+    float *ao;
+    float *apart; /* 1 where a smooth normal's horizon is not the triangle's: an error there is told apart */
+    float *triangle; /* 1 + number among all triangles; 0 for none */
+    double units;    /* the model's size over that of the solids' file: 1 where it was read as it was meant */
+} judge_truth;
+
+/* Ends the program where anything fails. */
+judge_truth judge_make(const char *model, const judge_question *question);
+void judge_free(judge_truth *truth);
+
+typedef struct judge_triangle {
+    double p[3][3], n[3][3], uv[3][2]; /* n: smooth, unit */
+    double g[3];                       /* geometric, unit */
+    double bend;                       /* radians, the largest between g and n */
+} judge_triangle;
+
+/* All triangles with an area, and the box around them. */
+judge_triangle *judge_take_triangles(const vsh_mesh *meshes, size_t mesh_count, size_t *count, double low[3],
+                                     double high[3]);
+
+typedef struct judge_shape {
+    float *positions;
+    uint32_t *indices;
+    size_t vertices, triangles;
+    double low[3], high[3];
+} judge_shape;
+
+/* "v" and "f" of an OBJ with convex faces, which are cut into fans; the faces of objects "sheet:…" are left
+ * out. */
+judge_shape judge_read_solids(const char *path);
+
+_Noreturn void judge_give_up(const char *what, const char *why);
+
+/* Bytes, or the end of the program. */
+void *judge_take(size_t bytes);
+
+#endif
