@@ -21,7 +21,16 @@ typedef struct vsh_mesh {
     size_t triangle_count;
     const double *transform; /* [12], local to world, three rows of four (column 3 translates), may mirror,
                                 scale unevenly and shear, but not flatten; NULL: identity */
+    const char *object_name; /* of the object that it is a part of; may be NULL: `name` */
+    uint32_t object; /* meshes of one number are parts of one object (a part for each of its materials);
+                        0: an object of its own */
 } vsh_mesh;
+
+/* Whether a mesh is meant by `pattern`: its name, its object's name, or what its name has behind its object's
+ * ("Wall", "Cube.003" and "Wall/Cube.003" for a node Wall with a mesh Cube.003) is `pattern`, or is matched
+ * by it as a shell matches: * for anything, ? for one character, [a-c] for one byte of some, [!a-c] for one
+ * of all others, \\ before what is meant as it is. Case counts. 1 or 0; 0 too where either is NULL. */
+VSH_API int32_t vsh_mesh_matches(const vsh_mesh *mesh, const char *pattern);
 
 /* What vsh_mesh_check() found. Vertices at equal positions count as one, so seams of UVs open nothing. */
 typedef struct vsh_mesh_report {
@@ -42,7 +51,8 @@ typedef struct vsh_mesh_report {
 VSH_API vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error);
 
 /* A file of meshes: OBJ, glTF/GLB, PLY, STL, FBX and what else Assimp reads. A node's transform is that of
- * its mesh's view; a mesh that two nodes use is two meshes. UVs have v up in every format. */
+ * its mesh's view; a mesh that two nodes use is two meshes. The meshes of a node are one object, and its name
+ * that of the node. UVs have v up in every format. */
 typedef struct vsh_model vsh_model;
 
 /* Reads a model; the ending of `path` tells its format. Warns of meshes that a transform flattens (left

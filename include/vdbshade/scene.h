@@ -23,6 +23,14 @@ enum {
     VSH_CASTER_TEXT = 6         /* text, likewise */
 };
 
+/* Which of a file's meshes are meant, by patterns as of vsh_mesh_matches(). All zero: all of them. */
+typedef struct vsh_selection {
+    const char *const *only; /* [only_count]: those that one of these matches, where there are any */
+    size_t only_count;
+    const char *const *except; /* [except_count]: but not those that one of these matches */
+    size_t except_count;
+} vsh_selection;
+
 typedef struct vsh_caster {
     int32_t type;         /* VSH_CASTER_… */
     const char *path;     /* mesh, vdb, heightfield, mask: file; text: font; spheres: NULL, or a file
@@ -43,6 +51,7 @@ typedef struct vsh_caster {
     vsh_text_options letters; /* text */
     double thickness;         /* mask, text: along z, local units, > 0 */
     double color[3];          /* in pictures, linear RGB, 0 … 1; all 0: 0.7, a light grey */
+    vsh_selection objects;    /* mesh: which of its meshes cast */
 } vsh_caster;
 
 /* Casters that are shaded in a way of their own. */
@@ -70,6 +79,11 @@ typedef struct vsh_receiver {
     int32_t type;       /* VSH_RECEIVER_…; a heightfield is made as VSH_HEIGHTS_SURFACE, its UV set is 0 */
     double extent[2];   /* heightfield: size and height in vsh_heights_source */
     double relief;
+    vsh_selection objects; /* mesh: which of its meshes receive */
+    int32_t partial; /* mesh: nonzero: those without UVs, or without the set, are left out with a warning,
+                        as long as one has them */
+    int32_t allow_overlap; /* nonzero: objects whose UVs lie over each other are meant so (vdbshade bake then
+                              does not refuse them) */
 } vsh_receiver;
 
 /* A whole scene, read from a file or filled by the caller. Paths are as the system takes them (the reader has
@@ -112,7 +126,8 @@ typedef struct vsh_assets vsh_assets;
  * scene need not outlive the call. Free the result with vsh_assets_free(). Errors:
  * - VSH_ERROR_ARGUMENT: scene or assets NULL, a caster of no type, a caster or receiver without a path, a
  *   UV set outside -1 … VSH_MAX_UV_SETS - 1, run;
- * - VSH_ERROR_INPUT: a receiver's mesh without UVs or without the set asked for; as vsh_model_read(),
+ * - VSH_ERROR_INPUT: a receiver's mesh without UVs or without the set asked for; a pattern that matches no
+ *   mesh of its file, patterns that leave none; as vsh_model_read(),
  *   vsh_grid_read(), vsh_image_read(), vsh_model_from_heights() and vsh_outline_from_…(); an image of no
  *   more than a pixel across;
  * - VSH_ERROR_READ, VSH_ERROR_LIMIT (for each file alone), VSH_ERROR_UNSUPPORTED: as these;

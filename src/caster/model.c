@@ -17,6 +17,7 @@ void vsh_model_free(vsh_model *model) {
         return;
     }
     for (size_t i = 0; i < model->entry_count; ++i) {
+        free(model->entries[i].object_name);
         free(model->entries[i].name);
     }
     free(model->entries);
@@ -54,6 +55,8 @@ vsh_mesh vsh_model_mesh(const vsh_model *model, size_t index, int32_t uv_set) {
         .vertex_count = shape->vertex_count,
         .triangle_count = shape->triangle_count,
         .transform = entry->transform,
+        .object_name = entry->object_name,
+        .object = entry->object,
     };
 }
 

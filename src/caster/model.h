@@ -20,7 +20,9 @@ typedef struct vshi_model_shape {
 } vshi_model_shape;
 
 typedef struct vshi_model_entry {
-    char *name; /* NULL where neither node nor mesh has one */
+    char *name;        /* NULL where neither node nor mesh has one */
+    char *object_name; /* the node's; NULL where it has none */
+    uint32_t object;   /* number of the node, from 1 */
     size_t shape;
     double transform[12];
 } vshi_model_entry;

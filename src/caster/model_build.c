@@ -100,6 +100,12 @@ static vsh_result copy_shape(const vshi_model_source *source, const struct aiMes
     return VSH_OK;
 }
 
+static void make_line(char *text) {
+    for (char *c = text; *c != '\0'; ++c) {
+        *c = (unsigned char)*c < 0x20 || *c == 0x7f ? '?' : *c;
+    }
+}
+
 /* "node/mesh", or whichever has a name, or NULL; on one line. */
 static vsh_result make_name(const struct aiNode *node, const struct aiMesh *mesh, char **name,
                             vsh_error *error) {
@@ -115,10 +121,22 @@ static vsh_result make_name(const struct aiNode *node, const struct aiMesh *mesh
         return result;
     }
     snprintf(*name, size, "%s%s%s", first, both ? "/" : "", both || first[0] == '\0' ? second : "");
-    for (char *c = *name; *c != '\0'; ++c) {
-        *c = (unsigned char)*c < 0x20 || *c == 0x7f ? '?' : *c;
-    }
+    make_line(*name);
     return VSH_OK;
+}
+
+static vsh_result make_object_name(const struct aiNode *node, char **name, vsh_error *error) {
+    const size_t size = strlen(node->mName.data) + 1;
+    *name = NULL;
+    if (size == 1) {
+        return VSH_OK;
+    }
+    const vsh_result result = vshi_allocate((void **)name, size, 1, "an object's name", error);
+    if (result == VSH_OK) {
+        memcpy(*name, node->mName.data, size);
+        make_line(*name);
+    }
+    return result;
 }
 
 static vsh_result grow_entries(vsh_model *model, vsh_error *error) {
@@ -142,18 +160,22 @@ static vsh_result grow_entries(vsh_model *model, vsh_error *error) {
 }
 
 static vsh_result add_entry(const vshi_model_source *source, vsh_model *model, const struct aiNode *node,
-                            unsigned shape, const double world[12], vsh_error *error) {
+                            uint32_t object, unsigned shape, const double world[12], vsh_error *error) {
     const struct aiMesh *mesh = source->scene->mMeshes[shape];
     vsh_result result = grow_entries(model, error);
-    char *name = NULL;
+    char *name = NULL, *object_name = NULL;
     if (result == VSH_OK) {
         result = make_name(node, mesh, &name, error);
     }
+    if (result == VSH_OK) {
+        result = make_object_name(node, &object_name, error);
+    }
     if (result != VSH_OK) {
+        free(name);
         return result;
     }
     vshi_model_entry *entry = &model->entries[model->entry_count++];
-    *entry = (vshi_model_entry){.name = name, .shape = shape};
+    *entry = (vshi_model_entry){.name = name, .object_name = object_name, .object = object, .shape = shape};
     memcpy(entry->transform, world, sizeof entry->transform);
     vsh_error why;
     const vsh_mesh view = vsh_model_mesh(model, model->entry_count - 1, 0);
@@ -167,6 +189,7 @@ static vsh_result add_entry(const vshi_model_source *source, vsh_model *model, c
     }
     /* A scale of zero is how scenes hide things. */
     vshi_warn(source->run, "%s: %s; left out", source->path, why.message);
+    free(object_name);
     free(name);
     --model->entry_count;
     return VSH_OK;
@@ -200,10 +223,12 @@ static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, c
     double world[12];
     node_transform(parent, &node->mTransformation, world);
     vsh_result result = VSH_OK;
+    /* that of the last entry is the highest so far */
+    const uint32_t object = model->entry_count > 0 ? model->entries[model->entry_count - 1].object + 1 : 1;
     for (unsigned i = 0; i < node->mNumMeshes && result == VSH_OK; ++i) {
         const unsigned shape = node->mMeshes[i];
         if (shape < model->shape_count && model->shapes[shape].triangle_count > 0) {
-            result = add_entry(source, model, node, shape, world, error);
+            result = add_entry(source, model, node, object, shape, world, error);
         }
     }
     for (unsigned i = 0; i < node->mNumChildren && result == VSH_OK; ++i) {

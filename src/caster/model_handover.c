@@ -44,6 +44,8 @@ vsh_result vshi_serve_model(const char *path, vshi_take *request, const vsh_run 
     for (size_t i = 0; i < model->entry_count; ++i) {
         const vshi_model_entry *entry = &model->entries[i];
         vshi_put_text(payload, entry->name);
+        vshi_put_text(payload, entry->object_name);
+        vshi_put_count(payload, entry->object);
         vshi_put_count(payload, entry->shape);
         vshi_put_array(payload, entry->transform, 12, sizeof(double));
     }
@@ -113,23 +115,36 @@ static vsh_result check_shape(const vshi_model_shape *shape, const char *path, v
     return VSH_OK;
 }
 
+static vsh_result copy_name(const char *name, char **copy, const char *path, vsh_error *error) {
+    if (name == NULL) {
+        return VSH_OK;
+    }
+    const size_t size = strlen(name) + 1;
+    const vsh_result result = vshi_allocate((void **)copy, size, 1, path, error);
+    if (result == VSH_OK) {
+        memcpy(*copy, name, size);
+    }
+    return result;
+}
+
 static vsh_result take_entry(vshi_take *take, vsh_model *model, size_t index, const char *path,
                              vsh_error *error) {
     vshi_model_entry *entry = &model->entries[index];
     const char *name = vshi_take_text(take, true);
+    const char *object_name = vshi_take_text(take, true);
+    entry->object = (uint32_t)vshi_take_count(take, UINT32_MAX);
     entry->shape = vshi_take_count(take, model->shape_count - 1);
     const void *transform = vshi_take_array(take, 12, sizeof(double));
     if (take->bad || model->shapes[entry->shape].triangle_count == 0) {
         return vshi_answer_fail(path, "a mesh's place", error);
     }
     memcpy(entry->transform, transform, sizeof entry->transform);
-    if (name != NULL) {
-        const size_t size = strlen(name) + 1;
-        const vsh_result result = vshi_allocate((void **)&entry->name, size, 1, path, error);
-        if (result != VSH_OK) {
-            return result;
-        }
-        memcpy(entry->name, name, size);
+    vsh_result result = copy_name(name, &entry->name, path, error);
+    if (result == VSH_OK) {
+        result = copy_name(object_name, &entry->object_name, path, error);
+    }
+    if (result != VSH_OK) {
+        return result;
     }
     vsh_error why;
     const vsh_mesh view = vsh_model_mesh(model, index, 0);

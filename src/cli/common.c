@@ -3,6 +3,7 @@
 #include "options.h"
 #include "progress.h"
 #include "self.h"
+#include "warnings.h"
 
 #include <stdio.h>
 #include <sys/resource.h>
@@ -35,7 +36,7 @@ static uint64_t machine_memory(void) {
 }
 
 cli_common cli_common_default(void) {
-    return (cli_common){0, machine_memory() / 4 * 3, false, false, VSH_ISA_BEST, false};
+    return (cli_common){0, machine_memory() / 4 * 3, false, false, VSH_ISA_BEST, false, false};
 }
 
 vsh_run cli_common_run(const cli_common *common) {
@@ -45,7 +46,8 @@ vsh_run cli_common_run(const cli_common *common) {
     run.isa = common->isa;
     run.reader = common->trusted ? NULL : cli_reader();
     run.progress = cli_progress_report;
-    run.warning = cli_progress_warning;
+    run.warning = cli_warnings_take;
+    cli_warnings_begin(common->verbose, common->quiet);
     return run;
 }
 
@@ -63,6 +65,9 @@ int cli_common_take(cli_common *common, int key, const char *name, const char *v
         return CLI_OK;
     case CLI_KEY_QUIET:
         common->quiet = true;
+        return CLI_OK;
+    case CLI_KEY_VERBOSE:
+        common->verbose = true;
         return CLI_OK;
     case CLI_KEY_PROGRESS:
         common->progress = true;

@@ -3,6 +3,7 @@
 #include "message.h"
 #include "self.h"
 #include "signals.h"
+#include "warnings.h"
 
 #include <errno.h>
 #include <stdio.h>
@@ -83,6 +84,7 @@ int main(int argc, char **argv) {
     cli_reader_begin(argv[0]);
     cli_signals_begin();
     int code = dispatch(argc, argv);
+    cli_warnings_tell();
     if ((fflush(stdout) != 0 || ferror(stdout)) && code == CLI_OK) {
         cli_say("standard output: cannot be written: %s", strerror(errno));
         code = CLI_FILE;

@@ -1,13 +1,14 @@
 #include "meshes.h"
 
 #include "message.h"
+#include "warnings.h"
 
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static int warn_file(const char *path, const vsh_mesh *meshes, size_t count, const vsh_run *run) {
+static int warn_file(const char *path, const vsh_mesh *meshes, size_t count) {
     size_t *skipped = calloc(count, sizeof *skipped);
     if (skipped == NULL) {
         cli_say("%s: the system refused memory", path);
@@ -30,10 +31,8 @@ static int warn_file(const char *path, const vsh_mesh *meshes, size_t count, con
     }
     for (size_t i = 0; i < count && code == CLI_OK; ++i) {
         if (skipped[i] > 0) {
-            char line[1024];
-            snprintf(line, sizeof line, "%s: mesh '%s': %zu triangles of zero area are skipped", path,
+            cli_warn("%s: mesh '%s': %zu triangles of zero area are skipped", path,
                      meshes[i].name != NULL ? meshes[i].name : "", skipped[i]);
-            run->warning(run->user, line);
         }
     }
     free(skipped);
@@ -54,13 +53,13 @@ static bool seen(const vsh_scene *scene, size_t casters, size_t receivers, const
     return false;
 }
 
-int cli_warn_meshes(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run) {
+int cli_warn_meshes(const vsh_scene *scene, const vsh_assets *assets) {
     int code = CLI_OK;
     for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
         size_t count;
         const vsh_mesh *meshes = vsh_assets_caster(assets, i, &count);
         if (scene->casters[i].type == VSH_CASTER_MESH && !seen(scene, i, 0, scene->casters[i].path)) {
-            code = warn_file(scene->casters[i].path, meshes, count, run);
+            code = warn_file(scene->casters[i].path, meshes, count);
         }
     }
     for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
@@ -68,7 +67,7 @@ int cli_warn_meshes(const vsh_scene *scene, const vsh_assets *assets, const vsh_
         const vsh_mesh *meshes = vsh_assets_receiver(assets, i, &count);
         if (scene->receivers[i].type == VSH_RECEIVER_MESH &&
             !seen(scene, scene->caster_count, i, scene->receivers[i].path)) {
-            code = warn_file(scene->receivers[i].path, meshes, count, run);
+            code = warn_file(scene->receivers[i].path, meshes, count);
         }
     }
     return code;
@@ -76,6 +75,6 @@ int cli_warn_meshes(const vsh_scene *scene, const vsh_assets *assets, const vsh_
 
 int cli_load_assets(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets) {
     vsh_error error;
-    return vsh_assets_load(scene, run, assets, &error) == VSH_OK ? cli_warn_meshes(scene, *assets, run)
+    return vsh_assets_load(scene, run, assets, &error) == VSH_OK ? cli_warn_meshes(scene, *assets)
                                                                  : cli_fail(&error);
 }

@@ -7,7 +7,7 @@
 
 /* Counts the triangles of zero area, which everything skips, in each file once. What is open is told by the
  * voxeliser. CLI_OK or an exit code, having said why. */
-int cli_warn_meshes(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run);
+int cli_warn_meshes(const vsh_scene *scene, const vsh_assets *assets);
 
 /* vsh_assets_load(), and the same. */
 int cli_load_assets(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets);

@@ -2,6 +2,7 @@
 
 #include "progress.h"
 #include "signals.h"
+#include "warnings.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -43,12 +44,14 @@ void cli_say(const char *format, ...) {
 int cli_usage(const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
+    cli_warnings_tell();
     say(format, arguments);
     va_end(arguments);
     return CLI_USAGE;
 }
 
 int cli_fail(const vsh_error *error) {
+    cli_warnings_tell();
     if (error->code == VSH_ERROR_CANCELLED) {
         cli_signals_tell();
         return CLI_INTERRUPTED;
@@ -63,6 +66,7 @@ int cli_fail(const vsh_error *error) {
 }
 
 int cli_out_of_memory(const char *what) {
+    cli_warnings_tell();
     cli_say("%s: the system refused memory", what);
     return CLI_LIMIT;
 }

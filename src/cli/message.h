@@ -17,7 +17,7 @@ enum {
 /* "vdbshade: …" as one line: control characters become '?'. */
 void cli_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
-/* As cli_say(), and returns CLI_USAGE. */
+/* As cli_say(), and returns CLI_USAGE. This and the next tell the warnings that were kept before. */
 int cli_usage(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 /* Says what failed and returns the exit code of its result. */

@@ -158,8 +158,8 @@ static const char *without_folder(const char *path) {
 
 static void append_option(const cli_option *option, const char *value) {
     static const char *const changes_nothing[] = {
-        "output", "output-folder", "stats", "threads",   "memory-limit", "isa",    "trusted",
-        "quiet",  "progress",      "json",  "band-rows", "dry-run",      "resume", "help"};
+        "output",  "output-folder", "stats", "threads",   "memory-limit", "isa",    "trusted", "quiet",
+        "verbose", "progress",      "json",  "band-rows", "dry-run",      "resume", "help"};
     for (size_t i = 0; i < sizeof changes_nothing / sizeof changes_nothing[0]; ++i) {
         if (strcmp(option->name, changes_nothing[i]) == 0) {
             return;

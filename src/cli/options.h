@@ -66,6 +66,7 @@ typedef struct cli_common {
     int32_t threads;
     uint64_t memory_limit;
     bool quiet;
+    bool verbose; /* every warning by itself */
     bool progress;
     int32_t isa;  /* of commands that shade */
     bool trusted; /* files are parsed in this process */
@@ -78,6 +79,7 @@ enum {
     CLI_KEY_THREADS = 0x1000,
     CLI_KEY_MEMORY_LIMIT,
     CLI_KEY_QUIET,
+    CLI_KEY_VERBOSE,
     CLI_KEY_PROGRESS,
     CLI_KEY_ISA,
     CLI_KEY_TRUSTED,
@@ -102,6 +104,7 @@ enum {
          "memory that a step may take; with k, M, G or KiB,\nMiB, GiB; 0: no limit (3/4 of the machine's)"}, \
         CLI_TRUSTED_OPTION,                                                                                  \
         {CLI_KEY_PROGRESS, "progress", NULL, "show progress even where it is no terminal"},                  \
+        {CLI_KEY_VERBOSE, "verbose", NULL, "every warning, and not one line for all of a kind"},             \
         {CLI_KEY_QUIET, "quiet", NULL, "say nothing but errors"}, {                                          \
         'h', "help", NULL, "show this help"                                                                  \
     }

@@ -21,7 +21,6 @@ static struct {
     pthread_mutex_t lock; /* around everything here and around standard error */
     bool shown;
     bool terminal;
-    bool quiet;
     bool standing; /* a line without its newline is on the terminal */
     char stage[80];
     double began; /* of the stage */
@@ -31,7 +30,6 @@ static struct {
 void cli_progress_begin(bool wanted, bool quiet) {
     state.terminal = isatty(STDERR_FILENO) != 0;
     state.shown = !quiet && (wanted || state.terminal);
-    state.quiet = quiet;
 }
 
 static void clear_line(void) {
@@ -87,13 +85,6 @@ void cli_progress_line(const char *line) {
     clear_line();
     fprintf(stderr, "vdbshade: %s\n", line);
     pthread_mutex_unlock(&state.lock);
-}
-
-void cli_progress_warning(void *user, const char *message) {
-    (void)user;
-    if (!state.quiet) {
-        cli_say("warning: %s", message);
-    }
 }
 
 void cli_progress_end(void) {

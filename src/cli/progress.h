@@ -6,12 +6,11 @@
 #include <vdbshade/base.h>
 
 /* Decides whether progress is shown: `wanted` shows it anywhere, else it is shown on a terminal only. `quiet`
- * silences progress and warnings. */
+ * silences it. */
 void cli_progress_begin(bool wanted, bool quiet);
 
 /* For vsh_run: show, and stop where the user interrupted. */
 int32_t cli_progress_report(void *user, const char *stage, double fraction);
-void cli_progress_warning(void *user, const char *message);
 
 /* Writes "vdbshade: LINE", clear of the progress that may stand on the terminal. Any thread. */
 void cli_progress_line(const char *line);

@@ -7,6 +7,7 @@
 #include "paths.h"
 #include "progress.h"
 #include "signals.h"
+#include "warnings.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -187,9 +188,7 @@ static int choose_answers(query_work *work) {
         if (s->bake.has_ao) {
             return cli_usage("%s: no normals, which --ao needs", work->reader.source.name);
         }
-        char line[512];
-        snprintf(line, sizeof line, "%s: no normals: no ao", work->reader.source.name);
-        work->run.warning(work->run.user, line);
+        cli_warn("%s: no normals: no ao", work->reader.source.name);
         scene->ao = 0;
     }
     *a = (query_answers){.lights = scene->light_count,
@@ -252,10 +251,9 @@ static void say_results(const query_work *work) {
         return;
     }
     if (stats->shade.beyond_reach > 0) {
-        cli_say("warning: %" PRIu64
-                " cones are wider than the field reaches: points are far from the casters; "
-                "see --within",
-                stats->shade.beyond_reach);
+        cli_warn("%" PRIu64 " cones are wider than the field reaches: points are far from the casters; "
+                 "see --within",
+                 stats->shade.beyond_reach);
     }
     cli_say("%s: %" PRIu64 " points", work->settings->bake.output, stats->points);
     cli_stats_say(stats);

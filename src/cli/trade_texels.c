@@ -107,7 +107,7 @@ int trade_load(trade_work *work) {
     if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
         return cli_fail(&error);
     }
-    int code = cli_warn_meshes(work->scene, work->assets, &work->run);
+    int code = cli_warn_meshes(work->scene, work->assets);
     code = code == CLI_OK ? load_receivers(work) : code;
     return code == CLI_OK ? load_casters(work) : code;
 }

@@ -170,7 +170,7 @@ static int load(volume_work *work) {
         result = vsh_voxels_from_vdb(s->like, s->like_grid, &work->run, &work->voxels, &error);
     }
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return result == VSH_OK ? cli_warn_meshes(work->scene, work->assets, &work->run) : cli_fail(&error);
+    return result == VSH_OK ? cli_warn_meshes(work->scene, work->assets) : cli_fail(&error);
 }
 
 /* Of the casters' band, or of the box, whose voxels may be of the casters' size. */

@@ -4,7 +4,9 @@
 #include "analytic/heightmap.h"
 #include "base/error.h"
 #include "base/floats.h"
+#include "base/job.h"
 #include "base/memory.h"
+#include "scene/select.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -117,9 +119,14 @@ static vsh_result find_grid(vsh_assets *assets, const char *path, const char *na
     return result;
 }
 
-static vsh_result place_model(asset_place *place, const vsh_model *model, int32_t uv_set,
-                              const double transform[12], vsh_error *error) {
-    const size_t count = vsh_model_mesh_count(model);
+/* The meshes of the model that are `chosen`; NULL: all. */
+static vsh_result place_chosen(asset_place *place, const vsh_model *model, const unsigned char *chosen,
+                               int32_t uv_set, const double transform[12], vsh_error *error) {
+    const size_t all = vsh_model_mesh_count(model);
+    size_t count = 0;
+    for (size_t i = 0; i < all; ++i) {
+        count += chosen == NULL || chosen[i] != 0;
+    }
     void *meshes = NULL;
     void *transforms = NULL;
     vsh_result result = vshi_allocate(&meshes, count, sizeof *place->meshes, "meshes", error);
@@ -131,14 +138,22 @@ static vsh_result place_model(asset_place *place, const vsh_model *model, int32_
     if (result != VSH_OK) {
         return result;
     }
-    place->count = count;
-    for (size_t i = 0; i < count; ++i) {
-        double *composed = place->transforms + 12 * i;
-        place->meshes[i] = vsh_model_mesh(model, i, uv_set);
-        vshi_transform_compose(transform, place->meshes[i].transform, composed);
-        place->meshes[i].transform = composed;
+    for (size_t i = 0; i < all; ++i) {
+        if (chosen != NULL && chosen[i] == 0) {
+            continue;
+        }
+        double *composed = place->transforms + 12 * place->count;
+        vsh_mesh *mesh = &place->meshes[place->count++];
+        *mesh = vsh_model_mesh(model, i, uv_set);
+        vshi_transform_compose(transform, mesh->transform, composed);
+        mesh->transform = composed;
     }
     return VSH_OK;
+}
+
+static vsh_result place_model(asset_place *place, const vsh_model *model, int32_t uv_set,
+                              const double transform[12], vsh_error *error) {
+    return place_chosen(place, model, NULL, uv_set, transform, error);
 }
 
 static vsh_result find_map(vsh_assets *assets, const char *path, const vsh_run *run,
@@ -236,28 +251,16 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_caster *caster, siz
         return place_heights(assets, place, &source, VSH_HEIGHTS_SOLID, caster->transform, run, error);
     }
     const vsh_model *model = NULL;
-    const vsh_result result = find_model(assets, caster->path, run, &model, error);
-    return result == VSH_OK ? place_model(place, model, -1, caster->transform, error) : result;
-}
-
-static vsh_result check_uv_set(const vsh_receiver *receiver, const vsh_model *model, vsh_error *error) {
-    if (receiver->uv_set < -1 || receiver->uv_set >= VSH_MAX_UV_SETS) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: UV set %d: expected -1 … %d", receiver->path,
-                         receiver->uv_set, VSH_MAX_UV_SETS - 1);
+    vsh_result result = find_model(assets, caster->path, run, &model, error);
+    unsigned char *chosen = NULL;
+    if (result == VSH_OK) {
+        result = vshi_select(model, caster->path, &caster->objects, &chosen, error);
     }
-    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
-        const int32_t sets = vsh_model_uv_sets(model, i);
-        const char *name = vsh_model_mesh(model, i, -1).name;
-        if (sets == 0) {
-            return vshi_fail(error, VSH_ERROR_INPUT, "%s: mesh %zu '%s': no UVs to bake into", receiver->path,
-                             i, name != NULL ? name : "");
-        }
-        if (receiver->uv_set >= sets) {
-            return vshi_fail(error, VSH_ERROR_INPUT, "%s: mesh %zu '%s': no UV set %d: expected 0 … %d",
-                             receiver->path, i, name != NULL ? name : "", receiver->uv_set, sets - 1);
-        }
+    if (result == VSH_OK) {
+        result = place_chosen(place, model, chosen, -1, caster->transform, error);
     }
-    return VSH_OK;
+    free(chosen);
+    return result;
 }
 
 static vsh_result place_receiver(vsh_assets *assets, const vsh_receiver *receiver, size_t index,
@@ -274,13 +277,19 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_receiver *receive
                              receiver->transform, run, error);
     }
     const vsh_model *model = NULL;
+    unsigned char *chosen = NULL;
     vsh_result result = find_model(assets, receiver->path, run, &model, error);
     if (result == VSH_OK) {
-        result = check_uv_set(receiver, model, error);
+        result = vshi_select(model, receiver->path, &receiver->objects, &chosen, error);
     }
     if (result == VSH_OK) {
-        result = place_model(&assets->receivers[index], model, receiver->uv_set, receiver->transform, error);
+        result = vshi_select_uvs(model, receiver, run, chosen, error);
     }
+    if (result == VSH_OK) {
+        result = place_chosen(&assets->receivers[index], model, chosen, receiver->uv_set, receiver->transform,
+                              error);
+    }
+    free(chosen);
     return result;
 }
 
@@ -320,7 +329,11 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     *assets = NULL;
     VSHI_NEEDS(scene);
     void *memory = NULL;
-    vsh_result result = vshi_allocate(&memory, 1, sizeof(vsh_assets), "assets", error);
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory, 1, sizeof(vsh_assets), "assets", error);
+    }
     if (result != VSH_OK) {
         return result;
     }
@@ -328,10 +341,10 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     result = allocate_places(loaded, scene, error);
     /* Receivers first: what is wrong with them is cheaper to find than a caster's volume is to read. */
     for (size_t i = 0; i < scene->receiver_count && result == VSH_OK; ++i) {
-        result = place_receiver(loaded, &scene->receivers[i], i, run, error);
+        result = place_receiver(loaded, &scene->receivers[i], i, &full, error);
     }
     for (size_t i = 0; i < scene->caster_count && result == VSH_OK; ++i) {
-        result = place_caster(loaded, &scene->casters[i], i, run, error);
+        result = place_caster(loaded, &scene->casters[i], i, &full, error);
     }
     if (result != VSH_OK) {
         vsh_assets_free(loaded);

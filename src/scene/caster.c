@@ -64,6 +64,16 @@ static vsh_result read_spheres(vshi_reader *reader, const vshi_value *value, voi
 
 static const vshi_key caster_keys[] = {
     {.name = "mesh", .kind = VSHI_PATH, .variants = MESH, .offset = offsetof(vsh_caster, path)},
+    {.name = "objects",
+     .kind = VSHI_CUSTOM,
+     .variants = MESH,
+     .offset = offsetof(vsh_caster, objects),
+     .read = vshi_read_only},
+    {.name = "except",
+     .kind = VSHI_CUSTOM,
+     .variants = MESH,
+     .offset = offsetof(vsh_caster, objects),
+     .read = vshi_read_except},
     {.name = "sdf",
      .kind = VSHI_CUSTOM,
      .variants = SDF,

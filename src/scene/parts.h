@@ -20,6 +20,9 @@ vsh_result vshi_check_layers(vshi_reader *reader, const vshi_value *root, vsh_sc
 
 /* Texels: 1024, or [width, height]. */
 vsh_result vshi_read_size(vshi_reader *reader, const vshi_value *value, int32_t *width, int32_t *height);
+/* A pattern, or an array of them, into a vsh_selection: what is chosen, and what of it is not. */
+vsh_result vshi_read_only(vshi_reader *reader, const vshi_value *value, void *selection);
+vsh_result vshi_read_except(vshi_reader *reader, const vshi_value *value, void *selection);
 vsh_result vshi_read_bits(vshi_reader *reader, const vshi_value *value, void *bits); /* int32_t */
 
 /* Fails where two lights of the array `value` have one name. */

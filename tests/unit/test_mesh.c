@@ -360,6 +360,71 @@ static void a_million_triangles_take_about_a_second(void **state) {
     free(positions);
 }
 
+static void names_match_patterns_as_in_a_shell(void **state) {
+    (void)state;
+    static const struct {
+        const char *name, *pattern;
+        int match;
+    } cases[] = {
+        {"floor", "floor", 1},
+        {"floor", "flo", 0},
+        {"floor", "FLOOR", 0},
+        {"floor", "*", 1},
+        {"floor", "flo*", 1},
+        {"floor", "*oo*", 1},
+        {"floor", "*o?", 1},
+        {"floor", "f??or", 1},
+        {"floor", "f??????", 0},
+        {"a/b c", "a*c", 1},
+        {"wände", "w?nde", 1},
+        {"wände", "w??nde", 0},
+        {"part7", "part[0-9]", 1},
+        {"partx", "part[0-9]", 0},
+        {"partx", "part[!0-9]", 1},
+        {"part7", "part[!0-9]", 0},
+        {"a]", "a[]]", 1},
+        {"a[1]", "a[1]", 1},
+        {"a1", "a[1]", 1},
+        {"a[", "a[", 1},
+        {"a*", "a\\*", 1},
+        {"ab", "a\\*", 0},
+        {"", "*", 1},
+        {"", "?", 0},
+        {"", "", 1},
+        {"aab", "*a*b", 1},
+        {"aXbYc", "a*b*c", 1},
+        {"abcabd", "*abd", 1},
+        {"abcabd", "*abc", 0},
+        {"a-", "a[b-]", 1},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        const vsh_mesh mesh = {.name = cases[i].name};
+        if (vsh_mesh_matches(&mesh, cases[i].pattern) != cases[i].match) {
+            fail_msg("'%s' by '%s': expected %d", cases[i].name, cases[i].pattern, cases[i].match);
+        }
+    }
+    const vsh_mesh part = {.name = "Wall/Cube.003", .object_name = "Wall"};
+    assert_true(vsh_mesh_matches(&part, "Wall") && vsh_mesh_matches(&part, "Cube.*"));
+    assert_true(vsh_mesh_matches(&part, "Wall/Cube.003"));
+    assert_false(vsh_mesh_matches(&part, "all") || vsh_mesh_matches(&part, "003"));
+    const vsh_mesh nameless = {0};
+    assert_false(vsh_mesh_matches(&nameless, "*") || vsh_mesh_matches(&part, NULL) ||
+                 vsh_mesh_matches(NULL, "*"));
+}
+
+static void a_pattern_of_many_stars_takes_no_time(void **state) {
+    (void)state;
+    char name[4001], pattern[2002];
+    memset(name, 'a', sizeof name - 1);
+    name[sizeof name - 1] = '\0';
+    for (size_t i = 0; i < 1000; ++i) {
+        memcpy(pattern + 2 * i, "*a", 2);
+    }
+    strcpy(pattern + 2000, "b");
+    const vsh_mesh mesh = {.name = name};
+    assert_false(vsh_mesh_matches(&mesh, pattern));
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_cube_is_closed),
@@ -377,6 +442,8 @@ int main(void) {
         cmocka_unit_test(transforms_that_flatten_or_are_not_finite_are_refused),
         cmocka_unit_test(arrays_that_are_missing_are_refused),
         cmocka_unit_test(labels_say_name_or_number_and_keep_whole_characters),
+        cmocka_unit_test(names_match_patterns_as_in_a_shell),
+        cmocka_unit_test(a_pattern_of_many_stars_takes_no_time),
         cmocka_unit_test(a_million_triangles_take_about_a_second),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

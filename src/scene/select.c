@@ -1,0 +1,202 @@
+#include "scene/select.h"
+
+#include "base/job.h"
+#include "base/memory.h"
+#include "caster/mesh.h"
+#include "scene/parts.h"
+#include "scene/suggest.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+/* --- in scene files */
+
+static vsh_result read_patterns(vshi_reader *reader, const vshi_value *value, const char *const **patterns,
+                                size_t *count) {
+    static const vshi_key key = {.kind = VSHI_STRING};
+    const bool list = json_is_array(value->json);
+    *count = list ? json_array_size(value->json) : 1;
+    if (*count == 0) {
+        return vshi_reader_fail(reader, value, "is empty");
+    }
+    void *memory = NULL;
+    vsh_result result = vshi_reader_allocate(reader, &memory, *count, sizeof **patterns, "patterns");
+    const char **strings = memory;
+    for (size_t i = 0; i < *count && result == VSH_OK; ++i) {
+        const vshi_value item = list ? vshi_item(value, i) : *value;
+        result = vshi_read_value(reader, &item, &key, &strings[i]);
+    }
+    *patterns = strings;
+    return result;
+}
+
+vsh_result vshi_read_only(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_selection *selection = member;
+    return read_patterns(reader, value, &selection->only, &selection->only_count);
+}
+
+vsh_result vshi_read_except(vshi_reader *reader, const vshi_value *value, void *member) {
+    vsh_selection *selection = member;
+    return read_patterns(reader, value, &selection->except, &selection->except_count);
+}
+
+/* --- in a model */
+
+/* A name as messages tell it: that of the object. */
+static const char *name_of(const vsh_mesh *mesh) {
+    const char *name = mesh->object_name != NULL ? mesh->object_name : mesh->name;
+    return name != NULL ? name : "";
+}
+
+/* "'floor', 'wall' and 12 more", without those that follow one of the same name. */
+static void list_names(const vsh_model *model, char *text, size_t capacity) {
+    enum { LISTED = 8, ROOM = 40 };
+    const size_t count = vsh_model_mesh_count(model);
+    size_t used = 0, listed = 0, more = 0;
+    const char *last = NULL;
+    for (size_t i = 0; i < count; ++i) {
+        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
+        const char *name = name_of(&mesh);
+        if (last != NULL && strcmp(last, name) == 0) {
+            continue;
+        }
+        last = name;
+        if (listed == LISTED || used + strlen(name) + ROOM > capacity) {
+            ++more;
+            continue;
+        }
+        used += (size_t)snprintf(text + used, capacity - used, "%s'%s'", listed++ > 0 ? ", " : "", name);
+    }
+    if (more > 0) {
+        snprintf(text + used, capacity - used, "%s%zu more", listed > 0 ? " and " : "", more);
+    }
+}
+
+static char lower(char c) {
+    return c >= 'A' && c <= 'Z' ? (char)(c - 'A' + 'a') : c;
+}
+
+/* The letters of a pattern or name, all small: case is what is mistaken most. */
+static void fold(const char *from, bool pattern, char to[64]) {
+    size_t length = 0;
+    for (; *from != '\0' && length < 63; ++from) {
+        if (!pattern || strchr("*?[]\\", *from) == NULL) {
+            to[length++] = lower(*from);
+        }
+    }
+    to[length] = '\0';
+}
+
+/* The name that a pattern which matches nothing comes nearest to, or NULL. */
+static const char *nearest_name(const vsh_model *model, const char *pattern) {
+    char wanted[64], have[64];
+    fold(pattern, true, wanted);
+    const char *nearest = NULL;
+    size_t least = SIZE_MAX;
+    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
+        fold(name_of(&mesh), false, have);
+        size_t distance = vshi_edit_distance(wanted, have);
+        if (wanted[0] != '\0' && strstr(have, wanted) != NULL) {
+            distance = 0;
+        }
+        if (distance < least) {
+            least = distance;
+            nearest = name_of(&mesh);
+        }
+    }
+    return nearest != NULL && wanted[0] != '\0' && vshi_is_near(least, wanted) ? nearest : NULL;
+}
+
+static vsh_result fail_unmatched(const vsh_model *model, const char *path, const char *pattern,
+                                 vsh_error *error) {
+    char names[600] = "";
+    list_names(model, names, sizeof names);
+    const char *near = nearest_name(model, pattern);
+    return vshi_fail(error, VSH_ERROR_INPUT, "%s: no object is named '%.100s'%s%.100s%s there are %s", path,
+                     pattern, near != NULL ? "; did you mean '" : ";", near != NULL ? near : "",
+                     near != NULL ? "'?" : "", names);
+}
+
+/* Sets those that a pattern matches to `value`. */
+static vsh_result apply(const vsh_model *model, const char *path, const char *const *patterns, size_t count,
+                        unsigned char value, unsigned char *chosen, vsh_error *error) {
+    for (size_t p = 0; p < count; ++p) {
+        if (patterns[p] == NULL) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: pattern %zu of objects is NULL", path, p);
+        }
+        bool matched = false;
+        for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+            const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
+            if (vsh_mesh_matches(&mesh, patterns[p])) {
+                chosen[i] = value;
+                matched = true;
+            }
+        }
+        if (!matched) {
+            return fail_unmatched(model, path, patterns[p], error);
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_select(const vsh_model *model, const char *path, const vsh_selection *selection,
+                       unsigned char **chosen, vsh_error *error) {
+    const size_t count = vsh_model_mesh_count(model);
+    vsh_result result = vshi_allocate((void **)chosen, count, 1, "objects", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    memset(*chosen, selection->only_count == 0, count);
+    result = apply(model, path, selection->only, selection->only_count, 1, *chosen, error);
+    if (result == VSH_OK) {
+        result = apply(model, path, selection->except, selection->except_count, 0, *chosen, error);
+    }
+    if (result == VSH_OK && memchr(*chosen, 1, count) == NULL) {
+        result = vshi_fail(error, VSH_ERROR_INPUT,
+                           "%s: no object is left: all that are chosen are excepted, too", path);
+    }
+    return result;
+}
+
+static vsh_result fail_without_uvs(const vsh_receiver *receiver, const char *mesh, int32_t sets,
+                                   vsh_error *error) {
+    if (sets == 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: %s: no UVs to bake into: unwrap it (in Blender: UV > Smart UV Project, into a "
+                         "second UV map), or leave it out of what receives: it then casts only",
+                         receiver->path, mesh);
+    }
+    return vshi_fail(error, VSH_ERROR_INPUT, "%s: %s: no UV set %d: it has %s%d", receiver->path, mesh,
+                     receiver->uv_set, sets == 1 ? "set " : "sets 0 … ", sets - 1);
+}
+
+vsh_result vshi_select_uvs(const vsh_model *model, const vsh_receiver *receiver, const vsh_run *run,
+                           unsigned char *chosen, vsh_error *error) {
+    if (receiver->uv_set < -1 || receiver->uv_set >= VSH_MAX_UV_SETS) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: UV set %d: expected -1 … %d", receiver->path,
+                         receiver->uv_set, VSH_MAX_UV_SETS - 1);
+    }
+    const size_t count = vsh_model_mesh_count(model);
+    bool any = false;
+    for (size_t i = 0; i < count; ++i) {
+        any = any ||
+              (chosen[i] != 0 && vsh_model_uv_sets(model, i) > (receiver->uv_set > 0 ? receiver->uv_set : 0));
+    }
+    for (size_t i = 0; i < count; ++i) {
+        const int32_t sets = vsh_model_uv_sets(model, i);
+        if (chosen[i] == 0 || (sets > 0 && receiver->uv_set < sets)) {
+            continue;
+        }
+        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
+        const vshi_mesh_name label = vshi_mesh_label(&mesh, i);
+        if (!any || !receiver->partial) {
+            return fail_without_uvs(receiver, label.text, sets, error);
+        }
+        chosen[i] = 0;
+        vshi_warn(run, "%s: %s: no UVs to bake into: it casts only", receiver->path, label.text);
+    }
+    return VSH_OK;
+}

@@ -1,0 +1,18 @@
+/* Which of a file's meshes a caster or receiver takes. */
+#ifndef VSHI_SELECT_H
+#define VSHI_SELECT_H
+
+#include <vdbshade/scene.h>
+
+/* *chosen [mesh count]: 1 for each mesh that the selection means; to be freed, also after an error. `path` is
+ * the model's, for messages. Errors: VSH_ERROR_INPUT where a pattern matches nothing (with names that it
+ * might have meant) or nothing is left; VSH_ERROR_ARGUMENT where a pattern is NULL; VSH_ERROR_MEMORY. */
+vsh_result vshi_select(const vsh_model *model, const char *path, const vsh_selection *selection,
+                       unsigned char **chosen, vsh_error *error);
+
+/* Takes those out of `chosen` that cannot receive, where the receiver is partial; else errors:
+ * VSH_ERROR_INPUT where a mesh has no UVs or not the set, VSH_ERROR_ARGUMENT where there is no such set. */
+vsh_result vshi_select_uvs(const vsh_model *model, const vsh_receiver *receiver, const vsh_run *run,
+                           unsigned char *chosen, vsh_error *error);
+
+#endif
