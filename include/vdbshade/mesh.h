@@ -10,6 +10,17 @@ extern "C" {
 
 enum { VSH_MAX_UV_SETS = 8 };
 
+/* What a mesh is taken for. AUTO looks at each piece of it that hangs together by its edges: closed ones, and
+ * open ones that enclose nearly all of what is behind their faces, are solid where their faces look outwards;
+ * where they look inwards they are rooms, cut out of the solids around them, or else thin walls behind the
+ * faces; what encloses nothing is a sheet with air on both sides. */
+enum {
+    VSH_SOLIDITY_AUTO,
+    VSH_SOLIDITY_SOLID, /* what it encloses is solid whatever way its faces look, and closed over its holes */
+    VSH_SOLIDITY_SHELL, /* all sheets */
+    VSH_SOLIDITY_INWARD /* air in what it encloses, whatever way its faces look: a room or a wall */
+};
+
 /* A view of a triangle mesh: nothing is copied or owned. */
 typedef struct vsh_mesh {
     const char *name;       /* for messages; may be NULL */
@@ -22,8 +33,11 @@ typedef struct vsh_mesh {
     const double *transform; /* [12], local to world, three rows of four (column 3 translates), may mirror,
                                 scale unevenly and shear, but not flatten; NULL: identity */
     const char *object_name; /* of the object that it is a part of; may be NULL: `name` */
-    uint32_t object; /* meshes of one number are parts of one object (a part for each of its materials);
-                        0: an object of its own */
+    uint32_t object;      /* meshes of one number are parts of one object (a part for each of its materials);
+                             0: an object of its own */
+    int32_t solidity;     /* VSH_SOLIDITY_…; where it casts */
+    const uint8_t *sides; /* [triangle_count]: what was found to be solid, so that it is not looked for
+                             again; of views from a scene's assets. Else NULL */
 } vsh_mesh;
 
 /* Whether a mesh is meant by `pattern`: its name, its object's name, or what its name has behind its object's

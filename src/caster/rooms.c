@@ -1,0 +1,139 @@
+/* Which of the components that look inwards are rooms in solids. */
+#include "base/memory.h"
+#include "caster/solidity_parts.h"
+
+#include <stdlib.h>
+
+enum { SAMPLES = 24 };
+
+/* Of a room's samples: those that lie in any solid, so that it is one; and in one solid, so that it is cut
+ * out of it and the solid not left to stand in it as a pillar that reaches into the wall would. */
+static const double ROOM_SHARE = 0.5, CUT_SHARE = 0.25;
+/* A sample goes a whole number of times around what it does not lie on: nearer to 1/2 than this it does. */
+static const double ON_SURFACE = 0.25;
+
+typedef struct surrounding {
+    vshi_vec samples[SAMPLES];
+    bool inside[SAMPLES]; /* of any solid */
+    size_t cuts;          /* found so far: of this room */
+    bool coincides;       /* with a solid's own surface */
+} surrounding;
+
+static bool in_box(const vshi_component *c, vshi_vec p) {
+    return p.x >= c->low.x && p.x <= c->high.x && p.y >= c->low.y && p.y <= c->high.y && p.z >= c->low.z &&
+           p.z <= c->high.z;
+}
+
+static vsh_result add_cut(vshi_solidity *s, size_t room, size_t solid, vsh_error *error) {
+    if (s->cut_count == s->cut_room) {
+        const size_t more = 2 * s->cut_room + 16;
+        void *memory = NULL;
+        const vsh_result result = vshi_allocate(&memory, more, sizeof *s->cuts, "rooms", error);
+        if (result != VSH_OK) {
+            return result;
+        }
+        vshi_cut *cuts = memory;
+        for (size_t i = 0; i < s->cut_count; ++i) {
+            cuts[i] = s->cuts[i];
+        }
+        free(s->cuts);
+        s->cuts = cuts;
+        s->cut_room = more;
+    }
+    s->cuts[s->cut_count++] = (vshi_cut){(uint32_t)room, (uint32_t)solid};
+    return VSH_OK;
+}
+
+/* Looks at how a room lies in one solid. */
+static vsh_result look(vshi_solidity *s, size_t room, size_t solid, surrounding *around, vsh_error *error) {
+    vshi_component *c = &s->components[solid];
+    const vshi_surface_part part = vshi_component_part(s, c);
+    size_t inside = 0, on = 0;
+    for (size_t i = 0; i < SAMPLES; ++i) {
+        if (!in_box(c, around->samples[i])) {
+            continue;
+        }
+        const double times = fabs(vshi_winding(&part, around->samples[i]));
+        if (fabs(times - floor(times) - 0.5) < ON_SURFACE) {
+            ++on;
+        } else if (times > 0.5) {
+            ++inside;
+            around->inside[i] = true;
+        }
+    }
+    if ((double)on > ROOM_SHARE * SAMPLES) { /* faces of both sides: air within, air outside */
+        c->kind = VSHI_KIND_SHEET;
+        around->coincides = true;
+    }
+    if ((double)inside < CUT_SHARE * SAMPLES) {
+        return VSH_OK;
+    }
+    ++around->cuts;
+    return add_cut(s, room, solid, error);
+}
+
+static vsh_result find_room(vshi_solidity *s, size_t room, vsh_error *error) {
+    vshi_component *c = &s->components[room];
+    const vshi_surface_part part = vshi_component_part(s, c);
+    surrounding around = {.cuts = 0};
+    vshi_part_samples(&part, c->area, SAMPLES, around.samples);
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < s->count && result == VSH_OK && !around.coincides; ++i) {
+        const vshi_component *solid = &s->components[i];
+        if (solid->kind == VSHI_KIND_SOLID && solid->low.x <= c->high.x && solid->high.x >= c->low.x &&
+            solid->low.y <= c->high.y && solid->high.y >= c->low.y && solid->low.z <= c->high.z &&
+            solid->high.z >= c->low.z) {
+            result = look(s, room, i, &around, error);
+        }
+    }
+    size_t inside = 0;
+    for (size_t i = 0; i < SAMPLES; ++i) {
+        inside += around.inside[i];
+    }
+    if ((double)inside >= ROOM_SHARE * SAMPLES && !around.coincides && around.cuts > 0) {
+        c->kind = VSHI_KIND_ROOM;
+    } else {
+        c->kind = around.coincides ? VSHI_KIND_SHEET : VSHI_KIND_WALL;
+        s->cut_count -= around.cuts;
+    }
+    return result;
+}
+
+/* A house whose skin has holes and an open room within: light goes from the one to the other, so neither is
+ * closed over its holes. Returns whether there was one. */
+static bool hollow(vshi_solidity *s) {
+    bool found = false;
+    for (size_t i = 0; i < s->cut_count; ++i) {
+        vshi_component *solid = &s->components[s->cuts[i].solid];
+        if (solid->open_edges > 0 && s->components[s->cuts[i].room].open_edges > 0) {
+            solid->kind = VSHI_KIND_WALL;
+            found = true;
+        }
+    }
+    return found;
+}
+
+static int compare_cuts(const void *a, const void *b) {
+    const vshi_cut *x = a, *y = b;
+    if (x->solid != y->solid) {
+        return x->solid < y->solid ? -1 : 1;
+    }
+    return (x->room > y->room) - (x->room < y->room);
+}
+
+vsh_result vshi_rooms_find(vshi_solidity *s, vsh_error *error) {
+    vsh_result result = VSH_OK;
+    do {
+        s->cut_count = 0;
+        for (size_t i = 0; i < s->count && result == VSH_OK; ++i) {
+            const vshi_component *c = &s->components[i];
+            if (c->inward && c->kind != VSHI_KIND_SHEET) {
+                result = find_room(s, i, error);
+            }
+        }
+    } while (result == VSH_OK && hollow(s));
+    if (s->cut_count > 1) {
+        qsort(s->cuts, s->cut_count, sizeof *s->cuts, compare_cuts);
+    }
+    return result;
+}

@@ -1,0 +1,155 @@
+#include "caster/solidity.h"
+
+#include "base/floats.h"
+#include "base/job.h"
+#include "base/memory.h"
+#include "caster/solidity_parts.h"
+
+#include <stdlib.h>
+
+/* What a triangle and a vertex take while edges are found, and afterwards at most. */
+static const double BYTES_PER_TRIANGLE = 120.0, BYTES_PER_VERTEX = 24.0;
+
+static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, vsh_error *error) {
+    size_t triangles = 0;
+    for (size_t m = 0; m < s->mesh_count; ++m) {
+        triangles += meshes[m].triangle_count;
+    }
+    const struct {
+        void **memory;
+        size_t count, size;
+    } wanted[] = {{(void **)&s->found, s->mesh_count, sizeof *s->found},
+                  {(void **)&s->first, s->mesh_count + 1, sizeof *s->first},
+                  {(void **)&s->first_side, s->mesh_count + 1, sizeof *s->first_side},
+                  {(void **)&s->sides, triangles, 1}};
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0] && result == VSH_OK; ++i) {
+        result = vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "what is solid", error);
+    }
+    return result;
+}
+
+static void set_sides(vshi_solidity *s) {
+    for (size_t i = 0; i < s->count; ++i) {
+        vshi_component *c = &s->components[i];
+        const uint8_t *turned = s->found[c->mesh].turned;
+        uint8_t *sides = s->sides + s->first_side[c->mesh];
+        for (size_t at = 0; at < c->triangles && c->kind != VSHI_KIND_SHEET; ++at) {
+            const uint32_t triangle = c->list[at];
+            sides[triangle] = turned[triangle] ? VSHI_SIDE_BEFORE : VSHI_SIDE_BEHIND;
+            c->turned += turned[triangle];
+        }
+    }
+}
+
+static vsh_result find(vshi_solidity *s, vshi_job *job, vsh_error *error) {
+    vsh_result result = VSH_OK;
+    for (size_t m = 0; m < s->mesh_count && result == VSH_OK; ++m) {
+        result = vshi_components_find(&s->meshes[m], m, &s->found[m], error);
+        s->first[m + 1] = s->first[m] + s->found[m].count;
+        s->first_side[m + 1] = s->first_side[m] + s->meshes[m].triangle_count;
+        s->cap_count += s->found[m].rim_count;
+        if (result == VSH_OK && vshi_job_advance(job, 1)) {
+            result = vshi_job_fail_cancelled(job, error);
+        }
+    }
+    s->count = s->first[s->mesh_count];
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&s->components, s->count, sizeof *s->components, "components", error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&s->caps, s->cap_count, sizeof *s->caps, "holes", error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_kinds_find(s, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_rooms_find(s, error);
+    }
+    if (result == VSH_OK) {
+        set_sides(s);
+    }
+    return result;
+}
+
+/* Keeps what the components list; the rest was for finding them. */
+static void tidy(vshi_solidity *s) {
+    for (size_t m = 0; m < s->mesh_count; ++m) {
+        uint32_t *list = s->found[m].list;
+        s->found[m].list = NULL;
+        vshi_components_free(&s->found[m]);
+        s->found[m].list = list;
+    }
+    s->meshes = NULL;
+}
+
+vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                vshi_solidity **made, vsh_error *error) {
+    *made = NULL;
+    double bytes = 0.0;
+    for (size_t m = 0; m < mesh_count; ++m) {
+        bytes += BYTES_PER_TRIANGLE * (double)meshes[m].triangle_count +
+                 BYTES_PER_VERTEX * (double)meshes[m].vertex_count;
+    }
+    vsh_result result = vshi_check_limit(run, bytes, "what is solid", error);
+    vshi_solidity *s = NULL;
+    vshi_job *job = NULL;
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&s, 1, sizeof *s, "what is solid", error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    s->meshes = meshes;
+    s->mesh_count = mesh_count;
+    result = allocate(s, meshes, error);
+    if (result == VSH_OK) {
+        job = vshi_job_begin(run, "solids", mesh_count);
+        result = job == NULL ? vshi_fail(error, VSH_ERROR_MEMORY, "what is solid: the system refused memory")
+                             : find(s, job, error);
+    }
+    vshi_job_end(job);
+    if (result == VSH_OK) {
+        tidy(s);
+        *made = s;
+    } else {
+        vshi_solidity_free(s);
+    }
+    return result;
+}
+
+void vshi_solidity_free(vshi_solidity *s) {
+    if (s == NULL) {
+        return;
+    }
+    free(s->cuts);
+    free(s->caps);
+    free(s->components);
+    for (size_t m = 0; s->found != NULL && m < s->mesh_count; ++m) {
+        vshi_components_free(&s->found[m]);
+    }
+    free(s->sides);
+    free(s->first_side);
+    free(s->first);
+    free(s->found);
+    free(s);
+}
+
+const uint8_t *vshi_solidity_sides(const vshi_solidity *s, size_t mesh) {
+    return s->sides + s->first_side[mesh];
+}
+
+const vshi_component *vshi_solidity_components(const vshi_solidity *s, size_t *count) {
+    *count = s->count;
+    return s->components;
+}
+
+const vshi_component *vshi_solidity_of_mesh(const vshi_solidity *s, size_t mesh, size_t *count) {
+    *count = s->first[mesh + 1] - s->first[mesh];
+    return s->components + s->first[mesh];
+}
+
+const vshi_cut *vshi_solidity_cuts(const vshi_solidity *s, size_t *count) {
+    *count = s->cut_count;
+    return s->cuts;
+}

@@ -1,0 +1,82 @@
+/* What is solid: which side of every triangle of some meshes is air, and which is not.
+ *
+ * Meshes fall apart into components, pieces that hang together by their edges (caster/components.h); each is
+ * one of four kinds. All meshes of a scene are looked at together, because a room is a room in the walls of
+ * another mesh too. */
+#ifndef VSHI_SOLIDITY_H
+#define VSHI_SOLIDITY_H
+
+#include "base/error.h"
+#include "base/vec.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+#include <vdbshade/mesh.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What lies on the two sides of a triangle. Its front is where its corners run anticlockwise as
+ * vshi_mesh_triangle() gives them. */
+enum {
+    VSHI_SIDE_SHEET,  /* air on both */
+    VSHI_SIDE_BEHIND, /* air in front; a solid or a wall behind */
+    VSHI_SIDE_BEFORE  /* a face that looks the wrong way: the solid or wall is in front, air is behind */
+};
+
+typedef enum vshi_kind {
+    VSHI_KIND_SHEET, /* air on both sides: a card, a leaf, a curtain, an open cup */
+    VSHI_KIND_SOLID, /* what it encloses is solid; where it is open, it is closed over its holes */
+    VSHI_KIND_ROOM,  /* looks inwards and lies within solids: what it encloses is cut out of them */
+    VSHI_KIND_WALL   /* a thin wall behind its faces, air on both sides of that: a room or a sky dome that
+                        stands for itself, or the outer skin of a house with open rooms in it */
+} vshi_kind;
+
+typedef struct vshi_component {
+    vshi_kind kind;
+    bool inward;        /* its faces look at what it encloses */
+    uint32_t mesh;      /* of the list */
+    size_t triangles;   /* with some area, and those given twice */
+    size_t turned;      /* of them: VSHI_SIDE_BEFORE */
+    size_t open_edges;  /* 0: closed */
+    size_t holes;       /* groups of open edges that hang together */
+    double area;        /* world units² */
+    double enclosed;    /* 1: it encloses all that lies behind its faces, 1/2: a plane (caster/enclosure.h) */
+    double volume;      /* world units³, of what it encloses; 0 where it has no inside */
+    vshi_vec low, high; /* box, world */
+    const uint32_t *list;     /* its triangles [triangles], ascending */
+    const vshi_vec (*cap)[3]; /* triangles that close its holes [open_edges], world, facing as its faces */
+} vshi_component;
+
+typedef struct vshi_solidity vshi_solidity;
+
+/* Looks at meshes that have passed vshi_mesh_check_data(). A mesh's `solidity` overrules what is found of its
+ * components. The meshes' names are not copied; nothing else of them is needed afterwards. Errors:
+ * VSH_ERROR_LIMIT (more than 2^32 / 3 triangles in one mesh, run->memory_limit), VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED. Free the result with vshi_solidity_free(). */
+vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                vshi_solidity **made, vsh_error *error);
+void vshi_solidity_free(vshi_solidity *solidity); /* NULL does nothing */
+
+/* VSHI_SIDE_… of the triangles of a mesh [triangle_count]; those without area are sheets. */
+const uint8_t *vshi_solidity_sides(const vshi_solidity *solidity, size_t mesh);
+
+/* The components, mesh by mesh, in the order of their first triangles. */
+const vshi_component *vshi_solidity_components(const vshi_solidity *solidity, size_t *count);
+
+/* Those of one mesh: *count of them from the one returned on. */
+const vshi_component *vshi_solidity_of_mesh(const vshi_solidity *solidity, size_t mesh, size_t *count);
+
+/* A room, and a solid that it is cut out of: places in the list of components. */
+typedef struct vshi_cut {
+    uint32_t room, solid;
+} vshi_cut;
+
+/* Sorted by solid, then by room. */
+const vshi_cut *vshi_solidity_cuts(const vshi_solidity *solidity, size_t *count);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
