@@ -38,11 +38,11 @@ static double volume_from(const vshi_vec corner[3], vshi_vec origin) {
 }
 
 vshi_surface_part vshi_component_part(const vshi_solidity *s, const vshi_component *c) {
-    return (vshi_surface_part){&s->meshes[c->mesh], c->list, c->triangles, s->found[c->mesh].turned};
+    return (vshi_surface_part){&s->wholes.meshes[c->whole], c->list, c->triangles, s->found[c->whole].turned};
 }
 
 static measure measure_component(const vshi_solidity *s, vshi_component *c) {
-    const vshi_components *found = &s->found[c->mesh];
+    const vshi_components *found = &s->found[c->whole];
     const vshi_surface_part part = vshi_component_part(s, c);
     measure m = {0.0, 0.0};
     double volume = 0.0;
@@ -72,7 +72,7 @@ static measure measure_component(const vshi_solidity *s, vshi_component *c) {
 }
 
 void vshi_component_turn(vshi_solidity *s, vshi_component *c) {
-    uint8_t *turned = s->found[c->mesh].turned;
+    uint8_t *turned = s->found[c->whole].turned;
     for (size_t at = 0; at < c->triangles; ++at) {
         turned[c->list[at]] ^= 1;
     }
@@ -145,8 +145,8 @@ static size_t close_holes(closing *k, const vshi_rim *rims, size_t count, vshi_v
 /* --- kinds */
 
 static void decide(vshi_solidity *s, vshi_component *c, const measure *m) {
-    const int32_t asked = s->meshes[c->mesh].solidity;
-    const vshi_components *found = &s->found[c->mesh];
+    const int32_t asked = s->wholes.meshes[c->whole].solidity;
+    const vshi_components *found = &s->found[c->whole];
     const bool twisted = found->twisted[found->of[c->list[0]]] != 0;
     double turned_area = m->turned_area;
     if (turned_area > 0.5 * c->area) { /* most are right */
@@ -178,9 +178,9 @@ static void decide(vshi_solidity *s, vshi_component *c, const measure *m) {
     }
 }
 
-static vsh_result find_of_mesh(vshi_solidity *s, size_t mesh, size_t *caps, vsh_error *error) {
-    const vshi_components *found = &s->found[mesh];
-    closing k = {.mesh = &s->meshes[mesh]};
+static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t *caps, vsh_error *error) {
+    const vshi_components *found = &s->found[whole];
+    closing k = {.mesh = &s->wholes.meshes[whole]};
     const size_t vertices = found->rim_count > 0 ? k.mesh->vertex_count : 0;
     vsh_result result = vshi_allocate((void **)&k.parent, vertices, sizeof *k.parent, "holes", error);
     if (result == VSH_OK) {
@@ -190,8 +190,8 @@ static vsh_result find_of_mesh(vshi_solidity *s, size_t mesh, size_t *caps, vsh_
         result = vshi_allocate((void **)&k.holes, found->rim_count, sizeof *k.holes, "holes", error);
     }
     for (size_t i = 0, rim = 0; i < found->count && result == VSH_OK; ++i) {
-        vshi_component *c = &s->components[s->first[mesh] + i];
-        *c = (vshi_component){.mesh = (uint32_t)mesh,
+        vshi_component *c = &s->components[s->first[whole] + i];
+        *c = (vshi_component){.whole = (uint32_t)whole,
                               .triangles = found->begin[i + 1] - found->begin[i],
                               .list = found->list + found->begin[i],
                               .cap = (const vshi_vec(*)[3])(s->caps + *caps)};
@@ -213,8 +213,8 @@ static vsh_result find_of_mesh(vshi_solidity *s, size_t mesh, size_t *caps, vsh_
 vsh_result vshi_kinds_find(vshi_solidity *s, vsh_error *error) {
     size_t caps = 0;
     vsh_result result = VSH_OK;
-    for (size_t m = 0; m < s->mesh_count && result == VSH_OK; ++m) {
-        result = find_of_mesh(s, m, &caps, error);
+    for (size_t m = 0; m < s->wholes.count && result == VSH_OK; ++m) {
+        result = find_of_whole(s, m, &caps, error);
     }
     return result;
 }

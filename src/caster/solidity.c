@@ -10,19 +10,21 @@
 /* What a triangle and a vertex take while edges are found, and afterwards at most. */
 static const double BYTES_PER_TRIANGLE = 120.0, BYTES_PER_VERTEX = 24.0;
 
-static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, vsh_error *error) {
-    size_t triangles = 0;
-    for (size_t m = 0; m < s->mesh_count; ++m) {
-        triangles += meshes[m].triangle_count;
+static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, size_t mesh_count, vsh_error *error) {
+    vsh_result result =
+        vshi_allocate((void **)&s->first_side, mesh_count + 1, sizeof *s->first_side, "what is solid", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    for (size_t m = 0; m < mesh_count; ++m) {
+        s->first_side[m + 1] = s->first_side[m] + meshes[m].triangle_count;
     }
     const struct {
         void **memory;
         size_t count, size;
-    } wanted[] = {{(void **)&s->found, s->mesh_count, sizeof *s->found},
-                  {(void **)&s->first, s->mesh_count + 1, sizeof *s->first},
-                  {(void **)&s->first_side, s->mesh_count + 1, sizeof *s->first_side},
-                  {(void **)&s->sides, triangles, 1}};
-    vsh_result result = VSH_OK;
+    } wanted[] = {{(void **)&s->found, s->wholes.count, sizeof *s->found},
+                  {(void **)&s->first, s->wholes.count + 1, sizeof *s->first},
+                  {(void **)&s->sides, s->first_side[mesh_count], 1}};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0] && result == VSH_OK; ++i) {
         result = vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "what is solid", error);
     }
@@ -32,8 +34,8 @@ static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, vsh_error *
 static void set_sides(vshi_solidity *s) {
     for (size_t i = 0; i < s->count; ++i) {
         vshi_component *c = &s->components[i];
-        const uint8_t *turned = s->found[c->mesh].turned;
-        uint8_t *sides = s->sides + s->first_side[c->mesh];
+        const uint8_t *turned = s->found[c->whole].turned;
+        uint8_t *sides = s->sides + s->first_side[s->wholes.first[c->whole]];
         for (size_t at = 0; at < c->triangles && c->kind != VSHI_KIND_SHEET; ++at) {
             const uint32_t triangle = c->list[at];
             sides[triangle] = turned[triangle] ? VSHI_SIDE_BEFORE : VSHI_SIDE_BEHIND;
@@ -44,16 +46,15 @@ static void set_sides(vshi_solidity *s) {
 
 static vsh_result find(vshi_solidity *s, vshi_job *job, vsh_error *error) {
     vsh_result result = VSH_OK;
-    for (size_t m = 0; m < s->mesh_count && result == VSH_OK; ++m) {
-        result = vshi_components_find(&s->meshes[m], m, &s->found[m], error);
+    for (size_t m = 0; m < s->wholes.count && result == VSH_OK; ++m) {
+        result = vshi_components_find(&s->wholes.meshes[m], m, &s->found[m], error);
         s->first[m + 1] = s->first[m] + s->found[m].count;
-        s->first_side[m + 1] = s->first_side[m] + s->meshes[m].triangle_count;
         s->cap_count += s->found[m].rim_count;
         if (result == VSH_OK && vshi_job_advance(job, 1)) {
             result = vshi_job_fail_cancelled(job, error);
         }
     }
-    s->count = s->first[s->mesh_count];
+    s->count = s->first[s->wholes.count];
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&s->components, s->count, sizeof *s->components, "components", error);
     }
@@ -74,13 +75,12 @@ static vsh_result find(vshi_solidity *s, vshi_job *job, vsh_error *error) {
 
 /* Keeps what the components list; the rest was for finding them. */
 static void tidy(vshi_solidity *s) {
-    for (size_t m = 0; m < s->mesh_count; ++m) {
+    for (size_t m = 0; m < s->wholes.count; ++m) {
         uint32_t *list = s->found[m].list;
         s->found[m].list = NULL;
         vshi_components_free(&s->found[m]);
         s->found[m].list = list;
     }
-    s->meshes = NULL;
 }
 
 vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
@@ -100,11 +100,12 @@ vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const
     if (result != VSH_OK) {
         return result;
     }
-    s->meshes = meshes;
-    s->mesh_count = mesh_count;
-    result = allocate(s, meshes, error);
+    result = vshi_wholes_make(meshes, mesh_count, &s->wholes, error);
     if (result == VSH_OK) {
-        job = vshi_job_begin(run, "solids", mesh_count);
+        result = allocate(s, meshes, mesh_count, error);
+    }
+    if (result == VSH_OK) {
+        job = vshi_job_begin(run, "solids", s->wholes.count);
         result = job == NULL ? vshi_fail(error, VSH_ERROR_MEMORY, "what is solid: the system refused memory")
                              : find(s, job, error);
     }
@@ -125,13 +126,14 @@ void vshi_solidity_free(vshi_solidity *s) {
     free(s->cuts);
     free(s->caps);
     free(s->components);
-    for (size_t m = 0; s->found != NULL && m < s->mesh_count; ++m) {
+    for (size_t m = 0; s->found != NULL && m < s->wholes.count; ++m) {
         vshi_components_free(&s->found[m]);
     }
     free(s->sides);
     free(s->first_side);
     free(s->first);
     free(s->found);
+    vshi_wholes_free(&s->wholes);
     free(s);
 }
 
@@ -144,12 +146,16 @@ const vshi_component *vshi_solidity_components(const vshi_solidity *s, size_t *c
     return s->components;
 }
 
-const vshi_component *vshi_solidity_of_mesh(const vshi_solidity *s, size_t mesh, size_t *count) {
-    *count = s->first[mesh + 1] - s->first[mesh];
-    return s->components + s->first[mesh];
+const vshi_component *vshi_solidity_of_whole(const vshi_solidity *s, size_t whole, size_t *count) {
+    *count = s->first[whole + 1] - s->first[whole];
+    return s->components + s->first[whole];
 }
 
 const vshi_cut *vshi_solidity_cuts(const vshi_solidity *s, size_t *count) {
     *count = s->cut_count;
     return s->cuts;
+}
+
+const vshi_wholes *vshi_solidity_wholes(const vshi_solidity *s) {
+    return &s->wholes;
 }

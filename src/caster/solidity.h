@@ -2,12 +2,13 @@
  *
  * Meshes fall apart into components, pieces that hang together by their edges (caster/components.h); each is
  * one of four kinds. All meshes of a scene are looked at together, because a room is a room in the walls of
- * another mesh too. */
+ * another mesh too, and the parts of an object (caster/whole.h) as one mesh. */
 #ifndef VSHI_SOLIDITY_H
 #define VSHI_SOLIDITY_H
 
 #include "base/error.h"
 #include "base/vec.h"
+#include "caster/whole.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -36,7 +37,7 @@ typedef enum vshi_kind {
 typedef struct vshi_component {
     vshi_kind kind;
     bool inward;        /* its faces look at what it encloses */
-    uint32_t mesh;      /* of the list */
+    uint32_t whole;     /* of vshi_solidity_wholes() */
     size_t triangles;   /* with some area, and those given twice */
     size_t turned;      /* of them: VSHI_SIDE_BEFORE */
     size_t open_edges;  /* 0: closed */
@@ -51,10 +52,10 @@ typedef struct vshi_component {
 
 typedef struct vshi_solidity vshi_solidity;
 
-/* Looks at meshes that have passed vshi_mesh_check_data(). A mesh's `solidity` overrules what is found of its
- * components. The meshes' names are not copied; nothing else of them is needed afterwards. Errors:
- * VSH_ERROR_LIMIT (more than 2^32 / 3 triangles in one mesh, run->memory_limit), VSH_ERROR_MEMORY,
- * VSH_ERROR_CANCELLED. Free the result with vshi_solidity_free(). */
+/* Looks at meshes that have passed vshi_mesh_check_data(), which must live as long as the result. A mesh's
+ * `solidity` overrules what is found of its components. Errors: VSH_ERROR_LIMIT (more than 2^32 / 3 triangles
+ * in one object, run->memory_limit), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the result with
+ * vshi_solidity_free(). */
 vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
                                 vshi_solidity **made, vsh_error *error);
 void vshi_solidity_free(vshi_solidity *solidity); /* NULL does nothing */
@@ -62,11 +63,14 @@ void vshi_solidity_free(vshi_solidity *solidity); /* NULL does nothing */
 /* VSHI_SIDE_… of the triangles of a mesh [triangle_count]; those without area are sheets. */
 const uint8_t *vshi_solidity_sides(const vshi_solidity *solidity, size_t mesh);
 
-/* The components, mesh by mesh, in the order of their first triangles. */
+/* The objects, put together from the meshes. */
+const vshi_wholes *vshi_solidity_wholes(const vshi_solidity *solidity);
+
+/* The components, whole by whole, in the order of their first triangles. */
 const vshi_component *vshi_solidity_components(const vshi_solidity *solidity, size_t *count);
 
-/* Those of one mesh: *count of them from the one returned on. */
-const vshi_component *vshi_solidity_of_mesh(const vshi_solidity *solidity, size_t mesh, size_t *count);
+/* Those of one whole: *count of them from the one returned on. */
+const vshi_component *vshi_solidity_of_whole(const vshi_solidity *solidity, size_t whole, size_t *count);
 
 /* A room, and a solid that it is cut out of: places in the list of components. */
 typedef struct vshi_cut {

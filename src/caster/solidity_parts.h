@@ -7,14 +7,13 @@
 #include "caster/solidity.h"
 
 struct vshi_solidity {
-    const vsh_mesh *meshes; /* while it is made */
-    size_t mesh_count;
-    vshi_components *found; /* [mesh_count] */
+    vshi_wholes wholes;
+    vshi_components *found; /* [wholes.count] */
     uint8_t *sides;         /* of all meshes */
-    size_t *first_side;     /* [mesh_count + 1] */
+    size_t *first_side;     /* [mesh count + 1] */
     vshi_component *components;
     size_t count;
-    size_t *first; /* [mesh_count + 1]: the meshes' first components */
+    size_t *first; /* [wholes.count + 1]: the wholes' first components */
     vshi_vec (*caps)[3];
     size_t cap_count;
     vshi_cut *cuts;
@@ -27,7 +26,7 @@ vsh_result vshi_kinds_find(vshi_solidity *solidity, vsh_error *error);
 /* Turns what encloses something to face the other way. */
 void vshi_component_turn(vshi_solidity *solidity, vshi_component *component);
 
-/* A component as a part of its mesh. */
+/* A component as a part of its whole. */
 vshi_surface_part vshi_component_part(const vshi_solidity *solidity, const vshi_component *component);
 
 /* Tells rooms from walls by what lies around them, and finds what they are cut out of. */
