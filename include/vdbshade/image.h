@@ -10,6 +10,10 @@ extern "C" {
 
 enum { VSH_MAX_CHANNELS = 256, VSH_CHANNEL_NAME = 128 };
 
+/* The string attribute of an EXR file that has R, G and B beside the channels that they are made of. Its
+ * value says of which: "irradiance", "shadow.sun * ao", "mean of 3 shadows". */
+#define VSH_IMAGE_RGB "vdbshade_rgb"
+
 /* Planes with names: a view. width × height × channel_count is at most 2^31; in
  * an EXR file that is written row by row there is no such limit. */
 typedef struct vsh_image {
@@ -27,8 +31,12 @@ typedef struct vsh_image_options {
                      else 16 where the format has it, else 8, else 32 */
     const char *pack; /* for formats that cannot name channels, "R=shadow.sun,G=ao,A=A": R, G, B, A from
                          channels or the numbers 0 and 1. R, G and B that are missing are 0; without A there
-                         is no alpha. NULL: vsh_image_default_pack(). In EXR, NULL writes every channel by
-                         name, and a pack only what it names */
+                         is no alpha. "rgb": the image's picture as R, G and B, and A: its irradiance.R,
+                         .G and .B, or where it has none the mean of its shadow.NAME times `ao`, as far as
+                         they are there. NULL: vsh_image_default_pack(). In EXR, NULL writes every channel by
+                         name and the picture beside them, as R, G and B, where the image has no such
+                         channels itself: programs that look for these open the file. "channels" leaves the
+                         picture out, and a pack writes only what it names */
     const vsh_attribute *attributes; /* [attribute_count]: written as string attributes into EXR and as text
                                         into PNG; other formats have no place for them */
     size_t attribute_count;
@@ -88,9 +96,9 @@ VSH_API uint64_t vsh_image_writer_bytes(const char *path, const vsh_image *image
 VSH_API vsh_result vsh_image_check(const char *path, const vsh_image *image, const vsh_image_options *options,
                                    vsh_error *error);
 
-/* The packing that is used where none is given, as text: the first three channels that are not "A" to R, G, B
- * (one alone: to R, G and B), "A" to A, which is left out where the format has no alpha. Writes at most
- * `capacity` bytes, NUL included. */
+/* The packing that is used where none is given, as text: irradiance.R, .G and .B, or else the first three
+ * channels that are not "A" to R, G, B (one alone: to R, G and B), "A" to A, which is left out where the
+ * format has no alpha. Writes at most `capacity` bytes, NUL included. */
 VSH_API void vsh_image_default_pack(const vsh_image *image, char *text, size_t capacity);
 
 /* An image read from a file, as float planes. Free it with vsh_image_free(). */

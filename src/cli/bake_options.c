@@ -38,8 +38,10 @@ static const cli_option options[] = {
      "8, 16 or 32 bits a channel (32 for EXR, else 16\nwhere the format has it, else 8)"},
     {KEY_PACK, "pack", "R=NAME,…",
      "what goes where in formats that cannot name channels:\n"
-     "R=shadow.sun,G=ao,A=A; 0 and 1 are constants\n"
-     "(the first three but A to R, G, B; A to A)"},
+     "R=shadow.sun,G=ao,A=A; 0 and 1 are constants; rgb:\n"
+     "the irradiance, or shadow * ao in grey (irradiance or\n"
+     "the first three but A to R, G, B; A to A; EXR: all by\n"
+     "name and the picture; channels: without the picture)"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {KEY_DRY_RUN, "dry-run", NULL,
      "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},

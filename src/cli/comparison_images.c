@@ -2,12 +2,15 @@
 #include "comparison_parts.h"
 #include "message.h"
 
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
 typedef struct images {
     vsh_image_file *file[2]; /* golden, new */
     vsh_image image[2];
+    const char *names[2][VSH_MAX_CHANNELS]; /* of the images */
+    const float *planes[2][VSH_MAX_CHANNELS];
     uint8_t *mask; /* of the texels to be compared */
 } images;
 
@@ -20,6 +23,37 @@ static int32_t find_channel(const vsh_image *image, const char *name) {
     return -1;
 }
 
+/* Whether a file says that its R, G and B are made of other channels, which are there as well. */
+static bool has_picture(const vsh_image_file *file) {
+    size_t count = 0;
+    const vsh_attribute *attributes = vsh_image_attributes(file, &count);
+    bool says = false;
+    for (size_t i = 0; i < count && !says; ++i) {
+        says = strcmp(attributes[i].name, VSH_IMAGE_RGB) == 0;
+    }
+    const vsh_image image = vsh_image_view(file);
+    bool others = false;
+    for (int32_t c = 0; c < image.channel_count && !others; ++c) {
+        others = image.names[c][0] == '\0' || image.names[c][1] != '\0';
+    }
+    return says && others;
+}
+
+/* The channels of a file, each counted once: without a picture that is there for other programs. */
+static void view(images *both, int which) {
+    const vsh_image all = vsh_image_view(both->file[which]);
+    const bool picture = has_picture(both->file[which]);
+    vsh_image *image = &both->image[which];
+    *image = (vsh_image){all.width, all.height, 0, both->names[which], both->planes[which]};
+    for (int32_t c = 0; c < all.channel_count; ++c) {
+        const char *name = all.names[c];
+        if (!picture || (strcmp(name, "R") != 0 && strcmp(name, "G") != 0 && strcmp(name, "B") != 0)) {
+            both->names[which][image->channel_count] = name;
+            both->planes[which][image->channel_count++] = all.planes[c];
+        }
+    }
+}
+
 static int read_both(const compare_work *work, images *both) {
     const char *const paths[2] = {work->comparison->golden, work->comparison->fresh};
     for (int which = 0; which < 2; ++which) {
@@ -27,7 +61,7 @@ static int read_both(const compare_work *work, images *both) {
         if (vsh_image_read_run(paths[which], &work->run, &both->file[which], &error) != VSH_OK) {
             return cli_fail(&error);
         }
-        both->image[which] = vsh_image_view(both->file[which]);
+        view(both, which);
     }
     return CLI_OK;
 }
@@ -107,7 +141,7 @@ static int compare_channels(const compare_work *work, const images *both) {
 
 int compare_images(const compare_work *work) {
     cli_comparison *c = work->comparison;
-    images both = {{NULL, NULL}, {{0}, {0}}, NULL};
+    images both = {.mask = NULL};
     int code = read_both(work, &both);
     const vsh_image *golden = &both.image[0], *fresh = &both.image[1];
     code = code == CLI_OK ? compare_names(work, &both) : code;

@@ -78,6 +78,9 @@ static exr_result_t write_header(vshi_exr_writer *writer, const vshi_planes *pla
         status = exr_attr_set_string(writer->context, writer->part, planes->attributes[i].name,
                                      planes->attributes[i].value);
     }
+    if (status == EXR_ERR_SUCCESS && planes->rgb[0] != '\0') {
+        status = exr_attr_set_string(writer->context, writer->part, VSH_IMAGE_RGB, planes->rgb);
+    }
     for (int32_t c = 0; status == EXR_ERR_SUCCESS && c < planes->count; ++c) {
         status = exr_add_channel(writer->context, writer->part, planes->planes[writer->order[c]].name,
                                  writer->type, EXR_PERCEPTUALLY_LINEAR, 1, 1);
@@ -91,14 +94,14 @@ static exr_result_t write_header(vshi_exr_writer *writer, const vshi_planes *pla
     return status;
 }
 
-static void fill_values(const vshi_exr_writer *writer, const vshi_plane *plane, size_t first, size_t count,
-                        unsigned char *to) {
+static void fill_values(const vshi_exr_writer *writer, const vshi_planes *planes, const vshi_plane *plane,
+                        size_t first, size_t count, unsigned char *to) {
     if (writer->type == EXR_PIXEL_FLOAT && plane->values != NULL) {
         memcpy(to, plane->values + first, count * sizeof(float));
         return;
     }
     for (size_t i = 0; i < count; ++i) {
-        const float value = plane->values != NULL ? plane->values[first + i] : plane->constant;
+        const float value = vshi_plane_at(planes, plane, first + i);
         if (writer->type == EXR_PIXEL_FLOAT) {
             memcpy(to + i * sizeof value, &value, sizeof value);
         } else {
@@ -210,8 +213,8 @@ vsh_result vshi_exr_add(vshi_exr_writer *writer, const vshi_planes *planes, int3
         const int32_t count = rows - y < room ? rows - y : room;
         for (int32_t c = 0; c < writer->count; ++c) {
             const size_t line = (size_t)c * (size_t)writer->lines + (size_t)writer->filled;
-            fill_values(writer, &planes->planes[writer->order[c]], (size_t)y * width, (size_t)count * width,
-                        writer->chunk + line * width * writer->value_size);
+            fill_values(writer, planes, &planes->planes[writer->order[c]], (size_t)y * width,
+                        (size_t)count * width, writer->chunk + line * width * writer->value_size);
         }
         y += count;
         writer->filled += count;

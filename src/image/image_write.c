@@ -112,6 +112,12 @@ vsh_result vsh_image_writer_add(vsh_image_writer *writer, int32_t rows, const fl
         const int32_t channel = writer->plan.channel[p];
         list->planes[p].values = channel >= 0 ? planes[channel] : NULL;
     }
+    const vshi_picture *picture = &writer->plan.picture;
+    list->grey.count = picture->light_count;
+    for (int32_t i = 0; i < picture->light_count; ++i) {
+        list->grey.lights[i] = planes[picture->lights[i]];
+    }
+    list->grey.ao = picture->ao >= 0 ? planes[picture->ao] : NULL;
     const vsh_result result = writer->plan.exr ? vshi_exr_add(writer->exr, list, rows, error)
                                                : vshi_oiio_add(writer->oiio, list, rows, error);
     writer->row += rows;

@@ -2,6 +2,8 @@
  */
 #include "image/pack.h"
 
+#include "image/picture.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -100,6 +102,14 @@ void vsh_image_default_pack(const vsh_image *image, char *text, size_t capacity)
         } else if (count < 3) {
             colors[count++] = image->names[c];
         }
+    }
+    vshi_picture picture;
+    if (image->channel_count <= VSH_MAX_CHANNELS && vshi_picture_of(image, &picture) && picture.rgb[0] >= 0 &&
+        picture.rgb[0] != picture.rgb[1]) { /* irradiance: a picture as it is */
+        for (int c = 0; c < 3; ++c) {
+            colors[c] = image->names[picture.rgb[c]];
+        }
+        count = 3;
     }
     if (count <= 1) {
         /* one alone is shown in grey; where there is coverage only, it is that one */

@@ -14,6 +14,10 @@ enum {
     VSHI_PACK_TEXT = VSHI_PACK_KEYS * (VSH_CHANNEL_NAME + 3) /* holds every default packing */
 };
 
+/* Words instead of a pack: the named channels alone; the picture alone. */
+#define VSHI_PACK_CHANNELS "channels"
+#define VSHI_PACK_PICTURE "rgb"
+
 typedef struct vshi_pack_entry {
     bool given;
     int32_t channel; /* index into the image; -1: `constant` */

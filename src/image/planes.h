@@ -21,7 +21,24 @@ typedef struct vshi_plane {
     const float *values; /* [height × width]; NULL: `constant` everywhere */
     float constant;
     bool is_signed; /* -1 … 1, of which integers hold the half, and one half */
+    bool is_grey;   /* vshi_grey_at() instead of all of these */
 } vshi_plane;
+
+/* One picture of several channels: the mean of the lights' shadows, times AO. */
+typedef struct vshi_grey {
+    int32_t count; /* of lights, ≥ 0 */
+    const float *lights[VSH_MAX_CHANNELS];
+    const float *ao; /* NULL: none */
+} vshi_grey;
+
+static inline float vshi_grey_at(const vshi_grey *grey, size_t at) {
+    float sum = 0.0f;
+    for (int32_t i = 0; i < grey->count; ++i) {
+        sum += grey->lights[i][at];
+    }
+    const float light = grey->count > 0 ? sum / (float)grey->count : 1.0f;
+    return grey->ao != NULL ? light * grey->ao[at] : light;
+}
 
 /* The channels of a file, in its order. */
 typedef struct vshi_planes {
@@ -29,9 +46,18 @@ typedef struct vshi_planes {
     int32_t height;
     int32_t count;
     vshi_plane planes[VSH_MAX_CHANNELS];
+    vshi_grey grey;                  /* where a plane is */
+    char rgb[2 * VSH_CHANNEL_NAME];  /* what R, G and B are made of, beside channels by name; or empty */
     const vsh_attribute *attributes; /* [attribute_count]: looked at when the file is begun */
     size_t attribute_count;
 } vshi_planes;
+
+static inline float vshi_plane_at(const vshi_planes *planes, const vshi_plane *plane, size_t at) {
+    if (plane->is_grey) {
+        return vshi_grey_at(&planes->grey, at);
+    }
+    return plane->values != NULL ? plane->values[at] : plane->constant;
+}
 
 enum { VSHI_FILE_NAME = 256 }; /* EXR's longest channel name is 255 bytes */
 

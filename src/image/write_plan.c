@@ -117,17 +117,78 @@ static vsh_result fit_pack(const char *path, const vshi_format *format, bool ask
     return VSH_OK;
 }
 
+/* Every channel under its own name. */
+static void add_channels(const vsh_image *image, vshi_write_plan *plan) {
+    vshi_planes *planes = &plan->planes;
+    for (int32_t c = 0; c < image->channel_count; ++c) {
+        plan->channel[planes->count] = c;
+        planes->planes[planes->count++] = (vshi_plane){.name = image->names[c]};
+    }
+}
+
+/* R, G and B of the image's picture, if it has one and there is room. */
+static bool add_picture(const vsh_image *image, vshi_write_plan *plan) {
+    vshi_planes *planes = &plan->planes;
+    vshi_picture picture;
+    if (!vshi_picture_of(image, &picture) || planes->count + 3 > VSH_MAX_CHANNELS) {
+        return false;
+    }
+    for (int c = 0; c < 3; ++c) {
+        plan->channel[planes->count] = picture.rgb[c];
+        planes->planes[planes->count++] =
+            (vshi_plane){.name = vshi_pack_keys[c], .is_grey = picture.rgb[c] < 0};
+    }
+    if (picture.rgb[0] < 0) {
+        plan->picture = picture;
+    }
+    vshi_picture_text(&picture, image, planes->rgb, sizeof planes->rgb);
+    return true;
+}
+
+/* The picture alone: R, G, B, and A where the image and the format have it. */
+static vsh_result pack_picture(const char *path, const vsh_image *image, vshi_write_plan *plan,
+                               vsh_error *error) {
+    if (!add_picture(image, plan)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "%s: pack: '%s': no channel shadow.NAME, ao or irradiance to make a picture of",
+                         path, VSHI_PACK_PICTURE);
+    }
+    vshi_planes *planes = &plan->planes;
+    const int32_t format_alpha = plan->exr ? VSHI_ALPHA_KEPT : plan->format.alpha;
+    if (!plan->exr && plan->format.grey) {
+        planes->count = 1;
+    }
+    int32_t alpha = -1;
+    for (int32_t c = 0; c < image->channel_count; ++c) {
+        alpha = strcmp(image->names[c], "A") == 0 ? c : alpha;
+    }
+    if (format_alpha == VSHI_ALPHA_ALWAYS || (format_alpha == VSHI_ALPHA_KEPT && alpha >= 0)) {
+        plan->channel[planes->count] = alpha;
+        planes->planes[planes->count++] =
+            (vshi_plane){.name = vshi_pack_keys[VSHI_PACK_ALPHA], .constant = 1.0f};
+    }
+    return VSH_OK;
+}
+
 static vsh_result plan_planes(const char *path, const vsh_image *image, const char *text,
                               vshi_write_plan *plan, vsh_error *error) {
     vshi_planes *planes = &plan->planes;
     *planes = (vshi_planes){.width = image->width, .height = image->height};
-    if (plan->exr && text == NULL) {
-        planes->count = image->channel_count;
-        for (int32_t c = 0; c < image->channel_count; ++c) {
-            planes->planes[c] = (vshi_plane){image->names[c], NULL, 0.0f, false};
-            plan->channel[c] = c;
+    plan->picture = (vshi_picture){.ao = -1};
+    const bool named = text != NULL && strcmp(text, VSHI_PACK_CHANNELS) == 0;
+    if (named && !plan->exr) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: pack: '%s': %s cannot name channels", path, text,
+                         plan->format.name);
+    }
+    if (plan->exr && (text == NULL || named)) {
+        add_channels(image, plan);
+        if (!named) {
+            add_picture(image, plan);
         }
         return VSH_OK;
+    }
+    if (text != NULL && strcmp(text, VSHI_PACK_PICTURE) == 0) {
+        return pack_picture(path, image, plan, error);
     }
     char default_text[VSHI_PACK_TEXT];
     vsh_image_default_pack(image, default_text, sizeof default_text);
@@ -146,9 +207,10 @@ static vsh_result plan_planes(const char *path, const vsh_image *image, const ch
         if (entry->given || (!plan->exr && key < (plan->format.grey ? 1 : VSHI_PACK_ALPHA))) {
             const int32_t channel = entry->given ? entry->channel : -1;
             plan->channel[planes->count] = channel;
-            planes->planes[planes->count++] =
-                (vshi_plane){vshi_pack_keys[key], NULL, entry->constant,
-                             channel >= 0 && strncmp(image->names[channel], SIGNED, strlen(SIGNED)) == 0};
+            planes->planes[planes->count++] = (vshi_plane){
+                .name = vshi_pack_keys[key],
+                .constant = entry->constant,
+                .is_signed = channel >= 0 && strncmp(image->names[channel], SIGNED, strlen(SIGNED)) == 0};
         }
     }
     return VSH_OK;

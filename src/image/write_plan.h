@@ -2,7 +2,7 @@
 #ifndef VSHI_WRITE_PLAN_H
 #define VSHI_WRITE_PLAN_H
 
-#include "image/planes.h"
+#include "image/picture.h"
 #include "shim/oiio.h"
 
 typedef struct vshi_write_plan {
@@ -10,7 +10,8 @@ typedef struct vshi_write_plan {
     vshi_format format;                /* where it is not EXR */
     int32_t bits;                      /* 8, 16 or 32 */
     vshi_planes planes;                /* without values; names are the image's, or static */
-    int32_t channel[VSH_MAX_CHANNELS]; /* of the image, for each plane; -1: the plane's constant */
+    int32_t channel[VSH_MAX_CHANNELS]; /* of the image, for each plane; -1: the plane's constant, or grey */
+    vshi_picture picture;              /* where a plane is grey: what of */
 } vshi_write_plan;
 
 /* Errors: as of vsh_image_check(), but for the disk's. */

@@ -39,11 +39,16 @@ setup() {
     for channel in shadow.sun ao irradiance.R irradiance.G irradiance.B A; do
         [[ $output == *"channel '$channel'"* ]] || fail "$channel is missing"
     done
-    [[ $output == *"32 × 32, 6 channels"* ]] || fail "wrong size"
+    [[ $output == *"32 × 32, 9 channels"* ]] || fail "wrong size"
+    [[ $output == *"vdbshade_rgb: irradiance"* ]] || fail "what R, G and B are is not told"
 }
 
 @test "what is not asked for is not in the file" {
     shade bake box.obj --ao 1 --size 32 --resolution 24 --quiet -o out.exr
+    done_well
+    shade info out.exr
+    [[ $output == *"5 channels"* ]] || fail "more than ao and A, and R, G and B made of it"
+    shade bake box.obj --ao 1 --size 32 --resolution 24 --pack channels --quiet -o out.exr
     done_well
     shade info out.exr
     [[ $output == *"2 channels"* ]] || fail "more than ao and A"
@@ -154,7 +159,7 @@ JSON
     done_well
     cmp a.exr b.exr
     shade info a.exr
-    [[ $output == *"24 × 24, 3 channels"* ]] || fail "--size did not override"
+    [[ $output == *"24 × 24, 6 channels"* ]] || fail "--size did not override"
     [[ $output == *"shadow.lamp"* ]] || fail "no lamp"
 }
 

@@ -92,6 +92,23 @@ between() {
     done_well
 }
 
+@test "a golden without R, G and B is like a bake that has them beside its channels" {
+    write_box box.obj
+    local bake=("$VDBSHADE" bake box.obj "${SMALL[@]}" --ao 1 --quiet)
+    "${bake[@]}" --pack channels -o without.exr
+    "${bake[@]}" -o with.exr
+    "${bake[@]}" --pack rgb -o picture.exr
+    "$VDBSHADE" info with.exr | grep -q "channel 'R'" || fail "no R"
+    compare without.exr with.exr
+    done_well
+    [ "${#lines[@]}" -eq 3 ] || fail "not a line a channel"
+    compare with.exr without.exr
+    done_well
+    compare picture.exr picture.exr
+    done_well
+    [ "${#lines[@]}" -eq 4 ] || fail "a picture alone has R, G, B and A"
+}
+
 @test "a light's angle a tenth off is told by the width of penumbrae alone among shapes" {
     local one names
     for one in wider narrower; do

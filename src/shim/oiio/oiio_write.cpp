@@ -96,7 +96,7 @@ void interleave(const vshi_planes &planes, int32_t first, int32_t last, Value *r
         const vshi_plane &plane = planes.planes[c];
         const bool halve = plane.is_signed && std::is_integral_v<Value>;
         for (size_t i = 0; i < texels; ++i) {
-            const float value = plane.values != nullptr ? plane.values[begin + i] : plane.constant;
+            const float value = vshi_plane_at(&planes, &plane, begin + i);
             rows[i * count + c] = convert<Value>(halve ? 0.5F + 0.5F * value : value);
         }
     }
