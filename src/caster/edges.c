@@ -24,6 +24,8 @@ typedef struct finding {
     const uint8_t *flat; /* [triangle_count]: of no area */
     size_t *ends;        /* [vertex_count + 1]: past the last use filed under a vertex, once filled */
     use *uses;
+    size_t odd;            /* edges of three triangles, five, … */
+    const uint8_t *frayed; /* [triangle_count]; NULL: not known */
 } finding;
 
 static int compare_uses(const void *a, const void *b) {
@@ -70,7 +72,8 @@ typedef struct spoke {
     double angle;
     uint32_t side;
     uint32_t downwards;
-    uint32_t taken;
+    bool frayed; /* its triangle hangs together with one at an edge that has no other */
+    bool taken;
 } spoke;
 
 static int compare_spokes(const void *a, const void *b) {
@@ -84,35 +87,35 @@ static int compare_spokes(const void *a, const void *b) {
     return (x->side > y->side) - (x->side < y->side);
 }
 
-/* Of three spokes two go on in each other: those that come nearest to a plane, of which one begins a wedge
- * and one ends it if there are such. */
-static void join_three(vshi_edges *edges, const spoke *s) {
+/* Which of three spokes ends at the edge while the two others go on in each other: a card that is stuck to a
+ * solid, where one of them hangs together with edges of one triangle; else the two that come nearest to a
+ * plane go on, one of which begins a wedge and one ends it if there are such. */
+static size_t ending_of_three(const spoke *s) {
     static const double PI = 3.14159265358979323846;
-    int best = 0;
+    size_t best = 0;
     double least = INFINITY;
-    for (int left_out = 0; left_out < 3; ++left_out) {
+    for (size_t left_out = 0; left_out < 3; ++left_out) {
         const spoke *a = &s[left_out == 0 ? 1 : 0], *b = &s[left_out == 2 ? 1 : 2];
-        const double bend =
-            fabs(fabs(b->angle - a->angle) - PI) + (a->downwards == b->downwards ? 10.0 : 0.0);
+        const double bend = fabs(fabs(b->angle - a->angle) - PI) +
+                            (a->downwards == b->downwards ? 10.0 : 0.0) + (s[left_out].frayed ? 0.0 : 100.0);
         if (bend < least) {
             least = bend;
             best = left_out;
         }
     }
-    join(edges, s[best == 0 ? 1 : 0].side, s[best == 2 ? 1 : 2].side);
+    return best;
 }
 
 static void join_spokes(vshi_edges *edges, spoke *s, size_t count) {
     qsort(s, count, sizeof *s, compare_spokes);
     if (count == 3) {
-        join_three(edges, s);
-        return;
+        s[ending_of_three(s)].taken = true;
     }
     for (size_t i = 0; i < count; ++i) {
         const size_t next = (i + 1) % count;
         if (s[i].downwards && !s[next].downwards && !s[i].taken && !s[next].taken) {
             join(edges, s[i].side, s[next].side);
-            s[i].taken = s[next].taken = 1;
+            s[i].taken = s[next].taken = true;
         }
     }
     /* faces that disagree: neighbours */
@@ -144,7 +147,8 @@ static vsh_result join_many(finding *f, uint32_t lower, const use *uses, size_t 
     vshi_frame(axis, &u, &v);
     for (size_t i = 0; i < count; ++i) {
         const vshi_vec to = vshi_sub(place_of(f, uses[i].third), origin);
-        spokes[i] = (spoke){vshi_atan2(vshi_dot(to, v), vshi_dot(to, u)), uses[i].side, uses[i].downwards, 0};
+        spokes[i] = (spoke){vshi_atan2(vshi_dot(to, v), vshi_dot(to, u)), uses[i].side, uses[i].downwards,
+                            f->frayed != NULL && f->frayed[uses[i].side / 3], false};
     }
     join_spokes(f->edges, spokes, count);
     free(spokes);
@@ -158,6 +162,9 @@ static size_t leave_out_repeated(finding *f, use *uses, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         const use *before = kept > 0 ? &uses[kept - 1] : NULL;
         if (before != NULL && before->third == uses[i].third) {
+            if (before->side == uses[i].side) { /* left behind by an earlier call */
+                continue;
+            }
             if (before->downwards == uses[i].downwards) {
                 edges->first[uses[i].side / 3] = before->side / 3;
                 edges->skipped[uses[i].side / 3] = 1;
@@ -181,8 +188,70 @@ static vsh_result join_edge(finding *f, uint32_t lower, use *uses, size_t given,
         join(f->edges, uses[0].side, uses[1].side);
         return VSH_OK;
     }
-    f->edges->open += count % 2;
-    return join_many(f, lower, uses, count, error);
+    if (count % 2 == 0) {
+        return join_many(f, lower, uses, count, error);
+    }
+    ++f->edges->open;
+    ++f->odd; /* later, when it is known what is frayed */
+    return VSH_OK;
+}
+
+/* Marks the triangles that hang together with one at an edge of its own. */
+static vsh_result find_frayed(finding *f, uint8_t *frayed, vsh_error *error) {
+    const vshi_edges *edges = f->edges;
+    const size_t count = f->mesh->triangle_count;
+    uint32_t *queue = NULL;
+    size_t waiting = 0;
+    const vsh_result result =
+        vshi_allocate((void **)&queue, count, sizeof *queue, "edges of triangles", error);
+    for (size_t vertex = 0, begin = 0; result == VSH_OK && vertex < f->mesh->vertex_count;
+         begin = f->ends[vertex], ++vertex) {
+        for (size_t i = begin, next; i < f->ends[vertex]; i = next) {
+            for (next = i + 1; next < f->ends[vertex] && f->uses[next].upper == f->uses[i].upper; ++next) {
+            }
+            const uint32_t triangle = f->uses[i].side / 3;
+            if (next - i == 1 && !frayed[triangle]) {
+                frayed[triangle] = 1;
+                queue[waiting++] = triangle;
+            }
+        }
+    }
+    for (size_t at = 0; at < waiting; ++at) {
+        for (uint32_t side = 3 * queue[at]; side < 3 * queue[at] + 3; ++side) {
+            const uint32_t other = edges->partner[side] / 3;
+            if (edges->partner[side] != VSHI_NO_PARTNER && !frayed[other]) {
+                frayed[other] = 1;
+                queue[waiting++] = other;
+            }
+        }
+    }
+    free(queue);
+    return result;
+}
+
+/* Joins what goes on at edges of odd numbers of triangles. */
+static vsh_result join_odd(finding *f, vsh_error *error) {
+    uint8_t *frayed = NULL;
+    vsh_result result =
+        vshi_allocate((void **)&frayed, f->mesh->triangle_count, 1, "edges of triangles", error);
+    if (result == VSH_OK) {
+        result = find_frayed(f, frayed, error);
+    }
+    f->frayed = frayed;
+    for (size_t vertex = 0, begin = 0; result == VSH_OK && vertex < f->mesh->vertex_count;
+         begin = f->ends[vertex], ++vertex) {
+        for (size_t i = begin, next; i < f->ends[vertex] && result == VSH_OK; i = next) {
+            for (next = i + 1; next < f->ends[vertex] && f->uses[next].upper == f->uses[i].upper; ++next) {
+            }
+            const size_t count = leave_out_repeated(f, f->uses + i, next - i);
+            if (count > 2 && count % 2 != 0) {
+                result = join_many(f, (uint32_t)vertex, f->uses + i, count, error);
+            }
+        }
+    }
+    f->frayed = NULL;
+    free(frayed);
+    return result;
 }
 
 /* Fills partner, skipped, first, doubled and open. Flat triangles may be what joins two long edges to one. */
@@ -190,14 +259,14 @@ static vsh_result join_edges(finding *f, bool with_flat, vsh_error *error) {
     const vsh_mesh *mesh = f->mesh;
     vshi_edges *edges = f->edges;
     uint32_t v[3];
-    edges->open = 0;
+    edges->open = f->odd = 0;
     memset(f->ends, 0, (mesh->vertex_count + 1) * sizeof *f->ends);
     memset(edges->partner, 0xff, 3 * mesh->triangle_count * sizeof *edges->partner);
     for (size_t i = 0; i < mesh->triangle_count; ++i) {
         edges->first[i] = (uint32_t)i;
         edges->doubled[i] = 0;
-        edges->skipped[i] =
-            (!with_flat && f->flat[i]) || !vshi_edges_corners(mesh, edges->weld, f->mirrored, i, v);
+        const bool whole = vshi_edges_corners(mesh, edges->weld, f->mirrored, i, v);
+        edges->skipped[i] = !whole || (!with_flat && f->flat[i]);
         for (int k = 0; k < 3 && !edges->skipped[i]; ++k) {
             const uint32_t a = v[k], b = v[(k + 1) % 3];
             ++f->ends[(a < b ? a : b) + (size_t)1];
@@ -228,6 +297,9 @@ static vsh_result join_edges(finding *f, bool with_flat, vsh_error *error) {
             result = join_edge(f, (uint32_t)vertex, f->uses + i, next - i, error);
         }
     }
+    if (result == VSH_OK && f->odd > 0) {
+        result = join_odd(f, error);
+    }
     return result;
 }
 
@@ -257,6 +329,9 @@ vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, vshi_edges *edges
     if (mesh->triangle_count > UINT32_MAX / 3) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu triangles, %u at most",
                          vshi_mesh_label(mesh, index).text, mesh->triangle_count, UINT32_MAX / 3);
+    }
+    if (mesh->triangle_count == 0) {
+        return VSH_OK;
     }
     finding f = {.mesh = mesh, .mirrored = vshi_transform_determinant(mesh->transform) < 0.0, .edges = edges};
     uint8_t *flat = NULL;
