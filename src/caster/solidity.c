@@ -24,7 +24,8 @@ static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, size_t mesh
         size_t count, size;
     } wanted[] = {{(void **)&s->found, s->wholes.count, sizeof *s->found},
                   {(void **)&s->first, s->wholes.count + 1, sizeof *s->first},
-                  {(void **)&s->sides, s->first_side[mesh_count], 1}};
+                  {(void **)&s->sides, s->first_side[mesh_count], 1},
+                  {(void **)&s->holed, s->first_side[mesh_count], 1}};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0] && result == VSH_OK; ++i) {
         result = vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "what is solid", error);
     }
@@ -35,10 +36,11 @@ static void set_sides(vshi_solidity *s) {
     for (size_t i = 0; i < s->count; ++i) {
         vshi_component *c = &s->components[i];
         const uint8_t *turned = s->found[c->whole].turned;
-        uint8_t *sides = s->sides + s->first_side[s->wholes.first[c->whole]];
+        const size_t first = s->first_side[s->wholes.first[c->whole]];
         for (size_t at = 0; at < c->triangles && c->kind != VSHI_KIND_SHEET; ++at) {
             const uint32_t triangle = c->list[at];
-            sides[triangle] = turned[triangle] ? VSHI_SIDE_BEFORE : VSHI_SIDE_BEHIND;
+            s->sides[first + triangle] = turned[triangle] ? VSHI_SIDE_BEFORE : VSHI_SIDE_BEHIND;
+            s->holed[first + triangle] = c->open_edges > 0;
             c->turned += turned[triangle];
         }
     }
@@ -129,6 +131,7 @@ void vshi_solidity_free(vshi_solidity *s) {
     for (size_t m = 0; s->found != NULL && m < s->wholes.count; ++m) {
         vshi_components_free(&s->found[m]);
     }
+    free(s->holed);
     free(s->sides);
     free(s->first_side);
     free(s->first);
@@ -139,6 +142,10 @@ void vshi_solidity_free(vshi_solidity *s) {
 
 const uint8_t *vshi_solidity_sides(const vshi_solidity *s, size_t mesh) {
     return s->sides + s->first_side[mesh];
+}
+
+const uint8_t *vshi_solidity_holed(const vshi_solidity *s, size_t mesh) {
+    return s->holed + s->first_side[mesh];
 }
 
 const vshi_component *vshi_solidity_components(const vshi_solidity *s, size_t *count) {

@@ -63,6 +63,10 @@ void vshi_solidity_free(vshi_solidity *solidity); /* NULL does nothing */
 /* VSHI_SIDE_… of the triangles of a mesh [triangle_count]; those without area are sheets. */
 const uint8_t *vshi_solidity_sides(const vshi_solidity *solidity, size_t mesh);
 
+/* 1 for triangles of a mesh [triangle_count] whose solid, room or wall has holes: what it encloses is not
+ * shut off from the rest, and rays may go in by one hole and out by another. */
+const uint8_t *vshi_solidity_holed(const vshi_solidity *solidity, size_t mesh);
+
 /* The objects, put together from the meshes. */
 const vshi_wholes *vshi_solidity_wholes(const vshi_solidity *solidity);
 

@@ -10,6 +10,7 @@ struct vshi_solidity {
     vshi_wholes wholes;
     vshi_components *found; /* [wholes.count] */
     uint8_t *sides;         /* of all meshes */
+    uint8_t *holed;         /* likewise */
     size_t *first_side;     /* [mesh count + 1] */
     vshi_component *components;
     size_t count;
