@@ -253,12 +253,75 @@ static int alike(char **arguments) {
     return 0;
 }
 
+/* Which mesh of a model an error is of: triangles are numbered as judge_take_triangles() takes them. */
+static int blame(char **arguments) {
+    typedef struct share {
+        size_t texels, invalid, valid, black;
+        double square[2];
+    } share;
+    vsh_error error;
+    vsh_model *model = NULL;
+    opened t = open_image(arguments[0]), b = open_image(arguments[1]);
+    if (vsh_model_read(arguments[2], NULL, &model, &error) != VSH_OK) {
+        fprintf(stderr, "judge: %s\n", error.message);
+        return 2;
+    }
+    const size_t meshes = vsh_model_mesh_count(model),
+                 texels = (size_t)t.image.width * (size_t)t.image.height;
+    size_t *end = judge_take((meshes + 1) * sizeof *end);
+    share *shares = judge_take(meshes * sizeof *shares);
+    for (size_t m = 0; m < meshes; ++m) {
+        const vsh_mesh mesh = vsh_model_mesh(model, m, -1);
+        double low[3] = {0}, high[3] = {0};
+        size_t count;
+        free(judge_take_triangles(&mesh, 1, &count, low, high));
+        end[m + 1] = end[m] + count;
+    }
+    const float *verdict = plane(&t, "verdict"), *triangle = plane(&t, "triangle"),
+                *apart = plane(&t, "apart");
+    const float *const truths[2] = {plane(&t, "shadow"), plane(&t, "ao")};
+    const float *const values[2] = {plane(&b, "shadow.sun"), plane(&b, "ao")}, *a = plane(&b, "A");
+    for (size_t i = 0; i < texels; ++i) {
+        const int v = (int)verdict[i];
+        size_t m = 0;
+        if (v == JUDGE_EMPTY || triangle[i] < 1.0f) {
+            continue;
+        }
+        while (m + 1 < meshes && (size_t)triangle[i] > end[m + 1]) {
+            ++m;
+        }
+        ++shares[m].texels;
+        shares[m].valid += v == JUDGE_INVALID && a[i] > 0.0f;
+        shares[m].invalid += v == JUDGE_VALID && a[i] < 1.0f;
+        for (int c = 0; c < 2 && v == JUDGE_VALID && apart[i] == 0.0f; ++c) {
+            const double e = (double)(values[c][i] - truths[c][i]);
+            shares[m].square[c] += e * e;
+            shares[m].black += values[c][i] < BLACK && truths[c][i] > BRIGHT;
+        }
+    }
+    for (size_t m = 0; m < meshes; ++m) {
+        printf("%-16s %7zu texels, %6zu invalid and %6zu valid by mistake, %6zu black, squares of shadow "
+               "%9.2f, AO %9.2f\n",
+               vsh_model_mesh(model, m, -1).name, shares[m].texels, shares[m].invalid, shares[m].valid,
+               shares[m].black, shares[m].square[0], shares[m].square[1]);
+    }
+    free(shares);
+    free(end);
+    vsh_model_free(model);
+    vsh_image_free(b.file);
+    vsh_image_free(t.file);
+    return 0;
+}
+
 int main(int argc, char **argv) {
     if (argc == 10 && strcmp(argv[1], "truth") == 0) {
         return truth(argv + 2);
     }
     if ((argc == 4 || argc == 5) && strcmp(argv[1], "compare") == 0) {
         return compare(argc - 2, argv + 2);
+    }
+    if (argc == 5 && strcmp(argv[1], "blame") == 0) {
+        return blame(argv + 2);
     }
     if (argc == 4 && strcmp(argv[1], "alike") == 0) {
         return alike(argv + 2);

@@ -45,34 +45,31 @@ static bool normalize(double v[3]) {
 
 /* --- rays */
 
-static bool trace(const truth_mesh *mesh, const double from[3], const double towards[3], double reach,
-                  bool *back) {
+static struct RTCRayHit ray_of(const truth_mesh *mesh, const double from[3], const double towards[3],
+                               double reach) {
+    return (struct RTCRayHit){.ray = {.org_x = (float)(from[0] - mesh->center[0]),
+                                      .org_y = (float)(from[1] - mesh->center[1]),
+                                      .org_z = (float)(from[2] - mesh->center[2]),
+                                      .dir_x = (float)towards[0],
+                                      .dir_y = (float)towards[1],
+                                      .dir_z = (float)towards[2],
+                                      .tfar = (float)reach,
+                                      .mask = ~0u},
+                              .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
+}
+
+static bool hidden(const truth_mesh *mesh, const double from[3], const double towards[3], double reach) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    struct RTCRayHit r = {.ray = {.org_x = (float)(from[0] - mesh->center[0]),
-                                  .org_y = (float)(from[1] - mesh->center[1]),
-                                  .org_z = (float)(from[2] - mesh->center[2]),
-                                  .dir_x = (float)towards[0],
-                                  .dir_y = (float)towards[1],
-                                  .dir_z = (float)towards[2],
-                                  .tfar = (float)reach,
-                                  .mask = ~0u},
-                          .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
-    if (back == NULL) {
-        rtcOccluded1(mesh->scene, &context, &r.ray);
-        return r.ray.tfar < 0.0f;
-    }
-    rtcIntersect1(mesh->scene, &context, &r);
-    /* Embree's normals of a hit look to where its triangle is anticlockwise. */
-    *back =
-        (double)r.hit.Ng_x * towards[0] + (double)r.hit.Ng_y * towards[1] + (double)r.hit.Ng_z * towards[2] >
-        0.0;
-    return r.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+    struct RTCRayHit r = ray_of(mesh, from, towards, reach);
+    rtcOccluded1(mesh->scene, &context, &r.ray);
+    return r.ray.tfar < 0.0f;
 }
 
 typedef struct gathering {
     struct RTCIntersectContext context; /* first: Embree hands on its address */
     const double *along;
+    double least; /* cosine */
     bool against;
 } gathering;
 
@@ -82,27 +79,49 @@ static void gather(const struct RTCFilterFunctionNArguments *arguments) {
     const struct RTCHit *hit =
         (const struct RTCHit *)arguments->hit; /* N is 1: packed as a lone hit's fields */
     const double n[3] = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
-    g->against = g->against || dot(n, g->along) < -0.99 * sqrt(dot(n, n));
+    g->against = g->against || dot(n, g->along) < -g->least * sqrt(dot(n, n));
     arguments->valid[0] = 0;
+}
+
+/* Whether a face of a solid that looks against `along` lies on the way there from `from`, `reach` long. */
+static bool against(const work *w, const double from[3], const double along[3], double reach, double least) {
+    gathering seen = {.along = along, .least = least};
+    rtcInitIntersectContext(&seen.context);
+    seen.context.filter = gather;
+    struct RTCRayHit r = ray_of(w->solids, from, along, reach);
+    rtcIntersect1(w->solids->scene, &seen.context, &r);
+    return seen.against;
+}
+
+/* Whether a ray first meets the back of a solid. Where two sheets lie in one place, back to back, the one
+ * that looks at us is seen. */
+static bool meets_back(const work *w, const double from[3], const double towards[3]) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    struct RTCRayHit r = ray_of(w->solids, from, towards, INFINITY);
+    rtcIntersect1(w->solids->scene, &context, &r);
+    /* Embree's normals of a hit look to where its triangle is anticlockwise. */
+    if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID ||
+        (double)r.hit.Ng_x * towards[0] + (double)r.hit.Ng_y * towards[1] + (double)r.hit.Ng_z * towards[2] <=
+            0.0) {
+        return false;
+    }
+    const double near = TOUCH * w->lift / w->solid_scale;
+    double before[3];
+    for (int k = 0; k < 3; ++k) {
+        before[k] = from[k] + fmax(0.0, (double)r.ray.tfar - near) * towards[k];
+    }
+    return !against(w, before, towards, 2.0 * near, 0.0);
 }
 
 /* Whether a solid ends where another begins: a face that looks against this one lies within TOUCH. */
 static bool touches(const work *w, const double at[3], const double g[3]) {
-    const double lift = TOUCH * w->lift / w->solid_scale;
-    gathering seen = {.along = g};
-    rtcInitIntersectContext(&seen.context);
-    seen.context.filter = gather;
-    struct RTCRayHit r = {.ray = {.org_x = (float)(at[0] + lift * g[0] - w->solids->center[0]),
-                                  .org_y = (float)(at[1] + lift * g[1] - w->solids->center[1]),
-                                  .org_z = (float)(at[2] + lift * g[2] - w->solids->center[2]),
-                                  .dir_x = (float)-g[0],
-                                  .dir_y = (float)-g[1],
-                                  .dir_z = (float)-g[2],
-                                  .tfar = (float)(2.0 * lift),
-                                  .mask = ~0u},
-                          .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
-    rtcIntersect1(w->solids->scene, &seen.context, &r);
-    return seen.against;
+    const double near = TOUCH * w->lift / w->solid_scale;
+    double under[3];
+    for (int k = 0; k < 3; ++k) {
+        under[k] = at[k] - near * g[k];
+    }
+    return against(w, under, g, 2.0 * near, 0.99);
 }
 
 static int verdict_of(const work *w, const double p[3], const double g[3]) {
@@ -114,13 +133,12 @@ static int verdict_of(const work *w, const double p[3], const double g[3]) {
     if (touches(w, at, g)) {
         return JUDGE_UNCLEAR;
     }
-    bool back;
     const truth_frame frame = truth_frame_around(g);
     int backs = 0;
     for (int i = 0; i < VERDICT_RAYS; ++i) {
         double towards[3];
         truth_to_world(&frame, w->verdict_rays[i], towards);
-        backs += trace(w->solids, start, towards, INFINITY, &back) && back ? 1 : 0;
+        backs += meets_back(w, start, towards) ? 1 : 0;
     }
     return backs <= FEW * VERDICT_RAYS    ? JUDGE_VALID
            : backs >= MOST * VERDICT_RAYS ? JUDGE_INVALID
@@ -135,7 +153,7 @@ static float shadow_of(const work *w, const double start[3], const double g[3]) 
         for (size_t i = 0; i < counts[pass]; ++i) {
             double towards[3];
             truth_to_world(&w->sun, pass == 0 ? w->few[i] : w->sun_rays[i], towards);
-            lit += dot(towards, g) > 0.0 && !trace(w->model, start, towards, INFINITY, NULL) ? 1 : 0;
+            lit += dot(towards, g) > 0.0 && !hidden(w->model, start, towards, INFINITY) ? 1 : 0;
         }
         if (lit == 0 || lit == counts[pass]) {
             return lit > 0 ? 1.0f : 0.0f;
@@ -151,8 +169,7 @@ static float ao_of(const work *w, const double start[3], const double g[3], cons
     for (size_t i = 0; i < rays; ++i) {
         double towards[3];
         truth_to_world(&frame, w->ao_rays[i], towards);
-        open +=
-            dot(towards, g) > 0.0 && !trace(w->model, start, towards, w->question->distance, NULL) ? 1 : 0;
+        open += dot(towards, g) > 0.0 && !hidden(w->model, start, towards, w->question->distance) ? 1 : 0;
     }
     return (float)((double)open / (double)rays);
 }
