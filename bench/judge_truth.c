@@ -130,9 +130,6 @@ static int verdict_of(const work *w, const double p[3], const double g[3]) {
         at[k] = p[k] / w->solid_scale;
         start[k] = at[k] + w->lift / w->solid_scale * g[k];
     }
-    if (touches(w, at, g)) {
-        return JUDGE_UNCLEAR;
-    }
     const truth_frame frame = truth_frame_around(g);
     int backs = 0;
     for (int i = 0; i < VERDICT_RAYS; ++i) {
@@ -140,9 +137,10 @@ static int verdict_of(const work *w, const double p[3], const double g[3]) {
         truth_to_world(&frame, w->verdict_rays[i], towards);
         backs += meets_back(w, start, towards) ? 1 : 0;
     }
-    return backs <= FEW * VERDICT_RAYS    ? JUDGE_VALID
-           : backs >= MOST * VERDICT_RAYS ? JUDGE_INVALID
-                                          : JUDGE_UNCLEAR;
+    if (backs <= FEW * VERDICT_RAYS) {
+        return JUDGE_VALID;
+    }
+    return backs < MOST * VERDICT_RAYS || touches(w, at, g) ? JUDGE_UNCLEAR : JUDGE_INVALID;
 }
 
 static float shadow_of(const work *w, const double start[3], const double g[3]) {
