@@ -42,6 +42,12 @@ VSH_API vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[
                                     const double bounds_max[3], double azimuth, double elevation,
                                     double aspect, vsh_error *error);
 
+/* The same for points [count][3], world units, as near as they can all be seen from there: they fill 86 % of
+ * the picture's width or height, and lie around its middle. The target is at their middle depth. Errors:
+ * VSH_ERROR_ARGUMENT, as there (points NULL, not finite, or all in one place). */
+VSH_API vsh_result vsh_camera_frame_points(vsh_camera *camera, size_t count, const double *points,
+                                           double azimuth, double elevation, double aspect, vsh_error *error);
+
 /* Turns a camera by `angle` radians around the axis along `up` through its target, as a turntable does;
  * anticlockwise seen from above. The camera must have passed vsh_camera_check(). */
 VSH_API void vsh_camera_orbit(vsh_camera *camera, double angle);
@@ -56,12 +62,14 @@ typedef struct vsh_surface {
     double color[3]; /* linear RGB, share of light that comes back, 0 … 1 */
 } vsh_surface;
 
-/* Meshes that are shown with a lightmap on them. A view; nothing is owned. */
+/* Meshes that are shown themselves, with a lightmap on them or in the light that the field answers for. A
+ * view; nothing is owned. */
 typedef struct vsh_lit_meshes {
     const vsh_mesh *meshes; /* [mesh_count], with the UVs of the lightmap */
     size_t mesh_count;
-    const vsh_image *lightmap; /* of any size, row 0 at v = 1, looked up bilinearly: either irradiance.R, .G,
-                                  .B or shadow.NAME of every light, and `ao` if there is one */
+    const vsh_image *lightmap; /* NULL: none, light is asked for at each point. Of any size, row 0 at v = 1,
+                                  looked up bilinearly: either irradiance.R, .G, .B or shadow.NAME of every
+                                  light, and `ao` if there is one */
     double color[3];           /* as of a surface */
     int32_t ambient; /* nonzero: its irradiance has the sky's light in it already (vsh_lightmap.ambient) */
 } vsh_lit_meshes;

@@ -13,11 +13,10 @@
 #include <inttypes.h>
 #include <limits.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static const double degree = 0.017453292519943295;
-/* A three-quarter view from a little above. */
-static const double azimuth_deg = 35.0, elevation_deg = 25.0;
 
 typedef struct render_work {
     const render_settings *settings;
@@ -28,6 +27,7 @@ typedef struct render_work {
     cli_field made;
     render_surfaces surfaces;
     render_lightmaps lightmaps;
+    vsh_lit_meshes *lit; /* of lightmaps, and of surfaces */
     vsh_render_options options;
     cli_origin origin;
     render_picture picture;
@@ -63,27 +63,21 @@ static int make_fields(render_work *work) {
     return code;
 }
 
-static int place_camera(render_work *work) {
-    const render_settings *s = work->settings;
-    const render_surfaces *seen = &work->surfaces;
-    vsh_camera *camera = &work->options.camera;
-    vsh_error error;
-    memcpy(camera->up, s->up, sizeof camera->up);
-    camera->fov = s->fov_deg * degree;
-    vsh_result result =
-        vsh_camera_frame(camera, seen->bounds_min, seen->bounds_max, azimuth_deg * degree,
-                         elevation_deg * degree, (double)s->width / (double)s->height, &error);
-    if (s->has_camera) {
-        memcpy(camera->position, s->camera, sizeof camera->position);
+/* Meshes with lightmaps first: where both are, they are what is seen. */
+static int join_lit(render_work *work) {
+    const size_t count = work->lightmaps.count, more = work->surfaces.mesh_count;
+    work->lit = calloc(count + more + 1, sizeof *work->lit);
+    if (work->lit == NULL) {
+        return cli_out_of_memory("meshes");
     }
-    if (s->has_look_at) {
-        memcpy(camera->target, s->look_at, sizeof camera->target);
+    if (count > 0) {
+        memcpy(work->lit, work->lightmaps.lit, count * sizeof *work->lit);
     }
-    result = result == VSH_OK ? vsh_camera_check(camera, &error) : result;
-    if (result != VSH_OK) {
-        return cli_fail(&error);
+    if (more > 0) {
+        memcpy(work->lit + count, work->surfaces.meshes, more * sizeof *work->lit);
     }
-    vsh_camera_orbit(camera, s->orbit_deg * degree);
+    work->options.lit = work->lit;
+    work->options.lit_count = count + more;
     return CLI_OK;
 }
 
@@ -96,12 +90,13 @@ static int set_options(render_work *work) {
     o->samples = s->samples;
     o->ao = work->scene->ao;
     memcpy(o->sky, s->has_sky || !work->scene->has_ambient ? s->sky : work->scene->ambient, sizeof o->sky);
+    for (int c = 0; c < 3 && work->scene->light_count == 0 && !s->has_sky && !work->scene->has_ambient; ++c) {
+        o->sky[c] = 1.0; /* all the light there is */
+    }
     o->tint = work->scene->tint;
     memcpy(o->background, s->background, sizeof o->background);
     o->shafts = s->shafts;
     o->shaft_steps = s->shaft_steps;
-    o->lit = work->lightmaps.lit;
-    o->lit_count = work->lightmaps.count;
     o->shade = work->scene->shade;
     o->shade.triangles = work->triangles;
     o->shade.layers = work->made.layers;
@@ -109,7 +104,8 @@ static int set_options(render_work *work) {
     if (!work->scene->ao) {
         o->shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
     }
-    return place_camera(work);
+    const int code = join_lit(work);
+    return code == CLI_OK ? render_camera_place(s, &work->surfaces, o) : code;
 }
 
 static int render_frame(render_work *work, int32_t index, const vsh_run *run) {
@@ -198,6 +194,7 @@ static int run_render(const render_settings *s, vsh_scene *scene) {
     render_page_abandon(work.page);
     render_picture_free(&work.picture);
     cli_origin_free(&work.origin);
+    free(work.lit);
     render_lightmaps_free(&work.lightmaps);
     render_surfaces_free(&work.surfaces);
     cli_field_free(&work.made);

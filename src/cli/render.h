@@ -31,17 +31,24 @@ int render_parse(int argc, char **argv, render_settings *settings, bool *help);
 typedef struct render_surfaces {
     vsh_surface *surfaces;
     size_t count;
-    cli_field own; /* of colours that share a layer */
-    double bounds_min[3], bounds_max[3];
+    cli_field own;          /* of colours that share a layer */
+    vsh_lit_meshes *meshes; /* [mesh_count]: of casters that are triangles, which are shown themselves */
+    size_t mesh_count;
 } render_surfaces;
 
-/* A surface for every layer's colour. CLI_OK or an exit code, having said why; free also after a failure. */
+/* The triangles of every caster that has them, and for what has none a surface for every layer's colour.
+ * CLI_OK or an exit code, having said why; free also after a failure. */
 int render_surfaces_make(const vsh_scene *scene, const vsh_assets *assets, const cli_field *made,
                          const vsh_run *run, render_surfaces *surfaces);
 void render_surfaces_free(render_surfaces *surfaces);
 
 /* A caster's color, or the default one (NULL too). */
 void render_color_of(const vsh_caster *caster, double color[3]);
+
+/* Places the camera as the settings say, or so that surfaces and the options' lit meshes are seen. CLI_OK or
+ * an exit code, having said why (render_camera.c). */
+int render_camera_place(const render_settings *settings, const render_surfaces *surfaces,
+                        vsh_render_options *options);
 
 /* --- lightmaps (render_lightmaps.c) */
 

@@ -42,8 +42,9 @@ static const cli_option options[] = {
     {KEY_TURNTABLE, "turntable", "N", "N pictures of a whole turn, 2 to 1000 (a page: 36)"},
     {0, NULL, NULL, "Light"},
     CLI_LIGHT_OPTIONS,
-    {KEY_SKY, "sky", "R,G,B", "light of the open sky, linear (the scene's ambient, or\n0.22,0.27,0.35)"},
-    {KEY_BACKGROUND, "background", "R,G,B", "where nothing is, linear (0.42,0.52,0.66); none:\ntransparent"},
+    {KEY_SKY, "sky", "R,G,B",
+     "light of the open sky, linear (the scene's ambient, or\n0.3,0.3,0.3; 1,1,1 where there are no lights)"},
+    {KEY_BACKGROUND, "background", "R,G,B", "where nothing is, linear (0.1,0.1,0.1); none:\ntransparent"},
     {KEY_SHAFTS, "shafts", "STRENGTH",
      "light shafts: thickness of a fog around the casters,\n0 to 100 (0: none; 0.3 is much)"},
     {KEY_SHAFT_STEPS, "shaft-steps", "N", "points a ray that they are taken at, 1 to 64 (8)"},
@@ -180,8 +181,10 @@ int render_parse(int argc, char **argv, render_settings *s, bool *help) {
     s->height = defaults.height;
     s->samples = defaults.samples;
     s->shaft_steps = defaults.shaft_steps;
-    memcpy(s->sky, defaults.sky, sizeof s->sky);
-    memcpy(s->background, defaults.background, sizeof s->background);
+    for (int c = 0; c < 3; ++c) { /* grey, so that no light or shadow is taken for a colour */
+        s->sky[c] = 0.3;
+        s->background[c] = 0.1;
+    }
     int code = cli_parse(&cli_render, argc, argv, take, s, "INPUT", &s->bake.input, help);
     if (code != CLI_OK || *help) {
         return code;

@@ -1,6 +1,6 @@
-/* Which casters have which colour: a field for each. Those of a layer are all in one field, which knows
- * nothing of casters; where they differ in colour, each colour gets a field of its own, for camera rays
- * alone. */
+/* What the camera sees: of casters that have triangles these, and of the others a field for each colour.
+ * Those of a layer are all in one field, which knows nothing of casters; where they differ in colour, or some
+ * have triangles, each colour gets a field of its own, for camera rays alone. */
 #include "meshes.h"
 #include "message.h"
 #include "render.h"
@@ -10,7 +10,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double default_color = 0.7;
+static const double default_color = 0.6; /* so that full light is not white */
+
+/* Whether a caster is shown as its triangles. */
+static bool is_shown_as_mesh(const vsh_assets *assets, size_t index) {
+    size_t count = 0;
+    vsh_assets_caster(assets, index, &count);
+    return count > 0;
+}
 
 void render_color_of(const vsh_caster *caster, double color[3]) {
     const bool given =
@@ -35,11 +42,11 @@ static bool same_layer(const char *a, const char *b) {
     return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
 }
 
-/* Caster `index`'s group: that of the first caster in its layer of its colour. */
-static size_t group_of(const vsh_scene *scene, size_t index) {
+/* Caster `index`'s group: that of the first caster without triangles in its layer of its colour. */
+static size_t group_of(const vsh_scene *scene, const vsh_assets *assets, size_t index) {
     const vsh_caster *caster = &scene->casters[index];
     size_t first = 0;
-    while (!same_layer(scene->casters[first].layer, caster->layer) ||
+    while (is_shown_as_mesh(assets, first) || !same_layer(scene->casters[first].layer, caster->layer) ||
            !same_color(&scene->casters[first], caster)) {
         ++first;
     }
@@ -56,14 +63,14 @@ static const vsh_field *field_of(const cli_field *made, const char *layer) {
     return field;
 }
 
-/* Whether all casters of a layer have one colour, and are in its field. */
-static bool is_plain(const vsh_scene *scene, const char *layer) {
+/* Whether all casters of a layer have one colour and no triangles, and are in its field. */
+static bool is_plain(const vsh_scene *scene, const vsh_assets *assets, const char *layer) {
     const vsh_caster *first = NULL;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
         if (same_layer(caster->layer, layer)) {
             first = first == NULL ? caster : first;
-            if (cli_caster_is_direct(caster) || !same_color(first, caster)) {
+            if (cli_caster_is_direct(caster) || !same_color(first, caster) || is_shown_as_mesh(assets, i)) {
                 return false;
             }
         }
@@ -75,11 +82,16 @@ static void add(render_surfaces *s, const vsh_field *field, const vsh_caster *ca
     vsh_surface *surface = &s->surfaces[s->count++];
     surface->field = field;
     render_color_of(caster, surface->color);
-    vsh_field_info info;
-    vsh_field_get_info(field, &info);
-    for (int axis = 0; axis < 3; ++axis) {
-        s->bounds_min[axis] = fmin(s->bounds_min[axis], info.bounds_min[axis]);
-        s->bounds_max[axis] = fmax(s->bounds_max[axis], info.bounds_max[axis]);
+}
+
+/* Counts the triangles' casters, and takes them where there is room for them. */
+static void add_meshes(const vsh_scene *scene, const vsh_assets *assets, render_surfaces *s) {
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        if (is_shown_as_mesh(assets, i)) {
+            vsh_lit_meshes *shown = &s->meshes[s->mesh_count++];
+            shown->meshes = vsh_assets_caster(assets, i, &shown->mesh_count);
+            render_color_of(&scene->casters[i], shown->color);
+        }
     }
 }
 
@@ -96,11 +108,15 @@ static int make_split(const vsh_scene *scene, const vsh_assets *assets, const cl
                       const vsh_run *run, split *p, render_surfaces *s) {
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_field *field = field_of(made, scene->casters[i].layer);
-        const size_t group = group_of(scene, i);
         p->casters[i] = scene->casters[i];
-        snprintf(p->names[i], sizeof p->names[i], "%zu", group);
         p->casters[i].layer = p->names[i];
-        if (group == i && is_plain(scene, scene->casters[i].layer)) {
+        if (is_shown_as_mesh(assets, i)) {
+            snprintf(p->names[i], sizeof p->names[i], "mesh"); /* no layer that is made */
+            continue;
+        }
+        const size_t group = group_of(scene, assets, i);
+        snprintf(p->names[i], sizeof p->names[i], "%zu", group);
+        if (group == i && is_plain(scene, assets, scene->casters[i].layer)) {
             add(s, field, &scene->casters[i]);
         } else if (group == i) {
             vsh_field_info info = {.voxel_size = 0.0}; /* the scene's, or by its resolution */
@@ -140,16 +156,19 @@ static int make_split(const vsh_scene *scene, const vsh_assets *assets, const cl
 
 int render_surfaces_make(const vsh_scene *scene, const vsh_assets *assets, const cli_field *made,
                          const vsh_run *run, render_surfaces *s) {
-    *s = (render_surfaces){.bounds_min = {INFINITY, INFINITY, INFINITY},
-                           .bounds_max = {-INFINITY, -INFINITY, -INFINITY}};
+    *s = (render_surfaces){.count = 0};
     const size_t count = scene->caster_count;
     split p = {.casters = calloc(count, sizeof *p.casters),
                .layers = calloc(count, sizeof *p.layers),
                .names = calloc(count, sizeof *p.names),
                .first = calloc(count, sizeof *p.first)};
     s->surfaces = calloc(count, sizeof *s->surfaces);
-    const bool room =
-        p.casters != NULL && p.layers != NULL && p.names != NULL && p.first != NULL && s->surfaces != NULL;
+    s->meshes = calloc(count, sizeof *s->meshes);
+    const bool room = p.casters != NULL && p.layers != NULL && p.names != NULL && p.first != NULL &&
+                      s->surfaces != NULL && s->meshes != NULL;
+    if (room) {
+        add_meshes(scene, assets, s);
+    }
     const int code = room ? make_split(scene, assets, made, run, &p, s) : cli_out_of_memory("surfaces");
     free(p.first);
     free(p.names);
@@ -159,6 +178,7 @@ int render_surfaces_make(const vsh_scene *scene, const vsh_assets *assets, const
 }
 
 void render_surfaces_free(render_surfaces *s) {
+    free(s->meshes);
     cli_field_free(&s->own);
     free(s->surfaces);
 }

@@ -12,6 +12,8 @@ static const double FOV_LEAST = 0.001, FOV_MOST = 3.0;
 static const double PARALLEL = 1e-6;
 /* Of the picture's edge that a framed box leaves free. */
 static const double MARGIN = 1.06;
+/* The same of framed points. */
+static const double POINTS_MARGIN = 1.16;
 
 static vsh_result check_vector(const char *name, const double v[3], vsh_error *error) {
     return vshi_finite(vshi_vec_of(v))
@@ -72,6 +74,85 @@ static void horizon(vshi_vec up, vshi_vec *front, vshi_vec *right) {
     *right = vshi_cross(up, *front);
 }
 
+static vsh_result check_view(double azimuth, double elevation, double aspect, vsh_error *error) {
+    if (isfinite(azimuth) && fabs(elevation) <= 1.57 && aspect > 0.0 && isfinite(aspect)) {
+        return VSH_OK;
+    }
+    return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                     "camera: azimuth %g, elevation %g, aspect %g: expected a number, -1.57 … 1.57 and a "
+                     "number above 0",
+                     azimuth, elevation, aspect);
+}
+
+/* Unit axes of a view: to the right, up, and back towards the eye. */
+typedef struct view_axes {
+    vshi_vec across, over, back;
+} view_axes;
+
+static view_axes axes_of(const vsh_camera *camera, double azimuth, double elevation) {
+    const vshi_vec up = vshi_unit(vshi_vec_of(camera->up));
+    vshi_vec front, right;
+    horizon(up, &front, &right);
+    const vshi_vec level =
+        vshi_add(vshi_scale(front, vshi_cos(azimuth)), vshi_scale(right, vshi_sin(azimuth)));
+    view_axes axes;
+    axes.back = vshi_add(vshi_scale(level, vshi_cos(elevation)), vshi_scale(up, vshi_sin(elevation)));
+    axes.across = vshi_unit(vshi_cross(up, axes.back));
+    axes.over = vshi_cross(axes.back, axes.across);
+    return axes;
+}
+
+/* A point is in the picture where across - eye's is within tangent × (eye's back - back) on both sides; so
+ * the eye stands where the largest of across + tangent × back and of -across + tangent × back meet, and the
+ * same of over: the nearest place from which all are seen. */
+vsh_result vsh_camera_frame_points(vsh_camera *camera, size_t count, const double *points, double azimuth,
+                                   double elevation, double aspect, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(points);
+    vsh_camera full;
+    vsh_result result = resolve(camera, &full, error);
+    result = result == VSH_OK ? check_lens(&full, error) : result;
+    result = result == VSH_OK ? check_view(azimuth, elevation, aspect, error) : result;
+    if (result != VSH_OK) {
+        return result;
+    }
+    const view_axes axes = axes_of(&full, azimuth, elevation);
+    const double tangent[2] = {aspect * vshi_tan(0.5 * full.fov) / POINTS_MARGIN,
+                               vshi_tan(0.5 * full.fov) / POINTS_MARGIN};
+    double high[2] = {-INFINITY, -INFINITY}, low[2] = {-INFINITY, -INFINITY};
+    double near = -INFINITY, far = INFINITY, size = 0.0;
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_vec p = vshi_vec_of(points + 3 * i);
+        if (!vshi_finite(p)) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: point %zu (%g, %g, %g) is not finite", i,
+                             p.x, p.y, p.z);
+        }
+        const double at[2] = {vshi_dot(p, axes.across), vshi_dot(p, axes.over)},
+                     back = vshi_dot(p, axes.back);
+        for (int axis = 0; axis < 2; ++axis) {
+            high[axis] = fmax(high[axis], at[axis] + tangent[axis] * back);
+            low[axis] = fmax(low[axis], -at[axis] + tangent[axis] * back);
+        }
+        near = fmax(near, back);
+        far = fmin(far, back);
+        size = fmax(size, vshi_length(vshi_sub(p, vshi_vec_of(points))));
+    }
+    if (!(size > 0.0) || !isfinite(size)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: %zu points without extent", count);
+    }
+    const double away =
+        fmax(fmax((high[0] + low[0]) / (2.0 * tangent[0]), (high[1] + low[1]) / (2.0 * tangent[1])),
+             near + 0.01 * size);
+    const vshi_vec middle = vshi_add(vshi_scale(axes.across, 0.5 * (high[0] - low[0])),
+                                     vshi_scale(axes.over, 0.5 * (high[1] - low[1])));
+    const vshi_vec eye = vshi_add(middle, vshi_scale(axes.back, away));
+    const vshi_vec to = vshi_add(middle, vshi_scale(axes.back, 0.5 * (near + far)));
+    const double position[3] = {eye.x, eye.y, eye.z}, target[3] = {to.x, to.y, to.z};
+    memcpy(camera->position, position, sizeof position);
+    memcpy(camera->target, target, sizeof target);
+    return VSH_OK;
+}
+
 vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], const double bounds_max[3],
                             double azimuth, double elevation, double aspect, vsh_error *error) {
     VSHI_FLOATS;
@@ -91,20 +172,12 @@ vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], cons
                          "camera: the box from (%g, %g, %g) to (%g, %g, %g) is none", low.x, low.y, low.z,
                          high.x, high.y, high.z);
     }
-    if (!isfinite(azimuth) || !(fabs(elevation) <= 1.57) || !(aspect > 0.0) || !isfinite(aspect)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "camera: azimuth %g, elevation %g, aspect %g: expected a number, -1.57 … 1.57 and a "
-                         "number above 0",
-                         azimuth, elevation, aspect);
+    result = check_view(azimuth, elevation, aspect, error);
+    if (result != VSH_OK) {
+        return result;
     }
-    const vshi_vec up = vshi_unit(vshi_vec_of(full.up));
-    vshi_vec front, right;
-    horizon(up, &front, &right);
-    const vshi_vec level =
-        vshi_add(vshi_scale(front, vshi_cos(azimuth)), vshi_scale(right, vshi_sin(azimuth)));
-    const vshi_vec back =
-        vshi_add(vshi_scale(level, vshi_cos(elevation)), vshi_scale(up, vshi_sin(elevation)));
-    const vshi_vec across = vshi_unit(vshi_cross(up, back)), over = vshi_cross(back, across);
+    const view_axes axes = axes_of(&full, azimuth, elevation);
+    const vshi_vec back = axes.back, across = axes.across, over = axes.over;
     const double tangent = vshi_tan(0.5 * full.fov) / MARGIN;
     double away = 0.0;
     for (int corner = 0; corner < 8; ++corner) {

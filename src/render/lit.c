@@ -98,7 +98,8 @@ static vsh_result find_planes(const vshi_lit *lit, size_t index, lightmap *map, 
 }
 
 static vsh_result check_meshes(const vsh_lit_meshes *of, size_t index, vsh_error *error) {
-    if (of->lightmap == NULL || of->lightmap->width < 1 || of->lightmap->height < 1 ||
+    const vsh_image *image = of->lightmap;
+    if ((image != NULL && (image->width < 1 || image->height < 1)) ||
         (of->meshes == NULL && of->mesh_count > 0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "lit meshes %zu: no lightmap, or no meshes", index);
     }
@@ -108,7 +109,7 @@ static vsh_result check_meshes(const vsh_lit_meshes *of, size_t index, vsh_error
         if (result != VSH_OK) {
             return result;
         }
-        if (mesh->uvs == NULL) {
+        if (image != NULL && mesh->uvs == NULL) {
             return vshi_fail(error, VSH_ERROR_INPUT, "%s: no UVs", vshi_mesh_label(mesh, m).text);
         }
     }
@@ -207,7 +208,7 @@ vsh_result vshi_lit_create(const vsh_render_options *options, const vsh_light *l
     for (size_t i = 0; result == VSH_OK && i < options->lit_count; ++i) {
         made->maps[i].of = &options->lit[i];
         made->maps[i].shadow = made->planes != NULL ? made->planes + i * light_count : NULL;
-        result = find_planes(made, i, &made->maps[i], error);
+        result = options->lit[i].lightmap != NULL ? find_planes(made, i, &made->maps[i], error) : VSH_OK;
     }
     if (result != VSH_OK) {
         vshi_lit_free(made);
@@ -307,34 +308,69 @@ static float blend(const footprint *f, const float *plane) {
     return (float)sum;
 }
 
-void vshi_lit_shade(const vshi_lit *lit, uint32_t number, vshi_vec ray, float color[3], float normal[3]) {
-    const triangle *t = &lit->triangles[number];
-    const lightmap *map = &lit->maps[t->map];
-    const vsh_mesh *mesh = &map->of->meshes[t->mesh];
-    double weight[3], uv[2] = {0.0, 0.0}, position[3];
-    vshi_vec corner[3], smooth = {0.0, 0.0, 0.0}, at = {0.0, 0.0, 0.0};
+/* Where a ray meets a triangle. */
+typedef struct spot {
+    vshi_vec at, flat, normal; /* flat and normal on one side, whichever */
+    double facing;             /* -1: that side is seen from behind */
+    double uv[2];
+} spot;
+
+static spot find_spot(const triangle *t, const vsh_mesh *mesh, vshi_vec ray) {
+    spot s = {.uv = {0.0, 0.0}};
+    double weight[3];
+    vshi_vec corner[3], smooth = {0.0, 0.0, 0.0};
     uint32_t vertex[3];
     cross_triangle(t, ray, weight);
     const double sum = weight[0] + weight[1] + weight[2];
     vshi_mesh_triangle_of(mesh, t->number, corner, vertex);
     for (int k = 0; k < 3; ++k) {
         const double share = weight[k] / sum;
-        for (int axis = 0; axis < 2; ++axis) {
-            uv[axis] += share * (double)mesh->uvs[2 * (size_t)vertex[k] + (size_t)axis];
+        for (int axis = 0; axis < 2 && mesh->uvs != NULL; ++axis) {
+            s.uv[axis] += share * (double)mesh->uvs[2 * (size_t)vertex[k] + (size_t)axis];
         }
-        at = vshi_add(at, vshi_scale(corner[k], share));
+        s.at = vshi_add(s.at, vshi_scale(corner[k], share));
         if (mesh->normals != NULL) {
             smooth = vshi_add(
                 smooth, vshi_scale(vshi_unit(vshi_vec_off(mesh->normals + 3 * (size_t)vertex[k])), share));
         }
     }
-    const vshi_vec flat = vshi_unit(normal_of(t));
-    vshi_vec n = vshi_unit(vshi_transform_normal(mesh->transform, smooth));
-    n = vshi_dot(n, n) > 0.5 && vshi_dot(n, flat) > 0.0 ? n : flat;
-    const double facing = vshi_dot(flat, ray) > 0.0 ? -1.0 : 1.0; /* seen from behind: as if it were thin */
-    position[0] = at.x, position[1] = at.y, position[2] = at.z;
-    const float front[3] = {(float)n.x, (float)n.y, (float)n.z};
-    const footprint f = look_up(map->of->lightmap, uv);
+    s.flat = vshi_unit(normal_of(t));
+    const vshi_vec n = vshi_unit(vshi_transform_normal(mesh->transform, smooth));
+    s.normal = vshi_dot(n, n) > 0.5 && vshi_dot(n, s.flat) > 0.0 ? n : s.flat;
+    s.facing = vshi_dot(s.flat, ray) > 0.0 ? -1.0 : 1.0;
+    return s;
+}
+
+bool vshi_lit_is_bare(const vshi_lit *lit, uint32_t number) {
+    return lit->maps[lit->triangles[number].map].of->lightmap == NULL;
+}
+
+vshi_lit_point vshi_lit_meet(const vshi_lit *lit, uint32_t number, vshi_vec ray) {
+    const triangle *t = &lit->triangles[number];
+    const vsh_lit_meshes *of = lit->maps[t->map].of;
+    const spot s = find_spot(t, &of->meshes[t->mesh], ray);
+    return (vshi_lit_point){s.at, vshi_scale(s.flat, s.facing), vshi_scale(s.normal, s.facing), of->color};
+}
+
+void vshi_lit_bounds(const vshi_lit *lit, vshi_vec *low, vshi_vec *high) {
+    *low = (vshi_vec){INFINITY, INFINITY, INFINITY};
+    *high = (vshi_vec){-INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 0; lit != NULL && i < lit->triangle_count; ++i) {
+        for (int k = 0; k < 3; ++k) {
+            const vshi_vec at = vshi_add(lit->triangles[i].corner[k], lit->grid.frame.eye);
+            *low = (vshi_vec){fmin(low->x, at.x), fmin(low->y, at.y), fmin(low->z, at.z)};
+            *high = (vshi_vec){fmax(high->x, at.x), fmax(high->y, at.y), fmax(high->z, at.z)};
+        }
+    }
+}
+
+void vshi_lit_shade(const vshi_lit *lit, uint32_t number, vshi_vec ray, float color[3], float normal[3]) {
+    const triangle *t = &lit->triangles[number];
+    const lightmap *map = &lit->maps[t->map];
+    const spot s = find_spot(t, &map->of->meshes[t->mesh], ray);
+    const double position[3] = {s.at.x, s.at.y, s.at.z};
+    const float front[3] = {(float)s.normal.x, (float)s.normal.y, (float)s.normal.z};
+    const footprint f = look_up(map->of->lightmap, s.uv);
     float light[3] = {0.0f, 0.0f, 0.0f};
     if (map->irradiance[0] != NULL) {
         for (int c = 0; c < 3; ++c) {
@@ -351,6 +387,6 @@ void vshi_lit_shade(const vshi_lit *lit, uint32_t number, vshi_vec ray, float co
     const double open = done ? 0.0 : map->ao != NULL ? (double)blend(&f, map->ao) : 1.0;
     for (int c = 0; c < 3; ++c) {
         color[c] = (float)(map->of->color[c] * ((double)light[c] + lit->options->sky[c] * open));
-        normal[c] = (float)facing * front[c];
+        normal[c] = (float)s.facing * front[c];
     }
 }

@@ -32,7 +32,21 @@ typedef struct vshi_lit_band {
 /* Fills strip `strip` of a band. */
 void vshi_lit_raster(const vshi_lit *lit, const vshi_lit_band *band, size_t strip);
 
-/* Light that comes from a triangle along a ray, and its unit normal towards the eye. */
+/* Whether a triangle has no lightmap, so that what falls on it is to be asked for at its points. */
+bool vshi_lit_is_bare(const vshi_lit *lit, uint32_t triangle);
+
+/* Where a ray meets a triangle, with unit normals towards the eye: its own, and the one to light it by. */
+typedef struct vshi_lit_point {
+    vshi_vec at, flat, normal; /* world space */
+    const double *color;       /* [3] */
+} vshi_lit_point;
+
+vshi_lit_point vshi_lit_meet(const vshi_lit *lit, uint32_t triangle, vshi_vec ray);
+
+/* The box around all triangles; low > high where there are none. */
+void vshi_lit_bounds(const vshi_lit *lit, vshi_vec *low, vshi_vec *high);
+
+/* Light that comes from a triangle with a lightmap along a ray, and its unit normal towards the eye. */
 void vshi_lit_shade(const vshi_lit *lit, uint32_t triangle, vshi_vec ray, float color[3], float normal[3]);
 
 #endif

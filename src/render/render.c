@@ -220,6 +220,10 @@ static bool place_fog(rendering *r) {
                               fmax(high.z, info.bounds_max[2])};
         }
     }
+    vshi_vec lit_low, lit_high;
+    vshi_lit_bounds(s->lit, &lit_low, &lit_high);
+    low = (vshi_vec){fmin(low.x, lit_low.x), fmin(low.y, lit_low.y), fmin(low.z, lit_low.z)};
+    high = (vshi_vec){fmax(high.x, lit_high.x), fmax(high.y, lit_high.y), fmax(high.z, lit_high.z)};
     const double diagonal = vshi_length(vshi_sub(high, low)), around = FOG_AROUND * diagonal;
     const vshi_vec margin = {around, around, around};
     r->scenery.shafts.low = vshi_sub(low, margin);
@@ -282,6 +286,7 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
         result == VSH_OK ? vsh_query_create(field, lights, light_count, &o.shade, &query, error) : result;
     result = result == VSH_OK ? vshi_lit_create(&o, lights, light_count, &r.grid, &lit, error) : result;
     r.scenery.query = query;
+    r.scenery.field = field;
     r.scenery.lift = result == VSH_OK && needs_lift(&o, light_count) ? LIFT : 0.0;
     r.scenery.lit = lit;
     if (result == VSH_OK && o.shafts > 0.0 && light_count > 0 && place_fog(&r)) {

@@ -5,12 +5,15 @@
 
 /* How much nearer than a lit mesh a surface of the same shape may be, its voxels. */
 static const double SAME = 1.5;
+/* Where light is asked for at a triangle: so far over it, and as much more as the field's surface stands over
+ * it, up to a limit; voxels. */
+static const double CLEAR = 0.5, LEAST_CLEAR = 0.3, MOST_LIFT = 3.0;
 
 /* The hits on surfaces in a tile, to be shaded together. */
 typedef struct hits {
     size_t count;
     vshi_seen *seen[VSHI_TILE_SAMPLES];
-    const vsh_surface *surface[VSHI_TILE_SAMPLES];
+    const double *color[VSHI_TILE_SAMPLES];
     double positions[VSHI_TILE_SAMPLES][3];
     float normals[VSHI_TILE_SAMPLES][3];
     uint32_t texels[VSHI_TILE_SAMPLES];
@@ -40,20 +43,49 @@ static const vsh_surface *find_surface(const vshi_scenery *scenery, const vshi_e
     return nearest;
 }
 
-static void add_hit(const vshi_scenery *scenery, hits *h, const vsh_surface *surface, const vshi_eye_ray *ray,
-                    double distance, uint32_t texel, vshi_seen *seen) {
+static void add_point(hits *h, vshi_vec point, vshi_vec n, const double *color, uint32_t texel,
+                      vshi_seen *seen) {
     const size_t i = h->count++;
-    const vshi_vec at = vshi_add(ray->origin, vshi_scale(ray->direction, distance));
-    const vshi_vec n = vshi_field_normal(surface->field, at, vshi_scale(ray->direction, -1.0));
-    const vshi_vec point = vshi_add(at, vshi_scale(n, scenery->lift * surface->field->voxel_size));
     h->seen[i] = seen;
-    h->surface[i] = surface;
+    h->color[i] = color;
     h->positions[i][0] = point.x, h->positions[i][1] = point.y, h->positions[i][2] = point.z;
     h->normals[i][0] = (float)n.x, h->normals[i][1] = (float)n.y, h->normals[i][2] = (float)n.z;
     h->texels[i] = texel;
     for (int c = 0; c < 3; ++c) {
         seen->normal[c] = h->normals[i][c];
     }
+}
+
+static void add_hit(const vshi_scenery *scenery, hits *h, const vsh_surface *surface, const vshi_eye_ray *ray,
+                    double distance, uint32_t texel, vshi_seen *seen) {
+    const vshi_vec at = vshi_add(ray->origin, vshi_scale(ray->direction, distance));
+    const vshi_vec n = vshi_field_normal(surface->field, at, vshi_scale(ray->direction, -1.0));
+    const vshi_vec point = vshi_add(at, vshi_scale(n, scenery->lift * surface->field->voxel_size));
+    add_point(h, point, n, surface->color, texel, seen);
+}
+
+/* How far a point of a triangle is to be lifted along its normal to be out of what the field has for it,
+ * which for an open mesh is a shell around it; voxels. */
+static double clear_of(const vsh_field *field, vshi_vec at, vshi_vec normal) {
+    double lift = CLEAR;
+    while (lift < MOST_LIFT) {
+        const vshi_vec point = vshi_add(at, vshi_scale(normal, lift * field->voxel_size));
+        const double world[3] = {point.x, point.y, point.z};
+        const vshi_vec p = vshi_to_field(field, world);
+        const double h = (double)vshi_field_distance(field, (float[3]){(float)p.x, (float)p.y, (float)p.z});
+        if (h >= LEAST_CLEAR) {
+            return lift;
+        }
+        lift += fmax(CLEAR - h, LEAST_CLEAR);
+    }
+    return CLEAR; /* in something else */
+}
+
+static void add_bare(const vshi_scenery *scenery, hits *h, uint32_t triangle, vshi_vec through,
+                     uint32_t texel, vshi_seen *seen) {
+    const vshi_lit_point p = vshi_lit_meet(scenery->lit, triangle, through);
+    const double lift = clear_of(scenery->field, p.at, p.flat) * scenery->field->voxel_size;
+    add_point(h, vshi_add(p.at, vshi_scale(p.flat, lift)), p.normal, p.color, texel, seen);
 }
 
 /* Light at the hits, one after the other of the lights, so that room for one is enough. */
@@ -78,7 +110,7 @@ static vsh_result light_hits(const vshi_scenery *scenery, hits *h, vsh_shade_sta
         const double open = !scenery->options->ao ? 1.0 : h->ao[i] > 0.0f ? (double)h->ao[i] : 0.0;
         for (int c = 0; c < 3; ++c) {
             h->seen[i]->color[c] =
-                (float)(h->surface[i]->color[c] * ((double)h->light[i][c] + scenery->options->sky[c] * open));
+                (float)(h->color[i][c] * ((double)h->light[i][c] + scenery->options->sky[c] * open));
         }
     }
     return result;
@@ -104,7 +136,9 @@ vsh_result vshi_tile_render(const vshi_scenery *scenery, const vshi_rows *rows, 
             const double lit = scenery->lit != NULL ? rows->lit.depth[at] * slant : INFINITY;
             double distance;
             const vsh_surface *surface = find_surface(scenery, &ray, lit, &distance, stats);
-            if (surface == NULL && lit < INFINITY) {
+            if (surface == NULL && lit < INFINITY && vshi_lit_is_bare(scenery->lit, rows->lit.triangle[at])) {
+                add_bare(scenery, &h, rows->lit.triangle[at], through, texel, seen);
+            } else if (surface == NULL && lit < INFINITY) {
                 vshi_lit_shade(scenery->lit, rows->lit.triangle[at], through, seen->color, seen->normal);
             }
             if (surface != NULL) {

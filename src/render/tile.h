@@ -14,6 +14,7 @@ typedef struct vshi_scenery {
     const vsh_light *lights;
     size_t light_count;
     const vsh_query *query;
+    const vsh_field *field; /* that the query asks */
     vsh_run run;
     double lift;         /* of shaded points, voxels */
     const vshi_lit *lit; /* NULL: none */

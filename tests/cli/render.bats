@@ -129,8 +129,13 @@ png_size() {
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap box.exr -o lit.png --quiet
     done_well
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" -o computed.png --quiet
-    ! same_values lit.png computed.png || fail "the lightmap is not what is shown"
-    # With other sizes the picture is nearly the same; a lightmap that is all dark is not.
+    # The same mesh is seen, and on a lone convex body the same light; a lightmap that is all dark shows.
+    "$VDBSHADE" compare computed.png lit.png --max-rmse 0.02 --quiet || fail "not the light that is computed"
+    printf 'P5 2 2 255\n\0\0\0\0' >black.pgm
+    shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap black.pgm --lightmap-pack R=shadow.sun -o dark.png --quiet
+    done_well
+    ! same_values lit.png dark.png || fail "the lightmap is not what is shown"
+    # With other sizes the picture is nearly the same.
     shade bake box.obj "${SUN[@]}" --irradiance --size 256 --resolution 24 -o fine.exr --quiet
     shade render box.obj "${SUN[@]}" "${QUICK[@]}" --lightmap fine.exr -o fine.png --quiet
     done_well
@@ -167,6 +172,50 @@ png_size() {
     # Without lights its AO is what there is to show.
     shade render box.obj "${QUICK[@]}" --lightmap ao.exr -o view.png --quiet
     done_well
+}
+
+# write_quad FILE: a square of two triangles that faces +z, open.
+write_quad() {
+    printf '%s\n' 'o quad' 'v -1 -1 0' 'v 1 -1 0' 'v 1 1 0' 'v -1 1 0' 'vt 0 0' 'vt 1 0' 'vt 1 1' 'vt 0 1' \
+        'f 1/1 2/2 3/3' 'f 1/1 3/3 4/4' >"$1"
+}
+
+@test "a mesh is what is seen, where it is, open or closed" {
+    write_quad quad.obj
+    local which
+    for which in quad box; do
+        shade render $which.obj --sun 0,0,1 --resolution 12 --size 9 --samples 1 --camera 0.5,0.5,4 --look-at 0.5,0.5,0 --fov 3 -o $which.exr --quiet
+        done_well
+    done
+    "$VDBSHADE" info quad.exr | grep -q "channel 'Z': min 4, mean 4, max 4" || fail "quad: $("$VDBSHADE" info quad.exr)"
+    "$VDBSHADE" info box.exr | grep -q "channel 'Z': min 3, mean 3, max 3" || fail "box: $("$VDBSHADE" info box.exr)"
+}
+
+@test "a dark lightmap leaves nothing light of an open mesh" {
+    write_quad quad.obj
+    printf 'P5 2 2 255\n\0\0\0\0' >black.pgm
+    for from in 0,0,4 2,0.4,1.5 -0.5,1,-3; do
+        shade render quad.obj --sun 0.2,0.3,1 --lightmap black.pgm --lightmap-pack R=shadow.sun --camera $from \
+            --resolution 12 --size 40 --samples 1 --sky 0,0,0 --background 0,0,0 -o view.ppm --quiet
+        done_well
+        [ "$(tail -c 4800 view.ppm | tr -d '\0' | wc -c)" -eq 0 ] || fail "from $from: not all dark"
+    done
+    shade render quad.obj --sun 0.2,0.3,1 --camera 0,0,4 --resolution 12 --size 40 --samples 1 --sky 0,0,0 --background 0,0,0 -o view.ppm --quiet
+    [ "$(tail -c 4800 view.ppm | tr -d '\0' | wc -c)" -gt 1000 ] || fail "without a lightmap it is lit"
+}
+
+@test "what is rendered fills 80 to 90 % of the picture" {
+    for up in 0,1,0 0,0,1; do
+        shade render box.obj "${SUN[@]}" --size 50 --samples 2 --resolution 24 --background 0,0,0 --up $up -o view.ppm --quiet
+        done_well
+        # Columns and rows of the pixels that are not black.
+        tail -c 7500 view.ppm | od -An -v -tu1 -w3 | awk '$1 + $2 + $3 > 0 {
+                x = (NR - 1) % 50; y = int((NR - 1) / 50); n++
+                if (n == 1) { x0 = x1 = x; y0 = y1 = y }
+                if (x < x0) x0 = x; if (x > x1) x1 = x; if (y < y0) y0 = y; if (y > y1) y1 = y
+            } END { w = x1 - x0 + 1; h = y1 - y0 + 1; most = w > h ? w : h; print w, h; exit !(most >= 40 && most <= 46) }' ||
+            fail "up $up"
+    done
 }
 
 scene() {

@@ -49,6 +49,54 @@ static void a_framed_box_fills_the_picture(void **state) {
     }
 }
 
+/* Points in a ball: the nearest place from which all are seen, one at an edge of each pair at least. */
+static void framed_points_fill_the_picture(void **state) {
+    (void)state;
+    enum { COUNT = 50 };
+    double points[COUNT][3];
+    for (int i = 0; i < COUNT; ++i) {
+        points[i][0] = 5.0 + 3.0 * sin(12.9898 * i + 1.0);
+        points[i][1] = 0.7 * sin(78.233 * i + 2.0);
+        points[i][2] = -2.0 + sin(37.719 * i + 3.0);
+    }
+    for (double azimuth = 0.0; azimuth < 6.0; azimuth += 0.7) {
+        vsh_camera camera = vsh_camera_default();
+        vsh_error error;
+        assert_int_equal(
+            vsh_camera_frame_points(&camera, COUNT, &points[0][0], azimuth, 0.4, (double)WIDE / HIGH, &error),
+            VSH_OK);
+        assert_int_equal(vsh_camera_check(&camera, &error), VSH_OK);
+        const pinhole p = pinhole_of(&camera);
+        double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
+        for (int i = 0; i < COUNT; ++i) {
+            const double to[3] = {points[i][0] - p.eye[0], points[i][1] - p.eye[1], points[i][2] - p.eye[2]};
+            const double away = dot(to, p.forward);
+            const double at[2] = {dot(to, p.right) / (away * p.pixel * 0.5 * WIDE),
+                                  dot(to, p.up) / (away * p.pixel * 0.5 * HIGH)};
+            assert_true(away > 0.0);
+            for (int axis = 0; axis < 2; ++axis) {
+                low[axis] = fmin(low[axis], at[axis]);
+                high[axis] = fmax(high[axis], at[axis]);
+            }
+        }
+        const double wide = 0.5 * (high[0] - low[0]), tall = 0.5 * (high[1] - low[1]);
+        assert_true(fmax(wide, tall) > 0.8 && fmax(wide, tall) < 0.9);
+        const int larger = wide > tall ? 0 : 1;
+        assert_true(fabs(high[larger] + low[larger]) < 1e-9); /* in the middle */
+    }
+}
+
+static void points_that_cannot_be_framed_are_refused(void **state) {
+    (void)state;
+    vsh_camera camera = vsh_camera_default();
+    vsh_error error;
+    const double same[6] = {1.0, 2.0, 3.0, 1.0, 2.0, 3.0}, bad[6] = {0.0, 0.0, 0.0, NAN, 1.0, 1.0};
+    assert_int_equal(vsh_camera_frame_points(&camera, 2, same, 0.0, 0.0, 1.0, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_camera_frame_points(&camera, 2, bad, 0.0, 0.0, 1.0, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_camera_frame_points(&camera, 0, bad, 0.0, 0.0, 1.0, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_camera_frame_points(&camera, 2, NULL, 0.0, 0.0, 1.0, &error), VSH_ERROR_ARGUMENT);
+}
+
 static void an_orbit_turns_around_the_target(void **state) {
     (void)state;
     vsh_camera camera = camera_at(1.0, 2.0, 7.0, 1.0, 1.0, 3.0, 30.0);
@@ -67,6 +115,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(cameras_that_see_nothing_are_refused),
         cmocka_unit_test(a_framed_box_fills_the_picture),
+        cmocka_unit_test(framed_points_fill_the_picture),
+        cmocka_unit_test(points_that_cannot_be_framed_are_refused),
         cmocka_unit_test(an_orbit_turns_around_the_target),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
