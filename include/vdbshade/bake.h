@@ -36,6 +36,11 @@ typedef struct vsh_uv_report {
     size_t overlap_triangles;    /* triangles of this mesh that have such texels */
     size_t outside_triangles;    /* triangles that leave the unit square; what lies outside is not baked */
     size_t degenerate_triangles; /* triangles without area in UV space, but with area in the world */
+    size_t other_texels; /* of overlap_texels, those that a mesh of another object (vsh_mesh.object) covers:
+                            they take light from one object and show it on another */
+    size_t other_mesh;   /* in the report of the mesh with the most other_texels: the mesh that most of them
+                            belong to; SIZE_MAX in all others */
+    size_t other_mesh_texels; /* how many of them do; 0 in all others */
 } vsh_uv_report;
 
 /* The texels of a receiver at one size: where each lies in the world. The meshes are not needed any more. */

@@ -131,21 +131,82 @@ static vsh_result count(counting *all, const vsh_run *run, bool limited, vshi_jo
                             : vshi_fail(error, result, "texels: the system refused memory for a row");
 }
 
-static void finish_reports(const counting *all, const vsh_run *run, vsh_uv_report *reports) {
+/* --- what is covered twice */
+
+static void count_owners(void *user, size_t begin, size_t end) {
+    counting *all = user;
+    const vshi_charts *sorted = &all->charts->sorted;
+    for (size_t row = begin; row < end; ++row) {
+        vshi_row work;
+        const vsh_result result = vshi_row_open(sorted, row, &work, NULL);
+        if (result != VSH_OK) {
+            atomic_store(&all->row_result, result);
+        }
+        for (size_t column = 0; result == VSH_OK && column < work.tiles; ++column) {
+            if (work.tile_start[column] != work.tile_start[column + 1]) {
+                vshi_row_tile(sorted, &work, column, &all->overlaps);
+            }
+        }
+        vshi_row_close(&work);
+    }
+}
+
+/* Whose texels the mesh with the most of other objects' has: rasterised again for it alone, as a count for
+ * each pair of meshes would be too many. */
+static vsh_result find_owners(counting *all, vshi_job *job, vsh_uv_report *reports, vsh_error *error) {
+    const size_t count = all->charts->sorted.mesh_count;
+    size_t worst = 0, owner = 0;
+    for (size_t m = 0; m < count; ++m) {
+        reports[m].other_mesh = SIZE_MAX;
+        worst = reports[m].other_texels > reports[worst].other_texels ? m : worst;
+    }
+    if (reports[worst].other_texels == 0) {
+        return VSH_OK;
+    }
+    vsh_result result = VSH_OK;
+    counting again = {.charts = all->charts, .overlaps = {.watched = worst}};
+    again.overlaps.owners = vshi_take(count, sizeof *again.overlaps.owners, "overlaps", &result, error);
+    if (result == VSH_OK) {
+        result = vshi_parallel_for(job, all->charts->sorted.rows, 1, 0, count_owners, &again, error);
+    }
+    if (result == VSH_OK && (result = atomic_load(&again.row_result)) != VSH_OK) {
+        vshi_fail(error, result, "texels: the system refused memory for a row");
+    }
+    for (size_t m = 0; result == VSH_OK && m < count; ++m) {
+        owner = again.overlaps.owners[m] > again.overlaps.owners[owner] ? m : owner;
+    }
+    if (result == VSH_OK) {
+        reports[worst].other_mesh = owner;
+        reports[worst].other_mesh_texels = again.overlaps.owners[owner];
+    }
+    free(again.overlaps.owners);
+    return result;
+}
+
+static void take_overlaps(const counting *all, vsh_uv_report *reports) {
     const vshi_charts *sorted = &all->charts->sorted;
     for (size_t m = 0; m < sorted->mesh_count; ++m) {
         vsh_uv_report *report = &reports[m];
         report->overlap_texels = atomic_load(&all->overlaps.texels[m]);
+        report->other_texels = atomic_load(&all->overlaps.others[m]);
         for (size_t i = sorted->first[m]; i < sorted->first[m + 1]; ++i) {
             report->overlap_triangles += atomic_load(&all->overlaps.triangles[i]);
         }
+    }
+}
+
+static void warn(const counting *all, const vsh_run *run, const vsh_uv_report *reports) {
+    const vshi_charts *sorted = &all->charts->sorted;
+    for (size_t m = 0; m < sorted->mesh_count; ++m) {
+        const vsh_uv_report *report = &reports[m];
         const vshi_mesh_name label = vshi_mesh_label(&sorted->meshes[m], m);
         const char *name = label.text;
         if (report->overlap_texels > 0) {
-            vshi_warn(run,
-                      "%s: lightmap UVs overlap: %zu texels of %zu triangles are covered already; the first "
-                      "triangle keeps them",
-                      name, report->overlap_texels, report->overlap_triangles);
+            vshi_warn(
+                run,
+                "%s: lightmap UVs overlap: %zu texels of %zu triangles are covered already, %zu of them "
+                "by other objects; the first triangle keeps them",
+                name, report->overlap_texels, report->overlap_triangles, report->other_texels);
         }
         if (report->outside_triangles > 0) {
             vshi_warn(run,
@@ -189,6 +250,7 @@ static vsh_result make(const vsh_mesh *meshes, size_t mesh_count, const vsh_ligh
         charts->info.bytes =
             sizeof *charts + sorted->bytes + mesh_count + sorted->rows * sizeof *charts->rows;
         all.overlaps.texels = vshi_take(mesh_count, sizeof *all.overlaps.texels, "overlaps", &result, error);
+        all.overlaps.others = vshi_take(mesh_count, sizeof *all.overlaps.others, "overlaps", &result, error);
         all.overlaps.triangles =
             vshi_take(sorted->first[mesh_count], sizeof *all.overlaps.triangles, "overlaps", &result, error);
     }
@@ -196,9 +258,14 @@ static vsh_result make(const vsh_mesh *meshes, size_t mesh_count, const vsh_ligh
         result = count(&all, run, limited, job, error);
     }
     if (result == VSH_OK) {
-        finish_reports(&all, run, reports);
+        take_overlaps(&all, reports);
+        result = find_owners(&all, job, reports, error);
+    }
+    if (result == VSH_OK) {
+        warn(&all, run, reports);
     }
     free(all.overlaps.triangles);
+    free(all.overlaps.others);
     free(all.overlaps.texels);
     return result;
 }

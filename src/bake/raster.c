@@ -135,8 +135,8 @@ static void sample_range(int64_t low, int64_t high, int64_t tile_first, int64_t 
     *last = *last < samples - 1 ? *last : samples - 1;
 }
 
-uint64_t vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle, uint32_t number,
-                         vshi_tile *tile) {
+vshi_taken vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle, uint32_t number,
+                           const uint64_t *object, vshi_tile *tile) {
     const int32_t n = raster->supersample;
     const int64_t side = (int64_t)VSHI_TILE * n;
     const int64_t tile_x = (int64_t)tile->column * side, tile_y = (int64_t)tile->row * side;
@@ -146,8 +146,9 @@ uint64_t vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *tria
                  &x0, &x1);
     sample_range(least(triangle->grid_y), greatest(triangle->grid_y), tile_y, rows < side ? rows : side, &y0,
                  &y1);
+    vshi_taken taken = {0, 0};
     if (x0 > x1 || y0 > y1) {
-        return 0;
+        return taken;
     }
     exact row_value[3], step_x[3], step_y[3], bias[3];
     for (int i = 0; i < 3; ++i) {
@@ -161,7 +162,6 @@ uint64_t vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *tria
         /* y points down and areas are positive: the inside lies below a top edge and right of a left one. */
         bias[i] = dy < 0 || (dy == 0 && dx > 0) ? 1 : 0;
     }
-    uint64_t overlap = 0;
     for (int64_t y = y0; y <= y1; ++y) {
         exact value[3] = {row_value[0], row_value[1], row_value[2]};
         uint32_t *owner = tile->owner + y * side;
@@ -173,7 +173,9 @@ uint64_t vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *tria
                     owner[x] = number;
                     tile->covered |= texel;
                 } else {
-                    overlap |= texel;
+                    const bool other = object != NULL && object[owner[x] - 1] != object[number - 1];
+                    taken.texels |= texel;
+                    taken.others |= other ? texel : 0;
                 }
             }
             value[0] += step_x[0];
@@ -184,7 +186,7 @@ uint64_t vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *tria
         row_value[1] += step_y[1];
         row_value[2] += step_y[2];
     }
-    return overlap;
+    return taken;
 }
 
 /* Whether the triangle's inside meets the inside of a texel: no edge of either separates them. */

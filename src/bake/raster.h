@@ -48,10 +48,16 @@ typedef struct vshi_tile {
 /* Empties a tile. */
 void vshi_tile_begin(const vshi_raster *raster, size_t column, size_t row, vshi_tile *tile);
 
-/* Gives the free samples inside the triangle (top-left rule) to `number` (triangle + 1). Returns the texels
- * where a sample was taken already; the rule keeps shared edges out of them. */
-uint64_t vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle, uint32_t number,
-                         vshi_tile *tile);
+/* Texels of a tile where a triangle finds samples taken already; shared edges are none. */
+typedef struct vshi_taken {
+    uint64_t texels;
+    uint64_t others; /* of them, those with a sample that a triangle of another object took */
+} vshi_taken;
+
+/* Gives the free samples inside the triangle (top-left rule, so that shared edges are of one) to `number`
+ * (triangle + 1). `object` [triangles] tells objects apart; NULL: not asked for. */
+vshi_taken vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle, uint32_t number,
+                           const uint64_t *object, vshi_tile *tile);
 
 /* Texels without any covered sample that the triangle's inside reaches become border texels; called in the
  * order of the triangles once all have covered, so that the first of equally near ones stays. */

@@ -5,20 +5,26 @@
 #include "field.h"
 #include "meshes.h"
 #include "message.h"
+#include "paths.h"
 #include "progress.h"
 #include "receiver.h"
 #include "resume.h"
 #include "signals.h"
+#include "targets.h"
 #include "temporary.h"
+#include "warnings.h"
 
 #include <inttypes.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 typedef struct bake_work {
     const cli_bake_settings *settings;
-    vsh_scene *scene;
+    const vsh_scene *given;
+    vsh_scene *scene; /* that of the targets */
     vsh_run run;
     vsh_assets *assets;
+    cli_targets targets;
     vsh_triangles *triangles; /* of exact methods */
     cli_field made;
     /* of the only receiver; several are rasterised again, so as not to hold all at once */
@@ -29,26 +35,51 @@ typedef struct bake_work {
     cli_stats stats;
 } bake_work;
 
+static int make_folder_of(const char *output) {
+    char *folder = cli_targets_folder(output);
+    const int code = folder != NULL ? cli_make_folder(folder) : cli_out_of_memory(output);
+    free(folder);
+    return code;
+}
+
 /* What can be refused before anything is read. */
 static int check_files(const cli_bake_settings *settings, const vsh_scene *scene) {
     int code = settings->stats != NULL ? cli_temporary_check(settings->stats) : CLI_OK;
+    const bool makes = settings->output_folder != NULL || settings->per_object;
     for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
-        code = cli_receiver_check(scene, i);
+        const char *output = scene->receivers[i].output;
+        if (makes && settings->dry_run) {
+            continue; /* its folder need not be there yet */
+        }
+        code = makes ? make_folder_of(output) : cli_check_folder(output);
+        code = code == CLI_OK ? cli_receiver_check(scene, i) : code;
     }
     return code;
 }
 
 static int load(bake_work *work) {
     const double start = cli_seconds();
-    const int code = cli_load_assets(work->scene, &work->run, &work->assets);
+    int code = cli_load_assets(work->given, &work->run, &work->assets);
+    if (code == CLI_OK) {
+        code = cli_targets_make(work->given, work->assets, work->settings->per_object, &work->targets);
+    }
+    for (size_t i = 0; i < work->targets.scene.receiver_count && code == CLI_OK; ++i) {
+        code = cli_bake_check_output(work->settings, work->given, work->targets.receivers[i].output);
+    }
+    work->scene = &work->targets.scene;
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
     return code;
 }
 
 static cli_receiver_job receiver_job(const bake_work *work, size_t index) {
-    return (cli_receiver_job){
-        work->scene,   work->assets,          &work->run, index, work->settings->band_rows,
-        &work->origin, work->settings->resume};
+    return (cli_receiver_job){.scene = work->scene,
+                              .meshes = work->targets.meshes[index],
+                              .mesh_count = work->targets.mesh_counts[index],
+                              .run = &work->run,
+                              .index = index,
+                              .band_rows = work->settings->band_rows,
+                              .origin = &work->origin,
+                              .resume = work->settings->resume};
 }
 
 /* Where its samples are: all of them are made, where they go into memory at once, or looked at in passing. */
@@ -125,15 +156,18 @@ static int make_triangles(bake_work *work) {
 
 static int find_origin(bake_work *work) {
     const double start = cli_seconds();
-    const int code = cli_origin_make(work->scene, &work->settings->input, 1, work->made.grid.voxel_size,
+    const int code = cli_origin_make(work->given, &work->settings->input, 1, work->made.grid.voxel_size,
                                      &work->run, &work->origin);
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
     return code;
 }
 
+enum { MOST_TOLD = 8 }; /* lightmaps that have a line each */
+
 static void say_receiver(const bake_work *work, size_t index, const cli_bands *bands,
                          const cli_stats *before) {
-    if (work->settings->common.quiet) {
+    const cli_common *common = &work->settings->common;
+    if (common->quiet || (work->scene->receiver_count > MOST_TOLD && !common->verbose)) {
         return;
     }
     const vsh_receiver *receiver = &work->scene->receivers[index];
@@ -195,23 +229,39 @@ static int bake_receivers(bake_work *work) {
     return code;
 }
 
-static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
-    bake_work work = {.settings = settings, .scene = scene, .run = cli_common_run(&settings->common)};
+/* Where there are too many for a line each. */
+static void say_all(const bake_work *work) {
+    const size_t count = work->scene->receiver_count;
+    if (count > MOST_TOLD && !work->settings->common.verbose) {
+        cli_say("%zu lightmaps, %s to %s: %" PRIu64 " texels, %" PRIu64
+                " of them invalid; --verbose tells of each",
+                count, work->scene->receivers[0].output, work->scene->receivers[count - 1].output,
+                work->stats.texels, work->stats.invalid_texels);
+    }
+}
+
+static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
+    bake_work work = {.settings = settings, .given = scene, .run = cli_common_run(&settings->common)};
     work.stats = cli_stats_begin(CLI_STATS_TEXELS, work.run.threads);
     int code = load(&work);
     if (code == CLI_OK && settings->dry_run) {
-        code = cli_bake_forecast(scene, work.assets, &work.run, settings->band_rows);
+        code = cli_bake_forecast(&work.targets, work.assets, &work.run, settings->band_rows);
+        cli_targets_free(&work.targets);
         vsh_assets_free(work.assets);
         return code;
     }
     code = code == CLI_OK ? rasterise(&work) : code;
+    cli_warnings_tell(); /* what is wrong with the files, before the long work */
     code = code == CLI_OK ? make_triangles(&work) : code;
     code = code == CLI_OK ? make_field(&work) : code;
+    cli_warnings_tell();
     code = code == CLI_OK ? find_origin(&work) : code;
     code = code == CLI_OK ? bake_receivers(&work) : code;
     code = code == CLI_OK ? cli_stats_finish(&work.stats, settings->stats) : code;
     if (code == CLI_OK) {
+        cli_warnings_tell();
         if (!settings->common.quiet) {
+            say_all(&work);
             cli_stats_say(&work.stats);
         }
     }
@@ -220,6 +270,7 @@ static int bake(const cli_bake_settings *settings, vsh_scene *scene) {
     vsh_triangles_free(work.triangles);
     cli_origin_free(&work.origin);
     cli_field_free(&work.made);
+    cli_targets_free(&work.targets);
     vsh_assets_free(work.assets);
     return code;
 }

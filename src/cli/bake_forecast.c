@@ -25,6 +25,7 @@ static const char *const time_note = "by a small bake; half or twice as much is 
 typedef struct forecast {
     const vsh_scene *scene;
     const vsh_assets *assets;
+    const cli_targets *targets;
     const vsh_run *run;
     uint64_t texels;
     uint64_t samples;
@@ -35,7 +36,12 @@ typedef struct forecast {
 } forecast;
 
 static cli_receiver_job receiver_job(const forecast *f, size_t index) {
-    return (cli_receiver_job){f->scene, f->assets, f->run, index, f->band_rows, NULL, false};
+    return (cli_receiver_job){.scene = f->scene,
+                              .meshes = f->targets->meshes[index],
+                              .mesh_count = f->targets->mesh_counts[index],
+                              .run = f->run,
+                              .index = index,
+                              .band_rows = f->band_rows};
 }
 
 static int count_texels(forecast *f) {
@@ -71,8 +77,8 @@ typedef struct trial {
 
 static int make_texels(const forecast *f, vsh_texels **texels) {
     const vsh_receiver *receiver = &f->scene->receivers[0];
-    size_t count;
-    const vsh_mesh *meshes = vsh_assets_receiver(f->assets, 0, &count);
+    const size_t count = f->targets->mesh_counts[0];
+    const vsh_mesh *meshes = f->targets->meshes[0];
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = receiver->width < TRIAL_SIZE ? receiver->width : TRIAL_SIZE;
     options.height = receiver->height < TRIAL_SIZE ? receiver->height : TRIAL_SIZE;
@@ -192,9 +198,10 @@ static int predict(const forecast *f, const trial *t) {
     return code;
 }
 
-int cli_bake_forecast(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+int cli_bake_forecast(const cli_targets *targets, const vsh_assets *assets, const vsh_run *run,
                       int32_t band_rows) {
-    forecast f = {.scene = scene, .assets = assets, .run = run, .band_rows = band_rows};
+    const vsh_scene *scene = &targets->scene;
+    forecast f = {.scene = scene, .assets = assets, .targets = targets, .run = run, .band_rows = band_rows};
     f.charts = calloc(scene->receiver_count, sizeof *f.charts);
     if (f.charts == NULL) {
         cli_say("forecast: the system refused memory");

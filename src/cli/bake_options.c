@@ -21,7 +21,12 @@ enum {
     KEY_STATS,
     KEY_DRY_RUN,
     KEY_RESUME,
-    KEY_OUTPUT_FOLDER
+    KEY_OUTPUT_FOLDER,
+    KEY_RECEIVE,
+    KEY_NO_RECEIVE,
+    KEY_NO_CAST,
+    KEY_PER_OBJECT,
+    KEY_ALLOW_OVERLAP
 };
 
 static const cli_option options[] = {
@@ -32,7 +37,8 @@ static const cli_option options[] = {
      ".hdr .ppm .pgm .jpg .webp .heic .avif .gif; what each\n"
      "can hold, and what is not written: docs/formats.md"},
     {KEY_OUTPUT_FOLDER, "output-folder", "FOLDER",
-     "write there what a scene's file says is written, under\nthe same names"},
+     "write there what a scene's file says is written, under\nthe same names; it is made where it is not "
+     "there"},
     {KEY_SIZE, "size", "W[xH]", "texels of the lightmap, 1 to 65536 (1024)"},
     {KEY_BITS, "bits", "N",
      "8, 16 or 32 bits a channel (32 for EXR, else 16\nwhere the format has it, else 8)"},
@@ -48,6 +54,15 @@ static const cli_option options[] = {
     {KEY_RESUME, "resume", NULL,
      "keep finished rows in OUT.resume until all are there,\nand go on from them where a bake with this "
      "option was\nended; the result is the same, bit by bit"},
+    {0, NULL, NULL, "Objects"},
+    {KEY_RECEIVE, "receive", "NAME",
+     "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
+    {KEY_NO_RECEIVE, "no-receive", "NAME", "objects of this name only cast; may be repeated"},
+    {KEY_NO_CAST, "no-cast", "NAME", "objects of this name only receive; may be repeated"},
+    {KEY_PER_OBJECT, "per-object", NULL,
+     "an image for each object: FOLDER/NAME.exr with\n-o FOLDER/, else OUT.NAME.exr, or where OUT has %s"},
+    {KEY_ALLOW_OVERLAP, "allow-overlap", NULL,
+     "bake objects that lie over each other in the lightmap,\ntoo: the first keeps the texels"},
     {0, NULL, NULL, "Light and occlusion"},
     CLI_LIGHT_OPTIONS,
     {KEY_IRRADIANCE, "irradiance", NULL,
@@ -119,6 +134,17 @@ static int take_caster(cli_bake_settings *s, const char *name, const char *value
     return CLI_OK;
 }
 
+static int take_pattern(cli_patterns *patterns, const char *name, const char *value) {
+    if (value[0] == '\0') {
+        return cli_usage("%s: expected an object's name, or a pattern such as 'floor*'", name);
+    }
+    if (patterns->count == CLI_MAX_PATTERNS) {
+        return cli_usage("%s '%s': given more than %d times", name, value, CLI_MAX_PATTERNS);
+    }
+    patterns->list[patterns->count++] = value;
+    return CLI_OK;
+}
+
 static int take_shade(cli_bake_settings *s, int key, const char *name, const char *value, bool *taken) {
     *taken = true;
     switch (key) {
@@ -184,6 +210,18 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_OUTPUT_FOLDER:
         s->output_folder = value;
+        return CLI_OK;
+    case KEY_RECEIVE:
+        return take_pattern(&s->receive, name, value);
+    case KEY_NO_RECEIVE:
+        return take_pattern(&s->no_receive, name, value);
+    case KEY_NO_CAST:
+        return take_pattern(&s->no_cast, name, value);
+    case KEY_PER_OBJECT:
+        s->per_object = true;
+        return CLI_OK;
+    case KEY_ALLOW_OVERLAP:
+        s->allow_overlap = true;
         return CLI_OK;
     case KEY_STATS:
         s->stats = value;

@@ -4,7 +4,13 @@
 
 #include "commands.h"
 
-enum { CLI_MAX_EXTRA_CASTERS = 256 };
+enum { CLI_MAX_EXTRA_CASTERS = 256, CLI_MAX_PATTERNS = 256 };
+
+/* Names of objects, as they were given one after the other. */
+typedef struct cli_patterns {
+    const char *list[CLI_MAX_PATTERNS];
+    size_t count;
+} cli_patterns;
 
 /* What commands that shade share: keys, rows of their tables, and who takes them. */
 enum {
@@ -66,6 +72,8 @@ typedef struct cli_bake_settings {
     const char *input;
     const char *output;
     const char *output_folder; /* for the outputs of a scene, by their names; NULL: where it says */
+    cli_patterns receive, no_receive, no_cast;
+    bool per_object, allow_overlap;
     const char *stats;
     cli_common common;
     cli_grid_settings grid;

@@ -2,6 +2,7 @@
 #include "bake_options.h"
 #include "message.h"
 #include "paths.h"
+#include "targets.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,6 +15,11 @@ static void set_identity(double transform[12]) {
     for (int i = 0; i < 12; ++i) {
         transform[i] = i % 5 == 0 ? 1.0 : 0.0;
     }
+}
+
+static vsh_selection selection(const cli_patterns *only, const cli_patterns *except) {
+    return (vsh_selection){only != NULL ? only->list : NULL, only != NULL ? only->count : 0, except->list,
+                           except->count};
 }
 
 /* The input's casters, then those of --caster. */
@@ -32,6 +38,9 @@ static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
             made->casters[i].type =
                 cli_has_ending(made->casters[i].path, "vdb") ? VSH_CASTER_VDB : VSH_CASTER_MESH;
             set_identity(made->casters[i].transform);
+            if (i < own) {
+                made->casters[i].objects = selection(NULL, &s->no_cast);
+            }
         }
     }
     made->scene.casters = made->casters;
@@ -40,6 +49,11 @@ static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
 }
 
 static void override_receiver(const cli_bake_settings *s, vsh_receiver *receiver) {
+    if (s->receive.count > 0 || s->no_receive.count > 0) {
+        receiver->objects = selection(&s->receive, &s->no_receive);
+    }
+    receiver->partial = s->per_object || receiver->partial;
+    receiver->allow_overlap = s->allow_overlap || receiver->allow_overlap;
     if (s->output != NULL) {
         receiver->output = s->output;
     }
@@ -67,6 +81,14 @@ static void override_receiver(const cli_bake_settings *s, vsh_receiver *receiver
     }
 }
 
+static void free_outputs(cli_bake_scene *made) {
+    for (size_t i = 0; made->outputs != NULL && i < made->scene.receiver_count; ++i) {
+        free(made->outputs[i]);
+    }
+    free(made->outputs);
+    made->outputs = NULL;
+}
+
 /* The scene's outputs, by their names, in a folder of the user's. */
 static int move_outputs(const char *folder, cli_bake_scene *made) {
     made->outputs = calloc(made->scene.receiver_count, sizeof *made->outputs);
@@ -83,6 +105,26 @@ static int move_outputs(const char *folder, cli_bake_scene *made) {
         }
         snprintf(made->outputs[i], size, "%s/%s", folder, name);
         made->receivers[i].output = made->outputs[i];
+    }
+    return CLI_OK;
+}
+
+/* Where the object's name goes in the output of each. */
+static int mark_outputs(cli_bake_scene *made) {
+    char **marked = calloc(made->scene.receiver_count, sizeof *marked);
+    if (marked == NULL) {
+        return cli_out_of_memory("outputs");
+    }
+    for (size_t i = 0; i < made->scene.receiver_count; ++i) {
+        marked[i] = cli_targets_template(made->receivers[i].output);
+        made->receivers[i].output = marked[i];
+    }
+    free_outputs(made);
+    made->outputs = marked;
+    for (size_t i = 0; i < made->scene.receiver_count; ++i) {
+        if (marked[i] == NULL) {
+            return cli_out_of_memory("outputs");
+        }
     }
     return CLI_OK;
 }
@@ -118,20 +160,52 @@ int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     return CLI_OK;
 }
 
+/* Whether it is meant for a folder: one that is called as an image is, is in the way. */
+static bool names_folder(const char *output) {
+    const char *slash = strrchr(output, '/');
+    return cli_is_folder(output) && strchr(slash != NULL && slash[1] != '\0' ? slash : "", '.') == NULL &&
+           (slash != NULL || strchr(output, '.') == NULL);
+}
+
+/* Whether an output is for many objects, of any file. */
+static bool is_of_objects(const char *output) {
+    const char *slash = strrchr(output, '/');
+    const char *last = slash != NULL ? slash : output;
+    return cli_is_folder(output) || strstr(last, CLI_OBJECT_NAME) != NULL || strchr(last, '.') == NULL;
+}
+
+/* Names are those of one file. */
+static int check_objects(const cli_bake_settings *s, const cli_bake_scene *made, size_t receivers) {
+    const bool chosen = s->receive.count > 0 || s->no_receive.count > 0;
+    const bool one =
+        receivers == 1 && (made->read == NULL || made->read->receivers[0].type == VSH_RECEIVER_MESH);
+    if (chosen && !one) {
+        return cli_usage("--%s: %s has no single mesh that receives: what of them does stands in the scene's "
+                         "file, by \"objects\" and \"except\"",
+                         s->receive.count > 0 ? "receive" : "no-receive", s->input);
+    }
+    if (s->no_cast.count > 0 && made->read != NULL) {
+        return cli_usage("--no-cast: the casters of a scene stand in its file, %s; see \"except\"", s->input);
+    }
+    return CLI_OK;
+}
+
 static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     const size_t given = made->read != NULL ? made->read->receiver_count : 1;
     if (s->output_folder != NULL && (s->output != NULL || made->read == NULL)) {
         return cli_usage("--output-folder '%s': %s", s->output_folder,
                          s->output != NULL ? "there is also -o" : "for the outputs that a scene names");
     }
-    if (given > 1 && s->output != NULL) {
+    const bool many = s->per_object && s->output != NULL && is_of_objects(s->output);
+    if (given > 1 && s->output != NULL && !many) {
         return cli_usage("-o '%s': %s has %zu receivers, each with its own output", s->output, s->input,
                          given);
     }
     if (made->read == NULL && cli_has_ending(s->input, "vdb")) {
         return cli_usage("%s: a level set has no UVs to bake a lightmap by; see 'vdbshade volume'", s->input);
     }
-    const int code = cli_bake_scene_receivers(s, made);
+    int code = check_objects(s, made, given);
+    code = code == CLI_OK ? cli_bake_scene_receivers(s, made) : code;
     if (code == CLI_OK && made->scene.receiver_count == 0) {
         return cli_usage("%s: no receivers to bake", s->input);
     }
@@ -140,7 +214,14 @@ static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
             return cli_usage("%s: no output; give -o OUT", s->input);
         }
     }
-    return code == CLI_OK && s->output_folder != NULL ? move_outputs(s->output_folder, made) : code;
+    if (code == CLI_OK && s->output != NULL && !s->per_object && names_folder(s->output)) {
+        return cli_usage(
+            "-o '%s': is a folder; give an image in it, as '%s%slightmap.exr', or an image for each "
+            "object with --per-object",
+            s->output, s->output, s->output[strlen(s->output) - 1] == '/' ? "" : "/");
+    }
+    code = code == CLI_OK && s->output_folder != NULL ? move_outputs(s->output_folder, made) : code;
+    return code == CLI_OK && s->per_object ? mark_outputs(made) : code;
 }
 
 static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
@@ -296,7 +377,7 @@ static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
             return cli_usage("%s: both the output and the --stats file", output);
         }
         for (size_t k = 0; k < i; ++k) {
-            if (cli_same_file(output, scene->receivers[k].output)) {
+            if (!s->per_object && cli_same_file(output, scene->receivers[k].output)) {
                 return cli_usage("%s: the output of two receivers", output);
             }
         }
@@ -344,10 +425,7 @@ int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made)
 }
 
 void cli_bake_scene_free(cli_bake_scene *made) {
-    for (size_t i = 0; made->outputs != NULL && i < made->scene.receiver_count; ++i) {
-        free(made->outputs[i]);
-    }
-    free(made->outputs);
+    free_outputs(made);
     free(made->receivers);
     free(made->casters);
     vsh_scene_free(made->read);

@@ -1,5 +1,8 @@
 #include "paths.h"
 
+#include "message.h"
+
+#include <errno.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -36,4 +39,53 @@ bool cli_same_file(const char *a, const char *b) {
     char first[2 * PATH_MAX], second[2 * PATH_MAX];
     return !has_one && !has_other && absolute(a, first, sizeof first) && absolute(b, second, sizeof second) &&
            strcmp(first, second) == 0;
+}
+
+bool cli_is_folder(const char *path) {
+    struct stat status;
+    const size_t length = strlen(path);
+    return (length > 0 && path[length - 1] == '/') || (stat(path, &status) == 0 && S_ISDIR(status.st_mode));
+}
+
+/* The folder of a path into folder[PATH_MAX]; false where it is the current one. */
+static bool folder_of(const char *path, char *folder) {
+    const char *slash = strrchr(path, '/');
+    if (slash == NULL || slash == path || slash - path >= PATH_MAX) {
+        return false;
+    }
+    snprintf(folder, PATH_MAX, "%.*s", (int)(slash - path), path);
+    return true;
+}
+
+int cli_check_folder(const char *path) {
+    char folder[PATH_MAX];
+    struct stat status;
+    if (!folder_of(path, folder) || stat(folder, &status) == 0 || errno != ENOENT) {
+        return CLI_OK;
+    }
+    cli_say("%s: cannot be written: there is no folder '%s'; make it first: mkdir -p '%s'", path, folder,
+            folder);
+    return CLI_FILE;
+}
+
+int cli_make_folder(const char *path) {
+    char part[PATH_MAX];
+    struct stat status;
+    const size_t length = strlen(path);
+    if (length >= sizeof part) {
+        cli_say("%s: cannot be made: %s", path, strerror(ENAMETOOLONG));
+        return CLI_FILE;
+    }
+    for (size_t i = 1; i <= length; ++i) {
+        if (path[i] != '/' && path[i] != '\0') {
+            continue;
+        }
+        snprintf(part, sizeof part, "%.*s", (int)i, path);
+        if (mkdir(part, 0777) != 0 && !(stat(part, &status) == 0 && S_ISDIR(status.st_mode))) {
+            const int why = errno == EEXIST ? ENOTDIR : errno;
+            cli_say("%s: cannot be made: %s: %s", path, part, strerror(why));
+            return CLI_FILE;
+        }
+    }
+    return CLI_OK;
 }

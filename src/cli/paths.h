@@ -11,4 +11,13 @@ bool cli_has_ending(const char *path, const char *ending);
 /* Whether the two name one file, whether by links or through folders; also where it does not exist yet. */
 bool cli_same_file(const char *a, const char *b);
 
+/* Whether a path is a folder, or ends as one. */
+bool cli_is_folder(const char *path);
+
+/* Says which folder is missing where an output's is. CLI_OK or CLI_FILE. */
+int cli_check_folder(const char *path);
+
+/* Makes a folder and those that it is in, where they are not there. CLI_OK or CLI_FILE, having said why. */
+int cli_make_folder(const char *path);
+
 #endif

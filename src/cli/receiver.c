@@ -28,9 +28,15 @@ static void warn_uvs(const vsh_run *run, const char *path, const vsh_mesh *mesh,
     };
     const char *name = mesh->name != NULL ? mesh->name : "";
     char line[1024];
-    if (uv->overlap_texels > 0) {
-        snprintf(line, sizeof line, "%s: mesh '%s': %zu texels of %zu triangles lie over other charts", path,
-                 name, uv->overlap_texels, uv->overlap_triangles);
+    if (uv->overlap_texels > uv->other_texels) {
+        snprintf(line, sizeof line,
+                 "%s: mesh '%s': %zu texels of %zu triangles lie over other charts of the same object", path,
+                 name, uv->overlap_texels - uv->other_texels, uv->overlap_triangles);
+        warn_line(run, line);
+    }
+    if (uv->other_texels > 0) {
+        snprintf(line, sizeof line, "%s: mesh '%s': %zu texels lie over charts of other objects", path, name,
+                 uv->other_texels);
         warn_line(run, line);
     }
     for (size_t i = 0; i < sizeof counted / sizeof counted[0]; ++i) {
@@ -40,6 +46,36 @@ static void warn_uvs(const vsh_run *run, const char *path, const vsh_mesh *mesh,
             warn_line(run, line);
         }
     }
+}
+
+static const char *object_name(const vsh_mesh *mesh) {
+    const char *name = mesh->object_name != NULL ? mesh->object_name : mesh->name;
+    return name != NULL ? name : "";
+}
+
+/* Objects that each fill a unit square of their own are not one lightmap, whatever its size. */
+static int check_overlap(const cli_receiver_job *job, const vsh_uv_report *reports, uint64_t covered) {
+    const vsh_receiver *receiver = &job->scene->receivers[job->index];
+    const vsh_uv_report *worst = reports;
+    uint64_t texels = 0;
+    size_t count = 0;
+    for (size_t i = 0; i < job->mesh_count; ++i) {
+        texels += reports[i].other_texels;
+        count += reports[i].other_texels > 0;
+        worst = reports[i].other_texels > worst->other_texels ? &reports[i] : worst;
+    }
+    if (job->allow_overlap || receiver->allow_overlap ||
+        (double)texels <= CLI_LARGEST_OVERLAP * (double)covered) {
+        return CLI_OK;
+    }
+    return cli_usage(
+        "%s: objects share texels of the lightmap: %zu of %zu meshes lie over others, on %" PRIu64
+        " texels (%" PRIu64 " are covered at all); '%.100s' on %zu, %zu of them over '%.100s': "
+        "give each object an image of its own (--per-object), choose some (--receive NAME), or "
+        "unwrap them together into one atlas (in Blender: select all, edit mode, UV > Smart UV "
+        "Project); --allow-overlap bakes it as it is",
+        receiver->path, count, job->mesh_count, texels, covered, object_name(&job->meshes[worst - reports]),
+        worst->other_texels, worst->other_mesh_texels, object_name(&job->meshes[worst->other_mesh]));
 }
 
 static vsh_image_options image_options(const vsh_receiver *receiver) {
@@ -66,8 +102,8 @@ int cli_receiver_check(const vsh_scene *scene, size_t index) {
 
 int cli_receiver_charts(const cli_receiver_job *job, bool warn, vsh_charts **charts) {
     const vsh_receiver *receiver = &job->scene->receivers[job->index];
-    size_t count = 0;
-    const vsh_mesh *meshes = vsh_assets_receiver(job->assets, job->index, &count);
+    const vsh_mesh *meshes = job->meshes;
+    const size_t count = job->mesh_count;
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = receiver->width;
     options.height = receiver->height;
@@ -87,6 +123,10 @@ int cli_receiver_charts(const cli_receiver_job *job, bool warn, vsh_charts **cha
     int code = CLI_OK;
     if (vsh_charts_create(meshes, count, &options, &run, reports, charts, &error) != VSH_OK) {
         code = cli_fail(&error);
+    } else {
+        vsh_charts_info info;
+        vsh_charts_get_info(*charts, &info);
+        code = check_overlap(job, reports, info.covered);
     }
     for (size_t i = 0; i < count && warn && code == CLI_OK; ++i) {
         warn_uvs(job->run, receiver->path, &meshes[i], &reports[i]);
@@ -126,8 +166,8 @@ int cli_receiver_texels(const vsh_charts *charts, int32_t first, int32_t rows, c
 
 static void warn_stats(const cli_receiver_job *job, const vsh_bake_stats *baked) {
     const vsh_receiver *receiver = &job->scene->receivers[job->index];
-    size_t count = 0;
-    const vsh_mesh *meshes = vsh_assets_receiver(job->assets, job->index, &count);
+    const vsh_mesh *meshes = job->meshes;
+    const size_t count = job->mesh_count;
     char line[1024];
     for (size_t i = 0; i < count; ++i) {
         if (baked->invalid_by_mesh[i] > 0) {
@@ -299,8 +339,11 @@ static int bake_bands(receiver_work *work) {
 int cli_receiver_bake(const cli_receiver_job *job, const cli_receiver_input *input, cli_stats *stats) {
     const vsh_scene *scene = job->scene;
     const vsh_receiver *receiver = &scene->receivers[job->index];
-    receiver_work work = {.job = job, .input = input, .stats = stats, .baked = vsh_bake_stats_zero()};
-    vsh_assets_receiver(job->assets, job->index, &work.mesh_count);
+    receiver_work work = {.job = job,
+                          .input = input,
+                          .stats = stats,
+                          .baked = vsh_bake_stats_zero(),
+                          .mesh_count = job->mesh_count};
     int code = cli_planes_name(&work.planes, scene, receiver->width, receiver->height);
     if (code == CLI_OK) {
         code = cli_planes_allocate(&work.planes, scene, input->bands.rows, job->run->memory_limit,

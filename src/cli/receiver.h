@@ -8,20 +8,26 @@
 
 #include <stdbool.h>
 
+/* The share of a lightmap's covered texels that objects may take from each other: charts that touch. */
+#define CLI_LARGEST_OVERLAP 0.01
+
 typedef struct cli_receiver_job {
     const vsh_scene *scene;
-    const vsh_assets *assets;
+    const vsh_mesh *meshes; /* of the receiver */
+    size_t mesh_count;
     const vsh_run *run;
     size_t index;             /* of the receiver */
     int32_t band_rows;        /* wanted; 0: as many as go */
     const cli_origin *origin; /* of its file; NULL where none is written */
     bool resume;              /* bands are kept, and taken where they are there */
+    bool allow_overlap;       /* whatever the receiver says of it */
 } cli_receiver_job;
 
 /* Whether its image can be written. Needs no assets. CLI_OK or an exit code, having said why. */
 int cli_receiver_check(const vsh_scene *scene, size_t index);
 
-/* Sorts and counts it, and warns (where asked to) of what is wrong with its UVs. */
+/* Sorts and counts it, and warns (where asked to) of what is wrong with its UVs. CLI_USAGE where objects lie
+ * over each other on more than CLI_LARGEST_OVERLAP of the texels. */
 int cli_receiver_charts(const cli_receiver_job *job, bool warn, vsh_charts **charts);
 
 /* How many rows go at a time, where `held` bytes are taken beside them. */

@@ -26,7 +26,8 @@ static int load_receivers(trade_work *work) {
     }
     for (size_t i = 0; i < count; ++i) {
         trade_receiver *receiver = &work->receivers[i];
-        const cli_receiver_job job = {work->scene, work->assets, &work->run, i, 0, NULL, false};
+        cli_receiver_job job = {.scene = work->scene, .run = &work->run, .index = i, .allow_overlap = true};
+        job.meshes = vsh_assets_receiver(work->assets, i, &job.mesh_count);
         vsh_charts *charts = NULL;
         int code = cli_receiver_charts(&job, true, &charts);
         if (code == CLI_OK) {

@@ -23,7 +23,8 @@ enum {
 typedef struct example {
     char name[NAME]; /* what it is about; "": it does not say */
     double number;   /* the first that it gives: the larger, the worse */
-    size_t order;    /* the earlier goes first, where numbers are the same */
+    bool numbered;
+    size_t order; /* the earlier goes first, where numbers are the same */
 } example;
 
 typedef struct kind {
@@ -81,7 +82,7 @@ static const char *take_name(const char *message, const char *c, example *about,
  * brackets ("mesh 'sail' (3 of 9)") is none that tells how bad it is. */
 static void examine(const char *message, char shape[TEXT], example *about, bool *object) {
     size_t length = 0;
-    bool found = false;
+    bool found = false, brackets = false;
     *object = false;
     const char *c = behind_file(message);
     const char *const first = c;
@@ -94,17 +95,19 @@ static void examine(const char *message, char shape[TEXT], example *about, bool 
         } else if (isdigit((unsigned char)*c)) {
             char *end;
             const double value = strtod(c, &end);
-            about->number = found || before == '(' ? about->number : value;
-            found = found || before != '(';
+            about->number = found || brackets ? about->number : value;
+            found = found || !brackets;
             shape[length++] = '#';
             c = end;
         } else if (*c == 's' && isalpha((unsigned char)before) && !isalpha((unsigned char)c[1])) {
             ++c;
         } else {
+            brackets = *c == '(' || (brackets && *c != ')');
             shape[length++] = *c++;
         }
     }
     shape[length] = '\0';
+    about->numbered = found;
     if (about->name[0] == '\0' && first > message) {
         snprintf(about->name, sizeof about->name, "%.*s", (int)(first - message - 2), message);
     }
@@ -183,9 +186,13 @@ static void tell(const kind *of) {
     size_t used = 0;
     for (size_t i = 1; i < WORST && i < of->count; ++i) {
         const example *one = &of->worst[i];
+        char number[32] = "";
+        if (one->numbered) {
+            snprintf(number, sizeof number, " (%g)", one->number);
+        }
         if (one->name[0] != '\0') {
-            used += (size_t)snprintf(then + used, sizeof then - used, "%s'%s' (%g)",
-                                     used > 0 ? ", " : "; then ", one->name, one->number);
+            used += (size_t)snprintf(then + used, sizeof then - used, "%s'%s'%s", used > 0 ? ", " : "; then ",
+                                     one->name, number);
         }
     }
     cli_say("warning: %zu %s: %s%s; --verbose lists all", of->count, of->objects ? "objects" : "times",

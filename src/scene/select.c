@@ -166,7 +166,8 @@ static vsh_result fail_without_uvs(const vsh_receiver *receiver, const char *mes
     if (sets == 0) {
         return vshi_fail(error, VSH_ERROR_INPUT,
                          "%s: %s: no UVs to bake into: unwrap it (in Blender: UV > Smart UV Project, into a "
-                         "second UV map), or leave it out of what receives: it then casts only",
+                         "second UV map), or leave it out of what receives, so that it only casts "
+                         "(--no-receive NAME, --per-object; \"except\" in a scene)",
                          receiver->path, mesh);
     }
     return vshi_fail(error, VSH_ERROR_INPUT, "%s: %s: no UV set %d: it has %s%d", receiver->path, mesh,

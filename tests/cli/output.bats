@@ -113,8 +113,13 @@ JSON
     done_well
     [ -s elsewhere/one.exr ] && [ -s elsewhere/two.png ] || fail "not there"
     [ ! -e maps/one.exr ] && [ ! -e two.png ] || fail "in both places"
-    shade bake two.json --output-folder nowhere --quiet
-    refused 3 nowhere/one.exr
+    shade bake two.json --output-folder no/where --quiet
+    done_well
+    [ -s no/where/one.exr ] || fail "the folder was not made"
+    shade bake two.json --output-folder box.obj/maps --quiet
+    refused 3 box.obj/maps 'cannot be made'
+    shade bake box.obj --ao 1 --resolution 16 -o missing/out.exr
+    refused 3 missing/out.exr "no folder 'missing'" "mkdir -p 'missing'"
     shade bake box.obj --ao 1 --output-folder elsewhere -o out.exr
     refused 2 --output-folder
     sed -i 's/two.png/one.exr/' two.json

@@ -189,6 +189,7 @@ static void overlaps_are_counted_where_two_meshes_share_texels(void **state) {
     assert_int_equal(reports[1].overlap_texels, 0);
     assert_int_equal(reports[2].overlap_texels, 8 * 8);
     assert_int_equal(reports[2].overlap_triangles, 2);
+    assert_int_equal(reports[2].other_texels, 8 * 8);
     vsh_texels_info info;
     vsh_texels_get_info(texels, &info);
     assert_int_equal(info.samples, 32 * 32);
@@ -356,6 +357,40 @@ static void count_warning(void *user, const char *message) {
     ++*(int *)user;
 }
 
+static void overlaps_tell_own_charts_from_those_of_other_objects_and_name_the_worst_pair(void **state) {
+    (void)state;
+    enum { COUNT = 5 };
+    quad q[COUNT];
+    make_quad(&q[0], 0.0f, 0.0f, 0.5f, 0.5f);
+    make_quad(&q[1], 0.0f, 0.0f, 0.5f, 0.25f); /* over the first, of the same object */
+    make_quad(&q[2], 0.5f, 0.0f, 1.0f, 1.0f);
+    make_quad(&q[3], 0.25f, 0.0f, 1.0f,
+              0.5f); /* 16 × 32 texels over the first object, 32 × 32 over the third */
+    make_quad(&q[4], 0.9375f, 0.9375f, 1.0f, 1.0f); /* 4 × 4 over the third */
+    vsh_mesh meshes[COUNT];
+    for (size_t i = 0; i < COUNT; ++i) {
+        meshes[i] = q[i].mesh;
+    }
+    meshes[0].object = meshes[1].object = 7;
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = 64;
+    for (int n = 1; n <= 2; ++n) {
+        options.supersample = n;
+        vsh_uv_report reports[COUNT];
+        vsh_texels *texels = NULL;
+        assert_int_equal(vsh_texels_create(meshes, COUNT, &options, NULL, reports, &texels, NULL), VSH_OK);
+        vsh_texels_free(texels);
+        assert_int_equal(reports[1].overlap_texels, 32 * 16);
+        assert_int_equal(reports[1].other_texels, 0);
+        assert_int_equal(reports[3].overlap_texels, (16 + 32) * 32);
+        assert_int_equal(reports[3].other_texels, (16 + 32) * 32);
+        assert_int_equal(reports[3].other_mesh, 2);
+        assert_int_equal(reports[3].other_mesh_texels, 32 * 32);
+        assert_int_equal(reports[4].other_texels, 4 * 4);
+        assert_true(reports[4].other_mesh == SIZE_MAX && reports[4].other_mesh_texels == 0);
+    }
+}
+
 static void overlaps_are_warned_of_by_mesh(void **state) {
     (void)state;
     quad q[2];
@@ -389,6 +424,7 @@ int main(void) {
         cmocka_unit_test(bad_sizes_and_uvs_are_refused_with_the_value_and_the_limit),
         cmocka_unit_test(the_memory_limit_is_passed_by_no_lightmap),
         cmocka_unit_test(progress_rises_and_cancels),
+        cmocka_unit_test(overlaps_tell_own_charts_from_those_of_other_objects_and_name_the_worst_pair),
         cmocka_unit_test(overlaps_are_warned_of_by_mesh),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,160 @@
+# Objects: which of a file's receive, one image for each, and what lies over what.
+load helper
+
+# write_level FILE NAME…: unit cubes in a row, each with its faces in all of the unit square.
+write_level() {
+    local file=$1
+    shift
+    printf '%s\n' "$@" | awk '
+        BEGIN {
+            split("0 0 0 1 0 0 1 1 0 0 1 0 0 0 1 1 0 1 1 1 1 0 1 1", p, " ")
+            split("1 4 3 2 5 6 7 8 1 2 6 5 4 8 7 3 1 5 8 4 2 3 7 6", f, " ")
+        }
+        {
+            print "o " $0
+            for (i = 0; i < 8; ++i) print "v", p[3 * i + 1] + 2 * (NR - 1), p[3 * i + 2], p[3 * i + 3]
+            for (i = 0; i < 6; ++i) {
+                u = (i % 3) / 3 + 0.02; v = int(i / 3) / 2 + 0.02
+                print "vt", u, v "\nvt", u + 0.29, v "\nvt", u + 0.29, v + 0.46 "\nvt", u, v + 0.46
+                line = "f"
+                for (k = 1; k <= 4; ++k)
+                    line = line " " f[4 * i + k] + 8 * (NR - 1) "/" 4 * i + k + 24 * (NR - 1)
+                print line
+            }
+        }' >"$file"
+}
+
+LEVEL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
+
+@test "objects that each fill the unit square are refused with counts, the worst pair and both ways out" {
+    write_level level.obj floor wall roof
+    shade bake level.obj "${LEVEL[@]}" -o out.exr
+    refused 2 level.obj '2 of 3 meshes' "'wall' on" "over 'floor'" --per-object --receive 'one atlas' \
+        --allow-overlap
+    [ ! -e out.exr ] || fail "an image beside the error"
+    shade bake level.obj "${LEVEL[@]}" --allow-overlap -o out.exr
+    done_well
+    [[ $stderr == *"2 objects"*"lie over charts of other objects"* ]] || fail "no warning"
+}
+
+@test "an atlas of objects, and charts that only touch, are not refused" {
+    write_level level.obj floor wall
+    # the second object to the right half, and a sliver of it over the first
+    awk '/^o /{n++} /^vt/{$2 = n == 1 ? $2 / 2 : 0.499 + $2 / 2.004} {print}' level.obj >atlas.obj
+    shade bake atlas.obj "${LEVEL[@]}" -o out.exr
+    done_well
+}
+
+@test "--receive chooses by name and pattern; what is not chosen casts all the same" {
+    write_level level.obj floor wall_1 wall_2
+    shade bake level.obj "${LEVEL[@]}" --receive floor -o floor.exr --quiet
+    done_well
+    shade bake level.obj "${LEVEL[@]}" --receive 'f*' -o pattern.exr --quiet
+    done_well
+    same_values floor.exr pattern.exr || fail "the pattern chose something else"
+    shade bake level.obj "${LEVEL[@]}" --no-receive 'wall_?' -o others.exr --quiet
+    done_well
+    same_values floor.exr others.exr || fail "--no-receive left something else"
+    shade bake level.obj "${LEVEL[@]}" --receive 'wall*' -o walls.exr
+    refused 2 '1 of 2 meshes' "'wall_2'" "'wall_1'"
+    # from the side, the next object's shadow; none where nothing else casts
+    local side=(--sun 1,0.3,0 --sun-angle 2 --size 32 --voxel-size 0.05 --receive floor --quiet)
+    shade bake level.obj "${side[@]}" -o shadowed.exr
+    done_well
+    shade bake level.obj "${side[@]}" --no-cast 'wall*' -o alone.exr
+    done_well
+    ! same_values shadowed.exr alone.exr || fail "the walls cast nothing"
+}
+
+@test "a name that is not there is an error with the names that are" {
+    write_level level.obj floor wall
+    shade bake level.obj "${LEVEL[@]}" --receive 'Flor*' -o out.exr
+    refused 2 level.obj "'Flor*'" "did you mean 'floor'?" "'floor', 'wall'"
+    shade bake level.obj "${LEVEL[@]}" --no-cast zzz -o out.exr
+    refused 2 level.obj "'zzz'" "'floor', 'wall'"
+    shade bake level.obj "${LEVEL[@]}" --receive wall --no-receive wall -o out.exr
+    refused 2 'no object is left'
+}
+
+@test "--per-object writes an image for each, the same as --receive of it" {
+    write_level level.obj floor wall roof
+    shade bake level.obj "${LEVEL[@]}" --per-object -o maps/new/ --quiet
+    done_well
+    [ "$(ls maps/new | tr '\n' ' ')" = "floor.exr roof.exr wall.exr " ] || fail "$(ls maps/new)"
+    shade bake level.obj "${LEVEL[@]}" --receive roof -o roof.exr --quiet
+    done_well
+    same_values roof.exr maps/new/roof.exr || fail "another image"
+    shade bake level.obj "${LEVEL[@]}" --per-object -o base.png --quiet
+    done_well
+    [ -s base.floor.png ] && [ -s base.wall.png ] || fail "$(ls)"
+    shade bake level.obj "${LEVEL[@]}" --per-object -o 'x/%s_light.png' --quiet
+    done_well
+    [ -s x/roof_light.png ] || fail "$(ls x)"
+    shade bake level.obj "${LEVEL[@]}" -o maps/
+    refused 2 maps/ --per-object
+}
+
+@test "names are made safe for file systems and unique" {
+    write_level level.obj 'a/b' 'a_b' 'A b' 'Wände' '../evil' '...' 'a?b'
+    shade bake level.obj "${LEVEL[@]}" --per-object -o maps/ --quiet
+    done_well
+    [ "$(ls maps | wc -l)" -eq 7 ] || fail "$(ls maps)"
+    for name in a_b a_b-2 a_b-3 'A b' 'Wände' _._evil ___; do
+        [ -s "maps/$name.exr" ] || fail "no $name: $(ls maps)"
+    done
+    [ ! -e evil.exr ] || fail "out of the folder"
+}
+
+@test "objects without UVs cast only where each has an image, and are said in one line" {
+    write_level level.obj floor bare naked
+    awk '/^o /{n++} n > 1 && /^vt/{next} n > 1 && /^f/{gsub(/\/[0-9]+/, "")} {print}' level.obj >bare.obj
+    shade bake bare.obj "${LEVEL[@]}" --per-object -o maps/
+    done_well
+    [ "$(ls maps)" = floor.exr ] || fail "$(ls maps)"
+    [ "$(grep -c 'no UVs' <<<"$stderr")" -eq 1 ] || fail "not one line"
+    [[ $stderr == *"2 objects"*"'bare'"*"casts only"*"'naked'"* ]] || fail "not both"
+    shade bake bare.obj "${LEVEL[@]}" -o out.exr
+    refused 2 bare.obj "'bare'" 'no UVs' 'Smart UV Project' --no-receive
+}
+
+@test "a scene's receivers choose objects too, and may overlap on purpose" {
+    write_level level.obj floor wall roof
+    cat >scene.json <<'JSON'
+{"casters": [{"mesh": "level.obj", "except": "roof"}], "resolution": 24, "ao": {"distance": 1},
+ "receivers": [{"mesh": "level.obj", "objects": ["fl*"], "size": 16, "output": "floor.exr"},
+               {"mesh": "level.obj", "except": "floor", "allow_overlap": true, "size": 16, "output": "rest.exr"}]}
+JSON
+    shade bake scene.json --quiet
+    done_well
+    sed 's/true/false/' scene.json >refused.json
+    shade bake refused.json
+    refused 2 level.obj "'roof' on" "over 'wall'"
+    sed 's/fl\*/flo/' scene.json >near.json
+    shade bake near.json
+    refused 2 "'flo'" "did you mean 'floor'?"
+    sed 's/\["fl\*"\]/[]/' scene.json >empty.json
+    shade bake empty.json
+    refused 2 empty.json:2 'receivers[0].objects' 'is empty'
+}
+
+@test "warnings of a kind are one line with the worst, all of them with --verbose, none with --quiet" {
+    write_level level.obj $(seq -f 'crate_%03g' 40)
+    shade bake level.obj "${LEVEL[@]}" --allow-overlap -o out.exr
+    done_well
+    [ "$(grep -c warning: <<<"$stderr")" -lt 4 ] || fail "too many lines"
+    [[ $stderr == *"warning: 39 objects: level.obj: mesh 'crate_"*"then 'crate_"*"--verbose lists all"* ]] || fail "no summary"
+    shade bake level.obj "${LEVEL[@]}" --allow-overlap -o out.exr --verbose
+    done_well
+    [ "$(grep -c 'lie over charts of other objects' <<<"$stderr")" -eq 39 ] || fail "not all"
+    shade bake level.obj "${LEVEL[@]}" --allow-overlap -o out.exr --quiet
+    done_well
+    [ -z "$stderr" ] || fail "--quiet said something"
+}
+
+@test "warnings that were kept come before the error that ends the run" {
+    write_level level.obj floor bare naked
+    awk '/^o /{n++} n > 1 && /^vt/{next} n > 1 && /^f/{gsub(/\/[0-9]+/, "")} {print}' level.obj >bare.obj
+    shade bake bare.obj "${LEVEL[@]}" --per-object --no-cast '*' -o maps/
+    [ "$status" -eq 2 ] || fail "expected an error"
+    [[ ${stderr_lines[0]} == *"warning: 2 objects"* ]] || fail "lost"
+}
