@@ -163,8 +163,7 @@ int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
 /* Whether it is meant for a folder: one that is called as an image is, is in the way. */
 static bool names_folder(const char *output) {
     const char *slash = strrchr(output, '/');
-    return cli_is_folder(output) && strchr(slash != NULL && slash[1] != '\0' ? slash : "", '.') == NULL &&
-           (slash != NULL || strchr(output, '.') == NULL);
+    return cli_is_folder(output) && strchr(slash != NULL ? slash + 1 : output, '.') == NULL;
 }
 
 /* Whether an output is for many objects, of any file. */
