@@ -1,9 +1,11 @@
-// Level sets from meshes: all closed ones together, all open ones as shells.
+// Level sets from meshes: solids together, rooms cut out of them, walls behind the faces of others, sheets as
+// shells.
 #include "caster/mesh.h"
 #include "shim/openvdb_shells.h"
 
 #include <cfloat>
 #include <cmath>
+#include <memory>
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Composite.h>
 #include <openvdb/util/Util.h>
@@ -55,13 +57,48 @@ Meshes look_over(const vsh_mesh *mesh, size_t count, vsh_error *error) {
     return meshes;
 }
 
-void foretell(const Meshes &meshes, const Lattice &lattice, const vsh_run &run, vsh_error *error) {
+using Solidity = std::unique_ptr<vshi_solidity, void (*)(vshi_solidity *)>;
+
+Solidity find_solidity(const Meshes &meshes, const vsh_run &run, vsh_error *error) {
+    vsh_run quiet = run; // a small part of a second for a million triangles: no stage of its own
+    quiet.progress = nullptr;
+    vshi_solidity *made = nullptr;
+    const vsh_result result = vshi_solidity_create(meshes.mesh, meshes.count, &quiet, &made, error);
+    if (result != VSH_OK) {
+        throw Failure{result};
+    }
+    return {made, vshi_solidity_free};
+}
+
+// Of a wide band to either side of a surface, voxels.
+double band_of(const vshi_component &component, const Lattice &lattice) {
+    const double shell = component.kind == VSHI_KIND_WALL    ? lattice.shell
+                         : component.kind == VSHI_KIND_SHEET ? 0.5 * lattice.shell
+                                                             : 0.0;
+    return lattice.half_width + RIM + shell;
+}
+
+void foretell(const Meshes &meshes, const vshi_solidity *solidity, const Lattice &lattice, const vsh_run &run,
+              vsh_error *error) {
     double leaves = 0.0;
-    for (const vsh_mesh_report &report : meshes.reports) {
-        const double band = lattice.half_width + RIM + (report.open_edges > 0 ? 0.5 * lattice.shell : 0.0);
-        const Vec3d size = Vec3d(report.bounds_max) - Vec3d(report.bounds_min);
-        if (report.area > 0.0) {
-            leaves += band_leaves(report.area / (lattice.voxel * lattice.voxel), size / lattice.voxel, band);
+    const vshi_wholes &wholes = *vshi_solidity_wholes(solidity);
+    for (size_t w = 0; w < wholes.count; ++w) {
+        size_t count = 0;
+        const vshi_component *components = vshi_solidity_of_whole(solidity, w, &count);
+        double band = lattice.half_width + RIM, twice = 0.0;
+        for (size_t i = 0; i < count; ++i) {
+            band = std::max(band, band_of(components[i], lattice));
+            twice += components[i].kind == VSHI_KIND_WALL ? components[i].area : 0.0;
+        }
+        double area = twice;
+        Vec3d low(DBL_MAX), high(-DBL_MAX);
+        for (size_t i = wholes.first[w]; i < wholes.first[w + 1]; ++i) {
+            area += meshes.reports[i].area;
+            low = openvdb::math::minComponent(low, Vec3d(meshes.reports[i].bounds_min));
+            high = openvdb::math::maxComponent(high, Vec3d(meshes.reports[i].bounds_max));
+        }
+        if (area > 0.0) {
+            leaves += band_leaves(area / (lattice.voxel * lattice.voxel), (high - low) / lattice.voxel, band);
         }
     }
     check_memory(&run, lattice.voxel, leaves,
@@ -82,9 +119,9 @@ bool beside_inside(FloatGrid::ConstUnsafeAccessor &values, const Coord &at, floa
     return false;
 }
 
-// Moves the surface out by `offset` (world units), so that a sheet becomes a solid; what its conversion found
-// to be enclosed stays inside.
-void thicken(FloatGrid &grid, float offset, float voxel, float background, Stage &stage) {
+// Moves the surface out by `offset` (world units) and narrows the band. A sheet becomes a solid: what its
+// conversion found to be enclosed stays inside.
+void move_out(FloatGrid &grid, bool sheet, float offset, float voxel, float background, Stage &stage) {
     std::vector<Leaf *> leaves;
     grid.tree().getNodes(leaves);
     std::vector<float> values(leaves.size() * Leaf::SIZE);
@@ -93,7 +130,7 @@ void thicken(FloatGrid &grid, float offset, float voxel, float background, Stage
         FloatGrid::ConstUnsafeAccessor around(grid.constTree());
         for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
             float value = leaves[i]->getValue(n);
-            if (value < 0.0f && value >= -near &&
+            if (sheet && value < 0.0f && value >= -near &&
                 !beside_inside(around, leaves[i]->offsetToGlobalCoord(n), near)) {
                 value = -value;
             }
@@ -110,20 +147,61 @@ void thicken(FloatGrid &grid, float offset, float voxel, float background, Stage
     stage.run([&] { openvdb::tools::changeLevelSetBackground(grid.tree(), background); });
 }
 
-void warn(const Meshes &meshes, const Lattice &lattice, const vsh_run &run) {
-    for (size_t i = 0; i < meshes.count; ++i) {
-        const vsh_mesh_report &report = meshes.reports[i];
-        const vshi_mesh_name name = vshi_mesh_label(&meshes.mesh[i], i);
-        if (report.open_edges > 0) {
+// What is said of the components of one object.
+struct Tally {
+    size_t sheets = 0, sheet_edges = 0;
+    size_t closed = 0, closed_edges = 0, holes = 0; // solids closed over their holes
+    size_t walls = 0, turned = 0;
+};
+
+Tally tally_of(const vshi_component *components, size_t count) {
+    Tally tally;
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_component &c = components[i];
+        tally.turned += c.turned;
+        tally.walls += c.kind == VSHI_KIND_WALL;
+        if (c.kind == VSHI_KIND_SHEET) {
+            ++tally.sheets;
+            tally.sheet_edges += c.open_edges;
+        } else if (c.kind != VSHI_KIND_WALL && c.open_edges > 0) {
+            ++tally.closed;
+            tally.closed_edges += c.open_edges;
+            tally.holes += c.holes;
+        }
+    }
+    return tally;
+}
+
+const char *plural(size_t count) {
+    return count == 1 ? "" : "s";
+}
+
+void warn(const Meshes &meshes, const vshi_solidity *solidity, const Lattice &lattice, const vsh_run &run) {
+    const vshi_wholes &wholes = *vshi_solidity_wholes(solidity);
+    for (size_t w = 0; w < wholes.count; ++w) {
+        size_t count = 0;
+        const vshi_component *components = vshi_solidity_of_whole(solidity, w, &count);
+        const Tally tally = tally_of(components, count);
+        const size_t first = wholes.first[w];
+        const vshi_mesh_name name = vshi_mesh_label(&meshes.mesh[first], first);
+        if (tally.sheets > 0) {
             vshi_warn(&run, "%s (%zu of %zu): %zu open edge%s: baked as a shell %g voxels (%g units) thick",
-                      name.text, i + 1, meshes.count, report.open_edges, report.open_edges == 1 ? "" : "s",
+                      name.text, first + 1, meshes.count, tally.sheet_edges, plural(tally.sheet_edges),
                       lattice.shell, lattice.shell * lattice.voxel);
-        } else if (report.flipped_edges > 0) {
+        }
+        if (tally.closed > 0) {
+            vshi_warn(&run,
+                      "%s (%zu of %zu): %zu open edge%s around %zu hole%s in %zu of %zu component%s that "
+                      "enclose nearly all behind them: taken for solid, closed over the holes",
+                      name.text, first + 1, meshes.count, tally.closed_edges, plural(tally.closed_edges),
+                      tally.holes, plural(tally.holes), tally.closed, count, plural(count));
+        }
+        if (tally.turned > 0) {
             vshi_warn(
                 &run,
-                "%s (%zu of %zu): %zu edge%s whose triangles disagree about the outside: what it encloses "
-                "is taken for inside",
-                name.text, i + 1, meshes.count, report.flipped_edges, report.flipped_edges == 1 ? "" : "s");
+                "%s (%zu of %zu): %zu triangle%s that face the other way than those around: taken as if "
+                "they were turned over",
+                name.text, first + 1, meshes.count, tally.turned, plural(tally.turned));
         }
     }
 }
@@ -160,6 +238,40 @@ void unite(FloatGrid::Ptr &united, const FloatGrid::Ptr &more, Stage &stage) {
     }
 }
 
+// A wall behind faces that look inwards, or behind the skin of what is hollow.
+FloatGrid::Ptr fill_wall(const Wall &wall, const Lattice &lattice, Progress &progress, Stage &stage) {
+    const double begin = progress.done, end = progress.next(wall.faces);
+    const double middle = 0.5 * (begin + end);
+    const float voxel = float(lattice.voxel), thickness = float(lattice.shell * lattice.voxel);
+    FloatGrid::Ptr grown =
+        fill_surface(wall.faces, lattice, lattice.half_width + lattice.shell, begin, middle, stage);
+    FloatGrid::Ptr within;
+    if (wall.open) {
+        within = fill_surface(wall.closed, lattice, lattice.half_width, middle, end, stage);
+    } else {
+        within = grown->deepCopy();
+        move_out(*within, false, 0.0f, voxel, lattice.background(), stage);
+    }
+    move_out(*grown, wall.open, thickness, voxel, lattice.background(), stage);
+    stage.run([&] {
+        if (wall.inward) {
+            openvdb::tools::csgDifference(*grown, *within);
+        } else {
+            openvdb::tools::csgIntersection(*grown, *within);
+        }
+    });
+    return grown;
+}
+
+FloatGrid::Ptr fill_sheets(const Surface &sheets, const Lattice &lattice, Progress &progress, Stage &stage) {
+    const double begin = progress.done;
+    FloatGrid::Ptr shell = fill_surface(sheets, lattice, lattice.half_width + 0.5 * lattice.shell, begin,
+                                        progress.next(sheets), stage);
+    move_out(*shell, true, float(0.5 * lattice.shell * lattice.voxel), float(lattice.voxel),
+             lattice.background(), stage);
+    return shell;
+}
+
 vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_options *options,
                        const vsh_run *given, vsh_grid **grid, vsh_error *error) {
     vsh_run run;
@@ -169,35 +281,26 @@ vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_option
     }
     const Meshes meshes = look_over(mesh, count, error);
     const Lattice lattice = make_lattice(options, meshes.low, meshes.high, error);
-    foretell(meshes, lattice, run, error);
+    const Solidity solidity = find_solidity(meshes, run, error);
+    foretell(meshes, solidity.get(), lattice, run, error);
     Stage stage(run, "voxelize", error);
-    warn(meshes, lattice, run);
+    warn(meshes, solidity.get(), lattice, run);
 
-    std::vector<Solid> solids(1);
-    Surface open;
-    for (size_t i = 0; i < count; ++i) {
-        if (meshes.reports[i].open_edges > 0) {
-            add_mesh(mesh[i], lattice, open);
-        } else if (meshes.reports[i].flipped_edges > 0) { // says nothing about rooms
-            add_mesh(mesh[i], lattice, solids.front().outward);
-        } else {
-            add_closed_mesh(mesh[i], lattice, solids, error);
-        }
-    }
+    const double reach = 2.0 * (lattice.half_width + lattice.shell + RIM) + 2.0;
+    const Parts parts = sort_parts(solidity.get(), lattice, reach);
     Progress progress{0.0, 1.0 / double(meshes.triangles)};
     FloatGrid::Ptr united;
-    for (const Solid &solid : solids) {
+    for (const Solid &solid : parts.solids) {
         unite(united, fill_solid(solid, lattice, progress, stage), stage);
     }
-    if (!open.polygons.empty()) {
-        const double begin = progress.done;
-        FloatGrid::Ptr shell =
-            fill_surface(open, lattice, lattice.half_width + 0.5 * lattice.shell, begin, 1.0, stage);
-        thicken(*shell, float(0.5 * lattice.shell * lattice.voxel), float(lattice.voxel),
-                lattice.background(), stage);
-        unite(united, shell, stage);
+    for (const Wall &wall : parts.walls) {
+        unite(united, fill_wall(wall, lattice, progress, stage), stage);
     }
-    *grid = close_grid(united, open.polygons.empty() ? 0.0 : lattice.shell * lattice.voxel, stage);
+    const bool sheets = !parts.sheets.polygons.empty();
+    if (sheets) {
+        unite(united, fill_sheets(parts.sheets, lattice, progress, stage), stage);
+    }
+    *grid = close_grid(united, sheets ? lattice.shell * lattice.voxel : 0.0, stage);
     return VSH_OK;
 }
 

@@ -1,9 +1,9 @@
-// The closed surfaces that a mesh consists of, and the rooms among them.
+// Surfaces to be voxelised, by what their components are.
 #pragma once
 
 #include "shim/openvdb_surface.h"
 
-#include <vdbshade/mesh.h>
+#include "caster/solidity.h"
 
 namespace vshi {
 
@@ -13,13 +13,23 @@ struct Solid {
     Surface rooms;
 };
 
-// Adds all of a mesh's triangles in index space.
-void add_mesh(const vsh_mesh &mesh, const Lattice &lattice, Surface &surface);
+// Faces with a thin wall behind them. What stands apart is voxelised together.
+struct Wall {
+    bool inward = true; // the wall is outside of what they enclose; else within
+    bool open = false;  // `closed` has triangles over holes
+    Surface faces;
+    Surface closed;                    // with what closes their holes
+    std::vector<openvdb::BBoxd> boxes; // index space
+};
 
-// Adds a closed mesh to solids.front(), which takes all that have no rooms. A shell that faces inward inside
-// other shells of its mesh is a room; its mesh becomes solids of its own, one for each depth of nesting, so
-// that what stands in a room is not cut out with it. Throws Failure when memory is short.
-void add_closed_mesh(const vsh_mesh &mesh, const Lattice &lattice, std::vector<Solid> &solids,
-                     vsh_error *error);
+struct Parts {
+    std::vector<Solid> solids; // the first takes all that have no rooms
+    std::vector<Wall> walls;
+    Surface sheets;
+};
+
+// Sorts the components' triangles in index space. Walls whose boxes are at least `apart` voxels from each
+// other may share a surface.
+Parts sort_parts(const vshi_solidity *solidity, const Lattice &lattice, double apart);
 
 } // namespace vshi
