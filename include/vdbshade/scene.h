@@ -31,6 +31,12 @@ typedef struct vsh_selection {
     size_t except_count;
 } vsh_selection;
 
+/* What meshes are to be taken for, by a pattern as of vsh_mesh_matches(). */
+typedef struct vsh_solidity_rule {
+    const char *pattern;
+    int32_t solidity; /* VSH_SOLIDITY_… */
+} vsh_solidity_rule;
+
 typedef struct vsh_caster {
     int32_t type;         /* VSH_CASTER_… */
     const char *path;     /* mesh, vdb, heightfield, mask: file; text: font; spheres: NULL, or a file
@@ -48,10 +54,12 @@ typedef struct vsh_caster {
     int32_t voxelised; /* spheres: nonzero: part of the level set; 0: cast as they are (vsh_spheres) */
     vsh_mask_options mask;
     const char *text;
-    vsh_text_options letters; /* text */
-    double thickness;         /* mask, text: along z, local units, > 0 */
-    double color[3];          /* in pictures, linear RGB, 0 … 1; all 0: 0.7, a light grey */
-    vsh_selection objects;    /* mesh: which of its meshes cast */
+    vsh_text_options letters;          /* text */
+    double thickness;                  /* mask, text: along z, local units, > 0 */
+    double color[3];                   /* in pictures, linear RGB, 0 … 1; all 0: 0.7, a light grey */
+    vsh_selection objects;             /* mesh: which of its meshes cast */
+    const vsh_solidity_rule *solidity; /* [solidity_count]; mesh: of those that cast; later ones overrule */
+    size_t solidity_count;
 } vsh_caster;
 
 /* Casters that are shaded in a way of their own. */
@@ -106,6 +114,9 @@ typedef struct vsh_scene {
     int32_t has_ambient;
     double ambient[3]; /* of irradiance, as in vsh_lightmap; where has_ambient is not 0 */
     int32_t error; /* nonzero: bake the error left in each shadow and AO value too, where methods know it */
+    const vsh_solidity_rule *solidity; /* [solidity_count]: of all mesh casters, over what they say
+                                          themselves; each must match one's mesh */
+    size_t solidity_count;
 } vsh_scene;
 
 /* Reads a scene file; what it names is not opened. The scene and all it points to belong to *scene; free it

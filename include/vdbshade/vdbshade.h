@@ -28,6 +28,7 @@
 #include "scene.h"
 #include "sdf.h"
 #include "shade.h"
+#include "solidity.h"
 #include "spheres.h"
 #include "trace.h"
 #include "volume.h"

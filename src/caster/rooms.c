@@ -4,7 +4,7 @@
 
 #include <stdlib.h>
 
-enum { SAMPLES = 24 };
+enum { SAMPLES = 24, AROUND_SAMPLES = 8, MOST_ANGLES = 1 << 24 };
 
 /* Of a room's samples: those that lie in any solid, so that it is one; and in one solid, so that it is cut
  * out of it and the solid not left to stand in it as a pillar that reaches into the wall would. */
@@ -113,6 +113,57 @@ static bool hollow(vshi_solidity *s) {
     return found;
 }
 
+/* Of samples of all else, the share that must lie within what is taken for a dome around it. */
+static const double AROUND_SHARE = 0.95;
+
+/* How many of a component's samples lie in a solid. */
+static size_t count_within(const vshi_solidity *s, const vshi_component *solid, const vshi_component *c) {
+    const vshi_surface_part around = vshi_component_part(s, solid), part = vshi_component_part(s, c);
+    vshi_vec samples[AROUND_SAMPLES];
+    size_t within = 0;
+    vshi_part_samples(&part, c->area, AROUND_SAMPLES, samples);
+    for (size_t i = 0; i < AROUND_SAMPLES; ++i) {
+        within += in_box(solid, samples[i]) && vshi_winding(&around, samples[i]) > 0.5;
+    }
+    return within;
+}
+
+/* A closed solid that everything else lies within, and no room in it: all of that would be buried, and is
+ * meant to be seen. A sky dome whose faces look outwards. */
+static void find_dome(vshi_solidity *s) {
+    vshi_component *dome = NULL;
+    double largest = 0.0;
+    for (size_t i = 0; i < s->count; ++i) {
+        const vshi_vec size = vshi_sub(s->components[i].high, s->components[i].low);
+        const double across = vshi_length(size);
+        if (across > largest) {
+            largest = across;
+            dome = &s->components[i];
+        }
+    }
+    if (dome == NULL || dome->kind != VSHI_KIND_SOLID || dome->open_edges > 0 || s->cut_count > 0 ||
+        s->wholes.meshes[dome->whole].solidity != VSH_SOLIDITY_AUTO || s->count < 2) {
+        return;
+    }
+    const size_t most = MOST_ANGLES / (AROUND_SAMPLES * (dome->triangles + 1)) + 16;
+    const size_t step = (s->count + most - 1) / most;
+    size_t within = 0, looked_at = 0;
+    for (size_t i = 0; i < s->count; i += step) {
+        if (&s->components[i] == dome) {
+            continue;
+        }
+        within += count_within(s, dome, &s->components[i]);
+        looked_at += AROUND_SAMPLES;
+        if ((double)(looked_at - within) > (1.0 - AROUND_SHARE) * (double)(AROUND_SAMPLES * s->count)) {
+            return;
+        }
+    }
+    if (looked_at > 0 && (double)within >= AROUND_SHARE * (double)looked_at) {
+        dome->kind = VSHI_KIND_SHEET;
+        dome->around_all = true;
+    }
+}
+
 static int compare_cuts(const void *a, const void *b) {
     const vshi_cut *x = a, *y = b;
     if (x->solid != y->solid) {
@@ -132,6 +183,9 @@ vsh_result vshi_rooms_find(vshi_solidity *s, vsh_error *error) {
             }
         }
     } while (result == VSH_OK && hollow(s));
+    if (result == VSH_OK) {
+        find_dome(s);
+    }
     if (s->cut_count > 1) {
         qsort(s->cuts, s->cut_count, sizeof *s->cuts, compare_cuts);
     }

@@ -37,6 +37,7 @@ typedef enum vshi_kind {
 typedef struct vshi_component {
     vshi_kind kind;
     bool inward;        /* its faces look at what it encloses */
+    bool around_all;    /* a sheet, because as a solid it would bury everything else */
     uint32_t whole;     /* of vshi_solidity_wholes() */
     size_t triangles;   /* with some area, and those given twice */
     size_t turned;      /* of them: VSHI_SIDE_BEFORE */

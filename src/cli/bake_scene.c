@@ -403,7 +403,7 @@ static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scen
             made->scene.grid.resolution = 0; /* its own voxels */
         }
     }
-    cli_grid_apply(&settings->grid, &made->scene.grid);
+    cli_grid_apply(&settings->grid, &made->scene);
     int code = add_lights(settings, made);
     code = code == CLI_OK ? set_shade(settings, &made->scene) : code;
     code = code == CLI_OK && receivers ? cli_bake_check_work(settings, made) : code;

@@ -78,6 +78,14 @@ int cli_common_take(cli_common *common, int key, const char *name, const char *v
     }
 }
 
+static int take_rule(cli_grid_settings *settings, const char *name, const char *pattern, int32_t solidity) {
+    if (settings->rule_count == CLI_MOST_RULES) {
+        return cli_usage("--%s %s: more than %d patterns", name, pattern, CLI_MOST_RULES);
+    }
+    settings->rules[settings->rule_count++] = (vsh_solidity_rule){pattern, solidity};
+    return CLI_OK;
+}
+
 int cli_grid_take(cli_grid_settings *settings, int key, const char *name, const char *value, bool *taken) {
     *taken = true;
     switch (key) {
@@ -93,6 +101,12 @@ int cli_grid_take(cli_grid_settings *settings, int key, const char *name, const 
     case CLI_KEY_SHELL_THICKNESS:
         settings->has_shell_thickness = true;
         return cli_take_number(name, value, 1.0, 50.0, &settings->options.shell_thickness);
+    case CLI_KEY_SOLID:
+        return take_rule(settings, name, value, VSH_SOLIDITY_SOLID);
+    case CLI_KEY_SHELL:
+        return take_rule(settings, name, value, VSH_SOLIDITY_SHELL);
+    case CLI_KEY_INWARD:
+        return take_rule(settings, name, value, VSH_SOLIDITY_INWARD);
     default:
         *taken = false;
         return CLI_OK;
@@ -106,7 +120,12 @@ int cli_grid_check(const cli_grid_settings *settings) {
     return CLI_OK;
 }
 
-void cli_grid_apply(const cli_grid_settings *settings, vsh_grid_options *options) {
+void cli_grid_apply(const cli_grid_settings *settings, vsh_scene *scene) {
+    vsh_grid_options *options = &scene->grid;
+    if (settings->rule_count > 0) {
+        scene->solidity = settings->rules;
+        scene->solidity_count = settings->rule_count;
+    }
     if (settings->has_resolution) {
         options->resolution = settings->options.resolution;
         options->voxel_size = 0.0;

@@ -1,6 +1,7 @@
 #include "info.h"
 #include "message.h"
 
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <vdbshade/vdbshade.h>
@@ -17,7 +18,31 @@ static void print_count(size_t count, const char *what) {
     }
 }
 
-static int print_mesh(const vsh_model *model, size_t index) {
+/* Counts one kind of components: "2 sheets". */
+static void print_kind(size_t count, const char *one, const char *many, bool *first) {
+    if (count > 0) {
+        printf("%s%zu %s", *first ? "" : ", ", count, count == 1 ? one : many);
+        *first = false;
+    }
+}
+
+static void print_solidity(const vsh_solidity_report *report) {
+    bool first = true;
+    printf("  taken for: ");
+    print_kind(report->solids, "solid", "solids", &first);
+    print_kind(report->rooms, "room in a solid", "rooms in solids", &first);
+    print_kind(report->walls, "wall with air in front of its faces", "walls with air in front of their faces",
+               &first);
+    print_kind(report->sheets, "sheet with air on both sides", "sheets with air on both sides", &first);
+    puts(first ? "nothing" : "");
+    if (report->closed_over > 0) {
+        printf("  closed over: %zu hole%s with %zu open edges, of %zu of these\n", report->holes,
+               report->holes == 1 ? "" : "s", report->open_edges, report->closed_over);
+    }
+    print_count(report->turned_triangles, "triangles that face the other way than those around");
+}
+
+static int print_mesh(const vsh_model *model, size_t index, const vsh_solidity_report *solidity) {
     const vsh_mesh mesh = vsh_model_mesh(model, index, -1);
     vsh_mesh_report report;
     vsh_error error;
@@ -31,9 +56,10 @@ static int print_mesh(const vsh_model *model, size_t index) {
     printf("  bounds: %g %g %g to %g %g %g\n  area: %g\n", report.bounds_min[0], report.bounds_min[1],
            report.bounds_min[2], report.bounds_max[0], report.bounds_max[1], report.bounds_max[2],
            report.area);
-    print_count(report.open_edges, "open edges: it bounds no solid and is baked as a shell");
+    print_count(report.open_edges, "open edges");
     print_count(report.flipped_edges, "edges whose triangles disagree about the outside");
     print_count(report.degenerate_triangles, "triangles of zero area, which are skipped");
+    print_solidity(solidity);
     return CLI_OK;
 }
 
@@ -87,13 +113,21 @@ int cli_info_mesh(const char *path, const vsh_run *run) {
     const size_t count = vsh_model_mesh_count(model);
     vsh_mesh *with_uvs = calloc(count, sizeof *with_uvs);
     size_t with_uv_count = 0;
+    vsh_mesh *meshes = calloc(count, sizeof *meshes);
+    vsh_solidity_report *solidity = calloc(count, sizeof *solidity);
     int code = CLI_OK;
-    if (with_uvs == NULL) {
+    if (with_uvs == NULL || meshes == NULL || solidity == NULL) {
         cli_say("%s: the system refused memory", path);
         code = CLI_LIMIT;
     }
     for (size_t i = 0; i < count && code == CLI_OK; ++i) {
-        code = print_mesh(model, i);
+        meshes[i] = vsh_model_mesh(model, i, -1);
+    }
+    if (code == CLI_OK && vsh_mesh_solidity(meshes, count, run, solidity, &error) != VSH_OK) {
+        code = cli_fail(&error);
+    }
+    for (size_t i = 0; i < count && code == CLI_OK; ++i) {
+        code = print_mesh(model, i, &solidity[i]);
         const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
         if (mesh.uvs != NULL) {
             with_uvs[with_uv_count++] = mesh;
@@ -105,6 +139,8 @@ int cli_info_mesh(const char *path, const vsh_run *run) {
     if (code == CLI_OK && with_uv_count > 0) {
         code = print_uvs(with_uvs, with_uv_count);
     }
+    free(solidity);
+    free(meshes);
     free(with_uvs);
     vsh_model_free(model);
     return code;

@@ -86,7 +86,10 @@ enum {
     CLI_KEY_RESOLUTION,
     CLI_KEY_VOXEL_SIZE,
     CLI_KEY_HALF_WIDTH,
-    CLI_KEY_SHELL_THICKNESS
+    CLI_KEY_SHELL_THICKNESS,
+    CLI_KEY_SOLID,
+    CLI_KEY_SHELL,
+    CLI_KEY_INWARD
 };
 
 #define CLI_TRUSTED_OPTION                                                                                   \
@@ -121,17 +124,26 @@ enum {
     {CLI_KEY_RESOLUTION, "resolution", "N",                                                                  \
      "voxels along the longest side of the casters,\n2 to 65536 (256)"},                                     \
         {CLI_KEY_VOXEL_SIZE, "voxel-size", "SIZE", "or the edge of a voxel, in scene units"},                \
+        {CLI_KEY_SOLID, "solid", "PATTERN",                                                                  \
+         "objects of casters that are solid whatever way their\nfaces look, closed over their holes; "       \
+         "repeatable"},                                                                                      \
+        {CLI_KEY_SHELL, "shell", "PATTERN", "objects that are sheets with air on both sides"},               \
+        {CLI_KEY_INWARD, "inward", "PATTERN", "objects that are rooms: air in what they enclose"},           \
         {CLI_KEY_HALF_WIDTH, "half-width", "VOXELS",                                                         \
          "half width of the narrow band, in voxels,\n3 to 100 (3)"},                                         \
     {                                                                                                        \
         CLI_KEY_SHELL_THICKNESS, "shell-thickness", "VOXELS",                                                \
-            "thickness of the solid that an open mesh\nbecomes, in voxels, 1 to 50 (2)"                      \
+            "thickness of sheets and of walls behind rooms' faces,\nin voxels, 1 to 50 (2)"                  \
     }
+
+enum { CLI_MOST_RULES = 64 };
 
 /* What of the grid's options was given on the command line. */
 typedef struct cli_grid_settings {
     bool has_resolution, has_voxel_size, has_half_width, has_shell_thickness;
     vsh_grid_options options;
+    vsh_solidity_rule rules[CLI_MOST_RULES];
+    size_t rule_count;
 } cli_grid_settings;
 
 /* Take an option of the tables above; *taken tells whether it was one of them. */
@@ -141,7 +153,7 @@ int cli_grid_take(cli_grid_settings *settings, int key, const char *name, const 
 /* --resolution and --voxel-size exclude each other. */
 int cli_grid_check(const cli_grid_settings *settings);
 
-/* Puts the given ones over a scene's. */
-void cli_grid_apply(const cli_grid_settings *settings, vsh_grid_options *options);
+/* Puts the given ones over a scene's, which then refers to the settings. */
+void cli_grid_apply(const cli_grid_settings *settings, vsh_scene *scene);
 
 #endif

@@ -157,7 +157,7 @@ static int voxelize_main(int argc, char **argv) {
         scene.caster_count = read->caster_count;
         scene.grid = read->grid;
     }
-    cli_grid_apply(&s.grid, &scene.grid);
+    cli_grid_apply(&s.grid, &scene);
     code = check_files(&s, &scene);
     if (code == CLI_OK) {
         cli_signals_watch();

@@ -6,7 +6,9 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "caster/solidity.h"
 #include "scene/select.h"
+#include "scene/solidity.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -32,10 +34,11 @@ typedef struct asset_place {
     vsh_mesh *meshes;
     double *transforms; /* [count][12] */
     size_t count;
-    const vsh_grid *grid; /* vdb casters; belongs to the assets' grids */
-    vsh_outline *outline; /* mask and text casters */
-    vsh_model *made;      /* of heightfields; its meshes are this place's */
-    vsh_heights *heights; /* direct ones */
+    const vsh_model *model; /* mesh casters; belongs to the assets' models */
+    const vsh_grid *grid;   /* vdb casters; belongs to the assets' grids */
+    vsh_outline *outline;   /* mask and text casters */
+    vsh_model *made;        /* of heightfields; its meshes are this place's */
+    vsh_heights *heights;   /* direct ones */
     vsh_spheres *spheres;
     bool direct;
 } asset_place;
@@ -51,21 +54,8 @@ struct vsh_assets {
     size_t caster_count;
     asset_place *receivers;
     size_t receiver_count;
+    vshi_solidity *solidity; /* of the casters' meshes */
 };
-
-void vshi_transform_compose(const double outer[12], const double *inner, double result[12]) {
-    if (inner == NULL) {
-        memcpy(result, outer, 12 * sizeof *result);
-        return;
-    }
-    for (int row = 0; row < 3; ++row) {
-        const double *o = outer + 4 * row;
-        for (int column = 0; column < 4; ++column) {
-            result[4 * row + column] = o[0] * inner[column] + o[1] * inner[4 + column] +
-                                       o[2] * inner[8 + column] + (column == 3 ? o[3] : 0.0);
-        }
-    }
-}
 
 static vsh_result copy_text(const char *text, char **copy, vsh_error *error) {
     const size_t size = strlen(text) + 1;
@@ -259,7 +249,26 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_caster *caster, siz
     if (result == VSH_OK) {
         result = place_chosen(place, model, chosen, -1, caster->transform, error);
     }
+    place->model = model;
     free(chosen);
+    return result;
+}
+
+static vsh_result settle_solidity(vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
+                                  vsh_error *error) {
+    vshi_mesh_list *lists = NULL;
+    const size_t casters = assets->caster_count, count = casters + assets->receiver_count;
+    vsh_result result = vshi_allocate((void **)&lists, count, sizeof *lists, "meshes", error);
+    if (result != VSH_OK || count == 0) {
+        return result;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        const asset_place *place = i < casters ? &assets->casters[i] : &assets->receivers[i - casters];
+        lists[i] = (vshi_mesh_list){place->meshes, place->count, place->model,
+                                    i < casters ? scene->casters[i].path : NULL};
+    }
+    result = vshi_solidity_settle(scene, lists, lists + casters, run, &assets->solidity, error);
+    free(lists);
     return result;
 }
 
@@ -346,6 +355,9 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     for (size_t i = 0; i < scene->caster_count && result == VSH_OK; ++i) {
         result = place_caster(loaded, &scene->casters[i], i, &full, error);
     }
+    if (result == VSH_OK) {
+        result = settle_solidity(loaded, scene, &full, error);
+    }
     if (result != VSH_OK) {
         vsh_assets_free(loaded);
         return result;
@@ -370,6 +382,7 @@ void vsh_assets_free(vsh_assets *assets) {
     if (assets == NULL) {
         return;
     }
+    vshi_solidity_free(assets->solidity);
     free_places(assets->receivers, assets->receiver_count);
     free_places(assets->casters, assets->caster_count);
     for (size_t i = 0; i < assets->map_count; ++i) {

@@ -23,6 +23,10 @@ vsh_result vshi_read_size(vshi_reader *reader, const vshi_value *value, int32_t 
 /* A pattern, or an array of them, into a vsh_selection: what is chosen, and what of it is not. */
 vsh_result vshi_read_only(vshi_reader *reader, const vshi_value *value, void *selection);
 vsh_result vshi_read_except(vshi_reader *reader, const vshi_value *value, void *selection);
+/* Patterns that are added to a caster's rules of solidity. */
+vsh_result vshi_read_solid(vshi_reader *reader, const vshi_value *value, void *caster);
+vsh_result vshi_read_shell(vshi_reader *reader, const vshi_value *value, void *caster);
+vsh_result vshi_read_inward(vshi_reader *reader, const vshi_value *value, void *caster);
 vsh_result vshi_read_bits(vshi_reader *reader, const vshi_value *value, void *bits); /* int32_t */
 
 /* Fails where two lights of the array `value` have one name. */

@@ -42,6 +42,41 @@ vsh_result vshi_read_except(vshi_reader *reader, const vshi_value *value, void *
     return read_patterns(reader, value, &selection->except, &selection->except_count);
 }
 
+static vsh_result read_rules(vshi_reader *reader, const vshi_value *value, vsh_caster *caster,
+                             int32_t solidity) {
+    vsh_selection given = {.only = NULL};
+    vsh_result result = vshi_read_only(reader, value, &given);
+    void *memory = NULL;
+    const size_t count = caster->solidity_count + given.only_count;
+    if (result == VSH_OK) {
+        result = vshi_reader_allocate(reader, &memory, count, sizeof *caster->solidity, "patterns");
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_solidity_rule *rules = memory;
+    for (size_t i = 0; i < count; ++i) {
+        rules[i] = i < caster->solidity_count
+                       ? caster->solidity[i]
+                       : (vsh_solidity_rule){given.only[i - caster->solidity_count], solidity};
+    }
+    caster->solidity = rules;
+    caster->solidity_count = count;
+    return VSH_OK;
+}
+
+vsh_result vshi_read_solid(vshi_reader *reader, const vshi_value *value, void *caster) {
+    return read_rules(reader, value, caster, VSH_SOLIDITY_SOLID);
+}
+
+vsh_result vshi_read_shell(vshi_reader *reader, const vshi_value *value, void *caster) {
+    return read_rules(reader, value, caster, VSH_SOLIDITY_SHELL);
+}
+
+vsh_result vshi_read_inward(vshi_reader *reader, const vshi_value *value, void *caster) {
+    return read_rules(reader, value, caster, VSH_SOLIDITY_INWARD);
+}
+
 /* --- in a model */
 
 /* A name as messages tell it: that of the object. */
@@ -110,8 +145,8 @@ static const char *nearest_name(const vsh_model *model, const char *pattern) {
     return nearest != NULL && wanted[0] != '\0' && vshi_is_near(least, wanted) ? nearest : NULL;
 }
 
-static vsh_result fail_unmatched(const vsh_model *model, const char *path, const char *pattern,
-                                 vsh_error *error) {
+vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const char *pattern,
+                               vsh_error *error) {
     char names[600] = "";
     list_names(model, names, sizeof names);
     const char *near = nearest_name(model, pattern);
@@ -136,7 +171,7 @@ static vsh_result apply(const vsh_model *model, const char *path, const char *co
             }
         }
         if (!matched) {
-            return fail_unmatched(model, path, patterns[p], error);
+            return vshi_fail_unmatched(model, path, patterns[p], error);
         }
     }
     return VSH_OK;

@@ -1,5 +1,7 @@
 #include "scene/transform.h"
 
+#include "scene/assets.h"
+
 #include "base/elementary.h"
 #include "base/vec.h"
 
@@ -159,4 +161,18 @@ bool vshi_transform_is_similarity(const double m[12]) {
         }
     }
     return true;
+}
+
+void vshi_transform_compose(const double outer[12], const double *inner, double result[12]) {
+    if (inner == NULL) {
+        memcpy(result, outer, 12 * sizeof *result);
+        return;
+    }
+    for (int row = 0; row < 3; ++row) {
+        const double *o = outer + 4 * row;
+        for (int column = 0; column < 4; ++column) {
+            result[4 * row + column] = o[0] * inner[column] + o[1] * inner[4 + column] +
+                                       o[2] * inner[8 + column] + (column == 3 ? o[3] : 0.0);
+        }
+    }
 }

@@ -151,7 +151,8 @@ void move_out(FloatGrid &grid, bool sheet, float offset, float voxel, float back
 struct Tally {
     size_t sheets = 0, sheet_edges = 0;
     size_t closed = 0, closed_edges = 0, holes = 0; // solids closed over their holes
-    size_t walls = 0, turned = 0;
+    size_t turned = 0;
+    bool around_all = false;
 };
 
 Tally tally_of(const vshi_component *components, size_t count) {
@@ -159,7 +160,7 @@ Tally tally_of(const vshi_component *components, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         const vshi_component &c = components[i];
         tally.turned += c.turned;
-        tally.walls += c.kind == VSHI_KIND_WALL;
+        tally.around_all |= c.around_all;
         if (c.kind == VSHI_KIND_SHEET) {
             ++tally.sheets;
             tally.sheet_edges += c.open_edges;
@@ -184,7 +185,19 @@ void warn(const Meshes &meshes, const vshi_solidity *solidity, const Lattice &la
         const Tally tally = tally_of(components, count);
         const size_t first = wholes.first[w];
         const vshi_mesh_name name = vshi_mesh_label(&meshes.mesh[first], first);
-        if (tally.sheets > 0) {
+        if (tally.around_all) {
+            vshi_warn(&run,
+                      "%s (%zu of %zu): everything else lies within it: baked as a shell with air on both "
+                      "sides; leave it out of what casts if light is to come in",
+                      name.text, first + 1, meshes.count);
+        }
+        if (tally.sheets > 0 && tally.sheet_edges == 0 && !tally.around_all) {
+            vshi_warn(
+                &run,
+                "%s (%zu of %zu): no volume between its faces: baked as a shell %g voxels (%g units) thick",
+                name.text, first + 1, meshes.count, lattice.shell, lattice.shell * lattice.voxel);
+        }
+        if (tally.sheet_edges > 0) {
             vshi_warn(&run, "%s (%zu of %zu): %zu open edge%s: baked as a shell %g voxels (%g units) thick",
                       name.text, first + 1, meshes.count, tally.sheet_edges, plural(tally.sheet_edges),
                       lattice.shell, lattice.shell * lattice.voxel);

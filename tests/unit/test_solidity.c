@@ -114,6 +114,11 @@ static void rooms_and_domes_are_walls_around_air(void **state) {
     shape_turn(s, 0);
     shape_box(s, LOW, HIGH, ALL_SIDES);
     assert_kinds_of(s, "sky dome around a cube", "WS");
+    const double floor_low[3] = {-5, -5, -1}, floor_high[3] = {5, 5, -1.5};
+    shape_box(s, LOW, HIGH, ALL_SIDES);
+    shape_box(s, floor_low, floor_high, TOP);
+    shape_ball(s, ORIGIN, 10.0, -1.0, 1.0, 24);
+    assert_kinds_of(s, "sky dome that looks outwards around a cube and a card", "S--");
     shape_box(s, LOW, HIGH, ALL_SIDES & ~FRONT);
     shape_turn(s, 0);
     assert_kinds_of(s, "room without its fourth wall", "W");

@@ -1,0 +1,125 @@
+#include "scene/solidity.h"
+
+#include "base/memory.h"
+#include "caster/solidity.h"
+#include "scene/select.h"
+
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool apply_rule(const vsh_solidity_rule *rule, const vshi_mesh_list *list) {
+    bool matched = false;
+    for (size_t i = 0; i < list->count; ++i) {
+        if (vsh_mesh_matches(&list->meshes[i], rule->pattern)) {
+            list->meshes[i].solidity = rule->solidity;
+            matched = true;
+        }
+    }
+    return matched;
+}
+
+/* Rules of one caster, or of all. */
+static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
+                              const vshi_mesh_list *casters, size_t count, vsh_error *error) {
+    for (size_t r = 0; r < rule_count; ++r) {
+        const vsh_solidity_rule *rule = &rules[r];
+        const vshi_mesh_list *first = NULL;
+        bool matched = false;
+        if (rule->pattern == NULL || rule->solidity < VSH_SOLIDITY_AUTO ||
+            rule->solidity > VSH_SOLIDITY_INWARD) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "rule of solidity %zu: %s", r,
+                             rule->pattern == NULL ? "pattern is NULL"
+                                                   : "solidity is none of VSH_SOLIDITY_…");
+        }
+        for (size_t i = 0; i < count; ++i) {
+            first = first == NULL && casters[i].model != NULL ? &casters[i] : first;
+            matched = (casters[i].model != NULL && apply_rule(rule, &casters[i])) || matched;
+        }
+        if (!matched && first != NULL) {
+            return vshi_fail_unmatched(first->model, first->path, rule->pattern, error);
+        }
+        if (!matched) {
+            return vshi_fail(error, VSH_ERROR_INPUT, "no object is named '%.100s': no caster is a mesh",
+                             rule->pattern);
+        }
+    }
+    return VSH_OK;
+}
+
+static bool same_place(const vsh_mesh *a, const vsh_mesh *b) {
+    return a->positions == b->positions && a->indices == b->indices &&
+           (a->transform == b->transform ||
+            (a->transform != NULL && b->transform != NULL &&
+             memcmp(a->transform, b->transform, 12 * sizeof *a->transform) == 0));
+}
+
+static void share(const vsh_mesh *casters, size_t count, const vshi_mesh_list *receiver) {
+    for (size_t i = 0; i < receiver->count; ++i) {
+        for (size_t k = 0; k < count && receiver->meshes[i].sides == NULL; ++k) {
+            /* a file's meshes stand in the same order where all of them cast */
+            const vsh_mesh *caster = &casters[(i + k) % count];
+            if (same_place(&receiver->meshes[i], caster)) {
+                receiver->meshes[i].sides = caster->sides;
+                receiver->meshes[i].solidity = caster->solidity;
+            }
+        }
+    }
+}
+
+/* All casters' meshes, one after the other. */
+static vsh_result list_all(const vshi_mesh_list *casters, size_t caster_count, vsh_mesh **all, size_t *count,
+                           vsh_error *error) {
+    *count = 0;
+    for (size_t i = 0; i < caster_count; ++i) {
+        *count += casters[i].count;
+    }
+    vsh_result result = vshi_allocate((void **)all, *count, sizeof **all, "meshes", error);
+    for (size_t i = 0, at = 0; i < caster_count && result == VSH_OK; at += casters[i++].count) {
+        if (casters[i].count > 0) {
+            memcpy(*all + at, casters[i].meshes, casters[i].count * sizeof **all);
+        }
+    }
+    for (size_t i = 0; i < *count && result == VSH_OK; ++i) {
+        result = vshi_mesh_check_data(*all + i, i, error);
+    }
+    return result;
+}
+
+static vsh_result find(const vshi_mesh_list *casters, size_t caster_count, const vshi_mesh_list *receivers,
+                       size_t receiver_count, const vsh_run *run, vshi_solidity **found, vsh_error *error) {
+    vsh_mesh *all = NULL;
+    size_t count;
+    vsh_result result = list_all(casters, caster_count, &all, &count, error);
+    if (result == VSH_OK && count > 0) {
+        vsh_run quiet = *run; /* a small part of a second for a million triangles: no stage of its own */
+        quiet.progress = NULL;
+        result = vshi_solidity_create(all, count, &quiet, found, error);
+    }
+    for (size_t i = 0, at = 0; i < caster_count && result == VSH_OK; ++i) {
+        for (size_t k = 0; k < casters[i].count; ++k, ++at) {
+            all[at].sides = casters[i].meshes[k].sides = vshi_solidity_sides(*found, at);
+        }
+    }
+    for (size_t i = 0; i < receiver_count && result == VSH_OK; ++i) {
+        share(all, count, &receivers[i]);
+    }
+    free(all);
+    return result;
+}
+
+vsh_result vshi_solidity_settle(const vsh_scene *scene, const vshi_mesh_list *casters,
+                                const vshi_mesh_list *receivers, const vsh_run *run, vshi_solidity **found,
+                                vsh_error *error) {
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < scene->caster_count && result == VSH_OK; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        result = apply_rules(caster->solidity, caster->solidity_count, &casters[i], 1, error);
+    }
+    if (result == VSH_OK) {
+        result = apply_rules(scene->solidity, scene->solidity_count, casters, scene->caster_count, error);
+    }
+    return result == VSH_OK
+               ? find(casters, scene->caster_count, receivers, scene->receiver_count, run, found, error)
+               : result;
+}
