@@ -13,7 +13,7 @@ bake() {
 
 # solid FILE: what info says of the level set of a mesh, without where it came from.
 solid() {
-    "$VDBSHADE" voxelize "$1" -o solid.vdb --voxel-size 0.05 --quiet
+    "$VDBSHADE" voxelize "$1" -o solid.vdb --voxel-size 0.05 --quiet "${@:2}"
     "$VDBSHADE" info solid.vdb | grep -E 'active voxels|voxel size|background|problem'
 }
 
@@ -64,7 +64,9 @@ solid() {
     [[ $stderr == *"4 open edges"* ]] || fail "says nothing of the missing face"
     solid box.obj >sound.txt
     sed -E 's/^f ([^ ]*) ([^ ]*) ([^ ]*)/f \1 \3 \2/' box.obj >inward.obj
-    solid inward.obj >inward.txt
+    solid inward.obj >room.txt
+    if cmp -s sound.txt room.txt; then fail "a room is filled"; fi
+    solid inward.obj --solid '*' >inward.txt
     cmp sound.txt inward.txt
     { cat box.obj && grep '^f ' box.obj; } >twice.obj
     solid twice.obj >twice.txt
