@@ -30,6 +30,7 @@ typedef struct baking {
     float *tinted;     /* [origins.count][3]: of one light */
     vsh_layer *layers; /* the options', of points that are lifted already; NULL: none */
     bool layered_ao;
+    vshi_origins_for wanted;
     vsh_bake_stats stats;
 } baking;
 
@@ -381,7 +382,8 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     result = vshi_halo_open(texels, bake->lightmap, bake->light_count, &bake->halo, error);
     bake->lightmap = &bake->halo.lightmap;
     if (result == VSH_OK) {
-        result = vshi_origins_create(bake->field, texels, &bake->shade, &bake->run, &bake->origins, error);
+        result = vshi_origins_create(bake->field, texels, &bake->shade, bake->wanted, &bake->run,
+                                     &bake->origins, error);
     }
     bake->state = vshi_take(vshi_texels_held(texels), 1, "lightmap", &result, error);
     const size_t count = bake->origins.count;
@@ -460,6 +462,7 @@ vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, c
     if (result != VSH_OK) {
         return result;
     }
+    bake.wanted = (vshi_origins_for){light, ao_wanted(lightmap)};
     for (size_t m = 0; bake.stats.invalid_by_mesh != NULL && m < texels->mesh_count; ++m) {
         bake.stats.invalid_by_mesh[m] = 0;
     }

@@ -3,8 +3,10 @@
 #include "analytic/spheres.h"
 #include "bake/take.h"
 #include "base/parallel.h"
+#include "shade/inside.h"
 #include "shade/kernel/march.h"
 #include "shade/layers.h"
+#include "shim/embree.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -27,6 +29,8 @@ typedef struct looked_at {
     const vsh_field *field;
     double probe; /* world units: how far above its surface a sample is looked at for whether it is free */
     double shell; /* world units, open meshes on top of it */
+    const vsh_triangles *triangles; /* its casters', where rays are traced against them; else NULL */
+    bool marched;                   /* it is looked at itself: methods march it, or there are no triangles */
 } looked_at;
 
 typedef struct lifting {
@@ -41,6 +45,7 @@ typedef struct lifting {
     const vshi_kernel *kernel;
     uint8_t
         *crease; /* [samples]: 0, or 1 + the field in whose crease a sample lies, that of the highest probe */
+    uint8_t *dropped; /* [samples]: 1 where the position is put down on its triangle again */
 } lifting;
 
 static size_t block_end(const lifting *l, size_t block) {
@@ -48,15 +53,44 @@ static size_t block_end(const lifting *l, size_t block) {
     return end < l->texels->count ? end : l->texels->count;
 }
 
+/* The sample itself, without any offset. */
+static vshi_vec place(const lifting *l, size_t i) {
+    const vsh_texels *texels = l->texels;
+    const vshi_vec p = vshi_vec_of(texels->position + 3 * i);
+    if (!l->dropped[i]) {
+        return p;
+    }
+    const vshi_vec normal = vshi_vec_off(texels->geometric + 3 * i);
+    return vshi_sub(p, vshi_scale(normal, (double)texels->height[i]));
+}
+
+static void put(vshi_vec p, double at[3]) {
+    at[0] = p.x;
+    at[1] = p.y;
+    at[2] = p.z;
+}
+
 static void lift(const lifting *l, size_t i, double offset, double shell, double origin[3]) {
     const vsh_texels *texels = l->texels;
     const double height = offset + (texels->open[texels->mesh[i]] ? shell : 0.0);
+    const vshi_vec p = place(l, i);
+    const double at[3] = {p.x, p.y, p.z};
     for (size_t k = 0; k < 3; ++k) {
-        origin[k] = texels->position[3 * i + k] + height * (double)texels->geometric[3 * i + k];
+        origin[k] = at[k] + height * (double)texels->geometric[3 * i + k];
     }
 }
 
-/* Looks at samples first … last - 1, at most a block, in one of the fields. */
+/* Where a sample is looked at in a field, in its space. */
+static void probe(const lifting *l, const looked_at *in, size_t i, float at[3]) {
+    double origin[3];
+    lift(l, i, in->probe, in->shell, origin);
+    const vshi_vec p = vshi_to_field(in->field, origin);
+    at[0] = (float)p.x;
+    at[1] = (float)p.y;
+    at[2] = (float)p.z;
+}
+
+/* Looks at samples first … last - 1, at most a block, in a field that decides. */
 static void look(const lifting *l, size_t field, size_t first, size_t last) {
     const looked_at *in = &l->fields[field];
     const float radius = (float)(CREASE * in->probe / in->field->voxel_size);
@@ -64,12 +98,11 @@ static void look(const lifting *l, size_t field, size_t first, size_t last) {
     float *const centres[3] = {at[0], at[1], at[2]};
     bool is_free[VSHI_ORIGIN_BLOCK];
     for (size_t i = first; i < last; ++i) {
-        double origin[3];
-        lift(l, i, in->probe, in->shell, origin);
-        const vshi_vec p = vshi_to_field(in->field, origin);
-        at[0][i - first] = (float)p.x;
-        at[1][i - first] = (float)p.y;
-        at[2][i - first] = (float)p.z;
+        float p[3];
+        probe(l, in, i, p);
+        for (size_t k = 0; k < 3; ++k) {
+            at[k][i - first] = p[k];
+        }
     }
     l->kernel->balls(in->field, last - first, centres, radius, is_free);
     for (size_t i = first; i < last; ++i) {
@@ -84,6 +117,63 @@ static void look(const lifting *l, size_t field, size_t first, size_t last) {
         const uint8_t crease = l->crease[i];
         if (distance < CREASE * in->probe && (crease == 0 || in->probe > l->fields[crease - 1].probe)) {
             l->crease[i] = (uint8_t)(field + 1);
+        }
+    }
+}
+
+/* Samples that are lifted through other triangles are put down again. */
+static void put_down(const lifting *l, const vsh_triangles *triangles, size_t first, size_t last) {
+    const vsh_texels *texels = l->texels;
+    const double hair = vshi_triangles_lift(triangles);
+    vshi_segment_ray rays[VSHI_ORIGIN_BLOCK];
+    uint16_t of[VSHI_ORIGIN_BLOCK];
+    bool blocked[VSHI_ORIGIN_BLOCK];
+    size_t count = 0;
+    for (size_t i = first; i < last; ++i) {
+        const double height = (double)texels->height[i];
+        if (!(height > hair)) {
+            continue;
+        }
+        const vshi_vec normal = vshi_vec_off(texels->geometric + 3 * i);
+        const vshi_vec low =
+            vshi_add(vshi_vec_of(texels->position + 3 * i), vshi_scale(normal, hair - height));
+        rays[count] = (vshi_segment_ray){{low.x, low.y, low.z}, {normal.x, normal.y, normal.z}, height};
+        of[count++] = (uint16_t)(i - first);
+    }
+    vshi_triangles_blocked(triangles, rays, count, blocked);
+    for (size_t k = 0; k < count; ++k) {
+        l->dropped[first + of[k]] = l->dropped[first + of[k]] || blocked[k];
+    }
+}
+
+/* A block that is traced. */
+typedef struct tracing {
+    const lifting *lifting;
+    const looked_at *in;
+    size_t first;
+} tracing;
+
+/* A vshi_open_fn: no surface is near but the sample's own, and what is within a solid the field knows. */
+static bool is_open(const void *user, size_t i) {
+    const tracing *t = user;
+    float at[3];
+    probe(t->lifting, t->in, t->first + i, at);
+    return t->in->field->voxel_size * (double)vshi_field_distance(t->in->field, at) >= CREASE * t->in->probe;
+}
+
+/* Looks at samples first … last - 1 by rays against a field's triangles. */
+static void trace(const lifting *l, const looked_at *in, size_t first, size_t last) {
+    double at[3 * VSHI_ORIGIN_BLOCK] = {0.0};
+    uint8_t where[VSHI_ORIGIN_BLOCK];
+    for (size_t i = first; i < last; ++i) {
+        put(place(l, i), at + 3 * (i - first));
+    }
+    const tracing task = {l, in, first};
+    vshi_inside(in->triangles, last - first, at, l->texels->geometric + 3 * first, is_open, &task, where);
+    for (size_t i = first; i < last; ++i) {
+        if (where[i - first] != VSHI_OUTSIDE) {
+            l->origins->valid[i] = 0;
+            l->origins->seen[i] = where[i - first] == VSHI_INSIDE_SEEN;
         }
     }
 }
@@ -104,7 +194,17 @@ static void validate(void *user, size_t begin, size_t end) {
         const size_t first = block * VSHI_ORIGIN_BLOCK, last = block_end(l, block);
         memset(l->origins->valid + first, 1, last - first);
         for (size_t field = 0; field < l->field_count; ++field) {
-            look(l, field, first, last);
+            if (l->fields[field].triangles != NULL) {
+                put_down(l, l->fields[field].triangles, first, last);
+            }
+        }
+        for (size_t field = 0; field < l->field_count; ++field) {
+            if (l->fields[field].triangles != NULL) {
+                trace(l, &l->fields[field], first, last);
+            }
+            if (l->fields[field].marched) {
+                look(l, field, first, last);
+            }
         }
         for (size_t solid = 0; solid < l->solid_count; ++solid) {
             look_at_solid(l, solid, first, last);
@@ -142,7 +242,7 @@ static void pack(void *user, size_t begin, size_t end) {
                      origins->position + 3 * next);
                 memcpy(origins->normal + 3 * next, l->texels->normal + 3 * i, 3 * sizeof(float));
                 if (origins->surface != NULL) {
-                    memcpy(origins->surface + 3 * next, l->texels->position + 3 * i, 3 * sizeof(double));
+                    put(place(l, i), origins->surface + 3 * next);
                 }
                 origins->texel[next] = sampler_texel(l->texels, i);
                 ++next;
@@ -168,26 +268,31 @@ static void find_rows(const vsh_texels *texels, vshi_origins *origins) {
                                       .last = band->own_end - band->held_begin};
 }
 
-static void look_in(lifting *l, const vsh_field *field) {
+static void look_in(lifting *l, const vsh_field *field, const vsh_triangles *triangles, int32_t method,
+                    int32_t ao_method, vshi_origins_for what) {
+    const bool marched =
+        (what.lights && method != VSH_SHADOW_EXACT) || (what.ao && ao_method != VSH_AO_EXACT);
     l->fields[l->field_count++] = (looked_at){.field = field,
                                               .probe = fmax(l->offset, PROBE_HEIGHT * field->voxel_size),
-                                              .shell = 0.5 * field->shell_thickness};
+                                              .shell = 0.5 * field->shell_thickness,
+                                              .triangles = triangles,
+                                              .marched = marched || triangles == NULL};
 }
 
 double vshi_origins_sample_bytes(bool traced) {
-    return 2.0 + (traced ? 6.0 : 3.0) * sizeof(double) + 4.0 * sizeof(float);
+    return 4.0 + (traced ? 6.0 : 3.0) * sizeof(double) + 4.0 * sizeof(float);
 }
 
 vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
-                               const vsh_shade_options *options, const vsh_run *run, vshi_origins *origins,
-                               vsh_error *error) {
-    const char *what = "lightmap samples";
+                               const vsh_shade_options *options, vshi_origins_for what, const vsh_run *run,
+                               vshi_origins *origins, vsh_error *error) {
+    const char *name = "lightmap samples";
     *origins = (vshi_origins){.blocks = (texels->count + VSHI_ORIGIN_BLOCK - 1) / VSHI_ORIGIN_BLOCK};
     lifting l = {.texels = texels,
                  .origins = origins,
                  .kernel = vshi_kernel_of(run->isa),
                  .offset = options->start_offset * field->voxel_size + options->surface_offset};
-    look_in(&l, field);
+    look_in(&l, field, options->triangles, options->method, options->ao_method, what);
     for (size_t i = 0; i < options->layer_count; ++i) {
         vsh_layer layer;
         const vsh_result result = vshi_layer_resolve(options, i, &layer, error);
@@ -195,7 +300,9 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
             return result;
         }
         if (layer.field != NULL) {
-            look_in(&l, layer.field);
+            const int32_t method = layer.method < 0 ? options->method : layer.method;
+            const vshi_origins_for here = {what.lights, what.ao && layer.ao != 0};
+            look_in(&l, layer.field, layer.triangles, method, options->ao_method, here);
         } else {
             l.heights[l.solid_count] = layer.heights;
             l.spheres[l.solid_count++] = layer.spheres;
@@ -204,11 +311,13 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
     vsh_result result = VSH_OK;
     vshi_job *job = vshi_job_begin(run, "validate", 2 * origins->blocks);
     if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
     }
-    origins->valid = vshi_take(texels->count, 1, what, &result, error);
-    l.crease = vshi_take(texels->count, 1, what, &result, error);
-    origins->before = vshi_take(origins->blocks + 1, sizeof(size_t), what, &result, error);
+    origins->valid = vshi_take(texels->count, 1, name, &result, error);
+    origins->seen = vshi_take(texels->count, 1, name, &result, error);
+    l.crease = vshi_take(texels->count, 1, name, &result, error);
+    l.dropped = vshi_take(texels->count, 1, name, &result, error);
+    origins->before = vshi_take(origins->blocks + 1, sizeof(size_t), name, &result, error);
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, origins->blocks, 1, 1, validate, &l, error);
     }
@@ -218,18 +327,19 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
         origins->count += valid;
     }
     origins->row_start =
-        vshi_take(texels->band.held_end - texels->band.held_begin + 1, sizeof(size_t), what, &result, error);
+        vshi_take(texels->band.held_end - texels->band.held_begin + 1, sizeof(size_t), name, &result, error);
     if (result == VSH_OK) {
         find_rows(texels, origins);
     }
-    origins->position = vshi_take(origins->count, 3 * sizeof(double), what, &result, error);
+    origins->position = vshi_take(origins->count, 3 * sizeof(double), name, &result, error);
     const bool traced = options->method == VSH_SHADOW_EXACT || options->ao_method == VSH_AO_EXACT;
-    origins->surface = vshi_take(traced ? origins->count : 0, 3 * sizeof(double), what, &result, error);
-    origins->texel = vshi_take(origins->count, sizeof(uint32_t), what, &result, error);
-    origins->normal = vshi_take(origins->count, 3 * sizeof(float), what, &result, error);
+    origins->surface = vshi_take(traced ? origins->count : 0, 3 * sizeof(double), name, &result, error);
+    origins->texel = vshi_take(origins->count, sizeof(uint32_t), name, &result, error);
+    origins->normal = vshi_take(origins->count, 3 * sizeof(float), name, &result, error);
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, origins->blocks, 1, 1, pack, &l, error);
     }
+    free(l.dropped);
     free(l.crease);
     vshi_job_end(job);
     return result;
@@ -242,6 +352,7 @@ void vshi_origins_free(vshi_origins *origins) {
     free(origins->position);
     free(origins->row_start);
     free(origins->before);
+    free(origins->seen);
     free(origins->valid);
     *origins = (vshi_origins){0};
 }

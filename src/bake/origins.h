@@ -15,22 +15,30 @@ typedef struct vshi_origins {
     float *normal; /* [count][3]: decides shadow */
     uint32_t *texel; /* [count]: as vsh_points.texels; a texel's further samples get numbers of their own */
     uint8_t *valid;  /* [all samples]: 1 where the sample is among them */
+    uint8_t *seen;   /* [all samples]: 1 where one that is not is seen from outside all the same */
     size_t blocks;   /* of all samples */
     size_t *before;  /* [blocks + 1]: valid samples before each block */
     vshi_point_rows rows; /* of tiles, the band's own counted */
     size_t *row_start;    /* [rows.count + 1] */
 } vshi_origins;
 
+/* What is baked of the samples. */
+typedef struct vshi_origins_for {
+    bool lights, ao;
+} vshi_origins_for;
+
 /* Bytes that the origin of a sample takes at most. */
 double vshi_origins_sample_bytes(bool traced);
 
 /* Lifts each sample along its geometric normal by the start offset, and by half a shell's thickness where its
- * mesh is open. A sample that ends up inside the field's solid, or all but, is invalid: it lies inside
- * another solid, or shows its back. The layers' fields are looked at as well. Free with vshi_origins_free()
- * also after an error. Errors: VSH_ERROR_ARGUMENT (a layer), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+ * mesh is open. A sample is invalid inside a solid or behind a wall of
+ * the casters: where there are triangles, by rays against them (see vshi_inside()); where a field is marched,
+ * also if it ends up inside the field's solid, or all but. The layers are looked at as well. Free with
+ * vshi_origins_free() also after an error. Errors: VSH_ERROR_ARGUMENT (a layer), VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED. */
 vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
-                               const vsh_shade_options *options, const vsh_run *run, vshi_origins *origins,
-                               vsh_error *error);
+                               const vsh_shade_options *options, vshi_origins_for what, const vsh_run *run,
+                               vshi_origins *origins, vsh_error *error);
 void vshi_origins_free(vshi_origins *origins);
 
 #endif

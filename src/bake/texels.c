@@ -53,7 +53,8 @@ static void write_sample(writer *w, uint32_t number, uint32_t texel, const doubl
         w->number = number;
     }
     vshi_vec position, normal;
-    vshi_surface_at(&w->surface, weight, &position, &normal);
+    double height;
+    vshi_surface_at(&w->surface, weight, &position, &normal, &height);
     const double p[3] = {position.x, position.y, position.z};
     const double n[3] = {normal.x, normal.y, normal.z};
     const double g[3] = {w->surface.geometric.x, w->surface.geometric.y, w->surface.geometric.z};
@@ -70,6 +71,7 @@ static void write_sample(writer *w, uint32_t number, uint32_t texel, const doubl
         texels->normal[3 * i + k] = (float)n[k];
         texels->geometric[3 * i + k] = (float)g[k];
     }
+    texels->height[i] = (float)height;
     texels->texel[i] = texel;
     texels->mesh[i] = mesh;
     if (texels->tangent != NULL) {
@@ -194,6 +196,7 @@ static vsh_result take_samples(vsh_texels *texels, bool tangents, vsh_error *err
     texels->position = vshi_take(texels->count, 3 * sizeof(double), what, &result, error);
     texels->normal = vshi_take(texels->count, 3 * sizeof(float), what, &result, error);
     texels->geometric = vshi_take(texels->count, 3 * sizeof(float), what, &result, error);
+    texels->height = vshi_take(texels->count, sizeof(float), what, &result, error);
     texels->texel = vshi_take(texels->count, sizeof(uint32_t), what, &result, error);
     texels->mesh = vshi_take(texels->count, sizeof(uint32_t), what, &result, error);
     texels->tangent = vshi_take(tangents ? texels->count : 0, 4 * sizeof(float), what, &result, error);
@@ -304,6 +307,7 @@ void vsh_texels_free(vsh_texels *texels) {
     free(texels->tangent);
     free(texels->mesh);
     free(texels->texel);
+    free(texels->height);
     free(texels->geometric);
     free(texels->normal);
     free(texels->position);

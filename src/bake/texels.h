@@ -26,7 +26,7 @@ struct vsh_charts {
 
 /* Bytes of one sample in texels. */
 static inline size_t vshi_sample_bytes(bool tangents) {
-    return 3 * sizeof(double) + (tangents ? 10 : 6) * sizeof(float) + 2 * sizeof(uint32_t);
+    return 3 * sizeof(double) + (tangents ? 11 : 7) * sizeof(float) + 2 * sizeof(uint32_t);
 }
 
 /* vsh_charts_create() with all that is checked, but for the memory of samples: VSH_ERROR_LIMIT where there
@@ -69,6 +69,7 @@ struct vsh_texels {
     double *position;        /* [count][3] */
     float *normal;           /* [count][3] */
     float *geometric;        /* [count][3] */
+    float *height;           /* [count]: of the position over its triangle's plane, world units */
     uint32_t *texel;         /* [count]: in the whole lightmap */
     uint32_t *mesh;          /* [count]: index of the mesh */
     float *tangent;          /* [count][4]: of the triangle, unit, and its handedness; NULL: not asked for */

@@ -172,6 +172,7 @@ vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const
         task.layers = layers;
         task.sampler = sampler;
         task.kernel = vshi_kernel_of(full_run.isa);
+        task.outside = rows != NULL;
         task.points = points;
         task.ao = ao;
         task.deviation = deviation;

@@ -25,6 +25,7 @@ typedef struct vshi_ao_task {
     double distance;             /* finest voxels */
     bool sphere;                 /* in free space: all directions alike, no normals, no start offset */
     const vshi_kernel *kernel;   /* of a call, as what follows */
+    bool outside;                /* the points are known to lie in no solid: samples of a lightmap */
     const vsh_points *points;
     float *ao;
     float *deviation; /* may be NULL */

@@ -307,6 +307,7 @@ static void occlude(const prepared *item, const vshi_ao_task *task, layer_piece 
     } else {
         vshi_ao_task own = item->ao;
         own.kernel = task->kernel;
+        own.outside = task->outside;
         own.points = &piece->points;
         own.ao = piece->value;
         own.deviation = task->deviation != NULL ? piece->deviation : NULL;

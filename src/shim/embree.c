@@ -1,4 +1,4 @@
-#include "shim/embree.h"
+#include "shim/embree_scene.h"
 
 #include "base/floats.h"
 #include "base/job.h"
@@ -40,39 +40,10 @@ uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
     return 0;
 }
 
-void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
-                            bool *blocked) {
-    (void)triangles, (void)rays, (void)count, (void)blocked;
-}
-
-void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *beams, size_t count, int most,
-                        bool *cut) {
-    (void)triangles, (void)beams, (void)count, (void)most, (void)cut;
-}
-
 #else
-
-#include <embree3/rtcore.h>
-#include <stdatomic.h>
-
-/* Embree counts in floats, drops what is beyond 1.8e18 and loses what is very small, so it gets the scene
- * around 0 and of a size near 1: `scale` is a power of two, which rounds nothing. */
-struct vsh_triangles {
-    RTCDevice device;
-    RTCScene scene;
-    vshi_sheet sheet; /* of all geometries one after the other, in the scene's units */
-    uint32_t *first;  /* triangle of the sheet that each geometry begins with */
-    double centre[3];
-    double scale;
-    uint64_t limit; /* bytes that Embree may hold; 0: no limit */
-    atomic_llong bytes;
-    atomic_bool refused;
-};
 
 /* A triangle's share of buffers and tree, bytes: 180 to 230 measured, more while the tree is made. */
 static const double TRIANGLE_BYTES = 300.0;
-/* A ray that begins farther than this from the scene, whose half size is at most 1, is moved up to it. */
-static const double FAR_ORIGIN = 4.0;
 
 int vsh_triangles_available(void) {
     return 1;
@@ -123,12 +94,21 @@ static void measure(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mes
         frexp(half, &exponent);
     }
     triangles->scale = ldexp(1.0, exponent < -1000 ? 1000 : -exponent);
+    triangles->size = 2.0 * half;
 }
 
 static void put(const vsh_triangles *triangles, vshi_vec world, float *out) {
     out[0] = (float)((world.x - triangles->centre[0]) * triangles->scale);
     out[1] = (float)((world.y - triangles->centre[1]) * triangles->scale);
     out[2] = (float)((world.z - triangles->centre[2]) * triangles->scale);
+}
+
+/* STUB until src/caster/solidity.h is there: a closed mesh has its solid, or its wall, behind it. */
+static vsh_result find_sides(const vsh_mesh *mesh, bool *closed, vsh_error *error) {
+    vsh_mesh_report report;
+    const vsh_result result = vshi_mesh_count_edges(mesh, &report, error);
+    *closed = result == VSH_OK && report.open_edges == 0;
+    return result;
 }
 
 /* The sheet of all meshes: their vertices, welded, and the triangles that are not degenerate. */
@@ -156,16 +136,28 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, s
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&weld, most, sizeof *weld, "welded vertices", error);
     }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&triangles->solid, triangle_count, 1, "triangles", error);
+    }
     size_t vertex = 0, triangle = 0;
     for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
         const vsh_mesh *mesh = &meshes[m];
         result = vshi_mesh_weld(mesh, weld, error);
         triangles->first[m] = (uint32_t)triangle;
+        bool closed = false;
+        if (result == VSH_OK) {
+            result = find_sides(mesh, &closed, error);
+        }
         for (size_t i = 0; result == VSH_OK && i < mesh->triangle_count; ++i) {
             if (!vshi_mesh_degenerate(mesh, i)) {
                 for (size_t k = 0; k < 3; ++k) {
                     sheet->corners[3 * triangle + k] = (uint32_t)vertex + weld[mesh->indices[3 * i + k]];
                 }
+                triangles->solid[triangle] = !closed ? VSHI_AIR_AROUND
+                                             : vshi_transform_determinant(mesh->transform) < 0.0
+                                                 ? VSHI_SOLID_BEFORE
+                                                 : VSHI_SOLID_BEHIND;
+                triangles->has_solids = triangles->has_solids || closed;
                 ++triangle;
             }
         }
@@ -242,7 +234,7 @@ static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t
     if (triangles->scene == NULL) {
         return refuse(triangles, job, error);
     }
-    rtcSetSceneFlags(triangles->scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneFlags(triangles->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
     rtcSetSceneProgressMonitorFunction(triangles->scene, watch_progress, job);
     vsh_result result = make_sheet(triangles, meshes, mesh_count, error);
     if (result != VSH_OK) {
@@ -327,6 +319,7 @@ void vsh_triangles_free(vsh_triangles *triangles) {
         rtcReleaseDevice(triangles->device);
     }
     vshi_sheet_free(&triangles->sheet);
+    free(triangles->solid);
     free(triangles->first);
     free(triangles);
 }
@@ -334,118 +327,8 @@ void vsh_triangles_free(vsh_triangles *triangles) {
 uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
     const long long bytes = atomic_load(&triangles->bytes);
     const vshi_sheet *sheet = &triangles->sheet;
-    return sizeof *triangles + (bytes > 0 ? (uint64_t)bytes : 0) +
+    return sizeof *triangles + (bytes > 0 ? (uint64_t)bytes : 0) + sheet->triangle_count +
            (uint64_t)vshi_sheet_bytes((double)sheet->vertex_count, (double)sheet->triangle_count);
-}
-
-/* Eight at once are twice as fast as one at a time, 20 to 9.5 million a second on the cloister towards a sun
- * of 3°; told that they go together, 23. Over the hemisphere that costs a quarter, 11 to 8.5. */
-enum { PACKET = 8 };
-static const double COHERENT = 0.9; /* cosine between a packet's rays, at least */
-
-static bool together(const vshi_segment_ray *rays, int count) {
-    for (int i = 1; i < count; ++i) {
-        const double *a = rays[0].direction, *b = rays[i].direction;
-        if (!(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] > COHERENT)) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* Lane `lane` of the packet, in the scene's own units; false where the ray ends before it comes near. */
-static bool aim(const vsh_triangles *triangles, const vshi_segment_ray *ray, struct RTCRay8 *packet,
-                int lane) {
-    double origin[3], far = ray->far * triangles->scale, distance = 0.0, along = 0.0;
-    for (int axis = 0; axis < 3; ++axis) {
-        origin[axis] = (ray->origin[axis] - triangles->centre[axis]) * triangles->scale;
-        distance += origin[axis] * origin[axis];
-        along -= origin[axis] * ray->direction[axis];
-    }
-    if (!(distance <= FAR_ORIGIN * FAR_ORIGIN)) {
-        const double skip = along - FAR_ORIGIN;
-        if (!(skip < far)) { /* not finite either */
-            return false;
-        }
-        for (int axis = 0; skip > 0.0 && axis < 3; ++axis) {
-            origin[axis] += skip * ray->direction[axis];
-        }
-        far -= skip > 0.0 ? skip : 0.0;
-    }
-    packet->org_x[lane] = (float)origin[0];
-    packet->org_y[lane] = (float)origin[1];
-    packet->org_z[lane] = (float)origin[2];
-    packet->dir_x[lane] = (float)ray->direction[0];
-    packet->dir_y[lane] = (float)ray->direction[1];
-    packet->dir_z[lane] = (float)ray->direction[2];
-    packet->tnear[lane] = 0.0f;
-    packet->time[lane] = 0.0f;
-    packet->tfar[lane] = far < (double)FLT_MAX ? (float)far : INFINITY;
-    packet->mask[lane] = 0xffffffffu;
-    packet->flags[lane] = 0;
-    return true;
-}
-
-void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
-                            bool *blocked) {
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    for (size_t begin = 0; begin < count; begin += PACKET) {
-        struct RTCRay8 packet = {0};
-        _Alignas(32) int valid[PACKET] = {0};
-        const int lanes = count - begin < PACKET ? (int)(count - begin) : PACKET;
-        for (int lane = 0; lane < lanes; ++lane) {
-            valid[lane] = aim(triangles, &rays[begin + (size_t)lane], &packet, lane) ? -1 : 0;
-        }
-        context.flags = together(rays + begin, lanes) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
-                                                      : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-        rtcOccluded8(valid, triangles->scene, &context, &packet);
-        for (int lane = 0; lane < lanes; ++lane) {
-            blocked[begin + (size_t)lane] = valid[lane] != 0 && packet.tfar[lane] < 0.0f;
-        }
-    }
-}
-
-/* Where the axis of a beam meets what is past `from`; false where nothing. */
-static bool next_hit(const vsh_triangles *triangles, const vshi_sheet_beam *beam, double from,
-                     struct RTCRayHit *hit) {
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    *hit = (struct RTCRayHit){.ray = {.org_x = (float)beam->origin.x,
-                                      .org_y = (float)beam->origin.y,
-                                      .org_z = (float)beam->origin.z,
-                                      .dir_x = (float)beam->axis.x,
-                                      .dir_y = (float)beam->axis.y,
-                                      .dir_z = (float)beam->axis.z,
-                                      .tnear = (float)from,
-                                      .tfar = beam->end < (double)FLT_MAX ? (float)beam->end : INFINITY,
-                                      .mask = 0xffffffffu},
-                              .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
-    rtcIntersect1(triangles->scene, &context, hit);
-    return hit->hit.geomID != RTC_INVALID_GEOMETRY_ID;
-}
-
-void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *beams, size_t count, int most,
-                        bool *cut) {
-    enum { LAYERS = 3 }; /* that may lie before the one that cuts */
-    for (size_t b = 0; b < count; ++b) {
-        vshi_sheet_beam beam = beams[b];
-        const double *centre = triangles->centre, scale = triangles->scale;
-        beam.origin = vshi_scale(vshi_sub(beam.origin, (vshi_vec){centre[0], centre[1], centre[2]}), scale);
-        beam.wide *= scale;
-        beam.end *= scale;
-        cut[b] = false;
-        double from = beam.wide;
-        struct RTCRayHit hit;
-        const bool near = vshi_dot(beam.origin, beam.origin) < FAR_ORIGIN * FAR_ORIGIN;
-        for (int layer = 0; near && layer < LAYERS && !cut[b] && next_hit(triangles, &beam, from, &hit);
-             ++layer) {
-            const double distance = (double)hit.ray.tfar;
-            const uint32_t triangle = triangles->first[hit.hit.geomID] + hit.hit.primID;
-            cut[b] = vshi_sheet_cuts(&triangles->sheet, &beam, triangle, distance, most);
-            from = distance * (1.0 + 0x1p-16) + 0x1p-16;
-        }
-    }
 }
 
 #endif

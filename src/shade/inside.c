@@ -1,0 +1,124 @@
+/* A point is inside a solid if what a ray from it meets first is the inner side of one: so two rays nearly
+ * always tell. Of points that they do not agree on, more rays are cast, and followed all the way: a ray
+ * leaves one solid more than it enters for each that holds its origin, also where solids overlap. Meshes have
+ * holes and flipped faces, so a clear majority decides, and who is seen by many from outside is outside. */
+#include "shade/inside.h"
+#include "base/vec.h"
+#include "shim/embree.h"
+
+#include <math.h>
+#include <string.h>
+
+enum {
+    AT_ONCE = 128,
+    FIRST = 2,  /* rays that all points have */
+    SECOND = 6, /* more, for those inside by the first if solids were not closed over holes: all must agree */
+    COUNTED = 3, /* rays that are followed all the way, for all others; where they disagree: */
+    MOST = 14
+};
+
+/* The share of rays that must say inside, of those that disagree: a head's eye, seen through its hole by a
+ * third of the rays, is to be baked. */
+static const double MAJORITY = 0.75;
+
+/* Directions over a hemisphere around +z, none along an axis, where the edges of what people build lie: the
+ * golden angle apart, from 18° to 75° off the normal. The first two lean to opposite sides. */
+static const double DIRECTIONS[FIRST + MOST][3] = {
+    {+0.44378, +0.13502, 0.88590}, {-0.61737, -0.22410, 0.75408}, {+0.29617, -0.50253, 0.81225},
+    {-0.10473, +0.65201, 0.75094}, {+0.73921, +0.24787, 0.62620}, {-0.66702, +0.53311, 0.52042},
+    {+0.08537, -0.86170, 0.50019}, {+0.60118, -0.67004, 0.43552}, {-0.29341, -0.18922, 0.93706},
+    {+0.17255, +0.37840, 0.90942}, {-0.48012, +0.28530, 0.82954}, {-0.30120, -0.60322, 0.73851},
+    {+0.52033, +0.58190, 0.62495}, {-0.85210, -0.17390, 0.49367}, {-0.21844, +0.85512, 0.47014},
+    {+0.88915, -0.22030, 0.40107},
+};
+
+typedef struct looking {
+    const vsh_triangles *triangles;
+    const double *positions; /* [count][3] */
+    const float *normals;
+    double lift;
+    vshi_open_fn *open;
+    const void *user;
+} looking;
+
+static void aim(const looking *l, size_t point, size_t direction, vshi_segment_ray *ray) {
+    vshi_vec normal = vshi_unit(vshi_vec_off(l->normals + 3 * point)), u, v;
+    const vshi_vec p = vshi_add(vshi_vec_of(l->positions + 3 * point), vshi_scale(normal, l->lift));
+    if (!(vshi_dot(normal, normal) > 0.5)) {
+        normal = (vshi_vec){0.0, 0.0, 1.0};
+    }
+    vshi_frame(normal, &u, &v);
+    const double *by = DIRECTIONS[direction];
+    const vshi_vec d =
+        vshi_unit(vshi_add(vshi_add(vshi_scale(u, by[0]), vshi_scale(v, by[1])), vshi_scale(normal, by[2])));
+    *ray = (vshi_segment_ray){{p.x, p.y, p.z}, {d.x, d.y, d.z}, INFINITY};
+}
+
+/* Follows rays all the way: more of them where they disagree. */
+static uint8_t count_through(const looking *l, size_t point, bool seen) {
+    int inside = 0, taken = 0;
+    for (int target = COUNTED; taken < target;) {
+        vshi_segment_ray ray;
+        bool escaped;
+        aim(l, point, (size_t)(FIRST + taken), &ray);
+        inside += vshi_triangles_depth(l->triangles, &ray, &escaped) > 0;
+        seen = seen || escaped;
+        ++taken;
+        target = taken == COUNTED && inside != 0 && inside != COUNTED ? MOST : target;
+    }
+    return inside < MAJORITY * taken ? VSHI_OUTSIDE : seen ? VSHI_INSIDE_SEEN : VSHI_INSIDE;
+}
+
+/* For a point whose first rays all begin in solids with holes: whether others do as well. */
+static uint8_t confirm(const looking *l, size_t point) {
+    vshi_segment_ray rays[SECOND];
+    uint8_t meets[SECOND];
+    for (size_t k = 0; k < SECOND; ++k) {
+        aim(l, point, FIRST + k, &rays[k]);
+    }
+    vshi_triangles_meet(l->triangles, rays, SECOND, meets);
+    for (size_t k = 0; k < SECOND; ++k) {
+        if (meets[k] < VSHI_MEETS_SOLID) {
+            return count_through(l, point, meets[k] == VSHI_MEETS_NOTHING);
+        }
+    }
+    return VSHI_INSIDE;
+}
+
+static void look(const looking *l, size_t first, size_t count, uint8_t *where) {
+    vshi_segment_ray rays[FIRST * AT_ONCE];
+    uint8_t meets[FIRST * AT_ONCE];
+    for (size_t k = 0; k < FIRST; ++k) { /* those of neighbours together: they go the same way */
+        for (size_t i = 0; i < count; ++i) {
+            aim(l, first + i, k, &rays[k * count + i]);
+        }
+    }
+    vshi_triangles_meet(l->triangles, rays, FIRST * count, meets);
+    for (size_t i = 0; i < count; ++i) {
+        int met[VSHI_MEETS_COUNT] = {0};
+        for (size_t k = 0; k < FIRST; ++k) {
+            ++met[meets[k * count + i]];
+        }
+        const size_t point = first + i;
+        const bool escapes = met[VSHI_MEETS_NOTHING] > 0;
+        if (met[VSHI_MEETS_SOLID] == FIRST) {
+            where[point] = confirm(l, point);
+        } else if (met[VSHI_MEETS_SOLID] == 0 && (escapes || (l->open != NULL && l->open(l->user, point)))) {
+            where[point] = VSHI_OUTSIDE;
+        } else {
+            where[point] = count_through(l, point, escapes);
+        }
+    }
+}
+
+void vshi_inside(const vsh_triangles *triangles, size_t count, const double *positions, const float *normals,
+                 vshi_open_fn *open, const void *user, uint8_t *where) {
+    memset(where, VSHI_OUTSIDE, count);
+    if (!vshi_triangles_have_solids(triangles)) {
+        return;
+    }
+    const looking l = {triangles, positions, normals, vshi_triangles_lift(triangles), open, user};
+    for (size_t first = 0; first < count; first += AT_ONCE) {
+        look(&l, first, count - first < AT_ONCE ? count - first : AT_ONCE, where);
+    }
+}
