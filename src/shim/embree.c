@@ -5,6 +5,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "caster/mesh.h"
+#include "caster/solidity.h"
 
 #include <float.h>
 #include <stdlib.h>
@@ -103,21 +104,42 @@ static void put(const vsh_triangles *triangles, vshi_vec world, float *out) {
     out[2] = (float)((world.z - triangles->centre[2]) * triangles->scale);
 }
 
-/* STUB until src/caster/solidity.h is there: a closed mesh has its solid, or its wall, behind it. */
-static vsh_result find_sides(const vsh_mesh *mesh, bool *closed, vsh_error *error) {
-    vsh_mesh_report report;
-    const vsh_result result = vshi_mesh_count_edges(mesh, &report, error);
-    *closed = result == VSH_OK && report.open_edges == 0;
-    return result;
+/* VSHI_SOLID_… of the triangles of all meshes one after the other, as their corners turn, also where a
+ * transform mirrors. */
+static void find_solids(const vshi_solidity *solidity, const vsh_mesh *meshes, uint8_t *solid) {
+    const vshi_wholes *wholes = vshi_solidity_wholes(solidity);
+    size_t at = 0;
+    for (size_t w = 0; w < wholes->count; ++w) {
+        const size_t begin = at;
+        for (size_t m = wholes->first[w]; m < wholes->first[w + 1]; ++m) {
+            const bool mirrored = vshi_transform_determinant(meshes[m].transform) < 0.0;
+            const uint8_t *sides = vshi_solidity_sides(solidity, m);
+            for (size_t i = 0; i < meshes[m].triangle_count; ++i) {
+                const bool behind = (sides[i] == VSHI_SIDE_BEHIND) != mirrored;
+                solid[at++] = sides[i] == VSHI_SIDE_SHEET ? VSHI_AIR_AROUND
+                              : behind                    ? VSHI_SOLID_BEHIND
+                                                          : VSHI_SOLID_BEFORE;
+            }
+        }
+        size_t count;
+        const vshi_component *components = vshi_solidity_of_whole(solidity, w, &count);
+        for (size_t c = 0; c < count; ++c) {
+            for (size_t i = 0; components[c].open_edges > 0 && i < components[c].triangles; ++i) {
+                uint8_t *of = &solid[begin + components[c].list[i]];
+                *of |= *of != VSHI_AIR_AROUND ? VSHI_SOLID_HOLED : 0;
+            }
+        }
+    }
 }
 
 /* The sheet of all meshes: their vertices, welded, and the triangles that are not degenerate. */
 static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count,
-                             vsh_error *error) {
-    size_t vertex_count = 0, triangle_count = 0, most = 0;
+                             const vshi_solidity *solidity, vsh_error *error) {
+    size_t vertex_count = 0, triangle_count = 0, most = 0, all = 0;
     for (size_t m = 0; m < mesh_count; ++m) {
         vertex_count += meshes[m].vertex_count;
         most = meshes[m].vertex_count > most ? meshes[m].vertex_count : most;
+        all += meshes[m].triangle_count;
         for (size_t i = 0; i < meshes[m].triangle_count; ++i) {
             triangle_count += !vshi_mesh_degenerate(&meshes[m], i);
         }
@@ -129,6 +151,7 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, s
     }
     vshi_sheet *sheet = &triangles->sheet;
     uint32_t *weld = NULL;
+    uint8_t *solid = NULL;
     vsh_result result = vshi_sheet_allocate(sheet, vertex_count, triangle_count, error);
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&triangles->first, mesh_count, sizeof(uint32_t), "triangles", error);
@@ -139,25 +162,24 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, s
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&triangles->solid, triangle_count, 1, "triangles", error);
     }
-    size_t vertex = 0, triangle = 0;
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&solid, all, 1, "sides of triangles", error);
+    }
+    if (result == VSH_OK) {
+        find_solids(solidity, meshes, solid);
+    }
+    size_t vertex = 0, triangle = 0, given = 0;
     for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
         const vsh_mesh *mesh = &meshes[m];
         result = vshi_mesh_weld(mesh, weld, error);
         triangles->first[m] = (uint32_t)triangle;
-        bool closed = false;
-        if (result == VSH_OK) {
-            result = find_sides(mesh, &closed, error);
-        }
-        for (size_t i = 0; result == VSH_OK && i < mesh->triangle_count; ++i) {
+        for (size_t i = 0; result == VSH_OK && i < mesh->triangle_count; ++i, ++given) {
             if (!vshi_mesh_degenerate(mesh, i)) {
                 for (size_t k = 0; k < 3; ++k) {
                     sheet->corners[3 * triangle + k] = (uint32_t)vertex + weld[mesh->indices[3 * i + k]];
                 }
-                triangles->solid[triangle] = !closed ? VSHI_AIR_AROUND
-                                             : vshi_transform_determinant(mesh->transform) < 0.0
-                                                 ? VSHI_SOLID_BEFORE
-                                                 : VSHI_SOLID_BEHIND;
-                triangles->has_solids = triangles->has_solids || closed;
+                triangles->solid[triangle] = solid[given];
+                triangles->has_solids = triangles->has_solids || solid[given] != VSHI_AIR_AROUND;
                 ++triangle;
             }
         }
@@ -166,6 +188,7 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, s
             put(triangles, vshi_transform_point(mesh->transform, local), sheet->vertices + 3 * vertex++);
         }
     }
+    free(solid);
     free(weld);
     return result == VSH_OK ? vshi_sheet_join(sheet, error) : result;
 }
@@ -219,8 +242,8 @@ static void commit(void *user) {
     rtcCommitScene(user);
 }
 
-static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count, vshi_job *job,
-                        vsh_error *error) {
+static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count,
+                        const vshi_solidity *solidity, vshi_job *job, vsh_error *error) {
     triangles->device = rtcNewDevice(NULL);
     if (triangles->device == NULL) {
         const enum RTCError code = rtcGetDeviceError(NULL);
@@ -236,7 +259,7 @@ static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t
     }
     rtcSetSceneFlags(triangles->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
     rtcSetSceneProgressMonitorFunction(triangles->scene, watch_progress, job);
-    vsh_result result = make_sheet(triangles, meshes, mesh_count, error);
+    vsh_result result = make_sheet(triangles, meshes, mesh_count, solidity, error);
     if (result != VSH_OK) {
         return result;
     }
@@ -286,7 +309,14 @@ vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const
     if (result == VSH_OK) {
         result = vshi_allocate(&memory, 1, sizeof **triangles, "triangles", error);
     }
+    vshi_solidity *solidity = NULL;
+    if (result == VSH_OK) {
+        vsh_run quiet = full;
+        quiet.progress = NULL;
+        result = vshi_solidity_create(meshes, mesh_count, &quiet, &solidity, error);
+    }
     if (result != VSH_OK) {
+        free(memory);
         return result;
     }
     vsh_triangles *made = memory;
@@ -294,12 +324,14 @@ vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const
     measure(made, meshes, mesh_count);
     vshi_job *job = vshi_job_begin(&full, "triangles", 1);
     if (job == NULL) {
+        vshi_solidity_free(solidity);
         free(made);
         return vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
     }
     result = vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error)
-                                     : build(made, meshes, mesh_count, job, error);
+                                     : build(made, meshes, mesh_count, solidity, job, error);
     vshi_job_end(job);
+    vshi_solidity_free(solidity);
     if (result != VSH_OK) {
         vsh_triangles_free(made);
         return result;
