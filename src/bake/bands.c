@@ -3,6 +3,7 @@
 #include "bake/origins.h"
 #include "bake/padding.h"
 #include "bake/rows.h"
+#include "bake/spread.h"
 #include "bake/take.h"
 #include "base/floats.h"
 #include "base/parallel.h"
@@ -13,7 +14,7 @@
 
 enum {
     MAX_PADDING = 4096,
-    LEAST_HALO = VSHI_LEAST_INVALID_RADIUS /* texels beside a band: padding may copy from as far */
+    LEAST_HALO = VSHI_SPREAD_REACH /* texels beside a band: invalid ones may be filled from as far */
 };
 
 static vsh_result check_range(int32_t value, int32_t low, int32_t high, const char *name, vsh_error *error) {
@@ -380,7 +381,8 @@ double vshi_bake_bytes(const vshi_bake_need *need) {
     sample += (need->values ? 1 : 0) * sizeof(float) + (need->errors ? 1 : 0) * sizeof(float);
     sample += (need->irradiance ? 3 : 0) * sizeof(float) + (need->bent ? 3 : 0) * sizeof(float);
     sample += (need->tint ? 3 : 0) * sizeof(float);
-    return need->samples * sample + need->texels * (1.0 + VSHI_PADDING_TEXEL_BYTES) +
+    return need->samples * sample +
+           need->texels * (1.0 + VSHI_PADDING_TEXEL_BYTES + VSHI_SPREAD_TEXEL_BYTES) +
            (need->lattice ? vshi_lattice_bytes(need->samples, need->texels, need->bent) : 0.0);
 }
 

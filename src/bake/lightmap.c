@@ -2,6 +2,7 @@
 #include "bake/halo.h"
 #include "bake/lattice.h"
 #include "bake/origins.h"
+#include "bake/spread.h"
 #include "bake/take.h"
 #include "base/floats.h"
 #include "base/parallel.h"
@@ -22,6 +23,7 @@ typedef struct baking {
     const vsh_lightmap *lightmap; /* planes of all rows that the texels hold */
     vshi_halo halo;
     vshi_origins origins;
+    vshi_spread spread;
     uint8_t *state;    /* [rows held][width]: VSHI_TEXEL_… */
     float *values;     /* [origins.count]: of one light, or AO */
     float *deviation;  /* [origins.count]: of the same; NULL where no plane is for it */
@@ -63,6 +65,12 @@ static bool errors_wanted(const vsh_lightmap *lightmap, size_t light_count) {
         wanted = wanted || lightmap->shadow_error[i] != NULL;
     }
     return wanted;
+}
+
+/* How far invalid texels are filled from other charts, texels. */
+static int32_t invalid_radius(const vsh_texels *texels) {
+    const int32_t least = VSHI_LEAST_INVALID_RADIUS;
+    return texels->padding > least ? texels->padding : least;
 }
 
 /* Whether AO need not be shaded at every texel. `rays` are for those who want just them, taps cost no more;
@@ -281,10 +289,45 @@ static void compose(const baking *bake) {
     }
 }
 
+/* A vshi_origins_keep: which texels are valid, where the others take their values from, and which rows beside
+ * the band's own are needed: all that are in reach of padding, and of others those that are taken from. */
+static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *rows, vsh_error *error) {
+    baking *bake = user;
+    const vsh_texels *texels = bake->texels;
+    const vshi_band *band = &texels->band;
+    const size_t count = band->held_end - band->held_begin;
+    (void)origins;
+    vsh_result result = average(bake, NULL, 0, NULL, error);
+    if (result == VSH_OK) {
+        result = vshi_spread_find(texels, bake->state, &bake->spread, error);
+    }
+    uint8_t *taken = vshi_take(count, 1, "lightmap rows", &result, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    vshi_spread_mark(&bake->spread, texels, taken);
+    const int32_t reach = invalid_radius(texels);
+    const size_t near = ((size_t)reach + VSHI_TILE - 1) / VSHI_TILE;
+    for (size_t row = 0; row < count; ++row) {
+        const size_t at = row + band->held_begin;
+        taken[row] = taken[row] || (at + near >= band->own_begin && at < band->own_end + near);
+    }
+    const bool lattice = interpolates(bake) && ao_wanted(bake->lightmap);
+    const size_t above = lattice ? VSHI_LATTICE_ABOVE : 0, below = lattice ? VSHI_LATTICE_BELOW : 0;
+    for (size_t row = 0; row < count; ++row) {
+        rows[row] = 0;
+        for (size_t other = row > below ? row - below : 0; other <= row + above && other < count; ++other) {
+            rows[row] = rows[row] || taken[other];
+        }
+    }
+    free(taken);
+    return VSH_OK;
+}
+
 static vsh_result bake_planes(baking *bake, vsh_error *error) {
     const vsh_lightmap *lightmap = bake->lightmap;
     const vsh_texels *texels = bake->texels;
-    vsh_result result = average(bake, NULL, 0, NULL, error);
+    vsh_result result = VSH_OK;
     for (size_t i = 0; result == VSH_OK && i < bake->light_count; ++i) {
         if (light_wanted(lightmap, i)) {
             result = bake_light(bake, i, error);
@@ -347,9 +390,11 @@ static size_t finish_coverage(baking *bake) {
 
 static vsh_result pad(baking *bake, size_t invalid, vsh_error *error) {
     const vsh_texels *texels = bake->texels;
-    const int32_t padding = texels->padding, least = VSHI_LEAST_INVALID_RADIUS;
-    const int32_t invalid_radius = padding > least ? padding : least;
-    const int32_t radius[VSHI_TEXEL_KINDS] = {padding, 0, invalid > 0 ? invalid_radius : 0};
+    const int32_t radius[VSHI_TEXEL_KINDS] = {
+        [VSHI_TEXEL_EMPTY] = texels->padding,
+        [VSHI_TEXEL_INVALID] = invalid > 0 ? invalid_radius(texels) : 0,
+    };
+    vshi_spread_copy(&bake->spread, bake->state, bake->halo.planes, bake->halo.padded);
     return vshi_padding_fill(&bake->run, texels->info.width, texels->band.rows, bake->state, radius,
                              bake->halo.planes, bake->halo.padded, error);
 }
@@ -381,11 +426,11 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     }
     result = vshi_halo_open(texels, bake->lightmap, bake->light_count, &bake->halo, error);
     bake->lightmap = &bake->halo.lightmap;
-    if (result == VSH_OK) {
-        result = vshi_origins_create(bake->field, texels, &bake->shade, bake->wanted, &bake->run,
-                                     &bake->origins, error);
-    }
     bake->state = vshi_take(vshi_texels_held(texels), 1, "lightmap", &result, error);
+    if (result == VSH_OK) {
+        result = vshi_origins_create(bake->field, texels, &bake->shade, bake->wanted, find_needed, bake,
+                                     &bake->run, &bake->origins, error);
+    }
     const size_t count = bake->origins.count;
     bake->values = vshi_take(values ? count : 0, sizeof(float), "lightmap", &result, error);
     bake->deviation = vshi_take(errors ? count : 0, sizeof(float), "lightmap", &result, error);
@@ -409,6 +454,7 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     free(bake->deviation);
     free(bake->values);
     free(bake->state);
+    vshi_spread_free(&bake->spread);
     vshi_origins_free(&bake->origins);
     vshi_halo_close(&bake->halo);
     return result;

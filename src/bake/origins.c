@@ -209,12 +209,31 @@ static void validate(void *user, size_t begin, size_t end) {
         for (size_t solid = 0; solid < l->solid_count; ++solid) {
             look_at_solid(l, solid, first, last);
         }
-        size_t valid = 0;
-        for (size_t i = first; i < last; ++i) {
-            valid += l->origins->valid[i];
-        }
-        l->origins->before[block] = valid;
     }
+}
+
+/* Valid samples that are not needed are left out; the rest are counted. */
+static vsh_result keep_needed(const lifting *l, vshi_origins_keep *keep, void *user, vsh_error *error) {
+    vshi_origins *origins = l->origins;
+    const vsh_texels *texels = l->texels;
+    const size_t rows = texels->band.held_end - texels->band.held_begin;
+    uint8_t *needed = NULL;
+    vsh_result result = vshi_allocate((void **)&needed, rows, 1, "lightmap rows", error);
+    if (result == VSH_OK) {
+        memset(needed, 1, rows);
+        result = keep(user, origins, needed, error);
+    }
+    for (size_t row = 0; result == VSH_OK && row < rows; ++row) {
+        if (!needed[row]) {
+            const size_t first = texels->row_start[row];
+            memset(origins->valid + first, 0, texels->row_start[row + 1] - first);
+        }
+    }
+    free(needed);
+    for (size_t i = 0; result == VSH_OK && i < texels->count; ++i) {
+        origins->before[i / VSHI_ORIGIN_BLOCK] += origins->valid[i];
+    }
+    return result;
 }
 
 /* Samplers tell points apart by it: column + 65536 row, and for the further samples of a texel a place some
@@ -284,8 +303,9 @@ double vshi_origins_sample_bytes(bool traced) {
 }
 
 vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
-                               const vsh_shade_options *options, vshi_origins_for what, const vsh_run *run,
-                               vshi_origins *origins, vsh_error *error) {
+                               const vsh_shade_options *options, vshi_origins_for what,
+                               vshi_origins_keep *keep, void *user, const vsh_run *run, vshi_origins *origins,
+                               vsh_error *error) {
     const char *name = "lightmap samples";
     *origins = (vshi_origins){.blocks = (texels->count + VSHI_ORIGIN_BLOCK - 1) / VSHI_ORIGIN_BLOCK};
     lifting l = {.texels = texels,
@@ -320,6 +340,9 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
     origins->before = vshi_take(origins->blocks + 1, sizeof(size_t), name, &result, error);
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, origins->blocks, 1, 1, validate, &l, error);
+    }
+    if (result == VSH_OK) {
+        result = keep_needed(&l, keep, user, error);
     }
     for (size_t block = 0; result == VSH_OK && block <= origins->blocks; ++block) {
         const size_t valid = origins->before[block];

@@ -27,6 +27,11 @@ typedef struct vshi_origins_for {
     bool lights, ao;
 } vshi_origins_for;
 
+/* Called once it is known which samples are valid, with all of them: sets rows[] to 0 for the tile rows held
+ * whose samples are not needed. Those count as invalid from then on. */
+typedef vsh_result vshi_origins_keep(void *user, const vshi_origins *origins, uint8_t *rows,
+                                     vsh_error *error);
+
 /* Bytes that the origin of a sample takes at most. */
 double vshi_origins_sample_bytes(bool traced);
 
@@ -37,8 +42,9 @@ double vshi_origins_sample_bytes(bool traced);
  * vshi_origins_free() also after an error. Errors: VSH_ERROR_ARGUMENT (a layer), VSH_ERROR_MEMORY,
  * VSH_ERROR_CANCELLED. */
 vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
-                               const vsh_shade_options *options, vshi_origins_for what, const vsh_run *run,
-                               vshi_origins *origins, vsh_error *error);
+                               const vsh_shade_options *options, vshi_origins_for what,
+                               vshi_origins_keep *keep, void *user, const vsh_run *run, vshi_origins *origins,
+                               vsh_error *error);
 void vshi_origins_free(vshi_origins *origins);
 
 #endif

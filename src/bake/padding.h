@@ -12,7 +12,8 @@ enum {
     VSHI_TEXEL_EMPTY = 0,   /* no chart */
     VSHI_TEXEL_VALID = 1,   /* has a value; the only ones that are copied from */
     VSHI_TEXEL_INVALID = 2, /* in a chart, but without a value */
-    VSHI_TEXEL_KINDS = 3
+    VSHI_TEXEL_FILLED = 3,  /* the same, but it has been given that of a texel of its chart */
+    VSHI_TEXEL_KINDS = 4
 };
 
 enum { VSHI_MAX_PADDING = 4096 }; /* texels; distances within a column are held in 16 bits */
@@ -23,7 +24,8 @@ typedef struct vshi_plane {
     size_t channels;
 } vshi_plane;
 
-/* Invalid texels are filled at least this far, texels, since filtering reads across them. */
+/* Invalid texels of charts that have nothing to give (see bake/spread.h) are filled at least this far,
+ * texels, since filtering reads across them. */
 enum { VSHI_LEAST_INVALID_RADIUS = 8 };
 
 /* Bytes that vshi_padding_fill() takes beside its arguments, each texel. */

@@ -104,42 +104,23 @@ static void put(const vsh_triangles *triangles, vshi_vec world, float *out) {
     out[2] = (float)((world.z - triangles->centre[2]) * triangles->scale);
 }
 
-/* VSHI_SOLID_… of the triangles of all meshes one after the other, as their corners turn, also where a
- * transform mirrors. */
-static void find_solids(const vshi_solidity *solidity, const vsh_mesh *meshes, uint8_t *solid) {
-    const vshi_wholes *wholes = vshi_solidity_wholes(solidity);
-    size_t at = 0;
-    for (size_t w = 0; w < wholes->count; ++w) {
-        const size_t begin = at;
-        for (size_t m = wholes->first[w]; m < wholes->first[w + 1]; ++m) {
-            const bool mirrored = vshi_transform_determinant(meshes[m].transform) < 0.0;
-            const uint8_t *sides = vshi_solidity_sides(solidity, m);
-            for (size_t i = 0; i < meshes[m].triangle_count; ++i) {
-                const bool behind = (sides[i] == VSHI_SIDE_BEHIND) != mirrored;
-                solid[at++] = sides[i] == VSHI_SIDE_SHEET ? VSHI_AIR_AROUND
-                              : behind                    ? VSHI_SOLID_BEHIND
-                                                          : VSHI_SOLID_BEFORE;
-            }
-        }
-        size_t count;
-        const vshi_component *components = vshi_solidity_of_whole(solidity, w, &count);
-        for (size_t c = 0; c < count; ++c) {
-            for (size_t i = 0; components[c].open_edges > 0 && i < components[c].triangles; ++i) {
-                uint8_t *of = &solid[begin + components[c].list[i]];
-                *of |= *of != VSHI_AIR_AROUND ? VSHI_SOLID_HOLED : 0;
-            }
-        }
+/* VSHI_SOLID_… of triangle i of a mesh, as its corners turn, also where the transform mirrors. */
+static uint8_t find_solid(const vsh_mesh *mesh, const uint8_t *sides, const uint8_t *holed, size_t i) {
+    if (sides[i] == VSHI_SIDE_SHEET) {
+        return VSHI_AIR_AROUND;
     }
+    const bool mirrored = vshi_transform_determinant(mesh->transform) < 0.0;
+    const bool behind = (sides[i] == VSHI_SIDE_BEHIND) != mirrored;
+    return (uint8_t)((behind ? VSHI_SOLID_BEHIND : VSHI_SOLID_BEFORE) | (holed[i] ? VSHI_SOLID_HOLED : 0));
 }
 
 /* The sheet of all meshes: their vertices, welded, and the triangles that are not degenerate. */
 static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count,
                              const vshi_solidity *solidity, vsh_error *error) {
-    size_t vertex_count = 0, triangle_count = 0, most = 0, all = 0;
+    size_t vertex_count = 0, triangle_count = 0, most = 0;
     for (size_t m = 0; m < mesh_count; ++m) {
         vertex_count += meshes[m].vertex_count;
         most = meshes[m].vertex_count > most ? meshes[m].vertex_count : most;
-        all += meshes[m].triangle_count;
         for (size_t i = 0; i < meshes[m].triangle_count; ++i) {
             triangle_count += !vshi_mesh_degenerate(&meshes[m], i);
         }
@@ -151,7 +132,6 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, s
     }
     vshi_sheet *sheet = &triangles->sheet;
     uint32_t *weld = NULL;
-    uint8_t *solid = NULL;
     vsh_result result = vshi_sheet_allocate(sheet, vertex_count, triangle_count, error);
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&triangles->first, mesh_count, sizeof(uint32_t), "triangles", error);
@@ -162,24 +142,20 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, s
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&triangles->solid, triangle_count, 1, "triangles", error);
     }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&solid, all, 1, "sides of triangles", error);
-    }
-    if (result == VSH_OK) {
-        find_solids(solidity, meshes, solid);
-    }
-    size_t vertex = 0, triangle = 0, given = 0;
+    size_t vertex = 0, triangle = 0;
     for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
         const vsh_mesh *mesh = &meshes[m];
+        const uint8_t *sides = vshi_solidity_sides(solidity, m), *holed = vshi_solidity_holed(solidity, m);
         result = vshi_mesh_weld(mesh, weld, error);
         triangles->first[m] = (uint32_t)triangle;
-        for (size_t i = 0; result == VSH_OK && i < mesh->triangle_count; ++i, ++given) {
+        for (size_t i = 0; result == VSH_OK && i < mesh->triangle_count; ++i) {
             if (!vshi_mesh_degenerate(mesh, i)) {
                 for (size_t k = 0; k < 3; ++k) {
                     sheet->corners[3 * triangle + k] = (uint32_t)vertex + weld[mesh->indices[3 * i + k]];
                 }
-                triangles->solid[triangle] = solid[given];
-                triangles->has_solids = triangles->has_solids || solid[given] != VSHI_AIR_AROUND;
+                triangles->solid[triangle] = find_solid(mesh, sides, holed, i);
+                triangles->has_solids =
+                    triangles->has_solids || triangles->solid[triangle] != VSHI_AIR_AROUND;
                 ++triangle;
             }
         }
@@ -188,7 +164,6 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, s
             put(triangles, vshi_transform_point(mesh->transform, local), sheet->vertices + 3 * vertex++);
         }
     }
-    free(solid);
     free(weld);
     return result == VSH_OK ? vshi_sheet_join(sheet, error) : result;
 }
