@@ -101,9 +101,10 @@ static void look(const looking *l, size_t first, size_t count, uint8_t *where) {
         }
         const size_t point = first + i;
         const bool escapes = met[VSHI_MEETS_NOTHING] > 0;
-        if (met[VSHI_MEETS_SOLID] == FIRST) {
-            where[point] = confirm(l, point);
-        } else if (met[VSHI_MEETS_SOLID] == 0 && (escapes || (l->open != NULL && l->open(l->user, point)))) {
+        const int inside = met[VSHI_MEETS_SOLID] + met[VSHI_MEETS_HOLED];
+        if (inside == FIRST) {
+            where[point] = met[VSHI_MEETS_HOLED] > 0 ? confirm(l, point) : VSHI_INSIDE;
+        } else if (inside == 0 && (escapes || (l->open != NULL && l->open(l->user, point)))) {
             where[point] = VSHI_OUTSIDE;
         } else {
             where[point] = count_through(l, point, escapes);

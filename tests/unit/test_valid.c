@@ -1,0 +1,432 @@
+/* Which texels of a lightmap are valid, by rays against triangles: boxes and spheres, where it is known. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#include <vdbshade/vdbshade.h>
+
+enum { MOST_QUADS = 4096, MOST_BOXES = 64, SIZE = 256 };
+
+typedef struct box {
+    double low[3], high[3];
+} box;
+
+/* Quads in one mesh, each with a square of its own in a grid of charts. */
+typedef struct shape {
+    float positions[12 * MOST_QUADS], uvs[8 * MOST_QUADS];
+    uint32_t indices[6 * MOST_QUADS];
+    size_t quads;
+    box boxes[MOST_BOXES]; /* the solids among them */
+    size_t box_count;
+} shape;
+
+static void add_quad(shape *s, const double corners[4][3]) {
+    static const uint32_t order[6] = {0, 1, 2, 0, 2, 3};
+    assert_true(s->quads < MOST_QUADS);
+    for (size_t k = 0; k < 4; ++k) {
+        for (size_t axis = 0; axis < 3; ++axis) {
+            s->positions[12 * s->quads + 3 * k + axis] = (float)corners[k][axis];
+        }
+    }
+    for (size_t k = 0; k < 6; ++k) {
+        s->indices[6 * s->quads + k] = (uint32_t)(4 * s->quads) + order[k];
+    }
+    ++s->quads;
+}
+
+/* `inwards` turns its faces: a room. */
+static void add_faces(shape *s, box b, bool inwards) {
+    for (int axis = 0; axis < 3; ++axis) {
+        for (int side = 0; side < 2; ++side) {
+            const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+            double corners[4][3];
+            for (int k = 0; k < 4; ++k) {
+                const bool along = k == 1 || k == 2, across = k >= 2;
+                const bool turned = (side == 0) != inwards;
+                corners[k][axis] = side != 0 ? b.high[axis] : b.low[axis];
+                corners[k][u] = (turned ? across : along) ? b.high[u] : b.low[u];
+                corners[k][v] = (turned ? along : across) ? b.high[v] : b.low[v];
+            }
+            add_quad(s, (const double(*)[3])corners);
+        }
+    }
+}
+
+static void add_box(shape *s, box b) {
+    assert_true(s->box_count < MOST_BOXES);
+    s->boxes[s->box_count++] = b;
+    add_faces(s, b, false);
+}
+
+/* A strip of charts has gaps of a fifth. */
+static vsh_mesh mesh_of(shape *s) {
+    const size_t across = (size_t)ceil(sqrt((double)s->quads));
+    for (size_t q = 0; q < s->quads; ++q) {
+        static const float corner[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+        for (size_t k = 0; k < 4; ++k) {
+            s->uvs[8 * q + 2 * k] = ((float)(q % across) + 0.1f + 0.8f * corner[k][0]) / (float)across;
+            s->uvs[8 * q + 2 * k + 1] = ((float)(q / across) + 0.1f + 0.8f * corner[k][1]) / (float)across;
+        }
+    }
+    return (vsh_mesh){.name = "shape",
+                      .positions = s->positions,
+                      .uvs = s->uvs,
+                      .indices = s->indices,
+                      .vertex_count = 4 * s->quads,
+                      .triangle_count = 2 * s->quads};
+}
+
+/* A lightmap of AO, and what is behind it. */
+typedef struct baked {
+    vsh_texels *texels;
+    vsh_texel_samples samples; /* one a texel */
+    float *ao, *coverage;
+    vsh_bake_stats stats;
+    uint64_t invalid;
+} baked;
+
+static void check(vsh_result result, const vsh_error *error) {
+    if (result != VSH_OK) {
+        fail_msg("%s", error->message);
+    }
+}
+
+static baked bake(const vsh_mesh *mesh, int32_t resolution, int32_t threads, double distance) {
+    baked b = {.stats = vsh_bake_stats_zero()};
+    vsh_error error = {VSH_OK, ""};
+    vsh_run run = vsh_run_default();
+    run.threads = threads;
+    vsh_grid_options grid_options = vsh_grid_options_default();
+    grid_options.resolution = resolution;
+    vsh_grid *grid = NULL;
+    vsh_field *field = NULL;
+    vsh_triangles *triangles = NULL;
+    check(vsh_grid_from_meshes(mesh, 1, &grid_options, &run, &grid, &error), &error);
+    check(vsh_field_create(grid, NULL, &run, &field, &error), &error);
+    check(vsh_triangles_create(mesh, 1, &run, &triangles, &error), &error);
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = SIZE;
+    options.ao_spacing = 1;
+    options.shade.method = VSH_SHADOW_EXACT;
+    options.shade.ao_method = VSH_AO_EXACT;
+    options.shade.ao_distance = distance;
+    options.shade.rays = 16;
+    options.shade.triangles = triangles;
+    check(vsh_texels_create(mesh, 1, &options, &run, NULL, &b.texels, &error), &error);
+    b.samples = vsh_texels_samples(b.texels);
+    b.ao = calloc(SIZE * SIZE, sizeof *b.ao);
+    b.coverage = calloc(SIZE * SIZE, sizeof *b.coverage);
+    b.stats.invalid_by_mesh = &b.invalid;
+    const vsh_lightmap lightmap = {.ao = b.ao, .coverage = b.coverage};
+    check(vsh_bake_lightmap(field, b.texels, NULL, 0, NULL, &run, &lightmap, &b.stats, &error), &error);
+    vsh_triangles_free(triangles);
+    vsh_field_free(field);
+    vsh_grid_free(grid);
+    return b;
+}
+
+static void free_baked(baked *b) {
+    vsh_texels_free(b->texels);
+    free(b->ao);
+    free(b->coverage);
+}
+
+/* How deep a point is in the deepest of the boxes. */
+static double depth_in(const shape *s, const double p[3]) {
+    double deepest = -INFINITY;
+    for (size_t i = 0; i < s->box_count; ++i) {
+        double depth = INFINITY;
+        for (int axis = 0; axis < 3; ++axis) {
+            depth = fmin(depth, fmin(p[axis] - s->boxes[i].low[axis], s->boxes[i].high[axis] - p[axis]));
+        }
+        deepest = fmax(deepest, depth);
+    }
+    return deepest;
+}
+
+static bool is_valid(const baked *b, size_t i) {
+    return b->coverage[b->samples.texel[i]] == 1.0f;
+}
+
+/* Samples whose validity is not that of the boxes, a hair above the surface. */
+static size_t count_wrong(const shape *s, const baked *b) {
+    static const double HAIR = 1e-3, CLEAR = 1e-4;
+    size_t wrong = 0;
+    for (size_t i = 0; i < b->samples.count; ++i) {
+        double above[3];
+        for (size_t axis = 0; axis < 3; ++axis) {
+            above[axis] = b->samples.positions[3 * i + axis] +
+                          HAIR * (double)b->samples.geometric_normals[3 * i + axis];
+        }
+        const double depth = depth_in(s, above);
+        wrong += fabs(depth) > CLEAR && is_valid(b, i) != (depth < 0.0);
+    }
+    return wrong;
+}
+
+/* A floor; boxes that stand on it, in it and in each other; pickets; and rivets a quarter of a voxel of 1/64
+ * proud of a wall. */
+static shape *new_yard(void) {
+    shape *s = calloc(1, sizeof *s);
+    add_box(s, (box){{-4.0, -0.5, -4.0}, {4.0, 0.0, 4.0}});
+    add_box(s, (box){{-1.03, 0.0, -1.07}, {0.21, 1.3, 0.4}});
+    add_box(s, (box){{1.0, -0.1, 1.0}, {2.03, 1.0, 2.1}});
+    add_box(s, (box){{1.5, -0.1, 2.05}, {2.6, 0.7, 3.0}});
+    add_box(s, (box){{1.2, 1.0, 1.2}, {1.7, 1.5, 1.7}});
+    for (int i = 0; i < 9; ++i) {
+        add_box(s, (box){{-3.5 + 0.2 * i, -0.3, 3.0}, {-3.39 + 0.2 * i, 0.8, 3.04}});
+    }
+    add_box(s, (box){{1.8, 0.0, -2.2}, {3.2, 2.0, -2.0}});
+    for (int i = 0; i < 9; ++i) {
+        const double x = 2.0 + 0.11 * i;
+        add_box(s, (box){{x, 0.9, -2.01}, {x + 0.031, 0.931, -1.969}});
+    }
+    return s;
+}
+
+static void samples_in_solids_are_invalid_and_no_others_at_every_voxel_size(void **state) {
+    (void)state;
+    shape *yard = new_yard();
+    const vsh_mesh mesh = mesh_of(yard);
+    static const int32_t RESOLUTIONS[3] = {32, 64, 256};
+    uint64_t invalid[3];
+    for (int r = 0; r < 3; ++r) {
+        baked b = bake(&mesh, RESOLUTIONS[r], 0, 1.0);
+        assert_int_equal(count_wrong(yard, &b), 0);
+        invalid[r] = b.stats.invalid_texels;
+        free_baked(&b);
+    }
+    assert_true(invalid[0] > 1000);
+    assert_int_equal(invalid[0], invalid[1]);
+    assert_int_equal(invalid[0], invalid[2]);
+    free(yard);
+}
+
+static void lightmaps_are_the_same_for_any_threads(void **state) {
+    (void)state;
+    shape *yard = new_yard();
+    const vsh_mesh mesh = mesh_of(yard);
+    baked one = bake(&mesh, 32, 1, 1.0), five = bake(&mesh, 32, 5, 1.0);
+    assert_memory_equal(one.coverage, five.coverage, SIZE * SIZE * sizeof(float));
+    assert_memory_equal(one.ao, five.ao, SIZE * SIZE * sizeof(float));
+    free_baked(&one);
+    free_baked(&five);
+    free(yard);
+}
+
+static void a_room_of_inward_faces_is_valid_but_where_things_stand(void **state) {
+    (void)state;
+    shape *s = calloc(1, sizeof *s);
+    add_faces(s, (box){{-3.0, 0.0, -3.0}, {3.0, 2.5, 3.0}}, true);
+    add_box(s, (box){{-1.0, 0.0, -1.0}, {0.5, 0.8, 0.5}});
+    add_box(s, (box){{1.0, 1.0, 2.5}, {1.5, 1.6, 3.5}}); /* through a wall */
+    const vsh_mesh mesh = mesh_of(s);
+    baked b = bake(&mesh, 48, 0, 1.0);
+    size_t wrong = 0, behind = 0;
+    for (size_t i = 0; i < b.samples.count; ++i) {
+        const double *p = b.samples.positions + 3 * i;
+        double above[3];
+        for (size_t axis = 0; axis < 3; ++axis) {
+            above[axis] = p[axis] + 1e-3 * (double)b.samples.geometric_normals[3 * i + axis];
+        }
+        const double depth = depth_in(s, above);
+        const bool outside = above[2] > 3.0 || above[1] < 0.0;
+        behind += outside;
+        wrong += !outside && fabs(depth) > 1e-4 && is_valid(&b, i) != (depth < 0.0);
+    }
+    assert_true(behind > 0);
+    assert_int_equal(wrong, 0);
+    free_baked(&b);
+    free(s);
+}
+
+static void quad_at(shape *s, double y, double low, double high) {
+    const double corners[4][3] = {{low, y, high}, {high, y, high}, {high, y, low}, {low, y, low}};
+    add_quad(s, corners);
+}
+
+static void decals_a_hair_off_a_floor_and_what_lies_under_cloth_are_valid(void **state) {
+    (void)state;
+    shape *s = calloc(1, sizeof *s);
+    add_box(s, (box){{-4.0, -0.5, -4.0}, {4.0, 0.0, 4.0}});
+    quad_at(s, 1e-4, -1.0, 0.0); /* the decal */
+    quad_at(s, 0.3, 1.0, 3.0);   /* the cloth */
+    const vsh_mesh mesh = mesh_of(s);
+    baked b = bake(&mesh, 32, 0, 1.0);
+    size_t decal = 0, cloth = 0;
+    for (size_t i = 0; i < b.samples.count; ++i) {
+        const double *p = b.samples.positions + 3 * i;
+        assert_true(is_valid(&b, i));
+        const bool up = b.samples.geometric_normals[3 * i + 1] > 0.5f;
+        if (up && p[1] > 5e-5 && p[1] < 2e-4) {
+            ++decal;
+            assert_true(b.ao[b.samples.texel[i]] > 0.9f);
+        }
+        cloth += up && p[1] == 0.0 && p[0] > 1.2 && p[0] < 2.8 && p[2] > 1.2 && p[2] < 2.8;
+    }
+    assert_true(decal > 1000 && cloth > 100);
+    free_baked(&b);
+    free(s);
+}
+
+/* Adds a sphere around a place, without its quads nearer than `hole` to the +z axis; the angle in radians. */
+static void add_sphere(shape *s, double radius, double z, double hole) {
+    enum { RINGS = 24, SECTORS = 32 };
+    const double pi = 3.14159265358979323846;
+    for (int ring = 0; ring < RINGS; ++ring) {
+        const double a0 = hole + (pi - hole) * ring / RINGS, a1 = hole + (pi - hole) * (ring + 1) / RINGS;
+        for (int sector = 0; sector < SECTORS; ++sector) {
+            double corners[4][3];
+            for (int k = 0; k < 4; ++k) {
+                const double a = k == 1 || k == 2 ? a1 : a0;
+                const double b = 2.0 * pi * ((sector + (k >= 2)) % SECTORS) / SECTORS;
+                const double across = ring + 1 == RINGS && a == a1 ? 0.0 : radius * sin(a);
+                corners[k][0] = across * cos(b);
+                corners[k][1] = across * sin(b);
+                corners[k][2] = z + radius * cos(a);
+            }
+            add_quad(s, (const double(*)[3])corners);
+        }
+    }
+}
+
+static void an_eye_in_a_head_with_a_hole_is_valid_where_it_is_seen(void **state) {
+    (void)state;
+    shape *s = calloc(1, sizeof *s);
+    add_sphere(s, 1.0, 0.0, 0.35);
+    add_sphere(s, 0.4, 0.5, 0.0);
+    const vsh_mesh mesh = mesh_of(s);
+    static const int32_t RESOLUTIONS[2] = {32, 128};
+    for (int r = 0; r < 2; ++r) {
+        baked b = bake(&mesh, RESOLUTIONS[r], 0, 0.5);
+        size_t head = 0, front = 0, back = 0;
+        for (size_t i = 0; i < b.samples.count; ++i) {
+            const double *p = b.samples.positions + 3 * i;
+            if (p[0] * p[0] + p[1] * p[1] + p[2] * p[2] > 0.95) {
+                ++head;
+                assert_true(is_valid(&b, i));
+            } else if (p[2] > 0.87) { /* up to the edge of the hole, close before which it lies */
+                ++front;
+                assert_true(is_valid(&b, i));
+            } else if (p[2] < 0.4) {
+                ++back;
+                assert_false(is_valid(&b, i));
+            }
+        }
+        assert_true(head > 1000 && front > 20 && back > 500);
+        free_baked(&b);
+    }
+    free(s);
+}
+
+static void flipped_faces_invalidate_no_others(void **state) {
+    (void)state;
+    shape *s = calloc(1, sizeof *s);
+    add_box(s, (box){{-1.0, -1.0, -1.0}, {1.0, 1.0, 1.0}});
+    add_box(s, (box){{1.5, -1.0, -1.0}, {2.5, 1.0, 1.0}});
+    for (size_t q = 0; q < 12; q += 5) {
+        uint32_t *index = s->indices + 6 * q;
+        const uint32_t turned[6] = {index[0], index[2], index[1], index[3], index[5], index[4]};
+        memcpy(index, turned, sizeof turned);
+    }
+    const vsh_mesh mesh = mesh_of(s);
+    baked b = bake(&mesh, 32, 0, 1.0);
+    for (size_t i = 0; i < b.samples.count; ++i) {
+        double above[3];
+        for (size_t axis = 0; axis < 3; ++axis) {
+            above[axis] =
+                b.samples.positions[3 * i + axis] + 1e-3 * (double)b.samples.geometric_normals[3 * i + axis];
+        }
+        if (depth_in(s, above) < 0.0) {
+            assert_true(is_valid(&b, i));
+        }
+    }
+    free_baked(&b);
+    free(s);
+}
+
+static void points_deep_in_a_box_see_no_sky_though_its_triangles_are_far(void **state) {
+    (void)state;
+    shape *s = calloc(1, sizeof *s);
+    add_box(s, (box){{-4.0, -4.0, -4.0}, {4.0, 4.0, 4.0}});
+    add_box(s, (box){{-0.01, 4.0, -0.01}, {0.01, 5.0, 0.01}}); /* less than a voxel thick */
+    const vsh_mesh mesh = mesh_of(s);
+    vsh_error error = {VSH_OK, ""};
+    vsh_grid_options grid_options = vsh_grid_options_default();
+    grid_options.resolution = 64;
+    vsh_grid *grid = NULL;
+    vsh_field *field = NULL;
+    vsh_triangles *triangles = NULL;
+    check(vsh_grid_from_meshes(&mesh, 1, &grid_options, NULL, &grid, &error), &error);
+    check(vsh_field_create(grid, NULL, NULL, &field, &error), &error);
+    check(vsh_triangles_create(&mesh, 1, NULL, &triangles, &error), &error);
+    const double positions[9] = {0.0, 0.0, 0.0, 2.0, 4.0, 2.0, 0.0, 4.5, 0.0};
+    const float normals[9] = {0, 1, 0, 0, 1, 0, 1, 0, 0};
+    const vsh_points points = {.count = 3, .positions = positions, .normals = normals};
+    vsh_shade_options options = vsh_shade_options_default();
+    options.ao_method = VSH_AO_EXACT;
+    options.ao_distance = 0.5;
+    options.triangles = triangles;
+    float ao[3];
+    check(vsh_shade_ao(field, &points, &options, NULL, ao, NULL, NULL, &error), &error);
+    assert_true(ao[0] == 0.0f);
+    assert_true(ao[1] > 0.95f);
+    assert_true(ao[2] == 0.0f);
+    vsh_triangles_free(triangles);
+    vsh_field_free(field);
+    vsh_grid_free(grid);
+    free(s);
+}
+
+/* A floor of one chart with a box on it, as wide as `half`: its texels under the box. */
+static void invalid_texels_take_the_nearest_value_of_their_chart(void **state) {
+    (void)state;
+    shape *s = calloc(1, sizeof *s);
+    quad_at(s, 0.0, -4.0, 4.0);
+    add_box(s, (box){{-1.5, -0.2, -1.5}, {1.5, 1.0, 1.5}});
+    vsh_mesh mesh = mesh_of(s);
+    const float floor[8] = {0, 0, 1, 0, 1, 0.9f, 0, 0.9f}; /* but for the topmost tenth */
+    memcpy(s->uvs, floor, sizeof floor);
+    for (size_t i = 8; i < 8 * s->quads; i += 2) {
+        s->uvs[i + 1] = 0.92f + 0.07f * s->uvs[i + 1];
+    }
+    baked b = bake(&mesh, 32, 0, 1.0);
+    size_t filled = 0;
+    for (size_t i = 0; i < b.samples.count; ++i) {
+        const double *p = b.samples.positions + 3 * i;
+        if (p[1] == 0.0 && fabs(p[0]) < 1.45 && fabs(p[2]) < 1.45) {
+            ++filled;
+            assert_false(is_valid(&b, i));
+            /* half of the sky is hidden beside a wall; nothing is as dark as no value, nor as light as what
+             * is far away */
+            assert_true(b.ao[b.samples.texel[i]] > 0.2f && b.ao[b.samples.texel[i]] < 0.85f);
+        }
+    }
+    assert_true(filled > 5000);
+    free_baked(&b);
+    free(s);
+}
+
+int main(void) {
+    if (!vsh_triangles_available()) {
+        return 0;
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(samples_in_solids_are_invalid_and_no_others_at_every_voxel_size),
+        cmocka_unit_test(lightmaps_are_the_same_for_any_threads),
+        cmocka_unit_test(a_room_of_inward_faces_is_valid_but_where_things_stand),
+        cmocka_unit_test(decals_a_hair_off_a_floor_and_what_lies_under_cloth_are_valid),
+        cmocka_unit_test(an_eye_in_a_head_with_a_hole_is_valid_where_it_is_seen),
+        cmocka_unit_test(flipped_faces_invalidate_no_others),
+        cmocka_unit_test(points_deep_in_a_box_see_no_sky_though_its_triangles_are_far),
+        cmocka_unit_test(invalid_texels_take_the_nearest_value_of_their_chart),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
