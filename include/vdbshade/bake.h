@@ -162,19 +162,25 @@ typedef struct vsh_lightmap {
     const double *ambient; /* [3]: of irradiance: light from all around, linear RGB ≥ 0; NULL: none, and AO
                               darkens all light */
     int32_t bent_space;    /* VSH_BENT_…; in tangent space the texels need vsh_lightmap_options.tangents */
+    float *invalid; /* 1: a chart covers it, but no sample of it is valid; 2: and it is in plain sight, as of
+                       vsh_bake_stats; 0 elsewhere. Not padded */
 } vsh_lightmap;
 
 typedef struct vsh_bake_stats {
     size_t struct_size;
-    uint64_t texels;         /* covered */
-    uint64_t invalid_texels; /* inside another solid or seen from behind: coverage 0, filled from the nearest
-                                valid texel within the padding, or 8 texels where that is more */
+    uint64_t texels;           /* covered */
+    uint64_t invalid_texels;   /* inside a solid or behind a wall: coverage 0, filled from the nearest valid
+                                  texel   of its chart (texels of the same mesh that touch) up to 64 texels off
+                                  along   the chart; where there is none, from the nearest of any within the
+                                  padding, or   8 texels where that is more */
     uint64_t *invalid_by_mesh; /* [mesh_count] of the texels, filled where not NULL */
     vsh_shade_stats shade;     /* added to */
+    uint64_t seen_texels;      /* of the invalid ones: in plain sight, rays from them escape. Of exact methods
+                                  only:      a field does not tell, and leaves it 0 */
 } vsh_bake_stats;
 
 static inline vsh_bake_stats vsh_bake_stats_zero(void) {
-    vsh_bake_stats stats = {sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero()};
+    vsh_bake_stats stats = {sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero(), 0};
     return stats;
 }
 

@@ -27,11 +27,13 @@ static void list(const vsh_lightmap *given, size_t light_count, vshi_halo *halo)
     }
     add(halo, given->ao_error, 1);
     add(halo, given->coverage, 1);
+    add(halo, given->invalid, 1);
 }
 
 double vshi_halo_bytes(const vsh_texels *texels, const vsh_lightmap *given, size_t light_count) {
     size_t floats = (given->ao != NULL) + (given->ao_error != NULL) + (given->coverage != NULL) +
-                    (given->irradiance != NULL ? 3 : 0) + (given->bent != NULL ? 3 : 0);
+                    (given->invalid != NULL) + (given->irradiance != NULL ? 3 : 0) +
+                    (given->bent != NULL ? 3 : 0);
     for (size_t i = 0; i < light_count; ++i) {
         floats += given->shadow != NULL && given->shadow[i] != NULL;
         floats += given->tint != NULL && given->tint[i] != NULL ? 3 : 0;
@@ -86,13 +88,14 @@ static vsh_result take_planes(const vsh_texels *texels, const vsh_lightmap *give
     own->shadow_error = given->shadow_error != NULL ? halo->shadow_error : NULL;
     own->ao_error = next_of(halo, given->ao_error, &next);
     own->coverage = next_of(halo, given->coverage, &next);
+    own->invalid = next_of(halo, given->invalid, &next);
     return VSH_OK;
 }
 
 vsh_result vshi_halo_open(const vsh_texels *texels, const vsh_lightmap *given, size_t light_count,
                           vshi_halo *halo, vsh_error *error) {
     *halo = (vshi_halo){.lightmap = *given};
-    const size_t most = 3 * light_count + 5;
+    const size_t most = 3 * light_count + 6;
     vsh_result result = VSH_OK;
     halo->planes = vshi_take(most, sizeof *halo->planes, "lightmap", &result, error);
     halo->given = vshi_take(most, sizeof *halo->given, "lightmap", &result, error);

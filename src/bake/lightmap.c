@@ -361,6 +361,16 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
     return result;
 }
 
+/* Whether the texel that sample i is the first of is in plain sight, none of whose samples is valid. */
+static bool is_seen(const baking *bake, size_t i) {
+    const vsh_texels *texels = bake->texels;
+    bool seen = false;
+    for (size_t k = i; k < texels->count && texels->texel[k] == texels->texel[i]; ++k) {
+        seen = seen || bake->origins.seen[k] != 0;
+    }
+    return seen;
+}
+
 /* Counts the band's texels without a value, by the mesh of their first sample, and writes the coverage. */
 static size_t finish_coverage(baking *bake) {
     const vsh_texels *texels = bake->texels;
@@ -375,7 +385,12 @@ static size_t finish_coverage(baking *bake) {
             continue;
         }
         if (bake->state[texel - base] == VSHI_TEXEL_INVALID) {
+            const bool seen = is_seen(bake, i);
             ++invalid;
+            bake->stats.seen_texels += seen;
+            if (bake->lightmap->invalid != NULL) {
+                bake->lightmap->invalid[texel - base] = seen ? 2.0f : 1.0f;
+            }
             if (bake->stats.invalid_by_mesh != NULL) {
                 ++bake->stats.invalid_by_mesh[texels->mesh[i]];
             }

@@ -3,6 +3,7 @@
 #include "bake_options.h"
 #include "clock.h"
 #include "field.h"
+#include "invalid.h"
 #include "meshes.h"
 #include "message.h"
 #include "paths.h"
@@ -45,6 +46,11 @@ static int make_folder_of(const char *output) {
 /* What can be refused before anything is read. */
 static int check_files(const cli_bake_settings *settings, const vsh_scene *scene) {
     int code = settings->stats != NULL ? cli_temporary_check(settings->stats) : CLI_OK;
+    if (code == CLI_OK && settings->invalid_picture != NULL) {
+        code = settings->resume
+                   ? cli_usage("--invalid '%s': not together with --resume", settings->invalid_picture)
+                   : cli_invalid_check(settings->invalid_picture);
+    }
     const bool makes = settings->output_folder != NULL || settings->per_object;
     for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
         const char *output = scene->receivers[i].output;
@@ -79,7 +85,8 @@ static cli_receiver_job receiver_job(const bake_work *work, size_t index) {
                               .index = index,
                               .band_rows = work->settings->band_rows,
                               .origin = &work->origin,
-                              .resume = work->settings->resume};
+                              .resume = work->settings->resume,
+                              .invalid_picture = work->settings->invalid_picture};
 }
 
 /* Where its samples are: all of them are made, where they go into memory at once, or looked at in passing. */

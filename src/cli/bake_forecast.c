@@ -100,7 +100,7 @@ static int bake_part(const forecast *f, const vsh_field *field, const vsh_shade_
     vsh_texels_get_info(texels, &info);
     cli_planes planes;
     code = cli_planes_name(&planes, f->scene, info.width, info.height);
-    code = code == CLI_OK ? cli_planes_allocate(&planes, f->scene, info.height, f->run->memory_limit,
+    code = code == CLI_OK ? cli_planes_allocate(&planes, f->scene, info.height, false, f->run->memory_limit,
                                                 f->scene->receivers[0].output)
                           : code;
     if (code == CLI_OK) {

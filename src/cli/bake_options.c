@@ -26,7 +26,9 @@ enum {
     KEY_NO_RECEIVE,
     KEY_NO_CAST,
     KEY_PER_OBJECT,
-    KEY_ALLOW_OVERLAP
+    KEY_ALLOW_OVERLAP,
+    KEY_INVALID,
+    KEY_INVALID_CHANNEL
 };
 
 static const cli_option options[] = {
@@ -48,6 +50,10 @@ static const cli_option options[] = {
      "the irradiance, or shadow * ao in grey (irradiance or\n"
      "the first three but A to R, G, B; A to A; EXR: all by\n"
      "name and the picture; channels: without the picture)"},
+    {KEY_INVALID, "invalid", "FILE.png",
+     "also a picture of the lightmap: charts grey, texels\ninside solids or behind walls red, those of them "
+     "in\nplain sight yellow; FILE.OUT.png where there are\nseveral outputs"},
+    {KEY_INVALID_CHANNEL, "invalid-channel", NULL, "also the channel invalid: 1 for such texels, else 0"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {KEY_DRY_RUN, "dry-run", NULL,
      "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},
@@ -222,6 +228,12 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_ALLOW_OVERLAP:
         s->allow_overlap = true;
+        return CLI_OK;
+    case KEY_INVALID:
+        s->invalid_picture = value;
+        return CLI_OK;
+    case KEY_INVALID_CHANNEL:
+        s->invalid = true;
         return CLI_OK;
     case KEY_STATS:
         s->stats = value;

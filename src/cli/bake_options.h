@@ -73,8 +73,9 @@ typedef struct cli_bake_settings {
     const char *output;
     const char *output_folder; /* for the outputs of a scene, by their names; NULL: where it says */
     cli_patterns receive, no_receive, no_cast;
-    bool per_object, allow_overlap;
+    bool per_object, allow_overlap, invalid;
     const char *stats;
+    const char *invalid_picture; /* NULL: none */
     cli_common common;
     cli_grid_settings grid;
     double sun[3];

@@ -279,6 +279,7 @@ static int set_accuracy(const cli_bake_settings *s, vsh_scene *scene) {
     shade->frame = s->has_frame ? s->frame : shade->frame;
     shade->early_rays = s->has_early_rays ? s->early_rays : shade->early_rays;
     scene->error = scene->error || s->error;
+    scene->invalid = scene->invalid || s->invalid;
     const char *option = s->has_rays         ? "--rays"
                          : s->has_sampler    ? "--sampler"
                          : s->has_frame      ? "--frame"

@@ -58,6 +58,9 @@ static void name_channels(cli_planes *planes, const vsh_scene *scene) {
         snprintf(name, sizeof name, "tint.%s", scene->lights[i].name);
         name_triple(planes, &at, name, "RGB");
     }
+    if (scene->invalid) {
+        snprintf(planes->names[at++], VSH_CHANNEL_NAME, "invalid");
+    }
     snprintf(planes->names[at++], VSH_CHANNEL_NAME, "A");
 }
 
@@ -65,7 +68,7 @@ int cli_planes_name(cli_planes *planes, const vsh_scene *scene, int32_t width, i
     memset(planes, 0, sizeof *planes);
     const size_t interleaved = (size_t)cli_planes_interleaved(scene);
     const size_t count = scene->light_count * (has_light_errors(scene) ? 2 : 1) + (scene->ao ? 1 : 0) +
-                         (has_ao_error(scene) ? 1 : 0) + interleaved + 1;
+                         (has_ao_error(scene) ? 1 : 0) + interleaved + (scene->invalid ? 1 : 0) + 1;
     if (count > VSH_MAX_CHANNELS) {
         return cli_usage("scene: %zu channels, at most %d", count, VSH_MAX_CHANNELS);
     }
@@ -104,6 +107,7 @@ static void fill_lightmap(cli_planes *planes, const vsh_scene *scene) {
         lightmap->ao_error = *next;
     }
     lightmap->coverage = planes->planes[planes->image.channel_count - 1];
+    lightmap->invalid = planes->invalid;
     const cli_triple *triple = planes->triples;
     if (scene->irradiance) {
         lightmap->irradiance = (triple++)->values;
@@ -122,12 +126,12 @@ static void fill_lightmap(cli_planes *planes, const vsh_scene *scene) {
     }
 }
 
-int cli_planes_allocate(cli_planes *planes, const vsh_scene *scene, int32_t rows, uint64_t limit,
-                        const char *output) {
+int cli_planes_allocate(cli_planes *planes, const vsh_scene *scene, int32_t rows, bool invalid,
+                        uint64_t limit, const char *output) {
     const size_t count = (size_t)planes->image.channel_count;
     const size_t texels = (size_t)planes->image.width * (size_t)rows; /* at most 2^32 */
-    const double bytes =
-        (double)texels * sizeof(float) * ((double)count + 3.0 * (double)planes->triple_count);
+    const double bytes = (double)texels * sizeof(float) *
+                         ((double)count + 3.0 * (double)planes->triple_count + (invalid ? 1.0 : 0.0));
     if (bytes > (double)SIZE_MAX / 2.0 || (limit > 0 && bytes > (double)limit)) {
         char need[32], have[32];
         cli_say("%s: %d × %d texels in %zu channels need %s; the memory limit is %s", output,
@@ -148,6 +152,9 @@ int cli_planes_allocate(cli_planes *planes, const vsh_scene *scene, int32_t rows
             return cli_out_of_memory(output);
         }
     }
+    if (invalid && (planes->invalid = calloc(texels, sizeof(float))) == NULL) {
+        return cli_out_of_memory(output);
+    }
     fill_lightmap(planes, scene);
     return CLI_OK;
 }
@@ -162,6 +169,11 @@ void cli_planes_split(cli_planes *planes) {
             }
         }
     }
+    const size_t last = (size_t)planes->image.channel_count - 1;
+    const bool channel = last > 0 && strcmp(planes->names[last - 1], "invalid") == 0;
+    for (size_t i = 0; channel && planes->invalid != NULL && i < texels; ++i) {
+        planes->planes[last - 1][i] = planes->invalid[i] > 0.0f ? 1.0f : 0.0f;
+    }
 }
 
 void cli_planes_free(cli_planes *planes) {
@@ -171,6 +183,7 @@ void cli_planes_free(cli_planes *planes) {
     for (int32_t i = 0; planes->planes != NULL && i < planes->image.channel_count; ++i) {
         free(planes->planes[i]);
     }
+    free(planes->invalid);
     free(planes->tints);
     free(planes->triples);
     free(planes->planes);

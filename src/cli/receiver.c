@@ -1,6 +1,7 @@
 #include "receiver.h"
 
 #include "clock.h"
+#include "invalid.h"
 #include "message.h"
 #include "overall.h"
 #include "planes.h"
@@ -78,6 +79,23 @@ static int check_overlap(const cli_receiver_job *job, const vsh_uv_report *repor
         worst->other_texels, worst->other_mesh_texels, object_name(&job->meshes[worst->other_mesh]));
 }
 
+/* Charts that cover no texel's centre: why. */
+static int refuse_empty(const cli_receiver_job *job, const vsh_uv_report *reports) {
+    const vsh_receiver *receiver = &job->scene->receivers[job->index];
+    size_t triangles = 0, outside = 0, flat = 0;
+    for (size_t m = 0; m < job->mesh_count; ++m) {
+        triangles += job->meshes[m].triangle_count;
+        outside += reports[m].outside_triangles;
+        flat += reports[m].degenerate_triangles;
+    }
+    return cli_usage(
+        "%s: nothing to bake: the UVs of its %zu triangles cover none of %d × %d texels; %zu have no "
+        "area in the UV set, %zu leave the unit square; %s",
+        receiver->path, triangles, receiver->width, receiver->height, flat, outside,
+        flat + outside > 0 ? "choose another set with --uv-set, or unwrap it anew"
+                           : "raise --size, or unwrap it anew");
+}
+
 static vsh_image_options image_options(const vsh_receiver *receiver) {
     vsh_image_options options = vsh_image_options_default();
     options.bits = receiver->bits;
@@ -126,7 +144,7 @@ int cli_receiver_charts(const cli_receiver_job *job, bool warn, vsh_charts **cha
     } else {
         vsh_charts_info info;
         vsh_charts_get_info(*charts, &info);
-        code = check_overlap(job, reports, info.covered);
+        code = info.covered == 0 ? refuse_empty(job, reports) : check_overlap(job, reports, info.covered);
     }
     for (size_t i = 0; i < count && warn && code == CLI_OK; ++i) {
         warn_uvs(job->run, receiver->path, &meshes[i], &reports[i]);
@@ -143,6 +161,7 @@ int cli_receiver_plan(const cli_receiver_job *job, const vsh_charts *charts, uin
     if (code == CLI_OK) {
         const vsh_image_options options = image_options(receiver);
         cli_bands_need need = cli_bands_need_of(job->scene, &planes.image, receiver->output, &options);
+        need.channels += (job->invalid_picture != NULL ? 4 : 0) + (job->scene->invalid ? 1 : 0);
         need.held = held;
         need.limit = job->run->memory_limit;
         need.rows = job->band_rows;
@@ -166,17 +185,11 @@ int cli_receiver_texels(const vsh_charts *charts, int32_t first, int32_t rows, c
 
 static void warn_stats(const cli_receiver_job *job, const vsh_bake_stats *baked) {
     const vsh_receiver *receiver = &job->scene->receivers[job->index];
-    const vsh_mesh *meshes = job->meshes;
-    const size_t count = job->mesh_count;
+    const vsh_scene *scene = job->scene;
+    const bool marched = (scene->light_count > 0 && scene->shade.method != VSH_SHADOW_EXACT) ||
+                         (scene->ao && scene->shade.ao_method != VSH_AO_EXACT);
     char line[1024];
-    for (size_t i = 0; i < count; ++i) {
-        if (baked->invalid_by_mesh[i] > 0) {
-            snprintf(line, sizeof line,
-                     "%s: mesh '%s': %" PRIu64 " texels are invalid (inside a solid or seen from behind)",
-                     receiver->path, meshes[i].name != NULL ? meshes[i].name : "", baked->invalid_by_mesh[i]);
-            warn_line(job->run, line);
-        }
-    }
+    cli_invalid_warn(job->run, receiver->path, job->meshes, job->mesh_count, baked, !marched);
     if (baked->shade.unfinished > 0) {
         snprintf(line, sizeof line, "%s: %" PRIu64 " of %" PRIu64 " marches ran out of %d steps",
                  receiver->path, baked->shade.unfinished, baked->shade.marches, job->scene->shade.max_steps);
@@ -228,6 +241,7 @@ typedef struct receiver_work {
     size_t mesh_count;
     cli_overall overall;      /* where there are several bands */
     vsh_image_writer *writer; /* NULL: no row has been written */
+    cli_invalid picture;
     cli_resume resume;
 } receiver_work;
 
@@ -254,6 +268,7 @@ static int bake_band(receiver_work *work, int32_t first, int32_t rows, const vsh
     }
     work->baked.texels += band.texels;
     work->baked.invalid_texels += band.invalid_texels;
+    work->baked.seen_texels += band.seen_texels;
     work->baked.shade = band.shade;
     for (size_t m = 0; m < work->mesh_count; ++m) {
         work->baked.invalid_by_mesh[m] += band.invalid_by_mesh[m];
@@ -282,7 +297,20 @@ static int write_band(receiver_work *work, int32_t rows) {
     if (result == VSH_OK) {
         result = vsh_image_writer_add(work->writer, rows, work->planes.image.planes, &error);
     }
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return result != VSH_OK
+               ? cli_fail(&error)
+               : cli_invalid_add(&work->picture, rows, work->planes.invalid, work->planes.lightmap.coverage);
+}
+
+/* A lightmap without one valid texel is no lightmap. */
+static int check_valid(const receiver_work *work) {
+    const vsh_bake_stats *baked = &work->baked;
+    return baked->texels == 0 || baked->invalid_texels < baked->texels
+               ? CLI_OK
+               : cli_usage("%s: nothing to bake: all %" PRIu64
+                           " texels are inside solids or behind walls; 'vdbshade info' tells what is taken "
+                           "for solid; is it to receive at all, or does what surrounds it cast?",
+                           work->job->scene->receivers[work->job->index].path, baked->texels);
 }
 
 static int finish_image(receiver_work *work, int code) {
@@ -326,6 +354,7 @@ static int bake_bands(receiver_work *work) {
         now = cli_stats_stage(work->stats, CLI_STAGE_BAKE, now);
         if (code == CLI_OK && left <= bands->rows) {
             warn_stats(job, &work->baked);
+            code = check_valid(work);
         }
         code = code == CLI_OK ? write_band(work, rows) : code;
         cli_stats_stage(work->stats, CLI_STAGE_WRITE, now);
@@ -346,8 +375,14 @@ int cli_receiver_bake(const cli_receiver_job *job, const cli_receiver_input *inp
                           .mesh_count = job->mesh_count};
     int code = cli_planes_name(&work.planes, scene, receiver->width, receiver->height);
     if (code == CLI_OK) {
-        code = cli_planes_allocate(&work.planes, scene, input->bands.rows, job->run->memory_limit,
+        code = cli_planes_allocate(&work.planes, scene, input->bands.rows,
+                                   job->invalid_picture != NULL || scene->invalid, job->run->memory_limit,
                                    receiver->output);
+    }
+    if (code == CLI_OK) {
+        code =
+            cli_invalid_open(&work.picture, job->invalid_picture, receiver->output, scene->receiver_count > 1,
+                             receiver->width, receiver->height, input->bands.rows);
     }
     work.invalid = calloc(work.mesh_count, sizeof *work.invalid);
     work.baked.invalid_by_mesh = calloc(work.mesh_count, sizeof *work.baked.invalid_by_mesh);
@@ -365,6 +400,7 @@ int cli_receiver_bake(const cli_receiver_job *job, const cli_receiver_input *inp
         code = finish_image(&work, code);
         cli_stats_stage(stats, CLI_STAGE_WRITE, now);
     }
+    code = cli_invalid_close(&work.picture, code);
     cli_resume_close(&work.resume, receiver->output, receiver->height, code);
     if (code == CLI_OK) {
         add_stats(stats, &work.baked);

@@ -16,11 +16,12 @@ typedef struct cli_receiver_job {
     const vsh_mesh *meshes; /* of the receiver */
     size_t mesh_count;
     const vsh_run *run;
-    size_t index;             /* of the receiver */
-    int32_t band_rows;        /* wanted; 0: as many as go */
-    const cli_origin *origin; /* of its file; NULL where none is written */
-    bool resume;              /* bands are kept, and taken where they are there */
-    bool allow_overlap;       /* whatever the receiver says of it */
+    size_t index;                /* of the receiver */
+    int32_t band_rows;           /* wanted; 0: as many as go */
+    const cli_origin *origin;    /* of its file; NULL where none is written */
+    bool resume;                 /* bands are kept, and taken where they are there */
+    const char *invalid_picture; /* as of cli_invalid_open(); NULL: none */
+    bool allow_overlap;          /* whatever the receiver says of it */
 } cli_receiver_job;
 
 /* Whether its image can be written. Needs no assets. CLI_OK or an exit code, having said why. */

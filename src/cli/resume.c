@@ -12,7 +12,7 @@
 /* Before every band. All of the file is of the machine's own byte order: it is of one bake on one machine. */
 typedef struct band_head {
     int32_t first, rows;
-    uint64_t texels, invalid_texels;
+    uint64_t texels, invalid_texels, seen_texels;
     vsh_shade_stats shade;
     uint64_t checksum; /* of what follows: invalid_by_mesh, then the planes */
 } band_head;
@@ -139,6 +139,7 @@ static bool read_band(cli_resume *r, const band_head *want, cli_planes *planes, 
     }
     stats->texels = head.texels;
     stats->invalid_texels = head.invalid_texels;
+    stats->seen_texels = head.seen_texels;
     stats->shade = head.shade;
     memcpy(stats->invalid_by_mesh, invalid, mesh_count * sizeof *invalid);
     return true;
@@ -177,6 +178,7 @@ void cli_resume_keep(cli_resume *r, int32_t first, int32_t rows, const cli_plane
     head.rows = rows;
     head.texels = stats->texels;
     head.invalid_texels = stats->invalid_texels;
+    head.seen_texels = stats->seen_texels;
     head.shade = stats->shade;
     head.checksum = checksum(planes, texels, stats->invalid_by_mesh, mesh_count);
     bool good = fwrite(&head, sizeof head, 1, r->file) == 1 &&
