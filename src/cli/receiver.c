@@ -353,8 +353,10 @@ static int bake_bands(receiver_work *work) {
         }
         now = cli_stats_stage(work->stats, CLI_STAGE_BAKE, now);
         if (code == CLI_OK && left <= bands->rows) {
-            warn_stats(job, &work->baked);
             code = check_valid(work);
+        }
+        if (code == CLI_OK && left <= bands->rows) {
+            warn_stats(job, &work->baked);
         }
         code = code == CLI_OK ? write_band(work, rows) : code;
         cli_stats_stage(work->stats, CLI_STAGE_WRITE, now);

@@ -1,0 +1,62 @@
+# Texels that are not valid: shown, counted and told of; and bakes of nothing.
+load helper
+
+@test "a picture and a channel show the texels that are in another solid, and one line tells of them" {
+    write_box box.obj
+    awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
+    shade bake box.obj --caster above.obj --ao 0.5 --method exact --ao-method exact --size 64 --resolution 24 \
+        -o box.exr --invalid where.png --invalid-channel
+    done_well
+    [[ $stderr == *"texels are invalid (inside a solid or behind a wall)"*"none in plain sight"*"--invalid"* ]] ||
+        fail "not told"
+    run -0 "$VDBSHADE" info box.exr
+    [[ $output == *"'invalid': min 0, "*", max 1"* ]]
+    run -0 "$VDBSHADE" info where.png
+    [[ $output == *"64 × 64"* ]]
+    [[ $output == *"'R'"*"'G'"*"'B'"* ]]
+    no_leftovers
+}
+
+@test "bands give the same channel of invalid texels" {
+    write_box box.obj
+    awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
+    options=(--caster above.obj --ao 0.5 --method exact --ao-method exact --size 64 --resolution 24
+        --invalid-channel --quiet)
+    shade bake box.obj "${options[@]}" -o whole.exr
+    done_well
+    shade bake box.obj "${options[@]}" --band-rows 8 -o bands.exr --invalid bands.png
+    done_well
+    shade bake box.obj "${options[@]}" -o whole.exr --invalid whole.png
+    same_values whole.exr bands.exr
+    cmp whole.png bands.png
+}
+
+@test "a bake whose every texel is in a solid is refused, and the old output stays" {
+    write_box box.obj
+    awk '$1 == "v" { print "v", 3 * $2 - 1, 3 * $3 - 1, 3 * $4 - 1; next } { print }' box.obj >around.obj
+    old_output out.exr
+    shade bake box.obj --caster around.obj --ao 0.5 --method exact --ao-method exact --size 32 --resolution 24 \
+        -o out.exr
+    refused 2 box.obj "inside solids" info
+    untouched out.exr
+}
+
+@test "a bake of no texel is refused: UVs without area, or all outside the square" {
+    write_box box.obj
+    old_output out.exr
+    sed 's/^vt .*/vt 0.5 0.5/' box.obj >flat.obj
+    shade bake flat.obj "${SMALL[@]}" -o out.exr
+    refused 2 flat.obj "cover none of 32 × 32 texels" "no area" "--uv-set"
+    awk '$1 == "vt" { print "vt", $2 + 2, $3; next } { print }' box.obj >far.obj
+    shade bake far.obj "${SMALL[@]}" -o out.exr
+    refused 2 far.obj "cover none of 32 × 32 texels" "leave the unit square"
+    untouched out.exr
+}
+
+@test "the picture is a PNG, and does not go on where another bake ended" {
+    write_box box.obj
+    shade bake box.obj "${SMALL[@]}" -o out.exr --invalid where.jpg
+    refused 2 --invalid where.jpg .png
+    shade bake box.obj "${SMALL[@]}" -o out.exr --invalid where.png --resume
+    refused 2 --invalid --resume
+}
