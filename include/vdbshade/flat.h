@@ -103,9 +103,10 @@ typedef struct vsh_flat_scene {
     const vsh_light *lights; /* no two names alike, none empty: channels are named after them */
     size_t light_count;
     vsh_flat_options options;
-    const char *output; /* image file; NULL: none is named */
-    int32_t bits;       /* as in vsh_image_options */
-    const char *pack;   /* as in vsh_image_options; may be NULL */
+    const char *output;  /* image file; NULL: none is named */
+    int32_t bits;        /* as in vsh_image_options */
+    const char *pack;    /* as in vsh_image_options; may be NULL */
+    int32_t color_space; /* as in vsh_image_options */
 } vsh_flat_scene;
 
 /* Reads a flat scene's file (docs/flat.md); what it names is not opened. The scene and all it points to

@@ -25,6 +25,21 @@ typedef struct vsh_image {
     const float *const *planes; /* [channel_count][height × width], row 0 on top */
 } vsh_image;
 
+/* What R, G and B of integers stand for. Programs take R, G and B of 8 and of 16 bits for sRGB, unless they
+ * are told that they are data. */
+enum {
+    VSH_COLOR_AUTO = 0, /* sRGB where all of R, G and B are light (irradiance.… and tint.…), else linear */
+    VSH_COLOR_LINEAR = 1, /* as they are */
+    VSH_COLOR_SRGB = 2,   /* through the curve of IEC 61966-2-1 */
+    VSH_COLOR_ENCODED = 3 /* the caller's values have gone through it: the file only says so */
+};
+
+/* "auto", "linear", "srgb", "encoded"; NULL for other numbers. */
+VSH_API const char *vsh_color_space_name(int32_t color_space);
+
+/* Takes the sRGB curve off a value of 0 … 1. */
+VSH_API double vsh_srgb_to_linear(double encoded);
+
 typedef struct vsh_image_options {
     size_t struct_size;
     int32_t bits; /* of a value: 8 and 16 are integers (16 in EXR: half float), 32 is float; 0: 32 for EXR,
@@ -40,17 +55,19 @@ typedef struct vsh_image_options {
     const vsh_attribute *attributes; /* [attribute_count]: written as string attributes into EXR and as text
                                         into PNG; other formats have no place for them */
     size_t attribute_count;
+    int32_t color_space; /* VSH_COLOR_…: of R, G and B in integers. A is linear, and so is all of floats */
 } vsh_image_options;
 
 static inline vsh_image_options vsh_image_options_default(void) {
-    vsh_image_options options = {sizeof(vsh_image_options), 0, NULL, NULL, 0};
+    vsh_image_options options = {sizeof(vsh_image_options), 0, NULL, NULL, 0, VSH_COLOR_AUTO};
     return options;
 }
 
 /* Writes an image; the ending of `path`, in any case, chooses the format (docs/formats.md lists them).
- * Integer formats clamp to 0 … 1 and round to nearest, NaN to 0, with no transfer curve; channels whose name
- * begins with "bent." hold -1 … 1, and go into integers as (1 + x) / 2. Atomic: written
- * beside `path` and renamed, so a failure leaves an old file alone. Errors:
+ * Integer formats clamp to 0 … 1 and round to nearest, NaN to 0, with the curve that options->color_space
+ * says; PNG files tell it in their text "vdbshade_color_space" ("sRGB" or "linear"), and sRGB in PNG's,
+ * TIFF's and JPEG's own way too. Channels whose name begins with "bent." hold -1 … 1, and go into integers as
+ * (1 + x) / 2. Atomic: written beside `path` and renamed, so a failure leaves an old file alone. Errors:
  * - VSH_ERROR_ARGUMENT: path NULL or empty, no image, sizes or channels out of range, a plane NULL,
  *   options; attributes other than vsh_attribute says; an unknown ending; bits, a pack or a size that the
  * format does not have;
@@ -77,6 +94,17 @@ VSH_API vsh_result vsh_image_writer_create(const char *path, const vsh_image *im
  * VSH_ERROR_MEMORY; after one, nothing but vsh_image_writer_abandon() is of use. */
 VSH_API vsh_result vsh_image_writer_add(vsh_image_writer *writer, int32_t rows, const float *const *planes,
                                         vsh_error *error);
+
+/* Light that integers cut, of the rows so far. */
+typedef struct vsh_image_clipping {
+    uint64_t texels;  /* whose A is above 0, where the image has one; 0 where no light goes into integers */
+    uint64_t clipped; /* of them with R, G or B over 1 */
+    float largest;    /* value of R, G and B of these texels, 0 … infinite */
+} vsh_image_clipping;
+
+/* Errors: VSH_ERROR_ARGUMENT (an argument is NULL). */
+VSH_API vsh_result vsh_image_writer_get_clipping(const vsh_image_writer *writer, vsh_image_clipping *clipping,
+                                                 vsh_error *error);
 
 /* Puts the file in place and frees the writer, also where it fails; the old file is then as it was. Errors:
  * VSH_ERROR_ARGUMENT (rows are missing), and as vsh_image_writer_add(). */

@@ -92,6 +92,7 @@ typedef struct vsh_receiver {
                         as long as one has them */
     int32_t allow_overlap; /* nonzero: objects whose UVs lie over each other are meant so (vdbshade bake then
                               does not refuse them) */
+    int32_t color_space;   /* as in vsh_image_options */
 } vsh_receiver;
 
 /* A whole scene, read from a file or filled by the caller. Paths are as the system takes them (the reader has

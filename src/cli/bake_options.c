@@ -18,6 +18,7 @@ enum {
     KEY_BAND_ROWS,
     KEY_BITS,
     KEY_PACK,
+    KEY_COLOR_SPACE,
     KEY_STATS,
     KEY_DRY_RUN,
     KEY_RESUME,
@@ -54,6 +55,9 @@ static const cli_option options[] = {
      "also a picture of the lightmap: charts grey, texels\ninside solids or behind walls red, those of them "
      "in\nplain sight yellow; FILE.OUT.png where there are\nseveral outputs"},
     {KEY_INVALID_CHANNEL, "invalid-channel", NULL, "also the channel invalid: 1 for such texels, else 0"},
+    {KEY_COLOR_SPACE, "color-space", "SPACE",
+     "of R, G, B in 8 and 16 bits: srgb or linear (auto:\n"
+     "srgb for irradiance and tints, linear for the rest)"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {KEY_DRY_RUN, "dry-run", NULL,
      "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},
@@ -282,6 +286,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_PACK:
         s->pack = value;
         return CLI_OK;
+    case KEY_COLOR_SPACE:
+        s->has_color_space = true;
+        return cli_take_color_space(name, value, &s->color_space);
     default:
         break;
     }

@@ -96,11 +96,13 @@ typedef struct cli_bake_settings {
     int32_t ao_spacing;
     int32_t band_rows; /* 0: as many as go */
     int32_t bits;
+    int32_t color_space; /* VSH_COLOR_… */
     const char *pack;
     const char *casters[CLI_MAX_EXTRA_CASTERS];
     size_t caster_count;
     bool has_sun, has_sun_angle, has_ao, has_ao_method, has_ao_cones, has_method, has_size, has_uv_set;
-    bool has_supersample, has_padding, has_ao_spacing, has_bits, irradiance, has_tint, has_ambient;
+    bool has_supersample, has_padding, has_ao_spacing, has_bits, has_color_space, irradiance, has_tint,
+        has_ambient;
     bool dry_run, resume;
     bool has_rays, has_sampler, has_frame, has_early_rays, has_max_error, has_jitter, error;
 } cli_bake_settings;

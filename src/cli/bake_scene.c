@@ -79,6 +79,9 @@ static void override_receiver(const cli_bake_settings *s, vsh_receiver *receiver
     if (s->pack != NULL) {
         receiver->pack = s->pack;
     }
+    if (s->has_color_space) {
+        receiver->color_space = s->color_space;
+    }
 }
 
 static void free_outputs(cli_bake_scene *made) {

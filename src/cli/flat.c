@@ -1,4 +1,5 @@
 /* vdbshade flat: light maps of a plane, for 2D games. */
+#include "clipping.h"
 #include "clock.h"
 #include "commands.h"
 #include "message.h"
@@ -13,14 +14,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { KEY_SIZE = 0x2000, KEY_METHOD, KEY_SUPERSAMPLE, KEY_PADDING, KEY_BITS, KEY_PACK, KEY_STATS };
+enum {
+    KEY_SIZE = 0x2000,
+    KEY_METHOD,
+    KEY_SUPERSAMPLE,
+    KEY_PADDING,
+    KEY_BITS,
+    KEY_PACK,
+    KEY_COLOR_SPACE,
+    KEY_STATS
+};
 
 typedef struct flat_settings {
     const char *input, *output, *stats, *pack;
     cli_common common;
     vsh_flat_options options;
-    int32_t bits;
-    bool has_size, has_method, has_supersample, has_padding, has_bits;
+    int32_t bits, color_space;
+    bool has_color_space, has_size, has_method, has_supersample, has_padding, has_bits;
 } flat_settings;
 
 static const cli_option options[] = {
@@ -31,6 +41,8 @@ static const cli_option options[] = {
      "8, 16 or 32 bits a channel (32 for EXR, else 16\nwhere the format has it, else 8)"},
     {KEY_PACK, "pack", "R=NAME,…",
      "what goes where in formats that cannot name channels\n(irradiance.R, .G and .B to R, G, B; A to A)"},
+    {KEY_COLOR_SPACE, "color-space", "SPACE",
+     "of R, G, B in 8 and 16 bits: srgb or linear (auto:\nsrgb for irradiance, linear for shadows)"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {0, NULL, NULL, "Texels"},
     {KEY_METHOD, "method", "NAME", "exact, classic (outer half of the penumbra only) or hard\n(exact)"},
@@ -76,6 +88,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_PACK:
         s->pack = value;
         return CLI_OK;
+    case KEY_COLOR_SPACE:
+        s->has_color_space = true;
+        return cli_take_color_space(name, value, &s->color_space);
     case KEY_STATS:
         s->stats = value;
         return CLI_OK;
@@ -98,6 +113,7 @@ static int apply(const flat_settings *s, vsh_flat_scene *scene) {
     scene->output = s->output != NULL ? s->output : scene->output;
     scene->bits = s->has_bits ? s->bits : scene->bits;
     scene->pack = s->pack != NULL ? s->pack : scene->pack;
+    scene->color_space = s->has_color_space ? s->color_space : scene->color_space;
     return scene->output != NULL ? CLI_OK : cli_usage("%s: no output; give -o OUT", s->input);
 }
 
@@ -228,8 +244,14 @@ static int write_map(const flat_settings *s, const vsh_flat_scene *scene, const 
     told.attribute_count = origin.count;
     vsh_error error;
     cli_signals_writing(scene->output);
-    if (code == CLI_OK && vsh_image_write(scene->output, &planes->image, &told, &error) != VSH_OK) {
+    vsh_image_writer *writer = NULL;
+    if (code == CLI_OK &&
+        (vsh_image_writer_create(scene->output, &planes->image, &told, &writer, &error) != VSH_OK ||
+         vsh_image_writer_add(writer, planes->image.height, planes->image.planes, &error) != VSH_OK)) {
+        vsh_image_writer_abandon(writer);
         code = cli_fail(&error);
+    } else if (code == CLI_OK) {
+        code = cli_finish_image(writer, scene->output);
     }
     cli_signals_writing(NULL);
     cli_origin_free(&origin);
@@ -275,6 +297,7 @@ static int run_flat(const flat_settings *s, const vsh_flat_scene *scene) {
     vsh_image_options image = vsh_image_options_default();
     image.bits = scene->bits;
     image.pack = scene->pack;
+    image.color_space = scene->color_space;
     flat_planes planes = {.count = 0};
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, s->common.threads);
     stats.texels = (uint64_t)scene->options.width * (uint64_t)scene->options.height;

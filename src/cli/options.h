@@ -55,7 +55,8 @@ int cli_take_box(const char *name, const char *text, double min[3], double max[3
 int cli_take_size(const char *name, const char *text, int32_t *w, int32_t *h);      /* W[xH] */
 int cli_take_bytes(const char *name, const char *text, uint64_t *value);            /* 500M, 2GiB */
 
-int cli_take_bits(const char *name, const char *text, int32_t *bits); /* 8, 16, 32 */
+int cli_take_bits(const char *name, const char *text, int32_t *bits);         /* 8, 16, 32 */
+int cli_take_color_space(const char *name, const char *text, int32_t *space); /* VSH_COLOR_… */
 
 /* A name out of the library's list, or an error that shows the list. */
 int cli_take_name(const char *name, const char *text, int32_t (*value_of)(const char *),

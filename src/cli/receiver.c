@@ -1,5 +1,6 @@
 #include "receiver.h"
 
+#include "clipping.h"
 #include "clock.h"
 #include "invalid.h"
 #include "message.h"
@@ -100,6 +101,7 @@ static vsh_image_options image_options(const vsh_receiver *receiver) {
     vsh_image_options options = vsh_image_options_default();
     options.bits = receiver->bits;
     options.pack = receiver->pack;
+    options.color_space = receiver->color_space;
     return options;
 }
 
@@ -314,11 +316,10 @@ static int check_valid(const receiver_work *work) {
 }
 
 static int finish_image(receiver_work *work, int code) {
-    vsh_error error;
     if (code != CLI_OK) {
         vsh_image_writer_abandon(work->writer);
-    } else if (vsh_image_writer_finish(work->writer, &error) != VSH_OK) {
-        code = cli_fail(&error);
+    } else {
+        code = cli_finish_image(work->writer, work->job->scene->receivers[work->job->index].output);
     }
     cli_signals_writing(NULL);
     return code;

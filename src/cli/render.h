@@ -57,6 +57,7 @@ typedef struct render_lightmap {
     vsh_image image;
     const char *names[VSH_MAX_CHANNELS]; /* as a pack has it */
     const float *planes[VSH_MAX_CHANNELS];
+    float *linear; /* of R, G and B, where the file says that they are sRGB; else NULL */
     char text[VSH_CHANNEL_NAME * 4];
 } render_lightmap;
 

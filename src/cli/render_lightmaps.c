@@ -2,12 +2,19 @@
 #include "message.h"
 #include "render.h"
 
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* Names the channels R, G, B, A (Y: R) as a pack says: "R=shadow.sun,G=ao". */
 static int unpack(const char *pack, const char *path, render_lightmap *map) {
-    const vsh_image read = vsh_image_view(map->file);
+    const char *names[VSH_MAX_CHANNELS];
+    const float *planes[VSH_MAX_CHANNELS];
+    vsh_image read = map->image;
+    memcpy(names, read.names, (size_t)read.channel_count * sizeof *names);
+    memcpy(planes, read.planes, (size_t)read.channel_count * sizeof *planes);
+    read.names = names;
+    read.planes = planes;
     if (strlen(pack) >= sizeof map->text) {
         return cli_usage("--lightmap-pack '%s': is too long", pack);
     }
@@ -36,6 +43,40 @@ static int unpack(const char *pack, const char *path, render_lightmap *map) {
         map->names[at] = name + 1;
         map->planes[at] = plane;
         ++map->image.channel_count;
+    }
+    return CLI_OK;
+}
+
+static bool says_srgb(const vsh_image_file *file) {
+    size_t count = 0;
+    const vsh_attribute *attributes = vsh_image_attributes(file, &count);
+    bool says = false;
+    for (size_t i = 0; i < count && !says; ++i) {
+        says = strcmp(attributes[i].name, "vdbshade_color_space") == 0 &&
+               strcmp(attributes[i].value, "sRGB") == 0;
+    }
+    return says;
+}
+
+/* Takes the curve off what a PNG of ours says is sRGB: R, G and B. The image is then one of map->planes. */
+static int decode(render_lightmap *map) {
+    const vsh_image read = map->image;
+    const size_t texels = (size_t)read.width * (size_t)read.height;
+    map->linear = malloc(3 * texels * sizeof *map->linear);
+    if (map->linear == NULL) {
+        return cli_out_of_memory("lightmaps");
+    }
+    map->image.names = map->names;
+    map->image.planes = map->planes;
+    for (int32_t c = 0; c < read.channel_count; ++c) {
+        static const char rgb[] = "RGB";
+        const char *name = read.names[c], *at = name[1] == '\0' ? strchr(rgb, name[0]) : NULL;
+        float *plane = at != NULL ? map->linear + (size_t)(at - rgb) * texels : NULL;
+        map->names[c] = name;
+        map->planes[c] = plane != NULL ? plane : read.planes[c];
+        for (size_t i = 0; plane != NULL && i < texels; ++i) {
+            plane[i] = (float)vsh_srgb_to_linear((double)read.planes[c][i]);
+        }
     }
     return CLI_OK;
 }
@@ -73,7 +114,8 @@ int render_lightmaps_read(const render_settings *s, const vsh_scene *scene, cons
             return cli_fail(&error);
         }
         map->image = vsh_image_view(map->file);
-        const int code = s->pack != NULL ? unpack(s->pack, s->lightmaps[i], map) : CLI_OK;
+        int code = says_srgb(map->file) ? decode(map) : CLI_OK;
+        code = code == CLI_OK && s->pack != NULL ? unpack(s->pack, s->lightmaps[i], map) : code;
         if (code != CLI_OK) {
             return code;
         }
@@ -87,6 +129,7 @@ int render_lightmaps_read(const render_settings *s, const vsh_scene *scene, cons
 
 void render_lightmaps_free(render_lightmaps *lightmaps) {
     for (size_t i = 0; lightmaps->maps != NULL && i < lightmaps->count; ++i) {
+        free(lightmaps->maps[i].linear);
         vsh_image_free(lightmaps->maps[i].file);
     }
     free(lightmaps->lit);

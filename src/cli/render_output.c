@@ -103,6 +103,7 @@ static int write_image(const char *path, const vsh_image *image, int32_t bits, c
     vsh_image_options options = vsh_image_options_default();
     vsh_error error;
     options.bits = bits;
+    options.color_space = bits == 8 ? VSH_COLOR_ENCODED : VSH_COLOR_AUTO;
     options.attributes = origin->attributes;
     options.attribute_count = origin->count;
     cli_signals_writing(path);

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <vdbshade/image.h>
 
 /* strtod() and strtoll() also take leading blanks. */
 static bool starts_number(const char *text) {
@@ -151,6 +152,16 @@ int cli_take_name(const char *option, const char *text, int32_t (*value_of)(cons
         used += (size_t)snprintf(list + used, sizeof list - used, "%s%s", i > 0 ? ", " : "", name_of(i));
     }
     return cli_usage("%s '%s': expected one of %s", option, text, list);
+}
+
+int cli_take_color_space(const char *name, const char *value, int32_t *space) {
+    for (int32_t i = VSH_COLOR_AUTO; i <= VSH_COLOR_SRGB; ++i) {
+        if (strcmp(value, vsh_color_space_name(i)) == 0) {
+            *space = i;
+            return CLI_OK;
+        }
+    }
+    return cli_usage("%s '%s': expected auto, linear or srgb", name, value);
 }
 
 int cli_take_bits(const char *name, const char *value, int32_t *bits) {

@@ -3,6 +3,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "image/exr.h"
+#include "image/pack.h"
 #include "image/write_plan.h"
 
 #include <stdlib.h>
@@ -17,6 +18,7 @@ struct vsh_image_writer {
     int32_t row; /* next */
     vshi_exr_writer *exr;
     vshi_oiio_writer *oiio;
+    vsh_image_clipping clipping;
 };
 
 static void free_writer(vsh_image_writer *writer) {
@@ -94,6 +96,43 @@ vsh_result vsh_image_writer_create(const char *path, const vsh_image *image, con
     return VSH_OK;
 }
 
+/* Texels of light that integers cut. */
+static void count_clipped(vsh_image_writer *writer, size_t texels, const float *const *planes) {
+    const vshi_planes *list = &writer->plan.planes;
+    const float *light[VSHI_PACK_KEYS];
+    const float *coverage = NULL;
+    int count = 0;
+    for (int32_t p = 0; p < list->count && !writer->plan.exr; ++p) {
+        if (list->planes[p].is_color && list->planes[p].values != NULL && count < VSHI_PACK_KEYS) {
+            light[count++] = list->planes[p].values;
+        }
+    }
+    for (int32_t c = 0; c < writer->channel_count; ++c) {
+        coverage = strcmp(writer->names[c], "A") == 0 ? planes[c] : coverage;
+    }
+    vsh_image_clipping *clipping = &writer->clipping;
+    for (size_t i = 0; i < texels && count > 0; ++i) {
+        if (coverage != NULL && !(coverage[i] > 0.0f)) {
+            continue;
+        }
+        float most = 0.0f;
+        for (int c = 0; c < count; ++c) {
+            most = light[c][i] > most ? light[c][i] : most;
+        }
+        ++clipping->texels;
+        clipping->clipped += most > 1.0f;
+        clipping->largest = most > clipping->largest ? most : clipping->largest;
+    }
+}
+
+vsh_result vsh_image_writer_get_clipping(const vsh_image_writer *writer, vsh_image_clipping *clipping,
+                                         vsh_error *error) {
+    VSHI_NEEDS(writer);
+    VSHI_NEEDS(clipping);
+    *clipping = writer->clipping;
+    return VSH_OK;
+}
+
 vsh_result vsh_image_writer_add(vsh_image_writer *writer, int32_t rows, const float *const *planes,
                                 vsh_error *error) {
     VSHI_FLOATS;
@@ -118,6 +157,7 @@ vsh_result vsh_image_writer_add(vsh_image_writer *writer, int32_t rows, const fl
         list->grey.lights[i] = planes[picture->lights[i]];
     }
     list->grey.ao = picture->ao >= 0 ? planes[picture->ao] : NULL;
+    count_clipped(writer, (size_t)rows * (size_t)list->width, planes);
     const vsh_result result = writer->plan.exr ? vshi_exr_add(writer->exr, list, rows, error)
                                                : vshi_oiio_add(writer->oiio, list, rows, error);
     writer->row += rows;

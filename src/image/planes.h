@@ -20,8 +20,10 @@ typedef struct vshi_plane {
     const char *name;
     const float *values; /* [height × width]; NULL: `constant` everywhere */
     float constant;
-    bool is_signed; /* -1 … 1, of which integers hold the half, and one half */
-    bool is_grey;   /* vshi_grey_at() instead of all of these */
+    bool is_signed;         /* -1 … 1, of which integers hold the half, and one half */
+    bool is_grey;           /* vshi_grey_at() instead of all of these */
+    bool is_color;          /* light: cut where it is over 1 */
+    float (*encode)(float); /* into integers; NULL: as it is */
 } vshi_plane;
 
 /* One picture of several channels: the mean of the lights' shadows, times AO. */
@@ -47,16 +49,17 @@ typedef struct vshi_planes {
     int32_t count;
     vshi_plane planes[VSH_MAX_CHANNELS];
     vshi_grey grey;                  /* where a plane is */
+    bool is_srgb;                    /* R, G and B of integers have the sRGB curve */
     char rgb[2 * VSH_CHANNEL_NAME];  /* what R, G and B are made of, beside channels by name; or empty */
     const vsh_attribute *attributes; /* [attribute_count]: looked at when the file is begun */
     size_t attribute_count;
 } vshi_planes;
 
 static inline float vshi_plane_at(const vshi_planes *planes, const vshi_plane *plane, size_t at) {
-    if (plane->is_grey) {
-        return vshi_grey_at(&planes->grey, at);
-    }
-    return plane->values != NULL ? plane->values[at] : plane->constant;
+    const float value = plane->is_grey          ? vshi_grey_at(&planes->grey, at)
+                        : plane->values != NULL ? plane->values[at]
+                                                : plane->constant;
+    return plane->encode != NULL ? plane->encode(value) : value;
 }
 
 enum { VSHI_FILE_NAME = 256 }; /* EXR's longest channel name is 255 bytes */

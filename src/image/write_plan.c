@@ -4,6 +4,7 @@
 #include "base/attributes.h"
 #include "base/file.h"
 #include "base/job.h"
+#include "base/srgb.h"
 #include "image/pack.h"
 
 #include <string.h>
@@ -216,6 +217,53 @@ static vsh_result plan_planes(const char *path, const vsh_image *image, const ch
     return VSH_OK;
 }
 
+static float encode_srgb(float value) {
+    return (float)vshi_to_srgb((double)value);
+}
+
+static bool begins_with(const char *text, const char *prefix) {
+    return strncmp(text, prefix, strlen(prefix)) == 0;
+}
+
+/* Which planes are light, and which go through a curve. */
+static vsh_result plan_colors(const char *path, const vsh_image *image, int32_t color_space,
+                              vshi_write_plan *plan, vsh_error *error) {
+    if (vsh_color_space_name(color_space) == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: color_space %d is out of range %d … %d", path,
+                         color_space, VSH_COLOR_AUTO, VSH_COLOR_ENCODED);
+    }
+    if (plan->exr || plan->bits == 32) {
+        return color_space != VSH_COLOR_SRGB
+                   ? VSH_OK
+                   : vshi_fail(error, VSH_ERROR_ARGUMENT,
+                               "%s: color space srgb: floats are linear; expected 8 or 16 bits of another "
+                               "format",
+                               path);
+    }
+    vshi_planes *planes = &plan->planes;
+    int32_t lights = 0, others = 0;
+    for (int32_t p = 0; p < planes->count; ++p) {
+        vshi_plane *plane = &planes->planes[p];
+        const int32_t channel = plan->channel[p];
+        const char *name = channel >= 0 ? image->names[channel] : NULL;
+        plane->is_color = name != NULL && (begins_with(name, "irradiance.") || begins_with(name, "tint."));
+        if (strcmp(plane->name, vshi_pack_keys[VSHI_PACK_ALPHA]) != 0) {
+            lights += plane->is_color;
+            others += !plane->is_color && (channel >= 0 || plane->is_grey); /* 0 and 1 are either */
+        }
+    }
+    const bool encode =
+        color_space == VSH_COLOR_SRGB || (color_space == VSH_COLOR_AUTO && lights > 0 && others == 0);
+    planes->is_srgb = encode || color_space == VSH_COLOR_ENCODED;
+    for (int32_t p = 0; p < planes->count && encode; ++p) {
+        vshi_plane *plane = &planes->planes[p];
+        if (!plane->is_signed && strcmp(plane->name, vshi_pack_keys[VSHI_PACK_ALPHA]) != 0) {
+            plane->encode = encode_srgb;
+        }
+    }
+    return VSH_OK;
+}
+
 vsh_result vshi_write_plan_make(const char *path, const vsh_image *image, const vsh_image_options *options,
                                 vshi_write_plan *plan, vsh_error *error) {
     vsh_image_options full = vsh_image_options_default();
@@ -238,6 +286,9 @@ vsh_result vshi_write_plan_make(const char *path, const vsh_image *image, const 
     }
     if (result == VSH_OK) {
         result = plan_planes(path, image, full.pack, plan, error);
+    }
+    if (result == VSH_OK) {
+        result = plan_colors(path, image, full.color_space, plan, error);
     }
     if (result == VSH_OK) {
         plan->planes.attributes = full.attributes;

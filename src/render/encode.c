@@ -1,17 +1,9 @@
-#include "base/elementary.h"
 #include "base/error.h"
 #include "base/floats.h"
+#include "base/srgb.h"
 
 #include <math.h>
 #include <vdbshade/render.h>
-
-/* Of IEC 61966-2-1. */
-static double to_srgb(double linear) {
-    if (!(linear > 0.0)) {
-        return 0.0;
-    }
-    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * vshi_pow(fmin(linear, 1.0), 1.0 / 2.4) - 0.055;
-}
 
 /* A mask whose neighbourhoods hold all levels (J. Jimenez, "Next generation post processing in Call of Duty:
  * Advanced Warfare", 2014: interleaved gradient noise), in [0, 1); channels read it from other places. */
@@ -51,7 +43,7 @@ vsh_result vsh_picture_encode(const vsh_picture *picture, int32_t width, int32_t
                 over = a > LEAST_ALPHA ? gain / a : 0.0;
             }
             for (int c = 0; c < 3; ++c) {
-                const double value = to_srgb(over * (double)picture->color[3 * pixel + (size_t)c]);
+                const double value = vshi_to_srgb(over * (double)picture->color[3 * pixel + (size_t)c]);
                 rgb[c][pixel] = dither(value, mask_at(column, row, c));
             }
         }

@@ -93,6 +93,10 @@ static const vshi_key scene_keys[] = {
     {.name = "output", .kind = VSHI_PATH, .offset = offsetof(vsh_flat_scene, output)},
     {.name = "bits", .kind = VSHI_CUSTOM, .offset = offsetof(vsh_flat_scene, bits), .read = vshi_read_bits},
     {.name = "pack", .kind = VSHI_STRING, .offset = offsetof(vsh_flat_scene, pack)},
+    {.name = "color_space",
+     .kind = VSHI_NAME,
+     .offset = offsetof(vsh_flat_scene, color_space),
+     .name_of = vshi_color_space_key},
 };
 static const vshi_table scene_table = VSHI_TABLE(scene_keys);
 

@@ -27,6 +27,7 @@ vsh_result vshi_read_except(vshi_reader *reader, const vshi_value *value, void *
 vsh_result vshi_read_solid(vshi_reader *reader, const vshi_value *value, void *caster);
 vsh_result vshi_read_shell(vshi_reader *reader, const vshi_value *value, void *caster);
 vsh_result vshi_read_inward(vshi_reader *reader, const vshi_value *value, void *caster);
+const char *vshi_color_space_key(int32_t i); /* names of color_space; NULL behind the last */
 vsh_result vshi_read_bits(vshi_reader *reader, const vshi_value *value, void *bits); /* int32_t */
 
 /* Fails where two lights of the array `value` have one name. */

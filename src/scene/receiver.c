@@ -37,6 +37,10 @@ vsh_result vshi_read_bits(vshi_reader *reader, const vshi_value *value, void *me
 
 enum { MESH = 1 << VSH_RECEIVER_MESH, HEIGHTFIELD = 1 << VSH_RECEIVER_HEIGHTFIELD };
 
+const char *vshi_color_space_key(int32_t i) {
+    return i < VSH_COLOR_ENCODED ? vsh_color_space_name(i) : NULL; /* bakes are never encoded yet */
+}
+
 static const vshi_key receiver_keys[] = {
     {.name = "mesh",
      .kind = VSHI_PATH,
@@ -100,6 +104,10 @@ static const vshi_key receiver_keys[] = {
     {.name = "output", .kind = VSHI_PATH, .required = VSHI_ALL, .offset = offsetof(vsh_receiver, output)},
     {.name = "bits", .kind = VSHI_CUSTOM, .offset = offsetof(vsh_receiver, bits), .read = vshi_read_bits},
     {.name = "pack", .kind = VSHI_STRING, .offset = offsetof(vsh_receiver, pack)},
+    {.name = "color_space",
+     .kind = VSHI_NAME,
+     .offset = offsetof(vsh_receiver, color_space),
+     .name_of = vshi_color_space_key},
 };
 static const vshi_table receiver_table = VSHI_TABLE(receiver_keys);
 

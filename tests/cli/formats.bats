@@ -50,3 +50,26 @@ endings_after() {
     done
     [[ $output == *docs/formats.md* ]] || fail "no reference"
 }
+
+@test "light in a PNG is sRGB, and light over 1 is told once with its share" {
+    write_box box.obj
+    bake=(bake box.obj --sun 0,3,4 --irradiance --size 32 --resolution 24 --bits 8)
+    shade "${bake[@]}" -o light.png --quiet
+    done_well
+    "$VDBSHADE" info light.png | grep -qx 'vdbshade_color_space: sRGB' || fail "it does not say sRGB"
+    shade "${bake[@]}" --pack R=shadow.sun,A=A -o data.png --quiet
+    "$VDBSHADE" info data.png | grep -qx 'vdbshade_color_space: linear' || fail "it does not say linear"
+    shade "${bake[@]}" --color-space linear -o linear.png --quiet
+    ! same_values light.png linear.png || fail "--color-space changes nothing"
+    shade "${bake[@]}" --color-space gamma -o x.png
+    refused 2 --color-space gamma
+    shade "${bake[@]}" --color-space srgb -o x.tif --bits 32
+    refused 2 srgb
+    shade "${bake[@]}" -o light.png
+    [[ $stderr != *"brighter than 1"* ]] || fail "nothing is"
+    shade "${bake[@]}" --ambient 0.5,0.5,2.25 --ao 1 -o light.png
+    done_well
+    [ "$(grep -c 'texels are brighter than 1, up to 3.05, and cut to 1' <<<"$stderr")" -eq 1 ] || fail "not told"
+    shade "${bake[@]}" --ambient 0.5,0.5,2.25 --ao 1 --bits 32 -o light.exr
+    [[ $stderr != *"brighter than 1"* ]] || fail "EXR holds it"
+}

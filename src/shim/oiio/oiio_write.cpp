@@ -139,6 +139,10 @@ OIIO::ImageSpec make_spec(const vshi_planes &planes, const char *path, const std
         for (size_t i = 0; i < planes.attribute_count; ++i) {
             spec.attribute(planes.attributes[i].name, planes.attributes[i].value);
         }
+        spec.attribute("vdbshade_color_space", planes.is_srgb ? "sRGB" : "linear");
+    }
+    if (planes.is_srgb && (format == "png" || format == "tiff" || format == "jpeg")) {
+        spec.attribute("oiio:ColorSpace", "sRGB"); // data says nothing: what it was would be undone
     }
     return spec;
 }

@@ -1,0 +1,172 @@
+/* Colour spaces of files: which values go through the sRGB curve, what the file says, what is cut. */
+#include "images.h"
+
+static const char *const IRRADIANCE[] = {"shadow.sun", "irradiance.R", "irradiance.G", "irradiance.B", "A"};
+
+static vsh_image_file *write_as(const char *path, const vsh_image *image, int32_t bits, int32_t space,
+                                const char *pack) {
+    vsh_image_options options = vsh_image_options_default();
+    options.bits = bits;
+    options.pack = pack;
+    options.color_space = space;
+    vsh_error error;
+    assert_ok(vsh_image_write(path, image, &options, &error), &error);
+    vsh_image_file *file = NULL;
+    assert_ok(vsh_image_read(path, &file, &error), &error);
+    return file;
+}
+
+static const char *said(const vsh_image_file *file) {
+    size_t count = 0;
+    const vsh_attribute *list = vsh_image_attributes(file, &count);
+    for (size_t i = 0; i < count; ++i) {
+        if (strcmp(list[i].name, "vdbshade_color_space") == 0) {
+            return list[i].value;
+        }
+    }
+    return "";
+}
+
+static bool has_chunk(const char *path, const char *type) {
+    unsigned char *bytes = NULL;
+    const size_t size = read_all(path, &bytes);
+    bool found = false;
+    for (size_t at = 8; at + 12 <= size && !found;) {
+        found = memcmp(bytes + at + 4, type, 4) == 0;
+        at += 12 + ((size_t)bytes[at] << 24 | (size_t)bytes[at + 1] << 16 | (size_t)bytes[at + 2] << 8 |
+                    bytes[at + 3]);
+    }
+    free(bytes);
+    return found;
+}
+
+/* IEC 61966-2-1, by libm. */
+static double srgb(double x) {
+    return x <= 0.0031308 ? 12.92 * x : 1.055 * pow(x, 1.0 / 2.4) - 0.055;
+}
+
+static void light_is_srgb_and_its_file_says_so(void **state) {
+    (void)state;
+    for (int32_t bits = 8; bits <= 16; bits += 8) {
+        sample s;
+        make(&s, 30, 20, 5, IRRADIANCE);
+        const double step = bits == 8 ? 255.0 : 65535.0;
+        vsh_image_file *file = write_as(at("light.png"), &s.image, bits, VSH_COLOR_AUTO, NULL);
+        const vsh_image view = vsh_image_view(file);
+        assert_int_equal(view.channel_count, 4);
+        for (size_t i = 0; i < 600; ++i) {
+            for (size_t c = 0; c < 3; ++c) {
+                const double is = view.planes[c][i], be = srgb((double)s.planes[c + 1][i]);
+                assert_true(fabs(is - be) <= 0.501 / step);
+                assert_true(fabs(vsh_srgb_to_linear(is) - (double)s.planes[c + 1][i]) <= 1.2 / step);
+            }
+            assert_true(fabs((double)(view.planes[3][i] - s.planes[4][i])) <= 0.501 / step); /* A is linear */
+        }
+        assert_string_equal(said(file), "sRGB");
+        assert_true(has_chunk(at("light.png"), "sRGB"));
+        vsh_image_free(file);
+        unmake(&s);
+    }
+}
+
+static void data_is_linear_and_its_file_says_nothing_to_be_undone(void **state) {
+    (void)state;
+    sample s;
+    make(&s, 30, 20, 5, IRRADIANCE);
+    static const char *const packs[] = {"R=shadow.sun,A=A", "R=shadow.sun,G=irradiance.G", "rgb"};
+    for (size_t k = 0; k < 3; ++k) {
+        const bool light = k == 2; /* the picture is the irradiance */
+        vsh_image_file *file = write_as(at("data.png"), &s.image, 8, VSH_COLOR_AUTO, packs[k]);
+        const double is = vsh_image_view(file).planes[0][77], be = s.planes[k < 2 ? 0 : 1][77];
+        assert_true(fabs(is - (light ? srgb(be) : be)) <= 0.501 / 255);
+        assert_string_equal(said(file), light ? "sRGB" : "linear");
+        assert_true(has_chunk(at("data.png"), "sRGB") == light);
+        assert_false(!light && has_chunk(at("data.png"), "gAMA"));
+        vsh_image_free(file);
+    }
+    unmake(&s);
+}
+
+static void a_space_that_is_asked_for_is_taken(void **state) {
+    (void)state;
+    sample s;
+    make(&s, 30, 20, 5, IRRADIANCE);
+    const double light = s.planes[1][50], shadow = s.planes[0][50];
+    vsh_image_file *file = write_as(at("a.png"), &s.image, 16, VSH_COLOR_LINEAR, NULL);
+    assert_true(fabs((double)vsh_image_view(file).planes[0][50] - light) <= 0.501 / 65535);
+    assert_string_equal(said(file), "linear");
+    vsh_image_free(file);
+    file = write_as(at("b.png"), &s.image, 16, VSH_COLOR_SRGB, "R=shadow.sun,A=A");
+    assert_true(fabs((double)vsh_image_view(file).planes[0][50] - srgb(shadow)) <= 0.501 / 65535);
+    assert_true(fabs((double)(vsh_image_view(file).planes[3][50] - s.planes[4][50])) <= 0.501 / 65535);
+    vsh_image_free(file);
+    file = write_as(at("c.png"), &s.image, 16, VSH_COLOR_ENCODED, "R=shadow.sun"); /* said, not done */
+    assert_true(fabs((double)vsh_image_view(file).planes[0][50] - shadow) <= 0.501 / 65535);
+    assert_string_equal(said(file), "sRGB");
+    vsh_image_free(file);
+    unmake(&s);
+}
+
+static void floats_are_linear(void **state) {
+    (void)state;
+    sample s;
+    make(&s, 30, 20, 5, IRRADIANCE);
+    vsh_image_file *file = write_as(at("float.tif"), &s.image, 32, VSH_COLOR_AUTO, NULL);
+    assert_memory_equal(vsh_image_view(file).planes[0], s.planes[1], 600 * sizeof(float));
+    vsh_image_free(file);
+    vsh_image_options options = vsh_image_options_default();
+    vsh_error error;
+    options.color_space = VSH_COLOR_SRGB;
+    assert_int_equal(vsh_image_check(at("x.exr"), &s.image, &options, &error), VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "floats are linear"));
+    options.color_space = 7;
+    assert_int_equal(vsh_image_check(at("x.png"), &s.image, &options, &error), VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "color_space 7"));
+    unmake(&s);
+}
+
+static vsh_image_clipping clipping_of(const char *path, const vsh_image *image, const char *pack) {
+    vsh_image_options options = vsh_image_options_default();
+    options.pack = pack;
+    vsh_image_writer *writer = NULL;
+    vsh_error error;
+    assert_ok(vsh_image_writer_create(path, image, &options, &writer, &error), &error);
+    assert_ok(vsh_image_writer_add(writer, image->height, image->planes, &error), &error);
+    vsh_image_clipping clipping;
+    assert_ok(vsh_image_writer_get_clipping(writer, &clipping, &error), &error);
+    assert_ok(vsh_image_writer_finish(writer, &error), &error);
+    return clipping;
+}
+
+static void light_over_1_is_counted_where_it_is_cut(void **state) {
+    (void)state;
+    sample s;
+    make(&s, 10, 10, 5, IRRADIANCE);
+    for (size_t i = 0; i < 100; ++i) {
+        s.values[400 + i] = i < 50 ? 1.0f : 0.0f; /* A */
+    }
+    s.values[100 + 3] = 1.5f;    /* R */
+    s.values[300 + 7] = 4.0f;    /* B */
+    s.values[300 + 3] = 1.25f;   /* the same texel as R's */
+    s.values[100 + 60] = 100.0f; /* where A is 0 */
+    s.values[5] = 9.0f;          /* a shadow is no light */
+    const vsh_image_clipping cut = clipping_of(at("cut.png"), &s.image, NULL);
+    assert_int_equal(cut.texels, 50);
+    assert_int_equal(cut.clipped, 2);
+    assert_true(cut.largest == 4.0f);
+    assert_int_equal(clipping_of(at("cut.exr"), &s.image, NULL).clipped, 0);
+    assert_int_equal(clipping_of(at("cut.hdr"), &s.image, NULL).clipped, 0);
+    assert_int_equal(clipping_of(at("cut.png"), &s.image, "R=shadow.sun,A=A").clipped, 0);
+    unmake(&s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(light_is_srgb_and_its_file_says_so),
+        cmocka_unit_test(data_is_linear_and_its_file_says_nothing_to_be_undone),
+        cmocka_unit_test(a_space_that_is_asked_for_is_taken),
+        cmocka_unit_test(floats_are_linear),
+        cmocka_unit_test(light_over_1_is_counted_where_it_is_cut),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
