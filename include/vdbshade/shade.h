@@ -129,8 +129,9 @@ typedef struct vsh_shade_stats {
     uint64_t certified;  /* cones whose light was proved fully seen or fully hidden (to the field's error) */
     uint64_t unfinished; /* marches that ran out of steps; their value is what was known by then */
     uint64_t invalid;    /* points with a position or normal that is not finite, or a zero normal: NaN */
-    uint64_t beyond_reach; /* cones wider somewhere, and taps farther off, than the field's reach: make the
-                              field with a larger one */
+    uint64_t beyond_reach; /* cones wider somewhere than the field's reach by over 3 %, and taps farther off:
+                              they may read too dark, which matters where no rays refine them. Make the field
+                              with a larger reach */
     uint64_t rays;         /* rays marched or traced to refine what no cone decided, or by the rays methods */
     uint64_t refined;      /* values that took rays */
     double square_error;   /* adaptive, exact: sum over values of the estimated squared error */

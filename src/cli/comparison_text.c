@@ -146,8 +146,15 @@ static void print_measures(FILE *out, const cli_channel *channel) {
             cli_channel_place(channel, m->worst, place), m->value[VSH_MEASURE_P99],
             m->value[VSH_MEASURE_SHARE], m->value[VSH_MEASURE_SSIM]);
     if (m->pairs > 0) {
-        fprintf(out, ", penumbrae %.2f and %.2f (%" PRIu64 " edges, %.3g off, %.3g unpaired)", m->width[0],
-                m->width[1], m->pairs, m->value[VSH_MEASURE_WIDTHS], m->value[VSH_MEASURE_EDGES]);
+        fprintf(out, ", penumbrae %.2f and %.2f (%" PRIu64 " edges", m->width[0], m->width[1], m->pairs);
+        /* of too few edges nothing is measured */
+        if (!isnan(m->value[VSH_MEASURE_WIDTHS])) {
+            fprintf(out, ", %.3g off", m->value[VSH_MEASURE_WIDTHS]);
+        }
+        if (!isnan(m->value[VSH_MEASURE_EDGES])) {
+            fprintf(out, ", %.3g unpaired", m->value[VSH_MEASURE_EDGES]);
+        }
+        fputc(')', out);
     }
     fprintf(out, ", shift %.2f, lost %" PRIu64 ", gained %" PRIu64, m->value[VSH_MEASURE_SHIFT],
             m->lost.count, m->gained.count);

@@ -7,8 +7,12 @@
 #include "progress.h"
 #include "signals.h"
 
+enum { KEY_SIZE = 0x2000 };
+
 static const cli_option options[] = {
     {0, NULL, NULL, "Options"},
+    {KEY_SIZE, "size", "W[xH]", "texels of the lightmap that UVs are looked at in (1024)"},
+    {CLI_KEY_VERBOSE, "verbose", NULL, "a paragraph for each mesh, however many there are"},
     CLI_TRUSTED_OPTION,
     {'h', "help", NULL, "show this help"},
 };
@@ -18,21 +22,31 @@ static int info_main(int argc, char **argv);
 const cli_command cli_info = {
     "info",
     "FILE",
-    "Prints what a file holds and what is wrong with it. Meshes: triangles, vertices, UV sets, bounds,\n"
-    "open, flipped and degenerate parts, overlapping UVs. OpenVDB files (.vdb): class, voxel size, band,\n"
+    "Prints what a file holds and what is wrong with it. Meshes: objects, triangles, UV sets, bounds,\n"
+    "open, flipped and degenerate parts, UVs that overlap within or between objects. OpenVDB files (.vdb): "
+    "class, voxel size, band,\n"
     "bounds, memory of each grid, and why it cannot cast. Scenes (.json): casters, lights, receivers.\n"
     "Images: size, and the range of each channel.",
     options,
     sizeof options / sizeof options[0],
     info_main};
 
+typedef struct info_settings {
+    cli_common common;
+    cli_info_look look;
+} info_settings;
+
 static int take(void *settings, int key, const char *name, const char *value) {
+    info_settings *s = settings;
     bool taken;
-    const int code = cli_common_take(settings, key, name, value, &taken);
+    if (key == KEY_SIZE) {
+        return cli_take_size(name, value, &s->look.width, &s->look.height);
+    }
+    const int code = cli_common_take(&s->common, key, name, value, &taken);
     return taken ? code : cli_usage("%s: no such option", name);
 }
 
-static int print_info(const char *path, const vsh_run *run) {
+static int print_info(const char *path, const cli_info_look *look, const vsh_run *run) {
     static const char *const image_endings[] = {
         "exr", "png", "tif", "tiff", "jpg", "jpeg", "hdr", "tga", "bmp", "webp", "dpx",  "psd",  "pgm",
         "ppm", "pnm", "pfm", "gif",  "jp2", "j2k",  "sgi", "rgb", "rla", "ico",  "heic", "heif", "avif"};
@@ -47,19 +61,20 @@ static int print_info(const char *path, const vsh_run *run) {
             return cli_info_image(path, run);
         }
     }
-    return cli_info_mesh(path, run);
+    return cli_info_mesh(path, look, run);
 }
 
 static int info_main(int argc, char **argv) {
-    cli_common common = cli_common_default();
+    info_settings s = {.common = cli_common_default(), .look = {.width = 1024, .height = 1024}};
     const char *path = NULL;
     bool help;
-    const int code = cli_parse(&cli_info, argc, argv, take, &common, "FILE", &path, &help);
+    const int code = cli_parse(&cli_info, argc, argv, take, &s, "FILE", &path, &help);
     if (code != CLI_OK || help) {
         return code;
     }
     cli_progress_begin(false, true);
     cli_signals_watch();
-    const vsh_run run = cli_common_run(&common);
-    return print_info(path, &run);
+    const vsh_run run = cli_common_run(&s.common);
+    s.look.all = s.common.verbose;
+    return print_info(path, &s.look, &run);
 }

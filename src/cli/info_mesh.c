@@ -6,8 +6,6 @@
 #include <stdlib.h>
 #include <vdbshade/vdbshade.h>
 
-enum { UV_REPORT_SIZE = 1024 };
-
 static const char *name_of(const vsh_mesh *mesh) {
     return mesh->name != NULL ? mesh->name : "";
 }
@@ -63,48 +61,7 @@ static int print_mesh(const vsh_model *model, size_t index, const vsh_solidity_r
     return CLI_OK;
 }
 
-/* All meshes with UVs are one receiver, as `bake` takes them. */
-static int print_uvs(const vsh_mesh *meshes, size_t count) {
-    vsh_lightmap_options options = vsh_lightmap_options_default();
-    options.width = UV_REPORT_SIZE;
-    options.height = UV_REPORT_SIZE;
-    vsh_uv_report *reports = calloc(count, sizeof *reports);
-    if (reports == NULL) {
-        cli_say("UV reports: the system refused memory");
-        return CLI_LIMIT;
-    }
-    const vsh_run run = vsh_run_default();
-    vsh_texels *texels = NULL;
-    vsh_error error;
-    if (vsh_texels_create(meshes, count, &options, &run, reports, &texels, &error) != VSH_OK) {
-        free(reports);
-        return cli_fail(&error);
-    }
-    vsh_texels_info info;
-    vsh_texels_get_info(texels, &info);
-    printf("lightmap of %d × %d texels: %.1f %% covered\n", UV_REPORT_SIZE, UV_REPORT_SIZE,
-           100.0 * (double)info.covered / ((double)UV_REPORT_SIZE * UV_REPORT_SIZE));
-    for (size_t i = 0; i < count; ++i) {
-        const vsh_uv_report *uv = &reports[i];
-        if (uv->overlap_texels > 0) {
-            printf("  problem: mesh '%s': %zu texels of %zu triangles lie over other charts\n",
-                   name_of(&meshes[i]), uv->overlap_texels, uv->overlap_triangles);
-        }
-        if (uv->outside_triangles > 0) {
-            printf("  problem: mesh '%s': %zu triangles leave the UV square\n", name_of(&meshes[i]),
-                   uv->outside_triangles);
-        }
-        if (uv->degenerate_triangles > 0) {
-            printf("  problem: mesh '%s': %zu triangles have no area in the UV set\n", name_of(&meshes[i]),
-                   uv->degenerate_triangles);
-        }
-    }
-    vsh_texels_free(texels);
-    free(reports);
-    return CLI_OK;
-}
-
-int cli_info_mesh(const char *path, const vsh_run *run) {
+int cli_info_mesh(const char *path, const cli_info_look *given, const vsh_run *run) {
     vsh_model *model = NULL;
     vsh_error error;
     if (vsh_model_read(path, run, &model, &error) != VSH_OK) {
@@ -115,7 +72,11 @@ int cli_info_mesh(const char *path, const vsh_run *run) {
     size_t with_uv_count = 0;
     vsh_mesh *meshes = calloc(count, sizeof *meshes);
     vsh_solidity_report *solidity = calloc(count, sizeof *solidity);
+    cli_info_look look = *given;
+    look.table = count > CLI_INFO_PARAGRAPHS && !look.all;
+    look.solidity = solidity;
     int code = CLI_OK;
+    cli_info_summary(model);
     if (with_uvs == NULL || meshes == NULL || solidity == NULL) {
         cli_say("%s: the system refused memory", path);
         code = CLI_LIMIT;
@@ -127,17 +88,19 @@ int cli_info_mesh(const char *path, const vsh_run *run) {
         code = cli_fail(&error);
     }
     for (size_t i = 0; i < count && code == CLI_OK; ++i) {
-        code = print_mesh(model, i, &solidity[i]);
+        code = look.table ? CLI_OK : print_mesh(model, i, &solidity[i]);
         const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
         if (mesh.uvs != NULL) {
             with_uvs[with_uv_count++] = mesh;
         }
     }
-    if (code == CLI_OK && with_uv_count < count) {
-        printf("problem: %zu of %zu meshes have no UVs to bake into\n", count - with_uv_count, count);
+    if (code == CLI_OK) {
+        code = cli_info_uvs(model, with_uvs, with_uv_count, &look, run);
     }
-    if (code == CLI_OK && with_uv_count > 0) {
-        code = print_uvs(with_uvs, with_uv_count);
+    if (code == CLI_OK && with_uv_count < count) {
+        printf("problem: %zu of %zu meshes have no UVs to bake into: they only cast with --per-object or "
+               "--no-receive; or unwrap them\n",
+               count - with_uv_count, count);
     }
     free(solidity);
     free(meshes);

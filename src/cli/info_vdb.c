@@ -4,12 +4,18 @@
 
 #include <inttypes.h>
 #include <math.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <vdbshade/grid.h>
 
 enum { MAX_LISTED = 4096 };
+
+/* Whether it is of `vdbshade volume`: what is wrong with it as a caster is then no problem. */
+static bool is_ours(const vsh_vdb_entry *grid) {
+    return strstr(grid->attributes, "vdbshade_version") != NULL && strcmp(grid->grid_class, "level set") != 0;
+}
 
 static void print_grid(const vsh_vdb_entry *grid) {
     char bytes[32];
@@ -31,7 +37,10 @@ static void print_grid(const vsh_vdb_entry *grid) {
         printf("  %.*s\n", (int)length, line);
         line += length + (line[length] != '\0');
     }
-    if (grid->problem[0] != '\0') {
+    if (is_ours(grid)) {
+        printf(
+            "  holds: values that vdbshade baked, to be looked up: it is no caster and needs to be none\n");
+    } else if (grid->problem[0] != '\0') {
         printf("  problem: %s\n", grid->problem);
     }
 }

@@ -41,6 +41,17 @@ bool cli_same_file(const char *a, const char *b) {
            strcmp(first, second) == 0;
 }
 
+bool cli_is_model(const char *path) {
+    static const char *const endings[] = {"obj", "gltf", "glb", "fbx",   "stl",
+                                          "dae", "x3d",  "3ds", "blend", "off"};
+    for (size_t i = 0; i < sizeof endings / sizeof endings[0]; ++i) {
+        if (cli_has_ending(path, endings[i])) {
+            return true;
+        }
+    }
+    return false;
+}
+
 bool cli_is_folder(const char *path) {
     struct stat status;
     const size_t length = strlen(path);

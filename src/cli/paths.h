@@ -11,6 +11,9 @@ bool cli_has_ending(const char *path, const char *ending);
 /* Whether the two name one file, whether by links or through folders; also where it does not exist yet. */
 bool cli_same_file(const char *a, const char *b);
 
+/* Whether a path ends as a mesh's file does (but for .ply, which may hold points alone). */
+bool cli_is_model(const char *path);
+
 /* Whether a path is a folder, or ends as one. */
 bool cli_is_folder(const char *path);
 

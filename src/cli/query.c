@@ -133,7 +133,12 @@ static int find_formats(query_settings *s) {
         s->points_format = cli_points_format_of_path(s->points);
     }
     if (s->points_format < 0) {
-        return cli_usage("--points '%s': give --points-format csv, ply or raw", s->points);
+        return cli_usage(
+            "--points '%s': is called as no file of points (.csv .tsv .txt .xyz, .ply, .raw .f32 "
+            ".bin); %s",
+            s->points,
+            cli_is_model(s->points) ? "export the mesh's vertices as .ply, with normals for --ao"
+                                    : "--points-format csv, ply or raw says which of these it holds");
     }
     if (s->format < 0) {
         s->format =

@@ -185,6 +185,12 @@ int cli_receiver_texels(const vsh_charts *charts, int32_t first, int32_t rows, c
                                                                                       : cli_fail(&error);
 }
 
+/* Whether values are what cones read, and no rays refine them. */
+static bool cones_decide(const vsh_scene *scene) {
+    return (scene->light_count > 0 && scene->shade.method < VSH_SHADOW_RAYS) ||
+           (scene->ao && scene->shade.ao_method < VSH_AO_RAYS);
+}
+
 static void warn_stats(const cli_receiver_job *job, const vsh_bake_stats *baked) {
     const vsh_receiver *receiver = &job->scene->receivers[job->index];
     const vsh_scene *scene = job->scene;
@@ -197,9 +203,12 @@ static void warn_stats(const cli_receiver_job *job, const vsh_bake_stats *baked)
                  receiver->path, baked->shade.unfinished, baked->shade.marches, job->scene->shade.max_steps);
         warn_line(job->run, line);
     }
-    if (baked->shade.beyond_reach > 0) {
-        snprintf(line, sizeof line, "%s: %" PRIu64 " cones grew wider than the field's reach", receiver->path,
-                 baked->shade.beyond_reach);
+    if (baked->shade.beyond_reach > 0 && cones_decide(job->scene)) {
+        snprintf(line, sizeof line,
+                 "%s: %" PRIu64 " of %" PRIu64
+                 " cones grew wider than the field reaches: far shadows may be too "
+                 "dark there; rays decide with --method exact (or adaptive) and --ao-method exact",
+                 receiver->path, baked->shade.beyond_reach, baked->shade.marches);
         warn_line(job->run, line);
     }
 }

@@ -7,6 +7,28 @@
 
 static const char *const status_names[] = {"unchanged", "alike", "not alike", "failed", "updated"};
 
+/* What the golden bake was that a new one took the place of. */
+static void print_updated(const cli_comparison *c, const char *output) {
+    if (c->alike) {
+        return;
+    }
+    if (c->golden == NULL) {
+        printf("  %s: is the golden bake now; there was none\n", output);
+        return;
+    }
+    printf("  %s: is the golden bake now; the one before differed:\n", output);
+    for (size_t i = 0; i < c->problem_count; ++i) {
+        printf("    %s\n", c->problems[i]);
+    }
+    for (size_t i = 0; i < c->channel_count; ++i) {
+        char what[2048];
+        cli_channel_explain(&c->channels[i], what, sizeof what);
+        if (what[0] != '\0') {
+            printf("    %s: %s\n", c->channels[i].name, what);
+        }
+    }
+}
+
 static void print_lines(const regress_work *work) {
     for (size_t i = 0; i < work->case_count; ++i) {
         const regress_case *one = &work->cases[i];
@@ -18,6 +40,8 @@ static void print_lines(const regress_work *work) {
         for (size_t k = 0; k < one->outputs.count; ++k) {
             if (one->status == REGRESS_FAILED) {
                 printf("  %s: the bake ended with exit code %d\n", one->outputs.line[k], one->code);
+            } else if (one->status == REGRESS_UPDATED) {
+                print_updated(&one->comparisons[k], one->outputs.line[k]);
             } else if (one->status != REGRESS_UNCHANGED && !one->comparisons[k].alike) {
                 char prefix[300];
                 snprintf(prefix, sizeof prefix, "  %.250s: ", one->outputs.line[k]);

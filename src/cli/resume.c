@@ -1,7 +1,6 @@
 #include "resume.h"
 
 #include "message.h"
-#include "warnings.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -73,7 +72,7 @@ static bool has_key(FILE *file, const char *key) {
 }
 
 static void give_up(cli_resume *r) {
-    cli_warn("%s: could not be written: %s; nothing is kept any more", r->path, strerror(errno));
+    cli_say("warning: %s: could not be written: %s; nothing is kept any more", r->path, strerror(errno));
     fclose(r->file);
     r->file = NULL;
     unlink(r->path);
@@ -112,7 +111,7 @@ int cli_resume_open(cli_resume *r, const char *output, const cli_origin *origin,
         r->taking = has_key(r->file, key);
         if (!r->taking) {
             if (fseek(r->file, 0, SEEK_END) == 0 && ftell(r->file) > 0) {
-                cli_warn("%s: is of another bake, of other inputs or options; begun anew", r->path);
+                cli_say("warning: %s: is of another bake, of other inputs or options; begun anew", r->path);
             }
             rewind(r->file);
             if (ftruncate(fileno(r->file), 0) != 0 || fwrite(key, strlen(key) + 1, 1, r->file) != 1 ||

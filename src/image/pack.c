@@ -37,6 +37,18 @@ static int find_key(const char *part) {
     return -1;
 }
 
+/* "shadow.sun, ao, A; 0 and 1 are constants". */
+static void list_channels(const vsh_image *image, char *text, size_t capacity) {
+    enum { ROOM = 48 };
+    size_t used = 0;
+    int32_t c = 0;
+    for (; c < image->channel_count && used + strlen(image->names[c]) + ROOM < capacity; ++c) {
+        used += (size_t)snprintf(text + used, capacity - used, "%s%s", c > 0 ? ", " : "", image->names[c]);
+    }
+    snprintf(text + used, capacity - used, "%s; 0 and 1 are constants",
+             c < image->channel_count ? " and others" : "");
+}
+
 /* Reads the part at *text and moves behind it. */
 static vsh_result parse_part(const char **text, const vsh_image *image, vshi_pack *pack, vsh_error *error) {
     const char *part = *text;
@@ -56,9 +68,11 @@ static vsh_result parse_part(const char **text, const vsh_image *image, vshi_pac
     vshi_pack_entry entry = {true, find_channel(value, image, &length), 0.0f};
     if (entry.channel < 0) {
         if ((value[0] != '0' && value[0] != '1') || !ends_value(value[1])) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "pack: part '%.*s': %s%.*s", part_length, part,
-                             part_length > 2 ? "no such channel: " : "nothing after '='", part_length - 2,
-                             value);
+            char names[400];
+            list_channels(image, names, sizeof names);
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "pack: part '%.*s': %s%.*s; there are %s",
+                             part_length, part, part_length > 2 ? "no such channel: " : "nothing after '='",
+                             part_length - 2, value, names);
         }
         entry.constant = value[0] == '1' ? 1.0f : 0.0f;
         length = 1;

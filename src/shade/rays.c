@@ -6,6 +6,12 @@
 static const double FIRST_STEP = 0.0625;
 /* Cones no longer than this, voxels, are marched as they are: clipping them costs more than it saves. */
 static const double SHORT = 32.0;
+/* Cones that are wider than the reach by no more than this part are not counted as beyond it: the least that
+ * their closeness can then read, 1 / 1.03, is 0.997 of the light seen where all of it is. Nor do their last
+ * voxels count: a field that reaches as its scene asks for ends at the farthest corner of casters and
+ * receivers, and marches begin and end a few voxels outside. */
+static const double BEYOND = 0.03;
+static const double LAST_STRETCH = 4.0;
 /* The bounds are those of lattice points next to the surface; half a voxel covers the float rounding. */
 static const double BOUNDS_MARGIN = 0.5;
 
@@ -108,7 +114,8 @@ bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *
     chunk->rays.begin[chunk->rays.count - 1] = (float)begin;
     chunk->rays.end[chunk->rays.count - 1] = (float)end;
     ++stats->marches;
-    if (cone->wide + cone->sine * end > field->levels[field->level_count - 1].band) {
+    if (cone->wide + cone->sine * (end - LAST_STRETCH) >
+        (1.0 + BEYOND) * field->levels[field->level_count - 1].band) {
         ++stats->beyond_reach;
     }
     return true;

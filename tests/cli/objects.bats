@@ -158,3 +158,68 @@ JSON
     [ "$status" -eq 2 ] || fail "expected an error"
     [[ ${stderr_lines[0]} == *"warning: 2 objects"* ]] || fail "lost"
 }
+
+@test "info tells a level's objects in a table, and what bake would refuse at a size" {
+    write_level level.obj $(seq -f 'crate_%03g' 12)
+    shade info level.obj --size 64
+    done_well
+    [[ ${lines[0]} == "objects: 12, in 12 meshes, 144 triangles; UV sets: 1" ]] || fail "no summary"
+    [ "$(grep -c ' crate_' <<<"$output")" -eq 12 ] || fail "no line each"
+    [[ $output == *"64 × 64 texels"*"problem: objects share texels: 11 of 12 meshes"*"'crate_002'"*"over 'crate_001'"*--per-object* ]] ||
+        fail "not what bake refuses"
+    shade info level.obj --verbose
+    [ "$(grep -c '^mesh ' <<<"$output")" -eq 12 ] || fail "no paragraph each"
+}
+
+@test "a channel, a file of points and a UV set that are not there are told with those that are" {
+    write_level level.obj floor
+    shade bake level.obj --sun 0,1,0 --ao 1 --pack R=shadow -o out.png
+    refused 2 'no such channel: shadow' 'shadow.sun, ao, A'
+    shade query level.obj --sun 0,1,0 --points level.obj -o out.csv
+    refused 2 level.obj '.csv' "export the mesh's vertices as .ply"
+    shade bake level.obj --ao 1 --uv-set 3 -o out.png
+    refused 2 level.obj 'no UV set 3' 'it has set 0'
+}
+
+@test "info calls a volume of our own no problem" {
+    write_level level.obj floor
+    shade volume level.obj --sun 0,1,0 --resolution 16 --box -1,-1,-1,2,2,2 --box-voxel-size 0.5 -o box.vdb --quiet
+    done_well
+    shade info box.vdb
+    done_well
+    [[ $output == *"holds: values that vdbshade baked"* && $output != *problem* ]] || fail "a problem"
+}
+
+@test "cones within the reach of their field are not warned of" {
+    for size in 16 24 48 96; do
+        shade bake "$ASSETS/cloister.glb" --sun 0.6,0.75,0.5 --sun-angle 10 --method cone --size 64 --resolution "$size" -o out.exr
+        done_well
+        [[ $stderr != *reach* ]] || fail "at $size voxels"
+    done
+}
+
+@test "every warning that is printed is documented" {
+    local sources=("$BATS_TEST_DIRNAME"/../../src) docs=$BATS_TEST_DIRNAME/../../docs/warnings.md missing=
+    # the strings of each call joined, what is filled in cut out, and the longest piece of the rest
+    while IFS= read -r piece; do
+        grep -qF -- "$piece" "$docs" || missing+="$piece"$'\n'
+    done < <(find "${sources[@]}" -name '*.c' -o -name '*.cpp' | xargs awk '
+        /(vshi_warn|cli_warn)\(/ || (/snprintf\(line, sizeof line/ && FILENAME ~ /cli/) { on = 1; text = "" }
+        on {
+            rest = $0
+            while (match(rest, /"([^"\\]|\\.)*"/)) {
+                if (RLENGTH > 4) text = text substr(rest, RSTART + 1, RLENGTH - 2)
+                rest = substr(rest, RSTART + RLENGTH)
+                if (rest ~ /^ PRIu64/) text = text "u"
+            }
+            if (/;[ ]*$/) {
+                on = 0
+                n = split(text, part, /%[-+ 0-9.]*(zu|s|d|u|g|f|lu)/)
+                best = ""
+                for (i = 1; i <= n; ++i) if (length(part[i]) > length(best)) best = part[i]
+                gsub(/^[ :;,.'"'"']+|[ :;,.'"'"']+$/, "", best)
+                if (length(best) > 12) print best
+            }
+        }')
+    [ -z "$missing" ] || fail "not in docs/warnings.md: $missing"
+}
