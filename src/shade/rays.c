@@ -114,8 +114,7 @@ bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *
     chunk->rays.begin[chunk->rays.count - 1] = (float)begin;
     chunk->rays.end[chunk->rays.count - 1] = (float)end;
     ++stats->marches;
-    if (cone->wide + cone->sine * (end - LAST_STRETCH) >
-        (1.0 + BEYOND) * field->levels[field->level_count - 1].band) {
+    if (cone->sine * (end - LAST_STRETCH) > (1.0 + BEYOND) * field->levels[field->level_count - 1].band) {
         ++stats->beyond_reach;
     }
     return true;

@@ -208,7 +208,8 @@ JSON
         on {
             rest = $0
             while (match(rest, /"([^"\\]|\\.)*"/)) {
-                if (RLENGTH > 4) text = text substr(rest, RSTART + 1, RLENGTH - 2)
+                piece = substr(rest, RSTART + 1, RLENGTH - 2)
+                if (RLENGTH > 4 || piece ~ /%/) text = text piece
                 rest = substr(rest, RSTART + RLENGTH)
                 if (rest ~ /^ PRIu64/) text = text "u"
             }
@@ -217,7 +218,7 @@ JSON
                 n = split(text, part, /%[-+ 0-9.]*(zu|s|d|u|g|f|lu)/)
                 best = ""
                 for (i = 1; i <= n; ++i) if (length(part[i]) > length(best)) best = part[i]
-                gsub(/^[ :;,.'"'"']+|[ :;,.'"'"']+$/, "", best)
+                gsub(/^[ :;,.()'"'"']+|[ :;,.()'"'"']+$/, "", best)
                 if (length(best) > 12) print best
             }
         }')
