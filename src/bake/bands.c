@@ -8,6 +8,7 @@
 #include "base/floats.h"
 #include "base/parallel.h"
 #include "caster/mesh.h"
+#include "caster/solidity.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -221,18 +222,30 @@ static void warn(const counting *all, const vsh_run *run, const vsh_uv_report *r
     }
 }
 
-static vsh_result find_open(vsh_charts *charts, vshi_job *job, vsh_error *error) {
+/* Which triangles are sheets: as was found where all casters are known, else of these meshes alone. */
+static vsh_result find_sheets(vsh_charts *charts, vshi_job *job, const vsh_run *run, vsh_error *error) {
     const vshi_charts *sorted = &charts->sorted;
     vsh_result result = VSH_OK;
-    charts->open = vshi_take(sorted->mesh_count, 1, "texels", &result, error);
-    for (size_t m = 0; result == VSH_OK && m < sorted->mesh_count; ++m) {
-        vsh_mesh_report report;
-        result = vsh_mesh_check(&sorted->meshes[m], &report, error);
-        if (result == VSH_OK) {
-            charts->open[m] = report.open_edges > 0;
-            result = vshi_job_advance(job, 0) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
-        }
+    bool known = true;
+    for (size_t m = 0; m < sorted->mesh_count; ++m) {
+        known = known && sorted->meshes[m].sides != NULL;
     }
+    charts->sheet = vshi_take(sorted->first[sorted->mesh_count], 1, "texels", &result, error);
+    vshi_solidity *found = NULL;
+    if (result == VSH_OK && !known) {
+        vsh_run quiet = *run;
+        quiet.progress = NULL;
+        result = vshi_solidity_create(sorted->meshes, sorted->mesh_count, &quiet, &found, error);
+    }
+    for (size_t m = 0; result == VSH_OK && m < sorted->mesh_count; ++m) {
+        const uint8_t *given = sorted->meshes[m].sides;
+        const uint8_t *sides = given != NULL ? given : vshi_solidity_sides(found, m);
+        for (size_t i = 0; i < sorted->meshes[m].triangle_count; ++i) {
+            charts->sheet[sorted->first[m] + i] = sides[i] == VSHI_SIDE_SHEET;
+        }
+        result = vshi_job_advance(job, 0) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+    }
+    vshi_solidity_free(found);
     return result;
 }
 
@@ -244,12 +257,12 @@ static vsh_result make(const vsh_mesh *meshes, size_t mesh_count, const vsh_ligh
     vshi_charts *sorted = &charts->sorted;
     vsh_result result = vshi_charts_create(meshes, mesh_count, raster, run, job, reports, sorted, error);
     if (result == VSH_OK) {
-        result = find_open(charts, job, error);
+        result = find_sheets(charts, job, run, error);
     }
     if (result == VSH_OK) {
         charts->rows = vshi_take(sorted->rows, sizeof *charts->rows, "texels", &result, error);
         charts->info.bytes =
-            sizeof *charts + sorted->bytes + mesh_count + sorted->rows * sizeof *charts->rows;
+            sizeof *charts + sorted->bytes + sorted->first[mesh_count] + sorted->rows * sizeof *charts->rows;
         all.overlaps.texels = vshi_take(mesh_count, sizeof *all.overlaps.texels, "overlaps", &result, error);
         all.overlaps.others = vshi_take(mesh_count, sizeof *all.overlaps.others, "overlaps", &result, error);
         all.overlaps.triangles =
@@ -283,9 +296,9 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
     if (result != VSH_OK) {
         return result;
     }
-    if (mesh_count == 0 || mesh_count > UINT32_MAX) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap of %zu meshes: expected 1 … %u", mesh_count,
-                         UINT32_MAX);
+    if (mesh_count == 0 || mesh_count > INT32_MAX) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap of %zu meshes: expected 1 … %d", mesh_count,
+                         INT32_MAX);
     }
     vsh_uv_report *reports = NULL;
     vsh_charts *made = NULL;
@@ -335,7 +348,7 @@ void vsh_charts_free(vsh_charts *charts) {
     if (charts == NULL) {
         return;
     }
-    free(charts->open);
+    free(charts->sheet);
     free(charts->rows);
     vshi_charts_free(&charts->sorted);
     free(charts);

@@ -392,7 +392,7 @@ static size_t finish_coverage(baking *bake) {
                 bake->lightmap->invalid[texel - base] = seen ? 2.0f : 1.0f;
             }
             if (bake->stats.invalid_by_mesh != NULL) {
-                ++bake->stats.invalid_by_mesh[texels->mesh[i]];
+                ++bake->stats.invalid_by_mesh[vshi_sample_mesh(texels, i)];
             }
         } else if (bake->lightmap->coverage != NULL) {
             bake->lightmap->coverage[texel - base] = 1.0f;

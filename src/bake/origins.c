@@ -72,7 +72,7 @@ static void put(vshi_vec p, double at[3]) {
 
 static void lift(const lifting *l, size_t i, double offset, double shell, double origin[3]) {
     const vsh_texels *texels = l->texels;
-    const double height = offset + (texels->open[texels->mesh[i]] ? shell : 0.0);
+    const double height = offset + (vshi_sample_is_sheet(texels, i) ? shell : 0.0);
     const vshi_vec p = place(l, i);
     const double at[3] = {p.x, p.y, p.z};
     for (size_t k = 0; k < 3; ++k) {

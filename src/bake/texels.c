@@ -73,7 +73,9 @@ static void write_sample(writer *w, uint32_t number, uint32_t texel, const doubl
     }
     texels->height[i] = (float)height;
     texels->texel[i] = texel;
-    texels->mesh[i] = mesh;
+    const vsh_charts *charts = w->all->charts;
+    const bool sheet = charts->sheet[charts->sorted.first[mesh] + w->work->local[number - 1]] != 0;
+    texels->mesh[i] = mesh | (sheet ? VSHI_SAMPLE_SHEET : 0);
     if (texels->tangent != NULL) {
         memcpy(texels->tangent + 4 * i, w->tangent, sizeof w->tangent);
     }
@@ -209,11 +211,9 @@ static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_te
     const size_t rows = band->held_end - band->held_begin;
     vsh_result result = VSH_OK;
     texels->row_start = vshi_take(rows + 1, sizeof *texels->row_start, "texels", &result, error);
-    texels->open = vshi_take(texels->mesh_count, 1, "texels", &result, error);
     if (result != VSH_OK) {
         return result;
     }
-    memcpy(texels->open, charts->open, texels->mesh_count);
     for (size_t row = 0; row < rows; ++row) {
         const vshi_tile_row *counted = &charts->rows[band->held_begin + row];
         const bool own = band->held_begin + row >= band->own_begin && band->held_begin + row < band->own_end;
@@ -228,8 +228,7 @@ static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_te
     if ((result = vshi_check_limit(run, held + samples, "texels", error)) != VSH_OK) {
         return result;
     }
-    texels->info.bytes =
-        sizeof *texels + texels->count * sample + texels->mesh_count + (rows + 1) * sizeof *texels->row_start;
+    texels->info.bytes = sizeof *texels + texels->count * sample + (rows + 1) * sizeof *texels->row_start;
     creation all = {.charts = charts, .first = band->held_begin, .texels = texels};
     result = take_samples(texels, charts->tangents, error);
     if (result == VSH_OK) {
@@ -303,7 +302,6 @@ void vsh_texels_free(vsh_texels *texels) {
     if (texels == NULL) {
         return;
     }
-    free(texels->open);
     free(texels->tangent);
     free(texels->mesh);
     free(texels->texel);

@@ -20,8 +20,9 @@ struct vsh_charts {
     int32_t ao_spacing; /* 1 where texels have several samples */
     bool tangents;
     vsh_shade_options shade;
-    vshi_tile_row *rows; /* [sorted.rows] */
-    unsigned char *open; /* [mesh_count]: the mesh bounds no solid, so that the field holds its shell */
+    vshi_tile_row *rows;  /* [sorted.rows] */
+    unsigned char *sheet; /* [triangles of all meshes]: it has air on both sides, so that the field holds its
+                             shell */
 };
 
 /* Bytes of one sample in texels. */
@@ -71,11 +72,21 @@ struct vsh_texels {
     float *geometric;        /* [count][3] */
     float *height;           /* [count]: of the position over its triangle's plane, world units */
     uint32_t *texel;         /* [count]: in the whole lightmap */
-    uint32_t *mesh;          /* [count]: index of the mesh */
+    uint32_t *mesh;          /* [count]: index of the mesh, and VSHI_SAMPLE_SHEET: vshi_sample_mesh() */
     float *tangent;          /* [count][4]: of the triangle, unit, and its handedness; NULL: not asked for */
     size_t mesh_count;
-    unsigned char *open; /* [mesh_count]: as of the charts */
 };
+
+/* In a sample's mesh: its triangle is a sheet. */
+#define VSHI_SAMPLE_SHEET UINT32_C(0x80000000)
+
+static inline uint32_t vshi_sample_mesh(const vsh_texels *texels, size_t sample) {
+    return texels->mesh[sample] & ~VSHI_SAMPLE_SHEET;
+}
+
+static inline bool vshi_sample_is_sheet(const vsh_texels *texels, size_t sample) {
+    return (texels->mesh[sample] & VSHI_SAMPLE_SHEET) != 0;
+}
 
 /* Number of the first texel that is held. */
 static inline size_t vshi_texels_base(const vsh_texels *texels) {

@@ -61,7 +61,9 @@ static vsh_result look(vshi_solidity *s, size_t room, size_t solid, surrounding 
             around->inside[i] = true;
         }
     }
-    if ((double)on > ROOM_SHARE * SAMPLES) { /* faces of both sides: air within, air outside */
+    const bool found = s->wholes.meshes[c->whole].solidity == VSH_SOLIDITY_AUTO &&
+                       s->wholes.meshes[s->components[room].whole].solidity == VSH_SOLIDITY_AUTO;
+    if (found && (double)on > ROOM_SHARE * SAMPLES) { /* faces of both sides: air within, air outside */
         c->kind = VSHI_KIND_SHEET;
         around->coincides = true;
     }

@@ -230,8 +230,10 @@ static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s,
         block *b = &blocks[chunk->owner[r]];
         const double clear = (double)chunk->rays.clear[r];
         if (chunk->rays.proof[r] == VSHI_PROVED_FULL) {
-            hide(task, facing, b, stats);
-            b->near = true;
+            if (!task->leaky) {
+                hide(task, facing, b, stats);
+                b->near = true;
+            }
         } else if (clear < (double)chunk->rays.end[r]) {
             shorten(task, facing, b, clear > (double)chunk->rays.begin[r] ? clear : b->beam.begin);
             b->near = clear < b->beam.begin + NEAR + 3.0 * b->beam.wide;
@@ -320,7 +322,7 @@ void vshi_blocks_prove_balls(const vshi_shadow_task *task, size_t count, const v
     for (size_t r = 0; r < chunk.rays.count; ++r) {
         if (chunk.rays.proof[r] == VSHI_PROVED_FULL) {
             /* what hides a lamp may stand behind it, as seen from some of the points */
-            proof[chunk.owner[r]] = parallel ? VSHI_PROVED_FULL : VSHI_UNPROVED;
+            proof[chunk.owner[r]] = parallel && !task->leaky ? VSHI_PROVED_FULL : VSHI_UNPROVED;
         } else if (chunk.rays.clear[r] <= chunk.rays.begin[r]) {
             proof[chunk.owner[r]] = VSHI_PROVED_FREE;
         }

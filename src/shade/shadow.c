@@ -4,6 +4,7 @@
 #include "base/hash.h"
 #include "shade/blocks.h"
 #include "shade/layers.h"
+#include "shim/embree.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -176,6 +177,7 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
                        options->method == VSH_SHADOW_CONE;
     *task =
         (vshi_shadow_task){.field = field, .light = light, .options = options, .lowest = inner ? 1.0 : 0.0};
+    task->leaky = options->method == VSH_SHADOW_EXACT && vshi_triangles_have_holes(options->triangles);
     if (light->type == VSH_LIGHT_DIRECTIONAL) {
         task->towards = vshi_direction_to_field(field, vshi_unit(vshi_vec_of(light->direction)));
         task->sine = vshi_sin(0.5 * light->angle);

@@ -17,6 +17,8 @@ typedef struct vshi_shadow_task {
     double radius;               /* positional: finest voxels */
     double lowest;    /* sine of how far below the receiver's plane an axis may be, of its cone's: 1 where the
                        * inner penumbra counts, else 0 */
+    bool leaky;       /* exact: what the field has for solid need not be shut off by triangles, so that a cone
+                       * which goes into it is not hidden for certain */
     uint32_t purpose; /* of the sampler: lights of other names have other sequences */
     const vshi_kernel *kernel;
     const vsh_points *points;

@@ -295,9 +295,9 @@ static void prove(ray_batch *batch, vshi_facing *facing) {
     batch->stats->samples += work.samples;
     for (size_t r = 0; r < batch->chunk.rays.count; ++r) {
         const size_t i = batch->chunk.owner[r];
-        if (batch->chunk.rays.proof[r] != VSHI_UNPROVED) {
-            vshi_shadow_settle(task, facing->point[i],
-                               batch->chunk.rays.proof[r] == VSHI_PROVED_FREE ? 1.0f : 0.0f, 0.0f);
+        const uint8_t proof = (uint8_t)batch->chunk.rays.proof[r];
+        if (proof == VSHI_PROVED_FREE || (proof == VSHI_PROVED_FULL && !task->leaky)) {
+            vshi_shadow_settle(task, facing->point[i], proof == VSHI_PROVED_FREE ? 1.0f : 0.0f, 0.0f);
             facing->settled[i] = true;
             ++batch->stats->certified;
         }

@@ -156,6 +156,8 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, s
                 triangles->solid[triangle] = find_solid(mesh, sides, holed, i);
                 triangles->has_solids =
                     triangles->has_solids || triangles->solid[triangle] != VSHI_AIR_AROUND;
+                triangles->has_holes =
+                    triangles->has_holes || (triangles->solid[triangle] & VSHI_SOLID_HOLED) != 0;
                 ++triangle;
             }
         }

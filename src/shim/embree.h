@@ -35,6 +35,9 @@ int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray 
 /* Whether any triangle is a solid's or a wall's. */
 bool vshi_triangles_have_solids(const vsh_triangles *triangles);
 
+/* Whether any solid or wall has holes, by which rays go in and out. */
+bool vshi_triangles_have_holes(const vsh_triangles *triangles);
+
 /* How far off a surface rays begin, world units: above the rounding of floats, below what shows. */
 double vshi_triangles_lift(const vsh_triangles *triangles);
 

@@ -18,6 +18,11 @@ bool vshi_triangles_have_solids(const vsh_triangles *triangles) {
     return false;
 }
 
+bool vshi_triangles_have_holes(const vsh_triangles *triangles) {
+    (void)triangles;
+    return false;
+}
+
 double vshi_triangles_lift(const vsh_triangles *triangles) {
     (void)triangles;
     return 0.0;
@@ -175,6 +180,10 @@ int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray 
 
 bool vshi_triangles_have_solids(const vsh_triangles *triangles) {
     return triangles->has_solids;
+}
+
+bool vshi_triangles_have_holes(const vsh_triangles *triangles) {
+    return triangles->has_holes;
 }
 
 double vshi_triangles_lift(const vsh_triangles *triangles) {

@@ -25,6 +25,7 @@ struct vsh_triangles {
     uint32_t *first;  /* triangle of the sheet that each geometry begins with */
     uint8_t *solid;   /* [of the sheet]: where each one's solid lies */
     bool has_solids;  /* any */
+    bool has_holes;   /* in any of them */
     double centre[3];
     double scale;
     double size;    /* of the longest side of the triangles' box, world units */

@@ -1,0 +1,67 @@
+# What casters are taken for: found by themselves, or said by name.
+load helper
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    write_box box.obj
+    sed -E 's/^f ([^ ]*) ([^ ]*) ([^ ]*)/f \1 \3 \2/' box.obj >room.obj
+    sed '$d' box.obj | sed '$d' >crate.obj
+}
+
+@test "info says what objects are taken for" {
+    shade info box.obj
+    done_well
+    [[ $output == *"taken for: 1 solid"* ]] || fail "a box is solid"
+    shade info room.obj
+    done_well
+    [[ $output == *"taken for: 1 wall with air in front of its faces"* ]] || fail "a room is a wall"
+    shade info crate.obj
+    done_well
+    [[ $output == *"taken for: 1 sheet with air on both sides"* ]] || fail "a crate is a sheet"
+    [[ $output == *"problem: 4 open edges"* ]] || fail "no open edges"
+}
+
+@test "a room whose faces look inwards is baked" {
+    shade bake room.obj -o room.exr --ao 0.5 --size 64 --resolution 64 --ao-method exact
+    done_well
+    [[ $stderr != *"are invalid"* ]] || fail "$stderr"
+}
+
+@test "solid, shell and inward overrule what is found" {
+    shade voxelize crate.obj -o crate.vdb --resolution 32
+    done_well
+    [[ $stderr == *"baked as a shell"* ]] || fail "no shell: $stderr"
+    shade voxelize crate.obj -o crate.vdb --resolution 32 --solid '*'
+    done_well
+    [[ $stderr == *"closed over the holes"* ]] || fail "not closed: $stderr"
+    shade voxelize box.obj -o shell.vdb --resolution 32 --shell 'b*' --shell 'box'
+    done_well
+    [[ $stderr == *"baked as a shell"* ]] || fail "no shell: $stderr"
+    shade voxelize box.obj -o wall.vdb --resolution 32 --inward box
+    done_well
+    [[ $stderr == *"triangles that face the other way"* ]] || fail "not turned: $stderr"
+}
+
+@test "a pattern that matches nothing is refused with names" {
+    shade voxelize box.obj -o out.vdb --solid 'bix'
+    refused 2 "no object is named 'bix'"
+    [[ $stderr == *"did you mean 'box'"* ]] || fail "no name"
+    [ ! -e out.vdb ] || fail "written all the same"
+    shade bake box.obj -o out.exr --ao 1 --inward 'none*'
+    refused 2 "no object is named 'none*'"
+}
+
+@test "casters of a scene say it too" {
+    cat >scene.json <<'JSON'
+{"casters": [{"mesh": "crate.obj", "solid": "box"}, {"mesh": "box.obj", "shell": ["b*"], "inward": ["box"],
+  "transform": {"translate": [3, 0, 0]}}],
+ "resolution": 32}
+JSON
+    shade voxelize scene.json -o out.vdb
+    done_well
+    [[ $stderr == *"closed over the holes"* ]] || fail "not closed: $stderr"
+    [[ $stderr == *"face the other way"* ]] || fail "not inward: $stderr"
+    sed -i 's/"solid": "box"/"solid": "bax"/' scene.json
+    shade voxelize scene.json -o out.vdb
+    refused 2 "no object is named 'bax'"
+}
