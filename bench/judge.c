@@ -22,7 +22,7 @@
 
 static const float BLACK = 0.02f, BRIGHT = 0.5f; /* a mistake: a value below where truth is above */
 static const float WRONG = 0.25f;                /* an error that is seen at a glance */
-enum { BLACK_TRIANGLE = 4 };                     /* texels of a triangle, at least, to call it black */
+enum { BLACK_TRIANGLE = 4, LISTED = 40 };        /* texels of a triangle, at least, to call it black */
 
 typedef struct opened {
     vsh_image_file *file;
@@ -253,6 +253,60 @@ static int alike(char **arguments) {
     return 0;
 }
 
+static int list(char **arguments) {
+    vsh_error error;
+    vsh_model *model = NULL;
+    opened t = open_image(arguments[0]), b = open_image(arguments[1]);
+    if (vsh_model_read(arguments[2], NULL, &model, &error) != VSH_OK) {
+        fprintf(stderr, "judge: %s\n", error.message);
+        return 2;
+    }
+    const size_t mesh_count = vsh_model_mesh_count(model), width = (size_t)t.image.width;
+    const size_t texels = width * (size_t)t.image.height;
+    vsh_mesh *meshes = judge_take(mesh_count * sizeof *meshes);
+    for (size_t m = 0; m < mesh_count; ++m) {
+        meshes[m] = vsh_model_mesh(model, m, -1);
+    }
+    double low[3] = {0}, high[3] = {0};
+    size_t count, wrong = 0;
+    judge_triangle *triangles = judge_take_triangles(meshes, mesh_count, &count, low, high);
+    size_t *found = judge_take(texels * sizeof *found);
+    const float *verdict = plane(&t, "verdict"), *triangle = plane(&t, "triangle"),
+                *apart = plane(&t, "apart");
+    const float *const truths[2] = {plane(&t, "shadow"), plane(&t, "ao")};
+    const float *const values[2] = {plane(&b, "shadow.sun"), plane(&b, "ao")}, *a = plane(&b, "A");
+    for (size_t i = 0; i < texels; ++i) {
+        const int v = (int)verdict[i];
+        const bool off =
+            fabsf(values[0][i] - truths[0][i]) > WRONG || fabsf(values[1][i] - truths[1][i]) > WRONG;
+        if ((v == JUDGE_INVALID && a[i] > 0.0f) ||
+            (v == JUDGE_VALID && (a[i] < 1.0f || (off && apart[i] == 0.0f)))) {
+            found[wrong++] = i;
+        }
+    }
+    for (size_t k = 0; k < wrong; k += wrong / LISTED + 1) {
+        const size_t i = found[k];
+        const judge_triangle *at = &triangles[(size_t)triangle[i] - 1];
+        double p[3];
+        judge_position(at, (double)(i % width) + 0.5, (double)(i / width) + 0.5, t.image.width, p, NULL);
+        printf("%4zu %4zu  at %.5f %.5f %.5f  normal %.3f %.3f %.3f  %s  shadow %.3f, truth %.3f  AO %.3f, "
+               "truth %.3f\n",
+               i % width, i / width, p[0], p[1], p[2], at->g[0], at->g[1], at->g[2],
+               (int)verdict[i] == JUDGE_INVALID ? "valid by mistake  "
+               : a[i] < 1.0f                    ? "invalid by mistake"
+                                                : "off               ",
+               (double)values[0][i], (double)truths[0][i], (double)values[1][i], (double)truths[1][i]);
+    }
+    printf("%zu texels\n", wrong);
+    free(found);
+    free(triangles);
+    free(meshes);
+    vsh_model_free(model);
+    vsh_image_free(b.file);
+    vsh_image_free(t.file);
+    return 0;
+}
+
 /* Which mesh of a model an error is of: triangles are numbered as judge_take_triangles() takes them. */
 static int blame(char **arguments) {
     typedef struct share {
@@ -322,6 +376,9 @@ int main(int argc, char **argv) {
     }
     if (argc == 5 && strcmp(argv[1], "blame") == 0) {
         return blame(argv + 2);
+    }
+    if (argc == 5 && strcmp(argv[1], "list") == 0) {
+        return list(argv + 2);
     }
     if (argc == 4 && strcmp(argv[1], "alike") == 0) {
         return alike(argv + 2);

@@ -11,7 +11,8 @@
 /* What truth says of a texel. */
 enum {
     JUDGE_EMPTY = 0,   /* of no chart, or within a thousandth of a texel of a chart's border */
-    JUDGE_VALID = 1,   /* fewer than FEW of its rays first meet the back of a solid */
+    JUDGE_VALID = 1,   /* fewer than FEW of its rays leave solids more often than they enter, or first meet a
+                          room's back */
     JUDGE_INVALID = 2, /* more than MOST of them do: inside a solid, or behind a wall */
     JUDGE_UNCLEAR = 3, /* between them, or where two solids touch: not judged */
     JUDGE_VERDICTS = 4
@@ -23,7 +24,7 @@ typedef struct judge_question {
     double angle; /* degrees, diameter */
     double distance;
     int32_t rays;
-    const char *solids; /* an OBJ of what is solid, which may be NULL: all triangles of the model */
+    const char *solids; /* an OBJ of what a person takes for solids and for rooms; NULL: all are solids */
 } judge_question;
 
 /* Planes of [size × size], row 0 at v = 1. */
@@ -50,6 +51,11 @@ typedef struct judge_triangle {
 judge_triangle *judge_take_triangles(const vsh_mesh *meshes, size_t mesh_count, size_t *count, double low[3],
                                      double high[3]);
 
+/* Where a texel's centre lies, and the smooth normal there (which may be NULL); column and row end in a half.
+ */
+void judge_position(const judge_triangle *t, double column, double row, double size, double at[3],
+                    double n[3]);
+
 typedef struct judge_shape {
     float *positions;
     uint32_t *indices;
@@ -57,9 +63,8 @@ typedef struct judge_shape {
     double low[3], high[3];
 } judge_shape;
 
-/* "v" and "f" of an OBJ with convex faces, which are cut into fans; the faces of objects "sheet:…" are left
- * out. */
-judge_shape judge_read_solids(const char *path);
+/* "v" and "f" of an OBJ with convex faces, which are cut into fans: the faces of objects "KIND:…" only. */
+judge_shape judge_read_solids(const char *path, const char *kind);
 
 _Noreturn void judge_give_up(const char *what, const char *why);
 

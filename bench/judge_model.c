@@ -131,7 +131,7 @@ judge_triangle *judge_take_triangles(const vsh_mesh *meshes, size_t mesh_count, 
 
 /* --- what is solid: "v" and "f" of an OBJ with convex faces, which are cut into fans */
 
-judge_shape judge_read_solids(const char *path) {
+judge_shape judge_read_solids(const char *path, const char *kind) {
     FILE *file = fopen(path, "r");
     if (file == NULL) {
         judge_give_up(path, "cannot be opened");
@@ -139,7 +139,7 @@ judge_shape judge_read_solids(const char *path) {
     judge_shape s = {.low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}};
     size_t room = 1 << 16;
     char line[1024];
-    bool sheet = false;
+    bool wanted = false;
     s.positions = judge_take(room * 3 * sizeof *s.positions);
     s.indices = judge_take(room * 6 * sizeof *s.indices);
     while (fgets(line, sizeof line, file) != NULL) {
@@ -152,7 +152,7 @@ judge_shape judge_read_solids(const char *path) {
             }
         }
         if (line[0] == 'o') {
-            sheet = strncmp(line, "o sheet:", 8) == 0; /* only its size counts */
+            wanted = strncmp(line + 2, kind, strlen(kind)) == 0; /* of the others only the size counts */
         } else if (line[0] == 'v') {
             float *p = s.positions + 3 * s.vertices++;
             if (sscanf(line + 1, "%f %f %f", &p[0], &p[1], &p[2]) != 3) {
@@ -162,7 +162,7 @@ judge_shape judge_read_solids(const char *path) {
                 s.low[k] = fmin(s.low[k], (double)p[k]);
                 s.high[k] = fmax(s.high[k], (double)p[k]);
             }
-        } else if (line[0] == 'f' && !sheet) {
+        } else if (line[0] == 'f' && wanted) {
             uint32_t first = 0, last = 0, corner = 0;
             char *at = line + 1;
             for (unsigned n = 0; (corner = (uint32_t)strtoul(at, &at, 10)) != 0; ++n) {
@@ -177,4 +177,25 @@ judge_shape judge_read_solids(const char *path) {
     }
     fclose(file);
     return s;
+}
+
+void judge_position(const judge_triangle *t, double column, double row, double size, double at[3],
+                    double n[3]) {
+    const double u = column / size, v = 1.0 - row / size;
+    double b[3], whole = 0.0, normal[3] = {0};
+    for (int c = 0; c < 3; ++c) {
+        const double *p = t->uv[(c + 1) % 3], *q = t->uv[(c + 2) % 3];
+        b[c] = (p[0] - u) * (q[1] - v) - (p[1] - v) * (q[0] - u);
+        whole += b[c];
+    }
+    for (int k = 0; k < 3; ++k) {
+        at[k] = 0.0;
+        for (int c = 0; c < 3; ++c) {
+            at[k] += b[c] / whole * t->p[c][k];
+            normal[k] += b[c] / whole * t->n[c][k];
+        }
+    }
+    if (n != NULL) {
+        memcpy(n, normalize(normal) ? normal : t->g, 3 * sizeof *n);
+    }
 }

@@ -25,7 +25,7 @@ typedef struct work {
     judge_truth *truth;
     judge_triangle *triangles;
     size_t count;
-    const truth_mesh *model, *solids;
+    const truth_mesh *model, *solids, *rooms; /* no rooms: NULL */
     double lift, solid_scale;
     truth_frame sun;
     double (*few)[3], (*sun_rays)[3], (*ao_rays)[3], (*verdict_rays)[3]; /* in a frame's axes */
@@ -33,14 +33,6 @@ typedef struct work {
 
 static double dot(const double a[3], const double b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-static bool normalize(double v[3]) {
-    const double length = sqrt(dot(v, v));
-    for (int k = 0; k < 3; ++k) {
-        v[k] /= length;
-    }
-    return length > 0.0 && isfinite(length);
 }
 
 /* --- rays */
@@ -69,59 +61,76 @@ static bool hidden(const truth_mesh *mesh, const double from[3], const double to
 typedef struct gathering {
     struct RTCIntersectContext context; /* first: Embree hands on its address */
     const double *along;
-    double least; /* cosine */
-    bool against;
+    bool against; /* a face looks straight against `along` */
+    int backs;    /* less fronts, on the way along */
 } gathering;
 
-/* Notes faces that look against `along`, and lets the ray go on. */
+/* Looks at every face on a ray's way. */
 static void gather(const struct RTCFilterFunctionNArguments *arguments) {
     gathering *g = (gathering *)(void *)arguments->context;
     const struct RTCHit *hit =
         (const struct RTCHit *)arguments->hit; /* N is 1: packed as a lone hit's fields */
     const double n[3] = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
-    g->against = g->against || dot(n, g->along) < -g->least * sqrt(dot(n, n));
+    const double cosine = dot(n, g->along) / sqrt(dot(n, n));
+    g->against = g->against || cosine < -0.99;
+    g->backs += cosine > 0.0 ? 1 : -1; /* Embree's normals look to where a triangle is anticlockwise */
     arguments->valid[0] = 0;
 }
 
-/* Whether a face of a solid that looks against `along` lies on the way there from `from`, `reach` long. */
-static bool against(const work *w, const double from[3], const double along[3], double reach, double least) {
-    gathering seen = {.along = along, .least = least};
+static gathering all_on(const truth_mesh *mesh, const double from[3], const double along[3], double reach) {
+    gathering seen = {.along = along};
     rtcInitIntersectContext(&seen.context);
     seen.context.filter = gather;
-    struct RTCRayHit r = ray_of(w->solids, from, along, reach);
-    rtcIntersect1(w->solids->scene, &seen.context, &r);
-    return seen.against;
+    struct RTCRayHit r = ray_of(mesh, from, along, reach);
+    rtcIntersect1(mesh->scene, &seen.context, &r);
+    return seen;
 }
 
-/* Whether a ray first meets the back of a solid. Where two sheets lie in one place, back to back, the one
- * that looks at us is seen. */
-static bool meets_back(const work *w, const double from[3], const double towards[3]) {
+/* How far a ray comes, and whether it meets a back there. */
+static double first_on(const truth_mesh *mesh, const double from[3], const double towards[3], bool *back) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    struct RTCRayHit r = ray_of(w->solids, from, towards, INFINITY);
-    rtcIntersect1(w->solids->scene, &context, &r);
-    /* Embree's normals of a hit look to where its triangle is anticlockwise. */
-    if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID ||
-        (double)r.hit.Ng_x * towards[0] + (double)r.hit.Ng_y * towards[1] + (double)r.hit.Ng_z * towards[2] <=
-            0.0) {
+    struct RTCRayHit r = ray_of(mesh, from, towards, INFINITY);
+    rtcIntersect1(mesh->scene, &context, &r);
+    *back =
+        r.hit.geomID != RTC_INVALID_GEOMETRY_ID &&
+        (double)r.hit.Ng_x * towards[0] + (double)r.hit.Ng_y * towards[1] + (double)r.hit.Ng_z * towards[2] >
+            0.0;
+    return (double)r.ray.tfar;
+}
+
+/* Whether a ray says that it begins within a solid, which it leaves more often than it enters (solids may lie
+ * within and across each other), or behind the wall of a room. Where two walls lie in one place, back to
+ * back, the one that looks at us is seen. */
+static bool is_behind(const work *w, const double from[3], const double towards[3]) {
+    if (all_on(w->solids, from, towards, INFINITY).backs > 0) {
+        return true;
+    }
+    bool back, unused;
+    if (w->rooms == NULL) {
+        return false;
+    }
+    const double wall = first_on(w->rooms, from, towards, &back);
+    if (!back || wall > first_on(w->solids, from, towards, &unused)) {
         return false;
     }
     const double near = TOUCH * w->lift / w->solid_scale;
     double before[3];
     for (int k = 0; k < 3; ++k) {
-        before[k] = from[k] + fmax(0.0, (double)r.ray.tfar - near) * towards[k];
+        before[k] = from[k] + fmax(0.0, wall - near) * towards[k];
     }
-    return !against(w, before, towards, 2.0 * near, 0.0);
+    return all_on(w->rooms, before, towards, 2.0 * near).backs > 0;
 }
 
-/* Whether a solid ends where another begins: a face that looks against this one lies within TOUCH. */
+/* Whether a solid or room ends where another begins: a face that looks against this one lies within TOUCH. */
 static bool touches(const work *w, const double at[3], const double g[3]) {
     const double near = TOUCH * w->lift / w->solid_scale;
     double under[3];
     for (int k = 0; k < 3; ++k) {
         under[k] = at[k] - near * g[k];
     }
-    return against(w, under, g, 2.0 * near, 0.99);
+    return all_on(w->solids, under, g, 2.0 * near).against ||
+           (w->rooms != NULL && all_on(w->rooms, under, g, 2.0 * near).against);
 }
 
 static int verdict_of(const work *w, const double p[3], const double g[3]) {
@@ -135,7 +144,7 @@ static int verdict_of(const work *w, const double p[3], const double g[3]) {
     for (int i = 0; i < VERDICT_RAYS; ++i) {
         double towards[3];
         truth_to_world(&frame, w->verdict_rays[i], towards);
-        backs += meets_back(w, start, towards) ? 1 : 0;
+        backs += is_behind(w, start, towards) ? 1 : 0;
     }
     if (backs <= FEW * VERDICT_RAYS) {
         return JUDGE_VALID;
@@ -203,24 +212,8 @@ static void texel(void *user, size_t begin, size_t end) {
             continue;
         }
         const judge_triangle *t = &w->triangles[(size_t)w->truth->triangle[i] - 1];
-        const double u = ((double)(i % (size_t)size) + 0.5) / size,
-                     v = 1.0 - ((double)(i / (size_t)size) + 0.5) / size;
-        double b[3], whole = 0.0;
-        for (int c = 0; c < 3; ++c) {
-            const double *p = t->uv[(c + 1) % 3], *q = t->uv[(c + 2) % 3];
-            b[c] = (p[0] - u) * (q[1] - v) - (p[1] - v) * (q[0] - u);
-            whole += b[c];
-        }
-        double at[3] = {0}, n[3] = {0}, start[3];
-        for (int c = 0; c < 3; ++c) {
-            for (int k = 0; k < 3; ++k) {
-                at[k] += b[c] / whole * t->p[c][k];
-                n[k] += b[c] / whole * t->n[c][k];
-            }
-        }
-        if (!normalize(n)) {
-            memcpy(n, t->g, sizeof n);
-        }
+        double at[3], n[3], start[3];
+        judge_position(t, (double)(i % (size_t)size) + 0.5, (double)(i / (size_t)size) + 0.5, size, at, n);
         for (int k = 0; k < 3; ++k) {
             start[k] = at[k] + w->lift * t->g[k];
         }
@@ -294,17 +287,21 @@ judge_truth judge_make(const char *path, const judge_question *question) {
     const double extent = fmax(high[0] - low[0], fmax(high[1] - low[1], high[2] - low[2]));
     w.lift = 0.5 * LIFT * extent;
     w.sun = truth_frame_around(question->towards);
-    truth_mesh *mesh = truth_mesh_create(meshes, mesh_count), *solids = mesh;
-    if (question->solids != NULL) {
-        judge_shape s = judge_read_solids(question->solids);
-        const vsh_mesh solid = {.positions = s.positions,
+    truth_mesh *mesh = truth_mesh_create(meshes, mesh_count);
+    truth_mesh *solids = question->solids != NULL ? NULL : truth_mesh_create(meshes, mesh_count),
+               *rooms = NULL;
+    for (int kind = 0; question->solids != NULL && kind < 2; ++kind) {
+        judge_shape s = judge_read_solids(question->solids, kind == 0 ? "solid:" : "room:");
+        const vsh_mesh shape = {.positions = s.positions,
                                 .indices = s.indices,
                                 .vertex_count = s.vertices,
                                 .triangle_count = s.triangles};
-        solids = truth_mesh_create(&solid, 1);
+        if (s.triangles > 0 || kind == 0) {
+            *(kind == 0 ? &solids : &rooms) = truth_mesh_create(&shape, 1);
+        }
         truth.units = extent / fmax(s.high[0] - s.low[0], fmax(s.high[1] - s.low[1], s.high[2] - s.low[2]));
         w.solid_scale = truth.units;
-        for (int k = 0; k < 3; ++k) {
+        for (int k = 0; k < 3 && kind == 0; ++k) {
             if (fabs(low[k] - s.low[k] * truth.units) > 1e-4 * extent ||
                 fabs(high[k] - s.high[k] * truth.units) > 1e-4 * extent) {
                 fprintf(stderr, "judge: %s: axis %d is %g … %g, the solids say %g … %g\n", path, k, low[k],
@@ -317,16 +314,22 @@ judge_truth judge_make(const char *path, const judge_question *question) {
     if (mesh == NULL || solids == NULL) {
         judge_give_up(path, "no Embree, no truth");
     }
-    rtcSetSceneFlags(solids->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
-    rtcCommitScene(solids->scene);
+    truth_mesh *const looked_into[2] = {solids, rooms};
+    for (int k = 0; k < 2 && looked_into[k] != NULL; ++k) {
+        rtcSetSceneFlags(looked_into[k]->scene,
+                         RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+        rtcCommitScene(looked_into[k]->scene);
+    }
+    w.rooms = rooms;
     w.model = mesh;
     w.solids = solids;
     aim(&w);
     cover(&w);
     truth_in_pieces(texels, 0, texel, &w);
-    if (solids != mesh) {
-        truth_mesh_free(solids);
+    if (rooms != NULL) {
+        truth_mesh_free(rooms);
     }
+    truth_mesh_free(solids);
     truth_mesh_free(mesh);
     free(w.verdict_rays);
     free(w.ao_rays);

@@ -69,7 +69,7 @@ def write_solids(path, parts):
     with open(path, "w", encoding="ascii") as f:
         base = 1
         for name, part in parts:
-            f.write("o %s%s\n" % ("sheet:" if part.kind == "sheet" else "", name))
+            f.write("o %s:%s\n" % (part.kind, name))
             flip = (part.scale[0] * part.scale[1] * part.scale[2] < 0)
             for v in part.vertices:
                 f.write("v %.9g %.9g %.9g\n" % to_file(part.place(v)))
