@@ -1,7 +1,7 @@
 /* Judges bakes of models, for tools/judge-assets:
  *
- *   vsh_judge truth MODEL SIZE X,Y,Z DEGREES DISTANCE RAYS SOLIDS.obj|- OUT.exr
- *       verdict, shadow, ao, apart and triangle of every texel (judge.h)
+ *   vsh_judge truth MODEL SIZE X,Y,Z DEGREES DISTANCE RAYS[:N] SOLIDS.obj|- OUT.exr
+ *       verdict, shadow, ao, apart and triangle of every texel, or of one in N (judge.h)
  *   vsh_judge compare TRUTH.exr BAKE.exr [PICTURES.ppm]
  *       one line of figures (NAMES below says which), and a picture: shadow, its truth, error × 4; AO
  * likewise below vsh_judge alike BAKE.exr BAKE.exr RMSE between two bakes over texels that both have as
@@ -56,9 +56,13 @@ static int truth(char **arguments) {
                         .angle = atof(arguments[3]),
                         .distance = atof(arguments[4]),
                         .rays = atoi(arguments[5]),
+                        .every = 1,
                         .solids = strcmp(arguments[6], "-") != 0 ? arguments[6] : NULL};
     vsh_error error;
-    if (sscanf(arguments[2], "%lf,%lf,%lf", &q.towards[0], &q.towards[1], &q.towards[2]) != 3 || q.size < 1 ||
+    const char *every = strchr(arguments[5], ':');
+    q.every = every != NULL ? atoi(every + 1) : 1;
+    if (q.every < 1 ||
+        sscanf(arguments[2], "%lf,%lf,%lf", &q.towards[0], &q.towards[1], &q.towards[2]) != 3 || q.size < 1 ||
         q.rays < 1) {
         fputs("judge: size, rays or direction\n", stderr);
         return 2;

@@ -24,6 +24,7 @@ typedef struct judge_question {
     double angle; /* degrees, diameter */
     double distance;
     int32_t rays;
+    int32_t every;      /* N: one texel of N is looked at, from all rows and columns */
     const char *solids; /* an OBJ of what a person takes for solids and for rooms; NULL: all are solids */
 } judge_question;
 

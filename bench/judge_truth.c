@@ -17,7 +17,7 @@ static const double LIFT = 2e-6;   /* of the model's half size: some of Embree's
 static const double TOUCH = 6.0;   /* lifts: solids so near to each other touch */
 static const double TILT =
     10.0; /* degrees of a smooth normal off its triangle: what lies beyond is told apart */
-enum { VERDICT_RAYS = 96, FIRST_RAYS = 64 };
+enum { VERDICT_RAYS = 96, FIRST_RAYS = 64, KINDS = 3 };
 static const double PI = 3.14159265358979323846;
 
 typedef struct work {
@@ -25,7 +25,7 @@ typedef struct work {
     judge_truth *truth;
     judge_triangle *triangles;
     size_t count;
-    const truth_mesh *model, *solids, *rooms; /* no rooms: NULL */
+    const truth_mesh *model, *solids, *rooms, *hollows; /* of the last two NULL where there are none */
     double lift, solid_scale;
     truth_frame sun;
     double (*few)[3], (*sun_rays)[3], (*ao_rays)[3], (*verdict_rays)[3]; /* in a frame's axes */
@@ -102,8 +102,10 @@ static double first_on(const truth_mesh *mesh, const double from[3], const doubl
 /* Whether a ray says that it begins within a solid, which it leaves more often than it enters (solids may lie
  * within and across each other), or behind the wall of a room. Where two walls lie in one place, back to
  * back, the one that looks at us is seen. */
-static bool is_behind(const work *w, const double from[3], const double towards[3]) {
-    if (all_on(w->solids, from, towards, INFINITY).backs > 0) {
+static bool is_behind(const work *w, const double from[3], const double towards[3], bool hollows) {
+    if (all_on(w->solids, from, towards, INFINITY).backs +
+            (hollows ? all_on(w->hollows, from, towards, INFINITY).backs : 0) >
+        0) {
         return true;
     }
     bool back, unused;
@@ -133,21 +135,27 @@ static bool touches(const work *w, const double at[3], const double g[3]) {
            (w->rooms != NULL && all_on(w->rooms, under, g, 2.0 * near).against);
 }
 
+static int count_behind(const work *w, const double start[3], const double g[3], bool hollows) {
+    const truth_frame frame = truth_frame_around(g);
+    int backs = 0;
+    for (int i = 0; i < VERDICT_RAYS; ++i) {
+        double towards[3];
+        truth_to_world(&frame, w->verdict_rays[i], towards);
+        backs += is_behind(w, start, towards, hollows) ? 1 : 0;
+    }
+    return backs;
+}
+
 static int verdict_of(const work *w, const double p[3], const double g[3]) {
     double at[3], start[3];
     for (int k = 0; k < 3; ++k) {
         at[k] = p[k] / w->solid_scale;
         start[k] = at[k] + w->lift / w->solid_scale * g[k];
     }
-    const truth_frame frame = truth_frame_around(g);
-    int backs = 0;
-    for (int i = 0; i < VERDICT_RAYS; ++i) {
-        double towards[3];
-        truth_to_world(&frame, w->verdict_rays[i], towards);
-        backs += is_behind(w, start, towards) ? 1 : 0;
-    }
+    const int backs = count_behind(w, start, g, false);
     if (backs <= FEW * VERDICT_RAYS) {
-        return JUDGE_VALID;
+        const bool either = w->hollows != NULL && count_behind(w, start, g, true) > FEW * VERDICT_RAYS;
+        return either ? JUDGE_UNCLEAR : JUDGE_VALID;
     }
     return backs < MOST * VERDICT_RAYS || touches(w, at, g) ? JUDGE_UNCLEAR : JUDGE_INVALID;
 }
@@ -258,7 +266,8 @@ static void cover(const work *w) {
                     least = fmin(least, copysign(1.0, area) * side / hypot(b[0] - a[0], b[1] - a[1]));
                 }
                 float *keeper = &w->truth->triangle[(size_t)y * (size_t)size + (size_t)x];
-                if (least > 0.0 && *keeper == 0.0f) {
+                const bool asked = (x + 2 * y) % w->question->every == 0;
+                if (least > 0.0 && *keeper == 0.0f && asked) {
                     *keeper = least > BORDER ? (float)(k + 1) : -1.0f;
                 }
             }
@@ -288,16 +297,19 @@ judge_truth judge_make(const char *path, const judge_question *question) {
     w.lift = 0.5 * LIFT * extent;
     w.sun = truth_frame_around(question->towards);
     truth_mesh *mesh = truth_mesh_create(meshes, mesh_count);
-    truth_mesh *solids = question->solids != NULL ? NULL : truth_mesh_create(meshes, mesh_count),
-               *rooms = NULL;
-    for (int kind = 0; question->solids != NULL && kind < 2; ++kind) {
-        judge_shape s = judge_read_solids(question->solids, kind == 0 ? "solid:" : "room:");
+    truth_mesh *looked_into[KINDS] = {NULL};
+    static const char *const kinds[KINDS] = {"solid:", "room:", "hollow:"};
+    if (question->solids == NULL) {
+        looked_into[0] = truth_mesh_create(meshes, mesh_count);
+    }
+    for (int kind = 0; question->solids != NULL && kind < KINDS; ++kind) {
+        judge_shape s = judge_read_solids(question->solids, kinds[kind]);
         const vsh_mesh shape = {.positions = s.positions,
                                 .indices = s.indices,
                                 .vertex_count = s.vertices,
                                 .triangle_count = s.triangles};
         if (s.triangles > 0 || kind == 0) {
-            *(kind == 0 ? &solids : &rooms) = truth_mesh_create(&shape, 1);
+            looked_into[kind] = truth_mesh_create(&shape, 1);
         }
         truth.units = extent / fmax(s.high[0] - s.low[0], fmax(s.high[1] - s.low[1], s.high[2] - s.low[2]));
         w.solid_scale = truth.units;
@@ -311,25 +323,28 @@ judge_truth judge_make(const char *path, const judge_question *question) {
         free(s.positions);
         free(s.indices);
     }
-    if (mesh == NULL || solids == NULL) {
+    if (mesh == NULL || looked_into[0] == NULL) {
         judge_give_up(path, "no Embree, no truth");
     }
-    truth_mesh *const looked_into[2] = {solids, rooms};
-    for (int k = 0; k < 2 && looked_into[k] != NULL; ++k) {
-        rtcSetSceneFlags(looked_into[k]->scene,
-                         RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
-        rtcCommitScene(looked_into[k]->scene);
+    for (int k = 0; k < KINDS; ++k) {
+        if (looked_into[k] != NULL) {
+            rtcSetSceneFlags(looked_into[k]->scene,
+                             RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+            rtcCommitScene(looked_into[k]->scene);
+        }
     }
-    w.rooms = rooms;
+    w.solids = looked_into[0];
+    w.rooms = looked_into[1];
+    w.hollows = looked_into[2];
     w.model = mesh;
-    w.solids = solids;
     aim(&w);
     cover(&w);
     truth_in_pieces(texels, 0, texel, &w);
-    if (rooms != NULL) {
-        truth_mesh_free(rooms);
+    for (int k = 0; k < KINDS; ++k) {
+        if (looked_into[k] != NULL) {
+            truth_mesh_free(looked_into[k]);
+        }
     }
-    truth_mesh_free(solids);
     truth_mesh_free(mesh);
     free(w.verdict_rays);
     free(w.ao_rays);

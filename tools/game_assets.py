@@ -275,8 +275,8 @@ def pipes():
         bends.append(bend)
     flanges = [rod(0.3, (-1.5 + 0.5 * k, 0.4, 0.25), (-1.5 + 0.5 * k, 0.46, 0.25), 32) for k in range(0, 7, 2)]
     return [("floor", box((-2.5, 3.5), (-2.5, 2.5), (-0.1, 0), cells=(24, 20, 1))),
-            ("tubes", together(tubes, smooth=True)), ("thick", together(thick, smooth=True)),
-            ("bends", together(bends, smooth=True)), ("flanges", together(flanges, smooth=True))]
+            ("tubes", together(tubes, "hollow", smooth=True)), ("thick", together(thick, smooth=True)),
+            ("bends", together(bends, "hollow", smooth=True)), ("flanges", together(flanges, smooth=True))]
 
 
 def mixed():
@@ -337,7 +337,7 @@ def vessels():
              ("bowl", lathe(bowl, 64, "sheet").moved(-0.3, 0, 0)),
              ("fruit", together([ball(0.045, 14, 28).moved(-0.3 + 0.05 * cos(2.1 * k), 0.05 * sin(2.1 * k), 0.06 + 0.001 * k)
                                  for k in range(3)], smooth=True)),
-             ("vase", lathe(vase, 64, "sheet").moved(0.15, 0.2, 0)),
+             ("vase", lathe(vase, 64, "hollow").moved(0.15, 0.2, 0)),
              ("flower", together([rod(0.003, (0.15, 0.2, 0.01), (0.15 + 0.06 * cos(k), 0.2 + 0.06 * sin(k), 0.5), 8)
                                   for k in range(5)], smooth=True)),
              ("cup", lathe(cup, 48, "sheet").moved(0.1, -0.25, 0)),

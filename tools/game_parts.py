@@ -4,7 +4,7 @@ from math import cos, pi, sin, sqrt
 
 class Part:
     """A mesh. kind tells what a person takes it for: "solid" (what is behind its faces is inside), "room" (the same, of
-    a mesh whose faces look inwards) or "sheet" (nothing is behind it). true_faces are the faces before some of them were
+    a mesh whose faces look inwards) "sheet" (nothing is behind it) or "hollow" (a vessel or pipe of one wall: either is right). true_faces are the faces before some of them were
     flipped by mistake."""
 
     def __init__(self, vertices=(), faces=(), kind="solid", smooth=False):
