@@ -1,4 +1,5 @@
 /* vdbshade bake: from files to lightmaps. */
+#include "bake_expect.h"
 #include "bake_forecast.h"
 #include "bake_options.h"
 #include "clock.h"
@@ -116,6 +117,10 @@ static int rasterise(bake_work *work) {
     const double start = cli_seconds();
     int code = CLI_OK;
     work->receivers = cli_box_empty();
+    cli_expected_receiver *expected = calloc(work->scene->receiver_count + 1, sizeof *expected);
+    if (expected == NULL) {
+        return cli_out_of_memory("receivers");
+    }
     for (size_t i = 0; i < work->scene->receiver_count && code == CLI_OK; ++i) {
         const cli_receiver_job job = receiver_job(work, i);
         vsh_charts *charts = NULL;
@@ -125,6 +130,9 @@ static int rasterise(bake_work *work) {
         code = code == CLI_OK ? find_bounds(work, &job, charts, &texels, &info) : code;
         if (code == CLI_OK) {
             cli_box_grow(&work->receivers, &info);
+            vsh_charts_info counted;
+            vsh_charts_get_info(charts, &counted);
+            expected[i] = (cli_expected_receiver){counted.covered, counted.samples, texels == NULL};
         }
         if (code == CLI_OK && work->scene->receiver_count == 1) {
             work->charts = charts;
@@ -134,6 +142,10 @@ static int rasterise(bake_work *work) {
             vsh_charts_free(charts);
         }
     }
+    if (code == CLI_OK) {
+        cli_bake_expect(work->scene, work->assets, expected, work->run.threads);
+    }
+    free(expected);
     cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
     return code;
 }
