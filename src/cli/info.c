@@ -23,10 +23,10 @@ const cli_command cli_info = {
     "info",
     "FILE",
     "Prints what a file holds and what is wrong with it. Meshes: objects, triangles, UV sets, bounds,\n"
-    "open, flipped and degenerate parts, UVs that overlap within or between objects. OpenVDB files (.vdb): "
-    "class, voxel size, band,\n"
-    "bounds, memory of each grid, and why it cannot cast. Scenes (.json): casters, lights, receivers.\n"
-    "Images: size, and the range of each channel.",
+    "open, flipped and degenerate parts, what they are taken for, UVs that overlap within or between\n"
+    "objects. OpenVDB files (.vdb): class, voxel size, band, bounds, memory of each grid, and why it\n"
+    "cannot cast. Scenes (.json): casters, lights, receivers. Images: size, and the range of each\n"
+    "channel.",
     options,
     sizeof options / sizeof options[0],
     info_main};
