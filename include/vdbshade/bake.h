@@ -43,6 +43,21 @@ typedef struct vsh_uv_report {
     size_t other_mesh_texels; /* how many of them do; 0 in all others */
 } vsh_uv_report;
 
+/* Charts that lie closer to each other than a texel: what is read between texels takes from both. */
+typedef struct vsh_closeness {
+    uint64_t texels;      /* that borders so close to another chart's pass */
+    uint64_t mesh_texels; /* those of the mesh with the most, */
+    size_t mesh;          /* which is this */
+    double gap;           /* the least between two charts, texels; 1: none is less */
+} vsh_closeness;
+
+/* Measures a receiver's charts at a size; a chart is what hangs together by edges in space and in the UVs.
+ * Errors: VSH_ERROR_ARGUMENT (sizes, run), VSH_ERROR_INPUT (no UVs, and as vsh_mesh_check()), VSH_ERROR_LIMIT
+ * (run->memory_limit; 2^32 / 3 triangles), VSH_ERROR_MEMORY. */
+VSH_API vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32_t width,
+                                        int32_t height, const vsh_run *run, vsh_closeness *found,
+                                        vsh_error *error);
+
 /* The texels of a receiver at one size: where each lies in the world. The meshes are not needed any more. */
 typedef struct vsh_texels vsh_texels;
 

@@ -2,6 +2,7 @@
 
 #include "clipping.h"
 #include "clock.h"
+#include "closeness.h"
 #include "invalid.h"
 #include "message.h"
 #include "overall.h"
@@ -150,6 +151,9 @@ int cli_receiver_charts(const cli_receiver_job *job, bool warn, vsh_charts **cha
     }
     for (size_t i = 0; i < count && warn && code == CLI_OK; ++i) {
         warn_uvs(job->run, receiver->path, &meshes[i], &reports[i]);
+    }
+    if (warn && code == CLI_OK) {
+        cli_closeness_warn(job, reports);
     }
     free(reports);
     return code;

@@ -35,7 +35,8 @@ load helper
     write_box box.obj
     awk '$1 == "v" { print "v", 3 * $2 - 1, 3 * $3 - 1, 3 * $4 - 1; next } { print }' box.obj >around.obj
     old_output out.exr
-    shade bake box.obj --caster around.obj --ao 0.5 --method exact --ao-method exact --size 32 --resolution 24 \
+    # what everything else lies within is a sky dome, unless it is said to be solid
+    shade bake box.obj --caster around.obj --solid box --ao 0.5 --method exact --ao-method exact --size 32 --resolution 24 \
         -o out.exr
     refused 2 box.obj "inside solids" info
     untouched out.exr
@@ -59,4 +60,18 @@ load helper
     refused 2 --invalid where.jpg .png
     shade bake box.obj "${SMALL[@]}" -o out.exr --invalid where.png --resume
     refused 2 --invalid --resume
+}
+
+@test "charts closer than a texel are told of, and from which size on they are apart" {
+    write_box box.obj
+    shade bake box.obj "${SMALL[@]}" --size 16 -o out.exr
+    done_well
+    [[ $stderr == *"charts lie closer than a texel"*"mesh 'box'"*"from --size 2"[56]" on"* ]] || fail "not told"
+    shade bake box.obj "${SMALL[@]}" --size 26 -o out.exr
+    done_well
+    [[ $stderr != *"charts lie closer"* ]] || fail "told for no reason"
+    # no size parts charts that touch
+    sed 's/^vt 0.31 /vt 0.33 /; s/^vt 0.35 /vt 0.33 /' box.obj >touching.obj
+    shade bake touching.obj "${SMALL[@]}" --size 64 -o out.exr
+    [[ $stderr == *"they touch"*"margin"* ]] || fail "not told"
 }
