@@ -37,6 +37,7 @@ typedef struct looking {
     const double *positions; /* [count][3] */
     const float *normals;
     double lift;
+    bool holes; /* solids have some: a ray that escapes proves nothing */
     vshi_open_fn *open;
     const void *user;
 } looking;
@@ -104,7 +105,7 @@ static void look(const looking *l, size_t first, size_t count, uint8_t *where) {
         const int inside = met[VSHI_MEETS_SOLID] + met[VSHI_MEETS_HOLED];
         if (inside == FIRST) {
             where[point] = met[VSHI_MEETS_HOLED] > 0 ? confirm(l, point) : VSHI_INSIDE;
-        } else if (inside == 0 && (escapes || (l->open != NULL && l->open(l->user, point)))) {
+        } else if (inside == 0 && ((escapes && !l->holes) || (l->open != NULL && l->open(l->user, point)))) {
             where[point] = VSHI_OUTSIDE;
         } else {
             where[point] = count_through(l, point, escapes);
@@ -118,7 +119,9 @@ void vshi_inside(const vsh_triangles *triangles, size_t count, const double *pos
     if (!vshi_triangles_have_solids(triangles)) {
         return;
     }
-    const looking l = {triangles, positions, normals, vshi_triangles_lift(triangles), open, user};
+    const looking l = {
+        triangles, positions, normals, vshi_triangles_lift(triangles), vshi_triangles_have_holes(triangles),
+        open,      user};
     for (size_t first = 0; first < count; first += AT_ONCE) {
         look(&l, first, count - first < AT_ONCE ? count - first : AT_ONCE, where);
     }
