@@ -39,10 +39,15 @@ LEVEL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
 
 @test "an atlas of objects, and charts that only touch, are not refused" {
     write_level level.obj floor wall
-    # the second object to the right half, and a sliver of it over the first
-    awk '/^o /{n++} /^vt/{$2 = n == 1 ? $2 / 2 : 0.499 + $2 / 2.004} {print}' level.obj >atlas.obj
+    awk '/^o /{n++} /^vt/{$2 = $2 / 2 + (n - 1) / 2} {print}' level.obj >atlas.obj
     shade bake atlas.obj "${LEVEL[@]}" -o out.exr
     done_well
+    [[ $stderr != *"other objects"* ]] || fail "nothing overlaps"
+    # a column of texels or two of the second object over the first
+    awk '/^o /{n++} /^vt/{$2 = $2 / 2 + (n - 1) * 0.472} {print}' level.obj >touching.obj
+    shade bake touching.obj --sun 0.3,1,0.2 --size 256 --resolution 24 -o out.exr
+    done_well
+    [[ $stderr == *"mesh 'wall': "*" texels lie over charts of other objects"* ]] || fail "no warning"
 }
 
 @test "--receive chooses by name and pattern; what is not chosen casts all the same" {
@@ -95,11 +100,11 @@ LEVEL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
 }
 
 @test "names are made safe for file systems and unique" {
-    write_level level.obj 'a/b' 'a_b' 'A-b' 'Wände' '../evil' '...' 'a?b'
+    write_level level.obj 'a/b' 'a_b' 'A-b' 'a-b' 'Wände' '../evil' '...' 'a?b'
     shade bake level.obj "${LEVEL[@]}" --per-object -o maps/ --quiet
     done_well
-    [ "$(ls maps | wc -l)" -eq 7 ] || fail "$(ls maps)"
-    for name in a_b a_b-2 a_b-3 'A-b' 'Wände' _._evil ___; do
+    [ "$(ls maps | wc -l)" -eq 8 ] || fail "$(ls maps)"
+    for name in a_b a_b-2 a_b-3 A-b a-b-2 'Wände' _._evil ___; do
         [ -s "maps/$name.exr" ] || fail "no $name: $(ls maps)"
     done
     [ ! -e evil.exr ] || fail "out of the folder"
@@ -223,4 +228,13 @@ JSON
             }
         }')
     [ -z "$missing" ] || fail "not in docs/warnings.md: $missing"
+}
+
+@test "compare tells no measure that too few edges do not give" {
+    write_level level.obj floor wall
+    shade bake level.obj --receive floor --sun 1,0.3,0 --sun-angle 2 --method cone --size 8 --resolution 48 --quiet -o out.exr
+    done_well
+    shade compare out.exr out.exr
+    done_well
+    [[ $output == *" edges)"* && $output != *nan* ]] || fail "nan"
 }
