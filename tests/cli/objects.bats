@@ -132,7 +132,7 @@ JSON
     shade bake scene.json --quiet
     done_well
     sed 's/true/false/' scene.json >refused.json
-    shade bake refused.json
+    shade bake refused.json --quiet
     refused 2 level.obj "'roof' on" "over 'wall'"
     sed 's/fl\*/flo/' scene.json >near.json
     shade bake near.json
