@@ -21,6 +21,13 @@ enum {
     VSH_SOLIDITY_INWARD /* air in what it encloses, whatever way its faces look: a room or a wall */
 };
 
+/* What a mesh's material makes of light that comes through (glTF's alphaMode). */
+enum {
+    VSH_ALPHA_OPAQUE = 0,
+    VSH_ALPHA_MASKED = 1, /* holes where its texture says so */
+    VSH_ALPHA_BLENDED = 2 /* glass, smoke */
+};
+
 /* A view of a triangle mesh: nothing is copied or owned. */
 typedef struct vsh_mesh {
     const char *name;       /* for messages; may be NULL */
@@ -38,6 +45,7 @@ typedef struct vsh_mesh {
     int32_t solidity;     /* VSH_SOLIDITY_…; where it casts */
     const uint8_t *sides; /* [triangle_count]: what was found to be solid, so that it is not looked for
                              again; of views from a scene's assets. Else NULL */
+    int32_t alpha;        /* VSH_ALPHA_…; what scenes make of it: vsh_caster.cast_blended */
 } vsh_mesh;
 
 /* Whether a mesh is meant by `pattern`: its name, its object's name, or what its name has behind its object's
@@ -64,20 +72,28 @@ typedef struct vsh_mesh_report {
  * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error);
 
-/* A file of meshes: OBJ, glTF/GLB, PLY, STL, FBX and what else Assimp reads. A node's transform is that of
- * its mesh's view; a mesh that two nodes use is two meshes. The meshes of a node are one object, and its name
- * that of the node. UVs have v up in every format. */
+/* A file of meshes: OBJ, glTF or GLB (2.0), PLY, STL, FBX or Collada (.dae). A node's transform is that
+ * of its mesh's view; a mesh that two nodes use is two meshes, and so are the instances of
+ * EXT_mesh_gpu_instancing. The meshes of a node are one object, and its name that of the node. UVs have v up
+ * in every format.
+ *
+ * - Units: positions are in metres where the format knows its unit (glTF: metres; FBX, Collada: as the
+ *   file says); OBJ, PLY and STL are numbers as they are.
+ * - Axes: as glTF has them, y up, in formats that know theirs (FBX, Collada); else as they are.
+ * - Pose: skins at rest, that is as the nodes stand in the file; morph targets at their default weights.
+ * - Polygons are cut into triangles that cover them exactly, concave ones too. */
 typedef struct vsh_model vsh_model;
 
 /* Reads a model; the ending of `path` tells its format. Warns of meshes that a transform flattens (left
- * out), normals that are not finite (flat there) and polygons that cannot be cut into triangles. Free the
+ * out), normals that are not finite (flat there) and polygons whose edges cross. Free the
  * result with vsh_model_free(). Errors:
  * - VSH_ERROR_ARGUMENT: path or model NULL, run;
- * - VSH_ERROR_READ: no such file, no permission, no regular file, empty, cut short, not understood by
- *   Assimp;
- * - VSH_ERROR_INPUT: no ending, or one of no format that is read (Alembic and USD files, by their first bytes
- *   too); no triangles; vertices that are not
- *   finite, indices out of range, a damaged header or JSON;
+ * - VSH_ERROR_READ: no such file, no permission, no regular file, empty, cut short, damaged, or a glTF's
+ *   buffer that is not beside it;
+ * - VSH_ERROR_UNSUPPORTED: a glTF that needs an extension that is not read, or of another version;
+ * - VSH_ERROR_INPUT: no ending, or one of no format that is read (.blend, Alembic and USD files, by their
+ *   first bytes too); no triangles; vertices that are not finite, indices out of range, a damaged header or
+ *   JSON;
  * - VSH_ERROR_LIMIT: run->memory_limit (about six bytes for one of the file), nodes nested more than 1024
  *   deep;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
@@ -86,6 +102,13 @@ VSH_API void vsh_model_free(vsh_model *model); /* NULL does nothing */
 
 /* Number of meshes, at least 1; each has a triangle. */
 VSH_API size_t vsh_model_mesh_count(const vsh_model *model);
+
+/* Metres in one unit of the file, by which positions have been multiplied: 1 for glTF; 0 where the
+ * format has no unit. */
+VSH_API double vsh_model_unit(const vsh_model *model);
+
+/* Metres in a unit: "m", "cm", "mm", "in" or "ft"; 0 for what is none, and NULL. */
+VSH_API double vsh_unit(const char *name);
 
 /* Number of UV sets of mesh `index` (< mesh count), 0 … VSH_MAX_UV_SETS. */
 VSH_API int32_t vsh_model_uv_sets(const vsh_model *model, size_t index);

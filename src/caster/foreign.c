@@ -10,20 +10,21 @@
 enum { HEAD = 512 };
 
 static const char alembic[] = "an Alembic file", usd[] = "a USD file";
+static const char blender[] = "Blender's own file; export it as GLB (File, Export, glTF 2.0)";
 
 static const struct {
     const char *ending, *what;
-} endings[] = {{"abc", alembic}, {"usd", usd}, {"usda", usd}, {"usdc", usd}, {"usdz", usd}};
+} endings[] = {{"abc", alembic}, {"usd", usd},  {"usda", usd},
+               {"usdc", usd},    {"usdz", usd}, {"blend", blender}};
 
 static const struct {
     const char *bytes;
     size_t size;
     const char *what;
 } beginnings[] = {
-    {"Ogawa", 5, alembic},
-    {"\x89HDF\r\n\x1a\n", 8, alembic}, /* before 2013; no other format that meshes come in is HDF5 */
-    {"#usda", 5, usd},
-    {"PXR-USDC", 8, usd},
+    {"Ogawa", 5, alembic}, {"\x89HDF\r\n\x1a\n", 8, alembic}, /* before 2013; no other format that meshes come
+                                                                 in is HDF5 */
+    {"#usda", 5, usd},     {"BLENDER-v", 9, blender},         {"BLENDER_v", 9, blender}, {"PXR-USDC", 8, usd},
 };
 
 /* A USDZ file is a Zip file whose first entry is a USD file. */
@@ -65,8 +66,5 @@ vsh_result vshi_foreign_check(const char *path, vsh_error *error) {
     }
     return what == NULL
                ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_INPUT,
-                           "%s: is %s, which is not read: give a mesh as OBJ, glTF, GLB, PLY, STL or "
-                           "FBX, a level set as .vdb, or a scene as .json",
-                           path, what);
+               : vshi_fail(error, VSH_ERROR_INPUT, "%s: is %s, which is not read: " VSHI_FORMATS, path, what);
 }

@@ -4,8 +4,12 @@
 
 #include "base/error.h"
 
-/* VSH_ERROR_INPUT, with the formats that are read, where a file is Alembic or USD by its ending or its first
- * bytes. A file that cannot be read is told apart by its ending only. Thread safe. */
+/* What is said to whoever gives another. */
+#define VSHI_FORMATS                                                                                         \
+    "give a mesh as OBJ, glTF, GLB, PLY, STL, FBX or DAE, a level set as .vdb, or a scene as .json"
+
+/* VSH_ERROR_INPUT, with the formats that are read, where a file is of Blender, Alembic or USD by its ending
+ * or its first bytes. A file that cannot be read is told apart by its ending only. Thread safe. */
 vsh_result vshi_foreign_check(const char *path, vsh_error *error);
 
 #endif

@@ -1,9 +1,5 @@
-/* A model: the arrays of each mesh of a file once, and an entry for every node that uses them.
- *
- * What Assimp has done by then, and what is left as it is: v of UVs points up in every format (glTF's v is
- * flipped by its importer); an FBX file's unit stays out of the positions, that is they are in the file's own
- * numbers, mostly centimetres; the up axis of a format is that of the file, but for those that Assimp turns
- * by a root node (Collada, FBX). Bones and morph targets are left out: meshes are in their rest pose. */
+/* A model: the arrays of each mesh of a file once, and an entry for every node that uses them. glTF is read
+ * by gltf*.c, other formats by Assimp (model_file.c, model_build.c). v of UVs points up in every format. */
 #include "caster/model.h"
 
 #include "base/floats.h"
@@ -38,6 +34,23 @@ size_t vsh_model_mesh_count(const vsh_model *model) {
     return model->entry_count;
 }
 
+double vsh_unit(const char *name) {
+    static const struct {
+        const char *name;
+        double metres;
+    } units[] = {{"m", 1.0}, {"cm", 0.01}, {"mm", 0.001}, {"in", 0.0254}, {"ft", 0.3048}};
+    for (size_t i = 0; name != NULL && i < sizeof units / sizeof units[0]; ++i) {
+        if (strcmp(name, units[i].name) == 0) {
+            return units[i].metres;
+        }
+    }
+    return 0.0;
+}
+
+double vsh_model_unit(const vsh_model *model) {
+    return model->unit;
+}
+
 int32_t vsh_model_uv_sets(const vsh_model *model, size_t index) {
     return model->shapes[model->entries[index].shape].uv_sets;
 }
@@ -57,6 +70,7 @@ vsh_mesh vsh_model_mesh(const vsh_model *model, size_t index, int32_t uv_set) {
         .transform = entry->transform,
         .object_name = entry->object_name,
         .object = entry->object,
+        .alpha = shape->alpha,
     };
 }
 
@@ -69,9 +83,16 @@ static bool wants_normals(const char *path) {
 static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job, vsh_model **model,
                             vsh_error *error) {
     vshi_import *import = NULL;
-    vsh_result result = vshi_model_file_read(path, run, job, &import, error);
-    if (result == VSH_OK) {
-        const vshi_model_source source = {path, run, job, vshi_import_scene(import), wants_normals(path)};
+    double unit = 0.0;
+    vsh_result result = vshi_model_file_read(path, run, job, &import, model, &unit, error);
+    if (result == VSH_OK && import != NULL) {
+        const vshi_model_source source = {.path = path,
+                                          .run = run,
+                                          .job = job,
+                                          .scene = vshi_import_scene(import),
+                                          .keep_normals = wants_normals(path),
+                                          .unit = unit > 0.0 ? unit : vshi_import_unit(import),
+                                          .in_metres = unit > 0.0};
         result = vshi_model_build(&source, model, error);
     }
     vshi_import_free(import);

@@ -17,6 +17,7 @@ typedef struct vshi_model_shape {
     size_t vertex_count;
     size_t triangle_count;
     int32_t uv_sets; /* highest set + 1 */
+    int32_t alpha;   /* VSH_ALPHA_… */
 } vshi_model_shape;
 
 typedef struct vshi_model_entry {
@@ -32,6 +33,7 @@ struct vsh_model {
     size_t shape_count;
     vshi_model_entry *entries;
     size_t entry_count, entry_capacity;
+    double unit; /* metres in one of the file's; 0: not known */
 };
 
 /* What a model is built from, and by whose order. */
@@ -41,7 +43,28 @@ typedef struct vshi_model_source {
     vshi_job *job;
     const struct aiScene *scene;
     bool keep_normals;
+    double unit;    /* metres in a unit of the file; 0: it has none */
+    bool in_metres; /* whether positions are in metres already */
 } vshi_model_source;
+
+/* Where a shape stands. */
+typedef struct vshi_model_place {
+    const char *node, *mesh; /* names; may be "" */
+    uint32_t object;
+    size_t shape;
+    const double *world; /* [12] */
+} vshi_model_place;
+
+/* Adds an entry; a transform that flattens it is left out, with a warning. Errors: VSH_ERROR_INPUT (a
+ * transform that is not finite in 32 bits), VSH_ERROR_MEMORY. */
+vsh_result vshi_model_add(vsh_model *model, const char *path, const vsh_run *run,
+                          const vshi_model_place *place, vsh_error *error);
+
+/* The number of an object that is yet to be added. */
+uint32_t vshi_model_next_object(const vsh_model *model);
+
+/* world = parent × own. */
+void vshi_model_compose(const double parent[12], const double own[12], double world[12]);
 
 /* Builds the model of a scene that vshi_model_file_read() has passed. */
 vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **model, vsh_error *error);

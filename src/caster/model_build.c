@@ -1,17 +1,23 @@
+/* From Assimp's scene to a model: arrays, polygons cut into triangles, skins at rest, places. */
 #include "base/memory.h"
 #include "caster/mesh.h"
 #include "caster/model.h"
+#include "caster/model_skin.h"
+#include "caster/polygon.h"
 
+#include <assimp/material.h>
 #include <assimp/scene.h>
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+/* Most triangles that a mesh's faces make. */
 static size_t count_triangles(const struct aiMesh *mesh) {
     size_t count = 0;
     for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
-        count += mesh->mFaces[f].mNumIndices == 3;
+        const unsigned corners = mesh->mFaces[f].mNumIndices;
+        count += corners >= 3 ? corners - 2 : 0;
     }
     return count;
 }
@@ -26,9 +32,10 @@ static vsh_result check_size(const vshi_model_source *source, vsh_error *error) 
         for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
             vertex += mesh->mTextureCoords[set] != NULL ? sizeof(float[2]) + sizeof(struct aiVector3D) : 0;
         }
+        vertex += mesh->mNumBones > 0 ? VSHI_SKIN_BYTES_A_VERTEX : 0;
         /* Each of Assimp's faces has an array of its own, of 32 bytes with malloc's header. */
-        const double face = sizeof(uint32_t[3]) + sizeof(struct aiFace) + 32;
-        bytes += vertex * mesh->mNumVertices + face * mesh->mNumFaces;
+        bytes += vertex * mesh->mNumVertices + (sizeof(struct aiFace) + 32.0) * mesh->mNumFaces +
+                 (double)sizeof(uint32_t[3]) * (double)count_triangles(mesh);
     }
     return vshi_check_limit(source->run, bytes, source->path, error);
 }
@@ -47,6 +54,73 @@ static size_t copy_normals(float *to, const struct aiVector3D *from, size_t coun
     return bad;
 }
 
+/* Polygons that shared their first corner with the face before have always begun at another one (Assimp's
+ * encoding of polygons as fans), and so bakes keep their bits. */
+static void turn_fan(uint32_t *triangles, size_t count, uint32_t *last_first) {
+    if (triangles[0] == *last_first) {
+        uint32_t *t = triangles;
+        const uint32_t first[3] = {t[2], t[0], t[1]};
+        memcpy(t, first, sizeof first);
+        if (count == 2) {
+            const uint32_t second[3] = {t[4], t[5], t[3]};
+            memcpy(t + 3, second, sizeof second);
+        }
+    }
+    *last_first = triangles[0];
+}
+
+static vsh_result copy_faces(const vshi_model_source *source, const struct aiMesh *mesh,
+                             vshi_model_shape *shape, vsh_error *error) {
+    enum { FACES_A_POLL = 1 << 14 };
+    vshi_polygon_cutter cutter = {0};
+    uint32_t last_first = UINT32_MAX;
+    size_t crossing = 0;
+    vsh_result result = VSH_OK;
+    const bool polygons = shape->triangle_count > mesh->mNumFaces;
+    shape->triangle_count = 0;
+    for (unsigned f = 0; f < mesh->mNumFaces && result == VSH_OK; ++f) {
+        const struct aiFace *face = &mesh->mFaces[f];
+        uint32_t *to = shape->indices + 3 * shape->triangle_count;
+        if (face->mNumIndices < 3) {
+            continue;
+        }
+        if (f % FACES_A_POLL == 0 && vshi_job_cancelled(source->job)) {
+            result = vshi_job_fail_cancelled(source->job, error);
+            break;
+        }
+        size_t made;
+        bool simple;
+        result = vshi_polygon_cut(&cutter, shape->positions, face->mIndices, face->mNumIndices, source->job,
+                                  to, &made, &simple, error);
+        shape->triangle_count += made;
+        crossing += !simple;
+        if (polygons && face->mNumIndices <= 4 && made > 0) {
+            turn_fan(to, made, &last_first);
+        }
+        for (size_t i = 0; face->mNumIndices > 4 && i < made; ++i) {
+            turn_fan(to + 3 * i, 1, &last_first);
+        }
+    }
+    vshi_polygon_free(&cutter);
+    if (result == VSH_OK && crossing > 0) {
+        vshi_warn(source->run,
+                  "%s: mesh '%s': edges of %zu polygons cross each other: which triangles they mean cannot "
+                  "be told",
+                  source->path, mesh->mName.data, crossing);
+    }
+    return result;
+}
+
+static int32_t alpha_of(const struct aiScene *scene, const struct aiMesh *mesh) {
+    float opacity = 1.0F;
+    return mesh->mMaterialIndex < scene->mNumMaterials &&
+                   aiGetMaterialFloat(scene->mMaterials[mesh->mMaterialIndex], AI_MATKEY_OPACITY, &opacity) ==
+                       aiReturn_SUCCESS &&
+                   opacity < 1.0F
+               ? VSH_ALPHA_BLENDED
+               : VSH_ALPHA_OPAQUE;
+}
+
 static vsh_result copy_shape(const vshi_model_source *source, const struct aiMesh *mesh,
                              vshi_model_shape *shape, vsh_error *error) {
     const char *what = source->path;
@@ -56,6 +130,7 @@ static vsh_result copy_shape(const vshi_model_source *source, const struct aiMes
     if (shape->triangle_count == 0) {
         return VSH_OK; /* points or lines */
     }
+    shape->alpha = alpha_of(source->scene, mesh);
     vsh_result result = vshi_allocate((void **)&shape->positions, count, sizeof(float[3]), what, error);
     if (result == VSH_OK) {
         result =
@@ -90,129 +165,13 @@ static vsh_result copy_shape(const vshi_model_source *source, const struct aiMes
                       mesh->mName.data, bad);
         }
     }
-    uint32_t *index = shape->indices;
-    for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
-        if (mesh->mFaces[f].mNumIndices == 3) {
-            memcpy(index, mesh->mFaces[f].mIndices, sizeof(uint32_t[3]));
-            index += 3;
-        }
-    }
-    return VSH_OK;
+    return copy_faces(source, mesh, shape, error);
 }
 
-static void make_line(char *text) {
-    for (char *c = text; *c != '\0'; ++c) {
-        *c = (unsigned char)*c < 0x20 || *c == 0x7f ? '?' : *c;
-    }
-}
-
-/* "node/mesh", or whichever has a name, or NULL; on one line. */
-static vsh_result make_name(const struct aiNode *node, const struct aiMesh *mesh, char **name,
-                            vsh_error *error) {
-    const char *first = node->mName.data, *second = mesh->mName.data;
-    const bool both = first[0] != '\0' && second[0] != '\0' && strcmp(first, second) != 0;
-    *name = NULL;
-    if (first[0] == '\0' && second[0] == '\0') {
-        return VSH_OK;
-    }
-    const size_t size = strlen(first) + strlen(second) + 2;
-    const vsh_result result = vshi_allocate((void **)name, size, 1, "a mesh's name", error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    snprintf(*name, size, "%s%s%s", first, both ? "/" : "", both || first[0] == '\0' ? second : "");
-    make_line(*name);
-    return VSH_OK;
-}
-
-static vsh_result make_object_name(const struct aiNode *node, char **name, vsh_error *error) {
-    const size_t size = strlen(node->mName.data) + 1;
-    *name = NULL;
-    if (size == 1) {
-        return VSH_OK;
-    }
-    const vsh_result result = vshi_allocate((void **)name, size, 1, "an object's name", error);
-    if (result == VSH_OK) {
-        memcpy(*name, node->mName.data, size);
-        make_line(*name);
-    }
-    return result;
-}
-
-static vsh_result grow_entries(vsh_model *model, vsh_error *error) {
-    if (model->entry_count < model->entry_capacity) {
-        return VSH_OK;
-    }
-    const size_t capacity = model->entry_capacity > 0 ? 2 * model->entry_capacity : 8;
-    vshi_model_entry *entries = NULL;
-    const vsh_result result =
-        vshi_allocate((void **)&entries, capacity, sizeof *entries, "a model's meshes", error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    if (model->entry_count > 0) {
-        memcpy(entries, model->entries, model->entry_count * sizeof *entries);
-    }
-    free(model->entries);
-    model->entries = entries;
-    model->entry_capacity = capacity;
-    return VSH_OK;
-}
-
-static vsh_result add_entry(const vshi_model_source *source, vsh_model *model, const struct aiNode *node,
-                            uint32_t object, unsigned shape, const double world[12], vsh_error *error) {
-    const struct aiMesh *mesh = source->scene->mMeshes[shape];
-    vsh_result result = grow_entries(model, error);
-    char *name = NULL, *object_name = NULL;
-    if (result == VSH_OK) {
-        result = make_name(node, mesh, &name, error);
-    }
-    if (result == VSH_OK) {
-        result = make_object_name(node, &object_name, error);
-    }
-    if (result != VSH_OK) {
-        free(name);
-        return result;
-    }
-    vshi_model_entry *entry = &model->entries[model->entry_count++];
-    *entry = (vshi_model_entry){.name = name, .object_name = object_name, .object = object, .shape = shape};
-    memcpy(entry->transform, world, sizeof entry->transform);
-    vsh_error why;
-    const vsh_mesh view = vsh_model_mesh(model, model->entry_count - 1, 0);
-    if (vshi_mesh_check_transform(&view, VSHI_MESH_ALONE, &why) == VSH_OK) {
-        return VSH_OK;
-    }
-    for (int i = 0; i < 12; ++i) {
-        if (!isfinite(world[i])) {
-            return vshi_fail(error, VSH_ERROR_INPUT, "%s: %s", source->path, why.message);
-        }
-    }
-    /* A scale of zero is how scenes hide things. */
-    vshi_warn(source->run, "%s: %s; left out", source->path, why.message);
-    free(object_name);
-    free(name);
-    --model->entry_count;
-    return VSH_OK;
-}
-
-/* parent × the node's own transform, whose rows Assimp stores one after the other. */
-static void node_transform(const double parent[12], const struct aiMatrix4x4 *m, double world[12]) {
-    const double own[12] = {m->a1, m->a2, m->a3, m->a4, m->b1, m->b2,
-                            m->b3, m->b4, m->c1, m->c2, m->c3, m->c4};
-    for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 4; ++column) {
-            double sum = column == 3 ? parent[4 * row + 3] : 0.0;
-            for (int k = 0; k < 3; ++k) {
-                sum += parent[4 * row + k] * own[4 * k + column];
-            }
-            world[4 * row + column] = sum;
-        }
-    }
-}
-
-static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, const struct aiNode *node,
-                            const double parent[12], int depth, vsh_error *error) {
+static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, vshi_skins *skins,
+                            const struct aiNode *node, const double parent[12], int depth, vsh_error *error) {
     enum { DEEPEST = 1024 };
+    static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     if (depth > DEEPEST) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: its nodes are nested deeper than %d", source->path,
                          DEEPEST);
@@ -221,25 +180,37 @@ static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, c
         return vshi_job_fail_cancelled(source->job, error);
     }
     double world[12];
-    node_transform(parent, &node->mTransformation, world);
+    vshi_node_world(parent, node, world);
     vsh_result result = VSH_OK;
-    /* that of the last entry is the highest so far */
-    const uint32_t object = model->entry_count > 0 ? model->entries[model->entry_count - 1].object + 1 : 1;
+    const uint32_t object = vshi_model_next_object(model);
     for (unsigned i = 0; i < node->mNumMeshes && result == VSH_OK; ++i) {
         const unsigned shape = node->mMeshes[i];
-        if (shape < model->shape_count && model->shapes[shape].triangle_count > 0) {
-            result = add_entry(source, model, node, object, shape, world, error);
+        if (shape >= model->shape_count || model->shapes[shape].triangle_count == 0) {
+            continue;
+        }
+        const struct aiMesh *mesh = source->scene->mMeshes[shape];
+        const bool skinned = mesh->mNumBones > 0;
+        if (skinned) {
+            result = vshi_skins_apply(skins, shape, &model->shapes[shape], world, error);
+        }
+        const vshi_model_place place = {.node = node->mName.data,
+                                        .mesh = mesh->mName.data,
+                                        .object = object,
+                                        .shape = shape,
+                                        .world = skinned ? identity : world};
+        if (result == VSH_OK) {
+            result = vshi_model_add(model, source->path, source->run, &place, error);
         }
     }
     for (unsigned i = 0; i < node->mNumChildren && result == VSH_OK; ++i) {
-        result = add_nodes(source, model, node->mChildren[i], world, depth + 1, error);
+        result = add_nodes(source, model, skins, node->mChildren[i], world, depth + 1, error);
     }
     return result;
 }
 
 vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **out, vsh_error *error) {
-    static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     vsh_model *model = NULL;
+    vshi_skins skins = {.source = source};
     vsh_result result = check_size(source, error);
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&model, 1, sizeof *model, source->path, error);
@@ -250,6 +221,7 @@ vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **out, vs
     }
     if (result == VSH_OK) {
         model->shape_count = source->scene->mNumMeshes;
+        model->unit = source->unit;
     }
     for (size_t m = 0; result == VSH_OK && m < model->shape_count; ++m) {
         result = vshi_job_cancelled(source->job)
@@ -257,12 +229,16 @@ vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **out, vs
                      : copy_shape(source, source->scene->mMeshes[m], &model->shapes[m], error);
     }
     if (result == VSH_OK && source->scene->mRootNode != NULL) {
-        result = add_nodes(source, model, source->scene->mRootNode, identity, 0, error);
+        const double metres = model->unit > 0.0 && !source->in_metres ? model->unit : 1.0;
+        const double root[12] = {metres, 0, 0, 0, 0, metres, 0, 0, 0, 0, metres, 0};
+        memcpy(skins.root, root, sizeof root);
+        result = add_nodes(source, model, &skins, source->scene->mRootNode, root, 0, error);
     }
     if (result == VSH_OK && model->entry_count == 0) {
         result = vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles: no node uses its meshes",
                            source->path);
     }
+    vshi_skins_free(&skins);
     if (result == VSH_OK) {
         *out = model;
     } else {

@@ -2,6 +2,7 @@
 
 #include "base/memory.h"
 #include "caster/foreign.h"
+#include "caster/gltf.h"
 #include "caster/scan.h"
 
 #include <assimp/scene.h>
@@ -11,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 
 /* Bytes that reading takes at its peak for one byte of file: its text, Assimp's structures and our arrays.
@@ -24,6 +26,10 @@ enum {
     CHECK_UNITS = VSHI_MODEL_FILE_UNITS - SCAN_UNITS - IMPORT_UNITS
 };
 
+/* Formats that are read, each tested with what Blender writes (tests/models). Assimp reads more, and some of
+ * them wrongly. */
+static const char *const endings[] = {"obj", "gltf", "glb", "ply", "stl", "fbx", "dae"};
+
 static vsh_result check_ending(const char *path, const char **ending, vsh_error *error) {
     const char *slash = strrchr(path, '/');
     const char *dot = strrchr(slash != NULL ? slash : path, '.');
@@ -32,11 +38,17 @@ static vsh_result check_ending(const char *path, const char **ending, vsh_error 
                          "%s: has no ending to tell its format by (.obj, .glb, .ply …)", path);
     }
     *ending = dot + 1;
-    if (!vshi_import_knows(*ending)) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: '.%s' is no mesh format that can be read", path,
-                         *ending);
+    for (size_t i = 0; i < sizeof endings / sizeof endings[0]; ++i) {
+        if (strcasecmp(*ending, endings[i]) == 0) {
+            return VSH_OK;
+        }
     }
-    return VSH_OK;
+    return vshi_fail(error, VSH_ERROR_INPUT, "%s: '.%s' is no mesh format that is read: " VSHI_FORMATS, path,
+                     *ending);
+}
+
+static bool is_gltf(const char *ending) {
+    return strcasecmp(ending, "gltf") == 0 || strcasecmp(ending, "glb") == 0;
 }
 
 /* The whole file in *text, *size bytes of it. */
@@ -76,19 +88,26 @@ static vsh_result load_file(const char *path, const vsh_run *run, char **text, s
     return result;
 }
 
-static vsh_result scan_file(const char *path, const char *ending, const vsh_run *run, vshi_job *job,
-                            size_t *faces, vsh_error *error) {
-    vshi_scan scan = {.path = path, .job = job, .units = SCAN_UNITS};
+static vsh_result scan_text(vshi_scan *scan, const char *ending, const vsh_run *run, vsh_model **model,
+                            vsh_error *error) {
+    if (is_gltf(ending)) {
+        return vshi_gltf_read(scan->path, scan->text, scan->size, run, scan->job, model, error);
+    }
+    return vshi_scan_file(scan, ending, error);
+}
+
+static vsh_result scan_file(vshi_scan *scan, const char *ending, const vsh_run *run, vsh_model **model,
+                            vsh_error *error) {
     char *text;
-    vsh_result result = load_file(path, run, &text, &scan.size, error);
+    vsh_result result = load_file(scan->path, run, &text, &scan->size, error);
     if (result == VSH_OK) {
-        scan.text = text;
-        result = vshi_scan_file(&scan, ending, error);
+        scan->text = text;
+        result = scan_text(scan, ending, run, model, error);
     }
     free(text);
-    *faces = scan.faces;
-    if (result == VSH_OK && vshi_job_advance(job, SCAN_UNITS - scan.units_done)) {
-        result = vshi_job_fail_cancelled(job, error);
+    scan->text = NULL;
+    if (result == VSH_OK && vshi_job_advance(scan->job, SCAN_UNITS - scan->units_done)) {
+        result = vshi_job_fail_cancelled(scan->job, error);
     }
     return result;
 }
@@ -129,7 +148,7 @@ static void count_faces(const struct aiScene *scene, size_t *faces, size_t *tria
     }
 }
 
-/* Everything that Assimp's triangulation takes for granted, and that nothing was lost on the way here. */
+/* Everything that what follows takes for granted, and that nothing was lost on the way here. */
 static vsh_result check_scene(const char *path, const struct aiScene *scene, size_t expected, vshi_job *job,
                               vsh_error *error) {
     for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
@@ -154,30 +173,12 @@ static vsh_result check_scene(const char *path, const struct aiScene *scene, siz
     return VSH_OK;
 }
 
-static vsh_result triangulate(vshi_import *import, const char *path, const vsh_run *run, vsh_error *error) {
-    size_t faces, expected, triangles;
-    count_faces(vshi_import_scene(import), &faces, &expected);
-    if (faces == expected) {
-        return VSH_OK; /* triangles already */
-    }
-    const vsh_result result = vshi_import_triangulate(import, path, error);
-    if (result == VSH_OK) {
-        count_faces(vshi_import_scene(import), &triangles, &faces);
-        if (triangles < expected) {
-            vshi_warn(run,
-                      "%s: %zu of %zu triangles are lost: polygons that cross themselves or have no area "
-                      "cannot be cut into triangles",
-                      path, expected - triangles, expected);
-        }
-    }
-    return result;
-}
-
 vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *job, vshi_import **import,
-                                vsh_error *error) {
+                                vsh_model **model, double *unit, vsh_error *error) {
     *import = NULL;
+    *model = NULL;
     const char *ending = NULL;
-    size_t faces = 0;
+    vshi_scan scan = {.path = path, .job = job, .units = SCAN_UNITS};
     struct stat status;
     /* A missing file is that first, whatever its ending. */
     if (stat(path, &status) != 0) {
@@ -188,23 +189,24 @@ vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *
         result = check_ending(path, &ending, error);
     }
     if (result == VSH_OK) {
-        result = scan_file(path, ending, run, job, &faces, error);
+        result = scan_file(&scan, ending, run, model, error);
     }
-    if (result == VSH_OK) {
+    if (result == VSH_OK && *model == NULL) {
         result = vshi_import_read(path, job, IMPORT_UNITS, import, error);
     }
-    if (result == VSH_OK) {
-        result = check_scene(path, vshi_import_scene(*import), faces, job, error);
+    if (result == VSH_OK && *import != NULL) {
+        result = check_scene(path, vshi_import_scene(*import), scan.faces, job, error);
     }
-    if (result == VSH_OK) {
-        result = triangulate(*import, path, run, error);
-    }
-    if (result == VSH_OK && vshi_job_advance(job, CHECK_UNITS)) {
+    *unit = scan.unit;
+    const size_t rest = CHECK_UNITS + (*import == NULL ? IMPORT_UNITS : 0);
+    if (result == VSH_OK && vshi_job_advance(job, rest)) {
         result = vshi_job_fail_cancelled(job, error);
     }
     if (result != VSH_OK) {
         vshi_import_free(*import);
         *import = NULL;
+        vsh_model_free(*model);
+        *model = NULL;
     }
     return result;
 }

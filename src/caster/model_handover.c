@@ -11,6 +11,7 @@ static void put_shape(vshi_put *put, const vshi_model_shape *shape) {
     vshi_put_count(put, shape->triangle_count);
     vshi_put_count(put, shape->vertex_count);
     vshi_put_count(put, (uint64_t)shape->uv_sets);
+    vshi_put_count(put, (uint64_t)shape->alpha);
     if (shape->triangle_count == 0) {
         return;
     }
@@ -36,6 +37,7 @@ vsh_result vshi_serve_model(const char *path, vshi_take *request, const vsh_run 
     if (result != VSH_OK) {
         return result;
     }
+    vshi_put_number(payload, model->unit);
     vshi_put_count(payload, model->shape_count);
     for (size_t i = 0; i < model->shape_count; ++i) {
         put_shape(payload, &model->shapes[i]);
@@ -81,6 +83,7 @@ static vsh_result take_shape(vshi_take *take, vshi_model_shape *shape, const cha
     shape->triangle_count = vshi_take_count(take, SIZE_MAX / 64);
     shape->vertex_count = vshi_take_count(take, UINT32_MAX);
     shape->uv_sets = (int32_t)vshi_take_count(take, VSH_MAX_UV_SETS);
+    shape->alpha = (int32_t)vshi_take_count(take, VSH_ALPHA_BLENDED);
     if (take->bad || shape->triangle_count == 0) {
         return VSH_OK;
     }
@@ -154,7 +157,11 @@ static vsh_result take_entry(vshi_take *take, vsh_model *model, size_t index, co
 }
 
 static vsh_result take_meshes(vshi_take *take, vsh_model *model, const char *path, vsh_error *error) {
-    enum { LEAST_SHAPE = 24, LEAST_ENTRY = 112 }; /* bytes of the message */
+    enum { LEAST_SHAPE = 32, LEAST_ENTRY = 112 }; /* bytes of the message */
+    model->unit = vshi_take_number(take);
+    if (!(model->unit >= 0.0)) {
+        return vshi_answer_fail(path, "its unit", error);
+    }
     const size_t shapes = vshi_take_count(take, (uint64_t)(take->end - take->at) / LEAST_SHAPE);
     if (shapes == 0) {
         return vshi_answer_fail(path, "its meshes", error);

@@ -7,8 +7,10 @@ static const struct {
     const char *ending;
     vsh_result (*scan)(vshi_scan *, vsh_error *);
 } scanners[] = {
-    {"obj", vshi_scan_obj},   {"ply", vshi_scan_ply}, {"stl", vshi_scan_stl},
-    {"gltf", vshi_scan_gltf}, {"glb", vshi_scan_glb},
+    {"obj", vshi_scan_obj},
+    {"ply", vshi_scan_ply},
+    {"stl", vshi_scan_stl},
+    {"dae", vshi_scan_dae},
 };
 
 vsh_result vshi_scan_file(vshi_scan *scan, const char *ending, vsh_error *error) {

@@ -1,6 +1,6 @@
 /* What Assimp hides is looked for in the file's own bytes before Assimp reads it: files that end early,
  * indices out of range, coordinates that are no finite numbers. Assimp 5.2 drops or repeats faces, or
- * replaces numbers, where it finds such things in OBJ, PLY, STL and glTF, and reports a mesh that is not the
+ * replaces numbers, where it finds such things in OBJ, PLY and STL, and reports a mesh that is not the
  * one in the file. */
 #ifndef VSHI_CASTER_SCAN_H
 #define VSHI_CASTER_SCAN_H
@@ -15,6 +15,7 @@ typedef struct vshi_scan {
     size_t units;      /* of the job, for the whole scan */
     size_t units_done; /* told to the job so far */
     size_t faces; /* out: polygons of three corners or more that a reader must find at least; 0: not known */
+    double unit;  /* out: metres in a unit of a Collada file; 0: of another */
 } vshi_scan;
 
 /* Looks the file over, by its ending (without the dot, any case); endings without a scanner pass. Errors:
@@ -24,8 +25,7 @@ vsh_result vshi_scan_file(vshi_scan *scan, const char *ending, vsh_error *error)
 vsh_result vshi_scan_obj(vshi_scan *scan, vsh_error *error);
 vsh_result vshi_scan_ply(vshi_scan *scan, vsh_error *error);
 vsh_result vshi_scan_stl(vshi_scan *scan, vsh_error *error);
-vsh_result vshi_scan_gltf(vshi_scan *scan, vsh_error *error);
-vsh_result vshi_scan_glb(vshi_scan *scan, vsh_error *error);
+vsh_result vshi_scan_dae(vshi_scan *scan, vsh_error *error);
 
 /* Tells the job that the file has been looked at up to `at`; true where it is cancelled. */
 bool vshi_scan_poll(vshi_scan *scan, const char *at);

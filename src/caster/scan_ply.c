@@ -23,6 +23,7 @@ typedef struct ply_element {
 
 typedef struct ply_header {
     bool ascii, big_endian;
+    bool strips; /* of triangles, which Assimp 5.2 takes for one face each */
     ply_element element[MAX_ELEMENTS];
     ply_property property[MAX_PROPERTIES];
     int elements, properties;
@@ -90,6 +91,7 @@ static bool read_element(ply_header *header, const char *at, const char *end) {
     memcpy(element->name, name.text, length);
     element->name[length] = '\0';
     element->count = (uint64_t)count;
+    header->strips = header->strips || (vshi_token_is(name, "tristrips") && count > 0);
     element->first = element->end = header->properties;
     return true;
 }
@@ -208,6 +210,13 @@ vsh_result vshi_scan_ply(vshi_scan *scan, vsh_error *error) {
     const char *body = read_header(scan, &header, &result, error);
     if (body == NULL) {
         return result;
+    }
+    if (header.strips) {
+        return vshi_fail(
+            error, VSH_ERROR_UNSUPPORTED,
+            "%s: its triangles are strips ('tristrips'), which are not read: save it with faces, "
+            "from MeshLab or Blender",
+            scan->path);
     }
     ply_cursor c = {scan, &header, NULL, 0, body, scan->text + scan->size};
     for (int e = 0; e < header.elements; ++e) {

@@ -1,6 +1,7 @@
 #include "scene/inputs.h"
 
 #include "base/file.h"
+#include "base/uri.h"
 
 #include <jansson.h>
 #include <stdbool.h>
@@ -41,33 +42,6 @@ static vsh_result add(vshi_inputs *inputs, const char *path, vsh_error *error) {
     return path != NULL ? add_own(inputs, strdup(path), error) : VSH_OK;
 }
 
-static int hex_digit(char c) {
-    const char *const digits = "0123456789abcdef";
-    const char lower = c >= 'A' && c <= 'F' ? (char)(c - 'A' + 'a') : c;
-    const char *at = lower != '\0' ? strchr(digits, lower) : NULL;
-    return at != NULL ? (int)(at - digits) : -1;
-}
-
-/* The path of a URI beside `model`, "%20" and the like decoded (RFC 3986). */
-static char *beside(const char *model, const char *uri) {
-    const char *slash = strrchr(model, '/');
-    const size_t folder = slash != NULL && uri[0] != '/' ? (size_t)(slash - model) + 1 : 0;
-    char *path = malloc(folder + strlen(uri) + 1);
-    if (path == NULL) {
-        return NULL;
-    }
-    memcpy(path, model, folder);
-    char *to = path + folder;
-    for (const char *from = uri; *from != '\0'; ++from) {
-        const int high = *from == '%' ? hex_digit(from[1]) : -1;
-        const int low = high >= 0 ? hex_digit(from[2]) : -1;
-        *to++ = low >= 0 ? (char)(16 * high + low) : *from;
-        from += low >= 0 ? 2 : 0;
-    }
-    *to = '\0';
-    return path;
-}
-
 /* A glTF's buffers, which hold its vertices. What cannot be read as one has none. */
 static vsh_result add_buffers(vshi_inputs *inputs, const char *model, vsh_error *error) {
     json_t *root = json_load_file(model, 0, NULL);
@@ -76,8 +50,8 @@ static vsh_result add_buffers(vshi_inputs *inputs, const char *model, vsh_error 
     json_t *buffer;
     json_array_foreach(json_object_get(root, "buffers"), i, buffer) {
         const char *uri = json_string_value(json_object_get(buffer, "uri"));
-        if (result == VSH_OK && uri != NULL && strncasecmp(uri, "data:", 5) != 0) {
-            result = add_own(inputs, beside(model, uri), error);
+        if (result == VSH_OK && uri != NULL && !vshi_uri_is_data(uri)) {
+            result = add_own(inputs, vshi_uri_path(model, uri), error);
         }
     }
     json_decref(root);

@@ -2,8 +2,8 @@
 
 #include "shim/guard.h"
 
+#include <assimp/commonMetaData.h>
 #include <assimp/config.h>
-#include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
 #include <assimp/Importer.hpp>
@@ -57,16 +57,6 @@ struct vshi_import {
     const aiScene *scene = nullptr;
 };
 
-bool vshi_import_knows(const char *ending) {
-    vsh_error ignored;
-    bool knows = false;
-    vshi::guard(&ignored, VSH_ERROR_INTERNAL, "assimp", [&] {
-        knows = Assimp::Importer().IsExtensionSupported(ending);
-        return VSH_OK;
-    });
-    return knows;
-}
-
 vsh_result vshi_import_read(const char *path, vshi_job *job, size_t units, vshi_import **import,
                             vsh_error *error) {
     *import = nullptr;
@@ -80,23 +70,30 @@ vsh_result vshi_import_read(const char *path, vshi_job *job, size_t units, vshi_
             return vshi_job_fail_cancelled(job, error);
         }
         if (reader->scene == nullptr) {
-            return vshi_fail(error, VSH_ERROR_READ, "%s: damaged or cut short: %s", path,
-                             first_line(reader->importer.GetErrorString()).c_str());
+            return vshi_fail(error, VSH_ERROR_READ, "%s: damaged or cut short, or not as its format says: %s",
+                             path, first_line(reader->importer.GetErrorString()).c_str());
         }
         *import = reader.release();
         return VSH_OK;
     });
 }
 
-vsh_result vshi_import_triangulate(vshi_import *import, const char *path, vsh_error *error) {
-    return vshi::guard(error, VSH_ERROR_INPUT, path, [&]() -> vsh_result {
-        import->scene = import->importer.ApplyPostProcessing(aiProcess_Triangulate);
-        if (import->scene == nullptr) {
-            return vshi_fail(error, VSH_ERROR_INPUT, "%s: polygons could not be cut into triangles: %s", path,
-                             first_line(import->importer.GetErrorString()).c_str());
-        }
-        return VSH_OK;
-    });
+double vshi_import_unit(const vshi_import *import) {
+    static const double metres_a_centimetre = 0.01;
+    const aiMetadata *facts = import->scene->mMetaData;
+    aiString format;
+    float centimetres = 1.0F; // what FBX is in where it says nothing
+    if (facts == nullptr || !facts->Get(AI_METADATA_SOURCE_FORMAT, format)) {
+        return 0.0;
+    }
+    const std::string name = format.C_Str();
+    if (name.find("FBX") != std::string::npos) {
+        facts->Get("UnitScaleFactor", centimetres);
+        return centimetres > 0.0F && centimetres < 1e12F
+                   ? static_cast<double>(centimetres) * metres_a_centimetre
+                   : metres_a_centimetre;
+    }
+    return 0.0;
 }
 
 const aiScene *vshi_import_scene(const vshi_import *import) {

@@ -12,17 +12,14 @@ extern "C" {
 struct aiScene;
 typedef struct vshi_import vshi_import;
 
-/* Whether Assimp reads files with this ending ("obj"). */
-bool vshi_import_knows(const char *ending);
-
 /* Reads the file as it is: polygons stay polygons, nothing is joined, generated or transformed. Advances the
  * job by up to `units`. Errors: VSH_ERROR_READ with Assimp's reason, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED
  * (the readers of OBJ and a few others listen). Free with vshi_import_free(). */
 vsh_result vshi_import_read(const char *path, vshi_job *job, size_t units, vshi_import **import,
                             vsh_error *error);
 
-/* Cuts polygons into triangles. Every index must have been checked before: Assimp does not. */
-vsh_result vshi_import_triangulate(vshi_import *import, const char *path, vsh_error *error);
+/* Metres in one unit of an FBX, by which Assimp does not multiply; 0: of another format. */
+double vshi_import_unit(const vshi_import *import);
 
 /* Belongs to the import. */
 const struct aiScene *vshi_import_scene(const vshi_import *import);

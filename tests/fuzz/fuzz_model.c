@@ -21,7 +21,7 @@ static void check(const vsh_model *model) {
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    static const char *const names[] = {"a.obj", "a.ply", "a.stl", "a.gltf", "a.glb", "a.fbx"};
+    static const char *const names[] = {"a.obj", "a.ply", "a.stl", "a.gltf", "a.glb", "a.fbx", "a.dae"};
     if (size == 0) {
         return 0;
     }

@@ -150,6 +150,24 @@ static void meshes_objects_and_polygons_become_triangles_and_lines_are_dropped(v
     vsh_model_free(model);
 }
 
+/* An FBX says what its numbers are in; a Collada file, too (test_exported.c). */
+static void an_fbx_is_in_metres(void **state) {
+    (void)state;
+    static const struct {
+        const char *factor;
+        double metres;
+    } units[] = {{"100", 1.0}, {"2.5", 0.025}, {"1.0", 0.01}};
+    for (size_t i = 0; i < sizeof units / sizeof units[0]; ++i) {
+        char fbx[sizeof quad_fbx];
+        memcpy(fbx, quad_fbx, sizeof fbx);
+        memcpy(strstr(strstr(fbx, "UnitScaleFactor"), ",100") + 1, units[i].factor, 3);
+        vsh_model *model = read_text("unit.fbx", fbx);
+        assert_near(vsh_model_unit(model), units[i].metres, 1e-9);
+        assert_near(check(model, 0).area, units[i].metres * units[i].metres, 1e-9);
+        vsh_model_free(model);
+    }
+}
+
 /* Twelve triangles with corners of their own, as STL has them. */
 static void a_cube_in_stl_is_closed(void **state) {
     (void)state;
@@ -196,6 +214,7 @@ int main(void) {
         cmocka_unit_test(nodes_are_instances_that_share_arrays),
         cmocka_unit_test(a_node_scaled_to_nothing_is_left_out_with_a_warning),
         cmocka_unit_test(meshes_objects_and_polygons_become_triangles_and_lines_are_dropped),
+        cmocka_unit_test(an_fbx_is_in_metres),
         cmocka_unit_test(a_cube_in_stl_is_closed),
         cmocka_unit_test(binary_ply_of_either_byte_order_is_read),
     };

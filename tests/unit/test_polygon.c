@@ -1,0 +1,313 @@
+/* Polygons cut into triangles: their area is that of the polygon, and none is flipped. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "caster/polygon.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST = 4096 };
+
+typedef struct shape {
+    float at[MOST][3];
+    uint32_t corner[MOST];
+    size_t count;
+} shape;
+
+static uint64_t seed;
+
+static double random_unit(void) {
+    seed = seed * 6364136223846793005U + 1442695040888963407U;
+    return (double)(seed >> 11) / 9007199254740992.0;
+}
+
+/* Twice the signed area in x and y; products of floats are exact in double. */
+static double doubled_area(const shape *s, const uint32_t *corner, size_t count) {
+    double area = 0.0;
+    for (size_t i = 0; i < count; ++i) {
+        const float *p = s->at[corner[i]], *q = s->at[corner[i + 1 < count ? i + 1 : 0]];
+        area += (double)p[0] * (double)q[1] - (double)p[1] * (double)q[0];
+    }
+    return area;
+}
+
+static uint32_t triangles[3 * MOST];
+
+/* Cuts, and checks in x and y what holds of every simple polygon. Returns how many triangles there are. */
+static size_t cut(const shape *s, bool expected_simple) {
+    vshi_polygon_cutter cutter = {0};
+    vshi_job *job = vshi_job_begin(NULL, "load", 1);
+    size_t made;
+    bool simple;
+    assert_int_equal(
+        vshi_polygon_cut(&cutter, s->at[0], s->corner, s->count, job, triangles, &made, &simple, NULL),
+        VSH_OK);
+    vshi_polygon_free(&cutter);
+    vshi_job_end(job);
+    if (simple != expected_simple) {
+        fail_msg("%zu corners are taken for %s", s->count, simple ? "simple" : "crossing");
+    }
+    assert_true(made <= s->count - 2);
+    double sum = 0.0;
+    const double whole = doubled_area(s, s->corner, s->count), sign = whole < 0.0 ? -1.0 : 1.0;
+    for (size_t i = 0; i < made && simple && whole != 0.0; ++i) {
+        const double area = sign * doubled_area(s, triangles + 3 * i, 3);
+        if (!(area > 0.0)) {
+            fail_msg("triangle %zu of %zu has the area %g", i, made, area);
+        }
+        sum += area;
+    }
+    if (simple && whole != 0.0 && !(fabs(sum - sign * whole) <= 1e-9 * sign * whole)) {
+        fail_msg("%zu corners: triangles of %.12g, polygon of %.12g", s->count, sum, sign * whole);
+    }
+    return made;
+}
+
+static void set(shape *s, const float (*at)[2], size_t count) {
+    s->count = count;
+    for (size_t i = 0; i < count; ++i) {
+        s->at[i][0] = at[i][0];
+        s->at[i][1] = at[i][1];
+        s->at[i][2] = 0.0F;
+        s->corner[i] = (uint32_t)i;
+    }
+}
+
+static bool crosses(const shape *s, size_t i, size_t k) {
+    const float *a = s->at[i], *b = s->at[(i + 1) % s->count], *c = s->at[k], *d = s->at[(k + 1) % s->count];
+#define SIDE(p, q, r)                                                                                        \
+    (((double)(q)[0] - (double)(p)[0]) * ((double)(r)[1] - (double)(p)[1]) -                                 \
+     ((double)(q)[1] - (double)(p)[1]) * ((double)(r)[0] - (double)(p)[0]))
+    return SIDE(a, b, c) * SIDE(a, b, d) < 0.0 && SIDE(c, d, a) * SIDE(c, d, b) < 0.0;
+#undef SIDE
+}
+
+/* Random points whose crossing edges are swapped until none cross (2-opt): as twisted as polygons get. On a
+ * grid of small integers many corners lie on lines. */
+static bool make_twisted(shape *s, size_t count, int grid) {
+    float at[64][2];
+    for (size_t i = 0; i < count; ++i) {
+        for (int k = 0; k < 2; ++k) {
+            at[i][k] = (float)(grid > 0 ? floor(random_unit() * grid) : random_unit());
+        }
+        for (size_t j = 0; j < i; ++j) {
+            if (at[i][0] == at[j][0] && at[i][1] == at[j][1]) {
+                return false;
+            }
+        }
+    }
+    set(s, (const float(*)[2])at, count);
+    for (int round = 0; round < 400; ++round) {
+        bool any = false;
+        for (size_t i = 0; i + 2 < count; ++i) {
+            for (size_t k = i + 2; k < count - (i == 0); ++k) {
+                if (!crosses(s, i, k)) {
+                    continue;
+                }
+                any = true;
+                for (size_t low = i + 1, high = k; low < high; ++low, --high) {
+                    float swapped[3];
+                    memcpy(swapped, s->at[low], sizeof swapped);
+                    memcpy(s->at[low], s->at[high], sizeof swapped);
+                    memcpy(s->at[high], swapped, sizeof swapped);
+                }
+            }
+        }
+        if (!any) {
+            return doubled_area(s, s->corner, count) != 0.0;
+        }
+    }
+    return false;
+}
+
+static void every_simple_polygon_is_covered_and_no_triangle_is_flipped(void **state) {
+    (void)state;
+    static shape s;
+    seed = 7;
+    size_t made = 0;
+    for (int i = 0; i < 6000; ++i) {
+        const size_t count = 4 + (size_t)(random_unit() * 28);
+        if (make_twisted(&s, count, 0)) {
+            assert_int_equal(cut(&s, true), count - 2);
+            ++made;
+        }
+    }
+    assert_true(made > 5000);
+}
+
+/* Combs, spirals and stars, of many corners, in both directions of turning. */
+static void long_and_narrow_polygons_are_covered(void **state) {
+    (void)state;
+    static shape s;
+    static float at[MOST][2];
+    size_t n = 0;
+    for (int tooth = 0; tooth < 500; ++tooth) {
+        at[n][0] = (float)tooth, at[n++][1] = 0.0F;
+        at[n][0] = (float)tooth + 0.25F, at[n++][1] = 100.0F;
+        at[n][0] = (float)tooth + 0.5F, at[n++][1] = 0.0F;
+    }
+    at[n][0] = 500.0F, at[n++][1] = -1.0F;
+    at[n][0] = -1.0F, at[n++][1] = -1.0F;
+    set(&s, (const float(*)[2])at, n);
+    cut(&s, true);
+    n = 0;
+    for (int i = 100; i < 1000; ++i, ++n) { /* out, and back in at a little less */
+        at[n][0] = (float)(i * cos(0.05 * i)), at[n][1] = (float)(i * sin(0.05 * i));
+    }
+    for (int i = 999; i > 100; --i, ++n) {
+        at[n][0] = (float)((i - 20.0) * cos(0.05 * i)), at[n][1] = (float)((i - 20.0) * sin(0.05 * i));
+    }
+    set(&s, (const float(*)[2])at, n);
+    for (size_t i = 0; i < n; ++i) {
+        s.corner[i] = (uint32_t)(n - 1 - i);
+    }
+    cut(&s, true);
+    seed = 3;
+    for (size_t i = 0; i < 2000; ++i) {
+        const double r = 1.0 + 30.0 * random_unit(), angle = 6.283185307179586 * (double)i / 2000.0;
+        at[i][0] = (float)(r * cos(angle)), at[i][1] = (float)(r * sin(angle));
+    }
+    set(&s, (const float(*)[2])at, 2000);
+    cut(&s, true);
+}
+
+static void an_l_has_no_triangle_over_the_void(void **state) {
+    (void)state;
+    static const float corners[6][2] = {{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}};
+    static shape s;
+    for (size_t first = 0; first < 6; ++first) {
+        float at[6][2];
+        for (size_t i = 0; i < 6; ++i) {
+            memcpy(at[i], corners[(first + i) % 6], sizeof at[i]);
+        }
+        set(&s, (const float(*)[2])at, 6);
+        assert_int_equal(cut(&s, true), 4);
+    }
+}
+
+/* Holes joined to the outline by an edge there and back. */
+static void holes_at_the_end_of_bridges_stay_open(void **state) {
+    (void)state;
+    static const float one[10][2] = {{0, 0}, {4, 0}, {4, 4}, {0, 4}, {0, 0},
+                                     {1, 1}, {1, 3}, {3, 3}, {3, 1}, {1, 1}};
+    static const float two[16][2] = {{0, 0}, {8, 0}, {8, 4}, {0, 4}, {0, 0}, {1, 1}, {1, 3}, {3, 3},
+                                     {3, 1}, {5, 1}, {5, 3}, {7, 3}, {7, 1}, {5, 1}, {3, 1}, {1, 1}};
+    static shape s;
+    set(&s, one, 10);
+    cut(&s, true);
+    assert_true(doubled_area(&s, s.corner, 10) == 24.0);
+    set(&s, two, 16);
+    cut(&s, true);
+    assert_true(doubled_area(&s, s.corner, 16) == 48.0);
+}
+
+/* Points within an edge must stay corners of triangles: else the neighbours' edges would be open. */
+static void corners_on_a_line_all_stay_corners(void **state) {
+    (void)state;
+    static const float edge[6][2] = {{4, 0}, {0, 4}, {0, 0}, {1, 0}, {2, 0}, {3, 0}};
+    static const float quad[4][2] = {{0, 0}, {2, 0}, {0, 2}, {0, 1}};
+    static const float square[8][2] = {{0, 0}, {1, 0}, {2, 0}, {2, 1}, {2, 2}, {1, 2}, {0, 2}, {0, 1}};
+    static shape s;
+    for (size_t first = 0; first < 8; ++first) {
+        float at[8][2];
+        for (size_t i = 0; i < 8; ++i) {
+            memcpy(at[i], square[(first + i) % 8], sizeof at[i]);
+        }
+        set(&s, (const float(*)[2])at, 8);
+        assert_int_equal(cut(&s, true), 6);
+        for (size_t i = 0; i < 6; ++i) {
+            memcpy(at[i], edge[(first + i) % 6], sizeof at[i]);
+        }
+        set(&s, (const float(*)[2])at, 6);
+        assert_int_equal(cut(&s, true), 4);
+        for (size_t i = 0; i < 4; ++i) {
+            memcpy(at[i], quad[(first + i) % 4], sizeof at[i]);
+        }
+        set(&s, (const float(*)[2])at, 4);
+        assert_int_equal(cut(&s, true), 2);
+    }
+}
+
+/* The fans that they have always been: bakes keep their bits. */
+static void convex_polygons_are_fans_from_the_last_corner_and_quads_from_the_first(void **state) {
+    (void)state;
+    static const float corners[6][2] = {{2, 0}, {1, 2}, {-1, 2}, {-2, 0}, {-1, -2}, {1, -2}};
+    static const uint32_t fan[12] = {5, 0, 1, 5, 1, 2, 5, 2, 3, 3, 4, 5}, quad[6] = {0, 1, 2, 0, 2, 3};
+    static shape s;
+    set(&s, corners, 6);
+    cut(&s, true);
+    assert_memory_equal(triangles, fan, sizeof fan);
+    set(&s, corners, 4);
+    cut(&s, true);
+    assert_memory_equal(triangles, quad, sizeof quad);
+}
+
+static void polygons_that_cross_themselves_are_told(void **state) {
+    (void)state;
+    static const float tie[4][2] = {{0, 0}, {2, 2}, {2, 0}, {0, 1}};
+    static const float even[4][2] = {{0, 0}, {2, 2}, {2, 0}, {0, 2}};
+    static const float star[5][2] = {{0, 10}, {6, -8}, {-9, 3}, {9, 3}, {-6, -8}};
+    static const float line[5][2] = {{0, 0}, {1, 1}, {2, 2}, {3, 3}, {1, 1}};
+    static shape s;
+    set(&s, tie, 4);
+    cut(&s, false);
+    set(&s, even, 4);
+    cut(&s, false);
+    set(&s, star, 5);
+    cut(&s, false);
+    set(&s, line, 5); /* no area, which is no crossing */
+    cut(&s, true);
+}
+
+/* On integers, many corners lie on edges of others, which is more than simple polygons may do: whatever is
+ * said of them, the triangles add up. */
+static void polygons_that_touch_themselves_do_no_harm(void **state) {
+    (void)state;
+    static shape s;
+    seed = 11;
+    vshi_polygon_cutter cutter = {0};
+    vshi_job *job = vshi_job_begin(NULL, "load", 1);
+    size_t simple_ones = 0, all = 0;
+    for (int i = 0; i < 3000; ++i) {
+        const size_t count = 4 + (size_t)(random_unit() * 20);
+        if (!make_twisted(&s, count, 9)) {
+            continue;
+        }
+        size_t made;
+        bool simple;
+        assert_int_equal(
+            vshi_polygon_cut(&cutter, s.at[0], s.corner, count, job, triangles, &made, &simple, NULL),
+            VSH_OK);
+        assert_true(made <= count - 2);
+        double sum = 0.0;
+        for (size_t t = 0; t < made; ++t) {
+            sum += doubled_area(&s, triangles + 3 * t, 3);
+        }
+        assert_true(sum == doubled_area(&s, s.corner, count));
+        simple_ones += simple;
+        ++all;
+    }
+    vshi_polygon_free(&cutter);
+    vshi_job_end(job);
+    assert_true(all > 1000 && simple_ones > 4 * all / 5);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_simple_polygon_is_covered_and_no_triangle_is_flipped),
+        cmocka_unit_test(long_and_narrow_polygons_are_covered),
+        cmocka_unit_test(an_l_has_no_triangle_over_the_void),
+        cmocka_unit_test(holes_at_the_end_of_bridges_stay_open),
+        cmocka_unit_test(corners_on_a_line_all_stay_corners),
+        cmocka_unit_test(convex_polygons_are_fans_from_the_last_corner_and_quads_from_the_first),
+        cmocka_unit_test(polygons_that_cross_themselves_are_told),
+        cmocka_unit_test(polygons_that_touch_themselves_do_no_harm),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
