@@ -119,6 +119,10 @@ typedef struct vsh_scene {
     const vsh_solidity_rule *solidity; /* [solidity_count]: of all mesh casters, over what they say
                                           themselves; each must match one's mesh */
     size_t solidity_count;
+    double unit;          /* of the numbers in mesh files, metres, > 0: instead of what the files say
+                             (vsh_model_unit());   0: as they say, and those that say nothing as they are */
+    int32_t cast_blended; /* nonzero: meshes of blended materials (VSH_ALPHA_BLENDED) cast, whole; 0: they
+                             only receive */
 } vsh_scene;
 
 /* Reads a scene file; what it names is not opened. The scene and all it points to belong to *scene; free it
@@ -140,7 +144,8 @@ typedef struct vsh_assets vsh_assets;
  * - VSH_ERROR_ARGUMENT: scene or assets NULL, a caster of no type, a caster or receiver without a path, a
  *   UV set outside -1 … VSH_MAX_UV_SETS - 1, run;
  * - VSH_ERROR_INPUT: a receiver's mesh without UVs or without the set asked for; a pattern that matches no
- *   mesh of its file, patterns that leave none; as vsh_model_read(),
+ *   mesh of its file, patterns that leave none; a caster whose meshes are all blended, without
+ *   scene->cast_blended; as vsh_model_read(),
  *   vsh_grid_read(), vsh_image_read(), vsh_model_from_heights() and vsh_outline_from_…(); an image of no
  *   more than a pixel across;
  * - VSH_ERROR_READ, VSH_ERROR_LIMIT (for each file alone), VSH_ERROR_UNSUPPORTED: as these;

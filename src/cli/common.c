@@ -86,6 +86,11 @@ static int take_rule(cli_grid_settings *settings, const char *name, const char *
     return CLI_OK;
 }
 
+int cli_take_unit(const char *name, const char *value, double *unit) {
+    *unit = vsh_unit(value);
+    return *unit > 0.0 ? CLI_OK : cli_take_positive(name, value, unit);
+}
+
 int cli_grid_take(cli_grid_settings *settings, int key, const char *name, const char *value, bool *taken) {
     *taken = true;
     switch (key) {
@@ -98,6 +103,11 @@ int cli_grid_take(cli_grid_settings *settings, int key, const char *name, const 
     case CLI_KEY_HALF_WIDTH:
         settings->has_half_width = true;
         return cli_take_number(name, value, 3.0, 100.0, &settings->options.half_width);
+    case CLI_KEY_UNIT:
+        return cli_take_unit(name, value, &settings->unit);
+    case CLI_KEY_CAST_BLENDED:
+        settings->cast_blended = true;
+        return CLI_OK;
     case CLI_KEY_SHELL_THICKNESS:
         settings->has_shell_thickness = true;
         return cli_take_number(name, value, 1.0, 50.0, &settings->options.shell_thickness);
@@ -122,6 +132,8 @@ int cli_grid_check(const cli_grid_settings *settings) {
 
 void cli_grid_apply(const cli_grid_settings *settings, vsh_scene *scene) {
     vsh_grid_options *options = &scene->grid;
+    scene->unit = settings->unit > 0.0 ? settings->unit : scene->unit;
+    scene->cast_blended = settings->cast_blended ? 1 : scene->cast_blended;
     if (settings->rule_count > 0) {
         scene->solidity = settings->rules;
         scene->solidity_count = settings->rule_count;

@@ -13,6 +13,7 @@ static const cli_option options[] = {
     {0, NULL, NULL, "Options"},
     {KEY_SIZE, "size", "W[xH]", "texels of the lightmap that UVs are looked at in (1024)"},
     {CLI_KEY_VERBOSE, "verbose", NULL, "a paragraph for each mesh, however many there are"},
+    CLI_UNIT_OPTION,
     CLI_TRUSTED_OPTION,
     {'h', "help", NULL, "show this help"},
 };
@@ -41,6 +42,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
     bool taken;
     if (key == KEY_SIZE) {
         return cli_take_size(name, value, &s->look.width, &s->look.height);
+    }
+    if (key == CLI_KEY_UNIT) {
+        return cli_take_unit(name, value, &s->look.unit);
     }
     const int code = cli_common_take(&s->common, key, name, value, &taken);
     return taken ? code : cli_usage("%s: no such option", name);

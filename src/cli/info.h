@@ -9,6 +9,7 @@
 /* How closely a mesh file's objects are looked at. */
 typedef struct cli_info_look {
     int32_t width, height;               /* of the lightmap that their UVs are laid out in */
+    double unit;                         /* as of vsh_scene */
     bool all;                            /* a paragraph for each mesh, however many there are */
     bool table;                          /* a line for each */
     const vsh_solidity_report *solidity; /* [meshes] */

@@ -40,8 +40,31 @@ static void print_solidity(const vsh_solidity_report *report) {
     print_count(report->turned_triangles, "triangles that face the other way than those around");
 }
 
-static int print_mesh(const vsh_model *model, size_t index, const vsh_solidity_report *solidity) {
-    const vsh_mesh mesh = vsh_model_mesh(model, index, -1);
+/* What positions are multiplied by, where the user says what unit they are in. */
+static double scale_for(const vsh_model *model, double unit) {
+    const double own = vsh_model_unit(model);
+    return unit > 0.0 ? unit / (own > 0.0 ? own : 1.0) : 1.0;
+}
+
+static void print_unit(const vsh_model *model, double unit) {
+    const double own = vsh_model_unit(model);
+    if (unit > 0.0) {
+        printf("unit: %g m (as asked)\n", unit);
+    } else if (own > 0.0) {
+        printf("unit: %g m; bounds are in metres\n", own);
+    } else {
+        printf("unit: none in this format; bounds are the file's own numbers\n");
+    }
+}
+
+static int print_mesh(const vsh_model *model, size_t index, double scale,
+                      const vsh_solidity_report *solidity) {
+    vsh_mesh mesh = vsh_model_mesh(model, index, -1);
+    double scaled[12];
+    for (int i = 0; i < 12; ++i) {
+        scaled[i] = mesh.transform[i] * scale;
+    }
+    mesh.transform = scaled;
     vsh_mesh_report report;
     vsh_error error;
     if (vsh_mesh_check(&mesh, &report, &error) != VSH_OK) {
@@ -54,6 +77,11 @@ static int print_mesh(const vsh_model *model, size_t index, const vsh_solidity_r
     printf("  bounds: %g %g %g to %g %g %g\n  area: %g\n", report.bounds_min[0], report.bounds_min[1],
            report.bounds_min[2], report.bounds_max[0], report.bounds_max[1], report.bounds_max[2],
            report.area);
+    if (mesh.alpha != VSH_ALPHA_OPAQUE) {
+        printf("  material: %s\n", mesh.alpha == VSH_ALPHA_BLENDED
+                                       ? "blended (glass, smoke): it casts no shadow, unless --cast-blended"
+                                       : "masked (leaves, fences): it casts whole, without the mask's holes");
+    }
     print_count(report.open_edges, "open edges");
     print_count(report.flipped_edges, "edges whose triangles disagree about the outside");
     print_count(report.degenerate_triangles, "triangles of zero area, which are skipped");
@@ -81,6 +109,9 @@ int cli_info_mesh(const char *path, const cli_info_look *given, const vsh_run *r
         cli_say("%s: the system refused memory", path);
         code = CLI_LIMIT;
     }
+    if (code == CLI_OK) {
+        print_unit(model, look.unit);
+    }
     for (size_t i = 0; i < count && code == CLI_OK; ++i) {
         meshes[i] = vsh_model_mesh(model, i, -1);
     }
@@ -88,7 +119,7 @@ int cli_info_mesh(const char *path, const cli_info_look *given, const vsh_run *r
         code = cli_fail(&error);
     }
     for (size_t i = 0; i < count && code == CLI_OK; ++i) {
-        code = look.table ? CLI_OK : print_mesh(model, i, &solidity[i]);
+        code = look.table ? CLI_OK : print_mesh(model, i, scale_for(model, look.unit), &solidity[i]);
         const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
         if (mesh.uvs != NULL) {
             with_uvs[with_uv_count++] = mesh;

@@ -90,7 +90,9 @@ enum {
     CLI_KEY_SHELL_THICKNESS,
     CLI_KEY_SOLID,
     CLI_KEY_SHELL,
-    CLI_KEY_INWARD
+    CLI_KEY_INWARD,
+    CLI_KEY_UNIT,
+    CLI_KEY_CAST_BLENDED
 };
 
 #define CLI_TRUSTED_OPTION                                                                                   \
@@ -121,6 +123,13 @@ enum {
             "the same for any"                                                                               \
     }
 
+#define CLI_UNIT_OPTION                                                                                      \
+    {                                                                                                        \
+        CLI_KEY_UNIT, "unit", "UNIT",                                                                        \
+            "of the numbers in mesh files: m, cm, mm, in, ft, or\nmetres; FBX and DAE know theirs, and "     \
+            "OBJ, PLY and STL\nstay as they are"                                                             \
+    }
+
 #define CLI_GRID_OPTIONS                                                                                     \
     {CLI_KEY_RESOLUTION, "resolution", "N",                                                                  \
      "voxels along the longest side of the casters,\n2 to 65536 (256)"},                                     \
@@ -130,6 +139,8 @@ enum {
          "repeatable"},                                                                                      \
         {CLI_KEY_SHELL, "shell", "PATTERN", "objects that are sheets with air on both sides"},               \
         {CLI_KEY_INWARD, "inward", "PATTERN", "objects that are rooms: air in what they enclose"},           \
+        CLI_UNIT_OPTION,                                                                                     \
+        {CLI_KEY_CAST_BLENDED, "cast-blended", NULL, "meshes of blended materials (glass) cast too, whole"}, \
         {CLI_KEY_HALF_WIDTH, "half-width", "VOXELS",                                                         \
          "half width of the narrow band, in voxels,\n3 to 100 (3)"},                                         \
     {                                                                                                        \
@@ -145,6 +156,8 @@ typedef struct cli_grid_settings {
     vsh_grid_options options;
     vsh_solidity_rule rules[CLI_MOST_RULES];
     size_t rule_count;
+    double unit; /* 0: as the files say */
+    bool cast_blended;
 } cli_grid_settings;
 
 /* Take an option of the tables above; *taken tells whether it was one of them. */
@@ -156,5 +169,8 @@ int cli_grid_check(const cli_grid_settings *settings);
 
 /* Puts the given ones over a scene's, which then refers to the settings. */
 void cli_grid_apply(const cli_grid_settings *settings, vsh_scene *scene);
+
+/* Metres: a unit's name, or a number. */
+int cli_take_unit(const char *name, const char *value, double *unit);
 
 #endif

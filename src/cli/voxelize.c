@@ -156,6 +156,8 @@ static int voxelize_main(int argc, char **argv) {
         scene.casters = read->casters;
         scene.caster_count = read->caster_count;
         scene.grid = read->grid;
+        scene.unit = read->unit;
+        scene.cast_blended = read->cast_blended;
     }
     cli_grid_apply(&s.grid, &scene);
     code = check_files(&s, &scene);

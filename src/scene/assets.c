@@ -111,8 +111,10 @@ static vsh_result find_grid(vsh_assets *assets, const char *path, const char *na
 
 /* The meshes of the model that are `chosen`; NULL: all. */
 static vsh_result place_chosen(asset_place *place, const vsh_model *model, const unsigned char *chosen,
-                               int32_t uv_set, const double transform[12], vsh_error *error) {
+                               int32_t uv_set, double unit, const double transform[12], vsh_error *error) {
     const size_t all = vsh_model_mesh_count(model);
+    const double own_unit = vsh_model_unit(model) > 0.0 ? vsh_model_unit(model) : 1.0;
+    const double scale = unit > 0.0 ? unit / own_unit : 1.0;
     size_t count = 0;
     for (size_t i = 0; i < all; ++i) {
         count += chosen == NULL || chosen[i] != 0;
@@ -135,7 +137,11 @@ static vsh_result place_chosen(asset_place *place, const vsh_model *model, const
         double *composed = place->transforms + 12 * place->count;
         vsh_mesh *mesh = &place->meshes[place->count++];
         *mesh = vsh_model_mesh(model, i, uv_set);
-        vshi_transform_compose(transform, mesh->transform, composed);
+        double scaled[12];
+        for (int k = 0; k < 12; ++k) {
+            scaled[k] = mesh->transform[k] * scale;
+        }
+        vshi_transform_compose(transform, scaled, composed);
         mesh->transform = composed;
     }
     return VSH_OK;
@@ -143,7 +149,7 @@ static vsh_result place_chosen(asset_place *place, const vsh_model *model, const
 
 static vsh_result place_model(asset_place *place, const vsh_model *model, int32_t uv_set,
                               const double transform[12], vsh_error *error) {
-    return place_chosen(place, model, NULL, uv_set, transform, error);
+    return place_chosen(place, model, NULL, uv_set, 0.0, transform, error);
 }
 
 static vsh_result find_map(vsh_assets *assets, const char *path, const vsh_run *run,
@@ -206,8 +212,44 @@ static vsh_result place_spheres(asset_place *place, const vsh_caster *caster, si
     return result;
 }
 
-static vsh_result place_caster(vsh_assets *assets, const vsh_caster *caster, size_t index, const vsh_run *run,
+/* Takes glass and the like out of `chosen`, and tells what masks are taken for. */
+static vsh_result leave_out_blended(const vsh_scene *scene, const vsh_model *model, const char *path,
+                                    const vsh_run *run, unsigned char *chosen, vsh_error *error) {
+    const size_t count = vsh_model_mesh_count(model);
+    size_t left = 0, blended = 0, masked = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const int32_t alpha = vsh_model_mesh(model, i, -1).alpha;
+        const bool out = chosen[i] != 0 && alpha == VSH_ALPHA_BLENDED && scene->cast_blended == 0;
+        blended += out;
+        masked += chosen[i] != 0 && alpha == VSH_ALPHA_MASKED;
+        chosen[i] = out ? 0 : chosen[i];
+        left += chosen[i] != 0;
+    }
+    if (left == 0) {
+        return vshi_fail(
+            error, VSH_ERROR_INPUT,
+            "%s: all its materials are blended (glass, smoke), and cast nothing; \"cast_blended\" "
+            "in a scene, or --cast-blended, has them cast",
+            path);
+    }
+    if (blended > 0) {
+        vshi_warn(run,
+                  "%s: %zu of %zu meshes have blended materials (glass, smoke) and cast no shadow; "
+                  "\"cast_blended\" in a scene, or --cast-blended, has them cast",
+                  path, blended, count);
+    }
+    if (masked > 0) {
+        vshi_warn(run,
+                  "%s: %zu of %zu meshes have masked materials (leaves, fences) and cast whole, without the "
+                  "holes of their textures",
+                  path, masked, count);
+    }
+    return VSH_OK;
+}
+
+static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_t index, const vsh_run *run,
                                vsh_error *error) {
+    const vsh_caster *caster = &scene->casters[index];
     asset_place *place = &assets->casters[index];
     if (caster->type == VSH_CASTER_SDF) {
         return VSH_OK;
@@ -247,7 +289,10 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_caster *caster, siz
         result = vshi_select(model, caster->path, &caster->objects, &chosen, error);
     }
     if (result == VSH_OK) {
-        result = place_chosen(place, model, chosen, -1, caster->transform, error);
+        result = leave_out_blended(scene, model, caster->path, run, chosen, error);
+    }
+    if (result == VSH_OK) {
+        result = place_chosen(place, model, chosen, -1, scene->unit, caster->transform, error);
     }
     place->model = model;
     free(chosen);
@@ -272,8 +317,9 @@ static vsh_result settle_solidity(vsh_assets *assets, const vsh_scene *scene, co
     return result;
 }
 
-static vsh_result place_receiver(vsh_assets *assets, const vsh_receiver *receiver, size_t index,
-                                 const vsh_run *run, vsh_error *error) {
+static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, size_t index, const vsh_run *run,
+                                 vsh_error *error) {
+    const vsh_receiver *receiver = &scene->receivers[index];
     if (receiver->path == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "receiver %zu: no path", index);
     }
@@ -295,8 +341,8 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_receiver *receive
         result = vshi_select_uvs(model, receiver, run, chosen, error);
     }
     if (result == VSH_OK) {
-        result = place_chosen(&assets->receivers[index], model, chosen, receiver->uv_set, receiver->transform,
-                              error);
+        result = place_chosen(&assets->receivers[index], model, chosen, receiver->uv_set, scene->unit,
+                              receiver->transform, error);
     }
     free(chosen);
     return result;
@@ -350,10 +396,10 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     result = allocate_places(loaded, scene, error);
     /* Receivers first: what is wrong with them is cheaper to find than a caster's volume is to read. */
     for (size_t i = 0; i < scene->receiver_count && result == VSH_OK; ++i) {
-        result = place_receiver(loaded, &scene->receivers[i], i, &full, error);
+        result = place_receiver(loaded, scene, i, &full, error);
     }
     for (size_t i = 0; i < scene->caster_count && result == VSH_OK; ++i) {
-        result = place_caster(loaded, &scene->casters[i], i, &full, error);
+        result = place_caster(loaded, scene, i, &full, error);
     }
     if (result == VSH_OK) {
         result = settle_solidity(loaded, scene, &full, error);

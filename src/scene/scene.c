@@ -160,6 +160,19 @@ static vsh_result read_ambient(vshi_reader *reader, const vshi_value *value, voi
     return vshi_read_value(reader, value, &color, scene->ambient);
 }
 
+/* A name, or metres. */
+static vsh_result read_unit(vshi_reader *reader, const vshi_value *value, void *member) {
+    static const vshi_key metres = {.kind = VSHI_NUMBER, .highest = 1e12, .flags = VSHI_ABOVE};
+    vsh_scene *scene = member;
+    if (!json_is_string(value->json)) {
+        return vshi_read_value(reader, value, &metres, &scene->unit);
+    }
+    scene->unit = vsh_unit(json_string_value(value->json));
+    return scene->unit > 0.0 ? VSH_OK
+                             : vshi_reader_fail(reader, value, "\"%.64s\" is none of m, cm, mm, in, ft",
+                                                json_string_value(value->json));
+}
+
 static const vshi_key scene_keys[] = {
     {.name = "casters", .kind = VSHI_CUSTOM, .required = VSHI_ALL, .read = read_casters},
     {.name = "voxel_size",
@@ -223,6 +236,8 @@ static const vshi_key scene_keys[] = {
      .kind = VSHI_NUMBER,
      .offset = offsetof(vsh_scene, shade.start_offset),
      .highest = 16.0},
+    {.name = "unit", .kind = VSHI_CUSTOM, .read = read_unit},
+    {.name = "cast_blended", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, cast_blended)},
     {.name = "receivers", .kind = VSHI_CUSTOM, .read = read_receivers},
 };
 static const vshi_table scene_table = VSHI_TABLE(scene_keys);

@@ -1,0 +1,73 @@
+# What files of meshes say of themselves: units, materials, extensions, buffers; and what is told of those that are not read.
+load helper
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    models=$(cd "$BATS_TEST_DIRNAME/../models" && pwd)
+}
+
+
+@test "info tells a file's unit, and the size in metres" {
+    shade info "$models/scene.fbx"
+    done_well
+    [[ $output == *"unit: 0.01 m; bounds are in metres"* ]] || fail "no unit"
+    [[ $output == *"bounds: 0 2 -3 to 2 4 -1"* ]] || fail "not in metres"
+    shade info "$models/scene.obj"
+    [[ $output == *"unit: none"* ]] || fail "a unit of OBJ"
+}
+
+@test "--unit overrules, by a name or in metres" {
+    shade info --unit m "$models/scene.fbx"
+    [[ $output == *"bounds: 0 200 -300 to 200 400 -100"* ]] || fail "FBX in metres"
+    shade info --unit in "$models/scene.obj"
+    [[ $output == *"bounds: 0 0.0508 -0.0762 to 0.0508 0.1016 -0.0254"* ]] || fail "OBJ in inches"
+    shade info --unit 10 "$models/scene.obj"
+    [[ $output == *"bounds: 0 20 -30 to 20 40 -10"* ]] || fail "OBJ by ten"
+    shade voxelize "$models/scene.obj" -o a.vdb --unit cm --resolution 32
+    done_well
+    shade info a.vdb
+    [[ $output == *"voxel size: 0.0014667"* ]] || fail "voxelize: $output"
+    shade info --unit yard "$models/scene.obj"
+    refused 2 "--unit 'yard'"
+}
+
+@test "blended materials cast nothing unless asked, and one line says so" {
+    shade voxelize "$models/scene.glb" -o without.vdb --resolution 32
+    done_well
+    [[ $stderr == *"1 of 3 meshes have blended materials"*"--cast-blended"* ]] || fail "not told: $stderr"
+    shade voxelize "$models/scene.glb" -o with.vdb --resolution 32 --cast-blended
+    done_well
+    [[ $stderr != *blended* ]] || fail "told all the same: $stderr"
+    printf '{"casters": [{"mesh": "%s"}], "resolution": 32, "cast_blended": true, "unit": "cm"}' "$models/scene.glb" >a.json
+    shade voxelize a.json -o scene.vdb
+    done_well
+    [[ $stderr != *blended* ]] || fail "the scene: $stderr"
+    "$VDBSHADE" info with.vdb | grep "active voxels" >with.txt
+    "$VDBSHADE" info without.vdb | grep "active voxels" >without.txt
+    ! cmp -s with.txt without.txt || fail "the glass casts"
+}
+
+@test "what is not read is refused with what would help" {
+    sed 's/"asset"/"extensionsRequired":["EXT_meshopt_compression"],"asset"/' "$models/scene.gltf" >packed.gltf
+    cp "$models/scene.bin" .
+    shade info packed.gltf
+    refused 2 "EXT_meshopt_compression"
+    refused 2 "gltfpack"
+    cp "$models/scene.gltf" alone.gltf && rm scene.bin
+    shade info alone.gltf
+    refused 3 "scene.bin': No such file"
+    printf 'BLENDER-v304' >a.blend
+    shade info a.blend
+    refused 2 "export it as GLB"
+    printf 'anything' >a.x3d
+    shade info a.x3d
+    refused 2 "GLB"
+}
+
+@test "a file with blanks in its name is read in every format" {
+    for format in glb fbx dae obj ply stl; do
+        cp "$models/scene.$format" "my scene.$format"
+        shade info "my scene.$format"
+        done_well
+    done
+}
