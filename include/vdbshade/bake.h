@@ -200,7 +200,7 @@ static inline vsh_bake_stats vsh_bake_stats_zero(void) {
 }
 
 /* Shades the texels and fills the lightmap's planes. NULL options are those given to vsh_texels_create().
- * Rays begin start_offset + surface_offset above the surface (a voxel at least in creases), for open meshes
+ * Rays begin start_offset + surface_offset above the surface (a voxel at least in creases), for sheets
  * half of the field's shell_thickness farther. `lights` may be NULL where light_count is 0; `stats` is
  * filled on success. Errors (planes then hold nothing of use):
  * - VSH_ERROR_ARGUMENT: field, texels, lightmap or lights NULL, options out of range, run, and as

@@ -51,7 +51,7 @@ typedef struct vsh_field_info {
     double reach;         /* that the coarsest level resolves, world units */
     double bounds_min[3]; /* of the solid, world units */
     double bounds_max[3];
-    double shell_thickness; /* of open meshes in it, world units; 0: none */
+    double shell_thickness; /* of sheets in it, world units; 0: none */
     int32_t levels;
     uint64_t bricks; /* of 8³ cells, over all levels */
     uint64_t bytes;  /* in memory */

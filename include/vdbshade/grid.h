@@ -18,7 +18,7 @@ typedef struct vsh_grid_options {
     double voxel_size;  /* edge of a voxel, world units, 1e-12 … 1e12; 0: from `resolution` */
     int32_t resolution; /* voxels along the longest side of the bounds, 2 … 65536, where voxel_size is 0 */
     double half_width;  /* of the narrow band, voxels, 3 … 100 */
-    double shell_thickness; /* of the solid that an open mesh becomes, voxels, 1 … 50 */
+    double shell_thickness; /* of sheets and walls, voxels, 1 … 50 */
 } vsh_grid_options;
 
 static inline vsh_grid_options vsh_grid_options_default(void) {
@@ -26,9 +26,10 @@ static inline vsh_grid_options vsh_grid_options_default(void) {
     return options;
 }
 
-/* The union of the meshes' solids: what cannot be reached from outside is inside, but for rooms, shells
- * that face inward within a closed mesh. An open mesh (vsh_mesh_report.open_edges) becomes a shell of
- * shell_thickness around its triangles, with a warning; a mesh with flipped edges is warned of. Errors:
+/* The union of what the meshes are taken for (vsh_mesh.solidity): solids (closed over their holes, with a
+ * warning) less the rooms in them; walls of shell_thickness behind faces that look inwards; shells of
+ * shell_thickness around sheets, with a warning. Faces that look the other way than those around are warned
+ * of. Errors:
  * - VSH_ERROR_ARGUMENT: no meshes, options out of range, run, and as vsh_mesh_check();
  * - VSH_ERROR_INPUT: as vsh_mesh_check(); no triangle of any area;
  * - VSH_ERROR_LIMIT: the estimated memory passes run->memory_limit or the machine's, a voxel size outside
@@ -126,7 +127,7 @@ typedef struct vsh_grid_info {
     double half_width;    /* voxels */
     double bounds_min[3]; /* world box of the voxels inside the surface or next to it */
     double bounds_max[3];
-    double shell_thickness; /* world units, of open meshes in it; 0: none */
+    double shell_thickness; /* world units, of sheets in it; 0: none */
     uint64_t active_voxels; /* of the band */
     uint64_t bytes;         /* in memory */
 } vsh_grid_info;

@@ -57,7 +57,7 @@ VSH_API int32_t vsh_mesh_matches(const vsh_mesh *mesh, const char *pattern);
 /* What vsh_mesh_check() found. Vertices at equal positions count as one, so seams of UVs open nothing. */
 typedef struct vsh_mesh_report {
     size_t degenerate_triangles; /* of zero area; they are skipped everywhere */
-    size_t open_edges;           /* edges with an odd number of triangles: the mesh bounds no solid */
+    size_t open_edges;           /* edges with an odd number of triangles */
     size_t flipped_edges;        /* edges whose triangles disagree about the outside */
     double area;                 /* world units², of all triangles */
     double bounds_min[3]; /* world units, over triangles of some area; min > max where there are none */

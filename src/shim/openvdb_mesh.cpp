@@ -8,7 +8,6 @@
 #include <memory>
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Composite.h>
-#include <openvdb/util/Util.h>
 
 namespace vshi {
 
@@ -105,41 +104,13 @@ void foretell(const Meshes &meshes, const vshi_solidity *solidity, const Lattice
                  leaves * MESH_BYTES_PER_LEAF + double(meshes.triangles) * BYTES_PER_TRIANGLE, error);
 }
 
-// Within this distance (voxels) of a surface the conversion signs a voxel by the side it lies on; farther
-// off, by what can be reached from outside. The first means nothing where a surface ends.
-constexpr float SIGNED_BY_SIDE = 0.87f;
-
-// A voxel next to a surface that ends is inside only if the side it lies on is inside farther off, too.
-bool beside_inside(FloatGrid::ConstUnsafeAccessor &values, const Coord &at, float near) {
-    for (int32_t n = 0; n < 26; ++n) {
-        if (values.getValue(at + openvdb::util::COORD_OFFSETS[n]) < -near) {
-            return true;
-        }
-    }
-    return false;
-}
-
-// Moves the surface out by `offset` (world units) and narrows the band. A sheet becomes a solid: what its
-// conversion found to be enclosed stays inside.
-void move_out(FloatGrid &grid, bool sheet, float offset, float voxel, float background, Stage &stage) {
+// Moves the surface out by `offset` (world units) and narrows the band, so that a sheet becomes a solid.
+void move_out(FloatGrid &grid, float offset, float background, Stage &stage) {
     std::vector<Leaf *> leaves;
     grid.tree().getNodes(leaves);
-    std::vector<float> values(leaves.size() * Leaf::SIZE);
-    const float near = SIGNED_BY_SIDE * voxel;
-    stage.loop(leaves.size(), 64, 0.0, 0.0, [&](size_t i) {
-        FloatGrid::ConstUnsafeAccessor around(grid.constTree());
-        for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
-            float value = leaves[i]->getValue(n);
-            if (sheet && value < 0.0f && value >= -near &&
-                !beside_inside(around, leaves[i]->offsetToGlobalCoord(n), near)) {
-                value = -value;
-            }
-            values[i * Leaf::SIZE + n] = std::clamp(value - offset, -background, background);
-        }
-    });
     stage.loop(leaves.size(), 64, 0.0, 0.0, [&](size_t i) {
         for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
-            const float value = values[i * Leaf::SIZE + n];
+            const float value = std::clamp(leaves[i]->getValue(n) - offset, -background, background);
             leaves[i]->setValueOnly(n, value);
             leaves[i]->setActiveState(n, std::fabs(value) < background);
         }
@@ -255,17 +226,17 @@ void unite(FloatGrid::Ptr &united, const FloatGrid::Ptr &more, Stage &stage) {
 FloatGrid::Ptr fill_wall(const Wall &wall, const Lattice &lattice, Progress &progress, Stage &stage) {
     const double begin = progress.done, end = progress.next(wall.faces);
     const double middle = 0.5 * (begin + end);
-    const float voxel = float(lattice.voxel), thickness = float(lattice.shell * lattice.voxel);
-    FloatGrid::Ptr grown =
-        fill_surface(wall.faces, lattice, lattice.half_width + lattice.shell, begin, middle, stage);
-    FloatGrid::Ptr within;
+    const double half_width = lattice.half_width + lattice.shell;
+    FloatGrid::Ptr grown, within;
     if (wall.open) {
+        grown = measure_surface(wall.faces, lattice, half_width, begin, middle, stage);
         within = fill_surface(wall.closed, lattice, lattice.half_width, middle, end, stage);
     } else {
+        grown = fill_surface(wall.faces, lattice, half_width, begin, end, stage);
         within = grown->deepCopy();
-        move_out(*within, false, 0.0f, voxel, lattice.background(), stage);
+        move_out(*within, 0.0f, lattice.background(), stage);
     }
-    move_out(*grown, wall.open, thickness, voxel, lattice.background(), stage);
+    move_out(*grown, float(lattice.shell * lattice.voxel), lattice.background(), stage);
     stage.run([&] {
         if (wall.inward) {
             openvdb::tools::csgDifference(*grown, *within);
@@ -276,12 +247,12 @@ FloatGrid::Ptr fill_wall(const Wall &wall, const Lattice &lattice, Progress &pro
     return grown;
 }
 
+// Without signs: what sheets enclose together is air.
 FloatGrid::Ptr fill_sheets(const Surface &sheets, const Lattice &lattice, Progress &progress, Stage &stage) {
     const double begin = progress.done;
-    FloatGrid::Ptr shell = fill_surface(sheets, lattice, lattice.half_width + 0.5 * lattice.shell, begin,
-                                        progress.next(sheets), stage);
-    move_out(*shell, true, float(0.5 * lattice.shell * lattice.voxel), float(lattice.voxel),
-             lattice.background(), stage);
+    FloatGrid::Ptr shell = measure_surface(sheets, lattice, lattice.half_width + 0.5 * lattice.shell, begin,
+                                           progress.next(sheets), stage);
+    move_out(*shell, float(0.5 * lattice.shell * lattice.voxel), lattice.background(), stage);
     return shell;
 }
 

@@ -226,6 +226,44 @@ static void a_face_turned_over_changes_nothing(void **state) {
     free(s);
 }
 
+static double room_of_sheets(const double p[3]) {
+    return fabs(box(p, 1.0)) - VOXEL;
+}
+
+static void rooms_of_separate_walls_hold_air(void **state) {
+    (void)state;
+    shape *s[6];
+    vsh_mesh meshes[6];
+    for (int i = 0; i < 6; ++i) {
+        s[i] = shape_new();
+        shape_box(s[i], LOW, HIGH, 1U << i);
+        meshes[i] = shape_mesh(s[i], "wall");
+    }
+    vsh_grid *grid = grid_of(meshes, 6, VOXEL);
+    assert_true(has_sheets(grid));
+    assert_is(grid, room_of_sheets, 0.9, 0.1, "six walls");
+    shape_box(s[0], LOW, HIGH, ALL_SIDES & ~LEFT);
+    meshes[0] = shape_mesh(s[0], "box");
+    meshes[0].solidity = VSH_SOLIDITY_SHELL;
+    assert_is(grid_of(meshes, 1, VOXEL), room_of_sheets, 0.9, 0.1, "a box that is to be a shell");
+    for (int i = 0; i < 6; ++i) {
+        free(s[i]);
+    }
+}
+
+static double dome_of_sheets(const double p[3]) {
+    return fmin(fabs(ball(p, 3.0)) - VOXEL, box(p, 1.0));
+}
+
+static void a_dome_that_looks_outwards_holds_air(void **state) {
+    (void)state;
+    shape *s = shape_new();
+    shape_ball(s, ORIGIN, 3.0, -1.0, 1.0, 128);
+    shape_box(s, LOW, HIGH, ALL_SIDES);
+    assert_is(grid_of_shape(s, VOXEL), dome_of_sheets, 0.9, 0.1, "dome");
+    free(s);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sky_dome_leaves_what_it_holds),
@@ -235,6 +273,8 @@ int main(void) {
         cmocka_unit_test(the_door_of_a_room_stays_open),
         cmocka_unit_test(a_card_in_a_solid_s_mesh_leaves_it_solid),
         cmocka_unit_test(a_face_turned_over_changes_nothing),
+        cmocka_unit_test(rooms_of_separate_walls_hold_air),
+        cmocka_unit_test(a_dome_that_looks_outwards_holds_air),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
