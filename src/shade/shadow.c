@@ -177,7 +177,8 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
                        options->method == VSH_SHADOW_CONE;
     *task =
         (vshi_shadow_task){.field = field, .light = light, .options = options, .lowest = inner ? 1.0 : 0.0};
-    task->leaky = options->method == VSH_SHADOW_EXACT && vshi_triangles_have_holes(options->triangles);
+    task->leaky = options->method == VSH_SHADOW_EXACT &&
+                  (field->shell_thickness > 0.0 || vshi_triangles_have_holes(options->triangles));
     if (light->type == VSH_LIGHT_DIRECTIONAL) {
         task->towards = vshi_direction_to_field(field, vshi_unit(vshi_vec_of(light->direction)));
         task->sine = vshi_sin(0.5 * light->angle);

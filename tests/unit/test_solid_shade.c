@@ -81,9 +81,48 @@ static void the_floor_of_an_inward_room_has_the_ao_of_a_room(void **state) {
     free(s);
 }
 
+/* Points nearer to a sheet than half of the thickness that it has as a shell in the voxels, on the sun's side
+ * of it. */
+static void no_ray_is_proved_hidden_by_the_thickness_of_a_sheet(void **state) {
+    (void)state;
+    if (!vsh_triangles_available()) {
+        skip();
+    }
+    const float corners[12] = {0, -2, -2, 0, 2, -2, 0, 2, 2, 0, -2, 2};
+    const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    const vsh_mesh mesh = {
+        .name = "sheet", .positions = corners, .indices = indices, .vertex_count = 4, .triangle_count = 2};
+    const double towards[3] = {1.0, 0.0, 1.0};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = 0.1;
+    vsh_grid *grid = NULL;
+    vsh_triangles *triangles = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &error) != VSH_OK ||
+        vsh_triangles_create(&mesh, 1, NULL, &triangles, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    caster c = {field_of_grid(grid, 0.0), triangles};
+    const vsh_light narrow = sun(towards, RADIANS(1.0));
+    double at[3 * 64];
+    float up[3 * 64], seen[64];
+    for (int i = 0; i < 64; ++i) {
+        const double p[3] = {0.005 + 0.01 * (i % 8), 0.02 * (i / 8), 0.0};
+        const float n[3] = {0.0f, 0.0f, 1.0f};
+        memcpy(at + 3 * i, p, sizeof p);
+        memcpy(up + 3 * i, n, sizeof n);
+    }
+    cast_shadows(&c, &narrow, VSH_SHADOW_EXACT, 64, at, up, seen);
+    for (int i = 0; i < 64; ++i) {
+        assert_true(seen[i] == 1.0f);
+    }
+    caster_free(&c);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(no_ray_through_two_holes_is_proved_hidden),
+        cmocka_unit_test(no_ray_is_proved_hidden_by_the_thickness_of_a_sheet),
         cmocka_unit_test(the_floor_of_an_inward_room_has_the_ao_of_a_room),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
