@@ -194,6 +194,11 @@ VSH_API vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets 
                                        const vsh_scene_layer *layer, const vsh_run *run,
                                        vsh_triangles **triangles, vsh_error *error);
 
+/* 1 where the casters in `layer`, or (NULL) in none, are all triangles, which vsh_scene_triangles() then
+ * gives: meshes, and heightfields that are voxelised. Those that cast as they are (direct heightfields,
+ * spheres) do not count. Also 1 where there are no others. */
+VSH_API int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer);
+
 /* Reach, world units > 0, that a field of `grid` needs for the scene's lights and AO at receivers within a
  * world box: see vsh_field_options. Directional lights count up to a half angle of 60°. */
 VSH_API double vsh_scene_reach(const vsh_scene *scene, const vsh_grid *grid, const double receivers_min[3],

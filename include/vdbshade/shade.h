@@ -25,8 +25,9 @@ enum {
     VSH_SHADOW_CONE = 5, /* inner and outer penumbra, circular segment: the share of a disc behind an edge */
     VSH_SHADOW_RAYS = 6, /* `rays` rays over the light's disc, marched against the field */
     VSH_SHADOW_ADAPTIVE =
-        7,               /* a cone that proves the light fully seen or hidden, else rays until max_error */
-    VSH_SHADOW_EXACT = 8 /* the same cone, the rays traced against `triangles` */
+        7,                /* a cone that proves the light fully seen or hidden, else rays until max_error */
+    VSH_SHADOW_EXACT = 8, /* the same cone, the rays traced against `triangles` */
+    VSH_SHADOW_AUTO = 9   /* exact where `triangles` are given, else adaptive: keeps max_error */
 };
 
 enum {
@@ -34,8 +35,16 @@ enum {
     VSH_AO_CONES = 1,    /* cosine-weighted cones (Crassin and others, 2011, marched in a distance field) */
     VSH_AO_RAYS = 2,     /* `rays` cosine-weighted rays, marched against the field */
     VSH_AO_ADAPTIVE = 3, /* the same, as many as max_error takes */
-    VSH_AO_EXACT = 4     /* likewise, the rays traced against `triangles`, from the points themselves:
+    VSH_AO_EXACT = 4,    /* likewise, the rays traced against `triangles`, from the points themselves:
                             start_offset is not added */
+    VSH_AO_AUTO = 5      /* exact where `triangles` are given, else adaptive */
+};
+
+/* What a method is like. All that takes no rays is a preview: its error depends on the scene. */
+enum {
+    VSH_METHOD_RAYS = 1,        /* takes rays, and knows the error that they leave */
+    VSH_METHOD_KEEPS_ERROR = 2, /* takes as many as max_error asks for */
+    VSH_METHOD_TRIANGLES = 4    /* traces them against `triangles`, which have to be given */
 };
 
 /* Where the rays of a point go, over the light's disc or the hemisphere. `frame` gives another, independent
@@ -50,20 +59,22 @@ enum {
 
 typedef struct vsh_shade_options {
     size_t struct_size;
-    int32_t method;        /* VSH_SHADOW_… */
-    int32_t ao_method;     /* VSH_AO_… */
+    int32_t method;        /* VSH_SHADOW_… (auto) */
+    int32_t ao_method;     /* VSH_AO_… (auto) */
     int32_t ao_cones;      /* 1 … 256, with VSH_AO_CONES */
     int32_t max_steps;     /* 16 … 65536; a ray that has not ended after so many is counted as unfinished */
     double ao_distance;    /* how far an occluder can be, world units, > 0 (2^-1000 … 2^1000) */
     double start_offset;   /* how far above a point rays begin, along its normal, voxels, 0 … 16 */
     double surface_offset; /* added to it, world units, 0 … 2^1000: where the receiver itself is in the field
                               as a shell, half of its thickness */
-    int32_t rays;          /* rays, and the most that adaptive and exact take, 1 … 4096 */
+    int32_t rays;          /* rays: how many (0: 64). adaptive and exact: the most that a value takes, even
+                              where max_error asks for more; 0: as many as that does, up to 16384 (blue: 4096).
+                              0 … 4096 (0) */
     int32_t sampler;       /* VSH_SAMPLER_… */
     int32_t frame;         /* ≥ 0 */
     int32_t early_rays;    /* rays: where the first so many agree, the rest are not marched; 0: never */
-    double max_error;      /* adaptive, exact: standard error that a value may keep, 1e-4 … 1 */
-    const vsh_triangles *triangles; /* exact: the casters' triangles; else NULL */
+    double max_error;      /* adaptive, exact: standard error that a value may keep, 1e-4 … 1 (0.02) */
+    const vsh_triangles *triangles; /* exact, auto: the casters' triangles; else NULL */
     const vsh_layer *layers; /* [layer_count]: casters beside those of the field; may be NULL. Each has the
                                 same struct_size */
     size_t layer_count;
@@ -73,14 +84,14 @@ typedef struct vsh_shade_options {
 
 static inline vsh_shade_options vsh_shade_options_default(void) {
     vsh_shade_options options = {sizeof(vsh_shade_options),
-                                 VSH_SHADOW_CONE,
-                                 VSH_AO_CONES,
+                                 VSH_SHADOW_AUTO,
+                                 VSH_AO_AUTO,
                                  16,
                                  1024,
                                  1.0,
                                  0.25,
                                  0.0,
-                                 64,
+                                 0,
                                  VSH_SAMPLER_SOBOL,
                                  0,
                                  0,
@@ -102,6 +113,14 @@ VSH_API int32_t vsh_tint_type(const char *name);
 VSH_API const char *vsh_tint_type_name(int32_t type);
 VSH_API int32_t vsh_sampler(const char *name);
 VSH_API const char *vsh_sampler_name(int32_t sampler);
+
+/* VSH_METHOD_… of a method, 0 for what is none; of auto, what holds for both that it may come to. */
+VSH_API uint32_t vsh_shadow_method_traits(int32_t method);
+VSH_API uint32_t vsh_ao_method_traits(int32_t method);
+
+/* What auto comes to with triangles (nonzero) or without; every other method is itself. */
+VSH_API int32_t vsh_shadow_method_resolve(int32_t method, int32_t has_triangles);
+VSH_API int32_t vsh_ao_method_resolve(int32_t method, int32_t has_triangles);
 
 /* Receivers: a view of the caller's arrays. Points that follow each other and lie within a few voxels of each
  * other share proofs, which makes them several times as fast: sort them along a curve that fills space
@@ -135,10 +154,11 @@ typedef struct vsh_shade_stats {
     uint64_t rays;         /* rays marched or traced to refine what no cone decided, or by the rays methods */
     uint64_t refined;      /* values that took rays */
     double square_error;   /* adaptive, exact: sum over values of the estimated squared error */
+    double ao_square_error; /* what of it is AO's */
 } vsh_shade_stats;
 
 static inline vsh_shade_stats vsh_shade_stats_zero(void) {
-    vsh_shade_stats stats = {sizeof(vsh_shade_stats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.0};
+    vsh_shade_stats stats = {sizeof(vsh_shade_stats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.0, 0.0};
     return stats;
 }
 

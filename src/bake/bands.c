@@ -9,6 +9,7 @@
 #include "base/parallel.h"
 #include "caster/mesh.h"
 #include "caster/solidity.h"
+#include "shade/layers.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -406,9 +407,11 @@ uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int3
         return 0;
     }
     const double width = charts->info.width;
-    const vsh_shade_options *shade = &charts->shade;
+    vsh_shade_options shade = charts->shade;
+    shade.method = vsh_shadow_method_resolve(shade.method, 1); /* the triangles may not be there yet */
+    shade.ao_method = vsh_ao_method_resolve(shade.ao_method, 1);
     vshi_bake_need need = {.texels = width * band.rows,
-                           .traced = shade->method == VSH_SHADOW_EXACT || shade->ao_method == VSH_AO_EXACT,
+                           .traced = vshi_shadow_traces(&shade) || vshi_ao_traces(&shade),
                            .values = true,
                            .errors = errors != 0,
                            .irradiance = irradiance != 0,

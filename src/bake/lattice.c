@@ -420,6 +420,7 @@ static void add_errors(const lattice *l, vsh_shade_stats *stats) {
         sum += deviation > 0.0 ? (uint64_t)(deviation * deviation / VSHI_SQUARE_UNIT) : 0;
     }
     stats->square_error += (double)sum * VSHI_SQUARE_UNIT;
+    stats->ao_square_error += (double)sum * VSHI_SQUARE_UNIT;
 }
 
 double vshi_lattice_bytes(double samples, double texels, bool bent) {
@@ -451,7 +452,7 @@ vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, con
     l.state = vshi_take(origins->count, 1, what, &result, error);
     l.before = vshi_take(l.blocks + 1, sizeof *l.before, what, &result, error);
     l.row_start = vshi_take(origins->rows.count + 1, sizeof *l.row_start, what, &result, error);
-    const bool estimates = options->ao_method == VSH_AO_ADAPTIVE || options->ao_method == VSH_AO_EXACT;
+    const bool estimates = (vsh_ao_method_traits(options->ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
     float *own =
         vshi_take(estimates && deviation == NULL ? origins->count : 0, sizeof *own, what, &result, error);
     l.deviation = deviation == NULL && estimates ? own : deviation;

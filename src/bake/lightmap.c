@@ -78,7 +78,7 @@ static int32_t invalid_radius(const vsh_texels *texels) {
 static bool interpolates(const baking *bake) {
     const int32_t method = bake->shade.ao_method;
     return bake->texels->ao_spacing > 1 && !bake->layered_ao &&
-           (method == VSH_AO_CONES || method == VSH_AO_ADAPTIVE || method == VSH_AO_EXACT);
+           (method == VSH_AO_CONES || (vsh_ao_method_traits(method) & VSH_METHOD_KEEPS_ERROR) != 0);
 }
 
 /* The layers for points that are lifted already: what their voxels need beyond that is left. */
@@ -238,7 +238,7 @@ static vsh_result over_samples(baking *bake, const char *what, vshi_range_fn *st
 static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
     const vsh_lightmap *lightmap = bake->lightmap;
     vsh_shade_options shade;
-    const vsh_points points = points_of(bake, bake->shade.method == VSH_SHADOW_EXACT, &shade);
+    const vsh_points points = points_of(bake, vshi_shadow_traces(&bake->shade), &shade);
     float *errors = lightmap->shadow_error != NULL ? lightmap->shadow_error[index] : NULL;
     vsh_result result =
         vshi_shade_shadow(bake->field, &points, &bake->origins.rows, &bake->lights[index], &shade, &bake->run,
@@ -335,7 +335,7 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
     }
     if (result == VSH_OK && ao_wanted(lightmap)) {
         vsh_shade_options shade;
-        const vsh_points points = points_of(bake, bake->shade.ao_method == VSH_AO_EXACT, &shade);
+        const vsh_points points = points_of(bake, vshi_ao_traces(&bake->shade), &shade);
         float *deviation = lightmap->ao_error != NULL ? bake->deviation : NULL;
         result = interpolates(bake)
                      ? vshi_lattice_ao(bake->field, texels, &bake->origins, &points, &shade, &bake->run,
@@ -419,8 +419,7 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     const bool errors = errors_wanted(bake->lightmap, bake->light_count);
     const vshi_bake_need need = {.samples = (double)texels->count,
                                  .texels = (double)vshi_texels_held(texels),
-                                 .traced = bake->shade.method == VSH_SHADOW_EXACT ||
-                                           bake->shade.ao_method == VSH_AO_EXACT,
+                                 .traced = vshi_shadow_traces(&bake->shade) || vshi_ao_traces(&bake->shade),
                                  .values = values,
                                  .errors = errors,
                                  .irradiance = irradiance,

@@ -355,7 +355,7 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
         find_rows(texels, origins);
     }
     origins->position = vshi_take(origins->count, 3 * sizeof(double), name, &result, error);
-    const bool traced = options->method == VSH_SHADOW_EXACT || options->ao_method == VSH_AO_EXACT;
+    const bool traced = vshi_shadow_traces(options) || vshi_ao_traces(options);
     origins->surface = vshi_take(traced ? origins->count : 0, 3 * sizeof(double), name, &result, error);
     origins->texel = vshi_take(origins->count, sizeof(uint32_t), name, &result, error);
     origins->normal = vshi_take(origins->count, 3 * sizeof(float), name, &result, error);

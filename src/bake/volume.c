@@ -209,8 +209,8 @@ vsh_result vsh_bake_volume(const vsh_field *field, const vsh_voxels *voxels, con
     const vsh_shade_options *shade = &bake.options.shade;
     bake.normals = info.has_normals != 0;
     bake.blocks = vshi_voxels_blocks(voxels, &bake.block_count);
-    bake.shadow_error = bake.options.error != 0 && light_count > 0 && shade->method >= VSH_SHADOW_RAYS;
-    bake.ao_error = bake.options.error != 0 && bake.options.ao != 0 && shade->ao_method >= VSH_AO_RAYS;
+    bake.shadow_error = bake.options.error != 0 && light_count > 0 && vshi_shadow_has_rays(shade);
+    bake.ao_error = bake.options.error != 0 && bake.options.ao != 0 && vshi_ao_has_rays(shade);
     bake.channel_count = light_count * (bake.shadow_error ? 2 : 1) + (bake.options.ao != 0) + bake.ao_error;
     bake.one.threads = 1;
     bake.one.isa = full.isa;

@@ -286,6 +286,7 @@ void vshi_volume_shade_blocks(void *user, size_t begin, size_t end) {
     }
     /* in units, so that the order of threads changes no bit */
     stats.square_error = floor(stats.square_error / VSHI_SQUARE_UNIT) * VSHI_SQUARE_UNIT;
+    stats.ao_square_error = floor(stats.ao_square_error / VSHI_SQUARE_UNIT) * VSHI_SQUARE_UNIT;
     pthread_mutex_lock(&bake->lock);
     vshi_shade_stats_add(&bake->stats, &stats);
     pthread_mutex_unlock(&bake->lock);

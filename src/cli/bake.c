@@ -169,6 +169,7 @@ static int make_triangles(bake_work *work) {
     const double start = cli_seconds();
     const int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
     work->scene->shade.triangles = work->triangles;
+    cli_stats_methods(&work->stats, work->scene);
     cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
     return code;
 }
@@ -276,7 +277,10 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
     cli_warnings_tell();
     code = code == CLI_OK ? find_origin(&work) : code;
     code = code == CLI_OK ? bake_receivers(&work) : code;
-    code = code == CLI_OK ? cli_stats_finish(&work.stats, settings->stats) : code;
+    if (code == CLI_OK) {
+        cli_stats_warn(&work.stats, scene, &work.run);
+        code = cli_stats_finish(&work.stats, settings->stats);
+    }
     if (code == CLI_OK) {
         cli_warnings_tell();
         if (!settings->common.quiet) {

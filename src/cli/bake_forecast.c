@@ -73,6 +73,7 @@ typedef struct trial {
     double finer;    /* the scene's resolution over the trial's */
     double sample_s; /* of one texel's sample, all lights and AO */
     cli_field made;  /* its fields are freed when the trial is over */
+    bool traced;     /* triangles were there to trace */
 } trial;
 
 static int make_texels(const forecast *f, vsh_texels **texels) {
@@ -133,6 +134,7 @@ static int try_small(const forecast *f, trial *t) {
     if (code == CLI_OK) {
         vsh_shade_options shade = f->scene->shade;
         shade.triangles = triangles;
+        t->traced = triangles != NULL;
         shade.layers = t->made.layers;
         shade.layer_count = t->made.layer_count;
         t->finer = finer(f->scene, t->made.grid.voxel_size);
@@ -167,6 +169,16 @@ static int plan_bands(const forecast *f, double field_bytes, bool tell, uint64_t
     return CLI_OK;
 }
 
+static void tell_methods(const forecast *f, const trial *t) {
+    cli_stats stats = {.of = CLI_STATS_TEXELS};
+    vsh_scene scene = *f->scene;
+    char text[128];
+    scene.shade.method = vsh_shadow_method_resolve(scene.shade.method, t->traced);
+    scene.shade.ao_method = vsh_ao_method_resolve(scene.shade.ao_method, t->traced);
+    cli_stats_methods(&stats, &scene);
+    printf("methods       %s\n", cli_stats_methods_text(&stats, text, sizeof text));
+}
+
 static int predict(const forecast *f, const trial *t) {
     const double more = t->finer * t->finer; /* surfaces: voxels grow with the square */
     const double voxelize = t->made.voxelize_s * more, field = t->made.field_s * more;
@@ -181,6 +193,7 @@ static int predict(const forecast *f, const trial *t) {
     if (code != CLI_OK) {
         return code;
     }
+    tell_methods(f, t);
     printf("texels        %" PRIu64 " in %zu lightmap%s, %" PRIu64 " samples\n", f->texels,
            f->scene->receiver_count, f->scene->receiver_count == 1 ? "" : "s", f->samples);
     code = plan_bands(f, field_bytes, true, &largest);

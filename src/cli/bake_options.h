@@ -34,23 +34,23 @@ enum {
     {CLI_KEY_SUN, "sun", "X,Y,Z", "direction towards the sun; its channel is shadow.sun"},                   \
         {CLI_KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},           \
         {CLI_KEY_AO, "ao", "DISTANCE", "ambient occlusion within a distance, scene units"},                  \
-        {CLI_KEY_AO_METHOD, "ao-method", "NAME", "taps, cones, rays, adaptive or exact (cones)"},            \
+        {CLI_KEY_AO_METHOD, "ao-method", "NAME",                                                             \
+         "auto, exact, adaptive or rays; previews: cones, taps\n(auto)"},                                    \
         {CLI_KEY_AO_CONES, "ao-cones", "N", "cones a texel, 1 to 256 (16)"}, {                               \
         CLI_KEY_METHOD, "method", "NAME",                                                                    \
-            "shadow estimate: hard, classic, practical,\nimproved, smooth, cone, rays, adaptive, exact "     \
-            "(cone);\n"                                                                                      \
-            "classic, practical and improved have the outer half\nof the penumbra only"                      \
+            "of the shadow (auto: exact where all casters are\ntriangles, else adaptive): exact, adaptive "  \
+            "and rays; or a\n"                                                                               \
+            "preview, which keeps no error: cone, smooth, hard;\nclassic, practical and improved have the "  \
+            "outer half of\nthe penumbra only"                                                               \
     }
 
 #define CLI_ACCURACY_OPTIONS                                                                                 \
     {0, NULL, NULL, "Accuracy"},                                                                             \
         {CLI_KEY_MAX_ERROR, "max-error", "E",                                                                \
-         "standard error that a value may keep, 0.0001 to 1\n(0.02); chooses adaptive methods where none "   \
-         "is "                                                                                               \
-         "named\n"                                                                                           \
-         "that keeps one"},                                                                                  \
+         "standard error that a value may keep, 0.0001 to 1\n(0.02): rays follow from it. Takes the place "  \
+         "of a\nscene's preview methods by auto"},                                                           \
         {CLI_KEY_RAYS, "rays", "N",                                                                          \
-         "rays a texel, and the most that adaptive and exact\ntake, 1 to 4096 (64)"},                        \
+         "rays a texel (64); with adaptive and exact a limit,\n1 to 4096 (as many as the error takes)"},     \
         {CLI_KEY_SAMPLER, "sampler", "NAME", "where they go: sobol, white or blue (sobol)"},                 \
         {CLI_KEY_FRAME, "frame", "N",                                                                        \
          "another set of them: bakes of frames 0, 1, 2 … may\nbe averaged (0)"},                             \

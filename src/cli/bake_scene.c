@@ -247,15 +247,19 @@ static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
     return CLI_OK;
 }
 
+/* Whether a method that the scene is baked by has all of these traits. */
+static bool any_is(const vsh_scene *scene, uint32_t traits) {
+    return (scene->light_count > 0 && (vsh_shadow_method_traits(scene->shade.method) & traits) == traits) ||
+           (scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & traits) == traits);
+}
+
 /* Methods that know the error of their values, and those that work until it is small enough. */
 static bool knows_error(const vsh_scene *scene) {
-    return (scene->light_count > 0 && scene->shade.method >= VSH_SHADOW_RAYS) ||
-           (scene->ao && scene->shade.ao_method >= VSH_AO_RAYS);
+    return any_is(scene, VSH_METHOD_RAYS);
 }
 
 static bool keeps_error(const vsh_scene *scene) {
-    return (scene->light_count > 0 && scene->shade.method >= VSH_SHADOW_ADAPTIVE) ||
-           (scene->ao && scene->shade.ao_method >= VSH_AO_ADAPTIVE);
+    return any_is(scene, VSH_METHOD_KEEPS_ERROR);
 }
 
 /* Who asks for an error is to get it: a method that keeps none is none that was meant, unless it was named.
@@ -264,11 +268,11 @@ static int set_accuracy(const cli_bake_settings *s, vsh_scene *scene) {
     vsh_shade_options *shade = &scene->shade;
     if (s->has_max_error) {
         shade->max_error = s->max_error;
-        if (!s->has_method && shade->method < VSH_SHADOW_ADAPTIVE) {
-            shade->method = VSH_SHADOW_ADAPTIVE;
+        if (!s->has_method && (vsh_shadow_method_traits(shade->method) & VSH_METHOD_KEEPS_ERROR) == 0) {
+            shade->method = VSH_SHADOW_AUTO;
         }
-        if (!s->has_ao_method && shade->ao_method < VSH_AO_ADAPTIVE) {
-            shade->ao_method = VSH_AO_ADAPTIVE;
+        if (!s->has_ao_method && (vsh_ao_method_traits(shade->ao_method) & VSH_METHOD_KEEPS_ERROR) == 0) {
+            shade->ao_method = VSH_AO_AUTO;
         }
         if (!keeps_error(scene)) {
             return cli_usage("--max-error: method %s keeps none; adaptive and exact do",

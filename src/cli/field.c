@@ -110,10 +110,14 @@ static int make_one(const making *m, const vsh_scene_layer *layer, vsh_field **f
 
 /* Whether exact methods trace a layer's triangles, or (NULL) those of casters in none. */
 static bool traces(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    const int32_t method =
+    const int32_t given =
         layer != NULL && layer->shade.method >= 0 ? layer->shade.method : scene->shade.method;
-    return (scene->light_count > 0 && method == VSH_SHADOW_EXACT) ||
-           (scene->ao && scene->shade.ao_method == VSH_AO_EXACT && (layer == NULL || layer->shade.ao));
+    const int32_t can = vsh_scene_traceable(scene, layer) && vsh_triangles_available();
+    const int32_t method = vsh_shadow_method_resolve(given, can);
+    const int32_t ao_method = vsh_ao_method_resolve(scene->shade.ao_method, can);
+    return (scene->light_count > 0 && (vsh_shadow_method_traits(method) & VSH_METHOD_TRIANGLES) != 0) ||
+           (scene->ao && (vsh_ao_method_traits(ao_method) & VSH_METHOD_TRIANGLES) != 0 &&
+            (layer == NULL || layer->shade.ao));
 }
 
 static int trace(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
@@ -255,10 +259,21 @@ void cli_field_free(cli_field *made) {
     made->layer_count = 0;
 }
 
+/* Whether auto would have been exact. */
+static bool misses_embree(const vsh_scene *scene) {
+    const bool asked = (scene->light_count > 0 && scene->shade.method == VSH_SHADOW_AUTO) ||
+                       (scene->ao && scene->shade.ao_method == VSH_AO_AUTO);
+    return asked && vsh_scene_traceable(scene, NULL) != 0;
+}
+
 int cli_triangles_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                        vsh_triangles **triangles) {
     const int code = trace(scene, assets, NULL, run, triangles);
     vsh_error error;
+    if (code == CLI_OK && !vsh_triangles_available() && misses_embree(scene)) {
+        run->warning(run->user, "this build has no Embree to trace triangles with: adaptive takes the place "
+                                "of exact, and its error is that of the voxels");
+    }
     /* no caster outside of layers: none, where the library wants to be given those that there are */
     if (code == CLI_OK && *triangles == NULL && traces(scene, NULL) &&
         vsh_triangles_create(NULL, 0, run, triangles, &error) != VSH_OK) {

@@ -9,11 +9,11 @@
 
 /* Channels of the error that is left: only where the method knows it. */
 static bool has_light_errors(const vsh_scene *scene) {
-    return scene->error && scene->shade.method >= VSH_SHADOW_RAYS;
+    return scene->error && (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_RAYS) != 0;
 }
 
 static bool has_ao_error(const vsh_scene *scene) {
-    return scene->error && scene->ao && scene->shade.ao_method >= VSH_AO_RAYS;
+    return scene->error && scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
 }
 
 static bool has_tints(const vsh_scene *scene) {

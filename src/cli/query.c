@@ -201,8 +201,10 @@ static int choose_answers(query_work *work) {
                          .ao = scene->ao != 0,
                          .distance = s->distance,
                          .gradient = s->gradient};
-    a->shadow_error = scene->error && scene->light_count > 0 && scene->shade.method >= VSH_SHADOW_RAYS;
-    a->ao_error = scene->error && scene->ao && scene->shade.ao_method >= VSH_AO_RAYS;
+    a->shadow_error = scene->error && scene->light_count > 0 &&
+                      (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_RAYS) != 0;
+    a->ao_error =
+        scene->error && scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
     if (query_answers_floats(a) == 0) {
         return cli_usage(
             "%s: nothing to answer: no lights and no ao; give --sun, --ao, --distance or --gradient",
@@ -222,6 +224,7 @@ static int make_query(query_work *work) {
     const double start = cli_seconds();
     int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
     work->scene->shade.triangles = work->triangles;
+    cli_stats_methods(&work->stats, work->scene);
     cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
     if (code == CLI_OK) {
         code =

@@ -224,10 +224,11 @@ static void add_values(cli_stats *sum, const vsh_scene *scene, const vsh_charts 
     vsh_charts_get_info(charts, &info);
     const double valid =
         baked->texels > 0 ? (double)(baked->texels - baked->invalid_texels) / (double)baked->texels : 0.0;
-    const bool lights = scene->shade.method >= VSH_SHADOW_ADAPTIVE;
-    const bool ao = scene->ao && scene->shade.ao_method >= VSH_AO_ADAPTIVE;
-    const double planes = (lights ? (double)scene->light_count : 0.0) + (ao ? 1.0 : 0.0);
-    sum->estimated_values += valid * (double)info.samples * planes;
+    const bool lights = (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_KEEPS_ERROR) != 0;
+    const bool ao = scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
+    sum->estimated_values[CLI_STATS_SHADOW] +=
+        lights ? valid * (double)info.samples * (double)scene->light_count : 0.0;
+    sum->estimated_values[CLI_STATS_AO] += ao ? valid * (double)info.samples : 0.0;
 }
 
 static void add_stats(cli_stats *sum, const vsh_bake_stats *baked) {
@@ -243,6 +244,7 @@ static void add_stats(cli_stats *sum, const vsh_bake_stats *baked) {
     sum->shade.rays += baked->shade.rays;
     sum->shade.refined += baked->shade.refined;
     sum->shade.square_error += baked->shade.square_error;
+    sum->shade.ao_square_error += baked->shade.ao_square_error;
 }
 
 /* A receiver under way. */

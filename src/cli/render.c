@@ -48,6 +48,8 @@ static int load(render_work *work) {
 static int make_fields(render_work *work) {
     double start = cli_seconds();
     int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
+    work->scene->shade.triangles = work->triangles;
+    cli_stats_methods(&work->stats, work->scene);
     cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
     code = code == CLI_OK ? cli_field_make_around(work->scene, work->assets, 0.0, &work->run, &work->made)
                           : code;

@@ -16,6 +16,14 @@ enum {
 
 enum { CLI_STATS_TEXELS, CLI_STATS_POINTS, CLI_STATS_VOXELS };
 
+enum { CLI_STATS_SHADOW, CLI_STATS_AO };
+
+/* What a kind of value is made by. */
+typedef struct cli_method {
+    const char *name; /* NULL: there are no such values */
+    bool keeps_error;
+} cli_method;
+
 typedef struct cli_stats {
     double seconds[CLI_STAGE_COUNT];
     uint64_t texels;
@@ -26,7 +34,10 @@ typedef struct cli_stats {
     uint64_t resumed_rows; /* of lightmaps, that an earlier bake had kept */
     uint64_t bands;        /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
-    double estimated_values; /* behind shade.square_error and shade.refined, by adaptive and exact methods */
+    double estimated_values[2]; /* CLI_STATS_SHADOW and …_AO: behind shade.square_error, by methods that keep
+                                 * an error */
+    cli_method methods[2];      /* likewise; NULL names where nothing is baked by one */
+    double max_error;           /* that was asked for */
     int32_t threads;
     vsh_grid_info grid;
     vsh_field_info field;
@@ -37,6 +48,18 @@ double cli_stats_stage(cli_stats *stats, int stage, double since);
 
 /* Nothing yet; `threads` as of vsh_run. */
 cli_stats cli_stats_begin(int32_t of, int32_t threads);
+
+/* Takes what the scene's methods come to, once its triangles are known. */
+void cli_stats_methods(cli_stats *stats, const vsh_scene *scene);
+
+/* Estimated error of the values of a kind, root mean square; NaN where none is known. */
+double cli_stats_error(const cli_stats *stats, int kind);
+
+/* "shadow exact, AO exact, max error 0.02". Returns text. */
+const char *cli_stats_methods_text(const cli_stats *stats, char *text, size_t size);
+
+/* Where the error asked for is not kept: by how much, and what would help. */
+void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene, const vsh_run *run);
 
 /* The end of a run that went well: writes the JSON file where `path` is not NULL; signals then end nothing
  * any more. CLI_OK or an exit code, having said why. */

@@ -7,8 +7,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { MOST_RAYS = 1024 };
-
 typedef struct plan {
     int32_t method;
     int32_t number;   /* rays or cones; 0: none */
@@ -67,8 +65,8 @@ static vsh_shade_options shade_of(const trade_work *work, const trade_subject *s
     char more[64] = "";
     if (p->max_error > 0.0) {
         shade.max_error = p->max_error;
-        shade.rays = MOST_RAYS;
-        snprintf(more, sizeof more, " --max-error %g --rays %d", p->max_error, MOST_RAYS);
+        shade.rays = 0; /* as many as that takes */
+        snprintf(more, sizeof more, " --max-error %g", p->max_error);
     } else if (rays) {
         shade.rays = p->number;
         snprintf(more, sizeof more, " --rays %d", p->number);

@@ -219,6 +219,7 @@ static int make_field(volume_work *work) {
     const double start = cli_seconds();
     int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
     work->scene->shade.triangles = work->triangles;
+    cli_stats_methods(&work->stats, work->scene);
     cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
     code = code == CLI_OK ? make_grid(work) : code;
     code = code == CLI_OK ? choose_voxels(work) : code;

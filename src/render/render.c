@@ -117,6 +117,7 @@ static void add_stats(vsh_shade_stats *to, const vsh_shade_stats *from) {
     to->rays += from->rays;
     to->refined += from->refined;
     to->square_error += from->square_error;
+    to->ao_square_error += from->ao_square_error;
 }
 
 static int32_t rows_at_once(const vshi_sample_grid *grid) {
@@ -244,8 +245,7 @@ static vsh_result check_memory(const rendering *r, const vsh_surface *surfaces, 
 /* Whether light is asked of something else than the fields that are seen. */
 static bool needs_lift(const vsh_render_options *o, size_t light_count) {
     const vsh_shade_options *shade = &o->shade;
-    bool lift =
-        (light_count > 0 && shade->method == VSH_SHADOW_EXACT) || (o->ao && shade->ao_method == VSH_AO_EXACT);
+    bool lift = (light_count > 0 && vshi_shadow_traces(shade)) || (o->ao && vshi_ao_traces(shade));
     for (size_t i = 0; i < shade->layer_count && !lift; ++i) {
         vsh_layer layer;
         lift = vshi_layer_resolve(shade, i, &layer, NULL) == VSH_OK && layer.field == NULL;

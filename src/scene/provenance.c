@@ -13,6 +13,7 @@
 #include <vdbshade/provenance.h>
 
 enum { NAME_SIZE = 96, LINE_SIZE = 512, HASH_PREFIX = sizeof "sha256:" - 1 };
+enum { RAYS = 64 }; /* of methods that keep no error, where none are given */
 
 struct vsh_provenance {
     vshi_attributes attributes;
@@ -32,8 +33,10 @@ static void describe_rays(const vsh_shade_options *o, bool adaptive, char *text,
     if (adaptive) {
         used = snprintf(text, size, ", max error %.9g", o->max_error);
     }
-    used +=
-        snprintf(text + used, size - (size_t)used, ", %d rays, %s", o->rays, vsh_sampler_name(o->sampler));
+    if (!adaptive || o->rays > 0) {
+        used += snprintf(text + used, size - (size_t)used, ", %d rays", o->rays > 0 ? o->rays : RAYS);
+    }
+    used += snprintf(text + used, size - (size_t)used, ", %s", vsh_sampler_name(o->sampler));
     if (o->frame != 0) {
         used += snprintf(text + used, size - (size_t)used, ", frame %d", o->frame);
     }
@@ -44,23 +47,27 @@ static void describe_rays(const vsh_shade_options *o, bool adaptive, char *text,
 
 static vsh_result add_shadow(vsh_provenance *p, const vsh_shade_options *o, vsh_error *error) {
     char text[LINE_SIZE], more[LINE_SIZE / 2] = "";
-    if (o->method >= VSH_SHADOW_RAYS) {
-        describe_rays(o, o->method >= VSH_SHADOW_ADAPTIVE, more, sizeof more);
+    const int32_t method = vsh_shadow_method_resolve(o->method, o->triangles != NULL);
+    const uint32_t traits = vsh_shadow_method_traits(method);
+    if ((traits & VSH_METHOD_RAYS) != 0) {
+        describe_rays(o, (traits & VSH_METHOD_KEEPS_ERROR) != 0, more, sizeof more);
     } else if (o->jitter > 0.0) {
         snprintf(more, sizeof more, ", jitter %.9g", o->jitter);
     }
-    snprintf(text, sizeof text, "%s%s", vsh_shadow_method_name(o->method), more);
+    snprintf(text, sizeof text, "%s%s", vsh_shadow_method_name(method), more);
     return add(p, "vdbshade_shadow", text, error);
 }
 
 static vsh_result add_ao(vsh_provenance *p, const vsh_shade_options *o, vsh_error *error) {
     char text[LINE_SIZE], more[LINE_SIZE / 2] = "";
-    if (o->ao_method >= VSH_AO_RAYS) {
-        describe_rays(o, o->ao_method >= VSH_AO_ADAPTIVE, more, sizeof more);
-    } else if (o->ao_method == VSH_AO_CONES) {
+    const int32_t method = vsh_ao_method_resolve(o->ao_method, o->triangles != NULL);
+    const uint32_t traits = vsh_ao_method_traits(method);
+    if ((traits & VSH_METHOD_RAYS) != 0) {
+        describe_rays(o, (traits & VSH_METHOD_KEEPS_ERROR) != 0, more, sizeof more);
+    } else if (method == VSH_AO_CONES) {
         snprintf(more, sizeof more, ", %d cones", o->ao_cones);
     }
-    snprintf(text, sizeof text, "%s within %.9g%s", vsh_ao_method_name(o->ao_method), o->ao_distance, more);
+    snprintf(text, sizeof text, "%s within %.9g%s", vsh_ao_method_name(method), o->ao_distance, more);
     return add(p, "vdbshade_ao", text, error);
 }
 

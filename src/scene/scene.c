@@ -104,7 +104,7 @@ static const vshi_key ao_keys[] = {
      .name_of = vsh_ao_method_name},
     {.name = "cones",
      .kind = VSHI_INTEGER,
-     .variants = 1U << VSH_AO_CONES | 1U << VSH_AO_ADAPTIVE | 1U << VSH_AO_EXACT,
+     .variants = 1U << VSH_AO_CONES | 1U << VSH_AO_ADAPTIVE | 1U << VSH_AO_EXACT | 1U << VSH_AO_AUTO,
      .offset = offsetof(vsh_shade_options, ao_cones),
      .lowest = 1.0,
      .highest = 256.0},
@@ -123,7 +123,7 @@ static vsh_result read_ao(vshi_reader *reader, const vshi_value *value, void *me
         return result;
     }
     static const char *const whats[] = {
-        [VSH_AO_TAPS] = "ao by taps", [VSH_AO_RAYS] = "ao by rays", [VSH_AO_EXACT] = "ao"};
+        [VSH_AO_TAPS] = "ao by taps", [VSH_AO_RAYS] = "ao by rays", [VSH_AO_AUTO] = NULL};
     const char *what = whats[scene->shade.ao_method];
     result = vshi_read_object(reader, value, &ao_table, 1U << scene->shade.ao_method,
                               what != NULL ? what : "ao", &scene->shade);

@@ -8,6 +8,23 @@
 static const char *const type_names[] = {"a mesh",  "an sdf", "a vdb", "a heightfield",
                                          "spheres", "a mask", "a text"};
 
+static bool is_voxelised_in(const vsh_caster *caster, const vsh_scene_layer *layer) {
+    return vshi_caster_in_layer(caster, layer) && !vshi_caster_is_direct(caster);
+}
+
+static bool has_triangles(const vsh_caster *caster) {
+    return caster->type == VSH_CASTER_MESH || caster->type == VSH_CASTER_HEIGHTFIELD;
+}
+
+int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer) {
+    for (size_t i = 0; scene != NULL && i < scene->caster_count; ++i) {
+        if (is_voxelised_in(&scene->casters[i], layer) && !has_triangles(&scene->casters[i])) {
+            return 0;
+        }
+    }
+    return scene != NULL;
+}
+
 vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
                                const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
     VSHI_NEEDS(triangles);
@@ -17,10 +34,10 @@ vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
     size_t count = 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        if (!vshi_caster_in_layer(caster, layer) || vshi_caster_is_direct(caster)) {
+        if (!is_voxelised_in(caster, layer)) {
             continue;
         }
-        if (caster->type != VSH_CASTER_MESH && caster->type != VSH_CASTER_HEIGHTFIELD) {
+        if (!has_triangles(caster)) {
             const bool known = caster->type > VSH_CASTER_MESH && caster->type <= VSH_CASTER_TEXT;
             return vshi_fail(error, VSH_ERROR_INPUT,
                              "casters[%zu] is %s: exact methods trace triangles, and need casters that are "

@@ -160,13 +160,14 @@ vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const
                            "bent normals: AO by taps knows no directions; use cones or rays");
     }
     if (result == VSH_OK) {
-        result = vshi_ao_prepare(field, &full, &cones, &task, error);
-    }
-    if (result == VSH_OK) {
         result = vshi_layers_prepare(&full, NULL, &layers, error);
     }
+    if (result == VSH_OK) {
+        vshi_shade_options_settle(&full);
+        result = vshi_ao_prepare(field, &full, &cones, &task, error);
+    }
     if (result == VSH_OK && vshi_ao_has_rays(&full)) {
-        result = vshi_shade_sampler(&full, "ao", &sampler, error);
+        result = vshi_shade_sampler(&full, vshi_ao_most_rays(&full), "ao", &sampler, error);
     }
     if (result == VSH_OK) {
         task.layers = layers;

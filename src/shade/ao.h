@@ -65,8 +65,17 @@ vsh_result vshi_ao_check_points(const vsh_points *points, vsh_error *error);
 
 /* Whether AO takes the task's sampler. */
 static inline bool vshi_ao_has_rays(const vsh_shade_options *options) {
-    return options->ao_method >= VSH_AO_RAYS;
+    return (vsh_ao_method_traits(options->ao_method) & VSH_METHOD_RAYS) != 0;
 }
+
+/* Whether it is traced against triangles, by options that may not be settled. */
+static inline bool vshi_ao_traces(const vsh_shade_options *options) {
+    const int32_t method = vsh_ao_method_resolve(options->ao_method, options->triangles != NULL);
+    return (vsh_ao_method_traits(method) & VSH_METHOD_TRIANGLES) != 0;
+}
+
+/* The most rays that a point takes, by settled options. */
+int32_t vshi_ao_most_rays(const vsh_shade_options *options);
 
 /* A vshi_shade_fn of a vshi_ao_task. */
 void vshi_ao_shade(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);

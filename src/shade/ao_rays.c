@@ -273,10 +273,18 @@ static double standard_error(int32_t sampler, int32_t taken, int32_t free) {
     return (sampler == VSH_SAMPLER_BLUE ? BLUE : SOBOL) * spread / (root * eighth * sqrt(eighth));
 }
 
-/* What comes after a round: more rays, or none. */
-static void decide(const vshi_ao_task *task, ao_point *point) {
+static double spread_of(int32_t sampler, int32_t rays) {
+    return standard_error(sampler, rays, rays / 2);
+}
+
+int32_t vshi_ao_most_rays(const vsh_shade_options *options) {
+    const bool keeps_error = (vsh_ao_method_traits(options->ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
+    return vshi_shade_most_rays(options, spread_of, keeps_error);
+}
+
+/* What comes after a round: more rays up to `most`, or none. */
+static void decide(const vshi_ao_task *task, int32_t most, ao_point *point) {
     const vsh_shade_options *options = task->options;
-    const int32_t most = options->rays;
     bool more = point->taken < most;
     if (options->ao_method == VSH_AO_RAYS) {
         more = more && point->free != 0 && point->free != point->taken;
@@ -292,8 +300,9 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
     const vshi_ao_task *task = user;
     const vsh_shade_options *options = task->options;
     const bool fixed = options->ao_method == VSH_AO_RAYS;
+    const int32_t most = vshi_ao_most_rays(options);
     int32_t first = fixed ? options->early_rays : FIRST_ROUND;
-    first = first == 0 || first > options->rays ? options->rays : first;
+    first = first == 0 || first > most ? most : first;
     ao_point points[VSHI_AO_GRAIN];
     batch b;
     b.task = task;
@@ -316,7 +325,7 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
         flush(&b, stats);
         for (size_t i = 0; i < end - begin; ++i) {
             if (points[i].next > 0) {
-                decide(task, &points[i]);
+                decide(task, most, &points[i]);
                 more = more || points[i].next > 0;
             }
         }
@@ -339,6 +348,7 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
             vshi_ao_set_bent(task, i, vshi_scale(d, vshi_length(mean)));
         }
         stats->square_error += fixed ? 0.0 : error * error;
+        stats->ao_square_error += fixed ? 0.0 : error * error;
         ++stats->refined;
     }
 }

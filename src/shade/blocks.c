@@ -39,7 +39,7 @@ static void march_beams(const vshi_shadow_task *task, vshi_chunk *chunk, vsh_sha
 /* Whether it pays to look at less than the largest blocks where those leave cones open up to `end`: always
  * where a point's cone takes more than one march. */
 static bool worthwhile(const vshi_shadow_task *task, double end) {
-    return task->options->method >= VSH_SHADOW_RAYS || end < SHORT;
+    return vshi_shadow_has_rays(task->options) || end < SHORT;
 }
 
 /* --- the ball above each point */

@@ -38,7 +38,7 @@ vsh_result vshi_layer_resolve(const vsh_shade_options *options, size_t index, vs
         const char *name;
         double value, low, high;
     } fields[] = {
-        {"method", layer->method, -1, VSH_SHADOW_EXACT},
+        {"method", layer->method, -1, VSH_SHADOW_AUTO},
         {"combine", layer->combine, VSH_COMBINE_MULTIPLY, VSH_COMBINE_MIN},
         {"softness", layer->softness, 0, 1000},
         {"remap[0]", layer->remap[0], 0, 1},
@@ -109,6 +109,7 @@ static vsh_result prepare(prepared *item, size_t index, const vsh_light *light, 
     options->triangles = layer->triangles;
     options->start_offset = layer->start_offset < 0.0 ? options->start_offset : layer->start_offset;
     options->method = layer->method < 0 ? options->method : layer->method;
+    vshi_shade_options_settle(options);
     vsh_error why;
     vsh_result result = VSH_OK;
     if (light != NULL) {
@@ -125,7 +126,8 @@ static vsh_result prepare(prepared *item, size_t index, const vsh_light *light, 
         result = vshi_ao_prepare(layer->field, options, cones, &item->ao, &why);
     }
     if (result == VSH_OK && (light != NULL ? vshi_shadow_has_rays(options) : vshi_ao_has_rays(options))) {
-        result = vshi_shade_sampler(options, "rays", &item->sampler, &why);
+        const int32_t rays = light != NULL ? vshi_shadow_most_rays(options) : vshi_ao_most_rays(options);
+        result = vshi_shade_sampler(options, rays, "rays", &item->sampler, &why);
         item->shadow.sampler = item->ao.sampler = item->sampler;
     }
     return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "layer %zu: %s", index, why.message);

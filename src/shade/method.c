@@ -1,21 +1,32 @@
-/* Names of the methods, each in one table that both directions read. */
+/* Methods: their names and what they are like, each in one table. */
 #include <vdbshade/bake.h>
 
 #include <string.h>
 
-static const char *const shadow_names[] = {
-    [VSH_SHADOW_HARD] = "hard",           [VSH_SHADOW_CLASSIC] = "classic",
-    [VSH_SHADOW_PRACTICAL] = "practical", [VSH_SHADOW_IMPROVED] = "improved",
-    [VSH_SHADOW_SMOOTH] = "smooth",       [VSH_SHADOW_CONE] = "cone",
-    [VSH_SHADOW_RAYS] = "rays",           [VSH_SHADOW_ADAPTIVE] = "adaptive",
-    [VSH_SHADOW_EXACT] = "exact",
+enum {
+    RAYS = VSH_METHOD_RAYS,
+    KEEPS = VSH_METHOD_RAYS | VSH_METHOD_KEEPS_ERROR,
+    TRACES = VSH_METHOD_RAYS | VSH_METHOD_KEEPS_ERROR | VSH_METHOD_TRIANGLES,
 };
 
-static const char *const ao_names[] = {[VSH_AO_TAPS] = "taps",
-                                       [VSH_AO_CONES] = "cones",
-                                       [VSH_AO_RAYS] = "rays",
-                                       [VSH_AO_ADAPTIVE] = "adaptive",
-                                       [VSH_AO_EXACT] = "exact"};
+typedef struct method_row {
+    const char *name;
+    uint32_t traits;
+} method_row;
+
+static const method_row shadow_methods[] = {
+    [VSH_SHADOW_HARD] = {"hard", 0},           [VSH_SHADOW_CLASSIC] = {"classic", 0},
+    [VSH_SHADOW_PRACTICAL] = {"practical", 0}, [VSH_SHADOW_IMPROVED] = {"improved", 0},
+    [VSH_SHADOW_SMOOTH] = {"smooth", 0},       [VSH_SHADOW_CONE] = {"cone", 0},
+    [VSH_SHADOW_RAYS] = {"rays", RAYS},        [VSH_SHADOW_ADAPTIVE] = {"adaptive", KEEPS},
+    [VSH_SHADOW_EXACT] = {"exact", TRACES},    [VSH_SHADOW_AUTO] = {"auto", KEEPS},
+};
+
+static const method_row ao_methods[] = {
+    [VSH_AO_TAPS] = {"taps", 0},        [VSH_AO_CONES] = {"cones", 0},
+    [VSH_AO_RAYS] = {"rays", RAYS},     [VSH_AO_ADAPTIVE] = {"adaptive", KEEPS},
+    [VSH_AO_EXACT] = {"exact", TRACES}, [VSH_AO_AUTO] = {"auto", KEEPS},
+};
 
 static const char *const sampler_names[] = {
     [VSH_SAMPLER_SOBOL] = "sobol", [VSH_SAMPLER_WHITE] = "white", [VSH_SAMPLER_BLUE] = "blue"};
@@ -27,8 +38,8 @@ static const char *const tint_names[] = {
 static const char *const space_names[] = {[VSH_BENT_WORLD] = "world", [VSH_BENT_TANGENT] = "tangent"};
 
 enum {
-    SHADOW_COUNT = sizeof shadow_names / sizeof shadow_names[0],
-    AO_COUNT = sizeof ao_names / sizeof ao_names[0],
+    SHADOW_COUNT = sizeof shadow_methods / sizeof shadow_methods[0],
+    AO_COUNT = sizeof ao_methods / sizeof ao_methods[0],
     SAMPLER_COUNT = sizeof sampler_names / sizeof sampler_names[0],
     TINT_COUNT = sizeof tint_names / sizeof tint_names[0],
     SPACE_COUNT = sizeof space_names / sizeof space_names[0],
@@ -48,20 +59,49 @@ static const char *name_at(const char *const *names, int32_t count, int32_t i) {
     return i >= 0 && i < count ? names[i] : NULL;
 }
 
+static int32_t find_method(const method_row *rows, int32_t count, const char *name) {
+    for (int32_t i = 0; name != NULL && i < count; ++i) {
+        if (strcmp(rows[i].name, name) == 0) {
+            return i;
+        }
+    }
+    return -1;
+}
+
 int32_t vsh_shadow_method(const char *name) {
-    return find(shadow_names, SHADOW_COUNT, name);
+    return find_method(shadow_methods, SHADOW_COUNT, name);
 }
 
 const char *vsh_shadow_method_name(int32_t method) {
-    return name_at(shadow_names, SHADOW_COUNT, method);
+    return method >= 0 && method < SHADOW_COUNT ? shadow_methods[method].name : NULL;
+}
+
+uint32_t vsh_shadow_method_traits(int32_t method) {
+    return method >= 0 && method < SHADOW_COUNT ? shadow_methods[method].traits : 0;
+}
+
+int32_t vsh_shadow_method_resolve(int32_t method, int32_t has_triangles) {
+    return method != VSH_SHADOW_AUTO ? method
+           : has_triangles != 0      ? (int32_t)VSH_SHADOW_EXACT
+                                     : (int32_t)VSH_SHADOW_ADAPTIVE;
 }
 
 int32_t vsh_ao_method(const char *name) {
-    return find(ao_names, AO_COUNT, name);
+    return find_method(ao_methods, AO_COUNT, name);
 }
 
 const char *vsh_ao_method_name(int32_t method) {
-    return name_at(ao_names, AO_COUNT, method);
+    return method >= 0 && method < AO_COUNT ? ao_methods[method].name : NULL;
+}
+
+uint32_t vsh_ao_method_traits(int32_t method) {
+    return method >= 0 && method < AO_COUNT ? ao_methods[method].traits : 0;
+}
+
+int32_t vsh_ao_method_resolve(int32_t method, int32_t has_triangles) {
+    return method != VSH_AO_AUTO ? method
+           : has_triangles != 0  ? (int32_t)VSH_AO_EXACT
+                                 : (int32_t)VSH_AO_ADAPTIVE;
 }
 
 int32_t vsh_sampler(const char *name) {

@@ -53,27 +53,37 @@ static vsh_result prepare(vsh_query *q, const vsh_field *field, const vsh_light 
         result = vshi_allocate((void **)&q->layers, light_count + 1, sizeof *q->layers, "lights of a query",
                                error);
     }
-    for (; result == VSH_OK && q->light_count < light_count; ++q->light_count) {
-        const size_t l = q->light_count;
+    q->light_count = result == VSH_OK ? light_count : 0;
+    for (size_t l = 0; result == VSH_OK && l < light_count; ++l) {
         vsh_error why;
         q->lights[l] = lights[l];
-        result = vshi_shadow_prepare(field, &q->lights[l], &q->options, &q->shadow[l], &why);
+        result = vsh_light_check(&q->lights[l], &why);
         if (result != VSH_OK) {
             return vshi_fail(error, result, "light %zu: %s", l, why.message);
         }
         result = vshi_layers_prepare(&q->options, &q->lights[l], &q->layers[l], error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_layers_prepare(&q->options, NULL, &q->layers[light_count], error);
+    }
+    vshi_shade_options_settle(&q->options);
+    for (size_t l = 0; result == VSH_OK && l < light_count; ++l) {
+        vsh_error why;
+        result = vshi_shadow_prepare(field, &q->lights[l], &q->options, &q->shadow[l], &why);
+        if (result != VSH_OK) {
+            return vshi_fail(error, result, "light %zu: %s", l, why.message);
+        }
         q->shadow[l].layers = q->layers[l];
     }
     if (result == VSH_OK) {
         result = vshi_ao_prepare(field, &q->options, &q->cones, &q->ao, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_layers_prepare(&q->options, NULL, &q->layers[light_count], error);
         q->ao.layers = q->layers[light_count];
     }
-    if (result == VSH_OK &&
-        ((light_count > 0 && vshi_shadow_has_rays(&q->options)) || vshi_ao_has_rays(&q->options))) {
-        result = vshi_shade_sampler(&q->options, "query", &q->sampler, error);
+    const bool shadow = light_count > 0 && vshi_shadow_has_rays(&q->options);
+    if (result == VSH_OK && (shadow || vshi_ao_has_rays(&q->options))) {
+        const int32_t own = shadow ? vshi_shadow_most_rays(&q->options) : 0;
+        const int32_t ao = vshi_ao_has_rays(&q->options) ? vshi_ao_most_rays(&q->options) : 0;
+        result = vshi_shade_sampler(&q->options, own > ao ? own : ao, "query", &q->sampler, error);
     }
     for (size_t l = 0; l < q->light_count; ++l) {
         q->shadow[l].sampler = q->sampler;

@@ -18,14 +18,14 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
         const char *name;
         double value, low, high;
     } fields[] = {
-        {"method", full->method, VSH_SHADOW_HARD, VSH_SHADOW_EXACT},
-        {"ao_method", full->ao_method, VSH_AO_TAPS, VSH_AO_EXACT},
+        {"method", full->method, VSH_SHADOW_HARD, VSH_SHADOW_AUTO},
+        {"ao_method", full->ao_method, VSH_AO_TAPS, VSH_AO_AUTO},
         {"ao_cones", full->ao_cones, 1, 256},
         {"max_steps", full->max_steps, 16, 65536},
         {"ao_distance", full->ao_distance, 0x1p-1000, 0x1p1000},
         {"start_offset", full->start_offset, 0, 16},
         {"surface_offset", full->surface_offset, 0, 0x1p1000},
-        {"rays", full->rays, 1, 4096},
+        {"rays", full->rays, 0, 4096},
         {"sampler", full->sampler, VSH_SAMPLER_SOBOL, VSH_SAMPLER_BLUE},
         {"frame", full->frame, 0, INT32_MAX},
         {"early_rays", full->early_rays, 0, 4096},
@@ -45,9 +45,32 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
     return VSH_OK;
 }
 
-vsh_result vshi_shade_sampler(const vsh_shade_options *options, const char *what, vshi_sampler **sampler,
-                              vsh_error *error) {
-    *sampler = vshi_sampler_create(options->sampler, options->rays, options->frame);
+void vshi_shade_options_settle(vsh_shade_options *full) {
+    const int32_t has_triangles = full->triangles != NULL;
+    full->method = vsh_shadow_method_resolve(full->method, has_triangles);
+    full->ao_method = vsh_ao_method_resolve(full->ao_method, has_triangles);
+}
+
+int32_t vshi_shade_most_rays(const vsh_shade_options *options, vshi_spread_fn *spread, bool keeps_error) {
+    enum { FIXED = 64, FEWEST = 8, MOST = 16384, MOST_BLUE = 4096 };
+    if (options->rays > 0) {
+        return options->rays;
+    }
+    if (!keeps_error) {
+        return FIXED;
+    }
+    /* best-candidate points cost the square of their number to place */
+    const int32_t most = options->sampler == VSH_SAMPLER_BLUE ? MOST_BLUE : MOST;
+    int32_t rays = FEWEST;
+    while (rays < most && spread(options->sampler, rays) > options->max_error) {
+        rays *= 2;
+    }
+    return rays;
+}
+
+vsh_result vshi_shade_sampler(const vsh_shade_options *options, int32_t rays, const char *what,
+                              vshi_sampler **sampler, vsh_error *error) {
+    *sampler = vshi_sampler_create(options->sampler, rays, options->frame);
     return *sampler != NULL ? VSH_OK
                             : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
 }
@@ -63,6 +86,7 @@ void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more) {
     stats->rays += more->rays;
     stats->refined += more->refined;
     stats->square_error += more->square_error;
+    stats->ao_square_error += more->ao_square_error;
 }
 
 typedef struct shade_run {
@@ -73,8 +97,8 @@ typedef struct shade_run {
     const vshi_point_rows *rows;
     const size_t *pieces; /* [rows + 1]: before each row */
     _Atomic uint64_t marches, samples, skipped, certified, unfinished, invalid, beyond_reach, rays, refined;
-    _Atomic uint64_t
-        square_error; /* in units of VSHI_SQUARE_UNIT, so that the order of threads changes no bit */
+    _Atomic uint64_t square_error,
+        ao_square_error; /* in units of VSHI_SQUARE_UNIT, so that the order of threads changes no bit */
 } shade_run;
 
 static void run_piece(void *user, size_t piece, size_t next) {
@@ -108,6 +132,7 @@ static void run_piece(void *user, size_t piece, size_t next) {
     atomic_fetch_add(&run->rays, stats.rays);
     atomic_fetch_add(&run->refined, stats.refined);
     atomic_fetch_add(&run->square_error, (uint64_t)(stats.square_error / VSHI_SQUARE_UNIT));
+    atomic_fetch_add(&run->ao_square_error, (uint64_t)(stats.ao_square_error / VSHI_SQUARE_UNIT));
 }
 
 vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows *rows, size_t grain,
@@ -141,7 +166,8 @@ vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows 
                                       .beyond_reach = pieces.beyond_reach,
                                       .rays = pieces.rays,
                                       .refined = pieces.refined,
-                                      .square_error = (double)pieces.square_error * VSHI_SQUARE_UNIT};
+                                      .square_error = (double)pieces.square_error * VSHI_SQUARE_UNIT,
+                                      .ao_square_error = (double)pieces.ao_square_error * VSHI_SQUARE_UNIT};
         vshi_shade_stats_add(stats, &done);
     }
     return result;

@@ -10,6 +10,17 @@
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
                                       vsh_error *error);
 
+/* Makes of auto what it comes to with the options' own triangles. Layers, which have their own, take theirs
+ * from options that are not settled yet. */
+void vshi_shade_options_settle(vsh_shade_options *full);
+
+/* Standard error of a value near a half by so many rays of a VSH_SAMPLER_…. */
+typedef double vshi_spread_fn(int32_t sampler, int32_t rays);
+
+/* The most rays that a value takes: what the options say, or what it takes for max_error, or a number for
+ * methods that keep none. */
+int32_t vshi_shade_most_rays(const vsh_shade_options *options, vshi_spread_fn *spread, bool keeps_error);
+
 /* Squared errors are added up in units of it, so that the order of threads and bands changes no bit. */
 #define VSHI_SQUARE_UNIT 0x1p-40
 
@@ -19,9 +30,9 @@ typedef void vshi_shade_fn(const void *task, size_t begin, size_t end, vsh_shade
 /* Adds what `more` counts. */
 void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more);
 
-/* The sampler of methods by rays, for `what`. */
-vsh_result vshi_shade_sampler(const vsh_shade_options *options, const char *what, vshi_sampler **sampler,
-                              vsh_error *error);
+/* The sampler of methods by rays, of so many at most, for `what`. */
+vsh_result vshi_shade_sampler(const vsh_shade_options *options, int32_t rays, const char *what,
+                              vshi_sampler **sampler, vsh_error *error);
 
 /* Rows that points come in. Each begins a piece of its own, so that what is worked on together, and with it
  * every value, does not depend on which rows there are. */

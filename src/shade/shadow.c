@@ -216,18 +216,23 @@ vsh_result vshi_shade_shadow(const vsh_field *field, const vsh_points *points, c
         result = vshi_run_resolve(run, &full_run, error);
     }
     if (result == VSH_OK) {
-        result = vshi_shadow_prepare(field, light, &full, &task, error);
+        result = vsh_light_check(light, error);
     }
     if (result == VSH_OK) {
         result = vshi_layers_prepare(&full, light, &layers, error);
     }
+    if (result == VSH_OK) {
+        vshi_shade_options_settle(&full);
+        result = vshi_shadow_prepare(field, light, &full, &task, error);
+    }
     if (result != VSH_OK) {
+        vshi_layers_free(layers);
         return result;
     }
     char stage[sizeof light->name + 8];
     snprintf(stage, sizeof stage, "shadow.%.*s", (int)sizeof light->name, light->name);
     if (vshi_shadow_has_rays(&full)) {
-        result = vshi_shade_sampler(&full, stage, &sampler, error);
+        result = vshi_shade_sampler(&full, vshi_shadow_most_rays(&full), stage, &sampler, error);
     }
     if (result == VSH_OK) {
         task.layers = layers;

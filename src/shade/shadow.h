@@ -33,8 +33,24 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
 
 /* Whether shadows take the task's sampler. */
 static inline bool vshi_shadow_has_rays(const vsh_shade_options *options) {
-    return options->method >= VSH_SHADOW_RAYS;
+    return (vsh_shadow_method_traits(options->method) & VSH_METHOD_RAYS) != 0;
 }
+
+/* Whether they are traced against triangles, by options that may not be settled. */
+static inline bool vshi_shadow_traces(const vsh_shade_options *options) {
+    const int32_t method = vsh_shadow_method_resolve(options->method, options->triangles != NULL);
+    return (vsh_shadow_method_traits(method) & VSH_METHOD_TRIANGLES) != 0;
+}
+
+/* Whether what the field says is solid is. Open meshes are shells in it, some voxels thick, where their
+ * triangles have no thickness: that hides nothing for methods that trace them. Of one in thirty cards of
+ * foliage, each a voxel wide, the rim hid texels that saw the whole light. */
+static inline bool vshi_shadow_trusts_solids(const vsh_field *field, const vsh_shade_options *options) {
+    return field->shell_thickness <= 0.0 || !vshi_shadow_traces(options);
+}
+
+/* The most rays that a point takes, by settled options. */
+int32_t vshi_shadow_most_rays(const vsh_shade_options *options);
 
 /* Fraction of the light over the receiver's plane at point i, as the task's method sees an edge: 1 without
  * normals. */

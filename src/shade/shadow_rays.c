@@ -142,12 +142,22 @@ double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken, double e
     return spread * sqrt(p * (1.0 - p));
 }
 
+/* Where the neighbours' share is taken for a point's, errors come out larger by so much: measured on the
+ * seeds' floor, where the estimate is right by it to a tenth. */
+static const double BORROWED = 1.2;
+
+static double spread_of(int32_t sampler, int32_t rays) {
+    return BORROWED * vshi_rays_deviation(sampler, rays / 2, rays, 0.5);
+}
+
+int32_t vshi_shadow_most_rays(const vsh_shade_options *options) {
+    const bool keeps_error = (vsh_shadow_method_traits(options->method) & VSH_METHOD_KEEPS_ERROR) != 0;
+    return vshi_shade_most_rays(options, spread_of, keeps_error);
+}
+
 /* The deviation of an open point, its share expected to be that of the rays of the points around it (smoothed
  * by Laplace's rule of succession), or a half where none is near. */
 static double deviation_of(const ray_batch *batch, size_t owner) {
-    /* where the neighbours' share is taken for a point's, errors come out larger by so much: measured on the
-     * seeds' floor, where the estimate is right by it to a tenth */
-    static const double BORROWED = 1.2;
     const open_point *open = batch->open, *p = &open[owner];
     const size_t first = owner > AROUND ? owner - AROUND : 0;
     const size_t last = owner + AROUND < batch->open_count ? owner + AROUND : batch->open_count - 1;
@@ -170,7 +180,7 @@ static void cast_rounds(ray_batch *batch, const size_t *some, size_t count) {
     const vsh_shade_options *options = batch->task->options;
     const bool refining = options->method != VSH_SHADOW_RAYS;
     const bool hard = is_hard(batch->task);
-    const int32_t most = hard ? 1 : options->rays;
+    const int32_t most = hard ? 1 : vshi_shadow_most_rays(options);
     int32_t target = refining ? FIRST_ROUND : options->early_rays > 0 ? options->early_rays : most;
     size_t unsettled[VSHI_PIECE];
     memcpy(unsettled, some, count * sizeof *some);
@@ -342,7 +352,7 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
         some[o] = o;
     }
     if (task->options->method != VSH_SHADOW_RAYS &&
-        task->options->rays > vshi_share_rays(task->options->max_error) && !is_hard(task) &&
+        vshi_shadow_most_rays(task->options) > vshi_share_rays(task->options->max_error) && !is_hard(task) &&
         vshi_share_can(task->points)) {
         count = cast_shared(&batch, begin, end, some);
     }

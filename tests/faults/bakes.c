@@ -1,5 +1,6 @@
 /* Scenarios that bake, and that write and read images. */
 #include "parts.h"
+#include "../unit/previews.h"
 
 #include <string.h>
 
@@ -19,7 +20,7 @@ vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
     MAKE(model, vsh_model_read("box.obj", run, &model, error));
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     TRY(parts_field(run, &grid, &field, error));
-    vsh_lightmap_options options = vsh_lightmap_options_default();
+    vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = SIDE;
     options.tangents = 1;
     MAKE(texels, vsh_texels_create(&mesh, 1, &options, run, NULL, &texels, error));
@@ -36,7 +37,7 @@ vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
                               .tint_by = {VSH_TINT_QUADRATIC, {1, 1, 1}},
                               .bent_space = VSH_BENT_TANGENT};
     TRY(vsh_bake_lightmap(field, texels, lights, 2, NULL, run, &all, NULL, error));
-    vsh_shade_options adaptive = vsh_shade_options_default();
+    vsh_shade_options adaptive = preview_options();
     adaptive.method = VSH_SHADOW_ADAPTIVE;
     adaptive.ao_method = VSH_AO_ADAPTIVE;
     adaptive.rays = 16;
@@ -66,7 +67,7 @@ vsh_result bake_volume(const vsh_run *run, vsh_error *error) {
     vsh_volume *on_band = NULL, *in_box = NULL;
     const double least[] = {-1, -1, -1}, most[] = {2, 2, 2};
     const vsh_light light = vsh_light_default();
-    vsh_volume_options options = vsh_volume_options_default();
+    vsh_volume_options options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_cones = 4;
     vsh_result result;
@@ -96,7 +97,7 @@ vsh_result draw(const vsh_run *run, vsh_error *error) {
     const float *const plane = light_plane;
     const vsh_image lightmap = {SIDE, SIDE, 1, &name, &plane};
     const vsh_light light = vsh_light_default();
-    vsh_render_options options = vsh_render_options_default();
+    vsh_render_options options = preview_render_options();
     options.width = options.height = SIDE;
     options.samples = 1;
     options.ao = 1;

@@ -1,4 +1,5 @@
 #include "parts.h"
+#include "../unit/previews.h"
 
 #include <math.h>
 
@@ -136,7 +137,7 @@ static vsh_result shade_points(const vsh_run *run, vsh_error *error) {
     const vsh_points points = {POINTS, positions, normals, NULL};
     vsh_light light = vsh_light_default();
     light.angle = 0.3;
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.rays = 16;
     vsh_result result;
     TRY(parts_field(run, &grid, &field, error));
@@ -186,7 +187,7 @@ static vsh_result ask(const vsh_run *run, vsh_error *error) {
     layers[1].lights = names;
     layers[1].light_count = 1;
     layers[2].field = field;
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.layers = layers;
     options.layer_count = 3;
     const vsh_light light = vsh_light_default();

@@ -2,6 +2,7 @@
 #ifndef TESTS_LIGHTMAPS_H
 #define TESTS_LIGHTMAPS_H
 
+#include "previews.h"
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -69,7 +70,7 @@ static inline vsh_field *floor_field(int wall) {
 
 static inline vsh_texels *make_texels(const vsh_mesh *meshes, size_t count, int32_t size, int32_t supersample,
                                       int32_t padding) {
-    vsh_lightmap_options options = vsh_lightmap_options_default();
+    vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = size;
     options.supersample = supersample;
     options.padding = padding;

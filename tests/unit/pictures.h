@@ -2,6 +2,7 @@
 #ifndef TESTS_PICTURES_H
 #define TESTS_PICTURES_H
 
+#include "previews.h"
 #include "shading.h"
 
 #include <vdbshade/render.h>
@@ -69,7 +70,7 @@ static inline vsh_camera camera_at(double x, double y, double z, double tx, doub
 }
 
 static inline vsh_render_options small(vsh_camera camera, int32_t samples) {
-    vsh_render_options o = vsh_render_options_default();
+    vsh_render_options o = preview_render_options();
     o.camera = camera;
     o.width = WIDE;
     o.height = HIGH;

@@ -3,6 +3,7 @@
 #define TESTS_SHADING_H
 
 #include "fields.h"
+#include "previews.h"
 
 #include <vdbshade/shade.h>
 
@@ -28,7 +29,7 @@ static inline vsh_light lamp(const double position[3], double radius) {
 static inline vsh_shade_stats shadows(const vsh_field *field, const vsh_light *light, int32_t method,
                                       size_t count, const double *positions, const float *normals,
                                       float *visible) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = method;
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();

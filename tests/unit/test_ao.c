@@ -1,4 +1,5 @@
 /* Ambient occlusion against closed forms and ray-traced truth. */
+#include "previews.h"
 #include "shading.h"
 
 #include <stdio.h>
@@ -8,7 +9,7 @@ static const float UP[3] = {0.0f, 1.0f, 0.0f};
 
 static vsh_shade_stats ao_of(const vsh_field *field, int32_t method, int32_t cones, double distance,
                              size_t count, const double *positions, const float *normals, float *ao) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.ao_method = method;
     options.ao_cones = cones;
     options.ao_distance = distance;
@@ -244,7 +245,7 @@ static void threads_and_the_order_of_points_do_not_show(void **state) {
     floor_texels(size, positions, normals);
     vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
     for (int32_t method = VSH_AO_TAPS; method <= VSH_AO_CONES; ++method) {
-        vsh_shade_options options = vsh_shade_options_default();
+        vsh_shade_options options = preview_options();
         options.ao_method = method;
         options.ao_cones = 7; /* pieces of the kernel's lanes end in the middle of points */
         const vsh_points points = {4096, positions, normals, NULL};
@@ -283,7 +284,7 @@ static void options_out_of_range_are_named(void **state) {
     assert_non_null(strstr(error.message, "normals"));
     const int32_t counts[] = {0, -1, 257};
     for (int i = 0; i < 3; ++i) {
-        vsh_shade_options options = vsh_shade_options_default();
+        vsh_shade_options options = preview_options();
         options.ao_cones = counts[i];
         assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &ao, NULL, NULL, &error),
                          VSH_ERROR_ARGUMENT);
@@ -291,14 +292,14 @@ static void options_out_of_range_are_named(void **state) {
     }
     const double distances[] = {0.0, -1.0, (double)NAN, (double)INFINITY};
     for (int i = 0; i < 4; ++i) {
-        vsh_shade_options options = vsh_shade_options_default();
+        vsh_shade_options options = preview_options();
         options.ao_distance = distances[i];
         assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &ao, NULL, NULL, &error),
                          VSH_ERROR_ARGUMENT);
         assert_non_null(strstr(error.message, "ao_distance"));
     }
-    vsh_shade_options options = vsh_shade_options_default();
-    options.ao_method = 5;
+    vsh_shade_options options = preview_options();
+    options.ao_method = VSH_AO_AUTO + 1;
     assert_int_equal(vsh_shade_ao(field, &points, &options, NULL, &ao, NULL, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "ao_method"));

@@ -1,5 +1,6 @@
 /* Ambient occlusion with rays against triangles: boxes, whose truth is analytic. Without Embree there is
  * nothing to test. */
+#include "previews.h"
 #include "shading.h"
 
 #include <vdbshade/grid.h>
@@ -66,7 +67,7 @@ static void free_scene(traced_scene *scene) {
 }
 
 static vsh_shade_options options_of(const traced_scene *scene, double max_error) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.ao_method = VSH_AO_EXACT;
     options.ao_distance = DISTANCE;
     options.rays = 4096;

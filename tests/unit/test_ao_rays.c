@@ -1,4 +1,5 @@
 /* Ambient occlusion by rays: fixed numbers of them, and until an error is reached. */
+#include "previews.h"
 #include "shading.h"
 #include "truth/metrics.h"
 
@@ -10,7 +11,7 @@ enum { TEXELS = 1500 };
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
 
 static vsh_shade_options options_of(int32_t method, int32_t rays, double distance) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.ao_method = method;
     options.rays = rays;
     options.ao_distance = distance;
@@ -311,7 +312,7 @@ static void edges_hide_as_much_as_their_casters(void **state) {
         expected[i] = (float)truth_ao(scene, places + 3 * i, up, 1.0, 4096);
     }
     vsh_field *field = field_of(scene, 0.06, 0.0);
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.ao_method = VSH_AO_RAYS;
     options.rays = 1024;
     options.ao_distance = 1.0;

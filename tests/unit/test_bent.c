@@ -1,4 +1,5 @@
 /* Bent normals, tinted penumbrae, ambient light: what a bake can give beside shadow and AO. */
+#include "previews.h"
 #include "shading.h"
 
 #include <stdlib.h>
@@ -41,12 +42,12 @@ static vsh_result bake(const vsh_field *field, const asked *ask, baked *into, vs
                            .indices = INDICES,
                            .vertex_count = 4,
                            .triangle_count = 2};
-    vsh_lightmap_options options = vsh_lightmap_options_default();
+    vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = SIZE;
     options.tangents = ask->tangents;
     vsh_texels *texels = NULL;
     assert_int_equal(vsh_texels_create(&mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
-    vsh_shade_options shade = vsh_shade_options_default();
+    vsh_shade_options shade = preview_options();
     shade.ao_method = ask->ao_method;
     shade.ao_cones = 64;
     shade.rays = 256;
@@ -122,7 +123,7 @@ static void test_wall(void **state) {
     const double truth[3] = {2.0 / (3.0 * PI), 1.0 / 3.0, 0.0};
     const vsh_points points = {1, position, normal, NULL};
     for (int m = 0; m < METHOD_COUNT; ++m) {
-        vsh_shade_options shade = vsh_shade_options_default();
+        vsh_shade_options shade = preview_options();
         shade.ao_method = METHODS[m];
         shade.ao_cones = 64;
         shade.rays = 1024;

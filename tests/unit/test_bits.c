@@ -4,6 +4,7 @@
  * of a method changes its hash: VSH_BITS=print prints the table, VSH_BITS=once checks it for one thread and
  * the base set. */
 #include "grids.h"
+#include "previews.h"
 
 #include <stdbool.h>
 #include <vdbshade/vdbshade.h>
@@ -166,7 +167,7 @@ static void shade(const context *c, const vsh_light *light, vsh_shade_options *o
 }
 
 static void shadow(const context *c, int32_t method, bits *b) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = method;
     const vsh_light lights[] = {sun(), spot()};
     for (int i = 0; i < 2; ++i) {
@@ -175,13 +176,13 @@ static void shadow(const context *c, int32_t method, bits *b) {
 }
 
 static void ao(const context *c, int32_t method, bits *b) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.ao_method = method;
     shade(c, NULL, &options, b);
 }
 
 static void samplers(const context *c, int32_t sampler, bits *b) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_RAYS;
     options.sampler = sampler;
     options.frame = 3;
@@ -192,7 +193,7 @@ static void samplers(const context *c, int32_t sampler, bits *b) {
 static void bent_normals(const context *c, int32_t method, bits *b) {
     float value[POINTS], bent[3 * POINTS];
     const vsh_points points = {POINTS, positions, normals, texels};
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.ao_method = method;
     options.rays = 16;
     vsh_error error;
@@ -208,7 +209,8 @@ static void irradiance_and_tint(const context *c, int32_t unused, bits *b) {
     const vsh_light light = spot();
     const vsh_tint tint = {VSH_TINT_POWER, {1.0, 1.25, 1.5}};
     vsh_error error;
-    check(vsh_shade_shadow(c->field, &points, &light, NULL, &c->run, value, NULL, NULL, &error), &error);
+    const vsh_shade_options options = preview_options();
+    check(vsh_shade_shadow(c->field, &points, &light, &options, &c->run, value, NULL, NULL, &error), &error);
     vsh_shade_irradiance(&points, NULL, &light, value, rgb);
     vsh_shade_tint(POINTS, value, &tint, tinted);
     add_floats(b, rgb, sizeof rgb / sizeof rgb[0]);
@@ -223,7 +225,7 @@ static void lightmap(const context *c, int32_t method, bits *b) {
         .positions = corners, .uvs = uvs, .indices = indices, .vertex_count = 4, .triangle_count = 2};
     enum { SIZE = 64, TEXELS = SIZE * SIZE };
     static float shadow_plane[TEXELS], ao_plane[TEXELS], rgb[3 * TEXELS], coverage[TEXELS];
-    vsh_lightmap_options options = vsh_lightmap_options_default();
+    vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = SIZE;
     options.shade.method = method;
     options.shade.ao_method = VSH_AO_CONES;
@@ -246,7 +248,7 @@ static void volume_of_band(const context *c, int32_t unused, bits *b) {
     (void)unused;
     vsh_voxels *voxels = NULL;
     vsh_volume *volume = NULL;
-    vsh_volume_options options = vsh_volume_options_default();
+    vsh_volume_options options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_distance = 0.75;
     const vsh_light light = sun();
@@ -273,7 +275,7 @@ static void shade_layer(const context *c, const vsh_heights *heights, const vsh_
     vsh_layer layer = vsh_layer_default();
     layer.heights = heights;
     layer.spheres = spheres;
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.layers = &layer;
     options.layer_count = 1;
     const context here = {c->run, NULL, empty};
@@ -349,7 +351,7 @@ static void picture(const context *c, int32_t unused, bits *b) {
     static float color[3 * PIXELS], alpha[PIXELS], depth[PIXELS], normal[3 * PIXELS], encoded[3][PIXELS];
     const vsh_picture made = {color, alpha, depth, normal};
     const vsh_surface surface = {.field = c->field, .color = {0.7, 0.7, 0.7}};
-    vsh_render_options options = vsh_render_options_default();
+    vsh_render_options options = preview_render_options();
     options.width = WIDE;
     options.height = HIGH;
     options.samples = 2;
@@ -410,7 +412,7 @@ static void exact(const context *c, int32_t is_ao, bits *b) {
     check(vsh_grid_from_meshes(&mesh, 1, &options, &c->run, &grid, &error), &error);
     check(vsh_field_create(grid, NULL, &c->run, &here.field, &error), &error);
     check(vsh_triangles_create(&mesh, 1, &c->run, &triangles, &error), &error);
-    vsh_shade_options shading = vsh_shade_options_default();
+    vsh_shade_options shading = preview_options();
     shading.method = VSH_SHADOW_EXACT;
     shading.ao_method = VSH_AO_EXACT;
     shading.triangles = triangles;

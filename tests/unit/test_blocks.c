@@ -2,6 +2,7 @@
  */
 #include "traced.h"
 
+#include "previews.h"
 #include "truth/metrics.h"
 
 enum { SIDE = 128, POINTS = SIDE * SIDE };
@@ -36,7 +37,7 @@ static void place_points(void) {
 
 static vsh_shade_stats shade(const caster *made, const vsh_light *light, int32_t method,
                              const double *positions, float *values) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = method;
     options.triangles = made->triangles;
     options.rays = 8;

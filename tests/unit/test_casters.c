@@ -4,6 +4,7 @@
 #include "truth/directions.h"
 
 #include "base/vec.h"
+#include "previews.h"
 #include "scene/scene.h"
 
 #include <stdio.h>
@@ -48,7 +49,7 @@ static void a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_hor
     vsh_layer layer = vsh_layer_default();
     layer.heights = heights_of(&source);
     vsh_field *empty = empty_field();
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.layers = &layer;
     options.layer_count = 1;
     options.ao_distance = 1.0;
@@ -143,7 +144,7 @@ static void spheres_in_a_layer_and_in_voxels_cast_the_same(void **state) {
     assert_int_equal(vsh_spheres_create(spheres[0], 20, NULL, NULL, &made, &error), VSH_OK);
     vsh_layer layer = vsh_layer_default();
     layer.spheres = made;
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.layers = &layer;
     options.layer_count = 1;
     const vsh_points points = {POINTS, positions, normals, NULL};
@@ -201,7 +202,7 @@ static void bent_normals_lean_away_from_spheres_and_terrain(void **state) {
     assert_int_equal(vsh_spheres_create(spheres[0], 2, NULL, NULL, &made, NULL), VSH_OK);
     vsh_layer layer = vsh_layer_default();
     layer.spheres = made;
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.layers = &layer;
     options.layer_count = 1;
     options.ao_distance = 3.0;
@@ -262,10 +263,10 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
     vsh_layer layer = vsh_layer_default();
     layer.heights = vsh_assets_heights(assets, 0);
     layer.spheres = vsh_assets_spheres(assets, 0);
-    vsh_shade_options shade = vsh_shade_options_default();
+    vsh_shade_options shade = preview_options();
     shade.layers = &layer;
     shade.layer_count = 1;
-    vsh_lightmap_options options = vsh_lightmap_options_default();
+    vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = side;
     options.padding = 0;
     size_t count = 0;

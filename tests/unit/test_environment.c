@@ -3,6 +3,7 @@
 
 #include "base/floats.h"
 #include "field/field.h"
+#include "previews.h"
 
 #include <fenv.h>
 
@@ -100,14 +101,14 @@ static void run_all(int s, int32_t threads, outcome *o) {
             vshi_floats_set(setting);
         }
         for (int32_t i = 0; i <= shadow_methods(); ++i) { /* once more the cone, of the lamp */
-            vsh_shade_options how = vsh_shade_options_default();
+            vsh_shade_options how = preview_options();
             how.method = i < shadow_methods() ? i : VSH_SHADOW_CONE;
             how.triangles = triangles;
             results[calls++] = vsh_shade_shadow(f, &points, &lights[i == 1 || i >= VSH_SHADOW_EXACT], &how,
                                                 &run, o->visible[i], NULL, &o->stats, &error);
         }
         for (int32_t i = 0; i < ao_methods(); ++i) {
-            vsh_shade_options how = vsh_shade_options_default();
+            vsh_shade_options how = preview_options();
             how.ao_method = i;
             how.triangles = triangles;
             results[calls++] = vsh_shade_ao(f, &points, &how, &run, o->open[i], NULL, &o->stats, &error);

@@ -3,6 +3,7 @@
 #include "terrain.h"
 
 #include "base/vec.h"
+#include "previews.h"
 
 #include <vdbshade/scene.h>
 
@@ -110,7 +111,7 @@ static vsh_result load(const char *path, vsh_assets **assets, vsh_error *error) 
     const vsh_scene scene = {.casters = &caster,
                              .caster_count = 1,
                              .grid = vsh_grid_options_default(),
-                             .shade = vsh_shade_options_default()};
+                             .shade = preview_options()};
     return vsh_assets_load(&scene, NULL, assets, error);
 }
 

@@ -2,6 +2,7 @@
 #include "traced.h"
 
 #include "base/isa.h"
+#include "previews.h"
 #include "shade/kernel/march.h"
 
 enum { SIDE = 24, COUNT = SIDE * SIDE + 5 }; /* pieces of 512 and 69, lanes that are filled in part */
@@ -139,7 +140,7 @@ typedef struct outcome {
 
 /* Light NULL: AO. */
 static void shade_with(const caster *c, const vsh_light *light, int32_t method, int32_t isa, outcome *o) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = light != NULL ? method : VSH_SHADOW_CONE;
     options.ao_method = light == NULL ? method : VSH_AO_CONES;
     options.ao_distance = 0.7;

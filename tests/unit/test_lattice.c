@@ -1,5 +1,6 @@
 /* AO that is interpolated between texels, against the same AO at every texel. */
 #include "fields.h"
+#include "previews.h"
 
 #include <stdlib.h>
 
@@ -33,7 +34,7 @@ static baked *bake(const vsh_field *field, int32_t spacing, const vsh_shade_opti
                            .indices = INDICES,
                            .vertex_count = 4,
                            .triangle_count = 2};
-    vsh_lightmap_options options = vsh_lightmap_options_default();
+    vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = SIZE;
     options.padding = 0;
     options.ao_spacing = spacing;
@@ -54,7 +55,7 @@ static baked *bake(const vsh_field *field, int32_t spacing, const vsh_shade_opti
 }
 
 static vsh_shade_options options_of(int32_t method) {
-    vsh_shade_options shade = vsh_shade_options_default();
+    vsh_shade_options shade = preview_options();
     shade.ao_method = method;
     shade.ao_distance = 0.8;
     shade.rays = 1024;
@@ -125,7 +126,7 @@ static void bands_are_interpolated_as_the_whole(void **state) {
     const vsh_mesh mesh = {
         .positions = POSITIONS, .uvs = UVS, .indices = INDICES, .vertex_count = 4, .triangle_count = 2};
     const vsh_shade_options shade = options_of(VSH_AO_CONES);
-    vsh_lightmap_options options = vsh_lightmap_options_default();
+    vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = SIZE;
     options.padding = 0;
     options.ao_spacing = 8;
@@ -164,7 +165,7 @@ static void other_spacings_are_refused(void **state) {
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
         const vsh_mesh mesh = {
             .positions = POSITIONS, .uvs = UVS, .indices = INDICES, .vertex_count = 4, .triangle_count = 2};
-        vsh_lightmap_options options = vsh_lightmap_options_default();
+        vsh_lightmap_options options = preview_lightmap_options();
         options.ao_spacing = bad[i];
         vsh_texels *texels;
         vsh_error error = {0};

@@ -1,4 +1,5 @@
 /* Layers beside the field: what they hide, and how it is combined. */
+#include "previews.h"
 #include "shading.h"
 
 #include <stdlib.h>
@@ -36,7 +37,7 @@ static void shade(const vsh_field *field, const vsh_light *light, const vsh_shad
 }
 
 static vsh_shade_options with(const vsh_layer *layers, size_t count) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.layers = layers;
     options.layer_count = count;
     return options;
@@ -59,7 +60,7 @@ static void test_nothing_hides(void **state) {
     const int32_t methods[] = {VSH_SHADOW_HARD, VSH_SHADOW_SMOOTH, VSH_SHADOW_CONE, VSH_SHADOW_RAYS,
                                VSH_SHADOW_ADAPTIVE};
     for (size_t m = 0; m < sizeof methods / sizeof methods[0]; ++m) {
-        vsh_shade_options options = vsh_shade_options_default();
+        vsh_shade_options options = preview_options();
         options.method = methods[m];
         shade(empty, &above, &options, values, NULL);
         for (size_t i = 0; i < COUNT; ++i) {
@@ -73,7 +74,7 @@ static void test_nothing_hides(void **state) {
         }
     }
     const vsh_points points = {COUNT, positions, normals, NULL};
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, values, NULL, NULL, NULL), VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(values[i], 1.0f, 1e-6f);
@@ -90,7 +91,7 @@ static void test_layer_alone(void **state) {
     const double low[3] = {1.0, 0.05, 0.2};
     const vsh_light lights[2] = {sun(towards, 0.2), sun(low, 0.2)};
     float alone[COUNT], layered[COUNT];
-    const vsh_shade_options plain = vsh_shade_options_default(), options = with(&layer, 1);
+    const vsh_shade_options plain = preview_options(), options = with(&layer, 1);
     for (int l = 0; l < 2; ++l) {
         shade(field, &lights[l], &plain, alone, NULL);
         shade(empty, &lights[l], &options, layered, NULL);
@@ -115,7 +116,7 @@ static void test_product(void **state) {
     vsh_field *all = field_of((truth_scene){both, 2}, 0.025, 4.0);
     const vsh_light light = sun(towards, 0.2);
     const vsh_layer layer = layer_of(b);
-    const vsh_shade_options plain = vsh_shade_options_default(), options = with(&layer, 1);
+    const vsh_shade_options plain = preview_options(), options = with(&layer, 1);
     float united[COUNT], layered[COUNT];
     shade(all, &light, &plain, united, NULL);
     shade(a, &light, &options, layered, NULL);
@@ -139,7 +140,7 @@ static void test_combinations(void **state) {
     vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05);
     const vsh_light light = sun(towards, 0.2);
     vsh_layer layer = layer_of(field);
-    const vsh_shade_options plain = vsh_shade_options_default(), options = with(&layer, 1);
+    const vsh_shade_options plain = preview_options(), options = with(&layer, 1);
     float alone[COUNT], combined[COUNT];
     shade(field, &light, &plain, alone, NULL);
     layer.combine = VSH_COMBINE_MIN;
@@ -171,7 +172,7 @@ static void test_softness(void **state) {
     const vsh_light full = sun(towards, 2.0 * atan(0.1)), half = sun(towards, 2.0 * atan(0.05));
     vsh_layer layer = layer_of(field);
     layer.softness = 0.5;
-    const vsh_shade_options plain = vsh_shade_options_default(), options = with(&layer, 1);
+    const vsh_shade_options plain = preview_options(), options = with(&layer, 1);
     float smaller[COUNT], layered[COUNT];
     shade(field, &half, &plain, smaller, NULL);
     shade(empty, &full, &options, layered, NULL);
@@ -214,7 +215,7 @@ static void test_where_it_counts(void **state) {
     assert_true(least < 0.01f);
 
     const vsh_points points = {COUNT, positions, normals, NULL};
-    const vsh_shade_options plain = vsh_shade_options_default();
+    const vsh_shade_options plain = preview_options();
     assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, ao, NULL, NULL, NULL), VSH_OK);
     assert_int_equal(vsh_shade_ao(field, &points, &plain, NULL, alone, NULL, NULL, NULL), VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
@@ -242,7 +243,7 @@ static void test_deviation(void **state) {
     vsh_field *a = field_of_ball(-0.2, 0.8, 0.0, 0.5, 0.05), *b = field_of_ball(0.2, 0.9, 0.1, 0.5, 0.05);
     const vsh_light light = sun(towards, 0.3);
     vsh_layer layer = layer_of(b);
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_RAYS;
     float va[COUNT], vb[COUNT], both[COUNT], da[COUNT], db[COUNT], dboth[COUNT];
     shade(a, &light, &options, va, da);
@@ -281,7 +282,7 @@ static void bake_floor(const vsh_field *field, const vsh_layer *layers, size_t l
                            .indices = indices,
                            .vertex_count = 4,
                            .triangle_count = 2};
-    vsh_lightmap_options options = vsh_lightmap_options_default();
+    vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = SIZE;
     options.padding = 0;
     options.ao_spacing = 1;

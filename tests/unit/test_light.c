@@ -166,11 +166,11 @@ static void every_method_has_a_name_that_leads_back_to_it(void **state) {
     for (; vsh_shadow_method_name(count) != NULL; ++count) {
         assert_int_equal(vsh_shadow_method(vsh_shadow_method_name(count)), count);
     }
-    assert_int_equal(count, VSH_SHADOW_EXACT + 1);
+    assert_int_equal(count, VSH_SHADOW_AUTO + 1);
     for (count = 0; vsh_ao_method_name(count) != NULL; ++count) {
         assert_int_equal(vsh_ao_method(vsh_ao_method_name(count)), count);
     }
-    assert_int_equal(count, VSH_AO_EXACT + 1);
+    assert_int_equal(count, VSH_AO_AUTO + 1);
     for (count = 0; vsh_sampler_name(count) != NULL; ++count) {
         assert_int_equal(vsh_sampler(vsh_sampler_name(count)), count);
     }

@@ -1,5 +1,6 @@
 /* How a lightmap is baked: its planes, their errors, threads, options, limits. */
 #include "lightmaps.h"
+#include "previews.h"
 
 static void irradiance_is_visibility_times_colour_times_cosine_times_ao(void **state) {
     (void)state;
@@ -94,16 +95,16 @@ static void bad_options_limits_and_cancelling_are_reported(void **state) {
     vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     planes *p = new_planes();
     vsh_error error = {0};
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.start_offset = NAN;
     assert_int_equal(vsh_bake_lightmap(field, texels, &light, 1, &options, NULL, &p->all, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "start_offset"));
-    options = vsh_shade_options_default();
+    options = preview_options();
     options.surface_offset = -1.0;
     assert_int_equal(vsh_bake_lightmap(field, texels, &light, 1, &options, NULL, &p->all, NULL, &error),
                      VSH_ERROR_ARGUMENT);
-    options = vsh_shade_options_default();
+    options = preview_options();
     options.layer_count = (size_t)1 << 40; /* is no reason to ask for memory */
     assert_int_equal(vsh_bake_lightmap(field, texels, &light, 1, &options, NULL, &p->all, NULL, &error),
                      VSH_ERROR_ARGUMENT);
@@ -130,7 +131,7 @@ static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_e
     const vsh_mesh mesh = floor_mesh();
     vsh_texels *texels = make_texels(&mesh, 1, SIZE, 2, 4);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.5);
-    vsh_shade_options shade = vsh_shade_options_default();
+    vsh_shade_options shade = preview_options();
     shade.method = method;
     float *shadows[1] = {shadow}, *errors[1] = {shadow_error};
     const vsh_lightmap lightmap = {

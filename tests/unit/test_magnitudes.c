@@ -5,6 +5,7 @@
 #include "traced.h"
 
 #include "field/field.h"
+#include "previews.h"
 #include "shade/kernel/march.h"
 #include "truth/metrics.h"
 
@@ -284,7 +285,7 @@ static void a_hundred_thousand_least_steps_lose_nothing(void **state) {
     /* and through the front door, out of steps: lit as far as is known, and counted */
     const double p[3] = {-0.5 * length + 100.0, 0.1, 0.3}, along[3] = {1.0, 0.0, 0.0};
     const vsh_light light = sun(along, 0.0);
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_HARD;
     options.max_steps = 65536;
     const vsh_points points = {1, p, NULL, NULL};

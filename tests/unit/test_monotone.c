@@ -3,6 +3,7 @@
  * test_shadow.c has balls that grow and lights of size 0. */
 #include "traced.h"
 
+#include "previews.h"
 #include "truth/metrics.h"
 
 enum { SIDE = 64, COUNT = SIDE * SIDE };
@@ -92,7 +93,7 @@ static void more_rays_are_never_farther_from_the_truth(void **state) {
         for (int32_t method = first; method < methods; ++method) {
             double last = 1.0;
             for (int step = 0; step < 4; ++step) {
-                vsh_shade_options options = vsh_shade_options_default();
+                vsh_shade_options options = preview_options();
                 *(ao ? &options.ao_method : &options.method) = method;
                 options.ao_distance = AO_DISTANCE;
                 options.triangles = c.triangles;

@@ -1,5 +1,6 @@
 /* What outputs tell of where they come from, and the files that carry it. */
 #include "images.h"
+#include "previews.h"
 
 #include <vdbshade/provenance.h>
 #include <vdbshade/volume.h>
@@ -78,7 +79,7 @@ static void settings_and_inputs_are_told_in_order_and_once(void **state) {
                        .light_count = 1,
                        .receivers = &receiver,
                        .receiver_count = 1,
-                       .shade = vsh_shade_options_default(),
+                       .shade = preview_options(),
                        .ao = 1};
     scene.shade.method = VSH_SHADOW_EXACT;
     scene.shade.max_error = 0.05;

@@ -1,5 +1,6 @@
 /* Points asked for by a handle: the values of vsh_shade_shadow() and vsh_shade_ao(), whatever their order and
  * number. */
+#include "previews.h"
 #include "traced.h"
 
 #include <vdbshade/query.h>
@@ -94,7 +95,7 @@ static void values_and_deviations_are_those_of_the_shade_calls(void **state) {
     fill_points();
     const int32_t methods = shadow_methods() > ao_methods() ? shadow_methods() : ao_methods();
     for (int32_t method = 0; method < methods; ++method) {
-        vsh_shade_options options = vsh_shade_options_default();
+        vsh_shade_options options = preview_options();
         options.method = method < shadow_methods() ? method : VSH_SHADOW_CONE;
         options.ao_method = method < ao_methods() ? method : VSH_AO_TAPS;
         options.rays = 16;
@@ -127,7 +128,7 @@ static void values_follow_points_that_are_shuffled_on_any_number_of_threads(void
     }
     const int32_t methods[] = {VSH_SHADOW_HARD, VSH_SHADOW_CONE, VSH_SHADOW_RAYS};
     for (size_t m = 0; m < sizeof methods / sizeof methods[0]; ++m) {
-        vsh_shade_options options = vsh_shade_options_default();
+        vsh_shade_options options = preview_options();
         options.method = methods[m];
         options.ao_method = m == 2 ? VSH_AO_RAYS : VSH_AO_TAPS;
         options.rays = 4;
@@ -159,7 +160,7 @@ static void points_without_texels_are_told_apart_by_their_numbers_in_any_order(v
     lights_of(lights);
     fill_points();
     shuffle();
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_RAYS;
     options.ao_method = VSH_AO_RAYS;
     options.rays = 2;
@@ -224,7 +225,7 @@ static void one_point_has_the_value_that_it_has_among_many(void **state) {
     const int32_t methods[] = {VSH_SHADOW_HARD, VSH_SHADOW_CLASSIC, VSH_SHADOW_IMPROVED, VSH_SHADOW_CONE,
                                VSH_SHADOW_RAYS};
     for (size_t m = 0; m < sizeof methods / sizeof methods[0]; ++m) {
-        vsh_shade_options options = vsh_shade_options_default();
+        vsh_shade_options options = preview_options();
         options.method = methods[m];
         options.rays = 8;
         vsh_query *query = query_of(field, lights, LIGHTS, &options);
@@ -296,7 +297,7 @@ static void a_handle_is_shared_by_threads(void **state) {
     vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     fill_points();
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_ADAPTIVE;
     vsh_query *query = query_of(field, &light, 1, &options);
     static asker askers[5];
@@ -368,15 +369,15 @@ static void bad_arguments_are_refused_by_name(void **state) {
     assert_null(query);
     assert_non_null(strstr(error.message, "light 1"));
     lights_of(lights);
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_EXACT;
     assert_int_equal(vsh_query_create(field, lights, LIGHTS, &options, &query, &error), VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "triangles"));
     vsh_query_free(query_of(field, NULL, 0, &options)); /* of no light's shadow */
     options.ao_method = VSH_AO_EXACT;
     assert_int_equal(vsh_query_create(field, NULL, 0, &options, &query, &error), VSH_ERROR_ARGUMENT);
-    options = vsh_shade_options_default();
-    options.rays = 0;
+    options = preview_options();
+    options.rays = 4097;
     assert_int_equal(vsh_query_create(field, NULL, 0, &options, &query, &error), VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "rays"));
 

@@ -1,4 +1,5 @@
 /* Points with strides, in floats, and answers with gaps; distance and gradient; batches. */
+#include "previews.h"
 #include "traced.h"
 
 #include <vdbshade/query.h>
@@ -44,7 +45,7 @@ static void fill_points(void) {
 static vsh_query *query_of(const vsh_field *field, const vsh_light *light, int32_t method) {
     vsh_query *query = NULL;
     vsh_error error = {VSH_OK, ""};
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = method;
     options.ao_method = VSH_AO_TAPS;
     options.rays = method == VSH_SHADOW_ADAPTIVE ? 64 : 8;

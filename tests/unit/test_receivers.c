@@ -1,5 +1,6 @@
 /* Where receivers can be and what normals they can have: deep inside, far outside, on lattice planes; of any
  * length, zero, not finite. Of every method; docs/numerics.md has the bounds. */
+#include "previews.h"
 #include "traced.h"
 
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
@@ -74,7 +75,7 @@ static void receivers_on_voxel_planes_see_what_their_neighbours_see(void **state
     const vsh_points points = {ALL, at, ns, texels};
     for (int ao = 0; ao < 2; ++ao) {
         for (int32_t method = 0; method < (ao ? ao_methods() : shadow_methods()); ++method) {
-            vsh_shade_options options = vsh_shade_options_default();
+            vsh_shade_options options = preview_options();
             *(ao ? &options.ao_method : &options.method) = method;
             options.ao_distance = 0.5;
             options.triangles = c.triangles;

@@ -10,6 +10,7 @@
 #include <vdbshade/scene.h>
 #include <vector>
 
+#include "previews.h"
 #include "shim/openvdb.h"
 
 // Last: it has macros named as OpenVDB's members are.
@@ -82,7 +83,7 @@ void several_grids_and_files_are_their_union(void **) {
     scene.caster_count = sizeof casters / sizeof casters[0];
     scene.grid = vsh_grid_options_default();
     scene.grid.voxel_size = static_cast<double>(VOXEL);
-    scene.shade = vsh_shade_options_default();
+    scene.shade = preview_options();
     vsh_assets *assets = nullptr;
     vsh_grid *grid = nullptr;
     vsh_error error{};

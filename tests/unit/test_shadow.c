@@ -1,6 +1,7 @@
 /* Shadow values against closed forms and ray-traced truth. */
 #include "shading.h"
 
+#include "previews.h"
 #include "truth/directions.h"
 #include "truth/metrics.h"
 
@@ -306,7 +307,7 @@ static void jittered_steps_leave_grain(void **state) {
                      0);
     vsh_field *field = field_of(truth_seeds(), 0.02, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_shade_stats whole = vsh_shade_stats_zero(), shorter = vsh_shade_stats_zero();
     assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, plain, NULL, &whole, NULL),

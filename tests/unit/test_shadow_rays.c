@@ -1,6 +1,7 @@
 /* Shadows by rays: the reference on the field, and what proves its way past them. */
 #include "shading.h"
 
+#include "previews.h"
 #include "truth/metrics.h"
 
 #include <stdlib.h>
@@ -31,7 +32,7 @@ static void place_floor(void) {
 }
 
 static vsh_shade_options options_of(int32_t method, int32_t rays, double max_error) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = method;
     options.rays = rays;
     options.max_error = max_error;

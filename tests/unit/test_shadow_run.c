@@ -1,4 +1,5 @@
 /* How shadows are computed: the same bits however they are run, work that is counted, bad input. */
+#include "previews.h"
 #include "shading.h"
 
 #include <stdlib.h>
@@ -32,7 +33,7 @@ static void neither_threads_nor_neighbours_show_in_the_bits(void **state) {
     const vsh_light lights[2] = {sun(truth_seeds_sun, 0.2), lamp(place, 0.2)};
     for (int l = 0; l < 2; ++l) {
         for (int32_t method = 0; method < METHODS; ++method) {
-            vsh_shade_options options = vsh_shade_options_default();
+            vsh_shade_options options = preview_options();
             options.method = method;
             const vsh_points points = {COUNT, positions, normals, NULL};
             const int32_t threads[] = {1, 2, 5};
@@ -178,7 +179,7 @@ static void running_out_of_steps_is_counted_and_stays_in_range(void **state) {
     vsh_field *field = field_of(truth_seeds(), 0.02, 0.0);
     const double low[3] = {-1.0, 0.02, -0.3}; /* along the floor, where steps are short */
     const vsh_light light = sun(low, 0.01);
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_shade_stats few = vsh_shade_stats_zero(), many = vsh_shade_stats_zero();
     options.max_steps = 16;
@@ -223,26 +224,26 @@ static void options_lights_and_cancelling_have_their_codes(void **state) {
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_light light = sun(truth_seeds_sun, 0.2);
     vsh_error error = {VSH_OK, ""};
-    vsh_shade_options options = vsh_shade_options_default();
-    options.method = VSH_SHADOW_EXACT + 1;
+    vsh_shade_options options = preview_options();
+    options.method = VSH_SHADOW_AUTO + 1;
     assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "method"));
-    options = vsh_shade_options_default();
+    options = preview_options();
     options.max_steps = 15;
     assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "max_steps"));
     const double offsets[] = {-0.1, 17.0, (double)NAN};
     for (int i = 0; i < 3; ++i) {
-        options = vsh_shade_options_default();
+        options = preview_options();
         options.start_offset = offsets[i];
         assert_int_equal(
             vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
             VSH_ERROR_ARGUMENT);
         assert_non_null(strstr(error.message, "start_offset"));
     }
-    options = vsh_shade_options_default();
+    options = preview_options();
     options.struct_size = 3;
     assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
                      VSH_ERROR_ARGUMENT);

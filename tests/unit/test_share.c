@@ -2,6 +2,7 @@
 #include "shade/share.h"
 #include "shading.h"
 
+#include "previews.h"
 #include "truth/metrics.h"
 
 #include <stdlib.h>
@@ -241,7 +242,7 @@ static vsh_shade_stats shade(const vsh_field *field, const uint32_t *at, int32_t
                              float *values, float *errors) {
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
     const vsh_points points = {FLOOR, places, ups, at};
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = method;
     options.rays = 1024;
     options.max_error = max_error;

@@ -1,6 +1,7 @@
 /* Volumes: their values against closed forms, against queries at the same places, and against a lightmap. */
 #include "volumes.h"
 
+#include "previews.h"
 #include "texels_of.h"
 
 static const double TOWARDS[3] = {0.3, 1.0, 0.2};
@@ -70,7 +71,7 @@ static void ao_of_free_space_is_the_free_share_of_all_directions(void **state) {
         double error; /* RMSE */
     } methods[] = {{VSH_AO_CONES, 16, 0.015}, {VSH_AO_CONES, 64, 0.008}, {VSH_AO_RAYS, 256, 0.01}};
     for (size_t m = 0; m < sizeof methods / sizeof methods[0]; ++m) {
-        vsh_volume_options options = vsh_volume_options_default();
+        vsh_volume_options options = preview_volume_options();
         options.ao = 1;
         options.shade.ao_distance = 8.0;
         options.shade.ao_method = methods[m].method;
@@ -181,7 +182,7 @@ static void values_are_those_of_queries_at_the_voxels_centres(void **state) {
     vsh_light lights[LIGHTS];
     lights_of(lights);
     for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
-        vsh_volume_options options = vsh_volume_options_default();
+        vsh_volume_options options = preview_volume_options();
         options.shade.method = method;
         options.ao = method == VSH_SHADOW_CONE;
         options.shade.ao_distance = 0.5;
@@ -213,7 +214,7 @@ static void blocks_that_are_proved_open_are_open(void **state) {
     vsh_field *field = field_of(truth_seeds(), 0.05, 4.0);
     const double low[3] = {-4.0, -1.0, -4.0}, high[3] = {4.0, 5.0, 4.0};
     vsh_voxels *voxels = box_of(low, high, 0.25);
-    vsh_volume_options options = vsh_volume_options_default();
+    vsh_volume_options options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_distance = 0.3;
     vsh_volume *volume = bake(field, voxels, NULL, 0, &options, NULL);
@@ -247,7 +248,7 @@ static void layers_hide_light_and_are_solid(void **state) {
     vsh_field *of_layer = field_of((truth_scene){&slab, 1}, 0.05, 4.0);
     layer.field = of_layer;
     vsh_voxels *voxels = cube_of(2.4, 0.1);
-    vsh_volume_options options = vsh_volume_options_default();
+    vsh_volume_options options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_distance = 0.5;
     options.shade.layers = &layer;
@@ -306,7 +307,7 @@ static void a_lightmap_and_a_band_agree_where_texel_and_voxel_meet(void **state)
     vsh_voxels *voxels = band_of(grid, 0.0);
     vsh_field *field = field_of_grid(grid, 4.0);
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
-    vsh_volume_options options = vsh_volume_options_default();
+    vsh_volume_options options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_distance = 0.5;
     options.shade.ao_cones = 64;
@@ -387,7 +388,7 @@ static void casters_without_voxels_hide_light_and_are_solid(void **state) {
     layers[0].spheres = spheres;
     layers[1].heights = heights;
     vsh_voxels *voxels = cube_of(2.6, 0.05);
-    vsh_volume_options options = vsh_volume_options_default();
+    vsh_volume_options options = preview_volume_options();
     options.shade.layers = layers;
     options.shade.layer_count = 2;
     const vsh_light light = sun(TOWARDS, 0.1);

@@ -1,5 +1,6 @@
 // Volumes and .vdb files: the voxels of other grids, and what OpenVDB reads of what is written. In C++, to
 // write and read with OpenVDB what the library's own calls do not.
+#include "previews.h"
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -80,7 +81,7 @@ vsh_field *ball() {
 vsh_volume *bake(const vsh_field *field, const vsh_voxels *voxels, bool ao) {
     vsh_light light = vsh_light_default();
     light.angle = 0.1;
-    vsh_volume_options options = vsh_volume_options_default();
+    vsh_volume_options options = preview_volume_options();
     options.ao = ao;
     vsh_volume *volume = nullptr;
     if (vsh_bake_volume(field, voxels, &light, 1, &options, nullptr, &volume, nullptr, &failure) != VSH_OK) {

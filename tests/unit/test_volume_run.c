@@ -1,4 +1,5 @@
 /* Volumes: voxels inside solids, sparseness, threads, limits, cancelling, and what is refused. */
+#include "previews.h"
 #include "volumes.h"
 
 #include <float.h>
@@ -65,7 +66,7 @@ static void inside_voxels_take_the_nearest_outside_value_or_are_off(void **state
     const double towards[3] = {0.4, 1.0, 0.1};
     const vsh_light light = sun(towards, RADIANS(60.0));
     for (int v = 0; v < 2; ++v) {
-        vsh_volume_options options = vsh_volume_options_default();
+        vsh_volume_options options = preview_volume_options();
         vsh_volume *nearest = bake(field, all[v], &light, 1, &options, NULL);
         options.inside = VSH_INSIDE_OFF;
         vsh_volume *off = bake(field, all[v], &light, 1, &options, NULL);
@@ -203,7 +204,7 @@ static void the_same_file_for_any_number_of_threads_and_instruction_set(void **s
     static const int32_t methods[] = {VSH_SHADOW_CONE, VSH_SHADOW_ADAPTIVE};
     for (int v = 0; v < 2; ++v) {
         for (int m = 0; m < 2; ++m) {
-            vsh_volume_options options = vsh_volume_options_default();
+            vsh_volume_options options = preview_volume_options();
             options.ao = 1;
             options.error = 1;
             options.shade.method = methods[m];
@@ -396,7 +397,7 @@ static void bad_boxes_bands_and_options_are_refused(void **state) {
     voxels = cube_of(0.3, 0.1);
     vsh_field *field = field_of_grid(grid, 1.0);
     vsh_volume *volume = NULL;
-    vsh_volume_options options = vsh_volume_options_default();
+    vsh_volume_options options = preview_volume_options();
     vsh_light lights[2] = {sun(UP, 0.1), sun(UP, 0.2)};
     assert_fails(vsh_bake_volume(field, voxels, NULL, 0, NULL, NULL, &volume, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "nothing to bake");
@@ -412,11 +413,11 @@ static void bad_boxes_bands_and_options_are_refused(void **state) {
     options.inside = 7;
     assert_fails(vsh_bake_volume(field, voxels, lights, 1, &options, NULL, &volume, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "inside 7");
-    options = vsh_volume_options_default();
-    options.shade.rays = 0;
+    options = preview_volume_options();
+    options.shade.rays = 4097;
     assert_fails(vsh_bake_volume(field, voxels, lights, 1, &options, NULL, &volume, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "rays 0");
-    options = vsh_volume_options_default();
+    options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_method = VSH_AO_TAPS;
     assert_fails(vsh_bake_volume(field, voxels, lights, 1, &options, NULL, &volume, NULL, &failure),

@@ -2,6 +2,7 @@
 #ifndef TESTS_TEXELS_OF_H
 #define TESTS_TEXELS_OF_H
 
+#include "previews.h"
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -15,7 +16,7 @@
 #include <vdbshade/bake.h>
 
 static inline vsh_lightmap_options size_of(int32_t width, int32_t height, int32_t supersample) {
-    vsh_lightmap_options options = vsh_lightmap_options_default();
+    vsh_lightmap_options options = preview_lightmap_options();
     options.width = width;
     options.height = height;
     options.supersample = supersample;

@@ -4,6 +4,7 @@
 #ifndef TESTS_TRACED_H
 #define TESTS_TRACED_H
 
+#include "previews.h"
 #include "shading.h"
 
 #include <stdlib.h>
@@ -146,7 +147,7 @@ static inline void caster_free(caster *c) {
 static inline vsh_shade_stats cast_shadows(const caster *c, const vsh_light *light, int32_t method,
                                            size_t count, const double *positions, const float *normals,
                                            float *visible) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.method = method;
     options.triangles = c->triangles;
     const vsh_points points = {count, positions, normals, NULL};
@@ -167,7 +168,7 @@ static inline float cast_shadow_at(const caster *c, const vsh_light *light, int3
 
 static inline vsh_shade_stats cast_ao(const caster *c, int32_t method, double distance, size_t count,
                                       const double *positions, const float *normals, float *open) {
-    vsh_shade_options options = vsh_shade_options_default();
+    vsh_shade_options options = preview_options();
     options.ao_method = method;
     options.ao_distance = distance;
     options.triangles = c->triangles;

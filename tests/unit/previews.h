@@ -1,0 +1,36 @@
+/* Options of the preview methods, for tests of what cones do. */
+#ifndef TESTS_PREVIEWS_H
+#define TESTS_PREVIEWS_H
+
+#include <vdbshade/bake.h>
+#include <vdbshade/render.h>
+#include <vdbshade/volume.h>
+
+/* One cone a point, sixteen for AO; 64 rays where a test then names a method by rays. */
+static inline vsh_shade_options preview_options(void) {
+    vsh_shade_options options = vsh_shade_options_default();
+    options.method = VSH_SHADOW_CONE;
+    options.ao_method = VSH_AO_CONES;
+    options.rays = 64;
+    return options;
+}
+
+static inline vsh_lightmap_options preview_lightmap_options(void) {
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.shade = preview_options();
+    return options;
+}
+
+static inline vsh_volume_options preview_volume_options(void) {
+    vsh_volume_options options = vsh_volume_options_default();
+    options.shade = preview_options();
+    return options;
+}
+
+static inline vsh_render_options preview_render_options(void) {
+    vsh_render_options options = vsh_render_options_default();
+    options.shade = preview_options();
+    return options;
+}
+
+#endif
