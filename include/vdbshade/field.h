@@ -3,6 +3,7 @@
 #define VDBSHADE_FIELD_H
 
 #include "grid.h"
+#include "trace.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -61,6 +62,23 @@ typedef struct vsh_field_info {
 
 /* Cannot fail. */
 VSH_API void vsh_field_get_info(const vsh_field *field, vsh_field_info *info);
+
+/* What of a mesh a field does not hold: its voxels are too coarse for it, and nothing that marches against
+ * them sees it. */
+typedef struct vsh_lost {
+    double share;     /* of the mesh's area, 0 … 1 */
+    double thickness; /* of nine tenths of it at least, world units: voxels of 0.8 times that hold it. 0: not
+                         known */
+    uint64_t triangles; /* that have such places, among those that were looked at */
+} vsh_lost;
+
+/* Looks at some 16,000 places of the meshes that the field was made of, for whether there is a solid there:
+ * lost[mesh_count]. `triangles`, of the same meshes, tell how thin the lost parts are, and edges of thick ones,
+ * which voxels cut, from them; may be NULL. Takes
+ * some milliseconds, on the calling thread. Errors: VSH_ERROR_ARGUMENT (field, meshes or lost NULL),
+ * VSH_ERROR_INPUT (as vsh_mesh_check()), VSH_ERROR_MEMORY. */
+VSH_API vsh_result vsh_field_find_lost(const vsh_field *field, const vsh_mesh *meshes, size_t mesh_count,
+                                       const vsh_triangles *triangles, vsh_lost *lost, vsh_error *error);
 
 #ifdef __cplusplus
 }

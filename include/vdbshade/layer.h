@@ -35,7 +35,7 @@ typedef struct vsh_layer {
                       * 2013) */
     double start_offset; /* voxels of its field, 0 … 16; -1: that of the options. Cells of heights, -1: 0;
                             of no account for spheres */
-    const vsh_triangles *triangles; /* its casters', for exact methods; else NULL */
+    const vsh_triangles *triangles; /* its casters', for exact methods; auto is exact with them; else NULL */
     const char *const *lights;      /* [light_count]: names of the lights it casts for; NULL: of all */
     size_t light_count;
     int32_t ao;                 /* nonzero: part of ambient occlusion */

@@ -129,7 +129,9 @@ static int try_small(const forecast *f, trial *t) {
     small.grid.voxel_size = 0.0;
     small.grid.resolution = TRIAL_RESOLUTION;
     vsh_triangles *triangles = NULL;
-    int code = cli_field_make(&small, f->assets, &f->receivers, f->run, &t->made);
+    vsh_run quiet = *f->run; /* what coarse voxels lose is not lost by the scene's */
+    quiet.warning = NULL;
+    int code = cli_field_make(&small, f->assets, &f->receivers, &quiet, &t->made);
     code = code == CLI_OK ? cli_triangles_make(f->scene, f->assets, f->run, &triangles) : code;
     if (code == CLI_OK) {
         vsh_shade_options shade = f->scene->shade;

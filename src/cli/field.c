@@ -1,6 +1,7 @@
 #include "field.h"
 
 #include "clock.h"
+#include "lost.h"
 #include "meshes.h"
 #include "message.h"
 
@@ -105,7 +106,7 @@ static int make_one(const making *m, const vsh_scene_layer *layer, vsh_field **f
     count(m->made, &info, &made);
     m->made->voxelize_s += voxelized - start;
     m->made->field_s += cli_seconds() - voxelized;
-    return CLI_OK;
+    return cli_lost_warn(m->scene, m->assets, layer, *field, info.voxel_size, m->run);
 }
 
 /* Whether exact methods trace a layer's triangles, or (NULL) those of casters in none. */

@@ -74,6 +74,9 @@ static inline bool vshi_ao_traces(const vsh_shade_options *options) {
     return (vsh_ao_method_traits(method) & VSH_METHOD_TRIANGLES) != 0;
 }
 
+/* Standard error of the share of so many rays of a VSH_SAMPLER_… where `value` is free. */
+double vshi_ao_deviation(int32_t sampler, int32_t rays, double value);
+
 /* The most rays that a point takes, by settled options. */
 int32_t vshi_ao_most_rays(const vsh_shade_options *options);
 

@@ -262,7 +262,7 @@ static void find_buried(const vshi_ao_task *task, size_t begin, size_t end, ao_p
  * leave c n^(-11/16) of it, measured on the seeds' floor and the cloister: one edge alone falls as n^-3/4,
  * but a hemisphere shows more edges the finer it is looked at. The share is smoothed (Laplace's rule of
  * succession), for that some rays agree does not mean that all do. */
-static double standard_error(int32_t sampler, int32_t taken, int32_t free) {
+static double standard_error(int32_t sampler, int32_t taken, double free) {
     static const double SOBOL = 0.9, BLUE = 1.5;
     const double n = taken, p = (free + 1.0) / (n + 2.0);
     const double spread = sqrt(p * (1.0 - p)), root = sqrt(n);
@@ -274,7 +274,11 @@ static double standard_error(int32_t sampler, int32_t taken, int32_t free) {
 }
 
 static double spread_of(int32_t sampler, int32_t rays) {
-    return standard_error(sampler, rays, rays / 2);
+    return standard_error(sampler, rays, 0.5 * rays);
+}
+
+double vshi_ao_deviation(int32_t sampler, int32_t rays, double value) {
+    return standard_error(sampler, rays, value * rays);
 }
 
 int32_t vshi_ao_most_rays(const vsh_shade_options *options) {

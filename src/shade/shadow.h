@@ -42,13 +42,6 @@ static inline bool vshi_shadow_traces(const vsh_shade_options *options) {
     return (vsh_shadow_method_traits(method) & VSH_METHOD_TRIANGLES) != 0;
 }
 
-/* Whether what the field says is solid is. Open meshes are shells in it, some voxels thick, where their
- * triangles have no thickness: that hides nothing for methods that trace them. Of one in thirty cards of
- * foliage, each a voxel wide, the rim hid texels that saw the whole light. */
-static inline bool vshi_shadow_trusts_solids(const vsh_field *field, const vsh_shade_options *options) {
-    return field->shell_thickness <= 0.0 || !vshi_shadow_traces(options);
-}
-
 /* The most rays that a point takes, by settled options. */
 int32_t vshi_shadow_most_rays(const vsh_shade_options *options);
 

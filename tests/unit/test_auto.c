@@ -1,0 +1,289 @@
+/* What is baked where no method is named: the error that was asked for, whatever the voxels. */
+#include "traced.h"
+
+#include <stdio.h>
+#include <vdbshade/bake.h>
+
+enum { MOST = 64, SIDE = 48, COUNT = SIDE * SIDE };
+
+/* Boxes and cards as one mesh, on a board of UVs that is the first quad. */
+typedef struct shape {
+    float positions[24 * MOST * 3], uvs[24 * MOST * 2];
+    uint32_t indices[36 * MOST];
+    vsh_mesh mesh;
+} shape;
+
+static void add_quad(shape *s, const float corners[4][3]) {
+    const uint32_t first = (uint32_t)s->mesh.vertex_count;
+    const uint32_t order[6] = {0, 1, 2, 0, 2, 3};
+    memcpy(s->positions + 3 * first, corners, 12 * sizeof(float));
+    for (int k = 0; k < 6; ++k) {
+        s->indices[3 * s->mesh.triangle_count + (size_t)k] = first + order[k];
+    }
+    s->mesh.vertex_count += 4;
+    s->mesh.triangle_count += 2;
+    s->mesh.positions = s->positions;
+    s->mesh.indices = s->indices;
+    s->mesh.name = "shape";
+}
+
+static void add_box(shape *s, double x0, double y0, double z0, double x1, double y1, double z1) {
+    const float a[3] = {(float)x0, (float)y0, (float)z0}, b[3] = {(float)x1, (float)y1, (float)z1};
+    const float sides[6][4][3] = {
+        {{a[0], a[1], b[2]}, {b[0], a[1], b[2]}, {b[0], b[1], b[2]}, {a[0], b[1], b[2]}},
+        {{b[0], a[1], a[2]}, {a[0], a[1], a[2]}, {a[0], b[1], a[2]}, {b[0], b[1], a[2]}},
+        {{b[0], a[1], b[2]}, {b[0], a[1], a[2]}, {b[0], b[1], a[2]}, {b[0], b[1], b[2]}},
+        {{a[0], a[1], a[2]}, {a[0], a[1], b[2]}, {a[0], b[1], b[2]}, {a[0], b[1], a[2]}},
+        {{a[0], b[1], b[2]}, {b[0], b[1], b[2]}, {b[0], b[1], a[2]}, {a[0], b[1], a[2]}},
+        {{a[0], a[1], a[2]}, {b[0], a[1], a[2]}, {b[0], a[1], b[2]}, {a[0], a[1], b[2]}}};
+    for (int k = 0; k < 6; ++k) {
+        add_quad(s, sides[k]);
+    }
+}
+
+static caster make(const vsh_mesh *meshes, size_t count, double voxel) {
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = voxel;
+    vsh_grid *grid = NULL;
+    caster c = {NULL, NULL};
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_grid_from_meshes(meshes, count, &options, NULL, &grid, &error) != VSH_OK ||
+        vsh_triangles_create(meshes, count, NULL, &c.triangles, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    c.field = field_of_grid(grid, 4.0);
+    return c;
+}
+
+static double positions[3 * COUNT];
+static float normals[3 * COUNT], values[COUNT], truth[COUNT], other[COUNT];
+static uint32_t texels[COUNT];
+
+/* A square of points that look up, `height` over the origin. */
+static vsh_points board(double half, double height) {
+    for (size_t i = 0; i < COUNT; ++i) {
+        positions[3 * i] = half * (2.0 * ((double)(i % SIDE) + 0.5) / SIDE - 1.0);
+        positions[3 * i + 1] = height;
+        positions[3 * i + 2] = half * (2.0 * ((double)(i / SIDE) + 0.5) / SIDE - 1.0);
+        normals[3 * i] = normals[3 * i + 2] = 0.0f;
+        normals[3 * i + 1] = 1.0f;
+        texels[i] = (uint32_t)(i % SIDE + 65536 * (i / SIDE));
+    }
+    return (vsh_points){COUNT, positions, normals, texels};
+}
+
+static const double UP[3] = {0.4, 1.0, 0.3};
+
+static vsh_shade_stats shade(const caster *c, const vsh_points *points, const vsh_shade_options *options,
+                             float *into) {
+    const vsh_light light = sun(UP, RADIANS(6.0));
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_shade_shadow(c->field, points, &light, options, NULL, into, NULL, &stats, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return stats;
+}
+
+static double rmse_to_truth(const caster *c, const vsh_points *points, const vsh_shade_options *options) {
+    const vsh_light light = sun(UP, RADIANS(6.0));
+    double sum = 0.0;
+    assert_int_equal(vsh_trace_shadow(c->triangles, NULL, points->count, points->positions, points->normals,
+                                      1e-5, &light, 4096, NULL, truth, NULL),
+                     VSH_OK);
+    shade(c, points, options, values);
+    for (size_t i = 0; i < points->count; ++i) {
+        sum += ((double)values[i] - (double)truth[i]) * ((double)values[i] - (double)truth[i]);
+    }
+    return sqrt(sum / (double)points->count);
+}
+
+static void the_default_is_exact_with_triangles_and_adaptive_without(void **state) {
+    (void)state;
+    static shape s;
+    s = (shape){.mesh = {.vertex_count = 0}};
+    add_box(&s, -0.3, 0.2, -0.3, 0.3, 0.8, 0.3);
+    caster c = make(&s.mesh, 1, 0.05);
+    const vsh_points points = board(1.0, 0.0);
+    for (int traced = 0; traced < 2; ++traced) {
+        vsh_shade_options options = vsh_shade_options_default(), named = options;
+        options.triangles = named.triangles = traced ? c.triangles : NULL;
+        named.method = traced ? VSH_SHADOW_EXACT : VSH_SHADOW_ADAPTIVE;
+        named.ao_method = traced ? VSH_AO_EXACT : VSH_AO_ADAPTIVE;
+        shade(&c, &points, &options, values);
+        shade(&c, &points, &named, other);
+        assert_memory_equal(values, other, sizeof values);
+        assert_int_equal(vsh_shade_ao(c.field, &points, &options, NULL, values, NULL, NULL, NULL), VSH_OK);
+        assert_int_equal(vsh_shade_ao(c.field, &points, &named, NULL, other, NULL, NULL, NULL), VSH_OK);
+        assert_memory_equal(values, other, sizeof values);
+        assert_int_equal(vsh_shadow_method_resolve(VSH_SHADOW_AUTO, traced), named.method);
+        assert_int_equal(vsh_ao_method_resolve(VSH_AO_AUTO, traced), named.ao_method);
+    }
+    caster_free(&c);
+}
+
+static void a_layer_takes_the_method_that_its_own_triangles_allow(void **state) {
+    (void)state;
+    static shape s;
+    s = (shape){.mesh = {.vertex_count = 0}};
+    add_box(&s, -0.3, 0.2, -0.3, 0.3, 0.8, 0.3);
+    caster c = make(&s.mesh, 1, 0.05);
+    const vsh_points points = board(1.0, 0.0);
+    vsh_layer layer = vsh_layer_default();
+    layer.field = c.field; /* no triangles */
+    vsh_shade_options options = vsh_shade_options_default();
+    options.triangles = c.triangles;
+    options.layers = &layer;
+    options.layer_count = 1;
+    shade(&c, &points, &options, values);
+    layer.method = VSH_SHADOW_ADAPTIVE;
+    shade(&c, &points, &options, other);
+    assert_memory_equal(values, other, sizeof values);
+    assert_int_equal(vsh_shade_ao(c.field, &points, &options, NULL, values, NULL, NULL, NULL), VSH_OK);
+    caster_free(&c);
+}
+
+static void rays_follow_from_the_error_unless_they_are_limited(void **state) {
+    (void)state;
+    static shape s;
+    s = (shape){.mesh = {.vertex_count = 0}};
+    for (int i = 0; i < 10; ++i) {
+        add_box(&s, -1.0 + 0.2 * i, 0.5, -1.0, -0.92 + 0.2 * i, 0.55, 1.0);
+    }
+    caster c = make(&s.mesh, 1, 0.03);
+    const vsh_points points = board(1.0, 0.0);
+    vsh_shade_options options = vsh_shade_options_default();
+    options.triangles = c.triangles;
+    options.max_error = 0.003;
+    const double free = rmse_to_truth(&c, &points, &options);
+    const double said = sqrt(shade(&c, &points, &options, values).square_error / COUNT);
+    options.rays = 32;
+    const double limited = rmse_to_truth(&c, &points, &options);
+    const double told = sqrt(shade(&c, &points, &options, values).square_error / COUNT);
+    print_message("asked for 0.003: %.4f, said %.4f; of 32 rays %.4f, said %.4f\n", free, said, limited,
+                  told);
+    assert_true(free <= 0.003 && said <= 0.003 && said >= 0.9 * free);
+    assert_true(limited > 0.003 && told > 0.003);
+    caster_free(&c);
+}
+
+static void parts_thinner_than_voxels_are_found_lost(void **state) {
+    (void)state;
+    static shape fence, block;
+    fence = block = (shape){.mesh = {.vertex_count = 0}};
+    for (int i = 0; i < 10; ++i) {
+        add_box(&fence, -1.0 + 0.2 * i, 0.0, 0.0, -0.9 + 0.2 * i, 1.0, 0.02);
+    }
+    add_box(&block, -0.5, 0.0, 1.0, 0.5, 1.0, 2.0);
+    const vsh_mesh meshes[2] = {fence.mesh, block.mesh};
+    const double voxels[3] = {0.12, 0.05, 0.012};
+    for (int v = 0; v < 3; ++v) {
+        caster c = make(meshes, 2, voxels[v]);
+        vsh_lost lost[2];
+        assert_int_equal(vsh_field_find_lost(c.field, meshes, 2, c.triangles, lost, NULL), VSH_OK);
+        print_message("voxel %g: %.3f of the fence, %.3f of the block; thin %.4f\n", voxels[v], lost[0].share,
+                      lost[1].share, lost[0].thickness);
+        assert_true(lost[1].share < 0.005);
+        if (v < 2) {
+            assert_true(lost[0].share > 0.2 && lost[0].triangles > 0);
+            assert_true(fabs(lost[0].thickness - 0.02) < 0.001);
+        } else {
+            assert_true(lost[0].share < 0.005);
+        }
+        caster_free(&c);
+    }
+}
+
+static void voxels_coarser_than_casters_cost_exact_no_error(void **state) {
+    (void)state;
+    static shape slats, cards;
+    slats = cards = (shape){.mesh = {.vertex_count = 0}};
+    for (int i = 0; i < 10; ++i) {
+        add_box(&slats, -1.0 + 0.2 * i, 0.5, -1.0, -0.9 + 0.2 * i, 0.51, 1.0);
+    }
+    uint64_t counter = 1;
+    for (int i = 0; i < 60; ++i) {
+        const float x = (float)between(&counter, -1.0, 1.0), y = (float)between(&counter, 0.5, 1.2),
+                    z = (float)between(&counter, -1.0, 1.0), t = (float)between(&counter, -0.1, 0.1);
+        const float card[4][3] = {{x - 0.1f, y, z - 0.1f},
+                                  {x + 0.1f, y + t, z - 0.1f},
+                                  {x + 0.1f, y + t, z + 0.1f},
+                                  {x - 0.1f, y, z + 0.1f}};
+        add_quad(&cards, card);
+    }
+    const vsh_points points = board(1.0, 0.0);
+    const shape *const shapes[2] = {&slats, &cards};
+    for (int which = 0; which < 2; ++which) {
+        for (double voxel = 0.2; voxel > 0.02; voxel *= 0.5) {
+            caster c = make(&shapes[which]->mesh, 1, voxel);
+            vsh_shade_options options = vsh_shade_options_default();
+            options.triangles = c.triangles;
+            const double rmse = rmse_to_truth(&c, &points, &options);
+            print_message("%s, voxels of %g: %.4f\n", which ? "cards" : "slats", voxel, rmse);
+            assert_true(rmse <= 0.02);
+            caster_free(&c);
+        }
+    }
+}
+
+/* A board whose AO is interpolated between texels, with low slats on it. */
+static void ao_between_texels_keeps_the_error_beside_what_is_low(void **state) {
+    (void)state;
+    enum { SIZE = 96, TEXELS = SIZE * SIZE };
+    static float plane[TEXELS], covered[TEXELS];
+    static const float uvs[8] = {0.0f, 0.0f, 1.0f, 0.0f, 1.0f, 1.0f, 0.0f, 1.0f};
+    static shape ground, low;
+    ground = low = (shape){.mesh = {.vertex_count = 0}};
+    const float quad[4][3] = {
+        {-1.0f, 0.0f, 1.0f}, {1.0f, 0.0f, 1.0f}, {1.0f, 0.0f, -1.0f}, {-1.0f, 0.0f, -1.0f}};
+    add_quad(&ground, quad);
+    ground.mesh.uvs = uvs;
+    for (int i = 0; i < 12; ++i) {
+        const double x = -0.95 + 0.16 * i;
+        add_box(&low, x, 0.001, -0.9, x + 0.03, 0.012, 0.9);
+    }
+    const vsh_mesh meshes[2] = {ground.mesh, low.mesh};
+    caster c = make(meshes, 2, 0.05);
+    vsh_lightmap_options size = vsh_lightmap_options_default();
+    size.width = size.height = SIZE;
+    vsh_texels *of = NULL;
+    assert_int_equal(vsh_texels_create(&ground.mesh, 1, &size, NULL, NULL, &of, NULL), VSH_OK);
+    const vsh_texel_samples samples = vsh_texels_samples(of);
+    float *open = malloc(samples.count * sizeof *open);
+    assert_int_equal(vsh_trace_ao(c.triangles, NULL, samples.count, samples.positions, samples.normals, 2e-4,
+                                  0.5, 1024, NULL, open, NULL),
+                     VSH_OK);
+    vsh_shade_options options = vsh_shade_options_default();
+    options.triangles = c.triangles;
+    options.ao_distance = 0.5;
+    const vsh_lightmap lightmap = {.ao = plane, .coverage = covered};
+    assert_int_equal(vsh_bake_lightmap(c.field, of, NULL, 0, &options, NULL, &lightmap, NULL, NULL), VSH_OK);
+    double sum = 0.0, count = 0.0;
+    for (size_t i = 0; i < samples.count; ++i) {
+        const uint32_t at = samples.texel[i];
+        const double off = (double)plane[at] - (double)open[i];
+        sum += covered[at] > 0.0f ? off * off : 0.0;
+        count += covered[at] > 0.0f;
+    }
+    print_message("AO over %g texels beside low slats: %.4f\n", count, sqrt(sum / count));
+    assert_true(count > 0.5 * TEXELS && sqrt(sum / count) <= 0.02);
+    free(open);
+    vsh_texels_free(of);
+    caster_free(&c);
+}
+
+int main(void) {
+    if (!vsh_triangles_available()) {
+        puts("no Embree: nothing to trace");
+        return 0;
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_default_is_exact_with_triangles_and_adaptive_without),
+        cmocka_unit_test(a_layer_takes_the_method_that_its_own_triangles_allow),
+        cmocka_unit_test(rays_follow_from_the_error_unless_they_are_limited),
+        cmocka_unit_test(parts_thinner_than_voxels_are_found_lost),
+        cmocka_unit_test(voxels_coarser_than_casters_cost_exact_no_error),
+        cmocka_unit_test(ao_between_texels_keeps_the_error_beside_what_is_low),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
