@@ -34,14 +34,15 @@ static bool is_in(const vsh_caster *caster, const vsh_scene_layer *layer) {
 
 static void warn(const vsh_caster *caster, const vsh_mesh *mesh, const vsh_lost *lost, double voxel_size,
                  const vsh_run *run) {
-    char line[1024], help[64] = "finer ones may hold it";
+    char line[1024], share[32], help[64] = "finer ones may hold it";
+    snprintf(share, sizeof share, "%.2g %%", 100.0 * lost->share);
     if (lost->thickness > 0.0) {
         snprintf(help, sizeof help, "voxels of %.2g hold most of it", HELD * lost->thickness);
     }
     snprintf(line, sizeof line,
-             "%s: mesh '%s': %.2g %% of its area is lost, thinner than 1.25 voxels of %.3g: nothing is cast "
+             "%s: mesh '%s': %s of its area is lost, thinner than 1.25 voxels of %.3g: nothing is cast "
              "there; %s, and --method exact needs none",
-             caster->path, mesh->name != NULL ? mesh->name : "", 100.0 * lost->share, voxel_size, help);
+             caster->path, mesh->name != NULL ? mesh->name : "", share, voxel_size, help);
     run->warning(run->user, line);
 }
 
