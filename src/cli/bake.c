@@ -176,7 +176,9 @@ static int make_triangles(bake_work *work) {
 
 static int find_origin(bake_work *work) {
     const double start = cli_seconds();
-    const int code = cli_origin_make(work->given, &work->settings->input, 1, work->made.grid.voxel_size,
+    vsh_scene given = *work->given;
+    given.shade.triangles = work->triangles; /* they tell what auto comes to */
+    const int code = cli_origin_make(&given, &work->settings->input, 1, work->made.grid.voxel_size,
                                      &work->run, &work->origin);
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
     return code;
