@@ -39,7 +39,7 @@ JSON
 }
 
 @test "--error bakes what error is left, for methods that know it" {
-    shade bake box.obj "${SMALL[@]}" --ao 0.5 --method adaptive --error --quiet -o out.exr
+    shade bake box.obj "${SMALL[@]}" --ao 0.5 --method adaptive --ao-method cones --error --quiet -o out.exr
     done_well
     shade info out.exr
     [[ $output == *"channel 'error.sun'"* ]] || fail "no error.sun"
@@ -67,7 +67,7 @@ JSON
     for key in rays refined certified_share estimated_rmse; do
         grep -q "\"$key\": [0-9]" stats.json || fail "no $key: $(cat stats.json)"
     done
-    shade bake box.obj "${SMALL[@]}" --quiet --stats stats.json -o out.exr
+    shade bake box.obj "${SMALL[@]}" --method cone --quiet --stats stats.json -o out.exr
     done_well
     grep -q '"estimated_rmse": null' stats.json
 }

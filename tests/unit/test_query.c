@@ -183,7 +183,8 @@ static void points_that_are_invalid_are_nan_and_leave_the_others_alone(void **st
     lights_of(lights);
     fill_points();
     shuffle();
-    vsh_query *query = query_of(field, lights, LIGHTS, NULL);
+    const vsh_shade_options preview = preview_options(); /* rays of adaptive are shared with neighbours */
+    vsh_query *query = query_of(field, lights, LIGHTS, &preview);
     static float before[LIGHTS + 1][MANY];
     const vsh_points all = {MANY, shuffled_positions, shuffled_normals, NULL};
     const size_t bad[] = {0, 31000, 31001, MANY - 1};
