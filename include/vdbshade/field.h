@@ -73,10 +73,10 @@ typedef struct vsh_lost {
 } vsh_lost;
 
 /* Looks at some 16,000 places of the meshes that the field was made of, for whether there is a solid there:
- * lost[mesh_count]. `triangles`, of the same meshes, tell how thin the lost parts are, and edges of thick ones,
- * which voxels cut, from them; may be NULL. Takes
- * some milliseconds, on the calling thread. Errors: VSH_ERROR_ARGUMENT (field, meshes or lost NULL),
- * VSH_ERROR_INPUT (as vsh_mesh_check()), VSH_ERROR_MEMORY. */
+ * lost[mesh_count]. `triangles`, of the same meshes, tell how thin the lost parts are, and edges of thick
+ * ones, which voxels cut, from them; may be NULL. Takes some milliseconds, on the calling thread. Errors:
+ * VSH_ERROR_ARGUMENT (field, meshes or lost NULL), VSH_ERROR_INPUT (as vsh_mesh_check()), VSH_ERROR_MEMORY.
+ */
 VSH_API vsh_result vsh_field_find_lost(const vsh_field *field, const vsh_mesh *meshes, size_t mesh_count,
                                        const vsh_triangles *triangles, vsh_lost *lost, vsh_error *error);
 

@@ -121,6 +121,8 @@ typedef struct vsh_scene {
     size_t solidity_count;
     double unit;          /* of the numbers in mesh files, metres, > 0: instead of what the files say
                              (vsh_model_unit());   0: as they say, and those that say nothing as they are */
+    int32_t voxels_named; /* nonzero: `grid` holds a voxel size or a resolution that was asked for; 0: the
+                             default, where `vdbshade bake` takes fewer for what is only traced */
     int32_t cast_blended; /* nonzero: meshes of blended materials (VSH_ALPHA_BLENDED) cast, whole; 0: they
                              only receive */
 } vsh_scene;
@@ -198,6 +200,10 @@ VSH_API vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets 
  * gives: meshes, and heightfields that are voxelised. Those that cast as they are (direct heightfields,
  * spheres) do not count. Also 1 where there are no others. */
 VSH_API int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer);
+
+/* 1 where shadows of the casters in `layer`, or (NULL) in none, or AO are baked by a method that knows them
+ * by their voxels alone; 0 where rays against triangles decide, and voxels only save rays. */
+VSH_API int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer);
 
 /* Reach, world units > 0, that a field of `grid` needs for the scene's lights and AO at receivers within a
  * world box: see vsh_field_options. Directional lights count up to a half angle of 60°. */

@@ -289,8 +289,9 @@ static void find_rows(const vsh_texels *texels, vshi_origins *origins) {
 
 static void look_in(lifting *l, const vsh_field *field, const vsh_triangles *triangles, int32_t method,
                     int32_t ao_method, vshi_origins_for what) {
-    const bool marched =
-        (what.lights && method != VSH_SHADOW_EXACT) || (what.ao && ao_method != VSH_AO_EXACT);
+    const bool traced = triangles != NULL;
+    const bool marched = (what.lights && vsh_shadow_method_resolve(method, traced) != VSH_SHADOW_EXACT) ||
+                         (what.ao && vsh_ao_method_resolve(ao_method, traced) != VSH_AO_EXACT);
     l->fields[l->field_count++] = (looked_at){.field = field,
                                               .probe = fmax(l->offset, PROBE_HEIGHT * field->voxel_size),
                                               .shell = 0.5 * field->shell_thickness,

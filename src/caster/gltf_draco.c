@@ -79,7 +79,7 @@ vsh_result vshi_gltf_read_draco(vshi_gltf *gltf, const json_t *extension, const 
         result = take_attribute(gltf, mesh, attributes, "NORMAL", 3, where, &shape->normals, error);
     }
     for (int set = 0; set < VSH_MAX_UV_SETS && result == VSH_OK; ++set) {
-        char name[16];
+        char name[32];
         snprintf(name, sizeof name, "TEXCOORD_%d", set);
         result = take_attribute(gltf, mesh, attributes, name, 2, where, &shape->uvs[set], error);
         shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;

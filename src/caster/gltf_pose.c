@@ -92,7 +92,7 @@ static vsh_result add_sets(vshi_gltf *gltf, const json_t *primitive, const vshi_
     const json_t *attributes = json_object_get(primitive, "attributes");
     vsh_result result = VSH_OK;
     for (int set = 0; set < VSH_MAX_UV_SETS && result == VSH_OK; ++set) {
-        char name[16];
+        char name[32];
         size_t index;
         float *weights = NULL;
         snprintf(name, sizeof name, "JOINTS_%d", set);

@@ -55,7 +55,7 @@ static vsh_result read_vertices(vshi_gltf *gltf, const json_t *primitive, const 
             vshi_gltf_read_attribute(gltf, attributes, "NORMAL", 3, count, where, &shape->normals, error);
     }
     for (int set = 0; set < VSH_MAX_UV_SETS && result == VSH_OK; ++set) {
-        char name[16];
+        char name[32];
         snprintf(name, sizeof name, "TEXCOORD_%d", set);
         result = vshi_gltf_read_attribute(gltf, attributes, name, 2, count, where, &shape->uvs[set], error);
         shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;

@@ -4,12 +4,11 @@
 
 #include <stdlib.h>
 
-/* What an open surface must enclose (vshi_part_encloses()) to be taken for closed. Measured: a rabbit with
- * holes underneath or a head with holes for eyes 0.98 and more, a head open at its neck 0.95, a tree's trunk
- * 0.96; a cup 0.91, a box without its lid 0.90, half a sphere 0.82, a short tube 0.79, a tent 0.64, a curtain
- * 0.60. A bust without its base (0.86 to 0.93) is a vessel turned over: nothing but its use tells them apart.
- * What is filled by mistake buries what stands in it, while what is taken for a sheet only costs time, so
- * such are sheets. */
+/* What an open surface must enclose (vshi_part_encloses()) to be taken for closed. Of shapes made for it: a
+ * ball with small holes 0.98 and more, a head open at its neck 0.95, a tree's trunk 0.96; a cup 0.91, a box
+ * without its lid 0.90, half a sphere 0.82, a short tube 0.79, a tent 0.64, a curtain 0.60. A bust without
+ * its base (0.86 to 0.93) is a vessel turned over: nothing but its use tells them apart. What is filled by
+ * mistake buries what stands in it, while what is taken for a sheet only costs time, so such are sheets. */
 static const double SOLID_ENCLOSES = 0.945;
 /* Of one that looks inwards: nothing is filled behind its faces but a thin wall, so that a room may lack a
  * whole side. */

@@ -52,7 +52,8 @@ static void add_mesh(shape *s, const vsh_mesh *mesh) {
 }
 
 static bool is_traced(const vsh_scene *scene) {
-    return scene->shade.method == VSH_SHADOW_EXACT || (scene->ao && scene->shade.ao_method == VSH_AO_EXACT);
+    return (scene->light_count > 0 && scene->shade.method == VSH_SHADOW_EXACT) ||
+           (scene->ao && scene->shade.ao_method == VSH_AO_EXACT);
 }
 
 static void expect_shape(const vsh_scene *scene, const vsh_assets *assets) {
@@ -156,12 +157,24 @@ static void expect_receiver(const vsh_scene *scene, const cli_expected_receiver 
     cli_progress_expect("write", CLI_ESTIMATE_FILE, (double)r->texels * channels * write_us * micro);
 }
 
-void cli_bake_expect(const vsh_scene *scene, const vsh_assets *assets, const cli_expected_receiver *receivers,
+/* What auto comes to, and the rays that a value may take. */
+static void resolve(vsh_shade_options *shade, int32_t traced) {
+    shade->method = vsh_shadow_method_resolve(shade->method, traced);
+    shade->ao_method = vsh_ao_method_resolve(shade->ao_method, traced);
+    if (shade->rays == 0) {
+        const bool all = shade->method == VSH_SHADOW_RAYS || shade->ao_method == VSH_AO_RAYS;
+        shade->rays = all ? 64 : 4096;
+    }
+}
+
+void cli_bake_expect(const vsh_scene *given, const vsh_assets *assets, const cli_expected_receiver *receivers,
                      int32_t threads) {
     const long cores = sysconf(_SC_NPROCESSORS_ONLN);
     const double used = threads > 0 ? (double)threads : cores > 0 ? (double)cores : 1.0;
-    expect_shape(scene, assets);
-    for (size_t i = 0; i < scene->receiver_count; ++i) {
-        expect_receiver(scene, &receivers[i], used);
+    vsh_scene scene = *given;
+    resolve(&scene.shade, vsh_scene_traceable(given, NULL) && vsh_triangles_available());
+    expect_shape(&scene, assets);
+    for (size_t i = 0; i < scene.receiver_count; ++i) {
+        expect_receiver(&scene, &receivers[i], used);
     }
 }

@@ -392,6 +392,20 @@ static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
     return s->stats != NULL ? cli_bake_check_output(s, scene, s->stats) : CLI_OK;
 }
 
+/* Voxels along the longest side where rays against triangles decide every value: finer ones save fewer rays
+ * than they take time, coarser ones the other way round (docs/numerics.md). */
+enum { TRACED_RESOLUTION = 128 };
+
+static void choose_voxels(vsh_scene *scene) {
+    bool marches = vsh_scene_marches(scene, NULL) != 0;
+    for (size_t i = 0; i < scene->layer_count; ++i) {
+        marches = marches || vsh_scene_marches(scene, &scene->layers[i]) != 0;
+    }
+    if (!scene->voxels_named && !marches && scene->grid.resolution > TRACED_RESOLUTION) {
+        scene->grid.resolution = TRACED_RESOLUTION;
+    }
+}
+
 /* The input, or defaults for a mesh, with what the options put over it. */
 static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scene *made) {
     memset(made, 0, sizeof *made);
@@ -415,7 +429,11 @@ static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scen
     int code = add_lights(settings, made);
     code = code == CLI_OK ? set_shade(settings, &made->scene) : code;
     code = code == CLI_OK && receivers ? cli_bake_check_work(settings, made) : code;
-    return code == CLI_OK ? add_casters(settings, made) : code;
+    code = code == CLI_OK ? add_casters(settings, made) : code;
+    if (code == CLI_OK && receivers) {
+        choose_voxels(&made->scene);
+    }
+    return code;
 }
 
 int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made) {

@@ -138,6 +138,7 @@ void cli_grid_apply(const cli_grid_settings *settings, vsh_scene *scene) {
         scene->solidity = settings->rules;
         scene->solidity_count = settings->rule_count;
     }
+    scene->voxels_named = scene->voxels_named || settings->has_resolution || settings->has_voxel_size;
     if (settings->has_resolution) {
         options->resolution = settings->options.resolution;
         options->voxel_size = 0.0;

@@ -12,21 +12,6 @@ static const double TOLD = 0.005;
 /* Voxels that hold a part are so much smaller than it is thick. */
 static const double HELD = 0.8;
 
-static bool traces(uint32_t traits) {
-    return (traits & VSH_METHOD_TRIANGLES) != 0;
-}
-
-/* Whether anything is baked by what only voxels know. */
-static bool depends_on_voxels(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    const int32_t can = vsh_scene_traceable(scene, layer) && vsh_triangles_available();
-    const int32_t given =
-        layer != NULL && layer->shade.method >= 0 ? layer->shade.method : scene->shade.method;
-    const uint32_t shadow = vsh_shadow_method_traits(vsh_shadow_method_resolve(given, can));
-    const uint32_t ao = vsh_ao_method_traits(vsh_ao_method_resolve(scene->shade.ao_method, can));
-    return (scene->light_count > 0 && !traces(shadow)) ||
-           (scene->ao && (layer == NULL || layer->shade.ao) && !traces(ao));
-}
-
 static bool is_in(const vsh_caster *caster, const vsh_scene_layer *layer) {
     return layer != NULL ? caster->layer != NULL && strcmp(caster->layer, layer->name) == 0
                          : caster->layer == NULL;
@@ -78,7 +63,7 @@ static int look(const vsh_caster *caster, const vsh_mesh *meshes, size_t count, 
 int cli_lost_warn(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
                   const vsh_field *field, double voxel_size, const vsh_run *run) {
     int code = CLI_OK;
-    if (run->warning == NULL || !depends_on_voxels(scene, layer)) {
+    if (run->warning == NULL || !vsh_scene_marches(scene, layer)) {
         return code;
     }
     for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {

@@ -132,7 +132,7 @@ enum {
 
 #define CLI_GRID_OPTIONS                                                                                     \
     {CLI_KEY_RESOLUTION, "resolution", "N",                                                                  \
-     "voxels along the longest side of the casters,\n2 to 65536 (256)"},                                     \
+     "voxels along the longest side of the casters,\n2 to 65536 (256; for bake 128 where all is exact)"},    \
         {CLI_KEY_VOXEL_SIZE, "voxel-size", "SIZE", "or the edge of a voxel, in scene units"},                \
         {CLI_KEY_SOLID, "solid", "PATTERN",                                                                  \
          "objects of casters that are solid whatever way their\nfaces look, closed over their holes; "       \

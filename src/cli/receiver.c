@@ -191,15 +191,14 @@ int cli_receiver_texels(const vsh_charts *charts, int32_t first, int32_t rows, c
 
 /* Whether values are what cones read, and no rays refine them. */
 static bool cones_decide(const vsh_scene *scene) {
-    return (scene->light_count > 0 && scene->shade.method < VSH_SHADOW_RAYS) ||
-           (scene->ao && scene->shade.ao_method < VSH_AO_RAYS);
+    return (scene->light_count > 0 &&
+            (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_RAYS) == 0) ||
+           (scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) == 0);
 }
 
 static void warn_stats(const cli_receiver_job *job, const vsh_bake_stats *baked) {
     const vsh_receiver *receiver = &job->scene->receivers[job->index];
-    const vsh_scene *scene = job->scene;
-    const bool marched = (scene->light_count > 0 && scene->shade.method != VSH_SHADOW_EXACT) ||
-                         (scene->ao && scene->shade.ao_method != VSH_AO_EXACT);
+    const bool marched = vsh_scene_marches(job->scene, NULL) != 0;
     char line[1024];
     cli_invalid_warn(job->run, receiver->path, job->meshes, job->mesh_count, baked, !marched);
     if (baked->shade.unfinished > 0) {

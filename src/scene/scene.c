@@ -263,6 +263,8 @@ vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh
     result = vshi_read_object(&reader, &root, &scene_table, 1, "a scene", &made->scene);
     if (result == VSH_OK) {
         result = vshi_reject_both(&reader, &root, "voxel_size", "resolution");
+        made->scene.voxels_named =
+            json_object_get(json, "voxel_size") != NULL || json_object_get(json, "resolution") != NULL;
     }
     if (result == VSH_OK) {
         result = vshi_check_layers(&reader, &root, &made->scene);

@@ -73,6 +73,7 @@ static void one_scene_is_the_same_in_every_format(void **state) {
         bool alpha, z_up;
     } files[] = {
         {"scene.glb", 1.0, 2, true, false},       {"scene.gltf", 1.0, 2, true, false},
+        {"scene_draco.glb", 1.0, 2, true, false}, /* the same through gltf-transform's Draco, 24 bits */
         {"scene.fbx", 0.01, 2, true, false},      {"scene.dae", 1.0, 2, true, false},
         {"scene.obj", 0.0, 1, true, false},       {"scene.ply", 0.0, 1, false, true},
         {"scene_ascii.ply", 0.0, 1, false, true}, {"scene.stl", 0.0, 0, false, true},
