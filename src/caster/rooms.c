@@ -2,6 +2,7 @@
 #include "base/memory.h"
 #include "caster/solidity_parts.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 enum { SAMPLES = 24, AROUND_SAMPLES = 8, MOST_ANGLES = 1 << 24 };
@@ -130,6 +131,29 @@ static size_t count_within(const vshi_solidity *s, const vshi_component *solid, 
     return within;
 }
 
+/* What lies within a dome is smaller than this part of it, or none of its solids alone: eyes in a head and an
+ * engine in its hood are solids of about its size. */
+static const double DOME_SHARE = 0.5;
+
+static double longest(vshi_vec size) {
+    return fmax(size.x, fmax(size.y, size.z));
+}
+
+/* Whether what lies within `dome` is what a sky dome has within. */
+static bool fits_a_dome(const vshi_solidity *s, const vshi_component *dome) {
+    vshi_vec low = {INFINITY, INFINITY, INFINITY}, high = {-INFINITY, -INFINITY, -INFINITY};
+    bool solids = true;
+    for (size_t i = 0; i < s->count; ++i) {
+        const vshi_component *c = &s->components[i];
+        if (c != dome) {
+            solids = solids && c->kind == VSHI_KIND_SOLID;
+            low = (vshi_vec){fmin(low.x, c->low.x), fmin(low.y, c->low.y), fmin(low.z, c->low.z)};
+            high = (vshi_vec){fmax(high.x, c->high.x), fmax(high.y, c->high.y), fmax(high.z, c->high.z)};
+        }
+    }
+    return !solids || longest(vshi_sub(high, low)) < DOME_SHARE * longest(vshi_sub(dome->high, dome->low));
+}
+
 /* A closed solid that everything else lies within, and no room in it: all of that would be buried, and is
  * meant to be seen. A sky dome whose faces look outwards. */
 static void find_dome(vshi_solidity *s) {
@@ -144,7 +168,8 @@ static void find_dome(vshi_solidity *s) {
         }
     }
     if (dome == NULL || dome->kind != VSHI_KIND_SOLID || dome->open_edges > 0 || s->cut_count > 0 ||
-        s->wholes.meshes[dome->whole].solidity != VSH_SOLIDITY_AUTO || s->count < 2) {
+        s->wholes.meshes[dome->whole].solidity != VSH_SOLIDITY_AUTO || s->count < 2 ||
+        !fits_a_dome(s, dome)) {
         return;
     }
     const size_t most = MOST_ANGLES / (AROUND_SAMPLES * (dome->triangles + 1)) + 16;

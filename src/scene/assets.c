@@ -235,7 +235,7 @@ static vsh_result leave_out_blended(const vsh_scene *scene, const vsh_model *mod
     if (blended > 0) {
         vshi_warn(run,
                   "%s: %zu of %zu meshes have blended materials (glass, smoke) and cast no shadow; "
-                  "\"cast_blended\" in a scene, or --cast-blended, has them cast",
+                  "--cast-blended has them cast",
                   path, blended, count);
     }
     if (masked > 0) {

@@ -50,7 +50,7 @@ JSON
     for channel in shadow.sun ao error.sun error.ao irradiance.R A; do
         [[ $output == *"channel '$channel'"* ]] || fail "no $channel"
     done
-    [[ $output == *"8 channels"* ]] || fail "not 8 channels"
+    [[ $output == *"11 channels"* ]] || fail "not 8 channels, and R, G and B"
 }
 
 @test "who asks for an error gets a method that keeps it" {

@@ -105,7 +105,7 @@ setup() {
 }
 
 @test "the statistics have every key" {
-    shade bake box.obj "${SMALL[@]}" --ao 1 --quiet --stats stats.json --threads 2 -o out.exr
+    shade bake box.obj "${SMALL[@]}" --method cone --ao 1 --ao-method cones --quiet --stats stats.json --threads 2 -o out.exr
     done_well
     for key in version stages_s load voxelize field bake write texels invalid_texels samples marches \
         certified unfinished skipped rays peak_bytes threads voxel_size levels field_bytes field_bytes_per_voxel active_voxels; do

@@ -12,9 +12,9 @@ scene() {
   {"sdf": {"shape": "sphere", "radius": 0.5, "translate": [-0.8, 0.7, 0.3]}},
   {"sdf": {"shape": "box", "half_size": [0.4, 0.3, 0.3], "translate": [0.9, 0.3, -0.6]}},
   {"sdf": {"shape": "torus", "radius": 0.5, "tube_radius": 0.15, "translate": [0.6, 0.5, 1.1]}}],
- "voxel_size": 0.05,
+ "voxel_size": 0.05, "method": "cone",
  "lights": [{"name": "sun", "type": "directional", "direction": [-0.5, 0.6, -0.6], "angle_deg": ${2:-10}}],
- "ao": {"distance": 0.6},
+ "ao": {"distance": 0.6, "method": "cones"},
  "receivers": [{"mesh": "${4:-$ASSETS/seeds_floor.obj}", "size": 96, "output": "$1.exr"}]}
 JSON
 }

@@ -198,7 +198,7 @@ JSON
     local file
     for file in set.usda set.obj cache.abc; do
         shade bake "$file" -o out.vdb.exr --ao 1
-        refused 2 "$file" 'which is not read' 'OBJ, glTF, GLB, PLY, STL or FBX'
+        refused 2 "$file" 'which is not read' 'OBJ, glTF, GLB, PLY, STL, FBX or DAE'
         shade voxelize "$file" -o out.vdb
         refused 2 "$file" 'which is not read'
         bad "{\"mesh\": \"$file\"}"

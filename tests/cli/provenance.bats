@@ -10,7 +10,7 @@ load helper
     [[ $output == *"vdbshade_version: 0.1.0"* ]]
     [[ $output == *"vdbshade_command: bake --sun 1,2,1 --sun-angle 5 --ao 2 --size 32 --resolution 16 --method adaptive --max-error 0.1 box.obj"* ]]
     [[ $output == *"vdbshade_shadow: adaptive, max error 0.1, sobol"* ]]
-    [[ $output == *"vdbshade_ao: adaptive within 2, max error 0.1, sobol"* ]]
+    [[ $output == *"vdbshade_ao: exact within 2, max error 0.1, sobol"* ]]
     [[ $output == *"vdbshade_light_sun: directional towards 1 2 1, 5 degrees across"* ]]
     [[ $output == *"vdbshade_voxel_size: 0.0625"* ]]
     [[ $output == *"vdbshade_input_0: sha256:$(sha256sum <box.obj | cut -d' ' -f1) box.obj"* ]]

@@ -213,10 +213,10 @@ inf,0,0,0,1,0
 1,,1,0,1,0
 1,0x1,1,0,1,0
 CSV
-    shade "${QUERY[@]}" --points good.csv -o good.out --format csv
+    shade "${QUERY[@]}" --method cone --points good.csv -o good.out --format csv
     done_well
     [ -z "$stderr" ] || fail "a clean input is nothing to speak of"
-    shade "${QUERY[@]}" --points bad.csv -o bad.out --format csv --stats stats.json
+    shade "${QUERY[@]}" --method cone --points bad.csv -o bad.out --format csv --stats stats.json
     done_well
     for line in "row 2: 2 columns" "row 3: column 2 is '0,001'" "row 5: x is not finite" "row 6: the normal is zero" \
         "row 8: column 2 is ''" "6 of 9 rows are bad"; do
@@ -440,7 +440,7 @@ write_binary_ply() {
     refused 3 none.csv
     shade query scene.json --points . --points-format csv -o out.csv
     refused 3 folder
-    shade query scene.json --points p.csv --error -o out.csv
+    shade query scene.json --points p.csv --method cone --ao-method cones --error -o out.csv
     refused 2 --error
     [ ! -e out.csv ]
 }

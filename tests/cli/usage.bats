@@ -148,14 +148,14 @@ LIST
     old_output out.exr
     for method in magic ray; do
         shade bake box.obj -o out.exr "${SMALL[@]}" --method "$method"
-        refused 2 "$method" 'hard, classic, practical, improved, smooth, cone, rays, adaptive, exact'
+        refused 2 "$method" 'hard, classic, practical, improved, smooth, cone, rays, adaptive, exact, auto'
     done
     untouched out.exr
 }
 
 @test "what a method does not use is refused beside it" {
     write_box box.obj
-    shade bake box.obj -o out.exr "${SMALL[@]}" --rays 8
+    shade bake box.obj -o out.exr "${SMALL[@]}" --rays 8 --method cone
     refused 2 --rays cone 'rays, adaptive and exact'
     shade bake box.obj -o out.exr "${SMALL[@]}" --error --method smooth
     refused 2 --error smooth

@@ -81,10 +81,10 @@ info() {
 }
 
 @test "half floats take less room, and values are the same for any number of threads" {
-    shade volume scene.json -o 1.vdb --threads 1 --quiet
-    shade volume scene.json -o 5.vdb --threads 5 --isa base --quiet
+    shade volume scene.json --method cone --ao-method cones -o 1.vdb --threads 1 --quiet
+    shade volume scene.json --method cone --ao-method cones -o 5.vdb --threads 5 --isa base --quiet
     cmp 1.vdb 5.vdb
-    shade volume scene.json -o half.vdb --half --quiet
+    shade volume scene.json --method cone --ao-method cones -o half.vdb --half --quiet
     done_well
     [ "$(stat -c %s half.vdb)" -lt "$(($(stat -c %s 1.vdb) * 19 / 20))" ] || fail "not smaller"
     info half.vdb

@@ -1,5 +1,5 @@
-#include "parts.h"
 #include "../unit/previews.h"
+#include "parts.h"
 
 #include <math.h>
 
@@ -15,7 +15,8 @@ vsh_result parts_field(const vsh_run *run, vsh_grid **grid, vsh_field **field, v
     static const float corners[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1};
     static const uint32_t indices[] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
                                        3, 7, 6, 3, 6, 2, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5};
-    const vsh_mesh mesh = {"box", corners, NULL, NULL, indices, 8, 12, NULL, NULL, 0, 0, NULL};
+    const vsh_mesh mesh = {
+        .name = "box", .positions = corners, .indices = indices, .vertex_count = 8, .triangle_count = 12};
     vsh_grid_options options = vsh_grid_options_default();
     options.resolution = 6;
     vsh_field_options wide = vsh_field_options_default();

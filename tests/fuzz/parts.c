@@ -19,7 +19,12 @@ void fuzz_must(vsh_result result) {
 static fuzz_handles made;
 
 static void make(void) {
-    made.mesh = (vsh_mesh){"box", fuzz_corners, NULL, fuzz_uvs, fuzz_indices, 8, 12, NULL, NULL, 0, 0, NULL};
+    made.mesh = (vsh_mesh){.name = "box",
+                           .positions = fuzz_corners,
+                           .uvs = fuzz_uvs,
+                           .indices = fuzz_indices,
+                           .vertex_count = 8,
+                           .triangle_count = 12};
     vsh_run run = vsh_run_default();
     run.threads = 1;
     vsh_grid_options grid = vsh_grid_options_default();

@@ -48,8 +48,11 @@ static model make_sphere(int rows, double radius, int inverted) {
             }
         }
     }
-    m.mesh =
-        (vsh_mesh){"ball", m.positions, NULL, NULL, m.indices, vertices, triangles, NULL, NULL, 0, 0, NULL};
+    m.mesh = (vsh_mesh){.name = "ball",
+                        .positions = m.positions,
+                        .indices = m.indices,
+                        .vertex_count = vertices,
+                        .triangle_count = triangles};
     return m;
 }
 
@@ -101,8 +104,11 @@ static const float cube_positions[24] = {-1, -1, -1, 1, -1, -1, 1, 1, -1, -1, 1,
 static const uint32_t cube_indices[36] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
                                           3, 6, 2, 3, 7, 6, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5};
 
-static const vsh_mesh cube = {"cube", cube_positions, NULL, NULL, cube_indices, 8, 12,
-                              NULL,   NULL,           0,    0,    NULL};
+static const vsh_mesh cube = {.name = "cube",
+                              .positions = cube_positions,
+                              .indices = cube_indices,
+                              .vertex_count = 8,
+                              .triangle_count = 12};
 
 static void few_large_triangles_are_exact(void **state) {
     (void)state;
@@ -132,7 +138,8 @@ static void an_open_quad_becomes_a_shell_with_a_warning(void **state) {
     (void)state;
     static const float positions[12] = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
     static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    const vsh_mesh quad = {"sail", positions, NULL, NULL, indices, 4, 2, NULL, NULL, 0, 0, NULL};
+    const vsh_mesh quad = {
+        .name = "sail", .positions = positions, .indices = indices, .vertex_count = 4, .triangle_count = 2};
     int warnings = 0;
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
@@ -234,12 +241,12 @@ static void a_room_in_a_mesh_stays_open_and_keeps_its_furniture(void **state) {
             vertices += m->vertex_count;
         }
         const double mirrored[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0};
-        all.mesh = (vsh_mesh){"house",     all.positions,
-                              NULL,        NULL,
-                              all.indices, vertices,
-                              indices / 3, turned ? mirrored : NULL,
-                              NULL,        0,
-                              0,           NULL};
+        all.mesh = (vsh_mesh){.name = "house",
+                              .positions = all.positions,
+                              .indices = all.indices,
+                              .vertex_count = vertices,
+                              .triangle_count = indices / 3,
+                              .transform = turned ? mirrored : NULL};
         vsh_grid *grid = grid_of(&all.mesh, 1, 0.03, NULL);
         assert_true(worst_error(grid, room_with_a_ball, 2.9, 2.9) < 0.1);
         assert_int_equal(wrong_blocks(grid, room_with_a_ball, 8), 0);

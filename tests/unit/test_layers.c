@@ -355,7 +355,7 @@ static void test_refused(void **state) {
         {"layer 0: none of field, heights and spheres: expected one", vsh_layer_default()},
         {"layer 0: softness -1 is out of range 0 … 1000", {.softness = -1.0}},
         {"layer 0: softness nan is out of range 0 … 1000", {.softness = NAN}},
-        {"layer 0: method 9 is out of range -1 … 8", {.method = 9}},
+        {"layer 0: method 10 is out of range -1 … 9", {.method = 10}},
         {"layer 0: combine 2 is out of range 0 … 1", {.combine = 2}},
         {"layer 0: remap[1] 0.25 is out of range 0.5 … 1", {.remap = {0.5, 0.25}}},
         {"layer 0: remap from 0.5 to 0.5: expected a rise", {.remap = {0.5, 0.5}}},

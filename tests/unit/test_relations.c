@@ -165,8 +165,16 @@ static vsh_grid *grid_of_meshes(double scale, double half_width, bool open) {
         (&p[0][0])[i] = (float)scale * (&box[0][0])[i];
         (&q[0][0])[i % 15] = (float)scale * (&roof[0][0])[i % 15];
     }
-    const vsh_mesh meshes[2] = {{"box", &p[0][0], NULL, NULL, &sides[0][0], 8, 12, NULL, NULL, 0, 0, NULL},
-                                {"roof", &q[0][0], NULL, NULL, &slopes[0][0], 5, 4, NULL, NULL, 0, 0, NULL}};
+    const vsh_mesh meshes[2] = {{.name = "box",
+                                 .positions = &p[0][0],
+                                 .indices = &sides[0][0],
+                                 .vertex_count = 8,
+                                 .triangle_count = 12},
+                                {.name = "roof",
+                                 .positions = &q[0][0],
+                                 .indices = &slopes[0][0],
+                                 .vertex_count = 5,
+                                 .triangle_count = 4}};
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = 0.0625 * scale;
     options.half_width = half_width;

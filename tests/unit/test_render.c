@@ -121,7 +121,8 @@ static float floor_light(const vsh_field *field, const vsh_light *light, const d
     }
     const vsh_points points = {1, at, up, NULL};
     float open = -1.0f;
-    assert_int_equal(vsh_shade_ao(field, &points, NULL, NULL, &open, NULL, NULL, NULL), VSH_OK);
+    const vsh_shade_options shade = preview_options();
+    assert_int_equal(vsh_shade_ao(field, &points, &shade, NULL, &open, NULL, NULL, NULL), VSH_OK);
     return open;
 }
 

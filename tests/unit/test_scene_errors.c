@@ -32,7 +32,8 @@ static const struct {
     {"{\n\t@\"castors\": []}", "castors: unknown key; did you mean \"casters\"?"},
     {CASTERS "@\"é\":1,\"xyzzy\":1}", "é: unknown key"},
     {CASTERS "\"method\":@\"ré\",\"xyzzy\":1}",
-     "method: \"ré\" is none of hard, classic, practical, improved, smooth, cone, rays, adaptive, exact"},
+     "method: \"ré\" is none of hard, classic, practical, improved, smooth, cone, rays, adaptive, "
+     "exact, auto"},
     {CASTERS "\"method\":\"cone\",@\"xyzzy\":1}", "xyzzy: unknown key"},
     {"{\"receivers\":[],\"\\u0061o\":{\"distance\":1,@\"cone\":1}}",
      "ao.cone: unknown key; did you mean \"cones\"?"},
@@ -72,7 +73,7 @@ static const struct {
     {CASTERS "\"ao\":{@\"cones\":8,\"method\":\"taps\",\"distance\":1}}",
      "ao.cones: is no key of ao by taps"},
     {CASTERS "\"ao\":{\"method\":@\"ray\"}}",
-     "ao.method: \"ray\" is none of taps, cones, rays, adaptive, exact"},
+     "ao.method: \"ray\" is none of taps, cones, rays, adaptive, exact, auto"},
     {CASTERS "\"ao\":{@\"cones\":8,\"method\":\"rays\",\"distance\":1}}",
      "ao.cones: is no key of ao by rays"},
     {CASTERS "\"rays\":@0}", "rays: 0 is out of range 1 … 4096"},

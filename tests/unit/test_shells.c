@@ -21,7 +21,11 @@ static void make_box(box_mesh *box, const double low[3], const double high[3]) {
     for (int i = 0; i < 24; ++i) {
         box->positions[i] = (float)(corners[i / 3][i % 3] ? high[i % 3] : low[i % 3]);
     }
-    box->mesh = (vsh_mesh){"box", box->positions, NULL, NULL, &SIDES[0][0], 8, 12, NULL, NULL, 0, 0, NULL};
+    box->mesh = (vsh_mesh){.name = "box",
+                           .positions = box->positions,
+                           .indices = &SIDES[0][0],
+                           .vertex_count = 8,
+                           .triangle_count = 12};
 }
 
 static caster caster_of_boxes(const double (*corners)[2][3], int count, double voxel) {

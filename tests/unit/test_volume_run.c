@@ -416,7 +416,7 @@ static void bad_boxes_bands_and_options_are_refused(void **state) {
     options = preview_volume_options();
     options.shade.rays = 4097;
     assert_fails(vsh_bake_volume(field, voxels, lights, 1, &options, NULL, &volume, NULL, &failure),
-                 VSH_ERROR_ARGUMENT, "rays 0");
+                 VSH_ERROR_ARGUMENT, "rays 4097");
     options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_method = VSH_AO_TAPS;
