@@ -8,7 +8,7 @@
 
 typedef struct vshi_numbers {
     locale_t locale;
-    uint16_t control; /* x87: glibc's printf() and strtod() round as its control word says */
+    uint16_t control; /* x87: glibc rounds numbers to and from text as its control word says */
 } vshi_numbers;
 
 static inline uint16_t vshi_numbers_control(void) {
