@@ -75,3 +75,18 @@ load helper
     shade bake touching.obj "${SMALL[@]}" --size 64 -o out.exr
     [[ $stderr == *"they touch"*"margin"* ]] || fail "not told"
 }
+
+@test "with nothing said rays decide what is valid, as with exact, and voxels do not" {
+    write_box box.obj
+    awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
+    options=(--caster above.obj --sun 0.3,1,0.2 --ao 0.5 --size 64 --invalid-channel --quiet)
+    shade bake box.obj "${options[@]}" --resolution 8 -o auto.exr
+    done_well
+    shade bake box.obj "${options[@]}" --resolution 8 --method exact --ao-method exact -o exact.exr
+    done_well
+    same_values auto.exr exact.exr
+    shade bake box.obj "${options[@]}" --resolution 64 -o finer.exr
+    done_well
+    shade compare auto.exr finer.exr
+    [[ $output == *"A: alike; "*" covered, 0 in one alone"* ]] || fail "voxels decide"
+}
