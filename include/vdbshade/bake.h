@@ -137,7 +137,9 @@ VSH_API uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_r
                                        int32_t tint);
 
 /* The samples behind a lightmap, in the order in which they are shaded. A view into the texels. Positions are
- * lifted off coarse triangles towards the smooth surface (Hanika, "Hacking the shadow terminator", 2021). */
+ * lifted off coarse triangles towards the smooth surface (Hanika, "Hacking the shadow terminator", 2021).
+ * Rays against triangles begin on the sample's own where others are in the lift's way, or all of a light is
+ * over it. */
 typedef struct vsh_texel_samples {
     size_t count;
     const double *positions; /* [count][3], world units */

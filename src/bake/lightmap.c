@@ -1,6 +1,7 @@
 #include "bake/bend.h"
 #include "bake/halo.h"
 #include "bake/lattice.h"
+#include "bake/lift.h"
 #include "bake/origins.h"
 #include "bake/spread.h"
 #include "bake/take.h"
@@ -241,8 +242,12 @@ static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
     const vsh_points points = points_of(bake, vshi_shadow_traces(&bake->shade), &shade);
     float *errors = lightmap->shadow_error != NULL ? lightmap->shadow_error[index] : NULL;
     vsh_result result =
-        vshi_shade_shadow(bake->field, &points, &bake->origins.rows, &bake->lights[index], &shade, &bake->run,
-                          bake->values, errors != NULL ? bake->deviation : NULL, &bake->stats.shade, error);
+        vshi_lift_for(bake->texels, &bake->lights[index], &bake->quiet, &bake->origins, error);
+    if (result == VSH_OK) {
+        result = vshi_shade_shadow(bake->field, &points, &bake->origins.rows, &bake->lights[index], &shade,
+                                   &bake->run, bake->values, errors != NULL ? bake->deviation : NULL,
+                                   &bake->stats.shade, error);
+    }
     if (result == VSH_OK && errors != NULL) {
         result = average(bake, bake->deviation, 1, errors, error);
     }
@@ -337,11 +342,14 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
         vsh_shade_options shade;
         const vsh_points points = points_of(bake, vshi_ao_traces(&bake->shade), &shade);
         float *deviation = lightmap->ao_error != NULL ? bake->deviation : NULL;
-        result = interpolates(bake)
-                     ? vshi_lattice_ao(bake->field, texels, &bake->origins, &points, &shade, &bake->run,
-                                       bake->values, deviation, bake->bent, &bake->stats.shade, error)
-                     : vshi_shade_ao(bake->field, &points, &bake->origins.rows, &shade, &bake->run,
-                                     bake->values, deviation, bake->bent, &bake->stats.shade, error);
+        result = vshi_lift_for(texels, NULL, &bake->quiet, &bake->origins, error);
+        if (result == VSH_OK) {
+            result = interpolates(bake)
+                         ? vshi_lattice_ao(bake->field, texels, &bake->origins, &points, &shade, &bake->run,
+                                           bake->values, deviation, bake->bent, &bake->stats.shade, error)
+                         : vshi_shade_ao(bake->field, &points, &bake->origins.rows, &shade, &bake->run,
+                                         bake->values, deviation, bake->bent, &bake->stats.shade, error);
+        }
         if (result == VSH_OK && lightmap->ao_error != NULL) {
             result = average(bake, bake->deviation, 1, lightmap->ao_error, error);
         }

@@ -1,6 +1,7 @@
 #include "bake/origins.h"
 #include "analytic/heights.h"
 #include "analytic/spheres.h"
+#include "bake/lift.h"
 #include "bake/take.h"
 #include "base/parallel.h"
 #include "shade/inside.h"
@@ -45,7 +46,6 @@ typedef struct lifting {
     const vshi_kernel *kernel;
     uint8_t
         *crease; /* [samples]: 0, or 1 + the field in whose crease a sample lies, that of the highest probe */
-    uint8_t *dropped; /* [samples]: 1 where the position is put down on its triangle again */
 } lifting;
 
 static size_t block_end(const lifting *l, size_t block) {
@@ -55,13 +55,7 @@ static size_t block_end(const lifting *l, size_t block) {
 
 /* The sample itself, without any offset. */
 static vshi_vec place(const lifting *l, size_t i) {
-    const vsh_texels *texels = l->texels;
-    const vshi_vec p = vshi_vec_of(texels->position + 3 * i);
-    if (!l->dropped[i]) {
-        return p;
-    }
-    const vshi_vec normal = vshi_vec_off(texels->geometric + 3 * i);
-    return vshi_sub(p, vshi_scale(normal, (double)texels->height[i]));
+    return l->origins->dropped[i] ? vshi_lift_foot(l->texels, i) : vshi_vec_of(l->texels->position + 3 * i);
 }
 
 static void put(vshi_vec p, double at[3]) {
@@ -121,31 +115,6 @@ static void look(const lifting *l, size_t field, size_t first, size_t last) {
     }
 }
 
-/* Samples that are lifted through other triangles are put down again. */
-static void put_down(const lifting *l, const vsh_triangles *triangles, size_t first, size_t last) {
-    const vsh_texels *texels = l->texels;
-    const double hair = vshi_triangles_lift(triangles);
-    vshi_segment_ray rays[VSHI_ORIGIN_BLOCK];
-    uint16_t of[VSHI_ORIGIN_BLOCK];
-    bool blocked[VSHI_ORIGIN_BLOCK];
-    size_t count = 0;
-    for (size_t i = first; i < last; ++i) {
-        const double height = (double)texels->height[i];
-        if (!(height > hair)) {
-            continue;
-        }
-        const vshi_vec normal = vshi_vec_off(texels->geometric + 3 * i);
-        const vshi_vec low =
-            vshi_add(vshi_vec_of(texels->position + 3 * i), vshi_scale(normal, hair - height));
-        rays[count] = (vshi_segment_ray){{low.x, low.y, low.z}, {normal.x, normal.y, normal.z}, height};
-        of[count++] = (uint16_t)(i - first);
-    }
-    vshi_triangles_blocked(triangles, rays, count, blocked);
-    for (size_t k = 0; k < count; ++k) {
-        l->dropped[first + of[k]] = l->dropped[first + of[k]] || blocked[k];
-    }
-}
-
 /* A block that is traced. */
 typedef struct tracing {
     const lifting *lifting;
@@ -195,7 +164,7 @@ static void validate(void *user, size_t begin, size_t end) {
         memset(l->origins->valid + first, 1, last - first);
         for (size_t field = 0; field < l->field_count; ++field) {
             if (l->fields[field].triangles != NULL) {
-                put_down(l, l->fields[field].triangles, first, last);
+                vshi_lift_drop(l->texels, l->fields[field].triangles, first, last, l->origins->dropped);
             }
         }
         for (size_t field = 0; field < l->field_count; ++field) {
@@ -260,9 +229,6 @@ static void pack(void *user, size_t begin, size_t end) {
                 lift(l, i, crease > 0 ? l->fields[crease - 1].probe : l->offset, l->fields[0].shell,
                      origins->position + 3 * next);
                 memcpy(origins->normal + 3 * next, l->texels->normal + 3 * i, 3 * sizeof(float));
-                if (origins->surface != NULL) {
-                    put(place(l, i), origins->surface + 3 * next);
-                }
                 origins->texel[next] = sampler_texel(l->texels, i);
                 ++next;
             }
@@ -337,7 +303,7 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
     origins->valid = vshi_take(texels->count, 1, name, &result, error);
     origins->seen = vshi_take(texels->count, 1, name, &result, error);
     l.crease = vshi_take(texels->count, 1, name, &result, error);
-    l.dropped = vshi_take(texels->count, 1, name, &result, error);
+    origins->dropped = vshi_take(texels->count, 1, name, &result, error);
     origins->before = vshi_take(origins->blocks + 1, sizeof(size_t), name, &result, error);
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, origins->blocks, 1, 1, validate, &l, error);
@@ -363,7 +329,6 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, origins->blocks, 1, 1, pack, &l, error);
     }
-    free(l.dropped);
     free(l.crease);
     vshi_job_end(job);
     return result;
@@ -376,6 +341,7 @@ void vshi_origins_free(vshi_origins *origins) {
     free(origins->position);
     free(origins->row_start);
     free(origins->before);
+    free(origins->dropped);
     free(origins->seen);
     free(origins->valid);
     *origins = (vshi_origins){0};

@@ -10,14 +10,16 @@ enum { VSHI_ORIGIN_BLOCK = 1024 }; /* samples that are worked on together */
 typedef struct vshi_origins {
     size_t count;
     double *position; /* [count][3]: lifted off the surface, world units */
-    double
-        *surface;  /* [count][3]: not lifted, for rays against triangles; NULL where no method traces them */
-    float *normal; /* [count][3]: decides shadow */
-    uint32_t *texel; /* [count]: as vsh_points.texels; a texel's further samples get numbers of their own */
-    uint8_t *valid;  /* [all samples]: 1 where the sample is among them */
-    uint8_t *seen;   /* [all samples]: 1 where one that is not is seen from outside all the same */
-    size_t blocks;   /* of all samples */
-    size_t *before;  /* [blocks + 1]: valid samples before each block */
+    double *surface;  /* [count][3]: where rays against triangles begin, set by vshi_lift_for(); NULL where no
+                         method traces them */
+    float *normal;    /* [count][3]: decides shadow */
+    uint32_t *texel;  /* [count]: as vsh_points.texels; a texel's further samples get numbers of their own */
+    uint8_t *valid;   /* [all samples]: 1 where the sample is among them */
+    uint8_t *seen;    /* [all samples]: 1 where one that is not is seen from outside all the same */
+    uint8_t
+        *dropped;   /* [all samples]: 1 where one stands on its triangle, as something is in its lift's way */
+    size_t blocks;  /* of all samples */
+    size_t *before; /* [blocks + 1]: valid samples before each block */
     vshi_point_rows rows; /* of tiles, the band's own counted */
     size_t *row_start;    /* [rows.count + 1] */
 } vshi_origins;

@@ -44,14 +44,14 @@ bool vshi_surface_set(const vsh_mesh *mesh, size_t triangle, vshi_surface *surfa
 }
 
 void vshi_surface_at(const vshi_surface *surface, const double weight[3], vshi_vec *position,
-                     vshi_vec *normal, double *height) {
+                     vshi_vec *normal, vshi_vec *lift) {
     const double b[3] = {weight[0], weight[surface->mirrored ? 2 : 1], weight[surface->mirrored ? 1 : 2]};
     const vshi_vec *corner = surface->corner;
     const vshi_vec p = vshi_add(corner[0], vshi_add(vshi_scale(vshi_sub(corner[1], corner[0]), b[1]),
                                                     vshi_scale(vshi_sub(corner[2], corner[0]), b[2])));
     *position = p;
     *normal = surface->geometric;
-    *height = 0.0;
+    *lift = (vshi_vec){0.0, 0.0, 0.0};
     if (!surface->smooth) {
         return;
     }
@@ -64,7 +64,7 @@ void vshi_surface_at(const vshi_surface *surface, const double weight[3], vshi_v
             *position = vshi_add(*position, vshi_scale(n, -b[k] * below));
         }
     }
-    *height = vshi_dot(vshi_sub(*position, p), surface->geometric);
+    *lift = vshi_sub(*position, p);
     vshi_vec unit = vshi_unit(sum);
     const double cosine = vshi_dot(unit, surface->geometric);
     if (cosine < LEAST_COSINE) {

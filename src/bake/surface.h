@@ -20,9 +20,9 @@ typedef struct vshi_surface {
 bool vshi_surface_set(const vsh_mesh *mesh, size_t triangle, vshi_surface *surface);
 
 /* Position and normal at barycentric weights of the triangle's corners as the mesh's indices give them, and
- * how far over the triangle's plane the position is lifted. */
+ * how far the position is off the triangle. */
 void vshi_surface_at(const vshi_surface *surface, const double weight[3], vshi_vec *position,
-                     vshi_vec *normal, double *height);
+                     vshi_vec *normal, vshi_vec *lift);
 
 /* The direction in which a triangle's u grows, unit, and 1 or -1: the side of normal × tangent on which v
  * grows. A zero vector where the UVs have no area. */

@@ -52,11 +52,11 @@ static void write_sample(writer *w, uint32_t number, uint32_t texel, const doubl
         }
         w->number = number;
     }
-    vshi_vec position, normal;
-    double height;
-    vshi_surface_at(&w->surface, weight, &position, &normal, &height);
+    vshi_vec position, normal, lift;
+    vshi_surface_at(&w->surface, weight, &position, &normal, &lift);
     const double p[3] = {position.x, position.y, position.z};
     const double n[3] = {normal.x, normal.y, normal.z};
+    const double up[3] = {lift.x, lift.y, lift.z};
     const double g[3] = {w->surface.geometric.x, w->surface.geometric.y, w->surface.geometric.z};
     for (size_t k = 0; k < 3; ++k) {
         w->box->low[k] = p[k] < w->box->low[k] ? p[k] : w->box->low[k];
@@ -70,8 +70,8 @@ static void write_sample(writer *w, uint32_t number, uint32_t texel, const doubl
         texels->position[3 * i + k] = p[k];
         texels->normal[3 * i + k] = (float)n[k];
         texels->geometric[3 * i + k] = (float)g[k];
+        texels->lift[3 * i + k] = (float)up[k];
     }
-    texels->height[i] = (float)height;
     texels->texel[i] = texel;
     const vsh_charts *charts = w->all->charts;
     const bool sheet = charts->sheet[charts->sorted.first[mesh] + w->work->local[number - 1]] != 0;
@@ -198,7 +198,7 @@ static vsh_result take_samples(vsh_texels *texels, bool tangents, vsh_error *err
     texels->position = vshi_take(texels->count, 3 * sizeof(double), what, &result, error);
     texels->normal = vshi_take(texels->count, 3 * sizeof(float), what, &result, error);
     texels->geometric = vshi_take(texels->count, 3 * sizeof(float), what, &result, error);
-    texels->height = vshi_take(texels->count, sizeof(float), what, &result, error);
+    texels->lift = vshi_take(texels->count, 3 * sizeof(float), what, &result, error);
     texels->texel = vshi_take(texels->count, sizeof(uint32_t), what, &result, error);
     texels->mesh = vshi_take(texels->count, sizeof(uint32_t), what, &result, error);
     texels->tangent = vshi_take(tangents ? texels->count : 0, 4 * sizeof(float), what, &result, error);
@@ -305,7 +305,7 @@ void vsh_texels_free(vsh_texels *texels) {
     free(texels->tangent);
     free(texels->mesh);
     free(texels->texel);
-    free(texels->height);
+    free(texels->lift);
     free(texels->geometric);
     free(texels->normal);
     free(texels->position);

@@ -27,7 +27,7 @@ struct vsh_charts {
 
 /* Bytes of one sample in texels. */
 static inline size_t vshi_sample_bytes(bool tangents) {
-    return 3 * sizeof(double) + (tangents ? 11 : 7) * sizeof(float) + 2 * sizeof(uint32_t);
+    return 3 * sizeof(double) + (tangents ? 13 : 9) * sizeof(float) + 2 * sizeof(uint32_t);
 }
 
 /* vsh_charts_create() with all that is checked, but for the memory of samples: VSH_ERROR_LIMIT where there
@@ -70,7 +70,7 @@ struct vsh_texels {
     double *position;        /* [count][3] */
     float *normal;           /* [count][3] */
     float *geometric;        /* [count][3] */
-    float *height;           /* [count]: of the position over its triangle's plane, world units */
+    float *lift;             /* [count][3]: of the position off its triangle, world units */
     uint32_t *texel;         /* [count]: in the whole lightmap */
     uint32_t *mesh;          /* [count]: index of the mesh, and VSHI_SAMPLE_SHEET: vshi_sample_mesh() */
     float *tangent;          /* [count][4]: of the triangle, unit, and its handedness; NULL: not asked for */

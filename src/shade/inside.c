@@ -21,6 +21,14 @@ enum {
  * third of the rays, is to be baked. */
 static const double MAJORITY = 0.75;
 
+/* And of all of them, where the COUNTED agree on inside and one of the first does not: under the mouth of a
+ * pipe whose faces look inwards three rays go into it, and more than half escape. */
+static const double AGREED = 2.0 / 3.0;
+
+/* Rays begin a little off the surface, and so on the wrong side of what is nearer than that. Those of points
+ * inside by them, where something is, begin at this part of it: some roundings of a float. */
+static const double NEARER = 0.25;
+
 /* Directions over a hemisphere around +z, none along an axis, where the edges of what people build lie: the
  * golden angle apart, from 18° to 75° off the normal. The first two lean to opposite sides. */
 static const double DIRECTIONS[FIRST + MOST][3] = {
@@ -55,19 +63,40 @@ static void aim(const looking *l, size_t point, size_t direction, vshi_segment_r
     *ray = (vshi_segment_ray){{p.x, p.y, p.z}, {d.x, d.y, d.z}, INFINITY};
 }
 
-/* Follows rays all the way: more of them where they disagree. */
+/* Whether a ray begins in a solid, followed all the way. */
+static bool begins_inside(const looking *l, size_t point, int direction, bool *seen) {
+    vshi_segment_ray ray;
+    bool escaped;
+    aim(l, point, (size_t)direction, &ray);
+    const bool inside = vshi_triangles_depth(l->triangles, &ray, &escaped) > 0;
+    *seen = *seen || escaped;
+    return inside;
+}
+
+/* Follows rays all the way: more of them where they disagree, with each other or with the first. */
 static uint8_t count_through(const looking *l, size_t point, bool seen) {
-    int inside = 0, taken = 0;
-    for (int target = COUNTED; taken < target;) {
-        vshi_segment_ray ray;
-        bool escaped;
-        aim(l, point, (size_t)(FIRST + taken), &ray);
-        inside += vshi_triangles_depth(l->triangles, &ray, &escaped) > 0;
-        seen = seen || escaped;
-        ++taken;
-        target = taken == COUNTED && inside != 0 && inside != COUNTED ? MOST : target;
+    int inside = 0, all = MOST;
+    double share = MAJORITY;
+    for (int k = 0; k < COUNTED; ++k) {
+        inside += begins_inside(l, point, FIRST + k, &seen);
     }
-    return inside < MAJORITY * taken ? VSHI_OUTSIDE : seen ? VSHI_INSIDE_SEEN : VSHI_INSIDE;
+    if (inside == 0) {
+        return VSHI_OUTSIDE;
+    }
+    if (inside == COUNTED) {
+        for (int k = 0; k < FIRST; ++k) {
+            inside += begins_inside(l, point, k, &seen);
+        }
+        if (inside == COUNTED + FIRST) {
+            return seen ? VSHI_INSIDE_SEEN : VSHI_INSIDE;
+        }
+        all += FIRST;
+        share = AGREED;
+    }
+    for (int k = COUNTED; k < MOST; ++k) {
+        inside += begins_inside(l, point, FIRST + k, &seen);
+    }
+    return inside < share * all ? VSHI_OUTSIDE : seen ? VSHI_INSIDE_SEEN : VSHI_INSIDE;
 }
 
 /* For a point whose first rays all begin in solids with holes: whether others do as well. */
@@ -113,6 +142,31 @@ static void look(const looking *l, size_t first, size_t count, uint8_t *where) {
     }
 }
 
+/* Looks again at points inside that have a triangle closer than the rays' lift. */
+static void look_nearer(const looking *l, size_t first, size_t count, uint8_t *where) {
+    looking nearer = *l;
+    nearer.lift *= NEARER;
+    vshi_segment_ray rays[AT_ONCE];
+    size_t of[AT_ONCE], some = 0;
+    bool blocked[AT_ONCE];
+    for (size_t i = first; i < first + count; ++i) {
+        if (where[i] != VSHI_OUTSIDE) {
+            const vshi_vec normal = vshi_vec_off(l->normals + 3 * i);
+            const vshi_vec p = vshi_add(vshi_vec_of(l->positions + 3 * i), vshi_scale(normal, nearer.lift));
+            rays[some] = (vshi_segment_ray){{p.x, p.y, p.z}, {normal.x, normal.y, normal.z}, l->lift};
+            of[some++] = i;
+        }
+    }
+    if (some > 0) {
+        vshi_triangles_blocked(l->triangles, rays, some, blocked);
+    }
+    for (size_t k = 0; k < some; ++k) {
+        if (blocked[k]) {
+            look(&nearer, of[k], 1, where);
+        }
+    }
+}
+
 void vshi_inside(const vsh_triangles *triangles, size_t count, const double *positions, const float *normals,
                  vshi_open_fn *open, const void *user, uint8_t *where) {
     memset(where, VSHI_OUTSIDE, count);
@@ -123,6 +177,8 @@ void vshi_inside(const vsh_triangles *triangles, size_t count, const double *pos
         triangles, positions, normals, vshi_triangles_lift(triangles), vshi_triangles_have_holes(triangles),
         open,      user};
     for (size_t first = 0; first < count; first += AT_ONCE) {
-        look(&l, first, count - first < AT_ONCE ? count - first : AT_ONCE, where);
+        const size_t some = count - first < AT_ONCE ? count - first : AT_ONCE;
+        look(&l, first, some, where);
+        look_nearer(&l, first, some, where);
     }
 }

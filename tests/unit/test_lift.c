@@ -1,0 +1,272 @@
+/* Samples that are lifted off the facets of a smooth sphere: where rays to a light begin, and what is in a
+ * lift's way. The truth is that of the facets. */
+#include "texels_of.h"
+
+#include <stdbool.h>
+#include <vdbshade/vdbshade.h>
+
+enum { ROWS = 8, WIDTH = 256, HEIGHT = 128, TEXELS = WIDTH * HEIGHT };
+
+static const double HAIR = 1e-5; /* above the facets, for truth */
+
+static void check(vsh_result result, const vsh_error *error) {
+    if (result != VSH_OK) {
+        fail_msg("%s", error->message);
+    }
+}
+
+/* A box without UVs: it casts only. */
+typedef struct box {
+    float positions[24];
+    vsh_mesh mesh;
+} box;
+
+static void make_box(box *b, const double low[3], const double high[3]) {
+    static const uint32_t SIDES[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    for (size_t v = 0; v < 8; ++v) {
+        for (size_t axis = 0; axis < 3; ++axis) {
+            b->positions[3 * v + axis] = (float)((v >> axis & 1) != 0 ? high[axis] : low[axis]);
+        }
+    }
+    b->mesh = (vsh_mesh){
+        .name = "box", .positions = b->positions, .indices = SIDES, .vertex_count = 8, .triangle_count = 12};
+}
+
+/* A smooth sphere of radius 1 that is baked, and what casts on it. */
+typedef struct scene {
+    sphere ball;
+    vsh_field *field;
+    vsh_triangles *triangles;
+    vsh_texels *texels, *facets; /* the same samples, of the sphere without normals */
+    vsh_texel_samples lifted, flat;
+} scene;
+
+static void open_scene(scene *s, const box *other) {
+    vsh_error error = {VSH_OK, ""};
+    make_sphere(&s->ball, ROWS, 1.0);
+    const vsh_mesh casters[2] = {s->ball.mesh, other != NULL ? other->mesh : (vsh_mesh){0}};
+    const size_t count = other != NULL ? 2 : 1;
+    vsh_grid_options grid_options = vsh_grid_options_default();
+    grid_options.resolution = 64;
+    vsh_grid *grid = NULL;
+    check(vsh_grid_from_meshes(casters, count, &grid_options, NULL, &grid, &error), &error);
+    check(vsh_field_create(grid, NULL, NULL, &s->field, &error), &error);
+    check(vsh_triangles_create(casters, count, NULL, &s->triangles, &error), &error);
+    vsh_grid_free(grid);
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = WIDTH;
+    options.height = HEIGHT;
+    options.ao_spacing = 1;
+    options.shade.method = VSH_SHADOW_EXACT;
+    options.shade.ao_method = VSH_AO_EXACT;
+    options.shade.ao_distance = 0.1;
+    options.shade.rays = 64;
+    options.shade.triangles = s->triangles;
+    vsh_mesh faceted = s->ball.mesh;
+    faceted.normals = NULL;
+    s->texels = create(&s->ball.mesh, 1, options, NULL);
+    s->facets = create(&faceted, 1, options, NULL);
+    s->lifted = vsh_texels_samples(s->texels);
+    s->flat = vsh_texels_samples(s->facets);
+    assert_int_equal(s->lifted.count, s->flat.count);
+}
+
+static void close_scene(scene *s) {
+    vsh_texels_free(s->facets);
+    vsh_texels_free(s->texels);
+    vsh_triangles_free(s->triangles);
+    vsh_field_free(s->field);
+    free_sphere(&s->ball);
+}
+
+static void bake(const scene *s, const vsh_light *lights, size_t light_count, const vsh_lightmap *planes) {
+    vsh_error error = {VSH_OK, ""};
+    check(vsh_bake_lightmap(s->field, s->texels, lights, light_count, NULL, NULL, planes, NULL, &error),
+          &error);
+}
+
+static double dot(const float *a, const double *b) {
+    return (double)a[0] * b[0] + (double)a[1] * b[1] + (double)a[2] * b[2];
+}
+
+/* Half a degree wide. */
+static vsh_light sun_towards(double x, double y, double z) {
+    vsh_light light = vsh_light_default();
+    const double length = sqrt(x * x + y * y + z * z);
+    light.direction[0] = x / length;
+    light.direction[1] = y / length;
+    light.direction[2] = z / length;
+    return light;
+}
+
+/* The direction to a light, and how far it is. */
+static double towards(const vsh_light *light, const double *from, double to[3]) {
+    for (int k = 0; k < 3; ++k) {
+        to[k] = light->type == VSH_LIGHT_DIRECTIONAL ? light->direction[k] : light->position[k] - from[k];
+    }
+    const double length = sqrt(to[0] * to[0] + to[1] * to[1] + to[2] * to[2]);
+    for (int k = 0; k < 3; ++k) {
+        to[k] /= length;
+    }
+    return length;
+}
+
+/* A bar over the sphere: its shadow is narrower than two of the lifts that would move it. */
+static void rays_to_a_light_well_above_a_facet_begin_on_it(void **state) {
+    (void)state;
+    box bar;
+    make_box(&bar, (double[]){-0.03, 1.05, -1.0}, (double[]){0.0, 1.08, 1.0});
+    scene s;
+    open_scene(&s, &bar);
+    vsh_light lights[2] = {sun_towards(1.0, 1.0, 0.1), sun_towards(0.0, 0.0, 1.0)};
+    lights[1].type = VSH_LIGHT_SPHERE;
+    lights[1].position[0] = 1.5;
+    lights[1].position[1] = 2.5;
+    lights[1].radius = 0.02;
+    for (int l = 0; l < 2; ++l) {
+        const vsh_light *light = &lights[l];
+        float *shadow = calloc(TEXELS, sizeof *shadow), *truth = calloc(TEXELS, sizeof *truth);
+        bake(&s, light, 1, &(vsh_lightmap){.shadow = &shadow});
+        vsh_error error = {VSH_OK, ""};
+        check(vsh_trace_shadow(s.triangles, NULL, s.flat.count, s.flat.positions, s.flat.geometric_normals,
+                               HAIR, light, 64, NULL, truth, &error),
+              &error);
+        size_t hidden = 0, off = 0;
+        for (size_t i = 0; i < s.flat.count; ++i) {
+            double to[3];
+            towards(light, s.flat.positions + 3 * i, to);
+            if (dot(s.flat.geometric_normals + 3 * i, to) < 0.35) {
+                continue;
+            }
+            hidden += truth[i] < 0.5f;
+            off += fabsf(shadow[s.lifted.texel[i]] - truth[i]) > 0.5f;
+        }
+        assert_true(hidden > 100);
+        assert_int_equal(off, 0);
+        free(truth);
+        free(shadow);
+    }
+    close_scene(&s);
+}
+
+/* A light of 11.5° each way, near and far. */
+static void facets_do_not_hide_a_light_that_is_over_the_smooth_sphere(void **state) {
+    (void)state;
+    static const double SINE = 0.2;
+    scene s;
+    open_scene(&s, NULL);
+    vsh_light lights[2] = {sun_towards(1.0, 0.3, 0.2), sun_towards(1.0, 0.3, 0.2)};
+    lights[0].angle = 2.0 * asin(SINE);
+    lights[1].type = VSH_LIGHT_SPHERE;
+    lights[1].position[0] = 5.0;
+    lights[1].position[1] = 1.0;
+    lights[1].radius = SINE * 4.5;
+    for (int l = 0; l < 2; ++l) {
+        const vsh_light *light = &lights[l];
+        float *shadow = calloc(TEXELS, sizeof *shadow);
+        bake(&s, light, 1, &(vsh_lightmap){.shadow = &shadow});
+        size_t cut = 0, dark = 0;
+        for (size_t i = 0; i < s.flat.count; ++i) {
+            double to[3];
+            const double length = towards(light, s.flat.positions + 3 * i, to);
+            const double sine = l == 0 ? SINE : light->radius / length;
+            if (dot(s.flat.geometric_normals + 3 * i, to) < sine &&
+                dot(s.lifted.normals + 3 * i, to) > sine + 0.02) {
+                ++cut;
+                dark += shadow[s.lifted.texel[i]] < 0.95f;
+            }
+        }
+        assert_true(cut > 200);
+        assert_int_equal(dark, 0);
+        free(shadow);
+    }
+    close_scene(&s);
+}
+
+/* A box whose face cuts the sphere: between the facets and the smooth sphere, near the cut. */
+static void samples_are_valid_by_where_their_facets_are(void **state) {
+    (void)state;
+    static const double FACE = 0.953, CLEAR = 1e-4;
+    box wall;
+    make_box(&wall, (double[]){FACE, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
+    scene s;
+    open_scene(&s, &wall);
+    float *ao = calloc(TEXELS, sizeof *ao), *coverage = calloc(TEXELS, sizeof *coverage);
+    bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao, .coverage = coverage});
+    size_t between = 0, wrong = 0;
+    for (size_t i = 0; i < s.flat.count; ++i) {
+        const double x = s.flat.positions[3 * i];
+        const bool valid = coverage[s.lifted.texel[i]] == 1.0f;
+        between += x < FACE && s.lifted.positions[3 * i] > FACE;
+        wrong += fabs(x - FACE) > CLEAR && valid != (x < FACE);
+    }
+    assert_true(between > 50);
+    assert_int_equal(wrong, 0);
+    free(coverage);
+    free(ao);
+    close_scene(&s);
+}
+
+/* A box just beyond where samples are lifted to. */
+static void samples_are_not_lifted_close_to_what_is_over_them(void **state) {
+    (void)state;
+    static const double FACE = 1.018;
+    box over;
+    make_box(&over, (double[]){FACE, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
+    scene s;
+    open_scene(&s, &over);
+    float *ao = calloc(TEXELS, sizeof *ao), *truth = calloc(TEXELS, sizeof *truth);
+    bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao});
+    vsh_error error = {VSH_OK, ""};
+    check(vsh_trace_ao(s.triangles, NULL, s.flat.count, s.flat.positions, s.lifted.normals, HAIR, 0.1, 256,
+                       NULL, truth, &error),
+          &error);
+    size_t under = 0;
+    double worst = 0.0;
+    for (size_t i = 0; i < s.flat.count; ++i) {
+        if (FACE - s.flat.positions[3 * i] < 0.045) {
+            ++under;
+            worst = fmax(worst, fabs((double)(ao[s.lifted.texel[i]] - truth[i])));
+        }
+    }
+    assert_true(under > 50);
+    assert_true(worst < 0.1);
+    free(truth);
+    free(ao);
+    close_scene(&s);
+}
+
+static void a_light_changes_nothing_for_other_lights_and_ao(void **state) {
+    (void)state;
+    scene s;
+    open_scene(&s, NULL);
+    const vsh_light lights[2] = {sun_towards(0.0, 1.0, 0.0), sun_towards(1.0, 0.0, 0.0)};
+    float *planes[5];
+    for (int k = 0; k < 5; ++k) {
+        planes[k] = calloc(TEXELS, sizeof *planes[k]);
+    }
+    bake(&s, lights, 2, &(vsh_lightmap){.shadow = planes, .ao = planes[2]});
+    bake(&s, lights + 1, 1, &(vsh_lightmap){.shadow = planes + 3});
+    bake(&s, NULL, 0, &(vsh_lightmap){.ao = planes[4]});
+    assert_memory_equal(planes[1], planes[3], TEXELS * sizeof(float));
+    assert_memory_equal(planes[2], planes[4], TEXELS * sizeof(float));
+    for (int k = 0; k < 5; ++k) {
+        free(planes[k]);
+    }
+    close_scene(&s);
+}
+
+int main(void) {
+    if (!vsh_triangles_available()) {
+        return 0;
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rays_to_a_light_well_above_a_facet_begin_on_it),
+        cmocka_unit_test(facets_do_not_hide_a_light_that_is_over_the_smooth_sphere),
+        cmocka_unit_test(samples_are_valid_by_where_their_facets_are),
+        cmocka_unit_test(samples_are_not_lifted_close_to_what_is_over_them),
+        cmocka_unit_test(a_light_changes_nothing_for_other_lights_and_ao),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
