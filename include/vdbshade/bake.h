@@ -183,6 +183,24 @@ typedef struct vsh_lightmap {
                        vsh_bake_stats; 0 elsewhere. Not padded */
 } vsh_lightmap;
 
+/* What is known of a channel's error, in sums over its values, so that those of bands add up. Begins as
+ * zeros. */
+typedef struct vsh_bake_error {
+    double values;       /* valid samples, where the channel's method keeps an error; else 0 */
+    double square_error; /* over them: the squared error that rays leave, as the method estimates it */
+    double held;         /* values that stand for the samples that were held against the casters themselves */
+    double held_square_error; /* over them: the squared error, of whatever cause: rays, voxels, samples that
+                                 are invalid by mistake and were filled */
+} vsh_bake_error;
+
+/* The root mean square error that is estimated: what rays leave, or what was found against the casters where
+ * that is more. NaN where there are no values. */
+VSH_API double vsh_bake_error_rmse(const vsh_bake_error *error);
+
+/* What of it rays don't account for, root mean square: the field's own, as its voxels differ from the
+ * casters. NaN where nothing was held against them. */
+VSH_API double vsh_bake_error_field(const vsh_bake_error *error);
+
 typedef struct vsh_bake_stats {
     size_t struct_size;
     uint64_t texels;           /* covered */
@@ -194,10 +212,19 @@ typedef struct vsh_bake_stats {
     vsh_shade_stats shade;     /* added to */
     uint64_t seen_texels;      /* of the invalid ones: in plain sight, rays from them escape. Of exact methods
                                   only:      a field does not tell, and leaves it 0 */
+    vsh_bake_error *errors; /* [light_count + 1]: of each light, then of AO; added to; NULL: not wanted */
+    const vsh_triangles *truth_triangles; /* with `errors`: the casters themselves. Where a method keeps an
+                                  error, a part of its samples (one in 16, at most 16384 of a lightmap; of
+                                  exact methods one in 64, at most 4096; the same ones for all bands) is held
+                                  against rays to them. Which part, and so
+                                  what is found, depends on nothing but the lightmap. Not with layers. Both
+                                  NULL: nothing is */
+    const vsh_solids *truth_solids;
 } vsh_bake_stats;
 
 static inline vsh_bake_stats vsh_bake_stats_zero(void) {
-    vsh_bake_stats stats = {sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero(), 0};
+    vsh_bake_stats stats = {
+        sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero(), 0, NULL, NULL, NULL};
     return stats;
 }
 

@@ -44,20 +44,34 @@ void vshi_lift_drop(const vsh_texels *texels, const vsh_triangles *triangles, si
 
 typedef struct aiming {
     const vsh_texels *texels;
-    const vsh_light *light; /* NULL: AO */
+    vshi_lift_light light;
     vshi_origins *origins;
-    vshi_vec towards; /* a directional light */
-    double sine;      /* of half its angle */
 } aiming;
 
 /* Whether all of the light is well above the triangle of a sample at `foot`. */
-static bool is_above(const aiming *a, size_t sample, vshi_vec foot) {
-    const vshi_vec normal = vshi_vec_off(a->texels->geometric + 3 * sample);
-    if (a->light->type == VSH_LIGHT_DIRECTIONAL) {
-        return vshi_dot(normal, a->towards) > a->sine + WELL_ABOVE;
+static bool is_above(const vsh_texels *texels, const vshi_lift_light *l, size_t sample, vshi_vec foot) {
+    const vshi_vec normal = vshi_vec_off(texels->geometric + 3 * sample);
+    if (l->light->type == VSH_LIGHT_DIRECTIONAL) {
+        return vshi_dot(normal, l->towards) > l->sine + WELL_ABOVE;
     }
-    const vshi_vec to = vshi_sub(vshi_vec_of(a->light->position), foot);
-    return vshi_dot(normal, to) > a->light->radius + WELL_ABOVE * vshi_length(to);
+    const vshi_vec to = vshi_sub(vshi_vec_of(l->light->position), foot);
+    return vshi_dot(normal, to) > l->light->radius + WELL_ABOVE * vshi_length(to);
+}
+
+vshi_lift_light vshi_lift_light_of(const vsh_light *light) {
+    vshi_lift_light l = {.light = light};
+    if (light != NULL && light->type == VSH_LIGHT_DIRECTIONAL) {
+        l.towards = vshi_unit(vshi_vec_of(light->direction));
+        l.sine = vshi_sin(0.5 * light->angle);
+    }
+    return l;
+}
+
+vshi_vec vshi_lift_place(const vsh_texels *texels, const vshi_lift_light *light, size_t sample,
+                         bool dropped) {
+    const vshi_vec foot = vshi_lift_foot(texels, sample);
+    const bool low = dropped || (light->light != NULL && is_above(texels, light, sample, foot));
+    return low ? foot : vshi_vec_of(texels->position + 3 * sample);
 }
 
 static void aim_blocks(void *user, size_t begin, size_t end) {
@@ -72,12 +86,10 @@ static void aim_blocks(void *user, size_t begin, size_t end) {
                 continue;
             }
             double *at = origins->surface + 3 * next++;
-            const vshi_vec foot = vshi_lift_foot(texels, i);
-            const bool low = origins->dropped[i] || (a->light != NULL && is_above(a, i, foot));
-            const double *lifted = texels->position + 3 * i;
-            at[0] = low ? foot.x : lifted[0];
-            at[1] = low ? foot.y : lifted[1];
-            at[2] = low ? foot.z : lifted[2];
+            const vshi_vec p = vshi_lift_place(texels, &a->light, i, origins->dropped[i]);
+            at[0] = p.x;
+            at[1] = p.y;
+            at[2] = p.z;
         }
     }
 }
@@ -87,11 +99,7 @@ vsh_result vshi_lift_for(const vsh_texels *texels, const vsh_light *light, const
     if (origins->surface == NULL) {
         return VSH_OK;
     }
-    aiming a = {.texels = texels, .light = light, .origins = origins};
-    if (light != NULL && light->type == VSH_LIGHT_DIRECTIONAL) {
-        a.towards = vshi_unit(vshi_vec_of(light->direction));
-        a.sine = vshi_sin(0.5 * light->angle);
-    }
+    aiming a = {.texels = texels, .light = vshi_lift_light_of(light), .origins = origins};
     vshi_job *job = vshi_job_begin(run, "lift", origins->blocks);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "lift: the system refused memory");

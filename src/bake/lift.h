@@ -15,6 +15,18 @@ static inline vshi_vec vshi_lift_foot(const vsh_texels *texels, size_t sample) {
 void vshi_lift_drop(const vsh_texels *texels, const vsh_triangles *triangles, size_t first, size_t last,
                     uint8_t *dropped);
 
+/* A light, or (NULL) AO, that samples are lifted for. */
+typedef struct vshi_lift_light {
+    const vsh_light *light;
+    vshi_vec towards; /* a directional light */
+    double sine;      /* of half its angle */
+} vshi_lift_light;
+
+vshi_lift_light vshi_lift_light_of(const vsh_light *light);
+
+/* Where a sample's rays to it begin. */
+vshi_vec vshi_lift_place(const vsh_texels *texels, const vshi_lift_light *light, size_t sample, bool dropped);
+
 /* Sets where rays to a light begin, origins->surface, or rays of AO where it is NULL. Facets hide light from
  * their neighbours where it comes in over the smooth surface but not over the facet: where all of a light is
  * well above a sample's triangle its rays begin on that, because a lift also moves the shadows of all else.

@@ -1,4 +1,5 @@
 #include "bake/bend.h"
+#include "bake/field_share.h"
 #include "bake/halo.h"
 #include "bake/lattice.h"
 #include "bake/lift.h"
@@ -8,6 +9,7 @@
 #include "base/floats.h"
 #include "base/parallel.h"
 #include "shade/layers.h"
+#include "shim/embree.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -34,6 +36,7 @@ typedef struct baking {
     vsh_layer *layers; /* the options', of points that are lifted already; NULL: none */
     bool layered_ao;
     vshi_origins_for wanted;
+    vshi_field_share held; /* samples that are held against the casters; none where that is not wanted */
     vsh_bake_stats stats;
 } baking;
 
@@ -236,10 +239,81 @@ static vsh_result over_samples(baking *bake, const char *what, vshi_range_fn *st
     return result;
 }
 
+/* --- what is known of their errors */
+
+static bool keeps_error(const baking *bake, const vsh_light *light) {
+    const uint32_t traits = light != NULL ? vsh_shadow_method_traits(bake->shade.method)
+                                          : vsh_ao_method_traits(bake->shade.ao_method);
+    return (traits & VSH_METHOD_KEEPS_ERROR) != 0;
+}
+
+/* Whether samples are to be held against the casters. */
+static bool holds(const baking *bake) {
+    const vsh_bake_stats *stats = &bake->stats;
+    const bool estimates = (bake->wanted.lights && keeps_error(bake, bake->lights)) ||
+                           (bake->wanted.ao && keeps_error(bake, NULL));
+    return stats->errors != NULL && (stats->truth_triangles != NULL || stats->truth_solids != NULL) &&
+           bake->shade.layer_count == 0 && estimates;
+}
+
+static vsh_result choose_held(baking *bake, vsh_error *error) {
+    static const double LIFT = 0x1p-18; /* of the casters' size, where no triangles say it */
+    const vsh_field *field = bake->field;
+    double size = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        size = fmax(size, field->world_max[axis] - field->world_min[axis]);
+    }
+    vshi_truth truth = {.triangles = bake->stats.truth_triangles, .solids = bake->stats.truth_solids};
+    truth.lift = bake->shade.surface_offset + (truth.triangles != NULL && truth.solids == NULL
+                                                   ? vshi_triangles_lift(truth.triangles)
+                                                   : LIFT * size);
+    const bool traced = (!bake->wanted.lights || vshi_shadow_traces(&bake->shade)) &&
+                        (!bake->wanted.ao || vshi_ao_traces(&bake->shade));
+    return vshi_field_share_choose(bake->texels, &bake->origins, bake->state, &truth, traced, &bake->quiet,
+                                   &bake->held, error);
+}
+
+static vsh_bake_error *error_of(const baking *bake, const vsh_light *light) {
+    return &bake->stats.errors[light != NULL ? (size_t)(light - bake->lights) : bake->light_count];
+}
+
+/* Adds a channel's error, of a light or (NULL) of AO; `square` is what the stats held before it. */
+static vsh_result add_error(baking *bake, const vsh_light *light, double square, vsh_error *error) {
+    if (bake->stats.errors == NULL || !keeps_error(bake, light)) {
+        return VSH_OK;
+    }
+    const vshi_point_rows *rows = &bake->origins.rows;
+    vsh_bake_error *sum = error_of(bake, light);
+    sum->values += (double)(rows->start[rows->last] - rows->start[rows->first]);
+    sum->square_error += bake->stats.shade.square_error - square;
+    return bake->held.count > 0 ? vshi_field_share_add(&bake->held, light, &bake->shade, bake->values, NULL,
+                                                       &bake->quiet, sum, error)
+                                : VSH_OK;
+}
+
+/* Adds what is filled, once it is: of the planes that there are. */
+static vsh_result add_filled(baking *bake, vsh_error *error) {
+    const vsh_lightmap *lightmap = bake->lightmap;
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i <= bake->light_count && result == VSH_OK && bake->held.count > 0; ++i) {
+        const vsh_light *light = i < bake->light_count ? &bake->lights[i] : NULL;
+        const float *plane = light == NULL              ? lightmap->ao
+                             : lightmap->shadow != NULL ? lightmap->shadow[i]
+                                                        : NULL;
+        if (plane != NULL && keeps_error(bake, light)) {
+            result = vshi_field_share_add(&bake->held, light, &bake->shade, NULL, plane, &bake->quiet,
+                                          error_of(bake, light), error);
+        }
+    }
+    return result;
+}
+
 static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
     const vsh_lightmap *lightmap = bake->lightmap;
     vsh_shade_options shade;
     const vsh_points points = points_of(bake, vshi_shadow_traces(&bake->shade), &shade);
+    const double square = bake->stats.shade.square_error;
+    float *shadow = lightmap->shadow != NULL ? lightmap->shadow[index] : NULL;
     float *errors = lightmap->shadow_error != NULL ? lightmap->shadow_error[index] : NULL;
     vsh_result result =
         vshi_lift_for(bake->texels, &bake->lights[index], &bake->quiet, &bake->origins, error);
@@ -251,8 +325,11 @@ static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
     if (result == VSH_OK && errors != NULL) {
         result = average(bake, bake->deviation, 1, errors, error);
     }
-    if (result == VSH_OK && lightmap->shadow != NULL && lightmap->shadow[index] != NULL) {
-        result = average(bake, bake->values, 1, lightmap->shadow[index], error);
+    if (result == VSH_OK && shadow != NULL) {
+        result = average(bake, bake->values, 1, shadow, error);
+    }
+    if (result == VSH_OK) {
+        result = add_error(bake, &bake->lights[index], square, error);
     }
     lighting l = {bake, &bake->lights[index]};
     if (result == VSH_OK && tint_of(lightmap, index) != NULL) {
@@ -341,6 +418,7 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
     if (result == VSH_OK && ao_wanted(lightmap)) {
         vsh_shade_options shade;
         const vsh_points points = points_of(bake, vshi_ao_traces(&bake->shade), &shade);
+        const double square = bake->stats.shade.square_error;
         float *deviation = lightmap->ao_error != NULL ? bake->deviation : NULL;
         result = vshi_lift_for(texels, NULL, &bake->quiet, &bake->origins, error);
         if (result == VSH_OK) {
@@ -355,6 +433,9 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
         }
         if (result == VSH_OK && lightmap->ao != NULL) {
             result = average(bake, bake->values, 1, lightmap->ao, error);
+        }
+        if (result == VSH_OK) {
+            result = add_error(bake, NULL, square, error);
         }
         if (result == VSH_OK && lightmap->bent != NULL) {
             result = bake_bent(bake, error);
@@ -440,7 +521,8 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
         return result;
     }
     const double bytes = fields_bytes(bake) + (double)texels->info.bytes + vshi_bake_bytes(&need) +
-                         vshi_halo_bytes(texels, bake->lightmap, bake->light_count);
+                         vshi_halo_bytes(texels, bake->lightmap, bake->light_count) +
+                         (holds(bake) ? (double)VSHI_FIELD_SHARE_MOST * VSHI_FIELD_SHARE_BYTES : 0.0);
     result = vshi_check_limit(&bake->run, bytes, "lightmap", error);
     if (result != VSH_OK) {
         free(bake->layers);
@@ -460,11 +542,17 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     bake->bent =
         vshi_take(bake->lightmap->bent != NULL ? count : 0, 3 * sizeof(float), "lightmap", &result, error);
     bake->tinted = vshi_take(need.tint ? count : 0, 3 * sizeof(float), "lightmap", &result, error);
+    if (result == VSH_OK && holds(bake)) {
+        result = choose_held(bake, error);
+    }
     if (result == VSH_OK) {
         result = bake_planes(bake, error);
     }
     if (result == VSH_OK) {
         result = pad(bake, finish_coverage(bake), error);
+    }
+    if (result == VSH_OK) {
+        result = add_filled(bake, error);
     }
     if (result == VSH_OK) {
         vshi_halo_give(texels, &bake->halo);
@@ -476,6 +564,7 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     free(bake->deviation);
     free(bake->values);
     free(bake->state);
+    vshi_field_share_free(&bake->held);
     vshi_spread_free(&bake->spread);
     vshi_origins_free(&bake->origins);
     vshi_halo_close(&bake->halo);

@@ -256,6 +256,7 @@ static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t ro
     made->padding = charts->padding;
     made->ao_spacing = charts->ao_spacing;
     made->shade = charts->shade;
+    made->whole = charts->info.samples;
     made->mesh_count = charts->sorted.mesh_count;
     result = make_band(charts, run, made, error);
     if (result == VSH_OK) {

@@ -66,6 +66,7 @@ struct vsh_texels {
     int32_t ao_spacing;      /* as of the charts */
     vsh_shade_options shade; /* those given with the lightmap's size */
     size_t count;            /* samples */
+    uint64_t whole;          /* samples of the whole lightmap, all its bands */
     size_t *row_start;       /* [held tile rows + 1]: first sample of each */
     double *position;        /* [count][3] */
     float *normal;           /* [count][3] */

@@ -28,6 +28,7 @@ typedef struct bake_work {
     vsh_assets *assets;
     cli_targets targets;
     vsh_triangles *triangles; /* of exact methods */
+    cli_truth truth;
     cli_field made;
     /* of the only receiver; several are rasterised again, so as not to hold all at once */
     vsh_charts *charts;
@@ -167,11 +168,14 @@ static int make_field(bake_work *work) {
 /* Exact methods trace the casters' own triangles. */
 static int make_triangles(bake_work *work) {
     const double start = cli_seconds();
-    const int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
+    int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
     work->scene->shade.triangles = work->triangles;
     cli_stats_methods(&work->stats, work->scene);
+    code = code == CLI_OK
+               ? cli_truth_make(work->scene, work->assets, work->triangles, &work->run, &work->truth)
+               : code;
     cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
-    return code;
+    return code == CLI_OK ? cli_stats_errors(&work->stats, work->scene) : code;
 }
 
 static int find_origin(bake_work *work) {
@@ -208,7 +212,7 @@ static void say_receiver(const bake_work *work, size_t index, const cli_bands *b
 
 static int bake_receiver(bake_work *work, size_t index) {
     const cli_receiver_job job = receiver_job(work, index);
-    cli_receiver_input input = {.field = work->made.field};
+    cli_receiver_input input = {.field = work->made.field, .truth = work->truth};
     int code = CLI_OK;
     if (work->charts == NULL) {
         const double start = cli_seconds();
@@ -217,8 +221,9 @@ static int bake_receiver(bake_work *work, size_t index) {
     }
     input.charts = work->charts;
     if (code == CLI_OK) {
+        const vsh_triangles *triangles = work->truth.own != NULL ? work->truth.own : work->triangles;
         const uint64_t held =
-            work->stats.field.bytes + (work->triangles != NULL ? vsh_triangles_bytes(work->triangles) : 0);
+            work->stats.field.bytes + (triangles != NULL ? vsh_triangles_bytes(triangles) : 0);
         code = cli_receiver_plan(&job, work->charts, held, &input.bands);
     }
     if (code == CLI_OK && input.bands.count > 1) {
@@ -292,6 +297,8 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
     }
     vsh_texels_free(work.kept);
     vsh_charts_free(work.charts);
+    cli_stats_end(&work.stats);
+    cli_truth_free(&work.truth);
     vsh_triangles_free(work.triangles);
     cli_origin_free(&work.origin);
     cli_field_free(&work.made);

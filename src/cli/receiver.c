@@ -216,20 +216,6 @@ static void warn_stats(const cli_receiver_job *job, const vsh_bake_stats *baked)
     }
 }
 
-/* Values of valid texels, an error for each of which square_error holds: samples where supersampled. */
-static void add_values(cli_stats *sum, const vsh_scene *scene, const vsh_charts *charts,
-                       const vsh_bake_stats *baked) {
-    vsh_charts_info info;
-    vsh_charts_get_info(charts, &info);
-    const double valid =
-        baked->texels > 0 ? (double)(baked->texels - baked->invalid_texels) / (double)baked->texels : 0.0;
-    const bool lights = (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_KEEPS_ERROR) != 0;
-    const bool ao = scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
-    sum->estimated_values[CLI_STATS_SHADOW] +=
-        lights ? valid * (double)info.samples * (double)scene->light_count : 0.0;
-    sum->estimated_values[CLI_STATS_AO] += ao ? valid * (double)info.samples : 0.0;
-}
-
 static void add_stats(cli_stats *sum, const vsh_bake_stats *baked) {
     sum->texels += baked->texels;
     sum->invalid_texels += baked->invalid_texels;
@@ -244,6 +230,12 @@ static void add_stats(cli_stats *sum, const vsh_bake_stats *baked) {
     sum->shade.refined += baked->shade.refined;
     sum->shade.square_error += baked->shade.square_error;
     sum->shade.ao_square_error += baked->shade.ao_square_error;
+    for (size_t i = 0; i <= sum->light_count; ++i) {
+        sum->errors[i].values += baked->errors[i].values;
+        sum->errors[i].square_error += baked->errors[i].square_error;
+        sum->errors[i].held += baked->errors[i].held;
+        sum->errors[i].held_square_error += baked->errors[i].held_square_error;
+    }
 }
 
 /* A receiver under way. */
@@ -275,6 +267,9 @@ static int bake_band(receiver_work *work, int32_t first, int32_t rows, const vsh
     vsh_bake_stats band = vsh_bake_stats_zero();
     band.invalid_by_mesh = work->invalid;
     band.shade = work->baked.shade;
+    band.errors = work->baked.errors;
+    band.truth_triangles = work->input->truth.triangles;
+    band.truth_solids = work->input->truth.solids;
     vsh_error error;
     const vsh_result result = vsh_bake_lightmap(work->input->field, texels, scene->lights, scene->light_count,
                                                 &scene->shade, run, &work->planes.lightmap, &band, &error);
@@ -403,13 +398,15 @@ int cli_receiver_bake(const cli_receiver_job *job, const cli_receiver_input *inp
     }
     work.invalid = calloc(work.mesh_count, sizeof *work.invalid);
     work.baked.invalid_by_mesh = calloc(work.mesh_count, sizeof *work.baked.invalid_by_mesh);
-    if (code == CLI_OK && (work.invalid == NULL || work.baked.invalid_by_mesh == NULL)) {
+    work.baked.errors = calloc(scene->light_count + 1, sizeof *work.baked.errors);
+    if (code == CLI_OK &&
+        (work.invalid == NULL || work.baked.invalid_by_mesh == NULL || work.baked.errors == NULL)) {
         cli_say("%s: the system refused memory", receiver->path);
         code = CLI_LIMIT;
     }
     if (code == CLI_OK && job->resume) {
         code = cli_resume_open(&work.resume, receiver->output, job->origin, &work.planes.image,
-                               input->bands.rows);
+                               input->bands.rows, scene->light_count + 1);
     }
     if (code == CLI_OK) {
         code = bake_bands(&work);
@@ -421,9 +418,9 @@ int cli_receiver_bake(const cli_receiver_job *job, const cli_receiver_input *inp
     cli_resume_close(&work.resume, receiver->output, receiver->height, code);
     if (code == CLI_OK) {
         add_stats(stats, &work.baked);
-        add_values(stats, scene, input->charts, &work.baked);
         stats->bands += (uint64_t)input->bands.count;
     }
+    free(work.baked.errors);
     free(work.baked.invalid_by_mesh);
     free(work.invalid);
     cli_planes_free(&work.planes);

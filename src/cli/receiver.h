@@ -5,6 +5,7 @@
 #include "bands.h"
 #include "origin.h"
 #include "stats.h"
+#include "truth.h"
 
 #include <stdbool.h>
 
@@ -44,6 +45,7 @@ typedef struct cli_receiver_input {
     const vsh_charts *charts;
     const vsh_texels *texels; /* all, where they are there already; or NULL */
     cli_bands bands;
+    cli_truth truth; /* what its values are held against; it owns nothing */
 } cli_receiver_input;
 
 /* Shades the texels and writes the file. */

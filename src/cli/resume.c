@@ -13,7 +13,7 @@ typedef struct band_head {
     int32_t first, rows;
     uint64_t texels, invalid_texels, seen_texels;
     vsh_shade_stats shade;
-    uint64_t checksum; /* of what follows: invalid_by_mesh, then the planes */
+    uint64_t checksum; /* of what follows: invalid_by_mesh, the planes, then the errors of channels */
 } band_head;
 
 /* FNV-1a (Fowler, Noll and Vo, 1991), a word at a time. */
@@ -27,13 +27,13 @@ static uint64_t checksum_of(uint64_t sum, const void *bytes, size_t size) {
     return sum;
 }
 
-static uint64_t checksum(const cli_planes *planes, size_t texels, const uint64_t *invalid,
-                         size_t mesh_count) {
+static uint64_t checksum(const cli_planes *planes, size_t texels, const uint64_t *invalid, size_t mesh_count,
+                         const vsh_bake_error *errors, size_t error_count) {
     uint64_t sum = checksum_of(UINT64_C(0xcbf29ce484222325), invalid, mesh_count * sizeof *invalid);
     for (int32_t c = 0; c < planes->image.channel_count; ++c) {
         sum = checksum_of(sum, planes->planes[c], texels * sizeof(float));
     }
-    return sum;
+    return checksum_of(sum, errors, error_count * sizeof *errors);
 }
 
 /* What must be the same for bands to be taken: text, to be freed; NULL where memory is short. */
@@ -44,7 +44,7 @@ static char *key_of(const cli_origin *origin, const vsh_image *image, int32_t ba
     if (out == NULL) {
         return NULL;
     }
-    fprintf(out, "vdbshade resume 1: %d x %d by %d\n", image->width, image->height, band_rows);
+    fprintf(out, "vdbshade resume 2: %d x %d by %d\n", image->width, image->height, band_rows);
     for (int32_t c = 0; c < image->channel_count; ++c) {
         fprintf(out, "%s\n", image->names[c]);
     }
@@ -97,8 +97,8 @@ static int open_file(cli_resume *r) {
 }
 
 int cli_resume_open(cli_resume *r, const char *output, const cli_origin *origin, const vsh_image *image,
-                    int32_t band_rows) {
-    *r = (cli_resume){.file = NULL};
+                    int32_t band_rows, size_t error_count) {
+    *r = (cli_resume){.file = NULL, .error_count = error_count};
     if (snprintf(r->path, sizeof r->path, "%s.resume", output) >= (int)sizeof r->path) {
         return cli_usage("%.64s…: the name is too long", output);
     }
@@ -125,7 +125,7 @@ int cli_resume_open(cli_resume *r, const char *output, const cli_origin *origin,
 }
 
 static bool read_band(cli_resume *r, const band_head *want, cli_planes *planes, vsh_bake_stats *stats,
-                      size_t mesh_count, uint64_t *invalid) {
+                      size_t mesh_count, uint64_t *invalid, vsh_bake_error *errors) {
     const size_t texels = (size_t)planes->image.width * (size_t)want->rows;
     band_head head;
     bool good = fread(&head, sizeof head, 1, r->file) == 1 && head.first == want->first &&
@@ -133,7 +133,8 @@ static bool read_band(cli_resume *r, const band_head *want, cli_planes *planes, 
     for (int32_t c = 0; good && c < planes->image.channel_count; ++c) {
         good = fread(planes->planes[c], sizeof(float), texels, r->file) == texels;
     }
-    if (!good || checksum(planes, texels, invalid, mesh_count) != head.checksum) {
+    good = good && fread(errors, sizeof *errors, r->error_count, r->file) == r->error_count;
+    if (!good || checksum(planes, texels, invalid, mesh_count, errors, r->error_count) != head.checksum) {
         return false;
     }
     stats->texels = head.texels;
@@ -141,6 +142,7 @@ static bool read_band(cli_resume *r, const band_head *want, cli_planes *planes, 
     stats->seen_texels = head.seen_texels;
     stats->shade = head.shade;
     memcpy(stats->invalid_by_mesh, invalid, mesh_count * sizeof *invalid);
+    memcpy(stats->errors, errors, r->error_count * sizeof *errors);
     return true;
 }
 
@@ -152,7 +154,10 @@ bool cli_resume_take(cli_resume *r, int32_t first, int32_t rows, cli_planes *pla
     const long begin = ftell(r->file);
     const band_head want = {.first = first, .rows = rows};
     uint64_t *invalid = calloc(mesh_count + 1, sizeof *invalid);
-    r->taking = invalid != NULL && read_band(r, &want, planes, stats, mesh_count, invalid);
+    vsh_bake_error *errors = calloc(r->error_count + 1, sizeof *errors);
+    r->taking =
+        invalid != NULL && errors != NULL && read_band(r, &want, planes, stats, mesh_count, invalid, errors);
+    free(errors);
     free(invalid);
     if (r->taking) {
         r->rows = first + rows;
@@ -179,12 +184,14 @@ void cli_resume_keep(cli_resume *r, int32_t first, int32_t rows, const cli_plane
     head.invalid_texels = stats->invalid_texels;
     head.seen_texels = stats->seen_texels;
     head.shade = stats->shade;
-    head.checksum = checksum(planes, texels, stats->invalid_by_mesh, mesh_count);
+    head.checksum =
+        checksum(planes, texels, stats->invalid_by_mesh, mesh_count, stats->errors, r->error_count);
     bool good = fwrite(&head, sizeof head, 1, r->file) == 1 &&
                 fwrite(stats->invalid_by_mesh, sizeof(uint64_t), mesh_count, r->file) == mesh_count;
     for (int32_t c = 0; good && c < planes->image.channel_count; ++c) {
         good = fwrite(planes->planes[c], sizeof(float), texels, r->file) == texels;
     }
+    good = good && fwrite(stats->errors, sizeof *stats->errors, r->error_count, r->file) == r->error_count;
     if (!good || fflush(r->file) != 0 || fdatasync(fileno(r->file)) != 0) {
         give_up(r);
         return;

@@ -15,12 +15,14 @@ typedef struct cli_resume {
     char path[4096];
     bool taking;  /* there may be bands to take yet */
     int32_t rows; /* kept or taken so far */
+    size_t error_count;
 } cli_resume;
 
 /* Opens, or begins, the file of an output, which no other run may have open: CLI_OK or an exit code, having
- * said why. Bands of another bake, or of other heights, are told and dropped. */
+ * said why. Bands of another bake, or of other heights, are told and dropped. `error_count` is the number of
+ * the statistics' `errors`. */
 int cli_resume_open(cli_resume *resume, const char *output, const cli_origin *origin, const vsh_image *image,
-                    int32_t band_rows);
+                    int32_t band_rows, size_t error_count);
 
 /* Takes the next band into the image's planes, and the statistics up to its end (invalid_by_mesh
  * [mesh_count]). False where there is none: it is to be baked, and so is all behind it. */

@@ -38,6 +38,10 @@ static json_t *number_or_null(double value) {
     return isnan(value) ? json_null() : json_real(value);
 }
 
+static cli_method method_of(const char *name, uint32_t traits) {
+    return (cli_method){name, (traits & VSH_METHOD_KEEPS_ERROR) != 0, (traits & VSH_METHOD_TRIANGLES) != 0};
+}
+
 void cli_stats_methods(cli_stats *stats, const vsh_scene *scene) {
     const vsh_shade_options *shade = &scene->shade;
     const int32_t has_triangles = shade->triangles != NULL;
@@ -45,19 +49,38 @@ void cli_stats_methods(cli_stats *stats, const vsh_scene *scene) {
     const int32_t ao_method = vsh_ao_method_resolve(shade->ao_method, has_triangles);
     stats->max_error = shade->max_error;
     if (scene->light_count > 0) {
-        stats->methods[CLI_STATS_SHADOW] = (cli_method){
-            vsh_shadow_method_name(method), (vsh_shadow_method_traits(method) & VSH_METHOD_KEEPS_ERROR) != 0};
+        stats->methods[CLI_STATS_SHADOW] =
+            method_of(vsh_shadow_method_name(method), vsh_shadow_method_traits(method));
     }
     if (scene->ao) {
-        stats->methods[CLI_STATS_AO] = (cli_method){
-            vsh_ao_method_name(ao_method), (vsh_ao_method_traits(ao_method) & VSH_METHOD_KEEPS_ERROR) != 0};
+        stats->methods[CLI_STATS_AO] =
+            method_of(vsh_ao_method_name(ao_method), vsh_ao_method_traits(ao_method));
     }
 }
 
-double cli_stats_error(const cli_stats *stats, int kind) {
-    const double values = stats->estimated_values[kind], ao = stats->shade.ao_square_error;
-    const double sum = kind == CLI_STATS_AO ? ao : stats->shade.square_error - ao;
-    return values > 0.0 ? sqrt(fmax(0.0, sum) / values) : NAN;
+int cli_stats_errors(cli_stats *stats, const vsh_scene *scene) {
+    stats->lights = scene->lights;
+    stats->light_count = scene->light_count;
+    stats->errors = calloc(scene->light_count + 1, sizeof *stats->errors);
+    return stats->errors != NULL ? CLI_OK : cli_out_of_memory("stats");
+}
+
+void cli_stats_end(cli_stats *stats) {
+    free(stats->errors);
+    stats->errors = NULL;
+}
+
+vsh_bake_error cli_stats_error(const cli_stats *stats, int kind) {
+    vsh_bake_error sum = {0.0, 0.0, 0.0, 0.0};
+    const size_t first = kind == CLI_STATS_AO ? stats->light_count : 0;
+    const size_t last = kind == CLI_STATS_AO ? stats->light_count + 1 : stats->light_count;
+    for (size_t i = first; stats->errors != NULL && i < last; ++i) {
+        sum.values += stats->errors[i].values;
+        sum.square_error += stats->errors[i].square_error;
+        sum.held += stats->errors[i].held;
+        sum.held_square_error += stats->errors[i].held_square_error;
+    }
+    return sum;
 }
 
 const char *cli_stats_methods_text(const cli_stats *stats, char *text, size_t size) {
@@ -76,33 +99,78 @@ const char *cli_stats_methods_text(const cli_stats *stats, char *text, size_t si
     return text;
 }
 
+/* What would help against an error of a kind that is left. */
+static void say_help(const cli_stats *stats, const vsh_scene *scene, int kind, char *text, size_t size) {
+    const vsh_bake_error known = cli_stats_error(stats, kind);
+    const bool by_rays = sqrt(known.square_error / known.values) > stats->max_error;
+    const char *option = kind == CLI_STATS_AO ? "--ao-method" : "--method";
+    if (by_rays && scene->shade.rays > 0) {
+        snprintf(text, size, "%d rays are too few; leave the limit off", scene->shade.rays);
+    } else if (by_rays) {
+        snprintf(text, size, "no more rays are taken by the sampler '%s'",
+                 vsh_sampler_name(scene->shade.sampler));
+    } else if (stats->methods[kind].traces) {
+        snprintf(text, size, "what is interpolated between rays is off by it; --max-error %.1g keeps it",
+                 0.5 * stats->max_error);
+    } else {
+        const bool can = vsh_scene_traceable(scene, NULL) && vsh_triangles_available();
+        snprintf(text, size, "%.3g of it is that of voxels of %.3g: %s%ssmaller ones leave less",
+                 vsh_bake_error_field(&known), stats->grid.voxel_size, can ? option : "",
+                 can ? " exact has none, " : "");
+    }
+}
+
 void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene, const vsh_run *run) {
     for (int kind = 0; kind < KINDS; ++kind) {
-        const double error = cli_stats_error(stats, kind);
+        const vsh_bake_error known = cli_stats_error(stats, kind);
+        const double error = vsh_bake_error_rmse(&known);
         if (!stats->methods[kind].keeps_error || !(error > stats->max_error) || run->warning == NULL) {
             continue;
         }
-        char line[256], help[64];
-        if (scene->shade.rays > 0) {
-            snprintf(help, sizeof help, "%d rays are too few; leave the limit off", scene->shade.rays);
-        } else {
-            snprintf(help, sizeof help, "no more rays are taken by the sampler '%s'",
-                     vsh_sampler_name(scene->shade.sampler));
-        }
-        snprintf(line, sizeof line, "%s: an error of %.2g is left, where %g was asked for: %s",
+        char line[512], help[256];
+        say_help(stats, scene, kind, help, sizeof help);
+        snprintf(line, sizeof line, "%s: an error of %.3g is left, where %g was asked for: %s",
                  kind == CLI_STATS_AO ? "AO" : "shadow", error, stats->max_error, help);
         run->warning(run->user, line);
     }
 }
 
+static void set_error(json_t *of, const vsh_bake_error *known) {
+    json_object_set_new(of, "estimated_rmse", number_or_null(vsh_bake_error_rmse(known)));
+    json_object_set_new(of, "field_rmse", number_or_null(vsh_bake_error_field(known)));
+}
+
+/* Of each channel on its own. */
+static json_t *channels_of(const cli_stats *stats) {
+    json_t *channels = json_array();
+    for (size_t i = 0; stats->errors != NULL && i <= stats->light_count; ++i) {
+        char name[96] = "ao";
+        if (i < stats->light_count) {
+            snprintf(name, sizeof name, "shadow.%.64s", stats->lights[i].name);
+        }
+        if (stats->methods[i < stats->light_count ? CLI_STATS_SHADOW : CLI_STATS_AO].name != NULL) {
+            json_t *of = json_object();
+            json_object_set_new(of, "name", json_string(name));
+            set_error(of, &stats->errors[i]);
+            json_array_append_new(channels, of);
+        }
+    }
+    return channels;
+}
+
 /* What methods that keep an error say of themselves; null where no such method ran. */
 static void add_errors(const cli_stats *stats, json_t *root) {
-    const double values = stats->estimated_values[CLI_STATS_SHADOW] + stats->estimated_values[CLI_STATS_AO];
+    double values = 0.0, square = 0.0;
+    for (int kind = 0; kind < KINDS; ++kind) {
+        const vsh_bake_error known = cli_stats_error(stats, kind);
+        const double error = known.values > 0.0 ? vsh_bake_error_rmse(&known) : 0.0;
+        values += known.values;
+        square += known.values * error * error;
+    }
     json_object_set_new(
         root, "certified_share",
         number_or_null(values > 0.0 ? 1.0 - fmin(1.0, (double)stats->shade.refined / values) : NAN));
-    json_object_set_new(root, "estimated_rmse",
-                        number_or_null(values > 0.0 ? sqrt(stats->shade.square_error / values) : NAN));
+    json_object_set_new(root, "estimated_rmse", number_or_null(values > 0.0 ? sqrt(square / values) : NAN));
     json_t *kinds = json_object();
     for (int kind = 0; kind < KINDS; ++kind) {
         const cli_method *method = &stats->methods[kind];
@@ -112,10 +180,12 @@ static void add_errors(const cli_stats *stats, json_t *root) {
         json_t *of = json_object();
         json_object_set_new(of, "method", json_string(method->name));
         json_object_set_new(of, "max_error", number_or_null(method->keeps_error ? stats->max_error : NAN));
-        json_object_set_new(of, "estimated_rmse", number_or_null(cli_stats_error(stats, kind)));
+        const vsh_bake_error known = cli_stats_error(stats, kind);
+        set_error(of, &known);
         json_object_set_new(kinds, kind_names[kind], of);
     }
     json_object_set_new(root, "methods", kinds);
+    json_object_set_new(root, "channels", channels_of(stats));
 }
 
 /* The JSON file. */
@@ -198,6 +268,27 @@ int cli_stats_finish(const cli_stats *stats, const char *path) {
     return code;
 }
 
+/* "estimated error: shadow 0.0123 (the voxels' 0.012), AO 0.0071". */
+static void say_errors(const cli_stats *stats) {
+    char text[256] = "";
+    size_t used = 0;
+    for (int kind = 0; kind < KINDS && used < sizeof text; ++kind) {
+        const vsh_bake_error known = cli_stats_error(stats, kind);
+        const double error = vsh_bake_error_rmse(&known), field = vsh_bake_error_field(&known);
+        if (isnan(error)) {
+            continue;
+        }
+        used += (size_t)snprintf(text + used, sizeof text - used, "%s%s %.3g", used > 0 ? ", " : "",
+                                 kind == CLI_STATS_AO ? "AO" : "shadow", error);
+        if (!isnan(field) && !stats->methods[kind].traces && used < sizeof text) {
+            used += (size_t)snprintf(text + used, sizeof text - used, " (the voxels' %.3g)", field);
+        }
+    }
+    if (used > 0) {
+        cli_say("estimated error: %s", text);
+    }
+}
+
 void cli_stats_say(const cli_stats *stats) {
     char field[32], peak[32];
     if (stats->field.bytes == 0) {
@@ -216,6 +307,7 @@ void cli_stats_say(const cli_stats *stats) {
     if (*cli_stats_methods_text(stats, methods, sizeof methods) != '\0') {
         cli_say("%s", methods);
     }
+    say_errors(stats);
     const double *s = stats->seconds;
     cli_say("load %.2f s, voxelize %.2f s, field %.2f s, %s %.2f s, write %.2f s", s[CLI_STAGE_LOAD],
             s[CLI_STAGE_VOXELIZE], s[CLI_STAGE_FIELD], stats->of == CLI_STATS_POINTS ? "shade" : "bake",

@@ -21,7 +21,7 @@ enum { CLI_STATS_SHADOW, CLI_STATS_AO };
 /* What a kind of value is made by. */
 typedef struct cli_method {
     const char *name; /* NULL: there are no such values */
-    bool keeps_error;
+    bool keeps_error, traces;
 } cli_method;
 
 typedef struct cli_stats {
@@ -34,10 +34,11 @@ typedef struct cli_stats {
     uint64_t resumed_rows; /* of lightmaps, that an earlier bake had kept */
     uint64_t bands;        /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
-    double estimated_values[2]; /* CLI_STATS_SHADOW and …_AO: behind shade.square_error, by methods that keep
-                                 * an error */
-    cli_method methods[2];      /* likewise; NULL names where nothing is baked by one */
-    double max_error;           /* that was asked for */
+    vsh_bake_error *errors;  /* [light_count + 1]: of each light, then of AO; NULL: none are known */
+    const vsh_light *lights; /* of `errors` */
+    size_t light_count;
+    cli_method methods[2]; /* CLI_STATS_SHADOW and …_AO; NULL names where nothing is baked by one */
+    double max_error;      /* that was asked for */
     int32_t threads;
     vsh_grid_info grid;
     vsh_field_info field;
@@ -52,8 +53,13 @@ cli_stats cli_stats_begin(int32_t of, int32_t threads);
 /* Takes what the scene's methods come to, once its triangles are known. */
 void cli_stats_methods(cli_stats *stats, const vsh_scene *scene);
 
-/* Estimated error of the values of a kind, root mean square; NaN where none is known. */
-double cli_stats_error(const cli_stats *stats, int kind);
+/* Room for the errors of a scene's channels, which must outlive them. CLI_OK, or an exit code, having said
+ * why; to be freed with cli_stats_end(). */
+int cli_stats_errors(cli_stats *stats, const vsh_scene *scene);
+void cli_stats_end(cli_stats *stats);
+
+/* What is known of the errors of a kind's values, all lights together. */
+vsh_bake_error cli_stats_error(const cli_stats *stats, int kind);
 
 /* "shadow exact, AO exact, max error 0.02". Returns text. */
 const char *cli_stats_methods_text(const cli_stats *stats, char *text, size_t size);
@@ -65,7 +71,7 @@ void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene, const vsh_ru
  * any more. CLI_OK or an exit code, having said why. */
 int cli_stats_finish(const cli_stats *stats, const char *path);
 
-/* Two lines on standard error. */
+/* Some lines on standard error. */
 void cli_stats_say(const cli_stats *stats);
 
 #endif

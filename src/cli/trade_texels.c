@@ -5,6 +5,7 @@
 #include "message.h"
 #include "receiver.h"
 #include "trade.h"
+#include "truth.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -55,52 +56,15 @@ static int load_receivers(trade_work *work) {
 
 /* The casters as rays meet them. */
 static int load_casters(trade_work *work) {
-    const vsh_scene *scene = work->scene;
-    size_t meshes = 0, solids = 0;
     work->meshes = vsh_triangles_available() != 0;
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        size_t own;
-        vsh_assets_caster(work->assets, i, &own);
-        meshes += own;
-        solids += scene->casters[i].type == VSH_CASTER_SDF;
-        work->meshes = work->meshes && cli_caster_has_triangles(&scene->casters[i]);
-    }
-    vsh_mesh *views = calloc(meshes + 1, sizeof *views);
-    vsh_sdf *trees = calloc(solids + 1, sizeof *trees);
-    double *places = calloc(solids + 1, 12 * sizeof *places);
-    if (views == NULL || trees == NULL || places == NULL) {
-        free(places);
-        free(trees);
-        free(views);
-        return cli_out_of_memory("casters");
-    }
-    meshes = solids = 0;
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        const vsh_caster *caster = &scene->casters[i];
-        size_t own;
-        const vsh_mesh *of_caster = vsh_assets_caster(work->assets, i, &own);
-        for (size_t m = 0; m < own; ++m) {
-            views[meshes++] = of_caster[m];
-        }
-        if (caster->type == VSH_CASTER_SDF) {
-            memcpy(places + 12 * solids, caster->transform, sizeof caster->transform);
-            trees[solids++] = caster->sdf;
-        }
+    for (size_t i = 0; i < work->scene->caster_count; ++i) {
+        work->meshes = work->meshes && cli_caster_has_triangles(&work->scene->casters[i]);
     }
     vsh_error error;
-    vsh_result result = VSH_OK;
-    if (solids > 0) {
-        result = vsh_solids_create(trees, places, solids, &work->solids, &error);
-    }
-    if (result == VSH_OK && meshes > 0 && vsh_triangles_available()) {
-        const double start = trade_now(work);
-        result = vsh_triangles_create(views, meshes, &work->run, &work->triangles, &error);
-        work->triangles_s = trade_now(work) - start;
-    }
-    free(places);
-    free(trees);
-    free(views);
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return cli_truth_casters(work->scene, work->assets, &work->run, &work->triangles, &work->solids,
+                             &work->triangles_s, &error) == VSH_OK
+               ? CLI_OK
+               : cli_fail(&error);
 }
 
 int trade_load(trade_work *work) {

@@ -4,6 +4,7 @@
 #include "meshes.h"
 #include "message.h"
 #include "trade.h"
+#include "truth.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -68,18 +69,6 @@ static int march(trade_work *work, int32_t resolution) {
     return code;
 }
 
-/* Whether rays can meet all casters. */
-static bool traceable(const trade_work *work) {
-    for (size_t i = 0; i < work->scene->caster_count; ++i) {
-        const vsh_caster *caster = &work->scene->casters[i];
-        if ((caster->type != VSH_CASTER_SDF && !cli_caster_has_triangles(caster)) ||
-            (cli_caster_has_triangles(caster) && !vsh_triangles_available())) {
-            return false;
-        }
-    }
-    return true;
-}
-
 static void describe(trade_work *work) {
     static const char *const whats[] = {
         "procedural casters themselves (sphere tracing in double precision)",
@@ -101,7 +90,7 @@ int trade_take_truth(trade_work *work, int32_t finest) {
     }
     const double start = trade_now(work);
     int code = CLI_OK;
-    if (traceable(work)) {
+    if (cli_truth_traceable(work->scene)) {
         describe(work);
         for (size_t s = 0; s < work->subject_count && code == CLI_OK; ++s) {
             double seconds;

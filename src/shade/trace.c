@@ -1,5 +1,6 @@
 /* Lights and open sky seen from points, by rays against the casters themselves: no field, no estimate but the
  * number of rays. */
+#include "shade/trace.h"
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/memory.h"
@@ -22,7 +23,7 @@ typedef struct tracing {
     const vsh_light *light; /* NULL: AO */
     double distance;        /* AO */
     int32_t rays;
-    double (*disc)[2]; /* [rays], the same for all points */
+    double (*disc)[2]; /* [rays], the same for all points; NULL: each point has its own */
     float *values;
 } tracing;
 
@@ -76,10 +77,11 @@ static double far_of(const target *t, double cosine) {
     return t->distance * cosine - (across > 0.0 ? sqrt(across) : 0.0);
 }
 
-/* Direction i, and how far it goes; false below the horizon of `normal` (NULL: none). */
-static bool direct(const tracing *task, const target *t, int32_t i, const vshi_vec *normal,
+/* The direction of a place on the unit disc, and how far it goes; false below the horizon of `normal` (NULL:
+ * none). */
+static bool direct(const tracing *task, const target *t, const double disc[2], const vshi_vec *normal,
                    vshi_segment_ray *ray) {
-    const double x = task->disc[i][0] * t->radius, y = task->disc[i][1] * t->radius;
+    const double x = disc[0] * t->radius, y = disc[1] * t->radius;
     double up, scale = 1.0;
     if (task->light != NULL) {
         scale = 1.0 / sqrt(1.0 + x * x + y * y);
@@ -122,46 +124,116 @@ static void meet(const tracing *task, const vsh_solids *solids, const vshi_segme
     }
 }
 
-static float trace_point(const tracing *task, size_t point) {
-    vshi_vec origin = vshi_vec_of(task->positions + 3 * point), normal = {0.0, 0.0, 0.0};
-    if (task->normals != NULL) {
-        normal = vshi_unit(vshi_vec_off(task->normals + 3 * point));
-        if (!(vshi_dot(normal, normal) > 0.5)) {
-            return NAN;
+/* A point that rays begin at, and what they go to. */
+typedef struct viewpoint {
+    vshi_vec origin, normal; /* no normal: zero */
+    target target;
+    bool horizon;             /* rays below the normal's plane count as hidden */
+    const vsh_solids *solids; /* that rays may meet */
+} viewpoint;
+
+/* False where the point's value needs no rays: it is then in *value. */
+static bool place_point(const tracing *task, const double position[3], const float *normal, viewpoint *from,
+                        double *value) {
+    *from = (viewpoint){.origin = vshi_vec_of(position)};
+    if (normal != NULL) {
+        from->normal = vshi_unit(vshi_vec_off(normal));
+        if (!(vshi_dot(from->normal, from->normal) > 0.5)) {
+            *value = NAN;
+            return false;
         }
-        origin = vshi_add(origin, vshi_scale(normal, task->lift));
+        from->origin = vshi_add(from->origin, vshi_scale(from->normal, task->lift));
     }
-    if (!vshi_finite(origin)) {
-        return NAN;
+    if (!vshi_finite(from->origin)) {
+        *value = NAN;
+        return false;
     }
-    target t = {.axis = normal, .radius = 1.0};
+    from->target = (target){.axis = from->normal, .radius = 1.0};
     if (task->light == NULL) {
-        vshi_frame(t.axis, &t.u, &t.v);
-    } else if (!aim(task->light, origin, &t)) {
-        return 1.0f;
+        vshi_frame(from->target.axis, &from->target.u, &from->target.v);
+    } else if (!aim(task->light, from->origin, &from->target)) {
+        *value = 1.0;
+        return false;
     }
-    const vshi_cone_state state = look(task, origin, &t);
+    const vshi_cone_state state = look(task, from->origin, &from->target);
     if (state == VSHI_CONE_COVERED) {
-        return 0.0f;
+        *value = 0.0;
+        return false;
     }
-    const vsh_solids *solids = state == VSHI_CONE_FREE ? NULL : task->solids;
-    const vshi_vec *horizon = task->light != NULL && task->normals != NULL ? &normal : NULL;
+    from->solids = state == VSHI_CONE_FREE ? NULL : task->solids;
+    from->horizon = task->light != NULL && normal != NULL;
+    return true;
+}
+
+/* How many of the rays to places [count] on the disc meet nothing. */
+static int32_t count_free(const tracing *task, const viewpoint *from, const double (*disc)[2],
+                          int32_t count) {
+    const vshi_vec o = from->origin;
     vshi_segment_ray rays[AT_ONCE];
     bool blocked[AT_ONCE];
-    size_t seen = 0, waiting = 0;
-    for (int32_t i = 0; i < task->rays; ++i) {
+    size_t waiting = 0;
+    int32_t free = 0;
+    for (int32_t i = 0; i < count; ++i) {
         vshi_segment_ray *ray = &rays[waiting];
-        *ray = (vshi_segment_ray){{origin.x, origin.y, origin.z}, {0.0, 0.0, 0.0}, 0.0};
-        waiting += direct(task, &t, i, horizon, ray);
-        if (waiting == AT_ONCE || (i + 1 == task->rays && waiting > 0)) {
-            meet(task, solids, rays, waiting, blocked);
+        *ray = (vshi_segment_ray){{o.x, o.y, o.z}, {0.0, 0.0, 0.0}, 0.0};
+        waiting += direct(task, &from->target, disc[i], from->horizon ? &from->normal : NULL, ray);
+        if (waiting == AT_ONCE || (i + 1 == count && waiting > 0)) {
+            meet(task, from->solids, rays, waiting, blocked);
             for (size_t r = 0; r < waiting; ++r) {
-                seen += !blocked[r];
+                free += !blocked[r];
             }
             waiting = 0;
         }
     }
-    return (float)((double)seen / (double)task->rays);
+    return free;
+}
+
+static float trace_point(const tracing *task, size_t point) {
+    viewpoint from;
+    double value;
+    const float *normal = task->normals != NULL ? task->normals + 3 * point : NULL;
+    if (!place_point(task, task->positions + 3 * point, normal, &from, &value)) {
+        return (float)value;
+    }
+    const int32_t free = count_free(task, &from, (const double(*)[2])task->disc, task->rays);
+    return (float)((double)free / (double)task->rays);
+}
+
+bool vshi_truth_twice(const vshi_truth *truth, const double position[3], const float normal[3],
+                      uint32_t texel, double expected, double seen[2]) {
+    /* the samplers' sequences: no others' */
+    static const uint32_t PURPOSE[2] = {0x7e570001u, 0x7e570002u};
+    static const double ENOUGH = 1e-3;
+    const tracing task = {.triangles = truth->triangles,
+                          .solids = truth->solids,
+                          .lift = truth->lift,
+                          .light = truth->light,
+                          .distance = truth->distance};
+    viewpoint from;
+    if (!place_point(&task, position, normal, &from, &seen[0])) {
+        seen[1] = seen[0];
+        return !isnan(seen[0]);
+    }
+    int32_t free[2] = {0, 0}, taken = 0;
+    while (taken < truth->rays) {
+        double disc[VSHI_TRUTH_FIRST][2];
+        const int32_t left = truth->rays - taken, count = left < VSHI_TRUTH_FIRST ? left : VSHI_TRUTH_FIRST;
+        for (int k = 0; k < 2; ++k) {
+            vshi_sampler_disc(truth->sampler, texel, PURPOSE[k], taken, count, disc);
+            free[k] += count_free(&task, &from, (const double(*)[2])disc, count);
+        }
+        taken += count;
+        /* rays that all agree are no reason to end where they don't agree with the value: few rays miss what
+         * is small, always to one side */
+        if ((free[0] == 0 || free[0] == taken) && free[0] == free[1] &&
+            fabs(free[0] - expected * taken) < ENOUGH * taken) {
+            break;
+        }
+    }
+    for (int k = 0; k < 2; ++k) {
+        seen[k] = (double)free[k] / (double)taken;
+    }
+    return true;
 }
 
 static void trace_points(void *user, size_t begin, size_t end) {

@@ -84,6 +84,31 @@ JSON
     is_at_most "$(said shadow estimated_rmse)" 0.003
 }
 
+@test "what voxels leave of an error is measured, told, and by exact not there" {
+    needs_embree
+    shade bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --method adaptive --max-error 0.01 \
+        --stats s.json -o a.exr
+    done_well
+    [[ $stderr == *"shadow: an error of "*"where 0.01 was asked for: "*"is that of voxels of"*"--method exact has none"* ]] ||
+        fail "$stderr"
+    [[ $stderr == *"estimated error: shadow "*"(the voxels' "* ]] || fail "$stderr"
+    is_at_most 0.05 "$(said shadow estimated_rmse)"
+    is_at_most 0.05 "$(said shadow field_rmse)"
+    shade bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --max-error 0.01 --stats s.json -o a.exr
+    done_well
+    [[ $stderr != *"asked for"* ]] || fail "$stderr"
+    is_at_most "$(said shadow estimated_rmse)" 0.01
+}
+
+@test "an error is the same in bands, and where a bake goes on" {
+    local bake=(bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --method adaptive -o a.exr --quiet)
+    shade "${bake[@]}" --stats whole.json
+    shade "${bake[@]}" --stats bands.json --band-rows 16
+    done_well
+    whole=$(sed -n '/"channels"/,/]/p' whole.json)
+    [ -n "$whole" ] && [ "$whole" = "$(sed -n '/"channels"/,/]/p' bands.json)" ] || fail "$whole $(cat bands.json)"
+}
+
 @test "a fence that voxels lose is named, unless its triangles are traced" {
     shade bake fence.obj --size 32 --resolution 32 --sun 0.3,1,0.5 --method cone -o a.exr
     done_well

@@ -1,0 +1,273 @@
+/* What a bake says of its error holds against rays to the casters, the field's own share included. */
+#include "texels_of.h"
+
+#include <vdbshade/trace.h>
+
+enum { WIDTH = 96, HEIGHT = 88, TEXELS = WIDTH * HEIGHT, BARS = 8, CHANNELS = 2 };
+
+/* Bars over a floor: half as wide as a voxel, so that most of them are lost in the field, and one that is
+ * thick, whose penumbra is right. */
+typedef struct stage {
+    quad floor;
+    float positions[BARS][24];
+    vsh_mesh bars[BARS];
+    vsh_field *field;
+    vsh_triangles *triangles;
+} stage;
+
+static const double VOXEL = 0.08;
+
+static void make_bar(stage *s, int i) {
+    static const uint32_t SIDES[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    const double half[3] = {i == 0 ? 0.2 : 0.02, i == 0 ? 0.2 : 0.02, 0.7};
+    for (size_t v = 0; v < 8; ++v) {
+        const double x = -0.9 + 0.24 * i;
+        s->positions[i][3 * v] = (float)(x + (v & 1 ? 1 : -1) * half[0]);
+        s->positions[i][3 * v + 1] = (float)(0.5 + (v & 2 ? 1 : -1) * half[1]);
+        s->positions[i][3 * v + 2] = (float)((v & 4 ? 1 : -1) * half[2]);
+    }
+    s->bars[i] = (vsh_mesh){.name = "bar",
+                            .positions = s->positions[i],
+                            .indices = SIDES,
+                            .vertex_count = 8,
+                            .triangle_count = 12};
+}
+
+static int set_up(void **state) {
+    stage *s = calloc(1, sizeof *s);
+    *state = s;
+    make_quad(&s->floor, 0.0f, 0.0f, 1.0f, 1.0f);
+    for (size_t v = 0; v < 4; ++v) {
+        s->floor.positions[3 * v] = 3.0f * s->floor.uvs[2 * v] - 1.5f;
+        s->floor.positions[3 * v + 1] = 0.0f;
+        s->floor.positions[3 * v + 2] = 1.5f - 3.0f * s->floor.uvs[2 * v + 1];
+    }
+    for (int i = 0; i < BARS; ++i) {
+        make_bar(s, i);
+    }
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = VOXEL;
+    vsh_grid *grid = NULL;
+    vsh_error error = {0};
+    if (vsh_grid_from_meshes(s->bars, BARS, &options, NULL, &grid, &error) != VSH_OK ||
+        vsh_field_create(grid, NULL, NULL, &s->field, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    vsh_grid_free(grid);
+    if (vsh_triangles_available()) {
+        assert_int_equal(vsh_triangles_create(s->bars, BARS, NULL, &s->triangles, &error), VSH_OK);
+    }
+    return 0;
+}
+
+static int tear_down(void **state) {
+    stage *s = *state;
+    vsh_triangles_free(s->triangles);
+    vsh_field_free(s->field);
+    free(s);
+    return 0;
+}
+
+typedef struct baked {
+    float shadow[TEXELS], ao[TEXELS];
+    vsh_bake_error errors[CHANNELS];
+} baked;
+
+static vsh_lightmap_options options_of(const stage *s, int32_t method, int32_t ao_method) {
+    vsh_lightmap_options options = size_of(WIDTH, HEIGHT, 1);
+    options.shade.method = method;
+    options.shade.ao_method = ao_method;
+    options.shade.ao_distance = 1.0;
+    options.shade.triangles = method == VSH_SHADOW_EXACT ? s->triangles : NULL;
+    options.ao_spacing = 1;
+    return options;
+}
+
+static vsh_light sun(void) {
+    vsh_light light = vsh_light_default();
+    light.direction[0] = 0.4;
+    light.direction[1] = 0.8;
+    light.direction[2] = 0.3;
+    light.angle = 0.04;
+    return light;
+}
+
+static void bake_rows(const stage *s, const vsh_texels *texels, const vsh_shade_options *shade, int32_t first,
+                      int32_t threads, const vsh_triangles *truth, baked *b) {
+    const vsh_light light = sun();
+    float *const shadow = b->shadow + (size_t)first * WIDTH;
+    const vsh_lightmap lightmap = {.shadow = &shadow, .ao = b->ao + (size_t)first * WIDTH};
+    vsh_run run = vsh_run_default();
+    run.threads = threads;
+    vsh_bake_stats stats = vsh_bake_stats_zero();
+    stats.errors = b->errors;
+    stats.truth_triangles = truth;
+    vsh_error error = {0};
+    if (vsh_bake_lightmap(s->field, texels, &light, 1, shade, &run, &lightmap, &stats, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+}
+
+static baked *bake_whole(const stage *s, vsh_lightmap_options options, int32_t threads,
+                         const vsh_triangles *truth) {
+    baked *b = calloc(1, sizeof *b);
+    vsh_texels *texels = create(&s->floor.mesh, 1, options, NULL);
+    bake_rows(s, texels, &options.shade, 0, threads, truth, b);
+    vsh_texels_free(texels);
+    return b;
+}
+
+/* Root mean square errors of all texels, against rays of the library's tracer. */
+static void measure(const stage *s, const baked *b, double rmse[CHANNELS]) {
+    enum { RAYS = 256 };
+    const vsh_light light = sun();
+    vsh_texels *texels = create(&s->floor.mesh, 1, options_of(s, VSH_SHADOW_CONE, VSH_AO_CONES), NULL);
+    const vsh_texel_samples all = vsh_texels_samples(texels);
+    float *truth = malloc(all.count * sizeof *truth);
+    for (int c = 0; c < CHANNELS; ++c) {
+        const vsh_result result = c == 0
+                                      ? vsh_trace_shadow(s->triangles, NULL, all.count, all.positions,
+                                                         all.normals, 1e-5, &light, RAYS, NULL, truth, NULL)
+                                      : vsh_trace_ao(s->triangles, NULL, all.count, all.positions,
+                                                     all.normals, 1e-5, 1.0, RAYS, NULL, truth, NULL);
+        assert_int_equal(result, VSH_OK);
+        double sum = 0.0;
+        for (size_t i = 0; i < all.count; ++i) {
+            const double off = (double)(c == 0 ? b->shadow : b->ao)[all.texel[i]] - (double)truth[i];
+            sum += off * off;
+        }
+        rmse[c] = sqrt(sum / (double)all.count);
+    }
+    free(truth);
+    vsh_texels_free(texels);
+}
+
+static void what_voxels_lose_is_in_the_estimate(void **state) {
+    const stage *s = *state;
+    if (s->triangles == NULL) {
+        skip();
+    }
+    baked *b = bake_whole(s, options_of(s, VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), 0, s->triangles);
+    double measured[CHANNELS];
+    measure(s, b, measured);
+    for (int c = 0; c < CHANNELS; ++c) {
+        const vsh_bake_error *known = &b->errors[c];
+        const double said = vsh_bake_error_rmse(known), field = vsh_bake_error_field(known);
+        print_message("%s: measured %.4f, said %.4f, the field's %.4f, by rays alone %.4f\n",
+                      c == 0 ? "shadow" : "ao", measured[c], said, field,
+                      sqrt(known->square_error / known->values));
+        assert_true(measured[c] > 0.02);
+        assert_true(said > 0.9 * measured[c] && said < 1.1 * measured[c]);
+        assert_true(fabs(field * field + known->square_error / known->values - said * said) < 1e-9);
+        assert_true(known->held == TEXELS && known->values == TEXELS);
+    }
+    free(b);
+}
+
+static void exact_values_are_held_against_rays_too(void **state) {
+    const stage *s = *state;
+    if (s->triangles == NULL) {
+        skip();
+    }
+    baked *b = bake_whole(s, options_of(s, VSH_SHADOW_EXACT, VSH_AO_EXACT), 0, s->triangles);
+    double measured[CHANNELS];
+    measure(s, b, measured);
+    for (int c = 0; c < CHANNELS; ++c) {
+        const double said = vsh_bake_error_rmse(&b->errors[c]);
+        print_message("measured %.4f, said %.4f\n", measured[c], said);
+        assert_true(said < 0.03 && said > 0.9 * measured[c]);
+    }
+    free(b);
+}
+
+static void without_the_casters_only_rays_are_known(void **state) {
+    const stage *s = *state;
+    baked *b = bake_whole(s, options_of(s, VSH_SHADOW_ADAPTIVE, VSH_AO_CONES), 0, NULL);
+    assert_true(b->errors[0].held == 0.0 && isnan(vsh_bake_error_field(&b->errors[0])));
+    assert_true(vsh_bake_error_rmse(&b->errors[0]) == sqrt(b->errors[0].square_error / TEXELS));
+    assert_true(isnan(vsh_bake_error_rmse(&b->errors[1]))); /* a preview knows nothing of its error */
+    free(b);
+}
+
+static void to_be_measured_changes_no_value(void **state) {
+    const stage *s = *state;
+    const vsh_lightmap_options options = options_of(s, VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE);
+    baked *plain = bake_whole(s, options, 0, NULL), *held = bake_whole(s, options, 0, s->triangles);
+    assert_memory_equal(plain->shadow, held->shadow, sizeof plain->shadow);
+    assert_memory_equal(plain->ao, held->ao, sizeof plain->ao);
+    free(held);
+    free(plain);
+}
+
+static void bands_and_threads_find_the_same(void **state) {
+    const stage *s = *state;
+    const vsh_lightmap_options options = options_of(s, VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE);
+    baked *whole = bake_whole(s, options, 1, s->triangles), *banded = calloc(1, sizeof *banded);
+    vsh_charts *charts = NULL;
+    assert_int_equal(vsh_charts_create(&s->floor.mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
+    for (int32_t first = 0; first < HEIGHT; first += 24) {
+        const int32_t rows = HEIGHT - first < 24 ? HEIGHT - first : 24;
+        vsh_texels *texels = NULL;
+        assert_int_equal(vsh_texels_create_band(charts, first, rows, NULL, &texels, NULL), VSH_OK);
+        bake_rows(s, texels, &options.shade, first, 4, s->triangles, banded);
+        vsh_texels_free(texels);
+    }
+    vsh_charts_free(charts);
+    assert_memory_equal(whole->errors, banded->errors, sizeof whole->errors);
+    free(banded);
+    free(whole);
+}
+
+/* A box a hair over the floor: what is under it is invalid by large voxels, and filled with what is lit
+ * beside it. */
+static void what_is_filled_by_mistake_counts(void **state) {
+    const stage *s = *state;
+    if (s->triangles == NULL) {
+        skip();
+    }
+    stage low = *s;
+    for (size_t v = 0; v < 8; ++v) {
+        const double at[3] = {(v & 1 ? 0.7 : -0.7), (v & 2 ? 0.85 : 0.05), (v & 4 ? 0.7 : -0.7)};
+        for (size_t axis = 0; axis < 3; ++axis) {
+            low.positions[0][3 * v + axis] = (float)at[axis];
+        }
+    }
+    low.bars[0].positions = low.positions[0];
+    low.triangles = NULL;
+    vsh_grid_options voxels = vsh_grid_options_default();
+    voxels.voxel_size = 0.2;
+    vsh_grid *grid = NULL;
+    vsh_error error = {0};
+    if (vsh_grid_from_meshes(low.bars, 1, &voxels, NULL, &grid, &error) != VSH_OK ||
+        vsh_field_create(grid, NULL, NULL, &low.field, &error) != VSH_OK ||
+        vsh_triangles_create(low.bars, 1, NULL, &low.triangles, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    vsh_grid_free(grid);
+    baked *b = bake_whole(&low, options_of(s, VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), 0, low.triangles);
+    double measured[CHANNELS];
+    measure(&low, b, measured);
+    for (int c = 0; c < CHANNELS; ++c) {
+        const double said = vsh_bake_error_rmse(&b->errors[c]);
+        print_message("%g valid, %g held; measured %.4f, said %.4f\n", b->errors[c].values, b->errors[c].held,
+                      measured[c], said);
+        assert_true(b->errors[c].values < 0.9 * TEXELS && b->errors[c].held == TEXELS);
+        assert_true(said > 0.9 * measured[c] && said < 1.1 * measured[c]);
+    }
+    free(b);
+    vsh_triangles_free(low.triangles);
+    vsh_field_free(low.field);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_voxels_lose_is_in_the_estimate),
+        cmocka_unit_test(exact_values_are_held_against_rays_too),
+        cmocka_unit_test(without_the_casters_only_rays_are_known),
+        cmocka_unit_test(to_be_measured_changes_no_value),
+        cmocka_unit_test(bands_and_threads_find_the_same),
+        cmocka_unit_test(what_is_filled_by_mistake_counts),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
