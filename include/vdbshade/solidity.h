@@ -17,10 +17,11 @@ typedef struct vsh_solidity_report {
     size_t walls;       /* faces inwards and not within solids, or the skin of a hollow house: a thin wall
                            behind the faces, air on both sides of it */
     size_t sheets;      /* air on both sides, shell_thickness apart */
-    size_t closed_over; /* of the solids and rooms: those that are closed over holes */
+    size_t closed_over; /* of the solids and rooms: those that are closed over holes of their own */
     size_t holes;       /* of those */
     size_t open_edges;  /* around these holes */
     size_t turned_triangles; /* that face the other way than those around, and are taken as turned over */
+    size_t standing;         /* of the solids: open ones that others close, which they stand on or run into */
 } vsh_solidity_report;
 
 /* Looks at meshes that cast together, and fills reports[mesh_count]; parts of one object (vsh_mesh.object)

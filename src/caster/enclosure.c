@@ -45,7 +45,7 @@ double vshi_winding(const vshi_surface_part *part, vshi_vec point) {
 }
 
 /* The fractions of the additive sequence of the plastic number (M. Roberts, 2018). */
-static vshi_vec point_in(const vshi_vec corner[3], size_t number) {
+vshi_vec vshi_point_in(const vshi_vec corner[3], size_t number) {
     double u = 0.5 + 0.7548776662466927 * (double)number, v = 0.5 + 0.5698402909980532 * (double)number;
     u -= floor(u);
     v -= floor(v);
@@ -66,12 +66,12 @@ void vshi_part_samples(const vshi_surface_part *part, double area, size_t count,
         reached +=
             0.5 * vshi_length(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
         while (next < count && reached >= area * ((double)next + 0.5) / (double)count) {
-            samples[next] = point_in(corner, next);
+            samples[next] = vshi_point_in(corner, next);
             ++next;
         }
     }
     for (; next < count; ++next) { /* rounding */
-        samples[next] = point_in(corner, next);
+        samples[next] = vshi_point_in(corner, next);
     }
 }
 

@@ -24,6 +24,9 @@ double vshi_solid_angle(const vshi_vec corner[3], vshi_vec point);
  * is open, and 1/2 on it. */
 double vshi_winding(const vshi_surface_part *part, vshi_vec point);
 
+/* The point of a triangle that has a number: those of numbers that follow each other are spread over it. */
+vshi_vec vshi_point_in(const vshi_vec corner[3], size_t number);
+
 /* `count` points spread over a part by area. */
 void vshi_part_samples(const vshi_surface_part *part, double area, size_t count, vshi_vec *samples);
 

@@ -4,12 +4,6 @@
 
 #include <stdlib.h>
 
-/* What an open surface must enclose (vshi_part_encloses()) to be taken for closed. Of shapes made for it: a
- * ball with small holes 0.98 and more, a head open at its neck 0.95, a tree's trunk 0.96; a cup 0.91, a box
- * without its lid 0.90, half a sphere 0.82, a short tube 0.79, a tent 0.64, a curtain 0.60. A bust without
- * its base (0.86 to 0.93) is a vessel turned over: nothing but its use tells them apart. What is filled by
- * mistake buries what stands in it, while what is taken for a sheet only costs time, so such are sheets. */
-static const double SOLID_ENCLOSES = 0.945;
 /* Of one that looks inwards: nothing is filled behind its faces but a thin wall, so that a room may lack a
  * whole side. */
 static const double WALL_ENCLOSES = 0.86;
@@ -109,7 +103,8 @@ static vshi_vec place_of(const vsh_mesh *mesh, uint32_t vertex) {
     return vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * (size_t)vertex));
 }
 
-static size_t close_holes(closing *k, const vshi_rim *rims, size_t count, vshi_vec (*caps)[3]) {
+static size_t close_holes(closing *k, const vshi_rim *rims, size_t count, vshi_vec (*caps)[3],
+                          uint32_t *hole_of) {
     size_t holes = 0;
     for (size_t i = 0; i < count; ++i) {
         k->parent[rims[i].a] = rims[i].a;
@@ -133,7 +128,8 @@ static size_t close_holes(closing *k, const vshi_rim *rims, size_t count, vshi_v
         h->length += length;
     }
     for (size_t i = 0; i < count; ++i) {
-        const hole *h = &k->holes[k->number[root_of(k->parent, rims[i].a)]];
+        hole_of[i] = k->number[root_of(k->parent, rims[i].a)];
+        const hole *h = &k->holes[hole_of[i]];
         caps[i][0] = place_of(k->mesh, rims[i].b);
         caps[i][1] = place_of(k->mesh, rims[i].a);
         caps[i][2] = h->length > 0.0 ? vshi_scale(h->sum, 1.0 / h->length) : caps[i][0];
@@ -169,12 +165,14 @@ static void decide(vshi_solidity *s, vshi_component *c, const measure *m) {
     c->volume = fabs(c->volume);
     const vshi_surface_part part = vshi_component_part(s, c);
     c->enclosed = vshi_part_encloses(&part, c->area, c->cap, c->open_edges);
-    const bool encloses =
-        c->enclosed >= (inward ? WALL_ENCLOSES : SOLID_ENCLOSES) && m->doubled_area < DOUBLED_SHARE * c->area;
+    const bool single = m->doubled_area < DOUBLED_SHARE * c->area;
+    const bool encloses = c->enclosed >= (inward ? WALL_ENCLOSES : VSHI_SOLID_ENCLOSES) && single;
     if (asked != VSH_SOLIDITY_SHELL && (encloses || asked != VSH_SOLIDITY_AUTO)) {
         c->kind = inward ? VSHI_KIND_WALL : VSHI_KIND_SOLID;
         c->inward = inward;
     }
+    c->vessel = c->kind == VSHI_KIND_SHEET && c->open_edges > 0 && asked == VSH_SOLIDITY_AUTO && !inward &&
+                agreed && single;
 }
 
 static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t *caps, vsh_error *error) {
@@ -197,7 +195,7 @@ static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t *caps, vs
         while (rim + c->open_edges < found->rim_count && found->rims[rim + c->open_edges].component == i) {
             ++c->open_edges;
         }
-        c->holes = close_holes(&k, found->rims + rim, c->open_edges, s->caps + *caps);
+        c->holes = close_holes(&k, found->rims + rim, c->open_edges, s->caps + *caps, s->hole_of + *caps);
         rim += c->open_edges;
         *caps += c->open_edges;
         const measure m = measure_component(s, c);

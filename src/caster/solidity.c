@@ -37,6 +37,7 @@ static void set_sides(vshi_solidity *s) {
         vshi_component *c = &s->components[i];
         const uint8_t *turned = s->found[c->whole].turned;
         const size_t first = s->first_side[s->wholes.first[c->whole]];
+        c->stands = c->stands && c->kind == VSHI_KIND_SOLID;
         for (size_t at = 0; at < c->triangles && c->kind != VSHI_KIND_SHEET; ++at) {
             const uint32_t triangle = c->list[at];
             s->sides[first + triangle] = turned[triangle] ? VSHI_SIDE_BEFORE : VSHI_SIDE_BEHIND;
@@ -64,7 +65,13 @@ static vsh_result find(vshi_solidity *s, vshi_job *job, vsh_error *error) {
         result = vshi_allocate((void **)&s->caps, s->cap_count, sizeof *s->caps, "holes", error);
     }
     if (result == VSH_OK) {
+        result = vshi_allocate((void **)&s->hole_of, s->cap_count, sizeof *s->hole_of, "holes", error);
+    }
+    if (result == VSH_OK) {
         result = vshi_kinds_find(s, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_standing_find(s, job, error);
     }
     if (result == VSH_OK) {
         result = vshi_rooms_find(s, error);
@@ -126,6 +133,7 @@ void vshi_solidity_free(vshi_solidity *s) {
         return;
     }
     free(s->cuts);
+    free(s->hole_of);
     free(s->caps);
     free(s->components);
     for (size_t m = 0; s->found != NULL && m < s->wholes.count; ++m) {

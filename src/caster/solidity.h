@@ -28,7 +28,8 @@ enum {
 
 typedef enum vshi_kind {
     VSHI_KIND_SHEET, /* air on both sides: a card, a leaf, a curtain, an open cup */
-    VSHI_KIND_SOLID, /* what it encloses is solid; where it is open, it is closed over its holes */
+    VSHI_KIND_SOLID, /* what it encloses is solid; where it is open, it is closed over its holes, or by what
+                        it stands on */
     VSHI_KIND_ROOM,  /* looks inwards and lies within solids: what it encloses is cut out of them */
     VSHI_KIND_WALL   /* a thin wall behind its faces, air on both sides of that: a room or a sky dome that
                         stands for itself, or the outer skin of a house with open rooms in it */
@@ -37,6 +38,8 @@ typedef enum vshi_kind {
 typedef struct vshi_component {
     vshi_kind kind;
     bool inward;        /* its faces look at what it encloses */
+    bool vessel;        /* a sheet that would be solid if its holes were closed */
+    bool stands;        /* a solid, because other components close its holes, or some of them */
     bool around_all;    /* a sheet, because as a solid it would bury everything else */
     uint32_t whole;     /* of vshi_solidity_wholes() */
     size_t triangles;   /* with some area, and those given twice */

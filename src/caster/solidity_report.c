@@ -11,7 +11,8 @@ static void add(const vshi_component *c, vsh_solidity_report *report) {
                               [VSHI_KIND_WALL] = &report->walls};
     ++*counts[c->kind];
     report->turned_triangles += c->turned;
-    if (c->open_edges > 0 && (c->kind == VSHI_KIND_SOLID || c->kind == VSHI_KIND_ROOM)) {
+    report->standing += c->stands;
+    if (c->open_edges > 0 && !c->stands && (c->kind == VSHI_KIND_SOLID || c->kind == VSHI_KIND_ROOM)) {
         ++report->closed_over;
         report->holes += c->holes;
         report->open_edges += c->open_edges;

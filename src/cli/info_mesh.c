@@ -37,6 +37,11 @@ static void print_solidity(const vsh_solidity_report *report) {
         printf("  closed over: %zu hole%s with %zu open edges, of %zu of these\n", report->holes,
                report->holes == 1 ? "" : "s", report->open_edges, report->closed_over);
     }
+    if (report->standing > 0) {
+        printf("  closed by what %s: %zu of these\n",
+               report->standing == 1 ? "it stands on or runs into" : "they stand on or run into",
+               report->standing);
+    }
     print_count(report->turned_triangles, "triangles that face the other way than those around");
 }
 

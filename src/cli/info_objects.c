@@ -39,7 +39,7 @@ void cli_info_summary(const vsh_model *model) {
     putchar('\n');
 }
 
-/* "solid", "3 walls", "mixed". */
+/* "solid", "3 walls", "solid, closed by what it stands on", "mixed". */
 static void taken_for(const vsh_solidity_report *report, char *text, size_t capacity) {
     const struct {
         size_t count;
@@ -60,13 +60,19 @@ static void taken_for(const vsh_solidity_report *report, char *text, size_t capa
     }
     if (found > 1) {
         snprintf(text, capacity, "mixed");
+    } else if (report->standing > 0 && report->solids == 1) {
+        snprintf(text, capacity, "solid, closed by what it stands on");
+    } else if (report->standing > 0 && report->standing == report->solids) {
+        snprintf(text, capacity, "%zu solids, closed by what they stand on", report->solids);
     }
 }
 
+enum { TAKEN = 64, LEAST_WIDE = 10 };
+
 static void print_row(const vsh_model *model, size_t index, const vsh_solidity_report *solidity,
-                      const vsh_uv_report *uv) {
+                      const vsh_uv_report *uv, int wide) {
     const vsh_mesh mesh = vsh_model_mesh(model, index, -1);
-    char others[32] = "", itself[32] = "", taken[32];
+    char others[32] = "", itself[32] = "", taken[TAKEN];
     if (uv != NULL && uv->other_texels > 0) {
         snprintf(others, sizeof others, "%zu", uv->other_texels);
     }
@@ -74,8 +80,8 @@ static void print_row(const vsh_model *model, size_t index, const vsh_solidity_r
         snprintf(itself, sizeof itself, "%zu", uv->overlap_texels - uv->other_texels);
     }
     taken_for(&solidity[index], taken, sizeof taken);
-    printf("%10zu %8d %12s %12s %-10s %s\n", mesh.triangle_count, vsh_model_uv_sets(model, index), others,
-           itself, taken, mesh.name != NULL ? mesh.name : "");
+    printf("%10zu %8d %12s %12s %-*s %s\n", mesh.triangle_count, vsh_model_uv_sets(model, index), others,
+           itself, wide, taken, mesh.name != NULL ? mesh.name : "");
 }
 
 static void print_verdict(const vsh_mesh *meshes, const vsh_uv_report *reports, size_t count,
@@ -128,11 +134,17 @@ static void print_uv_problems(const vsh_mesh *meshes, const vsh_uv_report *repor
 /* `reports` are of those with UVs, in their order. */
 static void print_table(const vsh_model *model, const cli_info_look *look, const vsh_uv_report *reports) {
     size_t next = 0;
-    printf("%10s %8s %12s %12s %-10s %s\n", "triangles", "UV sets", "over others", "over itself", "taken for",
-           "mesh");
+    int wide = LEAST_WIDE;
+    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+        char taken[TAKEN];
+        taken_for(&look->solidity[i], taken, sizeof taken);
+        wide = (int)strlen(taken) > wide ? (int)strlen(taken) : wide;
+    }
+    printf("%10s %8s %12s %12s %-*s %s\n", "triangles", "UV sets", "over others", "over itself", wide,
+           "taken for", "mesh");
     for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
         const bool uvs = vsh_model_mesh(model, i, -1).uvs != NULL;
-        print_row(model, i, look->solidity, uvs && reports != NULL ? &reports[next] : NULL);
+        print_row(model, i, look->solidity, uvs && reports != NULL ? &reports[next] : NULL, wide);
         next += uvs;
     }
     puts("(over others, over itself: texels that another object's triangle has, or one of its own)");

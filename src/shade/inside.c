@@ -14,12 +14,16 @@ enum {
     FIRST = 2,  /* rays that all points have */
     SECOND = 6, /* more, for those inside by the first if solids were not closed over holes: all must agree */
     COUNTED = 3, /* rays that are followed all the way, for all others; where they disagree: */
-    MOST = 14
+    MORE = 14,
+    TURNS = 4 /* where those do not tell clearly: as many times MORE, turned about the normal */
 };
 
 /* The share of rays that must say inside, of those that disagree: a head's eye, seen through its hole by a
  * third of the rays, is to be baked. */
-static const double MAJORITY = 0.75;
+static const double MAJORITY = 0.72;
+
+/* Between these shares of MORE, as many more are asked. */
+static const double UNCLEAR[2] = {0.5, 0.95};
 
 /* And of all of them, where the COUNTED agree on inside and one of the first does not: under the mouth of a
  * pipe whose faces look inwards three rays go into it, and more than half escape. */
@@ -31,7 +35,7 @@ static const double NEARER = 0.25;
 
 /* Directions over a hemisphere around +z, none along an axis, where the edges of what people build lie: the
  * golden angle apart, from 18° to 75° off the normal. The first two lean to opposite sides. */
-static const double DIRECTIONS[FIRST + MOST][3] = {
+static const double DIRECTIONS[FIRST + MORE][3] = {
     {+0.44378, +0.13502, 0.88590}, {-0.61737, -0.22410, 0.75408}, {+0.29617, -0.50253, 0.81225},
     {-0.10473, +0.65201, 0.75094}, {+0.73921, +0.24787, 0.62620}, {-0.66702, +0.53311, 0.52042},
     {+0.08537, -0.86170, 0.50019}, {+0.60118, -0.67004, 0.43552}, {-0.29341, -0.18922, 0.93706},
@@ -39,6 +43,12 @@ static const double DIRECTIONS[FIRST + MOST][3] = {
     {+0.52033, +0.58190, 0.62495}, {-0.85210, -0.17390, 0.49367}, {-0.21844, +0.85512, 0.47014},
     {+0.88915, -0.22030, 0.40107},
 };
+
+/* Cosine and sine of what a turn turns them by: 23° each, so that none comes to lie on another. */
+static const double TURNED[TURNS][2] = {{1.0, 0.0},
+                                        {0.92050485345244033, 0.39073112848927377},
+                                        {0.69465837045899725, 0.71933980033865119},
+                                        {0.35836794954530027, 0.93358042649720174}};
 
 typedef struct looking {
     const vsh_triangles *triangles;
@@ -57,9 +67,11 @@ static void aim(const looking *l, size_t point, size_t direction, vshi_segment_r
         normal = (vshi_vec){0.0, 0.0, 1.0};
     }
     vshi_frame(normal, &u, &v);
-    const double *by = DIRECTIONS[direction];
+    const size_t turn = direction < FIRST ? 0 : (direction - FIRST) / MORE;
+    const double *by = DIRECTIONS[direction - turn * MORE], c = TURNED[turn][0], s = TURNED[turn][1];
+    const double a = c * by[0] - s * by[1], b = s * by[0] + c * by[1];
     const vshi_vec d =
-        vshi_unit(vshi_add(vshi_add(vshi_scale(u, by[0]), vshi_scale(v, by[1])), vshi_scale(normal, by[2])));
+        vshi_unit(vshi_add(vshi_add(vshi_scale(u, a), vshi_scale(v, b)), vshi_scale(normal, by[2])));
     *ray = (vshi_segment_ray){{p.x, p.y, p.z}, {d.x, d.y, d.z}, INFINITY};
 }
 
@@ -75,7 +87,7 @@ static bool begins_inside(const looking *l, size_t point, int direction, bool *s
 
 /* Follows rays all the way: more of them where they disagree, with each other or with the first. */
 static uint8_t count_through(const looking *l, size_t point, bool seen) {
-    int inside = 0, all = MOST;
+    int inside = 0, all = MORE;
     double share = MAJORITY;
     for (int k = 0; k < COUNTED; ++k) {
         inside += begins_inside(l, point, FIRST + k, &seen);
@@ -93,8 +105,14 @@ static uint8_t count_through(const looking *l, size_t point, bool seen) {
         all += FIRST;
         share = AGREED;
     }
-    for (int k = COUNTED; k < MOST; ++k) {
+    for (int k = COUNTED; k < MORE; ++k) {
         inside += begins_inside(l, point, FIRST + k, &seen);
+    }
+    if (inside > UNCLEAR[0] * all && inside < UNCLEAR[1] * all) {
+        for (int k = MORE; k < TURNS * MORE; ++k) {
+            inside += begins_inside(l, point, FIRST + k, &seen);
+        }
+        all += (TURNS - 1) * MORE;
     }
     return inside < share * all ? VSHI_OUTSIDE : seen ? VSHI_INSIDE_SEEN : VSHI_INSIDE;
 }

@@ -122,6 +122,7 @@ void move_out(FloatGrid &grid, float offset, float background, Stage &stage) {
 struct Tally {
     size_t sheets = 0, sheet_edges = 0;
     size_t closed = 0, closed_edges = 0, holes = 0; // solids closed over their holes
+    size_t standing = 0, standing_edges = 0;        // closed by what they stand on
     size_t turned = 0;
     bool around_all = false;
 };
@@ -135,6 +136,9 @@ Tally tally_of(const vshi_component *components, size_t count) {
         if (c.kind == VSHI_KIND_SHEET) {
             ++tally.sheets;
             tally.sheet_edges += c.open_edges;
+        } else if (c.stands) {
+            ++tally.standing;
+            tally.standing_edges += c.open_edges;
         } else if (c.kind != VSHI_KIND_WALL && c.open_edges > 0) {
             ++tally.closed;
             tally.closed_edges += c.open_edges;
@@ -179,6 +183,14 @@ void warn(const Meshes &meshes, const vshi_solidity *solidity, const Lattice &la
                       "enclose nearly all behind them: taken for solid, closed over the holes",
                       name.text, first + 1, meshes.count, tally.closed_edges, plural(tally.closed_edges),
                       tally.holes, plural(tally.holes), tally.closed, count, plural(count));
+        }
+        if (tally.standing > 0) {
+            vshi_warn(
+                &run,
+                "%s (%zu of %zu): %zu open edge%s of %zu of %zu component%s that stand on others or run "
+                "into them: taken for solid, closed by those",
+                name.text, first + 1, meshes.count, tally.standing_edges, plural(tally.standing_edges),
+                tally.standing, count, plural(count));
         }
         if (tally.turned > 0) {
             vshi_warn(

@@ -21,6 +21,51 @@ setup() {
     [[ $output == *"problem: 4 open edges"* ]] || fail "no open edges"
 }
 
+# A floor of 6 × 6, and a box without its bottom in it: 4 of 36 of the floor are within.
+write_standing() {
+    cat >"$1" <<'OBJ'
+o floor
+v -3 0 -3
+v 3 0 -3
+v 3 0 3
+v -3 0 3
+vt 0 0
+vt 1 0
+vt 1 1
+vt 0 1
+f 1/1 4/4 3/3 2/2
+o hut
+v -1 -0.1 -1
+v 1 -0.1 -1
+v 1 -0.1 1
+v -1 -0.1 1
+v -1 2 -1
+v 1 2 -1
+v 1 2 1
+v -1 2 1
+f 12 11 10 9
+f 5 9 10 6
+f 6 10 11 7
+f 7 11 12 8
+f 8 12 9 5
+OBJ
+}
+
+@test "what stands on something is closed by it" {
+    write_standing stands.obj
+    shade info stands.obj
+    done_well
+    [[ $output == *"closed by what it stands on or runs into: 1 of these"* ]] || fail "not closed: $output"
+    shade bake stands.obj --receive floor -o floor.exr --ao 1 --size 60 --stats stats.json
+    done_well
+    [[ $stderr == *"taken for solid, closed by those"* ]] || fail "no warning: $stderr"
+    shade info stands.obj
+    [ "$(grep -oE '"invalid_texels": [0-9]+' stats.json)" = '"invalid_texels": 400' ] || fail "$(cat stats.json)"
+    shade bake stands.obj --receive floor --shell hut -o floor.exr --ao 1 --size 60 --stats stats.json
+    done_well
+    [ "$(grep -oE '"invalid_texels": [0-9]+' stats.json)" = '"invalid_texels": 0' ] || fail "$(cat stats.json)"
+}
+
 @test "a room whose faces look inwards is baked" {
     shade bake room.obj -o room.exr --ao 0.5 --size 64 --resolution 64 --ao-method exact
     done_well

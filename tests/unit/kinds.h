@@ -1,0 +1,49 @@
+/* What the components of meshes put together from parts are taken for. */
+#ifndef KINDS_H
+#define KINDS_H
+
+#include "shapes.h"
+
+#include "caster/solidity.h"
+
+static inline vshi_solidity *solidity_of(const vsh_mesh *meshes, size_t count) {
+    vshi_solidity *made = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vshi_solidity_create(meshes, count, NULL, &made, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    return made;
+}
+
+/* The kinds of all components in their order: "S" solid, "R" room, "W" wall, "-" sheet. */
+static inline void assert_kinds(const vsh_mesh *meshes, size_t count, const char *kinds) {
+    vshi_solidity *s = solidity_of(meshes, count);
+    size_t all;
+    const vshi_component *c = vshi_solidity_components(s, &all);
+    char found[32] = "";
+    for (size_t i = 0; i < all && i + 1 < sizeof found; ++i) {
+        found[i] = "-SRW"[c[i].kind];
+    }
+    if (strcmp(found, kinds) != 0) {
+        fail_msg("%s: %s, expected %s (encloses %g)", meshes->name, found, kinds, c[0].enclosed);
+    }
+    vshi_solidity_free(s);
+}
+
+static inline void assert_kinds_of(shape *s, const char *what, const char *kinds) {
+    const vsh_mesh mesh = shape_mesh(s, what);
+    assert_kinds(&mesh, 1, kinds);
+    s->vertices = s->triangles = 0;
+}
+
+/* All triangles of a mesh have this side. */
+static inline void assert_sides(const vshi_solidity *s, size_t mesh, const vsh_mesh *of, uint8_t side) {
+    const uint8_t *sides = vshi_solidity_sides(s, mesh);
+    for (size_t i = 0; i < of->triangle_count; ++i) {
+        if (sides[i] != side) {
+            fail_msg("%s: triangle %zu: side %d, expected %d", of->name, i, sides[i], side);
+        }
+    }
+}
+
+#endif

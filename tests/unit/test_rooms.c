@@ -1,0 +1,168 @@
+/* What is taken for a room, and what it is cut out of; walls, and what is a sheet because neither fits. */
+#include "kinds.h"
+
+static const double ORIGIN[3] = {0, 0, 0};
+static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};
+
+static void rooms_and_domes_are_walls_around_air(void **state) {
+    (void)state;
+    shape *s = shape_new();
+    shape_box(s, LOW, HIGH, ALL_SIDES);
+    shape_turn(s, 0);
+    assert_kinds_of(s, "room", "W");
+    shape_ball(s, ORIGIN, 10.0, -1.0, 1.0, 24);
+    shape_turn(s, 0);
+    shape_box(s, LOW, HIGH, ALL_SIDES);
+    assert_kinds_of(s, "sky dome around a cube", "WS");
+    const double floor_low[3] = {-5, -5, -1}, floor_high[3] = {5, 5, -1.5};
+    shape_box(s, LOW, HIGH, ALL_SIDES);
+    shape_box(s, floor_low, floor_high, TOP);
+    shape_ball(s, ORIGIN, 10.0, -1.0, 1.0, 24);
+    assert_kinds_of(s, "sky dome that looks outwards around a cube and a card", "S--");
+    shape_box(s, LOW, HIGH, ALL_SIDES & ~FRONT);
+    shape_turn(s, 0);
+    assert_kinds_of(s, "room without its fourth wall", "W");
+    /* a floor, and walls of four quads each with a door between them */
+    const double door_low[3] = {-0.2, -1, -1}, door_high[3] = {0.2, -1, 0.2};
+    shape_box(s, LOW, HIGH, ALL_SIDES & ~FRONT);
+    const double strips[3][2][3] = {{{-1, -1, -1}, {door_low[0], 1, 1}},
+                                    {{door_high[0], -1, -1}, {1, 1, 1}},
+                                    {{door_low[0], -1, door_high[2]}, {door_high[0], 1, 1}}};
+    for (int i = 0; i < 3; ++i) {
+        shape_box(s, strips[i][0], strips[i][1], FRONT);
+    }
+    shape_turn(s, 0);
+    assert_kinds_of(s, "room with a door, its lintel apart", "W-");
+    free(s);
+}
+
+/* A house of 6 with a room of 2 in it and a table of 1 in that. */
+static void build_house(shape *s, shape *room, shape *table) {
+    const double wide_low[3] = {-3, -3, -3}, wide_high[3] = {3, 3, 3};
+    const double table_low[3] = {-0.5, -0.5, -1}, table_high[3] = {0.5, 0.5, 0};
+    shape_box(s, wide_low, wide_high, ALL_SIDES);
+    const size_t first = room->triangles;
+    shape_box(room, LOW, HIGH, ALL_SIDES);
+    shape_turn(room, first);
+    shape_box(table, table_low, table_high, ALL_SIDES);
+}
+
+static void rooms_are_cut_out_of_houses(void **state) {
+    (void)state;
+    shape *s = shape_new(), *room = shape_new(), *table = shape_new();
+    build_house(s, s, s);
+    assert_kinds_of(s, "house in one mesh", "SRS");
+    build_house(s, room, table);
+    const vsh_mesh meshes[3] = {shape_mesh(table, "table"), shape_mesh(room, "room"), shape_mesh(s, "house")};
+    assert_kinds(meshes, 3, "SRS");
+    vshi_solidity *found = solidity_of(meshes, 3);
+    size_t cuts;
+    const vshi_cut *cut = vshi_solidity_cuts(found, &cuts);
+    assert_true(cuts == 1 && cut->room == 1 && cut->solid == 2);
+    for (size_t m = 0; m < 3; ++m) {
+        assert_sides(found, m, &meshes[m], VSHI_SIDE_BEHIND);
+    }
+    vshi_solidity_free(found);
+    free(table);
+    free(room);
+    free(s);
+}
+
+static void rooms_in_rooms_are_cut_out_of_what_they_lie_in(void **state) {
+    (void)state;
+    shape *s = shape_new();
+    const double half[5] = {5, 4, 3, 2, 1}; /* house, room, safe, room in it, gold */
+    for (int i = 0; i < 5; ++i) {
+        const double low[3] = {-half[i], -half[i], -half[i]}, high[3] = {half[i], half[i], half[i]};
+        const size_t first = s->triangles;
+        shape_box(s, low, high, ALL_SIDES);
+        if (i % 2 == 1) {
+            shape_turn(s, first);
+        }
+    }
+    const vsh_mesh mesh = shape_mesh(s, "house with a safe");
+    assert_kinds(&mesh, 1, "SRSRS");
+    vshi_solidity *found = solidity_of(&mesh, 1);
+    size_t cuts;
+    const vshi_cut *cut = vshi_solidity_cuts(found, &cuts);
+    /* out of the house both: the outer one holds the inner */
+    assert_int_equal(cuts, 3);
+    assert_true(cut[0].solid == 0 && cut[0].room == 1 && cut[1].solid == 0 && cut[1].room == 3);
+    assert_true(cut[2].solid == 2 && cut[2].room == 3);
+    vshi_solidity_free(found);
+    free(s);
+}
+
+static void a_pillar_that_reaches_into_a_room_is_not_cut(void **state) {
+    (void)state;
+    shape *s = shape_new();
+    build_house(s, s, s);
+    s->triangles -= 12;
+    const double low[3] = {-0.1, -0.1, -2.9}, high[3] = {0.1, 0.1, 0.0};
+    shape_box(s, low, high, ALL_SIDES);
+    const vsh_mesh mesh = shape_mesh(s, "pillar");
+    assert_kinds(&mesh, 1, "SRS");
+    vshi_solidity *found = solidity_of(&mesh, 1);
+    size_t cuts;
+    const vshi_cut *cut = vshi_solidity_cuts(found, &cuts);
+    assert_true(cuts == 1 && cut->solid == 0);
+    vshi_solidity_free(found);
+    free(s);
+}
+
+static void rooms_of_separate_quads_are_sheets_and_never_nothing(void **state) {
+    (void)state;
+    shape *s[6];
+    vsh_mesh meshes[6];
+    for (int i = 0; i < 6; ++i) {
+        s[i] = shape_new();
+        const double low[3] = {-1 - 0.01 * i, -1, -1}; /* corners that do not meet exactly */
+        shape_box(s[i], low, HIGH, 1U << i);
+        shape_turn(s[i], 0);
+        meshes[i] = shape_mesh(s[i], "wall");
+    }
+    assert_kinds(meshes, 6, "------");
+    /* parts of one object are one surface */
+    for (int i = 0; i < 6; ++i) {
+        s[i]->vertices = s[i]->triangles = 0;
+        shape_box(s[i], LOW, HIGH, 1U << i);
+        meshes[i] = shape_mesh(s[i], "side");
+        meshes[i].object = 7;
+    }
+    assert_kinds(meshes, 6, "S");
+    vshi_solidity *found = solidity_of(meshes, 6);
+    for (size_t i = 0; i < 6; ++i) {
+        assert_sides(found, i, &meshes[i], VSHI_SIDE_BEHIND);
+    }
+    vshi_solidity_free(found);
+    for (int i = 0; i < 6; ++i) {
+        free(s[i]);
+    }
+}
+
+static void an_open_room_in_an_open_house_closes_neither(void **state) {
+    (void)state;
+    shape *s = shape_new();
+    const double wide_low[3] = {-1.2, -1.2, -1.2}, wide_high[3] = {1.2, 1.2, 1.2};
+    shape_ball(s, ORIGIN, 1.3, -1.0, 0.95, 48);
+    shape_ball(s, ORIGIN, 1.0, -1.0, 0.95, 48);
+    shape_turn(s, s->triangles / 2);
+    assert_kinds_of(s, "hut with a hole in its roof", "WW");
+    shape_box(s, wide_low, wide_high, ALL_SIDES);
+    shape_ball(s, ORIGIN, 1.0, -1.0, 0.95, 48);
+    shape_turn(s, 12);
+    assert_kinds_of(s, "open room in a closed house", "SR");
+    free(s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(rooms_and_domes_are_walls_around_air),
+        cmocka_unit_test(rooms_are_cut_out_of_houses),
+        cmocka_unit_test(rooms_in_rooms_are_cut_out_of_what_they_lie_in),
+        cmocka_unit_test(a_pillar_that_reaches_into_a_room_is_not_cut),
+        cmocka_unit_test(rooms_of_separate_quads_are_sheets_and_never_nothing),
+        cmocka_unit_test(an_open_room_in_an_open_house_closes_neither),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
