@@ -139,7 +139,7 @@ static void write_texels(FILE *out, const trade_work *work) {
     }
     fprintf(out,
             "</dd>\n<dt>Texels</dt><dd>%zu measured, one sample each, of %zu that charts cover. Left out: "
-            "what a bake itself marks as invalid (inside another solid, or seen from behind) at one of the "
+            "what a bake itself marks as invalid (inside a solid or behind a wall) at one of the "
             "voxel sizes at least, so that all runs have the same texels:",
             work->common_count, work->covered);
     for (size_t f = work->field_count; f-- > 0;) {

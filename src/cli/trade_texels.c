@@ -1,5 +1,5 @@
-/* Which texels are measured. Every voxel size has its own view of what is valid (clear of other solids, seen
- * from the front); runs are compared on the texels that all of them find valid, and each on its own beside.
+/* Which texels are measured. Every voxel size has its own view of what is valid (not inside a solid nor
+ * behind a wall); runs are compared on the texels that all of them find valid, and each on its own beside.
  */
 #include "meshes.h"
 #include "message.h"
