@@ -1,4 +1,6 @@
+#include "bake/average.h"
 #include "bake/bend.h"
+#include "bake/coverage.h"
 #include "bake/field_share.h"
 #include "bake/halo.h"
 #include "bake/lattice.h"
@@ -132,77 +134,17 @@ static vsh_points points_of(const baking *bake, bool traced, vsh_shade_options *
                         origins->texel};
 }
 
-/* --- averages of samples over texels */
-
-typedef struct averaging {
-    baking *bake;
-    const float *values; /* [origins.count][channels]; NULL: only the state is found */
-    float *plane;
-    size_t channels;
-    bool deviation; /* says nothing of whether a texel is valid; what is not known is 0 */
-} averaging;
-
-/* Texels whose samples begin in a block belong to it, also where they go on beyond its end. */
-static void average_blocks(void *user, size_t begin, size_t end) {
-    const averaging *a = user;
-    const vsh_texels *texels = a->bake->texels;
-    const vshi_origins *origins = &a->bake->origins;
-    const size_t base = vshi_texels_base(texels);
-    uint8_t *state = a->bake->state;
-    for (size_t block = begin; block < end; ++block) {
-        size_t i = block * VSHI_ORIGIN_BLOCK;
-        size_t last = i + VSHI_ORIGIN_BLOCK;
-        last = last < texels->count ? last : texels->count;
-        size_t next = origins->before[block];
-        for (; i > 0 && i < last && texels->texel[i] == texels->texel[i - 1]; ++i) {
-            next += origins->valid[i];
-        }
-        while (i < last) {
-            const uint32_t texel = texels->texel[i];
-            double sum[3] = {0.0, 0.0, 0.0};
-            size_t count = 0;
-            for (; i < texels->count && texels->texel[i] == texel; ++i) {
-                if (!origins->valid[i]) {
-                    continue;
-                }
-                const float *value = a->values != NULL ? a->values + next * a->channels : NULL;
-                ++next;
-                if (value != NULL && isnan(value[0])) {
-                    continue;
-                }
-                for (size_t c = 0; value != NULL && c < a->channels; ++c) {
-                    sum[c] += (double)value[c];
-                }
-                ++count;
-            }
-            const size_t at = texel - base;
-            if (a->values == NULL) {
-                state[at] = count > 0 ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
-            } else if (count == 0 && !a->deviation) {
-                state[at] = VSHI_TEXEL_INVALID;
-            } else if (count > 0) {
-                for (size_t c = 0; c < a->channels; ++c) {
-                    a->plane[at * a->channels + c] = (float)(sum[c] / (double)count);
-                }
-            }
-        }
-    }
-}
-
+/* Averages samples over texels: of deviations not into the state. */
 static vsh_result average(baking *bake, const float *values, size_t channels, float *plane,
                           vsh_error *error) {
-    averaging a = {.bake = bake,
-                   .values = values,
-                   .plane = plane,
-                   .channels = channels,
-                   .deviation = values != NULL && values == bake->deviation};
-    vshi_job *job = vshi_job_begin(&bake->quiet, "resolve", bake->origins.blocks);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "resolve: the system refused memory");
-    }
-    const vsh_result result = vshi_parallel_for(job, bake->origins.blocks, 1, 1, average_blocks, &a, error);
-    vshi_job_end(job);
-    return result;
+    const vshi_average task = {.texels = bake->texels,
+                               .origins = &bake->origins,
+                               .values = values,
+                               .channels = channels,
+                               .deviation = values != NULL && values == bake->deviation,
+                               .plane = plane,
+                               .state = bake->state};
+    return vshi_average_run(&task, &bake->quiet, error);
 }
 
 /* --- the planes */
@@ -450,48 +392,6 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
     return result;
 }
 
-/* Whether the texel that sample i is the first of is in plain sight, none of whose samples is valid. */
-static bool is_seen(const baking *bake, size_t i) {
-    const vsh_texels *texels = bake->texels;
-    bool seen = false;
-    for (size_t k = i; k < texels->count && texels->texel[k] == texels->texel[i]; ++k) {
-        seen = seen || bake->origins.seen[k] != 0;
-    }
-    return seen;
-}
-
-/* Counts the band's texels without a value, by the mesh of their first sample, and writes the coverage. */
-static size_t finish_coverage(baking *bake) {
-    const vsh_texels *texels = bake->texels;
-    const vshi_band *band = &texels->band;
-    const size_t base = vshi_texels_base(texels);
-    const size_t first = texels->row_start[band->own_begin - band->held_begin];
-    const size_t last = texels->row_start[band->own_end - band->held_begin];
-    size_t invalid = 0;
-    for (size_t i = first; i < last; ++i) {
-        const uint32_t texel = texels->texel[i];
-        if (i > first && texel == texels->texel[i - 1]) {
-            continue;
-        }
-        if (bake->state[texel - base] == VSHI_TEXEL_INVALID) {
-            const bool seen = is_seen(bake, i);
-            ++invalid;
-            bake->stats.seen_texels += seen;
-            if (bake->lightmap->invalid != NULL) {
-                bake->lightmap->invalid[texel - base] = seen ? 2.0f : 1.0f;
-            }
-            if (bake->stats.invalid_by_mesh != NULL) {
-                ++bake->stats.invalid_by_mesh[vshi_sample_mesh(texels, i)];
-            }
-        } else if (bake->lightmap->coverage != NULL) {
-            bake->lightmap->coverage[texel - base] = 1.0f;
-        }
-    }
-    bake->stats.texels = texels->info.covered;
-    bake->stats.invalid_texels = invalid;
-    return invalid;
-}
-
 static vsh_result pad(baking *bake, size_t invalid, vsh_error *error) {
     const vsh_texels *texels = bake->texels;
     const int32_t radius[VSHI_TEXEL_KINDS] = {
@@ -549,7 +449,8 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
         result = bake_planes(bake, error);
     }
     if (result == VSH_OK) {
-        result = pad(bake, finish_coverage(bake), error);
+        vshi_coverage_write(texels, &bake->origins, bake->state, bake->lightmap, &bake->stats);
+        result = pad(bake, bake->stats.invalid_texels, error);
     }
     if (result == VSH_OK) {
         result = add_filled(bake, error);
