@@ -1,33 +1,17 @@
-/* The files behind a scene: each read once, its meshes put where casters and receivers stand. */
+/* What stands behind a scene: the meshes of its files put where casters and receivers stand. */
 #include "scene/assets.h"
 
-#include "analytic/heightmap.h"
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "caster/solidity.h"
+#include "scene/asset_files.h"
 #include "scene/select.h"
 #include "scene/solidity.h"
 
 #include <stdlib.h>
 #include <string.h>
-
-typedef struct asset_model {
-    char *path;
-    vsh_model *model;
-} asset_model;
-
-typedef struct asset_grid {
-    char *path;
-    char *name; /* NULL: the first of the file */
-    vsh_grid *grid;
-} asset_grid;
-
-typedef struct asset_map {
-    char *path;
-    vshi_heightmap map;
-} asset_map;
 
 /* One caster or receiver: the file's meshes with its transform in front of theirs. */
 typedef struct asset_place {
@@ -44,70 +28,13 @@ typedef struct asset_place {
 } asset_place;
 
 struct vsh_assets {
-    asset_model *models;
-    size_t model_count;
-    asset_grid *grids;
-    size_t grid_count;
-    asset_map *maps;
-    size_t map_count;
+    vshi_asset_files files;
     asset_place *casters;
     size_t caster_count;
     asset_place *receivers;
     size_t receiver_count;
     vshi_solidity *solidity; /* of the casters' meshes */
 };
-
-static vsh_result copy_text(const char *text, char **copy, vsh_error *error) {
-    const size_t size = strlen(text) + 1;
-    void *memory = NULL;
-    const vsh_result result = vshi_allocate(&memory, size, 1, "file name", error);
-    if (result == VSH_OK) {
-        *copy = memcpy(memory, text, size);
-    }
-    return result;
-}
-
-static vsh_result find_model(vsh_assets *assets, const char *path, const vsh_run *run,
-                             const vsh_model **model, vsh_error *error) {
-    for (size_t i = 0; i < assets->model_count; ++i) {
-        if (strcmp(assets->models[i].path, path) == 0) {
-            *model = assets->models[i].model;
-            return VSH_OK;
-        }
-    }
-    asset_model *entry = &assets->models[assets->model_count++];
-    vsh_result result = copy_text(path, &entry->path, error);
-    if (result == VSH_OK) {
-        result = vsh_model_read(path, run, &entry->model, error);
-    }
-    *model = entry->model;
-    return result;
-}
-
-static bool same_text(const char *a, const char *b) {
-    return a == NULL || b == NULL ? a == b : strcmp(a, b) == 0;
-}
-
-static vsh_result find_grid(vsh_assets *assets, const char *path, const char *name, const vsh_run *run,
-                            const vsh_grid **grid, vsh_error *error) {
-    for (size_t i = 0; i < assets->grid_count; ++i) {
-        const asset_grid *entry = &assets->grids[i];
-        if (same_text(entry->path, path) && same_text(entry->name, name)) {
-            *grid = entry->grid;
-            return VSH_OK;
-        }
-    }
-    asset_grid *entry = &assets->grids[assets->grid_count++];
-    vsh_result result = copy_text(path, &entry->path, error);
-    if (result == VSH_OK && name != NULL) {
-        result = copy_text(name, &entry->name, error);
-    }
-    if (result == VSH_OK) {
-        result = vsh_grid_read(path, name, run, &entry->grid, error);
-    }
-    *grid = entry->grid;
-    return result;
-}
 
 /* The meshes of the model that are `chosen`; NULL: all. */
 static vsh_result place_chosen(asset_place *place, const vsh_model *model, const unsigned char *chosen,
@@ -152,29 +79,12 @@ static vsh_result place_model(asset_place *place, const vsh_model *model, int32_
     return place_chosen(place, model, NULL, uv_set, 0.0, transform, error);
 }
 
-static vsh_result find_map(vsh_assets *assets, const char *path, const vsh_run *run,
-                           const vshi_heightmap **map, vsh_error *error) {
-    for (size_t i = 0; i < assets->map_count; ++i) {
-        if (strcmp(assets->maps[i].path, path) == 0) {
-            *map = &assets->maps[i].map;
-            return VSH_OK;
-        }
-    }
-    asset_map *entry = &assets->maps[assets->map_count++];
-    vsh_result result = copy_text(path, &entry->path, error);
-    if (result == VSH_OK) {
-        result = vshi_heightmap_read(path, run, &entry->map, error);
-    }
-    *map = &entry->map;
-    return result;
-}
-
 /* `source` is filled but for what the image holds, and whether it is direct but for its transform. */
 static vsh_result place_heights(vsh_assets *assets, asset_place *place, vsh_heights_source *source,
                                 int32_t what, const double transform[12], const vsh_run *run,
                                 vsh_error *error) {
     const vshi_heightmap *map = NULL;
-    vsh_result result = find_map(assets, source->name, run, &map, error);
+    vsh_result result = vshi_asset_map(&assets->files, source->name, run, &map, error);
     if (result == VSH_OK) {
         source->columns = map->columns;
         source->rows = map->rows;
@@ -266,7 +176,7 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: no path", index);
     }
     if (caster->type == VSH_CASTER_VDB) {
-        return find_grid(assets, caster->path, caster->grid, run, &place->grid, error);
+        return vshi_asset_grid(&assets->files, caster->path, caster->grid, run, &place->grid, error);
     }
     if (caster->type == VSH_CASTER_MASK) {
         return vsh_outline_from_image(caster->path, &caster->mask, run, &place->outline, error);
@@ -283,7 +193,7 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
         return place_heights(assets, place, &source, VSH_HEIGHTS_SOLID, caster->transform, run, error);
     }
     const vsh_model *model = NULL;
-    vsh_result result = find_model(assets, caster->path, run, &model, error);
+    vsh_result result = vshi_asset_model(&assets->files, caster->path, run, &model, error);
     unsigned char *chosen = NULL;
     if (result == VSH_OK) {
         result = vshi_select(model, caster->path, &caster->objects, &chosen, error);
@@ -333,7 +243,7 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
     }
     const vsh_model *model = NULL;
     unsigned char *chosen = NULL;
-    vsh_result result = find_model(assets, receiver->path, run, &model, error);
+    vsh_result result = vshi_asset_model(&assets->files, receiver->path, run, &model, error);
     if (result == VSH_OK) {
         result = vshi_select(model, receiver->path, &receiver->objects, &chosen, error);
     }
@@ -349,27 +259,17 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
 }
 
 static vsh_result allocate_places(vsh_assets *assets, const vsh_scene *scene, vsh_error *error) {
-    void *memory[5] = {NULL, NULL, NULL, NULL, NULL};
-    const size_t files = scene->caster_count + scene->receiver_count;
-    vsh_result result = vshi_allocate(&memory[0], files, sizeof *assets->models, "models", error);
+    void *casters = NULL, *receivers = NULL;
+    vsh_result result = vshi_asset_files_create(scene, &assets->files, error);
     if (result == VSH_OK) {
-        result = vshi_allocate(&memory[1], scene->caster_count, sizeof *assets->grids, "grids", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory[2], scene->caster_count, sizeof *assets->casters, "casters", error);
+        result = vshi_allocate(&casters, scene->caster_count, sizeof *assets->casters, "casters", error);
     }
     if (result == VSH_OK) {
         result =
-            vshi_allocate(&memory[3], scene->receiver_count, sizeof *assets->receivers, "receivers", error);
+            vshi_allocate(&receivers, scene->receiver_count, sizeof *assets->receivers, "receivers", error);
     }
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory[4], files, sizeof *assets->maps, "heightfields", error);
-    }
-    assets->maps = memory[4];
-    assets->models = memory[0];
-    assets->grids = memory[1];
-    assets->casters = memory[2];
-    assets->receivers = memory[3];
+    assets->casters = casters;
+    assets->receivers = receivers;
     if (result == VSH_OK) {
         assets->caster_count = scene->caster_count;
         assets->receiver_count = scene->receiver_count;
@@ -431,22 +331,7 @@ void vsh_assets_free(vsh_assets *assets) {
     vshi_solidity_free(assets->solidity);
     free_places(assets->receivers, assets->receiver_count);
     free_places(assets->casters, assets->caster_count);
-    for (size_t i = 0; i < assets->map_count; ++i) {
-        free(assets->maps[i].map.values);
-        free(assets->maps[i].path);
-    }
-    free(assets->maps);
-    for (size_t i = 0; i < assets->grid_count; ++i) {
-        vsh_grid_free(assets->grids[i].grid);
-        free(assets->grids[i].name);
-        free(assets->grids[i].path);
-    }
-    free(assets->grids);
-    for (size_t i = 0; i < assets->model_count; ++i) {
-        vsh_model_free(assets->models[i].model);
-        free(assets->models[i].path);
-    }
-    free(assets->models);
+    vshi_asset_files_free(&assets->files);
     free(assets);
 }
 

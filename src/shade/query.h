@@ -2,10 +2,23 @@
 #ifndef VSHI_QUERY_H
 #define VSHI_QUERY_H
 
-#include "shade/kernel/march.h"
+#include "shade/ao.h"
+#include "shade/layers.h"
+#include "shade/shadow.h"
 
 #include <stdbool.h>
 #include <vdbshade/query.h>
+
+struct vsh_query {
+    vsh_shade_options options;
+    size_t light_count;
+    vsh_light *lights;        /* [light_count] */
+    vshi_shadow_task *shadow; /* [light_count] */
+    vshi_layers **layers;     /* [light_count + 1]: of the lights, then of AO */
+    vshi_ao_task ao;
+    vshi_ao_cones cones;
+    vshi_sampler *sampler; /* NULL where no method takes one */
+};
 
 /* vsh_query_create(), or (sphere) a query whose AO is the free share of all directions around a point, each
  * counting alike, and takes no normals. Errors: VSH_ERROR_ARGUMENT, also for taps, which go along a normal.

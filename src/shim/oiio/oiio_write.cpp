@@ -1,10 +1,9 @@
 // Writing every image format but OpenEXR. Integers are made by us, and no value is multiplied by alpha or
 // sent through a transfer curve. Bytes go through a file of ours where the writer takes one; where it does
 // not, the file is read again, because those writers do not look whether their bytes arrived.
-#include "oiio_formats.h"
+#include "oiio_verify.h"
 
 #include "base/file.h"
-#include "base/hash.h"
 #include "shim/guard.h"
 
 #include <OpenImageIO/filesystem.h>
@@ -17,7 +16,6 @@
 #include <limits>
 #include <memory>
 #include <string>
-#include <sys/stat.h>
 #include <type_traits>
 #include <unistd.h>
 #include <vector>
@@ -102,14 +100,6 @@ void interleave(const vshi_planes &planes, int32_t first, int32_t last, Value *r
     }
 }
 
-template <typename Value> constexpr OIIO::TypeDesc::BASETYPE oiio_type() {
-    if constexpr (std::is_same_v<Value, float>) {
-        return OIIO::TypeDesc::FLOAT;
-    } else {
-        return sizeof(Value) == 1 ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::UINT16;
-    }
-}
-
 OIIO::ImageSpec make_spec(const vshi_planes &planes, const char *path, const std::string &format,
                           OIIO::TypeDesc type) {
     OIIO::ImageSpec spec(planes.width, planes.height, planes.count, type);
@@ -151,41 +141,6 @@ std::string reason(const std::string &text) {
     return text.empty() ? "the writer gave no reason" : text;
 }
 
-vsh_result fail_write(vsh_error *error, const char *path, const std::string &why) {
-    return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", path, why.c_str());
-}
-
-// The heif writer copies whole rows of libheif's, which are longer than ours: so many bytes at most.
-constexpr size_t READ_BEYOND = 1024;
-
-template <typename Value> std::vector<Value> make_rows(const vshi_planes &planes, int rows) {
-    return std::vector<Value>(static_cast<size_t>(rows) * static_cast<size_t>(planes.width) *
-                                  static_cast<size_t>(planes.count) +
-                              READ_BEYOND);
-}
-
-// What was written, in a word: the same for the same rows, however many at a time.
-class Sum {
-  public:
-    template <typename Value> void add(const Value *row, size_t values) {
-        const auto *bytes = reinterpret_cast<const unsigned char *>(row);
-        const size_t count = values * sizeof(Value);
-        uint64_t word;
-        size_t at = 0;
-        for (; at + sizeof word <= count; at += sizeof word) {
-            std::memcpy(&word, bytes + at, sizeof word);
-            sum_ = vshi_mix(sum_ + word);
-        }
-        word = 0;
-        std::memcpy(&word, bytes + at, count - at);
-        sum_ = vshi_mix(sum_ + word);
-    }
-    bool operator==(const Sum &other) const { return sum_ == other.sum_; }
-
-  private:
-    uint64_t sum_ = 0x9e3779b97f4a7c15;
-};
-
 // What a format's header says of the making of the file, and what stands there instead: same input, same
 // bytes.
 struct Stamp {
@@ -213,76 +168,6 @@ int clear_stamps(const char *temporary, const char *format) {
         return number;
     }
     return 0;
-}
-
-// Why nothing more can be written to a file, or 0: asked of a file that is to be thrown away.
-int disk_error(const char *temporary) {
-    const char more[4096] = {0};
-    const int file = ::open(temporary, O_WRONLY | O_APPEND | O_CLOEXEC);
-    const ssize_t written = file >= 0 ? ::write(file, more, sizeof more) : -1;
-    const int number = written < 0 ? errno : written < ssize_t(sizeof more) ? ENOSPC : 0;
-    if (file >= 0) {
-        ::close(file);
-    }
-    return number;
-}
-
-// Bytes of a whole file, or -1 where that is not known beforehand.
-int64_t whole_size(const std::string &format, const vshi_planes &planes, int64_t value_size) {
-    const int64_t width = planes.width, height = planes.height, count = planes.count;
-    if (format == "sgi") {
-        return 512 + width * height * count * value_size;
-    }
-    if (format == "ico") { // headers, pixels, and a mask of bits in rows of whole words
-        return 62 + height * (width * 4 + (width + 31) / 32 * 4);
-    }
-    if (format == "rla") { // header, offset of each row, and a size before each channel's values
-        return 740 + height * (4 + count * (2 + width * value_size));
-    }
-    return -1;
-}
-
-template <typename Value>
-bool reads_back(OIIO::ImageInput &input, const vshi_format &format, const vshi_planes &planes,
-                const Sum &written) {
-    const int step = rows_of_band(planes.width, planes.height, planes.count);
-    const size_t values = static_cast<size_t>(planes.width) * static_cast<size_t>(planes.count);
-    std::vector<Value> found = make_rows<Value>(planes, step);
-    Sum sum;
-    for (int64_t y = 0; y < planes.height; y += step) {
-        const int first = static_cast<int>(y);
-        const int last = static_cast<int>(std::min<int64_t>(y + step, planes.height));
-        if (!input.read_scanlines(0, 0, first, last, 0, 0, planes.count, oiio_type<Value>(), found.data())) {
-            return false;
-        }
-        for (int row = first; row < last; ++row) {
-            sum.add(found.data() + static_cast<size_t>(row - first) * values, values);
-        }
-    }
-    return format.lossy || sum == written;
-}
-
-template <typename Value>
-vsh_result verify(const char *temporary, const char *path, const vshi_format &format,
-                  const vshi_planes &planes, const Sum &written, vsh_error *error) {
-    const int64_t size = whole_size(format.name, planes, sizeof(Value));
-    struct stat status;
-    bool whole = ::stat(temporary, &status) == 0 && (size < 0 || status.st_size == size);
-    if (whole) {
-        const auto input = OIIO::ImageInput::create(format.name);
-        OIIO::ImageSpec config, spec;
-        config.attribute("oiio:UnassociatedAlpha", 1);
-        config.attribute("oiio:RawColor", 1);
-        whole = input != nullptr && input->open(temporary, spec, config) && spec.width == planes.width &&
-                spec.height == planes.height && spec.nchannels == planes.count &&
-                reads_back<Value>(*input, format, planes, written);
-        OIIO::geterror();
-    }
-    if (whole) {
-        return VSH_OK;
-    }
-    const int number = disk_error(temporary);
-    return fail_write(error, path, number != 0 ? std::strerror(number) : "it is not read back as written");
 }
 
 } // namespace
