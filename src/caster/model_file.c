@@ -96,13 +96,39 @@ static vsh_result scan_text(vshi_scan *scan, const char *ending, const vsh_run *
     return vshi_scan_file(scan, ending, error);
 }
 
+/* What Assimp is to read in the file's place. */
+typedef struct stand_in {
+    char *text; /* NULL: the file itself */
+    size_t size;
+} stand_in;
+
+/* Strips become faces. */
+static vsh_result stand_in_for(const vshi_scan *scan, const vsh_run *run, stand_in *other, vsh_error *error) {
+    const vshi_ply_strips *strips = &scan->strips;
+    if (strips->header == NULL) {
+        return VSH_OK;
+    }
+    if (strips->triangles == 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", scan->path);
+    }
+    const double bytes = vshi_ply_strips_bytes(strips, scan->size);
+    const vsh_result result =
+        vshi_check_limit(run, (double)scan->size + PEAK_BYTES_A_BYTE * bytes, scan->path, error);
+    return result == VSH_OK ? vshi_ply_strips_unroll(strips, scan->path, scan->text, scan->size, &other->text,
+                                                     &other->size, error)
+                            : result;
+}
+
 static vsh_result scan_file(vshi_scan *scan, const char *ending, const vsh_run *run, vsh_model **model,
-                            vsh_error *error) {
+                            stand_in *other, vsh_error *error) {
     char *text;
     vsh_result result = load_file(scan->path, run, &text, &scan->size, error);
     if (result == VSH_OK) {
         scan->text = text;
         result = scan_text(scan, ending, run, model, error);
+    }
+    if (result == VSH_OK) {
+        result = stand_in_for(scan, run, other, error);
     }
     free(text);
     scan->text = NULL;
@@ -179,6 +205,7 @@ vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *
     *model = NULL;
     const char *ending = NULL;
     vshi_scan scan = {.path = path, .job = job, .units = SCAN_UNITS};
+    stand_in other = {NULL, 0};
     struct stat status;
     /* A missing file is that first, whatever its ending. */
     if (stat(path, &status) != 0) {
@@ -189,11 +216,12 @@ vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *
         result = check_ending(path, &ending, error);
     }
     if (result == VSH_OK) {
-        result = scan_file(&scan, ending, run, model, error);
+        result = scan_file(&scan, ending, run, model, &other, error);
     }
     if (result == VSH_OK && *model == NULL) {
-        result = vshi_import_read(path, job, IMPORT_UNITS, import, error);
+        result = vshi_import_read(path, other.text, other.size, job, IMPORT_UNITS, import, error);
     }
+    free(other.text);
     if (result == VSH_OK && *import != NULL) {
         result = check_scene(path, vshi_import_scene(*import), scan.faces, job, error);
     }

@@ -6,6 +6,7 @@
 #define VSHI_CASTER_SCAN_H
 
 #include "base/job.h"
+#include "caster/ply_strips.h"
 
 typedef struct vshi_scan {
     const char *path; /* for messages */
@@ -16,6 +17,7 @@ typedef struct vshi_scan {
     size_t units_done; /* told to the job so far */
     size_t faces; /* out: polygons of three corners or more that a reader must find at least; 0: not known */
     double unit;  /* out: metres in a unit of a Collada file; 0: of another */
+    vshi_ply_strips strips; /* out: of a PLY file, in `text` */
 } vshi_scan;
 
 /* Looks the file over, by its ending (without the dot, any case); endings without a scanner pass. Errors:

@@ -11,6 +11,7 @@ typedef struct ply_property {
     int size;       /* bytes */
     int count_size; /* bytes of a list's count; 0: no list */
     bool is_float;
+    bool is_signed;   /* whole numbers */
     bool is_position; /* x, y or z of a vertex */
     bool is_corners;  /* the list of a face's vertices */
 } ply_property;
@@ -23,7 +24,9 @@ typedef struct ply_element {
 
 typedef struct ply_header {
     bool ascii, big_endian;
-    bool strips; /* of triangles, which Assimp 5.2 takes for one face each */
+    int strips;        /* the element of triangle strips; -1: none */
+    const char *lines; /* that the strips' element is described in */
+    const char *lines_end;
     ply_element element[MAX_ELEMENTS];
     ply_property property[MAX_PROPERTIES];
     int elements, properties;
@@ -39,11 +42,12 @@ static const struct {
     {"float", "float32", 4, true},  {"double", "float64", 8, true},
 };
 
-static bool read_type(vshi_token token, int *size, bool *is_float) {
+static bool read_type(vshi_token token, int *size, bool *is_float, bool *is_signed) {
     for (size_t i = 0; i < sizeof types / sizeof types[0]; ++i) {
         if (vshi_token_is(token, types[i].name) || vshi_token_is(token, types[i].other)) {
             *size = types[i].size;
             *is_float = types[i].is_float;
+            *is_signed = !types[i].is_float && types[i].name[0] != 'u';
             return true;
         }
     }
@@ -59,12 +63,13 @@ static bool read_property(ply_header *header, const char *at, const char *end) {
     bool ignored;
     vshi_token token = vshi_scan_token(&at, end);
     if (vshi_token_is(token, "list")) {
-        if (!read_type(vshi_scan_token(&at, end), &property.count_size, &ignored) || ignored) {
+        if (!read_type(vshi_scan_token(&at, end), &property.count_size, &ignored, &property.is_signed) ||
+            ignored) {
             return false;
         }
         token = vshi_scan_token(&at, end);
     }
-    if (!read_type(token, &property.size, &property.is_float)) {
+    if (!read_type(token, &property.size, &property.is_float, &property.is_signed)) {
         return false;
     }
     const vshi_token name = vshi_scan_token(&at, end);
@@ -91,7 +96,9 @@ static bool read_element(ply_header *header, const char *at, const char *end) {
     memcpy(element->name, name.text, length);
     element->name[length] = '\0';
     element->count = (uint64_t)count;
-    header->strips = header->strips || (vshi_token_is(name, "tristrips") && count > 0);
+    if (vshi_token_is(name, "tristrips") && count > 0) {
+        header->strips = header->elements - 1;
+    }
     element->first = element->end = header->properties;
     return true;
 }
@@ -125,6 +132,10 @@ static const char *read_header(const vshi_scan *scan, ply_header *header, vsh_re
             good = read_property(header, word, stop);
         } else if (vshi_token_is(keyword, "end_header")) {
             return stop + 1;
+        }
+        if (good && header->strips >= 0 && header->strips == header->elements - 1) {
+            header->lines = header->lines != NULL ? header->lines : at;
+            header->lines_end = stop + 1;
         }
         if (!good) {
             *result =
@@ -204,24 +215,69 @@ static vsh_result read_binary(ply_cursor *c, const ply_property *property, vsh_e
     return VSH_OK;
 }
 
+/* Strips take the place of faces: there can be no others, and nothing but vertices in their rows. */
+static vsh_result check_strips(const vshi_scan *scan, const ply_header *header, vsh_error *error) {
+    const ply_element *strips = &header->element[header->strips];
+    const ply_property *list = &header->property[strips->first];
+    bool others = false;
+    for (int e = 0; e < header->elements; ++e) {
+        const char *name = header->element[e].name;
+        others =
+            others || strcmp(name, "face") == 0 || (e != header->strips && strcmp(name, "tristrips") == 0);
+    }
+    return strips->end == strips->first + 1 && list->count_size > 0 && !list->is_float && !others
+               ? VSH_OK
+               : vshi_fail(
+                     error, VSH_ERROR_UNSUPPORTED,
+                     "%s: its triangles are strips ('tristrips') that are no single list of indices, or "
+                     "stand beside faces: save it with faces, from MeshLab or Blender",
+                     scan->path);
+}
+
+static vsh_result scan_strips(ply_cursor *c, vsh_error *error) {
+    const ply_header *header = c->header;
+    const ply_property *list = &header->property[c->element->first];
+    vshi_ply_strips *strips = &c->scan->strips;
+    *strips = (vshi_ply_strips){.header = header->lines,
+                                .header_end = header->lines_end,
+                                .body = c->at,
+                                .rows = c->element->count,
+                                .count_size = list->count_size,
+                                .index_size = list->size,
+                                .is_signed = list->is_signed,
+                                .ascii = header->ascii,
+                                .big_endian = header->big_endian};
+    for (int e = 0; e < header->elements; ++e) {
+        const bool vertices = strcmp(header->element[e].name, "vertex") == 0;
+        strips->vertices = vertices ? header->element[e].count : strips->vertices;
+    }
+    const vsh_result result = vshi_ply_strips_scan(strips, c->scan->path, c->end, error);
+    c->at = result == VSH_OK ? strips->body_end : c->at;
+    c->scan->faces += strips->triangles;
+    return result;
+}
+
 vsh_result vshi_scan_ply(vshi_scan *scan, vsh_error *error) {
-    ply_header header = {0};
+    ply_header header = {.strips = -1};
     vsh_result result = VSH_OK;
     const char *body = read_header(scan, &header, &result, error);
     if (body == NULL) {
         return result;
     }
-    if (header.strips) {
-        return vshi_fail(
-            error, VSH_ERROR_UNSUPPORTED,
-            "%s: its triangles are strips ('tristrips'), which are not read: save it with faces, "
-            "from MeshLab or Blender",
-            scan->path);
+    if (header.strips >= 0 && (result = check_strips(scan, &header, error)) != VSH_OK) {
+        return result;
     }
     ply_cursor c = {scan, &header, NULL, 0, body, scan->text + scan->size};
     for (int e = 0; e < header.elements; ++e) {
         c.element = &header.element[e];
         if (c.element->first == c.element->end) {
+            continue;
+        }
+        if (e == header.strips) {
+            result = scan_strips(&c, error);
+            if (result != VSH_OK) {
+                return result;
+            }
             continue;
         }
         for (c.row = 0; c.row < c.element->count; ++c.row) {

@@ -10,6 +10,7 @@
 #include <assimp/ProgressHandler.hpp>
 
 #include <algorithm>
+#include <cstring>
 #include <memory>
 
 namespace {
@@ -57,15 +58,18 @@ struct vshi_import {
     const aiScene *scene = nullptr;
 };
 
-vsh_result vshi_import_read(const char *path, vshi_job *job, size_t units, vshi_import **import,
-                            vsh_error *error) {
+vsh_result vshi_import_read(const char *path, const char *text, size_t size, vshi_job *job, size_t units,
+                            vshi_import **import, vsh_error *error) {
     *import = nullptr;
     return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
         auto reader = std::make_unique<vshi_import>();
         // Files that hold bones only would get a made-up mesh of them.
         reader->importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
         reader->importer.SetProgressHandler(new Progress(job, units)); // the importer deletes it
-        reader->scene = reader->importer.ReadFile(path, 0);
+        const char *dot = std::strrchr(path, '.');
+        reader->scene = text == nullptr ? reader->importer.ReadFile(path, 0)
+                                        : reader->importer.ReadFileFromMemory(text, size, 0,
+                                                                              dot != nullptr ? dot + 1 : "");
         if (vshi_job_cancelled(job)) {
             return vshi_job_fail_cancelled(job, error);
         }

@@ -38,11 +38,6 @@ static void bad_ply_and_stl_are_refused(void **state) {
             "4000000000");
     refused("a.ply", HEAD("-3") "0 0 0\n", VSH_ERROR_INPUT, "header", "-3");
 #undef HEAD
-    refused("a.ply",
-            "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-            "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
-            "0 0 0\n1 0 0\n0 1 0\n1 1 0\n5 0 1 2 -1 3\n",
-            VSH_ERROR_UNSUPPORTED, "'tristrips'", "save it with faces");
     refused("a.stl",
             "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 inf 0\nvertex 0 1 0\nendloop\n"
             "endfacet\nendsolid a\n",
