@@ -1,13 +1,16 @@
+#include "bake/ambient.h"
 #include "bake/average.h"
 #include "bake/bend.h"
 #include "bake/coverage.h"
 #include "bake/field_share.h"
 #include "bake/halo.h"
 #include "bake/lattice.h"
+#include "bake/layers_lifted.h"
 #include "bake/lift.h"
 #include "bake/origins.h"
 #include "bake/spread.h"
 #include "bake/take.h"
+#include "bake/wanted.h"
 #include "base/floats.h"
 #include "base/parallel.h"
 #include "shade/layers.h"
@@ -42,37 +45,6 @@ typedef struct baking {
     vsh_bake_stats stats;
 } baking;
 
-static float *tint_of(const vsh_lightmap *lightmap, size_t light) {
-    return lightmap->tint != NULL ? lightmap->tint[light] : NULL;
-}
-
-static bool tint_wanted(const vsh_lightmap *lightmap, size_t light_count) {
-    bool wanted = false;
-    for (size_t i = 0; i < light_count; ++i) {
-        wanted = wanted || tint_of(lightmap, i) != NULL;
-    }
-    return wanted;
-}
-
-static bool light_wanted(const vsh_lightmap *lightmap, size_t light) {
-    return lightmap->irradiance != NULL || tint_of(lightmap, light) != NULL ||
-           (lightmap->shadow != NULL && lightmap->shadow[light] != NULL) ||
-           (lightmap->shadow_error != NULL && lightmap->shadow_error[light] != NULL);
-}
-
-static bool ao_wanted(const vsh_lightmap *lightmap) {
-    return lightmap->ao != NULL || lightmap->ao_error != NULL || lightmap->bent != NULL;
-}
-
-/* Whether any plane of errors is asked for. */
-static bool errors_wanted(const vsh_lightmap *lightmap, size_t light_count) {
-    bool wanted = lightmap->ao_error != NULL;
-    for (size_t i = 0; i < light_count && lightmap->shadow_error != NULL; ++i) {
-        wanted = wanted || lightmap->shadow_error[i] != NULL;
-    }
-    return wanted;
-}
-
 /* How far invalid texels are filled from other charts, texels. */
 static int32_t invalid_radius(const vsh_texels *texels) {
     const int32_t least = VSHI_LEAST_INVALID_RADIUS;
@@ -85,29 +57,6 @@ static bool interpolates(const baking *bake) {
     const int32_t method = bake->shade.ao_method;
     return bake->texels->ao_spacing > 1 && !bake->layered_ao &&
            (method == VSH_AO_CONES || (vsh_ao_method_traits(method) & VSH_METHOD_KEEPS_ERROR) != 0);
-}
-
-/* The layers for points that are lifted already: what their voxels need beyond that is left. */
-static vsh_result lift_layers(baking *bake, vsh_error *error) {
-    const vsh_shade_options *shade = &bake->shade;
-    const double lifted = shade->start_offset * bake->field->voxel_size + shade->surface_offset;
-    vsh_result result =
-        vshi_allocate((void **)&bake->layers, shade->layer_count, sizeof *bake->layers, "layers", error);
-    for (size_t i = 0; result == VSH_OK && i < shade->layer_count; ++i) {
-        vsh_layer *layer = &bake->layers[i];
-        result = vshi_layer_resolve(shade, i, layer, error);
-        if (result == VSH_OK) {
-            bake->layered_ao = bake->layered_ao || layer->ao != 0;
-        }
-        if (result == VSH_OK && layer->field != NULL) {
-            const vsh_field *field = layer->field;
-            const double offset = layer->start_offset < 0.0 ? shade->start_offset : layer->start_offset;
-            const double height =
-                offset * field->voxel_size + 0.5 * field->shell_thickness + shade->surface_offset;
-            layer->start_offset = fmin(16.0, fmax(0.0, (height - lifted) / field->voxel_size));
-        }
-    }
-    return result;
 }
 
 static double fields_bytes(const baking *bake) {
@@ -274,9 +223,10 @@ static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
         result = add_error(bake, &bake->lights[index], square, error);
     }
     lighting l = {bake, &bake->lights[index]};
-    if (result == VSH_OK && tint_of(lightmap, index) != NULL) {
+    if (result == VSH_OK && vshi_tint_of(lightmap, index) != NULL) {
         result = over_samples(bake, "tint", tint, &l, error);
-        result = result == VSH_OK ? average(bake, bake->tinted, 3, tint_of(lightmap, index), error) : result;
+        result =
+            result == VSH_OK ? average(bake, bake->tinted, 3, vshi_tint_of(lightmap, index), error) : result;
     }
     if (result != VSH_OK || lightmap->irradiance == NULL) {
         return result;
@@ -295,22 +245,6 @@ static vsh_result bake_bent(baking *bake, vsh_error *error) {
         vshi_bend_again(vshi_texels_held(bake->texels), plane);
     }
     return result;
-}
-
-/* What AO and ambient light make of the irradiance of lights. */
-static void compose(const baking *bake) {
-    const vsh_lightmap *lightmap = bake->lightmap;
-    for (size_t i = 0; i < vshi_texels_held(bake->texels); ++i) {
-        const float open = lightmap->ao != NULL ? lightmap->ao[i] : 1.0f;
-        for (size_t c = 0; c < 3; ++c) {
-            float *value = &lightmap->irradiance[3 * i + c];
-            if (lightmap->ambient == NULL) {
-                *value *= open;
-            } else if (bake->state[i] == VSHI_TEXEL_VALID) {
-                *value += (float)lightmap->ambient[c] * open;
-            }
-        }
-    }
 }
 
 /* A vshi_origins_keep: which texels are valid, where the others take their values from, and which rows beside
@@ -336,7 +270,7 @@ static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *
         const size_t at = row + band->held_begin;
         taken[row] = taken[row] || (at + near >= band->own_begin && at < band->own_end + near);
     }
-    const bool lattice = interpolates(bake) && ao_wanted(bake->lightmap);
+    const bool lattice = interpolates(bake) && vshi_ao_wanted(bake->lightmap);
     const size_t above = lattice ? VSHI_LATTICE_ABOVE : 0, below = lattice ? VSHI_LATTICE_BELOW : 0;
     for (size_t row = 0; row < count; ++row) {
         rows[row] = 0;
@@ -353,11 +287,11 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
     const vsh_texels *texels = bake->texels;
     vsh_result result = VSH_OK;
     for (size_t i = 0; result == VSH_OK && i < bake->light_count; ++i) {
-        if (light_wanted(lightmap, i)) {
+        if (vshi_light_wanted(lightmap, i)) {
             result = bake_light(bake, i, error);
         }
     }
-    if (result == VSH_OK && ao_wanted(lightmap)) {
+    if (result == VSH_OK && vshi_ao_wanted(lightmap)) {
         vsh_shade_options shade;
         const vsh_points points = points_of(bake, vshi_ao_traces(&bake->shade), &shade);
         const double square = bake->stats.shade.square_error;
@@ -386,7 +320,7 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
     if (result == VSH_OK && lightmap->irradiance != NULL && bake->light_count > 0) {
         result = average(bake, bake->irradiance, 3, lightmap->irradiance, error);
         if (result == VSH_OK) {
-            compose(bake);
+            vshi_ambient_add(texels, bake->state, lightmap);
         }
     }
     return result;
@@ -405,7 +339,7 @@ static vsh_result pad(baking *bake, size_t invalid, vsh_error *error) {
 
 static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error *error) {
     const vsh_texels *texels = bake->texels;
-    const bool errors = errors_wanted(bake->lightmap, bake->light_count);
+    const bool errors = vshi_errors_wanted(bake->lightmap, bake->light_count);
     const vshi_bake_need need = {.samples = (double)texels->count,
                                  .texels = (double)vshi_texels_held(texels),
                                  .traced = vshi_shadow_traces(&bake->shade) || vshi_ao_traces(&bake->shade),
@@ -413,9 +347,9 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
                                  .errors = errors,
                                  .irradiance = irradiance,
                                  .bent = bake->lightmap->bent != NULL,
-                                 .tint = tint_wanted(bake->lightmap, bake->light_count),
-                                 .lattice = ao_wanted(bake->lightmap) && interpolates(bake)};
-    vsh_result result = lift_layers(bake, error);
+                                 .tint = vshi_tint_wanted(bake->lightmap, bake->light_count),
+                                 .lattice = vshi_ao_wanted(bake->lightmap) && interpolates(bake)};
+    vsh_result result = vshi_lift_layers(&bake->shade, bake->field, &bake->layers, &bake->layered_ao, error);
     if (result != VSH_OK) {
         free(bake->layers);
         return result;
@@ -496,35 +430,18 @@ vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, c
     }
     bake.quiet = bake.run;
     bake.quiet.progress = NULL;
-    if (result == VSH_OK && lightmap->bent != NULL && lightmap->bent_space != VSH_BENT_WORLD &&
-        (lightmap->bent_space != VSH_BENT_TANGENT || texels->tangent == NULL)) {
-        result = vshi_fail(error, VSH_ERROR_ARGUMENT,
-                           "bent_space %d: expected %d, or %d with texels that have tangents",
-                           lightmap->bent_space, VSH_BENT_WORLD, VSH_BENT_TANGENT);
-    }
-    if (result == VSH_OK) {
-        result = vsh_tint_check(&lightmap->tint_by, error);
-    }
-    for (int c = 0; result == VSH_OK && lightmap->ambient != NULL && c < 3; ++c) {
-        if (!(lightmap->ambient[c] >= 0.0 && isfinite(lightmap->ambient[c]))) {
-            result =
-                vshi_fail(error, VSH_ERROR_ARGUMENT, "ambient[%d] %g: expected a finite number, at least 0",
-                          c, lightmap->ambient[c]);
-        }
-    }
     bool light = false;
-    for (size_t i = 0; result == VSH_OK && i < light_count; ++i) {
-        result = vsh_light_check(&lights[i], error);
-        light = light || light_wanted(lightmap, i);
+    if (result == VSH_OK) {
+        result = vshi_wanted_check(lightmap, texels, lights, light_count, &light, error);
     }
     if (result != VSH_OK) {
         return result;
     }
-    bake.wanted = (vshi_origins_for){light, ao_wanted(lightmap)};
+    bake.wanted = (vshi_origins_for){light, vshi_ao_wanted(lightmap)};
     for (size_t m = 0; bake.stats.invalid_by_mesh != NULL && m < texels->mesh_count; ++m) {
         bake.stats.invalid_by_mesh[m] = 0;
     }
-    result = run_bake(&bake, light || ao_wanted(lightmap), light && lightmap->irradiance != NULL, error);
+    result = run_bake(&bake, light || vshi_ao_wanted(lightmap), light && lightmap->irradiance != NULL, error);
     if (stats != NULL && result == VSH_OK) {
         memcpy(stats, &bake.stats, stats->struct_size);
     }
