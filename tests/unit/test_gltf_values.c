@@ -10,6 +10,7 @@ enum { FLOATS = 5126, BYTES = 5120, UBYTES = 5121, USHORTS = 5123 };
 typedef struct maker {
     unsigned char bytes[4096];
     size_t size;
+    size_t beyond; /* bytes that the buffer has beyond its byteLength */
     char views[4096], accessors[4096];
     int count; /* of each */
 } maker;
@@ -54,7 +55,7 @@ static const char *text_of(const maker *m, const char *rest) {
     snprintf(json, sizeof json,
              "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":%zu,\"uri\":"
              "\"data:application/octet-stream;base64,%s\"}],\"bufferViews\":[%s],\"accessors\":[%s],%s}",
-             m->size, text, m->views, m->accessors, rest);
+             m->size - m->beyond, text, m->views, m->accessors, rest);
     return json;
 }
 
@@ -102,6 +103,9 @@ static void offsets_of_views_and_accessors_add_up(void **state) {
              m->size - 44);
     strcat(m->accessors, ",{\"bufferView\":2,\"componentType\":5126,\"count\":1,\"type\":\"VEC3\"}");
     refuse_made(m, ALONE MESH("\"POSITION\":2", ""), "bufferViews[2]: 48 bytes");
+    m = begin(); /* and one that ends behind its byteLength */
+    m->beyond = 4;
+    refuse_made(m, ALONE MESH("\"POSITION\":1", ""), "bufferViews[1]: 52 bytes");
     m = begin(); /* an accessor that ends behind its view, where the buffer goes on */
     strcat(m->accessors,
            ",{\"bufferView\":0,\"byteOffset\":8,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"}");
