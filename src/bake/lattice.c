@@ -35,6 +35,16 @@ static void find_texels(void *user, size_t begin, size_t end) {
     }
 }
 
+static void find_invalid(void *user, size_t begin, size_t end) {
+    const vshi_lattice *l = user;
+    const size_t width = (size_t)l->texels->info.width;
+    for (size_t i = begin; i < end; ++i) {
+        if (!l->origins->valid[i]) {
+            l->at[l->texels->texel[i] - (size_t)l->texels->band.first * width] = LATTICE_INVALID;
+        }
+    }
+}
+
 /* --- the texels of a pass */
 
 static void choose(void *user, size_t begin, size_t end) {
@@ -331,6 +341,9 @@ static vsh_result run_passes(vshi_lattice *l, const vsh_shade_options *options, 
     part.progress = run->progress != NULL ? tell : NULL;
     part.warning = run->warning != NULL ? warn : NULL;
     vsh_result result = vshi_parallel_for(job, l->origins->count, 4096, 0, find_texels, l, error);
+    if (result == VSH_OK) {
+        result = vshi_parallel_for(job, l->texels->count, 4096, 0, find_invalid, l, error);
+    }
     for (l->spacing = l->texels->ao_spacing; result == VSH_OK && l->spacing > 0; l->spacing /= 2) {
         result = vshi_parallel_for(job, l->blocks, 1, 0, choose, l, error);
         const size_t count = result == VSH_OK ? sum_blocks(l) : 0;

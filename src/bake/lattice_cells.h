@@ -8,6 +8,10 @@
 /* Guessed: interpolated, and not yet held against rays; known: shaded; between: interpolated. */
 enum { LATTICE_UNKNOWN, LATTICE_CHOSEN, LATTICE_GUESSED, LATTICE_KNOWN, LATTICE_BETWEEN };
 
+/* Texels without an origin: of no chart, or within a solid. */
+#define LATTICE_NONE UINT32_C(0)
+#define LATTICE_INVALID UINT32_MAX
+
 typedef struct vshi_lattice {
     const vsh_field *field;
     const vsh_texels *texels;
@@ -15,7 +19,7 @@ typedef struct vshi_lattice {
     const vsh_points *points;
     double distance; /* of AO, finest voxels */
     int32_t spacing; /* of this pass */
-    uint32_t *at;    /* [rows held][width]: number of the texel's origin + 1, 0: none */
+    uint32_t *at;    /* [rows held][width]: number of the texel's origin + 1, or LATTICE_… */
     uint8_t *state;  /* [origins.count] */
     size_t *before;  /* [blocks + 1]: chosen origins before each block */
     size_t blocks;

@@ -66,6 +66,38 @@ OBJ
     [ "$(grep -oE '"invalid_texels": [0-9]+' stats.json)" = '"invalid_texels": 0' ] || fail "$(cat stats.json)"
 }
 
+# A slab of 6 × 6, and 25 studs without bottoms on it, 6 cm wide and 9 cm high.
+write_studs() {
+    {
+        printf 'o floor\nv -3 0 -3\nv 3 0 -3\nv 3 0 3\nv -3 0 3\nv -3 -1 -3\nv 3 -1 -3\nv 3 -1 3\nv -3 -1 3\n'
+        printf 'vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 4/4 3/3 2/2\nf 5/1 6/1 7/1 8/1\n'
+        printf 'f 1/1 2/1 6/1 5/1\nf 2/1 3/1 7/1 6/1\nf 3/1 4/1 8/1 7/1\nf 4/1 1/1 5/1 8/1\no studs\n'
+        awk 'BEGIN {
+            n = 9
+            for (i = 0; i < 25; ++i) {
+                x = -2.43 + int(i / 5) * 1.19; z = -2.37 + i % 5 * 1.17
+                for (y = 0; y < 2; ++y) for (k = 0; k < 4; ++k)
+                    print "v", x + (k == 1 || k == 2 ? 0.06 : 0), y * 0.1 - 0.01, z + (k > 1 ? 0.06 : 0)
+                print "f", n + 7, n + 6, n + 5, n + 4
+                for (k = 0; k < 4; ++k) print "f", n + k, n + 4 + k, n + 4 + (k + 1) % 4, n + (k + 1) % 4
+                n += 8
+            }
+        }'
+    } >"$1"
+}
+
+@test "AO between texels keeps the foot of what the voxels lose" {
+    write_studs studs.obj
+    for spacing in 1 8; do
+        shade bake studs.obj --receive floor --resolution 16 --ao 0.3 --size 384 --ao-spacing $spacing -o $spacing.exr
+        done_well
+    done
+    shade compare 1.exr 8.exr
+    local largest
+    largest=$(sed -nE 's/^ao:.* max ([0-9.]+) at.*/\1/p' <<<"$output")
+    awk -v largest="$largest" 'BEGIN { exit !(largest > 0 && largest < 0.175) }' || fail "off by $largest"
+}
+
 @test "a room whose faces look inwards is baked" {
     shade bake room.obj -o room.exr --ao 0.5 --size 64 --resolution 64 --ao-method exact
     done_well
