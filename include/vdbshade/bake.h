@@ -212,19 +212,17 @@ typedef struct vsh_bake_stats {
     vsh_shade_stats shade;     /* added to */
     uint64_t seen_texels;      /* of the invalid ones: in plain sight, rays from them escape. Of exact methods
                                   only:      a field does not tell, and leaves it 0 */
-    vsh_bake_error *errors; /* [light_count + 1]: of each light, then of AO; added to; NULL: not wanted */
+    vsh_bake_error *errors;    /* [light_count + 1]: of each light, then of AO; added to; NULL: not wanted */
     const vsh_triangles *truth_triangles; /* with `errors`: the casters themselves. Where a method keeps an
-                                  error, a part of its samples (one in 16, at most 16384 of a lightmap; of
-                                  exact methods one in 64, at most 4096; the same ones for all bands) is held
-                                  against rays to them. Which part, and so
-                                  what is found, depends on nothing but the lightmap. Not with layers. Both
-                                  NULL: nothing is */
+                                  error, a part of its samples (one in 16, 4096 to 16384 of a lightmap; of
+                                  exact methods one in 64, 1024 to 4096; the same ones for all bands) is held
+                                  against rays to them. Which part, and so what is found, depends on nothing
+                                  but the lightmap. Not with layers. Both NULL: nothing is */
     const vsh_solids *truth_solids;
 } vsh_bake_stats;
 
 static inline vsh_bake_stats vsh_bake_stats_zero(void) {
-    vsh_bake_stats stats = {
-        sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero(), 0, NULL, NULL, NULL};
+    vsh_bake_stats stats = {sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero(), 0, NULL, NULL, NULL};
     return stats;
 }
 

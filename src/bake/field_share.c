@@ -22,7 +22,7 @@
 
 /* One sample in so many, which costs a few hundredths of shading them all, but not so few that a small
  * lightmap's error stays unknown. Where rays met the casters anyway, what is off is less and costs less. */
-enum { ONE_IN = 16, ONE_TRACED_IN = 64, MOST_TRACED = 4096, LEAST = 1024 };
+enum { ONE_IN = 16, ONE_TRACED_IN = 64, MOST_TRACED = 4096, LEAST = 4096, LEAST_TRACED = 1024 };
 /* Rays of a sample in doubt, each of both times: their noise, over all samples, is then a tenth of the error
  * that is asked for, and less. */
 enum { RAYS = 64, FINE_RAYS = 256 };
@@ -45,7 +45,8 @@ _Static_assert(sizeof(struct vshi_field_share_sample) + sizeof(double) <= VSHI_F
                "what a sample takes");
 
 static size_t step_of(const vsh_texels *texels, bool traced) {
-    const uint64_t wanted = texels->whole / (traced ? ONE_TRACED_IN : ONE_IN), least = LEAST;
+    const uint64_t wanted = texels->whole / (traced ? ONE_TRACED_IN : ONE_IN),
+                   least = traced ? LEAST_TRACED : LEAST;
     const uint64_t most = traced ? MOST_TRACED : VSHI_FIELD_SHARE_MOST;
     const uint64_t count = wanted < least ? least : wanted > most ? most : wanted;
     return (size_t)((texels->whole + count - 1) / count);
