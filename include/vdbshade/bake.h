@@ -18,10 +18,11 @@ typedef struct vsh_lightmap_options {
     int32_t supersample;     /* N: N × N samples a texel, 1 … 16 */
     int32_t padding;         /* texels that charts are grown by, 0 … 4096; fills values, never coverage */
     vsh_shade_options shade; /* of a bake that is given none; checked there */
-    int32_t ao_spacing;      /* 1, 2, 4 or 8 texels: AO by cones, adaptive or exact is shaded no closer than
-                              * this where casters are far enough, and interpolated between. 1: at every texel,
-                              * as supersampled lightmaps are always */
-    int32_t tangents;        /* nonzero: keep what bent normals in tangent space need, 16 bytes a sample */
+    int32_t ao_spacing; /* 1, 2, 4 or 8 texels: AO by cones or adaptive is shaded no closer than this where
+                         * casters are far enough, and interpolated between. Over 1 texels share the rays
+                         * of exact AO. 1: each texel has its own, as those of supersampled lightmaps have
+                         * always */
+    int32_t tangents;   /* nonzero: keep what bent normals in tangent space need, 16 bytes a sample */
 } vsh_lightmap_options;
 
 static inline vsh_lightmap_options vsh_lightmap_options_default(void) {
@@ -171,8 +172,9 @@ typedef struct vsh_lightmap {
     float *coverage;            /* 1: evaluated and valid; 0 elsewhere */
     float *const *shadow_error; /* [light_count] planes: standard error left in each value, see
                                    vsh_shade_shadow(); not padded; may be NULL */
-    float *ao_error;
-    float *bent;        /* [height][width][3]: bent normals, unit, see vsh_shade_bent() */
+    float *ao_error; /* the same of AO. Of exact AO whose rays texels share it is the rays' part: what bends
+                        within a texel or two can be half as much again, and is in vsh_bake_stats.errors */
+    float *bent;     /* [height][width][3]: bent normals, unit, see vsh_shade_bent() */
     float *const *tint; /* [light_count] planes [height][width][3]: visibility as tint_by colours it, linear
                            RGB; may be NULL */
     vsh_tint tint_by;   /* of these planes, and of the visibility in irradiance */

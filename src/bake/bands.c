@@ -1,4 +1,5 @@
 /* Charts that are counted once, and cut into bands of rows. */
+#include "bake/ao_texels.h"
 #include "bake/lattice.h"
 #include "bake/origins.h"
 #include "bake/padding.h"
@@ -376,9 +377,9 @@ vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t ro
     const size_t tile = VSHI_TILE, all = charts->sorted.rows;
     const size_t reach = (size_t)(charts->padding > LEAST_HALO ? charts->padding : LEAST_HALO);
     const size_t halo = (reach + tile - 1) / tile;
-    const bool lattice = charts->ao_spacing > 1;
-    const size_t above = halo + (lattice ? VSHI_LATTICE_ABOVE : 0);
-    const size_t below = halo + (lattice ? VSHI_LATTICE_BELOW : 0);
+    const bool shared = charts->ao_spacing > 1;
+    const size_t above = halo + (shared ? VSHI_AO_ABOVE : 0);
+    const size_t below = halo + (shared ? VSHI_AO_BELOW : 0);
     band->own_first = first_row;
     band->own_rows = rows;
     band->own_begin = (size_t)first_row / tile;
@@ -397,7 +398,8 @@ double vshi_bake_bytes(const vshi_bake_need *need) {
     sample += (need->tint ? 3 : 0) * sizeof(float);
     return need->samples * sample +
            need->texels * (1.0 + VSHI_PADDING_TEXEL_BYTES + VSHI_SPREAD_TEXEL_BYTES) +
-           (need->lattice ? vshi_lattice_bytes(need->samples, need->texels, need->bent) : 0.0);
+           (need->lattice ? vshi_lattice_bytes(need->samples, need->texels, need->bent) : 0.0) +
+           (need->windows ? vshi_ao_texels_bytes(need->samples, need->threads, need->bent) : 0.0);
 }
 
 uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows, int32_t floats,
@@ -417,7 +419,8 @@ uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int3
                            .irradiance = irradiance != 0,
                            .bent = bent != 0,
                            .tint = tint != 0,
-                           .lattice = charts->ao_spacing > 1};
+                           .lattice = charts->ao_spacing > 1 && !vshi_ao_traces(&shade),
+                           .windows = charts->ao_spacing > 1 && vshi_ao_traces(&shade)};
     for (size_t row = band.held_begin; row < band.held_end; ++row) {
         need.samples += (double)charts->rows[row].samples;
     }

@@ -35,16 +35,6 @@ static void find_texels(void *user, size_t begin, size_t end) {
     }
 }
 
-static void find_invalid(void *user, size_t begin, size_t end) {
-    const vshi_lattice *l = user;
-    const size_t width = (size_t)l->texels->info.width;
-    for (size_t i = begin; i < end; ++i) {
-        if (!l->origins->valid[i]) {
-            l->at[l->texels->texel[i] - (size_t)l->texels->band.first * width] = LATTICE_INVALID;
-        }
-    }
-}
-
 /* --- the texels of a pass */
 
 static void choose(void *user, size_t begin, size_t end) {
@@ -66,7 +56,7 @@ static void pack(void *user, size_t begin, size_t end) {
     for (size_t block = begin; block < end; ++block) {
         size_t next = l->before[block];
         for (size_t i = block * BLOCK; i < block_end(l, block); ++i) {
-            if (l->state[i] == l->packed) {
+            if (l->state[i] == LATTICE_CHOSEN) {
                 memcpy(l->position + 3 * next, l->points->positions + 3 * i, 3 * sizeof(double));
                 memcpy(l->normal + 3 * next, l->points->normals + 3 * i, 3 * sizeof(float));
                 l->texel[next] = l->points->texels[i];
@@ -134,94 +124,7 @@ static void interpolate(void *user, size_t begin, size_t end) {
             for (size_t axis = 0; axis < 3 && l->bent != NULL; ++axis) {
                 l->bent[3 * i + axis] = vshi_lattice_between(l->bent, 3, axis, &c, x, y);
             }
-            l->state[i] = l->probe != NULL ? LATTICE_GUESSED : LATTICE_BETWEEN;
-        }
-    }
-}
-
-/* --- what is guessed, held against rays */
-
-/* Standard errors that rays may be off: those of one texel, and of all of a cell on average. */
-static const double SIGMAS = 2.5, MEAN_SIGMAS = 1.5;
-
-/* How many rays a guess is held against: what is low, thin or touches is not seen from the middle of a cell,
- * nor by its corners. Slats on a board, rivets and decals were lost without: an RMSE of 0.06 where 0.02 was
- * asked for. */
-static int32_t probes_for(double max_error) {
-    int32_t rays = 4;
-    while (rays < 32 && rays * max_error < 0.16) {
-        rays *= 2;
-    }
-    return rays;
-}
-
-static void count_guessed(void *user, size_t begin, size_t end) {
-    const vshi_lattice *l = user;
-    for (size_t block = begin; block < end; ++block) {
-        size_t count = 0;
-        for (size_t i = block * BLOCK; i < block_end(l, block); ++i) {
-            count += l->state[i] == LATTICE_GUESSED;
-        }
-        l->before[block] = count;
-    }
-}
-
-static void unpack_probes(void *user, size_t begin, size_t end) {
-    const vshi_lattice *l = user;
-    for (size_t n = begin; n < end; ++n) {
-        l->probe[l->number[n]] = l->chosen_values[n];
-    }
-}
-
-/* Whether the rays at the guesses of the cell from (column, row) on say the same, each and on average. */
-static bool rays_agree(const vshi_lattice *l, uint32_t column, uint32_t row) {
-    const uint32_t s = (uint32_t)l->spacing;
-    double sum = 0.0, variance = 0.0, count = 0.0;
-    for (uint32_t y = row; y < row + s; ++y) {
-        for (uint32_t x = column; x < column + s; ++x) {
-            size_t i;
-            if (!vshi_lattice_lookup(l, x, y, &i) || l->state[i] != LATTICE_GUESSED) {
-                continue;
-            }
-            const double value = (double)l->values[i], off = (double)l->probe[i] - value;
-            const double error = vshi_ao_deviation(l->sampler, l->probes, value);
-            if (!(fabs(off) <= SIGMAS * error + l->max_error)) {
-                return false;
-            }
-            sum += off;
-            variance += error * error;
-            count += 1.0;
-        }
-    }
-    return fabs(sum) <= MEAN_SIGMAS * sqrt(variance) + l->max_error * count;
-}
-
-static void judge(void *user, size_t begin, size_t end) {
-    const vshi_lattice *l = user;
-    const uint32_t mask = (uint32_t)l->spacing - 1;
-    for (size_t block = begin; block < end; ++block) {
-        uint32_t at[2] = {UINT32_MAX, UINT32_MAX};
-        uint8_t verdict = 0;
-        for (size_t i = block * BLOCK; i < block_end(l, block); ++i) {
-            if (l->state[i] != LATTICE_GUESSED) {
-                continue;
-            }
-            const uint32_t column = column_of(l, i) & ~mask, row = row_of(l, i) & ~mask;
-            if (at[0] != column || at[1] != row) {
-                verdict = rays_agree(l, column, row);
-                at[0] = column;
-                at[1] = row;
-            }
-            l->verdict[i] = verdict;
-        }
-    }
-}
-
-static void sentence(void *user, size_t begin, size_t end) {
-    const vshi_lattice *l = user;
-    for (size_t i = begin; i < end; ++i) {
-        if (l->state[i] == LATTICE_GUESSED) {
-            l->state[i] = l->verdict[i] ? LATTICE_BETWEEN : LATTICE_UNKNOWN;
+            l->state[i] = LATTICE_BETWEEN;
         }
     }
 }
@@ -259,33 +162,28 @@ static vsh_result shade_pass(vshi_lattice *l, const vsh_shade_options *options, 
                              const vsh_run *run, vshi_job *job, vsh_shade_stats *stats, vsh_error *error) {
     vsh_result result = VSH_OK;
     const char *what = "AO texels";
-    const bool probing = l->packed == LATTICE_GUESSED;
     l->number = vshi_take(count, sizeof *l->number, what, &result, error);
     l->position = vshi_take(count, 3 * sizeof(double), what, &result, error);
     l->normal = vshi_take(count, 3 * sizeof(float), what, &result, error);
     l->texel = vshi_take(count, sizeof *l->texel, what, &result, error);
     l->chosen_values = vshi_take(count, sizeof(float), what, &result, error);
-    l->chosen_deviation =
-        vshi_take(l->deviation != NULL && !probing ? count : 0, sizeof(float), what, &result, error);
-    l->chosen_bent =
-        vshi_take(l->bent != NULL && !probing ? count : 0, 3 * sizeof(float), what, &result, error);
+    l->chosen_deviation = vshi_take(l->deviation != NULL ? count : 0, sizeof(float), what, &result, error);
+    l->chosen_bent = vshi_take(l->bent != NULL ? count : 0, 3 * sizeof(float), what, &result, error);
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, l->blocks, 1, 0, pack, l, error);
     }
     if (result == VSH_OK) {
         vsh_shade_options shade = *options;
-        if (probing) {
-            shade.rays = l->probes;
-        } else if (l->spacing > 1) {
+        if (l->spacing > 1) {
             shade.max_error = fmax(FINER * shade.max_error, 1e-4);
         }
         const vsh_points points = {count, l->position, l->normal, l->texel};
         const vshi_point_rows rows = chosen_rows(l, count);
         result = vshi_shade_ao(l->field, &points, &rows, &shade, run, l->chosen_values, l->chosen_deviation,
-                               l->chosen_bent, stats, error);
+                               l->chosen_bent, NULL, stats, error);
     }
     if (result == VSH_OK) {
-        result = vshi_parallel_for(job, count, 4096, 0, probing ? unpack_probes : unpack, l, error);
+        result = vshi_parallel_for(job, count, 4096, 0, unpack, l, error);
     }
     free(l->chosen_bent);
     free(l->chosen_deviation);
@@ -294,33 +192,6 @@ static vsh_result shade_pass(vshi_lattice *l, const vsh_shade_options *options, 
     free(l->normal);
     free(l->position);
     free(l->number);
-    return result;
-}
-
-/* Keeps the guesses that a few rays agree with. */
-static vsh_result probe_guesses(vshi_lattice *l, const vsh_shade_options *options, const vsh_run *run,
-                                vshi_job *job, vsh_shade_stats *stats, vsh_error *error) {
-    vsh_shade_stats own = vsh_shade_stats_zero();
-    vsh_result result = vshi_parallel_for(job, l->blocks, 1, 0, count_guessed, l, error);
-    const size_t count = result == VSH_OK ? sum_blocks(l) : 0;
-    if (count == 0) {
-        return result;
-    }
-    vsh_run quiet = *run;
-    quiet.progress = NULL;
-    l->packed = LATTICE_GUESSED;
-    result = shade_pass(l, options, count, &quiet, job, &own, error);
-    l->packed = LATTICE_CHOSEN;
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, l->blocks, 1, 0, judge, l, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, l->origins->count, 4096, 0, sentence, l, error);
-    }
-    if (stats != NULL) { /* what was looked at has no value by it, and no error */
-        stats->rays += own.rays;
-        stats->samples += own.samples;
-    }
     return result;
 }
 
@@ -341,9 +212,6 @@ static vsh_result run_passes(vshi_lattice *l, const vsh_shade_options *options, 
     part.progress = run->progress != NULL ? tell : NULL;
     part.warning = run->warning != NULL ? warn : NULL;
     vsh_result result = vshi_parallel_for(job, l->origins->count, 4096, 0, find_texels, l, error);
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, l->texels->count, 4096, 0, find_invalid, l, error);
-    }
     for (l->spacing = l->texels->ao_spacing; result == VSH_OK && l->spacing > 0; l->spacing /= 2) {
         result = vshi_parallel_for(job, l->blocks, 1, 0, choose, l, error);
         const size_t count = result == VSH_OK ? sum_blocks(l) : 0;
@@ -354,9 +222,6 @@ static vsh_result run_passes(vshi_lattice *l, const vsh_shade_options *options, 
         }
         if (result == VSH_OK && l->spacing > 1) {
             result = vshi_parallel_for(job, l->blocks, 1, 0, interpolate, l, error);
-        }
-        if (result == VSH_OK && l->spacing > 1 && l->probe != NULL) {
-            result = probe_guesses(l, options, &part, job, stats, error);
         }
     }
     return result;
@@ -376,7 +241,7 @@ static void add_errors(const vshi_lattice *l, vsh_shade_stats *stats) {
 
 double vshi_lattice_bytes(double samples, double texels, bool bent) {
     return texels * sizeof(uint32_t) +
-           samples * (2.0 + sizeof(float) + 3.0 * sizeof(double) + (bent ? 11.0 : 8.0) * sizeof(float));
+           samples * (1.0 + 3.0 * sizeof(double) + (bent ? 11.0 : 8.0) * sizeof(float));
 }
 
 vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
@@ -390,11 +255,7 @@ vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, con
                       .distance = options->ao_distance / field->voxel_size,
                       .blocks = (origins->count + BLOCK - 1) / BLOCK,
                       .values = values,
-                      .bent = bent,
-                      .packed = LATTICE_CHOSEN,
-                      .probes = probes_for(options->max_error),
-                      .sampler = options->sampler,
-                      .max_error = options->max_error};
+                      .bent = bent};
     const char *what = "AO texels";
     vsh_run quiet = *run;
     quiet.progress = NULL;
@@ -407,9 +268,6 @@ vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, con
     l.state = vshi_take(origins->count, 1, what, &result, error);
     l.before = vshi_take(l.blocks + 1, sizeof *l.before, what, &result, error);
     l.row_start = vshi_take(origins->rows.count + 1, sizeof *l.row_start, what, &result, error);
-    const bool probed = vshi_ao_traces(options);
-    l.probe = vshi_take(probed ? origins->count : 0, sizeof *l.probe, what, &result, error);
-    l.verdict = vshi_take(probed ? origins->count : 0, 1, what, &result, error);
     const bool estimates = (vsh_ao_method_traits(options->ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
     float *own =
         vshi_take(estimates && deviation == NULL ? origins->count : 0, sizeof *own, what, &result, error);
@@ -421,8 +279,6 @@ vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, con
         add_errors(&l, stats);
     }
     free(own);
-    free(l.verdict);
-    free(l.probe);
     free(l.row_start);
     free(l.before);
     free(l.state);

@@ -4,10 +4,6 @@
 
 #include "bake/origins.h"
 
-/* Rows of tiles beside a texel's own that its value depends on: the cells that end at it, its own and theirs.
- */
-enum { VSHI_LATTICE_ABOVE = 1, VSHI_LATTICE_BELOW = 2 };
-
 /* As vsh_shade_ao() at the origins' points, `points`, of a lightmap of one sample a texel. Texels of a
  * lattice of the texels' ao_spacing (1, 2, 4 or 8) are shaded; those between are interpolated where nothing
  * is near enough to change within a cell, else the lattice is halved there (irradiance caching: Ward,

@@ -14,17 +14,15 @@ static const double RANGE = 0.2;
 /* The texels between lie so flat, of the spacing, and their normals within so much (cosine) of each other. */
 static const double FLAT = 0.2, ALIKE = 0.95;
 
-static uint32_t number_at(const vshi_lattice *l, uint32_t column, uint32_t row) {
+bool vshi_lattice_lookup(const vshi_lattice *l, uint32_t column, uint32_t row, size_t *i) {
     const vshi_band *band = &l->texels->band;
     const uint32_t width = (uint32_t)l->texels->info.width, held = row - (uint32_t)band->first;
-    return column >= width || held >= (uint32_t)band->rows ? LATTICE_NONE
-                                                           : l->at[(size_t)held * width + column];
-}
-
-bool vshi_lattice_lookup(const vshi_lattice *l, uint32_t column, uint32_t row, size_t *i) {
-    const uint32_t number = number_at(l, column, row);
+    if (column >= width || held >= (uint32_t)band->rows) {
+        return false;
+    }
+    const uint32_t number = l->at[(size_t)held * width + column];
     *i = (size_t)number - 1;
-    return number != LATTICE_NONE && number != LATTICE_INVALID;
+    return number != 0;
 }
 
 /* Texels of the cell from (column, row) on; false where they are no rectangle. */
@@ -137,19 +135,6 @@ static bool is_clear(const vshi_lattice *l, const vshi_cell *c, const vshi_vec p
     return (double)vshi_field_distance(l->field, at) >= radius - lack;
 }
 
-/* Whether a texel of the cell, or beside it, is invalid: what stands there darkens its foot, and may be too
- * small for the field. */
-static bool has_a_foot_near(const vshi_lattice *l, const vshi_cell *c) {
-    for (uint32_t row = c->top - 1; row != c->bottom + 2; ++row) {
-        for (uint32_t column = c->left - 1; column != c->right + 2; ++column) {
-            if (number_at(l, column, row) == LATTICE_INVALID) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
 vshi_cell vshi_lattice_look_at(const vshi_lattice *l, uint32_t column, uint32_t row) {
     vshi_cell c;
     vshi_vec p[4];
@@ -163,7 +148,7 @@ vshi_cell vshi_lattice_look_at(const vshi_lattice *l, uint32_t column, uint32_t 
         }
         p[k] = position_of(l, c.corner[k]);
     }
-    if (!corners_agree(l, &c) || (l->probe != NULL && has_a_foot_near(l, &c))) {
+    if (!corners_agree(l, &c)) {
         return c;
     }
     const double size = fmax(vshi_length(vshi_sub(p[3], p[0])), vshi_length(vshi_sub(p[2], p[1])));

@@ -5,12 +5,8 @@
 
 #include "bake/origins.h"
 
-/* Guessed: interpolated, and not yet held against rays; known: shaded; between: interpolated. */
-enum { LATTICE_UNKNOWN, LATTICE_CHOSEN, LATTICE_GUESSED, LATTICE_KNOWN, LATTICE_BETWEEN };
-
-/* Texels without an origin: of no chart, or within a solid. */
-#define LATTICE_NONE UINT32_C(0)
-#define LATTICE_INVALID UINT32_MAX
+/* Known: shaded; between: interpolated. */
+enum { LATTICE_UNKNOWN, LATTICE_CHOSEN, LATTICE_KNOWN, LATTICE_BETWEEN };
 
 typedef struct vshi_lattice {
     const vsh_field *field;
@@ -19,17 +15,12 @@ typedef struct vshi_lattice {
     const vsh_points *points;
     double distance; /* of AO, finest voxels */
     int32_t spacing; /* of this pass */
-    uint32_t *at;    /* [rows held][width]: number of the texel's origin + 1, or LATTICE_… */
+    uint32_t *at;    /* [rows held][width]: number of the texel's origin + 1; 0: none */
     uint8_t *state;  /* [origins.count] */
     size_t *before;  /* [blocks + 1]: chosen origins before each block */
     size_t blocks;
     float *values, *deviation;
-    float *bent;      /* [origins.count][3], or NULL */
-    float *probe;     /* [origins.count]: a few rays at what is guessed; NULL: guesses are taken for good */
-    uint8_t *verdict; /* [origins.count]: of them */
-    int32_t probes, sampler; /* of the probe */
-    double max_error;
-    uint8_t packed; /* the state of what is shaded in this pass */
+    float *bent; /* [origins.count][3], or NULL */
     /* of the chosen */
     uint32_t *number;
     double *position;

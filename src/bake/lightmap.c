@@ -1,4 +1,5 @@
 #include "bake/ambient.h"
+#include "bake/ao_texels.h"
 #include "bake/average.h"
 #include "bake/bend.h"
 #include "bake/coverage.h"
@@ -14,7 +15,6 @@
 #include "base/floats.h"
 #include "base/parallel.h"
 #include "shade/layers.h"
-#include "shim/embree.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -57,6 +57,10 @@ static bool interpolates(const baking *bake) {
     const int32_t method = bake->shade.ao_method;
     return bake->texels->ao_spacing > 1 && !bake->layered_ao &&
            (method == VSH_AO_CONES || (vsh_ao_method_traits(method) & VSH_METHOD_KEEPS_ERROR) != 0);
+}
+
+static bool shares(const baking *bake) {
+    return interpolates(bake) && vshi_ao_traces(&bake->shade);
 }
 
 static double fields_bytes(const baking *bake) {
@@ -148,16 +152,7 @@ static bool holds(const baking *bake) {
 }
 
 static vsh_result choose_held(baking *bake, vsh_error *error) {
-    static const double LIFT = 0x1p-18; /* of the casters' size, where no triangles say it */
-    const vsh_field *field = bake->field;
-    double size = 0.0;
-    for (int axis = 0; axis < 3; ++axis) {
-        size = fmax(size, field->world_max[axis] - field->world_min[axis]);
-    }
-    vshi_truth truth = {.triangles = bake->stats.truth_triangles, .solids = bake->stats.truth_solids};
-    truth.lift = bake->shade.surface_offset + (truth.triangles != NULL && truth.solids == NULL
-                                                   ? vshi_triangles_lift(truth.triangles)
-                                                   : LIFT * size);
+    const vshi_truth truth = vshi_field_share_truth(bake->field, &bake->shade, &bake->stats);
     const bool traced = (!bake->wanted.lights || vshi_shadow_traces(&bake->shade)) &&
                         (!bake->wanted.ao || vshi_ao_traces(&bake->shade));
     return vshi_field_share_choose(bake->texels, &bake->origins, bake->state, &truth, traced, &bake->quiet,
@@ -264,14 +259,13 @@ static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *
         return result;
     }
     vshi_spread_mark(&bake->spread, texels, taken);
-    const int32_t reach = invalid_radius(texels);
-    const size_t near = ((size_t)reach + VSHI_TILE - 1) / VSHI_TILE;
+    const size_t near = ((size_t)invalid_radius(texels) + VSHI_TILE - 1) / VSHI_TILE;
     for (size_t row = 0; row < count; ++row) {
         const size_t at = row + band->held_begin;
         taken[row] = taken[row] || (at + near >= band->own_begin && at < band->own_end + near);
     }
-    const bool lattice = interpolates(bake) && vshi_ao_wanted(bake->lightmap);
-    const size_t above = lattice ? VSHI_LATTICE_ABOVE : 0, below = lattice ? VSHI_LATTICE_BELOW : 0;
+    const bool shared = interpolates(bake) && vshi_ao_wanted(bake->lightmap);
+    const size_t above = shared ? VSHI_AO_ABOVE : 0, below = shared ? VSHI_AO_BELOW : 0;
     for (size_t row = 0; row < count; ++row) {
         rows[row] = 0;
         for (size_t other = row > below ? row - below : 0; other <= row + above && other < count; ++other) {
@@ -298,11 +292,15 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
         float *deviation = lightmap->ao_error != NULL ? bake->deviation : NULL;
         result = vshi_lift_for(texels, NULL, &bake->quiet, &bake->origins, error);
         if (result == VSH_OK) {
-            result = interpolates(bake)
-                         ? vshi_lattice_ao(bake->field, texels, &bake->origins, &points, &shade, &bake->run,
-                                           bake->values, deviation, bake->bent, &bake->stats.shade, error)
-                         : vshi_shade_ao(bake->field, &points, &bake->origins.rows, &shade, &bake->run,
-                                         bake->values, deviation, bake->bent, &bake->stats.shade, error);
+            result =
+                shares(bake)
+                    ? vshi_ao_texels(bake->field, texels, &bake->origins, &points, &shade, &bake->run,
+                                     bake->values, deviation, bake->bent, &bake->stats.shade, error)
+                : interpolates(bake)
+                    ? vshi_lattice_ao(bake->field, texels, &bake->origins, &points, &shade, &bake->run,
+                                      bake->values, deviation, bake->bent, &bake->stats.shade, error)
+                    : vshi_shade_ao(bake->field, &points, &bake->origins.rows, &shade, &bake->run,
+                                    bake->values, deviation, bake->bent, NULL, &bake->stats.shade, error);
         }
         if (result == VSH_OK && lightmap->ao_error != NULL) {
             result = average(bake, bake->deviation, 1, lightmap->ao_error, error);
@@ -340,6 +338,7 @@ static vsh_result pad(baking *bake, size_t invalid, vsh_error *error) {
 static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error *error) {
     const vsh_texels *texels = bake->texels;
     const bool errors = vshi_errors_wanted(bake->lightmap, bake->light_count);
+    const bool ao = vshi_ao_wanted(bake->lightmap);
     const vshi_bake_need need = {.samples = (double)texels->count,
                                  .texels = (double)vshi_texels_held(texels),
                                  .traced = vshi_shadow_traces(&bake->shade) || vshi_ao_traces(&bake->shade),
@@ -348,7 +347,9 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
                                  .irradiance = irradiance,
                                  .bent = bake->lightmap->bent != NULL,
                                  .tint = vshi_tint_wanted(bake->lightmap, bake->light_count),
-                                 .lattice = vshi_ao_wanted(bake->lightmap) && interpolates(bake)};
+                                 .lattice = ao && interpolates(bake) && !shares(bake),
+                                 .windows = ao && shares(bake),
+                                 .threads = bake->run.threads};
     vsh_result result = vshi_lift_layers(&bake->shade, bake->field, &bake->layers, &bake->layered_ao, error);
     if (result != VSH_OK) {
         free(bake->layers);

@@ -49,11 +49,17 @@ typedef struct vshi_band {
 vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t rows, vshi_band *band,
                          vsh_error *error);
 
+/* Rows of tiles beside a texel's own that its AO depends on, where texels share it: of a lattice those of the
+ * cells that end at it, its own and theirs; of windows one. */
+enum { VSHI_AO_ABOVE = 1, VSHI_AO_BELOW = 2 };
+
 /* What vsh_bake_lightmap() takes beside field, texels and planes, bytes: the most it holds at a time. */
 typedef struct vshi_bake_need {
     double samples, texels; /* held */
     bool traced;            /* rays against triangles */
-    bool values, errors, irradiance, bent, tint, lattice;
+    bool values, errors, irradiance, bent, tint;
+    bool lattice, windows; /* AO between texels, or by those around */
+    int32_t threads;
 } vshi_bake_need;
 
 double vshi_bake_bytes(const vshi_bake_need *need);

@@ -96,8 +96,8 @@ static const cli_option options[] = {
     {KEY_SUPERSAMPLE, "supersample", "N", "N × N samples a texel, 1 to 16 (1)"},
     {KEY_PADDING, "padding", "N", "texels that charts are grown by, 0 to 4096 (4)"},
     {KEY_AO_SPACING, "ao-spacing", "N",
-     "1, 2, 4 or 8 texels: AO by cones, adaptive or exact is\ninterpolated between texels so far apart where "
-     "casters\nare far; 1: never (4)"},
+     "1, 2, 4 or 8 texels: AO by cones or adaptive is\ninterpolated between texels so far apart where "
+     "casters\nare far; texels share the rays of exact AO; 1: neither\n(4)"},
     {KEY_BAND_ROWS, "band-rows", "N",
      "rows baked and written at a time, 1 to 65536,\nrounded up to eights; changes no value (all, or as\n"
      "many as --memory-limit allows)"},

@@ -54,6 +54,7 @@ void vshi_ao_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *
     const int32_t method = task->options->ao_method;
     vshi_shade_fn *shade = method == VSH_AO_TAPS    ? vshi_ao_taps
                            : method == VSH_AO_CONES ? vshi_ao_by_cones
+                           : task->rays != NULL     ? vshi_ao_by_tile
                                                     : vshi_ao_by_rays;
     for (size_t i = begin; task->deviation != NULL && i < end; ++i) {
         task->deviation[i] = NAN;
@@ -108,7 +109,7 @@ vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const 
     VSHI_NEEDS(points);
     VSHI_NEEDS_OF(points->count, points->positions);
     VSHI_NEEDS_OF(points->count, ao);
-    return vshi_shade_ao(field, points, NULL, options, run, ao, deviation, NULL, stats, error);
+    return vshi_shade_ao(field, points, NULL, options, run, ao, deviation, NULL, NULL, stats, error);
 }
 
 void vshi_ao_bend(float *bent, const float *normal) {
@@ -131,7 +132,8 @@ vsh_result vsh_shade_bent(const vsh_field *field, const vsh_points *points, cons
     VSHI_NEEDS_OF(points->count, points->positions);
     VSHI_NEEDS_OF(points->count, ao);
     VSHI_NEEDS_OF(points->count, bent);
-    const vsh_result result = vshi_shade_ao(field, points, NULL, options, run, ao, NULL, bent, stats, error);
+    const vsh_result result =
+        vshi_shade_ao(field, points, NULL, options, run, ao, NULL, bent, NULL, stats, error);
     for (size_t i = 0; result == VSH_OK && i < points->count; ++i) {
         vshi_ao_bend(bent + 3 * i, points->normals + 3 * i);
     }
@@ -140,7 +142,7 @@ vsh_result vsh_shade_bent(const vsh_field *field, const vsh_points *points, cons
 
 vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
                          const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
-                         float *bent, vsh_shade_stats *stats, vsh_error *error) {
+                         float *bent, int32_t *rays, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     vsh_shade_options full;
     vsh_run full_run;
@@ -178,6 +180,7 @@ vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const
         task.ao = ao;
         task.deviation = deviation;
         task.bent = bent;
+        task.rays = rays;
         const size_t grain = full.ao_method == VSH_AO_TAPS ? VSHI_CHUNK : VSHI_AO_GRAIN;
         result =
             vshi_shade_run(&full_run, "ao", points->count, rows, grain, vshi_ao_shade, &task, stats, error);

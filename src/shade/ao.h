@@ -29,8 +29,10 @@ typedef struct vshi_ao_task {
     const vsh_points *points;
     float *ao;
     float *deviation; /* may be NULL */
-    float *bent;      /* [count][3]: the directions that are open, averaged over the whole cosine-weighted
-                       * hemisphere (2/3 of the normal where all is open), world space; may be NULL */
+    int32_t *rays; /* [count]: how many each value is of, where texels of a tile share theirs (see ao_tile.c),
+                    * 0 where the value is no share of rays; NULL: each point has its own */
+    float *bent;   /* [count][3]: the directions that are open, averaged over the whole cosine-weighted
+                    * hemisphere (2/3 of the normal where all is open), world space; may be NULL */
 } vshi_ao_task;
 
 /* Length of what `bent` is under an open sky: the mean cosine. */
@@ -74,8 +76,8 @@ static inline bool vshi_ao_traces(const vsh_shade_options *options) {
     return (vsh_ao_method_traits(method) & VSH_METHOD_TRIANGLES) != 0;
 }
 
-/* Standard error of the share of so many rays of a VSH_SAMPLER_… where `value` is free. */
-double vshi_ao_deviation(int32_t sampler, int32_t rays, double value);
+/* Variance of the share of `rays` rays of a VSH_SAMPLER_… that are free, over p (1 - p). */
+double vshi_ao_spread(int32_t sampler, int32_t rays);
 
 /* The most rays that a point takes, by settled options. */
 int32_t vshi_ao_most_rays(const vsh_shade_options *options);
@@ -112,6 +114,12 @@ static inline vshi_vec vshi_ao_direction(const vshi_vec axes[3], vshi_vec d) {
 vshi_shade_fn vshi_ao_taps;
 vshi_shade_fn vshi_ao_by_cones;
 vshi_shade_fn vshi_ao_by_rays;
+vshi_shade_fn vshi_ao_by_tile; /* the points of a call are texels of one tile */
+
+/* The standard error of a texel that ends its tile's rays, of max_error, were it in the middle of its window:
+ * what bends in windows adds to it. Values are those of larger windows than a tile has, in whose middle they
+ * are, but at the edges of charts. */
+#define VSHI_AO_TILE_ENOUGH 0.55
 
 void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count);
 

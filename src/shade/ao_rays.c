@@ -4,9 +4,8 @@
  * No cones go before them. Sixteen that prove their part of the sky free or hidden (VSHI_MARCH_PROOF) cost as
  * much as 16 marched or 50 traced rays and decide a fifth of the rays that follow: near the receiver nothing
  * is proved. At an error of 0.01 on the cloister that saved a fifth of the rays and no time. */
-#include "shade/ao.h"
+#include "shade/ao_rays.h"
 #include "shade/inside.h"
-#include "shim/embree.h"
 
 #include <math.h>
 #include <string.h>
@@ -21,50 +20,47 @@ static const int32_t FIRST_ROUND = 16;
  * closer. */
 static const double OPEN = 1.0;
 
-enum { BALLS = 4, AT_ONCE = 64 };
+enum { AT_ONCE = 64, EDGE = 10, KEYS = EDGE * EDGE + 2 * EDGE };
 
-/* A ball around a place up the normal that the field says is free. */
-typedef struct ball {
-    double height, square; /* of its centre over the origin; its radius, squared */
-} ball;
-
-typedef struct ao_point {
-    vshi_ao_frame frame;
-    uint32_t texel;
-    int32_t taken, free; /* rays */
-    int32_t next;        /* rays after this round; 0: done */
-    vshi_vec open;       /* sum of the directions of the free; exact: in world space, else in the field's */
-    vshi_vec all;        /* of all, along the frame's axes */
-    int32_t balls;       /* the smallest first */
-    ball ball[BALLS];
-    vshi_vec world_origin, world_axes[3]; /* exact */
-} ao_point;
-
-/* Rays of many points on their way: marched, or traced. */
-typedef struct batch {
-    const vshi_ao_task *task;
-    ao_point *points;
-    bool exact;
-    vshi_chunk chunk;
-    size_t traced;
-    vshi_segment_ray segments[VSHI_CHUNK];
-} batch;
-
-static void add_free(ao_point *point, vshi_vec direction) {
+static void add_free(vshi_ao_point *point, vshi_vec direction) {
     ++point->free;
     point->open = vshi_add(point->open, direction);
 }
 
-static void flush(batch *b, vsh_shade_stats *stats) {
+/* Rays that go alike follow each other: they meet the same boxes and triangles. */
+static void order(const vshi_ao_piece *b, uint16_t of[VSHI_CHUNK]) {
+    uint16_t start[KEYS + 1] = {0};
+    for (size_t r = 0; r < b->traced; ++r) {
+        ++start[b->key[r] + 1];
+    }
+    for (size_t k = 0; k < KEYS; ++k) {
+        start[k + 1] = (uint16_t)(start[k + 1] + start[k]);
+    }
+    for (size_t r = 0; r < b->traced; ++r) {
+        of[start[b->key[r]]++] = (uint16_t)r;
+    }
+}
+
+static void trace(vshi_ao_piece *b) {
+    uint16_t of[VSHI_CHUNK];
+    vshi_segment_ray sorted[VSHI_CHUNK];
+    bool blocked[VSHI_CHUNK];
+    order(b, of);
+    for (size_t r = 0; r < b->traced; ++r) {
+        sorted[r] = b->segments[of[r]];
+    }
+    vshi_triangles_blocked(b->task->options->triangles, sorted, b->traced, blocked);
+    for (size_t r = 0; r < b->traced; ++r) {
+        if (!blocked[r]) {
+            add_free(&b->points[b->chunk.owner[of[r]]], vshi_vec_of(sorted[r].direction));
+        }
+    }
+}
+
+static void flush(vshi_ao_piece *b, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
     if (b->exact) {
-        bool blocked[VSHI_CHUNK];
-        vshi_triangles_blocked(task->options->triangles, b->segments, b->traced, blocked);
-        for (size_t r = 0; r < b->traced; ++r) {
-            if (!blocked[r]) {
-                add_free(&b->points[b->chunk.owner[r]], vshi_vec_of(b->segments[r].direction));
-            }
-        }
+        trace(b);
         stats->rays += b->traced;
         b->traced = 0;
         return;
@@ -87,14 +83,14 @@ static void flush(batch *b, vsh_shade_stats *stats) {
 /* Free balls up the normal that hold the origin: rays leave the surface through them, and are known up to
  * where they come out. Those of an open plane reach its points at the AO distance in every direction but the
  * lowest. */
-static void find_balls(const vshi_ao_task *task, ao_point *point, vsh_shade_stats *stats) {
+static void find_balls(const vshi_ao_task *task, vshi_ao_point *point, vsh_shade_stats *stats) {
     static const double LEAST = 2.0; /* voxels: a smaller ball saves no step */
     point->balls = 0;
     double height = task->distance;
-    for (int i = 1; i < BALLS; ++i) {
+    for (int i = 1; i < VSHI_AO_BALLS; ++i) {
         height *= 0.5;
     }
-    for (int i = 0; i < BALLS; ++i, height *= 2.0) {
+    for (int i = 0; i < VSHI_AO_BALLS; ++i, height *= 2.0) {
         if (height < LEAST) {
             continue;
         }
@@ -103,13 +99,13 @@ static void find_balls(const vshi_ao_task *task, ao_point *point, vsh_shade_stat
         const double h = vshi_field_distance(task->field, at);
         ++stats->samples;
         if (h >= height) {
-            point->ball[point->balls++] = (ball){height, h * h};
+            point->ball[point->balls++] = (vshi_ao_ball){height, h * h};
         }
     }
 }
 
 /* How far a ray of this height over the plane is free by the balls. */
-static double free_up_to(const ao_point *point, double z) {
+static double free_up_to(const vshi_ao_point *point, double z) {
     double end = 0.0;
     for (int32_t i = 0; i < point->balls; ++i) {
         const double middle = point->ball[i].height * z;
@@ -120,9 +116,9 @@ static double free_up_to(const ao_point *point, double z) {
     return end;
 }
 
-static void march_ray(batch *b, uint32_t owner, vshi_vec local, vsh_shade_stats *stats) {
+static void march_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
-    ao_point *point = &b->points[owner];
+    vshi_ao_point *point = &b->points[owner];
     const double begin = free_up_to(point, local.z);
     const vshi_vec direction = vshi_ao_direction(point->frame.axes, local);
     if (begin >= task->distance) {
@@ -147,15 +143,22 @@ static void march_ray(batch *b, uint32_t owner, vshi_vec local, vsh_shade_stats 
     *start = (float)begin > *start ? (float)begin : *start;
 }
 
-static void trace_ray(batch *b, uint32_t owner, vshi_vec local, vsh_shade_stats *stats) {
+/* The cell of a direction, row by row there and back. */
+static uint8_t key_of(vshi_vec local) {
+    const int x = (int)(0.5 * EDGE * (local.x + 1.0)), y = (int)(0.5 * EDGE * (local.y + 1.0));
+    return (uint8_t)(y * EDGE + (y & 1 ? EDGE - 1 - x : x));
+}
+
+static void trace_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
-    const ao_point *point = &b->points[owner];
+    const vshi_ao_point *point = &b->points[owner];
     if (b->traced == VSHI_CHUNK) {
         flush(b, stats);
     }
     const vshi_vec o = point->world_origin, d = vshi_ao_direction(point->world_axes, local);
     b->segments[b->traced] = (vshi_segment_ray){
         .origin = {o.x, o.y, o.z}, .direction = {d.x, d.y, d.z}, .far = task->options->ao_distance};
+    b->key[b->traced] = b->tiled ? key_of(local) : 0;
     b->chunk.owner[b->traced++] = owner;
 }
 
@@ -168,13 +171,17 @@ static vshi_vec direction_of(const vshi_ao_task *task, const double disc[2]) {
                         : (vshi_vec){disc[0], disc[1], height};
 }
 
-static void shoot(batch *b, uint32_t owner, vsh_shade_stats *stats) {
-    ao_point *point = &b->points[owner];
+static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
+    vshi_ao_point *point = &b->points[owner];
     double disc[AT_ONCE][2];
     while (point->taken < point->next) {
         const int32_t left = point->next - point->taken;
         const int32_t count = left < AT_ONCE ? left : AT_ONCE;
-        vshi_sampler_disc(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
+        if (b->tiled) {
+            vshi_sampler_tile(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
+        } else {
+            vshi_sampler_disc(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
+        }
         for (int32_t i = 0; i < count; ++i) {
             const vshi_vec local = direction_of(b->task, disc[i]);
             point->all = vshi_add(point->all, local);
@@ -189,10 +196,10 @@ static void shoot(batch *b, uint32_t owner, vsh_shade_stats *stats) {
 }
 
 /* False where there is nothing to shoot: the value is then known. */
-static bool prepare(batch *b, size_t i, ao_point *point, vsh_shade_stats *stats) {
+static bool prepare(vshi_ao_piece *b, size_t i, vshi_ao_point *point, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
     const vsh_points *points = task->points;
-    *point = (ao_point){.texel = points->texels != NULL ? points->texels[i] : (uint32_t)i};
+    *point = (vshi_ao_point){.texel = points->texels != NULL ? points->texels[i] : (uint32_t)i};
     if (!vshi_ao_frame_at(task, i, &point->frame, stats)) {
         return false;
     }
@@ -214,7 +221,7 @@ static bool prepare(batch *b, size_t i, ao_point *point, vsh_shade_stats *stats)
 /* A piece of points, to be looked at for whether they are in solids. */
 typedef struct looking {
     const vshi_ao_task *task;
-    const ao_point *points;
+    const vshi_ao_point *points;
     uint32_t of[VSHI_AO_GRAIN]; /* those that are looked at, of the piece */
 } looking;
 
@@ -226,7 +233,7 @@ static bool is_open(const void *user, size_t i) {
 }
 
 /* Points in solids see nothing, also where all triangles around are farther than the AO distance. */
-static void find_buried(const vshi_ao_task *task, size_t begin, size_t end, ao_point *points) {
+static void find_buried(const vshi_ao_task *task, size_t begin, size_t end, vshi_ao_point *points) {
     looking l = {.task = task, .points = points};
     double positions[3 * VSHI_AO_GRAIN] = {0.0};
     float normals[3 * VSHI_AO_GRAIN] = {0.0f};
@@ -258,27 +265,29 @@ static void find_buried(const vshi_ao_task *task, size_t begin, size_t end, ao_p
     }
 }
 
-/* Standard error of `free` rays of `taken`. White noise has the binomial's; points that are spread evenly
- * leave c n^(-11/16) of it, measured on the seeds' floor and the cloister: one edge alone falls as n^-3/4,
- * but a hemisphere shows more edges the finer it is looked at. The share is smoothed (Laplace's rule of
- * succession), for that some rays agree does not mean that all do. */
-static double standard_error(int32_t sampler, int32_t taken, double free) {
+/* White noise has the binomial's variance; points that are spread evenly leave c² n^(-11/8) of it, measured
+ * on the seeds' floor and the cloister: the error at one edge alone falls as n^-3/4, but a hemisphere shows
+ * more edges the finer it is looked at. */
+double vshi_ao_spread(int32_t sampler, int32_t rays) {
     static const double SOBOL = 0.9, BLUE = 1.5;
-    const double n = taken, p = (free + 1.0) / (n + 2.0);
-    const double spread = sqrt(p * (1.0 - p)), root = sqrt(n);
+    const double n = rays, root = sqrt(n);
     if (sampler == VSH_SAMPLER_WHITE) {
-        return spread / root;
+        return 1.0 / n;
     }
     const double eighth = sqrt(sqrt(root)); /* square roots have the same bits everywhere, powers have not */
-    return (sampler == VSH_SAMPLER_BLUE ? BLUE : SOBOL) * spread / (root * eighth * sqrt(eighth));
+    const double c = (sampler == VSH_SAMPLER_BLUE ? BLUE : SOBOL) / (root * eighth * sqrt(eighth));
+    return c * c;
+}
+
+/* Standard error of `free` rays of `taken`. The share is smoothed (Laplace's rule of succession), for that
+ * some rays agree does not mean that all do. */
+static double standard_error(int32_t sampler, int32_t taken, double free) {
+    const double p = (free + 1.0) / (taken + 2.0);
+    return sqrt(p * (1.0 - p) * vshi_ao_spread(sampler, taken));
 }
 
 static double spread_of(int32_t sampler, int32_t rays) {
     return standard_error(sampler, rays, 0.5 * rays);
-}
-
-double vshi_ao_deviation(int32_t sampler, int32_t rays, double value) {
-    return standard_error(sampler, rays, value * rays);
 }
 
 int32_t vshi_ao_most_rays(const vsh_shade_options *options) {
@@ -287,7 +296,7 @@ int32_t vshi_ao_most_rays(const vsh_shade_options *options) {
 }
 
 /* What comes after a round: more rays up to `most`, or none. */
-static void decide(const vshi_ao_task *task, int32_t most, ao_point *point) {
+static void decide(const vshi_ao_task *task, int32_t most, vshi_ao_point *point) {
     const vsh_shade_options *options = task->options;
     bool more = point->taken < most;
     if (options->ao_method == VSH_AO_RAYS) {
@@ -300,6 +309,39 @@ static void decide(const vshi_ao_task *task, int32_t most, ao_point *point) {
     point->next = more ? doubled : 0;
 }
 
+void vshi_ao_piece_open(vshi_ao_piece *piece, const vshi_ao_task *task, size_t begin, size_t end, bool tiled,
+                        int32_t first, vsh_shade_stats *stats) {
+    piece->task = task;
+    piece->exact = task->options->ao_method == VSH_AO_EXACT;
+    piece->tiled = tiled;
+    piece->begin = begin;
+    piece->count = end - begin;
+    piece->traced = 0;
+    vshi_chunk_clear(&piece->chunk);
+    for (size_t i = begin; i < end; ++i) {
+        vshi_ao_point *point = &piece->points[i - begin];
+        point->next = prepare(piece, i, point, stats) ? first : 0;
+    }
+    if (piece->exact && !task->outside) {
+        find_buried(task, begin, end, piece->points);
+    }
+}
+
+void vshi_ao_piece_shoot(vshi_ao_piece *piece, vsh_shade_stats *stats) {
+    for (size_t i = 0; i < piece->count; ++i) {
+        shoot(piece, (uint32_t)i, stats);
+    }
+    flush(piece, stats);
+}
+
+vshi_vec vshi_ao_piece_bent(const vshi_ao_piece *piece, const vshi_ao_point *point) {
+    const vshi_vec *axes = piece->exact ? point->world_axes : point->frame.axes;
+    const vshi_vec mean =
+        vshi_ao_mean(point->open, vshi_ao_direction(axes, point->all), point->free, point->taken, axes[2]);
+    const vshi_vec d = piece->exact ? vshi_unit(mean) : vshi_direction_to_world(piece->task->field, mean);
+    return vshi_scale(d, vshi_length(mean));
+}
+
 void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const vshi_ao_task *task = user;
     const vsh_shade_options *options = task->options;
@@ -307,35 +349,20 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
     const int32_t most = vshi_ao_most_rays(options);
     int32_t first = fixed ? options->early_rays : FIRST_ROUND;
     first = first == 0 || first > most ? most : first;
-    ao_point points[VSHI_AO_GRAIN];
-    batch b;
-    b.task = task;
-    b.points = points;
-    b.exact = options->ao_method == VSH_AO_EXACT;
-    b.traced = 0;
-    vshi_chunk_clear(&b.chunk);
-    for (size_t i = begin; i < end; ++i) {
-        ao_point *point = &points[i - begin];
-        point->next = prepare(&b, i, point, stats) ? first : 0;
-    }
-    if (b.exact && !task->outside) {
-        find_buried(task, begin, end, points);
-    }
+    vshi_ao_piece piece;
+    vshi_ao_piece_open(&piece, task, begin, end, false, first, stats);
     for (bool more = true; more;) {
         more = false;
-        for (size_t i = 0; i < end - begin; ++i) {
-            shoot(&b, (uint32_t)i, stats);
-        }
-        flush(&b, stats);
-        for (size_t i = 0; i < end - begin; ++i) {
-            if (points[i].next > 0) {
-                decide(task, most, &points[i]);
-                more = more || points[i].next > 0;
+        vshi_ao_piece_shoot(&piece, stats);
+        for (size_t i = 0; i < piece.count; ++i) {
+            if (piece.points[i].next > 0) {
+                decide(task, most, &piece.points[i]);
+                more = more || piece.points[i].next > 0;
             }
         }
     }
     for (size_t i = begin; i < end; ++i) {
-        const ao_point *point = &points[i - begin];
+        const vshi_ao_point *point = &piece.points[i - begin];
         if (point->taken == 0) {
             continue;
         }
@@ -345,11 +372,7 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
             task->deviation[i] = (float)error;
         }
         if (task->bent != NULL) {
-            const vshi_vec *axes = b.exact ? point->world_axes : point->frame.axes;
-            const vshi_vec mean = vshi_ao_mean(point->open, vshi_ao_direction(axes, point->all), point->free,
-                                               point->taken, axes[2]);
-            const vshi_vec d = b.exact ? vshi_unit(mean) : vshi_direction_to_world(task->field, mean);
-            vshi_ao_set_bent(task, i, vshi_scale(d, vshi_length(mean)));
+            vshi_ao_set_bent(task, i, vshi_ao_piece_bent(&piece, point));
         }
         stats->square_error += fixed ? 0.0 : error * error;
         stats->ao_square_error += fixed ? 0.0 : error * error;

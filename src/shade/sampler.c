@@ -303,3 +303,71 @@ void vshi_sampler_disc(const vshi_sampler *sampler, uint32_t texel, uint32_t pur
         to_disc(square, points[i]);
     }
 }
+
+/* The two lowest bits of column and row, and the third of each: neighbours are near in it (Morton, 1966). */
+static uint32_t member_of(uint32_t texel) {
+    const uint32_t x = texel & 7u, y = texel >> 16 & 7u;
+    uint32_t member = 0;
+    for (uint32_t bit = 0; bit < 3; ++bit) {
+        member |= (x >> bit & 1u) << (2 * bit) | (y >> bit & 1u) << (2 * bit + 1);
+    }
+    return member;
+}
+
+static uint32_t bits_of(uint32_t x) {
+    uint32_t bits = 0;
+    for (; x > 0; x >>= 1) {
+        ++bits;
+    }
+    return bits;
+}
+
+/* Angles up to π/4 by series that are exact to 4e-7: a ray needs no more. No branches, so that compilers take
+ * several points at a time. */
+static void to_discs(int32_t count, double (*points)[2]) {
+    for (int32_t i = 0; i < count; ++i) {
+        const double x = 2.0 * points[i][0] - 1.0, y = 2.0 * points[i][1] - 1.0;
+        const bool wide = fabs(x) > fabs(y);
+        const double radius = wide ? x : y, across = wide ? y : x;
+        const double angle = 0.25 * PI * (across / (radius != 0.0 ? radius : 1.0)), square = angle * angle;
+        const double sine =
+            angle * (1.0 + square * (-1.0 / 6.0 + square * (1.0 / 120.0 - square * (1.0 / 5040.0))));
+        const double cosine =
+            1.0 +
+            square * (-0.5 + square * (1.0 / 24.0 + square * (-1.0 / 720.0 + square * (1.0 / 40320.0))));
+        points[i][0] = radius * (wide ? cosine : sine);
+        points[i][1] = radius * (wide ? sine : cosine);
+    }
+}
+
+void vshi_sampler_tile(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t first,
+                       int32_t count, double (*points)[2]) {
+    enum { TOGETHER = 3, EIGHT = 1 << TOGETHER }; /* points of a texel that come before its neighbours' */
+    if (sampler->kind != VSH_SAMPLER_SOBOL) {
+        vshi_sampler_disc(sampler, texel, purpose, first, count, points);
+        return;
+    }
+    const uint32_t member = member_of(texel) << TOGETHER;
+    const uint32_t seed = hash2(hash2(texel & ~0x00070007u, purpose), (uint32_t)sampler->frame),
+                   second = hash(seed);
+    uint32_t net[EIGHT][2];
+    for (uint32_t i = 0; i < EIGHT; ++i) {
+        net[i][0] = reverse(i);
+        net[i][1] = sobol_second(i);
+    }
+    for (int32_t i = 0; i < count;) {
+        /* A shift of digits by the points that the member's bits stand for makes one net of all members'
+         * first eight. From then on those would come again, in another texel: so each further eight have a
+         * shift of their own, of the digits that the texel's own points leave free. */
+        const uint32_t index = (uint32_t)(first + i), group = index >> TOGETHER;
+        const uint32_t base = (group << TOGETHER) ^ member, free = bits_of(index | (EIGHT - 1));
+        const uint32_t shift = group > 0 ? hash2(seed, group) : 0;
+        const uint32_t x = reverse(base) ^ seed ^ shift >> free,
+                       y = sobol_second(base) ^ second ^ (group > 0 ? hash(shift) >> free : 0);
+        for (uint32_t k = index % EIGHT; k < EIGHT && i < count; ++k, ++i) {
+            points[i][0] = unit(x ^ net[k][0]);
+            points[i][1] = unit(y ^ net[k][1]);
+        }
+    }
+    to_discs(count, points);
+}

@@ -52,14 +52,14 @@ vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, c
                           size_t grain, vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats,
                           vsh_error *error);
 
-/* vsh_shade_shadow() and vsh_shade_ao() for points in rows; `rows` may be NULL, and so may `bent`, as of
- * vshi_ao_task. */
+/* vsh_shade_shadow() and vsh_shade_ao() for points in rows; `rows` may be NULL, and so may `bent` and
+ * `rays`, as of vshi_ao_task. With `rays` each row is a tile. */
 vsh_result vshi_shade_shadow(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
                              const vsh_light *light, const vsh_shade_options *options, const vsh_run *run,
                              float *visibility, float *deviation, vsh_shade_stats *stats, vsh_error *error);
 vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
                          const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
-                         float *bent, vsh_shade_stats *stats, vsh_error *error);
+                         float *bent, int32_t *rays, vsh_shade_stats *stats, vsh_error *error);
 
 /* vsh_shade_irradiance() by a tinted visibility; the tint is one that vsh_tint_check() has passed. */
 void vshi_shade_irradiance(const vsh_points *points, const float *shading_normals, const vsh_light *light,

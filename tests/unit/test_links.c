@@ -1,0 +1,286 @@
+/* Which neighbouring texels hang together: charts as an atlas may lay them out, whose surfaces are known. */
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "shade/links.h"
+
+#include <math.h>
+#include <stdbool.h>
+#include <string.h>
+
+enum { WIDTH = 24, HEIGHT = 16, TEXELS = WIDTH * HEIGHT };
+
+/* An image of points; `at` as vshi_links_find() wants it, points in another order than texels. */
+typedef struct image {
+    double positions[3 * TEXELS];
+    float normals[3 * TEXELS];
+    uint32_t at[TEXELS];
+    vshi_window_texel texels[TEXELS];
+} image;
+
+static size_t point_of(int32_t x, int32_t y) {
+    return (size_t)(5 * (y * WIDTH + x) + 3) % TEXELS; /* 5 has no factor of the number of texels */
+}
+
+static void set(image *m, int32_t x, int32_t y, const double position[3], const double normal[3]) {
+    const size_t i = point_of(x, y);
+    memcpy(m->positions + 3 * i, position, 3 * sizeof(double));
+    for (size_t axis = 0; axis < 3; ++axis) {
+        m->normals[3 * i + axis] = (float)normal[axis];
+    }
+    m->at[y * WIDTH + x] = (uint32_t)i + 1;
+}
+
+static void find(image *m, double scale) {
+    static double scaled[3 * TEXELS];
+    for (size_t i = 0; i < 3 * TEXELS; ++i) {
+        scaled[i] = scale * m->positions[i];
+    }
+    memset(m->texels, 0, sizeof m->texels);
+    const vsh_points points = {.count = TEXELS, .positions = scaled, .normals = m->normals};
+    vshi_links_find(&points, m->at, WIDTH, HEIGHT, m->texels);
+}
+
+/* Whether two neighbouring texels should hang together. */
+typedef bool expected_fn(int32_t x0, int32_t y0, int32_t x1, int32_t y1);
+
+/* At scales from a millionth to a million: links do not depend on them. */
+static void assert_links(image *m, expected_fn *expected) {
+    static const double scales[] = {1.0, 1e-6, 1e6, 0.37};
+    for (size_t s = 0; s < sizeof scales / sizeof scales[0]; ++s) {
+        find(m, scales[s]);
+        for (int32_t y = 0; y < HEIGHT; ++y) {
+            for (int32_t x = 0; x < WIDTH; ++x) {
+                const vshi_window_texel *e = &m->texels[y * WIDTH + x];
+                const bool left = x > 0 && expected(x - 1, y, x, y),
+                           above = y > 0 && expected(x, y - 1, x, y);
+                if (e->left != left || e->above != above) {
+                    fail_msg("scale %g, texel %d, %d: left %d, above %d", scales[s], x, y, e->left, e->above);
+                }
+            }
+        }
+    }
+}
+
+static bool always(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return x0 >= 0 && y0 >= 0 && x1 < WIDTH && y1 < HEIGHT;
+}
+
+/* Columns before this are one chart, the others another. */
+enum { BORDER = 11 };
+
+static bool on_one_side(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    (void)y0;
+    (void)y1;
+    return (x0 < BORDER) == (x1 < BORDER);
+}
+
+static bool on_one_side_of_rows(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    (void)x0;
+    (void)x1;
+    return (y0 < BORDER) == (y1 < BORDER);
+}
+
+static const double UP[3] = {0.0, 1.0, 0.0};
+
+/* A plane that stands askew, its steps `along` and `down` long; far from the origin. */
+static void lay_plane(image *m, double along, double down) {
+    const double a[3] = {0.6, 0.48, 0.64}, b[3] = {0.8, -0.36, -0.48}, normal[3] = {0.0, -0.8, 0.6};
+    for (int32_t y = 0; y < HEIGHT; ++y) {
+        for (int32_t x = 0; x < WIDTH; ++x) {
+            double p[3];
+            for (size_t axis = 0; axis < 3; ++axis) {
+                p[axis] = 70.0 + along * x * a[axis] + down * y * b[axis];
+            }
+            set(m, x, y, p, normal);
+        }
+    }
+}
+
+static void texels_of_a_plane_hang_together(void **state) {
+    (void)state;
+    static image m;
+    lay_plane(&m, 0.03, 0.03);
+    assert_links(&m, always);
+}
+
+static void stretched_charts_hang_together(void **state) {
+    (void)state;
+    static image m;
+    lay_plane(&m, 0.09, 0.03);
+    assert_links(&m, always);
+    lay_plane(&m, 0.03, 0.09);
+    assert_links(&m, always);
+}
+
+/* A cylinder of 60 texels around, whose neighbours' normals are 6 degrees apart. */
+static void round_things_hang_together(void **state) {
+    (void)state;
+    static image m;
+    for (int32_t y = 0; y < HEIGHT; ++y) {
+        for (int32_t x = 0; x < WIDTH; ++x) {
+            const double angle = 0.1047 * x, n[3] = {cos(angle), 0.0, sin(angle)};
+            set(&m, x, y, (double[]){n[0], 0.1 * y, n[2]}, n);
+        }
+    }
+    assert_links(&m, always);
+}
+
+/* A floor whose chart goes on up a wall, in the image as in the world. */
+static void nothing_hangs_together_over_a_crease(void **state) {
+    (void)state;
+    static image m;
+    for (int32_t y = 0; y < HEIGHT; ++y) {
+        for (int32_t x = 0; x < WIDTH; ++x) {
+            const double s = 0.1 * (x - BORDER + 0.5);
+            const bool wall = x >= BORDER;
+            set(&m, x, y, (double[]){wall ? 0.0 : s, wall ? s : 0.0, 0.1 * y},
+                (double[]){wall ? -1.0 : 0.0, wall ? 0.0 : 1.0, 0.0});
+        }
+    }
+    assert_links(&m, on_one_side);
+}
+
+/* Two pieces of one floor: neighbours in the image, `gap` texels apart in the world. */
+static void lay_pieces(image *m, double gap, bool turned) {
+    for (int32_t y = 0; y < HEIGHT; ++y) {
+        for (int32_t x = 0; x < WIDTH; ++x) {
+            const double s = 0.1 * (x + (!turned && x >= BORDER ? gap - 1.0 : 0.0)),
+                         t = 0.1 * (y + (turned && y >= BORDER ? gap - 1.0 : 0.0));
+            set(m, x, y, (double[]){s, 0.0, t}, UP);
+        }
+    }
+}
+
+static void charts_that_touch_but_lie_apart_do_not(void **state) {
+    (void)state;
+    static image m;
+    static const double gaps[] = {1000.0, 10.0, 5.0, -5.0, -300.0};
+    for (size_t g = 0; g < sizeof gaps / sizeof gaps[0]; ++g) {
+        lay_pieces(&m, gaps[g], false);
+        assert_links(&m, on_one_side);
+        lay_pieces(&m, gaps[g], true);
+        assert_links(&m, on_one_side_of_rows);
+    }
+    lay_pieces(&m, 2.0, false); /* what is left out of one surface is no border */
+    assert_links(&m, always);
+}
+
+/* Fine texels beside coarse ones, whose step the one between them is not too long for. */
+static void charts_of_other_sizes_that_touch_do_not(void **state) {
+    (void)state;
+    static image m;
+    for (int32_t k = 0; k < 4; ++k) {
+        const bool turned = k >= 2, coarse_first = (k & 1) != 0;
+        for (int32_t y = 0; y < HEIGHT; ++y) {
+            for (int32_t x = 0; x < WIDTH; ++x) {
+                const int32_t off = turned ? y - BORDER : x - BORDER;
+                const double step = (off < 0) == coarse_first ? 1.0 : 0.1;
+                const double across = off < 0 ? step * (off + 1) : 2.0 + step * off;
+                const double along = step * (turned ? x : y);
+                set(&m, x, y, (double[]){turned ? along : across, 0.0, turned ? across : along}, UP);
+            }
+        }
+        assert_links(&m, turned ? on_one_side_of_rows : on_one_side);
+    }
+}
+
+static bool in_one_row(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return y0 == y1 && y0 % 2 == 0 && on_one_side(x0, y0, x1, y1);
+}
+
+static bool in_one_column(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return x0 == x1 && x0 % 2 == 0 && on_one_side_of_rows(x0, y0, x1, y1);
+}
+
+static bool in_one_later_row(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return x0 >= BORDER && in_one_row(x0, y0, x1, y1);
+}
+
+static bool in_one_lower_column(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return y0 >= BORDER && in_one_column(x0, y0, x1, y1);
+}
+
+/* Charts a texel wide, of which each has but one other step that tells how long they are; or of a texel. */
+static void strips_that_touch_but_lie_apart_do_not(void **state) {
+    (void)state;
+    static image m;
+    static expected_fn *const expected[2][2] = {{in_one_row, in_one_later_row},
+                                                {in_one_column, in_one_lower_column}};
+    for (int32_t turned = 0; turned < 2; ++turned) {
+        for (int32_t lone = 0; lone < 2; ++lone) {
+            lay_pieces(&m, 50.0, turned != 0);
+            for (int32_t i = 0; i < TEXELS; ++i) {
+                const int32_t along = turned ? i / WIDTH : i % WIDTH, across = turned ? i % WIDTH : i / WIDTH;
+                const bool gone = across % 2 != 0 || (lone && along < BORDER - 1);
+                m.at[i] = gone ? 0 : m.at[i];
+            }
+            assert_links(&m, expected[turned][lone]);
+        }
+    }
+}
+
+/* Two floors, one half a texel over the other or more. */
+static void nothing_hangs_together_over_a_step_in_height(void **state) {
+    (void)state;
+    static image m;
+    static const double heights[] = {0.05, 0.1, 0.3, -0.05, -2.0};
+    for (size_t h = 0; h < sizeof heights / sizeof heights[0]; ++h) {
+        for (int32_t y = 0; y < HEIGHT; ++y) {
+            for (int32_t x = 0; x < WIDTH; ++x) {
+                set(&m, x, y, (double[]){0.1 * x, x < BORDER ? 0.0 : heights[h], 0.1 * y}, UP);
+            }
+        }
+        assert_links(&m, on_one_side);
+    }
+}
+
+/* The two sides of a sheet, laid out beside each other. */
+static void sides_of_a_sheet_do_not_hang_together(void **state) {
+    (void)state;
+    static image m;
+    for (int32_t y = 0; y < HEIGHT; ++y) {
+        for (int32_t x = 0; x < WIDTH; ++x) {
+            set(&m, x, y, (double[]){0.1 * x, 0.0, 0.1 * y}, (double[]){0.0, x < BORDER ? 1.0 : -1.0, 0.0});
+        }
+    }
+    assert_links(&m, on_one_side);
+}
+
+static bool is_hole(int32_t x, int32_t y) {
+    return (x * 7 + y * 3) % 11 == 0 || x == 5;
+}
+
+static bool without_holes(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return !is_hole(x0, y0) && !is_hole(x1, y1);
+}
+
+static void texels_without_a_point_hang_together_with_none(void **state) {
+    (void)state;
+    static image m;
+    lay_plane(&m, 0.03, 0.03);
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        m.at[i] = is_hole(i % WIDTH, i / WIDTH) ? 0 : m.at[i];
+    }
+    assert_links(&m, without_holes);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(texels_of_a_plane_hang_together),
+        cmocka_unit_test(stretched_charts_hang_together),
+        cmocka_unit_test(round_things_hang_together),
+        cmocka_unit_test(nothing_hangs_together_over_a_crease),
+        cmocka_unit_test(charts_that_touch_but_lie_apart_do_not),
+        cmocka_unit_test(charts_of_other_sizes_that_touch_do_not),
+        cmocka_unit_test(strips_that_touch_but_lie_apart_do_not),
+        cmocka_unit_test(nothing_hangs_together_over_a_step_in_height),
+        cmocka_unit_test(sides_of_a_sheet_do_not_hang_together),
+        cmocka_unit_test(texels_without_a_point_hang_together_with_none),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

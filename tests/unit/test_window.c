@@ -1,0 +1,449 @@
+/* Windows over texels: what is known of each by the help of those around it. Truth is the share that a test's
+ * own rays are drawn by. */
+#include "fields.h"
+
+#include "shade/window.h"
+
+#include <stdbool.h>
+#include <stdlib.h>
+
+enum { EDGE = 96, TEXELS = EDGE * EDGE };
+
+static const double MAX_ERROR = 0.02;
+
+typedef struct table {
+    vshi_windows windows;
+    vshi_window_texel texels[TEXELS];
+    vshi_window_sums sums[(EDGE + 1) * (EDGE + 1)];
+} table;
+
+/* Texels that all hang together, of so many rays and no value. */
+static table *make_table(int32_t width, int32_t height, int32_t rays) {
+    assert_true(width * height <= TEXELS && (width + 1) * (height + 1) <= (EDGE + 1) * (EDGE + 1));
+    table *t = calloc(1, sizeof *t);
+    assert_non_null(t);
+    t->windows = (vshi_windows){width, height, t->texels, t->sums};
+    for (int32_t y = 0; y < height; ++y) {
+        for (int32_t x = 0; x < width; ++x) {
+            t->texels[y * width + x] = (vshi_window_texel){
+                .rays = rays, .spread = (float)(1.0 / rays), .left = x > 0, .above = y > 0};
+        }
+    }
+    return t;
+}
+
+static vshi_window_texel *texel_at(table *t, int32_t x, int32_t y) {
+    return &t->texels[y * t->windows.width + x];
+}
+
+static vshi_window_estimate estimate_at(const table *t, int32_t x, int32_t y) {
+    return vshi_windows_estimate(&t->windows, x, y, MAX_ERROR, 0);
+}
+
+/* The share of a texel's rays that are free where each is by the chance p. */
+static float draw(uint64_t *counter, int32_t rays, double p) {
+    int32_t free = 0;
+    for (int32_t i = 0; i < rays; ++i) {
+        free += uniform(counter) < p;
+    }
+    return (float)((double)free / rays);
+}
+
+/* Cuts texels apart where `area` differs; area 0 is no texel at all. */
+static void cut(table *t, const uint8_t *area) {
+    const int32_t width = t->windows.width;
+    for (int32_t y = 0; y < t->windows.height; ++y) {
+        for (int32_t x = 0; x < width; ++x) {
+            vshi_window_texel *e = texel_at(t, x, y);
+            const int32_t i = y * width + x;
+            e->rays = area[i] == 0 ? 0 : e->rays;
+            e->left = x > 0 && area[i] != 0 && area[i] == area[i - 1];
+            e->above = y > 0 && area[i] != 0 && area[i] == area[i - width];
+        }
+    }
+}
+
+static void planes_without_noise_are_exact_up_to_corners(void **state) {
+    (void)state;
+    static const int32_t sizes[][2] = {{40, 30}, {8, 8}, {64, 1}, {1, 64}, {3, 50}, {50, 5}, {2, 2}, {1, 1}};
+    static const double slopes[][2] = {{0.0, 0.0}, {0.004, 0.0}, {-0.003, 0.006}, {0.009, 0.005}};
+    for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; ++k) {
+        for (size_t s = 0; s < sizeof slopes / sizeof slopes[0]; ++s) {
+            const int32_t width = sizes[k][0], height = sizes[k][1];
+            table *t = make_table(width, height, 8);
+            for (int32_t i = 0; i < width * height; ++i) {
+                t->texels[i].value =
+                    (float)(0.25 + slopes[s][0] * (i % width) + slopes[s][1] * (int32_t)(i / width));
+            }
+            vshi_windows_sum(&t->windows);
+            for (int32_t i = 0; i < width * height; ++i) {
+                const vshi_window_estimate e = estimate_at(t, i % width, i / width);
+                if (fabs(e.value - (double)t->texels[i].value) > 1e-6) {
+                    fail_msg("%d × %d, slopes %g %g, texel %d: %.9f instead of %.9f", width, height,
+                             slopes[s][0], slopes[s][1], i, e.value, (double)t->texels[i].value);
+                }
+            }
+            const vshi_window_estimate corner = estimate_at(t, 0, 0),
+                                       middle = estimate_at(t, width / 2, height / 2);
+            if (k == 0) { /* as large as they come, and all in the table */
+                assert_true(corner.x[0] == 0 && corner.x[1] >= 4 && corner.y[0] == 0 && corner.y[1] >= 4);
+                assert_true(middle.x[1] - middle.x[0] == 10 && middle.y[1] - middle.y[0] == 10);
+                assert_true(middle.x[0] + middle.x[1] == width && middle.y[0] + middle.y[1] == height);
+                assert_true(middle.deviation < corner.deviation && middle.centred >= middle.deviation);
+                assert_true(corner.centred < corner.deviation);
+            }
+            free(t);
+        }
+    }
+}
+
+/* p of a texel. */
+typedef double share_fn(int32_t x, int32_t y);
+
+static double even(int32_t x, int32_t y) {
+    (void)x;
+    (void)y;
+    return 0.4;
+}
+
+static double ramp(int32_t x, int32_t y) {
+    return 0.2 + 0.004 * x + 0.002 * y;
+}
+
+static double open(int32_t x, int32_t y) {
+    (void)x;
+    (void)y;
+    return 0.93;
+}
+
+static void fill(table *t, share_fn *share, uint64_t seed) {
+    const int32_t width = t->windows.width;
+    uint64_t counter = seed;
+    for (int32_t i = 0; i < width * t->windows.height; ++i) {
+        t->texels[i].value = draw(&counter, t->texels[i].rays, share(i % width, i / width));
+    }
+    vshi_windows_sum(&t->windows);
+}
+
+/* Root mean squares over a table. */
+typedef struct errors {
+    double is, said, own, specks; /* of a texel's own rays; share that is off by more than 0.06 */
+} errors;
+
+static errors errors_of(const table *t, share_fn *share) {
+    const int32_t width = t->windows.width, count = width * t->windows.height;
+    errors sum = {0.0, 0.0, 0.0, 0.0};
+    for (int32_t i = 0; i < count; ++i) {
+        const vshi_window_estimate e = estimate_at(t, i % width, i / width);
+        const double p = share(i % width, i / width), off = e.value - p, own = (double)t->texels[i].value - p;
+        sum.is += off * off;
+        sum.said += e.deviation * e.deviation;
+        sum.own += own * own;
+        sum.specks += fabs(off) > 0.06;
+    }
+    return (errors){sqrt(sum.is / count), sqrt(sum.said / count), sqrt(sum.own / count), sum.specks / count};
+}
+
+static void noise_that_is_left_is_what_is_said(void **state) {
+    (void)state;
+    share_fn *const shares[] = {even, ramp, open};
+    static const char *const names[] = {"even", "ramp", "open"};
+    for (size_t s = 0; s < 3; ++s) {
+        for (int32_t rays = 8; rays <= 128; rays *= 4) {
+            table *t = make_table(EDGE, EDGE, rays);
+            fill(t, shares[s], 11 + s);
+            const errors e = errors_of(t, shares[s]);
+            print_message("%s, %d rays: RMSE %.5f, said %.5f (%.2f), own %.5f (1/%.1f)\n", names[s], rays,
+                          e.is, e.said, e.is / e.said, e.own, e.own / e.is);
+            assert_true(e.is > 0.9 * e.said && e.is < 1.28 * e.said);
+            assert_true(e.is < e.own / 6.2);
+            free(t);
+        }
+    }
+}
+
+/* Two halves that hang together, of 0.25 and 0.75; a texel's own error is 0.038. A mean over the edge would
+ * be off by up to 0.25. */
+static void edges_stay_sharp(void **state) {
+    (void)state;
+    enum { RAYS = 128, AT = 43, SEEDS = 8, COUNT = 2 * EDGE * SEEDS };
+    for (int32_t turned = 0; turned < 2; ++turned) {
+        table *t = make_table(EDGE, EDGE, RAYS);
+        double square = 0.0, bias = 0.0, blurred = 0.0;
+        uint64_t counter = 5;
+        for (int32_t seed = 0; seed < SEEDS; ++seed) {
+            for (int32_t i = 0; i < TEXELS; ++i) {
+                t->texels[i].value = draw(&counter, RAYS, (turned ? i / EDGE : i % EDGE) < AT ? 0.25 : 0.75);
+            }
+            vshi_windows_sum(&t->windows);
+            for (int32_t i = 0; i < 2 * EDGE; ++i) {
+                const int32_t along = i / 2, side = i % 2, across = AT - 1 + side;
+                const vshi_window_estimate e =
+                    estimate_at(t, turned ? along : across, turned ? across : along);
+                const double off = side ? 0.75 - e.value : e.value - 0.25; /* to the other side */
+                square += off * off / COUNT;
+                bias += off / COUNT;
+                blurred += (off > 0.1) / (double)COUNT;
+            }
+        }
+        print_message("beside an edge: RMSE %.4f, %+.4f to the other side, %.4f of them blurred\n",
+                      sqrt(square), bias, blurred);
+        assert_true(sqrt(square) < 0.033 && fabs(bias) < 0.006 && blurred < 0.02);
+        free(t);
+    }
+}
+
+/* Beside what is half hidden, texels whose rays are all free keep their value. */
+static void open_texels_beside_an_edge_stay_open(void **state) {
+    (void)state;
+    table *t = make_table(EDGE, EDGE, 64);
+    uint64_t counter = 4;
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        t->texels[i].value = i % EDGE < 43 ? 1.0f : draw(&counter, 64, 0.5);
+    }
+    vshi_windows_sum(&t->windows);
+    double most = 0.0;
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        if (i % EDGE < 43) {
+            most = fmax(most, 1.0 - estimate_at(t, i % EDGE, i / EDGE).value);
+        }
+    }
+    assert_true(most < 0.01);
+    free(t);
+}
+
+/* Areas with steep, slanted and winding edges, 1 … 3; 0 here and there. */
+static void draw_areas(uint8_t *area) {
+    uint64_t counter = 8;
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        const int32_t x = i % EDGE, y = i / EDGE;
+        const int32_t wave = (y / 5 % 2 != 0 ? y % 5 : 5 - y % 5);
+        area[i] = (uint8_t)(x < 30 + wave ? 1 : x + 2 * y < 130 ? 2 : 3);
+        if (y > 70) {
+            area[i] = (uint8_t)(x / 3 % 3 + 1);
+        }
+        if (uniform(&counter) < 0.01) {
+            area[i] = 0;
+        }
+    }
+}
+
+static bool is_same(vshi_window_estimate a, vshi_window_estimate b) {
+    return memcmp(&a, &b, sizeof a) == 0;
+}
+
+static void nothing_comes_over_a_cut(void **state) {
+    (void)state;
+    static uint8_t area[TEXELS];
+    draw_areas(area);
+    table *t = make_table(EDGE, EDGE, 32), *other = make_table(EDGE, EDGE, 32);
+    fill(t, ramp, 1);
+    fill(other, ramp, 1);
+    cut(t, area);
+    cut(other, area);
+    vshi_windows_sum(&t->windows);
+    for (uint8_t kept = 1; kept <= 3; ++kept) {
+        uint64_t counter = 77;
+        for (int32_t i = 0; i < TEXELS; ++i) {
+            other->texels[i].value =
+                area[i] == kept ? t->texels[i].value : draw(&counter, 32, uniform(&counter));
+            other->texels[i].rays = area[i] == kept ? 32 : area[i] != 0 ? 8 : 0;
+            other->texels[i].spread = area[i] == kept ? t->texels[i].spread : 0.125f;
+        }
+        vshi_windows_sum(&other->windows);
+        size_t wide = 0;
+        for (int32_t i = 0; i < TEXELS; ++i) {
+            if (area[i] == kept) {
+                const vshi_window_estimate e = estimate_at(t, i % EDGE, i / EDGE);
+                assert_true(is_same(e, estimate_at(other, i % EDGE, i / EDGE)));
+                wide += e.x[1] > e.x[0] || e.y[1] > e.y[0];
+            }
+        }
+        assert_true(wide > 1000);
+    }
+    free(other);
+    free(t);
+}
+
+/* Slits that windows could go around: all links within a window are whole, and all its texels have rays. */
+static void windows_hold_no_cut_and_no_hole(void **state) {
+    (void)state;
+    table *t = make_table(EDGE, EDGE, 16);
+    uint64_t counter = 3;
+    static uint8_t area[TEXELS];
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        area[i] = uniform(&counter) >= 0.004;
+    }
+    cut(t, area);
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        t->texels[i].left = t->texels[i].left && uniform(&counter) >= 0.01;
+        t->texels[i].above = t->texels[i].above && uniform(&counter) >= 0.01;
+    }
+    fill(t, even, 6);
+    size_t large = 0;
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        if (area[i] == 0) {
+            continue;
+        }
+        const vshi_window_estimate e = estimate_at(t, i % EDGE, i / EDGE);
+        assert_true(e.x[0] <= i % EDGE && i % EDGE <= e.x[1] && e.y[0] <= i / EDGE && i / EDGE <= e.y[1]);
+        assert_true(e.x[0] >= 0 && e.x[1] < EDGE && e.y[0] >= 0 && e.y[1] < EDGE);
+        for (int32_t y = e.y[0]; y <= e.y[1]; ++y) {
+            for (int32_t x = e.x[0]; x <= e.x[1]; ++x) {
+                assert_true(abs(x - i % EDGE) <= VSHI_WINDOW_REACH && abs(y - i / EDGE) <= VSHI_WINDOW_REACH);
+                assert_true(texel_at(t, x, y)->rays > 0);
+                assert_true(x == e.x[0] || texel_at(t, x, y)->left);
+                assert_true(y == e.y[0] || texel_at(t, x, y)->above);
+            }
+        }
+        large += (e.x[1] - e.x[0] + 1) * (e.y[1] - e.y[0] + 1) >= 25;
+    }
+    print_message("%.2f of the windows hold 25 texels\n", (double)large / TEXELS);
+    assert_true(large > TEXELS / 2);
+    free(t);
+}
+
+static void values_without_rays_are_used_by_nobody(void **state) {
+    (void)state;
+    static uint8_t area[TEXELS];
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        area[i] = (i % EDGE) % 13 != 6 || (i / EDGE) % 11 != 5;
+    }
+    table *t = make_table(EDGE, EDGE, 8), *other = make_table(EDGE, EDGE, 8);
+    fill(t, open, 2);
+    fill(other, open, 2);
+    cut(t, area);
+    cut(other, area);
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        if (area[i] == 0) {
+            t->texels[i].value = t->texels[i].spread = 0.0f;
+            other->texels[i].value = other->texels[i].spread = NAN;
+        }
+    }
+    vshi_windows_sum(&t->windows);
+    vshi_windows_sum(&other->windows);
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        if (area[i] != 0) {
+            assert_true(is_same(estimate_at(t, i % EDGE, i / EDGE), estimate_at(other, i % EDGE, i / EDGE)));
+        }
+    }
+    free(other);
+    free(t);
+}
+
+static void weights_give_the_value(void **state) {
+    (void)state;
+    table *t = make_table(EDGE, EDGE, 32);
+    fill(t, ramp, 4);
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        const vshi_window_estimate e = estimate_at(t, i % EDGE, i / EDGE);
+        double sum = 0.0, value = 0.0, squares = 0.0;
+        for (int32_t y = e.y[0]; y <= e.y[1]; ++y) {
+            for (int32_t x = e.x[0]; x <= e.x[1]; ++x) {
+                const double weight = vshi_window_weight(&e, i % EDGE, i / EDGE, x, y);
+                sum += weight;
+                squares += weight * weight;
+                value += weight * (double)texel_at(t, x, y)->value;
+            }
+        }
+        assert_true(fabs(sum - 1.0) < 1e-12);
+        assert_true(fabs(value - e.value) < 1e-6);
+        /* in the middle of its window each of n texels weighs 1/n */
+        const double n = (e.x[1] - e.x[0] + 1) * (e.y[1] - e.y[0] + 1);
+        assert_true(fabs(e.deviation * e.deviation - e.centred * e.centred * squares * n) <
+                    1e-9 * e.deviation * e.deviation);
+    }
+    free(t);
+}
+
+/* Texels of a tile, say, laid out in a whole strip, with others around that do not hang together with them.
+ */
+static void bits_do_not_depend_on_where_a_table_begins(void **state) {
+    (void)state;
+    enum { WIDTH = 37, HEIGHT = 21 };
+    static const int32_t offsets[][2] = {{0, 0}, {59, 0}, {0, 75}, {59, 75}, {8, 16}, {13, 7}};
+    table *t = make_table(WIDTH, HEIGHT, 16);
+    fill(t, ramp, 9);
+    for (size_t k = 0; k < sizeof offsets / sizeof offsets[0]; ++k) {
+        const int32_t dx = offsets[k][0], dy = offsets[k][1];
+        static uint8_t area[TEXELS];
+        table *large = make_table(EDGE, EDGE, 16);
+        fill(large, even, 10);
+        for (int32_t i = 0; i < TEXELS; ++i) {
+            const int32_t x = i % EDGE - dx, y = i / EDGE - dy;
+            const bool is_in = x >= 0 && x < WIDTH && y >= 0 && y < HEIGHT;
+            area[i] = is_in ? 1 : 2;
+            large->texels[i].value = is_in ? texel_at(t, x, y)->value : large->texels[i].value;
+        }
+        cut(large, area);
+        vshi_windows_sum(&large->windows);
+        for (int32_t i = 0; i < WIDTH * HEIGHT; ++i) {
+            const vshi_window_estimate a = estimate_at(t, i % WIDTH, i / WIDTH);
+            vshi_window_estimate b = estimate_at(large, i % WIDTH + dx, i / WIDTH + dy);
+            for (int32_t end = 0; end < 2; ++end) {
+                b.x[end] -= dx;
+                b.y[end] -= dy;
+            }
+            assert_true(is_same(a, b));
+        }
+        free(large);
+    }
+    free(t);
+}
+
+/* Eight rays that are all free do not mean that all would be. */
+static void no_value_is_without_error(void **state) {
+    (void)state;
+    table *alone = make_table(1, 1, 8);
+    for (int32_t shared = 0; shared < 2; ++shared) {
+        alone->texels[0].value = (float)shared;
+        vshi_windows_sum(&alone->windows);
+        const vshi_window_estimate e = estimate_at(alone, 0, 0);
+        assert_true(e.value == shared && e.deviation > 0.08 && e.centred == e.deviation);
+    }
+    free(alone);
+    for (int32_t k = 0; k < 2; ++k) {
+        table *t = make_table(EDGE, EDGE, 8);
+        for (int32_t i = 0; i < TEXELS; ++i) {
+            t->texels[i].value = (float)k;
+        }
+        vshi_windows_sum(&t->windows);
+        for (int32_t i = 0; i < TEXELS; ++i) {
+            const vshi_window_estimate e = estimate_at(t, i % EDGE, i / EDGE);
+            assert_true(e.value == k && e.deviation > 0.0 && e.deviation < 0.01);
+        }
+        free(t);
+    }
+}
+
+/* A texel in two has all of its eight rays free where p is 0.93. */
+static void few_rays_leave_few_specks(void **state) {
+    (void)state;
+    table *t = make_table(EDGE, EDGE, 8);
+    fill(t, open, 21);
+    const errors e = errors_of(t, open);
+    double least = INFINITY;
+    for (int32_t i = 0; i < TEXELS; ++i) {
+        least = fmin(least, estimate_at(t, i % EDGE, i / EDGE).deviation);
+    }
+    print_message("%.5f of the values are specks; the least deviation is %.5f\n", e.specks, least);
+    assert_true(e.specks < 0.005 && least > 0.005);
+    free(t);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(planes_without_noise_are_exact_up_to_corners),
+        cmocka_unit_test(noise_that_is_left_is_what_is_said),
+        cmocka_unit_test(edges_stay_sharp),
+        cmocka_unit_test(open_texels_beside_an_edge_stay_open),
+        cmocka_unit_test(nothing_comes_over_a_cut),
+        cmocka_unit_test(windows_hold_no_cut_and_no_hole),
+        cmocka_unit_test(values_without_rays_are_used_by_nobody),
+        cmocka_unit_test(weights_give_the_value),
+        cmocka_unit_test(bits_do_not_depend_on_where_a_table_begins),
+        cmocka_unit_test(no_value_is_without_error),
+        cmocka_unit_test(few_rays_leave_few_specks),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
