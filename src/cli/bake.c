@@ -133,9 +133,7 @@ static int rasterise(bake_work *work) {
             cli_box_grow(&work->receivers, &info);
             vsh_charts_info counted;
             vsh_charts_get_info(charts, &counted);
-            const vsh_receiver *receiver = &work->scene->receivers[i];
-            const bool spaced = receiver->ao_spacing == 4 && receiver->supersample <= 1;
-            expected[i] = (cli_expected_receiver){counted.covered, counted.samples, texels == NULL, spaced};
+            expected[i] = (cli_expected_receiver){counted.covered, counted.samples, texels == NULL};
         }
         if (code == CLI_OK && work->scene->receiver_count == 1) {
             work->charts = charts;

@@ -117,7 +117,7 @@ static double ao_us(const vsh_shade_options *o) {
     case VSH_AO_ADAPTIVE:
         return refined(0.5, 0.06, o->max_error, o->rays, 0.25);
     default:
-        return refined(0.5, 0.11, o->max_error, o->rays, 0.1);
+        return refined(0.5, 0.06, o->max_error, o->rays, 0.1);
     }
 }
 
@@ -146,9 +146,7 @@ static void expect_receiver(const vsh_scene *scene, const cli_expected_receiver 
         cli_progress_expect(name, CLI_ESTIMATE_SHADE, shadows);
     }
     if (scene->ao) {
-        const bool passes =
-            r->spaced && (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
-        cli_progress_expect("ao", CLI_ESTIMATE_SHADE | (passes ? CLI_ESTIMATE_IN_PASSES : 0), ao);
+        cli_progress_expect("ao", CLI_ESTIMATE_SHADE, ao);
     }
     if (scene->bent) {
         cli_progress_expect("bent", CLI_ESTIMATE_SHADE, sample * bent_us);

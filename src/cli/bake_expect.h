@@ -9,7 +9,6 @@
 typedef struct cli_expected_receiver {
     uint64_t texels, samples;
     bool banded; /* several bands: told as one stage, "bake" */
-    bool spaced; /* AO by texels four apart first, in passes */
 } cli_expected_receiver;
 
 /* Expects all that comes behind the counting of the receivers [scene->receiver_count]. */

@@ -45,9 +45,7 @@ void cli_estimate_expect(cli_estimate *e, const char *name, int kind, double sec
         return;
     }
     cli_expected *stage = &e->stages[e->count];
-    *stage = (cli_expected){.kind = kind & ~CLI_ESTIMATE_IN_PASSES,
-                            .in_passes = (kind & CLI_ESTIMATE_IN_PASSES) != 0,
-                            .seconds = seconds > 0.0 ? seconds : 0.0};
+    *stage = (cli_expected){.kind = kind, .seconds = seconds > 0.0 ? seconds : 0.0};
     snprintf(stage->name, sizeof stage->name, "%s", name);
     stage->over = take_past(e, name, &stage->took);
     if (!stage->over && e->running && e->current < 0 && is_same(e->name, name)) {
@@ -95,10 +93,8 @@ void cli_estimate_report(cli_estimate *e, const char *name, double fraction, dou
         e->running = true;
         e->fraction = 0.0;
         e->current = find_next(e, name);
-        e->passes = (cli_passes){.last = now};
     }
     e->fraction = fraction > e->fraction ? (fraction < 1.0 ? fraction : 1.0) : e->fraction;
-    cli_passes_report(&e->passes, e->fraction, now);
 }
 
 static double limited(double factor) {
@@ -134,10 +130,6 @@ static double left_of_current(const cli_estimate *e, double now) {
     }
     if (e->fraction <= 0.0) {
         return expected > elapsed * 0.1 ? expected : elapsed * 0.1;
-    }
-    if (e->current >= 0 && e->stages[e->current].in_passes) {
-        const double known = cli_passes_known(&e->passes);
-        return known * cli_passes_left(&e->passes) + (1.0 - known) * expected;
     }
     const double by_pace = elapsed * (1.0 - e->fraction) / e->fraction;
     const double part = e->fraction < PACE_KNOWN ? e->fraction / PACE_KNOWN : 1.0, known = part * part;

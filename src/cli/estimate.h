@@ -3,8 +3,6 @@
 #ifndef CLI_ESTIMATE_H
 #define CLI_ESTIMATE_H
 
-#include "passes.h"
-
 #include <stdbool.h>
 
 enum { CLI_ESTIMATE_STAGES = 256, CLI_ESTIMATE_NAME = 80 };
@@ -12,13 +10,9 @@ enum { CLI_ESTIMATE_STAGES = 256, CLI_ESTIMATE_NAME = 80 };
 /* Stages whose errors go together: where one took longer than expected, so will the others. */
 enum { CLI_ESTIMATE_SHAPE, CLI_ESTIMATE_SHADE, CLI_ESTIMATE_FILE, CLI_ESTIMATE_KINDS };
 
-/* Beside a kind: the stage comes in passes, as of cli_passes. */
-enum { CLI_ESTIMATE_IN_PASSES = 16 };
-
 typedef struct cli_expected {
     char name[CLI_ESTIMATE_NAME];
     int kind;
-    bool in_passes;
     double seconds; /* expected */
     double took;    /* once it is over */
     bool over, skipped;
@@ -34,7 +28,6 @@ typedef struct cli_estimate {
     bool running;                 /* a stage has begun */
     char name[CLI_ESTIMATE_NAME]; /* of the stage under way */
     double began, fraction;       /* of it */
-    cli_passes passes;            /* of it, should it come in some */
     double first;                 /* when the command began */
     double shown;                 /* the largest share told: it never falls */
 } cli_estimate;

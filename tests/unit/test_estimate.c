@@ -8,7 +8,6 @@
 
 /* The command line's sources are no library. */
 #include "cli/estimate.c"
-#include "cli/passes.c"
 
 #include <math.h>
 #include <stdlib.h>
