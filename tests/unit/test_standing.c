@@ -167,6 +167,61 @@ static void walls_without_floor_and_ceiling_are_solid_below_a_roof(void **state)
     free(s);
 }
 
+static void what_touches_only_by_its_edge_does_not_stand(void **state) {
+    (void)state;
+    shape *s = shape_new();
+    const double low[3] = {2.8, -1, 0}, high[3] = {4.8, 1, 4};
+    build_table(s);
+    shape_box(s, low, high, ALL_SIDES & ~BOTTOM);
+    assert_kinds_of(s, "tower with a tenth of its foot on a table", "S-");
+    const double in_low[3] = {0.8, -1, 0}, in_high[3] = {2.8, 1, 4};
+    build_table(s);
+    shape_box(s, in_low, in_high, ALL_SIDES & ~BOTTOM);
+    assert_kinds_of(s, "tower on a table", "SS");
+    free(s);
+}
+
+static void roofs_cover_what_is_near_below_their_backs(void **state) {
+    (void)state;
+    shape *s = shape_new();
+    static const struct {
+        const char *name, *kinds;
+        double height, half;
+        unsigned sides;
+    } cases[] = {{"pen below the back of a sheet", "-S-", 1.1, 1.5, TOP},
+                 {"pen below its front", "---", 1.1, 1.5, BOTTOM},
+                 {"pen far below its back", "---", 6.0, 15.0, TOP}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        const double half = cases[i].half, z = cases[i].height;
+        const double low[3] = {-half, -half, z}, high[3] = {half, half, z};
+        build_ground(s);
+        build_box(s, -0.3, 1.0, ALL_SIDES & ~BOTTOM & ~TOP);
+        shape_box(s, low, high, cases[i].sides);
+        assert_kinds_of(s, cases[i].name, cases[i].kinds);
+    }
+    free(s);
+}
+
+static void what_is_sunk_into_a_solid_stands_in_it(void **state) {
+    (void)state;
+    shape *s = shape_new();
+    build_table(s);
+    build_box(s, -0.9, 0.1, ALL_SIDES & ~BOTTOM);
+    assert_kinds_of(s, "box sunk into a table", "SS");
+    free(s);
+}
+
+static void what_is_mostly_outside_is_not_held(void **state) {
+    (void)state;
+    shape *s = shape_new();
+    const double low[3] = {0.45, 0.45, 0.01}, high[3] = {0.95, 0.95, 0.5};
+    build_table(s);
+    shape_ball(s, ORIGIN, 1.0, 0.0, 1.0, 24);
+    shape_box(s, low, high, ALL_SIDES);
+    assert_kinds_of(s, "half a ball with a box in its side", "SSS");
+    free(s);
+}
+
 static void face_corners(const void *user, vshi_face face, vshi_vec corner[3]) {
     const vshi_vec(*corners)[3] = user;
     memcpy(corner, corners[face.number], 3 * sizeof *corner);
@@ -246,6 +301,10 @@ int main(void) {
         cmocka_unit_test(vessels_that_stand_upright_are_sheets),
         cmocka_unit_test(what_holds_something_is_a_sheet),
         cmocka_unit_test(walls_without_floor_and_ceiling_are_solid_below_a_roof),
+        cmocka_unit_test(what_touches_only_by_its_edge_does_not_stand),
+        cmocka_unit_test(roofs_cover_what_is_near_below_their_backs),
+        cmocka_unit_test(what_is_sunk_into_a_solid_stands_in_it),
+        cmocka_unit_test(what_is_mostly_outside_is_not_held),
         cmocka_unit_test(a_tree_of_faces_finds_what_a_loop_finds),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
