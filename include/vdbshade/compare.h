@@ -44,10 +44,12 @@ typedef struct vsh_compare_options {
     double step;   /* a texel belongs to a lost or gained region where it is farther than this from all values
                       around its place, in units of the range, > 0 … 1 */
     int32_t reach; /* what is around: texels along each axis, 0 … 16. What moved less is not lost */
+    double noise;  /* standard error of the differences that sampling is known to make, in units of the range,
+                      0 … 1: threshold, step and the marks of edges give way by 2.6 of it */
 } vsh_compare_options;
 
 static inline vsh_compare_options vsh_compare_options_default(void) {
-    vsh_compare_options options = {sizeof(vsh_compare_options), 0.02, 0.1, 2};
+    vsh_compare_options options = {sizeof(vsh_compare_options), 0.02, 0.1, 2, 0.0};
     return options;
 }
 
@@ -126,6 +128,11 @@ typedef struct vsh_limits {
 /* Limits that bakes pass which differ by rounding: another compiler, files of 16 instead of 32 bits; and that
  * fail penumbrae a tenth wider, a shift of a quarter of a texel, a lost caster of four texels. */
 VSH_API vsh_limits vsh_limits_default(void);
+
+/* Widens limits, and sets options.noise, for values that were estimated: bakes whose standard errors are a
+ * and b differ by noise of √(a² + b²), in units of the range, 0 … 1, and are alike all the same.
+ * docs/regression.md has the formulas. Limits that are not to give way are set after it. Cannot fail. */
+VSH_API void vsh_limits_allow_noise(vsh_limits *limits, double noise);
 
 /* Bit i of the result: measure i does not hold. Measures that do not apply hold; nothing holds where nothing
  * was compared. */

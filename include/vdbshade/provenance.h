@@ -54,6 +54,12 @@ VSH_API vsh_result vsh_provenance_create(const vsh_provenance_source *source, co
 
 /* The attributes, which belong to the provenance; none of NULL. Cannot fail. */
 VSH_API const vsh_attribute *vsh_provenance_attributes(const vsh_provenance *provenance, size_t *count);
+
+/* The standard error that the values of a channel ("ao", "shadow.NAME") were made to, as attributes say that
+ * a file carries; NaN where they don't, or where a limit of rays was given, by which it may be missed. Cannot
+ * fail. */
+VSH_API double vsh_provenance_max_error(const vsh_attribute *attributes, size_t count, const char *channel);
+
 VSH_API void vsh_provenance_free(vsh_provenance *provenance); /* NULL does nothing */
 
 #ifdef __cplusplus

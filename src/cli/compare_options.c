@@ -12,6 +12,7 @@ cli_compare_settings cli_compare_settings_default(void) {
                               .max_coverage = NAN,
                               .threshold = NAN,
                               .step = NAN,
+                              .noise = NAN,
                               .reach = -1};
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         s.limits[i] = NAN;
@@ -40,6 +41,8 @@ int cli_compare_take(cli_compare_settings *s, int key, const char *name, const c
         return cli_take_number(name, value, 1e-6, 1.0, &s->step);
     case CLI_KEY_REACH:
         return cli_take_integer(name, value, 0, 16, &s->reach);
+    case CLI_KEY_NOISE:
+        return cli_take_number(name, value, 0.0, 1.0, &s->noise);
     case CLI_KEY_COMPARE_PADDING:
         s->padding = true;
         return CLI_OK;

@@ -15,6 +15,7 @@ typedef struct cli_compare_settings {
     const char *coverage;             /* channel that tells it */
     double limits[VSH_MEASURE_COUNT]; /* of all channels, over those of the file; NaN: not given */
     double max_coverage, threshold, step;
+    double noise;  /* NaN: what the files say */
     int32_t reach; /* -1: not given, as NaN above */
     bool padding;  /* texels that are not covered are compared too */
     bool json;     /* on standard output, in place of lines */
@@ -31,6 +32,7 @@ enum {
     CLI_KEY_THRESHOLD,
     CLI_KEY_STEP,
     CLI_KEY_REACH,
+    CLI_KEY_NOISE,
     CLI_KEY_COMPARE_PADDING,
     CLI_KEY_JSON,
     CLI_KEY_JUNIT,
@@ -69,9 +71,13 @@ enum {
          "size of a region that lost its shadow (3)"},                                                       \
         {CLI_KEY_LIMIT + VSH_MEASURE_GAINED, "max-gained", "TEXELS", "… that got one (3)"},                  \
         {CLI_KEY_THRESHOLD, "threshold", "X", "of --max-share, 0 to 1 (0.02)"},                              \
-        {CLI_KEY_STEP, "step", "X", "of --max-lost: what is farther off counts, to 1 (0.1)"}, {              \
-        CLI_KEY_REACH, "reach", "TEXELS",                                                                    \
-            "of --max-lost: what is found so far off is not lost,\n0 to 16 (2)"                              \
+        {CLI_KEY_STEP, "step", "X", "of --max-lost: what is farther off counts, to 1 (0.1)"},                \
+        {CLI_KEY_REACH, "reach", "TEXELS",                                                                   \
+         "of --max-lost: what is found so far off is not lost,\n0 to 16 (2)"},                               \
+    {                                                                                                        \
+        CLI_KEY_NOISE, "noise", "X",                                                                         \
+            "standard error between the two, which limits that are\nnot given allow for (by the max errors " \
+            "of the files where\nthese differ, else 0)"                                                      \
     }
 
 /* Takes an option of these, or a common one. */
@@ -89,6 +95,7 @@ typedef struct cli_channel {
     bool is_coverage;  /* the measures are not taken */
     vsh_coverage coverage;
     double coverage_limit;
+    double max_error[2]; /* that golden and new say they were made to; NaN: they don't */
     vsh_limits limits;
     vsh_measures measures;
     uint32_t failed; /* bits of measures */

@@ -52,9 +52,20 @@ void cli_comparison_free(cli_comparison *c) {
 
 /* --- limits */
 
-void cli_channel_set_limits(const compare_work *work, cli_channel *channel) {
+/* Bakes made to one error cast the same rays and have no noise between them. */
+static double noise_between(const double max_error[2]) {
+    const bool differ = max_error[0] < max_error[1] || max_error[0] > max_error[1]; /* false of NaN */
+    return differ ? sqrt(max_error[0] * max_error[0] + max_error[1] * max_error[1]) : 0.0;
+}
+
+void cli_channel_set_limits(const compare_work *work, const compare_texts texts[2], cli_channel *channel) {
     const cli_compare_settings *s = work->settings;
     channel->limits = vsh_limits_default();
+    for (int which = 0; which < 2; ++which) {
+        channel->max_error[which] =
+            vsh_provenance_max_error(texts[which].list, texts[which].count, channel->name);
+    }
+    vsh_limits_allow_noise(&channel->limits, isnan(s->noise) ? noise_between(channel->max_error) : s->noise);
     channel->coverage_limit = coverage_limit;
     vsh_tolerances_apply(work->tolerances, channel->name, &channel->limits, &channel->coverage_limit);
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {

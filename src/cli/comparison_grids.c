@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_GRIDS = 4096 };
+enum { MAX_GRIDS = 4096, MOST_TEXTS = 64 };
 
 static const double SAME_PLACE = 1e-3; /* voxels: two lattices that differ by less are one */
 
@@ -15,7 +15,7 @@ typedef struct listing {
     size_t count;
 } listing;
 
-static const vsh_vdb_entry *find_grid(const listing *list, const char *name) {
+static vsh_vdb_entry *find_grid(const listing *list, const char *name) {
     for (size_t i = 0; i < list->count; ++i) {
         if (strcmp(list->entries[i].name, name) == 0) {
             return &list->entries[i];
@@ -185,12 +185,29 @@ static void scale_distances(const vsh_vdb_entry *golden, dense *d, size_t count)
     }
 }
 
-static int compare_values(const compare_work *work, const vsh_vdb_entry *golden, const vsh_vdb_entry *fresh) {
+/* Takes lines "NAME: VALUE" apart, where they stand. */
+static compare_texts take_apart(char *lines, vsh_attribute list[MOST_TEXTS]) {
+    compare_texts texts = {list, 0};
+    for (char *line = strtok(lines, "\n"); line != NULL && texts.count < MOST_TEXTS;
+         line = strtok(NULL, "\n")) {
+        char *colon = strstr(line, ": ");
+        if (colon != NULL) {
+            *colon = '\0';
+            list[texts.count++] = (vsh_attribute){line, colon + 2};
+        }
+    }
+    return texts;
+}
+
+static int compare_values(const compare_work *work, vsh_vdb_entry *golden, vsh_vdb_entry *fresh) {
     cli_channel *channel = cli_comparison_add(work->comparison, golden->name);
     if (channel == NULL) {
         return no_memory(work);
     }
-    cli_channel_set_limits(work, channel);
+    vsh_attribute lists[2][MOST_TEXTS];
+    const compare_texts texts[2] = {take_apart(golden->attributes, lists[0]),
+                                    take_apart(fresh->attributes, lists[1])};
+    cli_channel_set_limits(work, texts, channel);
     size_t count = 0;
     dense d = {{NULL, NULL}, {NULL, NULL}, NULL};
     int code = set_box(work, golden, fresh, channel, &count);
@@ -225,7 +242,7 @@ int compare_grids(const compare_work *work) {
         }
     }
     for (size_t i = 0; i < lists[0].count && code == CLI_OK; ++i) {
-        const vsh_vdb_entry *golden = &lists[0].entries[i], *fresh = find_grid(&lists[1], golden->name);
+        vsh_vdb_entry *golden = &lists[0].entries[i], *fresh = find_grid(&lists[1], golden->name);
         bool comparable = false;
         code = fresh != NULL ? compare_kinds(work, golden, fresh, &comparable) : code;
         code = code == CLI_OK && comparable ? compare_values(work, golden, fresh) : code;

@@ -9,6 +9,7 @@
 typedef struct images {
     vsh_image_file *file[2]; /* golden, new */
     vsh_image image[2];
+    compare_texts texts[2];
     const char *names[2][VSH_MAX_CHANNELS]; /* of the images */
     const float *planes[2][VSH_MAX_CHANNELS];
     uint8_t *mask; /* of the texels to be compared */
@@ -61,6 +62,7 @@ static int read_both(const compare_work *work, images *both) {
         if (vsh_image_read_run(paths[which], &work->run, &both->file[which], &error) != VSH_OK) {
             return cli_fail(&error);
         }
+        both->texts[which].list = vsh_image_attributes(both->file[which], &both->texts[which].count);
         view(both, which);
     }
     return CLI_OK;
@@ -109,7 +111,7 @@ static int compare_coverage(const compare_work *work, images *both) {
     if (channel == NULL) {
         return cli_out_of_memory(work->comparison->golden);
     }
-    cli_channel_set_limits(work, channel);
+    cli_channel_set_limits(work, both->texts, channel);
     memcpy(channel->size, (const int32_t[]){golden->width, golden->height, 1}, sizeof channel->size);
     channel->is_coverage = true;
     channel->coverage = coverage;
@@ -130,7 +132,7 @@ static int compare_channels(const compare_work *work, const images *both) {
         if (channel == NULL) {
             return cli_out_of_memory(work->comparison->golden);
         }
-        cli_channel_set_limits(work, channel);
+        cli_channel_set_limits(work, both->texts, channel);
         const vsh_compared compared = {
             {golden->width, golden->height, 1}, golden->planes[i], values, both->mask};
         memcpy(channel->size, compared.size, sizeof channel->size);

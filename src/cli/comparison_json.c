@@ -46,6 +46,9 @@ static void set_measures(json_t *root, const cli_channel *channel) {
     }
     json_object_set_new(root, "compared", json_integer((json_int_t)m->count));
     json_object_set_new(root, "range", number(m->range));
+    json_object_set_new(root, "max_error",
+                        json_pack("[o,o]", number(channel->max_error[0]), number(channel->max_error[1])));
+    json_object_set_new(root, "noise", number(channel->limits.options.noise));
     json_object_set_new(root, "failed", failed);
     json_object_set_new(root, "measures", values);
     json_object_set_new(root, "limits", limits);

@@ -15,11 +15,17 @@ typedef struct compare_work {
 int compare_images(const compare_work *work);
 int compare_grids(const compare_work *work);
 
+/* What a file says of itself. */
+typedef struct compare_texts {
+    const vsh_attribute *list;
+    size_t count;
+} compare_texts;
+
 /* A new channel, zeroed; earlier pointers are then void. NULL where memory is short. */
 cli_channel *cli_comparison_add(cli_comparison *comparison, const char *name);
 
-/* The limits that hold for the channel of its name. */
-void cli_channel_set_limits(const compare_work *work, cli_channel *channel);
+/* The limits that hold for the channel of its name, of files that say this of themselves. */
+void cli_channel_set_limits(const compare_work *work, const compare_texts texts[2], cli_channel *channel);
 
 /* Measures and judges, and makes the pictures where a page is asked for. */
 int cli_channel_measure(const compare_work *work, cli_channel *channel, const vsh_compared *compared);

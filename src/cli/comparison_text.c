@@ -160,11 +160,22 @@ static void print_measures(FILE *out, const cli_channel *channel) {
             m->lost.count, m->gained.count);
 }
 
+static void print_noise(FILE *out, const cli_channel *channel) {
+    const double *made_to = channel->max_error;
+    fprintf(out, "; noise of %.3g is allowed for", channel->limits.options.noise);
+    if (!isnan(made_to[0]) && !isnan(made_to[1])) {
+        fprintf(out, " (made to max errors %.3g and %.3g)", made_to[0], made_to[1]);
+    }
+}
+
 static void print_channel(FILE *out, const cli_channel *channel) {
     char what[2048];
     cli_channel_explain(channel, what, sizeof what);
     fprintf(out, "%s: %s%s%s", channel->name, cli_channel_alike(channel) ? "alike" : "not alike",
             what[0] != '\0' ? ": " : "", what);
+    if (!channel->is_coverage && channel->limits.options.noise > 0.0) {
+        print_noise(out, channel);
+    }
     if (channel->is_coverage) {
         fprintf(out, "; %" PRIu64 " and %" PRIu64 " covered, %" PRIu64 " in one alone",
                 channel->coverage.golden, channel->coverage.values, channel->coverage.differs);

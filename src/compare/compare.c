@@ -62,6 +62,9 @@ static vsh_result check(const vsh_compared *compared, const vsh_compare_options 
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "reach of %d texels: expected 0 … %d", options->reach,
                          MOST_REACH);
     }
+    if (!(options->noise >= 0.0 && options->noise <= 1.0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "noise of %g: expected 0 … 1", options->noise);
+    }
     /* the caller's values and mask, then ours */
     const double bytes = count * (9.0 + 1.0 + VSHI_SHIFT_SCRATCH + VSHI_REGIONS_SCRATCH);
     return vshi_check_limit(run, bytes, "comparison", error);

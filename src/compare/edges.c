@@ -11,6 +11,12 @@
  * without the restriction that is a Crofton estimate.) Golden and new edges make a pair where each is the
  * nearest to the other, of one direction, and no farther off than the wider of them.
  *
+ * Values that hardly reach a mark in one bake may hardly miss it in the other, and say nothing by it. What
+ * is no difference (the threshold, and what noise comes to) is therefore allowed for at both marks: an edge
+ * of one bake is missed only where the other has none between marks that much closer together (hysteresis
+ * as Canny's, 1986), and the width of one counts only where so small a move of the marks changes it no more
+ * than it does twice on an even slope.
+ *
  * Limits: an edge between two neighbours reads as 0.8 texels wide, and widths below about two texels are not
  * resolved; a penumbra of a caster so thin that nothing gets dark has no edge. */
 #include "compare/pair.h"
@@ -22,6 +28,7 @@ enum { OUTLIERS = 8 };      /* so many values at each end of the range are not l
 enum { FEWEST_EDGES = 16 }; /* below it they say nothing of a bake */
 
 static const double LOW = 0.1, HIGH = 0.9;
+static const double MOST_ROOM = 0.3;    /* of the range, that each mark gives way */
 static const double LEAST_RANGE = 0.05; /* between the darkest and the lightest: less is no shadow */
 static const double REACH = 2.0;        /* texels that a pair's edges may stand apart, however narrow */
 
@@ -30,15 +37,20 @@ typedef struct edge {
     double width; /* across the edge */
     int rises;    /* 1: dark to light; -1 */
     bool own;     /* this axis is the one to measure it on */
+    bool steady;  /* its width does not hang on where the marks are */
     size_t near;  /* index of the nearest of the others; SIZE_MAX: none */
 } edge;
 
-/* A line of texels, and the values that count as its two sides. */
+/* Values that count as the two sides of an edge. */
+typedef struct marks {
+    double low, high;
+} marks;
+
 typedef struct line {
     const vshi_pair *pair;
     size_t first, stride, count;
     int axis;
-    double low, high;
+    marks sides, closer; /* the latter: closer together by what is no difference */
 } line;
 
 static bool valid(const line *l, size_t i) {
@@ -49,11 +61,11 @@ static double value(const line *l, int which, size_t i) {
     return vshi_value_at(l->pair, which, l->first + i * l->stride);
 }
 
-/* Length that the line spends between the sides from one texel to the next. */
-static double length_between(const line *l, double a, double b) {
-    const double least = fmax(fmin(a, b), l->low), most = fmin(fmax(a, b), l->high);
+/* Length that a line spends between the marks from one texel to the next. */
+static double length_between(marks m, double a, double b) {
+    const double least = fmax(fmin(a, b), m.low), most = fmin(fmax(a, b), m.high);
     if (a == b) {
-        return a > l->low && a < l->high ? 1.0 : 0.0;
+        return a > m.low && a < m.high ? 1.0 : 0.0;
     }
     return most > least ? (most - least) / fabs(b - a) : 0.0;
 }
@@ -75,16 +87,19 @@ static double slope(const line *l, int which, size_t i, int axis) {
 }
 
 /* The edge between texels `begin` and `end`, which are on two sides. */
-static edge measure_edge(const line *l, int which, size_t begin, size_t end) {
+static edge measure_edge(const line *l, marks m, int which, size_t begin, size_t end) {
     const double first = value(l, which, begin), last = value(l, which, end);
     edge e = {.rises = last > first ? 1 : -1, .near = SIZE_MAX};
-    double width = 0.0, lit = 0.0;
+    double width = 0.0, closer = 0.0, lit = 0.0;
     for (size_t i = begin; i < end; ++i) {
         const double a = value(l, which, i), b = value(l, which, i + 1);
-        width += length_between(l, a, b);
-        lit += 0.5 * (fmin(l->high, fmax(l->low, a)) + fmin(l->high, fmax(l->low, b))) - l->low;
+        width += length_between(m, a, b);
+        closer += length_between(l->closer, a, b);
+        lit += 0.5 * (fmin(m.high, fmax(m.low, a)) + fmin(m.high, fmax(m.low, b))) - m.low;
     }
-    const double share = lit / (l->high - l->low); /* texels of the way that are past the edge, if it rises */
+    const double even = (l->closer.high - l->closer.low) / (m.high - m.low); /* share left on an even slope */
+    e.steady = closer >= width * (2.0 * even - 1.0);
+    const double share = lit / (m.high - m.low); /* texels of the way that are past the edge, if it rises */
     e.at = e.rises > 0 ? (double)end - share : (double)begin + share;
     double along = 0.0, squares = 0.0, widest = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
@@ -101,7 +116,7 @@ static edge measure_edge(const line *l, int which, size_t begin, size_t end) {
     return e;
 }
 
-static size_t find_edges(const line *l, int which, edge *edges) {
+static size_t find_edges(const line *l, marks m, int which, edge *edges) {
     size_t count = 0, last = 0;
     int side = 0; /* of texel `last`: -1 dark, 1 light, 0 none yet */
     for (size_t i = 0; i < l->count; ++i) {
@@ -110,12 +125,12 @@ static size_t find_edges(const line *l, int which, edge *edges) {
             continue;
         }
         const double v = value(l, which, i);
-        const int now = v <= l->low ? -1 : v >= l->high ? 1 : 0;
+        const int now = v <= m.low ? -1 : v >= m.high ? 1 : 0;
         if (now == 0) {
             continue;
         }
         if (side != 0 && now != side) {
-            edges[count++] = measure_edge(l, which, last, i);
+            edges[count++] = measure_edge(l, m, which, last, i);
         }
         side = now;
         last = i;
@@ -127,6 +142,7 @@ static size_t find_edges(const line *l, int which, edge *edges) {
 static void find_nearest(edge *edges, size_t count, const edge *others, size_t other_count) {
     for (size_t i = 0, begin = 0; i < count; ++i) {
         double best = INFINITY;
+        edges[i].near = SIZE_MAX;
         while (begin < other_count && others[begin].at < edges[i].at && begin + 1 < other_count &&
                others[begin + 1].at < edges[i].at) {
             ++begin;
@@ -143,32 +159,54 @@ static void find_nearest(edge *edges, size_t count, const edge *others, size_t o
 }
 
 typedef struct tally {
-    uint64_t edges[2], pairs;
+    uint64_t edges[2], missed[2]; /* found in each; of these, not in the other */
+    uint64_t pairs;
     double width[2], off; /* sums over the pairs */
 } tally;
 
-static void count_line(const line *l, edge *golden, edge *values, tally *t) {
-    const size_t a = find_edges(l, VSHI_GOLDEN, golden), b = find_edges(l, VSHI_NEW, values);
-    find_nearest(golden, a, values, b);
-    find_nearest(values, b, golden, a);
-    for (size_t i = 0; i < a; ++i) {
-        const edge *other = golden[i].near != SIZE_MAX ? &values[golden[i].near] : NULL;
-        if (other != NULL && other->near == i && (golden[i].own || other->own)) {
-            /* where the two are near the diagonal, one may be its axis' own and the other not */
-            ++t->edges[VSHI_GOLDEN];
-            ++t->edges[VSHI_NEW];
+static bool paired(const edge *edges, size_t i, const edge *others) {
+    return edges[i].near != SIZE_MAX && others[edges[i].near].near == i;
+}
+
+static void find_pairs(edge *edges, size_t count, edge *others, size_t other_count) {
+    find_nearest(edges, count, others, other_count);
+    find_nearest(others, other_count, edges, count);
+}
+
+static void count_widths(const edge *golden, size_t count, const edge *values, tally *t) {
+    for (size_t i = 0; i < count; ++i) {
+        if (!paired(golden, i, values)) {
+            continue;
+        }
+        const edge *other = &values[golden[i].near];
+        /* where the two are near the diagonal, one may be its axis' own and the other not */
+        if ((golden[i].own || other->own) && golden[i].steady && other->steady) {
             ++t->pairs;
             t->width[VSHI_GOLDEN] += golden[i].width;
             t->width[VSHI_NEW] += other->width;
             t->off += fabs(other->width - golden[i].width);
-        } else if (golden[i].own) {
-            ++t->edges[VSHI_GOLDEN];
         }
     }
-    for (size_t i = 0; i < b; ++i) {
-        const bool paired = values[i].near != SIZE_MAX && golden[values[i].near].near == i;
-        t->edges[VSHI_NEW] += !paired && values[i].own;
+}
+
+/* Edges of one, and those of them without a counterpart in the other, however weak. `weak` is scratch. */
+static void count_missed(const line *l, int which, edge *edges, size_t count, edge *weak, tally *t) {
+    const size_t weak_count = find_edges(l, l->closer, 1 - which, weak);
+    find_pairs(edges, count, weak, weak_count);
+    for (size_t i = 0; i < count; ++i) {
+        t->edges[which] += edges[i].own;
+        t->missed[which] += edges[i].own && !paired(edges, i, weak);
     }
+}
+
+static void count_line(const line *l, edge *const scratch[3], tally *t) {
+    edge *golden = scratch[0], *values = scratch[1];
+    const size_t a = find_edges(l, l->sides, VSHI_GOLDEN, golden);
+    const size_t b = find_edges(l, l->sides, VSHI_NEW, values);
+    find_pairs(golden, a, values, b);
+    count_widths(golden, a, values, t);
+    count_missed(l, VSHI_GOLDEN, golden, a, scratch[2], t);
+    count_missed(l, VSHI_NEW, values, b, scratch[2], t);
 }
 
 /* Keeps the OUTLIERS smallest of what it is given, the largest of them first. */
@@ -184,7 +222,7 @@ static void keep_smallest(double kept[OUTLIERS], double v) {
 }
 
 /* What counts as dark and as light. */
-static bool find_sides(const vshi_pair *pair, double *low, double *high) {
+static bool find_sides(const vshi_pair *pair, const vsh_compare_options *options, line *l) {
     double dark[OUTLIERS], light[OUTLIERS]; /* the latter with the other sign */
     for (int i = 0; i < OUTLIERS; ++i) {
         dark[i] = light[i] = INFINITY;
@@ -196,25 +234,26 @@ static bool find_sides(const vshi_pair *pair, double *low, double *high) {
         }
     }
     const double range = -light[0] - dark[0];
-    *low = dark[0] + LOW * range;
-    *high = dark[0] + HIGH * range;
+    const double room = fmin(vshi_no_difference(options->threshold, options), MOST_ROOM * range);
+    l->sides = (marks){dark[0] + LOW * range, dark[0] + HIGH * range};
+    l->closer = (marks){l->sides.low + room, l->sides.high - room};
     return range >= LEAST_RANGE; /* not where there are fewer values: -inf */
 }
 
-static double share(double part, double of) {
-    return of > 0.0 ? part / of : 0.0;
+static double share(uint64_t part, uint64_t of) {
+    return of > 0 ? (double)part / (double)of : 0.0;
 }
 
 static void conclude(const tally *t, vsh_measures *m) {
-    const double pairs = (double)t->pairs, most = fmax((double)t->edges[0], (double)t->edges[1]);
+    const uint64_t most = t->edges[0] > t->edges[1] ? t->edges[0] : t->edges[1];
     for (int which = 0; which < 2; ++which) {
         m->edges[which] = t->edges[which];
-        m->width[which] = t->pairs > 0 ? t->width[which] / pairs : NAN;
+        m->width[which] = t->pairs > 0 ? t->width[which] / (double)t->pairs : NAN;
     }
     m->pairs = t->pairs;
     if (most >= FEWEST_EDGES) {
-        m->value[VSH_MEASURE_EDGES] = fmax(share((double)t->edges[0] - pairs, (double)t->edges[0]),
-                                           share((double)t->edges[1] - pairs, (double)t->edges[1]));
+        m->value[VSH_MEASURE_EDGES] =
+            fmax(share(t->missed[0], t->edges[0]), share(t->missed[1], t->edges[1]));
     }
     if (t->pairs >= FEWEST_EDGES) {
         const double ratio = t->width[VSHI_NEW] / t->width[VSHI_GOLDEN];
@@ -225,26 +264,26 @@ static void conclude(const tally *t, vsh_measures *m) {
 
 bool vshi_measure_edges(const vshi_pair *pair, const vsh_compare_options *options, void *scratch,
                         vsh_measures *m) {
-    (void)options;
     (void)scratch;
     size_t longest = 1;
     for (int axis = 0; axis < 3; ++axis) {
         longest = pair->size[axis] > longest ? pair->size[axis] : longest;
     }
-    edge *edges = calloc(2 * longest, sizeof *edges);
+    edge *edges = calloc(3 * longest, sizeof *edges);
     if (edges == NULL) {
         return false;
     }
-    tally t = {{0}, 0, {0.0}, 0.0};
+    edge *const lists[3] = {edges, edges + longest, edges + 2 * longest};
+    tally t = {.pairs = 0};
     line l = {.pair = pair};
-    const bool shadow = find_sides(pair, &l.low, &l.high);
+    const bool shadow = find_sides(pair, options, &l);
     for (l.axis = 0; shadow && l.axis < 3; ++l.axis) {
         l.stride = pair->stride[l.axis];
         l.count = pair->size[l.axis];
         for (size_t i = 0; i < pair->count; ++i) {
             if (i / l.stride % l.count == 0) { /* the first of a line */
                 l.first = i;
-                count_line(&l, edges, edges + longest, &t);
+                count_line(&l, lists, &t);
             }
         }
     }

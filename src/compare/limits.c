@@ -1,5 +1,6 @@
 /* What the measures are called, what they may come to, and whether they do. */
 #include "compare/limits.h"
+#include "compare/pair.h"
 
 #include "base/floats.h"
 
@@ -45,6 +46,23 @@ vsh_limits vsh_limits_default(void) {
         limits.value[i] = vshi_limits[i].value;
     }
     return limits;
+}
+
+/* Differences within the limits, and independent noise on top of them. Squares of errors add; the largest of
+ * a million normal values is 5 of their standard errors away, the 99th percentile of their sizes 2.6. Both
+ * ends of a penumbra move by noise / slope, and steady ones (edges.c) have half the mean slope there at
+ * least. A tenth of its error may be bias, as of texels that share rays. */
+void vsh_limits_allow_noise(vsh_limits *limits, double noise) {
+    VSHI_FLOATS;
+    double *limit = limits->value;
+    limits->options.noise = noise;
+    limit[VSH_MEASURE_RMSE] = sqrt(limit[VSH_MEASURE_RMSE] * limit[VSH_MEASURE_RMSE] + noise * noise);
+    limit[VSH_MEASURE_BIAS] += 0.1 * noise;
+    limit[VSH_MEASURE_MAX] += 5.0 * noise;
+    limit[VSH_MEASURE_P99] += 2.6 * noise;
+    limit[VSH_MEASURE_SSIM] *= vshi_ssim_of_noise(noise);
+    limit[VSH_MEASURE_PENUMBRA] += 5.0 * noise;
+    limit[VSH_MEASURE_WIDTHS] += 5.0 * noise;
 }
 
 uint32_t vsh_compare_judge(const vsh_measures *measures, const vsh_limits *limits) {

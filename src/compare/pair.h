@@ -28,6 +28,12 @@ static inline void vshi_place_of(const vshi_pair *pair, size_t i, size_t place[3
     place[2] = i / pair->stride[2];
 }
 
+/* What is told from nothing, and noise on top of it: at most so far does noise of that standard error carry
+ * 99 of 100 values. */
+static inline double vshi_no_difference(double nothing, const vsh_compare_options *options) {
+    return nothing + 2.6 * options->noise;
+}
+
 /* Each fills its own members of the measures. Work takes `scratch` bytes a value, below, and returns false
  * where the system refuses what it needs besides. */
 typedef bool vshi_measure_fn(const vshi_pair *pair, const vsh_compare_options *options, void *scratch,
@@ -38,6 +44,9 @@ vshi_measure_fn vshi_measure_ssim;    /* structural similarity */
 vshi_measure_fn vshi_measure_edges;   /* penumbra, widths, edges */
 vshi_measure_fn vshi_measure_shift;   /* displacement */
 vshi_measure_fn vshi_measure_regions; /* lost, gained */
+
+/* Of ssim.c: what two planes come to where one is flat and the other is it with noise of a standard error. */
+double vshi_ssim_of_noise(double noise);
 
 enum { VSHI_SHIFT_SCRATCH = 5, VSHI_REGIONS_SCRATCH = 16 }; /* bytes a value; the others take none */
 

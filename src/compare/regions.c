@@ -119,11 +119,12 @@ bool vshi_measure_regions(const vshi_pair *pair, const vsh_compare_options *opti
     memset(off, 0, pair->count * sizeof *off);
     look_around(pair, VSHI_NEW, 1.0, (size_t)options->reach, &e, off);
     look_around(pair, VSHI_GOLDEN, -1.0, (size_t)options->reach, &e, off);
+    const double step = vshi_no_difference(options->step, options);
     uint32_t *stack = (uint32_t *)(planes + 3 * pair->count); /* no texel is on it twice */
     for (size_t i = 0; i < pair->count; ++i) {
-        if (fabs((double)off[i]) >= options->step) {
+        if (fabs((double)off[i]) >= step) {
             vsh_region *largest = off[i] > 0.0f ? &m->lost : &m->gained;
-            const vsh_region region = take_region(pair, off, stack, i, options->step);
+            const vsh_region region = take_region(pair, off, stack, i, step);
             if (region.count > largest->count) {
                 *largest = region;
             }

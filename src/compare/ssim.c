@@ -18,6 +18,10 @@ enum { WEIGHT, SUM_A, SUM_B, SUM_AA, SUM_BB, SUM_AB, SUMS };
 
 typedef double sums[SUMS];
 
+double vshi_ssim_of_noise(double noise) {
+    return C2 / (C2 + noise * noise);
+}
+
 static void make_taps(double taps[TAPS]) {
     for (int k = -RADIUS; k <= RADIUS; ++k) {
         taps[k + RADIUS] = vshi_exp(-0.5 * k * k / (SIGMA * SIGMA));

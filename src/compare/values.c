@@ -51,6 +51,7 @@ bool vshi_measure_values(const vshi_pair *pair, const vsh_compare_options *optio
     }
     double sum = 0.0, squares = 0.0, worst = -1.0;
     uint64_t past = 0;
+    const double threshold = vshi_no_difference(options->threshold, options);
     for (size_t i = 0; i < pair->count; ++i) {
         if (!pair->mask[i]) {
             continue;
@@ -58,7 +59,7 @@ bool vshi_measure_values(const vshi_pair *pair, const vsh_compare_options *optio
         const double difference = difference_at(pair, i);
         sum += difference;
         squares += difference * difference;
-        past += fabs(difference) > options->threshold;
+        past += fabs(difference) > threshold;
         ++bins[bits_of(difference) >> 16];
         if (fabs(difference) > worst) {
             worst = fabs(difference);

@@ -7,6 +7,7 @@
 #include "scene/inputs.h"
 #include "shade/light.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,14 +28,17 @@ static vsh_result add(vsh_provenance *p, const char *name, const char *value, vs
     return vshi_attributes_add(&p->attributes, name, value) ? VSH_OK : out_of_memory(error);
 }
 
+static const char MAX_ERROR[] = ", max error ", RAYS_GIVEN[] = " rays";
+
 /* Of methods that cast rays: how many, which, and to what error. */
 static void describe_rays(const vsh_shade_options *o, bool adaptive, char *text, size_t size) {
     int used = 0;
     if (adaptive) {
-        used = snprintf(text, size, ", max error %.9g", o->max_error);
+        used = snprintf(text, size, "%s%.9g", MAX_ERROR, o->max_error);
     }
     if (!adaptive || o->rays > 0) {
-        used += snprintf(text + used, size - (size_t)used, ", %d rays", o->rays > 0 ? o->rays : RAYS);
+        used +=
+            snprintf(text + used, size - (size_t)used, ", %d%s", o->rays > 0 ? o->rays : RAYS, RAYS_GIVEN);
     }
     used += snprintf(text + used, size - (size_t)used, ", %s", vsh_sampler_name(o->sampler));
     if (o->frame != 0) {
@@ -185,6 +189,22 @@ vsh_result vsh_provenance_create(const vsh_provenance_source *source, const vsh_
 const vsh_attribute *vsh_provenance_attributes(const vsh_provenance *provenance, size_t *count) {
     *count = provenance != NULL ? provenance->attributes.count : 0;
     return provenance != NULL ? provenance->attributes.list : NULL;
+}
+
+double vsh_provenance_max_error(const vsh_attribute *attributes, size_t count, const char *channel) {
+    VSHI_NUMBERS;
+    const char *name = strcmp(channel, "ao") == 0            ? "vdbshade_ao"
+                       : strncmp(channel, "shadow.", 7) == 0 ? "vdbshade_shadow"
+                                                             : NULL;
+    for (size_t i = 0; name != NULL && i < count; ++i) {
+        const char *text = strcmp(attributes[i].name, name) == 0 ? attributes[i].value : "";
+        const char *at = strstr(text, MAX_ERROR);
+        if (at != NULL && strstr(at, RAYS_GIVEN) == NULL) {
+            const double error = strtod(at + strlen(MAX_ERROR), NULL);
+            return error > 0.0 && error <= 1.0 ? error : NAN;
+        }
+    }
+    return NAN;
 }
 
 void vsh_provenance_free(vsh_provenance *provenance) {

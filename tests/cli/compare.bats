@@ -276,3 +276,60 @@ JSON
     compare golden.exr half.exr --html same.xml --junit same.xml
     refused 2 same.xml
 }
+
+# of_error E OUT [options]: shadows and AO of a ball over a floor by rays.
+of_error() {
+    local error=$1 out=$2
+    shift 2
+    cat >rays.json <<JSON
+{"casters": [{"mesh": "$ASSETS/seeds_floor.obj"}, {"sdf": {"shape": "sphere", "radius": 0.8, "translate": [0, 0.9, 0]}}],
+ "voxel_size": 0.05, "lights": [{"name": "sun", "type": "directional", "direction": [-0.5, 0.6, -0.6], "angle_deg": 12}],
+ "ao": {"distance": 1.5}, "receivers": [{"mesh": "$ASSETS/seeds_floor.obj", "size": 96, "output": "rays.exr"}]}
+JSON
+    run -0 "$VDBSHADE" "${VERB:-bake}" rays.json --method adaptive --max-error "$error" --quiet -o "$out" "$@"
+}
+
+@test "bakes made to different errors are held to what they state of themselves" {
+    of_error 0.05 coarse.exr
+    of_error 0.005 fine.exr
+    compare fine.exr coarse.exr
+    done_well
+    [[ $(line ao) == *"noise of 0.0502 is allowed for (made to max errors 0.005 and 0.05)"* ]] || fail "$(line ao)"
+    compare fine.exr coarse.exr --noise 0
+    [ "$status" -eq 1 ] || fail "$output"
+    [[ $(line ao) == "ao: not alike: "*"rmse "*"(limit 0.004)"* ]] || fail "$(line ao)"
+    compare fine.exr coarse.exr --max-rmse 0.0001
+    [ "$status" -eq 1 ] || fail "a limit that is given does not give way"
+    [[ $(line ao) == "ao: not alike: rmse "*" (limit 0.0001); noise"* ]] || fail "$(line ao)"
+    echo '{"rmse": 0.0001}' >fine.exr.tolerance.json
+    compare fine.exr coarse.exr
+    [ "$status" -eq 1 ] || fail "a limit of the file does not give way"
+    rm fine.exr.tolerance.json
+    shade compare fine.exr coarse.exr --json
+    [[ $(tr -d ' \n' <<<"$output") == *'"max_error":[0.005,0.05],"noise":0.0502'* ]] || fail "$output"
+    of_error 0.05 limited.exr --rays 64
+    compare fine.exr limited.exr --noise 0.07
+    [[ $(line ao) != *"made to"* ]] || fail "a limit of rays may leave more than the error: $(line ao)"
+    compare fine.exr limited.exr
+    [[ $(line ao) != *"is allowed for"* ]] || fail "$(line ao)"
+    compare fine.exr coarse.exr --noise 1.5
+    refused 2 "--noise '1.5'" '1'
+}
+
+@test "bakes made to one error allow for no noise; .vdb files state theirs, and for a PNG it is given" {
+    of_error 0.05 one.png
+    of_error 0.01 other.png
+    compare one.png one.png
+    done_well
+    [[ $output != *"is allowed for"* ]] || fail "$output"
+    compare other.png one.png
+    [ "$status" -eq 1 ] || fail "R, G and B do not say what they hold"
+    compare other.png one.png --noise 0.051
+    done_well
+    [[ $(line R) == *"noise of 0.051 is allowed for;"* ]] || fail "$output"
+    local VERB=volume
+    of_error 0.05 one.vdb --box -1,0,-1,1,1,1 --box-voxel-size 0.25
+    of_error 0.01 other.vdb --box -1,0,-1,1,1,1 --box-voxel-size 0.25
+    compare other.vdb one.vdb
+    [[ $(line shadow.sun) == *"noise of 0.051 is allowed for (made to max errors 0.01 and 0.05)"* ]] || fail "$output"
+}

@@ -130,6 +130,30 @@ static void settings_and_inputs_are_told_in_order_and_once(void **state) {
     assert_non_null(strstr(error.message, "one.bin: cannot be read"));
 }
 
+static void the_error_that_a_channel_was_made_to_is_told(void **state) {
+    (void)state;
+    const vsh_attribute list[] = {{"vdbshade_version", "0.1.0"},
+                                  {"vdbshade_shadow", "adaptive, max error 0.005, sobol, frame 3"},
+                                  {"vdbshade_ao", "exact within 2.5, max error 0.02, sobol"}};
+    assert_true(vsh_provenance_max_error(list, 3, "shadow.sun") == 0.005);
+    assert_true(vsh_provenance_max_error(list, 3, "ao") == 0.02);
+    assert_true(isnan(vsh_provenance_max_error(list, 3, "irradiance.R")));
+    assert_true(isnan(vsh_provenance_max_error(list, 2, "ao")));
+    assert_true(isnan(vsh_provenance_max_error(NULL, 0, "ao")));
+    static const char *const none[] = {
+        "cone",
+        "exact, max error 0.02, 64 rays, sobol", /* a limit: more may be left */
+        "rays, 64 rays, sobol",
+        "exact, max error , sobol",
+        "exact, max error -1",
+        "exact, max error nan",
+        ""};
+    for (size_t i = 0; i < sizeof none / sizeof none[0]; ++i) {
+        const vsh_attribute one = {"vdbshade_shadow", none[i]};
+        assert_true(isnan(vsh_provenance_max_error(&one, 1, "shadow.key")));
+    }
+}
+
 static void images_carry_them_and_give_them_back(void **state) {
     (void)state;
     static const char *const files[] = {"told.exr", "told.png"};
@@ -227,6 +251,7 @@ int main(void) {
         cmocka_unit_test(digests_are_those_of_the_standard),
         cmocka_unit_test(digests_of_what_is_no_file_are_refused),
         cmocka_unit_test(settings_and_inputs_are_told_in_order_and_once),
+        cmocka_unit_test(the_error_that_a_channel_was_made_to_is_told),
         cmocka_unit_test(images_carry_them_and_give_them_back),
         cmocka_unit_test(level_sets_and_volumes_carry_them),
         cmocka_unit_test(attributes_that_no_file_could_hold_are_refused),

@@ -1,0 +1,196 @@
+/* Comparing estimates: noise that is known of is no fault, and hides none that is larger. */
+#include "compared.h"
+
+enum { SIDE = 128, COUNT = SIDE * SIDE };
+
+/* Nearly normal, of a standard error of 1: the sum of twelve uniform values. */
+static double normal(uint32_t counter) {
+    double sum = 0.0;
+    for (uint32_t i = 0; i < 12; ++i) {
+        sum += 0.5 * noise(12 * counter + i);
+    }
+    return sum;
+}
+
+/* Round shadows, soft at their edges. */
+typedef struct picture {
+    double radius, soft, shift;
+    int shadows;
+} picture;
+
+static const picture usual = {14.0, 5.0, 0.0, 4};
+
+static double picture_at(const void *user, double x, double y, double z) {
+    const picture *p = user;
+    double lit = 1.0;
+    (void)z;
+    for (int i = 0; i < p->shadows; ++i) {
+        const double dx = x - 32.0 - 64.0 * (i % 2) - p->shift, dy = y - 32.0 - 64.0 * (double)(i / 2);
+        lit = fmin(lit, 0.5 + (sqrt(dx * dx + dy * dy) - p->radius) / p->soft);
+    }
+    return 0.1 + 0.8 * fmax(0.0, lit);
+}
+
+static const double error = 0.02; /* between the two */
+
+/* What fails where the picture is the usual one and the other was estimated with noise, and limits allow for
+ * some of it. */
+static uint32_t failures(picture other, double made, double allowed) {
+    plane golden = make_plane(SIDE, SIDE, 1, picture_at, &usual),
+          values = make_plane(SIDE, SIDE, 1, picture_at, &other);
+    for (uint32_t i = 0; i < COUNT; ++i) {
+        golden.values[i] += (float)(made * sqrt(0.5) * normal(i));
+        values.values[i] += (float)(made * sqrt(0.5) * normal(i + COUNT));
+    }
+    vsh_limits limits = vsh_limits_default();
+    vsh_limits_allow_noise(&limits, allowed);
+    const vsh_compared c = pair_of(&golden, &values, NULL);
+    vsh_measures m;
+    vsh_error told = {VSH_OK, ""};
+    if (vsh_compare(&c, &limits.options, NULL, &m, &told) != VSH_OK) {
+        fail_msg("%s", told.message);
+    }
+    free(golden.values);
+    free(values.values);
+    return vsh_compare_judge(&m, &limits);
+}
+
+static bool has(uint32_t failed, int measure) {
+    return (failed >> measure & 1) != 0;
+}
+
+static void estimates_are_alike_within_their_errors_and_not_beyond(void **unused) {
+    (void)unused;
+    assert_int_equal(failures(usual, error, error), 0);
+    assert_int_equal(failures(usual, 0.0, 0.0), 0);
+    const uint32_t strict = failures(usual, error, 0.0), twice = failures(usual, 2.0 * error, error);
+    assert_true(has(strict, VSH_MEASURE_RMSE) && has(strict, VSH_MEASURE_P99) &&
+                has(strict, VSH_MEASURE_SHARE) && has(strict, VSH_MEASURE_SSIM));
+    assert_true(has(twice, VSH_MEASURE_RMSE) && has(twice, VSH_MEASURE_SHARE));
+}
+
+static void faults_are_told_through_the_noise(void **unused) {
+    (void)unused;
+    picture moved = usual, softer = usual, lost = usual;
+    moved.shift = 1.0;
+    softer.soft *= 1.3;
+    lost.shadows = 3;
+    assert_true(has(failures(moved, error, error), VSH_MEASURE_SHIFT));
+    assert_true(has(failures(softer, error, error), VSH_MEASURE_PENUMBRA));
+    const uint32_t without = failures(lost, error, error);
+    assert_true(has(without, VSH_MEASURE_LOST) && has(without, VSH_MEASURE_EDGES));
+}
+
+/* Texels of a patch that got lighter by so much. */
+static double lost_by(double off, double allowed) {
+    const double grey = 0.5;
+    plane golden = make_plane(SIDE, SIDE, 1, flat, &grey), values = make_plane(SIDE, SIDE, 1, flat, &grey);
+    for (size_t i = 0; i < 9; ++i) {
+        values.values[(40 + i / 3) * SIDE + 50 + i % 3] += (float)off;
+    }
+    vsh_compare_options options = vsh_compare_options_default();
+    options.noise = allowed;
+    const vsh_compared c = pair_of(&golden, &values, NULL);
+    vsh_measures m;
+    vsh_error told = {VSH_OK, ""};
+    assert_int_equal(vsh_compare(&c, &options, NULL, &m, &told), VSH_OK);
+    free(golden.values);
+    free(values.values);
+    return m.value[VSH_MEASURE_LOST];
+}
+
+static void what_noise_makes_is_no_lost_caster(void **unused) {
+    (void)unused;
+    assert_true(lost_by(0.15, 0.0) == 9.0 && lost_by(0.15, error) == 0.0 && lost_by(0.16, error) == 9.0);
+}
+
+static void limits_are_widened_as_documented(void **unused) {
+    (void)unused;
+    const vsh_limits before = vsh_limits_default();
+    vsh_limits limits = before;
+    vsh_limits_allow_noise(&limits, 0.0);
+    assert_memory_equal(limits.value, before.value, sizeof before.value);
+    vsh_limits_allow_noise(&limits, 0.03);
+    assert_true(limits.options.noise == 0.03);
+    assert_near(limits.value[VSH_MEASURE_RMSE], sqrt(0.004 * 0.004 + 0.03 * 0.03), 1e-15);
+    assert_near(limits.value[VSH_MEASURE_BIAS], 0.002 + 0.003, 1e-15);
+    assert_near(limits.value[VSH_MEASURE_MAX], 0.25 + 0.15, 1e-15);
+    assert_near(limits.value[VSH_MEASURE_P99], 0.02 + 0.078, 1e-15);
+    assert_near(limits.value[VSH_MEASURE_SSIM], 0.98 / 2.0, 1e-15); /* C2 is 0.03² */
+    assert_near(limits.value[VSH_MEASURE_PENUMBRA], 0.03 + 0.15, 1e-15);
+    assert_near(limits.value[VSH_MEASURE_WIDTHS], 0.05 + 0.15, 1e-15);
+    for (int i = VSH_MEASURE_EDGES; i < VSH_MEASURE_COUNT; ++i) {
+        assert_true(limits.value[i] == before.value[i]);
+    }
+    assert_true(limits.value[VSH_MEASURE_SHARE] == before.value[VSH_MEASURE_SHARE]);
+}
+
+static void noise_is_a_share_of_the_range(void **unused) {
+    (void)unused;
+    plane golden = make_plane(SIDE, SIDE, 1, picture_at, &usual);
+    const vsh_compared c = pair_of(&golden, &golden, NULL);
+    const double wrong[] = {-1e-9, 1.001, NAN, INFINITY};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
+        vsh_compare_options options = vsh_compare_options_default();
+        options.noise = wrong[i];
+        vsh_measures m;
+        vsh_error told = {VSH_OK, ""};
+        assert_int_equal(vsh_compare(&c, &options, NULL, &m, &told), VSH_ERROR_ARGUMENT);
+        assert_non_null(strstr(told.message, "noise of"));
+    }
+    free(golden.values);
+}
+
+/* --- values that hardly reach a mark: dark, a plateau that nearly is light from 20 to 100, dark, light from
+ * 110 */
+
+typedef struct step {
+    double plateau, slope; /* its middle, and how much more it is at the right end of it */
+} step;
+
+static double step_at(const void *user, double x, double y, double z) {
+    const step *s = user;
+    (void)y;
+    (void)z;
+    return x < 20.0 ? 0.0 : x < 100.0 ? s->plateau + s->slope * (x - 60.0) / 40.0 : x < 110.0 ? 0.0 : 1.0;
+}
+
+static vsh_measures compare_steps(step golden, step values) {
+    plane a = make_plane(SIDE, SIDE, 1, step_at, &golden), b = make_plane(SIDE, SIDE, 1, step_at, &values);
+    const vsh_measures m = measure(&a, &b, NULL);
+    free(a.values);
+    free(b.values);
+    return m;
+}
+
+static void an_edge_that_just_misses_a_mark_is_not_missed(void **unused) {
+    (void)unused;
+    const step light = {0.905, 0.0}, nearly = {0.895, 0.0}, grey = {0.85, 0.0};
+    assert_true(compare_steps(light, nearly).value[VSH_MEASURE_EDGES] == 0.0);
+    assert_true(compare_steps(nearly, light).value[VSH_MEASURE_EDGES] == 0.0);
+    assert_near(compare_steps(light, grey).value[VSH_MEASURE_EDGES], 2.0 / 3.0, 1e-12);
+    assert_near(compare_steps(grey, light).value[VSH_MEASURE_EDGES], 2.0 / 3.0, 1e-12);
+}
+
+static void a_width_that_hangs_on_the_mark_is_not_measured(void **unused) {
+    (void)unused;
+    const step crawls = {0.9, 0.01}, jumps = {0.95, 0.0};
+    const vsh_measures m = compare_steps(crawls, crawls), sharp = compare_steps(jumps, jumps);
+    assert_int_equal(m.edges[0], 3 * SIDE);
+    assert_int_equal(m.pairs, 2 * SIDE); /* not the one from 19 to 60 */
+    assert_int_equal(sharp.pairs, 3 * SIDE);
+    assert_true(m.value[VSH_MEASURE_EDGES] == 0.0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(estimates_are_alike_within_their_errors_and_not_beyond),
+        cmocka_unit_test(faults_are_told_through_the_noise),
+        cmocka_unit_test(what_noise_makes_is_no_lost_caster),
+        cmocka_unit_test(limits_are_widened_as_documented),
+        cmocka_unit_test(noise_is_a_share_of_the_range),
+        cmocka_unit_test(an_edge_that_just_misses_a_mark_is_not_missed),
+        cmocka_unit_test(a_width_that_hangs_on_the_mark_is_not_measured),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
