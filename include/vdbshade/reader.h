@@ -3,8 +3,9 @@
  * A call with a reader starts that program for each file, and waits. The child takes limits on itself before
  * it opens the file: address space (run->memory_limit and 2 GiB for the program itself; the machine's memory
  * where there is no limit), processor time, no core dump, few descriptors, no new privileges, no longer life
- * than its parent's, and, where the host allows it, a filter of system calls (seccomp) that leaves reading
- * files, memory and threads of its own: no sockets, no other program, no file opened for writing, no signal
+ * than its parent's, and, where the host allows it, a filter of system calls (seccomp) in all of its threads,
+ * each looked at, that leaves reading files, memory and threads of its own: no sockets, no other program, no
+ * file opened for writing, no signal
  * to others. It parses, and writes arrays into memory that the caller handed it. When it has ended the caller
  * seals that memory and takes nothing of it for granted: sizes, counts, indices, finite values, transforms,
  * order and alignment of leaves, ends of strings; then come the same checks as without a reader.

@@ -262,6 +262,10 @@ static vsh_result fail_end(const vshi_ask *ask, int status, bool begun, vsh_erro
                          "(ulimit -f); raise it, or read without a reader",
                          ask->path);
     }
+    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_LOOSE) {
+        return vshi_fail(error, VSH_ERROR_INTERNAL,
+                         "%s: not read: a thread of its reader is not confined as the others are", ask->path);
+    }
     if (!begun) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: '%s' is no reader of vdbshade %s", ask->path,
                          ask->run->reader, vsh_version());

@@ -2,6 +2,7 @@
 #include "read/confine.h"
 
 #include "read/reader.h"
+#include "read/tasks.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -64,7 +65,6 @@ static const int allowed[] = {
     SCMP_SYS(faccessat),
     SCMP_SYS(faccessat2),
     SCMP_SYS(fadvise64),
-    SCMP_SYS(fcntl),
     SCMP_SYS(fstat),
     SCMP_SYS(fstatfs),
     SCMP_SYS(futex),
@@ -119,6 +119,9 @@ static const int allowed[] = {
     SCMP_SYS(writev),
 };
 
+/* Of fcntl(): not the ones that send signals (F_SETOWN, F_SETSIG, F_NOTIFY). */
+static const int allowed_of_descriptors[] = {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL};
+
 /* Calls that depend on an argument: opening for reading, threads of this process, limits that are asked for,
  * and signals to itself (abort). */
 static int add_conditional(scmp_filter_ctx filter) {
@@ -132,20 +135,25 @@ static int add_conditional(scmp_filter_ctx filter) {
     failed |= seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(tgkill), 1, SCMP_A0(SCMP_CMP_EQ, self));
     failed |= seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(prlimit64), 2, SCMP_A0(SCMP_CMP_EQ, 0),
                                SCMP_A2(SCMP_CMP_EQ, 0));
+    for (size_t i = 0; i < sizeof allowed_of_descriptors / sizeof allowed_of_descriptors[0]; ++i) {
+        failed |= seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(fcntl), 1,
+                                   SCMP_A1(SCMP_CMP_EQ, (scmp_datum_t)allowed_of_descriptors[i]));
+    }
     /* its arguments lie in memory, where no filter sees them: the C library falls back to clone */
     failed |= seccomp_rule_add(filter, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(clone3), 0);
     return failed;
 }
 
-bool vshi_confine_calls(void) {
-    if (VSHI_SANITIZED) {
-        return false;
-    }
+/* Loads it into every thread, those that libraries have begun before main too: a filter of one thread is
+ * none, as that thread may write over the stack of another. Calls of another kind of machine (32 bit, x32)
+ * end the process, and not a thread that others may wait for. */
+static bool load_filter(void) {
     const scmp_filter_ctx filter = seccomp_init(SCMP_ACT_ERRNO(EPERM));
     if (filter == NULL) {
         return false;
     }
-    int failed = 0;
+    int failed = seccomp_attr_set(filter, SCMP_FLTATR_ACT_BADARCH, SCMP_ACT_KILL_PROCESS);
+    failed |= seccomp_attr_set(filter, SCMP_FLTATR_CTL_TSYNC, 1);
     for (size_t i = 0; i < sizeof allowed / sizeof allowed[0]; ++i) {
         /* a call that this kind of machine does not have is none to allow */
         const int added = seccomp_rule_add(filter, SCMP_ACT_ALLOW, allowed[i], 0);
@@ -155,4 +163,15 @@ bool vshi_confine_calls(void) {
     const bool loaded = failed == 0 && seccomp_load(filter) == 0;
     seccomp_release(filter);
     return loaded;
+}
+
+int vshi_confine_calls(void) {
+    if (VSHI_SANITIZED) {
+        return VSHI_CALLS_FREE;
+    }
+    const int before = vshi_task_filters();
+    if (!load_filter()) {
+        return VSHI_CALLS_FREE;
+    }
+    return vshi_tasks_filtered(before) ? VSHI_CALLS_CONFINED : VSHI_CALLS_IN_PART;
 }

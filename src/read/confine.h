@@ -14,9 +14,16 @@ extern "C" {
  * death with its parent. */
 void vshi_confine_resources(uint64_t memory, double seconds);
 
-/* Leaves the system calls that parsing needs; the others fail with EPERM. False where the host allows no such
- * filter, or in a sanitized build. To be called by a process with one thread. */
-bool vshi_confine_calls(void);
+/* What became of a filter of system calls. */
+enum {
+    VSHI_CALLS_FREE = 0,     /* the host allows none, or the build is a sanitized one */
+    VSHI_CALLS_CONFINED = 1, /* it holds in every thread, as the kernel tells of each */
+    VSHI_CALLS_IN_PART = 2   /* some thread is not seen to have it: nothing may be parsed here */
+};
+
+/* Leaves the system calls that parsing needs, in every thread of this process and those to come; the others
+ * fail with EPERM, and calls of another kind of machine (32 bit, x32) end the process. */
+int vshi_confine_calls(void);
 
 /* From now on memory that operator new is refused ends the process with VSHI_READER_HUNGRY, before a library
  * can do worse. */

@@ -74,10 +74,11 @@ vshi_serve_fn vshi_serve_grid, vshi_serve_list, vshi_serve_voxels, vshi_serve_mo
 /* The descriptors of a reader, behind the standard ones. */
 enum { VSHI_READER_ANSWER = 3, VSHI_READER_REQUEST = 4, VSHI_READER_PROGRESS = 5 };
 
-/* A reader's exit code where memory was refused. */
+/* A reader's exit codes. */
 enum {
-    VSHI_READER_HUNGRY = 86,
-    VSHI_READER_CRAMPED = 87 /* the caller's limit on the size of files does not let the answer through */
+    VSHI_READER_HUNGRY = 86,  /* memory was refused */
+    VSHI_READER_CRAMPED = 87, /* the caller's limit on the size of files does not let the answer through */
+    VSHI_READER_LOOSE = 88    /* some thread of it is not confined: it read nothing */
 };
 
 #define VSHI_REQUEST_MAGIC UINT64_C(0x6b7361687376)

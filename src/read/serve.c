@@ -143,6 +143,8 @@ int32_t vsh_reader_serve(int argc, char **argv) {
         return CANNOT_SERVE; /* it died before its death would have been ours */
     }
     vshi_confine_hunger();
-    vshi_confine_calls();
+    if (vshi_confine_calls() == VSHI_CALLS_IN_PART) {
+        return VSHI_READER_LOOSE;
+    }
     return answer(&s, servers[kind], path, &request, &run);
 }
