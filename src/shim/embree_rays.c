@@ -29,23 +29,45 @@ bool vshi_rays_together(const vshi_segment_ray *rays, int count) {
     return true;
 }
 
-bool vshi_triangles_aim(const vsh_triangles *triangles, const vshi_segment_ray *ray, struct RTCRay8 *packet,
-                        int lane) {
-    double origin[3], far = ray->far * triangles->scale, distance = 0.0, along = 0.0;
-    for (int axis = 0; axis < 3; ++axis) {
-        origin[axis] = (ray->origin[axis] - triangles->centre[axis]) * triangles->scale;
-        distance += origin[axis] * origin[axis];
-        along -= origin[axis] * ray->direction[axis];
-    }
-    if (!(distance <= VSHI_FAR_ORIGIN * VSHI_FAR_ORIGIN)) {
+/* Moves a ray that begins far away up to the scene; false where it passes it by, or ends before it. Rounding
+ * leaves each move as far off as a double is at that distance, so that the next one begins from there. */
+static bool approach(double origin[3], const double direction[3], double *far) {
+    enum { MOVES = 24 };                /* 1e308 by 1e15 a move */
+    static const double MOVED = 0x1p-6; /* what is left of a move that needs no other */
+    for (int move = 0; move < MOVES; ++move) {
+        double distance = 0.0, along = 0.0;
+        for (int axis = 0; axis < 3; ++axis) {
+            distance += origin[axis] * origin[axis];
+            along -= origin[axis] * direction[axis];
+        }
+        if (distance <= VSHI_FAR_ORIGIN * VSHI_FAR_ORIGIN) {
+            return true;
+        }
         const double skip = along - VSHI_FAR_ORIGIN;
-        if (!(skip < far)) { /* not finite either */
+        if (!(skip < *far)) { /* not finite either */
             return false;
         }
-        for (int axis = 0; skip > 0.0 && axis < 3; ++axis) {
-            origin[axis] += skip * ray->direction[axis];
+        if (!(skip > (move == 0 ? 0.0 : MOVED))) {
+            /* the scene is in the ball of √3 around 0: what is this far beside or behind it does not meet it
+             */
+            return distance <= 2.0 * VSHI_FAR_ORIGIN * VSHI_FAR_ORIGIN;
         }
-        far -= skip > 0.0 ? skip : 0.0;
+        for (int axis = 0; axis < 3; ++axis) {
+            origin[axis] += skip * direction[axis];
+        }
+        *far -= skip;
+    }
+    return false;
+}
+
+bool vshi_triangles_aim(const vsh_triangles *triangles, const vshi_segment_ray *ray, struct RTCRay8 *packet,
+                        int lane) {
+    double origin[3], far = ray->far * triangles->scale;
+    for (int axis = 0; axis < 3; ++axis) {
+        origin[axis] = (ray->origin[axis] - triangles->centre[axis]) * triangles->scale;
+    }
+    if (!approach(origin, ray->direction, &far)) {
+        return false;
     }
     packet->org_x[lane] = (float)origin[0];
     packet->org_y[lane] = (float)origin[1];

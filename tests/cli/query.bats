@@ -178,6 +178,15 @@ C
     [ "$(wc -l <out.xyz)" -eq 2 ]
 }
 
+@test "points as far away as a number goes are lit by exact" {
+    local far
+    for far in 1e15 1e19 1e30 1e300; do printf '%s,%s,0,0,1,0\n-%s,-%s,0,0,1,0\n' $far $far $far $far; done >p.csv
+    shade query "$ASSETS/cloister.glb" --resolution 48 --points p.csv --sun 0.6,0.75,0.5 --sun-angle 3 --ao 0.6 \
+        --method exact --ao-method exact --quiet -o out.csv
+    done_well
+    awk -F, '$7 != 1 || $8 != 1 { bad = 1 } END { exit bad || NR != 8 }' out.csv
+}
+
 @test "without normals there is no ao, and no horizon" {
     printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
     shade query scene.json --points p.csv -o out.csv

@@ -43,6 +43,45 @@ static void receivers_deep_inside_are_dark_and_far_outside_are_lit(void **state)
     caster_free(&c);
 }
 
+/* As far as doubles go, in every direction from the casters, towards them and away, by every method. */
+static void receivers_at_any_distance_are_lit(void **state) {
+    (void)state;
+    const truth_solid block = {TRUTH_BOX, {0.0, 0.0, 0.0}, {2.0, 2.0, 2.0}, 0.0, 0.0};
+    const double scales[] = {1e-10, 1e-6, 1.0, 1e10};
+    uint64_t counter = 5;
+    for (int s = 0; s < 4; ++s) {
+        caster c = caster_of_moved((truth_scene){&block, 1}, 0.2, scales[s], NOWHERE, 0.0);
+        for (double away = 1e6; away < 1e280; away *= away < 1e24 ? 10.0 : 1e16) {
+            double out[3], other[3];
+            random_direction(&counter, out);
+            random_direction(&counter, other);
+            const double far = away * scales[s], q[3] = {far * out[0], far * out[1], far * out[2]};
+            const double to[3] = {-out[0], -out[1], -out[2]};
+            const vsh_light lights[] = {sun(other, 0.05), sun(out, 0.0), sun(to, 0.05), sun(to, 3.0),
+                                        lamp(NOWHERE, 4.0 * scales[s])};
+            const float n[3] = {(float)to[0], (float)to[1], (float)to[2]};
+            for (int l = 0; l < 5; ++l) {
+                for (int32_t method = 0; method < shadow_methods(); ++method) {
+                    const bool one_sided = l == 2 || l == 3 ? method < VSH_SHADOW_CONE : false;
+                    const float v = cast_shadow_at(&c, &lights[l], method, q, NULL);
+                    if (one_sided || l == 4 ? !(v >= 0.0f && v <= 1.0f) : v != 1.0f) {
+                        fail_msg("%g sizes away, light %d, %s: %.9g", away, l, vsh_shadow_method_name(method),
+                                 (double)v);
+                    }
+                }
+            }
+            for (int32_t method = 0; method < ao_methods(); ++method) {
+                assert_true(cast_ao_at(&c, method, scales[s], q, n) == 1.0f);
+                const float v = cast_ao_at(&c, method, 2.0 * far, q, n);
+                if (!(v > (method == VSH_AO_TAPS ? -1.0f : 0.9f) && v <= 1.0f)) {
+                    fail_msg("%g sizes away, AO %s: %.9g", away, vsh_ao_method_name(method), (double)v);
+                }
+            }
+        }
+        caster_free(&c);
+    }
+}
+
 /* Exactly on the planes, edges and corners of cells, bricks and levels, and beside them by less than a float
  * tells: the same to what a float tells; a ray of 64 may come to lie on the other side of an edge. */
 static void receivers_on_voxel_planes_see_what_their_neighbours_see(void **state) {
@@ -165,6 +204,7 @@ static void points_that_are_none_are_nan_and_counted(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(receivers_deep_inside_are_dark_and_far_outside_are_lit),
+        cmocka_unit_test(receivers_at_any_distance_are_lit),
         cmocka_unit_test(receivers_on_voxel_planes_see_what_their_neighbours_see),
         cmocka_unit_test(normals_of_any_length_are_directions),
         cmocka_unit_test(points_that_are_none_are_nan_and_counted),

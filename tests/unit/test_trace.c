@@ -199,6 +199,63 @@ static void points_far_from_the_casters_keep_their_precision(void **state) {
     vsh_triangles_free(triangles);
 }
 
+/* A box of half side 1, scaled, seen from `distance` half sides away: straight below it, beside that, and
+ * from a slant; also from where its own shadow is thrown away from. */
+static void see_from_afar(double scale, double distance) {
+    static const uint32_t indices[36] = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
+                                         2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
+    float corners[24];
+    for (int i = 0; i < 24; ++i) {
+        corners[i] = (i / 3) >> (i % 3) & 1 ? 1.0f : -1.0f;
+    }
+    const double transform[12] = {scale, 0.0, 0.0, 0.0, 0.0, scale, 0.0, 0.0, 0.0, 0.0, scale, 0.0};
+    const vsh_mesh mesh = {.positions = corners,
+                           .indices = indices,
+                           .vertex_count = 8,
+                           .triangle_count = 12,
+                           .transform = transform};
+    vsh_triangles *triangles = triangles_of(&mesh, 1);
+    const double far = scale * distance, overhead[3] = {0.0, 1.0, 0.0}, slanted[3] = {0.6, 0.48, 0.64};
+    const double below[3] = {0.25 * scale, -far, 0.25 * scale}, above[3] = {0.25 * scale, far, 0.0};
+    const double beside[3] = {far, -far, 0.25 * scale}, everywhere[3] = {-far, -far, far};
+    const vsh_light hard = sun(overhead, 0.0), soft = sun(slanted, 0.1), near = lamp(ORIGIN, 0.5 * scale);
+    const vsh_light behind = lamp(above, 0.0);
+    NEAR(seen(triangles, below, UP, &hard, 1), 0.0, 0.0);
+    NEAR(seen(triangles, above, UP, &hard, 1), 1.0, 0.0);
+    NEAR(seen(triangles, beside, UP, &hard, 1), 1.0, 0.0);
+    NEAR(seen(triangles, everywhere, UP, &hard, 1), 1.0, 0.0);
+    NEAR(seen(triangles, below, NULL, &soft, 64), 1.0, 0.0);
+    NEAR(seen(triangles, everywhere, NULL, &soft, 64), 1.0, 0.0);
+    NEAR(seen(triangles, below, UP, &behind, 1), 0.0, 0.0);
+    if (distance < 1e6) { /* beyond, doubles do not tell which ray meets it */
+        NEAR(seen(triangles, below, NULL, &near, 64), 0.0, 0.0);
+        NEAR(seen(triangles, everywhere, NULL, &near, 64), 0.0, 0.0);
+    } else {
+        assert_in_range(64.0 * (double)seen(triangles, everywhere, NULL, &near, 64), 0, 64);
+    }
+    const double *from[] = {below, above, beside, everywhere};
+    for (int i = 0; i < 4; ++i) {
+        float ao = -1.0f;
+        assert_int_equal(vsh_trace_ao(triangles, NULL, 1, from[i], UP, 0.0, 2.0 * far, 64, NULL, &ao, NULL),
+                         VSH_OK);
+        NEAR(ao, 1.0, distance < 1e3 ? 0.25 : 0.0);
+    }
+    vsh_triangles_free(triangles);
+}
+
+/* Embree itself ends the process at a coordinate beyond 1.8e18 of its own. */
+static void no_distance_is_too_far_for_rays(void **state) {
+    (void)state;
+    for (double scale = 1e-30; scale < 1e31; scale *= 1e5) {
+        for (double distance = 10.0; distance < 1e61; distance *= distance < 1e5 ? 10.0 : 1e3) {
+            see_from_afar(scale, distance);
+        }
+        see_from_afar(scale, 1.7e18);
+        see_from_afar(scale, 1e19);
+        see_from_afar(scale, 1e250);
+    }
+}
+
 /* Who called back, and in which environment. */
 typedef struct witness {
     pthread_t thread;
@@ -351,6 +408,7 @@ int main(void) {
         cmocka_unit_test(rays_stop_at_the_light_and_both_sides_block),
         cmocka_unit_test(neither_place_nor_size_of_the_scene_shows),
         cmocka_unit_test(points_far_from_the_casters_keep_their_precision),
+        cmocka_unit_test(no_distance_is_too_far_for_rays),
         cmocka_unit_test(trees_are_made_by_the_threads_that_were_given),
         cmocka_unit_test(threads_and_packets_change_no_bit),
         cmocka_unit_test(points_that_are_no_points_are_nan),
