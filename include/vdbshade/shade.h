@@ -175,8 +175,8 @@ VSH_API vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *po
 
 /* Cosine-weighted fraction of the hemisphere around the normal that is free within ao_distance, 0 … 1 open,
  * into ao[count]; invalid points are NaN; `deviation` as above. Errors (ao then holds nothing of use):
- * VSH_ERROR_ARGUMENT (options out of range, run, points->normals NULL), VSH_ERROR_MEMORY,
- * VSH_ERROR_CANCELLED. */
+ * VSH_ERROR_ARGUMENT (options out of range, run, points->normals NULL where there are points),
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points,
                                 const vsh_shade_options *options, const vsh_run *run, float *ao,
                                 float *deviation, vsh_shade_stats *stats, vsh_error *error);

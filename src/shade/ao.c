@@ -96,7 +96,7 @@ vsh_result vshi_ao_prepare_sphere(vshi_ao_cones *cones, vshi_ao_task *task, vsh_
 }
 
 vsh_result vshi_ao_check_points(const vsh_points *points, vsh_error *error) {
-    if (points->normals == NULL) {
+    if (points->normals == NULL && points->count > 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO needs normals: vsh_points.normals is NULL");
     }
     return VSH_OK;

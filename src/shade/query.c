@@ -226,7 +226,7 @@ static vsh_result check_output(const vsh_query *query, const vshi_view *view, co
                          output->stride, least, least + sizeof(float));
     }
     return output->ao != NULL && view->normals == NULL && !query->ao.sphere
-               ? vshi_ao_check_points(&(vsh_points){0}, error)
+               ? vshi_ao_check_points(&(vsh_points){.count = view->count}, error)
                : VSH_OK;
 }
 

@@ -96,3 +96,40 @@ end() { # SIGNAL
     cmp whole.exr out.exr
     [ ! -e out.exr.resume ]
 }
+
+# A chart over a tenth of the rows, so that whole bands have no texel, with everything that is combined with the field.
+@test "bands without a texel are baked with AO and layers, spheres or a direct terrain" {
+    local kind cast
+    printf '%s\n' 'v -2 0 -2' 'v 2 0 -2' 'v 2 0 2' 'v -2 0 2' 'vt 0 0.9' 'vt 1 0.9' 'vt 1 1' 'vt 0 1' 'f 1/1 4/4 3/3 2/2' >floor.obj
+    printf 'P2 4 4 9 0 1 2 3 4 5 6 7 8 9 8 7 6 5 4 3\n' >terrain.pgm
+    for kind in spheres layer terrain; do
+        case $kind in
+        spheres) cast='{"spheres": [[0, 1, 0, 0.4]]}' ;;
+        layer) cast='{"sdf": {"shape": "sphere", "radius": 0.3, "translate": [0, 2, 0]}, "layer": "top"}' ;;
+        terrain) cast='{"heightfield": "terrain.pgm", "size": [4, 4], "height": 0.4, "direct": true, "transform": {"translate": [0, -0.5, 0]}}' ;;
+        esac
+        for at in '"scale": 1' '"scale": 0.1, "translate": [0, 0.8, 0]'; do # in the open, and inside the box
+            cat >scene.json <<JSON
+{
+    "casters": [{"sdf": {"shape": "box", "half_size": [1, 0.5, 1], "translate": [0, 0.8, 0]}}, $cast],
+    $([ $kind = layer ] && echo '"layers": [{"name": "top"}],')
+    "voxel_size": 0.1,
+    "lights": [{"name": "sun", "type": "directional", "direction": [0.3, 1, 0.2], "angle_deg": 3}],
+    "ao": {"distance": 0.6},
+    "receivers": [{"mesh": "floor.obj", "output": "out.exr", "transform": {$at}}]
+}
+JSON
+            for how in "" --resume "--memory-limit 42M"; do
+                rm -f out.exr out.exr.resume
+                run --separate-stderr "$VDBSHADE" bake scene.json --size 400x256 --max-error 0.2 $how --quiet
+                if [ "$at" = '"scale": 1' ]; then
+                    [ "$status" = 0 ] || fail "$kind, $at, $how: $stderr"
+                    [ -n "$how" ] || cp out.exr whole.exr
+                    cmp whole.exr out.exr
+                else
+                    [[ $stderr == *"nothing to bake: all"*"are inside solids"* ]] || fail "$kind, $at, $how: $stderr"
+                fi
+            done
+        done
+    done
+}

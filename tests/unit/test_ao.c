@@ -307,9 +307,25 @@ static void options_out_of_range_are_named(void **state) {
     vsh_field_free(field);
 }
 
+static void no_points_need_no_normals(void **state) {
+    (void)state;
+    const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
+    vsh_field *field = field_of((truth_scene){&ball, 1}, 0.2, 0.0);
+    const double position[3] = {0.0, 2.0, 0.0};
+    for (size_t count = 0; count < 2; ++count) {
+        const vsh_points points = {count, count > 0 ? position : NULL, NULL, NULL};
+        float ao[1], bent[3];
+        const vsh_result expected = count > 0 ? VSH_ERROR_ARGUMENT : VSH_OK;
+        assert_int_equal(vsh_shade_ao(field, &points, NULL, NULL, ao, NULL, NULL, NULL), expected);
+        assert_int_equal(vsh_shade_bent(field, &points, NULL, NULL, ao, bent, NULL, NULL), expected);
+    }
+    vsh_field_free(field);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_open_plate_is_exactly_1),
+        cmocka_unit_test(no_points_need_no_normals),
         cmocka_unit_test(a_wall_hides_half_of_the_sky_from_its_foot),
         cmocka_unit_test(under_a_sphere_ao_is_near_the_truth),
         cmocka_unit_test(what_is_beyond_the_distance_hides_nothing),
