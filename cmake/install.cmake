@@ -6,7 +6,20 @@ install(TARGETS vdbshade EXPORT vdbshade-targets
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}
         INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(TARGETS vdbshade_oiio LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(TARGETS vdbshade_cli RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+
+# The program stands elsewhere, seen from the library, than in the build folder, and so is linked once more.
+cmake_path(IS_ABSOLUTE CMAKE_INSTALL_LIBDIR absolute)
+if(absolute)
+  set(VSH_LIBRARY_RPATH ${CMAKE_INSTALL_LIBDIR})
+else()
+  set(VSH_LIBRARY_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
+endif()
+add_executable(vdbshade_cli_installed $<TARGET_OBJECTS:vdbshade_cli>)
+target_link_libraries(vdbshade_cli_installed PRIVATE $<TARGET_PROPERTY:vdbshade_cli,LINK_LIBRARIES>)
+set_target_properties(vdbshade_cli_installed PROPERTIES
+                      OUTPUT_NAME vdbshade RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/installed
+                      INSTALL_RPATH "${VSH_LIBRARY_RPATH}" BUILD_WITH_INSTALL_RPATH ON LINKER_LANGUAGE C)
+install(TARGETS vdbshade_cli_installed RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(DIRECTORY include/vdbshade DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 
 set(VSH_PACKAGE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/vdbshade)

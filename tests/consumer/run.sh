@@ -18,6 +18,7 @@ mv "$work/first" "$work/moved here" # nothing may remember where it was installe
 prefix="$work/moved here"
 library=$(dirname "$(find "$prefix" -name libvdbshade.so)")
 "$prefix/bin/vdbshade" --version
+"$here/../runpath.sh" "$prefix"
 
 say "every header alone, as C and as C++"
 for header in "$prefix"/include/vdbshade/*.h; do
