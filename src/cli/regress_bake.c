@@ -30,11 +30,17 @@ int regress_bake(const regress_work *work, const regress_case *one) {
          quiet[] = "--quiet";
     char limit[] = "--memory-limit", pool[] = "--threads", trusted[] = "--trusted";
     snprintf(name, sizeof name, "%s", one->command->name);
+    /* a scene "--stats=x.json" is a file in the folder, and no option */
+    char *scene = one->scene[0] == '-' ? regress_path(".", one->scene) : strdup(one->scene);
+    if (scene == NULL) {
+        free(output);
+        return cli_out_of_memory(work->folder);
+    }
     char *words[MOST_WORDS];
     size_t count = 0;
     words[count++] = program;
     words[count++] = name;
-    words[count++] = one->scene;
+    words[count++] = scene;
     for (size_t i = 0; i < one->options.count; ++i) {
         words[count++] = one->options.line[i];
     }
@@ -53,6 +59,7 @@ int regress_bake(const regress_work *work, const regress_case *one) {
     words[count] = NULL;
     /* in the folder of the scenes, which the files in options are relative to */
     const int code = cli_in_child(one->scene, work->folder, words);
+    free(scene);
     free(output);
     return code;
 }
