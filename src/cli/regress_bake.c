@@ -2,6 +2,7 @@
 #include "child.h"
 #include "commands.h"
 #include "message.h"
+#include "paths.h"
 #include "regress.h"
 #include "temporary.h"
 
@@ -98,7 +99,8 @@ int regress_update(const regress_work *work, const char *output) {
         return CLI_FILE;
     }
     char *from = regress_path(work->bakes, output), *to = regress_path(work->golden, output);
-    const int code = from != NULL && to != NULL ? copy(from, to) : cli_out_of_memory(output);
+    int code = from != NULL && to != NULL ? cli_check_links(work->golden, to) : cli_out_of_memory(output);
+    code = code == CLI_OK ? copy(from, to) : code;
     free(from);
     free(to);
     return code;
