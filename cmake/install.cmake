@@ -20,6 +20,7 @@ set_target_properties(vdbshade_cli_installed PROPERTIES
                       OUTPUT_NAME vdbshade RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/installed
                       INSTALL_RPATH "${VSH_LIBRARY_RPATH}" BUILD_WITH_INSTALL_RPATH ON LINKER_LANGUAGE C)
 install(TARGETS vdbshade_cli_installed RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS vdbshade_reader RUNTIME DESTINATION ${VSH_READER_DIR})
 install(DIRECTORY include/vdbshade DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 
 set(VSH_PACKAGE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/vdbshade)

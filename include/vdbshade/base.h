@@ -115,15 +115,20 @@ typedef struct vsh_run {
     void *user;                /* handed to both */
     int32_t isa; /* VSH_ISA_…, to test one; VSH_ERROR_ARGUMENT where this machine lacks it. No result depends
                     on it */
-    const char *reader; /* program that parses files, found as by execvp(); its main calls vsh_reader_serve()
-                           (reader.h), as vdbshade's own does. NULL: files are parsed in this process, where a
-                           damaged one can crash it. No result depends on it */
+    const char
+        *reader; /* program that parses files: VSH_READER (reader.h), which comes with this library, or
+                    another whose main calls vsh_reader_serve(), found as by execvp(). NULL: files are
+                    parsed in this process, where a damaged one can crash it. No result depends on it */
     double reader_seconds; /* that the reader may take for one file, by the clock, > 0; else VSH_ERROR_LIMIT.
                               0: 60, and one more for each MB of the file */
+    int32_t confined; /* 1: where the system refuses one of the reader's confinements (reader.h) nothing is
+                         read: VSH_ERROR_UNSUPPORTED; needs a reader, else VSH_ERROR_ARGUMENT. 0: a warning */
+    int32_t allow_outside; /* 1: what a model names (buffers, materials) may lie outside its folder. 0: such a
+                              file is not opened: VSH_ERROR_INPUT */
 } vsh_run;
 
 static inline vsh_run vsh_run_default(void) {
-    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST, NULL, 0.0};
+    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST, NULL, 0.0, 0, 0};
     return run;
 }
 

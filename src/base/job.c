@@ -104,6 +104,9 @@ vsh_result vshi_run_resolve(const vsh_run *run, vsh_run *full, vsh_error *error)
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "reader_seconds %g: expected more than 0, at most 1e9, or 0", full->reader_seconds);
     }
+    if (full->confined != 0 && full->reader == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "confined: needs a reader; vsh_run.reader is NULL");
+    }
     return vshi_isa_check(full->isa, error);
 }
 

@@ -286,7 +286,7 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
     code = code == CLI_OK ? bake_receivers(&work) : code;
     if (code == CLI_OK) {
         cli_stats_warn(&work.stats, scene, &work.run);
-        code = cli_stats_finish(&work.stats, settings->stats);
+        code = cli_stats_finish(&work.stats, &work.run, settings->stats);
     }
     if (code == CLI_OK) {
         cli_warnings_tell();

@@ -2,12 +2,12 @@
 #include "message.h"
 #include "options.h"
 #include "progress.h"
-#include "self.h"
 #include "warnings.h"
 
 #include <stdio.h>
 #include <sys/resource.h>
 #include <unistd.h>
+#include <vdbshade/reader.h>
 
 /* The machine's memory, or where they are less the control group's (a container) and what the process may
  * address (ulimit -v). 0: not known. */
@@ -36,7 +36,7 @@ static uint64_t machine_memory(void) {
 }
 
 cli_common cli_common_default(void) {
-    return (cli_common){0, machine_memory() / 4 * 3, false, false, VSH_ISA_BEST, false, false};
+    return (cli_common){0, machine_memory() / 4 * 3, false, false, false, VSH_ISA_BEST, false, false, false};
 }
 
 vsh_run cli_common_run(const cli_common *common) {
@@ -44,11 +44,20 @@ vsh_run cli_common_run(const cli_common *common) {
     run.threads = common->threads;
     run.memory_limit = common->memory_limit;
     run.isa = common->isa;
-    run.reader = common->trusted ? NULL : cli_reader();
+    run.reader = common->trusted ? NULL : VSH_READER;
+    run.confined = common->confined;
+    run.allow_outside = common->allow_outside;
     run.progress = cli_progress_report;
     run.warning = cli_warnings_take;
     cli_warnings_begin(common->verbose, common->quiet);
     return run;
+}
+
+static int check_reader(const cli_common *common) {
+    if (common->trusted && common->confined) {
+        return cli_usage("--trusted and --confined: give one of the two");
+    }
+    return CLI_OK;
 }
 
 int cli_common_take(cli_common *common, int key, const char *name, const char *value, bool *taken) {
@@ -62,6 +71,12 @@ int cli_common_take(cli_common *common, int key, const char *name, const char *v
         return cli_take_name(name, value, vsh_isa, vsh_isa_name, &common->isa);
     case CLI_KEY_TRUSTED:
         common->trusted = true;
+        return check_reader(common);
+    case CLI_KEY_CONFINED:
+        common->confined = true;
+        return check_reader(common);
+    case CLI_KEY_ALLOW_OUTSIDE:
+        common->allow_outside = true;
         return CLI_OK;
     case CLI_KEY_QUIET:
         common->quiet = true;

@@ -205,7 +205,6 @@ static int check_output(const flat_settings *s, const vsh_flat_scene *scene, con
 static int check_files(const flat_settings *s, const vsh_flat_scene *scene, const vsh_image *image,
                        const vsh_image_options *options_of_image) {
     int code = check_output(s, scene, scene->output);
-    code = code == CLI_OK && s->output == NULL ? cli_check_links(s->input, scene->output) : code;
     if (code == CLI_OK && s->stats != NULL) {
         code = cli_same_file(scene->output, s->stats)
                    ? cli_usage("%s: both the output and the --stats file", s->stats)
@@ -260,17 +259,16 @@ static int write_map(const flat_settings *s, const vsh_flat_scene *scene, const 
 }
 
 static int bake(const flat_settings *s, const vsh_flat_scene *scene, const flat_planes *planes,
-                const vsh_image_options *image, cli_stats *stats) {
-    const vsh_run run = cli_common_run(&s->common);
+                const vsh_image_options *image, const vsh_run *run, cli_stats *stats) {
     vsh_outline *casters = NULL;
     vsh_error error;
     double now = cli_seconds();
-    vsh_result result = vsh_flat_scene_casters(scene, &run, &casters, &error);
+    vsh_result result = vsh_flat_scene_casters(scene, run, &casters, &error);
     now = cli_stats_stage(stats, CLI_STAGE_LOAD, now);
     if (result == VSH_OK) {
         const vsh_flat_map map = {planes->planes + 3, planes->planes, planes->planes[planes->count - 1]};
         result =
-            vsh_flat_bake(casters, scene->lights, scene->light_count, &scene->options, &run, &map, &error);
+            vsh_flat_bake(casters, scene->lights, scene->light_count, &scene->options, run, &map, &error);
         now = cli_stats_stage(stats, CLI_STAGE_BAKE, now);
     }
     vsh_outline_free(casters);
@@ -279,7 +277,7 @@ static int bake(const flat_settings *s, const vsh_flat_scene *scene, const flat_
         error = (vsh_error){VSH_ERROR_CANCELLED, "write: cancelled"};
     }
     int code = result == VSH_OK ? CLI_OK : cli_fail(&error);
-    code = code == CLI_OK ? write_map(s, scene, planes, image, &run) : code;
+    code = code == CLI_OK ? write_map(s, scene, planes, image, run) : code;
     cli_stats_stage(stats, CLI_STAGE_WRITE, now);
     return code;
 }
@@ -300,6 +298,7 @@ static int run_flat(const flat_settings *s, const vsh_flat_scene *scene) {
     image.pack = scene->pack;
     image.color_space = scene->color_space;
     flat_planes planes = {.count = 0};
+    const vsh_run run = cli_common_run(&s->common);
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, s->common.threads);
     stats.texels = (uint64_t)scene->options.width * (uint64_t)scene->options.height;
     int code = name_planes(scene, &planes);
@@ -307,9 +306,9 @@ static int run_flat(const flat_settings *s, const vsh_flat_scene *scene) {
     code = code == CLI_OK ? allocate_planes(s, scene, &image, &planes) : code;
     if (code == CLI_OK) {
         cli_signals_watch();
-        code = bake(s, scene, &planes, &image, &stats);
+        code = bake(s, scene, &planes, &image, &run, &stats);
     }
-    code = code == CLI_OK ? cli_stats_finish(&stats, s->stats) : code;
+    code = code == CLI_OK ? cli_stats_finish(&stats, &run, s->stats) : code;
     if (code == CLI_OK) {
         say_summary(s, scene, &stats);
     }

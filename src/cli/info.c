@@ -14,7 +14,7 @@ static const cli_option options[] = {
     {KEY_SIZE, "size", "W[xH]", "texels of the lightmap that UVs are looked at in (1024)"},
     {CLI_KEY_VERBOSE, "verbose", NULL, "a paragraph for each mesh, however many there are"},
     CLI_UNIT_OPTION,
-    CLI_TRUSTED_OPTION,
+    CLI_READER_OPTIONS,
     {'h', "help", NULL, "show this help"},
 };
 

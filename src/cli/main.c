@@ -81,7 +81,7 @@ int main(int argc, char **argv) {
     if (served >= 0) {
         _exit(served); /* what it holds goes with it */
     }
-    cli_reader_begin(argv[0]);
+    cli_self_close();
     cli_signals_begin();
     int code = dispatch(argc, argv);
     cli_warnings_tell();

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_OPTIONS = 64, HELP_COLUMN = 30 };
+enum { MAX_OPTIONS = 96, HELP_COLUMN = 30 };
 
 static int least(int a, int b) {
     return a < b ? a : b;
@@ -158,8 +158,9 @@ static const char *without_folder(const char *path) {
 
 static void append_option(const cli_option *option, const char *value) {
     static const char *const changes_nothing[] = {
-        "output",  "output-folder", "stats", "threads",   "memory-limit", "isa",    "trusted", "quiet",
-        "verbose", "progress",      "json",  "band-rows", "dry-run",      "resume", "help"};
+        "output",  "output-folder", "stats",         "threads", "memory-limit", "isa",
+        "trusted", "confined",      "allow-outside", "quiet",   "verbose",      "progress",
+        "json",    "band-rows",     "dry-run",       "resume",  "help"};
     for (size_t i = 0; i < sizeof changes_nothing / sizeof changes_nothing[0]; ++i) {
         if (strcmp(option->name, changes_nothing[i]) == 0) {
             return;

@@ -69,8 +69,10 @@ typedef struct cli_common {
     bool quiet;
     bool verbose; /* every warning by itself */
     bool progress;
-    int32_t isa;  /* of commands that shade */
-    bool trusted; /* files are parsed in this process */
+    int32_t isa;        /* of commands that shade */
+    bool trusted;       /* files are parsed in this process */
+    bool confined;      /* … or in one that is confined wholly, or not at all */
+    bool allow_outside; /* what models name may lie outside their folder */
 } cli_common;
 
 cli_common cli_common_default(void);
@@ -84,6 +86,8 @@ enum {
     CLI_KEY_PROGRESS,
     CLI_KEY_ISA,
     CLI_KEY_TRUSTED,
+    CLI_KEY_CONFINED,
+    CLI_KEY_ALLOW_OUTSIDE,
     CLI_KEY_RESOLUTION,
     CLI_KEY_VOXEL_SIZE,
     CLI_KEY_HALF_WIDTH,
@@ -95,11 +99,16 @@ enum {
     CLI_KEY_CAST_BLENDED
 };
 
-#define CLI_TRUSTED_OPTION                                                                                   \
+#define CLI_READER_OPTIONS                                                                                   \
+    {CLI_KEY_TRUSTED, "trusted", NULL,                                                                       \
+     "parse files in this process, not in a confined one: a\nlittle faster, and a damaged file may crash "   \
+     "it"},                                                                                                  \
+        {CLI_KEY_CONFINED, "confined", NULL,                                                                 \
+         "read nothing where this system cannot confine the\nprocess that parses wholly; else that is a "    \
+         "warning"},                                                                                         \
     {                                                                                                        \
-        CLI_KEY_TRUSTED, "trusted", NULL,                                                                    \
-            "parse files in this process, not in a confined one: a\nlittle faster, and a damaged file may "  \
-            "crash it"                                                                                       \
+        CLI_KEY_ALLOW_OUTSIDE, "allow-outside", NULL,                                                        \
+            "models may name files (buffers, materials) outside\ntheir folder"                               \
     }
 
 #define CLI_COMMON_OPTIONS                                                                                   \
@@ -108,7 +117,7 @@ enum {
          "threads, 1 to 1024 (all cores); the result is\nthe same for any number"},                          \
         {CLI_KEY_MEMORY_LIMIT, "memory-limit", "BYTES",                                                      \
          "memory that a step may take; with k, M, G or KiB,\nMiB, GiB; 0: no limit (3/4 of the machine's)"}, \
-        CLI_TRUSTED_OPTION,                                                                                  \
+        CLI_READER_OPTIONS,                                                                                  \
         {CLI_KEY_PROGRESS, "progress", NULL, "show progress even where it is no terminal"},                  \
         {CLI_KEY_VERBOSE, "verbose", NULL, "every warning, and not one line for all of a kind"},             \
         {CLI_KEY_QUIET, "quiet", NULL, "say nothing but errors"}, {                                          \

@@ -279,7 +279,7 @@ static int run_query(const query_settings *s, vsh_scene *scene) {
             work.made.info.bytes + (work.triangles != NULL ? vsh_triangles_bytes(work.triangles) : 0);
         code = query_stream(s, work.query, &work.answers, held, &work.run, &work.reader, &work.stats);
     }
-    code = code == CLI_OK ? cli_stats_finish(&work.stats, s->bake.stats) : code;
+    code = code == CLI_OK ? cli_stats_finish(&work.stats, &work.run, s->bake.stats) : code;
     if (code == CLI_OK) {
         say_results(&work);
     }

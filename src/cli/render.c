@@ -189,7 +189,7 @@ static int run_render(const render_settings *s, vsh_scene *scene) {
     code = code == CLI_OK ? set_options(&work) : code;
     code = code == CLI_OK ? find_origin(&work) : code;
     code = code == CLI_OK ? render_frames(&work) : code;
-    code = code == CLI_OK ? cli_stats_finish(&work.stats, s->bake.stats) : code;
+    code = code == CLI_OK ? cli_stats_finish(&work.stats, &work.run, s->bake.stats) : code;
     if (code == CLI_OK) {
         say_results(&work);
     }

@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <sys/resource.h>
 #include <unistd.h>
+#include <vdbshade/reader.h>
 
 static const char *const stage_names[CLI_STAGE_COUNT] = {"load", "voxelize", "field", "bake", "write"};
 
@@ -189,7 +190,28 @@ static void add_errors(const cli_stats *stats, json_t *root) {
 }
 
 /* The JSON file. */
-static int write_file(const cli_stats *stats, const char *path) {
+/* How a reader is confined here; null where files were read without one (--trusted). */
+static json_t *confinement(const vsh_run *run) {
+    static const struct {
+        const char *name;
+        uint32_t bit;
+    } parts[] = {
+        {"limits", VSH_CONFINED_LIMITS}, {"calls", VSH_CONFINED_CALLS}, {"files", VSH_CONFINED_FILES}};
+    vsh_run quiet = *run;
+    quiet.progress = NULL;
+    uint32_t confined = 0;
+    vsh_error error;
+    if (run->reader == NULL || vsh_reader_confinement(&quiet, &confined, &error) != VSH_OK) {
+        return json_null();
+    }
+    json_t *of = json_object();
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
+        json_object_set_new(of, parts[i].name, json_boolean((confined & parts[i].bit) != 0));
+    }
+    return of;
+}
+
+static int write_file(const cli_stats *stats, const vsh_run *run, const char *path) {
     json_t *stages = json_object();
     for (int i = 0; i < CLI_STAGE_COUNT; ++i) {
         json_object_set_new(stages, stage_names[i], json_real(stats->seconds[i]));
@@ -236,6 +258,7 @@ static int write_file(const cli_stats *stats, const char *path) {
         json_object_set_new(root, "resumed_rows", json_integer((json_int_t)stats->resumed_rows));
     }
     add_errors(stats, root);
+    json_object_set_new(root, "confined", confinement(run));
     json_object_set_new(root, "field_bytes_per_voxel", json_real(bytes_per_voxel(stats)));
     json_object_set_new(root, "voxel_size", json_real(stats->grid.voxel_size));
     char *text = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
@@ -255,11 +278,11 @@ cli_stats cli_stats_begin(int32_t of, int32_t threads) {
         .of = of, .shade = vsh_shade_stats_zero(), .threads = threads > 0 ? threads : (int32_t)cores};
 }
 
-int cli_stats_finish(const cli_stats *stats, const char *path) {
+int cli_stats_finish(const cli_stats *stats, const vsh_run *run, const char *path) {
     int code = CLI_OK;
     if (path != NULL) {
         cli_signals_writing(path);
-        code = write_file(stats, path);
+        code = write_file(stats, run, path);
         cli_signals_writing(NULL);
     }
     if (code == CLI_OK) {

@@ -69,7 +69,7 @@ void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene, const vsh_ru
 
 /* The end of a run that went well: writes the JSON file where `path` is not NULL; signals then end nothing
  * any more. CLI_OK or an exit code, having said why. */
-int cli_stats_finish(const cli_stats *stats, const char *path);
+int cli_stats_finish(const cli_stats *stats, const vsh_run *run, const char *path);
 
 /* Some lines on standard error. */
 void cli_stats_say(const cli_stats *stats);

@@ -314,7 +314,7 @@ static int run_volume(const volume_settings *s, vsh_scene *scene) {
     if (code == CLI_OK) {
         count_voxels(&work, &info);
     }
-    code = code == CLI_OK ? cli_stats_finish(&work.stats, s->bake.stats) : code;
+    code = code == CLI_OK ? cli_stats_finish(&work.stats, &work.run, s->bake.stats) : code;
     if (code == CLI_OK) {
         say_results(&work, &info);
     }

@@ -3,6 +3,8 @@
 
 #include "base/memory.h"
 #include "read/reader.h"
+#include "read/request.h"
+#include "read/spawn.h"
 
 #include <vdbshade/reader.h>
 
@@ -11,7 +13,6 @@
 #include <math.h>
 #include <poll.h>
 #include <signal.h>
-#include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,8 +21,6 @@
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
-
-extern char **environ;
 
 enum {
     POLL_MS = 20,
@@ -61,8 +60,9 @@ static vsh_result fail_start(const vshi_ask *ask, int reason, vsh_error *error) 
     const char *why = strerrordesc_np(reason);
     const bool missing = reason == ENOENT || reason == EACCES || reason == ENOEXEC || reason == ENOTDIR;
     return vshi_fail(error, missing ? VSH_ERROR_ARGUMENT : VSH_ERROR_MEMORY,
-                     "%s: no process to read it in: '%s': %s", ask->path, ask->run->reader,
-                     why != NULL ? why : "?");
+                     "%s: no process to read it in: '%s': %s; a file that is trusted can be read without "
+                     "(--trusted; no vsh_run.reader)",
+                     ask->path, ask->run->reader, why != NULL ? why : "?");
 }
 
 /* Moves a descriptor up, and keeps it from other programs that the host may start meanwhile. */
@@ -92,60 +92,14 @@ vsh_result vshi_ask_begin(vshi_ask *ask, int32_t kind, const char *path, const v
     vshi_put_count(&ask->put, (uint64_t)getpid());
     vshi_put_count(&ask->put, run->memory_limit);
     vshi_put_number(&ask->put, seconds_for(path, run));
+    vshi_put_count(&ask->put, run->confined != 0);
+    vshi_put_count(&ask->put, run->allow_outside != 0);
     vshi_put_text(&ask->put, path);
+    vshi_put_folders(&ask->put);
     return VSH_OK;
 }
 
 /* --- starting */
-
-/* Nothing but posix_spawn(): between fork and exec none of our code runs, as it must not in a process that
- * may have threads. The reader leaves our process group, so that an interrupt on the terminal reaches it
- * through us. */
-static int spawn(const vshi_ask *ask, int answer, int progress, pid_t *pid) {
-    posix_spawn_file_actions_t files;
-    posix_spawnattr_t attributes;
-    int reason = posix_spawn_file_actions_init(&files);
-    if (reason != 0) {
-        return reason;
-    }
-    reason = posix_spawnattr_init(&attributes);
-    if (reason != 0) {
-        posix_spawn_file_actions_destroy(&files);
-        return reason;
-    }
-    sigset_t none, all;
-    sigemptyset(&none);
-    sigfillset(&all);
-    posix_spawnattr_setsigmask(&attributes, &none);
-    posix_spawnattr_setsigdefault(&attributes, &all);
-    posix_spawnattr_setpgroup(&attributes, 0);
-    posix_spawnattr_setflags(&attributes,
-                             POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
-    const struct {
-        int from, to;
-    } given[] = {
-        {answer, VSHI_READER_ANSWER}, {ask->put.file, VSHI_READER_REQUEST}, {progress, VSHI_READER_PROGRESS}};
-    reason = posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    reason = reason != 0 ? reason
-                         : posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-    if (reason == 0 && !VSHI_SANITIZED) { /* whose reports go there */
-        reason = posix_spawn_file_actions_addopen(&files, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-    }
-    for (size_t i = 0; reason == 0 && i < sizeof given / sizeof given[0]; ++i) {
-        reason = posix_spawn_file_actions_adddup2(&files, given[i].from, given[i].to);
-    }
-    if (reason == 0) {
-        reason = posix_spawn_file_actions_addclosefrom_np(&files, VSHI_READER_PROGRESS + 1);
-    }
-    if (reason == 0) {
-        char name[] = "vdbshade-reader", argument[] = VSH_READER_ARGUMENT;
-        char *const arguments[] = {name, argument, NULL};
-        reason = posix_spawnp(pid, ask->run->reader, &files, &attributes, arguments, environ);
-    }
-    posix_spawnattr_destroy(&attributes);
-    posix_spawn_file_actions_destroy(&files);
-    return reason;
-}
 
 static vsh_result start(const vshi_ask *ask, reader_process *process, vsh_error *error) {
     int ends[2] = {-1, -1};
@@ -155,7 +109,7 @@ static vsh_result start(const vshi_ask *ask, reader_process *process, vsh_error 
     process->progress = ends[0];
     if (reason == 0) {
         ends[1] = lift(ends[1]);
-        reason = ends[1] < 0 ? errno : spawn(ask, process->answer, ends[1], &process->pid);
+        reason = ends[1] < 0 ? errno : vshi_spawn_reader(ask, process->answer, ends[1], &process->pid);
     }
     if (ends[1] >= 0) {
         close(ends[1]);
@@ -266,6 +220,11 @@ static vsh_result fail_end(const vshi_ask *ask, int status, bool begun, vsh_erro
         return vshi_fail(error, VSH_ERROR_INTERNAL,
                          "%s: not read: a thread of its reader is not confined as the others are", ask->path);
     }
+    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_EMPTY) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "%s: its reader, '%s', cannot load the library of vdbshade %s", ask->path,
+                         ask->run->reader, vsh_version());
+    }
     if (!begun) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: '%s' is no reader of vdbshade %s", ask->path,
                          ask->run->reader, vsh_version());
@@ -308,6 +267,16 @@ static void pass_warnings(const vshi_ask *ask, vshi_take warnings, uint64_t coun
     }
 }
 
+/* Said with every file: whoever gets the warnings folds those that are alike. */
+static void warn_of_missing(const vshi_ask *ask, uint64_t confined) {
+    char missing[VSHI_MISSING_TEXT];
+    if ((confined & VSH_CONFINED_ALL) != VSH_CONFINED_ALL && !VSHI_SANITIZED) {
+        vshi_warn(ask->run,
+                  "the process that files are read in is confined in part only: this system refuses it %s",
+                  vshi_missing_text(confined, missing));
+    }
+}
+
 static vsh_result take_head(const vshi_ask *ask, int status, vshi_answer *answer, vsh_error *error) {
     vshi_answer_head head = {0};
     if (answer->map != NULL) {
@@ -330,6 +299,10 @@ static vsh_result take_head(const vshi_ask *ask, int status, vshi_answer *answer
     }
     const unsigned char *start = (const unsigned char *)answer->map + sizeof head;
     const unsigned char *end = start + head.payload;
+    answer->confined = (uint32_t)(head.confined & VSH_CONFINED_ALL);
+    if (head.code != VSH_ERROR_UNSUPPORTED || ask->run->confined == 0) {
+        warn_of_missing(ask, head.confined);
+    }
     pass_warnings(ask, (vshi_take){end, start + room, false}, head.warnings);
     if (head.code != VSH_OK) {
         return vshi_fail(error, head.code, "%s", head.message);
@@ -340,7 +313,7 @@ static vsh_result take_head(const vshi_ask *ask, int status, vshi_answer *answer
 
 vsh_result vshi_ask_send(vshi_ask *ask, vshi_poll_fn *poll_user, void *user, vshi_answer *answer,
                          vsh_error *error) {
-    *answer = (vshi_answer){NULL, 0, {NULL, NULL, true}};
+    *answer = (vshi_answer){NULL, 0, 0, {NULL, NULL, true}};
     reader_process process = {-1, -1, -1, 0.0};
     int status = 0;
     vsh_result result = VSH_OK;
@@ -394,5 +367,37 @@ void vshi_answer_free(vshi_answer *answer) {
     if (answer->map != NULL) {
         munmap(answer->map, answer->size);
     }
-    *answer = (vshi_answer){NULL, 0, {NULL, NULL, true}};
+    *answer = (vshi_answer){NULL, 0, 0, {NULL, NULL, true}};
+}
+
+static bool poll_nothing(void *user, double fraction) {
+    (void)fraction;
+    const vsh_run *run = user;
+    return run->progress != NULL && run->progress(run->user, "load", 0.0) != 0;
+}
+
+vsh_result vsh_reader_confinement(const vsh_run *run, uint32_t *confined, vsh_error *error) {
+    VSHI_NEEDS(confined);
+    *confined = 0;
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result == VSH_OK && full.reader == NULL) {
+        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_reader_confinement: vsh_run.reader is NULL");
+    }
+    vshi_ask *ask = NULL;
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&ask, 1, sizeof *ask, "reader", error);
+    }
+    vshi_answer answer;
+    if (result == VSH_OK) {
+        full.warning = NULL; /* what is missing is the result */
+        result = vshi_ask_begin(ask, VSHI_READ_CONFINEMENT, "reader", &full, error);
+        result = result == VSH_OK ? vshi_ask_send(ask, poll_nothing, &full, &answer, error) : result;
+    }
+    if (result == VSH_OK) {
+        *confined = answer.confined;
+        vshi_answer_free(&answer);
+    }
+    free(ask);
+    return result;
 }

@@ -19,35 +19,36 @@ static const uint64_t address_space_slack = (uint64_t)2 << 30;
 
 enum { MOST_FILES = 64 };
 
-static void limit(int what, rlim_t most) {
+static bool limit(int what, rlim_t most) {
     struct rlimit now;
     if (getrlimit((__rlimit_resource_t)what, &now) == 0 && most > now.rlim_max) {
         most = now.rlim_max;
     }
     /* who passes both limits of time at once is killed, and does not say of what */
     const struct rlimit limits = {most, what == RLIMIT_CPU && most < now.rlim_max ? most + 1 : most};
-    setrlimit((__rlimit_resource_t)what, &limits);
+    return setrlimit((__rlimit_resource_t)what, &limits) == 0;
 }
 
-void vshi_confine_resources(uint64_t memory, double seconds) {
+bool vshi_confine_resources(uint64_t memory, double seconds) {
     if (memory == 0) {
         memory = (uint64_t)sysconf(_SC_PHYS_PAGES) * (uint64_t)sysconf(_SC_PAGE_SIZE);
     }
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-    prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+    bool all = prctl(PR_SET_PDEATHSIG, SIGKILL) == 0;
+    all = prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && all;
     if (!VSHI_SANITIZED) { /* whose runtime reads /proc/self */
-        prctl(PR_SET_DUMPABLE, 0, 0, 0, 0);
+        all = prctl(PR_SET_DUMPABLE, 0, 0, 0, 0) == 0 && all;
     }
-    limit(RLIMIT_CORE, 0);
-    limit(RLIMIT_CPU, (rlim_t)ceil(seconds) + 1);
-    limit(RLIMIT_NOFILE, MOST_FILES);
+    all = limit(RLIMIT_CORE, 0) && all;
+    all = limit(RLIMIT_CPU, (rlim_t)ceil(seconds) + 1) && all;
+    all = limit(RLIMIT_NOFILE, MOST_FILES) && all;
     if (memory < UINT64_MAX - address_space_slack) {
-        limit(RLIMIT_FSIZE, (rlim_t)memory + (1 << 20));
+        all = limit(RLIMIT_FSIZE, (rlim_t)memory + (1 << 20)) && all;
         if (!VSHI_SANITIZED) {
-            limit(RLIMIT_AS, (rlim_t)(memory + address_space_slack));
+            all = limit(RLIMIT_AS, (rlim_t)(memory + address_space_slack)) && all;
         }
     }
     signal(SIGXFSZ, SIG_IGN); /* the write fails instead */
+    return all && !VSHI_SANITIZED;
 }
 
 /* Calls that parsing needs, whatever their arguments. */

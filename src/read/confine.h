@@ -11,8 +11,8 @@ extern "C" {
 
 /* Limits this process for good: `memory` bytes (0: as much as the machine has) and 2 GiB of address space,
  * `seconds` of processor time, no core dump, no file larger than what may be handed over, no new privileges,
- * death with its parent. */
-void vshi_confine_resources(uint64_t memory, double seconds);
+ * death with its parent. False where the host allows not all of it, or in a sanitized build. */
+bool vshi_confine_resources(uint64_t memory, double seconds);
 
 /* What became of a filter of system calls. */
 enum {

@@ -18,7 +18,8 @@ enum {
     VSHI_READ_IMAGE = 4,
     VSHI_READ_TEXT = 5,
     VSHI_READ_COPY = 6,
-    VSHI_READ_KINDS = 7
+    VSHI_READ_CONFINEMENT = 7, /* how its reader is confined; the path is of no matter */
+    VSHI_READ_KINDS = 8
 };
 
 /* --- the caller */
@@ -34,6 +35,7 @@ typedef struct vshi_ask {
 typedef struct vshi_answer {
     void *map;
     size_t size;
+    uint32_t confined; /* VSH_CONFINED_… of the reader */
     vshi_take payload;
 } vshi_answer;
 
@@ -74,18 +76,25 @@ vshi_serve_fn vshi_serve_grid, vshi_serve_list, vshi_serve_voxels, vshi_serve_mo
 /* The descriptors of a reader, behind the standard ones. */
 enum { VSHI_READER_ANSWER = 3, VSHI_READER_REQUEST = 4, VSHI_READER_PROGRESS = 5 };
 
+/* Begins the word by which vdbshade-reader tells the library how it is confined already; a sum of
+ * VSH_CONFINED_… and this follows. */
+#define VSHI_READER_HELD "held="
+enum { VSHI_HELD_CRAMPED = 256 };
+
 /* A reader's exit codes. */
 enum {
     VSHI_READER_HUNGRY = 86,  /* memory was refused */
     VSHI_READER_CRAMPED = 87, /* the caller's limit on the size of files does not let the answer through */
-    VSHI_READER_LOOSE = 88    /* some thread of it is not confined: it read nothing */
+    VSHI_READER_LOOSE = 88,   /* some thread of it is not confined: it read nothing */
+    VSHI_READER_CANNOT = 89,  /* it could not begin */
+    VSHI_READER_EMPTY = 90    /* it could not load the library */
 };
 
 #define VSHI_REQUEST_MAGIC UINT64_C(0x6b7361687376)
 #define VSHI_ANSWER_MAGIC UINT64_C(0x726577736e61)
 
 /* Of the messages' form; goes up with every change of one. */
-enum { VSHI_READER_PROTOCOL = 2 };
+enum { VSHI_READER_PROTOCOL = 3 };
 
 /* An answer begins with this. It is written twice: with code VSHI_ANSWER_BEGUN before anything is parsed,
  * and at the end. */
@@ -95,6 +104,7 @@ typedef struct vshi_answer_head {
     int32_t code;      /* a vsh_result */
     uint64_t payload;  /* bytes, behind the head */
     uint64_t warnings; /* how many texts follow the payload */
+    uint64_t confined; /* VSH_CONFINED_… of what held before it began */
     char message[1024];
 } vshi_answer_head;
 

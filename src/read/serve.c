@@ -1,24 +1,18 @@
 /* The reader's side: takes the request, limits itself, parses, answers. */
 #include "read/confine.h"
 #include "read/reader.h"
+#include "read/request.h"
 
 #include <vdbshade/reader.h>
 
 #include <errno.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/mman.h>
-#include <sys/resource.h>
-#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
 
-enum {
-    CANNOT_SERVE = 87,
-    MOST_WARNINGS = 1 << 20 /* bytes of all that are passed on */
-};
+enum { MOST_WARNINGS = 1 << 20 /* bytes of all that are passed on */ };
 
 /* Between two reports of progress, seconds. */
 static const double report_interval = 0.01;
@@ -34,6 +28,7 @@ typedef struct serving {
     char *warnings; /* texts, one behind the other with their ends */
     size_t used, count;
     double reported;
+    uint64_t confined;
     bool limited; /* the size of files, by the caller's own limit */
 } serving;
 
@@ -64,19 +59,6 @@ static int32_t report(void *user, const char *stage, double fraction) {
     return 0;
 }
 
-static bool map_request(vshi_take *take) {
-    struct stat status;
-    if (fstat(VSHI_READER_REQUEST, &status) != 0 || status.st_size <= 0) {
-        return false;
-    }
-    const void *map = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_PRIVATE, VSHI_READER_REQUEST, 0);
-    if (map == MAP_FAILED) {
-        return false;
-    }
-    *take = (vshi_take){map, (const unsigned char *)map + status.st_size, false};
-    return true;
-}
-
 static bool write_head(const vshi_answer_head *head) {
     return pwrite(VSHI_READER_ANSWER, head, sizeof *head, 0) == (ssize_t)sizeof *head;
 }
@@ -90,10 +72,12 @@ static int exit_code_of_write(const serving *s) {
 static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_take *request,
                   const vsh_run *run) {
     static vshi_put put;
-    vshi_answer_head head = {
-        .magic = VSHI_ANSWER_MAGIC, .protocol = VSHI_READER_PROTOCOL, .code = VSHI_ANSWER_BEGUN};
+    vshi_answer_head head = {.magic = VSHI_ANSWER_MAGIC,
+                             .protocol = VSHI_READER_PROTOCOL,
+                             .code = VSHI_ANSWER_BEGUN,
+                             .confined = s->confined};
     if (!write_head(&head)) {
-        return s->limited ? VSHI_READER_CRAMPED : CANNOT_SERVE;
+        return s->limited ? VSHI_READER_CRAMPED : VSHI_READER_CANNOT;
     }
     vsh_error error = {VSH_OK, ""};
     vshi_put_begin(&put, VSHI_READER_ANSWER, sizeof head);
@@ -110,41 +94,34 @@ static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_take 
     head.code = result;
     head.warnings = s->count;
     snprintf(head.message, sizeof head.message, "%s", error.message);
-    return write_head(&head) ? 0 : CANNOT_SERVE;
+    return write_head(&head) ? 0 : VSHI_READER_CANNOT;
 }
 
 int32_t vsh_reader_serve(int argc, char **argv) {
-    vshi_take request;
+    vshi_request request;
     if (argc < 2 || strcmp(argv[1], VSH_READER_ARGUMENT) != 0) {
         return -1;
     }
-    if (!map_request(&request) || vshi_take_count(&request, UINT64_MAX) != VSHI_REQUEST_MAGIC ||
-        vshi_take_count(&request, UINT64_MAX) != VSHI_READER_PROTOCOL) {
-        return CANNOT_SERVE;
-    }
-    const uint64_t kind = vshi_take_count(&request, VSHI_READ_KINDS - 1);
-    const uint64_t parent = vshi_take_count(&request, INT32_MAX);
-    vsh_run run = vsh_run_default();
-    run.memory_limit = vshi_take_count(&request, UINT64_MAX);
-    const double seconds = vshi_take_number(&request);
-    const char *path = vshi_take_text(&request, false);
     serving s = {.warnings = malloc(MOST_WARNINGS)};
-    if (request.bad || path == NULL || s.warnings == NULL) {
-        return CANNOT_SERVE;
+    if (!vshi_request_read(&request) || s.warnings == NULL) {
+        return VSHI_READER_CANNOT;
     }
-    struct rlimit size_limit;
-    s.limited = getrlimit(RLIMIT_FSIZE, &size_limit) == 0 && size_limit.rlim_cur != RLIM_INFINITY;
+    const vshi_reader_state state = vshi_reader_begin(argc, argv, &request);
+    if (state.code >= 0) {
+        return state.code;
+    }
+    if (request.kind == VSHI_READ_CONFINEMENT) {
+        return vshi_reader_tell(&state);
+    }
+    s.confined = state.confined;
+    s.limited = state.cramped;
+    vsh_run run = vsh_run_default();
     run.threads = 1;
+    run.memory_limit = request.memory;
+    run.allow_outside = request.outside;
     run.progress = report;
     run.warning = keep_warning;
     run.user = &s;
-    vshi_confine_resources(run.memory_limit, seconds);
-    if ((uint64_t)getppid() != parent) {
-        return CANNOT_SERVE; /* it died before its death would have been ours */
-    }
     vshi_confine_hunger();
-    if (vshi_confine_calls() == VSHI_CALLS_IN_PART) {
-        return VSHI_READER_LOOSE;
-    }
-    return answer(&s, servers[kind], path, &request, &run);
+    return answer(&s, servers[request.kind], request.path, &request.rest, &run);
 }

@@ -41,7 +41,7 @@ class Answer {
     }
 
   private:
-    vshi_answer answer{nullptr, 0, {nullptr, nullptr, true}};
+    vshi_answer answer{nullptr, 0, 0, {nullptr, nullptr, true}};
 };
 
 FloatGrid::Ptr mend_named(const Named &named, const FloatGrid &grid, Stage &stage, vsh_error *error) {

@@ -44,3 +44,49 @@ unharmed() {
     done
     unharmed
 }
+
+@test "a reader that is taken over reads nothing of its parent, and no file but those it was asked for" {
+    can files || skip "no Landlock here"
+    mkdir outside model
+    echo secret >outside/secret
+    mv box.obj model/box.obj
+    export VSH_TEST_OUTSIDE=$PWD/outside/secret TOKEN_OF_THE_HOST=secret
+    run --separate-stderr env LD_PRELOAD="$HOSTILE" VSH_TEST_HOSTILE=reads VSH_TEST_FOLDER="$PWD" \
+        VSH_TEST_VICTIM="$VICTIM" "$VDBSHADE" info model/box.obj
+    refused 2 'taken over: 4 threads, 48 calls, let through: none'
+}
+
+# can PART: whether this system confines a reader so far.
+can() {
+    "$VDBSHADE" bake box.obj -o probe.exr "${SMALL[@]}" --quiet --stats probe.json
+    grep -A 4 '"confined": {' probe.json | grep -q "\"$1\": true"
+}
+
+@test "what the system refuses is one warning, and told by --stats; --confined makes it an error" {
+    local what part
+    for what in "limits limits of resources" "seccomp seccomp (system calls)" "landlock Landlock (files)"; do
+        part=${what#* }
+        "$REFUSE" "${what%% *}" -- true || skip "no seccomp here"
+        run --separate-stderr "$REFUSE" "${what%% *}" -- "$VDBSHADE" bake box.obj -o out.exr "${SMALL[@]}" \
+            --stats stats.json
+        [ "$status" -eq 0 ] || fail "it is no error"
+        [ "$(grep -c "warning: .*confined in part only: .*$part" <<<"$stderr")" -eq 1 ] || fail "not one warning of it"
+        run --separate-stderr "$REFUSE" "${what%% *}" -- "$VDBSHADE" info box.obj --confined
+        refused 2 "box.obj: not read: its reader is to be confined, and this system refuses it"
+        [[ $stderr == *"$part"* ]] || fail "which is not said"
+    done
+    grep -A 4 '"confined": {' stats.json | grep -q '"files": false' || fail "not in --stats"
+    run --separate-stderr "$REFUSE" limits seccomp landlock -- "$VDBSHADE" info box.obj
+    [[ $stderr == *"limits of resources, seccomp (system calls), Landlock (files)"* ]] || fail "not all are said"
+    shade info box.obj --confined --trusted
+    refused 2 "--trusted and --confined"
+    "$VDBSHADE" bake box.obj -o out.exr "${SMALL[@]}" --quiet --trusted --stats stats.json
+    grep -q '"confined": null' stats.json || fail "nothing is confined with --trusted"
+}
+
+@test "--confined reads where all is had, without a word" {
+    can files && can calls && can limits || skip "not all is had here"
+    shade info box.obj --confined
+    done_well
+    [ -z "$stderr" ] || fail "it says something"
+}

@@ -10,13 +10,15 @@ typedef struct hostile_aim {
     const char *folder; /* for marker files; `kept` is a file there that is to stay as it is */
     int victim;         /* a process that is to get no signal */
     int parent;
+    const char *outside; /* a file beyond what the reader needs; may be NULL */
 } hostile_aim;
 
 /* Tries each call in the calling thread. The names of those that were let through go to `done`, a blank
  * before each. Returns how many were tried. */
 int hostile_calls(const hostile_aim *aim, char *done, size_t room);
 
-/* Tries to read the parent: its memory, its environment. As hostile_calls(). */
+/* Tries to read the parent, its memory and environment, and other files than the reader needs. As
+ * hostile_calls(). */
 int hostile_reads(const hostile_aim *aim, char *done, size_t room);
 
 #endif

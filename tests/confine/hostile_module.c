@@ -9,7 +9,6 @@
 
 #include <vdbshade/reader.h>
 
-#include <fcntl.h>
 #include <linux/futex.h>
 #include <pthread.h>
 #include <sched.h>
@@ -103,18 +102,15 @@ static void rewrite_stack(void) {
 
 /* --- the reader */
 
-__attribute__((constructor)) static void begin(void) {
-    char words[256] = "";
-    const int file = open("/proc/self/cmdline", O_RDONLY | O_CLOEXEC);
-    const ssize_t size = file >= 0 ? read(file, words, sizeof words - 1) : 0;
-    close(file);
-    const char *second = size > 0 ? words + strlen(words) + 1 : "";
-    if (strcmp(second, VSH_READER_ARGUMENT) != 0) {
+/* The C library calls constructors as it calls main. */
+__attribute__((constructor)) static void begin(int argc, char **argv) {
+    if (argc < 2 || strcmp(argv[1], VSH_READER_ARGUMENT) != 0) {
         return;
     }
     how = getenv("VSH_TEST_HOSTILE");
     const char *victim = getenv("VSH_TEST_VICTIM");
-    aim = (hostile_aim){getenv("VSH_TEST_FOLDER"), victim != NULL ? atoi(victim) : 0, (int)getppid()};
+    aim = (hostile_aim){getenv("VSH_TEST_FOLDER"), victim != NULL ? atoi(victim) : 0, (int)getppid(),
+                        getenv("VSH_TEST_OUTSIDE")};
     if (how == NULL || aim.folder == NULL || aim.victim <= 0) {
         how = NULL;
         return;
@@ -127,8 +123,10 @@ __attribute__((constructor)) static void begin(void) {
 }
 
 static void tell(void) {
-    vshi_answer_head head = {
-        .magic = VSHI_ANSWER_MAGIC, .protocol = VSHI_READER_PROTOCOL, .code = VSH_ERROR_INPUT};
+    vshi_answer_head head = {.magic = VSHI_ANSWER_MAGIC,
+                             .protocol = VSHI_READER_PROTOCOL,
+                             .code = VSH_ERROR_INPUT,
+                             .confined = VSH_CONFINED_ALL};
     snprintf(head.message, sizeof head.message, "taken over: %d threads, %d calls, let through:%s", attacked,
              tried, told[0] != '\0' ? told : " none");
     syscall(SYS_pwrite64, VSHI_READER_ANSWER, &head, sizeof head, 0L);

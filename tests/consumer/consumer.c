@@ -110,13 +110,20 @@ static vsh_grid *from_file(const char *folder, vsh_error *error) {
     vsh_grid *made = from_callback(error);
     check("write", vsh_grid_write(made, path, "ball", error), error);
     vsh_grid_free(made);
+    /* by the reader that is installed with the library */
+    vsh_run run = vsh_run_default();
+    run.reader = VSH_READER;
+    uint32_t confined = 0;
+    check("reader", vsh_reader_confinement(&run, &confined, error), error);
+    expect("its system calls are confined", (double)(confined & VSH_CONFINED_CALLS), VSH_CONFINED_CALLS,
+           VSH_CONFINED_CALLS);
     size_t count = 0;
     vsh_vdb_entry entry;
-    check("list", vsh_vdb_list(path, NULL, &entry, 1, &count, error), error);
+    check("list", vsh_vdb_list(path, &run, &entry, 1, &count, error), error);
     expect("grids in the file", (double)count, 1.0, 1.0);
     expect("name is \"ball\"", strcmp(entry.name, "ball") == 0 ? 1.0 : 0.0, 1.0, 1.0);
     vsh_grid *grid = NULL;
-    check("read", vsh_grid_read(path, "ball", NULL, &grid, error), error);
+    check("read", vsh_grid_read(path, "ball", &run, &grid, error), error);
     return grid;
 }
 

@@ -20,6 +20,17 @@ library=$(dirname "$(find "$prefix" -name libvdbshade.so)")
 "$prefix/bin/vdbshade" --version
 "$here/../runpath.sh" "$prefix"
 
+say "files are read by the reader beside it, or not at all"
+printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >"$work/a.obj"
+"$prefix/bin/vdbshade" info "$work/a.obj" >/dev/null
+mv "$prefix/libexec" "$work/libexec"
+if "$prefix/bin/vdbshade" info "$work/a.obj" 2>"$work/missing.log"; then
+    echo "it read without its reader" && exit 1
+fi
+grep "vdbshade-reader.*--trusted" "$work/missing.log"
+"$prefix/bin/vdbshade" info "$work/a.obj" --trusted >/dev/null
+mv "$work/libexec" "$prefix/libexec"
+
 say "every header alone, as C and as C++"
 for header in "$prefix"/include/vdbshade/*.h; do
     name=vdbshade/$(basename "$header")
