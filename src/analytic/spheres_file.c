@@ -1,20 +1,22 @@
 /* Spheres from a CSV file. */
 #include "base/error.h"
 #include "base/floats.h"
+#include "base/input.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/numbers.h"
 
-#include <errno.h>
 #include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <vdbshade/spheres.h>
 
 static const double LARGEST = 1e15;
+
+/* Of a file, 16 GiB; what is read of it is held against the memory limit. */
+static const uint64_t MOST_BYTES = (uint64_t)1 << 34;
 
 typedef struct list {
     double *values;
@@ -97,18 +99,41 @@ static vsh_result check_numbers(const char *path, size_t row, const double numbe
     return VSH_OK;
 }
 
-static vsh_result read_rows(const char *path, FILE *file, const vsh_run *run, list *l, vsh_error *error) {
-    char text[512];
+enum { LINE = 512, REPORTED = 1 << 16 /* bytes, between two reports of progress */ };
+
+/* A file under way. */
+typedef struct source {
+    FILE *file;
+    vshi_job *job;
+    size_t unreported;
+    bool cancelled;
+} source;
+
+/* The next line, or piece of a longer one. */
+static bool next(source *from, char text[LINE]) {
+    if (from->cancelled || fgets(text, LINE, from->file) == NULL) {
+        return false;
+    }
+    from->unreported += strlen(text);
+    if (from->unreported >= REPORTED) {
+        from->cancelled = vshi_job_advance(from->job, from->unreported);
+        from->unreported = 0;
+    }
+    return true;
+}
+
+static vsh_result read_rows(const char *path, source *from, const vsh_run *run, list *l, vsh_error *error) {
+    char text[LINE];
     vsh_result result = VSH_OK;
     bool first = true;
-    for (size_t row = 1; result == VSH_OK && fgets(text, sizeof text, file) != NULL; ++row) {
+    for (size_t row = 1; result == VSH_OK && next(from, text); ++row) {
         const char *start = text;
         if (row == 1 && strncmp(start, "\xef\xbb\xbf", 3) == 0) {
             start += 3; /* a byte order mark */
         }
         start += strspn(start, " \t\r\n");
         if (*start == '\0' || *start == '#') {
-            while (strchr(text, '\n') == NULL && fgets(text, sizeof text, file) != NULL) {
+            while (strchr(text, '\n') == NULL && next(from, text)) {
             }
             continue;
         }
@@ -125,7 +150,10 @@ static vsh_result read_rows(const char *path, FILE *file, const vsh_run *run, li
         }
         first = false;
     }
-    if (result == VSH_OK && ferror(file)) {
+    if (result == VSH_OK && from->cancelled) {
+        result = vshi_job_fail_cancelled(from->job, error);
+    }
+    if (result == VSH_OK && ferror(from->file)) {
         result = vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read", path);
     }
     if (result == VSH_OK && l->count == 0) {
@@ -147,19 +175,22 @@ vsh_result vsh_spheres_read(const char *path, const vsh_run *run, double **spher
     if (result != VSH_OK) {
         return result;
     }
-    struct stat status;
-    FILE *file = fopen(path, "rb");
-    if (file == NULL) {
-        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, strerror(errno));
-    }
-    if (stat(path, &status) == 0 && S_ISDIR(status.st_mode)) {
-        fclose(file);
-        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: it is a folder", path);
+    source from = {NULL, NULL, 0, false};
+    uint64_t size;
+    result = vshi_input_open(path, path, MOST_BYTES, &from.file, &size, error);
+    if (result != VSH_OK) {
+        return result;
     }
     VSHI_NUMBERS;
     list l = {NULL, 0, 0};
-    result = read_rows(path, file, &full, &l, error);
-    fclose(file);
+    from.job = vshi_job_begin(&full, "load", (size_t)size + 1);
+    result = from.job != NULL ? read_rows(path, &from, &full, &l, error)
+                              : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    if (result == VSH_OK && vshi_job_advance(from.job, (size_t)size + 1)) {
+        result = vshi_job_fail_cancelled(from.job, error);
+    }
+    vshi_job_end(from.job);
+    fclose(from.file);
     if (result != VSH_OK) {
         free(l.values);
         return result;

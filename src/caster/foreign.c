@@ -1,11 +1,11 @@
 #include "caster/foreign.h"
 
 #include "base/file.h"
+#include "base/input.h"
 
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 
 enum { HEAD = 512 };
 
@@ -44,8 +44,10 @@ static bool is_usdz(const unsigned char *head, size_t size) {
 
 static const char *by_content(const char *path) {
     unsigned char head[HEAD];
-    struct stat status; /* what is read from a pipe is gone */
-    FILE *file = stat(path, &status) == 0 && S_ISREG(status.st_mode) ? fopen(path, "rb") : NULL;
+    FILE *file;
+    uint64_t whole;
+    vsh_error ignored; /* whoever reads the file finds out, too */
+    vshi_input_open(path, path, UINT64_MAX, &file, &whole, &ignored);
     const size_t size = file != NULL ? fread(head, 1, sizeof head, file) : 0;
     if (file != NULL) {
         fclose(file);

@@ -1,6 +1,7 @@
 /* The bytes of a glTF: the binary chunk of a GLB, data in the JSON itself, files beside it. */
 #include "caster/gltf.h"
 
+#include "base/input.h"
 #include "base/memory.h"
 #include "base/uri.h"
 
@@ -8,7 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 static vsh_result load_data(vshi_gltf *gltf, size_t index, const char *uri, vshi_gltf_buffer *buffer,
                             vsh_error *error) {
@@ -26,19 +26,23 @@ static vsh_result load_data(vshi_gltf *gltf, size_t index, const char *uri, vshi
 
 static vsh_result read_file(vshi_gltf *gltf, size_t index, const char *path, vshi_gltf_buffer *buffer,
                             vsh_error *error) {
-    FILE *file = fopen(path, "rb");
-    struct stat status;
-    if (file == NULL || fstat(fileno(file), &status) != 0 || !S_ISREG(status.st_mode)) {
-        const char *why = file != NULL ? "is no regular file" : strerror(errno);
-        if (file != NULL) {
-            fclose(file);
-        }
-        return vshi_fail(error, VSH_ERROR_READ,
-                         "%s: buffers[%zu], which holds its vertices, is the file '%s': %s", gltf->path,
-                         index, path, why);
+    if (!gltf->run->allow_outside && !vshi_input_is_beside(gltf->path, path)) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: buffers[%zu], which holds its vertices, is '%s', outside of its folder, where "
+                         "nothing is read of a model; --allow-outside (vsh_run.allow_outside) reads it",
+                         gltf->path, index, path);
     }
-    const size_t size = (size_t)status.st_size;
-    vsh_result result = vshi_gltf_hold(gltf, (double)size, error);
+    char name[1024];
+    snprintf(name, sizeof name, "%.400s: buffers[%zu], which holds its vertices, is the file '%.400s'",
+             gltf->path, index, path);
+    FILE *file;
+    uint64_t bytes;
+    vsh_result result = vshi_input_open(path, name, SIZE_MAX, &file, &bytes, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    const size_t size = (size_t)bytes;
+    result = vshi_gltf_hold(gltf, (double)size, error);
     if (result == VSH_OK) {
         result = vshi_allocate((void **)&buffer->owned, size, 1, gltf->path, error);
     }

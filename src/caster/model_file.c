@@ -1,5 +1,6 @@
 #include "caster/model_file.h"
 
+#include "base/input.h"
 #include "base/memory.h"
 #include "caster/foreign.h"
 #include "caster/gltf.h"
@@ -55,24 +56,15 @@ static bool is_gltf(const char *ending) {
 static vsh_result load_file(const char *path, const vsh_run *run, char **text, size_t *size,
                             vsh_error *error) {
     *text = NULL;
-    FILE *file = fopen(path, "rb");
-    struct stat status;
-    if (file == NULL || fstat(fileno(file), &status) != 0) {
-        const vsh_result result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", path, strerror(errno));
-        if (file != NULL) {
-            fclose(file);
-        }
+    FILE *file;
+    uint64_t bytes;
+    vsh_result result = vshi_input_open(path, path, SIZE_MAX, &file, &bytes, error);
+    if (result != VSH_OK) {
         return result;
     }
-    vsh_result result = VSH_OK;
-    if (!S_ISREG(status.st_mode)) {
-        result = vshi_fail(error, VSH_ERROR_READ, "%s: is no regular file", path);
-    } else if (status.st_size == 0) {
-        result = vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path);
-    } else {
-        *size = (size_t)status.st_size;
-        result = vshi_check_limit(run, PEAK_BYTES_A_BYTE * (double)*size, path, error);
-    }
+    *size = (size_t)bytes;
+    result = bytes > 0 ? vshi_check_limit(run, PEAK_BYTES_A_BYTE * (double)*size, path, error)
+                       : vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path);
     if (result == VSH_OK) {
         result = vshi_allocate((void **)text, *size, 1, path, error);
     }
@@ -219,7 +211,8 @@ vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *
         result = scan_file(&scan, ending, run, model, &other, error);
     }
     if (result == VSH_OK && *model == NULL) {
-        result = vshi_import_read(path, other.text, other.size, job, IMPORT_UNITS, import, error);
+        result = vshi_import_read(path, other.text, other.size, run->allow_outside != 0, job, IMPORT_UNITS,
+                                  import, error);
     }
     free(other.text);
     if (result == VSH_OK && *import != NULL) {

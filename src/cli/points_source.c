@@ -1,9 +1,9 @@
 #include "points_source.h"
 
+#include "input.h"
 #include "message.h"
 
 #include <errno.h>
-#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -14,14 +14,14 @@ enum { ROOM = 1 << 18, MOST = 1 << 26 /* bytes of a line */ };
 int points_source_open(const char *path, points_source *source) {
     const bool standard = strcmp(path, "-") == 0;
     *source = (points_source){.name = standard ? "standard input" : path, .file = -1, .room = ROOM};
-    source->file = standard ? STDIN_FILENO : open(path, O_RDONLY | O_CLOEXEC);
+    const char *why = "it is a folder";
+    source->file = standard ? STDIN_FILENO : cli_input_open(path, UINT64_MAX, &why);
     struct stat status;
-    if (source->file < 0 || fstat(source->file, &status) != 0) {
-        cli_say("%s: cannot be read: %s", source->name, strerror(errno));
-        return CLI_FILE;
-    }
-    if (S_ISDIR(status.st_mode)) {
-        cli_say("%s: cannot be read: it is a folder", source->name);
+    if (source->file < 0 || fstat(source->file, &status) != 0 || S_ISDIR(status.st_mode)) {
+        cli_say("%s: cannot be read: %s%s", source->name, why,
+                standard || stat(path, &status) != 0 || S_ISREG(status.st_mode) || S_ISDIR(status.st_mode)
+                    ? ""
+                    : "; a pipe is read as standard input, by --points -");
         return CLI_FILE;
     }
     source->size = S_ISREG(status.st_mode) ? (uint64_t)status.st_size : 0;

@@ -48,6 +48,9 @@ typedef struct regress_work {
     size_t case_count;
 } regress_work;
 
+/* A file of JSON in a folder that strangers may have made; NULL where it is none, or cannot be read. */
+json_t *regress_load(const char *path);
+
 /* "FOLDER/NAME", to be freed; NULL where memory is short. */
 char *regress_path(const char *folder, const char *name);
 
@@ -55,10 +58,6 @@ char *regress_path(const char *folder, const char *name);
  * having said why. */
 int regress_find_cases(regress_work *work);
 void regress_free_case(regress_case *one);
-
-/* That a case's options, from the file `list`, only change values. CLI_OK or an exit code, having said why.
- */
-int regress_check_options(const regress_case *one, const char *list);
 
 /* A case that cannot be read or written fails by itself, and the others go on: marks it and gives CLI_OK;
  * other codes, which end all, as they are. */

@@ -1,6 +1,7 @@
 /* What there is to bake in a folder: its scenes, and what its regress.json says of them. */
 #define _GNU_SOURCE /* asprintf */
 #include "commands.h"
+#include "input.h"
 #include "message.h"
 #include "paths.h"
 #include "regress.h"
@@ -13,6 +14,9 @@
 #include <vdbshade/flat.h>
 
 static const char list_name[] = "regress.json";
+
+/* Of a scene or a list, which strangers may have made. */
+enum { MOST_BYTES = 64 << 20 };
 
 bool regress_lines_add(regress_lines *lines, const char *format, ...) {
     char **more = realloc(lines->line, (lines->count + 1) * sizeof *more);
@@ -78,9 +82,19 @@ static const char *last_part(const char *path) {
 
 /* --- what a scene writes */
 
+json_t *regress_load(const char *path) {
+    const char *why;
+    FILE *file = cli_input_stream(path, MOST_BYTES, &why);
+    json_t *root = file != NULL ? json_loadf(file, 0, NULL) : NULL;
+    if (file != NULL) {
+        fclose(file);
+    }
+    return root;
+}
+
 /* Scenes for 2D have a region, and a command of their own. */
 static bool is_flat(const char *path) {
-    json_t *root = json_load_file(path, 0, NULL);
+    json_t *root = regress_load(path);
     const bool flat = json_object_get(root, "region") != NULL;
     json_decref(root);
     return flat;
@@ -198,8 +212,7 @@ static int read_case(regress_work *work, json_t *json, size_t i) {
     if (scene == NULL) {
         return bad_list(work, i, "key \"scene\" is missing");
     }
-    if (output != NULL &&
-        (strchr(output, '/') != NULL || strcmp(output, ".") == 0 || strcmp(output, "..") == 0)) {
+    if (output != NULL && strchr(output, '/') != NULL) {
         return bad_list(work, i, "output: a name without a folder is expected");
     }
     regress_case *one = add_case(work);
@@ -226,11 +239,13 @@ static int read_list(regress_work *work) {
     if (path == NULL) {
         return no_memory(work);
     }
-    FILE *file = fopen(path, "rb");
+    const char *why;
+    errno = 0;
+    FILE *file = cli_input_stream(path, MOST_BYTES, &why);
     int code = CLI_OK;
     if (file == NULL) {
         if (errno != ENOENT) {
-            cli_say("%s: cannot be read: %s", path, strerror(errno));
+            cli_say("%s: cannot be read: %s", path, why);
             code = CLI_FILE;
         }
         free(path);
@@ -301,13 +316,6 @@ static int add_scenes(regress_work *work) {
 
 /* --- all of them */
 
-static int check_options(const regress_work *work, const regress_case *one) {
-    char *list = regress_path(work->folder, list_name);
-    const int code = list != NULL ? regress_check_options(one, list) : no_memory(work);
-    free(list);
-    return code;
-}
-
 static int check_unique(const regress_work *work) {
     for (size_t i = 0; i < work->case_count; ++i) {
         const regress_case *one = &work->cases[i];
@@ -353,7 +361,6 @@ int regress_find_cases(regress_work *work) {
         work->cases[kept] = *one;
         one = &work->cases[kept++];
         code = code == CLI_OK ? regress_failed(one, list_outputs(work, one)) : code;
-        code = code == CLI_OK && one->options.count > 0 ? check_options(work, one) : code;
         if (code == CLI_OK && one->status == REGRESS_FAILED) { /* to be told of by the scene's own name */
             regress_lines_free(&one->outputs);
             code = regress_lines_add(&one->outputs, "%s", one->scene) ? CLI_OK : no_memory(work);

@@ -196,7 +196,7 @@ static void look_up(json_t *lines, regress_case *one) {
 }
 
 void regress_read_cache(regress_work *work) {
-    json_t *root = json_load_file(work->cache, 0, NULL);
+    json_t *root = regress_load(work->cache);
     for (size_t i = 0; i < work->case_count; ++i) {
         regress_case *one = &work->cases[i];
         if (one->status == REGRESS_FAILED) {
@@ -214,7 +214,7 @@ static bool was_alike(const regress_case *one) {
 
 /* Cases that --only left out stay as they were. */
 int regress_write_cache(const regress_work *work) {
-    json_t *old = json_load_file(work->cache, 0, NULL), *alike = json_object(), *root = json_object();
+    json_t *old = regress_load(work->cache), *alike = json_object(), *root = json_object();
     if (work->settings->only != NULL) {
         json_object_update(alike, json_object_get(old, "alike"));
     }

@@ -1,16 +1,15 @@
 /* Which reader a file is for. */
 #include "base/file.h"
 #include "base/floats.h"
+#include "base/input.h"
 #include "base/job.h"
 #include "image/exr.h"
 #include "image/png.h"
 #include "shim/oiio.h"
 
-#include <errno.h>
 #include <stdio.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
 
 typedef vsh_result read_fn(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error);
 
@@ -19,14 +18,11 @@ static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *err
     static const unsigned char exr[] = {0x76, 0x2f, 0x31, 0x01};
     static const unsigned char png[] = {0x89, 'P', 'N', 'G'};
     unsigned char start[4] = {0};
-    struct stat status;
-    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode)) { /* a pipe would be waited for */
-        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: it is %s", path,
-                         S_ISDIR(status.st_mode) ? "a folder" : "no regular file");
-    }
-    FILE *file = fopen(path, "rb");
-    if (file == NULL) {
-        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, strerror(errno));
+    FILE *file;
+    uint64_t size;
+    const vsh_result result = vshi_input_open(path, path, UINT64_MAX, &file, &size, error);
+    if (result != VSH_OK) {
+        return result;
     }
     const size_t count = fread(start, 1, sizeof start, file);
     const bool failed = ferror(file) != 0;

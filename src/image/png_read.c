@@ -1,10 +1,10 @@
 #include "image/png.h"
 
+#include "base/input.h"
 #include "base/memory.h"
 
 #include <png.h>
 
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -141,11 +141,13 @@ static vsh_result read_all(png_reader *reader) {
 
 vsh_result vshi_png_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     *file = NULL;
-    png_reader reader = {.path = path, .run = run, .error = error, .stream = fopen(path, "rb")};
-    if (reader.stream == NULL) {
-        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, strerror(errno));
+    png_reader reader = {.path = path, .run = run, .error = error};
+    uint64_t size;
+    vsh_result result = vshi_input_open(path, path, UINT64_MAX, &reader.stream, &size, error);
+    if (result != VSH_OK) {
+        return result;
     }
-    const vsh_result result = read_all(&reader);
+    result = read_all(&reader);
     vshi_job_end(reader.job);
     png_destroy_read_struct(&reader.png, &reader.info, NULL);
     free(reader.rows);

@@ -3,6 +3,7 @@
 
 #include "base/error.h"
 #include "base/floats.h"
+#include "base/input.h"
 #include "caster/foreign.h"
 
 #include <errno.h>
@@ -20,7 +21,7 @@ static vsh_result fail_read(const char *path, int reason, vsh_error *error) {
     return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, why);
 }
 
-/* Read in pieces, not by the size that the system tells, so that a pipe is read as well. */
+/* Read in pieces, not by the size that the system told: the file may grow. */
 static vsh_result read_all(const char *path, FILE *file, char **text, size_t *size, vsh_error *error) {
     size_t capacity = 0;
     do {
@@ -47,11 +48,13 @@ static vsh_result read_all(const char *path, FILE *file, char **text, size_t *si
 vsh_result vshi_scene_text(const char *path, char **text, size_t *size, vsh_error *error) {
     *text = NULL;
     *size = 0;
-    FILE *file = fopen(path, "rb");
-    if (file == NULL) {
-        return fail_read(path, errno, error);
+    FILE *file;
+    uint64_t told;
+    vsh_result result = vshi_input_open(path, path, UINT64_MAX, &file, &told, error);
+    if (result != VSH_OK) {
+        return result;
     }
-    vsh_result result = vshi_foreign_check(path, error);
+    result = vshi_foreign_check(path, error);
     if (result == VSH_OK) {
         result = read_all(path, file, text, size, error);
     }

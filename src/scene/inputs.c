@@ -1,13 +1,16 @@
 #include "scene/inputs.h"
 
 #include "base/file.h"
+#include "base/input.h"
 #include "base/uri.h"
 
 #include <jansson.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+
+/* Bytes of a glTF that is looked through for its buffers. */
+static const uint64_t MOST_JSON = (uint64_t)1 << 30;
 
 static vsh_result out_of_memory(vsh_error *error) {
     return vshi_fail(error, VSH_ERROR_MEMORY, "inputs: the system refused memory");
@@ -42,23 +45,40 @@ static vsh_result add(vshi_inputs *inputs, const char *path, vsh_error *error) {
     return path != NULL ? add_own(inputs, strdup(path), error) : VSH_OK;
 }
 
+/* Takes `path` over. A buffer outside of the model's folder is not read, so nothing is to be told of it. */
+static vsh_result add_buffer(vshi_inputs *inputs, const char *model, char *path, bool outside,
+                             vsh_error *error) {
+    if (path != NULL && !outside && !vshi_input_is_beside(model, path)) {
+        free(path);
+        return VSH_OK;
+    }
+    return add_own(inputs, path, error);
+}
+
 /* A glTF's buffers, which hold its vertices. What cannot be read as one has none. */
-static vsh_result add_buffers(vshi_inputs *inputs, const char *model, vsh_error *error) {
-    json_t *root = json_load_file(model, 0, NULL);
+static vsh_result add_buffers(vshi_inputs *inputs, const char *model, bool outside, vsh_error *error) {
+    FILE *file;
+    uint64_t size;
+    vsh_error ignored;
+    if (vshi_input_open(model, model, MOST_JSON, &file, &size, &ignored) != VSH_OK) {
+        return VSH_OK;
+    }
+    json_t *root = json_loadf(file, 0, NULL);
+    fclose(file);
     vsh_result result = VSH_OK;
     size_t i;
     json_t *buffer;
     json_array_foreach(json_object_get(root, "buffers"), i, buffer) {
         const char *uri = json_string_value(json_object_get(buffer, "uri"));
-        if (result == VSH_OK && uri != NULL && !vshi_uri_is_data(uri)) {
-            result = add_own(inputs, vshi_uri_path(model, uri), error);
+        if (result == VSH_OK && uri != NULL && !vshi_uri_is_data(uri) && !vshi_uri_is_remote(uri)) {
+            result = add_buffer(inputs, model, vshi_uri_path(model, uri), outside, error);
         }
     }
     json_decref(root);
     return result;
 }
 
-vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, size_t file_count,
+vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, size_t file_count, bool outside,
                             vshi_inputs *inputs, vsh_error *error) {
     vsh_result result = VSH_OK;
     for (size_t i = 0; i < file_count && result == VSH_OK; ++i) {
@@ -73,7 +93,7 @@ vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, si
     const size_t named = inputs->count;
     for (size_t i = 0; i < named && result == VSH_OK; ++i) {
         if (strcasecmp(vshi_path_ending(inputs->paths[i]), "gltf") == 0) {
-            result = add_buffers(inputs, inputs->paths[i], error);
+            result = add_buffers(inputs, inputs->paths[i], outside, error);
         }
     }
     return result;

@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 
+#include <stdbool.h>
 #include <vdbshade/scene.h>
 
 typedef struct vshi_inputs {
@@ -11,10 +12,11 @@ typedef struct vshi_inputs {
     size_t count, capacity;
 } vshi_inputs;
 
-/* `files`, then what casters and receivers name, then the buffers of glTF among them; each path once. `scene`
+/* `files`, then what casters and receivers name, then the buffers of glTF among them, those outside of the
+ * model's folder only if `outside`; each path once. `scene`
  * may be NULL. Files that cannot be read are listed all the same. To be freed also where it fails. Errors:
  * VSH_ERROR_MEMORY. */
-vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, size_t file_count,
+vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, size_t file_count, bool outside,
                             vshi_inputs *inputs, vsh_error *error);
 void vshi_inputs_free(vshi_inputs *inputs);
 

@@ -1,5 +1,6 @@
 /* What an output was made of, as lines of text: settings as they are in force, and hashes of all inputs. */
 #include "base/attributes.h"
+#include "base/digest.h"
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
@@ -116,7 +117,7 @@ static vsh_result add_inputs(vsh_provenance *p, const vshi_inputs *inputs, vshi_
         const char *path = inputs->paths[i];
         const char *slash = strrchr(path, '/');
         char name[NAME_SIZE], digest[VSH_DIGEST_TEXT];
-        vsh_result result = vsh_file_digest(path, digest, error);
+        vsh_result result = vshi_file_digest(path, digest, job, error);
         if (result != VSH_OK) {
             return result;
         }
@@ -146,7 +147,8 @@ static vsh_result fill(vsh_provenance *p, const vsh_provenance_source *source, c
     vsh_result result = add_settings(p, source, error);
     vshi_inputs inputs = {NULL, 0, 0};
     if (result == VSH_OK) {
-        result = vshi_inputs_find(source->scene, source->files, source->file_count, &inputs, error);
+        result = vshi_inputs_find(source->scene, source->files, source->file_count, run->allow_outside != 0,
+                                  &inputs, error);
     }
     if (result == VSH_OK) {
         vshi_job *job = vshi_job_begin(run, "hash", inputs.count);

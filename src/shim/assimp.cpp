@@ -1,17 +1,21 @@
 #include "shim/assimp.h"
 
+#include "base/input.h"
 #include "shim/guard.h"
 
 #include <assimp/commonMetaData.h>
 #include <assimp/config.h>
 #include <assimp/scene.h>
 
+#include <assimp/DefaultIOSystem.h>
 #include <assimp/Importer.hpp>
 #include <assimp/ProgressHandler.hpp>
 
 #include <algorithm>
 #include <cstring>
 #include <memory>
+#include <string>
+#include <sys/stat.h>
 
 namespace {
 
@@ -44,6 +48,35 @@ class Progress : public Assimp::ProgressHandler {
     size_t done_ = 0;
 };
 
+// Opens what the file names, as a materials' file, but no pipe, and nothing outside of its folder.
+class Beside : public Assimp::DefaultIOSystem {
+  public:
+    Beside(const char *model, bool outside) : model_(model), outside_(outside) {}
+
+    bool Exists(const char *path) const override {
+        struct stat status;
+        return ::stat(path, &status) == 0 && S_ISREG(status.st_mode);
+    }
+
+    Assimp::IOStream *Open(const char *path, const char *mode) override {
+        struct stat status;
+        if (::stat(path, &status) == 0 && !S_ISREG(status.st_mode)) {
+            return nullptr;
+        }
+        if (!outside_ && model_ != path && !vshi_input_is_beside(model_.c_str(), path)) {
+            refused_ = path;
+            return nullptr;
+        }
+        return DefaultIOSystem::Open(path, mode);
+    }
+
+    const std::string &refused() const { return refused_; }
+
+  private:
+    std::string model_, refused_;
+    bool outside_;
+};
+
 // "a\nb" would break the one-line rule in a way that vshi_fail() can only patch with '?'.
 std::string first_line(const char *text) {
     std::string line(text);
@@ -58,20 +91,29 @@ struct vshi_import {
     const aiScene *scene = nullptr;
 };
 
-vsh_result vshi_import_read(const char *path, const char *text, size_t size, vshi_job *job, size_t units,
-                            vshi_import **import, vsh_error *error) {
+vsh_result vshi_import_read(const char *path, const char *text, size_t size, bool outside, vshi_job *job,
+                            size_t units, vshi_import **import, vsh_error *error) {
     *import = nullptr;
     return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
         auto reader = std::make_unique<vshi_import>();
         // Files that hold bones only would get a made-up mesh of them.
         reader->importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
         reader->importer.SetProgressHandler(new Progress(job, units)); // the importer deletes it
+        auto *const files = new Beside(path, outside);
+        reader->importer.SetIOHandler(files); // as it does this
         const char *dot = std::strrchr(path, '.');
         reader->scene = text == nullptr ? reader->importer.ReadFile(path, 0)
                                         : reader->importer.ReadFileFromMemory(text, size, 0,
                                                                               dot != nullptr ? dot + 1 : "");
         if (vshi_job_cancelled(job)) {
             return vshi_job_fail_cancelled(job, error);
+        }
+        if (!files->refused().empty()) {
+            return vshi_fail(
+                error, VSH_ERROR_INPUT,
+                "%s: names the file '%s' outside of its folder, where nothing is read of a model; "
+                "--allow-outside (vsh_run.allow_outside) reads it",
+                path, files->refused().c_str());
         }
         if (reader->scene == nullptr) {
             return vshi_fail(error, VSH_ERROR_READ, "%s: damaged or cut short, or not as its format says: %s",

@@ -1,10 +1,10 @@
 #include "shim/freetype.h"
 
-#include <errno.h>
+#include "base/input.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 #include <ft2build.h>
 
@@ -31,20 +31,13 @@ static vsh_result fail(vsh_error *error, const char *path, FT_Error code) {
 
 /* FreeType's own errors do not tell a missing file from a bad one. */
 static vsh_result check_file(const char *path, vsh_error *error) {
-    struct stat status;
-    FILE *file = fopen(path, "rb");
-    if (file == NULL || fstat(fileno(file), &status) != 0) {
-        const vsh_result result =
-            vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, strerror(errno));
-        if (file != NULL) {
-            fclose(file);
-        }
-        return result;
+    FILE *file;
+    uint64_t size;
+    const vsh_result result = vshi_input_open(path, path, UINT64_MAX, &file, &size, error);
+    if (result == VSH_OK) {
+        fclose(file);
     }
-    fclose(file);
-    return S_ISREG(status.st_mode)
-               ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: it is no regular file", path);
+    return result;
 }
 
 vsh_result vshi_font_open(const char *path, vshi_font **font, vsh_error *error) {

@@ -55,7 +55,7 @@ setup() {
     refused 2 "gltfpack"
     cp "$models/scene.gltf" alone.gltf && rm scene.bin
     shade info alone.gltf
-    refused 3 "scene.bin': No such file"
+    refused 3 "scene.bin': cannot be read: No such file"
     printf 'BLENDER-v304' >a.blend
     shade info a.blend
     refused 2 "export it as GLB"

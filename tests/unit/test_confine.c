@@ -1,0 +1,171 @@
+/* How a reader is confined, as the library tells and is told; and reading what is no reader's in this
+ * process. This program is a reader of its own, in which libraries have begun threads before its main. */
+#include "read/landlock.h"
+#include "read/reader.h"
+#include "read/tasks.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+#include <vdbshade/vdbshade.h>
+
+static char folder[] = "/tmp/vdbshade-test-XXXXXX";
+
+static const char *at(const char *name) {
+    static char path[256];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    return path;
+}
+
+static vsh_run with_reader(const char *reader) {
+    vsh_run run = vsh_run_default();
+    run.reader = reader;
+    return run;
+}
+
+static void a_program_is_its_own_reader_and_confined_wholly_though_it_has_threads(void **state) {
+    (void)state;
+    if (VSHI_SANITIZED) {
+        skip();
+    }
+    const vsh_run run = with_reader("/proc/self/exe");
+    uint32_t confined = 0;
+    vsh_error error;
+    assert_int_equal(vsh_reader_confinement(&run, &confined, &error), VSH_OK);
+    assert_int_equal(confined & (VSH_CONFINED_LIMITS | VSH_CONFINED_CALLS),
+                     VSH_CONFINED_LIMITS | VSH_CONFINED_CALLS);
+    assert_int_equal((confined & VSH_CONFINED_FILES) != 0, vshi_landlock_version() > 0);
+    assert_true(vshi_task_count() > 1); /* those of a library's */
+}
+
+static void what_cannot_be_asked_is_an_argument(void **state) {
+    (void)state;
+    uint32_t confined = 7;
+    vsh_error error;
+    vsh_run run = vsh_run_default();
+    assert_int_equal(vsh_reader_confinement(&run, &confined, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_reader_confinement(NULL, &confined, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_reader_confinement(&run, NULL, &error), VSH_ERROR_ARGUMENT);
+    run.confined = 1;
+    vsh_model *model;
+    assert_int_equal(vsh_model_read(VSH_ASSETS "/thin.glb", &run, &model, &error), VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "confined: needs a reader"));
+}
+
+/* This program does not lie where the library's reader is looked for. */
+static void a_missing_reader_is_an_error_that_says_how_to_do_without(void **state) {
+    (void)state;
+    if (VSHI_SANITIZED) {
+        skip();
+    }
+    const vsh_run run = with_reader(VSH_READER);
+    vsh_model *model;
+    vsh_error error;
+    assert_int_equal(vsh_model_read(VSH_ASSETS "/thin.glb", &run, &model, &error), VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "vdbshade-reader"));
+    assert_non_null(strstr(error.message, "--trusted"));
+}
+
+/* --- what is read in this process */
+
+static int32_t cancel_later(void *user, const char *stage, double fraction) {
+    (void)stage;
+    double *seen = user;
+    *seen = fraction;
+    return fraction > 0.2;
+}
+
+static void spheres_are_cancelled_within_a_file_of_any_size(void **state) {
+    (void)state;
+    FILE *file = fopen(at("spheres.csv"), "wb");
+    for (int i = 0; i < 100000; ++i) {
+        fputs(i < 50000 ? "1,2,3,0.5\n" : "# said", file); /* a line of no end, too */
+    }
+    assert_int_equal(fclose(file), 0);
+    double seen = 0.0, *spheres;
+    size_t count;
+    vsh_error error;
+    vsh_run run = vsh_run_default();
+    run.progress = cancel_later;
+    run.user = &seen;
+    assert_int_equal(vsh_spheres_read(at("spheres.csv"), &run, &spheres, &count, &error),
+                     VSH_ERROR_CANCELLED);
+    assert_null(spheres);
+    assert_true(seen > 0.2 && seen < 0.5);
+}
+
+static void a_file_of_spheres_past_every_measure_is_a_limit(void **state) {
+    (void)state;
+    FILE *file = fopen(at("sparse.csv"), "wb");
+    assert_int_equal(ftruncate(fileno(file), ((off_t)1 << 34) + 1), 0);
+    assert_int_equal(fclose(file), 0);
+    double *spheres;
+    size_t count;
+    vsh_error error;
+    assert_int_equal(vsh_spheres_read(at("sparse.csv"), NULL, &spheres, &count, &error), VSH_ERROR_LIMIT);
+    assert_non_null(strstr(error.message, "17179869184"));
+}
+
+static int32_t cancel_soon(void *user, const char *stage, double fraction) {
+    (void)stage;
+    (void)fraction;
+    int *calls = user;
+    return ++*calls > 10;
+}
+
+static void hashing_is_cancelled_within_a_file(void **state) {
+    (void)state;
+    FILE *file = fopen(at("large.bin"), "wb");
+    assert_int_equal(ftruncate(fileno(file), (off_t)1 << 36), 0); /* takes minutes to hash */
+    assert_int_equal(fclose(file), 0);
+    char path[256];
+    snprintf(path, sizeof path, "%s", at("large.bin"));
+    const char *const files[] = {path};
+    vsh_provenance_source source = vsh_provenance_source_default();
+    source.files = files;
+    source.file_count = 1;
+    int calls = 0;
+    vsh_run run = vsh_run_default();
+    run.progress = cancel_soon;
+    run.user = &calls;
+    vsh_provenance *made;
+    vsh_error error;
+    assert_int_equal(vsh_provenance_create(&source, &run, &made, &error), VSH_ERROR_CANCELLED);
+    assert_null(made);
+}
+
+static int make_folder(void **state) {
+    (void)state;
+    return mkdtemp(folder) != NULL ? 0 : -1;
+}
+
+static int remove_folder(void **state) {
+    (void)state;
+    unlink(at("spheres.csv"));
+    unlink(at("sparse.csv"));
+    unlink(at("large.bin"));
+    return rmdir(folder);
+}
+
+int main(int argc, char **argv) {
+    const int served = vsh_reader_serve(argc, argv);
+    if (served >= 0) {
+        _exit(served);
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_program_is_its_own_reader_and_confined_wholly_though_it_has_threads),
+        cmocka_unit_test(what_cannot_be_asked_is_an_argument),
+        cmocka_unit_test(a_missing_reader_is_an_error_that_says_how_to_do_without),
+        cmocka_unit_test(spheres_are_cancelled_within_a_file_of_any_size),
+        cmocka_unit_test(a_file_of_spheres_past_every_measure_is_a_limit),
+        cmocka_unit_test(hashing_is_cancelled_within_a_file),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
