@@ -262,6 +262,10 @@ int cli_bake_check_output(const cli_bake_settings *s, const vsh_scene *scene, co
     if (cli_same_file(output, s->input)) {
         return cli_usage("%s: the output is the input", output);
     }
+    const bool named_by_scene = s->output == NULL && s->output_folder == NULL && output != s->stats;
+    if (named_by_scene && cli_check_links(s->input, output) != CLI_OK) {
+        return CLI_FILE;
+    }
     for (size_t i = 0; i < scene->caster_count; ++i) {
         if (scene->casters[i].path != NULL && cli_same_file(output, scene->casters[i].path)) {
             return cli_usage("%s: the output is also a caster's file", output);

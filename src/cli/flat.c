@@ -205,6 +205,7 @@ static int check_output(const flat_settings *s, const vsh_flat_scene *scene, con
 static int check_files(const flat_settings *s, const vsh_flat_scene *scene, const vsh_image *image,
                        const vsh_image_options *options_of_image) {
     int code = check_output(s, scene, scene->output);
+    code = code == CLI_OK && s->output == NULL ? cli_check_links(s->input, scene->output) : code;
     if (code == CLI_OK && s->stats != NULL) {
         code = cli_same_file(scene->output, s->stats)
                    ? cli_usage("%s: both the output and the --stats file", s->stats)

@@ -100,3 +100,73 @@ int cli_make_folder(const char *path) {
     }
     return CLI_OK;
 }
+
+/* A path without "." and "..", by its words alone. False where it does not fit. */
+static bool normalize(const char *path, char *result) {
+    size_t used = 0;
+    for (const char *at = path; *at != '\0';) {
+        at += strspn(at, "/");
+        const size_t length = strcspn(at, "/");
+        if (length == 2 && strncmp(at, "..", 2) == 0) {
+            while (used > 0 && result[--used] != '/') {
+            }
+        } else if (length > 0 && !(length == 1 && at[0] == '.')) {
+            if (used + length + 2 > PATH_MAX) {
+                return false;
+            }
+            result[used++] = '/';
+            memcpy(result + used, at, length);
+            used += length;
+        }
+        at += length;
+    }
+    result[used] = '\0';
+    return true;
+}
+
+/* Where a file would be written; it and folders on the way need not be there. False where a link leads to
+ * nothing. */
+static bool find_place(const char *path, char *real) {
+    char there[PATH_MAX], joined[2 * PATH_MAX];
+    struct stat status;
+    if (strlen(path) >= sizeof there) {
+        return false;
+    }
+    strcpy(there, path);
+    while (lstat(there, &status) != 0) {
+        char *slash = strrchr(there, '/');
+        if (slash == NULL) {
+            strcpy(there, ".");
+        } else {
+            slash[slash == there] = '\0';
+        }
+    }
+    if (realpath(there, real) == NULL) {
+        return false;
+    }
+    const size_t kept = strcmp(there, ".") == 0 && path[0] != '.' ? 0 : strlen(there);
+    snprintf(joined, sizeof joined, "%s/%s", real, path + kept);
+    return normalize(joined, real);
+}
+
+int cli_check_links(const char *namer, const char *path) {
+    char folder[PATH_MAX], home[PATH_MAX], there[2 * PATH_MAX], meant[PATH_MAX], real[PATH_MAX] = "nothing";
+    const bool here = !folder_of(namer, folder);
+    const char *rest = path;
+    if (!here && strncmp(path, folder, strlen(folder)) == 0 && path[strlen(folder)] == '/') {
+        rest += strlen(folder) + 1;
+    }
+    bool stays = realpath(here ? "." : folder, home) != NULL;
+    if (rest[0] == '/') { /* its folder was said */
+        stays = stays && absolute(path, there, sizeof there);
+    } else {
+        snprintf(there, sizeof there, "%s/%s", home, rest);
+    }
+    stays = stays && normalize(there, meant) && find_place(path, real);
+    const size_t length = strcmp(home, "/") == 0 ? 0 : strlen(home);
+    if (stays && (strcmp(real, meant) == 0 || (strncmp(real, home, length) == 0 && real[length] == '/'))) {
+        return CLI_OK;
+    }
+    cli_say("%s: cannot be written: a link leads from the folder of '%s' to '%s'", path, namer, real);
+    return CLI_FILE;
+}

@@ -17,6 +17,11 @@ bool cli_is_model(const char *path);
 /* Whether a path is a folder, or ends as one. */
 bool cli_is_folder(const char *path);
 
+/* Outputs that a file names, and not the user, must not leave for elsewhere by links: the file and its folder
+ * may be a stranger's. `path` is as it was made of the folder of `namer` and of what stands there; its links
+ * must end where its words say, or below the folder of `namer`. CLI_OK or, having said why, CLI_FILE. */
+int cli_check_links(const char *namer, const char *path);
+
 /* Says which folder is missing where an output's is. CLI_OK or CLI_FILE. */
 int cli_check_folder(const char *path);
 

@@ -3,6 +3,7 @@
 #include "regress.h"
 #include "commands.h"
 #include "message.h"
+#include "paths.h"
 #include "progress.h"
 #include "signals.h"
 #include "temporary.h"
@@ -137,6 +138,7 @@ static int prepare(regress_work *work) {
     int code = regress_find_cases(work);
     code =
         code == CLI_OK ? cli_compare_check_reports(&s->compare, (const char *const *)&work->cache, 1) : code;
+    code = code == CLI_OK && s->cache == NULL ? cli_check_links(work->golden, work->cache) : code;
     code = code == CLI_OK ? cli_temporary_check(work->cache) : code;
     code = code == CLI_OK ? hash_program(work) : code;
     for (size_t i = 0; i < work->case_count && code == CLI_OK; ++i) {

@@ -59,6 +59,10 @@ char *regress_path(const char *folder, const char *name);
 int regress_find_cases(regress_work *work);
 void regress_free_case(regress_case *one);
 
+/* That a case's options, from the file `list`, only change values. CLI_OK or an exit code, having said why.
+ */
+int regress_check_options(const regress_case *one, const char *list);
+
 /* A case that cannot be read or written fails by itself, and the others go on: marks it and gives CLI_OK;
  * other codes, which end all, as they are. */
 int regress_failed(regress_case *one, int code);

@@ -2,6 +2,7 @@
 #include "child.h"
 #include "commands.h"
 #include "message.h"
+#include "paths.h"
 #include "regress.h"
 #include "temporary.h"
 
@@ -31,11 +32,17 @@ int regress_bake(const regress_work *work, const regress_case *one) {
     char limit[] = "--memory-limit", pool[] = "--threads", trusted[] = "--trusted", confined[] = "--confined",
          outside[] = "--allow-outside";
     snprintf(name, sizeof name, "%s", one->command->name);
+    /* a scene "--stats=x.json" is a file in the folder, and no option */
+    char *scene = one->scene[0] == '-' ? regress_path(".", one->scene) : strdup(one->scene);
+    if (scene == NULL) {
+        free(output);
+        return cli_out_of_memory(work->folder);
+    }
     char *words[MOST_WORDS];
     size_t count = 0;
     words[count++] = program;
     words[count++] = name;
-    words[count++] = one->scene;
+    words[count++] = scene;
     for (size_t i = 0; i < one->options.count; ++i) {
         words[count++] = one->options.line[i];
     }
@@ -60,6 +67,7 @@ int regress_bake(const regress_work *work, const regress_case *one) {
     words[count] = NULL;
     /* in the folder of the scenes, which the files in options are relative to */
     const int code = cli_in_child(one->scene, work->folder, words);
+    free(scene);
     free(output);
     return code;
 }
@@ -98,7 +106,8 @@ int regress_update(const regress_work *work, const char *output) {
         return CLI_FILE;
     }
     char *from = regress_path(work->bakes, output), *to = regress_path(work->golden, output);
-    const int code = from != NULL && to != NULL ? copy(from, to) : cli_out_of_memory(output);
+    int code = from != NULL && to != NULL ? cli_check_links(work->golden, to) : cli_out_of_memory(output);
+    code = code == CLI_OK ? copy(from, to) : code;
     free(from);
     free(to);
     return code;

@@ -212,7 +212,8 @@ static int read_case(regress_work *work, json_t *json, size_t i) {
     if (scene == NULL) {
         return bad_list(work, i, "key \"scene\" is missing");
     }
-    if (output != NULL && strchr(output, '/') != NULL) {
+    if (output != NULL &&
+        (strchr(output, '/') != NULL || strcmp(output, ".") == 0 || strcmp(output, "..") == 0)) {
         return bad_list(work, i, "output: a name without a folder is expected");
     }
     regress_case *one = add_case(work);
@@ -316,6 +317,13 @@ static int add_scenes(regress_work *work) {
 
 /* --- all of them */
 
+static int check_options(const regress_work *work, const regress_case *one) {
+    char *list = regress_path(work->folder, list_name);
+    const int code = list != NULL ? regress_check_options(one, list) : no_memory(work);
+    free(list);
+    return code;
+}
+
 static int check_unique(const regress_work *work) {
     for (size_t i = 0; i < work->case_count; ++i) {
         const regress_case *one = &work->cases[i];
@@ -361,6 +369,7 @@ int regress_find_cases(regress_work *work) {
         work->cases[kept] = *one;
         one = &work->cases[kept++];
         code = code == CLI_OK ? regress_failed(one, list_outputs(work, one)) : code;
+        code = code == CLI_OK && one->options.count > 0 ? check_options(work, one) : code;
         if (code == CLI_OK && one->status == REGRESS_FAILED) { /* to be told of by the scene's own name */
             regress_lines_free(&one->outputs);
             code = regress_lines_add(&one->outputs, "%s", one->scene) ? CLI_OK : no_memory(work);

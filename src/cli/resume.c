@@ -3,10 +3,14 @@
 #include "message.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
+
+static const char magic[] = "vdbshade resume "; /* the file begins with it; the format's number follows */
 
 /* Before every band. All of the file is of the machine's own byte order: it is of one bake on one machine. */
 typedef struct band_head {
@@ -44,7 +48,7 @@ static char *key_of(const cli_origin *origin, const vsh_image *image, int32_t ba
     if (out == NULL) {
         return NULL;
     }
-    fprintf(out, "vdbshade resume 2: %d x %d by %d\n", image->width, image->height, band_rows);
+    fprintf(out, "%s2: %d x %d by %d\n", magic, image->width, image->height, band_rows);
     for (int32_t c = 0; c < image->channel_count; ++c) {
         fprintf(out, "%s\n", image->names[c]);
     }
@@ -78,13 +82,36 @@ static void give_up(cli_resume *r) {
     unlink(r->path);
 }
 
+/* Whether the file is one of ours, or was going to be when its run was killed. */
+static bool is_ours(FILE *file) {
+    char head[sizeof magic - 1];
+    const size_t count = fread(head, 1, sizeof head, file);
+    rewind(file);
+    return memcmp(head, magic, count) == 0;
+}
+
+/* Nobody asked for this name: whatever else stands there is left as it is, and not waited for. */
 static int open_file(cli_resume *r) {
-    r->file = fopen(r->path, "r+b");
-    if (r->file == NULL && errno == ENOENT) {
-        r->file = fopen(r->path, "w+bx");
-    }
+    const int file = open(r->path, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
+    struct stat status;
+    const bool link = file < 0 && errno == ELOOP;
+    const bool regular = file >= 0 && fstat(file, &status) == 0 && S_ISREG(status.st_mode);
+    r->file = regular ? fdopen(file, "r+b") : NULL;
     if (r->file == NULL) {
-        cli_say("%s: cannot be written: %s", r->path, strerror(errno));
+        cli_say("%s: cannot be written: %s", r->path,
+                link                    ? "it is a link"
+                : file >= 0 && !regular ? "it is no regular file"
+                                        : strerror(errno));
+        if (file >= 0) {
+            close(file);
+        }
+        return CLI_FILE;
+    }
+    if (!is_ours(r->file)) {
+        cli_say("%s: is no file of --resume, and stays as it is; move it away, or bake without --resume",
+                r->path);
+        fclose(r->file);
+        r->file = NULL;
         return CLI_FILE;
     }
     if (flock(fileno(r->file), LOCK_EX | LOCK_NB) != 0) {

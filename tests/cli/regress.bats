@@ -178,3 +178,45 @@ JSON
     refused 3 "nowhere: cannot be read: No such file or directory"
     clean
 }
+
+# asking OPTION …: a folder whose list asks for them, of `bake` or $COMMAND.
+asking() {
+    local words
+    words=$(printf ', "%s"' "$@")
+    printf '{"cases": [{"scene": "box.json"}, {"scene": "box.json", "name": "sly", "command": "%s", "output": "sly.exr", "options": [%s]}]}' \
+        "${COMMAND:-bake}" "${words:2}" >scenes/regress.json
+    regress
+}
+
+@test "a folder's list cannot have files written, or parsed unconfined" {
+    local one
+    mkdir elsewhere
+    for one in --trusted "--stats $PWD/elsewhere/a" "--stats=$PWD/elsewhere/a" "-o $PWD/elsewhere/a.exr" "-o$PWD/elsewhere/a.exr" \
+        "--output $PWD/elsewhere/a.exr" "--output-folder $PWD/elsewhere" "--invalid $PWD/elsewhere/a.png" --resume --dry-run \
+        "--threads 1" "--memory-limit 0" "--trust" "--per-object" "-- x" "box.json" "--size 8 --trusted" "--size=8 --stats elsewhere/a"; do
+        # shellcheck disable=SC2086 # words
+        asking $one
+        [[ $one != "--size"* ]] || one=${one#--size?8 }
+        refused 2 "scenes/regress.json: case 'sly': option '${one%% *}' of 'bake'"
+    done
+    for one in flat volume voxelize; do
+        COMMAND=$one asking --stats "$PWD/elsewhere/a"
+        refused 2 "option '--stats' of '$one'"
+    done
+    asking --method --trusted # a value, and no option
+    [[ $stderr == *"--method '--trusted': "* ]] || fail "not taken for a value"
+    asking --size 8 --method=hard
+    [ "$status" -eq 1 ] || fail "options that change values"
+    regress --trusted --only sly
+    [ "$status" -eq 1 ] || fail "--trusted of regress itself"
+    [ -z "$(ls elsewhere)" ] || fail "written elsewhere"
+    clean
+}
+
+@test "a scene whose name looks like an option is a scene" {
+    mv scenes/box.json "scenes/--stats=sly.json"
+    regress --update
+    done_well
+    [[ $output == "--stats=sly: updated"* ]] || fail "not baked"
+    [ ! -e sly.json ] && [ ! -e scenes/sly.json ] || fail "taken for an option"
+}
