@@ -61,7 +61,7 @@ static void measure(FILE *csv, const char *name, const char *path, read_fn *read
     for (int i = 0; i < 2; ++i) {
         vsh_run run = vsh_run_default();
         run.threads = 1;
-        run.reader = i == 1 ? "/proc/self/exe" : NULL;
+        run.reader = i == 1 ? VSH_READER : NULL;
         double each[2][BENCH_RUNS];
         read(path, &run); /* what is loaded once is not counted */
         for (int k = 0; k < BENCH_RUNS; ++k) {

@@ -174,5 +174,8 @@ int vshi_confine_calls(void) {
     if (!load_filter()) {
         return VSHI_CALLS_FREE;
     }
-    return vshi_tasks_filtered(before) ? VSHI_CALLS_CONFINED : VSHI_CALLS_IN_PART;
+    static const int outcomes[] = {[VSHI_TASKS_UNSEEN] = VSHI_CALLS_FREE,
+                                   [VSHI_TASKS_FILTERED] = VSHI_CALLS_CONFINED,
+                                   [VSHI_TASKS_LOOSE] = VSHI_CALLS_IN_PART};
+    return outcomes[vshi_tasks_filtered(before)];
 }

@@ -16,7 +16,7 @@ bool vshi_confine_resources(uint64_t memory, double seconds);
 
 /* What became of a filter of system calls. */
 enum {
-    VSHI_CALLS_FREE = 0,     /* the host allows none, or the build is a sanitized one */
+    VSHI_CALLS_FREE = 0, /* the host allows none, or does not let it be seen (no /proc); sanitized builds */
     VSHI_CALLS_CONFINED = 1, /* it holds in every thread, as the kernel tells of each */
     VSHI_CALLS_IN_PART = 2   /* some thread is not seen to have it: nothing may be parsed here */
 };

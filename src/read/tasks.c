@@ -3,6 +3,7 @@
 
 #include <dirent.h>
 #include <fcntl.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,16 +39,16 @@ static bool read_state(const char *path, task_state *state) {
     return true;
 }
 
-/* The calling thread's. */
-static task_state own_state(void) {
-    task_state own = {MODE_NONE, 0};
+/* The calling thread's; false where it cannot be read. */
+static bool read_own_state(task_state *own) {
     char path[PATH_ROOM];
     snprintf(path, sizeof path, "/proc/self/task/%d/status", (int)gettid());
-    return read_state(path, &own) ? own : (task_state){MODE_NONE, 0};
+    return read_state(path, own);
 }
 
 int vshi_task_filters(void) {
-    return own_state().filters;
+    task_state own = {MODE_NONE, 0};
+    return read_own_state(&own) ? own.filters : 0;
 }
 
 int vshi_task_count(void) {
@@ -62,10 +63,13 @@ int vshi_task_count(void) {
     return count;
 }
 
-bool vshi_tasks_filtered(int before) {
-    const task_state own = own_state();
-    DIR *tasks = opendir("/proc/self/task");
-    bool all = tasks != NULL && own.mode == MODE_FILTER && (own.filters == UNCOUNTED || own.filters > before);
+int vshi_tasks_filtered(int before) {
+    task_state own = {MODE_NONE, 0};
+    DIR *tasks = read_own_state(&own) ? opendir("/proc/self/task") : NULL;
+    if (tasks == NULL) {
+        return VSHI_TASKS_UNSEEN;
+    }
+    bool all = own.mode == MODE_FILTER && (own.filters == UNCOUNTED || own.filters > before);
     for (const struct dirent *entry; all && (entry = readdir(tasks)) != NULL;) {
         char path[PATH_ROOM];
         task_state task = {MODE_NONE, 0};
@@ -74,8 +78,6 @@ bool vshi_tasks_filtered(int before) {
             all = read_state(path, &task) && task.mode == MODE_FILTER && task.filters == own.filters;
         }
     }
-    if (tasks != NULL) {
-        closedir(tasks);
-    }
-    return all;
+    closedir(tasks);
+    return all ? VSHI_TASKS_FILTERED : VSHI_TASKS_LOOSE;
 }

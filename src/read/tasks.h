@@ -2,8 +2,6 @@
 #ifndef VSHI_READ_TASKS_H
 #define VSHI_READ_TASKS_H
 
-#include <stdbool.h>
-
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -14,9 +12,15 @@ int vshi_task_filters(void);
 /* How many tasks (threads) there are; 0 where that cannot be read. */
 int vshi_task_count(void);
 
-/* Every task has a filter, and as many as the calling one, which are more than `before`. A kernel before 5.9
- * does not count them: every task has one. False where that cannot be read. */
-bool vshi_tasks_filtered(int before);
+enum {
+    VSHI_TASKS_UNSEEN = 0,   /* /proc is not there */
+    VSHI_TASKS_FILTERED = 1, /* all of them */
+    VSHI_TASKS_LOOSE = 2     /* not all of them */
+};
+
+/* Whether every task has a filter, and as many as the calling one, which are more than `before`. A kernel
+ * before 5.9 does not count them: whether every task has one. */
+int vshi_tasks_filtered(int before);
 
 #ifdef __cplusplus
 }
