@@ -125,10 +125,12 @@ typedef struct vsh_run {
                          read: VSH_ERROR_UNSUPPORTED; needs a reader, else VSH_ERROR_ARGUMENT. 0: a warning */
     int32_t allow_outside; /* 1: what a model names (buffers, materials) may lie outside its folder. 0: such a
                               file is not opened: VSH_ERROR_INPUT */
+    uint64_t memory_held;  /* bytes of memory_limit that the caller holds beside what it gives to the call:
+                              images  read before, say */
 } vsh_run;
 
 static inline vsh_run vsh_run_default(void) {
-    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST, NULL, 0.0, 0, 0};
+    vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST, NULL, 0.0, 0, 0, 0};
     return run;
 }
 

@@ -143,7 +143,7 @@ typedef struct vsh_tolerances vsh_tolerances;
 
 /* Reads such a file. Free it with vsh_tolerances_free(). Errors: VSH_ERROR_ARGUMENT (path or tolerances
  * NULL), VSH_ERROR_READ, VSH_ERROR_INPUT (no JSON, unknown keys, values out of range, with the place),
- * VSH_ERROR_LIMIT (over 64 MiB). */
+ * VSH_ERROR_LIMIT (one whose values may take over 64 MiB). */
 VSH_API vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vsh_error *error);
 VSH_API void vsh_tolerances_free(vsh_tolerances *tolerances); /* NULL does nothing */
 

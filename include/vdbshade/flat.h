@@ -112,6 +112,10 @@ typedef struct vsh_flat_scene {
 /* Reads a flat scene's file (docs/flat.md); what it names is not opened. The scene and all it points to
  * belong to *scene; free it with vsh_flat_scene_free(). Errors: as vsh_scene_read(). */
 VSH_API vsh_result vsh_flat_scene_read(const char *path, vsh_flat_scene **scene, vsh_error *error);
+
+/* The same, as vsh_scene_read_run(). */
+VSH_API vsh_result vsh_flat_scene_read_run(const char *path, const vsh_run *run, vsh_flat_scene **scene,
+                                           vsh_error *error);
 VSH_API void
 vsh_flat_scene_free(vsh_flat_scene *scene); /* of vsh_flat_scene_read() only; NULL does nothing */
 

@@ -136,6 +136,11 @@ typedef struct vsh_scene {
  * - VSH_ERROR_LIMIT: a file of more than 64 MiB;
  * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_scene_read(const char *path, vsh_scene **scene, vsh_error *error);
+
+/* The same within run->memory_limit: a text whose values may take more is refused before they are read.
+ * Errors: the same; VSH_ERROR_ARGUMENT (run), VSH_ERROR_LIMIT (memory). */
+VSH_API vsh_result vsh_scene_read_run(const char *path, const vsh_run *run, vsh_scene **scene,
+                                      vsh_error *error);
 VSH_API void vsh_scene_free(vsh_scene *scene); /* of vsh_scene_read() only; NULL does nothing */
 
 /* What a scene's files hold, each file read once, however many casters and receivers use it. */

@@ -24,8 +24,17 @@ vsh_result vshi_allocate(void **memory, size_t count, size_t size, const char *w
     return VSH_OK;
 }
 
+uint64_t vshi_memory_left(const vsh_run *run) {
+    return run->memory_held < run->memory_limit ? run->memory_limit - run->memory_held
+                                                : (uint64_t)(run->memory_limit > 0);
+}
+
 vsh_result vshi_check_limit(const vsh_run *run, double bytes, const char *what, vsh_error *error) {
-    if (run == NULL || run->memory_limit == 0 || bytes <= (double)run->memory_limit) {
+    if (run == NULL || run->memory_limit == 0) {
+        return VSH_OK;
+    }
+    bytes += (double)run->memory_held;
+    if (bytes <= (double)run->memory_limit) {
         return VSH_OK;
     }
     const int decimals = run->memory_limit < 1000000 ? 3 : 0;

@@ -15,8 +15,11 @@ extern "C" {
 vsh_result vshi_allocate(void **memory, size_t count, size_t size, const char *what, vsh_error *error);
 
 /* VSH_ERROR_LIMIT, naming `what`, where `bytes` (a double, so that estimates cannot overflow) pass
- * run->memory_limit. `run` may be NULL. */
+ * run->memory_limit together with run->memory_held. `run` may be NULL. */
 vsh_result vshi_check_limit(const vsh_run *run, double bytes, const char *what, vsh_error *error);
+
+/* What run->memory_held leaves of its limit, at least a byte; 0: there is no limit. */
+uint64_t vshi_memory_left(const vsh_run *run);
 
 #ifdef __cplusplus
 }

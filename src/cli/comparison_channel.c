@@ -81,8 +81,12 @@ void cli_channel_set_limits(const compare_work *work, const compare_texts texts[
 /* --- one channel */
 
 int cli_channel_measure(const compare_work *work, cli_channel *channel, const vsh_compared *compared) {
+    vsh_run run = work->run;
+    const uint64_t given = 2 * sizeof(float) * (uint64_t)compared->size[0] * (uint64_t)compared->size[1] *
+                           (uint64_t)compared->size[2]; /* of what is held */
+    run.memory_held -= run.memory_held < given ? run.memory_held : given;
     vsh_error error;
-    if (vsh_compare(compared, &channel->limits.options, &work->run, &channel->measures, &error) != VSH_OK) {
+    if (vsh_compare(compared, &channel->limits.options, &run, &channel->measures, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     channel->failed = vsh_compare_judge(&channel->measures, &channel->limits);

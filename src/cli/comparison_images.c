@@ -55,13 +55,16 @@ static void view(images *both, int which) {
     }
 }
 
-static int read_both(const compare_work *work, images *both) {
+static int read_both(compare_work *work, images *both) {
     const char *const paths[2] = {work->comparison->golden, work->comparison->fresh};
     for (int which = 0; which < 2; ++which) {
         vsh_error error;
         if (vsh_image_read_run(paths[which], &work->run, &both->file[which], &error) != VSH_OK) {
             return cli_fail(&error);
         }
+        const vsh_image all = vsh_image_view(both->file[which]);
+        work->run.memory_held +=
+            sizeof(float) * (uint64_t)all.width * (uint64_t)all.height * (uint64_t)all.channel_count;
         both->texts[which].list = vsh_image_attributes(both->file[which], &both->texts[which].count);
         view(both, which);
     }
@@ -141,7 +144,7 @@ static int compare_channels(const compare_work *work, const images *both) {
     return code;
 }
 
-int compare_images(const compare_work *work) {
+int compare_images(compare_work *work) {
     cli_comparison *c = work->comparison;
     images both = {.mask = NULL};
     int code = read_both(work, &both);

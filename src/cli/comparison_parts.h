@@ -12,7 +12,7 @@ typedef struct compare_work {
 } compare_work;
 
 /* The channels of two images, and the grids of two .vdb files. CLI_OK or an exit code, having said why. */
-int compare_images(const compare_work *work);
+int compare_images(compare_work *work);
 int compare_grids(const compare_work *work);
 
 /* What a file says of itself. */

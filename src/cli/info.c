@@ -14,6 +14,7 @@ static const cli_option options[] = {
     {KEY_SIZE, "size", "W[xH]", "texels of the lightmap that UVs are looked at in (1024)"},
     {CLI_KEY_VERBOSE, "verbose", NULL, "a paragraph for each mesh, however many there are"},
     CLI_UNIT_OPTION,
+    CLI_MEMORY_OPTION,
     CLI_READER_OPTIONS,
     {'h', "help", NULL, "show this help"},
 };
@@ -58,7 +59,7 @@ static int print_info(const char *path, const cli_info_look *look, const vsh_run
         return cli_info_vdb(path, run);
     }
     if (cli_has_ending(path, "json")) {
-        return cli_info_scene(path);
+        return cli_info_scene(path, run);
     }
     for (size_t i = 0; i < sizeof image_endings / sizeof image_endings[0]; ++i) {
         if (cli_has_ending(path, image_endings[i])) {

@@ -72,12 +72,12 @@ static void print_layer(const vsh_scene_layer *layer) {
 }
 
 /* False where the file is no flat scene. */
-static bool print_flat(const char *path) {
+static bool print_flat(const char *path, const vsh_run *run) {
     static const char *const casters[] = {"mask", "text", "circle", "box", "polygon"};
     static const char *const lights[] = {"directional", "disc", "spot"};
     vsh_flat_scene *scene = NULL;
     vsh_error error;
-    if (vsh_flat_scene_read(path, &scene, &error) != VSH_OK) {
+    if (vsh_flat_scene_read_run(path, run, &scene, &error) != VSH_OK) {
         return false;
     }
     const vsh_flat_options *o = &scene->options;
@@ -95,11 +95,11 @@ static bool print_flat(const char *path) {
     return true;
 }
 
-int cli_info_scene(const char *path) {
+int cli_info_scene(const char *path, const vsh_run *run) {
     vsh_scene *scene = NULL;
     vsh_error error;
-    if (vsh_scene_read(path, &scene, &error) != VSH_OK) {
-        return error.code == VSH_ERROR_INPUT && print_flat(path) ? CLI_OK : cli_fail(&error);
+    if (vsh_scene_read_run(path, run, &scene, &error) != VSH_OK) {
+        return error.code == VSH_ERROR_INPUT && print_flat(path, run) ? CLI_OK : cli_fail(&error);
     }
     for (size_t i = 0; i < scene->caster_count; ++i) {
         print_caster(&scene->casters[i], i);

@@ -111,13 +111,18 @@ enum {
             "models may name files (buffers, materials) outside\ntheir folder"                               \
     }
 
+#define CLI_MEMORY_OPTION                                                                                    \
+    {                                                                                                        \
+        CLI_KEY_MEMORY_LIMIT, "memory-limit", "BYTES",                                                       \
+            "memory that a step may take; with k, M, G or KiB,\nMiB, GiB; 0: no limit (3/4 of the "          \
+            "machine's)"                                                                                     \
+    }
+
 #define CLI_COMMON_OPTIONS                                                                                   \
     {0, NULL, NULL, "Running"},                                                                              \
         {CLI_KEY_THREADS, "threads", "N",                                                                    \
          "threads, 1 to 1024 (all cores); the result is\nthe same for any number"},                          \
-        {CLI_KEY_MEMORY_LIMIT, "memory-limit", "BYTES",                                                      \
-         "memory that a step may take; with k, M, G or KiB,\nMiB, GiB; 0: no limit (3/4 of the machine's)"}, \
-        CLI_READER_OPTIONS,                                                                                  \
+        CLI_MEMORY_OPTION, CLI_READER_OPTIONS,                                                               \
         {CLI_KEY_PROGRESS, "progress", NULL, "show progress even where it is no terminal"},                  \
         {CLI_KEY_VERBOSE, "verbose", NULL, "every warning, and not one line for all of a kind"},             \
         {CLI_KEY_QUIET, "quiet", NULL, "say nothing but errors"}, {                                          \

@@ -101,9 +101,10 @@ static bool is_flat(const char *path) {
 }
 
 static int list_scene_outputs(const regress_work *work, regress_case *one, const char *path) {
+    const vsh_run run = cli_common_run(&work->settings->compare.common);
     vsh_error error;
     vsh_scene *scene = NULL;
-    if (vsh_scene_read(path, &scene, &error) != VSH_OK) {
+    if (vsh_scene_read_run(path, &run, &scene, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     bool good = true;
@@ -115,9 +116,10 @@ static int list_scene_outputs(const regress_work *work, regress_case *one, const
 }
 
 static int list_flat_output(const regress_work *work, regress_case *one, const char *path) {
+    const vsh_run run = cli_common_run(&work->settings->compare.common);
     vsh_error error;
     vsh_flat_scene *scene = NULL;
-    if (vsh_flat_scene_read(path, &scene, &error) != VSH_OK) {
+    if (vsh_flat_scene_read_run(path, &run, &scene, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     if (scene->output != NULL) {

@@ -43,9 +43,10 @@ static int add_limits(const regress_work *work, regress_case *one) {
 
 /* Files that a flat scene names. */
 static int add_flat_files(const regress_work *work, const char *path, regress_lines *files) {
+    const vsh_run run = cli_common_run(&work->settings->compare.common);
     vsh_flat_scene *scene = NULL;
     vsh_error error;
-    if (vsh_flat_scene_read(path, &scene, &error) != VSH_OK) {
+    if (vsh_flat_scene_read_run(path, &run, &scene, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     bool good = true;
@@ -83,9 +84,10 @@ static int add_option_files(const regress_work *work, const regress_case *one, r
 /* The scene's own file and what it names, as outputs tell it. */
 static int add_provenance(const regress_work *work, regress_case *one, const char *path) {
     const bool flat = one->command == &cli_flat;
+    const vsh_run run = cli_common_run(&work->settings->compare.common);
     vsh_scene *scene = NULL;
     vsh_error error;
-    if (!flat && vsh_scene_read(path, &scene, &error) != VSH_OK) {
+    if (!flat && vsh_scene_read_run(path, &run, &scene, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     regress_lines files = {NULL, 0};
@@ -98,7 +100,6 @@ static int add_provenance(const regress_work *work, regress_case *one, const cha
         source.scene = scene;
         source.files = (const char *const *)files.line;
         source.file_count = files.count;
-        const vsh_run run = cli_common_run(&work->settings->compare.common);
         code =
             vsh_provenance_create(&source, &run, &provenance, &error) == VSH_OK ? CLI_OK : cli_fail(&error);
     }

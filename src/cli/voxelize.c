@@ -149,8 +149,9 @@ static int voxelize_main(int argc, char **argv) {
     vsh_scene scene = {.casters = &mesh, .caster_count = 1, .grid = vsh_grid_options_default()};
     vsh_scene *read = NULL;
     if (cli_has_ending(s.input, "json")) {
+        const vsh_run run = cli_common_run(&s.common);
         vsh_error error;
-        if (vsh_scene_read(s.input, &read, &error) != VSH_OK) {
+        if (vsh_scene_read_run(s.input, &run, &read, &error) != VSH_OK) {
             return cli_fail(&error);
         }
         scene.casters = read->casters;

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_REACH = 16 };
+enum { MOST_REACH = 16, MOST_BYTES = 64 << 20 };
 
 static const double MOST = 1e15; /* of a limit: nothing is held to it */
 
@@ -100,7 +100,9 @@ vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vs
     VSHI_NEEDS(path);
     char *text;
     size_t size;
-    vsh_result result = vshi_scene_text(path, &text, &size, error);
+    vsh_run run = vsh_run_default();
+    run.memory_limit = MOST_BYTES;
+    vsh_result result = vshi_scene_text(path, &run, &text, &size, error);
     if (result != VSH_OK) {
         return result;
     }

@@ -90,7 +90,7 @@ vsh_result vshi_ask_begin(vshi_ask *ask, int32_t kind, const char *path, const v
     vshi_put_count(&ask->put, VSHI_READER_PROTOCOL);
     vshi_put_count(&ask->put, (uint64_t)kind);
     vshi_put_count(&ask->put, (uint64_t)getpid());
-    vshi_put_count(&ask->put, run->memory_limit);
+    vshi_put_count(&ask->put, vshi_memory_left(run));
     vshi_put_number(&ask->put, seconds_for(path, run));
     vshi_put_count(&ask->put, run->confined != 0);
     vshi_put_count(&ask->put, run->allow_outside != 0);

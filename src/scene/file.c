@@ -4,6 +4,8 @@
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/input.h"
+#include "base/job.h"
+#include "base/memory.h"
 #include "caster/foreign.h"
 
 #include <errno.h>
@@ -45,7 +47,28 @@ static vsh_result read_all(const char *path, FILE *file, char **text, size_t *si
     return VSH_OK;
 }
 
-vsh_result vshi_scene_text(const char *path, char **text, size_t *size, vsh_error *error) {
+/* Bytes, at most, that reading a text takes: its own, Jansson's tree of it, and what is made of that. Objects
+ * and arrays bring the first slots of their tables; members and items double them. (The C library's blocks
+ * counted, Jansson 2.14 and glibc 2.36 on 64 bits: tests/unit/test_scene_memory.c.) */
+static double tree_bytes(const char *text, size_t size) {
+    double objects = 0.0, arrays = 0.0, members = 0.0, items = 0.0;
+    bool in_string = false;
+    for (size_t i = 0; i < size; ++i) {
+        const char c = text[i];
+        i += in_string && c == '\\';
+        in_string ^= c == '"';
+        if (!in_string) {
+            objects += c == '{';
+            arrays += c == '[';
+            members += c == ':';
+            items += c == ',';
+        }
+    }
+    return 288.0 * objects + 176.0 * arrays + 144.0 * members + 112.0 * items + 3.0 * (double)size;
+}
+
+vsh_result vshi_scene_text(const char *path, const vsh_run *run, char **text, size_t *size,
+                           vsh_error *error) {
     *text = NULL;
     *size = 0;
     FILE *file;
@@ -58,18 +81,29 @@ vsh_result vshi_scene_text(const char *path, char **text, size_t *size, vsh_erro
     if (result == VSH_OK) {
         result = read_all(path, file, text, size, error);
     }
+    if (result == VSH_OK) {
+        result = vshi_check_limit(run, tree_bytes(*text, *size), path, error);
+    }
     fclose(file);
     return result;
 }
 
 vsh_result vsh_scene_read(const char *path, vsh_scene **scene, vsh_error *error) {
+    return vsh_scene_read_run(path, NULL, scene, error);
+}
+
+vsh_result vsh_scene_read_run(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(scene);
     *scene = NULL;
     VSHI_NEEDS(path);
-    char *text;
+    char *text = NULL;
     size_t size;
-    vsh_result result = vshi_scene_text(path, &text, &size, error);
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result == VSH_OK) {
+        result = vshi_scene_text(path, &full, &text, &size, error);
+    }
     if (result == VSH_OK) {
         result = vshi_scene_parse(path, text, size, scene, error);
     }

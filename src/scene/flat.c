@@ -1,6 +1,7 @@
 /* Flat scenes: their file, and the outline of their casters. */
 #include "base/elementary.h"
 #include "base/floats.h"
+#include "base/job.h"
 #include "base/memory.h"
 #include "scene/parts.h"
 #include "scene/scene.h"
@@ -114,13 +115,22 @@ static vsh_result parse(vshi_reader *reader, owner *made) {
 }
 
 vsh_result vsh_flat_scene_read(const char *path, vsh_flat_scene **scene, vsh_error *error) {
+    return vsh_flat_scene_read_run(path, NULL, scene, error);
+}
+
+vsh_result vsh_flat_scene_read_run(const char *path, const vsh_run *run, vsh_flat_scene **scene,
+                                   vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(scene);
     *scene = NULL;
     VSHI_NEEDS(path);
-    char *text;
+    char *text = NULL;
     size_t size;
-    vsh_result result = vshi_scene_text(path, &text, &size, error);
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result == VSH_OK) {
+        result = vshi_scene_text(path, &full, &text, &size, error);
+    }
     owner *made = result == VSH_OK ? calloc(1, sizeof *made) : NULL;
     if (result == VSH_OK && made == NULL) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);

@@ -8,7 +8,8 @@
 vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh_scene **scene,
                             vsh_error *error);
 
-/* The text of a scene file, to be freed with free() also where it fails. Errors: as vsh_scene_read(). */
-vsh_result vshi_scene_text(const char *path, char **text, size_t *size, vsh_error *error);
+/* The text of a scene file, to be freed with free() also where it fails, which reading as JSON keeps within
+ * run->memory_limit. Errors: as vsh_scene_read_run(). */
+vsh_result vshi_scene_text(const char *path, const vsh_run *run, char **text, size_t *size, vsh_error *error);
 
 #endif

@@ -165,3 +165,24 @@ JSON
     [ ! -e a.exr ]
     [ ! -e b.exr ]
 }
+
+# What stands in a file may take a hundred times its size, and is refused before it does.
+@test "a scene of a million empty objects is refused within the memory limit, by every command that reads one" {
+    { printf '[{}'; yes ',{}' | head -n 1000000 | tr -d '\n'; printf ']'; } >bomb.json
+    local command
+    for command in "info bomb.json" "bake bomb.json --sun 0,1,0" "voxelize bomb.json -o out.vdb" "flat bomb.json -o out.exr"; do
+        shade $command --memory-limit 100MiB
+        refused 4 'bomb.json: about ' 'MB are needed, over the memory limit of 105 MB'
+    done
+}
+
+@test "two images that are compared count together" {
+    write_box box.obj
+    run -0 "$VDBSHADE" bake box.obj --sun 1,2,1 --size 512 --resolution 8 --method hard -o one.exr --quiet
+    shade compare one.exr one.exr --memory-limit 12M
+    refused 4 'one.exr: about 16 MB are needed, over the memory limit of 12 MB'
+    run -0 "$VDBSHADE" compare one.exr one.exr --memory-limit 18M
+    run -0 "$VDBSHADE" info one.exr --memory-limit 11M
+    shade info one.exr --memory-limit 5M
+    refused 4 'one.exr: about ' 'over the memory limit of 5 MB'
+}
