@@ -93,7 +93,7 @@ typedef struct vsh_model vsh_model;
  * - VSH_ERROR_UNSUPPORTED: a glTF that needs an extension that is not read, or of another version;
  * - VSH_ERROR_INPUT: no ending, or one of no format that is read (.blend, Alembic and USD files, by their
  *   first bytes too); no triangles; vertices that are not finite, indices out of range, a damaged header or
- *   JSON;
+ *   JSON; a file that it names outside of its folder (run->allow_outside);
  * - VSH_ERROR_LIMIT: run->memory_limit (about six bytes for one of the file), nodes nested more than 1024
  *   deep;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */

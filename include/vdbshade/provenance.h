@@ -42,7 +42,8 @@ static inline vsh_provenance_source vsh_provenance_source_default(void) {
  * - vdbshade_voxel_size;
  * - those of the source;
  * - vdbshade_input_N: "sha256:… NAME" of each input, from N = 0: the source's files, then those of casters
- *   and receivers, then the .bin files of glTF among them, each file once. */
+ *   and receivers, then the .bin files of glTF among them, each file once; one outside of its model's folder
+ *   only with run->allow_outside. */
 typedef struct vsh_provenance vsh_provenance;
 
 /* Reads every input once, to hash it. Free the result with vsh_provenance_free(). Errors:

@@ -130,7 +130,7 @@ typedef struct vsh_scene {
 /* Reads a scene file; what it names is not opened. The scene and all it points to belong to *scene; free it
  * with vsh_scene_free(). Errors:
  * - VSH_ERROR_ARGUMENT: path or scene NULL;
- * - VSH_ERROR_READ: no such file, no permission, a folder;
+ * - VSH_ERROR_READ: no such file, no permission, no regular file;
  * - VSH_ERROR_INPUT, with line and column: no JSON, an unknown or missing key, a value of the wrong type or
  *   out of range;
  * - VSH_ERROR_LIMIT: a file of more than 64 MiB;

@@ -38,11 +38,11 @@ VSH_API void vsh_spheres_get_info(const vsh_spheres *spheres, vsh_spheres_info *
  * blanks; numbers with a decimal point. Empty rows and rows that begin with # are passed over, and a first
  * row of names. *spheres is [*count][4]; free it with vsh_spheres_list_free(). Errors:
  * - VSH_ERROR_ARGUMENT: path, spheres or count NULL, run;
- * - VSH_ERROR_READ: no such file, no permission, a folder;
+ * - VSH_ERROR_READ: no such file, no permission, no regular file;
  * - VSH_ERROR_INPUT: no spheres; by the row's number in the file: not four numbers, one that is not finite or
  *   over 1e15 in size, a radius that is not over 0;
- * - VSH_ERROR_LIMIT: run->memory_limit;
- * - VSH_ERROR_MEMORY. */
+ * - VSH_ERROR_LIMIT: run->memory_limit, a file of more than 16 GiB;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (under the stage "load"). */
 VSH_API vsh_result vsh_spheres_read(const char *path, const vsh_run *run, double **spheres, size_t *count,
                                     vsh_error *error);
 VSH_API void vsh_spheres_list_free(double *spheres); /* NULL does nothing */

@@ -292,6 +292,7 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
 static int check_files(const trade_settings *s, const vsh_scene *scene) {
     const char *const outputs[] = {s->report, s->csv, s->plot};
     static const char *const names[] = {"output", "--csv file", "--plot file"};
+    cli_bake_settings named = s->bake; /* by the command line, not by the scene */
     int code = CLI_OK;
     if (scene->layer_count > 0) {
         code = cli_usage("%s: trade measures one field, not layers", s->bake.input);
@@ -311,7 +312,8 @@ static int check_files(const trade_settings *s, const vsh_scene *scene) {
                 code = cli_usage("%s: both the %s and the %s", outputs[i], names[k], names[i]);
             }
         }
-        code = code == CLI_OK ? cli_bake_check_output(&s->bake, scene, outputs[i]) : code;
+        named.output = outputs[i];
+        code = code == CLI_OK ? cli_bake_check_output(&named, scene, outputs[i]) : code;
         code = code == CLI_OK ? cli_temporary_check(outputs[i]) : code;
     }
     return code;

@@ -1,6 +1,8 @@
 /* Scenes that are wrong, damaged, too large or not there. */
 #include "scenes.h"
 
+#include <unistd.h>
+
 /* A scene around one part, so that the table below can be short. */
 #define CASTERS "{\"casters\":[{\"mesh\":\"a\"}],"
 
@@ -431,13 +433,20 @@ static void a_file_that_is_not_there_or_is_a_folder_cannot_be_read(void **state)
     vsh_scene_free(NULL);
 }
 
-static void a_file_without_end_is_over_the_limit(void **state) {
+static void a_device_is_no_scene_and_a_large_file_over_the_limit(void **state) {
     (void)state;
     vsh_scene *scene = NULL;
     vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_scene_read("/dev/zero", &scene, &error), VSH_ERROR_LIMIT);
-    assert_string_equal(error.message, "/dev/zero: is larger than the 67108864 bytes that a scene may have");
+    assert_int_equal(vsh_scene_read("/dev/zero", &scene, &error), VSH_ERROR_READ);
+    assert_string_equal(error.message, "/dev/zero: cannot be read: it is no regular file");
+    char path[] = "scene-XXXXXX";
+    const int file = mkstemp(path);
+    assert_true(file >= 0 && ftruncate(file, (off_t)1 << 36) == 0);
+    close(file);
+    assert_int_equal(vsh_scene_read(path, &scene, &error), VSH_ERROR_LIMIT);
+    assert_non_null(strstr(error.message, ": is larger than the 67108864 bytes that a scene may have"));
     assert_null(scene);
+    unlink(path);
 }
 
 int main(void) {
@@ -453,7 +462,7 @@ int main(void) {
         cmocka_unit_test(keys_with_escapes_are_the_keys_they_spell),
         cmocka_unit_test(messages_stay_one_line_whatever_the_key),
         cmocka_unit_test(a_file_that_is_not_there_or_is_a_folder_cannot_be_read),
-        cmocka_unit_test(a_file_without_end_is_over_the_limit),
+        cmocka_unit_test(a_device_is_no_scene_and_a_large_file_over_the_limit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
