@@ -133,12 +133,12 @@ static int add_conditional(scmp_filter_ctx filter) {
                                SCMP_A2(SCMP_CMP_MASKED_EQ, writes, O_RDONLY));
     failed |= seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(clone), 1,
                                SCMP_A0(SCMP_CMP_MASKED_EQ, CLONE_THREAD, CLONE_THREAD));
-    failed |= seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(tgkill), 1, SCMP_A0(SCMP_CMP_EQ, self));
-    failed |= seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(prlimit64), 2, SCMP_A0(SCMP_CMP_EQ, 0),
-                               SCMP_A2(SCMP_CMP_EQ, 0));
+    failed |= seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(tgkill), 1, SCMP_A0(SCMP_CMP_EQ, self, 0));
+    failed |= seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(prlimit64), 2, SCMP_A0(SCMP_CMP_EQ, 0, 0),
+                               SCMP_A2(SCMP_CMP_EQ, 0, 0));
     for (size_t i = 0; i < sizeof allowed_of_descriptors / sizeof allowed_of_descriptors[0]; ++i) {
         failed |= seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(fcntl), 1,
-                                   SCMP_A1(SCMP_CMP_EQ, (scmp_datum_t)allowed_of_descriptors[i]));
+                                   SCMP_A1(SCMP_CMP_EQ, (scmp_datum_t)allowed_of_descriptors[i], 0));
     }
     /* its arguments lie in memory, where no filter sees them: the C library falls back to clone */
     failed |= seccomp_rule_add(filter, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(clone3), 0);

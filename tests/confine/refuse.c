@@ -30,10 +30,10 @@ int main(int argc, char **argv) {
         }
         if (strcmp(argv[word], "seccomp") == 0) {
             failed |= seccomp_rule_add(filter, SCMP_ACT_ERRNO(EINVAL), SCMP_SYS(prctl), 1,
-                                       SCMP_A0(SCMP_CMP_EQ, PR_SET_SECCOMP));
+                                       SCMP_A0(SCMP_CMP_EQ, PR_SET_SECCOMP, 0));
         } else if (strcmp(argv[word], "limits") == 0) {
             failed |= seccomp_rule_add(filter, SCMP_ACT_ERRNO(EPERM), SCMP_SYS(prlimit64), 1,
-                                       SCMP_A2(SCMP_CMP_NE, 0));
+                                       SCMP_A2(SCMP_CMP_NE, 0, 0));
         }
     }
     if (failed != 0 || word + 1 >= argc || seccomp_load(filter) != 0) {
