@@ -94,37 +94,20 @@ static int hash_program(regress_work *work) {
 
 /* The folder for new bakes. */
 static int make_bakes(regress_work *work) {
-    const char *given = work->settings->bakes, *place = getenv("TMPDIR");
-    if (given != NULL && mkdir(given, 0777) != 0 && errno != EEXIST) {
+    const char *given = work->settings->bakes;
+    if (given == NULL) {
+        return regress_folder_make(&work->folder_of_bakes, &work->bakes);
+    }
+    if (mkdir(given, 0777) != 0 && errno != EEXIST) {
         cli_say("%s: cannot be made: %s", given, strerror(errno));
         return CLI_FILE;
     }
-    if (given != NULL) {
-        work->bakes = realpath(given, NULL);
-    } else {
-        work->bakes =
-            regress_path(place != NULL && place[0] == '/' ? place : "/tmp", "vdbshade-regress-XXXXXX");
-        work->bakes_are_temporary = work->bakes != NULL && mkdtemp(work->bakes) != NULL;
-    }
-    if (work->bakes == NULL || (given == NULL && !work->bakes_are_temporary)) {
-        cli_say("%s: cannot be made: %s", given != NULL ? given : "folder for new bakes", strerror(errno));
+    work->bakes = realpath(given, NULL);
+    if (work->bakes == NULL) {
+        cli_say("%s: cannot be made: %s", given, strerror(errno));
         return CLI_FILE;
     }
     return CLI_OK;
-}
-
-static void remove_bakes(const regress_work *work) {
-    DIR *listing = work->bakes_are_temporary ? opendir(work->bakes) : NULL;
-    const struct dirent *entry;
-    while (listing != NULL && (entry = readdir(listing)) != NULL) {
-        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0) {
-            unlinkat(dirfd(listing), entry->d_name, 0);
-        }
-    }
-    if (listing != NULL) {
-        closedir(listing);
-        rmdir(work->bakes);
-    }
 }
 
 static int prepare(regress_work *work) {
@@ -287,7 +270,7 @@ static int regress_main(int argc, char **argv) {
     cli_progress_begin(s.compare.common.progress, s.compare.common.quiet);
     regress_work work = {.settings = &s};
     code = run(&work);
-    remove_bakes(&work);
+    regress_folder_remove(&work.folder_of_bakes, work.bakes);
     for (size_t i = 0; i < work.case_count; ++i) {
         regress_free_case(&work.cases[i]);
     }

@@ -42,8 +42,8 @@ typedef struct regress_work {
     char *folder, *golden; /* golden: the folder of those */
     char *cache;           /* file */
     char *bakes;           /* folder of the new ones, absolute */
-    bool bakes_are_temporary;
-    char *program; /* hashes of the program and the library */
+    int folder_of_bakes;   /* descriptor + 1 that holds it, where it is temporary */
+    char *program;         /* hashes of the program and the library */
     regress_case *cases;
     size_t case_count;
 } regress_work;
@@ -76,6 +76,14 @@ void regress_read_cache(regress_work *work);
 
 /* Keeps what the cases that are alike depend on. */
 int regress_write_cache(const regress_work *work);
+
+/* Makes a folder for new bakes among the system's temporary ones, and takes away those that killed runs of
+ * this user left there: a lock on the folder, *held (to be 0 before), tells that its run lives. CLI_OK or
+ * CLI_FILE, having said why. */
+int regress_folder_make(int *held, char **path);
+
+/* Takes it away, and what is in it; nothing where none was made. */
+void regress_folder_remove(int *held, const char *path);
 
 /* Bakes a case in a child process. CLI_OK or an exit code, having said why. */
 int regress_bake(const regress_work *work, const regress_case *one);

@@ -1,11 +1,12 @@
-/* SIGINT and SIGTERM: the work is asked to stop, and ended where it does not. */
+/* SIGINT, SIGTERM and SIGHUP: the work is asked to stop, and ended where it does not. */
 #ifndef CLI_SIGNALS_H
 #define CLI_SIGNALS_H
 
 #include <stdbool.h>
 
-/* From here on the signals only ask. SIGXFSZ and SIGPIPE are ignored, so that a file-size limit and a pipe
- * that nobody reads are errors of the write and not the process's end. */
+/* From here on the signals only ask; a SIGHUP that is ignored (nohup) stays so. SIGXFSZ and SIGPIPE are
+ * ignored, so that a file-size limit and a pipe that nobody reads are errors of the write and not the
+ * process's end. */
 void cli_signals_begin(void);
 
 bool cli_interrupted(void);

@@ -49,3 +49,22 @@ interrupt() {
     [ "$took" -le "$most" ] || fail "took $took ms"
     untouched out.exr
 }
+
+@test "SIGHUP does the same, and is ignored under nohup" {
+    interrupt HUP 0.5
+    [ "$status" -eq 130 ] || fail "wrong code"
+    [ "$took" -le "$most" ] || fail "took $took ms"
+    untouched out.exr
+    write_box box.obj
+    (
+        trap '' HUP
+        exec "$VDBSHADE" bake box.obj --sun 0,1,0 --sun-angle 5 --size 1024 --resolution 256 --progress --trusted -o long.exr 2>long.txt
+    ) &
+    local pid=$!
+    until [ -s long.txt ]; do
+        sleep 0.01
+    done
+    kill -s HUP "$pid"
+    wait "$pid" || fail "ended by SIGHUP"
+    [ -s long.exr ] || fail "not baked"
+}

@@ -220,3 +220,40 @@ asking() {
     [[ $output == "--stats=sly: updated"* ]] || fail "not baked"
     [ ! -e sly.json ] && [ ! -e scenes/sly.json ] || fail "taken for an option"
 }
+
+# begin: starts a run of a long bake, and waits until it has a folder of its own; sets pid and folder.
+begin() {
+    local before=${folder-none}
+    "$VDBSHADE" regress long --quiet &
+    pid=$!
+    until folder=$(find . -maxdepth 1 -name 'vdbshade-regress-*' ! -path "$before") && [ -n "$folder" ]; do
+        sleep 0.01
+    done
+    touch "$folder/.box.exr.1.tmp.exr"
+}
+
+@test "what a killed run left goes with the next one; others' folders, and those of runs that go on, stay" {
+    cp -r scenes long
+    sed -i 's/"size": 64/"size": 4096, "supersample": 4/' long/box.json
+    begin
+    kill -s KILL "$pid"
+    wait "$pid" || true
+    local left=$folder
+    [ -d "$left" ] || fail "it was to leave its bake behind"
+    begin
+    [ ! -e "$left" ] || fail "the folder of the killed run is still there"
+    mkdir -m 700 vdbshade-regress-sixSix vdbshade-regress-seven77
+    mkdir -m 755 vdbshade-regress-theirs keep
+    echo mine >keep/mine
+    ln -s keep vdbshade-regress-linked
+    regress
+    [ "$status" -eq 1 ] || fail "expected 1"
+    [ ! -e vdbshade-regress-sixSix ] || fail "of a killed run"
+    [ -d vdbshade-regress-seven77 ] && [ -d vdbshade-regress-theirs ] && [ "$(cat keep/mine)" = mine ] || fail "others'"
+    [ -n "$(ls -A "$folder")" ] || fail "the other run's folder was emptied"
+    kill -s HUP "$pid"
+    status=0
+    wait "$pid" || status=$?
+    [ "$status" -eq 130 ] || fail "expected 130"
+    [ ! -e "$folder" ] || fail "SIGHUP left bakes"
+}
