@@ -107,6 +107,18 @@ vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *e
     return VSH_OK;
 }
 
+/* So that after a power cut the new name is there, and not only the file's contents. What fails here leaves
+ * the file in its place as it is: file systems there are that cannot, and folders that may not be read. */
+static void sync_folder(const char *target) {
+    char *path = folder_of(target);
+    const int folder = path != NULL ? open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
+    if (folder >= 0) {
+        (void)fdatasync(folder);
+        close(folder);
+    }
+    free(path);
+}
+
 static vsh_result finish(const char *temporary, const char *target, vsh_error *error) {
     const int file = open(temporary, O_RDONLY | O_CLOEXEC);
     if (file < 0) {
@@ -123,6 +135,7 @@ static vsh_result finish(const char *temporary, const char *target, vsh_error *e
         return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be put in place: %s", target,
                          strerror(errno));
     }
+    sync_folder(target);
     return VSH_OK;
 }
 

@@ -1,5 +1,6 @@
 /* A comparison as JSON. */
 #include "comparison.h"
+#include "utf8.h"
 
 #include <math.h>
 
@@ -81,8 +82,8 @@ static json_t *coverage(const cli_channel *channel) {
 static json_t *describe(const cli_channel *channel) {
     char what[2048];
     cli_channel_explain(channel, what, sizeof what);
-    json_t *root =
-        json_pack("{s:s,s:b,s:s}", "name", channel->name, "alike", cli_channel_alike(channel), "what", what);
+    json_t *root = json_pack("{s:o,s:b,s:o}", "name", cli_utf8_json(channel->name), "alike",
+                             cli_channel_alike(channel), "what", cli_utf8_json(what));
     if (root != NULL && (channel->is_coverage || channel->coverage.golden + channel->coverage.values > 0)) {
         json_object_set_new(root, "coverage", coverage(channel));
     }
@@ -92,14 +93,18 @@ static json_t *describe(const cli_channel *channel) {
     return root;
 }
 
+static json_t *path(const char *name) {
+    return name != NULL ? cli_utf8_json(name) : json_null();
+}
+
 json_t *cli_comparison_json(const cli_comparison *c) {
     json_t *problems = json_array(), *channels = json_array();
     for (size_t i = 0; i < c->problem_count; ++i) {
-        json_array_append_new(problems, json_string(c->problems[i]));
+        json_array_append_new(problems, cli_utf8_json(c->problems[i]));
     }
     for (size_t i = 0; i < c->channel_count; ++i) {
         json_array_append_new(channels, describe(&c->channels[i]));
     }
-    return json_pack("{s:s?,s:s?,s:b,s:o,s:o}", "golden", c->golden, "new", c->fresh, "alike", c->alike,
-                     "problems", problems, "channels", channels);
+    return json_pack("{s:o,s:o,s:b,s:o,s:o}", "golden", path(c->golden), "new", path(c->fresh), "alike",
+                     c->alike, "problems", problems, "channels", channels);
 }

@@ -4,6 +4,7 @@
 #include "message.h"
 #include "signals.h"
 #include "temporary.h"
+#include "utf8.h"
 
 #include <errno.h>
 #include <stdbool.h>
@@ -32,7 +33,8 @@ int cli_document_write(const char *path, void (*compose)(FILE *out, const void *
 }
 
 void cli_document_escape(FILE *out, const char *text) {
-    for (; *text != '\0'; ++text) {
+    for (size_t length; *text != '\0'; text += length > 0 ? length : 1) {
+        length = cli_utf8_length(text);
         switch (*text) {
         case '<':
             fputs("&lt;", out);
@@ -47,7 +49,13 @@ void cli_document_escape(FILE *out, const char *text) {
             fputs("&quot;", out);
             break;
         default: /* control characters are none of XML's */
-            fputc((unsigned char)*text < 0x20 || *text == 0x7f ? '?' : *text, out);
+            if (length == 0) {
+                fputs(CLI_NO_CHARACTER, out);
+            } else if (length == 1 && ((unsigned char)*text < 0x20 || *text == 0x7f)) {
+                fputc('?', out);
+            } else {
+                fwrite(text, 1, length, out);
+            }
         }
     }
 }

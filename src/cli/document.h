@@ -8,7 +8,7 @@
 /* Composes a text in memory and writes it, whole or not at all. CLI_OK or an exit code, having said why. */
 int cli_document_write(const char *path, void (*compose)(FILE *out, const void *user), const void *user);
 
-/* Text within HTML or XML, attributes too. */
+/* Text within HTML or XML, attributes too: bytes that are no UTF-8 become U+FFFD. */
 void cli_document_escape(FILE *out, const char *text);
 
 /* Name of a file beside a document, "part.png" say, that an interrupted run takes away: for what has to be a

@@ -2,6 +2,7 @@
 #define _GNU_SOURCE /* asprintf */
 #include "message.h"
 #include "regress.h"
+#include "utf8.h"
 
 #include <stdlib.h>
 
@@ -59,9 +60,11 @@ static int print_json(const regress_work *work) {
         for (size_t k = 0; k < one->outputs.count && one->comparisons[k].name != NULL; ++k) {
             json_array_append_new(outputs, cli_comparison_json(&one->comparisons[k]));
         }
-        json_array_append_new(cases, json_pack("{s:s,s:s,s:s?,s:o}", "name", one->name, "status",
-                                               status_names[one->status], "changed", one->changed, "outputs",
-                                               outputs));
+        json_array_append_new(cases,
+                              json_pack("{s:o,s:s,s:o,s:o}", "name", cli_utf8_json(one->name), "status",
+                                        status_names[one->status], "changed",
+                                        one->changed != NULL ? cli_utf8_json(one->changed) : json_null(),
+                                        "outputs", outputs));
     }
     json_t *root = json_pack("{s:o}", "cases", cases);
     const bool whole = root != NULL && json_dumpf(root, stdout, JSON_INDENT(2) | JSON_REAL_PRECISION(9)) == 0;

@@ -120,17 +120,6 @@ static int fail(const char *target) {
     return CLI_FILE;
 }
 
-int cli_temporary_check(const char *target) {
-    char real[PATH_MAX], folder[PATH_MAX];
-    split(target, real, folder);
-    struct stat status;
-    if (stat(target, &status) == 0 && !S_ISREG(status.st_mode)) {
-        cli_say("%s: cannot be written: it is no regular file", target);
-        return CLI_FILE;
-    }
-    return access(folder, W_OK | X_OK) == 0 ? CLI_OK : fail(target);
-}
-
 int cli_temporary_begin(cli_temporary *t, const char *target) {
     char real[PATH_MAX], folder[PATH_MAX];
     const char *name = split(target, real, folder);
@@ -156,8 +145,42 @@ void cli_temporary_abandon(cli_temporary *t) {
     }
 }
 
+int cli_temporary_check(const char *target) {
+    struct stat status;
+    const bool there = stat(target, &status) == 0;
+    if (!there && errno != ENOENT) { /* its name is too long, say, where that of its temporary is not */
+        return fail(target);
+    }
+    if (there && !S_ISREG(status.st_mode)) {
+        cli_say("%s: cannot be written: it is no regular file", target);
+        return CLI_FILE;
+    }
+    /* what only a file that is made shows: a name too long, a file system that takes none, a folder without
+     * room */
+    cli_temporary t;
+    const int code = cli_temporary_begin(&t, target);
+    cli_temporary_abandon(&t);
+    return code;
+}
+
+/* On the disk, where the file system can: else a power cut may leave the new name without its contents. */
+static bool is_synced(FILE *file) {
+    return fsync(fileno(file)) == 0 || errno == EINVAL;
+}
+
+/* And the name; as in the library, what fails here leaves the file as it is. */
+static void sync_folder(const char *path) {
+    char folder[2 * PATH_MAX];
+    snprintf(folder, sizeof folder, "%.*s", (int)(strrchr(path, '/') - path), path);
+    const int file = open(folder[0] != '\0' ? folder : "/", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (file >= 0) {
+        (void)fdatasync(file);
+        close(file);
+    }
+}
+
 int cli_temporary_commit(cli_temporary *t) {
-    const bool written = fflush(t->file) == 0 && !ferror(t->file);
+    const bool written = fflush(t->file) == 0 && !ferror(t->file) && is_synced(t->file);
     const int write_error = errno;
     const int held = dup(fileno(t->file)); /* with its lock, until the file is in its place */
     const bool closed = fclose(t->file) == 0;
@@ -171,6 +194,9 @@ int cli_temporary_commit(cli_temporary *t) {
         errno = written ? errno : write_error;
         code = fail(t->target);
         unlink(t->temporary);
+    }
+    if (code == CLI_OK) {
+        sync_folder(t->final);
     }
     if (held >= 0) {
         close(held);

@@ -71,7 +71,7 @@ static int lift(int file) {
         return file;
     }
     const int lifted = fcntl(file, F_DUPFD_CLOEXEC, FIRST_FREE);
-    const int reason = errno;
+    const int reason = errno == EINVAL ? EMFILE : errno; /* the process may have no more than FIRST_FREE */
     close(file);
     errno = reason;
     return lifted;

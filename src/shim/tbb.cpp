@@ -52,11 +52,25 @@ class Arena {
     tbb::task_arena arena;
 };
 
+// What throws here is TBB, to which the system refused a thread: loops throw nothing.
+template <typename Body> vsh_result with_threads(vsh_error *error, Body &&body) {
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "threads", [&]() -> vsh_result {
+        try {
+            return body();
+        } catch (const std::bad_alloc &) {
+            throw;
+        } catch (const std::exception &exception) {
+            return vshi_fail(error, VSH_ERROR_MEMORY, "threads: the system refused one (%s); ask for fewer",
+                             exception.what());
+        }
+    });
+}
+
 } // namespace
 
 vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t units, vshi_range_fn *fn,
                              void *user, vsh_error *error) {
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "threads", [&]() -> vsh_result {
+    return with_threads(error, [&]() -> vsh_result {
         const size_t pieces = (count + grain - 1) / grain;
         const Loop loop = {job, count, grain, units, fn, user};
         const int threads = vshi_job_threads(job);
@@ -75,7 +89,7 @@ vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t u
 }
 
 vsh_result vshi_parallel_call(const vshi_job *job, void (*fn)(void *user), void *user, vsh_error *error) {
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "threads", [&]() -> vsh_result {
+    return with_threads(error, [&]() -> vsh_result {
         Arena(vshi_job_threads(job)).run([&] { fn(user); });
         return VSH_OK;
     });

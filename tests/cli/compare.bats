@@ -333,3 +333,20 @@ JSON
     compare other.vdb one.vdb
     [[ $(line shadow.sun) == *"noise of 0.051 is allowed for (made to max errors 0.01 and 0.05)"* ]] || fail "$output"
 }
+
+@test "reports of files and channels whose names are no UTF-8 are UTF-8" {
+    local golden=$'bad\xff\xe2\x82.exr' new=$'über\x80.exr'
+    LC_ALL=C sed 's/shadow\.sun/shadow.s\xedn/g' golden.exr >"$golden"
+    LC_ALL=C sed 's/shadow\.sun/shadow.s\xedn/g' lost.exr >"$new"
+    compare "$golden" "$new" --json --junit bad.xml --html bad.html
+    [ "$status" -eq 1 ] || fail "expected 1"
+    [[ $output == *'"golden": "bad'$'\xef\xbf\xbd\xef\xbf\xbd\xef\xbf\xbd''.exr"'* && $output == *'"new": "über'$'\xef\xbf\xbd''.exr"'* ]] ||
+        fail "files"
+    [[ $output == *'"name": "shadow.s'$'\xef\xbf\xbd''n"'* ]] || fail "channels"
+    local one
+    printf '%s' "$output" >bad.json
+    for one in bad.json bad.xml bad.html; do
+        iconv -f UTF-8 -t UTF-8 "$one" >/dev/null || fail "$one is no UTF-8"
+    done
+    grep -q $'name="shadow.s\xef\xbf\xbdn"' bad.xml || fail "channels in XML"
+}

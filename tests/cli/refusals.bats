@@ -1,0 +1,84 @@
+# What the system refuses is told as what it is, and outputs are on the disk before they are in their place.
+load helper
+
+setup_file() {
+    "${CC:-cc}" -shared -fPIC -O1 "$BATS_TEST_DIRNAME/../preload/calls.c" -o "$BATS_FILE_TMPDIR/calls.so" -ldl
+}
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    write_box box.obj
+    calls=$BATS_FILE_TMPDIR/calls.so
+    bake=("$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o out.exr)
+}
+
+@test "too few descriptors are told as such, with the way to do without" {
+    old_output out.exr
+    local most
+    for most in 10 12 14 16; do
+        run --separate-stderr bash -c 'ulimit -n "$1"; shift; exec "$@"' bash "$most" "${bake[@]}"
+        [ "$status" -eq 4 ] || [ "$status" -eq 0 ] || fail "$most"
+        [ "$status" -eq 0 ] || refused 4 "box.obj: no process to read it in: " "Too many open files" --trusted
+        [ "$status" -eq 0 ] || untouched out.exr
+    done
+    run --separate-stderr bash -c 'ulimit -n 16; exec "$@"' bash "${bake[@]}" --trusted
+    done_well
+}
+
+@test "a system without memfd_create is told with the way to do without" {
+    old_output out.exr
+    LD_PRELOAD=$calls REFUSE_MEMFD=1 run --separate-stderr "${bake[@]}"
+    refused 4 "box.obj: no process to read it in: " "Function not implemented" --trusted
+    untouched out.exr
+}
+
+@test "threads that are refused are no defect" {
+    old_output out.exr
+    local most
+    for most in 4 5; do # OpenVDB's log4cplus takes four before main(); of more TBB's own threads are refused some
+        LD_PRELOAD=$calls REFUSE_THREADS=$most run --separate-stderr "${bake[@]}" --threads 8
+        refused 4 "threads: the system refused one (" "; ask for fewer"
+        untouched out.exr
+    done
+}
+
+@test "statistics that cannot be written are told before an image is replaced" {
+    old_output out.exr
+    local name
+    name=$(printf 'x%.0s' {1..256})
+    mkdir closed
+    for name in "$name" /proc/stats.json closed; do
+        run --separate-stderr "${bake[@]}" --stats "$name"
+        refused 3 "$name: cannot be written: "
+        untouched out.exr
+    done
+}
+
+# synced NAME: it was synced under its temporary name before it was renamed, and its folder after that.
+synced() {
+    awk -v name="$1" '$1 == "rename" && $2 ~ "(^|/)" name "$" { renamed = before; after = 1; next }
+        $1 == "rename" { before = 0; next }
+        after && $2 ~ "/there$" { folder = 1 }
+        $2 ~ "/there/[.]" { before = 1 }
+        END { exit !(renamed && folder) }' syncs || fail "$1: $(cat syncs)"
+    rm syncs
+}
+
+@test "every output is on the disk before it is in its place, and its folder after" {
+    mkdir there
+    export LD_PRELOAD=$calls TELL_SYNCS=$PWD/syncs
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o there/out.exr
+    synced out.exr
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o there/out.png --stats there/s.json
+    synced s.json
+    "$VDBSHADE" voxelize box.obj --resolution 16 --quiet -o there/out.vdb
+    synced out.vdb
+    printf '0,2,0,0,1,0\n' >points.csv
+    local ending
+    for ending in csv ply; do
+        "$VDBSHADE" query box.obj --points points.csv --resolution 16 --sun 0,1,0 --sun-angle 5 --quiet -o there/out.$ending
+        synced out.$ending
+    done
+    "$VDBSHADE" compare there/out.exr there/out.exr --html there/page.html --junit there/page.xml --quiet
+    synced page.html
+}

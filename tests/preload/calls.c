@@ -1,0 +1,82 @@
+/* Preloaded by tests/cli/refusals.bats: system calls that are refused, or told of.
+ * REFUSE_THREADS=N: no more than N threads; REFUSE_MEMFD: none; TELL_SYNCS=FILE: a line for each fsync(),
+ * fdatasync() and rename(), with the names. */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <limits.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+static void *next(const char *name) {
+    void *found = dlsym(RTLD_NEXT, name);
+    if (found == NULL) {
+        abort();
+    }
+    return found;
+}
+
+int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*fn)(void *), void *user) {
+    static atomic_int count;
+    const char *most = getenv("REFUSE_THREADS");
+    if (most != NULL && atomic_fetch_add(&count, 1) >= atoi(most)) {
+        return EAGAIN;
+    }
+    int (*real)(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
+    void *found = next("pthread_create");
+    memcpy(&real, &found, sizeof real);
+    return real(thread, attributes, fn, user);
+}
+
+int memfd_create(const char *name, unsigned flags) {
+    int (*real)(const char *, unsigned);
+    void *found = next("memfd_create");
+    memcpy(&real, &found, sizeof real);
+    if (getenv("REFUSE_MEMFD") != NULL) {
+        errno = ENOSYS;
+        return -1;
+    }
+    return real(name, flags);
+}
+
+static void tell(const char *call, const char *name) {
+    const char *path = getenv("TELL_SYNCS");
+    FILE *file = path != NULL ? fopen(path, "a") : NULL;
+    if (file != NULL) {
+        fprintf(file, "%s %s\n", call, name);
+        fclose(file);
+    }
+}
+
+static int sync_with(const char *call, int file) {
+    char link[64], name[PATH_MAX] = "";
+    snprintf(link, sizeof link, "/proc/self/fd/%d", file);
+    if (readlink(link, name, sizeof name - 1) > 0) {
+        tell(call, name);
+    }
+    int (*real)(int);
+    void *found = next(call);
+    memcpy(&real, &found, sizeof real);
+    return real(file);
+}
+
+int fsync(int file) {
+    return sync_with("fsync", file);
+}
+
+int fdatasync(int file) {
+    return sync_with("fdatasync", file);
+}
+
+int rename(const char *from, const char *to) {
+    tell("rename", to);
+    int (*real)(const char *, const char *);
+    void *found = next("rename");
+    memcpy(&real, &found, sizeof real);
+    return real(from, to);
+}
