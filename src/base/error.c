@@ -2,6 +2,7 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 #define STRING_OF(x) #x
 #define STRING(x) STRING_OF(x)
@@ -28,17 +29,41 @@ const char *vsh_result_name(vsh_result result) {
     return result >= 0 && result < count ? result_names[result] : "VSH_ERROR_UNKNOWN";
 }
 
+enum {
+    LONGEST = 3 * 4096, /* two paths and what is said of them */
+    KEPT_BEFORE = 120   /* of what is too long: where the path begins; the rest is its end and the reason */
+};
+
+static const char left_out[] = "…";
+
+/* Cuts in the middle, where paths are long: what is wrong stands at the end. No character is cut. */
+static void shorten(char *message, size_t capacity, const char *full, size_t length) {
+    size_t before = KEPT_BEFORE, after = length - (capacity - 1 - before - (sizeof left_out - 1));
+    while (before > 0 && ((unsigned char)full[before] & 0xc0) == 0x80) {
+        --before;
+    }
+    while (((unsigned char)full[after] & 0xc0) == 0x80) {
+        ++after;
+    }
+    snprintf(message, capacity, "%.*s%s%s", (int)before, full, left_out, full + after);
+}
+
 vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...) {
     if (error == NULL) {
         return code;
     }
     error->code = code;
+    char full[LONGEST];
     va_list arguments;
     va_start(arguments, format);
-    const int written = vsnprintf(error->message, sizeof error->message, format, arguments);
+    const int written = vsnprintf(full, sizeof full, format, arguments);
     va_end(arguments);
-    if (written < 0) {
-        error->message[0] = '\0';
+    const size_t length = written < 0 ? 0 : (size_t)written < sizeof full ? (size_t)written : sizeof full - 1;
+    if (length < sizeof error->message) {
+        memcpy(error->message, full, length);
+        error->message[length] = '\0';
+    } else {
+        shorten(error->message, sizeof error->message, full, length);
     }
     vshi_one_line(error->message);
     return code;

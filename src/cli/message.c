@@ -24,7 +24,7 @@ static const struct {
 };
 
 static void __attribute__((format(printf, 1, 0))) say(const char *format, va_list arguments) {
-    char line[2048];
+    char line[3 * 4096]; /* two paths and what is said of them */
     vsnprintf(line, sizeof line, format, arguments);
     for (char *c = line; *c != '\0'; ++c) {
         if ((unsigned char)*c < 0x20 || *c == 0x7f) {

@@ -82,3 +82,21 @@ synced() {
     "$VDBSHADE" compare there/out.exr there/out.exr --html there/page.html --junit there/page.xml --quiet
     synced page.html
 }
+
+@test "the reason is told however long a path is" {
+    local part long one name=
+    part=$(printf 'd%.0s' {1..200})
+    for _ in {1..6}; do
+        name=$name$part/
+    done
+    for long in "$name" "$name$name$name"; do
+        for one in obj exr vdb json; do
+            run --separate-stderr "$VDBSHADE" info "begin/${long}x.$one"
+            refused 3 "begin/ddd" "x.$one: " "No such file or directory"
+        done
+        run --separate-stderr "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o "begin/${long}x.exr"
+        refused 3 "begin/ddd" "x.exr: cannot be written: "
+        run --separate-stderr "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o out.exr --stats "begin/${long}x.json"
+        refused 3 "begin/ddd" "x.json: cannot be written: "
+    done
+}
