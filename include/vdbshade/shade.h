@@ -70,10 +70,11 @@ typedef struct vsh_shade_options {
     int32_t rays;          /* rays: how many (0: 64). adaptive and exact: the most that a value takes, even
                               where max_error asks for more; 0: as many as that does, up to 16384 (blue: 4096).
                               0 … 4096 (0) */
-    int32_t sampler;       /* VSH_SAMPLER_… */
-    int32_t frame;         /* ≥ 0 */
-    int32_t early_rays;    /* rays: where the first so many agree, the rest are not marched; 0: never */
-    double max_error;      /* adaptive, exact: standard error that a value may keep, 1e-4 … 1 (0.02) */
+    int32_t sampler;    /* VSH_SAMPLER_…; blue is sobol where adaptive and exact are to keep less than 0.02,
+                           and for AO of lightmaps whose texels share rays */
+    int32_t frame;      /* ≥ 0 */
+    int32_t early_rays; /* rays: where the first so many agree, the rest are not marched; 0: never */
+    double max_error;   /* adaptive, exact: standard error that a value may keep, 1e-4 … 1 (0.02) */
     const vsh_triangles *triangles; /* exact, auto: the casters' triangles; else NULL */
     const vsh_layer *layers; /* [layer_count]: casters beside those of the field; may be NULL. Each has the
                                 same struct_size */

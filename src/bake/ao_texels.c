@@ -30,6 +30,7 @@ typedef struct sharing {
     size_t block_columns;
     _Atomic size_t refused;  /* blocks whose memory was */
     _Atomic uint64_t square; /* of the estimates' errors, of the band's own, in VSHI_SQUARE_UNIT */
+    int64_t *curved;         /* [block_columns][rows of tiles]: vshi_window_estimate's, likewise */
 } sharing;
 
 /* Some tiles and those around them, as one rectangle of texels. */
@@ -115,7 +116,8 @@ static void lay_out(const sharing *s, size_t begin, size_t end, int32_t from, in
             b->at[place] = (uint32_t)i + 1;
             b->texels[place].value = s->shot[i];
             b->texels[place].rays = s->rays[i];
-            b->texels[place].spread = (float)vshi_ao_spread(s->options->sampler, s->rays[i]);
+            b->texels[place].spread =
+                (float)vshi_ao_spread(vshi_ao_tile_sampler(s->options->sampler), s->rays[i]);
         }
     }
     vshi_links_find(s->points, b->at, b->windows.width, b->windows.height, b->texels);
@@ -158,8 +160,10 @@ static vshi_window_estimate estimate(const sharing *s, const block *b, int32_t x
     return own.centred < e.centred ? own : e;
 }
 
-static void estimate_row(sharing *s, const block *b, const size_t range[2], bool own) {
+/* Returns the sum of what is curved, in VSHI_SQUARE_UNIT. */
+static int64_t estimate_row(sharing *s, const block *b, const size_t range[2], bool own) {
     uint64_t square = 0;
+    int64_t curved = 0;
     for (size_t i = range[0]; i < range[1]; ++i) {
         if (s->rays[i] == 0) {
             s->values[i] = s->shot[i];
@@ -181,8 +185,10 @@ static void estimate_row(sharing *s, const block *b, const size_t range[2], bool
             bend(s, b, &e, x, y, s->bent + 3 * i);
         }
         square += own ? (uint64_t)(e.deviation * e.deviation / VSHI_SQUARE_UNIT) : 0;
+        curved += own ? (int64_t)(e.curved / VSHI_SQUARE_UNIT) : 0;
     }
     atomic_fetch_add(&s->square, square);
+    return curved;
 }
 
 /* A vshi_range_fn over blocks, row by row. */
@@ -210,10 +216,26 @@ static void estimate_block(void *user, size_t begin, size_t end) {
         lay_out(s, first > 0 ? first - 1 : 0, below, left > 0 ? left - 1 : 0, right + 1, b);
         for (size_t row = first; row < last; ++row) {
             find_origins(s, row, left, right, range);
-            estimate_row(s, b, range, row >= rows->first && row < rows->last);
+            s->curved[n % s->block_columns * rows->count + row] =
+                estimate_row(s, b, range, row >= rows->first && row < rows->last);
         }
         free(b);
     }
+}
+
+/* What is curved in all texels, by rows of tiles, whose sums are known well enough to tell what is above zero
+ * and depend on no band. */
+static double sum_curved(const sharing *s) {
+    const vshi_point_rows *rows = &s->origins->rows;
+    double all = 0.0;
+    for (size_t row = rows->first; row < rows->last; ++row) {
+        int64_t sum = 0;
+        for (size_t column = 0; column < s->block_columns; ++column) {
+            sum += s->curved[column * rows->count + row];
+        }
+        all += sum > 0 ? (double)sum * VSHI_SQUARE_UNIT : 0.0;
+    }
+    return all;
 }
 
 double vshi_ao_texels_bytes(double samples, int32_t threads, bool bent) {
@@ -224,8 +246,6 @@ double vshi_ao_texels_bytes(double samples, int32_t threads, bool bent) {
 
 /* Estimates all, once each texel's own rays are shot. */
 static vsh_result estimate_all(sharing *s, vshi_job *job, vsh_error *error) {
-    const size_t columns = ((size_t)s->texels->info.width + VSHI_TILE - 1) / VSHI_TILE;
-    s->block_columns = (columns + COLUMNS - 1) / COLUMNS;
     const size_t blocks = (s->origins->rows.count + ROWS - 1) / ROWS * s->block_columns;
     const vsh_result result = vshi_parallel_for(job, blocks, 1, 0, estimate_block, s, error);
     return result == VSH_OK && s->refused > 0
@@ -245,6 +265,8 @@ vsh_result vshi_ao_texels(const vsh_field *field, const vsh_texels *texels, cons
                  .deviation = deviation,
                  .bent = bent};
     const char *what = "AO texels";
+    const size_t columns = ((size_t)texels->info.width + VSHI_TILE - 1) / VSHI_TILE;
+    s.block_columns = (columns + COLUMNS - 1) / COLUMNS;
     vsh_run quiet = *run;
     quiet.progress = NULL;
     vshi_job *job = vshi_job_begin(&quiet, "ao", origins->count);
@@ -258,6 +280,7 @@ vsh_result vshi_ao_texels(const vsh_field *field, const vsh_texels *texels, cons
     s.shot = vshi_take(origins->count, sizeof *s.shot, what, &result, error);
     s.rays = vshi_take(origins->count, sizeof *s.rays, what, &result, error);
     s.open = vshi_take(bent != NULL ? origins->count : 0, 3 * sizeof *s.open, what, &result, error);
+    s.curved = vshi_take(s.block_columns * origins->rows.count, sizeof *s.curved, what, &result, error);
     if (result == VSH_OK && tiles > 0) {
         list_tiles(origins, s.tile, s.row_tile);
         const vshi_point_rows rows = {.count = tiles,
@@ -269,9 +292,11 @@ vsh_result vshi_ao_texels(const vsh_field *field, const vsh_texels *texels, cons
         result = result == VSH_OK ? estimate_all(&s, job, error) : result;
     }
     if (result == VSH_OK && stats != NULL) {
-        stats->square_error += (double)s.square * VSHI_SQUARE_UNIT;
-        stats->ao_square_error += (double)s.square * VSHI_SQUARE_UNIT;
+        const double square = (double)s.square * VSHI_SQUARE_UNIT + sum_curved(&s);
+        stats->square_error += square;
+        stats->ao_square_error += square;
     }
+    free(s.curved);
     free(s.open);
     free(s.rays);
     free(s.shot);

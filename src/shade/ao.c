@@ -166,6 +166,9 @@ vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const
     }
     if (result == VSH_OK) {
         vshi_shade_options_settle(&full);
+        if (rays != NULL) {
+            full.sampler = vshi_ao_tile_sampler(full.sampler);
+        }
         result = vshi_ao_prepare(field, &full, &cones, &task, error);
     }
     if (result == VSH_OK && vshi_ao_has_rays(&full)) {

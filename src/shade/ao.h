@@ -116,6 +116,12 @@ vshi_shade_fn vshi_ao_by_cones;
 vshi_shade_fn vshi_ao_by_rays;
 vshi_shade_fn vshi_ao_by_tile; /* the points of a call are texels of one tile */
 
+/* The sampler of texels that share their rays: blue noise is the same few rays in each, turned, and what
+ * those miss no average finds. */
+static inline int32_t vshi_ao_tile_sampler(int32_t sampler) {
+    return sampler == VSH_SAMPLER_BLUE ? VSH_SAMPLER_SOBOL : sampler;
+}
+
 /* The standard error of a texel that ends its tile's rays, of max_error, were it in the middle of its window:
  * what bends in windows adds to it. Values are those of larger windows than a tile has, in whose middle they
  * are, but at the edges of charts. */

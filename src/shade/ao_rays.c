@@ -16,6 +16,11 @@ static const uint32_t PURPOSE = 0xa0;
  * powers of two. */
 static const int32_t FIRST_ROUND = 16;
 
+/* Texels of a tile have their rays spread together down to this error: it takes so few rays that they are not
+ * the same ones in another order. From some hundred rays on they are, all texels are wrong by the same, and
+ * windows over them average nothing. */
+static const double TOGETHER = 0.01;
+
 /* What no caster is nearer to than this, voxels, and that the field calls outside, is no point to look at
  * closer. */
 static const double OPEN = 1.0;
@@ -177,7 +182,7 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
     while (point->taken < point->next) {
         const int32_t left = point->next - point->taken;
         const int32_t count = left < AT_ONCE ? left : AT_ONCE;
-        if (b->tiled) {
+        if (b->tiled && b->task->options->max_error >= TOGETHER) {
             vshi_sampler_tile(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
         } else {
             vshi_sampler_disc(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);

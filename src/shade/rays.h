@@ -59,6 +59,13 @@ double vshi_cone_visibility(double closeness, double sine);
  * for white noise n^-1/2, measured over edges of all places and directions (test_sampler). */
 double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken, double expected);
 
+/* Standard error of the share of `taken` rays, of which `lit` were, where those of the points around have so
+ * many of so many. An edge across the disc cuts as many of the rays' cells as its chord is long, and that
+ * falls more slowly towards the rim than the part beyond it does: c (p (1 - p))^1/3 n^-3/2 is its variance
+ * (test_sampler), or the binomial's p (1 - p) / n where that is less. Where all rays agree the error is what
+ * they may have missed. */
+double vshi_rays_error(int32_t sampler, int32_t lit, int32_t taken, double lit_around, double taken_around);
+
 /* Unit normal and direction in field space. */
 static inline vshi_vec vshi_direction_to_field(const vsh_field *field, vshi_vec direction) {
     return vshi_unit(vshi_transform_vector(field->to_field, direction));

@@ -49,6 +49,10 @@ void vshi_shade_options_settle(vsh_shade_options *full) {
     const int32_t has_triangles = full->triangles != NULL;
     full->method = vsh_shadow_method_resolve(full->method, has_triangles);
     full->ao_method = vsh_ao_method_resolve(full->ao_method, has_triangles);
+    const bool fixed = full->method == VSH_SHADOW_RAYS || full->ao_method == VSH_AO_RAYS;
+    if (full->sampler == VSH_SAMPLER_BLUE && full->max_error < VSHI_COARSE && !fixed) {
+        full->sampler = VSH_SAMPLER_SOBOL;
+    }
 }
 
 int32_t vshi_shade_most_rays(const vsh_shade_options *options, vshi_spread_fn *spread, bool keeps_error) {

@@ -10,8 +10,13 @@
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
                                       vsh_error *error);
 
-/* Makes of auto what it comes to with the options' own triangles. Layers, which have their own, take theirs
- * from options that are not settled yet. */
+/* Errors from here on are kept with few rays, whose estimates of their own error are rough. */
+#define VSHI_COARSE 0.02
+
+/* Makes of auto what it comes to with the options' own triangles, and of blue noise Sobol's sequence where
+ * methods are to keep a smaller error than VSHI_COARSE: blue noise is for grain, which then nobody sees, and
+ * converges as slowly as white. Layers, which have their own, take theirs from options that are not settled
+ * yet. */
 void vshi_shade_options_settle(vsh_shade_options *full);
 
 /* Standard error of a value near a half by so many rays of a VSH_SAMPLER_…. */

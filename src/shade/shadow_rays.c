@@ -43,6 +43,7 @@ typedef struct ray_batch {
     vshi_segment_ray traced[VSHI_CHUNK];
     bool blocked[VSHI_CHUNK];
     size_t traced_count;
+    bool shared; /* points share their rays */
     vsh_shade_stats *stats;
 } ray_batch;
 
@@ -129,6 +130,11 @@ static void cast(ray_batch *batch, size_t owner, int32_t target) {
     }
 }
 
+/* Variances of what an edge through the middle of the disc leaves, of n^-3/2 and n^-1 (and see
+ * vshi_rays_error()); of what no ray has seen, over the square of what it is expected to be: 2 for a
+ * geometric distribution. */
+static const double SOBOL = 0.2, BLUE = 0.12, UNSEEN = 1.5;
+
 double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken, double expected) {
     /* the share is smoothed by a ray of the expected share (Jeffreys' prior where that is a half), so that a
      * few rays that agree prove nothing */
@@ -140,6 +146,28 @@ double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken, double e
                               ? (1.6 * low > 0.56 * white ? 1.6 * low : 0.56 * white)
                               : 1.04 * low;
     return spread * sqrt(p * (1.0 - p));
+}
+
+/* A power a little less than a third, by roots, which have the same bits everywhere. */
+static double third_of(double x) {
+    const double fourth = sqrt(sqrt(x));
+    return fourth * sqrt(sqrt(fourth));
+}
+
+double vshi_rays_error(int32_t sampler, int32_t lit, int32_t taken, double lit_around, double taken_around) {
+    const double n = taken;
+    const int32_t fewer = lit < taken - lit ? lit : taken - lit;
+    const double around = fewer == lit ? lit_around : taken_around - lit_around;
+    /* the lesser part, expected as large as around the point, smoothed by Laplace's rule of succession */
+    const double p = fmin(0.5, (fewer + 1.0) / (n + (taken_around + 2.0) / (around + 1.0)));
+    if (fewer == 0) {
+        return sqrt(UNSEEN) * p;
+    }
+    const double white = p * (1.0 - p) / n, edge = third_of(4.0 * p * (1.0 - p));
+    const double even = sampler == VSH_SAMPLER_SOBOL  ? SOBOL * edge / (n * sqrt(n))
+                        : sampler == VSH_SAMPLER_BLUE ? BLUE * edge * edge / n
+                                                      : white;
+    return sqrt(even < white || sampler == VSH_SAMPLER_BLUE ? even : white);
 }
 
 /* Where the neighbours' share is taken for a point's, errors come out larger by so much: measured on the
@@ -155,23 +183,71 @@ int32_t vshi_shadow_most_rays(const vsh_shade_options *options) {
     return vshi_shade_most_rays(options, spread_of, keeps_error);
 }
 
-/* The deviation of an open point, its share expected to be that of the rays of the points around it (smoothed
- * by Laplace's rule of succession), or a half where none is near. */
-static double deviation_of(const ray_batch *batch, size_t owner) {
+/* What the rays of the points around an open point say of it: how many are lit, of how many. */
+typedef struct around {
+    double lit, taken;
+} around;
+
+static around look_around(const ray_batch *batch, size_t owner) {
     const open_point *open = batch->open, *p = &open[owner];
     const size_t first = owner > AROUND ? owner - AROUND : 0;
     const size_t last = owner + AROUND < batch->open_count ? owner + AROUND : batch->open_count - 1;
-    double lit = 1.0, taken = 2.0;
+    around a = {0.0, 0.0};
     for (size_t o = first; o <= last; ++o) {
         const vshi_vec off = vshi_sub(open[o].origin, p->origin);
         if (o != owner && vshi_dot(off, off) < APART * APART) {
-            lit += open[o].lit;
-            taken += open[o].taken;
+            a.lit += open[o].lit;
+            a.taken += open[o].taken;
         }
     }
+    return a;
+}
+
+/* The deviation of an open point, its share expected to be that of the rays of the points around it (smoothed
+ * by Laplace's rule of succession), or a half where none is near. */
+static double deviation_of(const ray_batch *batch, size_t owner) {
+    const open_point *p = &batch->open[owner];
+    const around a = look_around(batch, owner);
     const double deviation =
-        vshi_rays_deviation(batch->task->options->sampler, p->lit, p->taken, lit / taken);
-    return taken > 2.0 ? BORROWED * deviation : deviation;
+        vshi_rays_deviation(batch->task->options->sampler, p->lit, p->taken, (a.lit + 1.0) / (a.taken + 2.0));
+    return a.taken > 0.0 ? BORROWED * deviation : deviation;
+}
+
+/* The same, as it is said, and as errors below VSHI_COARSE are kept: the other leaves more unseen at the ends
+ * of penumbrae than such an error. */
+static double error_of(const ray_batch *batch, size_t owner) {
+    const open_point *p = &batch->open[owner];
+    const around a = look_around(batch, owner);
+    return vshi_rays_error(batch->task->options->sampler, p->lit, p->taken, a.lit, a.taken);
+}
+
+static void cast_all(ray_batch *batch, const size_t *some, size_t count, int32_t target) {
+    for (size_t i = 0; i < count; ++i) {
+        cast(batch, some[i], target);
+    }
+    flush(batch);
+}
+
+/* Casts rays for some open points, twice as many in each round for those that are not known well enough, by
+ * then: what is found of one tells of those around it. */
+static void cast_fine(ray_batch *batch, const size_t *some, size_t count, int32_t most) {
+    const vsh_shade_options *options = batch->task->options;
+    size_t unsettled[VSHI_PIECE], left = count;
+    cast_all(batch, some, count, FIRST_ROUND < most ? FIRST_ROUND : most);
+    while (left > 0) {
+        left = 0;
+        for (size_t i = 0; i < count; ++i) {
+            const int32_t taken = batch->open[some[i]].taken;
+            if (taken < most && error_of(batch, some[i]) > options->max_error) {
+                unsettled[left++] = some[i];
+            }
+        }
+        for (size_t i = 0; i < left; ++i) {
+            const int32_t taken = batch->open[unsettled[i]].taken;
+            cast(batch, unsettled[i], 2 * taken < most ? 2 * taken : most);
+        }
+        flush(batch);
+    }
 }
 
 /* Casts rays for some open points, all up to the first target, then twice as many in each round for those
@@ -183,13 +259,14 @@ static void cast_rounds(ray_batch *batch, const size_t *some, size_t count) {
     const int32_t most = hard ? 1 : vshi_shadow_most_rays(options);
     int32_t target = refining ? FIRST_ROUND : options->early_rays > 0 ? options->early_rays : most;
     size_t unsettled[VSHI_PIECE];
+    if (refining && !hard && options->max_error < VSHI_COARSE) {
+        cast_fine(batch, some, count, most);
+        return;
+    }
     memcpy(unsettled, some, count * sizeof *some);
     while (count > 0) {
         target = target < most ? target : most;
-        for (size_t i = 0; i < count; ++i) {
-            cast(batch, unsettled[i], target);
-        }
-        flush(batch);
+        cast_all(batch, unsettled, count, target);
         size_t left = 0;
         for (size_t i = 0; i < count; ++i) {
             const size_t o = unsettled[i];
@@ -213,7 +290,18 @@ static void settle(ray_batch *batch, size_t point, float value, float deviation)
 
 static void settle_cast(ray_batch *batch, const size_t *some, size_t count) {
     for (size_t i = 0; i < count; ++i) {
-        const open_point *p = &batch->open[some[i]];
+        open_point *p = &batch->open[some[i]];
+        const vsh_shade_options *options = batch->task->options;
+        const bool refining = options->method != VSH_SHADOW_RAYS && !is_hard(batch->task);
+        if (refining && options->max_error < VSHI_COARSE) {
+            p->deviation = error_of(batch, some[i]);
+        } else if (refining) {
+            const bool rough = options->sampler != VSH_SAMPLER_SOBOL;
+            if (rough || (batch->shared && p->lit > 0 && p->lit < p->taken)) {
+                const double said = fmin(error_of(batch, some[i]), options->max_error);
+                p->deviation = fmax(p->deviation, said);
+            }
+        }
         settle(batch, p->point, (float)p->lit / (float)p->taken, (float)p->deviation);
     }
 }
@@ -240,7 +328,7 @@ static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *so
     for (size_t o = 0; o < batch->open_count; ++o) {
         const size_t k = batch->open[o].point - begin;
         share.state[k] = VSHI_SHARE_OPEN;
-        share.lit[k] = (uint8_t)batch->open[o].lit;
+        share.lit[k] = (uint16_t)batch->open[o].lit;
     }
     bool anchor[VSHI_PIECE] = {false};
     vshi_share_begin(&share);
@@ -351,9 +439,10 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
     for (size_t o = 0; o < count; ++o) {
         some[o] = o;
     }
-    if (task->options->method != VSH_SHADOW_RAYS &&
-        vshi_shadow_most_rays(task->options) > vshi_share_rays(task->options->max_error) && !is_hard(task) &&
-        vshi_share_can(task->points)) {
+    batch.shared = task->options->method != VSH_SHADOW_RAYS &&
+                   vshi_shadow_most_rays(task->options) > vshi_share_rays(task->options->max_error) &&
+                   !is_hard(task) && vshi_share_can(task->points);
+    if (batch.shared) {
         count = cast_shared(&batch, begin, end, some);
     }
     cast_rounds(&batch, some, count);

@@ -19,6 +19,11 @@ static const pattern LEVELS[VSHI_SHARE_LEVELS] = {
     {.size = 4, .place = {0, 2, 3}, .edges = false, .agree = 2.2, .keeps = 0.33},
 };
 
+/* Where light bends more than a parabola does, at the ends of penumbrae, more is left between. */
+static const double MORE = 2.0;
+/* Where errors below this are asked for, anchors agree that differ by less. */
+static const double FINE = 0.01, FINER = 0.7;
+
 /* Corners differ by at most this: an edge between them is not seen from the middle. */
 static const double RANGE = 0.5;
 /* Standard errors that rays may be off. */
@@ -44,7 +49,7 @@ bool vshi_share_can(const vsh_points *points) {
 
 int32_t vshi_share_rays(double max_error) {
     int32_t rays = 4;
-    while (rays < 32 && rays * max_error < 0.16) {
+    while (rays < 256 && rays * max_error < 0.16) {
         rays *= 2;
     }
     return rays;
@@ -228,7 +233,8 @@ static bool read(const square *s, anchors *a) {
         fill_side(a, p->edges, &v[1][e], &w[1][e], (double[]){v[0][e], v[2][e]},
                   (double[]){w[0][e], w[2][e]});
     }
-    return high - low <= RANGE && a->surplus <= p->agree * share->max_error;
+    const double agree = share->max_error < FINE ? FINER * p->agree : p->agree;
+    return high - low <= RANGE && a->surplus <= agree * share->max_error;
 }
 
 /* Values and variances of a square's open points, in the order of rows. */
@@ -239,7 +245,7 @@ typedef struct between {
 
 static void mix_open(const square *s, const anchors *a, between *found) {
     const pattern *p = s->pattern;
-    const double left = p->keeps * a->surplus;
+    const double left = MORE * p->keeps * a->surplus;
     found->count = 0;
     for (int row = 0; row < p->size; ++row) {
         for (int column = 0; column < p->size; ++column) {
@@ -251,7 +257,7 @@ static void mix_open(const square *s, const anchors *a, between *found) {
             const double x = (double)(column - p->place[i]) / (p->place[i + 1] - p->place[i]);
             const double y = (double)(row - p->place[j]) / (p->place[j + 1] - p->place[j]);
             const double weight[2][2] = {{(1.0 - x) * (1.0 - y), x * (1.0 - y)}, {(1.0 - x) * y, x * y}};
-            double value = 0.0, variance = left * left;
+            double value = 0.0, variance = 0.0;
             for (int b = 0; b < 4; ++b) {
                 const double w = weight[b >> 1][b & 1];
                 value += w * a->value[j + (b >> 1)][i + (b & 1)];
@@ -259,7 +265,8 @@ static void mix_open(const square *s, const anchors *a, between *found) {
             }
             found->point[found->count] = k;
             found->value[found->count] = fmin(fmax(value, 0.0), 1.0);
-            found->variance[found->count++] = variance;
+            found->variance[found->count++] =
+                fmin(variance + left * left, fmax(variance, s->share->max_error * s->share->max_error));
         }
     }
 }

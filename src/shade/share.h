@@ -16,7 +16,7 @@ typedef struct vshi_share {
     /* rays that are cast for every open point first, to be compared with what is interpolated: what is
      * narrower than the steps between anchors shows in them */
     int32_t rays;
-    uint8_t lit[VSHI_PIECE]; /* of them */
+    uint16_t lit[VSHI_PIECE]; /* of them */
     uint8_t state[VSHI_PIECE];
     float value[VSHI_PIECE], deviation[VSHI_PIECE]; /* of what is known */
     /* runs of points in the same square of eight by eight texels */
@@ -26,7 +26,7 @@ typedef struct vshi_share {
 
 enum { VSHI_SHARE_LEVELS = 2 }; /* squares of 8 × 8 texels, then of 4 × 4 */
 
-/* How many rays that takes: 4 to 32, a small part of what the error takes. */
+/* How many rays that takes: 4 to 256, a small part of what the error takes. */
 int32_t vshi_share_rays(double max_error);
 
 /* Whether points can share: they have normals, and places in a lightmap. */

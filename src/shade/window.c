@@ -34,6 +34,10 @@ static const window_size SIZES[CHAINS][LINKS] = {
  * and in larger windows bias counts for more. */
 static const double SIGMAS[LINKS] = {3.0, 2.5, 2.0, 2.0, 2.0, 2.0, 2.0};
 
+/* Of them, where errors below this are asked for: noise is then so small that what bends is most of the
+ * error. */
+static const double FINE = 0.01, FINE_SIGMAS = 0.7;
+
 /* What estimates may differ by beside their noise, of max_error. */
 static const double TOLERANCE = 0.1;
 
@@ -50,6 +54,7 @@ typedef struct window {
     double spread;   /* of a texel's value, on average, over p (1 - p) */
     double residual; /* variance of a texel's value, by how far they lie from the plane; 0: too few */
     double rays;
+    int smaller; /* of the fits: the one two links before it, or the texel's own */
 } window;
 
 static uint8_t one_more(uint8_t run) {
@@ -223,6 +228,7 @@ static bool agrees(const window *f, const window *smaller, double sigmas, double
 static int widen(const vshi_windows *w, const spot *at, const window_size *sizes, double max_error,
                  window *fits, int *count) {
     window *chain = fits + *count - 1; /* [link], but for the texel's own */
+    const double fine = max_error < FINE ? FINE_SIGMAS : 1.0;
     for (int link = 1; link < LINKS && sizes[link].columns > 0; ++link) {
         window *f = &chain[link];
         if (!fit(w, at, &sizes[link], f)) {
@@ -230,10 +236,12 @@ static int widen(const vshi_windows *w, const spot *at, const window_size *sizes
         }
         const double variance = variance_of(f);
         for (int smaller = 0; smaller < link; ++smaller) {
-            if (!agrees(f, smaller == 0 ? &fits[0] : &chain[smaller], SIGMAS[smaller], variance, max_error)) {
+            if (!agrees(f, smaller == 0 ? &fits[0] : &chain[smaller], fine * SIGMAS[smaller], variance,
+                        max_error)) {
                 return link;
             }
         }
+        f->smaller = link > 2 ? (int)(chain - fits) + link - 2 : 0;
         ++*count;
     }
     return LINKS;
@@ -272,11 +280,30 @@ static const window *choose(const window *fits, int count, double *square) {
     return best;
 }
 
+/* Windows are chosen that agree, so that their differences vary by no more than this of their noise. */
+static const double AGREEING = 0.75, FINE_AGREEING = 0.5;
+
+/* What bends grows with the square of a window's sides, so that two windows tell of it by what their values
+ * differ beyond their noise. */
+static double find_curved(const window *fits, const window *best, double max_error) {
+    const window *small = &fits[best->smaller];
+    const double sides = best->size->columns * best->size->columns + best->size->rows * best->size->rows;
+    const double less = small->size->columns * small->size->columns + small->size->rows * small->size->rows;
+    const double part = 1.0 - less / sides, off = best->value - small->value;
+    if (!(part > 0.0)) {
+        return 0.0;
+    }
+    const double noise = best->residual > 0.0 ? best->residual : variance_of(best) * best->spread;
+    const double agreeing = max_error < FINE ? FINE_AGREEING : AGREEING;
+    return (off * off - agreeing * noise * (small->weight - best->weight)) / (part * part);
+}
+
 vshi_window_estimate vshi_windows_estimate(const vshi_windows *w, int32_t x, int32_t y, double max_error,
                                            int32_t tile) {
     const spot at = look_at(w, x, y, tile);
     window fits[1 + CHAINS * (LINKS - 1)];
     int count = 1;
+    fits[0].smaller = 0;
     if (!find_even(w, &at, &fits[0])) {
         fit(w, &at, &SIZES[0][0], &fits[0]);
         for (int chain = 0; chain < CHAINS; ++chain) {
@@ -292,6 +319,7 @@ vshi_window_estimate vshi_windows_estimate(const vshi_windows *w, int32_t x, int
     return (vshi_window_estimate){.value = best->value,
                                   .deviation = sqrt(square),
                                   .centred = sqrt(square * best->size->part / best->weight),
+                                  .curved = find_curved(fits, best, max_error),
                                   .x = {best->x[0], best->x[1]},
                                   .y = {best->y[0], best->y[1]}};
 }

@@ -44,9 +44,12 @@ typedef struct vshi_windows {
 } vshi_windows;
 
 typedef struct vshi_window_estimate {
-    double value;       /* 0 … 1 */
-    double deviation;   /* its standard error */
-    double centred;     /* the same, were the texel in the middle of the window */
+    double value;     /* 0 … 1 */
+    double deviation; /* its standard error */
+    double centred;   /* the same, were the texel in the middle of the window */
+    /* square of what bends in the window and is no plane, as by a smaller one: with the noise of its own,
+     * which is below zero as often as above, and means something only in sums over many texels */
+    double curved;
     int32_t x[2], y[2]; /* first and last column and row of the window */
 } vshi_window_estimate;
 

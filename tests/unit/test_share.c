@@ -60,7 +60,7 @@ static int still_open(const vshi_share *share) {
 static int run(vshi_share *share, light_fn *light, int wanted[VSHI_SHARE_LEVELS]) {
     for (size_t k = 0; k < POINTS; ++k) {
         const double seen = light((double)(k % SQUARE), (double)(k / SQUARE));
-        share->lit[k] = (uint8_t)lround(share->rays * seen);
+        share->lit[k] = (uint16_t)lround(share->rays * seen);
     }
     vshi_share_begin(share);
     for (int level = 0; level < VSHI_SHARE_LEVELS; ++level) {

@@ -1,0 +1,473 @@
+/* What is said of the error of shadow and AO holds against closed forms, and what is asked is kept: edges,
+ * corners, slits and discs, by every sampler, in lightmaps and of points on their own. VSH_CLAIMS=1 takes
+ * larger ones, and prints all. */
+#include "shading.h"
+#include "texels_of.h"
+
+#include "truth/directions.h"
+
+#include <vdbshade/trace.h>
+
+enum { EDGE, CORNER, SLIT, DISC, SHAPES };
+static const char *const NAMES[SHAPES] = {"edge", "corner", "slit", "disc"};
+
+enum { ROUND = 1024, MOST_TEXELS = 1 << 13 };
+
+/* Whether all is printed, in full sizes. */
+static bool everything;
+
+/* Half angle of the sun as a tangent, height and thickness of what casts, AO distance. */
+static const double WIDE = 0.25, HEIGHT = 1.0, THICK = 0.5, DISTANCE = 1.0;
+/* Half the slit, the disc's radius. */
+static const double GAP = 0.125, RADIUS = 0.15;
+
+typedef struct stage {
+    int shape;
+    bool ao;
+    float positions[3][3 * (ROUND + 1)];
+    uint32_t indices[3 * ROUND];
+    vsh_mesh meshes[2];
+    size_t mesh_count;
+    vsh_field *field;
+    vsh_triangles *triangles;
+} stage;
+
+static void make_box(stage *s, const double low[3], const double high[3]) {
+    static const uint32_t SIDES[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    float *p = s->positions[s->mesh_count];
+    for (size_t v = 0; v < 8; ++v) {
+        for (size_t axis = 0; axis < 3; ++axis) {
+            p[3 * v + axis] = (float)(v >> axis & 1 ? high[axis] : low[axis]);
+        }
+    }
+    s->meshes[s->mesh_count++] =
+        (vsh_mesh){.name = "box", .positions = p, .indices = SIDES, .vertex_count = 8, .triangle_count = 12};
+}
+
+/* A flat disc, a fan of as large an area as the circle's. */
+static void make_disc(stage *s, double height, double radius) {
+    float *p = s->positions[0];
+    const double a = 2.0 * PI / ROUND, out = radius * sqrt(a / sin(a));
+    p[0] = p[2] = 0.0f;
+    p[1] = (float)height;
+    for (uint32_t k = 0; k < ROUND; ++k) {
+        p[3 * k + 3] = (float)(out * cos(a * k));
+        p[3 * k + 4] = (float)height;
+        p[3 * k + 5] = (float)(out * sin(a * k));
+        s->indices[3 * k] = 0;
+        s->indices[3 * k + 1] = k + 1;
+        s->indices[3 * k + 2] = (k + 1) % ROUND + 1;
+    }
+    s->meshes[s->mesh_count++] = (vsh_mesh){.name = "disc",
+                                            .positions = p,
+                                            .indices = s->indices,
+                                            .vertex_count = ROUND + 1,
+                                            .triangle_count = ROUND};
+}
+
+/* Boxes whose faces lie on planes of the lattice, where a field of them is exact; shadows fall on y = 0.
+ * Walls for AO stand in it. */
+static stage *make_stage(int shape, bool ao, double voxel) {
+    stage *s = calloc(1, sizeof *s);
+    assert_non_null(s);
+    s->shape = shape;
+    s->ao = ao;
+    const double y0 = ao ? -0.5 : HEIGHT, y1 = ao ? 1.5 : HEIGHT + THICK, far = 2.0;
+    const double all[2][3] = {{-far, y0, -far}, {far, y1, far}};
+    if (shape == DISC) {
+        make_disc(s, HEIGHT, ao ? 4.0 * RADIUS : RADIUS);
+    } else if (shape == CORNER && !ao) {
+        make_box(s, (double[]){0.0, y0, 0.0}, all[1]);
+    } else {
+        make_box(s, (double[]){shape == SLIT && !ao ? GAP : 0.0, y0, -far}, all[1]);
+        if (shape == SLIT) {
+            make_box(s, all[0], (double[]){ao ? -1.5 : -GAP, y1, far});
+        }
+        if (shape == CORNER) {
+            make_box(s, (double[]){-far, y0, 0.0}, all[1]);
+        }
+    }
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = voxel;
+    vsh_grid *grid = NULL;
+    vsh_error error = {0};
+    if (vsh_grid_from_meshes(s->meshes, s->mesh_count, &options, NULL, &grid, &error) != VSH_OK ||
+        vsh_field_create(grid, NULL, NULL, &s->field, &error) != VSH_OK ||
+        (vsh_triangles_available() &&
+         vsh_triangles_create(s->meshes, s->mesh_count, NULL, &s->triangles, &error) != VSH_OK)) {
+        fail_msg("%s", error.message);
+    }
+    vsh_grid_free(grid);
+    return s;
+}
+
+static void free_stage(stage *s) {
+    vsh_triangles_free(s->triangles);
+    vsh_field_free(s->field);
+    free(s);
+}
+
+/* --- closed forms: shares of a unit disc */
+
+/* Where x < a and y < b. */
+static double below_both(double a, double b) {
+    if (a <= -1.0 || b <= -1.0) {
+        return 0.0;
+    }
+    if (a >= 1.0 || b >= 1.0) {
+        return a >= 1.0 ? b >= 1.0 ? 1.0 : truth_disc_share(b) : truth_disc_share(a);
+    }
+    if (a * a + b * b >= 1.0) { /* the corner is outside the disc */
+        return a > 0.0 && b > 0.0 ? truth_disc_share(a) + truth_disc_share(b) - 1.0
+               : a > 0.0          ? truth_disc_share(b)
+               : b > 0.0          ? truth_disc_share(a)
+                                  : 0.0;
+    }
+    /* half of each part that the lines through the corner cut off, and the rest by the corner's rectangle:
+     * d²/da db of the share is 1 / π in the disc */
+    return 0.5 * (truth_disc_share(a) + truth_disc_share(b)) - 0.25 + a * b / PI;
+}
+
+/* Where circles of radius 1 and r, so far apart, overlap. */
+static double overlap(double r, double apart) {
+    if (apart >= 1.0 + r) {
+        return 0.0;
+    }
+    if (apart <= fabs(1.0 - r)) {
+        return r < 1.0 ? r * r : 1.0;
+    }
+    const double x = (apart * apart + 1.0 - r * r) / (2.0 * apart), y = apart - x;
+    const double h = sqrt(fmax(0.0, 1.0 - x * x));
+    return (acos(x) - x * h + r * r * acos(fmin(1.0, fmax(-1.0, y / r))) - y * h) / PI;
+}
+
+/* How far a face at `off` hides the light, in radii of its disc: by its upper edge where it stands beside the
+ * receiver, by its lower one where it is above it. */
+static double limit(double off) {
+    return off / (off > 0.0 ? HEIGHT + THICK : HEIGHT) / WIDE;
+}
+
+/* The corner's edges, seen from beside one and under the other, hide what lies between their ends: the part
+ * of each line of the disc is known. */
+static double beside_corner(double x, double z) {
+    enum { LINES = 4000 };
+    double hidden = 0.0;
+    for (int k = 0; k < LINES; ++k) {
+        const double angle = PI * ((k + 0.5) / LINES - 0.5), v = sin(angle), half = cos(angle);
+        /* heights at which the line is behind the corner's edge along x */
+        const double rise = WIDE * v;
+        double low = HEIGHT, high = HEIGHT + THICK;
+        if (z + low * rise <= 0.0 && z + high * rise <= 0.0) {
+            continue;
+        }
+        if (z + low * rise <= 0.0) {
+            low = -z / rise;
+        } else if (z + high * rise <= 0.0) {
+            high = -z / rise;
+        }
+        const double least = fmin(-x / low, -x / high) / WIDE;
+        const double from = fmax(least, -half);
+        hidden += from < half ? (half - from) * half : 0.0;
+    }
+    return 1.0 - hidden / LINES;
+}
+
+static double shadow_truth(const stage *s, double x, double z) {
+    switch (s->shape) {
+    case EDGE:
+        return truth_disc_share(fmin(1.0, fmax(-1.0, limit(-x))));
+    case SLIT:
+        return fmax(0.0, truth_disc_share(fmin(1.0, fmax(-1.0, limit(GAP - x)))) +
+                             truth_disc_share(fmin(1.0, fmax(-1.0, limit(GAP + x)))) - 1.0);
+    case CORNER:
+        return beside_corner(x, z);
+    default:
+        return 1.0 - overlap(RADIUS / HEIGHT / WIDE, hypot(x, z) / HEIGHT / WIDE);
+    }
+}
+
+/* Malley's: directions are even over the disc below them, and walls hide where they are nearer than the
+ * distance. */
+static double ao_truth(const stage *s, double x, double z) {
+    switch (s->shape) {
+    case EDGE:
+        return truth_disc_share(fmin(1.0, -x / DISTANCE));
+    case SLIT:
+        return truth_disc_share(fmin(1.0, -x / DISTANCE)) +
+               truth_disc_share(fmin(1.0, (1.5 + x) / DISTANCE)) - 1.0;
+    case CORNER:
+        return below_both(-x / DISTANCE, -z / DISTANCE);
+    default: { /* a parallel disc: Hottel's configuration factor */
+        const double h = HEIGHT / (4.0 * RADIUS), r = hypot(x, z) / (4.0 * RADIUS), sum = 1.0 + h * h + r * r;
+        return 1.0 - 0.5 * (1.0 - (h * h + r * r - 1.0) / sqrt(sum * sum - 4.0 * r * r));
+    }
+    }
+}
+
+static double truth_at(const stage *s, double x, double z) {
+    return s->ao ? ao_truth(s, x, z) : shadow_truth(s, x, z);
+}
+
+/* --- what is claimed, and what is so */
+
+typedef struct trial {
+    int32_t method, sampler; /* of shadow, or of AO */
+    double max_error;
+    int32_t width, height;
+    bool lightmap; /* else points, in no order that neighbours are in */
+    bool held;     /* lightmap: against the casters as well */
+} trial;
+
+typedef struct outcome {
+    double measured, claimed, worst,
+        inside;  /* inside: measured where something is seen and something is not */
+    double rays; /* of each texel */
+} outcome;
+
+/* A floor that holds all penumbrae and little else, or the side of the walls for AO; its texels are as wide
+ * as tall. */
+static void make_floor(const stage *s, int32_t width, int32_t height, quad *q) {
+    make_quad(q, 0.0f, 0.0f, 1.0f, 1.0f);
+    const double half = HEIGHT * WIDE * 1.6;
+    const double low[2] = {s->ao ? s->shape == SLIT   ? -1.49
+                                   : s->shape == DISC ? 0.0
+                                                      : -1.0
+                                 : -half,
+                           s->ao ? s->shape == DISC ? 0.0 : -1.0 : -half};
+    const double flat = (double)height / width;
+    const double high[2] = {s->ao ? s->shape == DISC ? 1.0 : -0.01 : half,
+                            s->ao ? s->shape == DISC ? 1.0 : -0.01 : half};
+    for (size_t v = 0; v < 4; ++v) {
+        const double u = (double)q->uvs[2 * v], w = (double)q->uvs[2 * v + 1];
+        q->positions[3 * v] = (float)(low[0] + (high[0] - low[0]) * u);
+        q->positions[3 * v + 1] = 0.0f;
+        q->positions[3 * v + 2] = (float)(flat * (high[1] + (low[1] - high[1]) * w));
+    }
+}
+
+static float values[MOST_TEXELS], deviations[MOST_TEXELS], normals[3 * MOST_TEXELS];
+static double places[3 * MOST_TEXELS];
+
+static outcome try(const stage *s, const trial *t) {
+    quad floor;
+    make_floor(s, t->width, t->height, &floor);
+    vsh_lightmap_options options = size_of(t->width, t->height, 1);
+    options.shade.rays = 0;
+    options.shade.method = s->ao ? VSH_SHADOW_CONE : t->method;
+    options.shade.ao_method = s->ao ? t->method : VSH_AO_CONES;
+    options.shade.sampler = t->sampler;
+    options.shade.max_error = t->max_error;
+    options.shade.ao_distance = s->shape == DISC ? 100.0 : DISTANCE;
+    options.shade.triangles = s->triangles;
+    options.shade.start_offset = 0.0;
+    options.ao_spacing = vsh_lightmap_options_default().ao_spacing;
+    vsh_light light = sun((double[]){0.0, 1.0, 0.0}, 2.0 * atan(WIDE));
+    vsh_texels *texels = create(&floor.mesh, 1, options, NULL);
+    const vsh_texel_samples all = vsh_texels_samples(texels);
+    outcome o = {0};
+    vsh_error error = {0};
+    vsh_result result = VSH_OK;
+    if (t->lightmap) {
+        vsh_bake_error errors[2] = {{0}};
+        float *const shadow = values;
+        const vsh_lightmap lightmap = {.shadow = s->ao ? NULL : &shadow, .ao = s->ao ? values : NULL};
+        vsh_bake_stats stats = vsh_bake_stats_zero();
+        stats.errors = errors;
+        stats.truth_triangles = t->held ? s->triangles : NULL;
+        result = vsh_bake_lightmap(s->field, texels, s->ao ? NULL : &light, s->ao ? 0 : 1, &options.shade,
+                                   NULL, &lightmap, &stats, &error);
+        o.claimed = vsh_bake_error_rmse(&errors[0]);
+        o.rays = (double)stats.shade.rays;
+    } else {
+        vsh_shade_stats stats = vsh_shade_stats_zero();
+        for (size_t i = 0; i < all.count; ++i) {
+            const size_t from = (size_t)(i * 40503u % all.count);
+            memcpy(places + 3 * i, all.positions + 3 * from, 3 * sizeof *places);
+            normals[3 * i + 1] = 1.0f;
+        }
+        const vsh_points points = {all.count, places, normals, NULL};
+        result =
+            s->ao ? vsh_shade_ao(s->field, &points, &options.shade, NULL, values, deviations, &stats, &error)
+                  : vsh_shade_shadow(s->field, &points, &light, &options.shade, NULL, values, deviations,
+                                     &stats, &error);
+        for (size_t i = 0; i < all.count; ++i) {
+            o.claimed += (double)deviations[i] * (double)deviations[i] / (double)all.count;
+        }
+        o.claimed = sqrt(o.claimed);
+        o.rays = (double)stats.rays;
+    }
+    if (result != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    double sum = 0.0, within = 0.0, inside = 0.0;
+    for (size_t i = 0; i < all.count; ++i) {
+        const double *p = t->lightmap ? all.positions + 3 * i : places + 3 * i;
+        const double truth = truth_at(s, p[0], p[2]);
+        const double off = (double)values[t->lightmap ? all.texel[i] : i] - truth;
+        sum += off * off;
+        o.worst = fmax(o.worst, fabs(off));
+        if (truth > 0.0 && truth < 1.0) {
+            within += off * off;
+            inside += 1.0;
+        }
+    }
+    o.measured = sqrt(sum / (double)all.count);
+    o.inside = sqrt(within / fmax(1.0, inside));
+    o.rays /= (double)all.count;
+    vsh_texels_free(texels);
+    return o;
+}
+
+/* Says what is so, and how often it is not: what is claimed is never less than 0.9 of the error, and what is
+ * asked is kept. */
+static int judge(const stage *s, const trial *t, const outcome *o) {
+    const bool claimed = o->claimed >= 0.9 * o->measured, kept = o->measured <= t->max_error;
+    if (!claimed || !kept || everything) {
+        print_message(
+            "%s of %s %s, %s, %s of %d x %d, asked %g: %.5f (%.5f where not all or nothing is seen, "
+            "%.3f at worst), claimed %.5f, %.2f of it, %.1f rays\n",
+            s->ao ? "AO" : "shadow", NAMES[s->shape],
+            s->ao ? vsh_ao_method_name(t->method) : vsh_shadow_method_name(t->method),
+            vsh_sampler_name(t->sampler), t->lightmap ? "lightmap" : "points", t->width, t->height,
+            t->max_error, o->measured, o->inside, o->worst, o->claimed, o->claimed / o->measured, o->rays);
+    }
+    return !claimed + !kept;
+}
+
+/* One of a method by a sampler: points, a lightmap whose penumbrae are many texels wide, and one of few. */
+static int try_all(const stage *s, bool exact, int32_t sampler, double max_error) {
+    int wrong = 0;
+    const int32_t fine = everything || max_error > 0.004 ? 1 : 2;
+    for (int where = 0; where < 3; ++where) {
+        if (where == 0 && !exact) {
+            continue; /* what voxels displace is not known of points */
+        }
+        const trial t = {.method = s->ao   ? exact ? VSH_AO_EXACT : VSH_AO_ADAPTIVE
+                                   : exact ? VSH_SHADOW_EXACT
+                                           : VSH_SHADOW_ADAPTIVE,
+                         .sampler = sampler,
+                         .max_error = max_error,
+                         .width = (where == 1   ? 256
+                                   : where == 0 ? 48
+                                                : 64) /
+                                  fine,
+                         .height = (where == 1   ? 16
+                                    : where == 0 ? 48
+                                                 : 64) /
+                                   fine,
+                         .lightmap = where > 0,
+                         .held = !exact};
+        const outcome o = try(s, &t);
+        wrong += judge(s, &t, &o);
+    }
+    return wrong;
+}
+
+static const double ASKED[] = {0.05, 0.02, 0.01, 0.005, 0.002, 0.001};
+
+/* Those of ASKED from `first` on down to `last`; in stages of every shape. */
+static int claims(bool ao, bool exact, int32_t sampler, int first, int last) {
+    int wrong = 0;
+    for (int shape = 0; shape < SHAPES; ++shape) {
+        if (shape == DISC && !exact) {
+            continue; /* round edges of a field are not the circle's */
+        }
+        stage *s = make_stage(shape, ao, 0.0625);
+        for (int e = first; e <= last && (everything || e < 5 || shape == SLIT); ++e) {
+            wrong += try_all(s, exact, sampler, ASKED[e]);
+        }
+        free_stage(s);
+    }
+    return wrong;
+}
+
+static void need_triangles(void) {
+    if (!vsh_triangles_available()) {
+        skip();
+    }
+}
+
+static void shadows_of_exact_claim_their_error_and_keep_what_is_asked(void **state) {
+    (void)state;
+    need_triangles();
+    assert_int_equal(claims(false, true, VSH_SAMPLER_SOBOL, 0, 5), 0);
+}
+
+static void ao_of_exact_claims_its_error_and_keeps_what_is_asked(void **state) {
+    (void)state;
+    need_triangles();
+    assert_int_equal(claims(true, true, VSH_SAMPLER_SOBOL, 0, 5), 0);
+}
+
+/* White noise has 16384 rays at most, which leave 0.004. */
+static void white_and_blue_noise_claim_theirs(void **state) {
+    (void)state;
+    need_triangles();
+    for (int ao = 0; ao < 2; ++ao) {
+        assert_int_equal(claims(ao, true, VSH_SAMPLER_WHITE, 0, everything ? 3 : 1), 0);
+        assert_int_equal(claims(ao, true, VSH_SAMPLER_BLUE, 0, everything ? 5 : 1), 0);
+    }
+}
+
+static void adaptive_on_a_field_of_flat_faces_does_too(void **state) {
+    (void)state;
+    need_triangles();
+    for (int ao = 0; ao < 2; ++ao) {
+        assert_int_equal(claims(ao, false, VSH_SAMPLER_SOBOL, 0, 2), 0);
+    }
+}
+
+/* At the ends of a penumbra nearly all rays agree: there the light's last hundredth was lost. */
+static void ends_of_penumbrae_do_not_collapse(void **state) {
+    (void)state;
+    need_triangles();
+    stage *s = make_stage(EDGE, false, 0.0625);
+    const trial t = {
+        .method = VSH_SHADOW_EXACT, .max_error = 0.005, .width = 256, .height = 32, .lightmap = true};
+    const outcome o = try(s, &t);
+    judge(s, &t, &o);
+    assert_true(o.worst < 0.025);
+    assert_true(o.rays < 200.0);
+    free_stage(s);
+}
+
+/* The forms themselves, by rays. */
+static void closed_forms_are_what_many_rays_see(void **state) {
+    (void)state;
+    need_triangles();
+    const double at[][2] = {{0.1, 0.05},  {-0.2, 0.1}, {0.03, -0.11},
+                            {-0.3, -0.2}, {0.2, -0.3}, {-0.05, 0.31}};
+    for (int k = 0; k < 2 * SHAPES; ++k) {
+        stage *s = make_stage(k / 2, k % 2, 0.25);
+        for (size_t i = 0; i < sizeof at / sizeof at[0]; ++i) {
+            const double x = s->ao && s->shape != DISC ? -fabs(at[i][0]) : at[i][0];
+            const double z = s->ao && s->shape != DISC ? -fabs(at[i][1]) : at[i][1];
+            const double p[3] = {x, 0.0, z};
+            const float up[3] = {0.0f, 1.0f, 0.0f};
+            const vsh_light light = sun((double[]){0.0, 1.0, 0.0}, 2.0 * atan(WIDE));
+            float seen = -1.0f;
+            assert_int_equal(
+                s->ao ? vsh_trace_ao(s->triangles, NULL, 1, p, up, 0.0, s->shape == DISC ? 100.0 : DISTANCE,
+                                     65536, NULL, &seen, NULL)
+                      : vsh_trace_shadow(s->triangles, NULL, 1, p, up, 0.0, &light, 65536, NULL, &seen, NULL),
+                VSH_OK);
+            assert_true(fabs((double)seen - truth_at(s, x, z)) < 5e-4);
+        }
+        free_stage(s);
+    }
+}
+
+int main(void) {
+    const char *all = getenv("VSH_CLAIMS");
+    everything = all != NULL && strcmp(all, "1") == 0;
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(closed_forms_are_what_many_rays_see),
+        cmocka_unit_test(shadows_of_exact_claim_their_error_and_keep_what_is_asked),
+        cmocka_unit_test(ao_of_exact_claims_its_error_and_keeps_what_is_asked),
+        cmocka_unit_test(white_and_blue_noise_claim_theirs),
+        cmocka_unit_test(adaptive_on_a_field_of_flat_faces_does_too),
+        cmocka_unit_test(ends_of_penumbrae_do_not_collapse),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
