@@ -136,8 +136,8 @@ typedef struct vsh_image_file vsh_image_file;
  * … 1 as they stand: no transfer curve, no multiplication by alpha. The readers of OpenImageIO
  * can crash on damaged files: those from strangers are for vsh_image_read_run(). Errors:
  * - VSH_ERROR_ARGUMENT: path NULL or empty, file NULL;
- * - VSH_ERROR_READ: no such file, no permission, a folder;
- * - VSH_ERROR_INPUT: an ending of no format that is read, damaged, cut short;
+ * - VSH_ERROR_READ: no such file, no permission, a folder; damaged, cut short;
+ * - VSH_ERROR_INPUT: an ending of no format that is read;
  * - VSH_ERROR_UNSUPPORTED: deep, volume and subsampled images, compressions and formats that the installed
  *   OpenEXR and OpenImageIO do not read;
  * - VSH_ERROR_LIMIT: more than 2^31 values or VSH_MAX_CHANNELS channels;

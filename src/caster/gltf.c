@@ -43,7 +43,7 @@ static vsh_result open_binary(vshi_gltf *gltf, const char *text, size_t size, vs
                       binary_type[4] = {'B', 'I', 'N', '\0'};
     const size_t compared = size < sizeof magic ? size : sizeof magic;
     if (memcmp(text, magic, compared) != 0) {
-        return vshi_gltf_fail(gltf, error, "is no GLB: it does not begin with 'glTF'");
+        return vshi_fail(error, VSH_ERROR_READ, "%s: is no GLB: it does not begin with 'glTF'", gltf->path);
     }
     if (size >= HEADER && vshi_scan_bytes(text + 4, 4, false) == 1) {
         return fail_version(gltf, "1.0", error);
@@ -55,10 +55,11 @@ static vsh_result open_binary(vshi_gltf *gltf, const char *text, size_t size, vs
     }
     const size_t json = (size_t)vshi_scan_bytes(text + HEADER, 4, false);
     if (json > size - HEADER - CHUNK) {
-        return vshi_gltf_fail(gltf, error, "its JSON of %zu bytes passes the file's %zu bytes", json, size);
+        return vshi_fail(error, VSH_ERROR_READ, "%s: its JSON of %zu bytes passes the file's %zu bytes",
+                         gltf->path, json, size);
     }
     if (memcmp(text + HEADER + 4, json_type, sizeof json_type) != 0) {
-        return vshi_gltf_fail(gltf, error, "its first chunk is no JSON");
+        return vshi_fail(error, VSH_ERROR_READ, "%s: its first chunk is no JSON", gltf->path);
     }
     const size_t next = HEADER + CHUNK + json;
     if (size - next >= CHUNK && memcmp(text + next + 4, binary_type, sizeof binary_type) == 0) {

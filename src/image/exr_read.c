@@ -162,8 +162,8 @@ static vsh_result code_of(exr_result_t status) {
         return VSH_ERROR_READ;
     case EXR_ERR_FEATURE_NOT_IMPLEMENTED: /* DWA compression, in 3.1 */
         return VSH_ERROR_UNSUPPORTED;
-    default:
-        return VSH_ERROR_INPUT;
+    default: /* damaged, or no EXR file */
+        return VSH_ERROR_READ;
     }
 }
 

@@ -19,7 +19,7 @@ vsh_result vshi_image_file_new(const char *path, const vsh_run *run, int64_t wid
                                int64_t channels, vsh_image_file **file, vsh_error *error) {
     *file = NULL;
     if (width < 1 || width > INT32_MAX || height < 1 || height > INT32_MAX || channels < 1) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: %lld × %lld pixels of %lld channels: damaged or empty",
+        return vshi_fail(error, VSH_ERROR_READ, "%s: %lld × %lld pixels of %lld channels: damaged or empty",
                          path, (long long)width, (long long)height, (long long)channels);
     }
     vsh_result result = vshi_check_values(path, width, height, channels, error);

@@ -34,6 +34,8 @@ static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *err
         *reader = vshi_exr_read;
     } else if (memcmp(start, png, sizeof png) == 0 || strcasecmp(vshi_path_ending(path), "png") == 0) {
         *reader = vshi_png_read;
+    } else if (strcasecmp(vshi_path_ending(path), "exr") == 0) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: is no EXR file, or cut short", path);
     } else {
         *reader = vshi_oiio_read;
     }

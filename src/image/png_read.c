@@ -51,7 +51,7 @@ static vsh_result read_header(png_reader *reader) {
     reader->row_bytes = png_get_rowbytes(reader->png, reader->info);
     const int channels = png_get_channels(reader->png, reader->info);
     if (channels < 1 || channels > 4 || (reader->bits != 8 && reader->bits != 16)) {
-        return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s: %d channels of %d bits: damaged", reader->path,
+        return vshi_fail(reader->error, VSH_ERROR_READ, "%s: %d channels of %d bits: damaged", reader->path,
                          channels, reader->bits);
     }
     const png_uint_32 height = png_get_image_height(reader->png, reader->info);
@@ -129,7 +129,7 @@ static vsh_result read_all(png_reader *reader) {
         return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
     }
     if (setjmp(png_jmpbuf(reader->png)) != 0) {
-        return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s: could not be read as png: %s", reader->path,
+        return vshi_fail(reader->error, VSH_ERROR_READ, "%s: could not be read as png: %s", reader->path,
                          reader->message);
     }
     vsh_result result = read_header(reader);

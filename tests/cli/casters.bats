@@ -67,7 +67,7 @@ scene() { # casters, receivers, more keys
     echo nothing >bad.png
     scene '{"heightfield": "bad.png", "size": [1, 1], "height": 1, "direct": true}' "$OVER"
     shade bake scene.json
-    refused 2 bad.png
+    refused 3 bad.png
 }
 
 @test "zero and huge sizes are refused by line and column" {

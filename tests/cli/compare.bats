@@ -263,7 +263,7 @@ JSON
     refused 3 nowhere.exr
     echo text >text.exr
     compare text.exr golden.exr
-    refused 2 text.exr
+    refused 3 text.exr
     head -c 3000 golden.vdb >cut.vdb
     compare golden.vdb cut.vdb
     refused 3 cut.vdb

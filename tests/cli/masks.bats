@@ -115,7 +115,7 @@ bad() {
     refused 2 bad.json
     head -c 300 emblem.png >cut.png
     bad '{"mask": "cut.png", "size": 1, "thickness": 1}'
-    refused 2 cut.png
+    refused 3 cut.png
     bad '{"mask": "emblem.png", "size": 1, "thickness": 1}' --voxel-size 0.0001 --memory-limit 64MiB
     refused 4
     mkdir folder.png

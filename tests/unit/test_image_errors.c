@@ -306,7 +306,7 @@ static void unreadable_paths_are_read_errors(void **state) {
     assert_non_null(strstr(error.message, "nothing.exr"));
     assert_int_equal(vsh_image_read(folder, &file, &error), VSH_ERROR_READ);
     write_all(at("empty.png"), (const unsigned char *)"", 0);
-    assert_int_equal(vsh_image_read(at("empty.png"), &file, &error), VSH_ERROR_INPUT);
+    assert_int_equal(vsh_image_read(at("empty.png"), &file, &error), VSH_ERROR_READ);
     static const char *const never[] = {"text.txt", "x.iff", "x.fits"};
     for (size_t i = 0; i < sizeof never / sizeof never[0]; ++i) {
         write_all(at(never[i]), (const unsigned char *)"hello", 5);

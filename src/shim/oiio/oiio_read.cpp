@@ -25,7 +25,7 @@ vsh_result check_ico(const char *path, vsh_error *error) {
     const auto at = [&] { return head[18] | head[19] << 8 | head[20] << 16 | long(head[21]) << 24; };
     if (!read(head, sizeof head) || std::fseek(file.get(), at(), SEEK_SET) != 0 ||
         !read(bitmap, sizeof bitmap)) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: could not be read as ico: cut short", path);
+        return vshi_fail(error, VSH_ERROR_READ, "%s: could not be read as ico: cut short", path);
     }
     constexpr unsigned char header_size[4] = {40, 0, 0, 0};
     if (std::memcmp(bitmap, header_size, sizeof header_size) != 0 || bitmap[14] != 32 || bitmap[15] != 0) {
@@ -59,7 +59,7 @@ vsh_result read_rows(OIIO::ImageInput &input, const char *path, vsh_image_file &
                   : input.read_scanlines(0, 0, from, last + spec.y, spec.z, 0, image.channel_count,
                                          OIIO::TypeDesc::FLOAT, rows.get());
         if (!done) {
-            return vshi_fail(error, VSH_ERROR_INPUT, "%s: could not be read at row %d: %s", path,
+            return vshi_fail(error, VSH_ERROR_READ, "%s: could not be read at row %d: %s", path,
                              static_cast<int>(y), input.geterror().c_str());
         }
         const size_t begin = static_cast<size_t>(y) * width;
@@ -99,7 +99,7 @@ vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file **file
     config.attribute("oiio:RawColor", 1);
     OIIO::ImageSpec spec;
     if (!input->open(path, spec, config)) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: could not be read as %s: %s", path, name.c_str(),
+        return vshi_fail(error, VSH_ERROR_READ, "%s: could not be read as %s: %s", path, name.c_str(),
                          input->geterror().c_str());
     }
     if (spec.deep || spec.depth > 1) {
@@ -107,7 +107,7 @@ vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file **file
     }
     const int64_t ends[] = {int64_t(spec.x) + spec.width, int64_t(spec.y) + spec.height, int64_t(spec.z) + 1};
     if (*std::max_element(ends, ends + 3) > LARGEST_END) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: its data window begins at (%d, %d, %d): damaged", path,
+        return vshi_fail(error, VSH_ERROR_READ, "%s: its data window begins at (%d, %d, %d): damaged", path,
                          spec.x, spec.y, spec.z);
     }
     vsh_image_file *image = nullptr;
@@ -138,5 +138,5 @@ vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file **file
 
 vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     *file = nullptr;
-    return vshi::guard(error, VSH_ERROR_INPUT, path, [&] { return vshi::read_file(path, run, file, error); });
+    return vshi::guard(error, VSH_ERROR_READ, path, [&] { return vshi::read_file(path, run, file, error); });
 }
