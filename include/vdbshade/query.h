@@ -53,9 +53,9 @@ static inline vsh_query_output vsh_query_output_default(void) {
  * VSH_QUERY_BATCH points at a time, which takes 16 bytes for each of them.
  *
  * Values do not depend on that order, nor on the other points of a call, but for the last bits of one shadow
- * in some thousands (1e-6 of it at most, as proofs are shared), and for shadows by adaptive and exact, whose
- * rays depend on it within their error (see vsh_points), as the deviations of shadows by rays do; nothing
- * depends on threads. Calls for VSH_QUERY_BATCH points each, in turn, and their numbers as
+ * in some thousands (6e-8 was the most that was measured), and for shadows by adaptive and exact, whose rays
+ * depend on it within their error (see vsh_points), as the deviations of shadows by rays do; nothing depends
+ * on threads. Calls for VSH_QUERY_BATCH points each, in turn, and their numbers as
  * `texels`, give every bit of one call for all.
  *
  * Errors (the arrays then hold nothing of use): VSH_ERROR_ARGUMENT (run, output's size, a deviation without
