@@ -17,6 +17,10 @@
 /* Address space beyond the memory limit: libraries, stacks of the thread pool, arenas of the allocator. */
 static const uint64_t address_space_slack = (uint64_t)2 << 30;
 
+/* Data (heap, stacks of threads, what libraries write to) beyond it: reading a small file of any format
+ * takes 35 MB, most of it of stacks that are never touched, and a pool of threads a stack for each core. */
+static const uint64_t data_slack = (uint64_t)68 << 20, most_stack = (uint64_t)8 << 20;
+
 enum { MOST_FILES = 64 };
 
 static bool limit(int what, rlim_t most) {
@@ -27,6 +31,13 @@ static bool limit(int what, rlim_t most) {
     /* who passes both limits of time at once is killed, and does not say of what */
     const struct rlimit limits = {most, what == RLIMIT_CPU && most < now.rlim_max ? most + 1 : most};
     return setrlimit((__rlimit_resource_t)what, &limits) == 0;
+}
+
+static uint64_t stacks(void) {
+    struct rlimit stack;
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    const bool less = getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur < most_stack;
+    return (uint64_t)(cores > 0 ? cores : 1) * (less ? (uint64_t)stack.rlim_cur : most_stack);
 }
 
 bool vshi_confine_resources(uint64_t memory, double seconds) {
@@ -45,6 +56,7 @@ bool vshi_confine_resources(uint64_t memory, double seconds) {
         all = limit(RLIMIT_FSIZE, (rlim_t)memory + (1 << 20)) && all;
         if (!VSHI_SANITIZED) {
             all = limit(RLIMIT_AS, (rlim_t)(memory + address_space_slack)) && all;
+            all = limit(RLIMIT_DATA, (rlim_t)(memory + data_slack + stacks())) && all;
         }
     }
     signal(SIGXFSZ, SIG_IGN); /* the write fails instead */

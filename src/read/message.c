@@ -1,6 +1,7 @@
 #include "read/message.h"
 
 #include <errno.h>
+#include <malloc.h>
 #include <math.h>
 #include <string.h>
 #include <unistd.h>
@@ -13,9 +14,25 @@ void vshi_put_begin(vshi_put *put, int file, uint64_t offset) {
     put->error = 0;
     put->used = 0;
     put->size = offset;
+    put->room = put->checked = 0;
+}
+
+enum { CHECK_EVERY = 1 << 20 }; /* bytes */
+
+/* The resident memory that getrusage() tells is no less than that of whoever started this process. */
+static bool has_room(vshi_put *put, uint64_t size) {
+    if (put->room == 0 || size < put->checked + CHECK_EVERY) {
+        return true;
+    }
+    put->checked = size;
+    const struct mallinfo2 heap = mallinfo2();
+    return heap.uordblks + heap.hblkhd + size <= put->room;
 }
 
 static void write_out(vshi_put *put, const unsigned char *bytes, size_t size, uint64_t offset) {
+    if (put->error == 0 && !has_room(put, offset + size)) {
+        put->error = ENOMEM;
+    }
     while (put->error == 0 && size > 0) {
         const ssize_t written = pwrite(put->file, bytes, size, (off_t)offset);
         if (written > 0) {

@@ -16,9 +16,11 @@ enum { VSHI_PUT_ROOM = 1 << 16 };
 /* A message that is written from offset `size` on; the first failure is kept, what follows it is left out. */
 typedef struct vshi_put {
     int file;
-    int error;     /* errno of the first failure; 0: none */
-    size_t used;   /* of the buffer */
-    uint64_t size; /* bytes of the file, with those of the buffer */
+    int error;        /* errno of the first failure; 0: none */
+    size_t used;      /* of the buffer */
+    uint64_t size;    /* bytes of the file, with those of the buffer */
+    uint64_t room;    /* bytes that the file and the heap may take together, ENOMEM past it; 0: any */
+    uint64_t checked; /* size at which that was looked at */
     unsigned char buffer[VSHI_PUT_ROOM];
 } vshi_put;
 

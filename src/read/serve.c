@@ -59,6 +59,9 @@ static int32_t report(void *user, const char *stage, double fraction) {
     return 0;
 }
 
+/* Bytes of the heap that a reader of anything takes, and more. */
+static const uint64_t heap_slack = (uint64_t)16 << 20;
+
 static bool write_head(const vshi_answer_head *head) {
     return pwrite(VSHI_READER_ANSWER, head, sizeof *head, 0) == (ssize_t)sizeof *head;
 }
@@ -81,6 +84,7 @@ static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_take 
     }
     vsh_error error = {VSH_OK, ""};
     vshi_put_begin(&put, VSHI_READER_ANSWER, sizeof head);
+    put.room = run->memory_limit > 0 && !VSHI_SANITIZED ? run->memory_limit + heap_slack : 0;
     vsh_result result = serve(path, request, run, &put, &error);
     head.payload = put.size - sizeof head;
     const char *text = s->warnings;
@@ -89,7 +93,7 @@ static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_take 
         text += strlen(text) + 1;
     }
     if (!vshi_put_flush(&put)) {
-        return exit_code_of_write(s);
+        return put.error == ENOMEM ? VSHI_READER_HUNGRY : exit_code_of_write(s);
     }
     head.code = result;
     head.warnings = s->count;

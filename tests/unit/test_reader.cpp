@@ -5,6 +5,7 @@
 
 #include <map>
 #include <openvdb/tools/LevelSetSphere.h>
+#include <sys/resource.h>
 
 namespace {
 
@@ -367,6 +368,40 @@ void the_memory_limit_holds_whatever_the_file_says_of_itself(void **) {
     }
 }
 
+// Leaves far from each other take nodes of 300 kB each, of which hardly anything stands in the file.
+void what_a_reader_takes_is_held_to_the_memory_limit(void **) {
+    const uint64_t limit = uint64_t(20) << 20;
+    // pages that it touched (what is resident is told as no less than that of its parent): the limit, 64 MiB
+    // beside it, and what its libraries have
+    const long MOST_FAULTS = long((limit + (uint64_t(64 + 64) << 20)) / 4096);
+    const FloatGrid::Ptr far = FloatGrid::create(0.3f);
+    far->setGridClass(openvdb::GRID_LEVEL_SET);
+    for (int i = 0; i < 1000; ++i) {
+        far->tree().setValue(openvdb::Coord(i * 40960, 0, 0), 0.1f);
+    }
+    const std::string path = save("far.vdb", {far});
+    openvdb::io::File file(path);
+    file.setGridStatsMetadataEnabled(false); // else the file says itself what it takes
+    file.write({far});
+    file.close();
+    const pid_t host = fork(); // whose only child the reader is
+    assert_true(host >= 0);
+    if (host == 0) {
+        vsh_run run = with_reader();
+        run.memory_limit = limit;
+        std::vector<vsh_vdb_entry> entries(4);
+        size_t count = 0;
+        const vsh_result result =
+            vsh_vdb_list(path.c_str(), &run, entries.data(), entries.size(), &count, &failure);
+        struct rusage reader {};
+        getrusage(RUSAGE_CHILDREN, &reader);
+        _exit(result != VSH_ERROR_LIMIT ? 1 : reader.ru_minflt > MOST_FAULTS ? 2 : 0);
+    }
+    int status = -1;
+    assert_int_equal(waitpid(host, &status, 0), host);
+    assert_int_equal(status, 0);
+}
+
 } // namespace
 
 int main(int argc, char **argv) {
@@ -386,6 +421,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test(a_host_may_ignore_its_children_and_have_threads),
         cmocka_unit_test(an_older_program_reads_in_its_own_process),
         cmocka_unit_test(the_memory_limit_holds_whatever_the_file_says_of_itself),
+        cmocka_unit_test(what_a_reader_takes_is_held_to_the_memory_limit),
     };
     return make_folder() ? cmocka_run_group_tests(tests, nullptr, remove_folder) : 1;
 }
