@@ -130,46 +130,6 @@ static void cast(ray_batch *batch, size_t owner, int32_t target) {
     }
 }
 
-/* Variances of what an edge through the middle of the disc leaves, of n^-3/2 and n^-1 (and see
- * vshi_rays_error()); of what no ray has seen, over the square of what it is expected to be: 2 for a
- * geometric distribution. */
-static const double SOBOL = 0.2, BLUE = 0.12, UNSEEN = 1.5;
-
-double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken, double expected) {
-    /* the share is smoothed by a ray of the expected share (Jeffreys' prior where that is a half), so that a
-     * few rays that agree prove nothing */
-    const double n = taken, p = (lit + expected) / (n + 1.0);
-    const double root = sqrt(n);
-    const double white = 1.0 / root, low = 1.0 / (root * sqrt(root));
-    const double spread = sampler == VSH_SAMPLER_WHITE ? white
-                          : sampler == VSH_SAMPLER_BLUE
-                              ? (1.6 * low > 0.56 * white ? 1.6 * low : 0.56 * white)
-                              : 1.04 * low;
-    return spread * sqrt(p * (1.0 - p));
-}
-
-/* A power a little less than a third, by roots, which have the same bits everywhere. */
-static double third_of(double x) {
-    const double fourth = sqrt(sqrt(x));
-    return fourth * sqrt(sqrt(fourth));
-}
-
-double vshi_rays_error(int32_t sampler, int32_t lit, int32_t taken, double lit_around, double taken_around) {
-    const double n = taken;
-    const int32_t fewer = lit < taken - lit ? lit : taken - lit;
-    const double around = fewer == lit ? lit_around : taken_around - lit_around;
-    /* the lesser part, expected as large as around the point, smoothed by Laplace's rule of succession */
-    const double p = fmin(0.5, (fewer + 1.0) / (n + (taken_around + 2.0) / (around + 1.0)));
-    if (fewer == 0) {
-        return sqrt(UNSEEN) * p;
-    }
-    const double white = p * (1.0 - p) / n, edge = third_of(4.0 * p * (1.0 - p));
-    const double even = sampler == VSH_SAMPLER_SOBOL  ? SOBOL * edge / (n * sqrt(n))
-                        : sampler == VSH_SAMPLER_BLUE ? BLUE * edge * edge / n
-                                                      : white;
-    return sqrt(even < white || sampler == VSH_SAMPLER_BLUE ? even : white);
-}
-
 /* Where the neighbours' share is taken for a point's, errors come out larger by so much: measured on the
  * seeds' floor, where the estimate is right by it to a tenth. */
 static const double BORROWED = 1.2;
@@ -288,20 +248,28 @@ static void settle(ray_batch *batch, size_t point, float value, float deviation)
     batch->stats->square_error += (double)deviation * (double)deviation;
 }
 
+/* What is said of a point whose rays were cast. Down to VSHI_COARSE rays end by deviation_of(), which knows
+ * the ends of penumbrae too well: where that matters, as of points that others are interpolated from or of
+ * samplers that leave more, the larger of the two is said, of the latter no more than was asked for. */
+static double said_of(const ray_batch *batch, size_t owner) {
+    const vsh_shade_options *options = batch->task->options;
+    const open_point *p = &batch->open[owner];
+    if (options->method == VSH_SHADOW_RAYS || is_hard(batch->task)) {
+        return p->deviation;
+    }
+    if (options->max_error < VSHI_COARSE) {
+        return error_of(batch, owner);
+    }
+    const bool cut = batch->shared && p->lit > 0 && p->lit < p->taken;
+    return cut || options->sampler != VSH_SAMPLER_SOBOL
+               ? fmax(p->deviation, fmin(error_of(batch, owner), options->max_error))
+               : p->deviation;
+}
+
 static void settle_cast(ray_batch *batch, const size_t *some, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         open_point *p = &batch->open[some[i]];
-        const vsh_shade_options *options = batch->task->options;
-        const bool refining = options->method != VSH_SHADOW_RAYS && !is_hard(batch->task);
-        if (refining && options->max_error < VSHI_COARSE) {
-            p->deviation = error_of(batch, some[i]);
-        } else if (refining) {
-            const bool rough = options->sampler != VSH_SAMPLER_SOBOL;
-            if (rough || (batch->shared && p->lit > 0 && p->lit < p->taken)) {
-                const double said = fmin(error_of(batch, some[i]), options->max_error);
-                p->deviation = fmax(p->deviation, said);
-            }
-        }
+        p->deviation = said_of(batch, some[i]);
         settle(batch, p->point, (float)p->lit / (float)p->taken, (float)p->deviation);
     }
 }

@@ -9,6 +9,8 @@
 
 #include <cmocka.h>
 
+#include "read/reader.h"
+
 #include <vdbshade/flat.h>
 #include <vdbshade/scene.h>
 
@@ -68,6 +70,9 @@ static size_t least_limit(void) {
 
 static void every_text_takes_less_than_the_least_limit_that_lets_it_pass(void **unused) {
     (void)unused;
+    if (VSHI_SANITIZED) {
+        skip(); /* whose allocator takes more, and does not tell */
+    }
     static const struct {
         const char *head, *piece, *tail;
     } texts[] = {{"[{}", ",{}", "]"},
