@@ -256,7 +256,8 @@ static void a_buffer_that_is_not_there_is_named(void **state) {
     "}]"                                                                                                     \
     "}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"}],"            \
     "\"bufferViews\":[{\"buffer\":0,\"byteLength\":48}]}"
-    refused("a.gltf", BESIDE("my%20data.bin"), VSH_ERROR_READ, "my data.bin': cannot be read: No such file", "buffers[0]");
+    refused("a.gltf", BESIDE("my%20data.bin"), VSH_ERROR_READ, "my data.bin': cannot be read: No such file",
+            "buffers[0]");
     refused("a.gltf", BESIDE("https://example.org/a.bin"), VSH_ERROR_UNSUPPORTED, "https://", "beside it");
     write_bytes("my data.bin", corners, 48);
     vsh_model_free(read_text("a.gltf", BESIDE("my%20data.bin")));
