@@ -3,9 +3,9 @@
  * A call with a reader starts that program for each file, and waits. Before the child loads the libraries
  * that parse, and before it opens the file, it is confined, in all of its threads:
  *
- * - limits (VSH_CONFINED_LIMITS): data (run->memory_limit, 68 MiB for the program itself and a stack for each
- *   core; the machine's memory where there is no limit), processor time, no core dump, few descriptors,
- *   no new privileges, no longer life than its parent's;
+ * - limits (VSH_CONFINED_LIMITS): data (run->memory_limit, 68 MiB for the program itself, of images 176, and
+ *   a stack for each core; the machine's memory where there is no limit), processor time, no core dump, few
+ *   descriptors, no new privileges, no longer life than its parent's;
  * - calls (VSH_CONFINED_CALLS): a filter of system calls (seccomp) that leaves reading files, memory and
  *   threads of its own: no sockets, no other program, no file opened for writing, no signal to others. The
  *   kernel is asked of every thread whether it has it; a reader of which one has not reads nothing;

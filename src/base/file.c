@@ -107,16 +107,25 @@ vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *e
     return VSH_OK;
 }
 
-/* So that after a power cut the new name is there, and not only the file's contents. What fails here leaves
- * the file in its place as it is: file systems there are that cannot, and folders that may not be read. */
-static void sync_folder(const char *target) {
+/* Puts a file in its place, and syncs the folder, so that after a power cut the new name is there, and not
+ * only the file's contents. What fails of the latter leaves the file in its place as it is: file systems
+ * there are that cannot, and folders that may not be read. */
+static vsh_result put_in_place(const char *temporary, const char *target, vsh_error *error) {
     char *path = folder_of(target);
-    const int folder = path != NULL ? open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
+    if (path == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", target);
+    }
+    const int folder = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    free(path);
+    const vsh_result result =
+        rename(temporary, target) == 0
+            ? VSH_OK
+            : vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be put in place: %s", target, strerror(errno));
     if (folder >= 0) {
         (void)fdatasync(folder);
         close(folder);
     }
-    free(path);
+    return result;
 }
 
 static vsh_result finish(const char *temporary, const char *target, vsh_error *error) {
@@ -131,12 +140,7 @@ static vsh_result finish(const char *temporary, const char *target, vsh_error *e
         return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", target,
                          strerror(flushed ? errno : flush_error));
     }
-    if (rename(temporary, target) != 0) {
-        return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be put in place: %s", target,
-                         strerror(errno));
-    }
-    sync_folder(target);
-    return VSH_OK;
+    return put_in_place(temporary, target, error);
 }
 
 vsh_result vshi_output_commit(vshi_output *output, vsh_error *error) {

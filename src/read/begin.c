@@ -34,9 +34,16 @@ static bool files_are_limited(void) {
     return getrlimit(RLIMIT_FSIZE, &size) == 0 && size.rlim_cur != RLIM_INFINITY;
 }
 
+/* Data (heap, stacks, what libraries write to) that reading a small file takes, whatever it holds, and 50
+ * MiB: most of it is never touched. OpenImageIO brings the libraries of all its formats, and their threads.
+ */
+static uint64_t data_beside(const vshi_request *request) {
+    return (uint64_t)(request->kind == VSHI_READ_IMAGE ? 176 : 68) << 20;
+}
+
 static void confine(const vshi_request *request, bool files, vshi_reader_state *state) {
     state->cramped = files_are_limited();
-    if (vshi_confine_resources(request->memory, request->seconds)) {
+    if (vshi_confine_resources(request->memory, data_beside(request), request->seconds)) {
         state->confined |= VSH_CONFINED_LIMITS;
     }
     if ((uint64_t)getppid() != request->parent) {

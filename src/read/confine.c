@@ -17,9 +17,7 @@
 /* Address space beyond the memory limit: libraries, stacks of the thread pool, arenas of the allocator. */
 static const uint64_t address_space_slack = (uint64_t)2 << 30;
 
-/* Data (heap, stacks of threads, what libraries write to) beyond it: reading a small file of any format
- * takes 35 MB, most of it of stacks that are never touched, and a pool of threads a stack for each core. */
-static const uint64_t data_slack = (uint64_t)68 << 20, most_stack = (uint64_t)8 << 20;
+static const uint64_t most_stack = (uint64_t)8 << 20;
 
 enum { MOST_FILES = 64 };
 
@@ -40,7 +38,7 @@ static uint64_t stacks(void) {
     return (uint64_t)(cores > 0 ? cores : 1) * (less ? (uint64_t)stack.rlim_cur : most_stack);
 }
 
-bool vshi_confine_resources(uint64_t memory, double seconds) {
+bool vshi_confine_resources(uint64_t memory, uint64_t beside, double seconds) {
     if (memory == 0) {
         memory = (uint64_t)sysconf(_SC_PHYS_PAGES) * (uint64_t)sysconf(_SC_PAGE_SIZE);
     }
@@ -56,7 +54,7 @@ bool vshi_confine_resources(uint64_t memory, double seconds) {
         all = limit(RLIMIT_FSIZE, (rlim_t)memory + (1 << 20)) && all;
         if (!VSHI_SANITIZED) {
             all = limit(RLIMIT_AS, (rlim_t)(memory + address_space_slack)) && all;
-            all = limit(RLIMIT_DATA, (rlim_t)(memory + data_slack + stacks())) && all;
+            all = limit(RLIMIT_DATA, (rlim_t)(memory + beside + stacks())) && all;
         }
     }
     signal(SIGXFSZ, SIG_IGN); /* the write fails instead */

@@ -9,11 +9,11 @@
 extern "C" {
 #endif
 
-/* Limits this process for good: `memory` bytes (0: as much as the machine has) and 68 MiB of data, with a
+/* Limits this process for good: `memory` bytes (0: as much as the machine has) of data, `beside` more and a
  * stack for each core; address space of `memory` and 2 GiB; `seconds` of processor time, no core dump, no
  * file larger than what may be handed over, no new privileges, death with its parent. False where the host
  * allows not all of it, or in a sanitized build. */
-bool vshi_confine_resources(uint64_t memory, double seconds);
+bool vshi_confine_resources(uint64_t memory, uint64_t beside, double seconds);
 
 /* What became of a filter of system calls. */
 enum {

@@ -50,11 +50,11 @@ inline int as_reader(int argc, char **argv) {
         }
         pause();
     } else if (how == "spin") {
-        vshi_confine_resources(0, 0.0);
+        vshi_confine_resources(0, 0, 0.0);
         for (volatile uint64_t i = 0;; i = i + 1) {
         }
     } else if (how == "hungry") {
-        vshi_confine_resources(uint64_t(1) << 20, 60.0);
+        vshi_confine_resources(uint64_t(1) << 20, uint64_t(64) << 20, 60.0);
         vshi_confine_hunger();
         std::vector<char *> kept;
         for (;;) {

@@ -144,7 +144,7 @@ void a_message_is_not_read_past_its_end(void **) {
 // What a confined process has tried and was let do, as bits of its exit code.
 int forbidden_things() {
     int done = 0;
-    vshi_confine_resources(uint64_t(1) << 30, 60.0);
+    vshi_confine_resources(uint64_t(1) << 30, uint64_t(64) << 20, 60.0);
     if (!vshi_confine_calls()) {
         return 128;
     }
