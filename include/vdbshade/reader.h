@@ -15,7 +15,8 @@
  *   locales and of sanitizers alone.
  *
  * Where the system refuses one of them (an old kernel, a container) the rest holds, and a warning says what
- * is missing: run->confined makes it an error, vsh_reader_confinement() tells.
+ * is missing, but for files, which many systems cannot confine: run->confined makes it an error,
+ * vsh_reader_confinement() tells.
  *
  * The child parses, and writes arrays into memory that the caller handed it. When it has ended the caller
  * seals that memory and takes nothing of it for granted: sizes, counts, indices, finite values, transforms,

@@ -62,7 +62,7 @@ can() {
     grep -A 4 '"confined": {' probe.json | grep -q "\"$1\": true"
 }
 
-@test "what the system refuses is one warning, and told by --stats; --confined makes it an error" {
+@test "what the system refuses is one warning (but for Landlock), and told by --stats; --confined makes it an error" {
     local what part
     for what in "limits limits of resources" "seccomp seccomp (system calls)" "landlock Landlock (files)"; do
         part=${what#* }
@@ -70,7 +70,9 @@ can() {
         run --separate-stderr "$REFUSE" "${what%% *}" -- "$VDBSHADE" bake box.obj -o out.exr "${SMALL[@]}" \
             --stats stats.json
         [ "$status" -eq 0 ] || fail "it is no error"
-        [ "$(grep -c "warning: .*confined in part only: .*$part" <<<"$stderr")" -eq 1 ] || fail "not one warning of it"
+        local told=1
+        [ "${what%% *}" != landlock ] || told=0 # many systems have none
+        [ "$(grep -c "warning: .*confined in part only: .*$part" <<<"$stderr")" -eq "$told" ] || fail "not $told warnings of it"
         run --separate-stderr "$REFUSE" "${what%% *}" -- "$VDBSHADE" info box.obj --confined
         refused 2 "box.obj: not read: its reader is to be confined, and this system refuses it"
         [[ $stderr == *"$part"* ]] || fail "which is not said"
