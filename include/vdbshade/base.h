@@ -115,18 +115,19 @@ typedef struct vsh_run {
     void *user;                /* handed to both */
     int32_t isa; /* VSH_ISA_…, to test one; VSH_ERROR_ARGUMENT where this machine lacks it. No result depends
                     on it */
-    const char
-        *reader; /* program that parses files: VSH_READER (reader.h), which comes with this library, or
-                    another whose main calls vsh_reader_serve(), found as by execvp(). NULL: files are
-                    parsed in this process, where a damaged one can crash it. No result depends on it */
+    /* program that parses files: VSH_READER (reader.h), which comes with this library, or another whose main
+     * calls vsh_reader_serve(), found as by execvp(). NULL: files are parsed in this process, where a damaged
+     * one can crash it. No result depends on it */
+    const char *reader;
     double reader_seconds; /* that the reader may take for one file, by the clock, > 0; else VSH_ERROR_LIMIT.
                               0: 60, and one more for each MB of the file */
     int32_t confined; /* 1: where the system refuses one of the reader's confinements (reader.h) nothing is
-                         read: VSH_ERROR_UNSUPPORTED; needs a reader, else VSH_ERROR_ARGUMENT. 0: a warning */
+                         read: VSH_ERROR_UNSUPPORTED; needs a reader, else VSH_ERROR_ARGUMENT. 0: a warning,
+                         but where only Landlock is missing */
     int32_t allow_outside; /* 1: what a model names (buffers, materials) may lie outside its folder. 0: such a
                               file is not opened: VSH_ERROR_INPUT */
     uint64_t memory_held;  /* bytes of memory_limit that the caller holds beside what it gives to the call:
-                              images  read before, say */
+                              images read before, say */
 } vsh_run;
 
 static inline vsh_run vsh_run_default(void) {

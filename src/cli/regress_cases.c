@@ -15,8 +15,8 @@
 
 static const char list_name[] = "regress.json";
 
-/* Of a scene or a list, which strangers may have made. */
-enum { MOST_BYTES = 64 << 20 };
+/* Of a list of cases or what a cache keeps, which strangers may have made: as JSON a hundred times that. */
+enum { MOST_BYTES = 4 << 20, MOST_SCENE = 64 << 20 };
 
 bool regress_lines_add(regress_lines *lines, const char *format, ...) {
     char **more = realloc(lines->line, (lines->count + 1) * sizeof *more);
@@ -82,9 +82,9 @@ static const char *last_part(const char *path) {
 
 /* --- what a scene writes */
 
-json_t *regress_load(const char *path) {
+static json_t *load(const char *path, uint64_t most) {
     const char *why;
-    FILE *file = cli_input_stream(path, MOST_BYTES, &why);
+    FILE *file = cli_input_stream(path, most, &why);
     json_t *root = file != NULL ? json_loadf(file, 0, NULL) : NULL;
     if (file != NULL) {
         fclose(file);
@@ -92,12 +92,28 @@ json_t *regress_load(const char *path) {
     return root;
 }
 
-/* Scenes for 2D have a region, and a command of their own. */
-static bool is_flat(const char *path) {
-    json_t *root = regress_load(path);
-    const bool flat = json_object_get(root, "region") != NULL;
-    json_decref(root);
-    return flat;
+json_t *regress_load(const char *path) {
+    return load(path, MOST_BYTES);
+}
+
+/* Scenes for 2D have a region, and a command of their own. Read as a scene first, which finds the memory
+ * limit passed before any of it is taken. */
+static int find_command(const regress_work *work, regress_case *one, const char *path) {
+    const vsh_run run = cli_common_run(&work->settings->compare.common);
+    vsh_error error;
+    vsh_flat_scene *scene = NULL;
+    bool flat = vsh_flat_scene_read_run(path, &run, &scene, &error) == VSH_OK;
+    vsh_flat_scene_free(scene);
+    if (!flat && error.code == VSH_ERROR_LIMIT) {
+        return cli_fail(&error);
+    }
+    if (!flat) {
+        json_t *root = load(path, MOST_SCENE);
+        flat = json_object_get(root, "region") != NULL;
+        json_decref(root);
+    }
+    one->command = flat ? &cli_flat : &cli_bake;
+    return CLI_OK;
 }
 
 static int list_scene_outputs(const regress_work *work, regress_case *one, const char *path) {
@@ -139,10 +155,11 @@ static int list_outputs(const regress_work *work, regress_case *one) {
     if (path == NULL) {
         return no_memory(work);
     }
-    if (one->command == NULL) {
-        one->command = is_flat(path) ? &cli_flat : &cli_bake;
+    int code = one->command == NULL ? find_command(work, one, path) : CLI_OK;
+    if (code != CLI_OK) {
+        free(path);
+        return code;
     }
-    int code = CLI_OK;
     if (one->output != NULL) {
         code = regress_lines_add(&one->outputs, "%s", one->output) ? CLI_OK : no_memory(work);
     } else if (one->command == &cli_bake) {

@@ -317,6 +317,11 @@ JSON
 }
 
 @test "bakes made to one error allow for no noise; .vdb files state theirs, and for a PNG it is given" {
+    of_error 0.05 one.exr
+    of_error 0.05 same.exr
+    compare one.exr same.exr
+    done_well
+    [[ $output != *"is allowed for"* ]] || fail "$output"
     of_error 0.05 one.png
     of_error 0.01 other.png
     compare one.png one.png

@@ -23,6 +23,12 @@ regress() {
     shade regress scenes "$@"
 }
 
+@test "a scene that would take more than the memory limit is refused before it does" {
+    { printf '[{}'; yes ',{}' | head -n 1000000 | tr -d '\n'; printf ']'; } >scenes/bomb.json
+    run --separate-stderr bash -c 'ulimit -v 400000; exec "$@"' bash env MALLOC_ARENA_MAX=1 "$VDBSHADE" regress scenes --memory-limit 100MiB
+    refused 4 'bomb.json: about ' 'MB are needed, over the memory limit of 105 MB'
+}
+
 # clean: nothing was left behind, here or among the scenes.
 clean() {
     no_leftovers

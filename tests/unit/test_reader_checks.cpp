@@ -3,6 +3,7 @@
 #include "readers.h"
 
 #include <fcntl.h>
+#include <malloc.h>
 #include <sys/ptrace.h>
 #include <sys/socket.h>
 
@@ -141,6 +142,27 @@ void a_message_is_not_read_past_its_end(void **) {
     assert_true(take.bad);
 }
 
+// An answer is memory, too: it ends where the heap leaves it no room, whatever each may come to alone.
+void an_answer_and_the_heap_share_their_room(void **) {
+    if (VSHI_SANITIZED) {
+        skip(); // its heap is not libc's, which tells what it holds
+    }
+    static vshi_put put;
+    const size_t bytes = size_t(8) << 20;
+    const std::vector<char> answer(bytes);
+    for (const bool heap : {false, true}) {
+        const struct mallinfo2 now = mallinfo2();
+        const std::vector<char> held(heap ? bytes : 0);
+        const int file = memfd_create("answer", 0);
+        vshi_put_begin(&put, file, 0);
+        put.room = now.uordblks + now.hblkhd + bytes + bytes / 2;
+        vshi_put_array(&put, answer.data(), bytes, 1);
+        assert_true(vshi_put_flush(&put) == !heap);
+        assert_int_equal(put.error, heap ? ENOMEM : 0);
+        close(file);
+    }
+}
+
 // What a confined process has tried and was let do, as bits of its exit code.
 int forbidden_things() {
     int done = 0;
@@ -199,6 +221,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test(damaged_voxels_are_refused_or_sorted),
         cmocka_unit_test(damaged_models_are_refused_or_sound),
         cmocka_unit_test(damaged_images_and_contours_are_refused_or_sound),
+        cmocka_unit_test(an_answer_and_the_heap_share_their_room),
         cmocka_unit_test(a_confined_process_reads_and_nothing_else),
     };
     return make_folder() ? cmocka_run_group_tests(tests, nullptr, remove_folder) : 1;
