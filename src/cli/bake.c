@@ -107,7 +107,7 @@ static int find_bounds(const bake_work *work, const cli_receiver_job *job, const
         info->samples = counted.samples;
         vsh_error error;
         if (vsh_charts_bounds(charts, &work->run, info->bounds_min, info->bounds_max, &error) != VSH_OK) {
-            code = cli_fail(&error);
+            code = cli_fail_of(NULL, &error);
         }
     }
     return code;

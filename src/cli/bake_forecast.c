@@ -60,7 +60,7 @@ static int count_texels(forecast *f) {
         vsh_texels_info info = {.samples = counted.samples};
         vsh_error error;
         if (vsh_charts_bounds(f->charts[i], f->run, info.bounds_min, info.bounds_max, &error) != VSH_OK) {
-            return cli_fail(&error);
+            return cli_fail_of(NULL, &error);
         }
         cli_box_grow(&f->receivers, &info);
     }
@@ -88,7 +88,7 @@ static int make_texels(const forecast *f, vsh_texels **texels) {
     vsh_error error;
     return vsh_texels_create(meshes, count, &options, f->run, NULL, texels, &error) == VSH_OK
                ? CLI_OK
-               : cli_fail(&error);
+               : cli_fail_of(NULL, &error);
 }
 
 static int bake_part(const forecast *f, const vsh_field *field, const vsh_shade_options *shade, trial *t) {
@@ -109,7 +109,7 @@ static int bake_part(const forecast *f, const vsh_field *field, const vsh_shade_
         vsh_error error;
         if (vsh_bake_lightmap(field, texels, f->scene->lights, f->scene->light_count, shade, f->run,
                               &planes.lightmap, NULL, &error) != VSH_OK) {
-            code = cli_fail(&error);
+            code = cli_fail_of(NULL, &error);
         }
         t->sample_s = (cli_seconds() - start) / fmax(1.0, (double)info.samples);
     }

@@ -7,6 +7,7 @@
 
 #include <math.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -73,6 +74,16 @@ static void count(cli_field *made, const vsh_grid_info *grid, const vsh_field_in
     made->info.active_voxels += info->active_voxels;
 }
 
+static int fail_in_layer(const vsh_scene_layer *layer, const vsh_error *error) {
+    if (layer == NULL) {
+        return cli_fail_of(NULL, error);
+    }
+    vsh_error placed = {error->code, ""};
+    const size_t size = sizeof placed.message;
+    const int written = snprintf(placed.message, size, "layer '%s': %s", layer->name, error->message);
+    return cli_fail_of(NULL, written < (int)size ? &placed : error);
+}
+
 /* *field is NULL where there are no casters. */
 static int make_one(const making *m, const vsh_scene_layer *layer, vsh_field **field) {
     const double start = cli_seconds();
@@ -82,7 +93,7 @@ static int make_one(const making *m, const vsh_scene_layer *layer, vsh_field **f
     const vsh_grid *given = layer == NULL ? m->grid : NULL;
     if (given == NULL &&
         vsh_scene_layer_casters(m->scene, m->assets, layer, m->run, &grid, &error) != VSH_OK) {
-        return cli_fail(&error);
+        return fail_in_layer(layer, &error);
     }
     const vsh_grid *casters = given != NULL ? given : grid;
     if (casters == NULL) {
@@ -99,7 +110,7 @@ static int make_one(const making *m, const vsh_scene_layer *layer, vsh_field **f
     const vsh_result result = vsh_field_create(casters, &options, m->run, field, &error);
     vsh_grid_free(grid); /* the field does not need it */
     if (result != VSH_OK) {
-        return cli_fail(&error);
+        return fail_in_layer(layer, &error);
     }
     vsh_field_info made;
     vsh_field_get_info(*field, &made);
@@ -126,7 +137,7 @@ static int trace(const vsh_scene *scene, const vsh_assets *assets, const vsh_sce
     vsh_error error;
     *triangles = NULL;
     if (traces(scene, layer) && vsh_scene_triangles(scene, assets, layer, run, triangles, &error) != VSH_OK) {
-        return cli_fail(&error);
+        return cli_fail_of(NULL, &error);
     }
     return CLI_OK;
 }
@@ -210,7 +221,8 @@ static int make_empty(cli_field *made) {
         finest = fmin(fmax(FLOAT_STEPS * extent(&made->layers[i]), 1e-12), 1e12);
     }
     vsh_error error;
-    return vsh_field_create_empty(finest, &made->field, &error) == VSH_OK ? CLI_OK : cli_fail(&error);
+    return vsh_field_create_empty(finest, &made->field, &error) == VSH_OK ? CLI_OK
+                                                                          : cli_fail_of(NULL, &error);
 }
 
 static int make(const making *m) {
@@ -278,7 +290,7 @@ int cli_triangles_make(const vsh_scene *scene, const vsh_assets *assets, const v
     /* no caster outside of layers: none, where the library wants to be given those that there are */
     if (code == CLI_OK && *triangles == NULL && traces(scene, NULL) &&
         vsh_triangles_create(NULL, 0, run, triangles, &error) != VSH_OK) {
-        return cli_fail(&error);
+        return cli_fail_of(NULL, &error);
     }
     return code;
 }

@@ -277,7 +277,7 @@ static int bake(const flat_settings *s, const vsh_flat_scene *scene, const flat_
         result = VSH_ERROR_CANCELLED;
         error = (vsh_error){VSH_ERROR_CANCELLED, "write: cancelled"};
     }
-    int code = result == VSH_OK ? CLI_OK : cli_fail(&error);
+    int code = result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
     code = code == CLI_OK ? write_map(s, scene, planes, image, run) : code;
     cli_stats_stage(stats, CLI_STAGE_WRITE, now);
     return code;

@@ -73,7 +73,7 @@ static int print_mesh(const vsh_model *model, size_t index, double scale,
     vsh_mesh_report report;
     vsh_error error;
     if (vsh_mesh_check(&mesh, &report, &error) != VSH_OK) {
-        return cli_fail(&error);
+        return cli_fail_of(NULL, &error);
     }
     printf("mesh %zu '%s'\n", index, name_of(&mesh));
     printf("  triangles: %zu\n  vertices: %zu\n", mesh.triangle_count, mesh.vertex_count);
@@ -98,7 +98,7 @@ int cli_info_mesh(const char *path, const cli_info_look *given, const vsh_run *r
     vsh_model *model = NULL;
     vsh_error error;
     if (vsh_model_read(path, run, &model, &error) != VSH_OK) {
-        return cli_fail(&error);
+        return cli_fail_of(NULL, &error);
     }
     const size_t count = vsh_model_mesh_count(model);
     vsh_mesh *with_uvs = calloc(count, sizeof *with_uvs);
@@ -121,7 +121,7 @@ int cli_info_mesh(const char *path, const cli_info_look *given, const vsh_run *r
         meshes[i] = vsh_model_mesh(model, i, -1);
     }
     if (code == CLI_OK && vsh_mesh_solidity(meshes, count, run, solidity, &error) != VSH_OK) {
-        code = cli_fail(&error);
+        code = cli_fail_of(NULL, &error);
     }
     for (size_t i = 0; i < count && code == CLI_OK; ++i) {
         code = look.table ? CLI_OK : print_mesh(model, i, scale_for(model, look.unit), &solidity[i]);

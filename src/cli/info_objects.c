@@ -172,7 +172,7 @@ int cli_info_uvs(const vsh_model *model, const vsh_mesh *meshes, size_t count, c
     vsh_error error;
     int code = CLI_OK;
     if (vsh_charts_create(meshes, count, &options, &quiet, reports, &charts, &error) != VSH_OK) {
-        code = cli_fail(&error);
+        code = cli_fail_of(NULL, &error);
     } else {
         vsh_charts_info info;
         vsh_charts_get_info(charts, &info);

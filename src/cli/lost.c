@@ -57,7 +57,7 @@ static int look(const vsh_caster *caster, const vsh_mesh *meshes, size_t count, 
     }
     vsh_triangles_free(triangles);
     free(lost);
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 int cli_lost_warn(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,

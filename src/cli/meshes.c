@@ -20,7 +20,7 @@ static int warn_file(const char *path, const vsh_mesh *meshes, size_t count) {
         vsh_mesh_report report;
         vsh_error error;
         if (vsh_mesh_check(&meshes[i], &report, &error) != VSH_OK) {
-            code = cli_fail(&error);
+            code = cli_fail_of(path, &error);
             break;
         }
         skipped[i] = report.degenerate_triangles;
@@ -76,5 +76,5 @@ int cli_warn_meshes(const vsh_scene *scene, const vsh_assets *assets) {
 int cli_load_assets(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets) {
     vsh_error error;
     return vsh_assets_load(scene, run, assets, &error) == VSH_OK ? cli_warn_meshes(scene, *assets)
-                                                                 : cli_fail(&error);
+                                                                 : cli_fail_of(NULL, &error);
 }

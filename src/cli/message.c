@@ -5,7 +5,12 @@
 #include "warnings.h"
 
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static const char *input;
 
 static const struct {
     vsh_result result;
@@ -50,6 +55,15 @@ int cli_usage(const char *format, ...) {
     return CLI_USAGE;
 }
 
+static int code_of(vsh_result result) {
+    for (size_t i = 0; i < sizeof exit_codes / sizeof exit_codes[0]; ++i) {
+        if (exit_codes[i].result == result) {
+            return exit_codes[i].code;
+        }
+    }
+    return CLI_DEFECT;
+}
+
 int cli_fail(const vsh_error *error) {
     cli_warnings_tell();
     if (error->code == VSH_ERROR_CANCELLED) {
@@ -57,12 +71,35 @@ int cli_fail(const vsh_error *error) {
         return CLI_INTERRUPTED;
     }
     cli_say("%s", error->message);
-    for (size_t i = 0; i < sizeof exit_codes / sizeof exit_codes[0]; ++i) {
-        if (exit_codes[i].result == error->code) {
-            return exit_codes[i].code;
+    return code_of(error->code);
+}
+
+void cli_message_input(const char *path) {
+    input = path;
+}
+
+/* Whether a file is there of the name that stands before one of a message's colons. */
+static bool names_file(const char *message) {
+    char name[sizeof((vsh_error *)NULL)->message];
+    for (const char *colon = strchr(message, ':'); colon != NULL; colon = strchr(colon + 1, ':')) {
+        snprintf(name, sizeof name, "%.*s", (int)(colon - message), message);
+        if (access(name, F_OK) == 0) {
+            return true;
         }
     }
-    return CLI_DEFECT;
+    return false;
+}
+
+int cli_fail_of(const char *path, const vsh_error *error) {
+    const bool of_values = error->code == VSH_ERROR_INPUT || error->code == VSH_ERROR_LIMIT ||
+                           error->code == VSH_ERROR_UNSUPPORTED;
+    const char *of = path != NULL ? path : input;
+    if (!of_values || of == NULL || names_file(error->message)) {
+        return cli_fail(error);
+    }
+    cli_warnings_tell();
+    cli_say("%s: %s", of, error->message);
+    return code_of(error->code);
 }
 
 int cli_out_of_memory(const char *what) {

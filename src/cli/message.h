@@ -23,6 +23,13 @@ int cli_usage(const char *format, ...) __attribute__((format(printf, 1, 2)));
 /* Says what failed and returns the exit code of its result. */
 int cli_fail(const vsh_error *error);
 
+/* The same of what the library made of a file's contents, which may have told it no name: a message that
+ * begins with none of a file that is there begins with `path`, or (NULL) the command's first operand. */
+int cli_fail_of(const char *path, const vsh_error *error);
+
+/* What that operand is; it must live on. */
+void cli_message_input(const char *path);
+
 /* Says that there is no memory for `what` and returns CLI_LIMIT. */
 int cli_out_of_memory(const char *what);
 

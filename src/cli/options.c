@@ -228,6 +228,7 @@ int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_op
         operands[i] = argv[optind + i];
         append_word(without_folder(operands[i]));
     }
+    cli_message_input(operands[0]);
     if (optind + count < argc) {
         return cli_usage("%s: one %s is taken, not also '%s'", command->name, what[count - 1],
                          argv[optind + count]);

@@ -246,7 +246,7 @@ static int make_query(query_work *work) {
     vsh_error error;
     const vsh_result result = vsh_query_create(work->made.field, work->scene->lights,
                                                work->scene->light_count, &shade, &work->query, &error);
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 static void say_results(const query_work *work) {

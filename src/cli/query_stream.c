@@ -121,7 +121,7 @@ static int answer_batch(const vsh_query *query, const query_answers *answers, co
     vsh_error error;
     const vsh_result result = vsh_query_points(query, &view, &run, &answers->output, &stats->shade, &error);
     cli_stats_stage(stats, CLI_STAGE_BAKE, start);
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 int query_stream(const query_settings *s, const vsh_query *query, query_answers *answers, uint64_t held,

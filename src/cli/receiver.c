@@ -143,7 +143,7 @@ int cli_receiver_charts(const cli_receiver_job *job, bool warn, vsh_charts **cha
     vsh_error error;
     int code = CLI_OK;
     if (vsh_charts_create(meshes, count, &options, &run, reports, charts, &error) != VSH_OK) {
-        code = cli_fail(&error);
+        code = cli_fail_of(receiver->path, &error);
     } else {
         vsh_charts_info info;
         vsh_charts_get_info(*charts, &info);
@@ -185,8 +185,8 @@ int cli_receiver_plan(const cli_receiver_job *job, const vsh_charts *charts, uin
 int cli_receiver_texels(const vsh_charts *charts, int32_t first, int32_t rows, const vsh_run *run,
                         vsh_texels **texels) {
     vsh_error error;
-    return vsh_texels_create_band(charts, first, rows, run, texels, &error) == VSH_OK ? CLI_OK
-                                                                                      : cli_fail(&error);
+    const vsh_result result = vsh_texels_create_band(charts, first, rows, run, texels, &error);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 /* Whether values are what cones read, and no rays refine them. */
@@ -275,7 +275,7 @@ static int bake_band(receiver_work *work, int32_t first, int32_t rows, const vsh
                                                 &scene->shade, run, &work->planes.lightmap, &band, &error);
     vsh_texels_free(own);
     if (result != VSH_OK) {
-        return cli_fail(&error);
+        return cli_fail_of(scene->receivers[work->job->index].path, &error);
     }
     work->baked.texels += band.texels;
     work->baked.invalid_texels += band.invalid_texels;

@@ -110,6 +110,13 @@ static int set_options(render_work *work) {
     return code == CLI_OK ? render_camera_place(s, &work->surfaces, o) : code;
 }
 
+/* The file that a message is of which begins with "lightmap N: ", as vsh_render() counts them; else NULL. */
+static const char *lightmap_named(const render_settings *s, const char *message) {
+    size_t index;
+    return sscanf(message, "lightmap %zu: ", &index) == 1 && index < s->lightmap_count ? s->lightmaps[index]
+                                                                                       : NULL;
+}
+
 static int render_frame(render_work *work, int32_t index, const vsh_run *run) {
     const render_settings *s = work->settings;
     double start = cli_seconds();
@@ -123,7 +130,7 @@ static int render_frame(render_work *work, int32_t index, const vsh_run *run) {
                    work->scene->light_count, &o, run, &work->picture.picture, &work->stats.shade, &error);
     start = cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
     if (result != VSH_OK) {
-        return cli_fail(&error);
+        return cli_fail_of(lightmap_named(s, error.message), &error);
     }
     work->stats.points += (uint64_t)s->width * (uint64_t)s->height * (uint64_t)(s->samples * s->samples);
     char path[PATH_MAX];

@@ -116,7 +116,7 @@ int trade_bake(const trade_work *work, const vsh_field *field, const vsh_shade_o
         vsh_error error;
         if (vsh_bake_lightmap(field, work->receivers[r].texels, work->scene->lights, lights, shade,
                               &work->run, &lightmap, &baked, &error) != VSH_OK) {
-            code = cli_fail(&error);
+            code = cli_fail_of(NULL, &error);
         }
     }
     free(planes);

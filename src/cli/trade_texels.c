@@ -64,13 +64,13 @@ static int load_casters(trade_work *work) {
     return cli_truth_casters(work->scene, work->assets, &work->run, &work->triangles, &work->solids,
                              &work->triangles_s, &error) == VSH_OK
                ? CLI_OK
-               : cli_fail(&error);
+               : cli_fail_of(NULL, &error);
 }
 
 int trade_load(trade_work *work) {
     vsh_error error;
     if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
-        return cli_fail(&error);
+        return cli_fail_of(NULL, &error);
     }
     int code = cli_warn_meshes(work->scene, work->assets);
     code = code == CLI_OK ? load_receivers(work) : code;

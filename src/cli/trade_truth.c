@@ -34,7 +34,7 @@ static int trace(const trade_work *work, const trade_subject *subject, int32_t r
                                    &error);
         *seconds += trade_now(work) - start;
         if (result != VSH_OK) {
-            code = cli_fail(&error);
+            code = cli_fail_of(NULL, &error);
         }
         for (size_t i = 0; i < work->points && code == CLI_OK; ++i) {
             values[plane * work->texels + work->texel[i]] = packed[i];

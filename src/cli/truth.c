@@ -107,7 +107,7 @@ int cli_truth_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_t
     const vsh_result result =
         cli_truth_casters(scene, assets, run, &truth->own, &truth->solids, NULL, &error);
     if (result == VSH_ERROR_CANCELLED) {
-        return cli_fail(&error);
+        return cli_fail_of(NULL, &error);
     }
     if (result != VSH_OK) { /* the bake itself needs none of it */
         cli_truth_free(truth);

@@ -170,7 +170,7 @@ static int load(volume_work *work) {
         result = vsh_voxels_from_vdb(s->like, s->like_grid, &work->run, &work->voxels, &error);
     }
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return result == VSH_OK ? cli_warn_meshes(work->scene, work->assets) : cli_fail(&error);
+    return result == VSH_OK ? cli_warn_meshes(work->scene, work->assets) : cli_fail_of(NULL, &error);
 }
 
 /* Of the casters' band, or of the box, whose voxels may be of the casters' size. */
@@ -188,7 +188,7 @@ static int choose_voxels(volume_work *work) {
     } else if (s->like == NULL) {
         result = vsh_voxels_from_grid(work->grid, s->band, &work->run, &work->voxels, &error);
     }
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 /* The union of all casters in voxels: what has the band, or tells the size of a box's voxels; and without
@@ -212,7 +212,7 @@ static int make_grid(volume_work *work) {
     vsh_error error;
     const vsh_result result = vsh_scene_casters(work->scene, work->assets, &work->run, &work->grid, &error);
     cli_stats_stage(&work->stats, CLI_STAGE_VOXELIZE, start);
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 static int make_field(volume_work *work) {
@@ -255,7 +255,7 @@ static int bake_volume(volume_work *work) {
         vsh_bake_volume(work->made.field, work->voxels, work->scene->lights, work->scene->light_count, &bake,
                         &work->run, &work->volume, &work->stats.shade, &error);
     cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
-    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 static int write_volume(volume_work *work) {

@@ -113,7 +113,7 @@ static int voxelize(const voxelize_settings *s, const vsh_scene *scene) {
     int code = cli_load_assets(scene, &run, &assets);
     if (code == CLI_OK) {
         const vsh_result result = vsh_scene_casters(scene, assets, &run, &grid, &error);
-        code = result == VSH_OK ? write_grid(s, scene, &run, grid) : cli_fail(&error);
+        code = result == VSH_OK ? write_grid(s, scene, &run, grid) : cli_fail_of(NULL, &error);
     }
     if (code == CLI_OK) {
         cli_signals_end();

@@ -1,0 +1,80 @@
+# Whatever a file holds that cannot be used: the message names the file, the place in it, the value and the limit.
+load helper
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    write_box box.obj
+    printf '0,5,0,0,1,0\n' >points.csv
+}
+
+# write_scene NAME CASTERS [MORE]: a scene of these casters, with a receiver.
+write_scene() {
+    printf '{"casters": [%s], "lights": [{"name": "sun", "type": "directional", "direction": [0.3, 1, 0.2]}],
+        "receivers": [{"mesh": "box.obj", "size": 8, "output": "out.exr"}]%s}' "$2" "$3" >"$1"
+}
+
+# by_each INPUT CODE WORD…: every command that makes a field of its casters refuses it with the code and the words.
+by_each() {
+    local input=$1 code=$2
+    shift 2
+    shade bake "$input" --quiet -o out.exr
+    refused "$code" "$input: " "$@"
+    shade query "$input" --points points.csv --quiet -o out.csv
+    refused "$code" "$input: " "$@"
+    shade volume "$input" --quiet -o out.vdb
+    refused "$code" "$input: " "$@"
+    shade render "$input" --size 8x8 --quiet -o out.png
+    refused "$code" "$input: " "$@"
+}
+
+@test "a voxel size out of range names the scene, and the layer" {
+    local ball='{"sdf": {"shape": "sphere", "radius": 1}}'
+    write_scene small.json "$ball" ', "voxel_size": 1e-13'
+    by_each small.json 4 "voxel size 1e-13: " "5.36871e+08 at most"
+    write_scene large.json '{"sdf": {"shape": "sphere", "radius": 1e14}}' ', "resolution": 8'
+    by_each large.json 4 "voxel size 2.5e+13: " "1e-12 … 1e+12"
+    write_scene far.json '{"sdf": {"shape": "sphere", "radius": 1, "translate": [1e14, 0, 0]}}' ', "resolution": 8'
+    by_each far.json 4 "4e+14 voxels from the origin, 1e12 at most"
+    shade voxelize far.json --quiet -o out.vdb
+    refused 4 "far.json: voxel size "
+    write_scene layer.json "$ball, {\"sdf\": {\"shape\": \"sphere\", \"radius\": 1}, \"layer\": \"clouds\"}" \
+        ', "resolution": 8, "layers": [{"name": "clouds", "voxel_size": 1e-13}]'
+    by_each layer.json 4 "layer 'clouds': voxel size 1e-13: "
+}
+
+@test "a mesh whose voxel size is out of range is named" {
+    printf 'v 0 0 0\nv 1e30 0 0\nv 0 1e30 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n' >huge.obj
+    shade bake huge.obj --sun 0,1,0 --size 8 --quiet -o out.exr
+    refused 4 "huge.obj: voxel size "
+    shade voxelize huge.obj --quiet -o out.vdb
+    refused 4 "huge.obj: voxel size "
+    shade query box.obj --caster huge.obj --sun 0,1,0 --points points.csv --quiet -o out.csv
+    refused 4 "box.obj: voxel size "
+}
+
+@test "an UV that is not finite names the file, the mesh and the vertex" {
+    { printf 'ply\nformat binary_little_endian 1.0\nelement vertex 3\n'
+      printf 'property float %s\n' x y z s t
+      printf 'element face 1\nproperty list uchar int vertex_indices\nend_header\n'
+      printf '\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0'
+      printf '\0\0\200\77\0\0\0\0\0\0\0\0\0\0\300\177\0\0\0\0'
+      printf '\0\0\0\0\0\0\200\77\0\0\0\0\0\0\0\0\0\0\200\77'
+      printf '\3\0\0\0\0\1\0\0\0\2\0\0\0'; } >nan.ply
+    shade bake nan.ply --sun 0,1,0 --size 8 --quiet -o out.exr
+    refused 2 "nan.ply: mesh 0: vertex 1: UV (nan, 0) is not finite"
+}
+
+@test "what has no outline or no surface names the scene or the image" {
+    local font=/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf
+    write_scene blank.json "{\"text\": \"  \", \"font\": \"$font\", \"height\": 1, \"thickness\": 1}" ', "resolution": 8'
+    by_each blank.json 2 "has no outline: nothing in it is solid"
+    write_scene nothing.json '{"sdf": {"op": "subtraction", "of": [{"shape": "sphere", "radius": 1},
+        {"shape": "sphere", "radius": 2}]}}' ', "resolution": 8'
+    by_each nothing.json 2 "no surface"
+}
+
+@test "a lightmap without the light's channel is named" {
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet --pack R=shadow.sun -o grey.png
+    shade render box.obj --sun 0.3,1,0.2 --size 8x8 --resolution 12 --lightmap grey.png --quiet -o out.png
+    refused 2 "grey.png: lightmap 0: no channel shadow.sun"
+}
