@@ -1,6 +1,7 @@
 #include "base/job.h"
 
 #include "base/isa.h"
+#include "base/parallel.h"
 
 #include <stdarg.h>
 #include <stdatomic.h>
@@ -66,7 +67,16 @@ bool vshi_job_cancelled(const vshi_job *job) {
 }
 
 int32_t vshi_job_threads(const vshi_job *job) {
-    return job->run.threads;
+    const int32_t wanted = job->run.threads;
+    const int32_t given = vshi_parallel_threads(wanted);
+    static atomic_flag told = ATOMIC_FLAG_INIT; /* once a process, whose threads they are */
+    if (given != wanted && job->run.warning != NULL && !atomic_flag_test_and_set(&told)) {
+        vshi_warn(&job->run,
+                  "the system gives this process %d thread%s at a time%s: slower, with the same result",
+                  given, given == 1 ? "" : "s",
+                  wanted > 0 ? ", fewer than asked for" : ", fewer than there are cores");
+    }
+    return given;
 }
 
 vsh_result vshi_job_fail_cancelled(const vshi_job *job, vsh_error *error) {

@@ -23,7 +23,7 @@ bool vshi_job_advance(vshi_job *job, size_t units);
 
 bool vshi_job_cancelled(const vshi_job *job);
 
-/* 1 … 1024, or 0 for all cores. */
+/* 1 … 1024, or 0 for all cores: the run's, or as many as the system gives, with a warning. */
 int32_t vshi_job_threads(const vshi_job *job);
 
 /* VSH_ERROR_CANCELLED, naming the stage. */

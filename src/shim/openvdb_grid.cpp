@@ -1,6 +1,8 @@
 // The handle of a level set: what it tells, and what the field reads of it.
 #include "shim/openvdb_grid.h"
 
+#include "base/parallel.h"
+
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -135,15 +137,18 @@ void check_memory(const vsh_run *run, double voxel, double leaves, double bytes,
     }
 }
 
-Stage::Stage(const vsh_run &run, const char *name, vsh_error *error_)
-    : options(run), job(vshi_job_begin(&run, name, UNITS)), error(error_),
-      // TBB prints a warning where an arena asks for more threads than the machine has cores.
-      arena(run.threads > 0 ? std::min(run.threads, tbb::info::default_concurrency())
-                            : tbb::task_arena::automatic) {
+// Of an arena. TBB prints a warning where one asks for more threads than the machine has cores.
+static int slots(const vshi_job *job) {
     if (job == nullptr) {
         throw std::bad_alloc();
     }
+    vshi_parallel_threads(0); // OpenVDB frees trees on all cores, whatever the arena
+    const int threads = vshi_job_threads(job);
+    return threads > 0 ? std::min(threads, tbb::info::default_concurrency()) : tbb::task_arena::automatic;
 }
+
+Stage::Stage(const vsh_run &run, const char *name, vsh_error *error_)
+    : options(run), job(vshi_job_begin(&run, name, UNITS)), error(error_), arena(slots(job)) {}
 
 void Stage::reach(double fraction) {
     const size_t target = size_t(std::clamp(fraction, 0.0, 1.0) * double(UNITS));

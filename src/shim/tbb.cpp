@@ -1,5 +1,6 @@
 // Loops over TBB's pool.
 #include "base/parallel.h"
+#include "base/threads.h"
 #include "shim/guard.h"
 #include "shim/handover.h"
 
@@ -67,6 +68,24 @@ template <typename Body> vsh_result with_threads(vsh_error *error, Body &&body) 
 }
 
 } // namespace
+
+int32_t vshi_parallel_threads(int32_t wanted) {
+    if (wanted == 1) {
+        return wanted;
+    }
+    using control = tbb::global_control;
+    const int32_t all = wanted > 0 ? wanted : tbb::info::default_concurrency();
+    const int32_t given = 1 + vshi_threads_given(all - 1, control::active_value(control::thread_stack_size));
+    if (given == all) {
+        return wanted;
+    }
+    // Of arenas that are not ours too (OpenVDB frees its trees in TBB's own), and for as long as the process
+    // lives: TBB would end it.
+    static const auto *const limit =
+        new control(control::max_allowed_parallelism, static_cast<size_t>(given));
+    (void)limit;
+    return given;
+}
 
 vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t units, vshi_range_fn *fn,
                              void *user, vsh_error *error) {

@@ -1,6 +1,6 @@
 /* Preloaded by tests/cli/refusals.bats: system calls that are refused, or told of.
- * REFUSE_THREADS=N: no more than N threads; REFUSE_MEMFD: none; TELL_SYNCS=FILE: a line for each fsync(),
- * fdatasync() and rename(), with the names. */
+ * REFUSE_THREADS=N: no more than N threads at a time; REFUSE_MEMFD: none; TELL_SYNCS=FILE: a line for each
+ * fsync(), fdatasync() and rename(), with the names. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -21,16 +21,38 @@ static void *next(const char *name) {
     return found;
 }
 
+static atomic_int living;
+
+/* What a thread was to do. */
+typedef struct call {
+    void *(*fn)(void *);
+    void *user;
+} call;
+
+static void *live(void *user) {
+    const call made = *(call *)user;
+    free(user);
+    void *result = made.fn(made.user);
+    atomic_fetch_sub(&living, 1);
+    return result;
+}
+
 int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*fn)(void *), void *user) {
-    static atomic_int count;
-    const char *most = getenv("REFUSE_THREADS");
-    if (most != NULL && atomic_fetch_add(&count, 1) >= atoi(most)) {
-        return EAGAIN;
-    }
     int (*real)(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
     void *found = next("pthread_create");
     memcpy(&real, &found, sizeof real);
-    return real(thread, attributes, fn, user);
+    const char *most = getenv("REFUSE_THREADS");
+    if (most == NULL) {
+        return real(thread, attributes, fn, user);
+    }
+    call *made = malloc(sizeof *made);
+    if (made == NULL || atomic_fetch_add(&living, 1) >= atoi(most)) {
+        atomic_fetch_sub(&living, 1);
+        free(made);
+        return EAGAIN;
+    }
+    *made = (call){fn, user};
+    return real(thread, attributes, live, made);
 }
 
 int memfd_create(const char *name, unsigned flags) {
