@@ -8,9 +8,8 @@
 vsh_result vshi_serve_image(const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload,
                             vsh_error *error) {
     (void)request;
-    (void)run;
     vsh_image_file *file = NULL;
-    const vsh_result result = vsh_image_read(path, &file, error);
+    const vsh_result result = vsh_image_read_run(path, run, &file, error);
     if (result != VSH_OK) {
         return result;
     }

@@ -11,6 +11,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Of a scene and on the way from it: measured with 65,536 of one node, what is left of their text included.
+ */
+enum { BYTES_PER_CASTER = 1536 };
+
 /* An sdf caster ready for voxels: a tree in world space, or a mirrored one (which no quaternion turns) that
  * its grid's instance mirrors. */
 typedef struct placed_sdf {
@@ -219,13 +223,23 @@ static void add_instance(assembly *a, const vsh_grid *grid, const double *transf
     a->instances[a->instance_count++] = (vsh_grid_instance){grid, transform};
 }
 
+/* The grid that was made last: one of the union, and held until that is there. Small ones are checked here
+ * alone, together with all before. */
+static vsh_result add_made(assembly *a, const double *transform, vsh_run *run, vsh_error *error) {
+    const vsh_grid *grid = a->made[a->made_count++];
+    add_instance(a, grid, transform);
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    run->memory_held += info.bytes;
+    return vshi_check_limit(run, 0.0, "level sets of the casters", error);
+}
+
 static double spheres_distance(void *user, const double position[3]) {
     return vshi_balls_distance(user, position);
 }
 
 /* Distances to a union are true outside of it, and a bound within. */
-static vsh_result voxelise_spheres(assembly *a, const vsh_spheres *spheres, const vsh_run *run,
-                                   vsh_error *error) {
+static vsh_result voxelise_spheres(assembly *a, const vsh_spheres *spheres, vsh_run *run, vsh_error *error) {
     vsh_spheres_info info;
     vsh_spheres_get_info(spheres, &info);
     vsh_distance field = {.distance = spheres_distance,
@@ -236,60 +250,44 @@ static vsh_result voxelise_spheres(assembly *a, const vsh_spheres *spheres, cons
     memcpy(field.bounds_max, info.bounds_max, sizeof field.bounds_max);
     vsh_grid **made = &a->made[a->made_count];
     const vsh_result result = vsh_grid_from_distance(&field, &a->options, run, made, error);
-    if (result == VSH_OK) {
-        a->made_count++;
-        add_instance(a, *made, NULL);
-    }
-    return result;
+    return result == VSH_OK ? add_made(a, NULL, run, error) : result;
 }
 
-static vsh_result make_grids(assembly *a, const vsh_run *run, vsh_error *error) {
-    if (a->mesh_count > 0) {
-        vsh_grid **made = &a->made[a->made_count];
-        const vsh_result result =
-            vsh_grid_from_meshes(a->meshes, a->mesh_count, &a->options, run, made, error);
-        if (result != VSH_OK) {
-            return result;
-        }
-        a->made_count++;
-        add_instance(a, *made, NULL);
-    }
-    for (size_t i = 0; i < a->scene->caster_count; ++i) {
-        const vsh_caster *caster = &a->scene->casters[i];
-        if (!a->taken[i]) {
-            continue;
-        }
-        if (caster->type == VSH_CASTER_VDB) {
-            add_instance(a, vshi_assets_grid(a->assets, i), caster->transform);
-        } else if (caster->type == VSH_CASTER_SDF) {
-            const placed_sdf *placed = &a->sdfs[i];
-            vsh_grid_options options = a->options;
-            options.voxel_size /= placed->scale;
-            vsh_grid **made = &a->made[a->made_count];
-            const vsh_result result = vsh_grid_from_sdf(&placed->sdf, &options, run, made, error);
-            if (result != VSH_OK) {
-                return result;
-            }
-            a->made_count++;
-            add_instance(a, *made, placed->transform);
-        } else if (vshi_assets_outline(a->assets, i) != NULL) {
-            vsh_grid **made = &a->made[a->made_count];
-            const vsh_result result =
-                vsh_grid_from_outline(vshi_assets_outline(a->assets, i), caster->thickness, caster->transform,
-                                      &a->options, run, made, error);
-            if (result != VSH_OK) {
-                return result;
-            }
-            a->made_count++;
-            add_instance(a, *made, NULL);
-        } else if (caster->type == VSH_CASTER_SPHERES) {
-            const vsh_result result = voxelise_spheres(a, vshi_assets_spheres(a->assets, i), run, error);
-            if (result != VSH_OK) {
-                return result;
-            }
-        }
+/* The limit of memory is that of all the grids together: run->memory_held grows by each. */
+static vsh_result make_grid(assembly *a, size_t i, vsh_run *run, vsh_error *error) {
+    const vsh_caster *caster = &a->scene->casters[i];
+    vsh_grid **made = &a->made[a->made_count];
+    if (caster->type == VSH_CASTER_VDB) {
+        add_instance(a, vshi_assets_grid(a->assets, i), caster->transform);
+    } else if (caster->type == VSH_CASTER_SDF) {
+        const placed_sdf *placed = &a->sdfs[i];
+        vsh_grid_options options = a->options;
+        options.voxel_size /= placed->scale;
+        const vsh_result result = vsh_grid_from_sdf(&placed->sdf, &options, run, made, error);
+        return result == VSH_OK ? add_made(a, placed->transform, run, error) : result;
+    } else if (vshi_assets_outline(a->assets, i) != NULL) {
+        const vsh_result result = vsh_grid_from_outline(vshi_assets_outline(a->assets, i), caster->thickness,
+                                                        caster->transform, &a->options, run, made, error);
+        return result == VSH_OK ? add_made(a, NULL, run, error) : result;
+    } else if (caster->type == VSH_CASTER_SPHERES) {
+        return voxelise_spheres(a, vshi_assets_spheres(a->assets, i), run, error);
     }
     return VSH_OK;
+}
+
+static vsh_result make_grids(assembly *a, vsh_run *run, vsh_error *error) {
+    vsh_result result = VSH_OK;
+    if (a->mesh_count > 0) {
+        vsh_grid **made = &a->made[a->made_count];
+        result = vsh_grid_from_meshes(a->meshes, a->mesh_count, &a->options, run, made, error);
+        if (result == VSH_OK) {
+            result = add_made(a, NULL, run, error);
+        }
+    }
+    for (size_t i = 0; i < a->scene->caster_count && result == VSH_OK; ++i) {
+        result = a->taken[i] ? make_grid(a, i, run, error) : VSH_OK;
+    }
+    return result;
 }
 
 static vsh_result unite(assembly *a, const vsh_run *run, vsh_grid **grid, vsh_error *error) {
@@ -319,11 +317,15 @@ static vsh_result assemble(const vsh_scene *scene, const vsh_assets *assets, con
                            const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
                            vsh_error *error) {
     assembly a = {.scene = scene, .assets = assets, .taken = taken, .options = vsh_grid_options_default()};
-    vsh_result result =
-        vshi_options_resolve(options, &a.options, sizeof a.options, "vsh_grid_options", error);
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result == VSH_OK) {
+        result = vshi_options_resolve(options, &a.options, sizeof a.options, "vsh_grid_options", error);
+    }
     if (result != VSH_OK) {
         return result;
     }
+    full.memory_held += scene->caster_count * BYTES_PER_CASTER;
     result = allocate_assembly(&a, error);
     if (result == VSH_OK) {
         result = gather(&a, error);
@@ -332,10 +334,10 @@ static vsh_result assemble(const vsh_scene *scene, const vsh_assets *assets, con
         result = choose_voxel_size(&a, error);
     }
     if (result == VSH_OK) {
-        result = make_grids(&a, run, error);
+        result = make_grids(&a, &full, error);
     }
     if (result == VSH_OK) {
-        result = unite(&a, run, grid, error);
+        result = unite(&a, run, grid, error); /* which counts the instances itself */
     }
     free_assembly(&a);
     return result;

@@ -50,6 +50,7 @@ class Voxelizer {
     Level split(const Level &level);
     void fill_inside(const Coord &origin, int32_t size);
     void foretell(const Level &level) const;
+    void check_tiles(const Level &level, const std::vector<int8_t> &signs) const;
     Leaf *leaf(const Coord &origin, int8_t &sign, size_t index);
     bool sample_block(Leaf &leaf, const Coord &corner, float &deepest, size_t index);
     void leaves(const Level &level);
@@ -134,6 +135,18 @@ void Voxelizer::foretell(const Level &level) const {
     }
 }
 
+// Of what is filled by tiles of the root: it keeps a list of them.
+void Voxelizer::check_tiles(const Level &level, const std::vector<int8_t> &signs) const {
+    constexpr double TILE = 4096.0, BYTES_PER_TILE = 112.0; // voxels along its side; a node of std::map
+    if (level.size < TILE) {
+        return;
+    }
+    const double boxes = double(std::count(signs.begin(), signs.end(), int8_t(-1)));
+    const double tiles = boxes * std::pow(level.size / TILE, 3.0);
+    check_memory(&stage.options, lattice.voxel, tiles * std::pow(TILE / 8.0, 3.0), tiles * BYTES_PER_TILE,
+                 error);
+}
+
 Level Voxelizer::split(const Level &level) {
     const size_t count = level.origins.size();
     std::vector<int8_t> signs(count); // 0: to be halved
@@ -149,6 +162,7 @@ Level Voxelizer::split(const Level &level) {
     if (bad != SIZE_MAX) {
         fail_bad(level.origins[bad].asVec3d() + middle);
     }
+    check_tiles(level, signs);
     Level next{level.size / 2, {}};
     for (size_t i = 0; i < count; ++i) {
         if (signs[i] < 0) {
