@@ -91,8 +91,9 @@ static int make_one(const making *m, const vsh_scene_layer *layer, vsh_field **f
     vsh_error error;
     *field = NULL;
     const vsh_grid *given = layer == NULL ? m->grid : NULL;
-    if (given == NULL &&
-        vsh_scene_layer_casters(m->scene, m->assets, layer, m->run, &grid, &error) != VSH_OK) {
+    vsh_run run = *m->run;
+    run.memory_held += m->made->info.bytes; /* fields of layers before */
+    if (given == NULL && vsh_scene_layer_casters(m->scene, m->assets, layer, &run, &grid, &error) != VSH_OK) {
         return fail_in_layer(layer, &error);
     }
     const vsh_grid *casters = given != NULL ? given : grid;
@@ -107,7 +108,7 @@ static int make_one(const making *m, const vsh_scene_layer *layer, vsh_field **f
     if (layer != NULL) {
         options.reach *= fmax(1.0, layer->shade.softness); /* lights are as much wider */
     }
-    const vsh_result result = vsh_field_create(casters, &options, m->run, field, &error);
+    const vsh_result result = vsh_field_create(casters, &options, &run, field, &error);
     vsh_grid_free(grid); /* the field does not need it */
     if (result != VSH_OK) {
         return fail_in_layer(layer, &error);

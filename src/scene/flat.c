@@ -200,7 +200,11 @@ vsh_result vsh_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *ru
     VSHI_NEEDS(scene);
     const size_t count = scene->caster_count;
     void *memory[2] = {NULL, NULL};
-    vsh_result result = vshi_allocate(&memory[0], count, sizeof(vsh_outline *), "casters", error);
+    vsh_run held; /* by all that are made so far */
+    vsh_result result = vshi_run_resolve(run, &held, error);
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory[0], count, sizeof(vsh_outline *), "casters", error);
+    }
     if (result == VSH_OK) {
         result = vshi_allocate(&memory[1], count, sizeof(vsh_outline_instance), "casters", error);
     }
@@ -208,14 +212,20 @@ vsh_result vsh_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *ru
     vsh_outline_instance *instances = memory[1];
     for (size_t i = 0; i < count && result == VSH_OK; ++i) {
         vsh_error reason;
-        result = make_caster(&scene->casters[i], run, &made[i], &reason);
+        result = make_caster(&scene->casters[i], &held, &made[i], &reason);
+        if (result == VSH_OK) {
+            vsh_outline_info info;
+            vsh_outline_get_info(made[i], &info);
+            held.memory_held += info.bytes;
+            result = vshi_check_limit(&held, 0.0, "outlines", &reason);
+        }
         if (result != VSH_OK) {
             vshi_fail(error, result, "casters[%zu]: %.960s", i, reason.message);
         }
         instances[i] = (vsh_outline_instance){made[i], scene->casters[i].transform};
     }
     if (result == VSH_OK && count > 0) {
-        result = vsh_outline_unite(instances, count, run, outline, error);
+        result = vsh_outline_unite(instances, count, &held, outline, error);
     }
     for (size_t i = 0; made != NULL && i < count; ++i) {
         vsh_outline_free(made[i]);

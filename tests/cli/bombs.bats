@@ -27,3 +27,21 @@ within() {
     within 250 voxelize fine.json --memory-limit 100MiB --quiet -o out.vdb
     refused 4 "fine.json: voxel size 1e-06" "over the memory limit of 105 MB"
 }
+
+@test "fields of a scene's layers count together, and outlines of a plane's casters" {
+    local one='{"sdf": {"shape": "sphere", "radius": 1}, "layer": "l%d"}' i casters= layers=
+    for i in {1..20}; do
+        casters+=$(printf "$one, " "$i")
+        layers+=$(printf '{"name": "l%d"}, ' "$i")
+    done
+    printf '{"casters": [%s], "layers": [%s], "resolution": 128, "method": "cone", "lights": [{"name": "sun", "type": "directional",
+        "direction": [0, 1, 0]}]}' "${casters%, }" "${layers%, }" >layers.json
+    printf '0,5,0,0,1,0\n' >points.csv
+    within 1000 query layers.json --points points.csv --memory-limit 40MiB --quiet -o out.csv
+    refused 4 "layers.json: layer 'l" "over the memory limit of 42 MB"
+    { printf '{"region": [-1, -1, 1, 1], "size": 8, "lights": [{"name": "a", "type": "disc", "position": [0, 0]}], "casters": ['
+      yes '{"shape": "circle", "radius": 1},' | head -n 3000
+      printf '{"shape": "circle", "radius": 1}]}'; } >circles.json
+    within 1000 flat circles.json --memory-limit 20MiB --quiet -o out.exr
+    refused 4 "circles.json: casters[" ": about 21 MB are needed, over the memory limit of 21 MB"
+}
