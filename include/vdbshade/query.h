@@ -52,9 +52,9 @@ static inline vsh_query_output vsh_query_output_default(void) {
  * each value is put in its place: random points then take a fraction of the time. The order is found for
  * VSH_QUERY_BATCH points at a time, which takes 16 bytes for each of them.
  *
- * Values do not depend on that order, nor on the other points of a call, but for the last bits of one shadow
- * in some thousands (6e-8 was the most that was measured), and for shadows by adaptive and exact, whose rays
- * depend on it within their error (see vsh_points), as the deviations of shadows by rays do; nothing depends
+ * Values depend neither on that order nor on the other points of a call, by no bit: those of AO, of rays and
+ * of shadows by one march, where it ends within max_steps. Shadows by adaptive and exact do within their error,
+ * as their rays depend on them (see vsh_points), and so do the deviations of shadows by rays. Nothing depends
  * on threads. Calls for VSH_QUERY_BATCH points each, in turn, and their numbers as
  * `texels`, give every bit of one call for all.
  *

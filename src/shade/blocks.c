@@ -42,6 +42,10 @@ static bool worthwhile(const vshi_shadow_task *task, double end) {
     return vshi_shadow_has_rays(task->options) || end < SHORT;
 }
 
+/* See vshi_rays.deeper: a march may go a quarter of its cone's radius past its deepest place before its next
+ * sample, and that sample may read up to 0.7 voxels of its level less deep than it is. */
+static const double DEEPER = 0.25, READ = 0.71;
+
 /* --- the ball above each point */
 
 /* Looked at for every point, whatever its neighbours prove: where a march begins decides where it samples.
@@ -85,8 +89,10 @@ static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_sh
 typedef struct block {
     size_t first, count;
     vshi_cone beam;
-    double tilt; /* sine of the most that an axis of its cones is off the beam's */
-    bool near;   /* what is open of it is about its points */
+    double distance; /* to a lamp's middle; of suns 0 */
+    double ends;     /* of one march a point: where the first of the cones ends, along the beam */
+    double tilt;     /* sine of the most that an axis of its cones is off the beam's */
+    bool near;       /* what is open of it is about its points */
 } block;
 
 static inline double least(double a, double b) {
@@ -96,6 +102,28 @@ static inline double least(double a, double b) {
 /* How far the points themselves are below where their cones begin, voxels. */
 static double below(const vshi_shadow_task *task) {
     return vshi_shade_lift(task->field, task->options);
+}
+
+/* What one march makes of a cone is its point's value, and nothing is left out that would show in it: where
+ * the beam is free from a place on, so are the balls in the cones that begin before it, which at the place
+ * are wider by the cosine of the half angle. */
+static void tighten(block *b) {
+    vshi_cone *beam = &b->beam;
+    const double sine = beam->sine, wider = 1.0 / sqrt(1.0 - sine * sine);
+    beam->wide *= wider;
+    beam->sine = sine * wider;
+    beam->deeper = DEEPER * (1.0 + sine) + READ;
+}
+
+/* Of one march a point: where a cone begins along its beam, and how far the cone goes, at most, while its
+ * beam goes by 1. A lamp's beam is as far on its way to the lamp as its cones are. */
+static double along_of(const vshi_shadow_task *task, const block *b, const vshi_cone *cone) {
+    return b->distance > 0.0 ? 0.0 : vshi_dot(vshi_sub(cone->origin, b->beam.origin), task->towards);
+}
+
+static double pace_of(const vshi_shadow_task *task, const block *b, const vshi_cone *cone) {
+    return b->distance > 0.0 ? (vshi_length(vshi_sub(task->centre, cone->origin)) + below(task)) / b->distance
+                             : 1.0;
 }
 
 /* The beam around the cones of a block's points; false where there is none worth a look. */
@@ -115,7 +143,7 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
     }
     vshi_cone *beam = &b->beam;
     *beam = (vshi_cone){.origin = centre, .wide = sqrt(square) + 1e-3};
-    b->tilt = 0.0;
+    b->tilt = b->distance = 0.0;
     if (!(beam->wide <= WIDEST)) {
         return false;
     }
@@ -134,11 +162,27 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
         beam->direction = vshi_scale(to, 1.0 / distance);
         beam->sine = fmax(0.0, (radius - beam->wide) / distance);
         b->tilt = beam->wide / distance;
+        b->distance = distance;
     }
     /* from where the first of the cones is not yet proved to where the last is */
-    const double aside = (radius + beam->wide) * b->tilt, ahead = 1.0 - b->tilt * b->tilt;
-    beam->begin = INFINITY;
+    beam->begin = b->ends = INFINITY;
     beam->end = -INFINITY;
+    if (!vshi_shadow_has_rays(task->options)) {
+        tighten(b);
+        for (size_t i = b->first; i < last; ++i) {
+            const vshi_cone *cone = &facing->cone[i];
+            const double along = along_of(task, b, cone), pace = pace_of(task, b, cone);
+            const double slowest = b->distance > 0.0 ? pace - 2.0 * below(task) / b->distance : 1.0;
+            beam->begin = least(beam->begin, along + cone->begin / pace);
+            beam->end = -least(-beam->end, -(along + (slowest > 0.0 ? cone->end / slowest : INFINITY)));
+            b->ends = least(b->ends, along + cone->whole / pace);
+        }
+        if (b->distance > 0.0) { /* the balls in the cones go on behind where these end */
+            beam->end = least(beam->end, b->distance) * (1.0 + radius / b->distance);
+        }
+        return beam->begin < beam->end;
+    }
+    const double aside = (radius + beam->wide) * b->tilt, ahead = 1.0 - b->tilt * b->tilt;
     for (size_t i = b->first; i < last; ++i) {
         const vshi_cone *cone = &facing->cone[i];
         const double along = vshi_dot(vshi_sub(cone->origin, centre), beam->direction);
@@ -150,10 +194,16 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
 
 /* Ends the cones of a block where its beam is free from `clear` on. */
 static void shorten(const vshi_shadow_task *task, vshi_facing *facing, const block *b, double clear) {
+    const bool marched = !vshi_shadow_has_rays(task->options);
     const double aside = (task->radius + below(task) + b->beam.wide) * b->tilt,
                  ahead = 1.0 - b->tilt * b->tilt;
     for (size_t i = b->first; i < b->first + b->count; ++i) {
         vshi_cone *cone = &facing->cone[i];
+        if (marched) {
+            const double from = clear - along_of(task, b, cone);
+            cone->end = least(from > 0.0 ? from * pace_of(task, b, cone) : 0.0, cone->end);
+            continue;
+        }
         const double along = vshi_dot(vshi_sub(cone->origin, b->beam.origin), b->beam.direction);
         const double own = (clear > along ? clear - along : 0.0) / ahead + aside;
         cone->end = least(own, cone->end);
@@ -206,6 +256,12 @@ static void hide_cut(const vshi_shadow_task *task, vshi_facing *facing, const bl
     }
 }
 
+/* Whether every cone of a block comes to a solid ball around its beam's `t` before it ends. */
+static bool is_met(const vshi_shadow_task *task, const block *b, double t) {
+    const double beyond = DEEPER * fmax(1.0, b->beam.sine * t);
+    return vshi_shadow_has_rays(task->options) || t + beyond <= b->ends;
+}
+
 static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s, vshi_chunk *chunk,
                        vsh_shade_stats *stats) {
     const size_t size = SIZE[s].points;
@@ -230,7 +286,7 @@ static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s,
         block *b = &blocks[chunk->owner[r]];
         const double clear = (double)chunk->rays.clear[r];
         if (chunk->rays.proof[r] == VSHI_PROVED_FULL) {
-            if (!task->leaky) {
+            if (!task->leaky && is_met(task, b, clear)) {
                 hide(task, facing, b, stats);
                 b->near = true;
             }

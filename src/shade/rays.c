@@ -31,6 +31,7 @@ void vshi_chunk_clear(vshi_chunk *chunk) {
                               .horizon = lane[11],
                               .wide = lane[12],
                               .clear = lane[13],
+                              .deeper = lane[14],
                               .pace = lane[11], /* no march takes horizons and a pace */
                               .proof = chunk->proof};
 }
@@ -51,6 +52,7 @@ void vshi_chunk_push(vshi_chunk *chunk, const vshi_cone *cone, uint32_t owner) {
     rays->close[i] = (float)cone->close;
     rays->horizon[i] = (float)cone->horizon;
     rays->wide[i] = (float)cone->wide;
+    rays->deeper[i] = (float)cone->deeper;
     chunk->owner[i] = owner;
 }
 
@@ -114,7 +116,9 @@ bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *
     chunk->rays.begin[chunk->rays.count - 1] = (float)begin;
     chunk->rays.end[chunk->rays.count - 1] = (float)end;
     ++stats->marches;
-    if (cone->sine * (end - LAST_STRETCH) > (1.0 + BEYOND) * field->levels[field->level_count - 1].band) {
+    const double band = field->levels[field->level_count - 1].band;
+    /* beams that are wider than their cones say nothing of these */
+    if (!(cone->deeper > 0.0) && cone->sine * (end - LAST_STRETCH) > (1.0 + BEYOND) * band) {
         ++stats->beyond_reach;
     }
     return true;

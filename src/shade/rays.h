@@ -10,7 +10,7 @@
 
 enum {
     VSHI_CHUNK = 1024, /* rays: some 70 KB, which stay in the second cache */
-    VSHI_RAY_FLOATS = 14
+    VSHI_RAY_FLOATS = 15
 };
 
 typedef struct vshi_chunk {
@@ -32,6 +32,7 @@ typedef struct vshi_cone {
     double stop;
     double horizon; /* of proofs: see vshi_rays */
     double wide;    /* of beams: radius at the origin; else 0 */
+    double deeper;  /* of beams: see vshi_rays; else 0 */
 } vshi_cone;
 
 /* Empties a chunk. */

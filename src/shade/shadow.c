@@ -124,7 +124,9 @@ static void shade_points(const vshi_shadow_task *task, size_t begin, size_t end,
         cone->close = hard ? 1.0 : cone->horizon < cone->sine ? cone->horizon : cone->sine;
         cone->stop = method == VSH_SHADOW_PRACTICAL ? PRACTICAL_END * cone->sine : -task->lowest * cone->sine;
         if (!vshi_chunk_add(&chunk, task->field, cone, (uint32_t)i, stats)) {
-            task->visibility[facing.point[i]] = remap(method, cone->close, cone->sine);
+            /* in floats, as the kernel gives it back: whether there is a march depends on the neighbours */
+            task->visibility[facing.point[i]] =
+                remap(method, (double)(float)cone->close, (double)(float)cone->sine);
             stats->certified += cone->close >= cone->sine;
         }
     }

@@ -24,7 +24,11 @@ typedef struct vshi_rays {
     int8_t *proof;  /* out */
     float *wide;    /* of beams: radius at t = 0, to which that of the cone is added; see VSHI_MARCH_GROWN */
     float *pace;    /* of VSHI_MARCH_JITTERED: 0 … 1 */
-    float *clear;   /* out, of beams: the t from which on it is free; past `end` or infinite: nowhere */
+    float *deeper;  /* of beams whose cones are to come to a solid ball where one makes the beam full, else 0:
+                     * how much larger than the beam it is, parts of the cone's radius there, or of a voxel
+                     * where that is more */
+    float *clear;   /* out, of beams: the t from which on it is free, past `end` or infinite: nowhere; of a
+                     * full one where it is */
 } vshi_rays;
 
 /* How the closeness is taken at a sample. */
