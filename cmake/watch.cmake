@@ -45,7 +45,6 @@ endfunction()
 vsh_add_watched(vdbshade_objects ${VSH_SOURCES})
 foreach(watch ${VSH_WATCHES})
   vsh_add_kernels(${watch}.vdbshade_objects)
-  target_sources(${watch}.vdbshade_objects INTERFACE $<TARGET_OBJECTS:vdbshade_openvdb>)
 endforeach()
 
 # vsh_add_program(NAME WATCH SOURCES … FOLDERS … LIBRARIES … WRAP …): a program of the library's own objects and other
@@ -64,7 +63,7 @@ function(vsh_add_program name watch)
     endif()
     target_link_libraries(${name} PRIVATE ${library})
   endforeach()
-  target_link_libraries(${name} PRIVATE vsh::dependencies)
+  target_link_libraries(${name} PRIVATE vdbshade_openvdb_objects vsh::openvdb vsh::dependencies)
   add_dependencies(${name} vdbshade_oiio) # which is loaded, not linked
   set_target_properties(${name} PROPERTIES LINKER_LANGUAGE CXX)
   foreach(call ${given_WRAP})

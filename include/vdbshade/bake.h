@@ -30,6 +30,7 @@ static inline vsh_lightmap_options vsh_lightmap_options_default(void) {
                                     vsh_shade_options_default(),  4,    0};
     return options;
 }
+VSH_API void vsh_lightmap_options_init(vsh_lightmap_options *options, size_t size);
 
 /* What is wrong with a receiver's UVs, mesh by mesh. */
 typedef struct vsh_uv_report {
@@ -55,9 +56,14 @@ typedef struct vsh_closeness {
 /* Measures a receiver's charts at a size; a chart is what hangs together by edges in space and in the UVs.
  * Errors: VSH_ERROR_ARGUMENT (sizes, run), VSH_ERROR_INPUT (no UVs, and as vsh_mesh_check()), VSH_ERROR_LIMIT
  * (run->memory_limit; 2^32 / 3 triangles), VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32_t width,
-                                        int32_t height, const vsh_run *run, vsh_closeness *found,
-                                        vsh_error *error);
+VSH_API vsh_result vsh_charts_closeness_sized(const vsh_mesh *meshes, size_t mesh_count, int32_t width,
+                                              int32_t height, const vsh_run *run, vsh_closeness *found,
+                                              size_t found_size, vsh_error *error);
+static inline vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32_t width,
+                                              int32_t height, const vsh_run *run, vsh_closeness *found,
+                                              vsh_error *error) {
+    return vsh_charts_closeness_sized(meshes, mesh_count, width, height, run, found, sizeof *found, error);
+}
 
 /* The texels of a receiver at one size: where each lies in the world. The meshes are not needed any more. */
 typedef struct vsh_texels vsh_texels;
@@ -70,9 +76,16 @@ typedef struct vsh_texels vsh_texels;
  * - VSH_ERROR_INPUT: a mesh without UVs, UVs that are not finite, and as vsh_mesh_check();
  * - VSH_ERROR_LIMIT: run->memory_limit; more than 2^32 - 2 triangles;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count,
-                                     const vsh_lightmap_options *options, const vsh_run *run,
-                                     vsh_uv_report *uv_reports, vsh_texels **texels, vsh_error *error);
+VSH_API vsh_result vsh_texels_create_sized(const vsh_mesh *meshes, size_t mesh_count,
+                                           const vsh_lightmap_options *options, const vsh_run *run,
+                                           vsh_uv_report *uv_reports, size_t uv_reports_size,
+                                           vsh_texels **texels, vsh_error *error);
+static inline vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count,
+                                           const vsh_lightmap_options *options, const vsh_run *run,
+                                           vsh_uv_report *uv_reports, vsh_texels **texels, vsh_error *error) {
+    return vsh_texels_create_sized(meshes, mesh_count, options, run, uv_reports, sizeof *uv_reports, texels,
+                                   error);
+}
 VSH_API void vsh_texels_free(vsh_texels *texels); /* NULL does nothing */
 
 typedef struct vsh_texels_info {
@@ -86,7 +99,10 @@ typedef struct vsh_texels_info {
 } vsh_texels_info;
 
 /* Cannot fail. */
-VSH_API void vsh_texels_get_info(const vsh_texels *texels, vsh_texels_info *info);
+VSH_API void vsh_texels_get_info_sized(const vsh_texels *texels, vsh_texels_info *info, size_t info_size);
+static inline void vsh_texels_get_info(const vsh_texels *texels, vsh_texels_info *info) {
+    vsh_texels_get_info_sized(texels, info, sizeof *info);
+}
 
 /* --- bands of rows: lightmaps larger than memory */
 
@@ -97,9 +113,16 @@ typedef struct vsh_charts vsh_charts;
 /* Checks and sorts the meshes' triangles and counts the samples of every row. The same arguments, reports,
  * warnings and errors as of vsh_texels_create(), but memory is taken for the triangles only. Free with
  * vsh_charts_free(). */
-VSH_API vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count,
-                                     const vsh_lightmap_options *options, const vsh_run *run,
-                                     vsh_uv_report *uv_reports, vsh_charts **charts, vsh_error *error);
+VSH_API vsh_result vsh_charts_create_sized(const vsh_mesh *meshes, size_t mesh_count,
+                                           const vsh_lightmap_options *options, const vsh_run *run,
+                                           vsh_uv_report *uv_reports, size_t uv_reports_size,
+                                           vsh_charts **charts, vsh_error *error);
+static inline vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count,
+                                           const vsh_lightmap_options *options, const vsh_run *run,
+                                           vsh_uv_report *uv_reports, vsh_charts **charts, vsh_error *error) {
+    return vsh_charts_create_sized(meshes, mesh_count, options, run, uv_reports, sizeof *uv_reports, charts,
+                                   error);
+}
 VSH_API void vsh_charts_free(vsh_charts *charts); /* NULL does nothing */
 
 typedef struct vsh_charts_info {
@@ -111,7 +134,10 @@ typedef struct vsh_charts_info {
 } vsh_charts_info;
 
 /* Cannot fail. */
-VSH_API void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info *info);
+VSH_API void vsh_charts_get_info_sized(const vsh_charts *charts, vsh_charts_info *info, size_t info_size);
+static inline void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info *info) {
+    vsh_charts_get_info_sized(charts, info, sizeof *info);
+}
 
 /* World box of all samples, as of vsh_texels_info: what a field's `receivers` are to hold. Takes as long as
  * making all texels. Errors: VSH_ERROR_ARGUMENT (run), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
@@ -227,6 +253,7 @@ static inline vsh_bake_stats vsh_bake_stats_zero(void) {
     vsh_bake_stats stats = {sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero(), 0, NULL, NULL, NULL};
     return stats;
 }
+VSH_API void vsh_bake_stats_init(vsh_bake_stats *stats, size_t size);
 
 /* Shades the texels and fills the lightmap's planes. NULL options are those given to vsh_texels_create().
  * Rays begin start_offset + surface_offset above the surface (a voxel at least in creases), for sheets

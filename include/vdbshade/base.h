@@ -2,8 +2,11 @@
  *
  * What holds for every call, and is not said again at each:
  *
- * - The library prints nothing, ends nothing and keeps no state of its own. A call that can fail returns a
- *   vsh_result and fills the caller's vsh_error.
+ * - The library prints nothing, ends nothing and keeps no state of its own. It begins threads only within
+ * calls that take a vsh_run; but with the first level set it loads OpenVDB, whose liblog4cplus begins four
+ * that wait, and with the first image other than EXR and PNG it loads OpenImageIO; VSH_ERROR_UNSUPPORTED
+ * where such a module cannot be had. A call that can fail returns a vsh_result and fills the caller's
+ * vsh_error.
  * - Every function may be called by several threads at once. Handles are immutable once made and may be
  *   shared by threads; each is freed once, when no call uses it any more.
  * - Pointers must not be NULL but where that is said, for arrays of no elements, and for parameters named
@@ -11,9 +14,12 @@
  *   that returns a vsh_result answers any other NULL with VSH_ERROR_ARGUMENT, and says which it is.
  * - Arrays and structs that are passed in stay the caller's and are not used after the call.
  * - A call that makes a handle leaves NULL in its place where it fails.
- * - Structs that begin with struct_size are filled by their …_default() or …_zero() function; programs that
- *   were compiled against an older header then go on working. VSH_ERROR_ARGUMENT where struct_size is 0,
- *   more than this library knows, or the size of no such struct.
+ * - Structs may get more members at their end; programs that were compiled against an older header then go on
+ *   working. Those that begin with struct_size are filled by their …_default() or …_zero() function;
+ *   VSH_ERROR_ARGUMENT where struct_size is 0, more than this library knows, or the size of no such struct.
+ *   Calls that fill another struct are inline functions here, which hand its size to a …_sized() one.
+ * Bindings of other languages call these, and the …_init() of a struct, `size` being the bytes of it that
+ * they know. Everything else changes with the library's soname alone, which is that of the minor version.
  * - Calls compute in the default floating-point environment (round to nearest, denormals kept, no traps),
  *   whatever the caller has set, which is given back. Callbacks are called in the default one.
  * - Files that somebody else made: the libraries that parse .vdb files, meshes, images and fonts can crash on
@@ -134,6 +140,7 @@ static inline vsh_run vsh_run_default(void) {
     vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST, NULL, 0.0, 0, 0, 0};
     return run;
 }
+VSH_API void vsh_run_init(vsh_run *run, size_t size);
 
 #ifdef __cplusplus
 }

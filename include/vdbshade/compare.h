@@ -52,6 +52,7 @@ static inline vsh_compare_options vsh_compare_options_default(void) {
     vsh_compare_options options = {sizeof(vsh_compare_options), 0.02, 0.1, 2, 0.0};
     return options;
 }
+VSH_API void vsh_compare_options_init(vsh_compare_options *options, size_t size);
 
 /* What is held against a limit. Values are taken in units of the range (vsh_measures.range), lengths in
  * texels.
@@ -114,8 +115,13 @@ typedef struct vsh_measures {
  * - VSH_ERROR_ARGUMENT: compared, its planes or measures NULL, sizes, options out of range, run;
  * - VSH_ERROR_LIMIT: run->memory_limit;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *options,
-                               const vsh_run *run, vsh_measures *measures, vsh_error *error);
+VSH_API vsh_result vsh_compare_sized(const vsh_compared *compared, const vsh_compare_options *options,
+                                     const vsh_run *run, vsh_measures *measures, size_t measures_size,
+                                     vsh_error *error);
+static inline vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *options,
+                                     const vsh_run *run, vsh_measures *measures, vsh_error *error) {
+    return vsh_compare_sized(compared, options, run, measures, sizeof *measures, error);
+}
 
 /* --- limits */
 

@@ -23,6 +23,7 @@ static inline vsh_field_options vsh_field_options_default(void) {
     vsh_field_options options = {sizeof(vsh_field_options), 0.0};
     return options;
 }
+VSH_API void vsh_field_options_init(vsh_field_options *options, size_t size);
 
 /* Makes the field of a grid; free it with vsh_field_free(). Time and memory follow the surface's area; each
  * level above the finest adds about a quarter of the one below. Errors:
@@ -61,7 +62,10 @@ typedef struct vsh_field_info {
 } vsh_field_info;
 
 /* Cannot fail. */
-VSH_API void vsh_field_get_info(const vsh_field *field, vsh_field_info *info);
+VSH_API void vsh_field_get_info_sized(const vsh_field *field, vsh_field_info *info, size_t info_size);
+static inline void vsh_field_get_info(const vsh_field *field, vsh_field_info *info) {
+    vsh_field_get_info_sized(field, info, sizeof *info);
+}
 
 /* What of a mesh a field does not hold: its voxels are too coarse for it, and nothing that marches against
  * them sees it. */
@@ -77,8 +81,14 @@ typedef struct vsh_lost {
  * ones, which voxels cut, from them; may be NULL. Takes some milliseconds, on the calling thread. Errors:
  * VSH_ERROR_ARGUMENT (field, meshes or lost NULL), VSH_ERROR_INPUT (as vsh_mesh_check()), VSH_ERROR_MEMORY.
  */
-VSH_API vsh_result vsh_field_find_lost(const vsh_field *field, const vsh_mesh *meshes, size_t mesh_count,
-                                       const vsh_triangles *triangles, vsh_lost *lost, vsh_error *error);
+VSH_API vsh_result vsh_field_find_lost_sized(const vsh_field *field, const vsh_mesh *meshes,
+                                             size_t mesh_count, const vsh_triangles *triangles,
+                                             vsh_lost *lost, size_t lost_size, vsh_error *error);
+static inline vsh_result vsh_field_find_lost(const vsh_field *field, const vsh_mesh *meshes,
+                                             size_t mesh_count, const vsh_triangles *triangles,
+                                             vsh_lost *lost, vsh_error *error) {
+    return vsh_field_find_lost_sized(field, meshes, mesh_count, triangles, lost, sizeof *lost, error);
+}
 
 #ifdef __cplusplus
 }

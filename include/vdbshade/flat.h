@@ -45,6 +45,7 @@ static inline vsh_flat_options vsh_flat_options_default(void) {
                                 VSH_FLAT_EXACT,           1,   4,   1024};
     return options;
 }
+VSH_API void vsh_flat_options_init(vsh_flat_options *options, size_t size);
 
 /* Where a bake's values go; each plane [height][width], row 0 on top. */
 typedef struct vsh_flat_map {

@@ -25,6 +25,7 @@ static inline vsh_grid_options vsh_grid_options_default(void) {
     vsh_grid_options options = {sizeof(vsh_grid_options), 0.0, 256, 3.0, 2.0};
     return options;
 }
+VSH_API void vsh_grid_options_init(vsh_grid_options *options, size_t size);
 
 /* The union of what the meshes are taken for (vsh_mesh.solidity): solids (closed over their holes, with a
  * warning) less the rooms in them; walls of shell_thickness behind faces that look inwards; shells of
@@ -130,11 +131,31 @@ typedef struct vsh_grid_info {
     double shell_thickness; /* world units, of sheets in it; 0: none */
     uint64_t active_voxels; /* of the band */
     uint64_t bytes;         /* in memory */
+    int32_t index_min[3];   /* box of the band's voxels, inclusive */
+    int32_t index_max[3];
+    double transform[12]; /* voxel (x, y, z), its centre, to world: three rows of four */
 } vsh_grid_info;
 
 /* Cannot fail. */
-VSH_API void vsh_grid_get_info(const vsh_grid *grid, vsh_grid_info *info);
+VSH_API void vsh_grid_get_info_sized(const vsh_grid *grid, vsh_grid_info *info, size_t info_size);
+static inline void vsh_grid_get_info(const vsh_grid *grid, vsh_grid_info *info) {
+    vsh_grid_get_info_sized(grid, info, sizeof *info);
+}
+
+/* A dense copy: the distances of size[0] × size[1] × size[2] voxels from `index_min` on into values, z
+ * fastest, world units, negative inside; beyond the band ± its half width. Runs on the calling thread.
+ * Errors: VSH_ERROR_ARGUMENT (a size below 1, indices beyond 32 bits). */
+VSH_API vsh_result vsh_grid_copy(const vsh_grid *grid, const int32_t index_min[3], const int32_t size[3],
+                                 float *values, vsh_error *error);
 VSH_API void vsh_grid_free(vsh_grid *grid); /* NULL does nothing */
+
+/* For <vdbshade/openvdb.h>, whose functions call these: `level_set` points to an
+ * openvdb::FloatGrid::ConstPtr, `version` and `abi` are the caller's OPENVDB_LIBRARY_VERSION_NUMBER and
+ * OPENVDB_ABI_VERSION_NUMBER. */
+VSH_API vsh_result vsh_grid_from_openvdb(const void *level_set, uint32_t version, uint32_t abi,
+                                         const vsh_run *run, vsh_grid **grid, vsh_error *error);
+VSH_API vsh_result vsh_grid_to_openvdb(const vsh_grid *grid, uint32_t version, uint32_t abi, void *level_set,
+                                       vsh_error *error);
 
 /* One grid of a .vdb file, of any kind. Texts that do not fit are cut. */
 typedef struct vsh_vdb_entry {
@@ -159,8 +180,12 @@ typedef struct vsh_vdb_entry {
  * - VSH_ERROR_READ: as vsh_grid_read();
  * - VSH_ERROR_LIMIT: a streamed file, which can only be read whole, that passes run->memory_limit;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,
-                                size_t *count, vsh_error *error);
+VSH_API vsh_result vsh_vdb_list_sized(const char *path, const vsh_run *run, vsh_vdb_entry *entries,
+                                      size_t entries_size, size_t capacity, size_t *count, vsh_error *error);
+static inline vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries,
+                                      size_t capacity, size_t *count, vsh_error *error) {
+    return vsh_vdb_list_sized(path, run, entries, sizeof *entries, capacity, count, error);
+}
 
 #ifdef __cplusplus
 }

@@ -62,6 +62,7 @@ static inline vsh_image_options vsh_image_options_default(void) {
     vsh_image_options options = {sizeof(vsh_image_options), 0, NULL, NULL, 0, VSH_COLOR_AUTO};
     return options;
 }
+VSH_API void vsh_image_options_init(vsh_image_options *options, size_t size);
 
 /* Writes an image; the ending of `path`, in any case, chooses the format (docs/formats.md lists them).
  * Integer formats clamp to 0 … 1 and round to nearest, NaN to 0, with the curve that options->color_space
@@ -103,8 +104,13 @@ typedef struct vsh_image_clipping {
 } vsh_image_clipping;
 
 /* Errors: VSH_ERROR_ARGUMENT (an argument is NULL). */
-VSH_API vsh_result vsh_image_writer_get_clipping(const vsh_image_writer *writer, vsh_image_clipping *clipping,
-                                                 vsh_error *error);
+VSH_API vsh_result vsh_image_writer_get_clipping_sized(const vsh_image_writer *writer,
+                                                       vsh_image_clipping *clipping, size_t clipping_size,
+                                                       vsh_error *error);
+static inline vsh_result vsh_image_writer_get_clipping(const vsh_image_writer *writer,
+                                                       vsh_image_clipping *clipping, vsh_error *error) {
+    return vsh_image_writer_get_clipping_sized(writer, clipping, sizeof *clipping, error);
+}
 
 /* Puts the file in place and frees the writer, also where it fails; the old file is then as it was. Errors:
  * VSH_ERROR_ARGUMENT (rows are missing), and as vsh_image_writer_add(). */

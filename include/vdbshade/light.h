@@ -53,6 +53,7 @@ static inline vsh_light vsh_light_default(void) {
                        "sun"};
     return light;
 }
+VSH_API void vsh_light_init(vsh_light *light, size_t size);
 
 /* Checks a light against the ranges above. Errors: VSH_ERROR_ARGUMENT (light NULL, too), naming the light,
  * the field, the value and the limit. */

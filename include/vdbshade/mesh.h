@@ -70,7 +70,11 @@ typedef struct vsh_mesh_report {
  * - VSH_ERROR_INPUT: a vertex that is not finite (or not once transformed), an index out of range, a
  *   transform that is not finite or flattens;
  * - VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error);
+VSH_API vsh_result vsh_mesh_check_sized(const vsh_mesh *mesh, vsh_mesh_report *report, size_t report_size,
+                                        vsh_error *error);
+static inline vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error) {
+    return vsh_mesh_check_sized(mesh, report, sizeof *report, error);
+}
 
 /* A file of meshes: OBJ, glTF or GLB (2.0), PLY, STL, FBX or Collada (.dae). A node's transform is that
  * of its mesh's view; a mesh that two nodes use is two meshes, and so are the instances of

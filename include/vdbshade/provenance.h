@@ -32,6 +32,7 @@ static inline vsh_provenance_source vsh_provenance_source_default(void) {
     vsh_provenance_source source = {sizeof(vsh_provenance_source), NULL, NULL, 0, NULL, 0.0, NULL, 0};
     return source;
 }
+VSH_API void vsh_provenance_source_init(vsh_provenance_source *source, size_t size);
 
 /* Attributes that do not vary between two runs: no date, host, path or number of threads is in them. In this
  * order, where there is something to tell:

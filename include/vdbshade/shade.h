@@ -103,6 +103,7 @@ static inline vsh_shade_options vsh_shade_options_default(void) {
                                  0.0};
     return options;
 }
+VSH_API void vsh_shade_options_init(vsh_shade_options *options, size_t size);
 
 /* "cone" to VSH_SHADOW_CONE and back; -1 and NULL for what is no method. Names are static strings; NULL is
  * none. */
@@ -162,6 +163,7 @@ static inline vsh_shade_stats vsh_shade_stats_zero(void) {
     vsh_shade_stats stats = {sizeof(vsh_shade_stats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.0, 0.0};
     return stats;
 }
+VSH_API void vsh_shade_stats_init(vsh_shade_stats *stats, size_t size);
 
 /* Fraction of the light that each point sees, 0 dark … 1 lit, into visibility[count]: before any cosine,
  * colour or falloff (a spot's edge counts as falloff). Points turned away from the light are 0, points inside

@@ -60,7 +60,10 @@ typedef struct vsh_voxels_info {
 } vsh_voxels_info;
 
 /* Cannot fail. */
-VSH_API void vsh_voxels_get_info(const vsh_voxels *voxels, vsh_voxels_info *info);
+VSH_API void vsh_voxels_get_info_sized(const vsh_voxels *voxels, vsh_voxels_info *info, size_t info_size);
+static inline void vsh_voxels_get_info(const vsh_voxels *voxels, vsh_voxels_info *info) {
+    vsh_voxels_get_info_sized(voxels, info, sizeof *info);
+}
 
 /* World position of a voxel's centre: where it is shaded, bit by bit. Cannot fail. */
 VSH_API void vsh_voxels_centre(const vsh_voxels *voxels, const int32_t index[3], double centre[3]);
@@ -90,6 +93,7 @@ static inline vsh_volume_options vsh_volume_options_default(void) {
                                   vsh_shade_options_default()};
     return options;
 }
+VSH_API void vsh_volume_options_init(vsh_volume_options *options, size_t size);
 
 /* "nearest" to VSH_INSIDE_NEAREST and back; -1 and NULL for what is none. Names are static strings; NULL is
  * none. */
@@ -135,8 +139,15 @@ typedef struct vsh_volume_grid {
 } vsh_volume_grid;
 
 /* Cannot fail; of a grid beyond the last, an empty name and zeros. */
-VSH_API void vsh_volume_get_info(const vsh_volume *volume, vsh_volume_info *info);
-VSH_API void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vsh_volume_grid *info);
+VSH_API void vsh_volume_get_info_sized(const vsh_volume *volume, vsh_volume_info *info, size_t info_size);
+static inline void vsh_volume_get_info(const vsh_volume *volume, vsh_volume_info *info) {
+    vsh_volume_get_info_sized(volume, info, sizeof *info);
+}
+VSH_API void vsh_volume_get_grid_sized(const vsh_volume *volume, size_t grid, vsh_volume_grid *info,
+                                       size_t info_size);
+static inline void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vsh_volume_grid *info) {
+    vsh_volume_get_grid_sized(volume, grid, info, sizeof *info);
+}
 
 /* Values of a grid at `count` world positions ([count][3]) into values[count], interpolated between the
  * eight voxels around each, as renderers do; the background where there are none, NaN for positions that are
@@ -150,6 +161,10 @@ VSH_API vsh_result vsh_volume_sample(const vsh_volume *volume, size_t grid, size
  * grid, a size below 1, indices beyond 32 bits). */
 VSH_API vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const int32_t index_min[3],
                                    const int32_t size[3], float *values, vsh_error *error);
+
+/* For <vdbshade/openvdb.h>, as vsh_grid_to_openvdb(). */
+VSH_API vsh_result vsh_volume_to_openvdb(const vsh_volume *volume, size_t grid, uint32_t version,
+                                         uint32_t abi, void *values, vsh_error *error);
 
 /* Writes all grids as one .vdb file, `half` (nonzero) as 16-bit floats; the same volume gives the same bytes.
  * Metadata tell method, light and voxel size (docs/volume.md). Atomic, as vsh_grid_write(). Errors:

@@ -7,6 +7,7 @@
 #include "bake/spread.h"
 #include "bake/take.h"
 #include "base/floats.h"
+#include "base/memory.h"
 #include "base/parallel.h"
 #include "caster/mesh.h"
 #include "caster/solidity.h"
@@ -287,8 +288,8 @@ static vsh_result make(const vsh_mesh *meshes, size_t mesh_count, const vsh_ligh
 }
 
 vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
-                            const vsh_run *run, bool limited, vsh_uv_report *uv_reports, vsh_charts **charts,
-                            vsh_error *error) {
+                            const vsh_run *run, bool limited, vsh_uv_report *uv_reports,
+                            size_t uv_reports_size, vsh_charts **charts, vsh_error *error) {
     *charts = NULL;
     vsh_lightmap_options full = vsh_lightmap_options_default();
     vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_lightmap_options", error);
@@ -320,7 +321,7 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
         result = make(meshes, mesh_count, &full, run, limited, job, reports, made, error);
     }
     if (result == VSH_OK && uv_reports != NULL) {
-        memcpy(uv_reports, reports, mesh_count * sizeof *reports);
+        vshi_give_all(uv_reports, uv_reports_size, reports, sizeof *reports, mesh_count);
     }
     if (result == VSH_OK) {
         *charts = made;
@@ -332,18 +333,19 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
     return result;
 }
 
-vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
-                             const vsh_run *run, vsh_uv_report *uv_reports, vsh_charts **charts,
-                             vsh_error *error) {
+vsh_result vsh_charts_create_sized(const vsh_mesh *meshes, size_t mesh_count,
+                                   const vsh_lightmap_options *options, const vsh_run *run,
+                                   vsh_uv_report *uv_reports, size_t uv_reports_size, vsh_charts **charts,
+                                   vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(charts);
     *charts = NULL;
     VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full;
     const vsh_result result = vshi_run_resolve(run, &full, error);
-    return result == VSH_OK
-               ? vshi_charts_make(meshes, mesh_count, options, &full, false, uv_reports, charts, error)
-               : result;
+    return result == VSH_OK ? vshi_charts_make(meshes, mesh_count, options, &full, false, uv_reports,
+                                               uv_reports_size, charts, error)
+                            : result;
 }
 
 void vsh_charts_free(vsh_charts *charts) {
@@ -356,8 +358,8 @@ void vsh_charts_free(vsh_charts *charts) {
     free(charts);
 }
 
-void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info *info) {
-    *info = charts->info;
+void vsh_charts_get_info_sized(const vsh_charts *charts, vsh_charts_info *info, size_t info_size) {
+    vshi_give(info, info_size, &charts->info, sizeof charts->info);
 }
 
 /* --- bands */

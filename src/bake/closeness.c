@@ -5,6 +5,7 @@
 #include "base/floats.h"
 #include "base/hash.h"
 #include "base/job.h"
+#include "base/memory.h"
 #include "caster/mesh.h"
 
 #include <math.h>
@@ -291,8 +292,9 @@ static vsh_result find(closeness *c, const vsh_run *run, vsh_closeness *found, v
     return result;
 }
 
-vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32_t width, int32_t height,
-                                const vsh_run *run, vsh_closeness *found, vsh_error *error) {
+vsh_result vsh_charts_closeness_sized(const vsh_mesh *meshes, size_t mesh_count, int32_t width,
+                                      int32_t height, const vsh_run *run, vsh_closeness *found,
+                                      size_t found_size, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS_OF(mesh_count, meshes);
     VSHI_NEEDS(found);
@@ -319,6 +321,8 @@ vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32
     if (result != VSH_OK) {
         return result;
     }
-    *found = (vsh_closeness){.gap = 1.0};
-    return find(&c, &full, found, error);
+    vsh_closeness all = {.gap = 1.0};
+    result = find(&c, &full, &all, error);
+    vshi_give(found, found_size, &all, sizeof all);
+    return result;
 }

@@ -3,6 +3,7 @@
 #include "bake/surface.h"
 #include "bake/take.h"
 #include "base/floats.h"
+#include "base/memory.h"
 #include "base/parallel.h"
 
 #include <stdlib.h>
@@ -278,9 +279,10 @@ vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t first_row, i
     return result == VSH_OK ? create(charts, first_row, rows, &full, texels, error) : result;
 }
 
-vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
-                             const vsh_run *run, vsh_uv_report *uv_reports, vsh_texels **texels,
-                             vsh_error *error) {
+vsh_result vsh_texels_create_sized(const vsh_mesh *meshes, size_t mesh_count,
+                                   const vsh_lightmap_options *options, const vsh_run *run,
+                                   vsh_uv_report *uv_reports, size_t uv_reports_size, vsh_texels **texels,
+                                   vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(texels);
     *texels = NULL;
@@ -291,7 +293,8 @@ vsh_result vsh_texels_create(const vsh_mesh *meshes, size_t mesh_count, const vs
         return result;
     }
     vsh_charts *charts = NULL;
-    result = vshi_charts_make(meshes, mesh_count, options, &full, true, uv_reports, &charts, error);
+    result = vshi_charts_make(meshes, mesh_count, options, &full, true, uv_reports, uv_reports_size, &charts,
+                              error);
     if (result == VSH_OK) {
         result = create(charts, 0, charts->info.height, &full, texels, error);
     }
@@ -314,8 +317,8 @@ void vsh_texels_free(vsh_texels *texels) {
     free(texels);
 }
 
-void vsh_texels_get_info(const vsh_texels *texels, vsh_texels_info *info) {
-    *info = texels->info;
+void vsh_texels_get_info_sized(const vsh_texels *texels, vsh_texels_info *info, size_t info_size) {
+    vshi_give(info, info_size, &texels->info, sizeof texels->info);
 }
 
 vsh_texel_samples vsh_texels_samples(const vsh_texels *texels) {

@@ -3,6 +3,7 @@
 #define VSHI_ATTRIBUTES_H
 
 #include "base/error.h"
+#include "base/shared.h"
 
 #include <stdbool.h>
 
@@ -11,8 +12,8 @@ extern "C" {
 #endif
 
 /* VSH_ERROR_ARGUMENT, naming `path` and the attribute, where one is not as vsh_attribute says. */
-vsh_result vshi_attributes_check(const char *path, const vsh_attribute *attributes, size_t count,
-                                 vsh_error *error);
+VSHI_SHARED vsh_result vshi_attributes_check(const char *path, const vsh_attribute *attributes, size_t count,
+                                             vsh_error *error);
 
 /* A list that owns its texts; begins as zeros. */
 typedef struct vshi_attributes {

@@ -4,11 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#define STRING_OF(x) #x
-#define STRING(x) STRING_OF(x)
-
 const char *vsh_version(void) {
-    return STRING(VSH_VERSION_MAJOR) "." STRING(VSH_VERSION_MINOR) "." STRING(VSH_VERSION_PATCH);
+    return VSHI_VERSION;
 }
 
 static const char *const result_names[] = {

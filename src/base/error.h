@@ -2,6 +2,8 @@
 #ifndef VSHI_ERROR_H
 #define VSHI_ERROR_H
 
+#include "base/shared.h"
+
 #include <vdbshade/base.h>
 
 #include <stddef.h>
@@ -10,9 +12,15 @@
 extern "C" {
 #endif
 
+/* The header's version, which is that of whatever is compiled with it: "0.1.0". */
+#define VSHI_TEXT_OF(number) #number
+#define VSHI_TEXT(number) VSHI_TEXT_OF(number)
+#define VSHI_VERSION                                                                                         \
+    VSHI_TEXT(VSH_VERSION_MAJOR) "." VSHI_TEXT(VSH_VERSION_MINOR) "." VSHI_TEXT(VSH_VERSION_PATCH)
+
 /* Fills `error` (may be NULL) and returns `code`, so that a failing call can end in `return vshi_fail(…)`.
  * Control characters in the message (from file names, say) become '?', so that it stays one line. */
-vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...)
+VSHI_SHARED vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
 /* Ends a function of the API, whose `error` it fills, where a pointer that it needs is NULL. */
@@ -32,7 +40,7 @@ vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...)
     } while (0)
 
 /* Control characters become '?'. */
-void vshi_one_line(char *text);
+VSHI_SHARED void vshi_one_line(char *text);
 
 #ifdef __cplusplus
 }

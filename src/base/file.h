@@ -3,6 +3,7 @@
 #define VSHI_FILE_H
 
 #include "base/error.h"
+#include "base/shared.h"
 
 #include <stdbool.h>
 
@@ -19,7 +20,7 @@ typedef struct vshi_output {
 } vshi_output;
 
 /* Text after the last dot of the last part of the path, "exr"; "" where there is none. Points into `path`. */
-const char *vshi_path_ending(const char *path);
+VSHI_SHARED const char *vshi_path_ending(const char *path);
 
 /* Whether vshi_output_begin() would succeed, without touching the disk. Errors: VSH_ERROR_ARGUMENT (empty
  * path), VSH_ERROR_WRITE (no such folder, not writable, a folder or device is in the way). Thread safe. */
@@ -28,14 +29,14 @@ vsh_result vshi_output_check(const char *path, vsh_error *error);
 /* Takes a new temporary file for `path`, and removes those that killed processes have left for it. Same
  * errors, and VSH_ERROR_MEMORY. After success, end with commit or abandon. Thread safe, also for the same
  * path: the last commit stays. */
-vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *error);
+VSHI_SHARED vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *error);
 
 /* Flushes the temporary to the disk and renames it over the target. A failure abandons. Errors:
  * VSH_ERROR_WRITE. */
-vsh_result vshi_output_commit(vshi_output *output, vsh_error *error);
+VSHI_SHARED vsh_result vshi_output_commit(vshi_output *output, vsh_error *error);
 
 /* Removes the temporary; the target is as it was. Does nothing where nothing is under way. */
-void vshi_output_abandon(vshi_output *output);
+VSHI_SHARED void vshi_output_abandon(vshi_output *output);
 
 /* The bytes of a file under way, written at any place. For the libraries whose own writing hides failures, or
  * does worse after one: the first failure is kept, and what follows is left out. One thread at a time. */
@@ -44,9 +45,9 @@ typedef struct vshi_sink {
     int error; /* errno of the first failure; 0: none */
 } vshi_sink;
 
-vshi_sink vshi_sink_open(const char *path); /* empties the file; a failure shows in `error` */
-bool vshi_sink_write(vshi_sink *sink, const void *data, size_t size, uint64_t offset);
-int vshi_sink_close(vshi_sink *sink); /* returns `error`, with what closing came to */
+VSHI_SHARED vshi_sink vshi_sink_open(const char *path); /* empties the file; a failure shows in `error` */
+VSHI_SHARED bool vshi_sink_write(vshi_sink *sink, const void *data, size_t size, uint64_t offset);
+VSHI_SHARED int vshi_sink_close(vshi_sink *sink); /* returns `error`, with what closing came to */
 
 #ifdef __cplusplus
 }

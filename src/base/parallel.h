@@ -3,6 +3,7 @@
 #define VSHI_PARALLEL_H
 
 #include "base/job.h"
+#include "base/shared.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -11,8 +12,9 @@ extern "C" {
 /* Handles elements begin … end - 1. May run on any thread; must not depend on how the range was cut. */
 typedef void vshi_range_fn(void *user, size_t begin, size_t end);
 
-/* Of so many threads (0: all cores) as many as the system gives, and the same number where it gives them all. */
-int32_t vshi_parallel_threads(int32_t wanted);
+/* Of so many threads (0: all cores) as many as the system gives, and the same number where it gives them all.
+ */
+VSHI_SHARED int32_t vshi_parallel_threads(int32_t wanted);
 
 /* Calls fn over 0 … count - 1 in pieces of `grain` (the last may be shorter), each piece starting at a
  * multiple of it, on the job's threads; advances the job by `units` × the elements of every piece and stops

@@ -12,8 +12,8 @@
 #include <sys/stat.h>
 
 enum {
-    SPARE = 2,   /* threads that are left to others: the host's, another process of the user */
-    LOOKS = 1000 /* for the end of a thread, a yield each */
+    SPARE = VSHI_OPENVDB_THREADS + 2, /* left to others: the host's, another process of the user */
+    LOOKS = 1000                      /* for the end of a thread, a yield each */
 };
 
 static pthread_mutex_t looking = PTHREAD_MUTEX_INITIALIZER;
@@ -106,4 +106,11 @@ int32_t vshi_threads_given(int32_t wanted, size_t stack) {
     pthread_mutex_unlock(&looking);
     const int32_t now = atomic_load(&known);
     return wanted < now ? wanted : now;
+}
+
+bool vshi_threads_left(int32_t wanted) {
+    pthread_mutex_lock(&looking);
+    const bool left = try(wanted, 0) == wanted;
+    pthread_mutex_unlock(&looking);
+    return left;
 }

@@ -1,6 +1,7 @@
 #include "caster/mesh.h"
 
 #include "base/floats.h"
+#include "base/memory.h"
 
 #include <float.h>
 #include <stdio.h>
@@ -108,7 +109,8 @@ static void grow(vsh_mesh_report *report, vshi_vec p) {
     }
 }
 
-vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error) {
+vsh_result vsh_mesh_check_sized(const vsh_mesh *mesh, vsh_mesh_report *report, size_t report_size,
+                                vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(mesh);
     VSHI_NEEDS(report);
@@ -133,7 +135,7 @@ vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_err
     }
     result = vshi_mesh_count_edges(mesh, &found, error);
     if (result == VSH_OK) {
-        *report = found;
+        vshi_give(report, report_size, &found, sizeof found);
     }
     return result;
 }

@@ -3,6 +3,7 @@
 #define VSHI_CASTER_MESH_H
 
 #include "base/error.h"
+#include "base/shared.h"
 #include "base/vec.h"
 
 #include <vdbshade/mesh.h>
@@ -19,12 +20,12 @@ typedef struct vshi_mesh_name {
 
 #define VSHI_MESH_ALONE ((size_t)-1)
 
-vshi_mesh_name vshi_mesh_label(const vsh_mesh *mesh, size_t index);
+VSHI_SHARED vshi_mesh_name vshi_mesh_label(const vsh_mesh *mesh, size_t index);
 
 /* The checks that vsh_mesh_check() refuses a mesh for, without its report: cheap, and nothing is allocated.
  * Whoever takes meshes from a caller calls this first. `index` is the mesh's place in a list, for messages.
  */
-vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *error);
+VSHI_SHARED vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *error);
 
 /* The transform's part of it: finite, and no flattening. */
 vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_error *error);
@@ -53,7 +54,7 @@ static inline void vshi_mesh_triangle(const vsh_mesh *mesh, size_t i, vshi_vec c
 /* Whether triangle i has no area, so that everything skips it. Decided on the local positions: the products
  * of differences of floats are nearly always exact in double, so that collinear corners give 0 and not a
  * rounding's worth of area, as they would after a rotation. */
-bool vshi_mesh_degenerate(const vsh_mesh *mesh, size_t i);
+VSHI_SHARED bool vshi_mesh_degenerate(const vsh_mesh *mesh, size_t i);
 
 /* weld[v] = the lowest vertex at the very position of v (-0 is 0), for the mesh's vertex_count vertices.
  * Errors: VSH_ERROR_MEMORY. */

@@ -2,6 +2,8 @@
 #ifndef VSHI_SDF_H
 #define VSHI_SDF_H
 
+#include "base/shared.h"
+
 #include <stdbool.h>
 #include <vdbshade/sdf.h>
 
@@ -13,7 +15,7 @@ extern "C" {
 enum { VSHI_SDF_DEPTH = 2048 };
 
 /* True where the tree is a true distance outside: shapes and unions only. */
-bool vshi_sdf_exact(const vsh_sdf *sdf);
+VSHI_SHARED bool vshi_sdf_exact(const vsh_sdf *sdf);
 
 #ifdef __cplusplus
 }

@@ -7,6 +7,7 @@
 #define VSHI_SOLIDITY_H
 
 #include "base/error.h"
+#include "base/shared.h"
 #include "base/vec.h"
 #include "caster/whole.h"
 
@@ -60,9 +61,9 @@ typedef struct vshi_solidity vshi_solidity;
  * `solidity` overrules what is found of its components. Errors: VSH_ERROR_LIMIT (more than 2^32 / 3 triangles
  * in one object, run->memory_limit), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the result with
  * vshi_solidity_free(). */
-vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
-                                vshi_solidity **made, vsh_error *error);
-void vshi_solidity_free(vshi_solidity *solidity); /* NULL does nothing */
+VSHI_SHARED vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                            vshi_solidity **made, vsh_error *error);
+VSHI_SHARED void vshi_solidity_free(vshi_solidity *solidity); /* NULL does nothing */
 
 /* VSHI_SIDE_… of the triangles of a mesh [triangle_count]; those without area are sheets. */
 const uint8_t *vshi_solidity_sides(const vshi_solidity *solidity, size_t mesh);
@@ -72,13 +73,14 @@ const uint8_t *vshi_solidity_sides(const vshi_solidity *solidity, size_t mesh);
 const uint8_t *vshi_solidity_holed(const vshi_solidity *solidity, size_t mesh);
 
 /* The objects, put together from the meshes. */
-const vshi_wholes *vshi_solidity_wholes(const vshi_solidity *solidity);
+VSHI_SHARED const vshi_wholes *vshi_solidity_wholes(const vshi_solidity *solidity);
 
 /* The components, whole by whole, in the order of their first triangles. */
-const vshi_component *vshi_solidity_components(const vshi_solidity *solidity, size_t *count);
+VSHI_SHARED const vshi_component *vshi_solidity_components(const vshi_solidity *solidity, size_t *count);
 
 /* Those of one whole: *count of them from the one returned on. */
-const vshi_component *vshi_solidity_of_whole(const vshi_solidity *solidity, size_t whole, size_t *count);
+VSHI_SHARED const vshi_component *vshi_solidity_of_whole(const vshi_solidity *solidity, size_t whole,
+                                                         size_t *count);
 
 /* A room, and a solid that it is cut out of: places in the list of components. */
 typedef struct vshi_cut {
@@ -86,7 +88,7 @@ typedef struct vshi_cut {
 } vshi_cut;
 
 /* Sorted by solid, then by room. */
-const vshi_cut *vshi_solidity_cuts(const vshi_solidity *solidity, size_t *count);
+VSHI_SHARED const vshi_cut *vshi_solidity_cuts(const vshi_solidity *solidity, size_t *count);
 
 #ifdef __cplusplus
 }

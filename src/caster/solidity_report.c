@@ -1,5 +1,6 @@
 #include "base/floats.h"
 #include "base/job.h"
+#include "base/memory.h"
 #include "caster/solidity.h"
 
 #include <vdbshade/solidity.h>
@@ -19,8 +20,8 @@ static void add(const vshi_component *c, vsh_solidity_report *report) {
     }
 }
 
-vsh_result vsh_mesh_solidity(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
-                             vsh_solidity_report *reports, vsh_error *error) {
+vsh_result vsh_mesh_solidity_sized(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                   vsh_solidity_report *reports, size_t reports_size, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS_OF(mesh_count, meshes);
     VSHI_NEEDS_OF(mesh_count, reports);
@@ -46,7 +47,7 @@ vsh_result vsh_mesh_solidity(const vsh_mesh *meshes, size_t mesh_count, const vs
             add(&components[i], &report);
         }
         for (size_t m = wholes->first[w]; m < wholes->first[w + 1]; ++m) {
-            reports[m] = report;
+            vshi_give((char *)reports + m * reports_size, reports_size, &report, sizeof report);
         }
     }
     vshi_solidity_free(found);

@@ -141,8 +141,9 @@ static vsh_result take_all(work *w, const vsh_run *run, vsh_error *error) {
     return result;
 }
 
-vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *options, const vsh_run *run,
-                       vsh_measures *measures, vsh_error *error) {
+vsh_result vsh_compare_sized(const vsh_compared *compared, const vsh_compare_options *options,
+                             const vsh_run *run, vsh_measures *measures, size_t measures_size,
+                             vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(compared);
     VSHI_NEEDS(measures);
@@ -175,7 +176,7 @@ vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *
         work w = {&pair, &chosen, &m, scratch, {VSH_OK}};
         result = m.count > 0 ? take_all(&w, &full, error) : VSH_OK;
         if (result == VSH_OK) {
-            *measures = m;
+            vshi_give(measures, measures_size, &m, sizeof m);
         }
     }
     free(scratch);

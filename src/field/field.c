@@ -197,14 +197,14 @@ void vsh_field_sample(const vsh_field *field, size_t count, const double *positi
     }
 }
 
-void vsh_field_get_info(const vsh_field *field, vsh_field_info *info) {
+void vsh_field_get_info_sized(const vsh_field *field, vsh_field_info *info, size_t info_size) {
     VSHI_FLOATS;
     const vshi_level *top = &field->levels[field->level_count - 1];
     uint64_t bricks = 0;
     for (int32_t l = 0; l < field->level_count; ++l) {
         bricks += field->levels[l].brick_count;
     }
-    *info = (vsh_field_info){
+    vsh_field_info found = {
         .voxel_size = field->voxel_size,
         .reach = top->band * field->voxel_size,
         .shell_thickness = field->shell_thickness,
@@ -213,6 +213,7 @@ void vsh_field_get_info(const vsh_field *field, vsh_field_info *info) {
         .bytes = (uint64_t)vshi_field_bytes(field),
         .active_voxels = field->active_voxels,
     };
-    memcpy(info->bounds_min, field->world_min, sizeof info->bounds_min);
-    memcpy(info->bounds_max, field->world_max, sizeof info->bounds_max);
+    memcpy(found.bounds_min, field->world_min, sizeof found.bounds_min);
+    memcpy(found.bounds_max, field->world_max, sizeof found.bounds_max);
+    vshi_give(info, info_size, &found, sizeof found);
 }

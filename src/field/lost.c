@@ -135,8 +135,9 @@ static void look_at_mesh(const vsh_field *field, const vsh_mesh *mesh, double ar
     lost->thickness = measured > 0 ? thickness[measured / 10] : 0.0;
 }
 
-vsh_result vsh_field_find_lost(const vsh_field *field, const vsh_mesh *meshes, size_t mesh_count,
-                               const vsh_triangles *triangles, vsh_lost *lost, vsh_error *error) {
+vsh_result vsh_field_find_lost_sized(const vsh_field *field, const vsh_mesh *meshes, size_t mesh_count,
+                                     const vsh_triangles *triangles, vsh_lost *lost, size_t lost_size,
+                                     vsh_error *error) {
     VSHI_NEEDS(field);
     VSHI_NEEDS_OF(mesh_count, meshes);
     VSHI_NEEDS_OF(mesh_count, lost);
@@ -146,7 +147,6 @@ vsh_result vsh_field_find_lost(const vsh_field *field, const vsh_mesh *meshes, s
         if (result != VSH_OK) {
             return result;
         }
-        lost[m] = (vsh_lost){0.0, 0.0, 0};
         sum += mesh_area(&meshes[m]);
     }
     void *thickness = NULL;
@@ -155,9 +155,11 @@ vsh_result vsh_field_find_lost(const vsh_field *field, const vsh_mesh *meshes, s
     for (size_t m = 0; m < mesh_count && result == VSH_OK; ++m) {
         const double area = mesh_area(&meshes[m]);
         const size_t places = LEAST + (size_t)(sum > 0.0 ? PLACES * (area / sum) : 0.0);
+        vsh_lost found = {0.0, 0.0, 0};
         if (area > 0.0) {
-            look_at_mesh(field, &meshes[m], area, places, triangles, thickness, &lost[m]);
+            look_at_mesh(field, &meshes[m], area, places, triangles, thickness, &found);
         }
+        vshi_give((char *)lost + m * lost_size, lost_size, &found, sizeof found);
     }
     free(thickness);
     return result;

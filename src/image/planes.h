@@ -4,6 +4,7 @@
 
 #include "base/attributes.h"
 #include "base/job.h"
+#include "base/shared.h"
 
 #include <vdbshade/image.h>
 
@@ -81,15 +82,16 @@ vsh_result vshi_check_values(const char *path, int64_t width, int64_t height, in
 
 /* An image of zeros with empty names, within run->memory_limit; NULL is none. Errors: VSH_ERROR_INPUT (an
  * extent that is not positive), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-vsh_result vshi_image_file_new(const char *path, const vsh_run *run, int64_t width, int64_t height,
-                               int64_t channels, vsh_image_file **file, vsh_error *error);
+VSHI_SHARED vsh_result vshi_image_file_new(const char *path, const vsh_run *run, int64_t width,
+                                           int64_t height, int64_t channels, vsh_image_file **file,
+                                           vsh_error *error);
 
 /* The stage "load" of so many units. Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_image_job(const char *path, const vsh_run *run, int64_t units, vshi_job **job,
-                          vsh_error *error);
+VSHI_SHARED vsh_result vshi_image_job(const char *path, const vsh_run *run, int64_t units, vshi_job **job,
+                                      vsh_error *error);
 
 /* Cut to VSHI_FILE_NAME, without control characters. */
-void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *name);
+VSHI_SHARED void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *name);
 
 /* Has run->reader read the file. Errors: as vsh_image_read_run(). */
 vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_image_file **file,

@@ -4,6 +4,7 @@
 #define VSHI_READ_MESSAGE_H
 
 #include "base/error.h"
+#include "base/shared.h"
 
 #include <stdbool.h>
 
@@ -25,11 +26,11 @@ typedef struct vshi_put {
 } vshi_put;
 
 void vshi_put_begin(vshi_put *put, int file, uint64_t offset);
-void vshi_put_array(vshi_put *put, const void *array, size_t count, size_t size);
-void vshi_put_count(vshi_put *put, uint64_t count);
-void vshi_put_number(vshi_put *put, double number);
-void vshi_put_text(vshi_put *put, const char *text); /* may be NULL */
-bool vshi_put_flush(vshi_put *put);                  /* false after a failure */
+VSHI_SHARED void vshi_put_array(vshi_put *put, const void *array, size_t count, size_t size);
+VSHI_SHARED void vshi_put_count(vshi_put *put, uint64_t count);
+VSHI_SHARED void vshi_put_number(vshi_put *put, double number);
+VSHI_SHARED void vshi_put_text(vshi_put *put, const char *text); /* may be NULL */
+bool vshi_put_flush(vshi_put *put);                              /* false after a failure */
 
 /* A message in memory that is read. What is not there, or not as it must be, shows as `bad`, and as zeros. */
 typedef struct vshi_take {
@@ -39,15 +40,15 @@ typedef struct vshi_take {
 
 /* A view of count × size bytes (size not 0), at a multiple of 8; NULL where the message is shorter, or bad
  * before, and where count is 0. */
-const void *vshi_take_array(vshi_take *take, uint64_t count, size_t size);
-uint64_t vshi_take_count(vshi_take *take, uint64_t most); /* larger ones are bad */
-double vshi_take_number(vshi_take *take);                 /* one that is not finite is bad */
+VSHI_SHARED const void *vshi_take_array(vshi_take *take, uint64_t count, size_t size);
+VSHI_SHARED uint64_t vshi_take_count(vshi_take *take, uint64_t most); /* larger ones are bad */
+VSHI_SHARED double vshi_take_number(vshi_take *take);                 /* one that is not finite is bad */
 
 /* NULL where the writer put NULL, or bad. `line`: one with control characters is bad. */
-const char *vshi_take_text(vshi_take *take, bool line);
+VSHI_SHARED const char *vshi_take_text(vshi_take *take, bool line);
 
 /* Nothing is left, and nothing was bad. */
-bool vshi_take_ends(const vshi_take *take);
+VSHI_SHARED bool vshi_take_ends(const vshi_take *take);
 
 #ifdef __cplusplus
 }

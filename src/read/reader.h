@@ -3,6 +3,7 @@
 #define VSHI_READ_READER_H
 
 #include "base/job.h"
+#include "base/shared.h"
 #include "read/message.h"
 
 #ifdef __cplusplus
@@ -44,23 +45,23 @@ typedef bool vshi_poll_fn(void *user, double fraction);
 
 /* `run` is a resolved one with a reader; it and the path live until the request is sent. Errors:
  * VSH_ERROR_MEMORY. */
-vsh_result vshi_ask_begin(vshi_ask *ask, int32_t kind, const char *path, const vsh_run *run,
-                          vsh_error *error);
+VSHI_SHARED vsh_result vshi_ask_begin(vshi_ask *ask, int32_t kind, const char *path, const vsh_run *run,
+                                      vsh_error *error);
 
 /* Starts the reader, waits for its end, passes its warnings on. Ends the request, also where it fails.
  * Errors: those of the reader; VSH_ERROR_READ (it crashed, or its answer does not hold), VSH_ERROR_LIMIT
  * (time, memory), VSH_ERROR_ARGUMENT (no such program, or none that is a reader), VSH_ERROR_CANCELLED. */
-vsh_result vshi_ask_send(vshi_ask *ask, vshi_poll_fn *poll, void *user, vshi_answer *answer,
-                         vsh_error *error);
+VSHI_SHARED vsh_result vshi_ask_send(vshi_ask *ask, vshi_poll_fn *poll, void *user, vshi_answer *answer,
+                                     vsh_error *error);
 
 /* The same with progress and cancelling by a job, `units` of it. */
-vsh_result vshi_ask_send_job(vshi_ask *ask, vshi_job *job, size_t units, vshi_answer *answer,
-                             vsh_error *error);
+VSHI_SHARED vsh_result vshi_ask_send_job(vshi_ask *ask, vshi_job *job, size_t units, vshi_answer *answer,
+                                         vsh_error *error);
 
-void vshi_answer_free(vshi_answer *answer);
+VSHI_SHARED void vshi_answer_free(vshi_answer *answer);
 
 /* VSH_ERROR_READ: what came back is not what a sound reader sends. */
-vsh_result vshi_answer_fail(const char *path, const char *what, vsh_error *error);
+VSHI_SHARED vsh_result vshi_answer_fail(const char *path, const char *what, vsh_error *error);
 
 /* --- the reader */
 

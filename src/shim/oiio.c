@@ -1,49 +1,19 @@
 /* OpenImageIO is loaded when the first file needs it: with it come 240 libraries of formats, which take
  * longer to load (0.2 s) than a small bake takes, and most runs read and write EXR alone. */
-#define _GNU_SOURCE
-
 #include "shim/oiio.h"
 
+#include "shim/module.h"
 #include "shim/oiio_table.h"
 
-#include <dlfcn.h>
 #include <pthread.h>
-#include <stdio.h>
-#include <string.h>
-
-static const char module_name[] = "libvdbshade_oiio.so." VSHI_OIIO_SOVERSION;
 
 /* Written once, by load(). */
 static const vshi_oiio_table *table;
 static char reason[512];
 
-/* Beside this library, and then as every library is searched for: in a host with a sanitizer, whose dlopen()
- * is not libc's, the search does not begin at this one. */
-static void *open_module(void) {
-    Dl_info here;
-    char path[4096];
-    const bool known = dladdr(module_name, &here) != 0 && here.dli_fname != NULL;
-    /* a path that is not absolute would be looked for where the host is by now */
-    const char *end = known && here.dli_fname[0] == '/' ? strrchr(here.dli_fname, '/') : NULL;
-    void *module = NULL;
-    if (end != NULL && (size_t)snprintf(path, sizeof path, "%.*s/%s", (int)(end - here.dli_fname),
-                                        here.dli_fname, module_name) < sizeof path) {
-        module = dlopen(path, RTLD_LAZY | RTLD_LOCAL);
-    }
-    return module != NULL ? module : dlopen(module_name, RTLD_LAZY | RTLD_LOCAL);
-}
-
 static void load(void) {
-    void *module = open_module();
-    const vshi_oiio_table *found = module != NULL ? dlsym(module, "vshi_oiio_module") : NULL;
-    if (found == NULL) {
-        const char *why = dlerror();
-        snprintf(reason, sizeof reason, "%s", why != NULL ? why : "it has no table");
-    } else if (strcmp(found->version, vsh_version()) != 0) {
-        snprintf(reason, sizeof reason, "%s is of version %s", module_name, found->version);
-    } else {
-        table = found;
-    }
+    table =
+        vshi_module_table("libvdbshade_oiio.so." VSHI_SOVERSION, "vshi_oiio_module", reason, sizeof reason);
 }
 
 static const vshi_oiio_table *module_table(void) {

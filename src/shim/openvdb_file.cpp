@@ -261,11 +261,6 @@ FloatGrid::Ptr to_floats(const GridBase::Ptr &grid) {
     return floats;
 }
 
-double shell_of(const GridBase &grid) {
-    const auto shell = grid.getMetadata<openvdb::DoubleMetadata>(SHELL_THICKNESS);
-    return shell && std::isfinite(shell->value()) && shell->value() > 0.0 ? shell->value() : 0.0;
-}
-
 bool has_numbers(const GridBase &grid) {
     return grid.apply<NumberGrids>([](const auto &) {});
 }
@@ -360,6 +355,11 @@ void refuse_large(const Named &named, const vsh_run &run, double bytes, vsh_erro
     if (result != VSH_OK) {
         throw Failure{result};
     }
+}
+
+double shell_of(const GridBase &grid) {
+    const auto shell = grid.getMetadata<openvdb::DoubleMetadata>(SHELL_THICKNESS);
+    return shell && std::isfinite(shell->value()) && shell->value() > 0.0 ? shell->value() : 0.0;
 }
 
 LevelSet load_level_set(const char *path, const char *name, Stage &stage, vsh_error *error) {

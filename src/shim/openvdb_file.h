@@ -34,6 +34,13 @@ openvdb::GridBase::Ptr read_numbers(const char *path, const char *name, const vs
 // memory limit. Throws Failure.
 LevelSet load_level_set(const char *path, const char *name, Stage &stage, vsh_error *error);
 
+// A handle of a level set from outside: its values are looked at, and its distances made anew where they are
+// none. Throws Failure.
+vsh_grid *close_level_set(LevelSet &set, Stage &stage, vsh_error *error);
+
+// What our metadata say of it, world units; 0: nothing.
+double shell_of(const openvdb::GridBase &grid);
+
 // Up to `capacity` grids of a file, described; `count` is that of the file's. Throws Failure.
 void list_grids(const char *path, const vsh_run &run, std::vector<vsh_vdb_entry> &entries, size_t capacity,
                 size_t &count, vsh_error *error);
@@ -48,6 +55,9 @@ vsh_result check_writable(const char *path, double voxel_size, vsh_error *error)
 // A grid of ours: shares the tree.
 FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Transform &transform,
                           const std::string &name, openvdb::GridClass grid_class);
+
+// The same of a handle's level set.
+FloatGrid::Ptr named_surface(const vsh_grid &grid, const char *name);
 
 // Lines of text as metadata; those that are there under such a name are replaced.
 void put_attributes(FloatGrid &grid, const vsh_attribute *attributes, size_t count);

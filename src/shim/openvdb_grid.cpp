@@ -259,14 +259,20 @@ vsh_grid *close_grid(const FloatGrid::Ptr &level_set, double shell, Stage &stage
     if (!box.empty()) {
         set_bounds(info, grid->transform, box);
     }
+    const openvdb::CoordBBox band = level_set->evalActiveVoxelBoundingBox();
+    for (int axis = 0; axis < 3; ++axis) {
+        info.index_min[axis] = band.empty() ? 0 : band.min()[axis];
+        info.index_max[axis] = band.empty() ? 0 : band.max()[axis];
+    }
+    std::copy(std::begin(grid->transform), std::end(grid->transform), info.transform);
     grid->info = info;
     return grid.release();
 }
 
 } // namespace vshi
 
-void vsh_grid_get_info(const vsh_grid *grid, vsh_grid_info *info) {
-    *info = grid->info;
+void vsh_grid_get_info_sized(const vsh_grid *grid, vsh_grid_info *info, size_t info_size) {
+    vshi_give(info, info_size, &grid->info, sizeof grid->info);
 }
 
 void vsh_grid_free(vsh_grid *grid) {

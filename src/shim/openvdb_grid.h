@@ -117,4 +117,12 @@ class Stage {
 // others active; `shell` is the thickness of open meshes in it, world units.
 vsh_grid *close_grid(const FloatGrid::Ptr &level_set, double shell, Stage &stage);
 
+// A dense copy of a tree's values, z fastest.
+vsh_result copy_dense(const FloatTree &tree, const int32_t index_min[3], const int32_t size[3], float *values,
+                      vsh_error *error);
+
+// Throws Failure for a caller that was compiled against another OpenVDB: its grids are other classes, though
+// their names are alike.
+void check_openvdb(uint32_t version, uint32_t abi, vsh_error *error);
+
 } // namespace vshi

@@ -11,6 +11,38 @@ namespace vshi {
 
 namespace {
 
+FloatGrid::Ptr mend_named(const Named &named, const FloatGrid &grid, Stage &stage, vsh_error *error) {
+    vsh_error why;
+    try {
+        return mend(grid, stage, &why);
+    } catch (const Failure &failure) {
+        if (failure.code != VSH_ERROR_CANCELLED) { // which the stage has told already
+            vshi_fail(error, failure.code, "%s: %.700s", named.text().c_str(), why.message);
+        }
+        throw;
+    }
+}
+
+} // namespace
+
+vsh_grid *close_level_set(LevelSet &set, Stage &stage, vsh_error *error) {
+    stage.check();
+    refuse_large(set.named, stage.options, double(set.grid->memUsage()), error);
+    const Finding finding = examine_values(*set.grid, stage);
+    refuse_bad(set.named, finding, error);
+    if (finding.kind == Finding::NOTED) {
+        vshi_warn(&stage.options, "%s: %s", set.named.text().c_str(), finding.text.c_str());
+    }
+    if (finding.kind == Finding::ODD) {
+        vshi_warn(&stage.options, "%s: %s: its distances were made anew", set.named.text().c_str(),
+                  finding.text.c_str());
+        set.grid = mend_named(set.named, *set.grid, stage, error);
+    }
+    return close_grid(set.grid, set.shell, stage);
+}
+
+namespace {
+
 bool poll_stage(void *user, double fraction) {
     Stage &stage = *static_cast<Stage *>(user);
     stage.reach(0.25 * fraction);
@@ -44,18 +76,6 @@ class Answer {
     vshi_answer answer{nullptr, 0, 0, {nullptr, nullptr, true}};
 };
 
-FloatGrid::Ptr mend_named(const Named &named, const FloatGrid &grid, Stage &stage, vsh_error *error) {
-    vsh_error why;
-    try {
-        return mend(grid, stage, &why);
-    } catch (const Failure &failure) {
-        if (failure.code != VSH_ERROR_CANCELLED) { // which the stage has told already
-            vshi_fail(error, failure.code, "%s: %.700s", named.text().c_str(), why.message);
-        }
-        throw;
-    }
-}
-
 vsh_result read(const char *path, const char *name, const vsh_run &run, vsh_grid **grid, vsh_error *error) {
     Stage stage(run, "load", error);
     stage.check();
@@ -70,19 +90,7 @@ vsh_result read(const char *path, const char *name, const vsh_run &run, vsh_grid
         set = load_level_set(path, name, stage, error);
     }
     stage.reach(0.3);
-    stage.check();
-    refuse_large(set.named, run, double(set.grid->memUsage()), error);
-    const Finding finding = examine_values(*set.grid, stage);
-    refuse_bad(set.named, finding, error);
-    if (finding.kind == Finding::NOTED) {
-        vshi_warn(&run, "%s: %s", set.named.text().c_str(), finding.text.c_str());
-    }
-    if (finding.kind == Finding::ODD) {
-        vshi_warn(&run, "%s: %s: its distances were made anew", set.named.text().c_str(),
-                  finding.text.c_str());
-        set.grid = mend_named(set.named, *set.grid, stage, error);
-    }
-    *grid = close_grid(set.grid, set.shell, stage);
+    *grid = close_level_set(set, stage, error);
     return VSH_OK;
 }
 
@@ -99,38 +107,38 @@ template <size_t Capacity> bool is_text(const char (&text)[Capacity], bool lines
     return length < Capacity;
 }
 
-void take_list(vshi_take *take, const char *path, vsh_vdb_entry *entries, size_t capacity, size_t *count,
-               vsh_error *error) {
+void take_list(vshi_take *take, const char *path, std::vector<vsh_vdb_entry> &entries, size_t capacity,
+               size_t &count, vsh_error *error) {
     const uint64_t all = vshi_take_count(take, UINT32_MAX), listed = vshi_take_count(take, capacity);
-    const void *from = vshi_take_array(take, listed, sizeof *entries);
+    const void *from = vshi_take_array(take, listed, sizeof(vsh_vdb_entry));
     if (!vshi_take_ends(take) || listed > all) {
         throw Failure{vshi_answer_fail(path, "the list's size", error)};
     }
+    entries.resize(size_t(listed));
     if (listed > 0) {
-        std::memcpy(entries, from, size_t(listed) * sizeof *entries);
+        std::memcpy(entries.data(), from, size_t(listed) * sizeof(vsh_vdb_entry));
     }
-    for (size_t i = 0; i < listed; ++i) {
-        const vsh_vdb_entry &entry = entries[i];
+    for (const vsh_vdb_entry &entry : entries) {
         if (!is_text(entry.name) || !is_text(entry.type) || !is_text(entry.grid_class) ||
             !is_text(entry.problem) || !is_text(entry.attributes, true)) {
             throw Failure{vshi_answer_fail(path, "a text", error)};
         }
     }
-    *count = size_t(all);
+    count = size_t(all);
 }
 
-vsh_result list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, size_t capacity, size_t *count,
-                vsh_error *error) {
+vsh_result list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, size_t entry_size,
+                size_t capacity, size_t *count, vsh_error *error) {
+    std::vector<vsh_vdb_entry> found;
     if (run.reader != nullptr) {
         Stage stage(run, "load", error);
         Answer answer;
-        take_list(answer.ask(VSHI_READ_LIST, path, nullptr, capacity, stage, error), path, entries, capacity,
-                  count, error);
-        return VSH_OK;
+        take_list(answer.ask(VSHI_READ_LIST, path, nullptr, capacity, stage, error), path, found, capacity,
+                  *count, error);
+    } else {
+        list_grids(path, run, found, capacity, *count, error);
     }
-    std::vector<vsh_vdb_entry> found;
-    list_grids(path, run, found, capacity, *count, error);
-    std::copy(found.begin(), found.end(), entries);
+    vshi_give_all(entries, entry_size, found.data(), sizeof(vsh_vdb_entry), found.size());
     return VSH_OK;
 }
 
@@ -192,13 +200,13 @@ vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run,
                       [&](const vsh_run &full) { return vshi::read(path, name, full, grid, error); });
 }
 
-vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,
-                        size_t *count, vsh_error *error) {
+vsh_result vsh_vdb_list_sized(const char *path, const vsh_run *run, vsh_vdb_entry *entries,
+                              size_t entries_size, size_t capacity, size_t *count, vsh_error *error) {
     VSHI_NEEDS(count);
     *count = 0;
     VSHI_NEEDS(path);
     VSHI_NEEDS_OF(capacity, entries);
     return vshi::call(run, path, error, [&](const vsh_run &full) {
-        return vshi::list(path, full, entries, capacity, count, error);
+        return vshi::list(path, full, entries, entries_size, capacity, count, error);
     });
 }

@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <limits>
-#include <openvdb/tools/Dense.h>
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/Prune.h>
 
@@ -189,12 +188,15 @@ void vsh_volume_free(vsh_volume *volume) {
     delete volume;
 }
 
-void vsh_volume_get_info(const vsh_volume *volume, vsh_volume_info *info) {
-    *info = volume->info;
+void vsh_volume_get_info_sized(const vsh_volume *volume, vsh_volume_info *info, size_t info_size) {
+    vshi_give(info, info_size, &volume->info, sizeof volume->info);
 }
 
-void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vsh_volume_grid *info) {
-    *info = grid < volume->channels.size() ? volume->channels[grid].info : vsh_volume_grid{};
+void vsh_volume_get_grid_sized(const vsh_volume *volume, size_t grid, vsh_volume_grid *info,
+                               size_t info_size) {
+    const vsh_volume_grid none{};
+    vshi_give(info, info_size, grid < volume->channels.size() ? &volume->channels[grid].info : &none,
+              sizeof none);
 }
 
 vsh_result vsh_volume_sample(const vsh_volume *volume, size_t grid, size_t count, const double *positions,
@@ -228,17 +230,7 @@ vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const int32_t 
     VSHI_NEEDS(values);
     return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&]() -> vsh_result {
         const vshi::FloatTree &tree = *vshi::channel_of(*volume, grid, error).tree;
-        for (int axis = 0; axis < 3; ++axis) {
-            if (size[axis] < 1 || int64_t(index_min[axis]) + size[axis] - 1 > INT32_MAX) {
-                return vshi_fail(error, VSH_ERROR_ARGUMENT, "copy: %d voxels from %d on along %c", size[axis],
-                                 index_min[axis], "xyz"[axis]);
-            }
-        }
-        const openvdb::Coord low(index_min[0], index_min[1], index_min[2]);
-        openvdb::tools::Dense<float> dense(
-            openvdb::CoordBBox(low, low + openvdb::Coord(size[0] - 1, size[1] - 1, size[2] - 1)), values);
-        openvdb::tools::copyToDense(tree, dense, true);
-        return VSH_OK;
+        return vshi::copy_dense(tree, index_min, size, values, error);
     });
 }
 
@@ -265,5 +257,17 @@ vsh_result vsh_volume_write_with(const vsh_volume *volume, const char *path, int
             grids.push_back(grid);
         }
         return vshi::write_grids(grids, path, error);
+    });
+}
+
+vsh_result vsh_volume_to_openvdb(const vsh_volume *volume, size_t grid, uint32_t version, uint32_t abi,
+                                 void *values, vsh_error *error) {
+    VSHI_NEEDS(volume);
+    VSHI_NEEDS(values);
+    return vshi::guard(error, VSH_ERROR_LIMIT, "OpenVDB", [&] {
+        vshi::check_openvdb(version, abi, error);
+        *static_cast<openvdb::FloatGrid::ConstPtr *>(values) =
+            vshi::to_grid(vshi::channel_of(*volume, grid, error), *volume->set, false);
+        return VSH_OK;
     });
 }

@@ -181,6 +181,15 @@ FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Trans
     return grid;
 }
 
+FloatGrid::Ptr named_surface(const vsh_grid &grid, const char *name) {
+    const FloatGrid::Ptr named =
+        named_grid(grid.level_set->treePtr(), grid.level_set->transform(), name, openvdb::GRID_LEVEL_SET);
+    if (grid.info.shell_thickness > 0.0) {
+        named->insertMeta(SHELL_THICKNESS, openvdb::DoubleMetadata(grid.info.shell_thickness));
+    }
+    return named;
+}
+
 void put_attributes(FloatGrid &grid, const vsh_attribute *attributes, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         grid.insertMeta(attributes[i].name, openvdb::StringMetadata(attributes[i].value));
@@ -205,13 +214,7 @@ vsh_result vsh_grid_write_with(const vsh_grid *grid, const char *path, const cha
         if (result != VSH_OK) {
             return result;
         }
-        const openvdb::FloatGrid &level_set = *grid->level_set;
-        const openvdb::FloatGrid::Ptr named =
-            vshi::named_grid(grid->level_set->treePtr(), level_set.transform(),
-                             name != nullptr ? name : "surface", openvdb::GRID_LEVEL_SET);
-        if (grid->info.shell_thickness > 0.0) {
-            named->insertMeta(vshi::SHELL_THICKNESS, openvdb::DoubleMetadata(grid->info.shell_thickness));
-        }
+        const openvdb::FloatGrid::Ptr named = vshi::named_surface(*grid, name != nullptr ? name : "surface");
         vshi::put_attributes(*named, attributes, attribute_count);
         return vshi::write_grids({named}, path, error);
     });

@@ -21,6 +21,52 @@ static void a_sphere_is_exact_in_its_band(void **state) {
     vsh_grid_free(grid);
 }
 
+static void a_dense_copy_has_every_distance(void **state) {
+    (void)state;
+    sphere s = {{0.3, 0, 0}, 1.0, 0};
+    const vsh_distance field = sphere_field(&s);
+    const vsh_grid_options options = with_voxel(0.05);
+    vsh_grid *grid = NULL;
+    assert_int_equal(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_OK);
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    int32_t size[3], low[3];
+    for (int i = 0; i < 3; ++i) {
+        low[i] = info.index_min[i] - 1;
+        size[i] = info.index_max[i] - low[i] + 2;
+        assert_in_range(size[i], 2.0 / 0.05 + 4, 2.0 / 0.05 + 9);
+    }
+    float *values = malloc((size_t)size[0] * (size_t)size[1] * (size_t)size[2] * sizeof *values);
+    assert_int_equal(vsh_grid_copy(grid, low, size, values, &failure), VSH_OK);
+    const float band = (float)(info.half_width * info.voxel_size);
+    size_t at = 0;
+    uint64_t active = 0;
+    for (int32_t x = 0; x < size[0]; ++x) {
+        for (int32_t y = 0; y < size[1]; ++y) {
+            for (int32_t z = 0; z < size[2]; ++z, ++at) {
+                const double index[3] = {low[0] + x, low[1] + y, low[2] + z};
+                double p[3];
+                for (int row = 0; row < 3; ++row) {
+                    const double *m = info.transform + 4 * row;
+                    p[row] = m[0] * index[0] + m[1] * index[1] + m[2] * index[2] + m[3];
+                }
+                const double truth = sqrt((p[0] - 0.3) * (p[0] - 0.3) + p[1] * p[1] + p[2] * p[2]) - 1.0;
+                assert_float_equal(values[at], fmax(-band, fmin(band, truth)), 1e-6);
+                const int edge =
+                    x == 0 || y == 0 || z == 0 || x == size[0] - 1 || y == size[1] - 1 || z == size[2] - 1;
+                assert_true(!edge || values[at] == band);
+                active += fabsf(values[at]) < band;
+            }
+        }
+    }
+    assert_int_equal(active, info.active_voxels);
+    const int32_t none[3] = {1, 0, 1}, last[3] = {INT32_MAX, 0, 0}, two[3] = {2, 1, 1};
+    assert_int_equal(vsh_grid_copy(grid, low, none, values, &failure), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_grid_copy(grid, last, two, values, &failure), VSH_ERROR_ARGUMENT);
+    free(values);
+    vsh_grid_free(grid);
+}
+
 static void the_work_follows_the_area(void **state) {
     (void)state;
     size_t calls[2];
@@ -274,6 +320,7 @@ static void progress_rises_to_one_and_can_cancel(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_sphere_is_exact_in_its_band),
+        cmocka_unit_test(a_dense_copy_has_every_distance),
         cmocka_unit_test(the_work_follows_the_area),
         cmocka_unit_test(far_from_the_origin_nothing_changes),
         cmocka_unit_test(a_room_inside_a_solid_stays_a_room),

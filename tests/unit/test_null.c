@@ -59,6 +59,10 @@ static void casters_are_not_made_of_nothing(void **state) {
     MAKES_NONE(vsh_grid_unite(NULL, 1, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_grid_unite(&instance, 1, NULL, NULL, PLACE, &error));
     REFUSED(vsh_grid_unite(&instance, 1, NULL, NULL, NULL, &error));
+    MAKES_NONE(vsh_grid_from_openvdb(NULL, 0, 0, NULL, PLACE, &error));
+    REFUSED(vsh_grid_from_openvdb(&error, 0, 0, NULL, NULL, &error));
+    REFUSED(vsh_grid_to_openvdb(NULL, 0, 0, &error, &error));
+    REFUSED(vsh_volume_to_openvdb(NULL, 0, 0, 0, &error, &error));
     MAKES_NONE(vsh_grid_from_outline(NULL, 1.0, NULL, NULL, NULL, PLACE, &error));
     REFUSED(vsh_mesh_check(NULL, &report, &error));
     REFUSED(vsh_mesh_check(&mesh, NULL, &error));
@@ -234,6 +238,7 @@ static void nothing_is_baked_without_what_it_takes(void **state) {
     REFUSED(vsh_volume_sample(NULL, 0, 1, low, values, &error));
     REFUSED(vsh_volume_sample(volume, 0, 1, NULL, values, &error));
     REFUSED(vsh_volume_sample(volume, 0, 1, low, NULL, &error));
+    REFUSED(vsh_grid_copy(NULL, index, size, values, &error));
     REFUSED(vsh_volume_copy(NULL, 0, index, size, values, &error));
     REFUSED(vsh_volume_copy(volume, 0, NULL, size, values, &error));
     REFUSED(vsh_volume_copy(volume, 0, index, NULL, values, &error));
