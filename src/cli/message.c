@@ -91,10 +91,12 @@ static bool names_file(const char *message) {
 }
 
 int cli_fail_of(const char *path, const vsh_error *error) {
+    const bool of_caster =
+        strncmp(error->message, "casters[", strlen("casters[")) == 0; /* of a scene's file */
     const bool of_values = error->code == VSH_ERROR_INPUT || error->code == VSH_ERROR_LIMIT ||
                            error->code == VSH_ERROR_UNSUPPORTED;
     const char *of = path != NULL ? path : input;
-    if (!of_values || of == NULL || names_file(error->message)) {
+    if ((!of_values && !of_caster) || of == NULL || names_file(error->message)) {
         return cli_fail(error);
     }
     cli_warnings_tell();

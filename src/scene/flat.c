@@ -192,6 +192,9 @@ static vsh_result make_caster(const vsh_flat_caster *caster, const vsh_run *run,
     }
 }
 
+/* Of a scene and on the way from it, what is left of its text included: measured with 60,000 circles. */
+enum { BYTES_PER_CASTER = 1536 };
+
 vsh_result vsh_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *run, vsh_outline **outline,
                                   vsh_error *error) {
     VSHI_FLOATS;
@@ -208,6 +211,7 @@ vsh_result vsh_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *ru
     if (result == VSH_OK) {
         result = vshi_allocate(&memory[1], count, sizeof(vsh_outline_instance), "casters", error);
     }
+    held.memory_held += count * BYTES_PER_CASTER;
     vsh_outline **made = memory[0];
     vsh_outline_instance *instances = memory[1];
     for (size_t i = 0; i < count && result == VSH_OK; ++i) {

@@ -45,3 +45,28 @@ within() {
     within 1000 flat circles.json --memory-limit 20MiB --quiet -o out.exr
     refused 4 "circles.json: casters[" ": about 21 MB are needed, over the memory limit of 21 MB"
 }
+
+# far_cubes N: cubes so far from each other that each has inner nodes of its own in a level set's tree.
+far_cubes() {
+    local i corner
+    for ((i = 0; i < $1; ++i)); do
+        for corner in '0 0 0' '4 0 0' '0 4 0' '4 4 0' '0 0 4' '4 0 4' '0 4 4' '4 4 4'; do
+            echo "v $((i * 5000 + ${corner%% *})) ${corner#* }"
+        done
+    done
+    for ((i = 0; i < $1; ++i)); do
+        for corner in '1 3 4 2' '5 6 8 7' '1 2 6 5' '3 7 8 4' '1 5 7 3' '2 4 8 6'; do
+            printf 'f'
+            printf ' %d' $(for k in $corner; do echo $((8 * i + k)); done)
+            echo
+        done
+    done
+}
+
+@test "the inner nodes of far leaves count, in every copy" {
+    far_cubes 60 >far.obj
+    "$VDBSHADE" voxelize far.obj --voxel-size 1 --quiet -o far.vdb 2>/dev/null
+    printf '0,5,0,0,1,0\n' >points.csv
+    within 200 query far.vdb --sun 0,1,0 --points points.csv --memory-limit 100MiB --quiet -o out.csv
+    refused 4 "far.vdb: " "(about 2.46e+05 voxels)" "over the memory limit of 105 MB" # those of the file, before any copy
+}

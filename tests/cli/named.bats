@@ -73,6 +73,13 @@ by_each() {
     by_each nothing.json 2 "no surface"
 }
 
+@test "a file that a flat scene's caster names and that is not there is told with the scene" {
+    printf '{"region": [-1, -1, 1, 1], "casters": [{"mask": "none.png", "size": 1}],
+        "lights": [{"name": "a", "type": "disc", "position": [0, 0]}]}' >plane.json
+    shade flat plane.json --quiet -o out.exr
+    refused 3 "plane.json: casters[0]: none.png: "
+}
+
 @test "a lightmap without the light's channel is named" {
     "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet --pack R=shadow.sun -o grey.png
     shade render box.obj --sun 0.3,1,0.2 --size 8x8 --resolution 12 --lightmap grey.png --quiet -o out.png
