@@ -171,11 +171,17 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
         tighten(b);
         for (size_t i = b->first; i < last; ++i) {
             const vshi_cone *cone = &facing->cone[i];
-            const double along = along_of(task, b, cone), pace = pace_of(task, b, cone);
-            const double slowest = b->distance > 0.0 ? pace - 2.0 * below(task) / b->distance : 1.0;
-            beam->begin = least(beam->begin, along + cone->begin / pace);
-            beam->end = -least(-beam->end, -(along + (slowest > 0.0 ? cone->end / slowest : INFINITY)));
-            b->ends = least(b->ends, along + cone->whole / pace);
+            const double along = along_of(task, b, cone);
+            double begins = cone->begin, ends = cone->end, whole = cone->whole;
+            if (b->distance > 0.0) {
+                const double pace = pace_of(task, b, cone), slowest = pace - 2.0 * below(task) / b->distance;
+                begins /= pace;
+                ends = slowest > 0.0 ? ends / slowest : INFINITY;
+                whole /= pace;
+            }
+            beam->begin = least(beam->begin, along + begins);
+            beam->end = -least(-beam->end, -(along + ends));
+            b->ends = least(b->ends, along + whole);
         }
         if (b->distance > 0.0) { /* the balls in the cones go on behind where these end */
             beam->end = least(beam->end, b->distance) * (1.0 + radius / b->distance);
