@@ -2,6 +2,7 @@
 #include "read/tasks.h"
 
 #include <dirent.h>
+#include <errno.h>
 #include <fcntl.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -23,14 +24,18 @@ static int field(const char *status, const char *name, int missing) {
     return at != NULL ? atoi(at + strlen(name)) : missing;
 }
 
+/* False where it cannot be read, with errno: ENOENT or ESRCH of a task that has ended. */
 static bool read_state(const char *path, task_state *state) {
     char status[STATUS_ROOM];
+    errno = 0;
     const int file = open(path, O_RDONLY | O_CLOEXEC);
     const ssize_t size = file >= 0 ? read(file, status, sizeof status - 1) : -1;
+    const int why = errno;
     if (file >= 0) {
         close(file);
     }
     if (size <= 0) {
+        errno = why;
         return false;
     }
     status[size] = '\0';
@@ -75,7 +80,8 @@ int vshi_tasks_filtered(int before) {
         task_state task = {MODE_NONE, 0};
         if (entry->d_name[0] != '.') {
             snprintf(path, sizeof path, "/proc/self/task/%.20s/status", entry->d_name);
-            all = read_state(path, &task) && task.mode == MODE_FILTER && task.filters == own.filters;
+            all = read_state(path, &task) ? task.mode == MODE_FILTER && task.filters == own.filters
+                                          : errno == ENOENT || errno == ESRCH; /* ended meanwhile */
         }
     }
     closedir(tasks);
