@@ -190,6 +190,7 @@ static void say_results(const render_work *work) {
 
 static int run_render(const render_settings *s, vsh_scene *scene) {
     render_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
+    work.run.memory_held += render_picture_bytes(s);
     work.stats = cli_stats_begin(CLI_STATS_POINTS, work.run.threads);
     int code = load(&work);
     code = code == CLI_OK ? make_fields(&work) : code;
@@ -227,6 +228,13 @@ static int check_files(const render_settings *s, const vsh_scene *scene) {
     if (code == CLI_OK && scene->light_count == 0 && !scene->ao && s->lightmap_count == 0) {
         return cli_usage("%s: no lights and no ao; give --sun X,Y,Z or --ao DISTANCE, or both",
                          s->bake.input);
+    }
+    const uint64_t limit = s->bake.common.memory_limit, bytes = render_picture_bytes(s);
+    if (code == CLI_OK && limit > 0 && bytes > limit) {
+        char all[32], most[32];
+        cli_say("%s: a picture of %d × %d needs %s, over the memory limit of %s", s->bake.output, s->width,
+                s->height, cli_bytes_text(bytes, all, sizeof all), cli_bytes_text(limit, most, sizeof most));
+        return CLI_LIMIT;
     }
     return code;
 }

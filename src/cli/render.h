@@ -83,6 +83,9 @@ typedef struct render_picture {
     const cli_origin *origin; /* of the file */
 } render_picture;
 
+/* What a picture takes while it is made and written. */
+uint64_t render_picture_bytes(const render_settings *settings);
+
 int render_picture_create(const render_settings *settings, const cli_origin *origin, render_picture *picture);
 void render_picture_free(render_picture *picture);
 

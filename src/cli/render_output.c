@@ -79,6 +79,11 @@ int render_output_check(const render_settings *s) {
     return cli_temporary_check(path);
 }
 
+uint64_t render_picture_bytes(const render_settings *s) {
+    const uint64_t pixels = (uint64_t)s->width * (uint64_t)s->height;
+    return pixels * (FLOATS + ENCODED + (s->page || !is_linear(s->bake.output) ? 0 : 6)) * sizeof(float);
+}
+
 int render_picture_create(const render_settings *s, const cli_origin *origin, render_picture *p) {
     const size_t pixels = (size_t)s->width * (size_t)s->height;
     *p = (render_picture){.memory = calloc(pixels * (FLOATS + ENCODED), sizeof(float)), .origin = origin};

@@ -70,3 +70,11 @@ far_cubes() {
     within 200 query far.vdb --sun 0,1,0 --points points.csv --memory-limit 100MiB --quiet -o out.csv
     refused 4 "far.vdb: " "(about 2.46e+05 voxels)" "over the memory limit of 105 MB" # those of the file, before any copy
 }
+
+@test "a picture counts before it is taken, and with what it shows" {
+    write_box box.obj
+    within 300 render box.obj --sun 1,2,1 --size 16384 --memory-limit 100MiB -o out.png
+    refused 4 "out.png: a picture of 16384 × 16384 needs 12.0 GiB, over the memory limit of 100 MiB"
+    within 500 render box.obj --sun 1,2,1 --size 1024 --resolution 256 --memory-limit 60MiB -o out.png
+    refused 4 "over the memory limit of 63 MB"
+}
