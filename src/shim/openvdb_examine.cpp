@@ -345,7 +345,7 @@ Finding examine_values(const FloatGrid &grid, Stage &stage) {
 // 2 max |n_i| of them a voxel², 1.66 over all directions.
 constexpr double AREA_PER_VOXEL = 0.6;
 
-constexpr double COPIES = 6.0; // of a tree's inner nodes that are there at a time
+constexpr double COPIES = 6.0; // of far inner nodes that are there at a time
 
 FloatGrid::Ptr mend(const FloatGrid &grid, Stage &stage, vsh_error *error) {
     const double voxel = voxel_size(grid);
@@ -353,10 +353,9 @@ FloatGrid::Ptr mend(const FloatGrid &grid, Stage &stage, vsh_error *error) {
     // In index space the lattice stands where it likes; the transform is the source's in the end.
     const Lattice lattice{voxel, half_width, 0.0, Vec3d(0.0)};
     const double count = double(grid.tree().leafCount());
-    // leaves far from each other have inner nodes of their own, 130 times their size, in every copy on the
-    // way
-    const double nodes = std::max(0.0, double(grid.memUsage()) - count * double(sizeof(Leaf)));
-    check_memory(&stage.options, voxel, count, 2.0 * count * BYTES_PER_LEAF + COPIES * nodes, error);
+    check_memory(&stage.options, voxel, count,
+                 2.0 * count * BYTES_PER_LEAF + COPIES * far_node_bytes(double(grid.memUsage()), count),
+                 error);
 
     // Meshing looks at active voxels only: those of all cells that hold both signs.
     const FloatGrid::Ptr source = grid.deepCopy();

@@ -11,6 +11,14 @@ namespace vshi {
 constexpr double SOURCE_BYTES_PER_LEAF = 1.5 * BYTES_PER_LEAF;
 constexpr double REDISTANCE_BYTES_PER_LEAF = 4.0 * BYTES_PER_LEAF;
 
+// Bytes of a grid's inner nodes beside those of a compact one (eight around the origin, 2.1 MB, and those
+// below them), which the estimates' margins hold: leaves far from each other have nodes of their own, 130
+// times their size, in every copy on the way.
+inline double far_node_bytes(double grid_bytes, double leaves) {
+    constexpr double COMPACT = 3e6;
+    return std::max(0.0, grid_bytes - leaves * double(sizeof(Leaf)) - COMPACT);
+}
+
 // Throws Failure where re-distancing would pass the run's memory limit or the machine's: a surface of `area`
 // voxel² in a box of `sides` voxels, held in `source_leaves`, `held` bytes beside it.
 void check_redistance(const vsh_run &run, const Lattice &lattice, double area, const Vec3d &sides,

@@ -157,7 +157,7 @@ Lattice choose_lattice(const std::vector<Placed> &placed, const vsh_grid_options
     return lattice;
 }
 
-constexpr double COPIES = 5.0; // of a tree's inner nodes that are there at a time, beside the instance's own
+constexpr double COPIES = 5.0; // of far inner nodes that are there at a time, beside the instance's own
 
 void foretell(const std::vector<Placed> &placed, const Lattice &lattice, const vsh_run &run,
               vsh_error *error) {
@@ -170,9 +170,8 @@ void foretell(const std::vector<Placed> &placed, const Lattice &lattice, const v
         const double area = count * double(Leaf::SIZE) / (2.0 * instance.grid->info.half_width + 12.0);
         const Vec3d sides = instance.grid->level_set->evalActiveVoxelDim().asVec3d();
         leaves += band_leaves(area * finer * finer, sides * finer, lattice.half_width + RIM);
-        // leaves far from each other have nodes of their own, 130 times their size, in every copy on the way
-        const double nodes = std::max(0.0, double(instance.grid->info.bytes) - count * double(sizeof(Leaf)));
-        bytes += double(instance.grid->info.bytes) + count * SOURCE_BYTES_PER_LEAF + COPIES * nodes;
+        const double held = double(instance.grid->info.bytes);
+        bytes += held + count * SOURCE_BYTES_PER_LEAF + COPIES * far_node_bytes(held, count);
     }
     check_memory(&run, lattice.voxel, leaves, bytes + leaves * REDISTANCE_BYTES_PER_LEAF, error);
 }
