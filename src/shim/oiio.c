@@ -5,36 +5,24 @@
 #include "shim/module.h"
 #include "shim/oiio_table.h"
 
-#include <pthread.h>
+static vshi_module module = VSHI_MODULE("images of this kind", "oiio", 128 << 20);
 
-/* Written once, by load(). */
-static const vshi_oiio_table *table;
-static char reason[512];
-
-static void load(void) {
-    table =
-        vshi_module_table("libvdbshade_oiio.so." VSHI_SOVERSION, "vshi_oiio_module", reason, sizeof reason);
-}
-
-static const vshi_oiio_table *module_table(void) {
-    static pthread_once_t once = PTHREAD_ONCE_INIT;
-    pthread_once(&once, load);
-    return table;
+static const vshi_oiio_table *at(void) {
+    return vshi_module_table(&module);
 }
 
 vsh_result vshi_oiio_have(const char *path, vsh_error *error) {
-    return module_table() != NULL
-               ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_UNSUPPORTED,
-                           "%s: needs the module of image formats, which cannot be had: %s", path, reason);
+    vsh_error why;
+    const vsh_result result = vshi_module_load(&module, &why);
+    return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "%s: %s", path, why.message);
 }
 
 bool vshi_oiio_format(const char *path, vshi_format *format) {
-    return table->format(path, format);
+    return at()->format(path, format);
 }
 
 const char *vshi_oiio_refusal(const char *path) {
-    return table->refusal(path);
+    return at()->refusal(path);
 }
 
 const char *vshi_oiio_endings(void) {
@@ -44,24 +32,24 @@ const char *vshi_oiio_endings(void) {
 vsh_result vshi_oiio_begin(const char *temporary, const char *path, const vshi_format *format,
                            const vshi_planes *planes, int32_t bits, vshi_oiio_writer **writer,
                            vsh_error *error) {
-    return table->begin(temporary, path, format, planes, bits, writer, error);
+    return at()->begin(temporary, path, format, planes, bits, writer, error);
 }
 
 vsh_result vshi_oiio_add(vshi_oiio_writer *writer, const vshi_planes *planes, int32_t rows,
                          vsh_error *error) {
-    return table->add(writer, planes, rows, error);
+    return at()->add(writer, planes, rows, error);
 }
 
 vsh_result vshi_oiio_end(vshi_oiio_writer *writer, vsh_error *error) {
-    return writer != NULL ? table->end(writer, error) : VSH_OK;
+    return writer != NULL ? at()->end(writer, error) : VSH_OK;
 }
 
 double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits) {
-    return table->writer_bytes(format, planes, bits);
+    return at()->writer_bytes(format, planes, bits);
 }
 
 vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     *file = NULL;
     const vsh_result result = vshi_oiio_have(path, error);
-    return result == VSH_OK ? table->read(path, run, file, error) : result;
+    return result == VSH_OK ? at()->read(path, run, file, error) : result;
 }

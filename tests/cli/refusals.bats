@@ -58,6 +58,20 @@ setup() {
     done
 }
 
+@test "where it refuses the memory that OpenVDB or OpenImageIO take, that is said" {
+    local most refused=0
+    write_box box.obj
+    for most in 40 60 80 100 120 140 160 200; do
+        for what in "voxelize --resolution 16 -o out.vdb" "render --sun 1,2,1 --size 16 -o out.png"; do
+            run --separate-stderr bash -c 'ulimit -d "$1"; shift; exec "$@"' bash $((most * 1000)) "$VDBSHADE" ${what%% *} \
+                box.obj ${what#* } --trusted --threads 1 --quiet
+            [ "$status" -eq 0 ] || [ "$status" -eq 4 ] || fail "$most MB, $what"
+            [[ $stderr != *"the system refused the "*" MB that libvdbshade_"* ]] || refused=$((refused + 1))
+        done
+    done
+    [ "$refused" -gt 4 ] || fail "$refused refused"
+}
+
 @test "statistics that cannot be written are told before an image is replaced" {
     old_output out.exr
     local name
