@@ -71,10 +71,11 @@ int32_t vshi_job_threads(const vshi_job *job) {
     const int32_t given = vshi_parallel_threads(wanted);
     static atomic_flag told = ATOMIC_FLAG_INIT; /* once a process, whose threads they are */
     if (given != wanted && job->run.warning != NULL && !atomic_flag_test_and_set(&told)) {
+        const char *than = wanted > 0 ? "asked for" : "there are cores";
         vshi_warn(&job->run,
-                  "the system gives this process %d thread%s at a time%s: slower, with the same result",
-                  given, given == 1 ? "" : "s",
-                  wanted > 0 ? ", fewer than asked for" : ", fewer than there are cores");
+                  "the system gives this process fewer threads than %s (%d at a time): slower, with the same "
+                  "result",
+                  than, given);
     }
     return given;
 }

@@ -5,6 +5,7 @@ load helper
 within() {
     local most=$1
     shift
+    unless_sanitized "its shadow memory does not fit"
     run --separate-stderr bash -c 'ulimit -d "$1"; shift; exec "$@"' bash $((most * 1000)) "$VDBSHADE" "$@" --threads 1
 }
 

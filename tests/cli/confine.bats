@@ -3,7 +3,7 @@ load helper
 
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
-    case ${CFLAGS:-} in *-fsanitize*) skip "sanitized readers are not confined" ;; esac
+    unless_sanitized "sanitized readers are not confined"
     write_box box.obj
     echo kept >kept
     (trap 'touch signalled; exit' USR1; while :; do sleep 0.1; done) 3>&- &

@@ -113,3 +113,8 @@ refused() {
 done_well() {
     [ "$status" -eq 0 ] || fail "expected success"
 }
+
+# unless_sanitized REASON: of a sanitized program, whether it is the build's (CFLAGS) or one that watches a test.
+unless_sanitized() {
+    case ${CFLAGS:-}$VDBSHADE in *-fsanitize* | */address/* | */thread/*) skip "$1" ;; esac
+}
