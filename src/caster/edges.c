@@ -155,44 +155,39 @@ static vsh_result join_many(finding *f, uint32_t lower, const use *uses, size_t 
     return VSH_OK;
 }
 
-/* The uses of one edge, in which those of triangles given twice are left out; returns how many stay. */
+/* The uses of one edge, in which those of triangles given before go to the end; returns how many stay. */
 static size_t leave_out_repeated(finding *f, use *uses, size_t count) {
     vshi_edges *edges = f->edges;
     size_t kept = 0;
     for (size_t i = 0; i < count; ++i) {
-        const use *before = kept > 0 ? &uses[kept - 1] : NULL;
-        if (before != NULL && before->third == uses[i].third) {
-            if (before->side == uses[i].side) { /* left behind by an earlier call */
+        const use one = uses[i], *before = kept > 0 ? &uses[kept - 1] : NULL;
+        if (edges->skipped[one.side / 3]) { /* by another of its edges, or an earlier call */
+            continue;
+        }
+        if (before != NULL && before->third == one.third) {
+            if (before->downwards == one.downwards) {
+                edges->first[one.side / 3] = before->side / 3;
+                edges->skipped[one.side / 3] = 1;
                 continue;
             }
-            if (before->downwards == uses[i].downwards) {
-                edges->first[uses[i].side / 3] = before->side / 3;
-                edges->skipped[uses[i].side / 3] = 1;
-                continue;
-            }
-            edges->doubled[uses[i].side / 3] = 1;
+            edges->doubled[one.side / 3] = 1;
             edges->doubled[before->side / 3] = 1;
         }
-        uses[kept++] = uses[i];
+        uses[i] = uses[kept];
+        uses[kept++] = one;
     }
     return kept;
 }
 
 static vsh_result join_edge(finding *f, uint32_t lower, use *uses, size_t given, vsh_error *error) {
     const size_t count = leave_out_repeated(f, uses, given);
-    if (count == 1) {
-        ++f->edges->open;
-        return VSH_OK;
-    }
     if (count == 2) {
         join(f->edges, uses[0].side, uses[1].side);
-        return VSH_OK;
-    }
-    if (count % 2 == 0) {
+    } else if (count > 2 && count % 2 == 0) {
         return join_many(f, lower, uses, count, error);
+    } else if (count > 2) {
+        ++f->odd; /* later, when it is known what is frayed */
     }
-    ++f->edges->open;
-    ++f->odd; /* later, when it is known what is frayed */
     return VSH_OK;
 }
 
@@ -254,12 +249,20 @@ static vsh_result join_odd(finding *f, vsh_error *error) {
     return result;
 }
 
+static size_t count_open(const vsh_mesh *mesh, const vshi_edges *edges) {
+    size_t open = 0;
+    for (size_t side = 0; side < 3 * mesh->triangle_count; ++side) {
+        open += !edges->skipped[side / 3] && edges->partner[side] == VSHI_NO_PARTNER;
+    }
+    return open;
+}
+
 /* Fills partner, skipped, first, doubled and open. Flat triangles may be what joins two long edges to one. */
 static vsh_result join_edges(finding *f, bool with_flat, vsh_error *error) {
     const vsh_mesh *mesh = f->mesh;
     vshi_edges *edges = f->edges;
     uint32_t v[3];
-    edges->open = f->odd = 0;
+    f->odd = 0;
     memset(f->ends, 0, (mesh->vertex_count + 1) * sizeof *f->ends);
     memset(edges->partner, 0xff, 3 * mesh->triangle_count * sizeof *edges->partner);
     for (size_t i = 0; i < mesh->triangle_count; ++i) {
@@ -300,6 +303,7 @@ static vsh_result join_edges(finding *f, bool with_flat, vsh_error *error) {
     if (result == VSH_OK && f->odd > 0) {
         result = join_odd(f, error);
     }
+    edges->open = count_open(mesh, edges);
     return result;
 }
 

@@ -2,6 +2,9 @@
  * winding numbers that are summed over all triangles here. */
 #include "kinds.h"
 
+#include "caster/components.h"
+#include "caster/edges.h"
+
 static const double ORIGIN[3] = {0, 0, 0};
 static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};
 
@@ -20,6 +23,35 @@ static void closed_surfaces_that_look_outwards_are_solid(void **state) {
     assert_true(c->enclosed == 1.0 && c->open_edges == 0 && c->holes == 0);
     vshi_solidity_free(found);
     free(s);
+}
+
+/* An edge of three triangles, of which others are given again and again: what goes on in what, and what is
+ * open, is as if they were not. */
+static void triangles_given_thrice_at_an_edge_of_three_change_nothing(void **state) {
+    (void)state;
+    static const float corners[] = {0, 0, 0, 0, 0, 1, 1, 0, 0, -1, 0.5f, 0, -1, -0.5f, 0};
+    static const uint32_t fan[] = {0, 1, 2, 0, 1, 3, 1, 0, 4, 0, 1, 2, 0, 1,
+                                   2, 0, 1, 3, 1, 0, 4, 1, 0, 4, 1, 0, 4};
+    vsh_mesh mesh = {.positions = corners, .vertex_count = 5, .indices = fan, .triangle_count = 3};
+    vshi_components once, again;
+    vsh_error error;
+    assert_int_equal(vshi_components_find(&mesh, 0, &once, &error), VSH_OK);
+    assert_int_equal(once.rim_count, 7); /* six outer edges, and what ends at the one of three */
+    mesh.triangle_count = sizeof fan / sizeof *fan / 3;
+    vshi_edges edges;
+    assert_int_equal(vshi_edges_find(&mesh, 0, &edges, &error), VSH_OK);
+    for (uint32_t side = 0; side < 9; ++side) {
+        const uint32_t partner = edges.partner[side];
+        assert_true(partner == VSHI_NO_PARTNER || (partner != side && edges.partner[partner] == side));
+    }
+    assert_int_equal(edges.open, 7);
+    vshi_edges_free(&edges);
+    assert_int_equal(vshi_components_find(&mesh, 0, &again, &error), VSH_OK);
+    assert_int_equal(again.count, once.count);
+    assert_int_equal(again.rim_count, once.rim_count);
+    assert_memory_equal(again.rims, once.rims, once.rim_count * sizeof *once.rims);
+    vshi_components_free(&once);
+    vshi_components_free(&again);
 }
 
 static void a_mirrored_mesh_looks_the_same_way(void **state) {
@@ -312,6 +344,7 @@ static void odd_meshes_are_something(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(closed_surfaces_that_look_outwards_are_solid),
+        cmocka_unit_test(triangles_given_thrice_at_an_edge_of_three_change_nothing),
         cmocka_unit_test(a_mirrored_mesh_looks_the_same_way),
         cmocka_unit_test(faces_that_look_the_wrong_way_are_turned),
         cmocka_unit_test(small_holes_do_not_make_a_solid_hollow),
