@@ -3,10 +3,10 @@
  * What holds for every call, and is not said again at each:
  *
  * - The library prints nothing, ends nothing and keeps no state of its own. It begins threads only within
- * calls that take a vsh_run; but with the first level set it loads OpenVDB, whose liblog4cplus begins four
- * that wait, and with the first image other than EXR and PNG it loads OpenImageIO; VSH_ERROR_UNSUPPORTED
- * where such a module cannot be had. A call that can fail returns a vsh_result and fills the caller's
- * vsh_error.
+ *   calls that take a vsh_run. With the first level set it loads OpenVDB, and with the first image other than
+ *   EXR and PNG OpenImageIO; both stay, and four threads of liblog4cplus with them, which wait.
+ *   VSH_ERROR_UNSUPPORTED where such a module cannot be had.
+ * - A call that can fail returns a vsh_result and fills the caller's vsh_error.
  * - Every function may be called by several threads at once. Handles are immutable once made and may be
  *   shared by threads; each is freed once, when no call uses it any more.
  * - Pointers must not be NULL but where that is said, for arrays of no elements, and for parameters named
@@ -18,8 +18,8 @@
  *   working. Those that begin with struct_size are filled by their …_default() or …_zero() function;
  *   VSH_ERROR_ARGUMENT where struct_size is 0, more than this library knows, or the size of no such struct.
  *   Calls that fill another struct are inline functions here, which hand its size to a …_sized() one.
- * Bindings of other languages call these, and the …_init() of a struct, `size` being the bytes of it that
- * they know. Everything else changes with the library's soname alone, which is that of the minor version.
+ *   Bindings of other languages call these, and the …_init() of a struct, `size` being the bytes of it that
+ *   they know. All else changes with the library's soname alone, which is that of the minor version.
  * - Calls compute in the default floating-point environment (round to nearest, denormals kept, no traps),
  *   whatever the caller has set, which is given back. Callbacks are called in the default one.
  * - Files that somebody else made: the libraries that parse .vdb files, meshes, images and fonts can crash on

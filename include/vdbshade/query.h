@@ -54,10 +54,10 @@ VSH_API void vsh_query_output_init(vsh_query_output *output, size_t size);
  * VSH_QUERY_BATCH points at a time, which takes 16 bytes for each of them.
  *
  * Values depend neither on that order nor on the other points of a call, by no bit: those of AO, of rays and
- * of shadows by one march, where it ends within max_steps. Shadows by adaptive and exact do within their error,
- * as their rays depend on them (see vsh_points), and so do the deviations of shadows by rays. Nothing depends
- * on threads. Calls for VSH_QUERY_BATCH points each, in turn, and their numbers as
- * `texels`, give every bit of one call for all.
+ * of shadows by one march, where it ends within max_steps. Shadows by adaptive and exact do within their
+ * error, as their rays depend on them (see vsh_points), and so do the deviations of shadows by rays. Nothing
+ * depends on threads. Calls for VSH_QUERY_BATCH points each, in turn, and their numbers as `texels`, give
+ * every bit of one call for all.
  *
  * Errors (the arrays then hold nothing of use): VSH_ERROR_ARGUMENT (run, output's size, a deviation without
  * its values, AO without normals), VSH_ERROR_LIMIT (field and order need more than run->memory_limit),

@@ -1,15 +1,18 @@
 /* How a reader is confined, as the library tells and is told; and reading what is no reader's in this
  * process. This program is a reader of its own, in which libraries have begun threads before its main. */
+#include "read/confine.h"
 #include "read/landlock.h"
 #include "read/reader.h"
 #include "read/tasks.h"
 
+#include <pthread.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <cmocka.h>
@@ -43,6 +46,51 @@ static void a_program_is_its_own_reader_and_confined_wholly_though_it_has_thread
                      VSH_CONFINED_LIMITS | VSH_CONFINED_CALLS);
     assert_int_equal((confined & VSH_CONFINED_FILES) != 0, vshi_landlock_version() > 0);
     assert_true(vshi_task_count() > 1); /* those of a library's */
+}
+
+static void *nothing(void *user) {
+    return user;
+}
+
+static void *begin_and_end_threads(void *user) {
+    for (;;) {
+        pthread_t thread;
+        if (pthread_create(&thread, NULL, nothing, user) == 0) {
+            pthread_join(thread, NULL);
+        }
+    }
+    return NULL;
+}
+
+/* Of a process that confines itself while a thread of it begins and ends others: 0 where none was called
+ * loose. */
+static int confine_among_ending_threads(void) {
+    pthread_t busy;
+    if (pthread_create(&busy, NULL, begin_and_end_threads, NULL) != 0 ||
+        vshi_confine_calls() != VSHI_CALLS_CONFINED) {
+        return 2;
+    }
+    int loose = 0;
+    for (int i = 0; i < 20000; ++i) {
+        loose |= vshi_tasks_filtered(0) != VSHI_TASKS_FILTERED;
+    }
+    return loose;
+}
+
+static void a_task_that_ends_meanwhile_is_not_loose(void **state) {
+    (void)state;
+    if (VSHI_SANITIZED) {
+        skip();
+    }
+    const pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        _exit(confine_among_ending_threads());
+    }
+    int status;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFEXITED(status));
+    assert_int_equal(WEXITSTATUS(status), 0);
 }
 
 static void what_cannot_be_asked_is_an_argument(void **state) {
@@ -161,6 +209,7 @@ int main(int argc, char **argv) {
     }
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_program_is_its_own_reader_and_confined_wholly_though_it_has_threads),
+        cmocka_unit_test(a_task_that_ends_meanwhile_is_not_loose),
         cmocka_unit_test(what_cannot_be_asked_is_an_argument),
         cmocka_unit_test(a_missing_reader_is_an_error_that_says_how_to_do_without),
         cmocka_unit_test(spheres_are_cancelled_within_a_file_of_any_size),
