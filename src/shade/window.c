@@ -280,8 +280,14 @@ static const window *choose(const window *fits, int count, double *square) {
     return best;
 }
 
-/* Windows are chosen that agree, so that their differences vary by no more than this of their noise. */
-static const double AGREEING = 0.75, FINE_AGREEING = 0.5;
+/* Windows are chosen that agree, so that their differences vary by no more than this of their noise. Random
+ * rays leave so much of it that what bends hides in it, and more of their differences counts as bent. */
+static const double AGREEING = 0.75, RANDOM_AGREEING = 0.55, FINE_AGREEING = 0.5;
+
+/* Whether a window's rays are spread no more evenly than at random. */
+static bool is_random(const window *f) {
+    return f->spread * f->rays > 0.99 * f->size->columns * f->size->rows;
+}
 
 /* What bends grows with the square of a window's sides, so that two windows tell of it by what their values
  * differ beyond their noise. */
@@ -294,7 +300,7 @@ static double find_curved(const window *fits, const window *best, double max_err
         return 0.0;
     }
     const double noise = best->residual > 0.0 ? best->residual : variance_of(best) * best->spread;
-    const double agreeing = max_error < FINE ? FINE_AGREEING : AGREEING;
+    const double agreeing = max_error < FINE ? FINE_AGREEING : is_random(best) ? RANDOM_AGREEING : AGREEING;
     return (off * off - agreeing * noise * (small->weight - best->weight)) / (part * part);
 }
 
