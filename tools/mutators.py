@@ -2,6 +2,7 @@
 
 Every function takes a random.Random, a file's bytes and those of another of the same format, and gives bytes."""
 import json
+import math
 import re
 import struct
 
@@ -20,6 +21,11 @@ MOST = 1 << 20  # bytes; copies make files no longer
 
 NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 WORD = re.compile(rb"[A-Za-z_][A-Za-z0-9_.:\-]*")
+
+
+def whole(value):
+    """Of a number, its whole part; 0 of what has none."""
+    return int(value) if math.isfinite(value) else 0
 
 
 def span(rng, data, most=None):
@@ -124,7 +130,7 @@ def text_number(rng, data, _):
     if rng.random() < 0.4:  # near what it was
         try:
             value = float(one.group())
-            text = repr(rng.choice([value + 1, value - 1, -value, value * 1e6, value / 1e9, value * 0.999999, int(value) + 1])).encode()
+            text = repr(rng.choice([value + 1, value - 1, -value, value * 1e6, value / 1e9, value * 0.999999, whole(value) + 1])).encode()
         except (ValueError, OverflowError):
             pass
     return data[:one.start()] + text + data[one.end():]
@@ -202,7 +208,7 @@ def reach(value, at):
 def other_value(rng, value, theirs):
     """What a value becomes."""
     if isinstance(value, (int, float)) and not isinstance(value, bool) and rng.random() < 0.75:
-        near = [value + 1, value - 1, -value, value * 2, value * 1e6, value * 1e-9, int(value), value + 0.5]
+        near = [value + 1, value - 1, -value, value * 2, value * 1e6, value * 1e-9, whole(value), value + 0.5]
         ends = [0, -1, 1e-45, 1e-12, 1e15, 1.0000001e15, 1e30, -1e308, 65536, 65537, 2147483647, 2147483648, -2147483649, 4294967296,
                 9223372036854775807, 10 ** 30, float("nan"), float("inf")]
         return rng.choice(near if rng.random() < 0.4 else ends)
