@@ -3,6 +3,7 @@ import glob
 import json
 import os
 import subprocess
+import tarfile
 
 import mutators
 import mutators_parts as parts
@@ -77,8 +78,14 @@ class Sound:
         return [self.bake(f"{i}.{ending}", *pack) for i, pack in enumerate(packs or [[], ["--pack", "R=shadow.sun"]])]
 
 
+def fuzz_inputs(target, *names):
+    """Of what a fuzz target is replayed with."""
+    with tarfile.open(os.path.join(ROOT, "tests", "fuzz", "corpus", target + ".tar")) as archive:
+        return [archive.extractfile(name).read() for name in names]
+
+
 def level_sets(*names):
-    return lambda sound: sound.read(*("tests/fuzz/corpus/vdb/seed_" + name for name in names))
+    return lambda _: fuzz_inputs("vdb", *("seed_" + name for name in names))
 
 
 def text(value):
@@ -155,13 +162,13 @@ FONT = [["bake", "text.json", "--size", "8", *SMALL, "-o", "out.exr"], ["flat", 
         ["info", "text.json"]]
 
 FORMATS = [
-    Format("obj", "obj", T, MESH, lambda sound: sound.read("tests/models/scene.obj", "assets/seeds_floor.obj", "tests/fuzz/corpus/model/seed_obj")),
+    Format("obj", "obj", T, MESH, lambda sound: sound.read("tests/models/scene.obj", "assets/seeds_floor.obj") + fuzz_inputs("model", "seed_obj")),
     Format("mtl", "mtl", T, MTL, models("scene.mtl"), "scene.mtl", obj_with("mtl")),
-    Format("ply-text", "ply", T, MESH, lambda sound: sound.read("tests/models/scene_ascii.ply", "tests/fuzz/corpus/model/seed_ply")),
+    Format("ply-text", "ply", T, MESH, lambda sound: sound.read("tests/models/scene_ascii.ply") + fuzz_inputs("model", "seed_ply")),
     Format("ply-binary", "ply", B + [mutators.text_number, mutators.text_word, mutators.text_lines] * 3, MESH,
-           lambda sound: sound.read("tests/models/scene.ply", "tests/fuzz/corpus/model/seed_plyb", "tests/fuzz/corpus/model/seed_plyl")),
+           lambda sound: sound.read("tests/models/scene.ply") + fuzz_inputs("model", "seed_plyb", "seed_plyl")),
     Format("stl-text", "stl", T, MESH, models("scene_ascii.stl")),
-    Format("stl-binary", "stl", B, MESH, lambda sound: sound.read("tests/models/scene.stl", "tests/fuzz/corpus/model/seed_stlb")),
+    Format("stl-binary", "stl", B, MESH, lambda sound: sound.read("tests/models/scene.stl") + fuzz_inputs("model", "seed_stlb")),
     Format("glb", "glb", B + [parts.glb_tree] * 12 + [parts.GLB] * 6, MESH, models("scene.glb", "figure.glb")),
     Format("gltf", "gltf", J, MESH, models("scene.gltf"), None, lambda sound: {"scene.bin": sound.read("tests/models/scene.bin")[0]}),
     Format("glb-draco", "glb", B + [parts.glb_tree] * 6 + [parts.GLB] * 14, MESH, models("scene_draco.glb")),
