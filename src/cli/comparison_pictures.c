@@ -3,10 +3,8 @@
 #include "document.h"
 #include "message.h"
 
-#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
-#include <unistd.h>
 
 enum { LONGEST = 512 }; /* texels along a side of a picture: larger ones are shrunk */
 
@@ -67,35 +65,24 @@ static void colour(const view *v, int what, double value, float rgb[3]) {
 }
 
 static int write_picture(FILE *out, const char *page, const view *v, int what) {
-    const size_t pixels = (size_t)v->width * (size_t)v->height;
-    float *planes = malloc(3 * pixels * sizeof *planes);
-    if (planes == NULL) {
+    const size_t count = (size_t)v->width * (size_t)v->height;
+    uint8_t *values = malloc(3 * count);
+    if (values == NULL) {
         return cli_out_of_memory(page);
     }
-    for (size_t i = 0; i < pixels; ++i) {
+    for (size_t i = 0; i < count; ++i) {
         double value;
         float rgb[3] = {nothing[0], nothing[1], nothing[2]};
         if (take(v, what, (int32_t)(i % (size_t)v->width), (int32_t)(i / (size_t)v->width), &value)) {
             colour(v, what, value, rgb);
         }
-        for (int k = 0; k < 3; ++k) {
-            planes[(size_t)k * pixels + i] = rgb[k];
+        for (size_t k = 0; k < 3; ++k) {
+            values[3 * i + k] = (uint8_t)lround(255.0 * (double)rgb[k]);
         }
     }
-    static const char *const names[3] = {"R", "G", "B"};
-    const float *const list[3] = {planes, planes + pixels, planes + 2 * pixels};
-    const vsh_image image = {v->width, v->height, 3, names, list};
-    vsh_image_options options = vsh_image_options_default();
-    options.bits = 8;
-    char path[PATH_MAX + 64];
-    cli_document_part(page, "picture.png", path, sizeof path);
-    vsh_error error;
-    int code = vsh_image_write(path, &image, &options, &error) == VSH_OK ? CLI_OK : cli_fail(&error);
-    if (code == CLI_OK) {
-        code = cli_document_embed(out, path);
-    }
-    unlink(path);
-    free(planes);
+    const cli_pixels pixels = {v->width, v->height, 3, values};
+    const int code = cli_document_png(out, page, &pixels);
+    free(values);
     return code;
 }
 

@@ -1,16 +1,12 @@
 #include "document.h"
 
-#include "base64.h"
 #include "message.h"
 #include "signals.h"
 #include "temporary.h"
 #include "utf8.h"
 
-#include <errno.h>
 #include <stdbool.h>
 #include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 int cli_document_write(const char *path, void (*compose)(FILE *out, const void *user), const void *user) {
     char *text = NULL;
@@ -58,30 +54,4 @@ void cli_document_escape(FILE *out, const char *text) {
             }
         }
     }
-}
-
-void cli_document_part(const char *document, const char *part, char *path, size_t capacity) {
-    const char *slash = strrchr(document, '/');
-    const int folder = slash != NULL ? (int)(slash + 1 - document) : 0;
-    snprintf(path, capacity, "%.*s.%.200s.%ld.tmp" CLI_TEMPORARY_PART "%s", folder, document,
-             document + folder, (long)getpid(), part);
-}
-
-int cli_document_embed(FILE *out, const char *path) {
-    FILE *file = fopen(path, "rb");
-    if (file == NULL) {
-        cli_say("%s: cannot be read: %s", path, strerror(errno));
-        return CLI_FILE;
-    }
-    cli_base64 to = {.out = out};
-    for (int byte; (byte = fgetc(file)) != EOF;) {
-        cli_base64_put(&to, (uint8_t)byte);
-    }
-    cli_base64_end(&to);
-    const bool good = !ferror(file);
-    fclose(file);
-    if (!good) {
-        cli_say("%s: cannot be read", path);
-    }
-    return good ? CLI_OK : CLI_FILE;
 }

@@ -2,7 +2,7 @@
 #ifndef CLI_DOCUMENT_H
 #define CLI_DOCUMENT_H
 
-#include <stddef.h>
+#include <stdint.h>
 #include <stdio.h>
 
 /* Composes a text in memory and writes it, whole or not at all. CLI_OK or an exit code, having said why. */
@@ -11,11 +11,14 @@ int cli_document_write(const char *path, void (*compose)(FILE *out, const void *
 /* Text within HTML or XML, attributes too: bytes that are no UTF-8 become U+FFFD. */
 void cli_document_escape(FILE *out, const char *text);
 
-/* Name of a file beside a document, "part.png" say, that an interrupted run takes away: for what has to be a
- * file before it can stand in the document itself. */
-void cli_document_part(const char *document, const char *part, char *path, size_t capacity);
+/* A picture for the screen. */
+typedef struct cli_pixels {
+    int32_t width, height, channels; /* R, G and B; or with alpha, which is not multiplied in */
+    const uint8_t *values;           /* [height][width][channels], sRGB */
+} cli_pixels;
 
-/* Writes a file's bytes as base64. CLI_OK or, having said why, CLI_FILE. */
-int cli_document_embed(FILE *out, const char *path);
+/* Writes them as the base64 of a PNG, for what stands in the page itself. CLI_OK or, having said why, an exit
+ * code. */
+int cli_document_png(FILE *out, const char *document, const cli_pixels *pixels);
 
 #endif

@@ -95,6 +95,9 @@ int render_output_check(const render_settings *settings);
 /* Frame `index`'s file into path[capacity]; "%04d" in the output stands for its number, from 0. */
 void render_output_path(const render_settings *settings, int32_t index, char *path, size_t capacity);
 
+/* Fills a picture's `encoded`. CLI_OK or an exit code, having said why. */
+int render_output_encode(const render_settings *settings, const render_picture *picture);
+
 /* Writes a picture. CLI_OK or an exit code, having said why. */
 int render_output_write(const render_settings *settings, const render_picture *picture, const char *path);
 

@@ -10,7 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { FLOATS = 8, ENCODED = 4 }; /* a pixel: colour, alpha, depth, normal; R, G, B, A */
+/* Of a pixel: colour, alpha, depth, normal; R, G, B, A; planes of a file of floats, or bytes and PNG of a
+ * page. */
+enum { FLOATS = 8, ENCODED = 4, PLANES = 6, PAGE = 2 };
 
 static const char *const linear_names[FLOATS] = {"R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z"};
 
@@ -81,7 +83,8 @@ int render_output_check(const render_settings *s) {
 
 uint64_t render_picture_bytes(const render_settings *s) {
     const uint64_t pixels = (uint64_t)s->width * (uint64_t)s->height;
-    return pixels * (FLOATS + ENCODED + (s->page || !is_linear(s->bake.output) ? 0 : 6)) * sizeof(float);
+    const uint64_t more = s->page ? PAGE : is_linear(s->bake.output) ? PLANES : 0;
+    return pixels * (FLOATS + ENCODED + more) * sizeof(float);
 }
 
 int render_picture_create(const render_settings *s, const cli_origin *origin, render_picture *p) {
@@ -140,16 +143,20 @@ static int write_linear(const render_settings *s, const render_picture *p, const
     return code;
 }
 
+int render_output_encode(const render_settings *s, const render_picture *p) {
+    vsh_error error;
+    return vsh_picture_encode(&p->picture, s->width, s->height, s->exposure, p->encoded,
+                              s->transparent ? p->encoded[3] : NULL, &error) == VSH_OK
+               ? CLI_OK
+               : cli_fail(&error);
+}
+
 int render_output_write(const render_settings *s, const render_picture *p, const char *path) {
     if (is_linear(path)) {
         return write_linear(s, p, path);
     }
-    vsh_error error;
+    const int code = render_output_encode(s, p);
     const vsh_image image = {s->width, s->height, s->transparent ? 4 : 3, linear_names,
                              (const float *const *)p->encoded};
-    if (vsh_picture_encode(&p->picture, s->width, s->height, s->exposure, p->encoded,
-                           s->transparent ? p->encoded[3] : NULL, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    return write_image(path, &image, 8, p->origin);
+    return code == CLI_OK ? write_image(path, &image, 8, p->origin) : code;
 }

@@ -5,16 +5,14 @@
 #include "signals.h"
 #include "temporary.h"
 
-#include <limits.h>
+#include <math.h>
 #include <stdlib.h>
-#include <unistd.h>
 
 struct render_page {
     const render_settings *settings;
     FILE *out;
     char *text;
     size_t size;
-    int32_t frames;
 };
 
 static const char head[] =
@@ -56,16 +54,26 @@ render_page *render_page_begin(const render_settings *s) {
 }
 
 int render_page_add(render_page *page, const render_picture *picture) {
-    char path[PATH_MAX + 64];
-    cli_document_part(page->settings->bake.output, "frame.png", path, sizeof path);
-    int code = render_output_write(page->settings, picture, path);
+    const render_settings *s = page->settings;
+    const int32_t channels = s->transparent ? 4 : 3;
+    const size_t count = (size_t)s->width * (size_t)s->height;
+    uint8_t *values = malloc(count * (size_t)channels);
+    if (values == NULL) {
+        return cli_out_of_memory("page");
+    }
+    int code = render_output_encode(s, picture);
+    for (size_t i = 0; code == CLI_OK && i < count; ++i) {
+        for (size_t c = 0; c < (size_t)channels; ++c) {
+            values[i * (size_t)channels + c] = (uint8_t)lroundf(255.0f * picture->encoded[c][i]);
+        }
+    }
     if (code == CLI_OK) {
+        const cli_pixels pixels = {s->width, s->height, channels, values};
         fputc('"', page->out);
-        code = cli_document_embed(page->out, path);
+        code = cli_document_png(page->out, s->bake.output, &pixels);
         fputs("\",\n", page->out);
     }
-    unlink(path);
-    ++page->frames;
+    free(values);
     return code == CLI_OK && ferror(page->out) ? cli_out_of_memory("page") : code;
 }
 

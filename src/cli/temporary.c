@@ -28,12 +28,10 @@ static const char *split(const char *path, char *real, char *folder) {
     return slash + 1;
 }
 
-/* The process in ".STEM.PID.tmpREST" or ".STEM.PID-N.tmpREST", and *rest; 0: the name is none of these. What
- * the library writes on the way to a temporary of ours has one dot more. */
+/* The process in ".STEM.PID.tmpREST" or ".STEM.PID-N.tmpREST", and *rest; 0: the name is none of these. */
 static long process_of(const char *entry, const char *stem, size_t stem_length, const char **rest) {
-    const size_t dots = strspn(entry, ".");
-    const char *at = entry + dots;
-    if (dots < 1 || dots > 2 || strncmp(at, stem, stem_length) != 0 || at[stem_length] != '.') {
+    const char *at = entry + 1;
+    if (entry[0] != '.' || strncmp(at, stem, stem_length) != 0 || at[stem_length] != '.') {
         return 0;
     }
     at += stem_length + 1;
@@ -45,17 +43,13 @@ static long process_of(const char *entry, const char *stem, size_t stem_length, 
     return strncmp(at, ".tmp", strlen(".tmp")) == 0 ? process : 0;
 }
 
-static bool is_part(const char *rest) {
-    return strncmp(rest, CLI_TEMPORARY_PART, strlen(CLI_TEMPORARY_PART)) == 0;
-}
-
 /* The program's own names, ".out.csv.PID.tmp", and those of the library, ".out.PID.tmp.csv". */
 static bool is_of_process(const char *entry, const char *name, long process) {
     const char *dot = strrchr(name, '.'), *rest;
     const size_t length = strnlen(name, NAME_KEPT);
     dot = dot != NULL && dot != name ? dot : name + strlen(name);
     const size_t stem = dot - name < NAME_KEPT ? (size_t)(dot - name) : NAME_KEPT;
-    return (process_of(entry, name, length, &rest) == process && (*rest == '\0' || is_part(rest))) ||
+    return (process_of(entry, name, length, &rest) == process && *rest == '\0') ||
            (process_of(entry, name, stem, &rest) == process && strcmp(rest, dot) == 0);
 }
 
@@ -80,11 +74,10 @@ static bool is_dead(long process) {
 }
 
 /* Whether no process writes the file: as in the library, nobody holds its lock, or where there are no locks
- * (as on parts of documents) its process is dead. */
-static bool is_left(int file, long process, bool part) {
-    const bool locked = flock(file, LOCK_EX | LOCK_NB) == 0;
-    const bool unknown = !locked && errno != EWOULDBLOCK && errno != EINTR;
-    return locked && !part ? true : (locked || unknown) && is_dead(process);
+ * its process is dead. */
+static bool is_left(int file, long process) {
+    return flock(file, LOCK_EX | LOCK_NB) == 0 ||
+           (errno != EWOULDBLOCK && errno != EINTR && is_dead(process));
 }
 
 /* What a killed run has left of this target. */
@@ -98,7 +91,7 @@ static void clean(const char *folder, const char *name) {
     while ((entry = readdir(listing)) != NULL) {
         const char *rest;
         const long process = process_of(entry->d_name, name, length, &rest);
-        if (process == 0 || !(*rest == '\0' || is_part(rest))) {
+        if (process == 0 || *rest != '\0') {
             continue;
         }
         const int file =
@@ -106,7 +99,7 @@ static void clean(const char *folder, const char *name) {
         struct stat status;
         if (file >= 0) {
             if (fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid() &&
-                is_left(file, process, is_part(rest))) {
+                is_left(file, process)) {
                 unlinkat(dirfd(listing), entry->d_name, 0);
             }
             close(file);

@@ -5,9 +5,6 @@
 #include <limits.h>
 #include <stdio.h>
 
-/* Behind ".tmp": pictures on their way into a document, which are closed and opened again. */
-#define CLI_TEMPORARY_PART "-part-"
-
 /* Removes this process's temporary files of `target`, the library's too. */
 void cli_temporary_remove(const char *target);
 

@@ -1,6 +1,6 @@
 /* Small pictures of truth, bake and difference. */
+#include "document.h"
 #include "trade_parts.h"
-#include "trade_png.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -8,21 +8,15 @@
 
 enum { THUMB = 160, MOST_RECEIVERS = 3 };
 
-/* The palettes' last entry stands for what is not measured: no shade of grey, and in no difference. */
-enum { SHADES = 255, NOTHING = 255 };
+static const uint8_t not_measured[3] = {0xd3, 0xdb, 0xe6}; /* no shade of grey, and in no difference */
 
-static void make_palettes(uint8_t gray[256][3], uint8_t difference[256][3]) {
-    static const uint8_t nothing[3] = {0xd3, 0xdb, 0xe6};
-    for (int i = 0; i < SHADES; ++i) {
-        gray[i][0] = gray[i][1] = gray[i][2] = (uint8_t)i;
-        const int off = abs(i - SHADES / 2); /* white in the middle, red too light, blue too dark */
-        const uint8_t rest = (uint8_t)(255 - 2 * off);
-        difference[i][0] = i >= SHADES / 2 ? 255 : rest;
-        difference[i][1] = rest;
-        difference[i][2] = i >= SHADES / 2 ? rest : 255;
-    }
-    memcpy(gray[NOTHING], nothing, sizeof nothing);
-    memcpy(difference[NOTHING], nothing, sizeof nothing);
+/* Of 0 … 1: grey; or of a difference white in the middle, red where too light, blue where too dark. */
+static void colour(double value, bool difference, uint8_t rgb[3]) {
+    const uint8_t shade = (uint8_t)lround(254.0 * fmin(1.0, fmax(0.0, value)));
+    const uint8_t rest = difference ? (uint8_t)(255 - 2 * abs(shade - 127)) : shade;
+    rgb[0] = difference && shade >= 127 ? 255 : rest;
+    rgb[1] = rest;
+    rgb[2] = difference && shade < 127 ? 255 : rest;
 }
 
 typedef struct picture {
@@ -31,8 +25,7 @@ typedef struct picture {
     int width, height;
 } picture;
 
-/* Means of a plane's measured texels, or of their differences from `from`.
- */
+/* Means of a plane's measured texels, or of their differences from `from`, as colours. */
 static void shrink(const picture *p, const float *plane, const float *from, uint8_t *pixels) {
     const size_t wide = (size_t)p->receiver->info.width, high = (size_t)p->receiver->info.height;
     const size_t width = (size_t)p->width, height = (size_t)p->height, first = p->receiver->first;
@@ -50,8 +43,12 @@ static void shrink(const picture *p, const float *plane, const float *from, uint
             }
             /* a difference of an eighth is all red, or all blue */
             const double value = from != NULL ? 0.5 + 4.0 * (sum / count) : sum / count;
-            pixels[row * width + column] =
-                count > 0.0 ? (uint8_t)lround((SHADES - 1) * fmin(1.0, fmax(0.0, value))) : NOTHING;
+            uint8_t *rgb = pixels + 3 * (row * width + column);
+            if (count > 0.0) {
+                colour(value, from != NULL, rgb);
+            } else {
+                memcpy(rgb, not_measured, sizeof not_measured);
+            }
         }
     }
 }
@@ -59,8 +56,7 @@ static void shrink(const picture *p, const float *plane, const float *from, uint
 /* The first light's plane, or AO, at one receiver. */
 static void write_pictures(FILE *out, const trade_work *work, const trade_subject *subject,
                            const trade_run *run, const trade_receiver *receiver) {
-    uint8_t gray[256][3], difference[256][3], pixels[THUMB * THUMB];
-    make_palettes(gray, difference);
+    uint8_t values[THUMB * THUMB * 3];
     const int longest =
         receiver->info.width > receiver->info.height ? receiver->info.width : receiver->info.height;
     const int most = longest < THUMB ? longest : THUMB;
@@ -74,10 +70,12 @@ static void write_pictures(FILE *out, const trade_work *work, const trade_subjec
                  {run->values, subject->truth, "difference"}};
     fputs("<div>", out);
     for (size_t i = 0; i < sizeof shown / sizeof shown[0]; ++i) {
-        shrink(&p, shown[i].plane, shown[i].from, pixels);
-        fputs(i > 0 ? " " : "", out);
-        trade_png_write(out, p.width, p.height, pixels, shown[i].from != NULL ? difference : gray,
-                        shown[i].what);
+        shrink(&p, shown[i].plane, shown[i].from, values);
+        fprintf(out, "%s<img alt=\"%s\" width=\"%d\" height=\"%d\" src=\"data:image/png;base64,",
+                i > 0 ? " " : "", shown[i].what, p.width, p.height);
+        const cli_pixels pixels = {p.width, p.height, 3, values};
+        (void)cli_document_png(out, work->settings->report, &pixels); /* the page does without */
+        fputs("\">", out);
     }
     fputs("</div>", out);
 }

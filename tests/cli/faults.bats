@@ -30,17 +30,6 @@ QUERY=(query box.obj --sun 0.3,1,0.2 --sun-angle 5 --resolution 24 --points poin
     done
 }
 
-@test "a page's frames that a killed run has left are taken away by the next" {
-    touch .page.html.99999999.tmp-part-frame.png ..page.html.99999999.tmp-part-frame.99999999.tmp.png .page.html.99999999.tmp
-    cat >scene.json <<'JSON'
-{"casters": [{"mesh": "box.obj"}], "resolution": 16,
- "lights": [{"name": "sun", "type": "directional", "direction": [0.3, 1, 0.2]}]}
-JSON
-    shade render scene.json --size 16 --quiet --turntable 2 -o page.html
-    done_well
-    no_leftovers
-}
-
 @test "kill -9 at points over a bake: the old output is intact, the next run tidies up" {
     run "$BATS_TEST_DIRNAME/../../tools/kill-bakes" "$VDBSHADE" 6
     echo "$output"
