@@ -19,6 +19,8 @@ prefix="$work/moved here"
 library=$(dirname "$(find "$prefix" -name libvdbshade.so)")
 "$prefix/bin/vdbshade" --version
 "$here/../runpath.sh" "$prefix"
+cmp "$here/../../LICENSE" "$prefix/share/doc/vdbshade/LICENSE"
+grep -q 'License, version 2.0' "$prefix/share/doc/vdbshade/licences.md"
 
 say "files are read by the reader beside it, or not at all"
 printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >"$work/a.obj"
@@ -49,6 +51,7 @@ mkdir "$work/output"
 
 say "pkg-config"
 export PKG_CONFIG_PATH="$library/pkgconfig"
+grep -qx 'License: Apache-2.0' "$library/pkgconfig/vdbshade.pc"
 # pkg-config escapes spaces in paths; eval reads them as the shell that a makefile calls would.
 eval "$cc -std=c11 -pedantic -Wall -Wextra -Werror '$here/consumer.c' -o '$work/plain' \
     $(pkg-config --cflags --libs vdbshade) -lm"
