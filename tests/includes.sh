@@ -1,0 +1,47 @@
+#!/usr/bin/env bash
+# tools/includes: the order holds, and what would break it is found. Usage: includes.sh
+set -euo pipefail
+
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+includes=$here/../tools/includes
+"$includes"
+
+# A small tree, in which each of these is wrong in turn.
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+mkdir -p "$work"/{src/low,src/high,include/api,tools}
+
+make() {
+    printf '#include <stdio.h>\n' >"$work/src/low/low.h"
+    printf '#include "low/low.h"\n#include <api/high.h>\n' >"$work/src/high/high.c"
+    printf '\n' >"$work/include/api/high.h"
+    printf 'room low: src/low/*\nroom high: src/high/* include/api/high.h\nhigh -> low\n' >"$work/tools/includes.txt"
+}
+expect() { # CODE TEXT
+    local code=0
+    "$includes" "$work" >"$work/log" || code=$?
+    if [ "$code" -ne "$1" ] || ! grep -qF -- "$2" "$work/log"; then
+        echo "expected code $1 and: $2; got code $code and:" && cat "$work/log" && exit 1
+    fi
+}
+
+make && expect 0 "0 exceptions"
+printf '#include "../high/high.h"\n' >"$work/src/low/low.c"
+printf '\n' >"$work/src/high/high.h"
+expect 1 "src/low/low.c includes src/high/high.h: low may not include high"
+printf 'except src/low/low.c -> src/high/high.h\n' >>"$work/tools/includes.txt"
+expect 0 "1 exceptions"
+rm "$work/src/low/low.c"
+expect 1 "no exception any more"
+make && printf '#include <api/high.h>\n' >"$work/src/low/low.h"
+expect 1 "src/low/low.h includes include/api/high.h: low may not include high"
+make && printf 'low -> high\n' >>"$work/tools/includes.txt"
+expect 1 "low -> high: not a room that is declared above it"
+make && printf 'room top: src/top/*\ntop -> high.h\n' >>"$work/tools/includes.txt" && mkdir "$work/src/top"
+printf '#include <api/high.h>\n' >"$work/src/top/top.c"
+expect 0 "top "
+printf '#include "high/high.h"\n' >"$work/src/top/top.c"
+expect 1 "src/top/top.c includes src/high/high.h: top may not include high"
+make && mkdir "$work/src/new" && printf '#include "low/low.h"\n' >"$work/src/new/new.c"
+expect 1 "src/new/new.c: in no room"
+echo "includes: what breaks the order is found"
