@@ -6,15 +6,23 @@
 #include <stdbool.h>
 #include <stddef.h>
 
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 enum { CLI_NUMBER_ROOM = 32 }; /* what any number takes as text */
 
 /* The number that text … end - 1 is, all of it: [+-]digits[.digits][e[+-]digits], correctly rounded, or nan,
  * inf and infinity in any case. False where it is none. */
 bool cli_number_read(const char *text, const char *end, double *value);
 
-/* The shortest decimal, of up to 9 (17) digits, that reads back as `value`; "nan", "inf" and "-inf". Not
- * ended by NUL. Returns behind it. */
+/* The shortest decimal that reads back as `value`, without exponent from 1e-6 to 1e9 (1e15); "nan", "inf" and
+ * "-inf". Not ended by NUL. Returns behind it. */
 char *cli_number_write_float(char *text, float value);
 char *cli_number_write_double(char *text, double value);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif

@@ -1,13 +1,18 @@
 /* Numbers of points' text against the C library's: the same bits in, the same bits back. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
+#include <cmath>
+#include <csetjmp>
+#include <cstdarg>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
 
+extern "C" {
 #include <cmocka.h>
+}
 
 /* The command line's sources are no library. */
-#include "cli/points_number.c"
+#include "cli/points_number.cpp"
 
 static uint64_t counter;
 
@@ -71,7 +76,7 @@ static void numbers_are_read_as_strtod_reads_them(void **state) {
         case 0: { /* of any magnitude */
             double value;
             memcpy(&value, &bits, sizeof value);
-            snprintf(text, sizeof text, "%.*g", (int)(draw() % 21), isfinite(value) ? value : 1.0);
+            snprintf(text, sizeof text, "%.*g", (int)(draw() % 21), std::isfinite(value) ? value : 1.0);
             break;
         }
         case 1: /* as programs write coordinates */
@@ -103,10 +108,11 @@ static void what_is_no_decimal_number_is_refused(void **state) {
             fail_msg("'%s' is read as %g", texts[i], value);
         }
     }
+    const char *text = "nAn";
     double value;
-    assert_true(cli_number_read("nAn", (const char *)"nAn" + 3, &value) && isnan(value));
+    assert_true(cli_number_read(text, text + 3, &value) && std::isnan(value));
     const char *low = "-Infinity";
-    assert_true(cli_number_read(low, low + 9, &value) && isinf(value) && value < 0.0);
+    assert_true(cli_number_read(low, low + 9, &value) && std::isinf(value) && value < 0.0);
 }
 
 static void only_the_given_characters_are_read(void **state) {
@@ -132,7 +138,7 @@ static void floats_come_back_with_the_same_bits(void **state) {
         const float back = strtof(text, NULL);
         double wide;
         assert_true(cli_number_read(text, text + strlen(text), &wide));
-        if (isnan(value) ? !isnan(back) : memcmp(&back, &value, 4) != 0 || (float)wide != value) {
+        if (std::isnan(value) ? !std::isnan(back) : memcmp(&back, &value, 4) != 0 || (float)wide != value) {
             fail_msg("%.9g is written '%s'", (double)value, text);
         }
         assert_true(strlen(text) < 18);
@@ -165,7 +171,7 @@ static void doubles_come_back_with_the_same_bits(void **state) {
         char text[CLI_NUMBER_ROOM + 1];
         *cli_number_write_double(text, value) = '\0';
         const double back = strtod(text, NULL);
-        if (isnan(value) ? !isnan(back) : memcmp(&back, &value, sizeof back) != 0) {
+        if (std::isnan(value) ? !std::isnan(back) : memcmp(&back, &value, sizeof back) != 0) {
             fail_msg("%.17g is written '%s'", value, text);
         }
     }

@@ -1,0 +1,46 @@
+#include "points_number.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <string>
+
+namespace {
+
+// Without exponent where that is not longer than what printf() would write.
+template <typename Float> char *write(char *text, Float value, Float most) {
+    if (std::isnan(value)) {
+        return std::char_traits<char>::copy(text, "nan", 3) + 3;
+    }
+    const Float size = std::fabs(value);
+    const bool plain = size == 0 || (size >= Float(1e-6) && size < most) || std::isinf(size);
+    const auto format = plain ? std::chars_format::fixed : std::chars_format::scientific;
+    return std::to_chars(text, text + CLI_NUMBER_ROOM, value, format).ptr;
+}
+
+} // namespace
+
+bool cli_number_read(const char *text, const char *end, double *value) {
+    const bool negative = text < end && *text == '-';
+    text += text < end && (*text == '-' || *text == '+');
+    if (text == end || *text == '-' || end[-1] == ')') { // "nan(…)" is C's
+        return false;
+    }
+    const auto [behind, error] = std::from_chars(text, end, *value);
+    if (behind != end || error == std::errc::invalid_argument) {
+        return false;
+    }
+    if (error == std::errc::result_out_of_range) { // 0 or infinite, which is not told
+        *value = std::strtod(std::string(text, end).c_str(), nullptr);
+    }
+    *value = negative ? -*value : *value;
+    return true;
+}
+
+char *cli_number_write_float(char *text, float value) {
+    return write(text, value, 1e9f);
+}
+
+char *cli_number_write_double(char *text, double value) {
+    return write(text, value, 1e15);
+}
