@@ -6,6 +6,14 @@ here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 includes=$here/../tools/includes
 "$includes"
 
+# docs/architecture.md says the same.
+while read -r room _ rooms; do
+    rooms=${rooms// /, }
+    [ "$room" != cli ] || rooms="public headers only"
+    [ "$room" = umbrella ] || grep -q "^| $room | .* | $rooms |\$" "$here/../docs/architecture.md" ||
+        { echo "docs/architecture.md: room $room: expected '$rooms' in the last column" && exit 1; }
+done < <(grep -E '^[a-z]+ -> ' "$here/../tools/includes.txt")
+
 # A small tree, in which each of these is wrong in turn.
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
