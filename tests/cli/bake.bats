@@ -59,16 +59,30 @@ setup() {
     done_well
     shade info out.exr
     [[ $output == *"channel 'shadow.sun': min 0, mean "*", max 1"* ]] || fail "no light or no dark"
+    [[ $output == *"channel 'ao': min 1, mean 1, max 1"* ]] || fail "not open all over"
     [[ $output == *"channel 'A': min 0, mean "*", max 1"* ]] || fail "no coverage"
 }
 
-@test "every method bakes" {
-    for method in hard classic practical improved smooth cone; do
-        shade bake box.obj "${SMALL[@]}" --method "$method" --quiet -o "$method.exr"
-        done_well
-    done
-    shade bake box.obj --ao 0.5 --ao-method taps --size 32 --resolution 24 --quiet -o taps.exr
+# of_preview CHANNEL OPTION METHOD: a bake of the floor under the seeds, for its penumbrae; its mean is new to $means.
+of_preview() {
+    shade bake "$ASSETS/seeds.json" --size 64 --voxel-size 0.1 --method hard --ao-method cones "$2" "$3" --quiet \
+        --pack channels -o preview.exr
     done_well
+    shade info preview.exr
+    [[ $output == *"vdbshade_${1%.sun}: $3"* ]] || fail "$3 is not named"
+    [[ $output =~ channel\ \'$1\':\ min\ 0[0-9.]*,\ mean\ (0\.[0-9]+),\ max\ 1 ]] || fail "$3: no light or no dark"
+    [[ $means != *" ${BASH_REMATCH[1]} "* ]] || fail "$3 has the values of another"
+    means+="${BASH_REMATCH[1]} "
+}
+
+@test "every preview bakes light and dark, each its own values, and the file names it" {
+    local method means=" "
+    for method in hard classic practical improved smooth cone; do
+        of_preview shadow.sun --method "$method"
+    done
+    for method in taps cones; do
+        of_preview ao --ao-method "$method"
+    done
 }
 
 @test "a packed PNG" {

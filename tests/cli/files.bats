@@ -69,5 +69,6 @@ setup() {
         cp "$models/scene.$format" "my scene.$format"
         shade info "my scene.$format"
         done_well
+        [[ $output == *", 16 triangles;"* ]] || fail "$format: not its triangles"
     done
 }

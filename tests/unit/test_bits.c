@@ -149,21 +149,29 @@ static void field_samples(const context *c, int32_t unused, bits *b) {
     add_floats(b, distance, POINTS);
 }
 
-static void shade(const context *c, const vsh_light *light, vsh_shade_options *options, bits *b) {
+/* The rays that were taken. */
+static uint64_t shade_by(const context *c, const vsh_light *light, const vsh_shade_options *options,
+                         bits *b) {
     float value[POINTS], deviation[POINTS];
     const vsh_points points = {POINTS, positions, normals, texels};
-    options->rays = 16;
-    options->ao_distance = 0.75;
+    vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error;
     check(light != NULL
-              ? vsh_shade_shadow(c->field, &points, light, options, &c->run, value, deviation, NULL, &error)
-              : vsh_shade_ao(c->field, &points, options, &c->run, value, deviation, NULL, &error),
+              ? vsh_shade_shadow(c->field, &points, light, options, &c->run, value, deviation, &stats, &error)
+              : vsh_shade_ao(c->field, &points, options, &c->run, value, deviation, &stats, &error),
           &error);
     add_floats(b, value, POINTS);
     for (size_t i = 0; i < POINTS; ++i) { /* NaN has many bits */
         deviation[i] = deviation[i] == deviation[i] ? deviation[i] : -1.0f;
     }
     add_floats(b, deviation, POINTS);
+    return stats.rays;
+}
+
+static void shade(const context *c, const vsh_light *light, vsh_shade_options *options, bits *b) {
+    options->rays = 16;
+    options->ao_distance = 0.75;
+    shade_by(c, light, options, b);
 }
 
 static void shadow(const context *c, int32_t method, bits *b) {
@@ -179,6 +187,19 @@ static void ao(const context *c, int32_t method, bits *b) {
     vsh_shade_options options = preview_options();
     options.ao_method = method;
     shade(c, NULL, &options, b);
+}
+
+/* With fewer rays than the error takes, adaptive is `rays`; here it stops by itself, at some points later
+ * than at others. */
+static void ao_until_max_error(const context *c, int32_t method, bits *b) {
+    enum { MOST = 256 };
+    vsh_shade_options options = preview_options();
+    options.ao_method = method;
+    options.ao_distance = 0.75;
+    options.rays = MOST;
+    options.max_error = 0.06;
+    const uint64_t rays = shade_by(c, NULL, &options, b);
+    assert_true(rays > POINTS && rays < POINTS * MOST / 4);
 }
 
 static void samplers(const context *c, int32_t sampler, bits *b) {
@@ -481,6 +502,17 @@ static void every_part_has_its_bits_for_any_threads_and_instruction_set(void **s
     assert_false(wrong);
 }
 
+static void parts_have_bits_of_their_own(void **state) {
+    (void)state;
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
+        for (size_t j = 0; j < i; ++j) {
+            if (parts[i].hash == parts[j].hash) {
+                fail_msg("%s has the bits of %s", parts[i].name, parts[j].name);
+            }
+        }
+    }
+}
+
 int main(void) {
     place_points();
     const char *how = getenv("VSH_BITS");
@@ -490,6 +522,7 @@ int main(void) {
     }
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_part_has_its_bits_for_any_threads_and_instruction_set),
+        cmocka_unit_test(parts_have_bits_of_their_own),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

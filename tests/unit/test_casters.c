@@ -100,7 +100,7 @@ static void a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_hor
     free(heights);
 }
 
-static void spheres_in_a_layer_and_in_voxels_cast_the_same(void **state) {
+static void spheres_in_a_layer_cast_as_rays_say_and_in_voxels_within_the_error_asked_for(void **state) {
     (void)state;
     static double positions[3 * POINTS];
     static float normals[3 * POINTS], analytic[POINTS], voxels[POINTS], truth[POINTS];
@@ -318,7 +318,7 @@ static void texels_within_a_sphere_or_a_terrain_are_not_valid(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_horizon),
-        cmocka_unit_test(spheres_in_a_layer_and_in_voxels_cast_the_same),
+        cmocka_unit_test(spheres_in_a_layer_cast_as_rays_say_and_in_voxels_within_the_error_asked_for),
         cmocka_unit_test(bent_normals_lean_away_from_spheres_and_terrain),
         cmocka_unit_test(texels_within_a_sphere_or_a_terrain_are_not_valid),
     };

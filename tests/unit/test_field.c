@@ -254,7 +254,7 @@ static void signs_hold_deep_inside_big_solids_and_far_outside(void **state) {
     }
 }
 
-static void turned_and_moved_shapes_have_the_same_distances(void **state) {
+static void a_turned_box_far_away_is_within_what_a_trilinear_sample_errs(void **state) {
     (void)state;
     /* a box turned by 50° about (1, 2, 3), far from the origin; voxels of 0.04 at 1000 units */
     const double half = 25.0 / 180.0 * 3.14159265358979323846, norm = sqrt(14.0);
@@ -421,7 +421,7 @@ int main(void) {
         cmocka_unit_test(without_a_wish_the_reach_is_four_diagonals),
         cmocka_unit_test(coarse_levels_take_a_fraction_of_the_finest_ones_memory),
         cmocka_unit_test(signs_hold_deep_inside_big_solids_and_far_outside),
-        cmocka_unit_test(turned_and_moved_shapes_have_the_same_distances),
+        cmocka_unit_test(a_turned_box_far_away_is_within_what_a_trilinear_sample_errs),
         cmocka_unit_test(positions_that_are_not_finite_give_nan_and_far_ones_do_not),
         cmocka_unit_test(info_tells_the_solids_box_and_voxel),
         cmocka_unit_test(values_are_rounded_by_no_more_than_half_a_quantum),

@@ -70,13 +70,24 @@ static void stars_are_as_rays_see_them(void **state) {
     (void)state;
     for (uint64_t s = 0; s < 6; ++s) {
         vsh_outline *outline = star(100 * s);
-        /* a disc that spikes reach into, and one around the whole star */
-        const vsh_light lights[] = {lamp(0.6, 0.6, 0.5), lamp(1.2, 0.0, 0.4), lamp(0.1, 0.0, 1.5)};
-        for (size_t l = 0; l < 2; ++l) {
+        const vsh_light lights[] = {lamp(0.6, 0.6, 0.5), lamp(1.2, 0.0, 0.4)}; /* spikes reach into them */
+        for (size_t l = 0; l < sizeof lights / sizeof lights[0]; ++l) {
             compare_with_rays(outline, &lights[l], 2.0, 300, 7 * s + l);
         }
         vsh_outline_free(outline);
     }
+}
+
+static void a_disc_around_a_whole_star_is_seen_by_all(void **state) {
+    (void)state;
+    vsh_outline *outline = star(300);
+    const vsh_light light = lamp(0.1, 0.0, 1.5);
+    for (uint64_t i = 0; i < 300; ++i) {
+        const double p[2] = {4.0 * any(2 * i) - 2.0, 4.0 * any(2 * i + 1) - 2.0};
+        assert_true(vsh_flat_visibility(outline, &light, p) == 1.0);
+        assert_true(truth_visibility(outline, &light, p[0], p[1], 100) == 1.0);
+    }
+    vsh_outline_free(outline);
 }
 
 /* More gaps in one cone than the intervals that are kept. */
@@ -414,6 +425,7 @@ int main(void) {
         cmocka_unit_test(an_edge_hides_its_share_of_the_angle),
         cmocka_unit_test(text_is_as_rays_see_it),
         cmocka_unit_test(stars_are_as_rays_see_them),
+        cmocka_unit_test(a_disc_around_a_whole_star_is_seen_by_all),
         cmocka_unit_test(a_comb_of_a_thousand_teeth),
         cmocka_unit_test(a_light_of_no_size_is_seen_or_not),
         cmocka_unit_test(points_in_the_light_and_without_casters_are_lit),

@@ -334,7 +334,8 @@ static void jittered_steps_leave_grain(void **state) {
     assert_true(shorter.samples > whole.samples);
     const truth_metrics before = truth_compare(COUNT, plain, truth, NULL);
     const truth_metrics after = truth_compare(COUNT, jittered, truth, NULL);
-    assert_true(after.rmse <= 1.02 * before.rmse);
+    print_message("rmse %.6f, jittered %.6f\n", before.rmse, after.rmse);
+    assert_true(after.rmse <= before.rmse);
     vsh_field_free(field);
 }
 
