@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <exception>
 #include <string>
 
 namespace {
@@ -31,7 +32,11 @@ bool cli_number_read(const char *text, const char *end, double *value) {
         return false;
     }
     if (error == std::errc::result_out_of_range) { // 0 or infinite, which is not told
-        *value = std::strtod(std::string(text, end).c_str(), nullptr);
+        try {
+            *value = std::strtod(std::string(text, end).c_str(), nullptr);
+        } catch (const std::exception &) {
+            return false;
+        }
     }
     *value = negative ? -*value : *value;
     return true;

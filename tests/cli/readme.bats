@@ -21,11 +21,16 @@ setup() {
     [ -s cloister.exr ] && [ -s cloister.png ] && [ -s seeds.exr ]
 }
 
-@test "the C program of the README" {
-    local build
-    build=$(dirname "$(realpath "$VDBSHADE")")
-    awk '/^```c$/ { inside = 1; next } /^```$/ { inside = 0 } inside' "$README" >main.c
-    "${CC:-cc}" -std=c11 -Wall -Wextra -Werror ${CFLAGS-} -I"$BATS_TEST_DIRNAME/../../include" main.c -L"$build" \
-        -lvdbshade -Wl,-rpath,"$build" -o main
-    [ "$(./main)" = "0 1" ]
+# block N FILE: the Nth block of C of a Markdown file.
+block() {
+    awk -v wanted="$1" '/^```c$/ { inside = ++n == wanted; next } /^```$/ { inside = 0 } inside' "$2"
+}
+
+@test "the C of the README, and of the header that includes all, is that of the examples" {
+    local examples=$BATS_TEST_DIRNAME/../../examples header=$BATS_TEST_DIRNAME/../../include/vdbshade/vdbshade.h
+    [ "$(block 2 "$README")" = "$(cat "$examples/points.c")" ] || fail "points.c"
+    bake=$(sed -n '/^static vsh_result bake(/,/^}/p' "$examples/lightmap.c")
+    [ "$(block 1 "$README" | tail -n +2)" = "$bake" ] || fail "lightmap.c"
+    [ "$(sed -nE '/^ \*     static vsh_result bake/,/^ \*     }/s/^ \*     ?//p' "$header" | sed 's|// \(.*\)|/* \1 */|')" = "$bake" ] ||
+        fail "vdbshade.h"
 }

@@ -64,6 +64,23 @@ eval "$cc -std=c11 -g -fsanitize=address '$here/consumer.c' -o '$work/watched' \
 ASAN_OPTIONS=detect_leaks=0 "$work/watched" "$work/output" >"$work/watched.log" 2>&1 || { cat "$work/watched.log"; exit 1; }
 echo "the same values"
 
+say "the examples"
+cmake -S "$here/../../examples" -B "$work/examples" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Release \
+    -DCMAKE_C_FLAGS="-std=c11 -pedantic -Wall -Wextra -Werror" >"$work/cmake.log" &&
+    cmake --build "$work/examples" >>"$work/cmake.log" || { cat "$work/cmake.log"; exit 1; }
+(
+    cd "$work/examples"
+    ./points | tee points.log && grep -qx '0 1' points.log
+    ./lightmap | tee lightmap.log && grep -qx '0 under the box, 1 in the corner' lightmap.log
+    "$prefix/bin/vdbshade" info floor.exr | grep -q "shadow.sun"
+    # of the sky over a point on the axis the tube hides a ring between two angles, the difference of their sines' squares
+    ./callback | tee callback.log && awk '{ open = $NF == "open" ? $(NF - 1) : -1 }
+        /^0.4 / { hidden = sin(1.4732)^2 - sin(0.9074)^2 } /^1 / { hidden = sin(0.9992)^2 - sin(0.5716)^2 }
+        /^4 / { next } { n += open > 0.98 - hidden && open < 1.02 - hidden } END { exit n != 2 }' callback.log
+    # the hole's part of the sun's disc: (tan 47.9° / tan 57.3°)²
+    ./level_set torus.vdb | tee level_set.log && grep -qx 'a sun of 2 radians: 0.50' level_set.log
+)
+
 say "C++"
 eval "$cxx -std=c++11 -pedantic -Wall -Wextra -Werror '$here/header.cpp' -o '$work/plus' \
     $(pkg-config --cflags --libs vdbshade)"
