@@ -1,6 +1,7 @@
 /* vdbshade: the command line. Which subcommand, and the exit code. */
 #include "commands.h"
 #include "message.h"
+#include "plain.h"
 #include "self.h"
 #include "signals.h"
 #include "warnings.h"
@@ -70,6 +71,9 @@ static int dispatch(int argc, char **argv) {
     }
     for (size_t i = 0; i < COMMAND_COUNT; ++i) {
         if (strcmp(argv[1], commands[i]->name) == 0) {
+            if (commands[i] != &cli_query) { /* which may write points there */
+                cli_plain_output();
+            }
             return commands[i]->main(argc - 1, argv + 1);
         }
     }

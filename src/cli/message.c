@@ -1,5 +1,6 @@
 #include "message.h"
 
+#include "plain.h"
 #include "progress.h"
 #include "signals.h"
 #include "warnings.h"
@@ -31,11 +32,10 @@ static const struct {
 static void __attribute__((format(printf, 1, 0))) say(const char *format, va_list arguments) {
     char line[3 * 4096]; /* two paths and what is said of them */
     vsnprintf(line, sizeof line, format, arguments);
-    for (char *c = line; *c != '\0'; ++c) {
-        if ((unsigned char)*c < 0x20 || *c == 0x7f) {
-            *c = '?';
-        }
+    for (char *c = line; (c = strchr(c, '\n')) != NULL;) {
+        *c = '?';
     }
+    cli_plain(line, strlen(line));
     cli_progress_line(line);
 }
 

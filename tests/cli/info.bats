@@ -83,3 +83,17 @@ setup() {
     shade info $'none\033[31m\n.obj'
     refused 3 'none?[31m?.obj'
 }
+
+@test "control characters of names within files stay out of the terminal" {
+    local name=$'b\033[31mox\302\233'
+    write_box "$name.obj"
+    printf '{"casters": [{"mesh": "b\\u001b[31mox\\u009b.obj"}], "voxel_size": 0.2,
+        "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0]}]}' >scene.json
+    shade info scene.json
+    done_well
+    [[ "$output" == *'b?[31mox??.obj'* ]] || fail "$output"
+    mkdir -p cases
+    printf '{"cases": [{"scene": "none.json", "command": "volume", "output": "a\\u001b[31m.vdb", "name": "c\\u001b[31m"}]}' >cases/regress.json
+    shade regress cases
+    [[ "$output" == *'c?[31m: failed'*'a?[31m.vdb: the bake ended'* ]] || fail "$output"
+}
