@@ -29,6 +29,12 @@ function(vsh_set_flags target)
     $<$<BOOL:${VSH_WERROR}>:-Werror>)
 endfunction()
 
+# In the C of src each number that may change by a conversion is cast; signs apart, as sizes and indices meet everywhere.
+function(vsh_set_source_flags target)
+  vsh_set_flags(${target})
+  target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:C>:-Wconversion -Wno-sign-conversion>)
+endfunction()
+
 # The marching kernels are one source, built once for each instruction set and chosen at run time.
 set(VSH_KERNEL_base_FLAGS "")
 set(VSH_KERNEL_few_FLAGS "")

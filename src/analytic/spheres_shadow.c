@@ -62,8 +62,8 @@ typedef struct covering {
 /* Samples of chord k from y0 to y1, in the plane a unit away. */
 static uint64_t samples_between(const covering *c, int k, double y0, double y1) {
     const double half = c->chords->half[k] * c->radius;
-    const double first = ceil((y0 / half + 1.0) * (BITS / 2) - 0.5),
-                 last = floor((y1 / half + 1.0) * (BITS / 2) - 0.5);
+    const double first = ceil((y0 / half + 1.0) * (0.5 * BITS) - 0.5),
+                 last = floor((y1 / half + 1.0) * (0.5 * BITS) - 0.5);
     const int from = first > 0.0 ? first < BITS ? (int)first : BITS : 0;
     const int to = last < BITS - 1 ? last >= 0.0 ? (int)last : -1 : BITS - 1;
     if (from > to) {

@@ -395,9 +395,9 @@ vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t ro
 
 double vshi_bake_bytes(const vshi_bake_need *need) {
     double sample = vshi_origins_sample_bytes(need->traced);
-    sample += (need->values ? 1 : 0) * sizeof(float) + (need->errors ? 1 : 0) * sizeof(float);
-    sample += (need->irradiance ? 3 : 0) * sizeof(float) + (need->bent ? 3 : 0) * sizeof(float);
-    sample += (need->tint ? 3 : 0) * sizeof(float);
+    const int floats = (need->values ? 1 : 0) + (need->errors ? 1 : 0) + (need->irradiance ? 3 : 0) +
+                       (need->bent ? 3 : 0) + (need->tint ? 3 : 0);
+    sample += (double)floats * sizeof(float);
     return need->samples * sample +
            need->texels * (1.0 + VSHI_PADDING_TEXEL_BYTES + VSHI_SPREAD_TEXEL_BYTES) +
            (need->lattice ? vshi_lattice_bytes(need->samples, need->texels, need->bent) : 0.0) +

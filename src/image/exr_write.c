@@ -142,7 +142,8 @@ static exr_result_t write_chunk(vshi_exr_writer *writer) {
 }
 
 double vshi_exr_writer_bytes(const vshi_planes *planes, int32_t bits) {
-    const double chunk = (double)planes->count * (double)planes->width * (bits / 8) * MAX_CHUNK_LINES;
+    const int32_t bytes = bits / 8;
+    const double chunk = (double)planes->count * (double)planes->width * bytes * MAX_CHUNK_LINES;
     return 4.0 * chunk; /* ours, and the encoder's: packed, two steps of compression */
 }
 

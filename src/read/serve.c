@@ -101,13 +101,9 @@ static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_take 
     return write_head(&head) ? 0 : VSHI_READER_CANNOT;
 }
 
-int32_t vsh_reader_serve(int argc, char **argv) {
+static int32_t serve_request(serving *s, int argc, char **argv) {
     vshi_request request;
-    if (argc < 2 || strcmp(argv[1], VSH_READER_ARGUMENT) != 0) {
-        return -1;
-    }
-    serving s = {.warnings = malloc(MOST_WARNINGS)};
-    if (!vshi_request_read(&request) || s.warnings == NULL) {
+    if (!vshi_request_read(&request) || s->warnings == NULL) {
         return VSHI_READER_CANNOT;
     }
     const vshi_reader_state state = vshi_reader_begin(argc, argv, &request);
@@ -117,15 +113,25 @@ int32_t vsh_reader_serve(int argc, char **argv) {
     if (request.kind == VSHI_READ_CONFINEMENT) {
         return vshi_reader_tell(&state);
     }
-    s.confined = state.confined;
-    s.limited = state.cramped;
+    s->confined = state.confined;
+    s->limited = state.cramped;
     vsh_run run = vsh_run_default();
     run.threads = 1;
     run.memory_limit = request.memory;
     run.allow_outside = request.outside;
     run.progress = report;
     run.warning = keep_warning;
-    run.user = &s;
+    run.user = s;
     vshi_confine_hunger();
-    return answer(&s, servers[request.kind], request.path, &request.rest, &run);
+    return answer(s, servers[request.kind], request.path, &request.rest, &run);
+}
+
+int32_t vsh_reader_serve(int argc, char **argv) {
+    if (argc < 2 || strcmp(argv[1], VSH_READER_ARGUMENT) != 0) {
+        return -1;
+    }
+    serving s = {.warnings = malloc(MOST_WARNINGS)};
+    const int32_t code = serve_request(&s, argc, argv);
+    free(s.warnings);
+    return code;
 }

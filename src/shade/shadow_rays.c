@@ -287,7 +287,7 @@ static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *so
     for (size_t k = 0; k < share.count; ++k) {
         share.value[k] = task->visibility[begin + k];
         share.deviation[k] = 0.0f;
-        share.state[k] = isnan(share.value[k]) ? VSHI_SHARE_GONE : VSHI_SHARE_KNOWN;
+        share.state[k] = (uint8_t)(isnan(share.value[k]) ? VSHI_SHARE_GONE : VSHI_SHARE_KNOWN);
     }
     for (size_t o = 0; o < batch->open_count; ++o) {
         cast(batch, o, share.rays);
