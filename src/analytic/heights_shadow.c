@@ -8,6 +8,7 @@
 #include "analytic/place.h"
 #include "analytic/slices.h"
 #include "base/elementary.h"
+#include "light/view.h"
 
 /* Slopes of a slice's directions over the plane of a normal: from low to high. */
 typedef struct span {
@@ -77,17 +78,14 @@ static float shade_soft(const vsh_heights *heights, vshi_walk_fn *walk, const vs
 }
 
 /* Slices of a lamp as a point sees it; false where the point is within the lamp. */
-static bool aim(const vsh_heights *heights, const vsh_light *light, bool hard, const double at[3],
-                vshi_slices *s) {
-    const vshi_vec centre = vshi_transform_point(heights->to_relief, vshi_vec_of(light->position));
-    const vshi_vec to = vshi_sub(centre, vshi_vec_of(at));
-    const double distance = vshi_length(to), radius = light->radius / heights->unit;
-    if (!(distance > radius)) {
+static bool aim(const vshi_light_place *place, bool hard, const double at[3], vshi_slices *s) {
+    vshi_light_view view;
+    if (!vshi_light_seen(place, vshi_vec_of(at), &view)) {
         return false;
     }
-    const double sine = radius / distance, square = (1.0 - sine) * (1.0 + sine);
-    /* up to the circle where the cone touches the lamp */
-    vshi_slices_make(vshi_unit(to), hard ? 0.0 : sine / sqrt(square), distance * square, s);
+    /* up to the circle where the cone touches the lamp: vshi_light_end(), but for rounding */
+    const double square = (1.0 - view.sine) * (1.0 + view.sine);
+    vshi_slices_make(view.axis, hard ? 0.0 : vshi_light_tangent(place, &view), view.distance * square, s);
     return true;
 }
 
@@ -95,11 +93,15 @@ void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, int
                          const vsh_points *points, size_t begin, size_t end, double lift, float *visibility,
                          vsh_shade_stats *stats) {
     vshi_walk_fn *walk = vshi_walk_of_machine();
-    const bool lamp = light->type != VSH_LIGHT_DIRECTIONAL, hard = method == VSH_SHADOW_HARD;
+    const bool hard = method == VSH_SHADOW_HARD;
+    vshi_light_place place = vshi_light_in_world(light);
     vshi_slices slices;
-    if (!lamp) {
-        const vshi_vec axis = vshi_heights_direction(heights, vshi_vec_of(light->direction));
-        vshi_slices_make(axis, hard ? 0.0 : vshi_tan(0.5 * light->angle), INFINITY, &slices);
+    if (place.parallel) { /* the same for all points */
+        place.towards = vshi_heights_direction(heights, vshi_vec_of(light->direction));
+        vshi_slices_make(place.towards, hard ? 0.0 : place.tangent, INFINITY, &slices);
+    } else {
+        place.centre = vshi_transform_point(heights->to_relief, place.centre);
+        place.radius /= heights->unit;
     }
     for (size_t i = begin; i < end; ++i) {
         float *value = &visibility[i - begin];
@@ -115,7 +117,7 @@ void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, int
         case VSHI_STAND_FREE:
             break;
         }
-        if (lamp && !aim(heights, light, hard, at, &slices)) {
+        if (!place.parallel && !aim(&place, hard, at, &slices)) {
             *value = 1.0f;
             continue;
         }

@@ -7,6 +7,7 @@
 #include "analytic/caps.h"
 #include "analytic/spheres.h"
 #include "base/elementary.h"
+#include "light/view.h"
 
 #include <float.h>
 
@@ -238,22 +239,14 @@ static float shade_point(const vsh_spheres *spheres, covering *c, vsh_shade_stat
 }
 
 /* Where a light stands; false where the point is within it. */
-static bool aim(covering *c, const vsh_light *light, bool hard) {
-    if (light->type == VSH_LIGHT_DIRECTIONAL) {
-        c->axis = vshi_unit(vshi_vec_of(light->direction));
-        c->half = hard ? 0.0 : 0.5 * light->angle;
-        c->far = INFINITY;
-    } else {
-        const vshi_vec to = vshi_sub(vshi_vec_of(light->position), vshi_vec_of(c->origin));
-        const double distance = vshi_length(to);
-        if (!(distance > light->radius)) {
-            return false;
-        }
-        const double sine = light->radius / distance;
-        c->axis = vshi_unit(to);
-        c->half = hard ? 0.0 : vshi_asin(sine);
-        c->far = distance * (1.0 - sine * sine); /* where the cone touches the lamp */
+static bool aim(covering *c, const vshi_light_place *place, bool hard) {
+    vshi_light_view view;
+    if (!vshi_light_seen(place, vshi_vec_of(c->origin), &view)) {
+        return false;
     }
+    c->axis = view.axis;
+    c->half = hard ? 0.0 : place->parallel ? place->half : vshi_asin(view.sine);
+    c->far = vshi_light_end(&view);
     c->radius = vshi_tan(c->half);
     vshi_frame(c->axis, &c->u, &c->v);
     return true;
@@ -264,13 +257,14 @@ void vshi_spheres_shadow(const vsh_spheres *spheres, const vsh_light *light, int
                          vsh_shade_stats *stats) {
     chords of_disc;
     set_chords(&of_disc);
+    const vshi_light_place place = vshi_light_in_world(light);
     covering c = {.chords = &of_disc, .classic = method == VSH_SHADOW_CLASSIC};
     for (size_t i = begin; i < end; ++i) {
         float *value = &visibility[i - begin];
         if (!vshi_spheres_origin(points, i, lift, c.origin, &c.normal)) {
             *value = NAN;
         } else {
-            *value = aim(&c, light, method == VSH_SHADOW_HARD) ? shade_point(spheres, &c, stats) : 1.0f;
+            *value = aim(&c, &place, method == VSH_SHADOW_HARD) ? shade_point(spheres, &c, stats) : 1.0f;
         }
     }
 }

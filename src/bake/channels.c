@@ -1,7 +1,7 @@
 #include "bake/channels.h"
 
 #include "base/numbers.h"
-#include "shade/light.h"
+#include "light/light.h"
 
 #include <stdio.h>
 

@@ -246,12 +246,11 @@ vsh_result vshi_field_share_add(vshi_field_share *share, const vsh_light *light,
                  .light = vshi_lift_light_of(light),
                  .values = values,
                  .filled = filled};
-    const double size = light == NULL                          ? 1.0
-                        : light->type == VSH_LIGHT_DIRECTIONAL ? light->angle
-                                                               : light->radius;
+    const bool one_ray = light != NULL && vshi_light_is_point(&h.light.place);
     h.truth.light = light;
+    h.truth.place = h.light.place;
     h.truth.distance = options->ao_distance;
-    h.truth.rays = size > 0.0 ? options->max_error < FINE ? FINE_RAYS : RAYS : 1;
+    h.truth.rays = one_ray ? 1 : options->max_error < FINE ? FINE_RAYS : RAYS;
     vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, h.truth.rays, 0);
     if (sampler == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "error of the field: the system refused memory");

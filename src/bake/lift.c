@@ -51,18 +51,18 @@ typedef struct aiming {
 /* Whether all of the light is well above the triangle of a sample at `foot`. */
 static bool is_above(const vsh_texels *texels, const vshi_lift_light *l, size_t sample, vshi_vec foot) {
     const vshi_vec normal = vshi_vec_off(texels->geometric + 3 * sample);
-    if (l->light->type == VSH_LIGHT_DIRECTIONAL) {
-        return vshi_dot(normal, l->towards) > l->sine + WELL_ABOVE;
+    const vshi_light_place *place = &l->place;
+    if (place->parallel) {
+        return vshi_dot(normal, place->towards) > place->sine + WELL_ABOVE;
     }
-    const vshi_vec to = vshi_sub(vshi_vec_of(l->light->position), foot);
-    return vshi_dot(normal, to) > l->light->radius + WELL_ABOVE * vshi_length(to);
+    const vshi_vec to = vshi_sub(place->centre, foot);
+    return vshi_dot(normal, to) > place->radius + WELL_ABOVE * vshi_length(to);
 }
 
 vshi_lift_light vshi_lift_light_of(const vsh_light *light) {
     vshi_lift_light l = {.light = light};
-    if (light != NULL && light->type == VSH_LIGHT_DIRECTIONAL) {
-        l.towards = vshi_unit(vshi_vec_of(light->direction));
-        l.sine = vshi_sin(0.5 * light->angle);
+    if (light != NULL) {
+        l.place = vshi_light_in_world(light);
     }
     return l;
 }

@@ -4,6 +4,7 @@
 #define VSHI_BAKE_LIFT_H
 
 #include "bake/origins.h"
+#include "light/view.h"
 
 /* Where a sample stands: on its triangle. */
 static inline vshi_vec vshi_lift_foot(const vsh_texels *texels, size_t sample) {
@@ -18,8 +19,7 @@ void vshi_lift_drop(const vsh_texels *texels, const vsh_triangles *triangles, si
 /* A light, or (NULL) AO, that samples are lifted for. */
 typedef struct vshi_lift_light {
     const vsh_light *light;
-    vshi_vec towards; /* a directional light */
-    double sine;      /* of half its angle */
+    vshi_light_place place; /* of the light, in world space */
 } vshi_lift_light;
 
 vshi_lift_light vshi_lift_light_of(const vsh_light *light);

@@ -5,7 +5,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "flat/distances.h"
-#include "shade/light.h"
+#include "light/light.h"
 
 #include <vdbshade/flat.h>
 

@@ -1,6 +1,7 @@
 #include "render/shafts.h"
 
 #include "base/elementary.h"
+#include "light/view.h"
 
 /* The part of a ray within the box. */
 static bool clip(const vshi_shafts *shafts, const vshi_shaft_ray *ray, double *begin, double *end) {
@@ -48,12 +49,10 @@ static vsh_result light_step(const vshi_shafts *shafts, step *s, vsh_shade_stats
         if (result != VSH_OK) {
             return result;
         }
+        const vshi_light_place place = vshi_light_in_world(light);
         for (size_t i = 0; i < s->count; ++i) {
-            vshi_vec to = vshi_vec_of(light->direction);
-            if (light->type != VSH_LIGHT_DIRECTIONAL) {
-                to = vshi_sub(vshi_vec_of(light->position), vshi_vec_of(s->positions[i]));
-            }
-            to = vshi_unit(to);
+            vshi_vec to;
+            vshi_light_towards(&place, vshi_vec_of(s->positions[i]), &to);
             s->towards[i][0] = (float)to.x, s->towards[i][1] = (float)to.y, s->towards[i][2] = (float)to.z;
         }
         vsh_shade_irradiance(&points, &s->towards[0][0], light, s->visibility, &s->light[0][0]);

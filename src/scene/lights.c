@@ -1,5 +1,5 @@
+#include "light/light.h"
 #include "scene/parts.h"
-#include "shade/light.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -5,8 +5,8 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/numbers.h"
+#include "light/light.h"
 #include "scene/inputs.h"
-#include "shade/light.h"
 
 #include <math.h>
 #include <stdio.h>

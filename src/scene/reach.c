@@ -4,6 +4,7 @@
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/vec.h"
+#include "light/view.h"
 
 /* Tangent of 60°: wider half angles are marched as if they were this wide, as a tangent without
  * bound would ask for a field without bound. */
@@ -22,13 +23,13 @@ double vsh_scene_reach(const vsh_scene *scene, const vsh_grid *grid, const doubl
     const double longest = vshi_length(sides);        /* ray from a receiver to a caster */
     double reach = info.half_width * info.voxel_size; /* what the finest level has anyway */
     for (size_t i = 0; i < scene->light_count; ++i) {
-        const vsh_light *light = &scene->lights[i];
-        if (light->type == VSH_LIGHT_DIRECTIONAL) {
-            const double half_angle = fmin(0.5 * light->angle, vshi_atan(widest_tangent));
+        const vshi_light_place place = vshi_light_in_world(&scene->lights[i]);
+        if (place.parallel) {
+            const double half_angle = fmin(place.half, vshi_atan(widest_tangent));
             reach = fmax(reach, vshi_tan(half_angle) * longest);
         } else {
             /* At t of the distance d to a sphere of radius r, the cone is r t/d wide: never wider than r. */
-            reach = fmax(reach, fmin(light->radius, widest_tangent * longest));
+            reach = fmax(reach, fmin(place.radius, widest_tangent * longest));
         }
     }
     return scene->ao ? fmax(reach, scene->shade.ao_distance) : reach;

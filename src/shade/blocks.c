@@ -118,12 +118,33 @@ static void tighten(block *b) {
 /* Of one march a point: where a cone begins along its beam, and how far the cone goes, at most, while its
  * beam goes by 1. A lamp's beam is as far on its way to the lamp as its cones are. */
 static double along_of(const vshi_shadow_task *task, const block *b, const vshi_cone *cone) {
-    return b->distance > 0.0 ? 0.0 : vshi_dot(vshi_sub(cone->origin, b->beam.origin), task->towards);
+    return b->distance > 0.0 ? 0.0 : vshi_dot(vshi_sub(cone->origin, b->beam.origin), task->place.towards);
 }
 
 static double pace_of(const vshi_shadow_task *task, const block *b, const vshi_cone *cone) {
-    return b->distance > 0.0 ? (vshi_length(vshi_sub(task->centre, cone->origin)) + below(task)) / b->distance
-                             : 1.0;
+    return b->distance > 0.0
+               ? (vshi_length(vshi_sub(task->place.centre, cone->origin)) + below(task)) / b->distance
+               : 1.0;
+}
+
+/* Turns a beam that has its origin and width to the light, a lamp of `radius`, whose distance is told; 0
+ * where it has none. False where the beam is as wide as its way is long. */
+static bool aim_at(const vshi_shadow_task *task, double radius, vshi_cone *beam, double *distance) {
+    *distance = 0.0;
+    if (task->place.parallel) {
+        beam->direction = task->place.towards;
+        beam->sine = task->options->method == VSH_SHADOW_HARD ? 0.0 : task->place.sine;
+        return true;
+    }
+    const vshi_vec to = vshi_sub(task->place.centre, beam->origin);
+    const double length = vshi_length(to);
+    if (!(length > radius + 4.0 * beam->wide)) {
+        return false;
+    }
+    beam->direction = vshi_scale(to, 1.0 / length);
+    beam->sine = fmax(0.0, (radius - beam->wide) / length);
+    *distance = length;
+    return true;
 }
 
 /* The beam around the cones of a block's points; false where there is none worth a look. */
@@ -149,20 +170,12 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
     }
     const bool hard = task->options->method == VSH_SHADOW_HARD;
     /* lamps are aimed at from the points, below where the cones begin */
-    const double radius = (hard ? 0.0 : task->radius) + below(task);
-    if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
-        beam->direction = task->towards;
-        beam->sine = hard ? 0.0 : task->sine;
-    } else {
-        const vshi_vec to = vshi_sub(task->centre, centre);
-        const double distance = vshi_length(to);
-        if (!(distance > radius + 4.0 * beam->wide)) {
-            return false;
-        }
-        beam->direction = vshi_scale(to, 1.0 / distance);
-        beam->sine = fmax(0.0, (radius - beam->wide) / distance);
-        b->tilt = beam->wide / distance;
-        b->distance = distance;
+    const double radius = (hard ? 0.0 : task->place.radius) + below(task);
+    if (!aim_at(task, radius, beam, &b->distance)) {
+        return false;
+    }
+    if (b->distance > 0.0) {
+        b->tilt = beam->wide / b->distance;
     }
     /* from where the first of the cones is not yet proved to where the last is */
     beam->begin = b->ends = INFINITY;
@@ -201,7 +214,7 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
 /* Ends the cones of a block where its beam is free from `clear` on. */
 static void shorten(const vshi_shadow_task *task, vshi_facing *facing, const block *b, double clear) {
     const bool marched = !vshi_shadow_has_rays(task->options);
-    const double aside = (task->radius + below(task) + b->beam.wide) * b->tilt,
+    const double aside = (task->place.radius + below(task) + b->beam.wide) * b->tilt,
                  ahead = 1.0 - b->tilt * b->tilt;
     for (size_t i = b->first; i < b->first + b->count; ++i) {
         vshi_cone *cone = &facing->cone[i];
@@ -236,7 +249,7 @@ static void hide_cut(const vshi_shadow_task *task, vshi_facing *facing, const bl
         if (b->near) {
             continue;
         }
-        const bool parallel = task->light->type == VSH_LIGHT_DIRECTIONAL;
+        const bool parallel = task->place.parallel;
         const double wide = (b->beam.wide + below(task)) * field->voxel_size;
         vshi_sheet_beam *beam = &beams[tried];
         *beam = (vshi_sheet_beam){.origin = vshi_to_world(field, b->beam.origin),
@@ -245,8 +258,8 @@ static void hide_cut(const vshi_shadow_task *task, vshi_facing *facing, const bl
                                   .tangent = b->beam.sine / sqrt(1.0 - b->beam.sine * b->beam.sine),
                                   .end = INFINITY};
         if (!parallel) {
-            const double radius = task->light->radius;
-            const double distance = vshi_length(vshi_sub(vshi_vec_of(task->light->position), beam->origin));
+            const double radius = task->world.radius;
+            const double distance = vshi_length(vshi_sub(task->world.centre, beam->origin));
             beam->end = distance - radius;
             beam->tangent = (radius + wide) / beam->end;
         }
@@ -348,22 +361,13 @@ void vshi_blocks_prove(const vshi_shadow_task *task, vshi_facing *facing, vshi_c
 static bool aim_ball(const vshi_shadow_task *task, vshi_vec centre, double radius, vshi_cone *beam) {
     const bool hard = task->options->method == VSH_SHADOW_HARD;
     *beam = (vshi_cone){.origin = centre, .wide = radius + 1e-3, .end = INFINITY};
-    if (!(beam->wide <= WIDEST)) {
+    double distance;
+    if (!(beam->wide <= WIDEST) || !aim_at(task, hard ? 0.0 : task->place.radius, beam, &distance)) {
         return false;
     }
-    if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
-        beam->direction = task->towards;
-        beam->sine = hard ? 0.0 : task->sine;
-        return true;
+    if (distance > 0.0) {
+        beam->end = distance + beam->wide; /* no cone goes on behind the lamp's middle */
     }
-    const vshi_vec to = vshi_sub(task->centre, centre);
-    const double distance = vshi_length(to), lamp = hard ? 0.0 : task->radius;
-    if (!(distance > lamp + 4.0 * beam->wide)) {
-        return false;
-    }
-    beam->direction = vshi_scale(to, 1.0 / distance);
-    beam->sine = fmax(0.0, (lamp - beam->wide) / distance);
-    beam->end = distance + beam->wide; /* no cone goes on behind the lamp's middle */
     return true;
 }
 
@@ -371,7 +375,7 @@ void vshi_blocks_prove_balls(const vshi_shadow_task *task, size_t count, const v
                              const double *radius, int8_t *proof, vsh_shade_stats *stats) {
     vshi_chunk chunk;
     vshi_chunk_clear(&chunk);
-    const bool parallel = task->light->type == VSH_LIGHT_DIRECTIONAL;
+    const bool parallel = task->place.parallel;
     for (size_t i = 0; i < count; ++i) {
         vshi_cone beam;
         proof[i] = VSHI_UNPROVED;

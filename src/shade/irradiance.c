@@ -2,7 +2,8 @@
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/vec.h"
-#include "shade/light.h"
+#include "light/light.h"
+#include "light/view.h"
 #include "shade/shade.h"
 
 #include <math.h>
@@ -55,19 +56,16 @@ void vshi_shade_irradiance(const vsh_points *points, const float *shading_normal
                            const float *visibility, const vsh_tint *tint, float *irradiance) {
     VSHI_FLOATS;
     const float *normals = shading_normals != NULL ? shading_normals : points->normals;
-    const vshi_vec towards = vshi_unit(vshi_vec_of(light->direction));
+    const vshi_light_place place = vshi_light_in_world(light);
     for (size_t i = 0; i < points->count; ++i) {
-        double gain = 1.0, tinted[3];
+        double tinted[3];
         tint_one(tint, (double)visibility[i], tinted);
-        vshi_vec to = towards;
-        if (light->type != VSH_LIGHT_DIRECTIONAL) {
-            to = vshi_sub(vshi_vec_of(light->position), vshi_vec_of(points->positions + 3 * i));
-            const double distance = vshi_length(to);
-            to = vshi_unit(to);
-            /* not nearer than the light's own surface, so that the square stays finite */
-            gain *= vshi_light_gain(light, to, fmax(distance, fmax(light->radius, 1e-30)));
-        }
-        gain *= fmax(0.0, vshi_dot(vshi_unit(vshi_vec_off(normals + 3 * i)), to));
+        vshi_vec to;
+        const double distance = vshi_light_towards(&place, vshi_vec_of(points->positions + 3 * i), &to);
+        /* not nearer than the light's own surface, so that the square stays finite */
+        const double near = fmax(place.radius, 1e-30);
+        const double gain = vshi_light_gain(light, to, fmax(distance, near)) *
+                            fmax(0.0, vshi_dot(vshi_unit(vshi_vec_off(normals + 3 * i)), to));
         if (gain * tinted[0] > 0.0) {
             for (size_t c = 0; c < 3; ++c) {
                 irradiance[3 * i + c] += (float)(tinted[c] * gain * light->color[c]);

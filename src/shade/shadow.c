@@ -36,26 +36,13 @@ static float remap(int32_t method, double closeness, double sine) {
  * start offset would else be below it. */
 static bool aim(const vshi_shadow_task *task, size_t i, vshi_vec origin, vshi_cone *cone) {
     *cone = (vshi_cone){.origin = origin, .horizon = INFINITY};
-    if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
-        cone->direction = task->towards;
-        cone->sine = task->sine;
-        cone->end = INFINITY;
-    } else {
-        const vshi_vec to =
-            vshi_sub(task->centre, vshi_to_field(task->field, task->points->positions + 3 * i));
-        const double distance = vshi_length(to);
-        if (distance <= task->radius || distance <= 0.0) {
-            return false;
-        }
-        cone->direction = vshi_unit(to);
-        cone->sine = task->radius / distance;
-        /* up to the circle where the cone touches the sphere */
-        cone->end = distance * (1.0 - cone->sine * cone->sine);
+    vshi_light_view view;
+    if (!vshi_light_seen(&task->place, vshi_to_field(task->field, task->points->positions + 3 * i), &view)) {
+        return false;
     }
-    if (task->options->method == VSH_SHADOW_HARD) {
-        cone->sine = 0.0;
-    }
-    cone->whole = cone->end;
+    cone->direction = view.axis;
+    cone->sine = task->options->method == VSH_SHADOW_HARD ? 0.0 : view.sine;
+    cone->end = cone->whole = vshi_light_end(&view);
     return true;
 }
 
@@ -181,13 +168,10 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
         (vshi_shadow_task){.field = field, .light = light, .options = options, .lowest = inner ? 1.0 : 0.0};
     task->leaky = options->method == VSH_SHADOW_EXACT &&
                   (field->shell_thickness > 0.0 || vshi_triangles_have_holes(options->triangles));
-    if (light->type == VSH_LIGHT_DIRECTIONAL) {
-        task->towards = vshi_direction_to_field(field, vshi_unit(vshi_vec_of(light->direction)));
-        task->sine = vshi_sin(0.5 * light->angle);
-    } else {
-        task->centre = vshi_to_field(field, light->position);
-        task->radius = light->radius / field->voxel_size;
-    }
+    task->world = task->place = vshi_light_in_world(light);
+    task->place.towards = vshi_direction_to_field(field, task->world.towards);
+    task->place.centre = vshi_to_field(field, light->position);
+    task->place.radius = task->world.radius / field->voxel_size;
     for (size_t i = 0; i < sizeof light->name && light->name[i] != '\0'; ++i) {
         task->purpose = 31u * task->purpose + (unsigned char)light->name[i];
     }

@@ -2,6 +2,7 @@
 #ifndef VSHI_SHADOW_H
 #define VSHI_SHADOW_H
 
+#include "light/view.h"
 #include "shade/shade.h"
 
 /* A light as the points of one field see it: what holds for all of them, then a call's kernel and arrays. */
@@ -11,10 +12,8 @@ typedef struct vshi_shadow_task {
     const vsh_light *light;
     const vsh_shade_options *options;
     const vshi_sampler *sampler; /* of rays; else NULL */
-    vshi_vec towards;            /* directional: unit, field space */
-    vshi_vec centre;             /* positional: field space */
-    double sine;                 /* directional: of the half angle */
-    double radius;               /* positional: finest voxels */
+    vshi_light_place place;      /* of the light, in field space */
+    vshi_light_place world;      /* in world space */
     double lowest;    /* sine of how far below the receiver's plane an axis may be, of its cone's: 1 where the
                        * inner penumbra counts, else 0 */
     bool leaky;       /* exact: what the field has for solid need not be shut off by triangles, so that a cone

@@ -49,7 +49,7 @@ typedef struct ray_batch {
 
 /* Whether all rays of a point are the same. */
 static bool is_hard(const vshi_shadow_task *task) {
-    return task->sine <= 0.0 && task->radius <= 0.0;
+    return vshi_light_is_point(&task->place);
 }
 
 static void flush(ray_batch *batch) {
@@ -86,13 +86,8 @@ static void turn_to_world(const vshi_shadow_task *task, open_point *p) {
     p->u = vshi_scale(vshi_direction_to_world(task->field, p->u), tangent);
     p->v = vshi_scale(vshi_direction_to_world(task->field, p->v), tangent);
     p->start = vshi_add(vshi_vec_of(at), vshi_scale(p->normal, lift));
-    if (task->light->type == VSH_LIGHT_DIRECTIONAL) {
-        p->end = INFINITY;
-    } else { /* as in aim() of shadow.c */
-        const double distance = vshi_length(vshi_sub(vshi_vec_of(task->light->position), p->start));
-        const double sine = fmin(1.0, task->light->radius / distance);
-        p->end = distance * (1.0 - sine * sine);
-    }
+    vshi_light_view view;
+    p->end = vshi_light_seen(&task->world, p->start, &view) ? vshi_light_end(&view) : 0.0;
 }
 
 /* Rays taken … target - 1 of an open point. */

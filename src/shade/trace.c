@@ -7,6 +7,7 @@
 #include "base/parallel.h"
 #include "base/vec.h"
 #include "caster/solids.h"
+#include "light/view.h"
 #include "shim/embree.h"
 
 #include <stdlib.h>
@@ -25,6 +26,7 @@ typedef struct tracing {
     int32_t rays;
     double (*disc)[2]; /* [rays], the same for all points; NULL: each point has its own */
     float *values;
+    vshi_light_place place; /* of the light */
 } tracing;
 
 /* A light as a disc a unit away: its radius, and the most that a ray goes along it. */
@@ -47,23 +49,15 @@ static void place(tracing *task) {
 }
 
 /* Where the light stands, seen from a point; false where the point is within it. */
-static bool aim(const vsh_light *light, vshi_vec from, target *t) {
-    t->distance = INFINITY;
-    t->size = 0.0;
-    if (light->type == VSH_LIGHT_DIRECTIONAL) {
-        t->axis = vshi_unit(vshi_vec_of(light->direction));
-        t->radius = vshi_tan(0.5 * light->angle);
-    } else {
-        const vshi_vec to = vshi_sub(vshi_vec_of(light->position), from);
-        t->distance = vshi_length(to);
-        t->size = light->radius;
-        if (!(t->distance > t->size)) {
-            return false;
-        }
-        t->axis = vshi_unit(to);
-        const double sine = t->size / t->distance;
-        t->radius = sine / sqrt((1.0 - sine) * (1.0 + sine));
+static bool aim(const vshi_light_place *place, vshi_vec from, target *t) {
+    vshi_light_view view;
+    if (!vshi_light_seen(place, from, &view)) {
+        return false;
     }
+    *t = (target){.axis = view.axis,
+                  .radius = vshi_light_tangent(place, &view),
+                  .distance = view.distance,
+                  .size = place->radius};
     vshi_frame(t->axis, &t->u, &t->v);
     return true;
 }
@@ -151,7 +145,7 @@ static bool place_point(const tracing *task, const double position[3], const flo
     from->target = (target){.axis = from->normal, .radius = 1.0};
     if (task->light == NULL) {
         vshi_frame(from->target.axis, &from->target.u, &from->target.v);
-    } else if (!aim(task->light, from->origin, &from->target)) {
+    } else if (!aim(&task->place, from->origin, &from->target)) {
         *value = 1.0;
         return false;
     }
@@ -208,7 +202,8 @@ bool vshi_truth_twice(const vshi_truth *truth, const double position[3], const f
                           .solids = truth->solids,
                           .lift = truth->lift,
                           .light = truth->light,
-                          .distance = truth->distance};
+                          .distance = truth->distance,
+                          .place = truth->place};
     viewpoint from;
     if (!place_point(&task, position, normal, &from, &seen[0])) {
         seen[1] = seen[0];
@@ -289,7 +284,7 @@ vsh_result vsh_trace_shadow(const vsh_triangles *triangles, const vsh_solids *so
                             const vsh_light *light, int32_t rays, const vsh_run *run, float *visibility,
                             vsh_error *error) {
     VSHI_FLOATS;
-    tracing task = {triangles, solids, positions, normals, lift, light, 0.0, rays, NULL, visibility};
+    tracing task = {triangles, solids, positions, normals, lift, light, 0.0, rays, NULL, visibility, {0}};
     vsh_result result = check(&task, count, "vsh_trace_shadow", error);
     if (result == VSH_OK) {
         result = vsh_light_check(light, error);
@@ -297,9 +292,9 @@ vsh_result vsh_trace_shadow(const vsh_triangles *triangles, const vsh_solids *so
     if (result != VSH_OK) {
         return result;
     }
+    task.place = vshi_light_in_world(light);
     /* all rays to a point are one ray */
-    const double size = light->type == VSH_LIGHT_DIRECTIONAL ? light->angle : light->radius;
-    task.rays = size > 0.0 ? rays : 1;
+    task.rays = vshi_light_is_point(&task.place) ? 1 : rays;
     return trace(&task, count, run, "trace", error);
 }
 
@@ -307,7 +302,7 @@ vsh_result vsh_trace_ao(const vsh_triangles *triangles, const vsh_solids *solids
                         const double *positions, const float *normals, double lift, double distance,
                         int32_t rays, const vsh_run *run, float *ao, vsh_error *error) {
     VSHI_FLOATS;
-    tracing task = {triangles, solids, positions, normals, lift, NULL, distance, rays, NULL, ao};
+    tracing task = {triangles, solids, positions, normals, lift, NULL, distance, rays, NULL, ao, {0}};
     const vsh_result result = check(&task, count, "vsh_trace_ao", error);
     if (result != VSH_OK) {
         return result;

@@ -2,6 +2,7 @@
 #ifndef VSHI_TRACE_H
 #define VSHI_TRACE_H
 
+#include "light/view.h"
 #include "shade/sampler.h"
 
 #include <stdbool.h>
@@ -14,6 +15,7 @@ typedef struct vshi_truth {
     const vsh_triangles *triangles; /* one of these may be NULL */
     const vsh_solids *solids;
     const vsh_light *light; /* NULL: AO */
+    vshi_light_place place; /* of the light, in world space */
     double distance;        /* of AO */
     double lift;            /* of rays' beginnings along the normal, world units */
     const vshi_sampler *sampler;

@@ -1,4 +1,4 @@
-#include "shade/light.h"
+#include "light/light.h"
 
 #include "base/elementary.h"
 #include "base/error.h"
