@@ -11,7 +11,7 @@
 extern "C" {
 #endif
 
-/* How a shadow is estimated, cheapest model first. s is the sine of the light's half angle as seen from the
+/* How a shadow is estimated. s is the sine of the light's half angle as seen from the
  * point, h the distance to the nearest caster at a distance t along the ray. */
 enum {
     VSH_SHADOW_HARD = 0,      /* the light's centre: 0 or 1 */

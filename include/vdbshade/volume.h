@@ -52,7 +52,7 @@ typedef struct vsh_voxels_info {
     uint64_t blocks;      /* of 8³ voxels that hold them */
     int32_t index_min[3]; /* of the voxels, both inclusive */
     int32_t index_max[3];
-    double bounds_min[3]; /* world box of their centres: what a field's `receivers` are to hold */
+    double bounds_min[3]; /* world box of their centres, for vsh_scene_reach() */
     double bounds_max[3];
     double voxel_size[3]; /* world units along the lattice's own axes; of a frustum, at its middle */
     int32_t has_normals;  /* 1: the band of a surface; 0: free space */

@@ -85,3 +85,31 @@ run_commands() {
 @test "every command of docs/regression.md" {
     run_commands regression.md 5
 }
+
+# options_of FILE …: each option that is named there, once. Those of other programs are left out.
+options_of() {
+    grep -ohE -- '(^|[^[:alnum:]-])--[a-z][a-z0-9-]*' "$@" | grep -oE -- '--.*' | sort -u |
+        grep -vxE -- '--(cflags|libs|install|stat|leak-check|preset|count|limit|runs|seconds)' # of CMake, pkg-config, git, tools/…
+}
+
+@test "the documents name every option of --help, and no other" {
+    local command
+    "$VDBSHADE" --help >help.txt
+    for command in bake voxelize info trade query volume flat render compare regress; do
+        "$VDBSHADE" "$command" --help >>help.txt
+    done
+    options_of help.txt >told.txt
+    options_of "$DOCS"/*.md "$DOCS/../README.md" >named.txt
+    [ "$(wc -l <told.txt)" -gt 100 ] || fail "too few: $(cat told.txt)"
+    diff told.txt named.txt || fail "< only in --help, > only in the documents"
+}
+
+@test "the documents name functions and constants that the headers declare" {
+    cat "$BATS_TEST_DIRNAME"/../../include/vdbshade/*.h | grep -oE '\b(vsh|VSH)_[A-Za-z0-9_]+' | sort -u >declared.txt
+    # bench's programs, and what CMake and the tests are told
+    grep -ohE '\b(vsh|VSH)_[A-Za-z0-9_]*[A-Za-z0-9]\b' "$DOCS"/*.md "$DOCS/../README.md" |
+        grep -vxE 'vsh_bench|vsh_cancel|VSH_(CLAIMS|BITS|TESTS|WERROR|EMBREE|OIIO|DRACO|WATCH.*|BENCH.*)' | sort -u >names.txt
+    [ "$(wc -l <names.txt)" -gt 20 ] || fail "too few: $(cat names.txt)"
+    comm -13 declared.txt names.txt >unknown.txt
+    [ ! -s unknown.txt ] || fail "not in a header: $(cat unknown.txt)"
+}
