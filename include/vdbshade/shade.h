@@ -44,7 +44,9 @@ enum {
 enum {
     VSH_METHOD_RAYS = 1,        /* takes rays, and knows the error that they leave */
     VSH_METHOD_KEEPS_ERROR = 2, /* takes as many as max_error asks for */
-    VSH_METHOD_TRIANGLES = 4    /* traces them against `triangles`, which have to be given */
+    VSH_METHOD_TRIANGLES = 4,   /* traces them against `triangles`, which have to be given */
+    VSH_METHOD_INNER = 8 /* shadows: counts the inner penumbra, so that less than half of a light is seen
+                            where its centre is hidden; without it nothing is */
 };
 
 /* Where the rays of a point go, over the light's disc or the hemisphere. `frame` gives another, independent

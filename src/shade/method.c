@@ -4,6 +4,7 @@
 #include <string.h>
 
 enum {
+    INNER = VSH_METHOD_INNER,
     RAYS = VSH_METHOD_RAYS,
     KEEPS = VSH_METHOD_RAYS | VSH_METHOD_KEEPS_ERROR,
     TRACES = VSH_METHOD_RAYS | VSH_METHOD_KEEPS_ERROR | VSH_METHOD_TRIANGLES,
@@ -15,11 +16,16 @@ typedef struct method_row {
 } method_row;
 
 static const method_row shadow_methods[] = {
-    [VSH_SHADOW_HARD] = {"hard", 0},           [VSH_SHADOW_CLASSIC] = {"classic", 0},
-    [VSH_SHADOW_PRACTICAL] = {"practical", 0}, [VSH_SHADOW_IMPROVED] = {"improved", 0},
-    [VSH_SHADOW_SMOOTH] = {"smooth", 0},       [VSH_SHADOW_CONE] = {"cone", 0},
-    [VSH_SHADOW_RAYS] = {"rays", RAYS},        [VSH_SHADOW_ADAPTIVE] = {"adaptive", KEEPS},
-    [VSH_SHADOW_EXACT] = {"exact", TRACES},    [VSH_SHADOW_AUTO] = {"auto", KEEPS},
+    [VSH_SHADOW_HARD] = {"hard", 0},
+    [VSH_SHADOW_CLASSIC] = {"classic", 0},
+    [VSH_SHADOW_PRACTICAL] = {"practical", 0},
+    [VSH_SHADOW_IMPROVED] = {"improved", 0},
+    [VSH_SHADOW_SMOOTH] = {"smooth", INNER},
+    [VSH_SHADOW_CONE] = {"cone", INNER},
+    [VSH_SHADOW_RAYS] = {"rays", RAYS | INNER},
+    [VSH_SHADOW_ADAPTIVE] = {"adaptive", KEEPS | INNER},
+    [VSH_SHADOW_EXACT] = {"exact", TRACES | INNER},
+    [VSH_SHADOW_AUTO] = {"auto", KEEPS | INNER},
 };
 
 static const method_row ao_methods[] = {

@@ -158,15 +158,14 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
     if (result != VSH_OK) {
         return result;
     }
-    if (options->method == VSH_SHADOW_EXACT && options->triangles == NULL) {
+    if (vshi_shadow_traces(options) && options->triangles == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "method exact: triangles is NULL: it traces those of the casters");
     }
-    const bool inner = vshi_shadow_has_rays(options) || options->method == VSH_SHADOW_SMOOTH ||
-                       options->method == VSH_SHADOW_CONE;
+    const bool inner = (vsh_shadow_method_traits(options->method) & VSH_METHOD_INNER) != 0;
     *task =
         (vshi_shadow_task){.field = field, .light = light, .options = options, .lowest = inner ? 1.0 : 0.0};
-    task->leaky = options->method == VSH_SHADOW_EXACT &&
+    task->leaky = vshi_shadow_traces(options) &&
                   (field->shell_thickness > 0.0 || vshi_triangles_have_holes(options->triangles));
     task->world = task->place = vshi_light_in_world(light);
     task->place.towards = vshi_direction_to_field(field, task->world.towards);
