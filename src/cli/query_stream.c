@@ -141,7 +141,7 @@ int query_stream(const query_settings *s, const vsh_query *query, query_answers 
     while (code == CLI_OK) {
         double start = cli_seconds();
         code = cli_points_read(reader, most_kept, &points);
-        start = cli_stats_stage(stats, CLI_STAGE_LOAD, start);
+        cli_stats_stage(stats, CLI_STAGE_LOAD, start);
         if (code != CLI_OK || points.count == 0) {
             break;
         }
