@@ -60,7 +60,9 @@ static int check_files(const cli_bake_settings *settings, const vsh_scene *scene
             continue; /* its folder need not be there yet */
         }
         code = makes ? make_folder_of(output) : cli_check_folder(output);
-        code = code == CLI_OK ? cli_receiver_check(scene, i) : code;
+        code = code == CLI_OK
+                   ? cli_receiver_check(scene, i, settings->output == NULL ? settings->input : NULL)
+                   : code;
     }
     return code;
 }

@@ -106,7 +106,7 @@ static vsh_image_options image_options(const vsh_receiver *receiver) {
     return options;
 }
 
-int cli_receiver_check(const vsh_scene *scene, size_t index) {
+int cli_receiver_check(const vsh_scene *scene, size_t index, const char *file) {
     const vsh_receiver *receiver = &scene->receivers[index];
     cli_planes planes;
     int code = cli_planes_name(&planes, scene, receiver->width, receiver->height);
@@ -114,7 +114,9 @@ int cli_receiver_check(const vsh_scene *scene, size_t index) {
         const vsh_image_options options = image_options(receiver);
         vsh_error error;
         if (vsh_image_check(receiver->output, &planes.image, &options, &error) != VSH_OK) {
-            code = cli_fail(&error);
+            code = file != NULL && error.code == VSH_ERROR_ARGUMENT
+                       ? cli_usage("%s: receivers[%zu]: output %s", file, index, error.message)
+                       : cli_fail(&error);
         }
     }
     cli_planes_free(&planes);

@@ -25,8 +25,9 @@ typedef struct cli_receiver_job {
     bool allow_overlap;          /* whatever the receiver says of it */
 } cli_receiver_job;
 
-/* Whether its image can be written. Needs no assets. CLI_OK or an exit code, having said why. */
-int cli_receiver_check(const vsh_scene *scene, size_t index);
+/* Whether its image can be written, which `file` names (NULL: the command line does). Needs no assets. CLI_OK
+ * or an exit code, having said why. */
+int cli_receiver_check(const vsh_scene *scene, size_t index, const char *file);
 
 /* Sorts and counts it, and warns (where asked to) of what is wrong with its UVs. CLI_USAGE where objects lie
  * over each other on more than CLI_LARGEST_OVERLAP of the texels. */

@@ -85,3 +85,10 @@ by_each() {
     shade render box.obj --sun 0.3,1,0.2 --size 8x8 --resolution 12 --lightmap grey.png --quiet -o out.png
     refused 2 "grey.png: lightmap 0: no channel shadow.sun"
 }
+
+@test "an output that a scene names is told with the scene" {
+    printf '{"casters": [{"mesh": "box.obj"}], "receivers": [{"mesh": "box.obj", "output": "bake.xyz"}],
+        "lights": [{"name": "a", "type": "directional", "direction": [0, 1, 0]}]}' >scene.json
+    shade bake scene.json --size 8 --quiet
+    refused 2 "scene.json: receivers[0]: output bake.xyz: ending 'xyz'"
+}
