@@ -139,8 +139,8 @@ static inline void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info
     vsh_charts_get_info_sized(charts, info, sizeof *info);
 }
 
-/* World box of all samples, as of vsh_texels_info: of which vsh_scene_reach() makes a field's reach. Takes as long as
- * making all texels. Errors: VSH_ERROR_ARGUMENT (run), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+/* World box of all samples, as of vsh_texels_info: of which vsh_scene_reach() makes a field's reach. Takes as
+ * long as making all texels. Errors: VSH_ERROR_ARGUMENT (run), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, double bounds_min[3],
                                      double bounds_max[3], vsh_error *error);
 
@@ -233,13 +233,13 @@ typedef struct vsh_bake_stats {
     size_t struct_size;
     uint64_t texels;           /* covered */
     uint64_t invalid_texels;   /* inside a solid or behind a wall: coverage 0, filled from the nearest valid
-                                  texel   of its chart (texels of the same mesh that touch) up to 64 texels off
-                                  along   the chart; where there is none, from the nearest of any within the
-                                  padding, or   8 texels where that is more */
+                                  texel of its chart (texels of the same mesh that touch) up to 64 texels off
+                                  along the chart; where there is none, from the nearest of any within the
+                                  padding, or 8 texels where that is more */
     uint64_t *invalid_by_mesh; /* [mesh_count] of the texels, filled where not NULL */
     vsh_shade_stats shade;     /* added to */
     uint64_t seen_texels;      /* of the invalid ones: in plain sight, rays from them escape. Of exact methods
-                                  only:      a field does not tell, and leaves it 0 */
+                                  only: a field does not tell, and leaves it 0 */
     vsh_bake_error *errors;    /* [light_count + 1]: of each light, then of AO; added to; NULL: not wanted */
     const vsh_triangles *truth_triangles; /* with `errors`: the casters themselves. Where a method keeps an
                                   error, a part of its samples (one in 16, 4096 to 16384 of a lightmap; of
