@@ -1,4 +1,5 @@
 /* Spheres from a CSV file. */
+#include "base/decimal.h"
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/input.h"
@@ -39,12 +40,8 @@ static bool read_row(const char *text, double numbers[4]) {
         while (is_gap(*text)) {
             ++text;
         }
-        char *end = NULL;
-        if (strchr("+-.0123456789", *text) == NULL || *text == '\0' || strpbrk(text, "xXpP") != NULL) {
-            return false;
-        }
-        numbers[k] = strtod(text, &end);
-        if (end == text || !(is_gap(*end) || *end == ',' || *end == ';' || *end == '\0')) {
+        const char *end = text + strcspn(text, " \t\r\n,;");
+        if (!vshi_decimal_read(text, end, &numbers[k]) || isnan(numbers[k])) {
             return false;
         }
         text = end;

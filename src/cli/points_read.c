@@ -1,8 +1,8 @@
 /* Rows of points: what the formats share, CSV, and raw floats. */
+#include "base/decimal.h"
 #include "message.h"
 #include "paths.h"
 #include "points.h"
-#include "points_number.h"
 #include "signals.h"
 
 #include <inttypes.h>
@@ -207,7 +207,7 @@ int points_text_row(cli_points_reader *reader, const char *line, size_t size, cl
         }
         const field f = next_field(&at, end, reader->delimiter);
         const int which = reader->slot_of[column];
-        if (which >= 0 && !cli_number_read(f.text, f.end, &slot[which])) {
+        if (which >= 0 && !vshi_decimal_read(f.text, f.end, &slot[which])) {
             const int shown = f.end - f.text < 40 ? (int)(f.end - f.text) : 40;
             code = points_bad(reader, "column %d is '%.*s', expected a number", column + 1, shown, f.text);
             good = false;
@@ -314,7 +314,7 @@ static bool has_number(const char *line, size_t size, char delimiter) {
     while (at <= line + size) {
         const field f = next_field(&at, line + size, delimiter);
         double value;
-        if (cli_number_read(f.text, f.end, &value)) {
+        if (vshi_decimal_read(f.text, f.end, &value)) {
             return true;
         }
     }

@@ -1,8 +1,8 @@
 /* Rows of points with their answers behind them: the rows as they came where the format is the same, position
  * and normal else. */
+#include "base/decimal.h"
 #include "message.h"
 #include "points.h"
-#include "points_number.h"
 #include "signals.h"
 
 #include <errno.h>
@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BUFFER = 1 << 20, ROW_ROOM = 6 * CLI_NUMBER_ROOM + 16, COUNT_WIDTH = 20 };
+enum { BUFFER = 1 << 20, ROW_ROOM = 6 * VSHI_DECIMAL_ROOM + 16, COUNT_WIDTH = 20 };
 
 static int fail(const cli_points_writer *w) {
     cli_say("%s: cannot be written: %s", w->name, strerror(errno));
@@ -228,7 +228,7 @@ static bool put_binary_row(cli_points_writer *w, const cli_points *points, size_
 }
 
 static bool put_text_row(cli_points_writer *w, const cli_points *points, size_t i) {
-    char *at = room(w, ROW_ROOM + (CLI_NUMBER_ROOM + 1) * w->column_count), *start = at;
+    char *at = room(w, ROW_ROOM + (VSHI_DECIMAL_ROOM + 1) * w->column_count), *start = at;
     if (at == NULL) {
         return false;
     }
@@ -236,18 +236,18 @@ static bool put_text_row(cli_points_writer *w, const cli_points *points, size_t 
     if (!w->keep && !w->answers_only) {
         for (size_t k = 0; k < 3; ++k) {
             /* of a float too all digits that its double has: who reads it gets the same point */
-            at = cli_number_write_double(at, points->positions[3 * i + k]);
+            at = vshi_decimal_write_double(at, points->positions[3 * i + k]);
             *at++ = delimiter;
         }
         for (size_t k = 0; w->normals && k < 3; ++k) {
-            at = cli_number_write_float(at, points->normals[3 * i + k]);
+            at = vshi_decimal_write_float(at, points->normals[3 * i + k]);
             *at++ = delimiter;
         }
     } else if (w->keep) {
         *at++ = delimiter;
     }
     for (size_t c = 0; c < w->column_count; ++c) {
-        at = cli_number_write_float(at, w->columns[c].values[i * w->columns[c].stride]);
+        at = vshi_decimal_write_float(at, w->columns[c].values[i * w->columns[c].stride]);
         *at++ = delimiter;
     }
     at[-1] = '\n';

@@ -2,7 +2,7 @@
  */
 #include "fuzz.h"
 
-#include "../../src/cli/points_number.h"
+#include "base/decimal.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -16,7 +16,7 @@ static void check_text(const char *text, size_t size) {
     }
     memcpy(copy, text, size);
     copy[size] = '\0';
-    if (cli_number_read(text, text + size, &value)) {
+    if (vshi_decimal_read(text, text + size, &value)) {
         char *end;
         const double expected = strtod(copy, &end);
         if (*end != '\0' ||
@@ -30,17 +30,17 @@ static void check_text(const char *text, size_t size) {
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     check_text((const char *)data, size);
     fuzz_input input = {data, size};
-    char text[CLI_NUMBER_ROOM];
+    char text[VSHI_DECIMAL_ROOM];
     double number, back;
     fuzz_fill(&input, &number, sizeof number);
-    char *end = cli_number_write_double(text, number);
-    if (end > text + sizeof text || !cli_number_read(text, end, &back) ||
+    char *end = vshi_decimal_write_double(text, number);
+    if (end > text + sizeof text || !vshi_decimal_read(text, end, &back) ||
         (memcmp(&back, &number, sizeof back) != 0 && !(isnan(back) && isnan(number)))) {
         abort();
     }
     const float single = (float)number;
-    end = cli_number_write_float(text, single);
-    const int read = cli_number_read(text, end, &back);
+    end = vshi_decimal_write_float(text, single);
+    const int read = vshi_decimal_read(text, end, &back);
     const float again = (float)back;
     if (end > text + sizeof text || !read ||
         (memcmp(&again, &single, sizeof again) != 0 && !(isnan(again) && isnan(single)))) {

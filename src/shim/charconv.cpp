@@ -1,4 +1,5 @@
-#include "points_number.h"
+// Numbers as text by the C++ library, which knows no locale.
+#include "base/decimal.h"
 
 #include <charconv>
 #include <cmath>
@@ -16,12 +17,12 @@ template <typename Float> char *write(char *text, Float value, Float most) {
     const Float size = std::fabs(value);
     const bool plain = size == 0 || (size >= Float(1e-6) && size < most) || std::isinf(size);
     const auto format = plain ? std::chars_format::fixed : std::chars_format::scientific;
-    return std::to_chars(text, text + CLI_NUMBER_ROOM, value, format).ptr;
+    return std::to_chars(text, text + VSHI_DECIMAL_ROOM, value, format).ptr;
 }
 
 } // namespace
 
-bool cli_number_read(const char *text, const char *end, double *value) {
+bool vshi_decimal_read(const char *text, const char *end, double *value) {
     const bool negative = text < end && *text == '-';
     text += text < end && (*text == '-' || *text == '+');
     if (text == end || *text == '-' || end[-1] == ')') { // "nan(…)" is C's
@@ -42,10 +43,10 @@ bool cli_number_read(const char *text, const char *end, double *value) {
     return true;
 }
 
-char *cli_number_write_float(char *text, float value) {
+char *vshi_decimal_write_float(char *text, float value) {
     return write(text, value, 1e9f);
 }
 
-char *cli_number_write_double(char *text, double value) {
+char *vshi_decimal_write_double(char *text, double value) {
     return write(text, value, 1e15);
 }

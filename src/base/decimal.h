@@ -1,7 +1,7 @@
 /* Numbers in text, as every locale writes them in files: read exactly, written so that they read back as the
  * same bits. */
-#ifndef CLI_POINTS_NUMBER_H
-#define CLI_POINTS_NUMBER_H
+#ifndef VSHI_DECIMAL_H
+#define VSHI_DECIMAL_H
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -10,16 +10,16 @@
 extern "C" {
 #endif
 
-enum { CLI_NUMBER_ROOM = 32 }; /* what any number takes as text */
+enum { VSHI_DECIMAL_ROOM = 32 }; /* what any number takes as text */
 
 /* The number that text … end - 1 is, all of it: [+-]digits[.digits][e[+-]digits], correctly rounded, or nan,
  * inf and infinity in any case. False where it is none. */
-bool cli_number_read(const char *text, const char *end, double *value);
+bool vshi_decimal_read(const char *text, const char *end, double *value);
 
 /* The shortest decimal that reads back as `value`, without exponent from 1e-6 to 1e9 (1e15); "nan", "inf" and
  * "-inf". Not ended by NUL. Returns behind it. */
-char *cli_number_write_float(char *text, float value);
-char *cli_number_write_double(char *text, double value);
+char *vshi_decimal_write_float(char *text, float value);
+char *vshi_decimal_write_double(char *text, double value);
 
 #ifdef __cplusplus
 }

@@ -1,18 +1,15 @@
 /* Numbers of points' text against the C library's: the same bits in, the same bits back. */
-#include <cmath>
-#include <csetjmp>
-#include <cstdarg>
-#include <cstdint>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
+#include "base/decimal.h"
 
-extern "C" {
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
 #include <cmocka.h>
-}
-
-/* The command line's sources are no library. */
-#include "cli/points_number.cpp"
 
 static uint64_t counter;
 
@@ -25,7 +22,7 @@ static uint64_t draw(void) {
 
 static void expect_as_strtod(const char *text) {
     double value = -1.0;
-    if (!cli_number_read(text, text + strlen(text), &value)) {
+    if (!vshi_decimal_read(text, text + strlen(text), &value)) {
         fail_msg("'%s' is not read", text);
     }
     const double expected = strtod(text, NULL);
@@ -76,7 +73,7 @@ static void numbers_are_read_as_strtod_reads_them(void **state) {
         case 0: { /* of any magnitude */
             double value;
             memcpy(&value, &bits, sizeof value);
-            snprintf(text, sizeof text, "%.*g", (int)(draw() % 21), std::isfinite(value) ? value : 1.0);
+            snprintf(text, sizeof text, "%.*g", (int)(draw() % 21), isfinite(value) ? value : 1.0);
             break;
         }
         case 1: /* as programs write coordinates */
@@ -104,22 +101,22 @@ static void what_is_no_decimal_number_is_refused(void **state) {
                                         "in",   "--1", "1e5.0", "infinit", "1_000"};
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; ++i) {
         double value;
-        if (cli_number_read(texts[i], texts[i] + strlen(texts[i]), &value)) {
+        if (vshi_decimal_read(texts[i], texts[i] + strlen(texts[i]), &value)) {
             fail_msg("'%s' is read as %g", texts[i], value);
         }
     }
     const char *text = "nAn";
     double value;
-    assert_true(cli_number_read(text, text + 3, &value) && std::isnan(value));
+    assert_true(vshi_decimal_read(text, text + 3, &value) && isnan(value));
     const char *low = "-Infinity";
-    assert_true(cli_number_read(low, low + 9, &value) && std::isinf(value) && value < 0.0);
+    assert_true(vshi_decimal_read(low, low + 9, &value) && isinf(value) && value < 0.0);
 }
 
 static void only_the_given_characters_are_read(void **state) {
     (void)state;
     const char *text = "12.5678";
     double value;
-    assert_true(cli_number_read(text, text + 4, &value));
+    assert_true(vshi_decimal_read(text, text + 4, &value));
     assert_true(value == 12.5);
 }
 
@@ -133,12 +130,12 @@ static void floats_come_back_with_the_same_bits(void **state) {
         }
         float value;
         memcpy(&value, &bits, sizeof value);
-        char text[CLI_NUMBER_ROOM + 1];
-        *cli_number_write_float(text, value) = '\0';
+        char text[VSHI_DECIMAL_ROOM + 1];
+        *vshi_decimal_write_float(text, value) = '\0';
         const float back = strtof(text, NULL);
         double wide;
-        assert_true(cli_number_read(text, text + strlen(text), &wide));
-        if (std::isnan(value) ? !std::isnan(back) : memcmp(&back, &value, 4) != 0 || (float)wide != value) {
+        assert_true(vshi_decimal_read(text, text + strlen(text), &wide));
+        if (isnan(value) ? !isnan(back) : memcmp(&back, &value, 4) != 0 || (float)wide != value) {
             fail_msg("%.9g is written '%s'", (double)value, text);
         }
         assert_true(strlen(text) < 18);
@@ -150,8 +147,8 @@ static void floats_come_back_with_the_same_bits(void **state) {
                  {0.0f, "0"},   {100.0f, "100"},     {0.001f, "0.001"},
                  {-0.0f, "-0"}, {1e8f, "100000000"}, {0.97918636f, "0.97918636"}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        char text[CLI_NUMBER_ROOM + 1];
-        *cli_number_write_float(text, cases[i].value) = '\0';
+        char text[VSHI_DECIMAL_ROOM + 1];
+        *vshi_decimal_write_float(text, cases[i].value) = '\0';
         assert_string_equal(text, cases[i].text);
     }
 }
@@ -168,10 +165,10 @@ static void doubles_come_back_with_the_same_bits(void **state) {
             value =
                 i % 8 == 3 ? ldexp(1.0 - 0x1p-53 * (double)(bits & 3), (int)(bits >> 20 & 63) - 18) : value;
         }
-        char text[CLI_NUMBER_ROOM + 1];
-        *cli_number_write_double(text, value) = '\0';
+        char text[VSHI_DECIMAL_ROOM + 1];
+        *vshi_decimal_write_double(text, value) = '\0';
         const double back = strtod(text, NULL);
-        if (std::isnan(value) ? !std::isnan(back) : memcmp(&back, &value, sizeof back) != 0) {
+        if (isnan(value) ? !isnan(back) : memcmp(&back, &value, sizeof back) != 0) {
             fail_msg("%.17g is written '%s'", value, text);
         }
     }
