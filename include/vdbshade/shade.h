@@ -11,8 +11,8 @@
 extern "C" {
 #endif
 
-/* How a shadow is estimated. s is the sine of the light's half angle as seen from the
- * point, h the distance to the nearest caster at a distance t along the ray. */
+/* How a shadow is estimated. s is the sine of the light's half angle as seen from the point, h the distance
+ * to the nearest caster at a distance t along the ray. */
 enum {
     VSH_SHADOW_HARD = 0,      /* the light's centre: 0 or 1 */
     VSH_SHADOW_CLASSIC = 1,   /* min h/(s t), outer penumbra only (Quilez, "soft shadows in raymarched SDFs",

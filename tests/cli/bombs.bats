@@ -81,3 +81,26 @@ far_cubes() {
     within 500 render box.obj --sun 1,2,1 --size 1024 --resolution 256 --memory-limit 200MiB -o out.png
     refused 4 "over the memory limit of 210 MB"
 }
+
+# peak ARGUMENT…: the most that the program has had in memory while it ran, MB; its exit code is the function's.
+peak() {
+    local most=0 now code=0
+    "$VDBSHADE" "$@" 2>stderr.txt &
+    while now=$(sed -n 's/^VmHWM:[[:space:]]*\([0-9]*\) kB/\1/p' "/proc/$!/status" 2>/dev/null) && [ -n "$now" ]; do
+        most=$now
+    done
+    wait $! || code=$?
+    echo $((most / 1000))
+    return "$code"
+}
+
+@test "a case's scene is held against the limit before it is parsed" {
+    unless_sanitized "its shadow memory counts"
+    mkdir -p cases
+    printf '{"cases": [{"scene": "a.json", "output": "b.exr"}]}' >cases/regress.json
+    { printf '{"casters": [{}'; yes ', {}' | head -n 3000000 | tr -d '\n'; printf ']}'; } >cases/a.json
+    run peak regress cases --memory-limit 100MiB
+    [ "$status" -eq 4 ] || fail "expected 4"
+    grep -q "cases/a.json: .*over the memory limit of 105 MB" stderr.txt || fail "$(cat stderr.txt)"
+    [ "$output" -gt 5 ] && [ "$output" -lt 164 ] || fail "$output MB, of 105 + 64"
+}

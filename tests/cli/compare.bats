@@ -240,6 +240,26 @@ JSON
     refused 2 "--min-ssim '2'" '1'
 }
 
+# picture N: of the Nth picture of out.html, means of red, green and blue.
+picture() {
+    grep -o 'data:image/png;base64,[^"]*' out.html | sed -n "$1s/.*,//p" | base64 -d >"picture$1.png"
+    "$VDBSHADE" info "picture$1.png" | sed -nE "s/^channel '[RGB]': .*mean ([0-9.]+),.*/\1/p" | paste -sd ' '
+}
+
+@test "a page's pictures: grey where lit, red where the new one is lighter, blue where it is darker" {
+    local b g r lit
+    compare golden.exr lost.exr --html out.html
+    read -r r g b < <(picture 1)
+    lit=$g
+    read -r r g b < <(picture 2)
+    awk "BEGIN { exit !($g > $lit) }" || fail "a lost caster makes no lighter picture: $lit, $g"
+    read -r r g b < <(picture 3)
+    awk "BEGIN { exit !($r > $b + 0.01 && $g < $r) }" || fail "lighter is not red: $r $g $b"
+    compare lost.exr golden.exr --html out.html
+    read -r r g b < <(picture 3)
+    awk "BEGIN { exit !($b > $r + 0.01 && $g < $b) }" || fail "darker is not blue: $r $g $b"
+}
+
 @test "reports: JSON, JUnit, and a page that needs nothing beside it" {
     compare golden.exr lost.exr --json --junit out.xml --html out.html
     [ "$status" -eq 1 ] || fail "expected 1"

@@ -66,6 +66,7 @@ static int measure_all_voxels(void **state) {
                 const truth_metrics metrics = truth_compare(COUNT, values, truth, outside);
                 print_message("voxel %g, w %g, %s: rmse %.4f\n", voxels[v], ws[w],
                               vsh_shadow_method_name(method), metrics.rmse);
+                assert_true(isfinite(metrics.rmse));
                 rmse[kind_of_shadow(w, method)][v] = metrics.rmse;
             }
         }
@@ -75,6 +76,7 @@ static int measure_all_voxels(void **state) {
             const truth_metrics metrics = truth_compare(COUNT, values, truth, outside);
             print_message("voxel %g, AO %s: rmse %.4f\n", voxels[v], vsh_ao_method_name(method),
                           metrics.rmse);
+            assert_true(isfinite(metrics.rmse));
             rmse[kind_of_ao(method)][v] = metrics.rmse;
         }
         caster_free(&c);
