@@ -27,6 +27,7 @@ inline std::vector<Coord> root_origins(const FloatTree &tree) {
     std::vector<Coord> origins;
     std::vector<const UpperNode *> nodes;
     tree.getNodes(nodes);
+    origins.reserve(nodes.size());
     for (const UpperNode *node : nodes) {
         origins.push_back(node->origin());
     }

@@ -251,6 +251,7 @@ FloatGrid::Ptr unite_parts(const std::vector<Part> &parts, const Lattice &lattic
     united->setTransform(lattice.transform());
     const std::vector<Coord> origins = leaf_origins(parts);
     std::vector<Leaf *> leaves;
+    leaves.reserve(origins.size());
     for (const Coord &origin : origins) {
         leaves.push_back(united->tree().touchLeaf(origin));
     }
@@ -266,6 +267,7 @@ FloatGrid::Ptr unite_parts(const std::vector<Part> &parts, const Lattice &lattic
     });
     fill_tiles(united->tree(), upper_origins(parts), background, stage, [&] {
         std::vector<FloatGrid::ConstUnsafeAccessor> trees;
+        trees.reserve(parts.size());
         for (const Part &part : parts) {
             trees.emplace_back(part.grid->constTree());
         }

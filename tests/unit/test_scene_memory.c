@@ -19,7 +19,9 @@
 #include <stdbool.h>
 #include <unistd.h>
 
-static const char file[] = "memory.json";
+/* A folder of this run's own: the sanitizers' build runs beside this one in the same working folder. */
+static char folder[] = "/tmp/vdbshade-scene-memory-XXXXXX";
+static char file[sizeof folder + sizeof "/memory.json"];
 
 /* A text of `count` times a piece, between two others; in a file of ours. Its length, without the NUL. */
 static size_t write_scene(const char *head, const char *piece, size_t count, const char *tail, char **text) {
@@ -102,7 +104,6 @@ static void every_text_takes_less_than_the_least_limit_that_lets_it_pass(void **
             free(text);
         }
     }
-    unlink(file);
 }
 
 static void a_bomb_is_refused_before_it_is_read(void **unused) {
@@ -113,7 +114,21 @@ static void a_bomb_is_refused_before_it_is_read(void **unused) {
     const size_t before = taken();
     assert_false(passes((size_t)50 << 20));
     assert_true(taken() <= before + 65536);
+}
+
+static int make_folder(void **state) {
+    (void)state;
+    if (mkdtemp(folder) == NULL) {
+        return -1;
+    }
+    snprintf(file, sizeof file, "%s/memory.json", folder);
+    return 0;
+}
+
+static int remove_folder(void **state) {
+    (void)state;
     unlink(file);
+    return rmdir(folder);
 }
 
 int main(void) {
@@ -121,5 +136,5 @@ int main(void) {
         cmocka_unit_test(every_text_takes_less_than_the_least_limit_that_lets_it_pass),
         cmocka_unit_test(a_bomb_is_refused_before_it_is_read),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

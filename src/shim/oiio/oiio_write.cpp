@@ -101,7 +101,7 @@ void interleave(const vshi_planes &planes, int32_t first, int32_t last, Value *r
 }
 
 OIIO::ImageSpec make_spec(const vshi_planes &planes, const char *path, const std::string &format,
-                          OIIO::TypeDesc type) {
+                          const OIIO::TypeDesc &type) {
     OIIO::ImageSpec spec(planes.width, planes.height, planes.count, type);
     const std::string software = std::string("vdbshade ") + vsh_version();
     spec.attribute("Software", software);
