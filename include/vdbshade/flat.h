@@ -26,6 +26,10 @@ enum {
 VSH_API int32_t vsh_flat_method(const char *name);
 VSH_API const char *vsh_flat_method_name(int32_t method);
 
+/* What a light of a VSH_LIGHT_… type is in a plane: "directional", "disc", "spot"; NULL where there is none.
+ * A static string. */
+VSH_API const char *vsh_flat_light_name(int32_t type);
+
 typedef struct vsh_flat_options {
     size_t struct_size;
     int32_t width;        /* texels, 1 … 65536 */
@@ -71,7 +75,8 @@ VSH_API vsh_result vsh_flat_bake(const vsh_outline *casters, const vsh_light *li
                                  vsh_error *error);
 
 /* The share of a light that a point [2] sees, as by VSH_FLAT_EXACT and without its reach: 0 … 1; NaN where
- * the point is not finite. The light must have passed vsh_light_check(). */
+ * the point is not finite, or the light has no place in a plane. The light must have passed
+ * vsh_light_check(). */
 VSH_API double vsh_flat_visibility(const vsh_outline *casters, const vsh_light *light, const double point[2]);
 
 /* --- flat scenes */

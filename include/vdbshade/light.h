@@ -59,6 +59,10 @@ VSH_API void vsh_light_init(vsh_light *light, size_t size);
  * the field, the value and the limit. */
 VSH_API vsh_result vsh_light_check(const vsh_light *light, vsh_error *error);
 
+/* Type, place and size in words, colour and falloff where they are not the plain ones: one line, cut to
+ * `size` bytes with its end. The light is a checked one. */
+VSH_API void vsh_light_text(const vsh_light *light, char *text, size_t size);
+
 #ifdef __cplusplus
 }
 #endif

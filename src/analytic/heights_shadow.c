@@ -100,8 +100,7 @@ void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, int
         place.towards = vshi_heights_direction(heights, vshi_vec_of(light->direction));
         vshi_slices_make(place.towards, hard ? 0.0 : place.tangent, INFINITY, &slices);
     } else {
-        place.centre = vshi_transform_point(heights->to_relief, place.centre);
-        place.radius /= heights->unit;
+        place = vshi_light_moved(&place, heights->to_relief, heights->unit);
     }
     for (size_t i = begin; i < end; ++i) {
         float *value = &visibility[i - begin];

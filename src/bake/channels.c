@@ -21,7 +21,7 @@ static void describe_shadow(const vshi_channels *what, bool error, vshi_channel 
         snprintf(c->name, sizeof c->name, "%s.%s", error ? "error" : "shadow", light->name);
         snprintf(c->description, sizeof c->description, "%s light '%s', 1 lit, 0 dark",
                  error ? "standard error of the visible fraction of" : "visible fraction of", light->name);
-        vshi_light_text(light, c->light, sizeof c->light);
+        vsh_light_text(light, c->light, sizeof c->light);
     }
 }
 

@@ -40,15 +40,9 @@ static void print_caster(const vsh_caster *caster, size_t index) {
 }
 
 static void print_light(const vsh_light *light) {
-    static const char *const types[] = {"directional", "sphere", "spot"};
-    printf("light '%s': %s", light->name, types[light->type]);
-    if (light->type == VSH_LIGHT_DIRECTIONAL) {
-        printf(", towards %g %g %g, %.4g°\n", light->direction[0], light->direction[1], light->direction[2],
-               light->angle * 57.29577951308232);
-    } else {
-        printf(", at %g %g %g, radius %g\n", light->position[0], light->position[1], light->position[2],
-               light->radius);
-    }
+    char text[512];
+    vsh_light_text(light, text, sizeof text);
+    printf("light '%s': %s\n", light->name, text);
 }
 
 static void print_layer(const vsh_scene_layer *layer) {
@@ -74,7 +68,6 @@ static void print_layer(const vsh_scene_layer *layer) {
 /* False where the file is no flat scene. */
 static bool print_flat(const char *path, const vsh_run *run) {
     static const char *const casters[] = {"mask", "text", "circle", "box", "polygon"};
-    static const char *const lights[] = {"directional", "disc", "spot"};
     vsh_flat_scene *scene = NULL;
     vsh_error error;
     if (vsh_flat_scene_read_run(path, run, &scene, &error) != VSH_OK) {
@@ -89,7 +82,7 @@ static bool print_flat(const char *path, const vsh_run *run) {
                file != NULL ? file : "");
     }
     for (size_t i = 0; i < scene->light_count; ++i) {
-        printf("light '%s': %s\n", scene->lights[i].name, lights[scene->lights[i].type]);
+        printf("light '%s': %s\n", scene->lights[i].name, vsh_flat_light_name(scene->lights[i].type));
     }
     vsh_flat_scene_free(scene);
     return true;

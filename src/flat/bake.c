@@ -6,6 +6,7 @@
 #include "base/parallel.h"
 #include "flat/distances.h"
 #include "light/light.h"
+#include "light/types.h"
 
 #include <vdbshade/flat.h>
 
@@ -30,6 +31,11 @@ int32_t vsh_flat_method(const char *name) {
 
 const char *vsh_flat_method_name(int32_t method) {
     return method >= 0 && method < METHOD_COUNT ? method_names[method] : NULL;
+}
+
+const char *vsh_flat_light_name(int32_t type) {
+    const vshi_light_type *known = vshi_light_type_of(type);
+    return known != NULL ? known->flat_name : NULL;
 }
 
 /* --- what is asked for */
@@ -68,6 +74,10 @@ static vsh_result check_lights(const vsh_light *lights, size_t count, vsh_error 
         vsh_error reason;
         if (vsh_light_check(&lights[i], &reason) != VSH_OK) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "light %zu: %.900s", i, reason.message);
+        }
+        if (vsh_flat_light_name(lights[i].type) == NULL) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "light %zu: '%s': a plane knows no %s lights", i,
+                             lights[i].name, vshi_light_type_of(lights[i].type)->name);
         }
         if (lights[i].type != VSH_LIGHT_SPHERE &&
             !(vshi_hypot(lights[i].direction[0], lights[i].direction[1]) > 0.0)) {
@@ -299,7 +309,7 @@ double vsh_flat_visibility(const vsh_outline *casters, const vsh_light *light, c
     VSHI_FLOATS;
     const vshi_point p = {point[0], point[1]};
     vshi_flat_view view;
-    if (!isfinite(p.x) || !isfinite(p.y)) {
+    if (!isfinite(p.x) || !isfinite(p.y) || vsh_flat_light_name(light->type) == NULL) {
         return NAN;
     }
     return vshi_flat_look(light, p, &view) ? vshi_flat_visible(casters, &view) : 1.0;

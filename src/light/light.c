@@ -1,47 +1,25 @@
 #include "light/light.h"
 
-#include "base/elementary.h"
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/numbers.h"
-#include "base/vec.h"
+#include "light/types.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#define PI 3.14159265358979323846
-
-enum {
-    DIRECTIONAL = 1 << VSH_LIGHT_DIRECTIONAL,
-    SPHERE = 1 << VSH_LIGHT_SPHERE,
-    SPOT = 1 << VSH_LIGHT_SPOT,
-    ALL = DIRECTIONAL | SPHERE | SPOT,
-};
-
-/* One number, or three, that a light of some types must have in a range. */
-typedef struct field {
-    const char *name;
-    size_t offset;
-    int count;
-    int types;
-    double lowest, highest;
-    bool above, below; /* ends that are excluded */
-    bool nonzero;      /* not all of the numbers may be 0 */
-} field;
-
-/* Infinity as an excluded end stands for: any finite value. */
-static const field fields[] = {
-    {"direction", offsetof(vsh_light, direction), 3, DIRECTIONAL | SPOT, -INFINITY, INFINITY, true, true,
-     true},
-    {"position", offsetof(vsh_light, position), 3, SPHERE | SPOT, -INFINITY, INFINITY, true, true, false},
-    {"angle", offsetof(vsh_light, angle), 1, DIRECTIONAL, 0.0, PI, false, true, false},
-    {"radius", offsetof(vsh_light, radius), 1, SPHERE | SPOT, 0.0, INFINITY, false, true, false},
-    {"outer_angle", offsetof(vsh_light, outer_angle), 1, SPOT, 0.0, PI, true, false, false},
-    {"color", offsetof(vsh_light, color), 3, ALL, 0.0, INFINITY, false, true, false},
-};
-
-static const field reach_field = {
-    "reach", offsetof(vsh_light, reach), 1, SPHERE | SPOT, 0.0, INFINITY, true, true, false};
+static const vshi_light_member color_member = {.name = "color",
+                                               .kind = VSHI_LIGHT_VECTOR,
+                                               .offset = offsetof(vsh_light, color),
+                                               .highest = INFINITY,
+                                               .below = true};
+static const vshi_light_member reach_member = {.name = "reach",
+                                               .kind = VSHI_LIGHT_NUMBER,
+                                               .offset = offsetof(vsh_light, reach),
+                                               .highest = INFINITY,
+                                               .above = true,
+                                               .below = true};
 
 bool vshi_light_name_valid(const char *name) {
     static const char allowed[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-";
@@ -49,27 +27,44 @@ bool vshi_light_name_valid(const char *name) {
     return length > 0 && length < sizeof(((vsh_light *)NULL)->name) && strspn(name, allowed) == length;
 }
 
-static vsh_result check_field(const vsh_light *light, const field *f, vsh_error *error) {
+static vsh_result check_range(const vsh_light *light, const vshi_light_member *m, vsh_error *error) {
     static const char *const items[2][3] = {{""}, {"[0]", "[1]", "[2]"}};
+    const bool is_vector = m->kind == VSHI_LIGHT_VECTOR;
+    const int count = is_vector ? 3 : 1;
     double values[3];
-    memcpy(values, (const char *)light + f->offset, (size_t)f->count * sizeof values[0]);
+    memcpy(values, (const char *)light + m->offset, (size_t)count * sizeof values[0]);
     bool zero = true;
-    for (int i = 0; i < f->count; ++i) {
-        const bool above = f->above ? values[i] > f->lowest : values[i] >= f->lowest;
-        const bool below = f->below ? values[i] < f->highest : values[i] <= f->highest;
+    for (int i = 0; i < count; ++i) {
+        const bool above = m->above ? values[i] > m->lowest : values[i] >= m->lowest;
+        const bool below = m->below ? values[i] < m->highest : values[i] <= m->highest;
         if (!above || !below) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                             "light '%s': %s%s %.9g is out of range %.9g%s … %.9g%s", light->name, f->name,
-                             items[f->count == 3][i], values[i], f->lowest, f->above ? " (excluded)" : "",
-                             f->highest, f->below ? " (excluded)" : "");
+                             "light '%s': %s%s %.9g is out of range %.9g%s … %.9g%s", light->name, m->name,
+                             items[is_vector][i], values[i], m->lowest, m->above ? " (excluded)" : "",
+                             m->highest, m->below ? " (excluded)" : "");
         }
         zero = zero && values[i] == 0.0;
     }
-    if (zero && f->nonzero) {
+    if (zero && m->nonzero) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "light '%s': %s (0, 0, 0): expected a length over 0",
-                         light->name, f->name);
+                         light->name, m->name);
     }
     return VSH_OK;
+}
+
+/* The ranges of the members that a type has. */
+static vsh_result check_members(const vsh_light *light, vsh_error *error) {
+    for (size_t i = 0; i < vshi_light_member_count; ++i) {
+        const vshi_light_member *m = &vshi_light_members[i];
+        if ((m->types & (1U << light->type)) == 0 || m->apart || m->kind == VSHI_LIGHT_SWITCH) {
+            continue;
+        }
+        const vsh_result result = check_range(light, m, error);
+        if (result != VSH_OK) {
+            return result;
+        }
+    }
+    return check_range(light, &color_member, error);
 }
 
 vsh_result vsh_light_check(const vsh_light *light, vsh_error *error) {
@@ -83,40 +78,30 @@ vsh_result vsh_light_check(const vsh_light *light, vsh_error *error) {
                          "light: name '%.63s': expected at most 63 letters, digits, '_' and '-'",
                          light->name);
     }
-    if (light->type < VSH_LIGHT_DIRECTIONAL || light->type > VSH_LIGHT_SPOT) {
+    const vshi_light_type *type = vshi_light_type_of(light->type);
+    if (type == NULL) {
+        int32_t last = 0;
+        while (vshi_light_type_of(last + 1) != NULL) {
+            ++last;
+        }
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "light '%s': type %d is out of range 0 … %d", light->name,
-                         light->type, VSH_LIGHT_SPOT);
+                         light->type, last);
     }
     if (light->falloff < VSH_FALLOFF_NONE || light->falloff > VSH_FALLOFF_QUADRATIC) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "light '%s': falloff %d is out of range 0 … %d",
                          light->name, light->falloff, VSH_FALLOFF_QUADRATIC);
     }
-    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; ++i) {
-        if ((fields[i].types & (1 << light->type)) != 0) {
-            const vsh_result result = check_field(light, &fields[i], error);
-            if (result != VSH_OK) {
-                return result;
-            }
-        }
+    vsh_result result = check_members(light, error);
+    if (result == VSH_OK && type->check != NULL) {
+        result = type->check(light, error);
     }
-    if (light->type == VSH_LIGHT_SPOT &&
-        !(light->inner_angle >= 0.0 && light->inner_angle <= light->outer_angle)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "light '%s': inner_angle %.9g is out of range 0 … outer_angle %.9g", light->name,
-                         light->inner_angle, light->outer_angle);
+    if (result == VSH_OK && light->falloff == VSH_FALLOFF_QUADRATIC && type->falls_off) {
+        result = check_range(light, &reach_member, error);
     }
-    if (light->falloff == VSH_FALLOFF_QUADRATIC && light->type != VSH_LIGHT_DIRECTIONAL) {
-        return check_field(light, &reach_field, error);
-    }
-    return VSH_OK;
+    return result;
 }
 
-static double smoothstep(double from, double to, double x) {
-    const double t = fmin(1.0, fmax(0.0, (x - from) / (to - from)));
-    return t * t * (3.0 - 2.0 * t);
-}
-
-static double falloff(const vsh_light *light, double distance) {
+double vshi_light_falloff(const vsh_light *light, double distance) {
     if (light->falloff == VSH_FALLOFF_INVERSE_SQUARE) {
         return 1.0 / (distance * distance);
     }
@@ -127,47 +112,51 @@ static double falloff(const vsh_light *light, double distance) {
     return 1.0;
 }
 
-/* Smooth edge between the cosines of the outer and the inner angle. */
-static double spot(const vsh_light *light, vshi_vec to_light) {
-    const double cosine = -vshi_dot(vshi_unit(vshi_vec_of(light->direction)), to_light);
-    const double outer = vshi_cos(light->outer_angle), inner = vshi_cos(light->inner_angle);
-    return inner > outer ? smoothstep(outer, inner, cosine) : (cosine >= outer ? 1.0 : 0.0);
-}
-
 double vshi_light_gain(const vsh_light *light, vshi_vec to_light, double distance) {
-    if (light->type == VSH_LIGHT_DIRECTIONAL) {
-        return 1.0;
-    }
-    return falloff(light, distance) * (light->type == VSH_LIGHT_SPOT ? spot(light, to_light) : 1.0);
+    const vshi_light_type *type = vshi_light_type_of(light->type);
+    return type != NULL ? type->gain(light, to_light, distance) : 0.0;
 }
 
-static int describe_shape(const vsh_light *light, char *text, size_t size) {
-    const double degrees = 180.0 / PI, *d = light->direction, *p = light->position;
-    switch (light->type) {
-    case VSH_LIGHT_DIRECTIONAL:
-        return snprintf(text, size, "directional towards %.9g %.9g %.9g, %.9g degrees across", d[0], d[1],
-                        d[2], degrees * light->angle);
-    case VSH_LIGHT_SPHERE:
-        return snprintf(text, size, "sphere at %.9g %.9g %.9g, radius %.9g", p[0], p[1], p[2], light->radius);
-    default:
-        return snprintf(text, size,
-                        "spot at %.9g %.9g %.9g towards %.9g %.9g %.9g, radius %.9g, %.9g to %.9g degrees",
-                        p[0], p[1], p[2], d[0], d[1], d[2], light->radius, degrees * light->inner_angle,
-                        degrees * light->outer_angle);
+vsh_light vshi_light_resized(const vsh_light *light, double factor) {
+    vsh_light resized = *light;
+    if (factor != 1.0) {
+        resized.angle = 2.0 * vshi_atan(factor * vshi_tan(0.5 * light->angle));
+        resized.radius = factor * light->radius;
     }
+    return resized;
 }
 
-void vshi_light_text(const vsh_light *light, char *text, size_t size) {
+vshi_light_place vshi_light_in_world(const vsh_light *light) {
+    const vshi_light_type *type = vshi_light_type_of(light->type);
+    vshi_light_place place = {0};
+    if (type != NULL) {
+        type->place(light, &place);
+    }
+    return place;
+}
+
+vshi_light_place vshi_light_moved(const vshi_light_place *place, const double matrix[12], double unit) {
+    vshi_light_place moved = *place;
+    moved.towards = vshi_unit(vshi_transform_vector(matrix, place->towards));
+    moved.centre = vshi_transform_point(matrix, place->centre);
+    moved.radius = place->radius / unit;
+    return moved;
+}
+
+void vsh_light_text(const vsh_light *light, char *text, size_t size) {
     VSHI_NUMBERS;
+    const vshi_light_type *type = vshi_light_type_of(light->type);
     const double *c = light->color;
-    char shape[256], color[80] = "", falloff[48] = "";
-    describe_shape(light, shape, sizeof shape);
+    char shape[256] = "", color[80] = "", falloff[48] = "";
+    if (type != NULL) {
+        type->describe(light, shape, sizeof shape);
+    }
     if (c[0] != 1.0 || c[1] != 1.0 || c[2] != 1.0) {
         snprintf(color, sizeof color, ", color %.9g %.9g %.9g", c[0], c[1], c[2]);
     }
-    if (light->type != VSH_LIGHT_DIRECTIONAL && light->falloff == VSH_FALLOFF_INVERSE_SQUARE) {
+    if (type != NULL && type->falls_off && light->falloff == VSH_FALLOFF_INVERSE_SQUARE) {
         snprintf(falloff, sizeof falloff, ", inverse square");
-    } else if (light->type != VSH_LIGHT_DIRECTIONAL && light->falloff == VSH_FALLOFF_QUADRATIC) {
+    } else if (type != NULL && type->falls_off && light->falloff == VSH_FALLOFF_QUADRATIC) {
         snprintf(falloff, sizeof falloff, ", quadratic to %.9g", light->reach);
     }
     snprintf(text, size, "%s%s%s", shape, color, falloff);

@@ -13,12 +13,14 @@
  * and '-', 1 … 63 of them. */
 bool vshi_light_name_valid(const char *name);
 
-/* Type, place and size in words, colour and falloff where they are not the plain ones: one line, cut to
- * `size` bytes. */
-void vshi_light_text(const vsh_light *light, char *text, size_t size);
-
-/* What reaches a point of the light's colour, but for visibility and cosine: falloff at a distance > 0, and a
+/* What reaches a point of the light's colour, but for visibility and cosine: falloff at a distance, and a
  * spot's edge towards it. `to_light` is unit, to the light's centre. */
 double vshi_light_gain(const vsh_light *light, vshi_vec to_light, double distance);
+
+/* What is left at a distance > 0 by the light's falloff alone. */
+double vshi_light_falloff(const vsh_light *light, double distance);
+
+/* A light that is so many times as large, as a point sees it. */
+vsh_light vshi_light_resized(const vsh_light *light, double factor);
 
 #endif

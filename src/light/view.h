@@ -21,18 +21,11 @@ typedef struct vshi_light_place {
     double radius;    /* and radius; 0 where parallel */
 } vshi_light_place;
 
-/* In world space. For another one: transform towards, centre and radius. */
-static inline vshi_light_place vshi_light_in_world(const vsh_light *light) {
-    if (light->type == VSH_LIGHT_DIRECTIONAL) {
-        const double half = 0.5 * light->angle;
-        return (vshi_light_place){.parallel = true,
-                                  .towards = vshi_unit(vshi_vec_of(light->direction)),
-                                  .half = half,
-                                  .sine = vshi_sin(half),
-                                  .tangent = vshi_tan(half)};
-    }
-    return (vshi_light_place){.centre = vshi_vec_of(light->position), .radius = light->radius};
-}
+/* In world space. */
+vshi_light_place vshi_light_in_world(const vsh_light *light);
+
+/* The same after a transform that turns and scales alike in all directions, by 1 / unit. */
+vshi_light_place vshi_light_moved(const vshi_light_place *place, const double matrix[12], double unit);
 
 /* A light as a point sees it: a cone around an axis. */
 typedef struct vshi_light_view {

@@ -1,26 +1,21 @@
 #include "light/light.h"
+#include "light/types.h"
 #include "scene/parts.h"
 
+#include <vdbshade/flat.h>
+
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-enum {
-    DIRECTIONAL = 1 << VSH_LIGHT_DIRECTIONAL,
-    SPHERE = 1 << VSH_LIGHT_SPHERE,
-    SPOT = 1 << VSH_LIGHT_SPOT,
-};
-
 static const char *type_name(int32_t i) {
-    static const char *const names[] = {[VSH_LIGHT_DIRECTIONAL] = "directional",
-                                        [VSH_LIGHT_SPHERE] = "sphere",
-                                        [VSH_LIGHT_SPOT] = "spot",
-                                        NULL};
-    return names[i];
+    const vshi_light_type *type = vshi_light_type_of(i);
+    return type != NULL ? type->name : NULL;
 }
 
 /* Lights in a plane are discs. */
 static const char *flat_type_name(int32_t i) {
-    return i == VSH_LIGHT_SPHERE ? "disc" : type_name(i);
+    return vsh_flat_light_name(i);
 }
 
 static const char *falloff_name(int32_t i) {
@@ -45,78 +40,91 @@ static vsh_result read_name(vshi_reader *reader, const vshi_value *value, void *
     return VSH_OK;
 }
 
-#define COORDINATES(key, bits, member, dimensions, more)                                                     \
-    {                                                                                                        \
-        .name = key, .kind = VSHI_VECTOR, .variants = bits, .required = bits,                                \
-        .offset = offsetof(vsh_light, member), .count = dimensions, .lowest = -VSHI_LARGEST,                 \
-        .highest = VSHI_LARGEST, .flags = more                                                               \
+static const vshi_key name_key = {.name = "name",
+                                  .kind = VSHI_CUSTOM,
+                                  .required = VSHI_ALL,
+                                  .offset = offsetof(vsh_light, name),
+                                  .read = read_name};
+static const vshi_key color_key = {.name = "color",
+                                   .kind = VSHI_VECTOR,
+                                   .offset = offsetof(vsh_light, color),
+                                   .count = 3,
+                                   .highest = VSHI_LARGEST};
+
+enum { MOST_KEYS = 24 };
+
+/* The keys of lights in space, or in a plane. */
+typedef struct light_keys {
+    vshi_key keys[MOST_KEYS];
+    size_t count;
+} light_keys;
+
+static void add_key(light_keys *all, const vshi_key *key) {
+    if (all->count < MOST_KEYS) {
+        all->keys[all->count++] = *key;
     }
+}
 
-/* What lights in space and in a plane have in common. */
-#define LIGHT_KEYS(dimensions, types)                                                                        \
-    {.name = "name",                                                                                         \
-     .kind = VSHI_CUSTOM,                                                                                    \
-     .required = VSHI_ALL,                                                                                   \
-     .offset = offsetof(vsh_light, name),                                                                    \
-     .read = read_name},                                                                                     \
-        {.name = "type",                                                                                     \
-         .kind = VSHI_NAME,                                                                                  \
-         .required = VSHI_ALL,                                                                               \
-         .offset = offsetof(vsh_light, type),                                                                \
-         .name_of = types},                                                                                  \
-        COORDINATES("direction", DIRECTIONAL | SPOT, direction, dimensions, VSHI_NONZERO),                   \
-        COORDINATES("position", SPHERE | SPOT, position, dimensions, 0),                                     \
-        {.name = "angle_deg",                                                                                \
-         .kind = VSHI_DEGREES,                                                                               \
-         .variants = DIRECTIONAL,                                                                            \
-         .offset = offsetof(vsh_light, angle),                                                               \
-         .highest = 180.0,                                                                                   \
-         .flags = VSHI_BELOW},                                                                               \
-        {.name = "radius",                                                                                   \
-         .kind = VSHI_NUMBER,                                                                                \
-         .variants = SPHERE | SPOT,                                                                          \
-         .offset = offsetof(vsh_light, radius),                                                              \
-         .highest = VSHI_LARGEST},                                                                           \
-        {.name = "inner_deg",                                                                                \
-         .kind = VSHI_DEGREES,                                                                               \
-         .variants = SPOT,                                                                                   \
-         .required = SPOT,                                                                                   \
-         .offset = offsetof(vsh_light, inner_angle),                                                         \
-         .highest = 180.0},                                                                                  \
-        {.name = "outer_deg",                                                                                \
-         .kind = VSHI_DEGREES,                                                                               \
-         .variants = SPOT,                                                                                   \
-         .required = SPOT,                                                                                   \
-         .offset = offsetof(vsh_light, outer_angle),                                                         \
-         .highest = 180.0,                                                                                   \
-         .flags = VSHI_ABOVE},                                                                               \
-        {.name = "reach",                                                                                    \
-         .kind = VSHI_NUMBER,                                                                                \
-         .variants = SPHERE | SPOT,                                                                          \
-         .offset = offsetof(vsh_light, reach),                                                               \
-         .highest = VSHI_LARGEST,                                                                            \
-         .flags = VSHI_ABOVE},                                                                               \
-    {                                                                                                        \
-        .name = "color", .kind = VSHI_VECTOR, .offset = offsetof(vsh_light, color), .count = 3,              \
-        .highest = VSHI_LARGEST                                                                              \
+/* A bound in files, whose numbers are no larger than VSHI_LARGEST and whose angles are degrees. */
+static double bound_of(const vshi_light_member *m, double bound) {
+    const double number = m->kind == VSHI_LIGHT_ANGLE ? bound / VSHI_PI * 180.0 : bound;
+    return fmin(fmax(number, -VSHI_LARGEST), VSHI_LARGEST);
+}
+
+static vshi_key key_of(const vshi_light_member *m, int32_t dimensions) {
+    static const vshi_kind kinds[] = {[VSHI_LIGHT_NUMBER] = VSHI_NUMBER,
+                                      [VSHI_LIGHT_ANGLE] = VSHI_DEGREES,
+                                      [VSHI_LIGHT_VECTOR] = VSHI_VECTOR,
+                                      [VSHI_LIGHT_SWITCH] = VSHI_BOOL};
+    /* what is excluded at infinity is not at the largest number */
+    const bool above = m->above && isfinite(m->lowest), below = m->below && isfinite(m->highest);
+    return (vshi_key){.name = m->key,
+                      .kind = kinds[m->kind],
+                      .variants = m->types,
+                      .required = m->required,
+                      .offset = m->offset,
+                      .lowest = bound_of(m, m->lowest),
+                      .highest = bound_of(m, m->highest),
+                      .flags = (above ? VSHI_ABOVE : 0) | (below ? VSHI_BELOW : 0) |
+                               (m->nonzero ? VSHI_NONZERO : 0),
+                      .count = dimensions};
+}
+
+static void make_keys(bool flat, light_keys *all) {
+    const uint32_t types = flat ? vshi_light_types_flat() : VSHI_ALL, falling = vshi_light_types_falling();
+    all->count = 0;
+    add_key(all, &name_key);
+    add_key(all, &(vshi_key){.name = "type",
+                             .kind = VSHI_NAME,
+                             .required = VSHI_ALL,
+                             .offset = offsetof(vsh_light, type),
+                             .name_of = flat ? flat_type_name : type_name});
+    for (size_t i = 0; i < vshi_light_member_count; ++i) {
+        if ((vshi_light_members[i].types & types) != 0) {
+            const vshi_key key = key_of(&vshi_light_members[i], flat ? 2 : 3);
+            add_key(all, &key);
+        }
     }
+    add_key(all, &(vshi_key){.name = "reach",
+                             .kind = VSHI_NUMBER,
+                             .variants = falling,
+                             .offset = offsetof(vsh_light, reach),
+                             .highest = VSHI_LARGEST,
+                             .flags = VSHI_ABOVE});
+    add_key(all, &color_key);
+    if (flat) {
+        return;
+    }
+    add_key(all, &(vshi_key){.name = "falloff",
+                             .kind = VSHI_NAME,
+                             .variants = falling,
+                             .offset = offsetof(vsh_light, falloff),
+                             .name_of = falloff_name});
+    add_key(all, &(vshi_key){.name = "layers", .kind = VSHI_LATER});
+}
 
-static const vshi_key light_keys[] = {
-    LIGHT_KEYS(3, type_name),
-    {.name = "falloff",
-     .kind = VSHI_NAME,
-     .variants = SPHERE | SPOT,
-     .offset = offsetof(vsh_light, falloff),
-     .name_of = falloff_name},
-    {.name = "layers", .kind = VSHI_LATER},
-};
-static const vshi_table light_table = VSHI_TABLE(light_keys);
-
-static const vshi_key flat_keys[] = {LIGHT_KEYS(2, flat_type_name)};
-static const vshi_table flat_table = VSHI_TABLE(flat_keys);
-
-static vsh_result read_keys(vshi_reader *reader, const vshi_value *value, const vshi_table *table,
-                            vshi_name_fn *types, vsh_light *light) {
+static vsh_result read_keys(vshi_reader *reader, const vshi_value *value, bool flat, vsh_light *light) {
+    vshi_name_fn *types = flat ? flat_type_name : type_name;
     int32_t type = -1;
     vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
     if (result == VSH_OK) {
@@ -130,7 +138,10 @@ static vsh_result read_keys(vshi_reader *reader, const vshi_value *value, const 
     if (type >= 0) {
         snprintf(what, sizeof what, "a %s light", types(type));
     }
-    return vshi_read_object(reader, value, table, type < 0 ? VSHI_ALL : 1U << type, what, light);
+    light_keys keys;
+    make_keys(flat, &keys);
+    const vshi_table table = {keys.keys, keys.count};
+    return vshi_read_object(reader, value, &table, type < 0 ? VSHI_ALL : 1U << type, what, light);
 }
 
 /* What no key alone can tell. */
@@ -151,7 +162,7 @@ static vsh_result check(vshi_reader *reader, const vshi_value *value, const vsh_
 vsh_result vshi_read_light(vshi_reader *reader, const vshi_value *value, void *member) {
     vsh_light *light = member;
     *light = vsh_light_default();
-    const vsh_result result = read_keys(reader, value, &light_table, type_name, light);
+    const vsh_result result = read_keys(reader, value, false, light);
     if (result != VSH_OK) {
         return result;
     }
@@ -170,7 +181,7 @@ vsh_result vshi_read_flat_light(vshi_reader *reader, const vshi_value *value, vo
     vsh_light *light = member;
     *light = vsh_light_default();
     light->direction[1] = 0.0; /* so that what is read is all there is */
-    const vsh_result result = read_keys(reader, value, &flat_table, flat_type_name, light);
+    const vsh_result result = read_keys(reader, value, true, light);
     if (result != VSH_OK) {
         return result;
     }

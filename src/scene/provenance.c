@@ -87,7 +87,7 @@ static vsh_result add_scene(vsh_provenance *p, const vsh_scene *scene, vsh_error
     for (size_t i = 0; i < scene->light_count && result == VSH_OK; ++i) {
         char name[NAME_SIZE], text[LINE_SIZE];
         snprintf(name, sizeof name, "vdbshade_light_%.64s", scene->lights[i].name);
-        vshi_light_text(&scene->lights[i], text, sizeof text);
+        vsh_light_text(&scene->lights[i], text, sizeof text);
         result = add(p, name, text, error);
     }
     return result;

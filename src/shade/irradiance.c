@@ -62,9 +62,7 @@ void vshi_shade_irradiance(const vsh_points *points, const float *shading_normal
         tint_one(tint, (double)visibility[i], tinted);
         vshi_vec to;
         const double distance = vshi_light_towards(&place, vshi_vec_of(points->positions + 3 * i), &to);
-        /* not nearer than the light's own surface, so that the square stays finite */
-        const double near = fmax(place.radius, 1e-30);
-        const double gain = vshi_light_gain(light, to, fmax(distance, near)) *
+        const double gain = vshi_light_gain(light, to, distance) *
                             fmax(0.0, vshi_dot(vshi_unit(vshi_vec_off(normals + 3 * i)), to));
         if (gain * tinted[0] > 0.0) {
             for (size_t c = 0; c < 3; ++c) {

@@ -3,8 +3,8 @@
 #include "analytic/heights.h"
 #include "analytic/relief.h"
 #include "analytic/spheres.h"
-#include "base/elementary.h"
 #include "base/memory.h"
+#include "light/light.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -90,16 +90,6 @@ static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
     return casts;
 }
 
-/* A light whose size is `softness` times as large. */
-static vsh_light soften(const vsh_light *light, double softness) {
-    vsh_light soft = *light;
-    if (softness != 1.0) {
-        soft.angle = 2.0 * vshi_atan(softness * vshi_tan(0.5 * light->angle));
-        soft.radius = softness * light->radius;
-    }
-    return soft;
-}
-
 static vsh_result prepare(prepared *item, size_t index, const vsh_light *light, vshi_ao_cones *cones,
                           vsh_error *error) {
     const vsh_layer *layer = &item->layer;
@@ -113,7 +103,7 @@ static vsh_result prepare(prepared *item, size_t index, const vsh_light *light, 
     vsh_error why;
     vsh_result result = VSH_OK;
     if (light != NULL) {
-        item->light = soften(light, layer->softness);
+        item->light = vshi_light_resized(light, layer->softness);
     }
     if (layer->field == NULL) { /* needs no preparing */
         result = light != NULL ? vsh_light_check(&item->light, &why) : VSH_OK;

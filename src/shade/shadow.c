@@ -167,10 +167,8 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
         (vshi_shadow_task){.field = field, .light = light, .options = options, .lowest = inner ? 1.0 : 0.0};
     task->leaky = vshi_shadow_traces(options) &&
                   (field->shell_thickness > 0.0 || vshi_triangles_have_holes(options->triangles));
-    task->world = task->place = vshi_light_in_world(light);
-    task->place.towards = vshi_direction_to_field(field, task->world.towards);
-    task->place.centre = vshi_to_field(field, light->position);
-    task->place.radius = task->world.radius / field->voxel_size;
+    task->world = vshi_light_in_world(light);
+    task->place = vshi_light_moved(&task->world, field->to_field, field->voxel_size);
     for (size_t i = 0; i < sizeof light->name && light->name[i] != '\0'; ++i) {
         task->purpose = 31u * task->purpose + (unsigned char)light->name[i];
     }

@@ -1,0 +1,155 @@
+#include "light/types.h"
+
+#include "base/error.h"
+#include "light/light.h"
+
+#include <stddef.h>
+#include <stdio.h>
+
+#define PI 3.14159265358979323846
+
+static const double DEGREES = 180.0 / PI;
+
+/* --- suns */
+
+static void place_sun(const vsh_light *light, vshi_light_place *place) {
+    const double half = 0.5 * light->angle;
+    *place = (vshi_light_place){.parallel = true,
+                                .towards = vshi_unit(vshi_vec_of(light->direction)),
+                                .half = half,
+                                .sine = vshi_sin(half),
+                                .tangent = vshi_tan(half)};
+}
+
+static double sun_gain(const vsh_light *light, vshi_vec to_light, double distance) {
+    (void)light, (void)to_light, (void)distance;
+    return 1.0;
+}
+
+static int describe_sun(const vsh_light *light, char *text, size_t size) {
+    const double *d = light->direction;
+    return snprintf(text, size, "directional towards %.9g %.9g %.9g, %.9g degrees across", d[0], d[1], d[2],
+                    DEGREES * light->angle);
+}
+
+/* --- lamps */
+
+static void place_lamp(const vsh_light *light, vshi_light_place *place) {
+    *place = (vshi_light_place){.centre = vshi_vec_of(light->position), .radius = light->radius};
+}
+
+static double lamp_gain(const vsh_light *light, vshi_vec to_light, double distance) {
+    (void)to_light;
+    /* not nearer than the lamp's own surface, so that the square stays finite */
+    return vshi_light_falloff(light, fmax(distance, fmax(light->radius, 1e-30)));
+}
+
+static int describe_lamp(const vsh_light *light, char *text, size_t size) {
+    const double *p = light->position;
+    return snprintf(text, size, "sphere at %.9g %.9g %.9g, radius %.9g", p[0], p[1], p[2], light->radius);
+}
+
+/* --- spots: lamps that shine one way */
+
+static double smoothstep(double from, double to, double x) {
+    const double t = fmin(1.0, fmax(0.0, (x - from) / (to - from)));
+    return t * t * (3.0 - 2.0 * t);
+}
+
+/* Smooth edge between the cosines of the outer and the inner angle. */
+static double spot_edge(const vsh_light *light, vshi_vec to_light) {
+    const double cosine = -vshi_dot(vshi_unit(vshi_vec_of(light->direction)), to_light);
+    const double outer = vshi_cos(light->outer_angle), inner = vshi_cos(light->inner_angle);
+    return inner > outer ? smoothstep(outer, inner, cosine) : (cosine >= outer ? 1.0 : 0.0);
+}
+
+static double spot_gain(const vsh_light *light, vshi_vec to_light, double distance) {
+    return lamp_gain(light, to_light, distance) * spot_edge(light, to_light);
+}
+
+static int describe_spot(const vsh_light *light, char *text, size_t size) {
+    const double *d = light->direction, *p = light->position;
+    return snprintf(text, size,
+                    "spot at %.9g %.9g %.9g towards %.9g %.9g %.9g, radius %.9g, %.9g to %.9g degrees", p[0],
+                    p[1], p[2], d[0], d[1], d[2], light->radius, DEGREES * light->inner_angle,
+                    DEGREES * light->outer_angle);
+}
+
+static vsh_result check_spot(const vsh_light *light, vsh_error *error) {
+    if (light->inner_angle >= 0.0 && light->inner_angle <= light->outer_angle) {
+        return VSH_OK;
+    }
+    return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                     "light '%s': inner_angle %.9g is out of range 0 … outer_angle %.9g", light->name,
+                     light->inner_angle, light->outer_angle);
+}
+
+/* --- the tables */
+
+static const vshi_light_type types[] = {
+    [VSH_LIGHT_DIRECTIONAL] = {.name = "directional",
+                               .flat_name = "directional",
+                               .place = place_sun,
+                               .gain = sun_gain,
+                               .describe = describe_sun},
+    [VSH_LIGHT_SPHERE] = {.name = "sphere",
+                          .flat_name = "disc",
+                          .falls_off = true,
+                          .place = place_lamp,
+                          .gain = lamp_gain,
+                          .describe = describe_lamp},
+    [VSH_LIGHT_SPOT] = {.name = "spot",
+                        .flat_name = "spot",
+                        .falls_off = true,
+                        .place = place_lamp,
+                        .gain = spot_gain,
+                        .describe = describe_spot,
+                        .check = check_spot},
+};
+
+enum {
+    TYPES = sizeof types / sizeof types[0],
+    DIRECTIONAL = 1 << VSH_LIGHT_DIRECTIONAL,
+    SPHERE = 1 << VSH_LIGHT_SPHERE,
+    SPOT = 1 << VSH_LIGHT_SPOT,
+};
+
+const vshi_light_type *vshi_light_type_of(int32_t type) {
+    return type >= 0 && type < TYPES ? &types[type] : NULL;
+}
+
+uint32_t vshi_light_types_falling(void) {
+    uint32_t bits = 0;
+    for (int32_t i = 0; i < TYPES; ++i) {
+        bits |= types[i].falls_off ? 1U << i : 0;
+    }
+    return bits;
+}
+
+uint32_t vshi_light_types_flat(void) {
+    uint32_t bits = 0;
+    for (int32_t i = 0; i < TYPES; ++i) {
+        bits |= types[i].flat_name != NULL ? 1U << i : 0;
+    }
+    return bits;
+}
+
+#define MEMBER(member) .name = #member, .offset = offsetof(vsh_light, member)
+
+/* In the order in which they are checked. */
+const vshi_light_member vshi_light_members[] = {
+    {MEMBER(direction), .key = "direction", .kind = VSHI_LIGHT_VECTOR, .types = DIRECTIONAL | SPOT,
+     .required = DIRECTIONAL | SPOT, .lowest = -INFINITY, .highest = INFINITY, .above = true, .below = true,
+     .nonzero = true},
+    {MEMBER(position), .key = "position", .kind = VSHI_LIGHT_VECTOR, .types = SPHERE | SPOT,
+     .required = SPHERE | SPOT, .lowest = -INFINITY, .highest = INFINITY, .above = true, .below = true},
+    {MEMBER(angle), .key = "angle_deg", .kind = VSHI_LIGHT_ANGLE, .types = DIRECTIONAL, .highest = PI,
+     .below = true},
+    {MEMBER(radius), .key = "radius", .kind = VSHI_LIGHT_NUMBER, .types = SPHERE | SPOT, .highest = INFINITY,
+     .below = true},
+    {MEMBER(inner_angle), .key = "inner_deg", .kind = VSHI_LIGHT_ANGLE, .types = SPOT, .required = SPOT,
+     .highest = PI, .apart = true},
+    {MEMBER(outer_angle), .key = "outer_deg", .kind = VSHI_LIGHT_ANGLE, .types = SPOT, .required = SPOT,
+     .highest = PI, .above = true},
+};
+const size_t vshi_light_member_count = sizeof vshi_light_members / sizeof vshi_light_members[0];
