@@ -41,6 +41,7 @@ typedef struct vsh_layer {
     int32_t ao;                 /* nonzero: part of ambient occlusion */
     const vsh_heights *heights; /* a heightfield as it is */
     const vsh_spheres *spheres; /* spheres as they are */
+    const char *name; /* that of a scene's layer; NULL: none. For the caller: nothing here reads it */
 } vsh_layer;
 
 static inline vsh_layer vsh_layer_default(void) {
@@ -55,6 +56,7 @@ static inline vsh_layer vsh_layer_default(void) {
                        NULL,
                        0,
                        1,
+                       NULL,
                        NULL,
                        NULL};
     return layer;

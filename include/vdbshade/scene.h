@@ -5,6 +5,7 @@
 #include "bake.h"
 #include "grid.h"
 #include "heights.h"
+#include "occluders.h"
 #include "outline.h"
 #include "spheres.h"
 
@@ -209,6 +210,55 @@ VSH_API int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_laye
 /* 1 where shadows of the casters in `layer`, or (NULL) in none, or AO are baked by a method that knows them
  * by their voxels alone; 0 where rays against triangles decide, and voxels only save rays. */
 VSH_API int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer);
+
+/* Which of a scene's casters' parts are to be made, and for what. */
+typedef struct vsh_scene_occluders_options {
+    size_t struct_size;
+    const double *receivers_min; /* [3], both: world box of the receivers that are shaded: the field reaches
+                                    as far as the scene's lights and AO need there (vsh_scene_reach()). NULL:
+                                    they are not known beforehand */
+    const double *receivers_max;
+    double
+        within; /* without a box: how far points may be from the box around the casters, world units; 0: four
+                 * of its diagonals. It does not depend on the points, so that neither do their bits */
+    const vsh_grid *grid; /* the casters in no layer as a level set that is there already; NULL: it is made */
+    int32_t triangles;    /* nonzero: keep those that the scene's methods trace: where one is exact, or auto
+                             comes to it */
+    int32_t truth;        /* nonzero: keep what errors are measured against, where one of the scene's methods
+                             keeps an error, nothing is in layers and rays can meet all casters */
+    int32_t silent_voxels; /* nonzero: nothing is warned of what voxels make of the casters, or lose of them:
+                              a trial at voxels other than those that are meant */
+} vsh_scene_occluders_options;
+
+static inline vsh_scene_occluders_options vsh_scene_occluders_options_default(void) {
+    vsh_scene_occluders_options options = {
+        sizeof(vsh_scene_occluders_options), NULL, NULL, 0.0, NULL, 1, 0, 0};
+    return options;
+}
+VSH_API void vsh_scene_occluders_options_init(vsh_scene_occluders_options *options, size_t size);
+
+/* What casts in a scene: a field of the casters in no layer and one of each layer's, triangles where methods
+ * trace them, heightfields and spheres that cast as they are. Warns (run->warning) of casters that voxels
+ * lose where they decide, and where exact would be meant but the library has no Embree. Scene and assets must
+ * outlive the handle. Free it with vsh_occluders_free(). Errors, those of a layer's casters with its name:
+ * - VSH_ERROR_ARGUMENT: scene, assets or occluders NULL, a box of which a half is NULL, options, run;
+ * - VSH_ERROR_INPUT: no casters, more layers and casters that are not voxelised than VSH_MAX_LAYERS; as
+ *   vsh_scene_casters(), vsh_field_create() and vsh_triangles_create();
+ * - VSH_ERROR_LIMIT: as these;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,
+                                       const vsh_scene_occluders_options *options, const vsh_run *run,
+                                       vsh_occluders **occluders, vsh_error *error);
+
+/* A scene's casters as rays meet them, whatever their layers: the triangles of meshes and heightfields, and
+ * procedural ones as they are, for vsh_trace_shadow() and vsh_trace_ao(). Each is NULL where there are none,
+ * the triangles also without Embree. Free them with vsh_triangles_free() and vsh_solids_free(). Errors:
+ * VSH_ERROR_ARGUMENT (a pointer NULL, run); as vsh_triangles_create() and vsh_solids_create(). */
+VSH_API vsh_result vsh_scene_truth(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                                   vsh_triangles **triangles, vsh_solids **solids, vsh_error *error);
+
+/* 1 where these are all of the scene's casters: meshes and heightfields, with Embree, and procedural ones. */
+VSH_API int32_t vsh_scene_has_truth(const vsh_scene *scene);
 
 /* Reach, world units > 0, that a field of `grid` needs for the scene's lights and AO at receivers within a
  * world box: see vsh_field_options. Directional lights count up to a half angle of 60°. */

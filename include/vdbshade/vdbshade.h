@@ -49,6 +49,7 @@
 #include "layer.h"
 #include "light.h"
 #include "mesh.h"
+#include "occluders.h"
 #include "outline.h"
 #include "provenance.h"
 #include "query.h"

@@ -10,7 +10,7 @@ vsh_result vshi_lift_layers(const vsh_shade_options *shade, const vsh_field *fie
     *ao = false;
     for (size_t i = 0; result == VSH_OK && i < shade->layer_count; ++i) {
         vsh_layer *layer = &(*layers)[i];
-        result = vshi_layer_resolve(shade, i, layer, error);
+        result = vshi_layer_resolve(shade->layers, i, layer, error);
         if (result == VSH_OK) {
             *ao = *ao || layer->ao != 0;
         }

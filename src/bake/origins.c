@@ -282,7 +282,7 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
     look_in(&l, field, options->triangles, options->method, options->ao_method, what);
     for (size_t i = 0; i < options->layer_count; ++i) {
         vsh_layer layer;
-        const vsh_result result = vshi_layer_resolve(options, i, &layer, error);
+        const vsh_result result = vshi_layer_resolve(options->layers, i, &layer, error);
         if (result != VSH_OK) {
             return result;
         }

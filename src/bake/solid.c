@@ -12,7 +12,7 @@ vsh_result vshi_solid_of(const vsh_field *field, const vsh_shade_options *option
     vsh_result result = VSH_OK;
     for (size_t i = 0; i < options->layer_count && result == VSH_OK; ++i) {
         vsh_layer layer;
-        result = vshi_layer_resolve(options, i, &layer, error);
+        result = vshi_layer_resolve(options->layers, i, &layer, error);
         if (result != VSH_OK) {
             break;
         }

@@ -98,7 +98,7 @@ static vsh_result begin_volume(vshi_volume_bake *bake, const vsh_light *lights, 
     double layers = 0.0;
     for (size_t i = 0; i < bake->options.shade.layer_count; ++i) {
         vsh_layer layer;
-        if (vshi_layer_resolve(&bake->options.shade, i, &layer, NULL) == VSH_OK) {
+        if (vshi_layer_resolve(bake->options.shade.layers, i, &layer, NULL) == VSH_OK) {
             layers += vshi_layer_bytes(&layer);
         }
     }

@@ -2,8 +2,8 @@
 #include "bake_expect.h"
 #include "bake_forecast.h"
 #include "bake_options.h"
+#include "box.h"
 #include "clock.h"
-#include "field.h"
 #include "invalid.h"
 #include "meshes.h"
 #include "message.h"
@@ -27,9 +27,7 @@ typedef struct bake_work {
     vsh_run run;
     vsh_assets *assets;
     cli_targets targets;
-    vsh_triangles *triangles; /* of exact methods */
-    cli_truth truth;
-    cli_field made;
+    vsh_occluders *occluders;
     /* of the only receiver; several are rasterised again, so as not to hold all at once */
     vsh_charts *charts;
     vsh_texels *kept; /* NULL where it is baked in bands */
@@ -153,38 +151,31 @@ static int rasterise(bake_work *work) {
     return code;
 }
 
-static int make_field(bake_work *work) {
-    const cli_field *made = &work->made;
-    const int code = cli_field_make(work->scene, work->assets, &work->receivers, &work->run, &work->made);
-    if (code == CLI_OK) {
-        work->scene->shade.layers = made->layers;
-        work->scene->shade.layer_count = made->layer_count;
-        work->stats.grid = made->grid;
-        work->stats.field = made->info;
-        work->stats.seconds[CLI_STAGE_VOXELIZE] += made->voxelize_s;
-        work->stats.seconds[CLI_STAGE_FIELD] += made->field_s;
+/* Exact methods trace the casters' own triangles; values are held against the casters themselves. */
+static int make_occluders(bake_work *work) {
+    vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
+    options.receivers_min = work->receivers.min;
+    options.receivers_max = work->receivers.max;
+    options.truth = 1;
+    vsh_error error;
+    if (vsh_scene_occluders(work->scene, work->assets, &options, &work->run, &work->occluders, &error) !=
+        VSH_OK) {
+        return cli_fail_of(NULL, &error);
     }
-    return code;
-}
-
-/* Exact methods trace the casters' own triangles. */
-static int make_triangles(bake_work *work) {
-    const double start = cli_seconds();
-    int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
-    work->scene->shade.triangles = work->triangles;
-    cli_stats_methods(&work->stats, work->scene);
-    code = code == CLI_OK
-               ? cli_truth_make(work->scene, work->assets, work->triangles, &work->run, &work->truth)
-               : code;
-    cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
-    return code == CLI_OK ? cli_stats_errors(&work->stats, work->scene) : code;
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(work->occluders, &parts);
+    work->scene->shade.triangles = parts.triangles;
+    work->scene->shade.layers = parts.layers;
+    work->scene->shade.layer_count = parts.layer_count;
+    cli_stats_occluders(&work->stats, work->scene, work->occluders);
+    return cli_stats_errors(&work->stats, work->scene);
 }
 
 static int find_origin(bake_work *work) {
     const double start = cli_seconds();
     vsh_scene given = *work->given;
-    given.shade.triangles = work->triangles; /* they tell what auto comes to */
-    const int code = cli_origin_make(&given, &work->settings->input, 1, work->made.grid.voxel_size,
+    given.shade.triangles = work->scene->shade.triangles; /* they tell what auto comes to */
+    const int code = cli_origin_make(&given, &work->settings->input, 1, work->stats.casters.voxel_size,
                                      &work->run, &work->origin);
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
     return code;
@@ -214,7 +205,7 @@ static void say_receiver(const bake_work *work, size_t index, const cli_bands *b
 
 static int bake_receiver(bake_work *work, size_t index) {
     const cli_receiver_job job = receiver_job(work, index);
-    cli_receiver_input input = {.field = work->made.field, .truth = work->truth};
+    cli_receiver_input input = {.occluders = work->occluders};
     int code = CLI_OK;
     if (work->charts == NULL) {
         const double start = cli_seconds();
@@ -223,9 +214,7 @@ static int bake_receiver(bake_work *work, size_t index) {
     }
     input.charts = work->charts;
     if (code == CLI_OK) {
-        const vsh_triangles *triangles = work->truth.own != NULL ? work->truth.own : work->triangles;
-        const uint64_t held =
-            work->stats.field.bytes + (triangles != NULL ? vsh_triangles_bytes(triangles) : 0);
+        const uint64_t held = work->stats.casters.field_bytes + work->stats.casters.triangles_bytes;
         code = cli_receiver_plan(&job, work->charts, held, &input.bands);
     }
     if (code == CLI_OK && input.bands.count > 1) {
@@ -281,8 +270,7 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
     }
     code = code == CLI_OK ? rasterise(&work) : code;
     cli_warnings_tell(); /* what is wrong with the files, before the long work */
-    code = code == CLI_OK ? make_triangles(&work) : code;
-    code = code == CLI_OK ? make_field(&work) : code;
+    code = code == CLI_OK ? make_occluders(&work) : code;
     cli_warnings_tell();
     code = code == CLI_OK ? find_origin(&work) : code;
     code = code == CLI_OK ? bake_receivers(&work) : code;
@@ -300,10 +288,8 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
     vsh_texels_free(work.kept);
     vsh_charts_free(work.charts);
     cli_stats_end(&work.stats);
-    cli_truth_free(&work.truth);
-    vsh_triangles_free(work.triangles);
     cli_origin_free(&work.origin);
-    cli_field_free(&work.made);
+    vsh_occluders_free(work.occluders);
     cli_targets_free(&work.targets);
     vsh_assets_free(work.assets);
     return code;

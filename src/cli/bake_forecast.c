@@ -1,7 +1,7 @@
 #include "bake_forecast.h"
 
+#include "box.h"
 #include "clock.h"
-#include "field.h"
 #include "message.h"
 #include "planes.h"
 #include "receiver.h"
@@ -72,8 +72,7 @@ static int count_texels(forecast *f) {
 typedef struct trial {
     double finer;    /* the scene's resolution over the trial's */
     double sample_s; /* of one texel's sample, all lights and AO */
-    cli_field made;  /* its fields are freed when the trial is over */
-    bool traced;     /* triangles were there to trace */
+    vsh_occluders_info made;
 } trial;
 
 static int make_texels(const forecast *f, vsh_texels **texels) {
@@ -91,7 +90,7 @@ static int make_texels(const forecast *f, vsh_texels **texels) {
                : cli_fail_of(NULL, &error);
 }
 
-static int bake_part(const forecast *f, const vsh_field *field, const vsh_shade_options *shade, trial *t) {
+static int bake_part(const forecast *f, const vsh_occluders *occluders, trial *t) {
     vsh_texels *texels = NULL;
     int code = make_texels(f, &texels);
     if (code != CLI_OK) {
@@ -107,7 +106,13 @@ static int bake_part(const forecast *f, const vsh_field *field, const vsh_shade_
     if (code == CLI_OK) {
         const double start = cli_seconds();
         vsh_error error;
-        if (vsh_bake_lightmap(field, texels, f->scene->lights, f->scene->light_count, shade, f->run,
+        vsh_occluder_parts parts;
+        vsh_occluders_get_parts(occluders, &parts);
+        vsh_shade_options shade = f->scene->shade;
+        shade.triangles = parts.triangles;
+        shade.layers = parts.layers;
+        shade.layer_count = parts.layer_count;
+        if (vsh_bake_lightmap(parts.field, texels, f->scene->lights, f->scene->light_count, &shade, f->run,
                               &planes.lightmap, NULL, &error) != VSH_OK) {
             code = cli_fail_of(NULL, &error);
         }
@@ -128,22 +133,19 @@ static int try_small(const forecast *f, trial *t) {
     vsh_scene small = *f->scene;
     small.grid.voxel_size = 0.0;
     small.grid.resolution = TRIAL_RESOLUTION;
-    vsh_triangles *triangles = NULL;
-    vsh_run quiet = *f->run; /* what coarse voxels lose is not lost by the scene's */
-    quiet.warning = NULL;
-    int code = cli_field_make(&small, f->assets, &f->receivers, &quiet, &t->made);
-    code = code == CLI_OK ? cli_triangles_make(f->scene, f->assets, f->run, &triangles) : code;
-    if (code == CLI_OK) {
-        vsh_shade_options shade = f->scene->shade;
-        shade.triangles = triangles;
-        t->traced = triangles != NULL;
-        shade.layers = t->made.layers;
-        shade.layer_count = t->made.layer_count;
-        t->finer = finer(f->scene, t->made.grid.voxel_size);
-        code = bake_part(f, t->made.field, &shade, t);
+    vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
+    options.receivers_min = f->receivers.min;
+    options.receivers_max = f->receivers.max;
+    options.silent_voxels = 1; /* what coarse voxels lose is not lost by the scene's */
+    vsh_occluders *occluders = NULL;
+    vsh_error error;
+    if (vsh_scene_occluders(&small, f->assets, &options, f->run, &occluders, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
     }
-    vsh_triangles_free(triangles);
-    cli_field_free(&t->made);
+    vsh_occluders_get_info(occluders, &t->made);
+    t->finer = finer(f->scene, t->made.voxel_size);
+    const int code = bake_part(f, occluders, t);
+    vsh_occluders_free(occluders);
     return code;
 }
 
@@ -173,11 +175,8 @@ static int plan_bands(const forecast *f, double field_bytes, bool tell, uint64_t
 
 static void tell_methods(const forecast *f, const trial *t) {
     cli_stats stats = {.of = CLI_STATS_TEXELS};
-    vsh_scene scene = *f->scene;
     char text[128];
-    scene.shade.method = vsh_shadow_method_resolve(scene.shade.method, t->traced);
-    scene.shade.ao_method = vsh_ao_method_resolve(scene.shade.ao_method, t->traced);
-    cli_stats_methods(&stats, &scene);
+    cli_stats_methods(&stats, f->scene, t->made.has_triangles);
     printf("methods       %s\n", cli_stats_methods_text(&stats, text, sizeof text));
 }
 
@@ -186,10 +185,10 @@ static int predict(const forecast *f, const trial *t) {
     const double voxelize = t->made.voxelize_s * more, field = t->made.field_s * more;
     const double bake =
         f->seconds + (double)f->samples * t->sample_s * pow(MORE_PER_DOUBLING, fmax(0.0, log2(t->finer)));
-    const double grid_bytes = (double)t->made.grid.bytes * more,
-                 field_bytes = (double)t->made.info.bytes * more;
+    const double grid_bytes = (double)t->made.grid_bytes * more,
+                 field_bytes = (double)t->made.field_bytes * more;
     const double base =
-        fmax(0.0, resident_bytes() - MAKING * (double)t->made.grid.bytes); /* program and assets */
+        fmax(0.0, resident_bytes() - MAKING * (double)t->made.grid_bytes); /* program and assets */
     uint64_t largest = 0; /* of a receiver: field, texels, planes and what the bake takes */
     int code = plan_bands(f, field_bytes, false, &largest);
     if (code != CLI_OK) {
@@ -202,8 +201,7 @@ static int predict(const forecast *f, const trial *t) {
     const double peak = base + fmax(fmax(MAKING * grid_bytes, grid_bytes + field_bytes), (double)largest);
     char grid_text[32], field_text[32], peak_text[32];
     printf("voxels        about %.3g of %.4g, %.4g along the longest side\n",
-           (double)t->made.grid.active_voxels * more, t->made.grid.voxel_size / t->finer,
-           TRIAL_RESOLUTION * t->finer);
+           (double)t->made.active_voxels * more, t->made.voxel_size / t->finer, TRIAL_RESOLUTION * t->finer);
     printf("memory        about %s at most: level set %s, field %s\n",
            cli_bytes_text((uint64_t)peak, peak_text, sizeof peak_text),
            cli_bytes_text((uint64_t)grid_bytes, grid_text, sizeof grid_text),

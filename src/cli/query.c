@@ -1,7 +1,6 @@
 /* vdbshade query: shadow, AO and distance at points of a file or a pipe. */
 #include "query.h"
 #include "clock.h"
-#include "field.h"
 #include "meshes.h"
 #include "message.h"
 #include "paths.h"
@@ -176,8 +175,7 @@ typedef struct query_work {
     vsh_scene *scene;
     vsh_run run;
     vsh_assets *assets;
-    vsh_triangles *triangles;
-    cli_field made;
+    vsh_occluders *occluders;
     vsh_query *query;
     cli_points_reader reader;
     query_answers answers;
@@ -221,31 +219,26 @@ static int load(query_work *work) {
 }
 
 static int make_query(query_work *work) {
-    const double start = cli_seconds();
-    int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
-    work->scene->shade.triangles = work->triangles;
-    cli_stats_methods(&work->stats, work->scene);
-    cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
-    if (code == CLI_OK) {
-        code =
-            cli_field_make_around(work->scene, work->assets, work->settings->within, &work->run, &work->made);
+    vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
+    what.within = work->settings->within;
+    vsh_error error;
+    if (vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error) !=
+        VSH_OK) {
+        return cli_fail_of(NULL, &error);
     }
-    if (code != CLI_OK) {
-        return code;
-    }
-    work->stats.grid = work->made.grid;
-    work->stats.field = work->made.info;
-    work->stats.seconds[CLI_STAGE_VOXELIZE] += work->made.voxelize_s;
-    work->stats.seconds[CLI_STAGE_FIELD] += work->made.field_s;
+    cli_stats_occluders(&work->stats, work->scene, work->occluders);
     vsh_shade_options shade = work->scene->shade;
-    shade.layers = work->made.layers;
-    shade.layer_count = work->made.layer_count;
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(work->occluders, &parts);
+    work->scene->shade.triangles = parts.triangles; /* they tell what auto comes to */
+    shade.triangles = parts.triangles;
+    shade.layers = parts.layers;
+    shade.layer_count = parts.layer_count;
     if (!work->scene->ao) {
         shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
     }
-    vsh_error error;
-    const vsh_result result = vsh_query_create(work->made.field, work->scene->lights,
-                                               work->scene->light_count, &shade, &work->query, &error);
+    const vsh_result result = vsh_query_create(parts.field, work->scene->lights, work->scene->light_count,
+                                               &shade, &work->query, &error);
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
@@ -275,8 +268,7 @@ static int run_query(const query_settings *s, vsh_scene *scene) {
     code = code == CLI_OK ? load(&work) : code;
     code = code == CLI_OK ? make_query(&work) : code;
     if (code == CLI_OK) {
-        const uint64_t held =
-            work.made.info.bytes + (work.triangles != NULL ? vsh_triangles_bytes(work.triangles) : 0);
+        const uint64_t held = work.stats.casters.field_bytes + work.stats.casters.triangles_bytes;
         code = query_stream(s, work.query, &work.answers, held, &work.run, &work.reader, &work.stats);
     }
     code = code == CLI_OK ? cli_stats_finish(&work.stats, &work.run, s->bake.stats) : code;
@@ -285,8 +277,7 @@ static int run_query(const query_settings *s, vsh_scene *scene) {
     }
     query_answers_free(&work.answers);
     vsh_query_free(work.query);
-    cli_field_free(&work.made);
-    vsh_triangles_free(work.triangles);
+    vsh_occluders_free(work.occluders);
     vsh_assets_free(work.assets);
     cli_points_close(&work.reader);
     return code;

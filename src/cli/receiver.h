@@ -5,7 +5,6 @@
 #include "bands.h"
 #include "origin.h"
 #include "stats.h"
-#include "truth.h"
 
 #include <stdbool.h>
 
@@ -42,11 +41,10 @@ int cli_receiver_texels(const vsh_charts *charts, int32_t first, int32_t rows, c
 
 /* What a receiver is baked from. */
 typedef struct cli_receiver_input {
-    const vsh_field *field;
+    const vsh_occluders *occluders;
     const vsh_charts *charts;
     const vsh_texels *texels; /* all, where they are there already; or NULL */
     cli_bands bands;
-    cli_truth truth; /* what its values are held against; it owns nothing */
 } cli_receiver_input;
 
 /* Shades the texels and writes the file. */

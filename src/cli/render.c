@@ -23,8 +23,8 @@ typedef struct render_work {
     vsh_scene *scene;
     vsh_run run;
     vsh_assets *assets;
-    vsh_triangles *triangles;
-    cli_field made;
+    vsh_occluders *occluders;
+    const vsh_field *field;
     render_surfaces surfaces;
     render_lightmaps lightmaps;
     vsh_lit_meshes *lit; /* of lightmaps, and of surfaces */
@@ -45,22 +45,16 @@ static int load(render_work *work) {
     return code;
 }
 
-static int make_fields(render_work *work) {
-    double start = cli_seconds();
-    int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
-    work->scene->shade.triangles = work->triangles;
-    cli_stats_methods(&work->stats, work->scene);
-    cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
-    code = code == CLI_OK ? cli_field_make_around(work->scene, work->assets, 0.0, &work->run, &work->made)
-                          : code;
-    work->stats.grid = work->made.grid;
-    work->stats.field = work->made.info;
-    work->stats.seconds[CLI_STAGE_VOXELIZE] += work->made.voxelize_s;
-    work->stats.seconds[CLI_STAGE_FIELD] += work->made.field_s;
-    start = cli_seconds();
-    code = code == CLI_OK
-               ? render_surfaces_make(work->scene, work->assets, &work->made, &work->run, &work->surfaces)
-               : code;
+static int make_occluders(render_work *work) {
+    vsh_error error;
+    if (vsh_scene_occluders(work->scene, work->assets, NULL, &work->run, &work->occluders, &error) !=
+        VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    cli_stats_occluders(&work->stats, work->scene, work->occluders);
+    const double start = cli_seconds();
+    const int code =
+        render_surfaces_make(work->scene, work->assets, work->occluders, &work->run, &work->surfaces);
     cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
     return code;
 }
@@ -100,9 +94,13 @@ static int set_options(render_work *work) {
     o->shafts = s->shafts;
     o->shaft_steps = s->shaft_steps;
     o->shade = work->scene->shade;
-    o->shade.triangles = work->triangles;
-    o->shade.layers = work->made.layers;
-    o->shade.layer_count = work->made.layer_count;
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(work->occluders, &parts);
+    work->scene->shade.triangles = parts.triangles; /* they tell what auto comes to */
+    work->field = parts.field;
+    o->shade.triangles = parts.triangles;
+    o->shade.layers = parts.layers;
+    o->shade.layer_count = parts.layer_count;
     if (!work->scene->ao) {
         o->shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
     }
@@ -126,7 +124,7 @@ static int render_frame(render_work *work, int32_t index, const vsh_run *run) {
         vsh_camera_orbit(&o.camera, 360.0 * degree * index / s->frames);
     }
     const vsh_result result =
-        vsh_render(work->surfaces.surfaces, work->surfaces.count, work->made.field, work->scene->lights,
+        vsh_render(work->surfaces.surfaces, work->surfaces.count, work->field, work->scene->lights,
                    work->scene->light_count, &o, run, &work->picture.picture, &work->stats.shade, &error);
     start = cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
     if (result != VSH_OK) {
@@ -170,8 +168,8 @@ static int find_origin(render_work *work) {
     const render_settings *s = work->settings;
     const char *files[1 + RENDER_MOST_LIGHTMAPS] = {s->bake.input};
     memcpy(files + 1, s->lightmaps, s->lightmap_count * sizeof *files);
-    return cli_origin_make(work->scene, files, 1 + s->lightmap_count, work->made.grid.voxel_size, &work->run,
-                           &work->origin);
+    return cli_origin_make(work->scene, files, 1 + s->lightmap_count, work->stats.casters.voxel_size,
+                           &work->run, &work->origin);
 }
 
 static void say_results(const render_work *work) {
@@ -193,7 +191,7 @@ static int run_render(const render_settings *s, vsh_scene *scene) {
     work.run.memory_held += render_picture_bytes(s);
     work.stats = cli_stats_begin(CLI_STATS_POINTS, work.run.threads);
     int code = load(&work);
-    code = code == CLI_OK ? make_fields(&work) : code;
+    code = code == CLI_OK ? make_occluders(&work) : code;
     code = code == CLI_OK ? set_options(&work) : code;
     code = code == CLI_OK ? find_origin(&work) : code;
     code = code == CLI_OK ? render_frames(&work) : code;
@@ -207,8 +205,7 @@ static int run_render(const render_settings *s, vsh_scene *scene) {
     free(work.lit);
     render_lightmaps_free(&work.lightmaps);
     render_surfaces_free(&work.surfaces);
-    cli_field_free(&work.made);
-    vsh_triangles_free(work.triangles);
+    vsh_occluders_free(work.occluders);
     vsh_assets_free(work.assets);
     return code;
 }

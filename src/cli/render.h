@@ -3,7 +3,6 @@
 #define CLI_RENDER_H
 
 #include "bake_options.h"
-#include "field.h"
 #include "origin.h"
 
 enum { RENDER_MOST_LIGHTMAPS = 64, RENDER_MOST_FRAMES = 1000, RENDER_PAGE_FRAMES = 36 };
@@ -31,14 +30,14 @@ int render_parse(int argc, char **argv, render_settings *settings, bool *help);
 typedef struct render_surfaces {
     vsh_surface *surfaces;
     size_t count;
-    cli_field own;          /* of colours that share a layer */
+    vsh_occluders *own;     /* of colours that share a layer */
     vsh_lit_meshes *meshes; /* [mesh_count]: of casters that are triangles, which are shown themselves */
     size_t mesh_count;
 } render_surfaces;
 
 /* The triangles of every caster that has them, and for what has none a surface for every layer's colour.
  * CLI_OK or an exit code, having said why; free also after a failure. */
-int render_surfaces_make(const vsh_scene *scene, const vsh_assets *assets, const cli_field *made,
+int render_surfaces_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_occluders *occluders,
                          const vsh_run *run, render_surfaces *surfaces);
 void render_surfaces_free(render_surfaces *surfaces);
 

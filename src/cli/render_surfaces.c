@@ -54,10 +54,10 @@ static size_t group_of(const vsh_scene *scene, const vsh_assets *assets, size_t 
 }
 
 /* The field of a layer, or (NULL) of casters in none. */
-static const vsh_field *field_of(const cli_field *made, const char *layer) {
-    const vsh_field *field = layer == NULL ? made->field : NULL;
-    for (size_t l = 0; layer != NULL && field == NULL && l < made->layer_count; ++l) {
-        const cli_layer *own = &made->owned[l];
+static const vsh_field *field_of(const vsh_occluder_parts *parts, const char *layer) {
+    const vsh_field *field = layer == NULL ? parts->field : NULL;
+    for (size_t l = 0; layer != NULL && field == NULL && l < parts->layer_count; ++l) {
+        const vsh_layer *own = &parts->layers[l];
         field = own->field != NULL && strcmp(own->name, layer) == 0 ? own->field : NULL;
     }
     return field;
@@ -104,10 +104,27 @@ typedef struct split {
     size_t count;
 } split;
 
-static int make_split(const vsh_scene *scene, const vsh_assets *assets, const cli_field *made,
+/* Makes the fields of the groups, each of which is a layer. */
+static int make_own(const vsh_scene *colored, const vsh_assets *assets, const vsh_run *run, const split *p,
+                    render_surfaces *s) {
+    vsh_error error;
+    if (vsh_scene_occluders(colored, assets, NULL, run, &s->own, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    vsh_occluder_parts own;
+    vsh_occluders_get_parts(s->own, &own);
+    for (size_t k = 0; k < own.layer_count; ++k) {
+        add(s, own.layers[k].field, &colored->casters[p->first[k]]);
+    }
+    return CLI_OK;
+}
+
+static int make_split(const vsh_scene *scene, const vsh_assets *assets, const vsh_occluders *occluders,
                       const vsh_run *run, split *p, render_surfaces *s) {
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(occluders, &parts);
     for (size_t i = 0; i < scene->caster_count; ++i) {
-        const vsh_field *field = field_of(made, scene->casters[i].layer);
+        const vsh_field *field = field_of(&parts, scene->casters[i].layer);
         p->casters[i] = scene->casters[i];
         p->casters[i].layer = p->names[i];
         if (is_shown_as_mesh(assets, i)) {
@@ -145,16 +162,12 @@ static int make_split(const vsh_scene *scene, const vsh_assets *assets, const cl
     }
     vsh_assets *again = NULL; /* what is direct was not read as something to voxelise */
     int code = direct ? cli_load_assets(&colored, run, &again) : CLI_OK;
-    code =
-        code == CLI_OK ? cli_field_make_around(&colored, direct ? again : assets, 0.0, run, &s->own) : code;
+    code = code == CLI_OK ? make_own(&colored, direct ? again : assets, run, p, s) : code;
     vsh_assets_free(again);
-    for (size_t k = 0; code == CLI_OK && k < s->own.layer_count; ++k) {
-        add(s, s->own.layers[k].field, &scene->casters[p->first[k]]);
-    }
     return code;
 }
 
-int render_surfaces_make(const vsh_scene *scene, const vsh_assets *assets, const cli_field *made,
+int render_surfaces_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_occluders *occluders,
                          const vsh_run *run, render_surfaces *s) {
     *s = (render_surfaces){.count = 0};
     const size_t count = scene->caster_count;
@@ -169,7 +182,7 @@ int render_surfaces_make(const vsh_scene *scene, const vsh_assets *assets, const
     if (room) {
         add_meshes(scene, assets, s);
     }
-    const int code = room ? make_split(scene, assets, made, run, &p, s) : cli_out_of_memory("surfaces");
+    const int code = room ? make_split(scene, assets, occluders, run, &p, s) : cli_out_of_memory("surfaces");
     free(p.first);
     free(p.names);
     free(p.layers);
@@ -179,6 +192,6 @@ int render_surfaces_make(const vsh_scene *scene, const vsh_assets *assets, const
 
 void render_surfaces_free(render_surfaces *s) {
     free(s->meshes);
-    cli_field_free(&s->own);
+    vsh_occluders_free(s->own);
     free(s->surfaces);
 }

@@ -29,7 +29,7 @@ static uint64_t peak_bytes(void) {
 
 /* Of the field, for each active voxel of the level set. */
 static double bytes_per_voxel(const cli_stats *stats) {
-    return (double)stats->field.bytes / fmax(1.0, (double)stats->field.active_voxels);
+    return (double)stats->casters.field_bytes / fmax(1.0, (double)stats->casters.active_voxels);
 }
 
 static const char *const kind_names[] = {"shadow", "ao"};
@@ -43,9 +43,15 @@ static cli_method method_of(const char *name, uint32_t traits) {
     return (cli_method){name, (traits & VSH_METHOD_KEEPS_ERROR) != 0, (traits & VSH_METHOD_TRIANGLES) != 0};
 }
 
-void cli_stats_methods(cli_stats *stats, const vsh_scene *scene) {
+void cli_stats_occluders(cli_stats *stats, const vsh_scene *scene, const vsh_occluders *occluders) {
+    vsh_occluders_get_info(occluders, &stats->casters);
+    stats->seconds[CLI_STAGE_VOXELIZE] += stats->casters.voxelize_s;
+    stats->seconds[CLI_STAGE_FIELD] += stats->casters.triangles_s + stats->casters.field_s;
+    cli_stats_methods(stats, scene, stats->casters.has_triangles);
+}
+
+void cli_stats_methods(cli_stats *stats, const vsh_scene *scene, int32_t has_triangles) {
     const vsh_shade_options *shade = &scene->shade;
-    const int32_t has_triangles = shade->triangles != NULL;
     const int32_t method = vsh_shadow_method_resolve(shade->method, has_triangles);
     const int32_t ao_method = vsh_ao_method_resolve(shade->ao_method, has_triangles);
     stats->max_error = shade->max_error;
@@ -116,7 +122,7 @@ static void say_help(const cli_stats *stats, const vsh_scene *scene, int kind, c
     } else {
         const bool can = vsh_scene_traceable(scene, NULL) && vsh_triangles_available();
         snprintf(text, size, "%.3g of it is that of voxels of %.3g: %s%ssmaller ones leave less",
-                 vsh_bake_error_field(&known), stats->grid.voxel_size, can ? option : "",
+                 vsh_bake_error_field(&known), stats->casters.voxel_size, can ? option : "",
                  can ? " exact has none, " : "");
     }
 }
@@ -244,9 +250,9 @@ static int write_file(const cli_stats *stats, const vsh_run *run, const char *pa
         {"peak_bytes", peak_bytes()},
         own[stats->of][2],
         {"threads", (uint64_t)stats->threads},
-        {"levels", (uint64_t)stats->field.levels},
-        {"field_bytes", stats->field.bytes},
-        {"active_voxels", stats->grid.active_voxels},
+        {"levels", (uint64_t)stats->casters.levels},
+        {"field_bytes", stats->casters.field_bytes},
+        {"active_voxels", stats->casters.active_voxels},
     };
     json_t *root = json_object();
     json_object_set_new(root, "version", json_string(vsh_version()));
@@ -260,7 +266,7 @@ static int write_file(const cli_stats *stats, const vsh_run *run, const char *pa
     add_errors(stats, root);
     json_object_set_new(root, "confined", confinement(run));
     json_object_set_new(root, "field_bytes_per_voxel", json_real(bytes_per_voxel(stats)));
-    json_object_set_new(root, "voxel_size", json_real(stats->grid.voxel_size));
+    json_object_set_new(root, "voxel_size", json_real(stats->casters.voxel_size));
     char *text = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
     json_decref(root);
     if (text == NULL) {
@@ -314,16 +320,17 @@ static void say_errors(const cli_stats *stats) {
 
 void cli_stats_say(const cli_stats *stats) {
     char field[32], peak[32];
-    if (stats->field.bytes == 0) {
+    if (stats->casters.field_bytes == 0) {
         cli_say("no voxels, %d thread%s, peak %s", stats->threads, stats->threads == 1 ? "" : "s",
                 cli_bytes_text(peak_bytes(), peak, sizeof peak));
     } else {
         cli_say("voxel %.4g, %" PRIu64
                 " active voxels, field of %d level%s in %s (%.1f bytes a voxel), %d thread%s, "
                 "peak %s",
-                stats->grid.voxel_size, stats->grid.active_voxels, stats->field.levels,
-                stats->field.levels == 1 ? "" : "s", cli_bytes_text(stats->field.bytes, field, sizeof field),
-                bytes_per_voxel(stats), stats->threads, stats->threads == 1 ? "" : "s",
+                stats->casters.voxel_size, stats->casters.active_voxels, stats->casters.levels,
+                stats->casters.levels == 1 ? "" : "s",
+                cli_bytes_text(stats->casters.field_bytes, field, sizeof field), bytes_per_voxel(stats),
+                stats->threads, stats->threads == 1 ? "" : "s",
                 cli_bytes_text(peak_bytes(), peak, sizeof peak));
     }
     char methods[128];

@@ -40,8 +40,7 @@ typedef struct cli_stats {
     cli_method methods[2]; /* CLI_STATS_SHADOW and …_AO; NULL names where nothing is baked by one */
     double max_error;      /* that was asked for */
     int32_t threads;
-    vsh_grid_info grid;
-    vsh_field_info field;
+    vsh_occluders_info casters;
 } cli_stats;
 
 /* Adds the seconds since `since` to a stage and returns the time now. */
@@ -50,8 +49,11 @@ double cli_stats_stage(cli_stats *stats, int stage, double since);
 /* Nothing yet; `threads` as of vsh_run. */
 cli_stats cli_stats_begin(int32_t of, int32_t threads);
 
-/* Takes what the scene's methods come to, once its triangles are known. */
-void cli_stats_methods(cli_stats *stats, const vsh_scene *scene);
+/* Takes what the scene's methods come to, with triangles (not 0) or without. */
+void cli_stats_methods(cli_stats *stats, const vsh_scene *scene, int32_t has_triangles);
+
+/* Takes what casts and the seconds that it took to make, and what the scene's methods come to with it. */
+void cli_stats_occluders(cli_stats *stats, const vsh_scene *scene, const vsh_occluders *occluders);
 
 /* Room for the errors of a scene's channels, which must outlive them. CLI_OK, or an exit code, having said
  * why; to be freed with cli_stats_end(). */

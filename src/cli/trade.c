@@ -218,7 +218,7 @@ static int measure(trade_work *work) {
     for (size_t i = 0; i < s->resolution_count && code == CLI_OK; ++i) {
         trade_field *next = &work->fields[work->field_count];
         next->resolution = resolutions[s->resolution_count - 1 - i];
-        code = trade_make_field(work, next->resolution, &next->field, &next->build_s);
+        code = trade_make_occluders(work, next->resolution, &next->occluders, &next->build_s);
         work->field_count += code == CLI_OK;
     }
     code = code == CLI_OK ? trade_take_masks(work) : code;
@@ -242,7 +242,7 @@ static void free_work(trade_work *work) {
     }
     for (size_t i = 0; i < work->field_count; ++i) {
         free(work->fields[i].mask);
-        vsh_field_free(work->fields[i].field);
+        vsh_occluders_free(work->fields[i].occluders);
     }
     for (size_t i = 0; i < work->receiver_count; ++i) {
         vsh_texels_free(work->receivers[i].texels);

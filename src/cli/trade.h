@@ -56,7 +56,7 @@ typedef struct trade_run {
 
 typedef struct trade_field {
     int32_t resolution;
-    vsh_field *field;
+    vsh_occluders *occluders; /* without triangles */
     double build_s;
     uint8_t *mask; /* [texels]: 1 where a bake on this field finds a texel valid */
     size_t valid;  /* how many those are */
@@ -119,7 +119,7 @@ double trade_median(trade_clock *clock);
 
 /* All of these return CLI_OK or an exit code, having said why. */
 int trade_load(trade_work *work);
-int trade_make_field(trade_work *work, int32_t resolution, vsh_field **field, double *seconds);
+int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds);
 int trade_take_masks(trade_work *work);
 int trade_place_points(trade_work *work);
 int trade_measure(trade_work *work);
@@ -130,8 +130,8 @@ int trade_write_csv(const trade_work *work);
 int trade_write_plot(const trade_work *work);
 
 /* Bakes all receivers into planes of shadow [lights][texels], of AO or of coverage (each may be NULL). */
-int trade_bake(const trade_work *work, const vsh_field *field, const vsh_shade_options *shade, float *shadow,
-               float *ao, float *coverage, vsh_shade_stats *stats);
+int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh_shade_options *shade,
+               float *shadow, float *ao, float *coverage, vsh_shade_stats *stats);
 
 /* Measures run->values and the rate, on the texels that all runs have and on all of `mask`, `valid` of them.
  */

@@ -1,5 +1,5 @@
 /* Bakes the scene in every way that is worth a look, and takes the time. */
-#include "field.h"
+#include "box.h"
 #include "message.h"
 #include "trade.h"
 
@@ -30,7 +30,7 @@ static const plan ao_plans[] = {
     {VSH_AO_CONES, 64, 0.0},    {VSH_AO_EXACT, 0, 0.005},   {VSH_AO_ADAPTIVE, 0, 0.005},
 };
 
-int trade_make_field(trade_work *work, int32_t resolution, vsh_field **field, double *seconds) {
+int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds) {
     const double start = trade_now(work);
     vsh_scene scene = *work->scene;
     scene.grid.resolution = resolution;
@@ -39,11 +39,15 @@ int trade_make_field(trade_work *work, int32_t resolution, vsh_field **field, do
     for (size_t r = 0; r < work->receiver_count; ++r) {
         cli_box_grow(&receivers, &work->receivers[r].info);
     }
-    cli_field made;
-    const int code = cli_field_make(&scene, work->assets, &receivers, &work->run, &made);
-    *field = made.field;
+    vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
+    options.receivers_min = receivers.min;
+    options.receivers_max = receivers.max;
+    options.triangles = 0; /* the same for all resolutions */
+    vsh_error error;
+    const vsh_result result =
+        vsh_scene_occluders(&scene, work->assets, &options, &work->run, occluders, &error);
     *seconds = trade_now(work) - start;
-    return code;
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 /* The options of one plan, for the library and in `bake`'s words. */
@@ -96,8 +100,10 @@ static double certified_share(const trade_subject *subject, size_t valid, const 
     return fmax(0.0, fmin(1.0, proved / values));
 }
 
-int trade_bake(const trade_work *work, const vsh_field *field, const vsh_shade_options *shade, float *shadow,
-               float *ao, float *coverage, vsh_shade_stats *stats) {
+int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh_shade_options *shade,
+               float *shadow, float *ao, float *coverage, vsh_shade_stats *stats) {
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(occluders, &parts);
     const size_t lights = shadow != NULL ? work->scene->light_count : 0;
     float **planes = calloc(lights + 1, sizeof *planes);
     if (planes == NULL) {
@@ -114,7 +120,7 @@ int trade_bake(const trade_work *work, const vsh_field *field, const vsh_shade_o
                                        .ao = ao != NULL ? ao + first : NULL,
                                        .coverage = coverage != NULL ? coverage + first : NULL};
         vsh_error error;
-        if (vsh_bake_lightmap(field, work->receivers[r].texels, work->scene->lights, lights, shade,
+        if (vsh_bake_lightmap(parts.field, work->receivers[r].texels, work->scene->lights, lights, shade,
                               &work->run, &lightmap, &baked, &error) != VSH_OK) {
             code = cli_fail_of(NULL, &error);
         }
@@ -127,13 +133,13 @@ int trade_bake(const trade_work *work, const vsh_field *field, const vsh_shade_o
 }
 
 /* Bakes the run's values, several times where it is quick. */
-static int bake(const trade_work *work, const trade_subject *subject, const vsh_field *field,
+static int bake(const trade_work *work, const trade_subject *subject, const vsh_occluders *occluders,
                 const vsh_shade_options *shade, trade_run *run, vsh_shade_stats *stats) {
     trade_clock clock = {.count = 0};
     int code = CLI_OK;
     do {
         const double start = trade_now(work);
-        code = trade_bake(work, field, shade, subject->ao ? NULL : run->values,
+        code = trade_bake(work, occluders, shade, subject->ao ? NULL : run->values,
                           subject->ao ? run->values : NULL, NULL, stats);
         clock.times[clock.count++] = trade_now(work) - start;
     } while (code == CLI_OK && trade_again(&clock));
@@ -168,12 +174,12 @@ static int run_plan(trade_work *work, trade_subject *subject, const plan *p, con
     if (run.values == NULL) {
         return cli_out_of_memory("values");
     }
-    vsh_field_info info;
-    vsh_field_get_info(on->field, &info);
-    run.bytes = info.bytes + (exact ? vsh_triangles_bytes(work->triangles) : 0);
+    vsh_occluders_info info;
+    vsh_occluders_get_info(on->occluders, &info);
+    run.bytes = info.field_bytes + (exact ? vsh_triangles_bytes(work->triangles) : 0);
     run.build_s += exact ? work->triangles_s : 0.0;
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    int code = bake(work, subject, on->field, &shade, &run, &stats);
+    int code = bake(work, subject, on->occluders, &shade, &run, &stats);
     if (code == CLI_OK) {
         run.certified = certified_share(subject, run.valid, &shade, &stats);
         code = trade_compare(work, subject, on->mask, on->valid, &run);

@@ -5,7 +5,6 @@
 #include "message.h"
 #include "receiver.h"
 #include "trade.h"
-#include "truth.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -60,11 +59,12 @@ static int load_casters(trade_work *work) {
     for (size_t i = 0; i < work->scene->caster_count; ++i) {
         work->meshes = work->meshes && cli_caster_has_triangles(&work->scene->casters[i]);
     }
+    const double start = trade_now(work);
     vsh_error error;
-    return cli_truth_casters(work->scene, work->assets, &work->run, &work->triangles, &work->solids,
-                             &work->triangles_s, &error) == VSH_OK
-               ? CLI_OK
-               : cli_fail_of(NULL, &error);
+    const vsh_result result =
+        vsh_scene_truth(work->scene, work->assets, &work->run, &work->triangles, &work->solids, &error);
+    work->triangles_s = trade_now(work) - start;
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 int trade_load(trade_work *work) {
@@ -92,7 +92,7 @@ int trade_take_masks(trade_work *work) {
         field->mask = calloc(work->texels, 1);
         code = field->mask == NULL
                    ? cli_out_of_memory("coverage")
-                   : trade_bake(work, field->field, &work->scene->shade, NULL, NULL, coverage, NULL);
+                   : trade_bake(work, field->occluders, &work->scene->shade, NULL, NULL, coverage, NULL);
         for (size_t i = 0; i < work->texels && code == CLI_OK; ++i) {
             field->mask[i] = coverage[i] > 0.0f;
             field->valid += field->mask[i];
@@ -135,8 +135,10 @@ int trade_place_points(trade_work *work) {
     if (work->positions == NULL || work->normals == NULL || work->texel == NULL) {
         return cli_out_of_memory("points");
     }
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(work->fields[0].occluders, &parts);
     vsh_field_info info;
-    vsh_field_get_info(work->fields[0].field, &info);
+    vsh_field_get_info(parts.field, &info);
     double side = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         side = fmax(side, info.bounds_max[axis] - info.bounds_min[axis]);

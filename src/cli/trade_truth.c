@@ -4,7 +4,6 @@
 #include "meshes.h"
 #include "message.h"
 #include "trade.h"
-#include "truth.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -46,9 +45,9 @@ static int trace(const trade_work *work, const trade_subject *subject, int32_t r
 
 /* Of a scene whose casters rays cannot meet: rays against a field of twice the finest resolution. */
 static int march(trade_work *work, int32_t resolution) {
-    vsh_field *field = NULL;
+    vsh_occluders *occluders = NULL;
     double seconds;
-    int code = trade_make_field(work, resolution, &field, &seconds);
+    int code = trade_make_occluders(work, resolution, &occluders, &seconds);
     vsh_shade_options shade = work->scene->shade;
     shade.method = VSH_SHADOW_RAYS;
     shade.ao_method = VSH_AO_RAYS;
@@ -59,8 +58,8 @@ static int march(trade_work *work, int32_t resolution) {
         trade_subject *subject = &work->subjects[s];
         *(subject->ao ? &ao : &shadow) = subject->truth;
     }
-    code = code == CLI_OK ? trade_bake(work, field, &shade, shadow, ao, NULL, NULL) : code;
-    vsh_field_free(field);
+    code = code == CLI_OK ? trade_bake(work, occluders, &shade, shadow, ao, NULL, NULL) : code;
+    vsh_occluders_free(occluders);
     snprintf(work->truth_text, sizeof work->truth_text,
              "%d rays a texel marched against a field of %d voxels along the longest side, as %s", shade.rays,
              resolution,
@@ -90,7 +89,7 @@ int trade_take_truth(trade_work *work, int32_t finest) {
     }
     const double start = trade_now(work);
     int code = CLI_OK;
-    if (cli_truth_traceable(work->scene)) {
+    if (vsh_scene_has_truth(work->scene)) {
         describe(work);
         for (size_t s = 0; s < work->subject_count && code == CLI_OK; ++s) {
             double seconds;

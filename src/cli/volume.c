@@ -1,7 +1,6 @@
 /* vdbshade volume: shadow and AO on voxels, as .vdb grids. */
 #include "bake_options.h"
 #include "clock.h"
-#include "field.h"
 #include "meshes.h"
 #include "message.h"
 #include "origin.h"
@@ -153,9 +152,8 @@ typedef struct volume_work {
     vsh_scene *scene;
     vsh_run run;
     vsh_assets *assets;
-    vsh_triangles *triangles;
+    vsh_occluders *occluders;
     vsh_grid *grid;
-    cli_field made;
     vsh_voxels *voxels;
     vsh_volume *volume;
     cli_stats stats;
@@ -215,29 +213,26 @@ static int make_grid(volume_work *work) {
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
-static int make_field(volume_work *work) {
-    const double start = cli_seconds();
-    int code = cli_triangles_make(work->scene, work->assets, &work->run, &work->triangles);
-    work->scene->shade.triangles = work->triangles;
-    cli_stats_methods(&work->stats, work->scene);
-    cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
-    code = code == CLI_OK ? make_grid(work) : code;
+static int make_occluders(volume_work *work) {
+    int code = make_grid(work);
     code = code == CLI_OK ? choose_voxels(work) : code;
     if (code == CLI_OK) {
         vsh_voxels_info info;
         vsh_voxels_get_info(work->voxels, &info);
-        cli_box box;
-        memcpy(box.min, info.bounds_min, sizeof box.min);
-        memcpy(box.max, info.bounds_max, sizeof box.max);
-        const vsh_grid *all = work->scene->layer_count == 0 ? work->grid : NULL;
-        code = cli_field_make_of(work->scene, work->assets, all, &box, &work->run, &work->made);
+        vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
+        what.receivers_min = info.bounds_min;
+        what.receivers_max = info.bounds_max;
+        what.grid = work->scene->layer_count == 0 ? work->grid : NULL;
+        vsh_error error;
+        const vsh_result result =
+            vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error);
+        code = result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
     }
-    vsh_grid_free(work->grid); /* neither the field nor the voxels need it */
+    vsh_grid_free(work->grid); /* neither what casts nor the voxels need it */
     work->grid = NULL;
-    work->stats.grid = work->made.grid;
-    work->stats.field = work->made.info;
-    work->stats.seconds[CLI_STAGE_VOXELIZE] += work->made.voxelize_s;
-    work->stats.seconds[CLI_STAGE_FIELD] += work->made.field_s;
+    if (code == CLI_OK) {
+        cli_stats_occluders(&work->stats, work->scene, work->occluders);
+    }
     return code;
 }
 
@@ -248,11 +243,15 @@ static int bake_volume(volume_work *work) {
     bake.ao = work->scene->ao;
     bake.error = work->scene->error;
     bake.shade = work->scene->shade;
-    bake.shade.layers = work->made.layers;
-    bake.shade.layer_count = work->made.layer_count;
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(work->occluders, &parts);
+    work->scene->shade.triangles = parts.triangles; /* they tell what auto comes to */
+    bake.shade.triangles = parts.triangles;
+    bake.shade.layers = parts.layers;
+    bake.shade.layer_count = parts.layer_count;
     vsh_error error;
     const vsh_result result =
-        vsh_bake_volume(work->made.field, work->voxels, work->scene->lights, work->scene->light_count, &bake,
+        vsh_bake_volume(parts.field, work->voxels, work->scene->lights, work->scene->light_count, &bake,
                         &work->run, &work->volume, &work->stats.shade, &error);
     cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
@@ -267,7 +266,8 @@ static int write_volume(volume_work *work) {
     }
     const char *const files[] = {work->settings->bake.input, work->settings->like};
     cli_origin origin;
-    const int code = cli_origin_make(work->scene, files, 2, work->made.grid.voxel_size, &work->run, &origin);
+    const int code =
+        cli_origin_make(work->scene, files, 2, work->stats.casters.voxel_size, &work->run, &origin);
     if (code != CLI_OK) {
         return code;
     }
@@ -308,7 +308,7 @@ static int run_volume(const volume_settings *s, vsh_scene *scene) {
     work.stats = cli_stats_begin(CLI_STATS_VOXELS, work.run.threads);
     vsh_volume_info info;
     int code = load(&work);
-    code = code == CLI_OK ? make_field(&work) : code;
+    code = code == CLI_OK ? make_occluders(&work) : code;
     code = code == CLI_OK ? bake_volume(&work) : code;
     code = code == CLI_OK ? write_volume(&work) : code;
     if (code == CLI_OK) {
@@ -320,8 +320,7 @@ static int run_volume(const volume_settings *s, vsh_scene *scene) {
     }
     vsh_volume_free(work.volume);
     vsh_voxels_free(work.voxels);
-    cli_field_free(&work.made);
-    vsh_triangles_free(work.triangles);
+    vsh_occluders_free(work.occluders);
     vsh_assets_free(work.assets);
     return code;
 }

@@ -248,7 +248,7 @@ static bool needs_lift(const vsh_render_options *o, size_t light_count) {
     bool lift = (light_count > 0 && vshi_shadow_traces(shade)) || (o->ao && vshi_ao_traces(shade));
     for (size_t i = 0; i < shade->layer_count && !lift; ++i) {
         vsh_layer layer;
-        lift = vshi_layer_resolve(shade, i, &layer, NULL) == VSH_OK && layer.field == NULL;
+        lift = vshi_layer_resolve(shade->layers, i, &layer, NULL) == VSH_OK && layer.field == NULL;
     }
     return lift;
 }

@@ -2,6 +2,7 @@
 #include "base/memory.h"
 
 #include "scene/assets.h"
+#include "scene/occluders.h"
 
 #include <stdlib.h>
 
@@ -25,21 +26,18 @@ int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer
     return scene != NULL;
 }
 
-static bool traces(uint32_t traits) {
-    return (traits & VSH_METHOD_TRIANGLES) != 0;
-}
-
-int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    if (scene == NULL) {
-        return 0;
-    }
+bool vshi_scene_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, uint32_t traits, bool has) {
     const int32_t can = vsh_scene_traceable(scene, layer) && vsh_triangles_available();
     const int32_t given =
         layer != NULL && layer->shade.method >= 0 ? layer->shade.method : scene->shade.method;
     const uint32_t shadow = vsh_shadow_method_traits(vsh_shadow_method_resolve(given, can));
     const uint32_t ao = vsh_ao_method_traits(vsh_ao_method_resolve(scene->shade.ao_method, can));
-    return (scene->light_count > 0 && !traces(shadow)) ||
-           (scene->ao && (layer == NULL || layer->shade.ao) && !traces(ao));
+    return (scene->light_count > 0 && ((shadow & traits) == traits) == has) ||
+           (scene->ao && (layer == NULL || layer->shade.ao) && ((ao & traits) == traits) == has);
+}
+
+int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer) {
+    return scene != NULL && vshi_scene_method_is(scene, layer, VSH_METHOD_TRIANGLES, false);
 }
 
 vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,

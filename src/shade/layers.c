@@ -26,11 +26,10 @@ struct vshi_layers {
     prepared items[];
 };
 
-vsh_result vshi_layer_resolve(const vsh_shade_options *options, size_t index, vsh_layer *layer,
-                              vsh_error *error) {
+vsh_result vshi_layer_resolve(const vsh_layer *layers, size_t index, vsh_layer *layer, vsh_error *error) {
     *layer = vsh_layer_default();
     /* programs that were built with a shorter struct step by its size */
-    const char *at = (const char *)options->layers + index * options->layers->struct_size;
+    const char *at = (const char *)layers + index * layers->struct_size;
     vsh_error why;
     vsh_result result = vshi_options_resolve(at, layer, sizeof *layer, "vsh_layer", &why);
     layer->struct_size = sizeof *layer;
@@ -130,7 +129,7 @@ vsh_result vshi_layers_prepare(const vsh_shade_options *options, const vsh_light
         return VSH_OK;
     }
     vsh_layer first;
-    vsh_result result = vshi_layer_resolve(options, 0, &first, error);
+    vsh_result result = vshi_layer_resolve(options->layers, 0, &first, error);
     if (result != VSH_OK) {
         return result;
     }
@@ -139,7 +138,7 @@ vsh_result vshi_layers_prepare(const vsh_shade_options *options, const vsh_light
                            "layers", error);
     for (size_t i = 0; result == VSH_OK && i < options->layer_count; ++i) {
         prepared *item = &made->items[made->count];
-        result = vshi_layer_resolve(options, i, &item->layer, error);
+        result = vshi_layer_resolve(options->layers, i, &item->layer, error);
         if (result == VSH_OK && (light != NULL ? casts_for(&item->layer, light) : item->layer.ao != 0)) {
             item->options = *options;
             ++made->count;

@@ -8,10 +8,9 @@
 /* The layers that take part in one light's shadow, or in AO. */
 typedef struct vshi_layers vshi_layers;
 
-/* Layer `index` of resolved options, itself resolved and checked. Errors: VSH_ERROR_ARGUMENT, naming number,
- * field, value and limit. */
-vsh_result vshi_layer_resolve(const vsh_shade_options *options, size_t index, vsh_layer *layer,
-                              vsh_error *error);
+/* Layer `index` of the caller's, resolved and checked. Errors: VSH_ERROR_ARGUMENT, naming number, field,
+ * value and limit. */
+vsh_result vshi_layer_resolve(const vsh_layer *layers, size_t index, vsh_layer *layer, vsh_error *error);
 
 /* Bytes of what a resolved layer refers to, triangles aside. */
 double vshi_layer_bytes(const vsh_layer *layer);

@@ -1,0 +1,280 @@
+/* From a scene's casters to what is marched and traced. */
+#include "scene/occluders.h"
+
+#include "base/clock.h"
+#include "base/floats.h"
+#include "base/job.h"
+#include "base/memory.h"
+#include "shade/occluders.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+/* Diagonals of the casters' box that points are within, where nothing else is said. */
+static const double WITHIN = 4.0;
+
+typedef struct making {
+    const vsh_scene *scene;
+    const vsh_assets *assets;
+    vsh_scene_occluders_options options;
+    vsh_run run;   /* as given */
+    vsh_run voxel; /* of what makes voxels: it holds the fields that are made */
+    vshi_occluders_own own;
+    vsh_layer *layers; /* those that were made: copied in the end */
+    vsh_occluder_parts parts;
+} making;
+
+/* Reach for receivers in a box, or for points within a distance of the casters' box. */
+static double reach_of(const making *m, const vsh_grid *grid) {
+    const vsh_scene_occluders_options *o = &m->options;
+    if (o->receivers_min != NULL) {
+        return vsh_scene_reach(m->scene, grid, o->receivers_min, o->receivers_max);
+    }
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    double diagonal = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double side = info.bounds_max[axis] - info.bounds_min[axis];
+        diagonal += side * side;
+    }
+    diagonal = sqrt(diagonal);
+    const double margin = o->within > 0.0 ? o->within : WITHIN * diagonal;
+    double around_min[3], around_max[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        around_min[axis] = info.bounds_min[axis] - margin;
+        around_max[axis] = info.bounds_max[axis] + margin;
+    }
+    const double reach = vsh_scene_reach(m->scene, grid, around_min, around_max);
+    /* the field's own default, where that is enough: a program that takes it gets the same bits */
+    return reach > WITHIN * diagonal ? reach : vsh_field_options_default().reach;
+}
+
+/* The level set of a layer's casters, or (NULL) of those in none; NULL where there are none. *made is what
+ * is to be freed of it. */
+static vsh_result find_grid(making *m, const vsh_scene_layer *layer, const vsh_grid **grid, vsh_grid **made,
+                            vsh_error *error) {
+    *made = NULL;
+    *grid = layer == NULL ? m->options.grid : NULL;
+    if (*grid != NULL) {
+        return VSH_OK;
+    }
+    const vsh_result result = vsh_scene_layer_casters(m->scene, m->assets, layer, &m->voxel, made, error);
+    *grid = *made;
+    return result;
+}
+
+/* *field is NULL where there are no casters. */
+static vsh_result make_field(making *m, const vsh_scene_layer *layer, vsh_field **field, vsh_error *error) {
+    const double start = vshi_seconds();
+    const vsh_grid *grid;
+    vsh_grid *made;
+    vsh_result result = find_grid(m, layer, &grid, &made, error);
+    if (result != VSH_OK || grid == NULL) {
+        return result;
+    }
+    const double voxelized = vshi_seconds();
+    vsh_grid_info voxels;
+    vsh_grid_get_info(grid, &voxels);
+    m->own.grid_bytes += voxels.bytes;
+    vsh_field_options options = vsh_field_options_default();
+    options.reach = reach_of(m, grid);
+    if (layer != NULL) {
+        options.reach *= fmax(1.0, layer->shade.softness); /* lights are as much wider */
+    }
+    result = vsh_field_create(grid, &options, &m->voxel, field, error);
+    vsh_grid_free(made); /* the field does not need it */
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_field_info info;
+    vsh_field_get_info(*field, &info);
+    m->voxel.memory_held += info.bytes;
+    m->own.voxelize_s += voxelized - start;
+    m->own.field_s += vshi_seconds() - voxelized;
+    vsh_run run = m->run;
+    run.warning = m->voxel.warning;
+    return vshi_scene_warn_lost(m->scene, m->assets, layer, *field, &run, error);
+}
+
+static vsh_result make_field_of(making *m, const vsh_scene_layer *layer, vsh_field **field,
+                                vsh_error *error) {
+    vsh_error why;
+    const vsh_result result = make_field(m, layer, field, &why);
+    if (result == VSH_OK || error == NULL) {
+        return result;
+    }
+    vsh_error placed = {why.code, ""};
+    const size_t size = sizeof placed.message;
+    const int written =
+        layer != NULL ? snprintf(placed.message, size, "layer '%s': %s", layer->name, why.message) : -1;
+    *error = written >= 0 && written < (int)size ? placed : why;
+    return result;
+}
+
+/* Triangles where exact methods trace them, else NULL. */
+static vsh_result make_triangles(making *m, const vsh_scene_layer *layer, vsh_triangles **triangles,
+                                 vsh_error *error) {
+    if (m->options.triangles == 0 || !vshi_scene_method_is(m->scene, layer, VSH_METHOD_TRIANGLES, true)) {
+        return VSH_OK;
+    }
+    vsh_result result = vsh_scene_triangles(m->scene, m->assets, layer, &m->run, triangles, error);
+    /* no caster outside of layers: none, where methods want to be given those that there are */
+    if (result == VSH_OK && *triangles == NULL && layer == NULL) {
+        result = vsh_triangles_create(NULL, 0, &m->run, triangles, error);
+    }
+    return result;
+}
+
+/* Whether auto would have been exact. */
+static bool misses_embree(const vsh_scene *scene) {
+    const bool asked = (scene->light_count > 0 && scene->shade.method == VSH_SHADOW_AUTO) ||
+                       (scene->ao && scene->shade.ao_method == VSH_AO_AUTO);
+    return asked && !vsh_triangles_available() && vsh_scene_traceable(scene, NULL) != 0;
+}
+
+/* What values are held against: nothing where memory is short, as baking needs none of it. */
+static vsh_result make_truth(making *m, vsh_error *error) {
+    if (m->options.truth == 0 || !vshi_scene_wants_truth(m->scene)) {
+        return VSH_OK;
+    }
+    if (m->own.triangles != NULL) { /* all casters have some, or no method would trace them */
+        m->parts.true_triangles = m->own.triangles;
+        return VSH_OK;
+    }
+    vsh_error why;
+    const vsh_result result =
+        vsh_scene_truth(m->scene, m->assets, &m->run, &m->own.true_triangles, &m->own.true_solids, &why);
+    m->parts.true_triangles = m->own.true_triangles;
+    m->parts.true_solids = m->own.true_solids;
+    return result == VSH_ERROR_CANCELLED ? vshi_fail(error, result, "%s", why.message) : VSH_OK;
+}
+
+/* Casters without voxels, each shaded as its layer is. */
+static void add_direct(making *m) {
+    for (size_t i = 0; i < m->scene->caster_count; ++i) {
+        const vsh_caster *caster = &m->scene->casters[i];
+        if (!vshi_caster_is_direct(caster)) {
+            continue;
+        }
+        vsh_layer *layer = &m->layers[m->parts.layer_count++];
+        *layer = vsh_layer_default();
+        for (size_t k = 0; caster->layer != NULL && k < m->scene->layer_count; ++k) {
+            if (strcmp(m->scene->layers[k].name, caster->layer) == 0) {
+                *layer = m->scene->layers[k].shade;
+            }
+        }
+        layer->name = caster->layer;
+        layer->heights = vsh_assets_heights(m->assets, i);
+        layer->spheres = vsh_assets_spheres(m->assets, i);
+    }
+}
+
+static vsh_result allocate_layers(making *m, size_t count, vsh_error *error) {
+    vsh_result result = vshi_allocate((void **)&m->layers, count, sizeof *m->layers, "layers", error);
+    if (result == VSH_OK) {
+        result =
+            vshi_allocate((void **)&m->own.layer_fields, count, sizeof *m->own.layer_fields, "layers", error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&m->own.layer_triangles, count, sizeof *m->own.layer_triangles,
+                               "layers", error);
+    }
+    m->own.layer_capacity = count;
+    return result;
+}
+
+static vsh_result make_layers(making *m, vsh_error *error) {
+    const vsh_scene *scene = m->scene;
+    size_t direct = 0;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        direct += vshi_caster_is_direct(&scene->casters[i]);
+    }
+    const size_t most = scene->layer_count + direct;
+    if (most > VSH_MAX_LAYERS) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%zu layers and %zu casters that are not voxelised: at most %d together",
+                         scene->layer_count, direct, VSH_MAX_LAYERS);
+    }
+    vsh_result result = allocate_layers(m, most, error);
+    for (size_t i = 0; i < scene->layer_count && result == VSH_OK; ++i) {
+        const vsh_scene_layer *of_scene = &scene->layers[i];
+        vsh_field **field = &m->own.layer_fields[i];
+        vsh_triangles **triangles = &m->own.layer_triangles[i];
+        result = make_field_of(m, of_scene, field, error);
+        if (result == VSH_OK && *field != NULL) {
+            result = make_triangles(m, of_scene, triangles, error);
+            vsh_layer *layer = &m->layers[m->parts.layer_count++];
+            *layer = of_scene->shade;
+            layer->name = of_scene->name;
+            layer->field = *field;
+            layer->triangles = *triangles;
+        }
+    }
+    if (result == VSH_OK) {
+        add_direct(m);
+    }
+    return result;
+}
+
+static vsh_result make(making *m, vsh_error *error) {
+    const double start = vshi_seconds();
+    vsh_result result = make_triangles(m, NULL, &m->own.triangles, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (m->options.triangles != 0 && misses_embree(m->scene)) {
+        vshi_warn(&m->run, "this build has no Embree to trace triangles with: adaptive takes the place of "
+                           "exact, and its error is that of the voxels");
+    }
+    result = make_truth(m, error);
+    m->own.triangles_s = vshi_seconds() - start;
+    if (result == VSH_OK) {
+        result = make_field_of(m, NULL, &m->own.field, error);
+    }
+    if (result == VSH_OK) {
+        result = make_layers(m, error);
+    }
+    if (result == VSH_OK && m->own.field == NULL && m->parts.layer_count == 0) {
+        result = vshi_fail(error, VSH_ERROR_INPUT, "the scene has no casters");
+    }
+    return result;
+}
+
+vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,
+                               const vsh_scene_occluders_options *options, const vsh_run *run,
+                               vsh_occluders **occluders, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(occluders);
+    *occluders = NULL;
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS(assets);
+    making m = {.scene = scene,
+                .assets = assets,
+                .options = vsh_scene_occluders_options_default(),
+                .parts = vsh_occluder_parts_default()};
+    vsh_result result =
+        vshi_options_resolve(options, &m.options, sizeof m.options, "vsh_scene_occluders_options", error);
+    if (result == VSH_OK && (m.options.receivers_min == NULL) != (m.options.receivers_max == NULL)) {
+        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "receivers_min and receivers_max: one of them is NULL");
+    }
+    if (result == VSH_OK) {
+        result = vshi_run_resolve(run, &m.run, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    m.voxel = m.run;
+    m.voxel.warning = m.options.silent_voxels != 0 ? NULL : m.run.warning;
+    result = make(&m, error);
+    m.parts.field = m.own.field;
+    m.parts.triangles = m.own.triangles;
+    m.parts.layers = m.layers;
+    if (result == VSH_OK) {
+        result = vshi_occluders_make(&m.parts, &m.own, occluders, error);
+    } else {
+        vshi_occluders_own_free(&m.own);
+    }
+    free(m.layers);
+    return result;
+}

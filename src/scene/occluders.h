@@ -1,0 +1,23 @@
+/* The parts of a scene's occluders. */
+#ifndef VSHI_SCENE_OCCLUDERS_H
+#define VSHI_SCENE_OCCLUDERS_H
+
+#include "scene/assets.h"
+
+#include <vdbshade/field.h>
+
+/* Warns of what the field of a layer's casters, or (NULL) of those in none, has lost of their meshes, unless
+ * their triangles are traced. Errors: as vsh_field_find_lost(). */
+vsh_result vshi_scene_warn_lost(const vsh_scene *scene, const vsh_assets *assets,
+                                const vsh_scene_layer *layer, const vsh_field *field, const vsh_run *run,
+                                vsh_error *error);
+
+/* Whether a bake's values are to be held against the casters themselves: not where no method keeps an error,
+ * where layers cast, or where rays cannot meet all casters. */
+bool vshi_scene_wants_truth(const vsh_scene *scene);
+
+/* Whether a method that a layer's casters, or (NULL) those in none, are shaded with has all of `traits`,
+ * VSH_METHOD_…, or (`has` false) lacks one: of shadows where there are lights, of AO where it is baked. */
+bool vshi_scene_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, uint32_t traits, bool has);
+
+#endif

@@ -1,0 +1,188 @@
+#include "shade/occluders.h"
+
+#include "base/floats.h"
+#include "base/job.h"
+#include "base/memory.h"
+#include "field/field.h"
+#include "shade/layers.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+/* Of casters without voxels, whose surface is exact: positions of floats are off by a hundredth of it. */
+static const double FLOAT_STEPS = 1e-5;
+
+void vshi_occluders_own_free(vshi_occluders_own *own) {
+    for (size_t i = 0; i < own->layer_capacity; ++i) {
+        vsh_field_free(own->layer_fields != NULL ? own->layer_fields[i] : NULL);
+        vsh_triangles_free(own->layer_triangles != NULL ? own->layer_triangles[i] : NULL);
+    }
+    free(own->layer_triangles);
+    free(own->layer_fields);
+    free(own->layers);
+    vsh_solids_free(own->true_solids);
+    vsh_triangles_free(own->true_triangles);
+    vsh_triangles_free(own->triangles);
+    vsh_field_free(own->field);
+    *own = (vshi_occluders_own){.field = NULL};
+}
+
+static double extent(const vsh_layer *layer) {
+    vsh_heights_info heights;
+    vsh_spheres_info spheres;
+    const double *low = heights.bounds_min, *high = heights.bounds_max;
+    if (layer->heights != NULL) {
+        vsh_heights_get_info(layer->heights, &heights);
+    } else {
+        vsh_spheres_get_info(layer->spheres, &spheres);
+        low = spheres.bounds_min;
+        high = spheres.bounds_max;
+    }
+    return fmax(high[0] - low[0], fmax(high[1] - low[1], high[2] - low[2]));
+}
+
+/* Of the finest layer; beside casters without voxels alone as fine as a float tells positions apart. */
+static double finest_voxel(const vsh_layer *layers, size_t count) {
+    double finest = INFINITY;
+    for (size_t i = 0; i < count; ++i) {
+        if (layers[i].field != NULL) {
+            finest = fmin(finest, layers[i].field->voxel_size);
+        }
+    }
+    return isinf(finest) ? fmin(fmax(FLOAT_STEPS * extent(&layers[0]), 1e-12), 1e12) : finest;
+}
+
+static vsh_result copy_layers(const vsh_occluder_parts *parts, vshi_occluders_own *own, vsh_error *error) {
+    if (parts->layer_count > VSH_MAX_LAYERS || (parts->layer_count > 0 && parts->layers == NULL)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%zu layers%s: expected at most %d", parts->layer_count,
+                         parts->layers == NULL ? " at NULL" : "", VSH_MAX_LAYERS);
+    }
+    void *layers;
+    vsh_result result = vshi_allocate(&layers, parts->layer_count, sizeof *own->layers, "layers", error);
+    own->layers = layers;
+    for (size_t i = 0; i < parts->layer_count && result == VSH_OK; ++i) {
+        result = vshi_layer_resolve(parts->layers, i, &own->layers[i], error);
+    }
+    return result;
+}
+
+static vsh_result make_empty(const vsh_occluder_parts *parts, vshi_occluders_own *own, vsh_error *error) {
+    if (parts->layer_count == 0 && parts->voxel_size == 0.0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "occluders: neither a field nor layers");
+    }
+    const double voxel_size =
+        parts->voxel_size != 0.0 ? parts->voxel_size : finest_voxel(own->layers, parts->layer_count);
+    own->empty = true;
+    return vsh_field_create_empty(voxel_size, &own->field, error);
+}
+
+/* Takes what is owned along. */
+static vsh_result make(const vsh_occluder_parts *parts, vshi_occluders_own *own, vsh_occluders **occluders,
+                       vsh_error *error) {
+    vsh_result result = copy_layers(parts, own, error);
+    if (result == VSH_OK && parts->field == NULL) {
+        result = make_empty(parts, own, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    void *handle, *owned;
+    result = vshi_allocate(&handle, 1, sizeof **occluders, "occluders", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    result = vshi_allocate(&owned, 1, sizeof *own, "occluders", error);
+    if (result != VSH_OK) {
+        free(handle);
+        return result;
+    }
+    vsh_occluders *made = handle;
+    made->own = owned;
+    *made->own = *own;
+    made->field = parts->field != NULL ? parts->field : own->field;
+    made->triangles = parts->triangles;
+    made->layers = own->layers;
+    made->layer_count = parts->layer_count;
+    made->true_triangles = parts->true_triangles;
+    made->true_solids = parts->true_solids;
+    *occluders = made;
+    return VSH_OK;
+}
+
+vsh_result vshi_occluders_make(const vsh_occluder_parts *parts, vshi_occluders_own *own,
+                               vsh_occluders **occluders, vsh_error *error) {
+    const vsh_result result = make(parts, own, occluders, error);
+    if (result != VSH_OK) {
+        vshi_occluders_own_free(own);
+    }
+    return result;
+}
+
+vsh_result vsh_occluders_from_parts(const vsh_occluder_parts *parts, vsh_occluders **occluders,
+                                    vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(occluders);
+    *occluders = NULL;
+    VSHI_NEEDS(parts);
+    vsh_occluder_parts full = vsh_occluder_parts_default();
+    vshi_occluders_own own = {.field = NULL};
+    const vsh_result result = vshi_options_resolve(parts, &full, sizeof full, "vsh_occluder_parts", error);
+    return result == VSH_OK ? vshi_occluders_make(&full, &own, occluders, error) : result;
+}
+
+void vsh_occluders_free(vsh_occluders *occluders) {
+    if (occluders != NULL) {
+        vshi_occluders_own_free(occluders->own);
+        free(occluders->own);
+        free(occluders);
+    }
+}
+
+void vsh_occluders_get_parts_sized(const vsh_occluders *occluders, vsh_occluder_parts *parts,
+                                   size_t parts_size) {
+    const vsh_occluder_parts made = {.struct_size = parts_size,
+                                     .field = occluders->field,
+                                     .triangles = occluders->triangles,
+                                     .layers = occluders->layers,
+                                     .layer_count = occluders->layer_count,
+                                     .true_triangles = occluders->true_triangles,
+                                     .true_solids = occluders->true_solids};
+    vshi_give(parts, parts_size, &made, sizeof made);
+}
+
+/* Adds up what fields take; sizes are those of the first. */
+static void count(const vsh_field *field, vsh_occluders_info *info) {
+    vsh_field_info own;
+    vsh_field_get_info(field, &own);
+    if (info->field_bytes == 0) {
+        info->voxel_size = own.voxel_size;
+        info->levels = own.levels;
+    }
+    info->active_voxels += own.active_voxels;
+    info->bricks += own.bricks;
+    info->field_bytes += own.bytes;
+}
+
+void vsh_occluders_get_info_sized(const vsh_occluders *occluders, vsh_occluders_info *info,
+                                  size_t info_size) {
+    const vshi_occluders_own *own = occluders->own;
+    vsh_occluders_info made = {.layer_count = occluders->layer_count,
+                               .has_triangles = occluders->triangles != NULL,
+                               .grid_bytes = own->grid_bytes,
+                               .voxelize_s = own->voxelize_s,
+                               .field_s = own->field_s,
+                               .triangles_s = own->triangles_s};
+    if (!own->empty) {
+        count(occluders->field, &made);
+    }
+    for (size_t i = 0; i < occluders->layer_count; ++i) {
+        if (occluders->layers[i].field != NULL) {
+            count(occluders->layers[i].field, &made);
+        }
+    }
+    made.triangles_bytes = occluders->triangles != NULL ? vsh_triangles_bytes(occluders->triangles) : 0;
+    if (occluders->true_triangles != NULL && occluders->true_triangles != occluders->triangles) {
+        made.triangles_bytes += vsh_triangles_bytes(occluders->true_triangles);
+    }
+    vshi_give(info, info_size, &made, sizeof made);
+}

@@ -1,0 +1,55 @@
+/* What casts, from arrays of meshes. */
+#include "base/clock.h"
+#include "base/floats.h"
+#include "base/job.h"
+#include "shade/occluders.h"
+
+static vsh_result make_field(const vsh_mesh *meshes, size_t count, const vsh_occluders_options *options,
+                             const vsh_run *run, vshi_occluders_own *own, vsh_error *error) {
+    vsh_grid *grid = NULL;
+    const double start = vshi_seconds();
+    vsh_result result = vsh_grid_from_meshes(meshes, count, &options->grid, run, &grid, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    const double voxelized = vshi_seconds();
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    own->grid_bytes = info.bytes;
+    vsh_field_options reach = vsh_field_options_default();
+    reach.reach = options->reach;
+    result = vsh_field_create(grid, &reach, run, &own->field, error);
+    vsh_grid_free(grid);
+    own->voxelize_s = voxelized - start;
+    own->field_s = vshi_seconds() - voxelized;
+    return result;
+}
+
+vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_count,
+                                const vsh_occluders_options *options, const vsh_run *run,
+                                vsh_occluders **occluders, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(occluders);
+    *occluders = NULL;
+    VSHI_NEEDS_OF(mesh_count, meshes);
+    vsh_occluders_options full = vsh_occluders_options_default();
+    vshi_occluders_own own = {.field = NULL};
+    vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_occluders_options", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    result = make_field(meshes, mesh_count, &full, run, &own, error);
+    if (result == VSH_OK && full.triangles != 0 && vsh_triangles_available()) {
+        const double start = vshi_seconds();
+        result = vsh_triangles_create(meshes, mesh_count, run, &own.triangles, error);
+        own.triangles_s = vshi_seconds() - start;
+    }
+    if (result != VSH_OK) {
+        vshi_occluders_own_free(&own);
+        return result;
+    }
+    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    parts.field = own.field;
+    parts.triangles = parts.true_triangles = own.triangles;
+    return vshi_occluders_make(&parts, &own, occluders, error);
+}

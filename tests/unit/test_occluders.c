@@ -1,0 +1,213 @@
+/* What casts as one handle: from meshes, from parts and from a scene. */
+#include "fields.h"
+#include "scenes.h"
+
+#include <vdbshade/vdbshade.h>
+
+static vsh_error why;
+
+/* A square plate of 2 × 2 at y = 1, and of 0.2 thick. */
+static vsh_mesh plate(void) {
+    static const float positions[] = {-1, 1,    -1, 1, 1,    -1, 1, 1,    1, -1, 1,    1,
+                                      -1, 0.8f, -1, 1, 0.8f, -1, 1, 0.8f, 1, -1, 0.8f, 1};
+    static const uint32_t indices[] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
+                                       1, 2, 6, 1, 6, 5, 2, 3, 7, 2, 7, 6, 3, 0, 4, 3, 4, 7};
+    return (vsh_mesh){.positions = positions, .vertex_count = 8, .indices = indices, .triangle_count = 12};
+}
+
+static void meshes_make_the_field_and_triangles_that_their_parts_make(void **state) {
+    (void)state;
+    const vsh_mesh mesh = plate();
+    vsh_occluders_options options = vsh_occluders_options_default();
+    options.grid.resolution = 64;
+    options.reach = 2.0;
+    vsh_occluders *made = NULL;
+    assert_int_equal(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &why), VSH_OK);
+    vsh_grid *grid = NULL;
+    assert_int_equal(vsh_grid_from_meshes(&mesh, 1, &options.grid, NULL, &grid, &why), VSH_OK);
+    vsh_field *field = field_of_grid(grid, options.reach);
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(made, &parts);
+    assert_int_equal(parts.struct_size, sizeof parts);
+    assert_int_equal(parts.triangles != NULL, vsh_triangles_available());
+    assert_ptr_equal(parts.triangles, parts.true_triangles);
+    uint64_t counter = 7;
+    for (int i = 0; i < 200; ++i) {
+        const double at[3] = {between(&counter, -2, 2), between(&counter, -2, 2), between(&counter, -2, 2)};
+        float ours, theirs;
+        vsh_field_sample(parts.field, 1, at, &ours);
+        vsh_field_sample(field, 1, at, &theirs);
+        assert_int_equal(bits_of(ours), bits_of(theirs));
+    }
+    vsh_field_info of_field;
+    vsh_field_get_info(field, &of_field);
+    vsh_occluders_info info;
+    vsh_occluders_get_info(made, &info);
+    assert_true(info.field_bytes == of_field.bytes && info.bricks == of_field.bricks);
+    assert_true(info.voxel_size == of_field.voxel_size && info.levels == of_field.levels);
+    assert_true(info.grid_bytes > 0 && info.voxelize_s > 0.0 && info.field_s > 0.0);
+    assert_int_equal(info.has_triangles, vsh_triangles_available());
+    vsh_field_free(field);
+    vsh_occluders_free(made);
+
+    options.triangles = 0;
+    assert_int_equal(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &why), VSH_OK);
+    vsh_occluders_get_info(made, &info);
+    assert_true(info.has_triangles == 0 && info.triangles_bytes == 0);
+    vsh_occluders_free(made);
+}
+
+static void bad_meshes_and_options_are_refused_with_nothing_made(void **state) {
+    (void)state;
+    const vsh_mesh mesh = plate();
+    vsh_mesh bad = mesh;
+    bad.vertex_count = 5; /* indices beyond */
+    vsh_occluders *made = (vsh_occluders *)&why;
+    assert_int_equal(vsh_occluders_create(&bad, 1, NULL, NULL, &made, &why), VSH_ERROR_INPUT);
+    assert_null(made);
+    assert_int_equal(vsh_occluders_create(&mesh, 0, NULL, NULL, &made, &why), VSH_ERROR_ARGUMENT);
+    vsh_occluders_options options = vsh_occluders_options_default();
+    options.grid.resolution = 1;
+    assert_int_equal(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &why), VSH_ERROR_ARGUMENT);
+    options = vsh_occluders_options_default();
+    options.reach = -1.0;
+    assert_int_equal(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &why), VSH_ERROR_ARGUMENT);
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 1000;
+    assert_int_equal(vsh_occluders_create(&mesh, 1, NULL, &run, &made, &why), VSH_ERROR_LIMIT);
+    assert_null(made);
+}
+
+static void expect_refused(const vsh_occluder_parts *parts, const char *text) {
+    vsh_occluders *made = (vsh_occluders *)&why;
+    assert_int_equal(vsh_occluders_from_parts(parts, &made, &why), VSH_ERROR_ARGUMENT);
+    assert_null(made);
+    if (strstr(why.message, text) == NULL) {
+        fail_msg("'%s' without '%s'", why.message, text);
+    }
+}
+
+static void parts_that_are_none_are_refused_by_name(void **state) {
+    (void)state;
+    const double ball[] = {0, 0, 0, 1};
+    vsh_spheres *spheres = NULL;
+    assert_int_equal(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &why), VSH_OK);
+    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    expect_refused(&parts, "neither a field nor layers");
+    parts.voxel_size = -1.0;
+    expect_refused(&parts, "voxel_size");
+    parts = vsh_occluder_parts_default();
+    parts.layer_count = 1;
+    expect_refused(&parts, "layers at NULL");
+    vsh_layer layers[2] = {vsh_layer_default(), vsh_layer_default()};
+    layers[0].spheres = spheres;
+    parts.layers = layers;
+    parts.layer_count = VSH_MAX_LAYERS + 1;
+    expect_refused(&parts, "expected at most 128");
+    parts.layer_count = 2;
+    expect_refused(&parts, "layer 1: none of field, heights and spheres");
+    layers[1].spheres = spheres;
+    layers[1].softness = 2000;
+    expect_refused(&parts, "layer 1: softness 2000");
+    vsh_spheres_free(spheres);
+}
+
+static void layers_alone_say_what_offsets_are_measured_in(void **state) {
+    (void)state;
+    const double ball[] = {0, 0, 0, 1};
+    vsh_spheres *spheres = NULL;
+    assert_int_equal(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &why), VSH_OK);
+    const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 0.5};
+    vsh_field *field = field_of((truth_scene){&solid, 1}, 0.125, 1.0);
+    vsh_layer layers[2] = {vsh_layer_default(), vsh_layer_default()};
+    layers[0].spheres = spheres;
+    layers[1].field = field;
+    const struct {
+        size_t layers;
+        double given, expected;
+    } cases[] = {{1, 0.0, 2e-5}, {2, 0.0, 0.125}, {2, 0.5, 0.5}, {0, 3.0, 3.0}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        vsh_occluder_parts parts = vsh_occluder_parts_default();
+        parts.layers = layers;
+        parts.layer_count = cases[i].layers;
+        parts.voxel_size = cases[i].given;
+        vsh_occluders *made = NULL;
+        assert_int_equal(vsh_occluders_from_parts(&parts, &made, &why), VSH_OK);
+        vsh_occluder_parts views;
+        vsh_occluders_get_parts(made, &views);
+        assert_int_equal(views.layer_count, cases[i].layers);
+        vsh_field_info info;
+        vsh_field_get_info(views.field, &info);
+        assert_true(info.voxel_size == cases[i].expected);
+        vsh_occluders_info counted; /* the field of nothing is none */
+        vsh_occluders_get_info(made, &counted);
+        assert_true((counted.field_bytes > 0) == (cases[i].layers == 2));
+        assert_true(counted.voxel_size == (cases[i].layers == 2 ? 0.125 : 0.0));
+        vsh_occluders_free(made);
+    }
+    vsh_field_free(field);
+    vsh_spheres_free(spheres);
+}
+
+static vsh_occluders *of_scene(const char *text, const vsh_scene_occluders_options *options,
+                               vsh_result expected) {
+    vsh_scene *scene = parse("/scene.json", text);
+    vsh_assets *assets = NULL;
+    vsh_occluders *made = NULL;
+    assert_int_equal(vsh_assets_load(scene, NULL, &assets, &why), VSH_OK);
+    assert_int_equal(vsh_scene_occluders(scene, assets, options, NULL, &made, &why), expected);
+    vsh_occluders_info info;
+    if (made != NULL) { /* no layer of these scenes refers to scene or assets */
+        vsh_occluders_get_info(made, &info);
+    }
+    vsh_assets_free(assets);
+    vsh_scene_free(scene);
+    return made;
+}
+
+#define SCENE(casters, more)                                                                                 \
+    "{\"casters\": [" casters "], \"resolution\": 32, \"lights\": [{\"name\": \"sun\", \"type\": "           \
+    "\"directional\", \"direction\": [0, 1, 0]}], \"receivers\": [], " more "}"
+#define BALL "{\"sdf\": {\"shape\": \"sphere\", \"radius\": 1}}"
+
+static void a_scene_keeps_the_truth_only_where_an_error_is_kept(void **state) {
+    (void)state;
+    vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
+    const struct {
+        const char *text;
+        int32_t truth;
+        bool kept;
+    } cases[] = {{SCENE(BALL, "\"method\": \"adaptive\""), 1, true},
+                 {SCENE(BALL, "\"method\": \"adaptive\""), 0, false},
+                 {SCENE(BALL, "\"method\": \"cone\""), 1, false}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        options.truth = cases[i].truth;
+        vsh_occluders *made = of_scene(cases[i].text, &options, VSH_OK);
+        vsh_occluder_parts parts;
+        vsh_occluders_get_parts(made, &parts);
+        assert_int_equal(parts.true_solids != NULL, cases[i].kept);
+        assert_null(parts.true_triangles);
+        assert_null(parts.triangles);
+        vsh_occluders_free(made);
+    }
+}
+
+static void a_box_without_a_half_is_refused(void **state) {
+    (void)state;
+    const double corner[3] = {0, 0, 0};
+    vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
+    options.receivers_min = corner;
+    assert_null(of_scene(SCENE(BALL, "\"method\": \"cone\""), &options, VSH_ERROR_ARGUMENT));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(meshes_make_the_field_and_triangles_that_their_parts_make),
+        cmocka_unit_test(bad_meshes_and_options_are_refused_with_nothing_made),
+        cmocka_unit_test(parts_that_are_none_are_refused_by_name),
+        cmocka_unit_test(layers_alone_say_what_offsets_are_measured_in),
+        cmocka_unit_test(a_scene_keeps_the_truth_only_where_an_error_is_kept),
+        cmocka_unit_test(a_box_without_a_half_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
