@@ -77,16 +77,17 @@ static float shade_soft(const vsh_heights *heights, vshi_walk_fn *walk, const vs
     return visible;
 }
 
-/* Slices of a lamp as a point sees it; false where the point is within the lamp. */
-static bool aim(const vshi_light_place *place, bool hard, const double at[3], vshi_slices *s) {
+/* Slices of a lamp as a point sees it. */
+static vshi_light_side aim(const vshi_light_place *place, bool hard, const double at[3], vshi_slices *s) {
     vshi_light_view view;
-    if (!vshi_light_seen(place, vshi_vec_of(at), &view)) {
-        return false;
+    const vshi_light_side side = vshi_light_look(place, vshi_vec_of(at), hard, &view);
+    if (side != VSHI_LIGHT_SEEN) {
+        return side;
     }
     /* up to the circle where the cone touches the lamp: vshi_light_end(), but for rounding */
     const double square = (1.0 - view.sine) * (1.0 + view.sine);
     vshi_slices_make(view.axis, hard ? 0.0 : vshi_light_tangent(place, &view), view.distance * square, s);
-    return true;
+    return side;
 }
 
 void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, int32_t method,
@@ -116,8 +117,9 @@ void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, int
         case VSHI_STAND_FREE:
             break;
         }
-        if (!place.parallel && !aim(&place, hard, at, &slices)) {
-            *value = 1.0f;
+        const vshi_light_side side = place.parallel ? VSHI_LIGHT_SEEN : aim(&place, hard, at, &slices);
+        if (side != VSHI_LIGHT_SEEN) {
+            *value = side == VSHI_LIGHT_WITHIN ? 1.0f : 0.0f;
             continue;
         }
         ++stats->marches;

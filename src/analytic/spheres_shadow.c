@@ -238,18 +238,19 @@ static float shade_point(const vsh_spheres *spheres, covering *c, vsh_shade_stat
     return (float)(1.0 - fmin(hidden, 1.0));
 }
 
-/* Where a light stands; false where the point is within it. */
-static bool aim(covering *c, const vshi_light_place *place, bool hard) {
+/* Where a light stands, as the point sees it. */
+static vshi_light_side aim(covering *c, const vshi_light_place *place, bool hard) {
     vshi_light_view view;
-    if (!vshi_light_seen(place, vshi_vec_of(c->origin), &view)) {
-        return false;
+    const vshi_light_side side = vshi_light_look(place, vshi_vec_of(c->origin), hard, &view);
+    if (side != VSHI_LIGHT_SEEN) {
+        return side;
     }
     c->axis = view.axis;
     c->half = hard ? 0.0 : place->parallel ? place->half : vshi_asin(view.sine);
     c->far = vshi_light_end(&view);
     c->radius = vshi_tan(c->half);
     vshi_frame(c->axis, &c->u, &c->v);
-    return true;
+    return side;
 }
 
 void vshi_spheres_shadow(const vsh_spheres *spheres, const vsh_light *light, int32_t method,
@@ -263,9 +264,11 @@ void vshi_spheres_shadow(const vsh_spheres *spheres, const vsh_light *light, int
         float *value = &visibility[i - begin];
         if (!vshi_spheres_origin(points, i, lift, c.origin, &c.normal)) {
             *value = NAN;
-        } else {
-            *value = aim(&c, &place, method == VSH_SHADOW_HARD) ? shade_point(spheres, &c, stats) : 1.0f;
+            continue;
         }
+        const vshi_light_side side = aim(&c, &place, method == VSH_SHADOW_HARD);
+        *value = side == VSHI_LIGHT_SEEN ? shade_point(spheres, &c, stats)
+                                         : (side == VSHI_LIGHT_WITHIN ? 1.0f : 0.0f);
     }
 }
 

@@ -32,7 +32,11 @@ static vsh_result check_range(const vsh_light *light, const vshi_light_member *m
     const bool is_vector = m->kind == VSHI_LIGHT_VECTOR;
     const int count = is_vector ? 3 : 1;
     double values[3];
-    memcpy(values, (const char *)light + m->offset, (size_t)count * sizeof values[0]);
+    if (m->kind == VSHI_LIGHT_SWITCH) {
+        values[0] = (double)*(const int32_t *)((const char *)light + m->offset);
+    } else {
+        memcpy(values, (const char *)light + m->offset, (size_t)count * sizeof values[0]);
+    }
     bool zero = true;
     for (int i = 0; i < count; ++i) {
         const bool above = m->above ? values[i] > m->lowest : values[i] >= m->lowest;
@@ -56,7 +60,7 @@ static vsh_result check_range(const vsh_light *light, const vshi_light_member *m
 static vsh_result check_members(const vsh_light *light, vsh_error *error) {
     for (size_t i = 0; i < vshi_light_member_count; ++i) {
         const vshi_light_member *m = &vshi_light_members[i];
-        if ((m->types & (1U << light->type)) == 0 || m->apart || m->kind == VSHI_LIGHT_SWITCH) {
+        if ((m->types & (1U << light->type)) == 0 || m->apart) {
             continue;
         }
         const vsh_result result = check_range(light, m, error);
@@ -118,10 +122,10 @@ double vshi_light_gain(const vsh_light *light, vshi_vec to_light, double distanc
 }
 
 vsh_light vshi_light_resized(const vsh_light *light, double factor) {
+    const vshi_light_type *type = vshi_light_type_of(light->type);
     vsh_light resized = *light;
-    if (factor != 1.0) {
-        resized.angle = 2.0 * vshi_atan(factor * vshi_tan(0.5 * light->angle));
-        resized.radius = factor * light->radius;
+    if (factor != 1.0 && type != NULL) {
+        type->resize(&resized, factor);
     }
     return resized;
 }
@@ -140,6 +144,9 @@ vshi_light_place vshi_light_moved(const vshi_light_place *place, const double ma
     moved.towards = vshi_unit(vshi_transform_vector(matrix, place->towards));
     moved.centre = vshi_transform_point(matrix, place->centre);
     moved.radius = place->radius / unit;
+    if (place->shape != NULL) {
+        place->shape->move(&moved, matrix, unit);
+    }
     return moved;
 }
 

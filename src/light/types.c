@@ -26,6 +26,10 @@ static double sun_gain(const vsh_light *light, vshi_vec to_light, double distanc
     return 1.0;
 }
 
+static void resize_sun(vsh_light *light, double factor) {
+    light->angle = 2.0 * vshi_atan(factor * vshi_tan(0.5 * light->angle));
+}
+
 static int describe_sun(const vsh_light *light, char *text, size_t size) {
     const double *d = light->direction;
     return snprintf(text, size, "directional towards %.9g %.9g %.9g, %.9g degrees across", d[0], d[1], d[2],
@@ -42,6 +46,10 @@ static double lamp_gain(const vsh_light *light, vshi_vec to_light, double distan
     (void)to_light;
     /* not nearer than the lamp's own surface, so that the square stays finite */
     return vshi_light_falloff(light, fmax(distance, fmax(light->radius, 1e-30)));
+}
+
+static void resize_lamp(vsh_light *light, double factor) {
+    light->radius *= factor;
 }
 
 static int describe_lamp(const vsh_light *light, char *text, size_t size) {
@@ -91,19 +99,22 @@ static const vshi_light_type types[] = {
                                .flat_name = "directional",
                                .place = place_sun,
                                .gain = sun_gain,
-                               .describe = describe_sun},
+                               .describe = describe_sun,
+                               .resize = resize_sun},
     [VSH_LIGHT_SPHERE] = {.name = "sphere",
                           .flat_name = "disc",
                           .falls_off = true,
                           .place = place_lamp,
                           .gain = lamp_gain,
-                          .describe = describe_lamp},
+                          .describe = describe_lamp,
+                          .resize = resize_lamp},
     [VSH_LIGHT_SPOT] = {.name = "spot",
                         .flat_name = "spot",
                         .falls_off = true,
                         .place = place_lamp,
                         .gain = spot_gain,
                         .describe = describe_spot,
+                        .resize = resize_lamp,
                         .check = check_spot},
 };
 

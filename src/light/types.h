@@ -17,6 +17,8 @@ typedef struct vshi_light_type {
     double (*gain)(const vsh_light *light, vshi_vec to_light, double distance);
     /* Type, place and size in words. */
     int (*describe)(const vsh_light *light, char *text, size_t size);
+    /* Makes it so many times as large as a point sees it. */
+    void (*resize)(vsh_light *light, double factor);
     /* What no range of a member tells; NULL: nothing. */
     vsh_result (*check)(const vsh_light *light, vsh_error *error);
 } vshi_light_type;
@@ -43,10 +45,11 @@ typedef struct vshi_light_member {
     uint32_t types;    /* bits */
     uint32_t required; /* in files: bits */
     size_t offset;
-    double lowest, highest; /* infinity as an excluded end stands for: any finite value */
-    bool above, below;      /* ends that are excluded */
-    bool nonzero;           /* of vectors: not all of the numbers may be 0 */
-    bool apart;             /* its type's check() has its range, which another member decides */
+    double lowest,
+        highest;       /* of switches 0 and 1; infinity as an excluded end stands for: any finite value */
+    bool above, below; /* ends that are excluded */
+    bool nonzero;      /* of vectors: not all of the numbers may be 0 */
+    bool apart;        /* its type's check() has its range, which another member decides */
 } vshi_light_member;
 
 extern const vshi_light_member vshi_light_members[];

@@ -10,6 +10,8 @@
 #include <stdbool.h>
 #include <vdbshade/light.h>
 
+struct vshi_light_shape;
+
 /* Where a light is and how large. */
 typedef struct vshi_light_place {
     bool parallel;    /* directional: seen alike from everywhere */
@@ -18,7 +20,8 @@ typedef struct vshi_light_place {
     double sine;      /* the angle's sine, */
     double tangent;   /* and tangent; else 0 */
     vshi_vec centre;  /* else: its middle, */
-    double radius;    /* and radius; 0 where parallel */
+    double radius;    /* and that of the sphere around it which holds all of it; 0 where parallel */
+    const struct vshi_light_shape *shape; /* NULL: a sun or a sphere, which is seen as a disc */
 } vshi_light_place;
 
 /* In world space. */
@@ -27,12 +30,39 @@ vshi_light_place vshi_light_in_world(const vsh_light *light);
 /* The same after a transform that turns and scales alike in all directions, by 1 / unit. */
 vshi_light_place vshi_light_moved(const vshi_light_place *place, const double matrix[12], double unit);
 
-/* A light as a point sees it: a cone around an axis. */
+/* What a point sees of a light where nothing is in the way. */
+typedef enum vshi_light_side {
+    VSHI_LIGHT_WITHIN, /* the point is in the light: all of it */
+    VSHI_LIGHT_AWAY,   /* the light does not shine to this side: nothing of it */
+    VSHI_LIGHT_SEEN
+} vshi_light_side;
+
+/* A light as a point sees it. To methods of one march it is a sphere: the light itself, or of a shape the
+ * sphere of the same solid angle, at a distance where its cone ends before the shape. To proofs it is a cone
+ * that holds all of the light. */
 typedef struct vshi_light_view {
-    vshi_vec axis;   /* unit, to the light's centre */
-    double distance; /* of the centre; INFINITY where parallel */
-    double sine;     /* of the cone's half angle */
+    vshi_vec axis;   /* unit, to the light's middle as the point sees it */
+    double distance; /* of the sphere's centre; INFINITY where parallel */
+    double sine;     /* of the sphere's half angle */
+    double bound;    /* of proofs: sine of the half angle of a cone around all of the light; INFINITY: none */
+    double end;      /* of proofs and rays: how far along the axis the last of them end, */
+    double near;     /* and the first */
 } vshi_light_view;
+
+/* What must be known of a light that is not seen as a disc. */
+typedef struct vshi_light_shape {
+    /* Takes along what a place has beside its centre and radius: see vshi_light_moved(). */
+    void (*move)(vshi_light_place *place, const double matrix[12], double unit);
+    /* Fills *view where the light is seen; `hard`: as a point in its centre, of no size. */
+    vshi_light_side (*look)(const vshi_light_place *place, vshi_vec from, bool hard, vshi_light_view *view);
+    /* The way from the point of a view to the light's place that stands for one of the unit disc: what is
+     * uniform on the disc is uniform in solid angle. It ends a hair before the light. */
+    vshi_vec (*ray)(const vshi_light_place *place, const vshi_light_view *view, const double disc[2]);
+    /* Fraction of the light's solid angle over the plane of a normal. */
+    double (*above)(const vshi_light_place *place, vshi_vec from, vshi_vec normal);
+    /* Whether every point of a ball may see the light. */
+    bool (*faces)(const vshi_light_place *place, vshi_vec centre, double radius);
+} vshi_light_shape;
 
 /* Unit vector to the light's centre, and how far that is (INFINITY where parallel). */
 static inline double vshi_light_towards(const vshi_light_place *place, vshi_vec from, vshi_vec *axis) {
@@ -45,23 +75,30 @@ static inline double vshi_light_towards(const vshi_light_place *place, vshi_vec 
     return vshi_length(to);
 }
 
-/* False where the point is within the light: the view then holds nothing of use. */
-static inline bool vshi_light_seen(const vshi_light_place *place, vshi_vec from, vshi_light_view *view) {
-    view->distance = vshi_light_towards(place, from, &view->axis);
-    if (place->parallel) {
-        view->sine = place->sine;
-        return true;
-    }
-    if (!(view->distance > place->radius)) {
-        return false;
-    }
-    view->sine = place->radius / view->distance;
-    return true;
-}
-
-/* How far along the axis the light is: the circle where the cone touches the sphere. */
+/* How far along the axis one march goes: to the circle where the cone touches the sphere. */
 static inline double vshi_light_end(const vshi_light_view *view) {
     return isfinite(view->distance) ? view->distance * (1.0 - view->sine * view->sine) : INFINITY;
+}
+
+/* How a point sees the light; unless it does, the view holds nothing of use. A disc is the same whether it is
+ * looked at as `hard` or not: whoever wants no size takes a sine of 0. */
+static inline vshi_light_side vshi_light_look(const vshi_light_place *place, vshi_vec from, bool hard,
+                                              vshi_light_view *view) {
+    if (place->shape != NULL) {
+        return place->shape->look(place, from, hard, view);
+    }
+    view->distance = view->near = view->end = vshi_light_towards(place, from, &view->axis);
+    view->sine = view->bound = place->sine;
+    if (place->parallel) {
+        return VSHI_LIGHT_SEEN;
+    }
+    if (!(view->distance > place->radius)) {
+        return VSHI_LIGHT_WITHIN;
+    }
+    view->sine = view->bound = place->radius / view->distance;
+    view->near = view->distance - place->radius;
+    view->end = vshi_light_end(view);
+    return VSHI_LIGHT_SEEN;
 }
 
 /* Tangent of the cone's half angle. */

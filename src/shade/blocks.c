@@ -136,6 +136,11 @@ static bool aim_at(const vshi_shadow_task *task, double radius, vshi_cone *beam,
         beam->sine = task->options->method == VSH_SHADOW_HARD ? 0.0 : task->place.sine;
         return true;
     }
+    /* the cones of one march towards a shape are not those towards the sphere around it */
+    const bool hard = task->options->method == VSH_SHADOW_HARD;
+    if (task->place.shape != NULL && !hard && !vshi_shadow_has_rays(task->options)) {
+        return false;
+    }
     const vshi_vec to = vshi_sub(task->place.centre, beam->origin);
     const double length = vshi_length(to);
     if (!(length > radius + 4.0 * beam->wide)) {
@@ -145,6 +150,19 @@ static bool aim_at(const vshi_shadow_task *task, double radius, vshi_cone *beam,
     beam->sine = fmax(0.0, (radius - beam->wide) / length);
     *distance = length;
     return true;
+}
+
+/* Sine of the most that an axis of a block's cones is off its beam's. */
+static double tilt_of(const vshi_shadow_task *task, const vshi_facing *facing, const block *b) {
+    if (task->place.shape == NULL) {
+        return b->beam.wide / b->distance;
+    }
+    double square = 0.0;
+    for (size_t i = b->first; i < b->first + b->count; ++i) {
+        const vshi_vec across = vshi_cross(facing->cone[i].direction, b->beam.direction);
+        square = fmax(square, vshi_dot(across, across));
+    }
+    return sqrt(square);
 }
 
 /* The beam around the cones of a block's points; false where there is none worth a look. */
@@ -175,7 +193,7 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
         return false;
     }
     if (b->distance > 0.0) {
-        b->tilt = beam->wide / b->distance;
+        b->tilt = tilt_of(task, facing, b);
     }
     /* from where the first of the cones is not yet proved to where the last is */
     beam->begin = b->ends = INFINITY;
@@ -278,7 +296,11 @@ static void hide_cut(const vshi_shadow_task *task, vshi_facing *facing, const bl
 /* Whether every cone of a block comes to a solid ball around its beam's `t` before it ends. */
 static bool is_met(const vshi_shadow_task *task, const block *b, double t) {
     const double beyond = DEEPER * fmax(1.0, b->beam.sine * t);
-    return vshi_shadow_has_rays(task->options) || t + beyond <= b->ends;
+    if (vshi_shadow_has_rays(task->options)) {
+        /* what fills the beam to a shape may stand behind a part of it */
+        return task->place.shape == NULL || t <= b->distance - task->place.radius - below(task);
+    }
+    return t + beyond <= b->ends;
 }
 
 static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s, vshi_chunk *chunk,
@@ -361,12 +383,17 @@ void vshi_blocks_prove(const vshi_shadow_task *task, vshi_facing *facing, vshi_c
 static bool aim_ball(const vshi_shadow_task *task, vshi_vec centre, double radius, vshi_cone *beam) {
     const bool hard = task->options->method == VSH_SHADOW_HARD;
     *beam = (vshi_cone){.origin = centre, .wide = radius + 1e-3, .end = INFINITY};
+    const vshi_light_shape *shape = task->place.shape;
+    if (shape != NULL && !shape->faces(&task->place, centre, beam->wide)) {
+        return false;
+    }
     double distance;
     if (!(beam->wide <= WIDEST) || !aim_at(task, hard ? 0.0 : task->place.radius, beam, &distance)) {
         return false;
     }
     if (distance > 0.0) {
-        beam->end = distance + beam->wide; /* no cone goes on behind the lamp's middle */
+        /* no cone goes on behind the lamp's middle, or the last of a shape */
+        beam->end = distance + beam->wide + (shape != NULL ? task->place.radius : 0.0);
     }
     return true;
 }

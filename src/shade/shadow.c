@@ -31,19 +31,22 @@ static float remap(int32_t method, double closeness, double sine) {
     }
 }
 
-/* The cone of point i, which begins at `origin`; false where the point is within the light. Where a lamp
- * stands, and whether it is over the horizon, is seen from the point itself: one that is nearer than the
- * start offset would else be below it. */
-static bool aim(const vshi_shadow_task *task, size_t i, vshi_vec origin, vshi_cone *cone) {
+/* The cone of point i, which begins at `origin`: the light's own to one march, one that holds all of it to
+ * rays. Where a lamp stands, and whether it is over the horizon, is seen from the point itself: one that is
+ * nearer than the start offset would else be below it. */
+static vshi_light_side aim(const vshi_shadow_task *task, size_t i, vshi_vec origin, vshi_cone *cone) {
+    const bool hard = task->options->method == VSH_SHADOW_HARD,
+               has_rays = vshi_shadow_has_rays(task->options);
     *cone = (vshi_cone){.origin = origin, .horizon = INFINITY};
     vshi_light_view view;
-    if (!vshi_light_seen(&task->place, vshi_to_field(task->field, task->points->positions + 3 * i), &view)) {
-        return false;
+    const vshi_light_side side = vshi_light_look(
+        &task->place, vshi_to_field(task->field, task->points->positions + 3 * i), hard, &view);
+    if (side == VSHI_LIGHT_SEEN) {
+        cone->direction = view.axis;
+        cone->sine = hard ? 0.0 : has_rays ? view.bound : view.sine;
+        cone->end = cone->whole = has_rays ? view.end : vshi_light_end(&view);
     }
-    cone->direction = view.axis;
-    cone->sine = task->options->method == VSH_SHADOW_HARD ? 0.0 : view.sine;
-    cone->end = cone->whole = vshi_light_end(&view);
-    return true;
+    return side;
 }
 
 void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, vshi_facing *facing,
@@ -59,8 +62,10 @@ void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, 
             ++stats->invalid;
             continue;
         }
-        if (!aim(task, i, origin, cone)) {
-            vshi_shadow_settle(task, i, 1.0f, 0.0f);
+        const vshi_light_side side = aim(task, i, origin, cone);
+        if (side != VSHI_LIGHT_SEEN) {
+            vshi_shadow_settle(task, i, side == VSHI_LIGHT_WITHIN ? 1.0f : 0.0f, 0.0f);
+            stats->skipped += side == VSHI_LIGHT_AWAY;
             continue;
         }
         if (task->points->normals != NULL) {
@@ -81,10 +86,14 @@ void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, 
 double vshi_shadow_above(const vshi_shadow_task *task, size_t i) {
     const vsh_points *points = task->points;
     vshi_cone cone;
-    if (points->normals == NULL || !aim(task, i, (vshi_vec){0.0, 0.0, 0.0}, &cone)) {
+    if (points->normals == NULL || aim(task, i, (vshi_vec){0.0, 0.0, 0.0}, &cone) != VSHI_LIGHT_SEEN) {
         return 1.0;
     }
     const vshi_vec normal = vshi_direction_to_field(task->field, vshi_vec_off(points->normals + 3 * i));
+    const vshi_light_shape *shape = task->place.shape;
+    if (shape != NULL && vshi_shadow_has_rays(task->options)) {
+        return shape->above(&task->place, vshi_to_field(task->field, points->positions + 3 * i), normal);
+    }
     const double sine = vshi_dot(normal, cone.direction);
     return (double)remap(task->options->method, sine < cone.sine || cone.sine <= 0.0 ? sine : cone.sine,
                          cone.sine);

@@ -30,6 +30,8 @@ typedef struct open_point {
     vshi_vec origin, normal; /* field space; no normal: zero */
     vshi_vec axis, u, v;     /* towards the light, and over its disc a unit away; exact: in world space */
     vshi_vec start;          /* exact: of its rays, world space */
+    vshi_light_view view;    /* of a shape: from the point itself, */
+    vshi_vec off;            /* from which rays begin so far off, in the rays' space */
     double end;
     int32_t lit, taken;
     double deviation;
@@ -87,7 +89,36 @@ static void turn_to_world(const vshi_shadow_task *task, open_point *p) {
     p->v = vshi_scale(vshi_direction_to_world(task->field, p->v), tangent);
     p->start = vshi_add(vshi_vec_of(at), vshi_scale(p->normal, lift));
     vshi_light_view view;
-    p->end = vshi_light_seen(&task->world, p->start, &view) ? vshi_light_end(&view) : 0.0;
+    p->end = vshi_light_look(&task->world, p->start, false, &view) == VSHI_LIGHT_SEEN ? view.end : 0.0;
+}
+
+/* Looks at a light that is no disc, in the space of the rays. */
+static void look_at_shape(const vshi_shadow_task *task, open_point *p) {
+    const double *at = task->points->positions + 3 * p->point;
+    const bool traced = task->options->method == VSH_SHADOW_EXACT;
+    const vshi_vec from = traced ? vshi_vec_of(at) : vshi_to_field(task->field, at);
+    vshi_light_look(traced ? &task->world : &task->place, from, false, &p->view);
+    p->off = vshi_sub(traced ? p->start : p->origin, from);
+}
+
+/* Unit direction of the ray to a place on the unit disc, and how far it goes; false below the horizon. */
+static bool direct(const vshi_shadow_task *task, const open_point *p, const double disc[2], vshi_vec *d,
+                   double *end) {
+    const bool horizon = task->points->normals != NULL;
+    const vshi_light_shape *shape = task->place.shape;
+    *end = p->end;
+    if (shape == NULL) {
+        *d = vshi_unit(vshi_add(p->axis, vshi_add(vshi_scale(p->u, disc[0]), vshi_scale(p->v, disc[1]))));
+        return !(horizon && vshi_dot(*d, p->normal) <= 0.0);
+    }
+    const bool traced = task->options->method == VSH_SHADOW_EXACT;
+    const vshi_vec way = shape->ray(traced ? &task->world : &task->place, &p->view, disc);
+    const vshi_vec to = vshi_sub(way, p->off);
+    const double length = vshi_length(to), ahead = vshi_dot(to, p->axis);
+    *d = vshi_unit(to);
+    /* what is proved free ends the cone early, at a depth along its axis */
+    *end = !traced && ahead > p->end ? length * p->end / ahead : length;
+    return !(horizon && vshi_dot(way, p->normal) <= 0.0);
 }
 
 /* Rays taken … target - 1 of an open point. */
@@ -102,24 +133,22 @@ static void cast(ray_batch *batch, size_t owner, int32_t target) {
         p->taken += count;
         batch->stats->rays += (uint64_t)count;
         for (int32_t i = 0; i < count; ++i) {
-            const vshi_vec d = vshi_unit(
-                vshi_add(p->axis, vshi_add(vshi_scale(p->u, disc[i][0]), vshi_scale(p->v, disc[i][1]))));
-            if (task->points->normals != NULL && vshi_dot(d, p->normal) <= 0.0) {
+            vshi_vec d;
+            double end;
+            if (!direct(task, p, disc[i], &d, &end)) {
                 continue;
             }
             if (batch->chunk.rays.count == VSHI_CHUNK || batch->traced_count == VSHI_CHUNK) {
                 flush(batch);
             }
             if (task->options->method == VSH_SHADOW_EXACT) {
-                batch->traced[batch->traced_count] =
-                    (vshi_segment_ray){.origin = {p->start.x, p->start.y, p->start.z},
-                                       .direction = {d.x, d.y, d.z},
-                                       .far = p->end};
+                batch->traced[batch->traced_count] = (vshi_segment_ray){
+                    .origin = {p->start.x, p->start.y, p->start.z}, .direction = {d.x, d.y, d.z}, .far = end};
                 batch->chunk.owner[batch->traced_count++] = (uint32_t)owner;
                 continue;
             }
             const vshi_cone ray = {
-                .origin = p->origin, .direction = d, .end = p->end, .sine = 0.0, .close = 1.0};
+                .origin = p->origin, .direction = d, .end = end, .sine = 0.0, .close = 1.0};
             p->lit += !vshi_chunk_add(&batch->chunk, task->field, &ray, (uint32_t)owner, batch->stats);
         }
     }
@@ -342,8 +371,9 @@ static void prove(ray_batch *batch, vshi_facing *facing) {
         }
         /* nothing to prove where the receiver's own plane hides a part of the light, or nearly does; and
          * where no block around the point was, a few rays on triangles cost less than a long march */
-        const bool promising = task->options->method != VSH_SHADOW_EXACT || !facing->gathered[i] ||
-                               cone->end < cone->begin + NEAR;
+        const bool promising =
+            isfinite(cone->sine) && (task->options->method != VSH_SHADOW_EXACT || !facing->gathered[i] ||
+                                     cone->end < cone->begin + NEAR);
         if (promising && horizon >= cone->sine + GRAZING &&
             !vshi_chunk_add(&batch->chunk, task->field, cone, (uint32_t)i, batch->stats)) {
             vshi_shadow_settle(task, facing->point[i], 1.0f, 0.0f);
@@ -357,7 +387,9 @@ static void prove(ray_batch *batch, vshi_facing *facing) {
     for (size_t r = 0; r < batch->chunk.rays.count; ++r) {
         const size_t i = batch->chunk.owner[r];
         const uint8_t proof = (uint8_t)batch->chunk.rays.proof[r];
-        if (proof == VSHI_PROVED_FREE || (proof == VSHI_PROVED_FULL && !task->leaky)) {
+        /* what fills the cone around a shape may stand behind a part of it */
+        const bool is_full = proof == VSHI_PROVED_FULL && !task->leaky && task->place.shape == NULL;
+        if (proof == VSHI_PROVED_FREE || is_full) {
             vshi_shadow_settle(task, facing->point[i], proof == VSHI_PROVED_FREE ? 1.0f : 0.0f, 0.0f);
             facing->settled[i] = true;
             ++batch->stats->certified;
@@ -396,6 +428,9 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
         p->v = vshi_scale(p->v, tangent);
         if (task->options->method == VSH_SHADOW_EXACT) {
             turn_to_world(task, p);
+        }
+        if (task->place.shape != NULL) {
+            look_at_shape(task, p);
         }
     }
     size_t some[VSHI_PIECE], count = batch.open_count;

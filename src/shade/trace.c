@@ -35,6 +35,7 @@ typedef struct target {
     double radius;
     double distance; /* of the light's centre; infinite for a directional light */
     double size;     /* of the sphere */
+    vshi_light_view view;
 } target;
 
 /* Vogel's spiral ("A better way to construct the sunflower head", 1979), radii √((i + ½) / n), so that every
@@ -48,18 +49,19 @@ static void place(tracing *task) {
     }
 }
 
-/* Where the light stands, seen from a point; false where the point is within it. */
-static bool aim(const vshi_light_place *place, vshi_vec from, target *t) {
+/* Where the light stands, seen from a point. */
+static vshi_light_side aim(const vshi_light_place *place, vshi_vec from, target *t) {
     vshi_light_view view;
-    if (!vshi_light_seen(place, from, &view)) {
-        return false;
+    const vshi_light_side side = vshi_light_look(place, from, false, &view);
+    if (side == VSHI_LIGHT_SEEN) {
+        *t = (target){.axis = view.axis,
+                      .radius = vshi_light_tangent(place, &view),
+                      .distance = view.distance,
+                      .size = place->radius,
+                      .view = view};
+        vshi_frame(t->axis, &t->u, &t->v);
     }
-    *t = (target){.axis = view.axis,
-                  .radius = vshi_light_tangent(place, &view),
-                  .distance = view.distance,
-                  .size = place->radius};
-    vshi_frame(t->axis, &t->u, &t->v);
-    return true;
+    return side;
 }
 
 /* How far a ray at `cosine` to the axis goes: up to the sphere's near side. */
@@ -71,10 +73,24 @@ static double far_of(const target *t, double cosine) {
     return t->distance * cosine - (across > 0.0 ? sqrt(across) : 0.0);
 }
 
+/* The same to a light that is no disc. */
+static bool direct_to_shape(const vshi_light_place *place, const target *t, const double disc[2],
+                            const vshi_vec *normal, vshi_segment_ray *ray) {
+    const vshi_vec way = place->shape->ray(place, &t->view, disc), d = vshi_unit(way);
+    ray->direction[0] = d.x;
+    ray->direction[1] = d.y;
+    ray->direction[2] = d.z;
+    ray->far = vshi_length(way);
+    return normal == NULL || vshi_dot(d, *normal) > 0.0;
+}
+
 /* The direction of a place on the unit disc, and how far it goes; false below the horizon of `normal` (NULL:
  * none). */
 static bool direct(const tracing *task, const target *t, const double disc[2], const vshi_vec *normal,
                    vshi_segment_ray *ray) {
+    if (task->place.shape != NULL) {
+        return direct_to_shape(&task->place, t, disc, normal, ray);
+    }
     const double x = disc[0] * t->radius, y = disc[1] * t->radius;
     double up, scale = 1.0;
     if (task->light != NULL) {
@@ -103,8 +119,13 @@ static vshi_cone_state look(const tracing *task, vshi_vec origin, const target *
     if (task->light == NULL) {
         return vsh_solids_distance(task->solids, from) > task->distance ? VSHI_CONE_FREE : VSHI_CONE_UNKNOWN;
     }
-    const double axis[3] = {t->axis.x, t->axis.y, t->axis.z};
-    return vshi_solids_cone(task->solids, from, axis, t->radius, t->distance - t->size, t->distance);
+    const double axis[3] = {t->axis.x, t->axis.y, t->axis.z}, bound = t->view.bound;
+    if (task->place.shape == NULL) {
+        return vshi_solids_cone(task->solids, from, axis, t->radius, t->distance - t->size, t->distance);
+    }
+    return isfinite(bound) ? vshi_solids_cone(task->solids, from, axis, bound / sqrt(1.0 - bound * bound),
+                                              t->view.near, t->view.end)
+                           : VSHI_CONE_UNKNOWN;
 }
 
 static void meet(const tracing *task, const vsh_solids *solids, const vshi_segment_ray *rays, size_t count,
@@ -145,9 +166,12 @@ static bool place_point(const tracing *task, const double position[3], const flo
     from->target = (target){.axis = from->normal, .radius = 1.0};
     if (task->light == NULL) {
         vshi_frame(from->target.axis, &from->target.u, &from->target.v);
-    } else if (!aim(&task->place, from->origin, &from->target)) {
-        *value = 1.0;
-        return false;
+    } else {
+        const vshi_light_side side = aim(&task->place, from->origin, &from->target);
+        if (side != VSHI_LIGHT_SEEN) {
+            *value = side == VSHI_LIGHT_WITHIN ? 1.0 : 0.0;
+            return false;
+        }
     }
     const vshi_cone_state state = look(task, from->origin, &from->target);
     if (state == VSHI_CONE_COVERED) {
