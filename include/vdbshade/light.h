@@ -1,4 +1,4 @@
-/* Lights: directional with an angular diameter, sphere, spot. */
+/* Lights: directional with an angular diameter, sphere, spot, rectangle. */
 #ifndef VDBSHADE_LIGHT_H
 #define VDBSHADE_LIGHT_H
 
@@ -11,7 +11,8 @@ extern "C" {
 enum {
     VSH_LIGHT_DIRECTIONAL = 0, /* direction, angle */
     VSH_LIGHT_SPHERE = 1,      /* position, radius */
-    VSH_LIGHT_SPOT = 2         /* position, radius, direction, inner_angle, outer_angle */
+    VSH_LIGHT_SPOT = 2,        /* position, radius, direction, inner_angle, outer_angle */
+    VSH_LIGHT_RECTANGLE = 3    /* position, edge_u, edge_v, two_sided */
 };
 
 enum {
@@ -20,22 +21,33 @@ enum {
     VSH_FALLOFF_QUADRATIC = 2       /* (1 - d / reach)², 0 beyond the reach */
 };
 
-/* A light. Only its shape and place enter shadow values; falloff, colour, a spot's edge and the cosine enter
+/* A light. Only its shape and place enter shadow values; falloff, colour, a spot's edge and cosines enter
  * irradiance only. A size (angle, radius) of 0 is a hard light. All numbers are finite; what a type does not
- * name is ignored. */
+ * name is ignored.
+ *
+ * Of a rectangle the visible fraction is that of its solid angle. VSH_SHADOW_RAYS, ADAPTIVE and EXACT cast
+ * rays over it as it is; VSH_SHADOW_HARD takes its centre; the other methods, and heights and spheres without
+ * voxels, take a disc of the same solid angle, without the part of the way where its cone would reach the
+ * rectangle's plane. Points behind a one-sided rectangle, or in its plane, see nothing of it (0). Irradiance
+ * has the cosine at which it shines to a point as well; by VSH_FALLOFF_INVERSE_SQUARE that and the distance
+ * are of each of its parts, which comes to its solid angle over its area. */
 typedef struct vsh_light {
     int32_t type;        /* VSH_LIGHT_… */
-    int32_t falloff;     /* VSH_FALLOFF_…; sphere and spot only */
+    int32_t falloff;     /* VSH_FALLOFF_…; not directional */
     double direction[3]; /* directional: towards the light; spot: the way it shines. Any length but 0 */
-    double position[3];  /* world units */
+    double position[3];  /* of the centre, world units */
     double angle;        /* directional: angular diameter, radians, 0 … π (excluded) */
     double radius;       /* sphere, spot: world units, ≥ 0 */
     double inner_angle;  /* spot: half angle of full light, radians, 0 … outer_angle */
     double outer_angle;  /* spot: half angle where light ends, radians, > 0 … π */
-    double reach;        /* sphere and spot with VSH_FALLOFF_QUADRATIC: world units, > 0 */
+    double reach;        /* with VSH_FALLOFF_QUADRATIC, not directional: world units, > 0 */
     double color[3]; /* linear RGB times intensity, ≥ 0; irradiance at normal incidence before falloff */
     char name[64]; /* "sun": its channel is shadow.sun. At most 63 of A … Z, a … z, 0 … 9, _ and -; may
                       be empty where no channel is named after it */
+    double edge_u[3];  /* rectangle: its sides from end to end, world units, of lengths 1e-15 … 1e15 and at
+                          right */
+    double edge_v[3];  /* angles (a cosine of at most 0.001). It shines the way of edge_u × edge_v */
+    int32_t two_sided; /* rectangle: 1: it shines the other way too; 0: it does not */
 } vsh_light;
 
 /* A white sun of half a degree overhead (+y), named "sun". */
@@ -50,7 +62,10 @@ static inline vsh_light vsh_light_default(void) {
                        0.5,
                        1.0,
                        {1.0, 1.0, 1.0},
-                       "sun"};
+                       "sun",
+                       {1.0, 0.0, 0.0},
+                       {0.0, 0.0, 1.0},
+                       0};
     return light;
 }
 VSH_API void vsh_light_init(vsh_light *light, size_t size);

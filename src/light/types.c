@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "light/light.h"
+#include "light/rectangle.h"
 
 #include <stddef.h>
 #include <stdio.h>
@@ -116,6 +117,13 @@ static const vshi_light_type types[] = {
                         .describe = describe_spot,
                         .resize = resize_lamp,
                         .check = check_spot},
+    [VSH_LIGHT_RECTANGLE] = {.name = "rectangle",
+                             .falls_off = true,
+                             .place = vshi_rectangle_place,
+                             .gain = vshi_rectangle_gain,
+                             .describe = vshi_rectangle_describe,
+                             .resize = vshi_rectangle_resize,
+                             .check = vshi_rectangle_check},
 };
 
 enum {
@@ -123,6 +131,7 @@ enum {
     DIRECTIONAL = 1 << VSH_LIGHT_DIRECTIONAL,
     SPHERE = 1 << VSH_LIGHT_SPHERE,
     SPOT = 1 << VSH_LIGHT_SPOT,
+    RECTANGLE = 1 << VSH_LIGHT_RECTANGLE,
 };
 
 const vshi_light_type *vshi_light_type_of(int32_t type) {
@@ -147,13 +156,18 @@ uint32_t vshi_light_types_flat(void) {
 
 #define MEMBER(member) .name = #member, .offset = offsetof(vsh_light, member)
 
+#define EDGE(name)                                                                                           \
+    .key = name, .kind = VSHI_LIGHT_VECTOR, .types = RECTANGLE, .required = RECTANGLE, .lowest = -INFINITY,  \
+    .highest = INFINITY, .above = true, .below = true, .nonzero = true
+
 /* In the order in which they are checked. */
 const vshi_light_member vshi_light_members[] = {
     {MEMBER(direction), .key = "direction", .kind = VSHI_LIGHT_VECTOR, .types = DIRECTIONAL | SPOT,
      .required = DIRECTIONAL | SPOT, .lowest = -INFINITY, .highest = INFINITY, .above = true, .below = true,
      .nonzero = true},
-    {MEMBER(position), .key = "position", .kind = VSHI_LIGHT_VECTOR, .types = SPHERE | SPOT,
-     .required = SPHERE | SPOT, .lowest = -INFINITY, .highest = INFINITY, .above = true, .below = true},
+    {MEMBER(position), .key = "position", .kind = VSHI_LIGHT_VECTOR, .types = SPHERE | SPOT | RECTANGLE,
+     .required = SPHERE | SPOT | RECTANGLE, .lowest = -INFINITY, .highest = INFINITY, .above = true,
+     .below = true},
     {MEMBER(angle), .key = "angle_deg", .kind = VSHI_LIGHT_ANGLE, .types = DIRECTIONAL, .highest = PI,
      .below = true},
     {MEMBER(radius), .key = "radius", .kind = VSHI_LIGHT_NUMBER, .types = SPHERE | SPOT, .highest = INFINITY,
@@ -162,5 +176,8 @@ const vshi_light_member vshi_light_members[] = {
      .highest = PI, .apart = true},
     {MEMBER(outer_angle), .key = "outer_deg", .kind = VSHI_LIGHT_ANGLE, .types = SPOT, .required = SPOT,
      .highest = PI, .above = true},
+    {MEMBER(edge_u), EDGE("edge_u")},
+    {MEMBER(edge_v), EDGE("edge_v")},
+    {MEMBER(two_sided), .key = "two_sided", .kind = VSHI_LIGHT_SWITCH, .types = RECTANGLE, .highest = 1.0},
 };
 const size_t vshi_light_member_count = sizeof vshi_light_members / sizeof vshi_light_members[0];

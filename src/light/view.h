@@ -22,6 +22,9 @@ typedef struct vshi_light_place {
     vshi_vec centre;  /* else: its middle, */
     double radius;    /* and that of the sphere around it which holds all of it; 0 where parallel */
     const struct vshi_light_shape *shape; /* NULL: a sun or a sphere, which is seen as a disc */
+    vshi_vec x, y, normal;                /* rectangle: unit, along its sides, and the way it shines */
+    double half_width, half_height;       /* rectangle: of its sides */
+    bool two_sided;                       /* rectangle: shines the other way too */
 } vshi_light_place;
 
 /* In world space. */
@@ -37,6 +40,14 @@ typedef enum vshi_light_side {
     VSHI_LIGHT_SEEN
 } vshi_light_side;
 
+/* A rectangle as a point sees it, for rays: see light/rectangle.c. */
+typedef struct vshi_light_patch {
+    double x[2], y[2], height;
+    vshi_vec down;
+    double angle; /* steradians; 0: too small for rays to tell from an area */
+    double b0, b1, k;
+} vshi_light_patch;
+
 /* A light as a point sees it. To methods of one march it is a sphere: the light itself, or of a shape the
  * sphere of the same solid angle, at a distance where its cone ends before the shape. To proofs it is a cone
  * that holds all of the light. */
@@ -47,6 +58,7 @@ typedef struct vshi_light_view {
     double bound;    /* of proofs: sine of the half angle of a cone around all of the light; INFINITY: none */
     double end;      /* of proofs and rays: how far along the axis the last of them end, */
     double near;     /* and the first */
+    vshi_light_patch patch; /* of rectangles */
 } vshi_light_view;
 
 /* What must be known of a light that is not seen as a disc. */

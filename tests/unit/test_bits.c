@@ -63,6 +63,17 @@ static void shadow(const context *c, int32_t method, bits *b) {
     }
 }
 
+static void rectangle(const context *c, int32_t method, bits *b) {
+    vsh_shade_options options = preview_options();
+    options.method = method;
+    vsh_light light = spot();
+    light.type = VSH_LIGHT_RECTANGLE;
+    memcpy(light.edge_u, (const double[]){0.75, 0.0, 0.25}, sizeof light.edge_u);
+    memcpy(light.edge_v, (const double[]){-0.125, 0.25, 0.375}, sizeof light.edge_v);
+    light.two_sided = 1;
+    shade(c, &light, &options, b);
+}
+
 static void ao(const context *c, int32_t method, bits *b) {
     vsh_shade_options options = preview_options();
     options.ao_method = method;

@@ -121,8 +121,8 @@ static void bad_values_are_named_with_field_and_limit(void **state) {
     light.inner_angle = 0.75;
     refuses(&light, "light 'spot': inner_angle 0.75 is out of range 0 … outer_angle 0.5");
     light = sun();
-    light.type = 3;
-    refuses(&light, "light 'sun': type 3 is out of range 0 … 2");
+    light.type = VSH_LIGHT_RECTANGLE + 1;
+    refuses(&light, "light 'sun': type 4 is out of range 0 … 3");
     light = sun();
     light.falloff = -1;
     refuses(&light, "light 'sun': falloff -1 is out of range 0 … 2");

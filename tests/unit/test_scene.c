@@ -218,6 +218,23 @@ static void rotations_turn_about_x_then_y_then_z(void **state) {
     vsh_scene_free(scene);
 }
 
+static void a_rectangle_has_its_sides(void **state) {
+    (void)state;
+    vsh_scene *scene =
+        parse("a.json", "{\"casters\":[{\"sdf\":{\"shape\":\"sphere\",\"radius\":1}}],\"lights\":["
+                        "{\"name\":\"a\",\"type\":\"rectangle\",\"position\":[1,2,3],"
+                        "\"edge_u\":[4,0,0],\"edge_v\":[0,5,6],\"two_sided\":true},"
+                        "{\"name\":\"b\",\"type\":\"rectangle\",\"position\":[1,2,3],"
+                        "\"edge_u\":[0,1,0],\"edge_v\":[0,0,1]}]}");
+    const vsh_light *l = scene->lights;
+    assert_int_equal(l[0].type, VSH_LIGHT_RECTANGLE);
+    assert_vector(l[0].position, 1.0, 2.0, 3.0);
+    assert_vector(l[0].edge_u, 4.0, 0.0, 0.0);
+    assert_vector(l[0].edge_v, 0.0, 5.0, 6.0);
+    assert_true(l[0].two_sided == 1 && l[1].two_sided == 0);
+    vsh_scene_free(scene);
+}
+
 static void every_example_of_the_reference_is_a_scene(void **state) {
     (void)state;
     static const char start[] = "```json\n", end[] = "\n```";
@@ -244,6 +261,7 @@ int main(void) {
         cmocka_unit_test(every_key_lands_in_its_field),
         cmocka_unit_test(what_is_not_given_is_the_default_of_the_headers),
         cmocka_unit_test(rotations_turn_about_x_then_y_then_z),
+        cmocka_unit_test(a_rectangle_has_its_sides),
         cmocka_unit_test(every_example_of_the_reference_is_a_scene),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -163,7 +163,7 @@ static const struct {
     {LIGHT("{\"name\":\"a\",@\"typ\":\"spot\"}"), "lights[0].typ: unknown key; did you mean \"type\"?"},
     {LIGHT("@{\"name\":\"a\",\"radius\":1}"), "lights[0]: key \"type\" is missing: a light needs it"},
     {LIGHT("{\"name\":\"a\",\"type\":@\"sun\"}"),
-     "lights[0].type: \"sun\" is none of directional, sphere, spot"},
+     "lights[0].type: \"sun\" is none of directional, sphere, spot, rectangle"},
     {LIGHT("@{\"type\":\"sphere\",\"position\":[0,0,0]}"),
      "lights[0]: key \"name\" is missing: a sphere light needs it"},
     {LIGHT("@{\"name\":\"a\",\"type\":\"sphere\"}"),
@@ -182,6 +182,21 @@ static const struct {
      "lights[0].inner_deg: 9 is over outer_deg, 8"},
     {LIGHT("{\"name\":\"a\",\"type\":\"sphere\",\"position\":[0,0,0],\"color\":[1,@-1,1]}"),
      "lights[0].color[1]: -1 is out of range 0 … 1e+15"},
+    {LIGHT("@{\"name\":\"a\",\"type\":\"rectangle\",\"position\":[0,0,0],\"edge_u\":[1,0,0]}"),
+     "lights[0]: key \"edge_v\" is missing: a rectangle light needs it"},
+    {LIGHT("{\"name\":\"a\",\"type\":\"rectangle\",\"position\":[0,0,0],@\"radius\":1}"),
+     "lights[0].radius: is no key of a rectangle light"},
+    {LIGHT("{\"name\":\"a\",\"type\":\"rectangle\",\"position\":[0,0,0],\"edge_u\":@[0,0,0]}"),
+     "lights[0].edge_u: is zero, and so points nowhere"},
+    {LIGHT("{\"name\":\"a\",\"type\":\"rectangle\",\"position\":[0,0,0],\"two_sided\":@1}"),
+     "lights[0].two_sided: expected true or false, found a number"},
+    {LIGHT("@{\"name\":\"a\",\"type\":\"rectangle\",\"position\":[0,0,0],\"edge_u\":[1,0,0],"
+           "\"edge_v\":[1,1,0]}"),
+     "lights[0]: light 'a': edge_u and edge_v are not at right angles: the cosine between them is "
+     "0.707106781, "
+     "of at most 0.001"},
+    {LIGHT("{\"name\":\"a\",\"type\":\"sphere\",\"position\":[0,0,0],@\"edge_u\":[1,0,0]}"),
+     "lights[0].edge_u: is no key of a sphere light"},
     /* heightfields */
     {"{\"casters\":[@{\"heightfield\":\"a\",\"height\":1}]}",
      "casters[0]: key \"size\" is missing: a heightfield caster needs it"},
