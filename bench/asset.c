@@ -1,6 +1,7 @@
 /* The sample asset at 512 voxels on its long side: a 1024² lightmap's valid texels against Embree on its
  * triangles. */
 #include "bench.h"
+#include "casts.h"
 #include "embree.h"
 #include "scenes.h"
 #include "yardstick.h"
@@ -138,11 +139,11 @@ void bench_asset(FILE *csv) {
             shade.rays = ladder[m].count;
         }
         shade.max_error = ladder[m].max_error;
-        shade.triangles = triangles;
         shade.ao_distance = AO_DISTANCE;
         shade.start_offset = 0.0;
         vsh_shade_stats stats;
-        const double each = bench_ao(AO_RUNS, field, &from, &shade, values, &stats) / (double)r.count;
+        const double each = bench_ao(AO_RUNS, bench_traced(field, triangles), &from, &shade, values, &stats) /
+                            (double)r.count;
         const truth_metrics metrics = truth_compare(r.count, values, truth, r.valid);
         bench_row(csv, "cloister", ladder[m].name, 1e6 * each, (double)stats.samples / (double)r.count,
                   each / embree.ray, &metrics);

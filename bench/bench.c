@@ -1,4 +1,5 @@
 #include "bench.h"
+#include "casts.h"
 
 #include <stdbool.h>
 #include <stdlib.h>
@@ -31,7 +32,7 @@ void bench_ratio(FILE *csv, const char *part, const char *scene, const char *wha
 }
 
 /* Light NULL: AO. */
-static double shade_seconds(int runs, const vsh_field *field, const vsh_points *points,
+static double shade_seconds(int runs, const vsh_occluders *occluders, const vsh_points *points,
                             const vsh_light *light, const vsh_shade_options *shade, float *values,
                             float *deviation, vsh_shade_stats *stats) {
     double seconds[BENCH_RUNS];
@@ -43,22 +44,23 @@ static double shade_seconds(int runs, const vsh_field *field, const vsh_points *
         const double start = bench_seconds();
         bench_check(
             light != NULL
-                ? vsh_shade_shadow(field, points, light, shade, &run, values, deviation, stats, &error)
-                : vsh_shade_ao(field, points, shade, &run, values, deviation, stats, &error),
+                ? vsh_shade_shadow(occluders, points, light, shade, &run, values, deviation, stats, &error)
+                : vsh_shade_ao(occluders, points, shade, &run, values, deviation, stats, &error),
             &error);
         seconds[i] = bench_seconds() - start;
     }
     return bench_median(seconds, (size_t)runs);
 }
 
-double bench_shadow(int runs, const vsh_field *field, const vsh_points *points, const vsh_light *light,
-                    const vsh_shade_options *shade, float *values, float *deviation, vsh_shade_stats *stats) {
-    return shade_seconds(runs, field, points, light, shade, values, deviation, stats);
+double bench_shadow(int runs, const vsh_occluders *occluders, const vsh_points *points,
+                    const vsh_light *light, const vsh_shade_options *shade, float *values, float *deviation,
+                    vsh_shade_stats *stats) {
+    return shade_seconds(runs, occluders, points, light, shade, values, deviation, stats);
 }
 
-double bench_ao(int runs, const vsh_field *field, const vsh_points *points, const vsh_shade_options *shade,
-                float *values, vsh_shade_stats *stats) {
-    return shade_seconds(runs, field, points, NULL, shade, values, NULL, stats);
+double bench_ao(int runs, const vsh_occluders *occluders, const vsh_points *points,
+                const vsh_shade_options *shade, float *values, vsh_shade_stats *stats) {
+    return shade_seconds(runs, occluders, points, NULL, shade, values, NULL, stats);
 }
 
 void bench_methods(FILE *csv, const char *scene, const vsh_field *field, const vsh_points *points,
@@ -68,8 +70,9 @@ void bench_methods(FILE *csv, const char *scene, const vsh_field *field, const v
         vsh_shade_options shade = vsh_shade_options_default();
         shade.method = method;
         vsh_shade_stats stats;
-        const double each = bench_shadow(BENCH_RUNS, field, points, light, &shade, values, NULL, &stats) /
-                            (double)points->count;
+        const double each =
+            bench_shadow(BENCH_RUNS, bench_casts(field), points, light, &shade, values, NULL, &stats) /
+            (double)points->count;
         const truth_metrics metrics = truth_compare(points->count, values, truth, valid);
         bench_row(csv, scene, vsh_shadow_method_name(method), 1e6 * each,
                   (double)stats.samples / (double)points->count, ray > 0.0 ? each / ray : 0.0, &metrics);

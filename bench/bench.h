@@ -38,10 +38,11 @@ void bench_ratio(FILE *csv, const char *part, const char *scene, const char *wha
                  int threads, double ours, double theirs, double difference);
 
 /* Median seconds of `runs` calls on one thread. `deviation` may be NULL. */
-double bench_shadow(int runs, const vsh_field *field, const vsh_points *points, const vsh_light *light,
-                    const vsh_shade_options *shade, float *values, float *deviation, vsh_shade_stats *stats);
-double bench_ao(int runs, const vsh_field *field, const vsh_points *points, const vsh_shade_options *shade,
-                float *values, vsh_shade_stats *stats);
+double bench_shadow(int runs, const vsh_occluders *occluders, const vsh_points *points,
+                    const vsh_light *light, const vsh_shade_options *shade, float *values, float *deviation,
+                    vsh_shade_stats *stats);
+double bench_ao(int runs, const vsh_occluders *occluders, const vsh_points *points,
+                const vsh_shade_options *shade, float *values, vsh_shade_stats *stats);
 
 /* A row for each method that marches one ray or cone. `valid` may be NULL; ray: seconds of an Embree ray, or
  * 0. */

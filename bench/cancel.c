@@ -22,6 +22,8 @@ static struct {
     vsh_sdf_node node;
     vsh_grid *grid;
     vsh_field *field;
+    vsh_occluders *occluders; /* with triangles */
+    vsh_occluders *marched;   /* without */
     vsh_texels *texels;
     vsh_voxels *voxels;
     vsh_triangles *triangles;
@@ -165,10 +167,9 @@ static vsh_result bake(const vsh_run *run, int32_t shadow, int32_t ao) {
     vsh_shade_options shade = vsh_shade_options_default();
     shade.method = shadow;
     shade.ao_method = ao;
-    shade.triangles = made.triangles;
     shade.max_error = 0.1;
     const vsh_lightmap map = {.shadow = &made.planes[0], .ao = made.planes[1], .coverage = made.planes[2]};
-    return vsh_bake_lightmap(made.field, made.texels, &made.light, 1, &shade, run, &map, NULL, NULL);
+    return vsh_bake_lightmap(made.occluders, made.texels, &made.light, 1, &shade, run, &map, NULL, NULL);
 }
 
 static vsh_result bake_cones(const vsh_run *run) {
@@ -188,7 +189,7 @@ static vsh_result bake_volume(const vsh_run *run) {
     options.ao = 1;
     vsh_volume *volume;
     const vsh_result result =
-        vsh_bake_volume(made.field, made.voxels, &made.light, 1, &options, run, &volume, NULL, NULL);
+        vsh_bake_volume(made.marched, made.voxels, &made.light, 1, &options, run, &volume, NULL, NULL);
     vsh_volume_free(volume);
     return result;
 }
@@ -212,7 +213,7 @@ static vsh_result draw(const vsh_run *run) {
                 &error);
     const vsh_surface surface = {made.field, {0.7, 0.7, 0.7}};
     const vsh_picture picture = {.color = made.planes[3]};
-    return vsh_render(&surface, 1, made.field, &made.light, 1, &options, run, &picture, NULL, NULL);
+    return vsh_render(&surface, 1, made.marched, &made.light, 1, &options, run, &picture, NULL, NULL);
 }
 
 static vsh_result bake_flat(const vsh_run *run) {
@@ -297,6 +298,11 @@ static void prepare(void) {
     bench_check(vsh_texels_create(made.meshes, made.mesh_count, &lightmap, &run, NULL, &made.texels, &error),
                 &error);
     bench_check(vsh_triangles_create(made.meshes, made.mesh_count, &run, &made.triangles, &error), &error);
+    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    parts.field = made.field;
+    bench_check(vsh_occluders_from_parts(&parts, &made.marched, &error), &error);
+    parts.triangles = made.triangles;
+    bench_check(vsh_occluders_from_parts(&parts, &made.occluders, &error), &error);
     bench_check(vsh_voxels_from_grid(made.grid, 0.0, &run, &made.voxels, &error), &error);
     bench_check(vsh_outline_from_text("The quick brown fox jumps over the lazy dog", FONT, NULL, &run,
                                       &made.outline, &error),
@@ -304,7 +310,7 @@ static void prepare(void) {
     for (size_t i = 0; i < sizeof made.planes / sizeof made.planes[0]; ++i) {
         made.planes[i] = bench_take((size_t)3 * SIDE * SIDE * sizeof(float));
     }
-    bench_check(vsh_query_create(made.field, &made.light, 1, NULL, &made.query, &error), &error);
+    bench_check(vsh_query_create(made.marched, &made.light, 1, NULL, &made.query, &error), &error);
     const vsh_texel_samples samples = vsh_texels_samples(made.texels);
     made.positions = bench_take((size_t)POINTS * 3 * sizeof *made.positions);
     made.normals = bench_take((size_t)POINTS * 3 * sizeof *made.normals);

@@ -1,6 +1,7 @@
 /* All cores on both sides: `exact` and Embree's rays in their fastest way, for the same error, by the wall
  * clock; and what a second core brings to either. */
 #include "bench.h"
+#include "casts.h"
 #include "scenes.h"
 #include "yardstick.h"
 
@@ -16,7 +17,7 @@ static const double LIFT = 1e-5;
 static const double ERRORS[] = {0.1, 0.05, 0.02, 0.01};
 
 /* Least wall seconds of a few runs. */
-static double ours(const vsh_field *field, const vsh_points *points, const vsh_light *sun,
+static double ours(const vsh_occluders *occluders, const vsh_points *points, const vsh_light *sun,
                    const vsh_shade_options *shade, int threads, float *values) {
     vsh_error error;
     vsh_run run = vsh_run_default();
@@ -24,7 +25,8 @@ static double ours(const vsh_field *field, const vsh_points *points, const vsh_l
     double least = INFINITY;
     for (int i = 0; i < RUNS; ++i) {
         const double start = bench_wall();
-        bench_check(vsh_shade_shadow(field, points, sun, shade, &run, values, NULL, NULL, &error), &error);
+        bench_check(vsh_shade_shadow(occluders, points, sun, shade, &run, values, NULL, NULL, &error),
+                    &error);
         least = fmin(least, bench_wall() - start);
     }
     return least;
@@ -87,11 +89,10 @@ static void measure(FILE *csv, const bench_scene *scene) {
     sun.angle = SUN_ANGLE;
     vsh_shade_options shade = vsh_shade_options_default();
     shade.method = VSH_SHADOW_EXACT;
-    shade.triangles = triangles;
     for (size_t e = 0; e < sizeof ERRORS / sizeof ERRORS[0]; ++e) {
         shade.max_error = ERRORS[e];
-        const double one = ours(field, &points, &sun, &shade, 1, values),
-                     all = ours(field, &points, &sun, &shade, 0, values);
+        const double one = ours(bench_traced(field, triangles), &points, &sun, &shade, 1, values),
+                     all = ours(bench_traced(field, triangles), &points, &sun, &shade, 0, values);
         const truth_metrics metrics = truth_compare(POINTS, values, truth, valid);
         const double embree = bench_embree_seconds(&curve, metrics.rmse);
         char what[64];

@@ -1,6 +1,7 @@
 /* What each feature of a bake adds where it is on, and that it adds nothing where it is off: the cloister at
  * 512² and 256 voxels, one thread, each row in a process of its own. */
 #include "bench.h"
+#include "casts.h"
 #include "scenes.h"
 
 #include <malloc.h>
@@ -104,7 +105,6 @@ int bench_feature(int index) {
     vsh_shade_options shade = vsh_shade_options_default();
     shade.method = f->method;
     shade.max_error = f->max_error > 0.0 ? f->max_error : shade.max_error;
-    shade.triangles = triangles;
     shade.ao_distance = 0.6;
     if (f->idle) {
         shade.ao_method = VSH_AO_RAYS;
@@ -140,9 +140,9 @@ int bench_feature(int index) {
     for (int i = 0; i < BENCH_RUNS; ++i) {
         stats = vsh_bake_stats_zero();
         const double start = bench_seconds();
-        bench_check(
-            vsh_bake_lightmap(field, texels, lights, f->lights, &shade, &run, &planes, &stats, &error),
-            &error);
+        bench_check(vsh_bake_lightmap(bench_traced(field, triangles), texels, lights, f->lights, &shade, &run,
+                                      &planes, &stats, &error),
+                    &error);
         seconds[i] = bench_seconds() - start;
         peak = i == 0 ? status_bytes("VmHWM:") - before : peak;
     }

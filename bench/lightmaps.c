@@ -2,6 +2,7 @@
  * bakes of 1024², of the sun's shadow and of AO, compared at runs of texels all over them; one thread for
  * both sides. */
 #include "bench.h"
+#include "casts.h"
 #include "scenes.h"
 #include "yardstick.h"
 
@@ -106,7 +107,9 @@ static void measure(FILE *csv, const bench_scene *scene, bool sunlit, const ladd
     lightmap.ao = sunlit ? NULL : plane;
     lightmap.ao_error = sunlit ? NULL : deviation;
     const size_t lights = sunlit ? 1 : 0;
-    bench_check(vsh_bake_lightmap(field, texels, &sun, lights, NULL, NULL, &lightmap, NULL, &error), &error);
+    bench_check(
+        vsh_bake_lightmap(bench_casts(field), texels, &sun, lights, NULL, NULL, &lightmap, NULL, &error),
+        &error);
     for (size_t i = 0; i < count; ++i) {
         valid[i] = coverage[at[i]];
     }
@@ -124,7 +127,6 @@ static void measure(FILE *csv, const bench_scene *scene, bool sunlit, const ladd
         *(sunlit ? &shade.method : &shade.ao_method) = step->method;
         *(cones ? &shade.ao_cones : &shade.rays) = step->count;
         shade.max_error = step->max_error;
-        shade.triangles = triangles;
         shade.ao_distance = AO_DISTANCE;
         size.ao_spacing = step->spacing;
         vsh_texels_free(texels);
@@ -135,9 +137,9 @@ static void measure(FILE *csv, const bench_scene *scene, bool sunlit, const ladd
         for (int k = 0; k < 3; ++k) {
             stats = vsh_bake_stats_zero();
             const double start = bench_seconds();
-            bench_check(
-                vsh_bake_lightmap(field, texels, &sun, lights, &shade, &run, &lightmap, &stats, &error),
-                &error);
+            bench_check(vsh_bake_lightmap(bench_traced(field, triangles), texels, &sun, lights, &shade, &run,
+                                          &lightmap, &stats, &error),
+                        &error);
             seconds[k] = bench_seconds() - start;
         }
         const double each = bench_median(seconds, 3) / (double)samples.count;

@@ -1,6 +1,7 @@
 /* The same level set and the same rays in OpenVDB's LevelSetRayIntersector and in NanoVDB's ZeroCrossing: µs
  * a ray, on one core and on all. And the cone march's samples against NanoVDB's, at the same places. */
 #include "bench.h"
+#include "casts.h"
 #include "directions.h"
 #include "scenes.h"
 #include "seeds.h"
@@ -99,7 +100,8 @@ static double trace_ours(const subject *s, int32_t method, int threads, double *
     if (method == VSH_SHADOW_RAYS) {
         memcpy(sun.direction, SUN, sizeof SUN);
         sun.angle = SUN_ANGLE;
-        bench_check(vsh_shade_shadow(s->field, &points, &sun, &shade, &run, s->values, NULL, NULL, &error),
+        bench_check(vsh_shade_shadow(bench_casts(s->field), &points, &sun, &shade, &run, s->values, NULL,
+                                     NULL, &error),
                     &error);
         *wall = bench_wall() - start_wall;
         return bench_seconds() - start;
@@ -107,7 +109,8 @@ static double trace_ours(const subject *s, int32_t method, int threads, double *
     sun.angle = 0.0;
     for (size_t d = 0; d < DIRECTIONS; ++d) {
         memcpy(sun.direction, s->directions[d], sizeof sun.direction);
-        bench_check(vsh_shade_shadow(s->field, &points, &sun, &shade, &run, s->values, NULL, NULL, &error),
+        bench_check(vsh_shade_shadow(bench_casts(s->field), &points, &sun, &shade, &run, s->values, NULL,
+                                     NULL, &error),
                     &error);
         for (size_t i = 0; i < POINTS; ++i) {
             s->ours[d * POINTS + i] = s->values[i] < 0.5f;
@@ -238,7 +241,7 @@ static void compare_samples(FILE *csv) {
     const vsh_shade_options shade = vsh_shade_options_default();
     vsh_shade_stats stats;
     const double ours =
-        bench_shadow(BENCH_RUNS, seeds.field, &points, &seeds.sun, &shade, values, NULL, &stats);
+        bench_shadow(BENCH_RUNS, bench_casts(seeds.field), &points, &seeds.sun, &shade, values, NULL, &stats);
     bench_ratio(csv, "nanovdb", "seeds", "cone by sample", "trilinear sample", 1,
                 1e6 * ours / (double)stats.samples, 1e6 * theirs, 0.0);
     free(values);

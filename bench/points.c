@@ -1,6 +1,7 @@
 /* Points of the caller's own: one at a time, and a million all over the sample asset in no order, by
  * vsh_shade_shadow() as they come and by a vsh_query. */
 #include "bench.h"
+#include "casts.h"
 #include "scenes.h"
 
 #include <math.h>
@@ -130,9 +131,9 @@ static double shade_seconds(const points_bench *b, const vsh_shade_options *shad
         const double start = bench_seconds();
         for (size_t i = 0; i < count; ++i) {
             const vsh_points points = {1, b->points.positions + 3 * i, b->points.normals + 3 * i, NULL};
-            bench_check(
-                vsh_shade_shadow(b->field, &points, b->sun, shade, &run, b->values + i, NULL, stats, &error),
-                &error);
+            bench_check(vsh_shade_shadow(bench_casts(b->field), &points, b->sun, shade, &run, b->values + i,
+                                         NULL, stats, &error),
+                        &error);
         }
         seconds[r] = bench_seconds() - start;
     }
@@ -170,8 +171,9 @@ void bench_points(FILE *csv) {
         vsh_query *query = NULL;
         vsh_shade_stats stats;
         vsh_error error;
-        bench_check(vsh_query_create(field, &sun, 1, &shade, &query, &error), &error);
-        double seconds = bench_shadow(RUNS, field, &b.points, &sun, &shade, reference, NULL, &stats);
+        bench_check(vsh_query_create(bench_casts(field), &sun, 1, &shade, &query, &error), &error);
+        double seconds =
+            bench_shadow(RUNS, bench_casts(field), &b.points, &sun, &shade, reference, NULL, &stats);
         memcpy(values, reference, (size_t)MANY * sizeof *values);
         row(&b, "1e6 as they come", methods[m], MANY, seconds, &stats);
         seconds = query_seconds(&b, query, MANY, MANY, 1, &stats);
@@ -189,8 +191,8 @@ void bench_points(FILE *csv) {
     vsh_shade_stats stats;
     vsh_error error;
     bench_scene_points(&scene, field, 5, SINGLE, positions, normals, reference);
-    bench_check(vsh_query_create(field, &sun, 1, NULL, &query, &error), &error);
-    bench_shadow(1, field, &b.points, &sun, NULL, reference, NULL, &stats);
+    bench_check(vsh_query_create(bench_casts(field), &sun, 1, NULL, &query, &error), &error);
+    bench_shadow(1, bench_casts(field), &b.points, &sun, NULL, reference, NULL, &stats);
     const double seconds = query_seconds(&b, query, SINGLE, 1, 1, &stats);
     row(&b, "single query, lightmap order", VSH_SHADOW_CONE, SINGLE, seconds, &stats);
     vsh_query_free(query);

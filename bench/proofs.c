@@ -1,6 +1,7 @@
 /* Proofs that are wrong: points whose light a cone has certified as fully seen or fully hidden, checked with
  * rays against the triangles. Nothing here is timed. */
 #include "bench.h"
+#include "casts.h"
 #include "scenes.h"
 
 #include <math.h>
@@ -126,9 +127,10 @@ static void prove(const vsh_field *field, const vsh_triangles *triangles, const 
     shade.method = VSH_SHADOW_EXACT;
     shade.rays = 8;
     shade.max_error = 1.0; /* only what is proved has no error left */
-    shade.triangles = triangles;
     const vsh_points all = {POINTS, p->positions, p->normals, NULL};
-    bench_check(vsh_shade_shadow(field, &all, light, &shade, NULL, values, deviation, NULL, &error), &error);
+    bench_check(vsh_shade_shadow(bench_traced(field, triangles), &all, light, &shade, NULL, values, deviation,
+                                 NULL, &error),
+                &error);
 }
 
 static tally check(FILE *csv, const char *scene, int32_t resolution, const light_case *c,

@@ -2,6 +2,7 @@
  * thin structure (tools/make_bench_scenes.py): receivers are runs of texels all over the lightmaps, one
  * thread for both sides. */
 #include "bench.h"
+#include "casts.h"
 #include "embree.h"
 #include "scenes.h"
 #include "yardstick.h"
@@ -61,17 +62,18 @@ static void measure(FILE *csv, const bench_scene *scene) {
     vsh_shade_options shade = vsh_shade_options_default();
     shade.method = VSH_SHADOW_RAYS;
     shade.rays = TRUTH_RAYS;
-    bench_check(vsh_shade_shadow(field, &points, &sun, &shade, NULL, r.reference, NULL, NULL, &error),
-                &error);
+    bench_check(
+        vsh_shade_shadow(bench_casts(field), &points, &sun, &shade, NULL, r.reference, NULL, NULL, &error),
+        &error);
     const double asked[] = {0.1, 0.05, 0.02, 0.01};
     for (int exact = 0; exact < 2; ++exact) {
         for (size_t e = 0; e < sizeof asked / sizeof asked[0]; ++e) {
             shade.method = exact ? VSH_SHADOW_EXACT : VSH_SHADOW_ADAPTIVE;
             shade.max_error = asked[e];
-            shade.triangles = triangles;
             vsh_shade_stats stats;
-            const double each =
-                bench_shadow(3, field, &points, &sun, &shade, r.values, r.deviation, &stats) / POINTS;
+            const double each = bench_shadow(3, bench_traced(field, triangles), &points, &sun, &shade,
+                                             r.values, r.deviation, &stats) /
+                                POINTS;
             const truth_metrics metrics =
                 truth_compare(POINTS, r.values, exact ? r.truth : r.reference, r.valid);
             snprintf(what, sizeof what, "%s %g", exact ? "exact" : "adaptive", asked[e]);

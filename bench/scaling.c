@@ -1,6 +1,7 @@
 /* What the stages cost against texels, lights, triangles, voxels and threads: seconds, and the exponents that
  * a straight line through their logarithms has. tools/plot-scaling draws the rows. */
 #include "bench.h"
+#include "casts.h"
 #include "scenes.h"
 
 #include <math.h>
@@ -45,7 +46,6 @@ static double bake(const lightmap *m, int what) {
     if (what == EXACT) {
         shade.method = VSH_SHADOW_EXACT;
         shade.max_error = 0.05;
-        shade.triangles = m->triangles;
     }
     vsh_light lights[MOST_LIGHTS];
     for (size_t i = 0; i < m->s->lights; ++i) {
@@ -60,8 +60,8 @@ static double bake(const lightmap *m, int what) {
     const vsh_lightmap planes = {.shadow = what == AO ? NULL : m->plane,
                                  .ao = what == AO ? m->plane[0] : NULL};
     const double start = m->s->now();
-    bench_check(vsh_bake_lightmap(m->field, m->texels, lights, what == AO ? 0 : m->s->lights, &shade, &run,
-                                  &planes, NULL, &error),
+    bench_check(vsh_bake_lightmap(bench_traced(m->field, what == EXACT ? m->triangles : NULL), m->texels,
+                                  lights, what == AO ? 0 : m->s->lights, &shade, &run, &planes, NULL, &error),
                 &error);
     return m->s->now() - start;
 }

@@ -1,6 +1,8 @@
 /* Casters without voxels: a heightfield of 4096² marched as it is, and 10^4 spheres in closed form, each
  * against the same solids voxelised and against rays. */
 #include "bench.h"
+#include "casts.h"
+#include "field/field.h"
 #include "yardstick.h"
 
 #include "analytic.h"
@@ -172,9 +174,10 @@ static void bench_voxels(FILE *csv, const terrain *t, const vsh_points *points, 
             vsh_shade_stats stats;
             shade.method = methods[m];
             shade.ao_distance = AO_DISTANCE;
-            const double seconds = light != NULL
-                                       ? bench_shadow(1, field, points, light, &shade, values, NULL, &stats)
-                                       : bench_ao(1, field, points, &shade, values, &stats);
+            const double seconds =
+                light != NULL
+                    ? bench_shadow(1, bench_casts(field), points, light, &shade, values, NULL, &stats)
+                    : bench_ao(1, bench_casts(field), points, &shade, values, &stats);
             char what[40];
             snprintf(what, sizeof what, "%s %g",
                      light != NULL ? vsh_shadow_method_name(methods[m]) : "ao cones", voxels[v]);
@@ -196,12 +199,10 @@ static void bench_heights(FILE *csv) {
     sun.angle = SUN_ANGLE;
     vsh_error error;
     vsh_field *empty;
-    bench_check(vsh_field_create_empty(1e-6, &empty, &error), &error);
+    bench_check(vshi_field_create_empty(1e-6, &empty, &error), &error);
     vsh_layer layer = vsh_layer_default();
     layer.heights = t.heights;
     vsh_shade_options shade = vsh_shade_options_default();
-    shade.layers = &layer;
-    shade.layer_count = 1;
     shade.ao_distance = AO_DISTANCE;
     for (int ao = 0; ao < 2; ++ao) {
         double ray = 0.0;
@@ -220,12 +221,14 @@ static void bench_heights(FILE *csv) {
         double seconds;
         if (!ao) {
             layer.method = VSH_SHADOW_HARD;
-            seconds = bench_shadow(BENCH_RUNS, empty, &points, &sun, &shade, direct, NULL, &stats);
+            seconds = bench_shadow(BENCH_RUNS, bench_layered(empty, &layer), &points, &sun, &shade, direct,
+                                   NULL, &stats);
             row(csv, "terrain", "direct hard", seconds, COUNT, ray, &stats, direct, truth);
             layer.method = -1;
         }
-        seconds = ao ? bench_ao(BENCH_RUNS, empty, &points, &shade, direct, &stats)
-                     : bench_shadow(BENCH_RUNS, empty, &points, &sun, &shade, direct, NULL, &stats);
+        seconds = ao ? bench_ao(BENCH_RUNS, bench_layered(empty, &layer), &points, &shade, direct, &stats)
+                     : bench_shadow(BENCH_RUNS, bench_layered(empty, &layer), &points, &sun, &shade, direct,
+                                    NULL, &stats);
         row(csv, "terrain", ao ? "direct ao" : "direct", seconds, COUNT, ray, &stats, direct, truth);
         bench_voxels(csv, &t, &points, ao ? NULL : &sun, ray, truth, direct, values);
     }
@@ -250,13 +253,13 @@ static double random_in(uint64_t *counter, double low, double high) {
     return low + (high - low) * (double)(vshi_mix(++*counter) >> 11) * 0x1p-53;
 }
 
-static void sphere_row(FILE *csv, const char *what, const vsh_field *field, const vsh_points *points,
+static void sphere_row(FILE *csv, const char *what, const vsh_occluders *occluders, const vsh_points *points,
                        const vsh_light *light, const vsh_shade_options *shade, const float *truth,
                        float *values) {
     vsh_shade_stats stats;
-    const double seconds = light != NULL
-                               ? bench_shadow(BENCH_RUNS, field, points, light, shade, values, NULL, &stats)
-                               : bench_ao(BENCH_RUNS, field, points, shade, values, &stats);
+    const double seconds =
+        light != NULL ? bench_shadow(BENCH_RUNS, occluders, points, light, shade, values, NULL, &stats)
+                      : bench_ao(BENCH_RUNS, occluders, points, shade, values, &stats);
     row(csv, "spheres", what, seconds, points->count, 0.0, &stats, values, truth);
 }
 
@@ -287,7 +290,7 @@ static void bench_balls(FILE *csv) {
     double start = bench_seconds();
     bench_check(vsh_spheres_create(spheres[0], SPHERES, NULL, NULL, &made, &error), &error);
     printf("spheres: bounds over %d: %.4f s\n", SPHERES, bench_seconds() - start);
-    bench_check(vsh_field_create_empty(1e-6, &empty, &error), &error);
+    bench_check(vshi_field_create_empty(1e-6, &empty, &error), &error);
     const vsh_points points = {FLOOR, positions, normals, NULL};
     vsh_light sun = vsh_light_default();
     memcpy(sun.direction, SUN, sizeof SUN);
@@ -296,8 +299,6 @@ static void bench_balls(FILE *csv) {
     vsh_layer layer = vsh_layer_default();
     layer.spheres = made;
     vsh_shade_options shade = vsh_shade_options_default();
-    shade.layers = &layer;
-    shade.layer_count = 1;
     shade.ao_distance = 0.5;
     static const double voxel = 0.01;
     const vsh_caster caster = {.type = VSH_CASTER_SPHERES,
@@ -334,16 +335,16 @@ static void bench_balls(FILE *csv) {
         }
         printf("spheres: truth, %d rays a texel against each: %.1f s\n", SPHERE_RAYS,
                bench_seconds() - start);
-        sphere_row(csv, ao ? "analytic ao" : "analytic", empty, &points, ao ? NULL : &sun, &shade, truth,
-                   analytic);
+        sphere_row(csv, ao ? "analytic ao" : "analytic", bench_layered(empty, &layer), &points,
+                   ao ? NULL : &sun, &shade, truth, analytic);
         vsh_shade_options by_voxels = vsh_shade_options_default();
         by_voxels.ao_distance = shade.ao_distance;
-        sphere_row(csv, ao ? "ao cones 0.01" : "cone 0.01", field, &points, ao ? NULL : &sun, &by_voxels,
-                   truth, values);
+        sphere_row(csv, ao ? "ao cones 0.01" : "cone 0.01", bench_casts(field), &points, ao ? NULL : &sun,
+                   &by_voxels, truth, values);
         by_voxels.method = VSH_SHADOW_ADAPTIVE;
         by_voxels.ao_method = VSH_AO_ADAPTIVE;
-        sphere_row(csv, ao ? "ao adaptive 0.01" : "adaptive 0.01", field, &points, ao ? NULL : &sun,
-                   &by_voxels, truth, values);
+        sphere_row(csv, ao ? "ao adaptive 0.01" : "adaptive 0.01", bench_casts(field), &points,
+                   ao ? NULL : &sun, &by_voxels, truth, values);
         const truth_metrics apart = truth_compare(FLOOR, analytic, values, NULL);
         truth_metrics_print("  analytic from it", &apart);
     }

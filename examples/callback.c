@@ -26,10 +26,10 @@ int main(void) {
     voxels.voxel_size = 0.02;
     vsh_error error;
     vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
+    vsh_occluders *occluders = NULL;
     if (vsh_grid_from_distance(&distance, &voxels, NULL, &grid, &error) != VSH_OK ||
         vsh_grid_write(grid, "torus.vdb", "torus", &error) != VSH_OK ||
-        vsh_field_create(grid, NULL, NULL, &field, &error) != VSH_OK) {
+        vsh_occluders_from_grid(grid, NULL, NULL, &occluders, &error) != VSH_OK) {
         fprintf(stderr, "callback: %s\n", error.message);
         vsh_grid_free(grid);
         return 1;
@@ -40,12 +40,12 @@ int main(void) {
     vsh_shade_options options = vsh_shade_options_default();
     options.ao_distance = 4.0;
     float open[3];
-    if (vsh_shade_ao(field, &points, &options, NULL, open, NULL, NULL, &error) == VSH_OK) {
+    if (vsh_shade_ao(occluders, &points, &options, NULL, open, NULL, NULL, &error) == VSH_OK) {
         for (int i = 0; i < 3; ++i) {
             printf("%g below: %.2f open\n", -positions[i][1], (double)open[i]);
         }
     }
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     vsh_grid_free(grid);
     return 0;
 }

@@ -10,11 +10,11 @@ int main(int argc, char **argv) {
     }
     vsh_error error;
     vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
+    vsh_occluders *occluders = NULL;
     vsh_run run = vsh_run_default();
     run.reader = VSH_READER; /* parsed in a process of its own: files may come from anybody */
     if (vsh_grid_read(argv[1], NULL, &run, &grid, &error) != VSH_OK ||
-        vsh_field_create(grid, NULL, &run, &field, &error) != VSH_OK) {
+        vsh_occluders_from_grid(grid, NULL, &run, &occluders, &error) != VSH_OK) {
         fprintf(stderr, "level_set: %s\n", error.message);
         vsh_grid_free(grid);
         return 1;
@@ -36,13 +36,13 @@ int main(int argc, char **argv) {
         float lit;
         sun.angle = angles[i];
         options.method = VSH_SHADOW_ADAPTIVE;
-        if (vsh_shade_shadow(field, &points, &sun, &options, &run, &lit, NULL, NULL, &error) != VSH_OK) {
+        if (vsh_shade_shadow(occluders, &points, &sun, &options, &run, &lit, NULL, NULL, &error) != VSH_OK) {
             fprintf(stderr, "level_set: %s\n", error.message);
             break;
         }
         printf("a sun of %g radians: %.2f\n", angles[i], (double)lit);
     }
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     vsh_grid_free(grid);
     return 0;
 }

@@ -20,28 +20,23 @@ static const uint32_t floor_triangles[2][3] = {{0, 2, 1}, {0, 3, 2}};
 /* The shadow that casters throw on a receiver under a sun of six degrees, into shadow[SIZE * SIZE]. */
 static vsh_result bake(const vsh_mesh *casters, size_t count, const vsh_mesh *receiver, float *shadow,
                        vsh_error *error) {
-    vsh_grid *grid = NULL;     /* what casts, as a level set */
-    vsh_field *field = NULL;   /* the distances around it */
-    vsh_texels *texels = NULL; /* what receives */
+    vsh_occluders *occluders = NULL; /* what casts */
+    vsh_texels *texels = NULL;       /* what receives */
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIZE;
     vsh_light sun = vsh_light_default();
     sun.direction[0] = 0.5; /* towards it; y is 1 */
     sun.angle = 0.1;
     const vsh_lightmap lightmap = {.shadow = &shadow};
-    vsh_result result = vsh_grid_from_meshes(casters, count, NULL, NULL, &grid, error);
-    if (result == VSH_OK) {
-        result = vsh_field_create(grid, NULL, NULL, &field, error);
-    }
+    vsh_result result = vsh_occluders_create(casters, count, NULL, NULL, &occluders, error);
     if (result == VSH_OK) {
         result = vsh_texels_create(receiver, 1, &options, NULL, NULL, &texels, error);
     }
     if (result == VSH_OK) {
-        result = vsh_bake_lightmap(field, texels, &sun, 1, NULL, NULL, &lightmap, NULL, error);
+        result = vsh_bake_lightmap(occluders, texels, &sun, 1, NULL, NULL, &lightmap, NULL, error);
     }
     vsh_texels_free(texels);
-    vsh_field_free(field);
-    vsh_grid_free(grid);
+    vsh_occluders_free(occluders);
     return result;
 }
 

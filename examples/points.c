@@ -9,9 +9,9 @@ int main(void) {
     voxels.voxel_size = 0.05;
     vsh_error error;
     vsh_grid *grid;
-    vsh_field *field = NULL;
+    vsh_occluders *occluders = NULL;
     if (vsh_grid_from_sdf(&tree, &voxels, NULL, &grid, &error) != VSH_OK ||
-        vsh_field_create(grid, NULL, NULL, &field, &error) != VSH_OK) {
+        vsh_occluders_from_grid(grid, NULL, NULL, &occluders, &error) != VSH_OK) {
         fprintf(stderr, "points: %s\n", error.message);
         return 1;
     }
@@ -20,10 +20,10 @@ int main(void) {
     const vsh_points points = {2, &positions[0][0], &normals[0][0], NULL};
     const vsh_light sun = vsh_light_default(); /* half a degree, straight overhead */
     float lit[2];
-    if (vsh_shade_shadow(field, &points, &sun, NULL, NULL, lit, NULL, NULL, &error) == VSH_OK) {
+    if (vsh_shade_shadow(occluders, &points, &sun, NULL, NULL, lit, NULL, NULL, &error) == VSH_OK) {
         printf("%g %g\n", (double)lit[0], (double)lit[1]); /* 0 1 */
     }
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     vsh_grid_free(grid);
     return 0;
 }

@@ -210,13 +210,17 @@ int main(int argc, char **argv) {
     vsh_voxels *voxels;
     vsh_field *field;
     vsh_volume *volume;
+    vsh_occluders *occluders;
+    vsh_occluder_parts parts = vsh_occluder_parts_default();
     vsh_field_options reach = vsh_field_options_default();
     check(vsh_assets_load(&scene, NULL, &assets, &error));
     check(vsh_scene_casters(&scene, assets, NULL, &grid, &error));
     check(vsh_voxels_from_box(LOW, UP, 0.025, NULL, &voxels, &error));
     reach.reach = vsh_scene_reach(&scene, grid, LOW, UP);
     check(vsh_field_create(grid, &reach, NULL, &field, &error));
-    check(vsh_bake_volume(field, voxels, &sun, 1, &options, NULL, &volume, NULL, &error));
+    parts.field = field;
+    check(vsh_occluders_from_parts(&parts, &occluders, &error));
+    check(vsh_bake_volume(occluders, voxels, &sun, 1, &options, NULL, &volume, NULL, &error));
     draw_slices(field, volume);
     draw_fog(field, volume);
     static const char *const names[3] = {"R", "G", "B"};
@@ -226,6 +230,7 @@ int main(int argc, char **argv) {
     bits.bits = 8;
     check(vsh_image_write(argv[2], &image, &bits, &error));
     vsh_volume_free(volume);
+    vsh_occluders_free(occluders);
     vsh_field_free(field);
     vsh_voxels_free(voxels);
     vsh_grid_free(grid);

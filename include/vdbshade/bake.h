@@ -240,17 +240,16 @@ typedef struct vsh_bake_stats {
     vsh_shade_stats shade;     /* added to */
     uint64_t seen_texels;      /* of the invalid ones: in plain sight, rays from them escape. Of exact methods
                                   only: a field does not tell, and leaves it 0 */
-    vsh_bake_error *errors;    /* [light_count + 1]: of each light, then of AO; added to; NULL: not wanted */
-    const vsh_triangles *truth_triangles; /* with `errors`: the casters themselves. Where a method keeps an
-                                  error, a part of its samples (one in 16, 4096 to 16384 of a lightmap; of
-                                  exact methods one in 64, 1024 to 4096; the same ones for all bands) is held
-                                  against rays to them. Which part, and so what is found, depends on nothing
-                                  but the lightmap. Not with layers. Both NULL: nothing is */
-    const vsh_solids *truth_solids;
+    vsh_bake_error *errors;    /* [light_count + 1]: of each light, then of AO; added to; NULL: not wanted.
+                                  Where a method keeps an error and the occluders have what stands for the
+                                  truth (vsh_occluder_parts), a part of its samples (one in 16, 4096 to 16384
+                                  of a lightmap; of exact methods one in 64, 1024 to 4096; the same ones for
+                                  all bands) is held against rays to that. Which part, and so what is found,
+                                  depends on nothing but the lightmap */
 } vsh_bake_stats;
 
 static inline vsh_bake_stats vsh_bake_stats_zero(void) {
-    vsh_bake_stats stats = {sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero(), 0, NULL, NULL, NULL};
+    vsh_bake_stats stats = {sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero(), 0, NULL};
     return stats;
 }
 VSH_API void vsh_bake_stats_init(vsh_bake_stats *stats, size_t size);
@@ -259,11 +258,11 @@ VSH_API void vsh_bake_stats_init(vsh_bake_stats *stats, size_t size);
  * Rays begin start_offset + surface_offset above the surface (a voxel at least in creases), for sheets
  * half of the field's shell_thickness farther. `lights` may be NULL where light_count is 0; `stats` is
  * filled on success. Errors (planes then hold nothing of use):
- * - VSH_ERROR_ARGUMENT: field, texels, lightmap or lights NULL, options out of range, run, and as
+ * - VSH_ERROR_ARGUMENT: occluders, texels, lightmap or lights NULL, options out of range, run, and as
  *   vsh_light_check();
- * - VSH_ERROR_LIMIT: run->memory_limit, for field, texels and what the bake itself takes;
+ * - VSH_ERROR_LIMIT: run->memory_limit, for occluders, texels and what the bake itself takes;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels,
+VSH_API vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_texels *texels,
                                      const vsh_light *lights, size_t light_count,
                                      const vsh_shade_options *options, const vsh_run *run,
                                      const vsh_lightmap *lightmap, vsh_bake_stats *stats, vsh_error *error);

@@ -36,11 +36,6 @@ VSH_API vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_option
                                     const vsh_run *run, vsh_field **field, vsh_error *error);
 VSH_API void vsh_field_free(vsh_field *field); /* NULL does nothing */
 
-/* A field without casters, in which everything is free, for scenes whose casters are all in layers (layer.h).
- * Its voxel size, world units, 1e-12 … 1e12, is what start offsets are measured in. Distances are a lower
- * bound beyond all reach; its bounds are 0. Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_field_create_empty(double voxel_size, vsh_field **field, vsh_error *error);
-
 /* Signed distance, world units, negative inside, at `count` world positions ([count][3]) into
  * distances[count], from the finest level that resolves it: within the reach, exact to a voxel of that level
  * (never wider than the distance, the finest aside); beyond it, a lower bound. Positions that are not finite

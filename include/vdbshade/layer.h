@@ -19,7 +19,7 @@ enum {
 
 enum { VSH_MAX_LAYERS = 128 };
 
-/* A view; nothing is owned. What it refers to must outlive the calls, and the queries, that it is given to.
+/* A view; nothing is owned. What it refers to must outlive the occluders that it is a part of.
  */
 typedef struct vsh_layer {
     size_t struct_size;

@@ -11,8 +11,8 @@ extern "C" {
 #endif
 
 /* A field, triangles for exact methods, layers beside them, and what errors are measured against. Immutable;
- * may be shared by threads. Made from meshes here, from parts of the caller's own, or from a scene
- * (vsh_scene_occluders()). Free it with vsh_occluders_free(). */
+ * may be shared by threads. Made from meshes or a level set here, from parts of the caller's own, or from a
+ * scene (vsh_scene_occluders()). Free it with vsh_occluders_free(). */
 typedef struct vsh_occluders vsh_occluders;
 
 typedef struct vsh_occluders_options {
@@ -40,8 +40,14 @@ VSH_API vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_coun
                                         const vsh_occluders_options *options, const vsh_run *run,
                                         vsh_occluders **occluders, vsh_error *error);
 
-/* What a handle is made of, for casters that come from elsewhere: a .vdb file, a callback, heights, spheres,
- * or groups that are shaded each in its own way. A view; nothing is owned. */
+/* A level set as what casts: that of a .vdb file, a callback or a procedural tree, or a union of them
+ * (grid.h). NULL options stand for their default. The grid need not outlive the call. Errors: as
+ * vsh_field_create(). */
+VSH_API vsh_result vsh_occluders_from_grid(const vsh_grid *grid, const vsh_field_options *options,
+                                           const vsh_run *run, vsh_occluders **occluders, vsh_error *error);
+
+/* What a handle is made of, for casters that are in none of these: heights, spheres, groups that are shaded
+ * each in its own way, a field with triangles of another shape. A view; nothing is owned. */
 typedef struct vsh_occluder_parts {
     size_t struct_size;
     const vsh_field *field;         /* casters in no layer; NULL: all of them are in layers */

@@ -26,10 +26,11 @@ typedef struct vsh_provenance_source {
     const vsh_attribute *attributes; /* [attribute_count]: what else there is to be told; values are cut to
                                         one line */
     size_t attribute_count;
+    int32_t has_triangles; /* of vsh_occluders_info: tells what auto came to */
 } vsh_provenance_source;
 
 static inline vsh_provenance_source vsh_provenance_source_default(void) {
-    vsh_provenance_source source = {sizeof(vsh_provenance_source), NULL, NULL, 0, NULL, 0.0, NULL, 0};
+    vsh_provenance_source source = {sizeof(vsh_provenance_source), NULL, NULL, 0, NULL, 0.0, NULL, 0, 0};
     return source;
 }
 VSH_API void vsh_provenance_source_init(vsh_provenance_source *source, size_t size);

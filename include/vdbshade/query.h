@@ -9,20 +9,21 @@
 extern "C" {
 #endif
 
-/* A field, lights and options that are checked and made ready once, so that a call for one point costs little
- * more than its march. Immutable; may be shared by threads. */
+/* Occluders, lights and options that are checked and made ready once, so that a call for one point costs
+ * little more than its march. Immutable; may be shared by threads. */
 typedef struct vsh_query vsh_query;
 
-/* Lights [light_count] (NULL for none: AO only) and options are copied; the field, and options->triangles,
+/* Lights [light_count] (NULL for none: AO only) and options are copied; the occluders
  * must outlive the handle. Free with vsh_query_free(). Errors: VSH_ERROR_ARGUMENT (options out of range, a
- * light that vsh_light_check() refuses, its number in the message, an exact method without triangles: the
- * shadow's only where there are lights), VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_query_create(const vsh_field *field, const vsh_light *lights, size_t light_count,
-                                    const vsh_shade_options *options, vsh_query **query, vsh_error *error);
+ * light that vsh_light_check() refuses, its number in the message, an exact method of occluders without
+ * triangles: the shadow's only where there are lights), VSH_ERROR_MEMORY. */
+VSH_API vsh_result vsh_query_create(const vsh_occluders *occluders, const vsh_light *lights,
+                                    size_t light_count, const vsh_shade_options *options, vsh_query **query,
+                                    vsh_error *error);
 VSH_API void vsh_query_free(vsh_query *query); /* NULL does nothing */
 
 /* Where values go, in the points' order; what is NULL costs nothing. Values are those of vsh_shade_shadow(),
- * vsh_shade_ao() and vsh_field_sample(). */
+ * vsh_shade_ao() and, of the occluders' field, vsh_field_sample(). */
 typedef struct vsh_query_output {
     size_t struct_size;
     float *const *visibility; /* [light_count] arrays [count], each or all of them NULL where not asked for */
@@ -60,7 +61,7 @@ VSH_API void vsh_query_output_init(vsh_query_output *output, size_t size);
  * every bit of one call for all.
  *
  * Errors (the arrays then hold nothing of use): VSH_ERROR_ARGUMENT (run, output's size, a deviation without
- * its values, AO without normals), VSH_ERROR_LIMIT (field and order need more than run->memory_limit),
+ * its values, AO without normals), VSH_ERROR_LIMIT (occluders and order need more than run->memory_limit),
  * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, const vsh_run *run,
                                     const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error);

@@ -1,4 +1,4 @@
-/* Pictures: surfaces seen by a camera, in the light that a field answers for. For looking at what is baked:
+/* Pictures: surfaces seen by a camera, in the light that occluders leave. For looking at what is baked:
  * no materials but a colour, no light that is reflected. */
 #ifndef VDBSHADE_RENDER_H
 #define VDBSHADE_RENDER_H
@@ -63,7 +63,7 @@ typedef struct vsh_surface {
     double color[3]; /* linear RGB, share of light that comes back, 0 … 1 */
 } vsh_surface;
 
-/* Meshes that are shown themselves, with a lightmap on them or in the light that the field answers for. A
+/* Meshes that are shown themselves, with a lightmap on them or in the light that the occluders leave. A
  * view; nothing is owned. */
 typedef struct vsh_lit_meshes {
     const vsh_mesh *meshes; /* [mesh_count], with the UVs of the lightmap */
@@ -128,8 +128,8 @@ typedef struct vsh_picture {
 /* Renders a picture. Each ray is sphere-traced (J. C. Hart, 1996) to the nearest of `surfaces`
  * [surface_count], and its hit is found to a hundredth of a voxel; normals are central differences over a
  * voxel to each side. There a pixel's colour is the surface's × (sum over lights of colour × falloff × cosine
- * × tinted visibility + sky × AO), with the values of vsh_shade_shadow() and vsh_shade_ao() in `field` and
- * options->shade.layers. Surfaces are usually those fields; others of the same casters tell more colours
+ * × tinted visibility + sky × AO), with the values of vsh_shade_shadow() and vsh_shade_ao() among the
+ * occluders. Surfaces are usually their fields; others of the same casters tell more colours
  * apart. Rays that begin within a solid begin where they leave it. For VSH_SHADOW_EXACT, VSH_AO_EXACT and
  * layers without a field points are lifted by half a voxel.
  *
@@ -139,15 +139,15 @@ typedef struct vsh_picture {
  *
  * The picture is the same for any number of threads and any instruction set. Stages: "render". `stats` gets
  * marches and samples of camera rays too. Errors (planes then hold nothing of use):
- * - VSH_ERROR_ARGUMENT: picture or field NULL, surfaces or lights NULL with a count above 0, more than
+ * - VSH_ERROR_ARGUMENT: picture or occluders NULL, surfaces or lights NULL with a count above 0, more than
  *   VSH_MAX_SURFACES, options out of range, run, and as vsh_camera_check(), vsh_query_create();
  * - VSH_ERROR_INPUT: lit meshes as vsh_mesh_check() or without UVs; a lightmap without the channels above;
  * - VSH_ERROR_LIMIT: fields, lit meshes and what rendering takes pass run->memory_limit;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const vsh_field *field,
-                              const vsh_light *lights, size_t light_count, const vsh_render_options *options,
-                              const vsh_run *run, const vsh_picture *picture, vsh_shade_stats *stats,
-                              vsh_error *error);
+VSH_API vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count,
+                              const vsh_occluders *occluders, const vsh_light *lights, size_t light_count,
+                              const vsh_render_options *options, const vsh_run *run,
+                              const vsh_picture *picture, vsh_shade_stats *stats, vsh_error *error);
 
 /* A picture of width × height for files of 8 bits: color × 2^exposure through the sRGB curve (IEC 61966-2-1)
  * to 0 … 1 in steps of 1/255, dithered so that gradients do not band, into planes R, G, B

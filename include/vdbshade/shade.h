@@ -2,10 +2,8 @@
 #ifndef VDBSHADE_SHADE_H
 #define VDBSHADE_SHADE_H
 
-#include "field.h"
-#include "layer.h"
 #include "light.h"
-#include "trace.h"
+#include "occluders.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -26,8 +24,8 @@ enum {
     VSH_SHADOW_RAYS = 6, /* `rays` rays over the light's disc, marched against the field */
     VSH_SHADOW_ADAPTIVE =
         7,                /* a cone that proves the light fully seen or hidden, else rays until max_error */
-    VSH_SHADOW_EXACT = 8, /* the same cone, the rays traced against `triangles` */
-    VSH_SHADOW_AUTO = 9   /* exact where `triangles` are given, else adaptive: keeps max_error */
+    VSH_SHADOW_EXACT = 8, /* the same cone, the rays traced against the occluders' triangles */
+    VSH_SHADOW_AUTO = 9   /* exact where the occluders have triangles, else adaptive: keeps max_error */
 };
 
 enum {
@@ -35,16 +33,16 @@ enum {
     VSH_AO_CONES = 1,    /* cosine-weighted cones (Crassin and others, 2011, marched in a distance field) */
     VSH_AO_RAYS = 2,     /* `rays` cosine-weighted rays, marched against the field */
     VSH_AO_ADAPTIVE = 3, /* the same, as many as max_error takes */
-    VSH_AO_EXACT = 4,    /* likewise, the rays traced against `triangles`, from the points themselves:
-                            start_offset is not added */
-    VSH_AO_AUTO = 5      /* exact where `triangles` are given, else adaptive */
+    VSH_AO_EXACT = 4,    /* likewise, the rays traced against the occluders' triangles, from the points
+                            themselves: start_offset is not added */
+    VSH_AO_AUTO = 5      /* exact where the occluders have triangles, else adaptive */
 };
 
 /* What a method is like. All that takes no rays is a preview: its error depends on the scene. */
 enum {
     VSH_METHOD_RAYS = 1,        /* takes rays, and knows the error that they leave */
     VSH_METHOD_KEEPS_ERROR = 2, /* takes as many as max_error asks for */
-    VSH_METHOD_TRIANGLES = 4,   /* traces them against `triangles`, which have to be given */
+    VSH_METHOD_TRIANGLES = 4,   /* traces them against triangles, which the occluders have to have */
     VSH_METHOD_INNER = 8 /* shadows: counts the inner penumbra, so that less than half of a light is seen
                             where its centre is hidden; without it nothing is */
 };
@@ -77,12 +75,8 @@ typedef struct vsh_shade_options {
     int32_t frame;      /* ≥ 0 */
     int32_t early_rays; /* rays: where the first so many agree, the rest are not marched; 0: never */
     double max_error;   /* adaptive, exact: standard error that a value may keep, 1e-4 … 1 (0.02) */
-    const vsh_triangles *triangles; /* exact, auto: the casters' triangles; else NULL */
-    const vsh_layer *layers; /* [layer_count]: casters beside those of the field; may be NULL. Each has the
-                                same struct_size */
-    size_t layer_count;
-    double jitter; /* shadows by one march, but for improved: steps are shortened by a part between 0 and
-                    * this, 0 … 1, another for each texel. What steps have in common, bands, becomes grain */
+    double jitter;      /* shadows by one march, but for improved: steps are shortened by a part between 0 and
+                         * this, 0 … 1, another for each texel. What steps have in common, bands, becomes grain */
 } vsh_shade_options;
 
 static inline vsh_shade_options vsh_shade_options_default(void) {
@@ -99,9 +93,6 @@ static inline vsh_shade_options vsh_shade_options_default(void) {
                                  0,
                                  0,
                                  0.02,
-                                 NULL,
-                                 NULL,
-                                 0,
                                  0.0};
     return options;
 }
@@ -172,17 +163,18 @@ VSH_API void vsh_shade_stats_init(vsh_shade_stats *stats, size_t size);
  * it 1, invalid ones NaN. `deviation` [count], where not NULL, takes the standard error that is left: 0 where
  * a cone proved the value, estimated where rays gave it, NaN for methods that know nothing of it. Takes up to
  * 512 KB of the stack of every thread it runs on, the caller's too. Errors (the arrays then hold nothing of
- * use): VSH_ERROR_ARGUMENT (options out of range, exact without triangles, run, and as vsh_light_check()),
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
-                                    const vsh_shade_options *options, const vsh_run *run, float *visibility,
-                                    float *deviation, vsh_shade_stats *stats, vsh_error *error);
+ * use): VSH_ERROR_ARGUMENT (options out of range, exact of occluders without triangles, run, and as
+ * vsh_light_check()), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_shade_shadow(const vsh_occluders *occluders, const vsh_points *points,
+                                    const vsh_light *light, const vsh_shade_options *options,
+                                    const vsh_run *run, float *visibility, float *deviation,
+                                    vsh_shade_stats *stats, vsh_error *error);
 
 /* Cosine-weighted fraction of the hemisphere around the normal that is free within ao_distance, 0 … 1 open,
  * into ao[count]; invalid points are NaN; `deviation` as above. Errors (ao then holds nothing of use):
  * VSH_ERROR_ARGUMENT (options out of range, run, points->normals NULL where there are points),
  * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points,
+VSH_API vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
                                 const vsh_shade_options *options, const vsh_run *run, float *ao,
                                 float *deviation, vsh_shade_stats *stats, vsh_error *error);
 
@@ -190,7 +182,7 @@ VSH_API vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points
  * bent[count][3]; the normal where none is open, NaN for invalid points (Landis, "Production-ready global
  * illumination", 2002). Layers' directions are superposed, which is exact where they hide different parts of
  * the sky. Errors: as above; VSH_ERROR_ARGUMENT too for VSH_AO_TAPS, which knows no directions. */
-VSH_API vsh_result vsh_shade_bent(const vsh_field *field, const vsh_points *points,
+VSH_API vsh_result vsh_shade_bent(const vsh_occluders *occluders, const vsh_points *points,
                                   const vsh_shade_options *options, const vsh_run *run, float *ao,
                                   float *bent, vsh_shade_stats *stats, vsh_error *error);
 

@@ -107,19 +107,20 @@ typedef struct vsh_volume vsh_volume;
 /* Shades the voxels. Values are those of vsh_query_points() at vsh_voxels_centre(): in free space without
  * normals; in a band with the central differences of vsh_field_sample() half a voxel to either side of the
  * centre along each of the lattice's axes as normals (voxels where they vanish, between two walls, count as
- * inside). Which voxels are inside is decided by the sign of vsh_field_sample(), of the layers too. adaptive
+ * inside). Which voxels are inside is decided by the sign of vsh_field_sample() in the
+ * occluders' field, of the layers too. adaptive
  * and exact values are the same within their error. Runs under the stage "volume"; `stats` are added to. Free
  * the result with vsh_volume_free(). Errors:
- * - VSH_ERROR_ARGUMENT: field or voxels NULL, lights NULL with a count above 0, nothing to bake, two lights
- *   of one name or one without, options out of range, VSH_AO_TAPS, or layers of
- *   heights or spheres with AO, in free space, run, and as
- *   vsh_query_create();
- * - VSH_ERROR_LIMIT: run->memory_limit, or the machine's memory, for field, voxels and all grids without
+ * - VSH_ERROR_ARGUMENT: occluders or voxels NULL, lights NULL with a count above 0, nothing to bake, two
+ * lights of one name or one without, options out of range, VSH_AO_TAPS, or layers of heights or spheres with
+ * AO, in free space, run, and as vsh_query_create();
+ * - VSH_ERROR_LIMIT: run->memory_limit, or the machine's memory, for occluders, voxels and all grids without
  *   tiles;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_bake_volume(const vsh_field *field, const vsh_voxels *voxels, const vsh_light *lights,
-                                   size_t light_count, const vsh_volume_options *options, const vsh_run *run,
-                                   vsh_volume **volume, vsh_shade_stats *stats, vsh_error *error);
+VSH_API vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *voxels,
+                                   const vsh_light *lights, size_t light_count,
+                                   const vsh_volume_options *options, const vsh_run *run, vsh_volume **volume,
+                                   vsh_shade_stats *stats, vsh_error *error);
 VSH_API void vsh_volume_free(vsh_volume *volume); /* NULL does nothing */
 
 typedef struct vsh_volume_info {

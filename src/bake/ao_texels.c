@@ -253,10 +253,10 @@ static vsh_result estimate_all(sharing *s, vshi_job *job, vsh_error *error) {
                : result;
 }
 
-vsh_result vshi_ao_texels(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
-                          const vsh_points *points, const vsh_shade_options *options, const vsh_run *run,
-                          float *values, float *deviation, float *bent, vsh_shade_stats *stats,
-                          vsh_error *error) {
+vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texels,
+                          const vshi_origins *origins, const vsh_points *points,
+                          const vsh_shade_options *options, const vsh_run *run, float *values,
+                          float *deviation, float *bent, vsh_shade_stats *stats, vsh_error *error) {
     sharing s = {.texels = texels,
                  .origins = origins,
                  .points = points,
@@ -288,7 +288,7 @@ vsh_result vshi_ao_texels(const vsh_field *field, const vsh_texels *texels, cons
                                       .last = s.row_tile[origins->rows.last],
                                       .start = s.tile};
         result =
-            vshi_shade_ao(field, points, &rows, options, run, s.shot, NULL, s.open, s.rays, stats, error);
+            vshi_shade_ao(occluders, points, &rows, options, run, s.shot, NULL, s.open, s.rays, stats, error);
         result = result == VSH_OK ? estimate_all(&s, job, error) : result;
     }
     if (result == VSH_OK && stats != NULL) {

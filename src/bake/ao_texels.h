@@ -6,10 +6,10 @@
 #include "bake/origins.h"
 
 /* As vshi_lattice_ao(), of methods by rays that keep an error. */
-vsh_result vshi_ao_texels(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
-                          const vsh_points *points, const vsh_shade_options *options, const vsh_run *run,
-                          float *values, float *deviation, float *bent, vsh_shade_stats *stats,
-                          vsh_error *error);
+vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texels,
+                          const vshi_origins *origins, const vsh_points *points,
+                          const vsh_shade_options *options, const vsh_run *run, float *values,
+                          float *deviation, float *bent, vsh_shade_stats *stats, vsh_error *error);
 
 /* Bytes that it takes at most for so many samples, beside the origins. */
 double vshi_ao_texels_bytes(double samples, int32_t threads, bool bent);

@@ -415,14 +415,14 @@ uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int3
     shade.method = vsh_shadow_method_resolve(shade.method, 1); /* the triangles may not be there yet */
     shade.ao_method = vsh_ao_method_resolve(shade.ao_method, 1);
     vshi_bake_need need = {.texels = width * band.rows,
-                           .traced = vshi_shadow_traces(&shade) || vshi_ao_traces(&shade),
+                           .traced = vshi_shadow_traces(&shade, NULL) || vshi_ao_traces(&shade, NULL),
                            .values = true,
                            .errors = errors != 0,
                            .irradiance = irradiance != 0,
                            .bent = bent != 0,
                            .tint = tint != 0,
-                           .lattice = charts->ao_spacing > 1 && !vshi_ao_traces(&shade),
-                           .windows = charts->ao_spacing > 1 && vshi_ao_traces(&shade)};
+                           .lattice = charts->ao_spacing > 1 && !vshi_ao_traces(&shade, NULL),
+                           .windows = charts->ao_spacing > 1 && vshi_ao_traces(&shade, NULL)};
     for (size_t row = band.held_begin; row < band.held_end; ++row) {
         need.samples += (double)charts->rows[row].samples;
     }

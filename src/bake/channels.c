@@ -14,7 +14,7 @@ static vshi_channel *next_of(vshi_channel **next, const vshi_channels *what, con
 static void describe_shadow(const vshi_channels *what, bool error, vshi_channel **next) {
     const vsh_shade_options *shade = &what->options->shade;
     const char *method =
-        vsh_shadow_method_name(vsh_shadow_method_resolve(shade->method, shade->triangles != NULL));
+        vsh_shadow_method_name(vsh_shadow_method_resolve(shade->method, what->has_triangles));
     for (size_t l = 0; l < what->light_count; ++l) {
         const vsh_light *light = &what->lights[l];
         vshi_channel *c = next_of(next, what, method);
@@ -27,7 +27,7 @@ static void describe_shadow(const vshi_channels *what, bool error, vshi_channel 
 
 static void describe_ao(const vshi_channels *what, bool error, vshi_channel **next) {
     const vsh_shade_options *shade = &what->options->shade;
-    const int32_t method = vsh_ao_method_resolve(shade->ao_method, shade->triangles != NULL);
+    const int32_t method = vsh_ao_method_resolve(shade->ao_method, what->has_triangles);
     vshi_channel *c = next_of(next, what, vsh_ao_method_name(method));
     snprintf(c->name, sizeof c->name, "%s", error ? "error.ao" : "ao");
     snprintf(c->description, sizeof c->description, "%s within %g, 1 open, 0 closed",

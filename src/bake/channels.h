@@ -12,6 +12,7 @@ typedef struct vshi_channels {
     const vsh_volume_options *options;
     bool shadow_error, ao_error;
     double caster_voxel_size;
+    bool has_triangles; /* of the casters */
 } vshi_channels;
 
 /* Fills a channel for each grid, in the order of vsh_volume. */

@@ -173,14 +173,14 @@ static vsh_result over_samples(vshi_field_share *share, vshi_range_fn *fn, void 
     return result;
 }
 
-vshi_truth vshi_field_share_truth(const vsh_field *field, const vsh_shade_options *shade,
-                                  const vsh_bake_stats *stats) {
+vshi_truth vshi_field_share_truth(const vsh_occluders *occluders, const vsh_shade_options *shade) {
+    const vsh_field *field = occluders->field;
     static const double LIFT = 0x1p-18; /* of the casters' size, where no triangles say it */
     double size = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         size = fmax(size, field->world_max[axis] - field->world_min[axis]);
     }
-    vshi_truth truth = {.triangles = stats->truth_triangles, .solids = stats->truth_solids};
+    vshi_truth truth = {.triangles = occluders->true_triangles, .solids = occluders->true_solids};
     truth.lift = shade->surface_offset + (truth.triangles != NULL && truth.solids == NULL
                                               ? vshi_triangles_lift(truth.triangles)
                                               : LIFT * size);

@@ -22,9 +22,8 @@ typedef struct vshi_field_share {
     double *square; /* [count]: of one channel */
 } vshi_field_share;
 
-/* The casters of the stats, and the lift of rays to them. */
-vshi_truth vshi_field_share_truth(const vsh_field *field, const vsh_shade_options *shade,
-                                  const vsh_bake_stats *stats);
+/* What stands for the truth, and the lift of rays to them. */
+vshi_truth vshi_field_share_truth(const vsh_occluders *occluders, const vsh_shade_options *shade);
 
 /* Chooses them of the band's own rows, and looks at which the casters leave valid. `state` [texels held]
  * holds VSHI_TEXEL_…; `truth` has the casters and the lift; `traced`: all values came by rays to them, so

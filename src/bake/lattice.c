@@ -179,8 +179,8 @@ static vsh_result shade_pass(vshi_lattice *l, const vsh_shade_options *options, 
         }
         const vsh_points points = {count, l->position, l->normal, l->texel};
         const vshi_point_rows rows = chosen_rows(l, count);
-        result = vshi_shade_ao(l->field, &points, &rows, &shade, run, l->chosen_values, l->chosen_deviation,
-                               l->chosen_bent, NULL, stats, error);
+        result = vshi_shade_ao(l->occluders, &points, &rows, &shade, run, l->chosen_values,
+                               l->chosen_deviation, l->chosen_bent, NULL, stats, error);
     }
     if (result == VSH_OK) {
         result = vshi_parallel_for(job, count, 4096, 0, unpack, l, error);
@@ -244,15 +244,16 @@ double vshi_lattice_bytes(double samples, double texels, bool bent) {
            samples * (1.0 + 3.0 * sizeof(double) + (bent ? 11.0 : 8.0) * sizeof(float));
 }
 
-vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
-                           const vsh_points *points, const vsh_shade_options *options, const vsh_run *run,
-                           float *values, float *deviation, float *bent, vsh_shade_stats *stats,
-                           vsh_error *error) {
-    vshi_lattice l = {.field = field,
+vsh_result vshi_lattice_ao(const vsh_occluders *occluders, const vsh_texels *texels,
+                           const vshi_origins *origins, const vsh_points *points,
+                           const vsh_shade_options *options, const vsh_run *run, float *values,
+                           float *deviation, float *bent, vsh_shade_stats *stats, vsh_error *error) {
+    vshi_lattice l = {.occluders = occluders,
+                      .field = occluders->field,
                       .texels = texels,
                       .origins = origins,
                       .points = points,
-                      .distance = options->ao_distance / field->voxel_size,
+                      .distance = options->ao_distance / occluders->field->voxel_size,
                       .blocks = (origins->count + BLOCK - 1) / BLOCK,
                       .values = values,
                       .bent = bent};

@@ -9,10 +9,10 @@
  * is near enough to change within a cell, else the lattice is halved there (irradiance caching: Ward,
  * Rubinstein and Clear, 1988). Of a band, so many held at either end may have other values than in the
  * whole. `deviation` and `bent`, as of vshi_ao_task, may be NULL. */
-vsh_result vshi_lattice_ao(const vsh_field *field, const vsh_texels *texels, const vshi_origins *origins,
-                           const vsh_points *points, const vsh_shade_options *options, const vsh_run *run,
-                           float *values, float *deviation, float *bent, vsh_shade_stats *stats,
-                           vsh_error *error);
+vsh_result vshi_lattice_ao(const vsh_occluders *occluders, const vsh_texels *texels,
+                           const vshi_origins *origins, const vsh_points *points,
+                           const vsh_shade_options *options, const vsh_run *run, float *values,
+                           float *deviation, float *bent, vsh_shade_stats *stats, vsh_error *error);
 
 /* Bytes that it takes at most for so many samples and texels, beside the origins. */
 double vshi_lattice_bytes(double samples, double texels, bool bent);

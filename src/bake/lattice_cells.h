@@ -9,7 +9,8 @@
 enum { LATTICE_UNKNOWN, LATTICE_CHOSEN, LATTICE_KNOWN, LATTICE_BETWEEN };
 
 typedef struct vshi_lattice {
-    const vsh_field *field;
+    const vsh_occluders *occluders;
+    const vsh_field *field; /* of these */
     const vsh_texels *texels;
     const vshi_origins *origins;
     const vsh_points *points;

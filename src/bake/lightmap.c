@@ -21,7 +21,7 @@
 #include <string.h>
 
 typedef struct baking {
-    const vsh_field *field;
+    const vsh_occluders *occluders;
     const vsh_texels *texels;
     const vsh_light *lights;
     size_t light_count;
@@ -32,13 +32,14 @@ typedef struct baking {
     vshi_halo halo;
     vshi_origins origins;
     vshi_spread spread;
-    uint8_t *state;    /* [rows held][width]: VSHI_TEXEL_… */
-    float *values;     /* [origins.count]: of one light, or AO */
-    float *deviation;  /* [origins.count]: of the same; NULL where no plane is for it */
-    float *irradiance; /* [origins.count][3] */
-    float *bent;       /* [origins.count][3] */
-    float *tinted;     /* [origins.count][3]: of one light */
-    vsh_layer *layers; /* the options', of points that are lifted already; NULL: none */
+    uint8_t *state;       /* [rows held][width]: VSHI_TEXEL_… */
+    float *values;        /* [origins.count]: of one light, or AO */
+    float *deviation;     /* [origins.count]: of the same; NULL where no plane is for it */
+    float *irradiance;    /* [origins.count][3] */
+    float *bent;          /* [origins.count][3] */
+    float *tinted;        /* [origins.count][3]: of one light */
+    vsh_layer *layers;    /* the occluders', of points that are lifted already; NULL: none */
+    vsh_occluders lifted; /* with them */
     bool layered_ao;
     vshi_origins_for wanted;
     vshi_field_share held; /* samples that are held against the casters; none where that is not wanted */
@@ -59,29 +60,38 @@ static bool interpolates(const baking *bake) {
            (method == VSH_AO_CONES || (vsh_ao_method_traits(method) & VSH_METHOD_KEEPS_ERROR) != 0);
 }
 
+static bool traces_shadow(const baking *bake) {
+    return vshi_shadow_traces(&bake->shade, bake->occluders->triangles);
+}
+
+static bool traces_ao(const baking *bake) {
+    return vshi_ao_traces(&bake->shade, bake->occluders->triangles);
+}
+
 static bool shares(const baking *bake) {
-    return interpolates(bake) && vshi_ao_traces(&bake->shade);
+    return interpolates(bake) && traces_ao(bake);
 }
 
 static double fields_bytes(const baking *bake) {
     vsh_field_info info;
-    vsh_field_get_info(bake->field, &info);
+    vsh_field_get_info(bake->occluders->field, &info);
     double bytes = (double)info.bytes;
-    for (size_t i = 0; i < bake->shade.layer_count; ++i) {
-        bytes += vshi_layer_bytes(&bake->layers[i]);
+    for (size_t i = 0; i < bake->occluders->layer_count; ++i) {
+        bytes += vshi_layer_bytes(&bake->occluders->layers[i]);
     }
     return bytes;
 }
 
 /* Where rays begin: lifted already, but for methods that trace triangles. Those know the surface better than
  * any voxel does, and lift their cones themselves. */
-static vsh_points points_of(const baking *bake, bool traced, vsh_shade_options *shade) {
+static vsh_points points_of(const baking *bake, bool traced, vsh_shade_options *shade,
+                            const vsh_occluders **occluders) {
     const vshi_origins *origins = &bake->origins;
     *shade = bake->shade;
+    *occluders = traced ? bake->occluders : &bake->lifted;
     if (!traced) {
         shade->start_offset = 0.0;
         shade->surface_offset = 0.0;
-        shade->layers = bake->layers;
     }
     return (vsh_points){origins->count, traced ? origins->surface : origins->position, origins->normal,
                         origins->texel};
@@ -144,17 +154,17 @@ static bool keeps_error(const baking *bake, const vsh_light *light) {
 
 /* Whether samples are to be held against the casters. */
 static bool holds(const baking *bake) {
-    const vsh_bake_stats *stats = &bake->stats;
+    const vsh_occluders *casters = bake->occluders;
     const bool estimates = (bake->wanted.lights && keeps_error(bake, bake->lights)) ||
                            (bake->wanted.ao && keeps_error(bake, NULL));
-    return stats->errors != NULL && (stats->truth_triangles != NULL || stats->truth_solids != NULL) &&
-           bake->shade.layer_count == 0 && estimates;
+    return bake->stats.errors != NULL && (casters->true_triangles != NULL || casters->true_solids != NULL) &&
+           casters->layer_count == 0 && estimates;
 }
 
 static vsh_result choose_held(baking *bake, vsh_error *error) {
-    const vshi_truth truth = vshi_field_share_truth(bake->field, &bake->shade, &bake->stats);
-    const bool traced = (!bake->wanted.lights || vshi_shadow_traces(&bake->shade)) &&
-                        (!bake->wanted.ao || vshi_ao_traces(&bake->shade));
+    const vshi_truth truth = vshi_field_share_truth(bake->occluders, &bake->shade);
+    const bool traced =
+        (!bake->wanted.lights || traces_shadow(bake)) && (!bake->wanted.ao || traces_ao(bake));
     return vshi_field_share_choose(bake->texels, &bake->origins, bake->state, &truth, traced, &bake->quiet,
                                    &bake->held, error);
 }
@@ -197,14 +207,15 @@ static vsh_result add_filled(baking *bake, vsh_error *error) {
 static vsh_result bake_light(baking *bake, size_t index, vsh_error *error) {
     const vsh_lightmap *lightmap = bake->lightmap;
     vsh_shade_options shade;
-    const vsh_points points = points_of(bake, vshi_shadow_traces(&bake->shade), &shade);
+    const vsh_occluders *occluders;
+    const vsh_points points = points_of(bake, traces_shadow(bake), &shade, &occluders);
     const double square = bake->stats.shade.square_error;
     float *shadow = lightmap->shadow != NULL ? lightmap->shadow[index] : NULL;
     float *errors = lightmap->shadow_error != NULL ? lightmap->shadow_error[index] : NULL;
     vsh_result result =
         vshi_lift_for(bake->texels, &bake->lights[index], &bake->quiet, &bake->origins, error);
     if (result == VSH_OK) {
-        result = vshi_shade_shadow(bake->field, &points, &bake->origins.rows, &bake->lights[index], &shade,
+        result = vshi_shade_shadow(occluders, &points, &bake->origins.rows, &bake->lights[index], &shade,
                                    &bake->run, bake->values, errors != NULL ? bake->deviation : NULL,
                                    &bake->stats.shade, error);
     }
@@ -287,20 +298,20 @@ static vsh_result bake_planes(baking *bake, vsh_error *error) {
     }
     if (result == VSH_OK && vshi_ao_wanted(lightmap)) {
         vsh_shade_options shade;
-        const vsh_points points = points_of(bake, vshi_ao_traces(&bake->shade), &shade);
+        const vsh_occluders *occluders;
+        const vsh_points points = points_of(bake, traces_ao(bake), &shade, &occluders);
         const double square = bake->stats.shade.square_error;
         float *deviation = lightmap->ao_error != NULL ? bake->deviation : NULL;
         result = vshi_lift_for(texels, NULL, &bake->quiet, &bake->origins, error);
         if (result == VSH_OK) {
             result =
-                shares(bake)
-                    ? vshi_ao_texels(bake->field, texels, &bake->origins, &points, &shade, &bake->run,
-                                     bake->values, deviation, bake->bent, &bake->stats.shade, error)
+                shares(bake) ? vshi_ao_texels(occluders, texels, &bake->origins, &points, &shade, &bake->run,
+                                              bake->values, deviation, bake->bent, &bake->stats.shade, error)
                 : interpolates(bake)
-                    ? vshi_lattice_ao(bake->field, texels, &bake->origins, &points, &shade, &bake->run,
+                    ? vshi_lattice_ao(occluders, texels, &bake->origins, &points, &shade, &bake->run,
                                       bake->values, deviation, bake->bent, &bake->stats.shade, error)
-                    : vshi_shade_ao(bake->field, &points, &bake->origins.rows, &shade, &bake->run,
-                                    bake->values, deviation, bake->bent, NULL, &bake->stats.shade, error);
+                    : vshi_shade_ao(occluders, &points, &bake->origins.rows, &shade, &bake->run, bake->values,
+                                    deviation, bake->bent, NULL, &bake->stats.shade, error);
         }
         if (result == VSH_OK && lightmap->ao_error != NULL) {
             result = average(bake, bake->deviation, 1, lightmap->ao_error, error);
@@ -341,7 +352,7 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     const bool ao = vshi_ao_wanted(bake->lightmap);
     const vshi_bake_need need = {.samples = (double)texels->count,
                                  .texels = (double)vshi_texels_held(texels),
-                                 .traced = vshi_shadow_traces(&bake->shade) || vshi_ao_traces(&bake->shade),
+                                 .traced = traces_shadow(bake) || traces_ao(bake),
                                  .values = values,
                                  .errors = errors,
                                  .irradiance = irradiance,
@@ -350,11 +361,14 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
                                  .lattice = ao && interpolates(bake) && !shares(bake),
                                  .windows = ao && shares(bake),
                                  .threads = bake->run.threads};
-    vsh_result result = vshi_lift_layers(&bake->shade, bake->field, &bake->layers, &bake->layered_ao, error);
+    vsh_result result =
+        vshi_lift_layers(bake->occluders, &bake->shade, &bake->layers, &bake->layered_ao, error);
     if (result != VSH_OK) {
         free(bake->layers);
         return result;
     }
+    bake->lifted = *bake->occluders;
+    bake->lifted.layers = bake->layers;
     const double bytes = fields_bytes(bake) + (double)texels->info.bytes + vshi_bake_bytes(&need) +
                          vshi_halo_bytes(texels, bake->lightmap, bake->light_count) +
                          (holds(bake) ? (double)VSHI_FIELD_SHARE_MOST * VSHI_FIELD_SHARE_BYTES : 0.0);
@@ -367,7 +381,7 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     bake->lightmap = &bake->halo.lightmap;
     bake->state = vshi_take(vshi_texels_held(texels), 1, "lightmap", &result, error);
     if (result == VSH_OK) {
-        result = vshi_origins_create(bake->field, texels, &bake->shade, bake->wanted, find_needed, bake,
+        result = vshi_origins_create(bake->occluders, texels, &bake->shade, bake->wanted, find_needed, bake,
                                      &bake->run, &bake->origins, error);
     }
     const size_t count = bake->origins.count;
@@ -407,15 +421,16 @@ static vsh_result run_bake(baking *bake, bool values, bool irradiance, vsh_error
     return result;
 }
 
-vsh_result vsh_bake_lightmap(const vsh_field *field, const vsh_texels *texels, const vsh_light *lights,
-                             size_t light_count, const vsh_shade_options *options, const vsh_run *run,
-                             const vsh_lightmap *lightmap, vsh_bake_stats *stats, vsh_error *error) {
+vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_texels *texels,
+                             const vsh_light *lights, size_t light_count, const vsh_shade_options *options,
+                             const vsh_run *run, const vsh_lightmap *lightmap, vsh_bake_stats *stats,
+                             vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(field);
+    VSHI_NEEDS(occluders);
     VSHI_NEEDS(texels);
     VSHI_NEEDS(lightmap);
     VSHI_NEEDS_OF(light_count, lights);
-    baking bake = {.field = field,
+    baking bake = {.occluders = occluders,
                    .texels = texels,
                    .lights = lights,
                    .light_count = light_count,

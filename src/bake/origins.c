@@ -269,7 +269,7 @@ double vshi_origins_sample_bytes(bool traced) {
     return 4.0 + (traced ? 6.0 : 3.0) * sizeof(double) + 4.0 * sizeof(float);
 }
 
-vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
+vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels *texels,
                                const vsh_shade_options *options, vshi_origins_for what,
                                vshi_origins_keep *keep, void *user, const vsh_run *run, vshi_origins *origins,
                                vsh_error *error) {
@@ -278,21 +278,17 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
     lifting l = {.texels = texels,
                  .origins = origins,
                  .kernel = vshi_kernel_of(run->isa),
-                 .offset = options->start_offset * field->voxel_size + options->surface_offset};
-    look_in(&l, field, options->triangles, options->method, options->ao_method, what);
-    for (size_t i = 0; i < options->layer_count; ++i) {
-        vsh_layer layer;
-        const vsh_result result = vshi_layer_resolve(options->layers, i, &layer, error);
-        if (result != VSH_OK) {
-            return result;
-        }
-        if (layer.field != NULL) {
-            const int32_t method = layer.method < 0 ? options->method : layer.method;
-            const vshi_origins_for here = {what.lights, what.ao && layer.ao != 0};
-            look_in(&l, layer.field, layer.triangles, method, options->ao_method, here);
+                 .offset = options->start_offset * occluders->field->voxel_size + options->surface_offset};
+    look_in(&l, occluders->field, occluders->triangles, options->method, options->ao_method, what);
+    for (size_t i = 0; i < occluders->layer_count; ++i) {
+        const vsh_layer *layer = &occluders->layers[i];
+        if (layer->field != NULL) {
+            const int32_t method = layer->method < 0 ? options->method : layer->method;
+            const vshi_origins_for here = {what.lights, what.ao && layer->ao != 0};
+            look_in(&l, layer->field, layer->triangles, method, options->ao_method, here);
         } else {
-            l.heights[l.solid_count] = layer.heights;
-            l.spheres[l.solid_count++] = layer.spheres;
+            l.heights[l.solid_count] = layer->heights;
+            l.spheres[l.solid_count++] = layer->spheres;
         }
     }
     vsh_result result = VSH_OK;
@@ -322,7 +318,8 @@ vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
         find_rows(texels, origins);
     }
     origins->position = vshi_take(origins->count, 3 * sizeof(double), name, &result, error);
-    const bool traced = vshi_shadow_traces(options) || vshi_ao_traces(options);
+    const bool traced =
+        vshi_shadow_traces(options, occluders->triangles) || vshi_ao_traces(options, occluders->triangles);
     origins->surface = vshi_take(traced ? origins->count : 0, 3 * sizeof(double), name, &result, error);
     origins->texel = vshi_take(origins->count, sizeof(uint32_t), name, &result, error);
     origins->normal = vshi_take(origins->count, 3 * sizeof(float), name, &result, error);

@@ -41,9 +41,8 @@ double vshi_origins_sample_bytes(bool traced);
  * mesh is open. A sample is invalid inside a solid or behind a wall of
  * the casters: where there are triangles, by rays against them (see vshi_inside()); where a field is marched,
  * also if it ends up inside the field's solid, or all but. The layers are looked at as well. Free with
- * vshi_origins_free() also after an error. Errors: VSH_ERROR_ARGUMENT (a layer), VSH_ERROR_MEMORY,
- * VSH_ERROR_CANCELLED. */
-vsh_result vshi_origins_create(const vsh_field *field, const vsh_texels *texels,
+ * vshi_origins_free() also after an error. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels *texels,
                                const vsh_shade_options *options, vshi_origins_for what,
                                vshi_origins_keep *keep, void *user, const vsh_run *run, vshi_origins *origins,
                                vsh_error *error);

@@ -2,34 +2,28 @@
 
 #include "analytic/balls.h"
 #include "analytic/heights.h"
-#include "shade/layers.h"
+#include "shade/occluders.h"
 
 #include <math.h>
 
-vsh_result vshi_solid_of(const vsh_field *field, const vsh_shade_options *options, vshi_solid *solid,
-                         vsh_error *error) {
-    *solid = (vshi_solid){.fields = {field}, .field_count = 1};
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; i < options->layer_count && result == VSH_OK; ++i) {
-        vsh_layer layer;
-        result = vshi_layer_resolve(options->layers, i, &layer, error);
-        if (result != VSH_OK) {
-            break;
-        }
-        if (layer.field != NULL) {
-            solid->fields[solid->field_count++] = layer.field;
-        } else if (layer.spheres != NULL) {
-            solid->spheres[solid->spheres_count++] = layer.spheres;
+vshi_solid vshi_solid_of(const vsh_occluders *occluders) {
+    vshi_solid solid = {.fields = {occluders->field}, .field_count = 1};
+    for (size_t i = 0; i < occluders->layer_count; ++i) {
+        const vsh_layer *layer = &occluders->layers[i];
+        if (layer->field != NULL) {
+            solid.fields[solid.field_count++] = layer->field;
+        } else if (layer->spheres != NULL) {
+            solid.spheres[solid.spheres_count++] = layer->spheres;
         } else {
-            solid->heights[solid->heights_count++] = layer.heights;
+            solid.heights[solid.heights_count++] = layer->heights;
         }
     }
-    for (size_t i = 0; i < solid->field_count; ++i) {
+    for (size_t i = 0; i < solid.field_count; ++i) {
         vsh_field_info info;
-        vsh_field_get_info(solid->fields[i], &info);
-        solid->voxel_size = fmax(solid->voxel_size, info.voxel_size);
+        vsh_field_get_info(solid.fields[i], &info);
+        solid.voxel_size = fmax(solid.voxel_size, info.voxel_size);
     }
-    return result;
+    return solid;
 }
 
 static void lower(float *distance, float other) {

@@ -3,7 +3,7 @@
 #define VSHI_BAKE_SOLID_H
 
 #include <stdbool.h>
-#include <vdbshade/shade.h>
+#include <vdbshade/occluders.h>
 
 typedef struct vshi_solid {
     const vsh_field *fields[VSH_MAX_LAYERS + 1];
@@ -15,9 +15,7 @@ typedef struct vshi_solid {
 
 enum { VSHI_SOLID_MOST = 512 }; /* positions at a time */
 
-/* `options` are resolved ones. Errors: VSH_ERROR_ARGUMENT, of the layers. */
-vsh_result vshi_solid_of(const vsh_field *field, const vsh_shade_options *options, vshi_solid *solid,
-                         vsh_error *error);
+vshi_solid vshi_solid_of(const vsh_occluders *occluders);
 
 /* Signed distance, world units, to whichever field or sphere is nearest, as vsh_field_sample(); at most
  * VSHI_SOLID_MOST positions [count][3]. Heights have none. */

@@ -90,22 +90,20 @@ static vsh_result begin_volume(vshi_volume_bake *bake, const vsh_light *lights, 
     if (result != VSH_OK) {
         return result;
     }
+    const vsh_occluders *casters = bake->occluders;
     vsh_field_info info;
-    vsh_field_get_info(bake->field, &info);
-    const vshi_channels what = {lights,         bake->light_count, &bake->options, bake->shadow_error,
-                                bake->ao_error, info.voxel_size};
+    vsh_field_get_info(casters->field, &info);
+    const vshi_channels what = {
+        lights,          bake->light_count,         &bake->options, bake->shadow_error, bake->ao_error,
+        info.voxel_size, casters->triangles != NULL};
     vshi_channels_describe(&what, channels);
     double layers = 0.0;
-    for (size_t i = 0; i < bake->options.shade.layer_count; ++i) {
-        vsh_layer layer;
-        if (vshi_layer_resolve(bake->options.shade.layers, i, &layer, NULL) == VSH_OK) {
-            layers += vshi_layer_bytes(&layer);
-        }
+    for (size_t i = 0; i < casters->layer_count; ++i) {
+        layers += vshi_layer_bytes(&casters->layers[i]);
     }
-    const double held =
-        (double)info.bytes + layers + 2.0 * (double)bake->block_count * sizeof *bake->fill.shaded +
-        (bake->options.shade.triangles != NULL ? (double)vsh_triangles_bytes(bake->options.shade.triangles)
-                                               : 0.0);
+    const double held = (double)info.bytes + layers +
+                        2.0 * (double)bake->block_count * sizeof *bake->fill.shaded +
+                        (casters->triangles != NULL ? (double)vsh_triangles_bytes(casters->triangles) : 0.0);
     result = vshi_volume_begin(bake->voxels, channels, bake->channel_count, run, held, &bake->volume, error);
     free(channels);
     return result;
@@ -119,7 +117,7 @@ static vsh_result bake_all(vshi_volume_bake *bake, const vsh_light *lights, cons
     }
     const bool around = !bake->normals && bake->options.ao != 0; /* AO over all directions */
     vsh_result result =
-        vshi_query_create(bake->field, lights, bake->light_count, &shade, around, &bake->query, error);
+        vshi_query_create(bake->occluders, lights, bake->light_count, &shade, around, &bake->query, error);
     if (result == VSH_OK) {
         result = begin_volume(bake, lights, run, error);
     }
@@ -168,17 +166,18 @@ static vsh_result check(const vsh_light *lights, const vshi_volume_bake *bake, v
     return VSH_OK;
 }
 
-vsh_result vsh_bake_volume(const vsh_field *field, const vsh_voxels *voxels, const vsh_light *lights,
+vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *voxels, const vsh_light *lights,
                            size_t light_count, const vsh_volume_options *options, const vsh_run *run,
                            vsh_volume **volume, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(volume);
     *volume = NULL;
-    VSHI_NEEDS(field);
+    VSHI_NEEDS(occluders);
     VSHI_NEEDS(voxels);
     VSHI_NEEDS_OF(light_count, lights);
     vsh_run full;
-    vshi_volume_bake bake = {.field = field,
+    vshi_volume_bake bake = {.occluders = occluders,
+                             .solid = vshi_solid_of(occluders),
                              .voxels = voxels,
                              .light_count = light_count,
                              .options = vsh_volume_options_default(),
@@ -191,9 +190,6 @@ vsh_result vsh_bake_volume(const vsh_field *field, const vsh_voxels *voxels, con
         vsh_shade_options shade;
         result = vshi_shade_options_resolve(&bake.options.shade, &shade, error);
         bake.options.shade = shade;
-    }
-    if (result == VSH_OK) {
-        result = vshi_solid_of(field, &bake.options.shade, &bake.solid, error);
     }
     if (result == VSH_OK) {
         result = vshi_run_resolve(run, &full, error);

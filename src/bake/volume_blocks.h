@@ -11,8 +11,8 @@
 enum { VSHI_VOLUME_GRAIN = 16 }; /* blocks of a piece of work: as many as march together */
 
 typedef struct vshi_volume_bake {
-    const vsh_field *field;
-    vshi_solid solid; /* with its layers */
+    const vsh_occluders *occluders;
+    vshi_solid solid; /* of these */
     const vsh_voxels *voxels;
     const vshi_block *blocks;
     size_t block_count;

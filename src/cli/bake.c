@@ -162,21 +162,14 @@ static int make_occluders(bake_work *work) {
         VSH_OK) {
         return cli_fail_of(NULL, &error);
     }
-    vsh_occluder_parts parts;
-    vsh_occluders_get_parts(work->occluders, &parts);
-    work->scene->shade.triangles = parts.triangles;
-    work->scene->shade.layers = parts.layers;
-    work->scene->shade.layer_count = parts.layer_count;
     cli_stats_occluders(&work->stats, work->scene, work->occluders);
     return cli_stats_errors(&work->stats, work->scene);
 }
 
 static int find_origin(bake_work *work) {
     const double start = cli_seconds();
-    vsh_scene given = *work->given;
-    given.shade.triangles = work->scene->shade.triangles; /* they tell what auto comes to */
-    const int code = cli_origin_make(&given, &work->settings->input, 1, work->stats.casters.voxel_size,
-                                     &work->run, &work->origin);
+    const int code = cli_origin_make(work->given, &work->settings->input, 1, &work->stats.casters, &work->run,
+                                     &work->origin);
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
     return code;
 }

@@ -106,14 +106,8 @@ static int bake_part(const forecast *f, const vsh_occluders *occluders, trial *t
     if (code == CLI_OK) {
         const double start = cli_seconds();
         vsh_error error;
-        vsh_occluder_parts parts;
-        vsh_occluders_get_parts(occluders, &parts);
-        vsh_shade_options shade = f->scene->shade;
-        shade.triangles = parts.triangles;
-        shade.layers = parts.layers;
-        shade.layer_count = parts.layer_count;
-        if (vsh_bake_lightmap(parts.field, texels, f->scene->lights, f->scene->light_count, &shade, f->run,
-                              &planes.lightmap, NULL, &error) != VSH_OK) {
+        if (vsh_bake_lightmap(occluders, texels, f->scene->lights, f->scene->light_count, &f->scene->shade,
+                              f->run, &planes.lightmap, NULL, &error) != VSH_OK) {
             code = cli_fail_of(NULL, &error);
         }
         t->sample_s = (cli_seconds() - start) / fmax(1.0, (double)info.samples);

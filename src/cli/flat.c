@@ -231,7 +231,7 @@ static int make_origin(const flat_settings *s, const vsh_flat_scene *scene, cons
     for (size_t i = 0; i < scene->caster_count; ++i) {
         files[1 + i] = scene->casters[i].path;
     }
-    const int code = cli_origin_make(NULL, files, count, 0.0, run, origin);
+    const int code = cli_origin_make(NULL, files, count, NULL, run, origin);
     free(files);
     return code;
 }

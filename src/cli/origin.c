@@ -3,13 +3,16 @@
 #include "message.h"
 #include "options.h"
 
-int cli_origin_make(const vsh_scene *scene, const char *const *files, size_t file_count, double voxel_size,
-                    const vsh_run *run, cli_origin *origin) {
+int cli_origin_make(const vsh_scene *scene, const char *const *files, size_t file_count,
+                    const vsh_occluders_info *casters, const vsh_run *run, cli_origin *origin) {
     *origin = (cli_origin){NULL, NULL, 0};
     vsh_provenance_source source = vsh_provenance_source_default();
     source.scene = scene;
     source.command = cli_parsed_command();
-    source.voxel_size = voxel_size;
+    if (casters != NULL) {
+        source.voxel_size = casters->voxel_size;
+        source.has_triangles = casters->has_triangles;
+    }
     source.files = files;
     source.file_count = file_count;
     vsh_error error;

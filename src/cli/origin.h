@@ -11,10 +11,10 @@ typedef struct cli_origin {
 } cli_origin;
 
 /* Of the parsed command, of a scene (NULL: there is none) and of further files[file_count], the command's
- * operand first; those that are NULL or named by the scene add nothing. `voxel_size` is that of the level set
- * that casts; 0: none. CLI_OK or an exit code, having said why; free also after a failure. */
-int cli_origin_make(const vsh_scene *scene, const char *const *files, size_t file_count, double voxel_size,
-                    const vsh_run *run, cli_origin *origin);
+ * operand first; those that are NULL or named by the scene add nothing. `casters` tell of voxels and
+ * triangles; NULL: there are none. CLI_OK or an exit code, having said why; free also after a failure. */
+int cli_origin_make(const vsh_scene *scene, const char *const *files, size_t file_count,
+                    const vsh_occluders_info *casters, const vsh_run *run, cli_origin *origin);
 void cli_origin_free(cli_origin *origin);
 
 #endif

@@ -228,16 +228,10 @@ static int make_query(query_work *work) {
     }
     cli_stats_occluders(&work->stats, work->scene, work->occluders);
     vsh_shade_options shade = work->scene->shade;
-    vsh_occluder_parts parts;
-    vsh_occluders_get_parts(work->occluders, &parts);
-    work->scene->shade.triangles = parts.triangles; /* they tell what auto comes to */
-    shade.triangles = parts.triangles;
-    shade.layers = parts.layers;
-    shade.layer_count = parts.layer_count;
     if (!work->scene->ao) {
         shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
     }
-    const vsh_result result = vsh_query_create(parts.field, work->scene->lights, work->scene->light_count,
+    const vsh_result result = vsh_query_create(work->occluders, work->scene->lights, work->scene->light_count,
                                                &shade, &work->query, &error);
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }

@@ -270,13 +270,10 @@ static int bake_band(receiver_work *work, int32_t first, int32_t rows, const vsh
     band.invalid_by_mesh = work->invalid;
     band.shade = work->baked.shade;
     band.errors = work->baked.errors;
-    vsh_occluder_parts casters;
-    vsh_occluders_get_parts(work->input->occluders, &casters);
-    band.truth_triangles = casters.true_triangles;
-    band.truth_solids = casters.true_solids;
     vsh_error error;
-    const vsh_result result = vsh_bake_lightmap(casters.field, texels, scene->lights, scene->light_count,
-                                                &scene->shade, run, &work->planes.lightmap, &band, &error);
+    const vsh_result result =
+        vsh_bake_lightmap(work->input->occluders, texels, scene->lights, scene->light_count, &scene->shade,
+                          run, &work->planes.lightmap, &band, &error);
     vsh_texels_free(own);
     if (result != VSH_OK) {
         return cli_fail_of(scene->receivers[work->job->index].path, &error);

@@ -24,7 +24,6 @@ typedef struct render_work {
     vsh_run run;
     vsh_assets *assets;
     vsh_occluders *occluders;
-    const vsh_field *field;
     render_surfaces surfaces;
     render_lightmaps lightmaps;
     vsh_lit_meshes *lit; /* of lightmaps, and of surfaces */
@@ -94,13 +93,6 @@ static int set_options(render_work *work) {
     o->shafts = s->shafts;
     o->shaft_steps = s->shaft_steps;
     o->shade = work->scene->shade;
-    vsh_occluder_parts parts;
-    vsh_occluders_get_parts(work->occluders, &parts);
-    work->scene->shade.triangles = parts.triangles; /* they tell what auto comes to */
-    work->field = parts.field;
-    o->shade.triangles = parts.triangles;
-    o->shade.layers = parts.layers;
-    o->shade.layer_count = parts.layer_count;
     if (!work->scene->ao) {
         o->shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
     }
@@ -124,7 +116,7 @@ static int render_frame(render_work *work, int32_t index, const vsh_run *run) {
         vsh_camera_orbit(&o.camera, 360.0 * degree * index / s->frames);
     }
     const vsh_result result =
-        vsh_render(work->surfaces.surfaces, work->surfaces.count, work->field, work->scene->lights,
+        vsh_render(work->surfaces.surfaces, work->surfaces.count, work->occluders, work->scene->lights,
                    work->scene->light_count, &o, run, &work->picture.picture, &work->stats.shade, &error);
     start = cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
     if (result != VSH_OK) {
@@ -168,8 +160,8 @@ static int find_origin(render_work *work) {
     const render_settings *s = work->settings;
     const char *files[1 + RENDER_MOST_LIGHTMAPS] = {s->bake.input};
     memcpy(files + 1, s->lightmaps, s->lightmap_count * sizeof *files);
-    return cli_origin_make(work->scene, files, 1 + s->lightmap_count, work->stats.casters.voxel_size,
-                           &work->run, &work->origin);
+    return cli_origin_make(work->scene, files, 1 + s->lightmap_count, &work->stats.casters, &work->run,
+                           &work->origin);
 }
 
 static void say_results(const render_work *work) {

@@ -219,7 +219,8 @@ static int measure(trade_work *work) {
         trade_field *next = &work->fields[work->field_count];
         next->resolution = resolutions[s->resolution_count - 1 - i];
         code = trade_make_occluders(work, next->resolution, &next->occluders, &next->build_s);
-        work->field_count += code == CLI_OK;
+        code = code == CLI_OK ? trade_add_triangles(work, next) : code;
+        work->field_count += next->occluders != NULL;
     }
     code = code == CLI_OK ? trade_take_masks(work) : code;
     code = code == CLI_OK ? trade_place_points(work) : code;
@@ -242,6 +243,7 @@ static void free_work(trade_work *work) {
     }
     for (size_t i = 0; i < work->field_count; ++i) {
         free(work->fields[i].mask);
+        vsh_occluders_free(work->fields[i].traced); /* refers to the other */
         vsh_occluders_free(work->fields[i].occluders);
     }
     for (size_t i = 0; i < work->receiver_count; ++i) {

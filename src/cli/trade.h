@@ -56,7 +56,8 @@ typedef struct trade_run {
 
 typedef struct trade_field {
     int32_t resolution;
-    vsh_occluders *occluders; /* without triangles */
+    vsh_occluders *occluders; /* of voxels alone */
+    vsh_occluders *traced;    /* with triangles, where casters are all meshes */
     double build_s;
     uint8_t *mask; /* [texels]: 1 where a bake on this field finds a texel valid */
     size_t valid;  /* how many those are */
@@ -120,6 +121,7 @@ double trade_median(trade_clock *clock);
 /* All of these return CLI_OK or an exit code, having said why. */
 int trade_load(trade_work *work);
 int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds);
+int trade_add_triangles(const trade_work *work, trade_field *field);
 int trade_take_masks(trade_work *work);
 int trade_place_points(trade_work *work);
 int trade_measure(trade_work *work);

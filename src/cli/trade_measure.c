@@ -50,11 +50,19 @@ int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **o
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
+int trade_add_triangles(const trade_work *work, trade_field *field) {
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(field->occluders, &parts);
+    parts.triangles = work->meshes ? work->triangles : NULL;
+    vsh_error error;
+    return vsh_occluders_from_parts(&parts, &field->traced, &error) == VSH_OK ? CLI_OK
+                                                                              : cli_fail_of(NULL, &error);
+}
+
 /* The options of one plan, for the library and in `bake`'s words. */
 static vsh_shade_options shade_of(const trade_work *work, const trade_subject *subject, const plan *p,
                                   trade_run *run) {
     vsh_shade_options shade = work->scene->shade;
-    shade.triangles = work->meshes ? work->triangles : NULL;
     shade.early_rays = 0;
     const char *flag = subject->ao ? "--ao-method" : "--method";
     const bool rays = subject->ao ? p->method == VSH_AO_RAYS : p->method == VSH_SHADOW_RAYS;
@@ -102,8 +110,6 @@ static double certified_share(const trade_subject *subject, size_t valid, const 
 
 int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh_shade_options *shade,
                float *shadow, float *ao, float *coverage, vsh_shade_stats *stats) {
-    vsh_occluder_parts parts;
-    vsh_occluders_get_parts(occluders, &parts);
     const size_t lights = shadow != NULL ? work->scene->light_count : 0;
     float **planes = calloc(lights + 1, sizeof *planes);
     if (planes == NULL) {
@@ -120,7 +126,7 @@ int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh
                                        .ao = ao != NULL ? ao + first : NULL,
                                        .coverage = coverage != NULL ? coverage + first : NULL};
         vsh_error error;
-        if (vsh_bake_lightmap(parts.field, work->receivers[r].texels, work->scene->lights, lights, shade,
+        if (vsh_bake_lightmap(occluders, work->receivers[r].texels, work->scene->lights, lights, shade,
                               &work->run, &lightmap, &baked, &error) != VSH_OK) {
             code = cli_fail_of(NULL, &error);
         }
@@ -179,7 +185,7 @@ static int run_plan(trade_work *work, trade_subject *subject, const plan *p, con
     run.bytes = info.field_bytes + (exact ? vsh_triangles_bytes(work->triangles) : 0);
     run.build_s += exact ? work->triangles_s : 0.0;
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    int code = bake(work, subject, on->occluders, &shade, &run, &stats);
+    int code = bake(work, subject, on->traced, &shade, &run, &stats);
     if (code == CLI_OK) {
         run.certified = certified_share(subject, run.valid, &shade, &stats);
         code = trade_compare(work, subject, on->mask, on->valid, &run);

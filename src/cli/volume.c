@@ -243,15 +243,9 @@ static int bake_volume(volume_work *work) {
     bake.ao = work->scene->ao;
     bake.error = work->scene->error;
     bake.shade = work->scene->shade;
-    vsh_occluder_parts parts;
-    vsh_occluders_get_parts(work->occluders, &parts);
-    work->scene->shade.triangles = parts.triangles; /* they tell what auto comes to */
-    bake.shade.triangles = parts.triangles;
-    bake.shade.layers = parts.layers;
-    bake.shade.layer_count = parts.layer_count;
     vsh_error error;
     const vsh_result result =
-        vsh_bake_volume(parts.field, work->voxels, work->scene->lights, work->scene->light_count, &bake,
+        vsh_bake_volume(work->occluders, work->voxels, work->scene->lights, work->scene->light_count, &bake,
                         &work->run, &work->volume, &work->stats.shade, &error);
     cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
@@ -266,8 +260,7 @@ static int write_volume(volume_work *work) {
     }
     const char *const files[] = {work->settings->bake.input, work->settings->like};
     cli_origin origin;
-    const int code =
-        cli_origin_make(work->scene, files, 2, work->stats.casters.voxel_size, &work->run, &origin);
+    const int code = cli_origin_make(work->scene, files, 2, &work->stats.casters, &work->run, &origin);
     if (code != CLI_OK) {
         return code;
     }

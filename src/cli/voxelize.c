@@ -78,7 +78,8 @@ static int write_grid(const voxelize_settings *s, const vsh_scene *scene, const 
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
     cli_origin origin;
-    const int code = cli_origin_make(&casters, &s->input, 1, info.voxel_size, run, &origin);
+    const vsh_occluders_info made = {.voxel_size = info.voxel_size};
+    const int code = cli_origin_make(&casters, &s->input, 1, &made, run, &origin);
     if (code != CLI_OK) {
         return code;
     }

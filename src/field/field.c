@@ -161,9 +161,7 @@ static vsh_result append_emptiness(vsh_field *f, vsh_error *error) {
     return result;
 }
 
-vsh_result vsh_field_create_empty(double voxel_size, vsh_field **field, vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(field);
+vsh_result vshi_field_create_empty(double voxel_size, vsh_field **field, vsh_error *error) {
     *field = NULL;
     if (!(voxel_size >= 1e-12 && voxel_size <= 1e12)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "voxel_size %g is out of range 1e-12 … 1e12", voxel_size);

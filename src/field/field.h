@@ -13,6 +13,7 @@
 
 #include "base/vec.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 #include <vdbshade/field.h>
 
@@ -139,6 +140,15 @@ static inline vshi_vec vshi_to_world(const vsh_field *field, vshi_vec p) {
     return vshi_scale((vshi_vec){m[0] * d.x + m[4] * d.y + m[8] * d.z, m[1] * d.x + m[5] * d.y + m[9] * d.z,
                                  m[2] * d.x + m[6] * d.y + m[10] * d.z},
                       square);
+}
+
+/* A field without casters, in which everything is free. Start offsets are measured in its voxel size, world
+ * units, 1e-12 … 1e12; distances are a lower bound beyond all reach; its bounds are 0. Free it with
+ * vsh_field_free(). Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
+vsh_result vshi_field_create_empty(double voxel_size, vsh_field **field, vsh_error *error);
+
+static inline bool vshi_field_is_empty(const vsh_field *field) {
+    return field->bounds_min[0] > field->bounds_max[0];
 }
 
 #endif

@@ -243,17 +243,17 @@ static vsh_result check_memory(const rendering *r, const vsh_surface *surfaces, 
 }
 
 /* Whether light is asked of something else than the fields that are seen. */
-static bool needs_lift(const vsh_render_options *o, size_t light_count) {
+static bool needs_lift(const vsh_occluders *occluders, const vsh_render_options *o, size_t light_count) {
     const vsh_shade_options *shade = &o->shade;
-    bool lift = (light_count > 0 && vshi_shadow_traces(shade)) || (o->ao && vshi_ao_traces(shade));
-    for (size_t i = 0; i < shade->layer_count && !lift; ++i) {
-        vsh_layer layer;
-        lift = vshi_layer_resolve(shade->layers, i, &layer, NULL) == VSH_OK && layer.field == NULL;
+    bool lift = (light_count > 0 && vshi_shadow_traces(shade, occluders->triangles)) ||
+                (o->ao && vshi_ao_traces(shade, occluders->triangles));
+    for (size_t i = 0; i < occluders->layer_count && !lift; ++i) {
+        lift = occluders->layers[i].field == NULL;
     }
     return lift;
 }
 
-vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const vsh_field *field,
+vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const vsh_occluders *occluders,
                       const vsh_light *lights, size_t light_count, const vsh_render_options *options,
                       const vsh_run *run, const vsh_picture *picture, vsh_shade_stats *stats,
                       vsh_error *error) {
@@ -265,7 +265,7 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     vshi_sampler *sampler = NULL;
     vsh_shade_stats own = vsh_shade_stats_zero();
     VSHI_NEEDS(picture);
-    VSHI_NEEDS(field);
+    VSHI_NEEDS(occluders);
     VSHI_NEEDS_OF(light_count, lights);
     vsh_result result = vshi_options_resolve(options, &o, sizeof o, "vsh_render_options", error);
     result = result == VSH_OK ? vshi_run_resolve(run, &r.scenery.run, error) : result;
@@ -281,13 +281,13 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     r.scenery.surface_count = surface_count;
     r.scenery.lights = lights;
     r.scenery.light_count = light_count;
-    result = check_memory(&r, surfaces, surface_count, field, error);
+    result = check_memory(&r, surfaces, surface_count, occluders->field, error);
     result =
-        result == VSH_OK ? vsh_query_create(field, lights, light_count, &o.shade, &query, error) : result;
+        result == VSH_OK ? vsh_query_create(occluders, lights, light_count, &o.shade, &query, error) : result;
     result = result == VSH_OK ? vshi_lit_create(&o, lights, light_count, &r.grid, &lit, error) : result;
     r.scenery.query = query;
-    r.scenery.field = field;
-    r.scenery.lift = result == VSH_OK && needs_lift(&o, light_count) ? LIFT : 0.0;
+    r.scenery.field = occluders->field;
+    r.scenery.lift = result == VSH_OK && needs_lift(occluders, &o, light_count) ? LIFT : 0.0;
     r.scenery.lit = lit;
     if (result == VSH_OK && o.shafts > 0.0 && light_count > 0 && place_fog(&r)) {
         sampler = vshi_sampler_create(VSH_SAMPLER_BLUE, 1, o.shade.frame);

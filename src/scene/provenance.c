@@ -50,9 +50,10 @@ static void describe_rays(const vsh_shade_options *o, bool adaptive, char *text,
     }
 }
 
-static vsh_result add_shadow(vsh_provenance *p, const vsh_shade_options *o, vsh_error *error) {
+static vsh_result add_shadow(vsh_provenance *p, const vsh_provenance_source *source, vsh_error *error) {
     char text[LINE_SIZE], more[LINE_SIZE / 2] = "";
-    const int32_t method = vsh_shadow_method_resolve(o->method, o->triangles != NULL);
+    const vsh_shade_options *o = &source->scene->shade;
+    const int32_t method = vsh_shadow_method_resolve(o->method, source->has_triangles);
     const uint32_t traits = vsh_shadow_method_traits(method);
     if ((traits & VSH_METHOD_RAYS) != 0) {
         describe_rays(o, (traits & VSH_METHOD_KEEPS_ERROR) != 0, more, sizeof more);
@@ -63,9 +64,10 @@ static vsh_result add_shadow(vsh_provenance *p, const vsh_shade_options *o, vsh_
     return add(p, "vdbshade_shadow", text, error);
 }
 
-static vsh_result add_ao(vsh_provenance *p, const vsh_shade_options *o, vsh_error *error) {
+static vsh_result add_ao(vsh_provenance *p, const vsh_provenance_source *source, vsh_error *error) {
     char text[LINE_SIZE], more[LINE_SIZE / 2] = "";
-    const int32_t method = vsh_ao_method_resolve(o->ao_method, o->triangles != NULL);
+    const vsh_shade_options *o = &source->scene->shade;
+    const int32_t method = vsh_ao_method_resolve(o->ao_method, source->has_triangles);
     const uint32_t traits = vsh_ao_method_traits(method);
     if ((traits & VSH_METHOD_RAYS) != 0) {
         describe_rays(o, (traits & VSH_METHOD_KEEPS_ERROR) != 0, more, sizeof more);
@@ -76,13 +78,14 @@ static vsh_result add_ao(vsh_provenance *p, const vsh_shade_options *o, vsh_erro
     return add(p, "vdbshade_ao", text, error);
 }
 
-static vsh_result add_scene(vsh_provenance *p, const vsh_scene *scene, vsh_error *error) {
+static vsh_result add_scene(vsh_provenance *p, const vsh_provenance_source *source, vsh_error *error) {
+    const vsh_scene *scene = source->scene;
     vsh_result result = VSH_OK;
     if (scene->light_count > 0) {
-        result = add_shadow(p, &scene->shade, error);
+        result = add_shadow(p, source, error);
     }
     if (result == VSH_OK && scene->ao) {
-        result = add_ao(p, &scene->shade, error);
+        result = add_ao(p, source, error);
     }
     for (size_t i = 0; i < scene->light_count && result == VSH_OK; ++i) {
         char name[NAME_SIZE], text[LINE_SIZE];
@@ -99,7 +102,7 @@ static vsh_result add_settings(vsh_provenance *p, const vsh_provenance_source *s
         result = add(p, "vdbshade_command", source->command, error);
     }
     if (result == VSH_OK && source->scene != NULL) {
-        result = add_scene(p, source->scene, error);
+        result = add_scene(p, source, error);
     }
     if (result == VSH_OK && source->voxel_size > 0.0) {
         char text[LINE_SIZE];

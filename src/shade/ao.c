@@ -68,19 +68,20 @@ void vshi_ao_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *
     }
 }
 
-vsh_result vshi_ao_prepare(const vsh_field *field, const vsh_shade_options *options, vshi_ao_cones *cones,
-                           vshi_ao_task *task, vsh_error *error) {
-    if (options->ao_method == VSH_AO_EXACT && options->triangles == NULL) {
+vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_options *options,
+                           vshi_ao_cones *cones, vshi_ao_task *task, vsh_error *error) {
+    if (options->ao_method == VSH_AO_EXACT && occluders->triangles == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "AO method exact: triangles is NULL: it traces those of the casters");
+                         "AO method exact: the occluders have no triangles, which it traces");
     }
     if (options->ao_method == VSH_AO_CONES) {
         vshi_ao_cones_place(cones, options->ao_cones);
     }
-    *task = (vshi_ao_task){.field = field,
+    *task = (vshi_ao_task){.field = occluders->field,
+                           .triangles = occluders->triangles,
                            .options = options,
                            .cones = cones,
-                           .distance = options->ao_distance / field->voxel_size};
+                           .distance = options->ao_distance / occluders->field->voxel_size};
     return VSH_OK;
 }
 
@@ -102,14 +103,14 @@ vsh_result vshi_ao_check_points(const vsh_points *points, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vsh_shade_ao(const vsh_field *field, const vsh_points *points, const vsh_shade_options *options,
-                        const vsh_run *run, float *ao, float *deviation, vsh_shade_stats *stats,
-                        vsh_error *error) {
-    VSHI_NEEDS(field);
+vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
+                        const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
+                        vsh_shade_stats *stats, vsh_error *error) {
+    VSHI_NEEDS(occluders);
     VSHI_NEEDS(points);
     VSHI_NEEDS_OF(points->count, points->positions);
     VSHI_NEEDS_OF(points->count, ao);
-    return vshi_shade_ao(field, points, NULL, options, run, ao, deviation, NULL, NULL, stats, error);
+    return vshi_shade_ao(occluders, points, NULL, options, run, ao, deviation, NULL, NULL, stats, error);
 }
 
 void vshi_ao_bend(float *bent, const float *normal) {
@@ -123,26 +124,27 @@ void vshi_ao_bend(float *bent, const float *normal) {
     bent[2] = (float)b.z;
 }
 
-vsh_result vsh_shade_bent(const vsh_field *field, const vsh_points *points, const vsh_shade_options *options,
-                          const vsh_run *run, float *ao, float *bent, vsh_shade_stats *stats,
-                          vsh_error *error) {
+vsh_result vsh_shade_bent(const vsh_occluders *occluders, const vsh_points *points,
+                          const vsh_shade_options *options, const vsh_run *run, float *ao, float *bent,
+                          vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(field);
+    VSHI_NEEDS(occluders);
     VSHI_NEEDS(points);
     VSHI_NEEDS_OF(points->count, points->positions);
     VSHI_NEEDS_OF(points->count, ao);
     VSHI_NEEDS_OF(points->count, bent);
     const vsh_result result =
-        vshi_shade_ao(field, points, NULL, options, run, ao, NULL, bent, NULL, stats, error);
+        vshi_shade_ao(occluders, points, NULL, options, run, ao, NULL, bent, NULL, stats, error);
     for (size_t i = 0; result == VSH_OK && i < points->count; ++i) {
         vshi_ao_bend(bent + 3 * i, points->normals + 3 * i);
     }
     return result;
 }
 
-vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
-                         const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
-                         float *bent, int32_t *rays, vsh_shade_stats *stats, vsh_error *error) {
+vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
+                         const vshi_point_rows *rows, const vsh_shade_options *options, const vsh_run *run,
+                         float *ao, float *deviation, float *bent, int32_t *rays, vsh_shade_stats *stats,
+                         vsh_error *error) {
     VSHI_FLOATS;
     vsh_shade_options full;
     vsh_run full_run;
@@ -162,14 +164,14 @@ vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const
                            "bent normals: AO by taps knows no directions; use cones or rays");
     }
     if (result == VSH_OK) {
-        result = vshi_layers_prepare(&full, NULL, &layers, error);
+        result = vshi_layers_prepare(occluders, &full, NULL, &layers, error);
     }
     if (result == VSH_OK) {
-        vshi_shade_options_settle(&full);
+        vshi_shade_options_settle(&full, occluders->triangles);
         if (rays != NULL) {
             full.sampler = vshi_ao_tile_sampler(full.sampler);
         }
-        result = vshi_ao_prepare(field, &full, &cones, &task, error);
+        result = vshi_ao_prepare(occluders, &full, &cones, &task, error);
     }
     if (result == VSH_OK && vshi_ao_has_rays(&full)) {
         result = vshi_shade_sampler(&full, vshi_ao_most_rays(&full), "ao", &sampler, error);

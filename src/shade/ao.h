@@ -18,6 +18,7 @@ typedef struct vshi_ao_cones {
 
 typedef struct vshi_ao_task {
     const vsh_field *field;
+    const vsh_triangles *triangles;   /* of exact methods; else may be NULL */
     const struct vshi_layers *layers; /* beside the field; NULL: none */
     const vsh_shade_options *options;
     const vshi_sampler *sampler; /* of rays; else NULL */
@@ -55,8 +56,8 @@ static inline void vshi_ao_set_bent(const vshi_ao_task *task, size_t i, vshi_vec
 
 /* Checks options (resolved ones); fills *task but for sampler, kernel and arrays, and *cones where the method
  * takes them. Errors: VSH_ERROR_ARGUMENT. */
-vsh_result vshi_ao_prepare(const vsh_field *field, const vsh_shade_options *options, vshi_ao_cones *cones,
-                           vshi_ao_task *task, vsh_error *error);
+vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_options *options,
+                           vshi_ao_cones *cones, vshi_ao_task *task, vsh_error *error);
 
 /* Makes a prepared task one of free space: the free share of all directions around a point, each counting
  * alike. Errors: VSH_ERROR_ARGUMENT (taps, which go along a normal). */
@@ -70,9 +71,9 @@ static inline bool vshi_ao_has_rays(const vsh_shade_options *options) {
     return (vsh_ao_method_traits(options->ao_method) & VSH_METHOD_RAYS) != 0;
 }
 
-/* Whether it is traced against triangles, by options that may not be settled. */
-static inline bool vshi_ao_traces(const vsh_shade_options *options) {
-    const int32_t method = vsh_ao_method_resolve(options->ao_method, options->triangles != NULL);
+/* Whether it is traced against triangles, by options that may not be settled yet (else NULL will do). */
+static inline bool vshi_ao_traces(const vsh_shade_options *options, const vsh_triangles *triangles) {
+    const int32_t method = vsh_ao_method_resolve(options->ao_method, triangles != NULL);
     return (vsh_ao_method_traits(method) & VSH_METHOD_TRIANGLES) != 0;
 }
 

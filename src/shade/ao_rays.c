@@ -54,7 +54,7 @@ static void trace(vshi_ao_piece *b) {
     for (size_t r = 0; r < b->traced; ++r) {
         sorted[r] = b->segments[of[r]];
     }
-    vshi_triangles_blocked(b->task->options->triangles, sorted, b->traced, blocked);
+    vshi_triangles_blocked(b->task->triangles, sorted, b->traced, blocked);
     for (size_t r = 0; r < b->traced; ++r) {
         if (!blocked[r]) {
             add_free(&b->points[b->chunk.owner[of[r]]], vshi_vec_of(sorted[r].direction));
@@ -211,7 +211,7 @@ static bool prepare(vshi_ao_piece *b, size_t i, vshi_ao_point *point, vsh_shade_
     if (b->exact) {
         const vshi_vec normal =
             task->sphere ? point->frame.axes[2] : vshi_unit(vshi_vec_off(points->normals + 3 * i));
-        const double offset = vshi_triangles_lift(task->options->triangles) + task->options->surface_offset;
+        const double offset = vshi_triangles_lift(task->triangles) + task->options->surface_offset;
         vshi_ao_axes(normal, point->world_axes);
         point->world_origin =
             vshi_add(vshi_vec_of(points->positions + 3 * i), vshi_scale(normal, task->sphere ? 0.0 : offset));
@@ -253,7 +253,7 @@ static void find_buried(const vshi_ao_task *task, size_t begin, size_t end, vshi
             l.of[count++] = (uint32_t)(i - begin);
         }
     }
-    vshi_inside(task->options->triangles, count, positions, normals, is_open, &l, where);
+    vshi_inside(task->triangles, count, positions, normals, is_open, &l, where);
     for (size_t k = 0; k < count; ++k) {
         const size_t i = begin + l.of[k];
         if (where[k] == VSHI_OUTSIDE) {

@@ -285,7 +285,7 @@ static void hide_cut(const vshi_shadow_task *task, vshi_facing *facing, const bl
             number[tried++] = i;
         }
     }
-    vshi_triangles_cut(task->options->triangles, beams, tried, triangles, cut);
+    vshi_triangles_cut(task->triangles, beams, tried, triangles, cut);
     for (size_t t = 0; t < tried; ++t) {
         if (cut[t]) {
             hide(task, facing, &blocks[number[t]], stats);

@@ -93,12 +93,10 @@ static vsh_result prepare(prepared *item, size_t index, const vsh_light *light, 
                           vsh_error *error) {
     const vsh_layer *layer = &item->layer;
     vsh_shade_options *options = &item->options;
-    options->layers = NULL;
-    options->layer_count = 0;
-    options->triangles = layer->triangles;
+    const vsh_occluders own = {.field = layer->field, .triangles = layer->triangles};
     options->start_offset = layer->start_offset < 0.0 ? options->start_offset : layer->start_offset;
     options->method = layer->method < 0 ? options->method : layer->method;
-    vshi_shade_options_settle(options);
+    vshi_shade_options_settle(options, own.triangles);
     vsh_error why;
     vsh_result result = VSH_OK;
     if (light != NULL) {
@@ -109,10 +107,10 @@ static vsh_result prepare(prepared *item, size_t index, const vsh_light *light, 
         return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "layer %zu: %s", index, why.message);
     }
     if (light != NULL) {
-        result = vshi_shadow_prepare(layer->field, &item->light, options, &item->shadow, &why);
+        result = vshi_shadow_prepare(&own, &item->light, options, &item->shadow, &why);
         item->shadow.purpose = 31u * item->shadow.purpose + (uint32_t)index + 1u;
     } else {
-        result = vshi_ao_prepare(layer->field, options, cones, &item->ao, &why);
+        result = vshi_ao_prepare(&own, options, cones, &item->ao, &why);
     }
     if (result == VSH_OK && (light != NULL ? vshi_shadow_has_rays(options) : vshi_ao_has_rays(options))) {
         const int32_t rays = light != NULL ? vshi_shadow_most_rays(options) : vshi_ao_most_rays(options);
@@ -122,24 +120,19 @@ static vsh_result prepare(prepared *item, size_t index, const vsh_light *light, 
     return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "layer %zu: %s", index, why.message);
 }
 
-vsh_result vshi_layers_prepare(const vsh_shade_options *options, const vsh_light *light, vshi_layers **layers,
-                               vsh_error *error) {
+vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_options *options,
+                               const vsh_light *light, vshi_layers **layers, vsh_error *error) {
     *layers = NULL;
-    if (options->layer_count == 0) {
+    if (occluders->layer_count == 0) {
         return VSH_OK;
     }
-    vsh_layer first;
-    vsh_result result = vshi_layer_resolve(options->layers, 0, &first, error);
-    if (result != VSH_OK) {
-        return result;
-    }
     vshi_layers *made = NULL;
-    result = vshi_allocate((void **)&made, 1, sizeof *made + options->layer_count * sizeof made->items[0],
-                           "layers", error);
-    for (size_t i = 0; result == VSH_OK && i < options->layer_count; ++i) {
+    vsh_result result = vshi_allocate(
+        (void **)&made, 1, sizeof *made + occluders->layer_count * sizeof made->items[0], "layers", error);
+    for (size_t i = 0; result == VSH_OK && i < occluders->layer_count; ++i) {
         prepared *item = &made->items[made->count];
-        result = vshi_layer_resolve(options->layers, i, &item->layer, error);
-        if (result == VSH_OK && (light != NULL ? casts_for(&item->layer, light) : item->layer.ao != 0)) {
+        item->layer = occluders->layers[i];
+        if ((light != NULL ? casts_for(&item->layer, light) : item->layer.ao != 0)) {
             item->options = *options;
             ++made->count;
             result = prepare(item, i, light, &made->cones, error);

@@ -15,11 +15,11 @@ vsh_result vshi_layer_resolve(const vsh_layer *layers, size_t index, vsh_layer *
 /* Bytes of what a resolved layer refers to, triangles aside. */
 double vshi_layer_bytes(const vsh_layer *layer);
 
-/* Checks the options' layers (resolved options) and prepares those that cast for `light`, or NULL for AO.
+/* Prepares the layers, by resolved options, those that cast for `light`, or NULL for AO.
  * *layers is NULL where there are none. Free with vshi_layers_free(). Errors: VSH_ERROR_ARGUMENT,
  * VSH_ERROR_MEMORY. */
-vsh_result vshi_layers_prepare(const vsh_shade_options *options, const vsh_light *light, vshi_layers **layers,
-                               vsh_error *error);
+vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_options *options,
+                               const vsh_light *light, vshi_layers **layers, vsh_error *error);
 void vshi_layers_free(vshi_layers *layers); /* NULL does nothing */
 
 /* Makes layers that are prepared for AO those of free space, see vshi_ao_prepare_sphere(). NULL does nothing.

@@ -72,8 +72,7 @@ static vsh_result make_empty(const vsh_occluder_parts *parts, vshi_occluders_own
     }
     const double voxel_size =
         parts->voxel_size != 0.0 ? parts->voxel_size : finest_voxel(own->layers, parts->layer_count);
-    own->empty = true;
-    return vsh_field_create_empty(voxel_size, &own->field, error);
+    return vshi_field_create_empty(voxel_size, &own->field, error);
 }
 
 /* Takes what is owned along. */
@@ -172,7 +171,7 @@ void vsh_occluders_get_info_sized(const vsh_occluders *occluders, vsh_occluders_
                                .voxelize_s = own->voxelize_s,
                                .field_s = own->field_s,
                                .triangles_s = own->triangles_s};
-    if (!own->empty) {
+    if (!vshi_field_is_empty(occluders->field)) {
         count(occluders->field, &made);
     }
     for (size_t i = 0; i < occluders->layer_count; ++i) {

@@ -2,7 +2,6 @@
 #ifndef VSHI_OCCLUDERS_H
 #define VSHI_OCCLUDERS_H
 
-#include <stdbool.h>
 #include <vdbshade/occluders.h>
 
 /* Handles that are made for a caller own what they are made of; one that stands for a part of another within
@@ -27,7 +26,6 @@ typedef struct vshi_occluders_own {
     vsh_field **layer_fields; /* these two: [layer_capacity], or NULL */
     vsh_triangles **layer_triangles;
     size_t layer_capacity;
-    bool empty;          /* `field` stands for no casters */
     uint64_t grid_bytes; /* that level sets took */
     double voxelize_s, field_s, triangles_s;
 } vshi_occluders_own;

@@ -20,8 +20,8 @@ void vsh_query_free(vsh_query *query) {
     free(query);
 }
 
-static vsh_result prepare(vsh_query *q, const vsh_field *field, const vsh_light *lights, size_t light_count,
-                          vsh_error *error) {
+static vsh_result prepare(vsh_query *q, const vsh_occluders *occluders, const vsh_light *lights,
+                          size_t light_count, vsh_error *error) {
     vsh_result result =
         vshi_allocate((void **)&q->lights, light_count, sizeof *q->lights, "lights of a query", error);
     if (result == VSH_OK) {
@@ -40,22 +40,22 @@ static vsh_result prepare(vsh_query *q, const vsh_field *field, const vsh_light 
         if (result != VSH_OK) {
             return vshi_fail(error, result, "light %zu: %s", l, why.message);
         }
-        result = vshi_layers_prepare(&q->options, &q->lights[l], &q->layers[l], error);
+        result = vshi_layers_prepare(occluders, &q->options, &q->lights[l], &q->layers[l], error);
     }
     if (result == VSH_OK) {
-        result = vshi_layers_prepare(&q->options, NULL, &q->layers[light_count], error);
+        result = vshi_layers_prepare(occluders, &q->options, NULL, &q->layers[light_count], error);
     }
-    vshi_shade_options_settle(&q->options);
+    vshi_shade_options_settle(&q->options, occluders->triangles);
     for (size_t l = 0; result == VSH_OK && l < light_count; ++l) {
         vsh_error why;
-        result = vshi_shadow_prepare(field, &q->lights[l], &q->options, &q->shadow[l], &why);
+        result = vshi_shadow_prepare(occluders, &q->lights[l], &q->options, &q->shadow[l], &why);
         if (result != VSH_OK) {
             return vshi_fail(error, result, "light %zu: %s", l, why.message);
         }
         q->shadow[l].layers = q->layers[l];
     }
     if (result == VSH_OK) {
-        result = vshi_ao_prepare(field, &q->options, &q->cones, &q->ao, error);
+        result = vshi_ao_prepare(occluders, &q->options, &q->cones, &q->ao, error);
         q->ao.layers = q->layers[light_count];
     }
     const bool shadow = light_count > 0 && vshi_shadow_has_rays(&q->options);
@@ -71,16 +71,16 @@ static vsh_result prepare(vsh_query *q, const vsh_field *field, const vsh_light 
     return result;
 }
 
-vsh_result vsh_query_create(const vsh_field *field, const vsh_light *lights, size_t light_count,
+vsh_result vsh_query_create(const vsh_occluders *occluders, const vsh_light *lights, size_t light_count,
                             const vsh_shade_options *options, vsh_query **query, vsh_error *error) {
     VSHI_NEEDS(query);
     *query = NULL;
-    VSHI_NEEDS(field);
+    VSHI_NEEDS(occluders);
     VSHI_NEEDS_OF(light_count, lights);
-    return vshi_query_create(field, lights, light_count, options, false, query, error);
+    return vshi_query_create(occluders, lights, light_count, options, false, query, error);
 }
 
-vsh_result vshi_query_create(const vsh_field *field, const vsh_light *lights, size_t light_count,
+vsh_result vshi_query_create(const vsh_occluders *occluders, const vsh_light *lights, size_t light_count,
                              const vsh_shade_options *options, bool sphere, vsh_query **query,
                              vsh_error *error) {
     VSHI_FLOATS;
@@ -91,7 +91,7 @@ vsh_result vshi_query_create(const vsh_field *field, const vsh_light *lights, si
         result = vshi_shade_options_resolve(options, &q->options, error);
     }
     if (result == VSH_OK) {
-        result = prepare(q, field, lights, light_count, error);
+        result = prepare(q, occluders, lights, light_count, error);
     }
     if (result == VSH_OK && sphere) {
         result = vshi_ao_prepare_sphere(&q->cones, &q->ao, error);

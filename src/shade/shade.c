@@ -38,15 +38,11 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
                              fields[i].value, fields[i].low, fields[i].high);
         }
     }
-    if (full->layer_count > VSH_MAX_LAYERS || (full->layer_count > 0 && full->layers == NULL)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%zu layers%s: expected at most %d", full->layer_count,
-                         full->layers == NULL ? " at NULL" : "", VSH_MAX_LAYERS);
-    }
     return VSH_OK;
 }
 
-void vshi_shade_options_settle(vsh_shade_options *full) {
-    const int32_t has_triangles = full->triangles != NULL;
+void vshi_shade_options_settle(vsh_shade_options *full, const vsh_triangles *triangles) {
+    const int32_t has_triangles = triangles != NULL;
     full->method = vsh_shadow_method_resolve(full->method, has_triangles);
     full->ao_method = vsh_ao_method_resolve(full->ao_method, has_triangles);
     const bool fixed = full->method == VSH_SHADOW_RAYS || full->ao_method == VSH_AO_RAYS;

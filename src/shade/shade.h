@@ -3,6 +3,7 @@
 #define VSHI_SHADE_H
 
 #include "base/job.h"
+#include "shade/occluders.h"
 #include "shade/rays.h"
 #include "shade/sampler.h"
 
@@ -13,11 +14,11 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
 /* Errors from here on are kept with few rays, whose estimates of their own error are rough. */
 #define VSHI_COARSE 0.02
 
-/* Makes of auto what it comes to with the options' own triangles, and of blue noise Sobol's sequence where
+/* Makes of auto what it comes to with `triangles` (NULL: none), and of blue noise Sobol's sequence where
  * methods are to keep a smaller error than VSHI_COARSE: blue noise is for grain, which then nobody sees, and
  * converges as slowly as white. Layers, which have their own, take theirs from options that are not settled
  * yet. */
-void vshi_shade_options_settle(vsh_shade_options *full);
+void vshi_shade_options_settle(vsh_shade_options *full, const vsh_triangles *triangles);
 
 /* Standard error of a value near a half by so many rays of a VSH_SAMPLER_…. */
 typedef double vshi_spread_fn(int32_t sampler, int32_t rays);
@@ -59,12 +60,14 @@ vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, c
 
 /* vsh_shade_shadow() and vsh_shade_ao() for points in rows; `rows` may be NULL, and so may `bent` and
  * `rays`, as of vshi_ao_task. With `rays` each row is a tile. */
-vsh_result vshi_shade_shadow(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
-                             const vsh_light *light, const vsh_shade_options *options, const vsh_run *run,
-                             float *visibility, float *deviation, vsh_shade_stats *stats, vsh_error *error);
-vsh_result vshi_shade_ao(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
-                         const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
-                         float *bent, int32_t *rays, vsh_shade_stats *stats, vsh_error *error);
+vsh_result vshi_shade_shadow(const vsh_occluders *occluders, const vsh_points *points,
+                             const vshi_point_rows *rows, const vsh_light *light,
+                             const vsh_shade_options *options, const vsh_run *run, float *visibility,
+                             float *deviation, vsh_shade_stats *stats, vsh_error *error);
+vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
+                         const vshi_point_rows *rows, const vsh_shade_options *options, const vsh_run *run,
+                         float *ao, float *deviation, float *bent, int32_t *rays, vsh_shade_stats *stats,
+                         vsh_error *error);
 
 /* vsh_shade_irradiance() by a tinted visibility; the tint is one that vsh_tint_check() has passed. */
 void vshi_shade_irradiance(const vsh_points *points, const float *shading_normals, const vsh_light *light,

@@ -161,21 +161,26 @@ void vshi_shadow_shade(const void *user, size_t begin, size_t end, vsh_shade_sta
     }
 }
 
-vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
+vsh_result vshi_shadow_prepare(const vsh_occluders *occluders, const vsh_light *light,
                                const vsh_shade_options *options, vshi_shadow_task *task, vsh_error *error) {
     const vsh_result result = vsh_light_check(light, error);
     if (result != VSH_OK) {
         return result;
     }
-    if (vshi_shadow_traces(options) && options->triangles == NULL) {
+    const vsh_field *field = occluders->field;
+    const vsh_triangles *triangles = occluders->triangles;
+    if (vshi_shadow_traces(options, triangles) && triangles == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "method exact: triangles is NULL: it traces those of the casters");
+                         "method exact: the occluders have no triangles, which it traces");
     }
     const bool inner = (vsh_shadow_method_traits(options->method) & VSH_METHOD_INNER) != 0;
-    *task =
-        (vshi_shadow_task){.field = field, .light = light, .options = options, .lowest = inner ? 1.0 : 0.0};
-    task->leaky = vshi_shadow_traces(options) &&
-                  (field->shell_thickness > 0.0 || vshi_triangles_have_holes(options->triangles));
+    *task = (vshi_shadow_task){.field = field,
+                               .triangles = triangles,
+                               .light = light,
+                               .options = options,
+                               .lowest = inner ? 1.0 : 0.0};
+    task->leaky = vshi_shadow_traces(options, triangles) &&
+                  (field->shell_thickness > 0.0 || vshi_triangles_have_holes(triangles));
     task->world = vshi_light_in_world(light);
     task->place = vshi_light_moved(&task->world, field->to_field, field->voxel_size);
     for (size_t i = 0; i < sizeof light->name && light->name[i] != '\0'; ++i) {
@@ -184,19 +189,21 @@ vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
     return VSH_OK;
 }
 
-vsh_result vsh_shade_shadow(const vsh_field *field, const vsh_points *points, const vsh_light *light,
+vsh_result vsh_shade_shadow(const vsh_occluders *occluders, const vsh_points *points, const vsh_light *light,
                             const vsh_shade_options *options, const vsh_run *run, float *visibility,
                             float *deviation, vsh_shade_stats *stats, vsh_error *error) {
-    VSHI_NEEDS(field);
+    VSHI_NEEDS(occluders);
     VSHI_NEEDS(points);
     VSHI_NEEDS_OF(points->count, points->positions);
     VSHI_NEEDS_OF(points->count, visibility);
-    return vshi_shade_shadow(field, points, NULL, light, options, run, visibility, deviation, stats, error);
+    return vshi_shade_shadow(occluders, points, NULL, light, options, run, visibility, deviation, stats,
+                             error);
 }
 
-vsh_result vshi_shade_shadow(const vsh_field *field, const vsh_points *points, const vshi_point_rows *rows,
-                             const vsh_light *light, const vsh_shade_options *options, const vsh_run *run,
-                             float *visibility, float *deviation, vsh_shade_stats *stats, vsh_error *error) {
+vsh_result vshi_shade_shadow(const vsh_occluders *occluders, const vsh_points *points,
+                             const vshi_point_rows *rows, const vsh_light *light,
+                             const vsh_shade_options *options, const vsh_run *run, float *visibility,
+                             float *deviation, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     vsh_shade_options full;
     vsh_run full_run;
@@ -211,11 +218,11 @@ vsh_result vshi_shade_shadow(const vsh_field *field, const vsh_points *points, c
         result = vsh_light_check(light, error);
     }
     if (result == VSH_OK) {
-        result = vshi_layers_prepare(&full, light, &layers, error);
+        result = vshi_layers_prepare(occluders, &full, light, &layers, error);
     }
     if (result == VSH_OK) {
-        vshi_shade_options_settle(&full);
-        result = vshi_shadow_prepare(field, light, &full, &task, error);
+        vshi_shade_options_settle(&full, occluders->triangles);
+        result = vshi_shadow_prepare(occluders, light, &full, &task, error);
     }
     if (result != VSH_OK) {
         vshi_layers_free(layers);

@@ -8,6 +8,7 @@
 /* A light as the points of one field see it: what holds for all of them, then a call's kernel and arrays. */
 typedef struct vshi_shadow_task {
     const vsh_field *field;
+    const vsh_triangles *triangles;   /* of exact methods; else may be NULL */
     const struct vshi_layers *layers; /* beside the field; NULL: none */
     const vsh_light *light;
     const vsh_shade_options *options;
@@ -27,7 +28,7 @@ typedef struct vshi_shadow_task {
 
 /* Checks the light, and options (resolved ones) for it; fills *task but for sampler, kernel and arrays.
  * Errors: VSH_ERROR_ARGUMENT. */
-vsh_result vshi_shadow_prepare(const vsh_field *field, const vsh_light *light,
+vsh_result vshi_shadow_prepare(const vsh_occluders *occluders, const vsh_light *light,
                                const vsh_shade_options *options, vshi_shadow_task *task, vsh_error *error);
 
 /* Whether shadows take the task's sampler. */
@@ -35,9 +36,9 @@ static inline bool vshi_shadow_has_rays(const vsh_shade_options *options) {
     return (vsh_shadow_method_traits(options->method) & VSH_METHOD_RAYS) != 0;
 }
 
-/* Whether they are traced against triangles, by options that may not be settled. */
-static inline bool vshi_shadow_traces(const vsh_shade_options *options) {
-    const int32_t method = vsh_shadow_method_resolve(options->method, options->triangles != NULL);
+/* Whether they are traced against triangles, by options that may not be settled yet (else NULL will do). */
+static inline bool vshi_shadow_traces(const vsh_shade_options *options, const vsh_triangles *triangles) {
+    const int32_t method = vsh_shadow_method_resolve(options->method, triangles != NULL);
     return (vsh_shadow_method_traits(method) & VSH_METHOD_TRIANGLES) != 0;
 }
 

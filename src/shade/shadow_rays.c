@@ -65,7 +65,7 @@ static void flush(ray_batch *batch) {
     }
     vshi_chunk_clear(&batch->chunk);
     if (batch->traced_count > 0) {
-        vshi_triangles_blocked(task->options->triangles, batch->traced, batch->traced_count, batch->blocked);
+        vshi_triangles_blocked(task->triangles, batch->traced, batch->traced_count, batch->blocked);
         for (size_t r = 0; r < batch->traced_count; ++r) {
             batch->open[batch->chunk.owner[r]].lit += !batch->blocked[r];
         }

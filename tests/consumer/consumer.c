@@ -127,7 +127,8 @@ static vsh_grid *from_file(const char *folder, vsh_error *error) {
     return grid;
 }
 
-static void ask_points(const vsh_field *field, double least_open, double most_open, vsh_error *error) {
+static void ask_points(const vsh_occluders *occluders, double least_open, double most_open,
+                       vsh_error *error) {
     /* Under the caster, and far aside. */
     static const double positions[] = {0.0, 0.0, 0.0, 5.0, 0.0, 0.0};
     static const float normals[] = {0.0F, 1.0F, 0.0F, 0.0F, 1.0F, 0.0F};
@@ -139,9 +140,9 @@ static void ask_points(const vsh_field *field, double least_open, double most_op
     vsh_shade_stats stats = vsh_shade_stats_zero();
     float visible[2] = {-1.0F, -1.0F};
     float open[2] = {-1.0F, -1.0F};
-    check("shadow", vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &stats, error),
-          error);
-    check("ao", vsh_shade_ao(field, &points, &options, NULL, open, NULL, &stats, error), error);
+    check("shadow",
+          vsh_shade_shadow(occluders, &points, &light, &options, NULL, visible, NULL, &stats, error), error);
+    check("ao", vsh_shade_ao(occluders, &points, &options, NULL, open, NULL, &stats, error), error);
     expect("shadow under the caster", visible[0], 0.0, 0.0);
     expect("shadow far aside", visible[1], 1.0, 1.0);
     expect("AO under the caster", open[0], least_open, most_open);
@@ -152,7 +153,8 @@ static void ask_points(const vsh_field *field, double least_open, double most_op
 enum { SIZE = 32 };
 
 /* A floor 4 wide. The caster stands over u = 1/2, v = 1/4: column 16, row 24, as row 0 is v = 1. */
-static void bake_floor(const vsh_field *field, double least_open, double most_open, vsh_error *error) {
+static void bake_floor(const vsh_occluders *occluders, double least_open, double most_open,
+                       vsh_error *error) {
     static const float positions[] = {-2.0F, 0.0F, -1.0F, -2.0F, 0.0F, 3.0F,
                                       2.0F,  0.0F, 3.0F,  2.0F,  0.0F, -1.0F};
     static const float uvs[] = {0.0F, 0.0F, 0.0F, 1.0F, 1.0F, 1.0F, 1.0F, 0.0F};
@@ -178,7 +180,8 @@ static void bake_floor(const vsh_field *field, double least_open, double most_op
     const vsh_lightmap lightmap = {
         .shadow = planes, .ao = ao, .irradiance = irradiance, .coverage = coverage};
     vsh_bake_stats stats = vsh_bake_stats_zero();
-    check("bake", vsh_bake_lightmap(field, texels, &light, 1, &options.shade, NULL, &lightmap, &stats, error),
+    check("bake",
+          vsh_bake_lightmap(occluders, texels, &light, 1, &options.shade, NULL, &lightmap, &stats, error),
           error);
     vsh_texels_free(texels);
 
@@ -202,15 +205,17 @@ static void bake_floor(const vsh_field *field, double least_open, double most_op
 
 static void ask_all(const char *what, vsh_grid *grid, double least_open, double most_open, vsh_error *error) {
     printf("%s\n", what);
-    vsh_field *field = NULL;
-    check("field", vsh_field_create(grid, NULL, NULL, &field, error), error);
-    vsh_grid_free(grid); /* the field does not need it */
+    vsh_occluders *occluders = NULL;
+    check("occluders", vsh_occluders_from_grid(grid, NULL, NULL, &occluders, error), error);
+    vsh_grid_free(grid); /* they do not need it */
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(occluders, &parts);
     float distance = 0.0F;
-    vsh_field_sample(field, 1, (const double[]){0.0, 0.25, 0.0}, &distance);
+    vsh_field_sample(parts.field, 1, (const double[]){0.0, 0.25, 0.0}, &distance);
     expect("distance a quarter under the caster", distance, 0.21, 0.29);
-    ask_points(field, least_open, most_open, error);
-    bake_floor(field, least_open, most_open, error);
-    vsh_field_free(field);
+    ask_points(occluders, least_open, most_open, error);
+    bake_floor(occluders, least_open, most_open, error);
+    vsh_occluders_free(occluders);
 }
 
 /* By the module of image formats, which is installed beside the library. */

@@ -44,11 +44,13 @@ int main() {
     expect("in the same place", back->transform() == kept->transform());
     expect("of the class level set", back->getGridClass() == openvdb::GRID_LEVEL_SET);
 
-    vsh_field *field = nullptr;
-    expect("which casts", vsh_field_create(grid, nullptr, nullptr, &field, &error) == VSH_OK);
+    vsh_occluders *occluders = nullptr;
+    expect("which casts", vsh_occluders_from_grid(grid, nullptr, nullptr, &occluders, &error) == VSH_OK);
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(occluders, &parts);
     float distance = 0.0f;
     const double point[3] = {0.5, 0.5, 0.0};
-    vsh_field_sample(field, 1, point, &distance);
+    vsh_field_sample(parts.field, 1, point, &distance);
     expect("from where it is", std::fabs(distance - 0.5f) < 0.05f);
 
     vsh_voxels *voxels = nullptr;
@@ -56,9 +58,9 @@ int main() {
     const double low[3] = {0, 0, 0}, high[3] = {1, 0.8, 1};
     vsh_light sun = vsh_light_default();
     std::strcpy(sun.name, "sun");
-    expect("a volume is baked",
-           vsh_voxels_from_box(low, high, 0.1, nullptr, &voxels, &error) == VSH_OK &&
-               vsh_bake_volume(field, voxels, &sun, 1, nullptr, nullptr, &volume, nullptr, &error) == VSH_OK);
+    expect("a volume is baked", vsh_voxels_from_box(low, high, 0.1, nullptr, &voxels, &error) == VSH_OK &&
+                                    vsh_bake_volume(occluders, voxels, &sun, 1, nullptr, nullptr, &volume,
+                                                    nullptr, &error) == VSH_OK);
     vsh_grid_free(grid);
     openvdb::FloatGrid::ConstPtr shadow;
     expect("and is a grid", vdbshade::volume_to_openvdb(volume, 0, shadow, &error) == VSH_OK);
@@ -71,7 +73,8 @@ int main() {
     expect("and lives on", shadow->tree().getValue(openvdb::Coord(2, 2, 2)) == value);
     expect("no grid beyond the last", [&] {
         vsh_volume *none = nullptr;
-        return vsh_bake_volume(field, voxels, &sun, 1, nullptr, nullptr, &none, nullptr, &error) == VSH_OK &&
+        return vsh_bake_volume(occluders, voxels, &sun, 1, nullptr, nullptr, &none, nullptr, &error) ==
+                   VSH_OK &&
                vdbshade::volume_to_openvdb(none, 1, shadow, &error) == VSH_ERROR_ARGUMENT &&
                (vsh_volume_free(none), true);
     }());
@@ -96,6 +99,6 @@ int main() {
            vdbshade::grid_from_openvdb(given, &run, &none, &error) == VSH_ERROR_LIMIT);
 
     vsh_voxels_free(voxels);
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     return failures > 0 ? 1 : 0;
 }

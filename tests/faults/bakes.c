@@ -12,14 +12,14 @@ enum { FLAT_TEXELS = 64 };
 vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
     vsh_model *model = NULL;
     vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
+    vsh_occluders *occluders = NULL;
     vsh_texels *texels = NULL, *band = NULL;
     vsh_charts *charts = NULL;
     float planes[8][3 * SIDE * SIDE];
     vsh_result result;
     MAKE(model, vsh_model_read("box.obj", run, &model, error));
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
-    TRY(parts_field(run, &grid, &field, error));
+    TRY(parts_occluders(run, &grid, &occluders, error));
     vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = SIDE;
     options.tangents = 1;
@@ -36,25 +36,25 @@ vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
                               .tint = tint,
                               .tint_by = {VSH_TINT_QUADRATIC, {1, 1, 1}},
                               .bent_space = VSH_BENT_TANGENT};
-    TRY(vsh_bake_lightmap(field, texels, lights, 2, NULL, run, &all, NULL, error));
+    TRY(vsh_bake_lightmap(occluders, texels, lights, 2, NULL, run, &all, NULL, error));
     vsh_shade_options adaptive = preview_options();
     adaptive.method = VSH_SHADOW_ADAPTIVE;
     adaptive.ao_method = VSH_AO_ADAPTIVE;
     adaptive.rays = 16;
     const vsh_lightmap some = {
         .shadow = shadow, .ao = planes[4], .coverage = planes[6], .ao_error = planes[7]};
-    TRY(vsh_bake_lightmap(field, texels, lights, 2, &adaptive, run, &some, NULL, error));
+    TRY(vsh_bake_lightmap(occluders, texels, lights, 2, &adaptive, run, &some, NULL, error));
     options.supersample = 2;
     MAKE(charts, vsh_charts_create(&mesh, 1, &options, run, NULL, &charts, error));
     double box[6];
     TRY(vsh_charts_bounds(charts, run, box, box + 3, error));
     MAKE(band, vsh_texels_create_band(charts, 0, 8, run, &band, error));
-    TRY(vsh_bake_lightmap(field, band, lights, 2, NULL, run, &some, NULL, error));
+    TRY(vsh_bake_lightmap(occluders, band, lights, 2, NULL, run, &some, NULL, error));
 end:
     vsh_texels_free(band);
     vsh_charts_free(charts);
     vsh_texels_free(texels);
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     vsh_grid_free(grid);
     vsh_model_free(model);
     return result;
@@ -62,7 +62,7 @@ end:
 
 vsh_result bake_volume(const vsh_run *run, vsh_error *error) {
     vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
+    vsh_occluders *occluders = NULL;
     vsh_voxels *band = NULL, *box = NULL;
     vsh_volume *on_band = NULL, *in_box = NULL;
     const double least[] = {-1, -1, -1}, most[] = {2, 2, 2};
@@ -71,18 +71,18 @@ vsh_result bake_volume(const vsh_run *run, vsh_error *error) {
     options.ao = 1;
     options.shade.ao_cones = 4;
     vsh_result result;
-    TRY(parts_field(run, &grid, &field, error));
+    TRY(parts_occluders(run, &grid, &occluders, error));
     MAKE(band, vsh_voxels_from_grid(grid, 2.0, run, &band, error));
-    MAKE(on_band, vsh_bake_volume(field, band, &light, 1, &options, run, &on_band, NULL, error));
+    MAKE(on_band, vsh_bake_volume(occluders, band, &light, 1, &options, run, &on_band, NULL, error));
     MAKE(box, vsh_voxels_from_box(least, most, 0.4, run, &box, error));
-    MAKE(in_box, vsh_bake_volume(field, box, &light, 1, &options, run, &in_box, NULL, error));
+    MAKE(in_box, vsh_bake_volume(occluders, box, &light, 1, &options, run, &in_box, NULL, error));
     TRY(vsh_volume_write(in_box, "out.vdb", 1, error));
 end:
     vsh_volume_free(in_box);
     vsh_volume_free(on_band);
     vsh_voxels_free(box);
     vsh_voxels_free(band);
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     vsh_grid_free(grid);
     return result;
 }
@@ -90,7 +90,7 @@ end:
 vsh_result draw(const vsh_run *run, vsh_error *error) {
     vsh_model *model = NULL;
     vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
+    vsh_occluders *occluders = NULL;
     float planes[4][3 * SIDE * SIDE], light_plane[SIDE * SIDE];
     parts_fill(light_plane, SIDE * SIDE);
     static const char *const name = "shadow.sun";
@@ -105,19 +105,21 @@ vsh_result draw(const vsh_run *run, vsh_error *error) {
     vsh_result result;
     MAKE(model, vsh_model_read("box.obj", run, &model, error));
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
-    TRY(parts_field(run, &grid, &field, error));
-    const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
+    TRY(parts_occluders(run, &grid, &occluders, error));
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(occluders, &parts);
+    const vsh_surface surface = {parts.field, {0.5, 0.5, 0.5}};
     const vsh_lit_meshes lit = {&mesh, 1, &lightmap, {1, 1, 1}, 0};
     options.lit = &lit;
     options.lit_count = 1;
     const double least[] = {0, 0, 0}, most[] = {1, 1, 1};
     TRY(vsh_camera_frame(&options.camera, least, most, 0.5, 0.5, 1.0, error));
     const vsh_picture picture = {planes[0], planes[1], planes[2], planes[3]};
-    TRY(vsh_render(&surface, 1, field, &light, 1, &options, run, &picture, NULL, error));
+    TRY(vsh_render(&surface, 1, occluders, &light, 1, &options, run, &picture, NULL, error));
     float *const rgb[] = {planes[1], planes[2], planes[3]};
     TRY(vsh_picture_encode(&picture, SIDE, SIDE, 0.0, rgb, NULL, error));
 end:
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     vsh_grid_free(grid);
     vsh_model_free(model);
     return result;

@@ -38,7 +38,7 @@ extern const char *const images[IMAGES];
 void parts_fill(float *values, size_t count);
 
 /* A cube of 1 in a few voxels. */
-vsh_result parts_field(const vsh_run *run, vsh_grid **grid, vsh_field **field, vsh_error *error);
+vsh_result parts_occluders(const vsh_run *run, vsh_grid **grid, vsh_occluders **occluders, vsh_error *error);
 
 /* Points around it, with normals up. */
 void parts_place(double positions[3 * POINTS], float normals[3 * POINTS]);

@@ -11,7 +11,7 @@ void parts_fill(float *values, size_t count) {
     }
 }
 
-vsh_result parts_field(const vsh_run *run, vsh_grid **grid, vsh_field **field, vsh_error *error) {
+vsh_result parts_occluders(const vsh_run *run, vsh_grid **grid, vsh_occluders **occluders, vsh_error *error) {
     static const float corners[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1};
     static const uint32_t indices[] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
                                        3, 7, 6, 3, 6, 2, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5};
@@ -22,10 +22,10 @@ vsh_result parts_field(const vsh_run *run, vsh_grid **grid, vsh_field **field, v
     vsh_field_options wide = vsh_field_options_default();
     wide.reach = 1.0;
     *grid = NULL;
-    *field = NULL;
+    *occluders = NULL;
     vsh_result result;
     MAKE(*grid, vsh_grid_from_meshes(&mesh, 1, &options, run, grid, error));
-    MAKE(*field, vsh_field_create(*grid, &wide, run, field, error));
+    MAKE(*occluders, vsh_occluders_from_grid(*grid, &wide, run, occluders, error));
 end:
     return result;
 }
@@ -77,13 +77,18 @@ static vsh_result load_scene(const vsh_run *run, vsh_error *error) {
     vsh_assets *assets = NULL;
     vsh_grid *grid = NULL, *layer = NULL;
     vsh_triangles *triangles = NULL;
+    vsh_occluders *occluders = NULL;
+    vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
+    options.truth = 1;
     vsh_result result;
     MAKE(scene, vsh_scene_read("scene.json", &scene, error));
     MAKE(assets, vsh_assets_load(scene, run, &assets, error));
     MAKE(grid, vsh_scene_casters(scene, assets, run, &grid, error));
     MAKE(layer, vsh_scene_layer_casters(scene, assets, &scene->layers[0], run, &layer, error));
     MAKE(triangles, vsh_scene_triangles(scene, assets, &scene->layers[0], run, &triangles, error));
+    MAKE(occluders, vsh_scene_occluders(scene, assets, &options, run, &occluders, error));
 end:
+    vsh_occluders_free(occluders);
     vsh_triangles_free(triangles);
     vsh_grid_free(layer);
     vsh_grid_free(grid);
@@ -119,19 +124,19 @@ end:
 
 static vsh_result write_grid(const vsh_run *run, vsh_error *error) {
     vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
+    vsh_occluders *occluders = NULL;
     vsh_result result;
-    TRY(parts_field(run, &grid, &field, error));
+    TRY(parts_occluders(run, &grid, &occluders, error));
     TRY(vsh_grid_write(grid, "out.vdb", NULL, error));
 end:
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     vsh_grid_free(grid);
     return result;
 }
 
 static vsh_result shade_points(const vsh_run *run, vsh_error *error) {
     vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
+    vsh_occluders *occluders = NULL;
     double positions[3 * POINTS];
     float normals[3 * POINTS], values[POINTS], deviation[POINTS], bent[3 * POINTS];
     parts_place(positions, normals);
@@ -141,25 +146,25 @@ static vsh_result shade_points(const vsh_run *run, vsh_error *error) {
     vsh_shade_options options = preview_options();
     options.rays = 16;
     vsh_result result;
-    TRY(parts_field(run, &grid, &field, error));
+    TRY(parts_occluders(run, &grid, &occluders, error));
     for (options.method = VSH_SHADOW_HARD; options.method < VSH_SHADOW_EXACT; ++options.method) {
-        TRY(vsh_shade_shadow(field, &points, &light, &options, run, values, deviation, NULL, error));
+        TRY(vsh_shade_shadow(occluders, &points, &light, &options, run, values, deviation, NULL, error));
     }
     options.method = VSH_SHADOW_CONE;
     for (options.ao_method = VSH_AO_TAPS; options.ao_method < VSH_AO_EXACT; ++options.ao_method) {
-        TRY(vsh_shade_ao(field, &points, &options, run, values, deviation, NULL, error));
+        TRY(vsh_shade_ao(occluders, &points, &options, run, values, deviation, NULL, error));
     }
     options.ao_method = VSH_AO_CONES;
-    TRY(vsh_shade_bent(field, &points, &options, run, values, bent, NULL, error));
+    TRY(vsh_shade_bent(occluders, &points, &options, run, values, bent, NULL, error));
 end:
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     vsh_grid_free(grid);
     return result;
 }
 
 static vsh_result ask(const vsh_run *run, vsh_error *error) {
     vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
+    vsh_occluders *occluders = NULL, *layered = NULL;
     vsh_heights *heights = NULL;
     vsh_model *model = NULL;
     vsh_spheres *spheres = NULL;
@@ -173,7 +178,7 @@ static vsh_result ask(const vsh_run *run, vsh_error *error) {
     const vsh_heights_source source = {
         .columns = SIDE, .rows = SIDE, .values = samples, .size = {4, 4}, .height = 0.5};
     vsh_result result;
-    TRY(parts_field(run, &grid, &field, error));
+    TRY(parts_occluders(run, &grid, &occluders, error));
     MAKE(heights, vsh_heights_create(&source, run, &heights, error));
     MAKE(model, vsh_model_from_heights(&source, VSH_HEIGHTS_SURFACE, run, &model, error));
     vsh_model_free(model);
@@ -187,12 +192,15 @@ static vsh_result ask(const vsh_run *run, vsh_error *error) {
     layers[1].spheres = spheres;
     layers[1].lights = names;
     layers[1].light_count = 1;
-    layers[2].field = field;
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(occluders, &parts);
+    layers[2].field = parts.field;
+    parts.layers = layers;
+    parts.layer_count = 3;
+    MAKE(layered, vsh_occluders_from_parts(&parts, &layered, error));
     vsh_shade_options options = preview_options();
-    options.layers = layers;
-    options.layer_count = 3;
     const vsh_light light = vsh_light_default();
-    MAKE(query, vsh_query_create(field, &light, 1, &options, &query, error));
+    MAKE(query, vsh_query_create(layered, &light, 1, &options, &query, error));
     float *const planes[] = {values[0]};
     vsh_query_output output = vsh_query_output_default();
     output.visibility = planes;
@@ -209,7 +217,8 @@ end:
     vsh_spheres_list_free(list);
     vsh_model_free(model);
     vsh_heights_free(heights);
-    vsh_field_free(field);
+    vsh_occluders_free(layered);
+    vsh_occluders_free(occluders);
     vsh_grid_free(grid);
     return result;
 }
@@ -218,6 +227,9 @@ static vsh_result trace(const vsh_run *run, vsh_error *error) {
     vsh_model *model = NULL;
     vsh_triangles *triangles = NULL;
     vsh_solids *solids = NULL;
+    vsh_occluders *occluders = NULL;
+    vsh_occluders_options few = vsh_occluders_options_default();
+    few.grid.resolution = 10;
     double positions[3 * POINTS];
     float normals[3 * POINTS], values[POINTS];
     parts_place(positions, normals);
@@ -227,6 +239,7 @@ static vsh_result trace(const vsh_run *run, vsh_error *error) {
     vsh_result result;
     MAKE(model, vsh_model_read("box.obj", run, &model, error));
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    MAKE(occluders, vsh_occluders_create(&mesh, 1, &few, run, &occluders, error));
     MAKE(solids, vsh_solids_create(&sdf, NULL, 1, &solids, error));
     if (vsh_triangles_available()) {
         MAKE(triangles, vsh_triangles_create(&mesh, 1, run, &triangles, error));
@@ -234,6 +247,7 @@ static vsh_result trace(const vsh_run *run, vsh_error *error) {
     TRY(vsh_trace_shadow(triangles, solids, POINTS, positions, normals, 0.01, &light, 8, run, values, error));
     TRY(vsh_trace_ao(triangles, solids, POINTS, positions, normals, 0.01, 1.0, 8, run, values, error));
 end:
+    vsh_occluders_free(occluders);
     vsh_solids_free(solids);
     vsh_triangles_free(triangles);
     vsh_model_free(model);

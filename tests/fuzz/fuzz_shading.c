@@ -12,9 +12,9 @@ enum { POINTS = 12, MOST_TEXELS = 1 << 14 };
 
 static void shade(fuzz_input *input) {
     vsh_shade_options options = vsh_shade_options_default();
-    vsh_layer layer;
     options.rays = 4;
-    fuzz_take_shade(input, &options, &layer);
+    fuzz_take(input, &options, sizeof options);
+    vsh_occluders *occluders = fuzz_take_occluders(input);
     const vsh_run run = fuzz_take_run(input);
     const vsh_light light = fuzz_take_light(input);
     double positions[3 * POINTS];
@@ -32,28 +32,28 @@ static void shade(fuzz_input *input) {
     vsh_shade_stats stats = vsh_shade_stats_zero();
     fuzz_take(input, &stats, sizeof stats.struct_size);
     vsh_error error;
-    fuzz_ended_plain(vsh_shade_shadow(fuzz_made()->field, &points, &light, &options, &run, values,
+    fuzz_ended_plain(vsh_shade_shadow(occluders, &points, &light, &options, &run, values,
                                       how & 4 ? deviation : NULL, &stats, fuzz_error(&error)),
                      &error);
-    fuzz_ended_plain(vsh_shade_ao(fuzz_made()->field, &points, &options, &run, values,
-                                  how & 4 ? deviation : NULL, &stats, fuzz_error(&error)),
+    fuzz_ended_plain(vsh_shade_ao(occluders, &points, &options, &run, values, how & 4 ? deviation : NULL,
+                                  &stats, fuzz_error(&error)),
                      &error);
     fuzz_ended_plain(
-        vsh_shade_bent(fuzz_made()->field, &points, &options, &run, ao, values, &stats, fuzz_error(&error)),
-        &error);
+        vsh_shade_bent(occluders, &points, &options, &run, ao, values, &stats, fuzz_error(&error)), &error);
+    fuzz_free_occluders(occluders);
 }
 
 static void query(fuzz_input *input) {
     vsh_shade_options options = vsh_shade_options_default();
-    vsh_layer layer;
-    fuzz_take_shade(input, &options, &layer);
+    fuzz_take(input, &options, sizeof options);
+    vsh_occluders *occluders = fuzz_take_occluders(input);
     const vsh_run run = fuzz_take_run(input);
     const vsh_light light = fuzz_take_light(input);
     vsh_query *made_query;
     vsh_error error;
-    FUZZ_MAKE(made_query,
-              vsh_query_create(fuzz_made()->field, &light, 1, &options, &made_query, fuzz_error(&error)));
+    FUZZ_MAKE(made_query, vsh_query_create(occluders, &light, 1, &options, &made_query, fuzz_error(&error)));
     if (made_query == NULL) {
+        fuzz_free_occluders(occluders);
         return;
     }
     /* strides as long as they can be wished, within these */
@@ -88,6 +88,7 @@ static void query(fuzz_input *input) {
     fuzz_fill(input, normals, 3 * POINTS * sizeof *normals);
     fuzz_ended_plain(vsh_query_strided(made_query, &points, &run, &output, NULL, fuzz_error(&error)), &error);
     vsh_query_free(made_query);
+    fuzz_free_occluders(occluders);
 }
 
 static void lightmap(fuzz_input *input) {
@@ -95,9 +96,6 @@ static void lightmap(fuzz_input *input) {
     options.width = options.height = FUZZ_SIDE;
     fuzz_take(input, &options, sizeof options);
     const vsh_run run = fuzz_take_run(input);
-    vsh_layer layer;
-    options.shade.layers = NULL;
-    options.shade.triangles = NULL;
     float places[16];
     memcpy(places, fuzz_uvs, sizeof places);
     fuzz_take(input, places, sizeof places);
@@ -122,7 +120,8 @@ static void lightmap(fuzz_input *input) {
         static float planes[6][3 * MOST_TEXELS];
         vsh_shade_options shading = vsh_shade_options_default();
         shading.ao_cones = 4;
-        fuzz_take_shade(input, &shading, &layer);
+        fuzz_take(input, &shading, sizeof shading);
+        vsh_occluders *occluders = fuzz_take_occluders(input);
         const vsh_light light = fuzz_take_light(input);
         double ambient[3] = {0.1, 0.2, 0.3};
         fuzz_take(input, ambient, sizeof ambient);
@@ -139,9 +138,10 @@ static void lightmap(fuzz_input *input) {
         map.bent = how & 8 ? planes[5] : NULL;
         map.tint = how & 16 ? tint : NULL;
         map.ambient = how & 32 ? ambient : NULL;
-        fuzz_ended_plain(vsh_bake_lightmap(fuzz_made()->field, texels, &light, 1, &shading, &run, &map, NULL,
-                                           fuzz_error(&error)),
-                         &error);
+        fuzz_ended_plain(
+            vsh_bake_lightmap(occluders, texels, &light, 1, &shading, &run, &map, NULL, fuzz_error(&error)),
+            &error);
+        fuzz_free_occluders(occluders);
     }
     vsh_texels_free(texels);
 }
@@ -150,10 +150,7 @@ static void volume(fuzz_input *input) {
     vsh_volume_options options = vsh_volume_options_default();
     options.shade.ao_cones = 4;
     fuzz_take(input, &options, sizeof options);
-    vsh_layer layer;
-    options.shade.triangles = NULL;
-    options.shade.layers = fuzz_byte(input) & 1 ? fuzz_take_layer(input, &layer) : NULL;
-    options.shade.layer_count = options.shade.layers != NULL;
+    vsh_occluders *occluders = fuzz_take_occluders(input);
     const vsh_run run = fuzz_take_run(input);
     const vsh_light light = fuzz_take_light(input);
     vsh_error error;
@@ -163,9 +160,10 @@ static void volume(fuzz_input *input) {
     vsh_voxels *voxels;
     FUZZ_MAKE(voxels, vsh_voxels_from_box(box, box + 3, size, &run, &voxels, fuzz_error(&error)));
     vsh_volume *baked;
-    FUZZ_MAKE(baked, vsh_bake_volume(fuzz_made()->field, voxels != NULL ? voxels : fuzz_made()->voxels,
-                                     &light, 1, &options, &run, &baked, NULL, fuzz_error(&error)));
+    FUZZ_MAKE(baked, vsh_bake_volume(occluders, voxels != NULL ? voxels : fuzz_made()->voxels, &light, 1,
+                                     &options, &run, &baked, NULL, fuzz_error(&error)));
     vsh_volume_free(baked);
+    fuzz_free_occluders(occluders);
     vsh_voxels_free(voxels);
     fuzz_take(input, &size, sizeof size);
     FUZZ_MAKE(voxels, vsh_voxels_from_grid(fuzz_made()->grid, size, &run, &voxels, fuzz_error(&error)));
@@ -177,9 +175,8 @@ static void render(fuzz_input *input) {
     options.width = options.height = FUZZ_SIDE;
     options.samples = 1;
     fuzz_take(input, &options, sizeof options);
-    options.lit = NULL; /* as layers: a count of what is not there is refused */
-    options.shade.layers = NULL;
-    options.shade.triangles = NULL;
+    options.lit = NULL; /* a count of what is not there is refused */
+    vsh_occluders *occluders = fuzz_take_occluders(input);
     const vsh_run run = fuzz_take_run(input);
     const vsh_light light = fuzz_take_light(input);
     vsh_surface surface = {fuzz_made()->field, {0.5, 0.5, 0.5}};
@@ -216,9 +213,10 @@ static void render(fuzz_input *input) {
     }
     const int fits = FITS(options);
     const vsh_picture none = {NULL, NULL, NULL, NULL};
-    fuzz_ended_plain(vsh_render(&surface, 1, fuzz_made()->field, &light, 1, &options, &run,
-                                fits ? &picture : &none, NULL, fuzz_error(&error)),
+    fuzz_ended_plain(vsh_render(&surface, 1, occluders, &light, 1, &options, &run, fits ? &picture : &none,
+                                NULL, fuzz_error(&error)),
                      &error);
+    fuzz_free_occluders(occluders);
     float *const rgb[] = {planes[1], planes[2], planes[3]};
     fuzz_ended_plain(
         vsh_picture_encode(&picture, FUZZ_SIDE, FUZZ_SIDE, angles[2], rgb, NULL, fuzz_error(&error)), &error);

@@ -33,6 +33,7 @@ static void make(void) {
     vsh_field_options field = vsh_field_options_default();
     field.reach = 2.0;
     fuzz_must(vsh_field_create(made.grid, &field, &run, &made.field, NULL));
+    fuzz_must(vsh_occluders_from_grid(made.grid, &field, &run, &made.occluders, NULL));
     vsh_lightmap_options lightmap = vsh_lightmap_options_default();
     lightmap.width = lightmap.height = FUZZ_SIDE;
     fuzz_must(vsh_texels_create(&made.mesh, 1, &lightmap, &run, NULL, &made.texels, NULL));
@@ -92,7 +93,7 @@ vsh_run fuzz_take_run(fuzz_input *input) {
     return run;
 }
 
-const vsh_layer *fuzz_take_layer(fuzz_input *input, vsh_layer *layer) {
+static void take_layer(fuzz_input *input, vsh_layer *layer) {
     static const char *const lights[] = {"sun", "other"};
     *layer = vsh_layer_default();
     fuzz_take(input, layer, sizeof *layer);
@@ -103,15 +104,33 @@ const vsh_layer *fuzz_take_layer(fuzz_input *input, vsh_layer *layer) {
     layer->triangles = NULL;
     layer->lights = which & 16 ? lights : NULL;
     layer->light_count %= 3;
-    return layer;
+    layer->name = NULL;
 }
 
-void fuzz_take_shade(fuzz_input *input, vsh_shade_options *shade, vsh_layer *layer) {
-    fuzz_take(input, shade, sizeof *shade);
-    shade->triangles = NULL;
-    const int layers = fuzz_byte(input) % 4 == 0;
-    shade->layers = layers ? fuzz_take_layer(input, layer) : NULL;
-    shade->layer_count = layers ? 1 : shade->layer_count;
+vsh_occluders *fuzz_take_occluders(fuzz_input *input) {
+    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    vsh_layer layer;
+    fuzz_take(input, &parts, sizeof parts);
+    const uint8_t how = fuzz_byte(input);
+    parts.field = how & 1 ? NULL : made.field;
+    parts.triangles = parts.true_triangles = NULL;
+    parts.true_solids = NULL;
+    parts.layers = NULL; /* a count of what is not there is refused */
+    if (how % 8 < 2) {
+        take_layer(input, &layer);
+        parts.layers = &layer;
+        parts.layer_count = 1;
+    }
+    vsh_error error;
+    vsh_occluders *occluders;
+    FUZZ_MAKE(occluders, vsh_occluders_from_parts(&parts, &occluders, fuzz_error(&error)));
+    return occluders != NULL ? occluders : made.occluders;
+}
+
+void fuzz_free_occluders(vsh_occluders *occluders) {
+    if (occluders != made.occluders) {
+        vsh_occluders_free(occluders);
+    }
 }
 
 vsh_light fuzz_take_light(fuzz_input *input) {

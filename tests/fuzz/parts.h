@@ -15,6 +15,7 @@ typedef struct fuzz_handles {
     vsh_mesh mesh;
     vsh_grid *grid;
     vsh_field *field;
+    vsh_occluders *occluders; /* of the field alone */
     vsh_texels *texels;
     vsh_outline *outline;
     vsh_voxels *voxels;
@@ -33,8 +34,10 @@ void fuzz_must(vsh_result result);
 /* A struct of options: as it is with some bytes changed, or all bytes the input's. */
 void fuzz_take(fuzz_input *input, void *to, size_t size);
 vsh_run fuzz_take_run(fuzz_input *input);
-const vsh_layer *fuzz_take_layer(fuzz_input *input, vsh_layer *layer);
-void fuzz_take_shade(fuzz_input *input, vsh_shade_options *shade, vsh_layer *layer);
+/* What casts, with a layer or without; those that were made once where the input makes none. Free with
+ * fuzz_free_occluders(). */
+vsh_occluders *fuzz_take_occluders(fuzz_input *input);
+void fuzz_free_occluders(vsh_occluders *occluders);
 vsh_light fuzz_take_light(fuzz_input *input);
 
 /* fuzz_ended() for a call without a handle. */

@@ -2,6 +2,7 @@
 #ifndef TESTS_LIGHTMAPS_H
 #define TESTS_LIGHTMAPS_H
 
+#include "casts.h"
 #include "previews.h"
 #include <math.h>
 #include <setjmp.h>
@@ -112,8 +113,8 @@ static inline void bake(const vsh_field *field, const vsh_texels *texels, const 
     vsh_run run = vsh_run_default();
     run.threads = threads;
     vsh_error error = {0};
-    if (vsh_bake_lightmap(field, texels, light, light != NULL ? 1 : 0, NULL, &run, lightmap, stats, &error) !=
-        VSH_OK) {
+    if (vsh_bake_lightmap(occluders_of(field), texels, light, light != NULL ? 1 : 0, NULL, &run, lightmap,
+                          stats, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
 }

@@ -82,8 +82,8 @@ static inline void render(const vsh_surface *surfaces, size_t count, const vsh_f
                           const vsh_light *light, const vsh_render_options *options, const vsh_run *run) {
     vsh_error error = {VSH_OK, ""};
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    if (vsh_render(surfaces, count, field, light, light != NULL, options, run, &picture, &stats, &error) !=
-        VSH_OK) {
+    if (vsh_render(surfaces, count, occluders_of(field), light, light != NULL, options, run, &picture, &stats,
+                   &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     assert_int_equal(stats.unfinished, 0);

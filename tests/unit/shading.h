@@ -2,6 +2,7 @@
 #ifndef TESTS_SHADING_H
 #define TESTS_SHADING_H
 
+#include "casts.h"
 #include "fields.h"
 #include "previews.h"
 
@@ -34,7 +35,8 @@ static inline vsh_shade_stats shadows(const vsh_field *field, const vsh_light *l
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(field, &points, light, &options, NULL, visible, NULL, &stats, &error) != VSH_OK) {
+    if (vsh_shade_shadow(occluders_of(field), &points, light, &options, NULL, visible, NULL, &stats,
+                         &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;

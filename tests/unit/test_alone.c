@@ -71,7 +71,7 @@ static void compare(const vsh_field *field, const vsh_light *light, const vsh_sh
                     size_t count) {
     vsh_query *query = NULL;
     vsh_error error = {VSH_OK, ""};
-    if (vsh_query_create(field, light, light != NULL, options, &query, &error) != VSH_OK) {
+    if (vsh_query_create(occluders_of(field), light, light != NULL, options, &query, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     ask(query, light == NULL, count, count, among);

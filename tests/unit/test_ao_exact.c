@@ -66,13 +66,12 @@ static void free_scene(traced_scene *scene) {
     vsh_field_free(scene->field);
 }
 
-static vsh_shade_options options_of(const traced_scene *scene, double max_error) {
+static vsh_shade_options options_of(double max_error) {
     vsh_shade_options options = preview_options();
     options.ao_method = VSH_AO_EXACT;
     options.ao_distance = DISTANCE;
     options.rays = 4096;
     options.max_error = max_error;
-    options.triangles = scene->triangles;
     return options;
 }
 
@@ -96,8 +95,10 @@ static void an_open_plate_is_exactly_1(void **state) {
     static float normals[3 * TEXELS], ao[TEXELS];
     place(1, positions, normals);
     const vsh_points points = {TEXELS, positions, normals, NULL};
-    const vsh_shade_options options = options_of(&scene, 0.05);
-    assert_int_equal(vsh_shade_ao(scene.field, &points, &options, NULL, ao, NULL, NULL, NULL), VSH_OK);
+    const vsh_shade_options options = options_of(0.05);
+    assert_int_equal(vsh_shade_ao(occluders_traced(scene.field, scene.triangles), &points, &options, NULL, ao,
+                                  NULL, NULL, NULL),
+                     VSH_OK);
     for (size_t i = 0; i < TEXELS; ++i) {
         assert_true(ao[i] == 1.0f);
     }
@@ -118,9 +119,10 @@ static void the_error_left_is_what_was_asked_for_and_said(void **state) {
     }
     const vsh_points points = {TEXELS, positions, normals, NULL};
     for (int e = 0; e < 3; ++e) {
-        const vsh_shade_options options = options_of(&scene, errors[e]);
+        const vsh_shade_options options = options_of(errors[e]);
         vsh_shade_stats stats = vsh_shade_stats_zero();
-        assert_int_equal(vsh_shade_ao(scene.field, &points, &options, NULL, ao, deviation, &stats, NULL),
+        assert_int_equal(vsh_shade_ao(occluders_traced(scene.field, scene.triangles), &points, &options, NULL,
+                                      ao, deviation, &stats, NULL),
                          VSH_OK);
         double squares = 0.0, bias = 0.0, said = 0.0;
         for (size_t i = 0; i < TEXELS; ++i) {
@@ -139,7 +141,8 @@ static void the_error_left_is_what_was_asked_for_and_said(void **state) {
         for (int t = 0; t < 2; ++t) {
             vsh_run run = vsh_run_default();
             run.threads = threads[t];
-            assert_int_equal(vsh_shade_ao(scene.field, &points, &options, &run, other, NULL, NULL, NULL),
+            assert_int_equal(vsh_shade_ao(occluders_traced(scene.field, scene.triangles), &points, &options,
+                                          &run, other, NULL, NULL, NULL),
                              VSH_OK);
             assert_memory_equal(ao, other, sizeof ao);
         }
@@ -150,14 +153,14 @@ static void the_error_left_is_what_was_asked_for_and_said(void **state) {
 static void it_needs_triangles(void **state) {
     (void)state;
     traced_scene scene = scene_of(1);
-    vsh_shade_options options = options_of(&scene, 0.05);
-    options.triangles = NULL;
+    vsh_shade_options options = options_of(0.05);
     const double at[3] = {0.0, 0.0, 0.0};
     const vsh_points points = {1, at, UP, NULL};
     float ao = -1.0f;
     vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_shade_ao(scene.field, &points, &options, NULL, &ao, NULL, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(
+        vsh_shade_ao(occluders_of(scene.field), &points, &options, NULL, &ao, NULL, NULL, &error),
+        VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "triangles"));
     free_scene(&scene);
 }

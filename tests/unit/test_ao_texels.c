@@ -95,8 +95,8 @@ static void bake_rows(const stage *s, const vsh_texels *texels, const vsh_shade_
     vsh_bake_stats stats = vsh_bake_stats_zero();
     stats.shade = b->stats;
     vsh_error error = {0};
-    if (vsh_bake_lightmap(s->casters.field, texels, NULL, 0, shade, &run, &lightmap, &stats, &error) !=
-        VSH_OK) {
+    if (vsh_bake_lightmap(occluders_of_caster(&s->casters), texels, NULL, 0, shade, &run, &lightmap, &stats,
+                          &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     b->stats = stats.shade;
@@ -110,7 +110,6 @@ static baked *bake(const stage *s, how h) {
     options.shade.ao_distance = 0.8;
     options.shade.rays = 0; /* as many as the error takes */
     options.shade.max_error = h.max_error;
-    options.shade.triangles = s->casters.triangles;
     const size_t receivers = h.receivers == 0 ? RECEIVERS : h.receivers;
     baked *b = malloc(sizeof *b);
     assert_non_null(b);

@@ -74,15 +74,20 @@ static vsh_points board(double half, double height) {
 
 static const double UP[3] = {0.4, 1.0, 0.3};
 
-static vsh_shade_stats shade(const caster *c, const vsh_points *points, const vsh_shade_options *options,
-                             float *into) {
+static vsh_shade_stats shade_by(const vsh_occluders *casters, const vsh_points *points,
+                                const vsh_shade_options *options, float *into) {
     const vsh_light light = sun(UP, RADIANS(6.0));
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(c->field, points, &light, options, NULL, into, NULL, &stats, &error) != VSH_OK) {
+    if (vsh_shade_shadow(casters, points, &light, options, NULL, into, NULL, &stats, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;
+}
+
+static vsh_shade_stats shade(const caster *c, const vsh_points *points, const vsh_shade_options *options,
+                             float *into) {
+    return shade_by(occluders_of_caster(c), points, options, into);
 }
 
 static double rmse_to_truth(const caster *c, const vsh_points *points, const vsh_shade_options *options) {
@@ -107,14 +112,18 @@ static void the_default_is_exact_with_triangles_and_adaptive_without(void **stat
     const vsh_points points = board(1.0, 0.0);
     for (int traced = 0; traced < 2; ++traced) {
         vsh_shade_options options = vsh_shade_options_default(), named = options;
-        options.triangles = named.triangles = traced ? c.triangles : NULL;
+        const caster given = {c.field, traced ? c.triangles : NULL};
         named.method = traced ? VSH_SHADOW_EXACT : VSH_SHADOW_ADAPTIVE;
         named.ao_method = traced ? VSH_AO_EXACT : VSH_AO_ADAPTIVE;
-        shade(&c, &points, &options, values);
-        shade(&c, &points, &named, other);
+        shade(&given, &points, &options, values);
+        shade(&given, &points, &named, other);
         assert_memory_equal(values, other, sizeof values);
-        assert_int_equal(vsh_shade_ao(c.field, &points, &options, NULL, values, NULL, NULL, NULL), VSH_OK);
-        assert_int_equal(vsh_shade_ao(c.field, &points, &named, NULL, other, NULL, NULL, NULL), VSH_OK);
+        assert_int_equal(
+            vsh_shade_ao(occluders_of_caster(&given), &points, &options, NULL, values, NULL, NULL, NULL),
+            VSH_OK);
+        assert_int_equal(
+            vsh_shade_ao(occluders_of_caster(&given), &points, &named, NULL, other, NULL, NULL, NULL),
+            VSH_OK);
         assert_memory_equal(values, other, sizeof values);
         assert_int_equal(vsh_shadow_method_resolve(VSH_SHADOW_AUTO, traced), named.method);
         assert_int_equal(vsh_ao_method_resolve(VSH_AO_AUTO, traced), named.ao_method);
@@ -132,14 +141,13 @@ static void a_layer_takes_the_method_that_its_own_triangles_allow(void **state) 
     vsh_layer layer = vsh_layer_default();
     layer.field = c.field; /* no triangles */
     vsh_shade_options options = vsh_shade_options_default();
-    options.triangles = c.triangles;
-    options.layers = &layer;
-    options.layer_count = 1;
-    shade(&c, &points, &options, values);
+    const vsh_occluders casters = {
+        .field = c.field, .triangles = c.triangles, .layers = &layer, .layer_count = 1};
+    shade_by(&casters, &points, &options, values);
     layer.method = VSH_SHADOW_ADAPTIVE;
-    shade(&c, &points, &options, other);
+    shade_by(&casters, &points, &options, other);
     assert_memory_equal(values, other, sizeof values);
-    assert_int_equal(vsh_shade_ao(c.field, &points, &options, NULL, values, NULL, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_ao(&casters, &points, &options, NULL, values, NULL, NULL, NULL), VSH_OK);
     caster_free(&c);
 }
 
@@ -153,7 +161,6 @@ static void rays_follow_from_the_error_unless_they_are_limited(void **state) {
     caster c = make(&s.mesh, 1, 0.03);
     const vsh_points points = board(1.0, 0.0);
     vsh_shade_options options = vsh_shade_options_default();
-    options.triangles = c.triangles;
     options.max_error = 0.003;
     const double free = rmse_to_truth(&c, &points, &options);
     const double said = sqrt(shade(&c, &points, &options, values).square_error / COUNT);
@@ -217,7 +224,6 @@ static void voxels_coarser_than_casters_cost_exact_no_error(void **state) {
         for (double voxel = 0.2; voxel > 0.02; voxel *= 0.5) {
             caster c = make(&shapes[which]->mesh, 1, voxel);
             vsh_shade_options options = vsh_shade_options_default();
-            options.triangles = c.triangles;
             const double rmse = rmse_to_truth(&c, &points, &options);
             print_message("%s, voxels of %g: %.4f\n", which ? "cards" : "slats", voxel, rmse);
             assert_true(rmse <= 0.02);
@@ -255,10 +261,11 @@ static void ao_between_texels_keeps_the_error_beside_what_is_low(void **state) {
                                   0.5, 1024, NULL, open, NULL),
                      VSH_OK);
     vsh_shade_options options = vsh_shade_options_default();
-    options.triangles = c.triangles;
     options.ao_distance = 0.5;
     const vsh_lightmap lightmap = {.ao = plane, .coverage = covered};
-    assert_int_equal(vsh_bake_lightmap(c.field, of, NULL, 0, &options, NULL, &lightmap, NULL, NULL), VSH_OK);
+    assert_int_equal(
+        vsh_bake_lightmap(occluders_of_caster(&c), of, NULL, 0, &options, NULL, &lightmap, NULL, NULL),
+        VSH_OK);
     double sum = 0.0, count = 0.0;
     for (size_t i = 0; i < samples.count; ++i) {
         const uint32_t at = samples.texel[i];

@@ -1,4 +1,5 @@
 /* Lightmaps baked in bands of rows are those baked whole, bit by bit. */
+#include "casts.h"
 #include "texels_of.h"
 
 #include <vdbshade/trace.h>
@@ -131,7 +132,8 @@ static void bake_rows(const stage *s, const vsh_texels *texels, const vsh_shade_
     stats.invalid_by_mesh = invalid;
     stats.shade = p->stats.shade;
     vsh_error error = {0};
-    if (vsh_bake_lightmap(s->field, texels, lights, 2, shade, &run, &lightmap, &stats, &error) != VSH_OK) {
+    if (vsh_bake_lightmap(occluders_traced(s->field, s->triangles), texels, lights, 2, shade, &run, &lightmap,
+                          &stats, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     p->stats.texels += stats.texels;
@@ -202,7 +204,6 @@ static void bake_by(const stage *s, int32_t method, int32_t ao_method) {
         options.shade.ao_method = ao_method;
         options.shade.ao_cones = 4;
         options.shade.rays = 32;
-        options.shade.triangles = s->triangles;
         bake_whole_and_in_bands(s, options);
     }
 }
@@ -323,13 +324,13 @@ static void a_band_bakes_within_the_bytes_it_is_said_to_take(void **state) {
         .shadow = shadow, .ao = memory + 2 * plane, .coverage = memory + 3 * plane};
     options.shade.ao_method = VSH_AO_TAPS;
     run.memory_limit = field.bytes + bytes;
-    assert_int_equal(
-        vsh_bake_lightmap(s->field, texels, lights, 2, &options.shade, &run, &lightmap, NULL, &error),
-        VSH_OK);
+    assert_int_equal(vsh_bake_lightmap(occluders_traced(s->field, s->triangles), texels, lights, 2,
+                                       &options.shade, &run, &lightmap, NULL, &error),
+                     VSH_OK);
     run.memory_limit = field.bytes + bytes / 2;
-    assert_int_equal(
-        vsh_bake_lightmap(s->field, texels, lights, 2, &options.shade, &run, &lightmap, NULL, &error),
-        VSH_ERROR_LIMIT);
+    assert_int_equal(vsh_bake_lightmap(occluders_traced(s->field, s->triangles), texels, lights, 2,
+                                       &options.shade, &run, &lightmap, NULL, &error),
+                     VSH_ERROR_LIMIT);
     free(memory);
     vsh_texels_free(texels);
     vsh_charts_free(charts);

@@ -52,8 +52,6 @@ static vsh_result bake(const vsh_field *field, const asked *ask, baked *into, vs
     shade.ao_cones = 64;
     shade.rays = 256;
     shade.ao_distance = 2.0;
-    shade.layers = ask->layer;
-    shade.layer_count = ask->layer != NULL;
     const double towards[3] = {-1.0, 6.0, 0.2};
     vsh_light light = sun(towards, 0.3);
     light.color[1] = 0.5;
@@ -67,7 +65,8 @@ static vsh_result bake(const vsh_field *field, const asked *ask, baked *into, vs
                                    .tint_by = ask->tint,
                                    .ambient = ask->ambient};
     const vsh_result result =
-        vsh_bake_lightmap(field, texels, &light, ask->light ? 1 : 0, &shade, NULL, &lightmap, NULL, error);
+        vsh_bake_lightmap(occluders_with(field, ask->layer, ask->layer != NULL), texels, &light,
+                          ask->light ? 1 : 0, &shade, NULL, &lightmap, NULL, error);
     vsh_texels_free(texels);
     return result;
 }
@@ -129,11 +128,13 @@ static void test_wall(void **state) {
         shade.rays = 1024;
         shade.ao_distance = 2.0;
         float ao, bent[3];
-        assert_int_equal(vsh_shade_bent(field, &points, &shade, NULL, &ao, bent, NULL, NULL), VSH_OK);
+        assert_int_equal(vsh_shade_bent(occluders_of(field), &points, &shade, NULL, &ao, bent, NULL, NULL),
+                         VSH_OK);
         assert_float_equal(ao, 0.5, 0.05);
         assert_true(degrees_between(bent, truth) < 3.0);
         float alone;
-        assert_int_equal(vsh_shade_ao(field, &points, &shade, NULL, &alone, NULL, NULL, NULL), VSH_OK);
+        assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &shade, NULL, &alone, NULL, NULL, NULL),
+                         VSH_OK);
         assert_int_equal(bits_of(alone), bits_of(ao));
     }
     vsh_field_free(field);

@@ -4,6 +4,8 @@
  * of a method changes its hash: VSH_BITS=print prints the table, VSH_BITS=once checks it for one thread and
  * the base set. */
 #include "baked.h"
+#include "casts.h"
+#include "field/field.h"
 #include "previews.h"
 
 /* --- the parts */
@@ -12,6 +14,8 @@ typedef struct context {
     vsh_run run;
     vsh_grid *grid; /* of the solids */
     vsh_field *field;
+    const vsh_triangles *triangles; /* these two: NULL where there are none */
+    const vsh_layer *layer;
 } context;
 
 static void level_set_of_solids(const context *c, int32_t unused, bits *b) {
@@ -35,10 +39,12 @@ static uint64_t shade_by(const context *c, const vsh_light *light, const vsh_sha
     float value[POINTS], deviation[POINTS];
     const vsh_points points = {POINTS, positions, normals, texels};
     vsh_shade_stats stats = vsh_shade_stats_zero();
+    const vsh_occluders casters = {
+        .field = c->field, .triangles = c->triangles, .layers = c->layer, .layer_count = c->layer != NULL};
     vsh_error error;
     check(light != NULL
-              ? vsh_shade_shadow(c->field, &points, light, options, &c->run, value, deviation, &stats, &error)
-              : vsh_shade_ao(c->field, &points, options, &c->run, value, deviation, &stats, &error),
+              ? vsh_shade_shadow(&casters, &points, light, options, &c->run, value, deviation, &stats, &error)
+              : vsh_shade_ao(&casters, &points, options, &c->run, value, deviation, &stats, &error),
           &error);
     add_floats(b, value, POINTS);
     for (size_t i = 0; i < POINTS; ++i) { /* NaN has many bits */
@@ -109,7 +115,8 @@ static void bent_normals(const context *c, int32_t method, bits *b) {
     options.ao_method = method;
     options.rays = 16;
     vsh_error error;
-    check(vsh_shade_bent(c->field, &points, &options, &c->run, value, bent, NULL, &error), &error);
+    check(vsh_shade_bent(occluders_of(c->field), &points, &options, &c->run, value, bent, NULL, &error),
+          &error);
     add_floats(b, value, POINTS);
     add_floats(b, bent, sizeof bent / sizeof bent[0]);
 }
@@ -122,7 +129,9 @@ static void irradiance_and_tint(const context *c, int32_t unused, bits *b) {
     const vsh_tint tint = {VSH_TINT_POWER, {1.0, 1.25, 1.5}};
     vsh_error error;
     const vsh_shade_options options = preview_options();
-    check(vsh_shade_shadow(c->field, &points, &light, &options, &c->run, value, NULL, NULL, &error), &error);
+    check(vsh_shade_shadow(occluders_of(c->field), &points, &light, &options, &c->run, value, NULL, NULL,
+                           &error),
+          &error);
     vsh_shade_irradiance(&points, NULL, &light, value, rgb);
     vsh_shade_tint(POINTS, value, &tint, tinted);
     add_floats(b, rgb, sizeof rgb / sizeof rgb[0]);
@@ -148,7 +157,9 @@ static void lightmap(const context *c, int32_t method, bits *b) {
     const vsh_light light = sun();
     vsh_error error;
     check(vsh_texels_create(&floor, 1, &options, &c->run, NULL, &made, &error), &error);
-    check(vsh_bake_lightmap(c->field, made, &light, 1, &options.shade, &c->run, &map, NULL, &error), &error);
+    check(vsh_bake_lightmap(occluders_of(c->field), made, &light, 1, &options.shade, &c->run, &map, NULL,
+                            &error),
+          &error);
     vsh_texels_free(made);
     add_floats(b, shadow_plane, TEXELS);
     add_floats(b, ao_plane, TEXELS);
@@ -166,7 +177,9 @@ static void volume_of_band(const context *c, int32_t unused, bits *b) {
     const vsh_light light = sun();
     vsh_error error;
     check(vsh_voxels_from_grid(c->grid, 0.0, &c->run, &voxels, &error), &error);
-    check(vsh_bake_volume(c->field, voxels, &light, 1, &options, &c->run, &volume, NULL, &error), &error);
+    check(
+        vsh_bake_volume(occluders_of(c->field), voxels, &light, 1, &options, &c->run, &volume, NULL, &error),
+        &error);
     float *values = malloc(48 * 48 * 48 * sizeof *values);
     assert_non_null(values);
     const int32_t low[3] = {-24, -8, -24}, size[3] = {48, 48, 48};
@@ -183,14 +196,12 @@ static void volume_of_band(const context *c, int32_t unused, bits *b) {
 static void shade_layer(const context *c, const vsh_heights *heights, const vsh_spheres *spheres, bits *b) {
     vsh_field *empty = NULL;
     vsh_error error;
-    check(vsh_field_create_empty(0.0625, &empty, &error), &error);
+    check(vshi_field_create_empty(0.0625, &empty, &error), &error);
     vsh_layer layer = vsh_layer_default();
     layer.heights = heights;
     layer.spheres = spheres;
     vsh_shade_options options = preview_options();
-    options.layers = &layer;
-    options.layer_count = 1;
-    const context here = {c->run, NULL, empty};
+    const context here = {c->run, NULL, empty, NULL, &layer};
     const vsh_light lights[] = {sun(), spot()};
     for (int i = 0; i < 2; ++i) {
         shade(&here, &lights[i], &options, b);
@@ -273,7 +284,8 @@ static void picture(const context *c, int32_t unused, bits *b) {
     const vsh_light light = spot();
     vsh_error error;
     check(vsh_camera_frame(&options.camera, low, high, 0.5, 0.5, 1.5, &error), &error);
-    check(vsh_render(&surface, 1, c->field, &light, 1, &options, &c->run, &made, NULL, &error), &error);
+    check(vsh_render(&surface, 1, occluders_of(c->field), &light, 1, &options, &c->run, &made, NULL, &error),
+          &error);
     float *const planes[3] = {encoded[0], encoded[1], encoded[2]};
     check(vsh_picture_encode(&made, WIDE, HIGH, 0.5, planes, NULL, &error), &error);
     add_floats(b, color, 3 * PIXELS);
@@ -315,7 +327,7 @@ static void exact(const context *c, int32_t is_ao, bits *b) {
     vsh_model *model = NULL;
     vsh_grid *grid = NULL;
     vsh_triangles *triangles = NULL;
-    context here = {c->run, NULL, NULL};
+    context here = {.run = c->run};
     vsh_error error;
     check(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &c->run, &model, &error), &error);
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
@@ -327,7 +339,7 @@ static void exact(const context *c, int32_t is_ao, bits *b) {
     vsh_shade_options shading = preview_options();
     shading.method = VSH_SHADOW_EXACT;
     shading.ao_method = VSH_AO_EXACT;
-    shading.triangles = triangles;
+    here.triangles = triangles;
     const vsh_light light = sun();
     shade(&here, is_ao ? NULL : &light, &shading, b);
     vsh_triangles_free(triangles);
@@ -350,7 +362,7 @@ static const part parts[] = {
 };
 
 static void bake_part(const part *p, const vsh_run *run, bits *b) {
-    context c = {*run, solids(run), NULL};
+    context c = {.run = *run, .grid = solids(run)};
     vsh_error error;
     check(vsh_field_create(c.grid, NULL, run, &c.field, &error), &error);
     *b = (bits){0, 0, 0};

@@ -39,14 +39,13 @@ static vsh_shade_stats shade(const caster *made, const vsh_light *light, int32_t
                              const double *positions, float *values) {
     vsh_shade_options options = preview_options();
     options.method = method;
-    options.triangles = made->triangles;
     options.rays = 8;
     options.max_error = 1.0; /* only what is proved has no error left */
     const vsh_points points = {POINTS, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(made->field, &points, light, &options, NULL, values, deviation, &stats, &error) !=
-        VSH_OK) {
+    if (vsh_shade_shadow(occluders_of_caster(made), &points, light, &options, NULL, values, deviation, &stats,
+                         &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;

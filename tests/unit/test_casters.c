@@ -1,4 +1,5 @@
 /* Terrains and spheres through the public calls: as layers of a field, and from scene files to lightmaps. */
+#include "field/field.h"
 #include "terrain.h"
 #include "truth/analytic.h"
 #include "truth/directions.h"
@@ -14,7 +15,7 @@ enum { SIDE = 65, POINTS = 1000 };
 
 static vsh_field *empty_field(void) {
     vsh_field *field = NULL;
-    assert_int_equal(vsh_field_create_empty(1e-5, &field, NULL), VSH_OK);
+    assert_int_equal(vshi_field_create_empty(1e-5, &field, NULL), VSH_OK);
     return field;
 }
 
@@ -50,8 +51,6 @@ static void a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_hor
     layer.heights = heights_of(&source);
     vsh_field *empty = empty_field();
     vsh_shade_options options = preview_options();
-    options.layers = &layer;
-    options.layer_count = 1;
     options.ao_distance = 1.0;
     const vsh_points points = {POINTS, positions, normals, NULL};
     static const double towards[3] = {-0.8, 0.3, 0.4};
@@ -59,7 +58,8 @@ static void a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_hor
     const vsh_light light = sun(towards, angle);
     vsh_error error = {VSH_OK, ""};
     truth_mesh *rays = truth_mesh_create(&mesh, 1);
-    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, values, NULL, NULL, &error),
+    assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
+                                      values, NULL, NULL, &error),
                      VSH_OK);
     if (rays != NULL) {
         truth_mesh_light(rays, POINTS, positions, normals, towards, tan(0.5 * angle), 1024, 0, truth);
@@ -68,7 +68,9 @@ static void a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_hor
         assert_true(m.rmse < 0.006);
         assert_true(m.penumbra > POINTS / 4);
     }
-    assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, values, NULL, NULL, &error), VSH_OK);
+    assert_int_equal(
+        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &options, NULL, values, NULL, NULL, &error),
+        VSH_OK);
     if (rays != NULL) {
         truth_mesh_ao(rays, POINTS, positions, normals, 1.0, 1024, 0, truth);
         const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
@@ -77,21 +79,24 @@ static void a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_hor
     }
     /* a layer that is hard, or that casts for another light */
     layer.softness = 0.0;
-    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, values, NULL, NULL, &error),
+    assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
+                                      values, NULL, NULL, &error),
                      VSH_OK);
     layer.softness = 1.0;
     layer.method = VSH_SHADOW_HARD;
-    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, truth, NULL, NULL, &error),
+    assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
+                                      truth, NULL, NULL, &error),
                      VSH_OK);
     assert_memory_equal(values, truth, sizeof values);
     static const char *const lamp_name[] = {"lamp"};
     layer.lights = lamp_name;
     layer.light_count = 1;
-    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, values, NULL, NULL, &error),
+    assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
+                                      values, NULL, NULL, &error),
                      VSH_OK);
-    options.layer_count = 0;
-    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, truth, NULL, NULL, &error),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(empty), &points, &light, &options, NULL, truth, NULL, NULL, &error),
+        VSH_OK);
     assert_memory_equal(values, truth, sizeof values);
     truth_mesh_free(rays);
     vsh_field_free(empty);
@@ -145,10 +150,9 @@ static void spheres_in_a_layer_cast_as_rays_say_and_in_voxels_within_the_error_a
     vsh_layer layer = vsh_layer_default();
     layer.spheres = made;
     vsh_shade_options options = preview_options();
-    options.layers = &layer;
-    options.layer_count = 1;
     const vsh_points points = {POINTS, positions, normals, NULL};
-    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, analytic, NULL, NULL, &error),
+    assert_int_equal(vsh_shade_shadow(occluders_with(empty, &layer, 1), &points, &light, &options, NULL,
+                                      analytic, NULL, NULL, &error),
                      VSH_OK);
     const truth_scene rays = {solids, 20};
     truth_lights(rays, POINTS, positions, up, towards, tan(RADIANS(5.5)), INFINITY, 1024, truth);
@@ -203,13 +207,13 @@ static void bent_normals_lean_away_from_spheres_and_terrain(void **state) {
     vsh_layer layer = vsh_layer_default();
     layer.spheres = made;
     vsh_shade_options options = preview_options();
-    options.layers = &layer;
-    options.layer_count = 1;
     options.ao_distance = 3.0;
     vsh_field *empty = empty_field();
     const vsh_points points = {COUNT, positions, normals, NULL};
     const truth_scene scene = {solids, 2};
-    assert_int_equal(vsh_shade_bent(empty, &points, &options, NULL, ao, bent, NULL, NULL), VSH_OK);
+    assert_int_equal(
+        vsh_shade_bent(occluders_with(empty, &layer, 1), &points, &options, NULL, ao, bent, NULL, NULL),
+        VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         double mean[3];
         bent_by_rays(scene, positions + 3 * i, 3.0, mean);
@@ -235,7 +239,9 @@ static void bent_normals_lean_away_from_spheres_and_terrain(void **state) {
         positions[3 * i + 1] = 1e-3;
         positions[3 * i + 2] = between(&counter, -3.0, 3.0);
     }
-    assert_int_equal(vsh_shade_bent(empty, &points, &options, NULL, ao, bent, NULL, NULL), VSH_OK);
+    assert_int_equal(
+        vsh_shade_bent(occluders_with(empty, &layer, 1), &points, &options, NULL, ao, bent, NULL, NULL),
+        VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         double mean[3];
         bent_by_rays(beside, positions + 3 * i, 10.0, mean);
@@ -264,8 +270,6 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
     layer.heights = vsh_assets_heights(assets, 0);
     layer.spheres = vsh_assets_spheres(assets, 0);
     vsh_shade_options shade = preview_options();
-    shade.layers = &layer;
-    shade.layer_count = 1;
     vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = side;
     options.padding = 0;
@@ -278,7 +282,8 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
     float *const planes[1] = {shadow};
     vsh_lightmap lightmap = {.shadow = planes, .coverage = coverage};
     vsh_field *empty = empty_field();
-    if (vsh_bake_lightmap(empty, texels, &light, 1, &shade, NULL, &lightmap, NULL, &error) != VSH_OK) {
+    if (vsh_bake_lightmap(occluders_with(empty, &layer, 1), texels, &light, 1, &shade, NULL, &lightmap, NULL,
+                          &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     vsh_field_free(empty);

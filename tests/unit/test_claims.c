@@ -259,7 +259,6 @@ static outcome try(const stage *s, const trial *t) {
     options.shade.sampler = t->sampler;
     options.shade.max_error = t->max_error;
     options.shade.ao_distance = s->shape == DISC ? 100.0 : DISTANCE;
-    options.shade.triangles = s->triangles;
     options.shade.start_offset = 0.0;
     options.ao_spacing = vsh_lightmap_options_default().ao_spacing;
     vsh_light light = sun((double[]){0.0, 1.0, 0.0}, 2.0 * atan(WIDE));
@@ -274,8 +273,9 @@ static outcome try(const stage *s, const trial *t) {
         const vsh_lightmap lightmap = {.shadow = s->ao ? NULL : &shadow, .ao = s->ao ? values : NULL};
         vsh_bake_stats stats = vsh_bake_stats_zero();
         stats.errors = errors;
-        stats.truth_triangles = t->held ? s->triangles : NULL;
-        result = vsh_bake_lightmap(s->field, texels, s->ao ? NULL : &light, s->ao ? 0 : 1, &options.shade,
+        const vsh_occluders casters = {
+            .field = s->field, .triangles = s->triangles, .true_triangles = t->held ? s->triangles : NULL};
+        result = vsh_bake_lightmap(&casters, texels, s->ao ? NULL : &light, s->ao ? 0 : 1, &options.shade,
                                    NULL, &lightmap, &stats, &error);
         o.claimed = vsh_bake_error_rmse(&errors[0]);
         o.rays = (double)stats.shade.rays;
@@ -287,10 +287,10 @@ static outcome try(const stage *s, const trial *t) {
             normals[3 * i + 1] = 1.0f;
         }
         const vsh_points points = {all.count, places, normals, NULL};
-        result =
-            s->ao ? vsh_shade_ao(s->field, &points, &options.shade, NULL, values, deviations, &stats, &error)
-                  : vsh_shade_shadow(s->field, &points, &light, &options.shade, NULL, values, deviations,
-                                     &stats, &error);
+        result = s->ao ? vsh_shade_ao(occluders_traced(s->field, s->triangles), &points, &options.shade, NULL,
+                                      values, deviations, &stats, &error)
+                       : vsh_shade_shadow(occluders_traced(s->field, s->triangles), &points, &light,
+                                          &options.shade, NULL, values, deviations, &stats, &error);
         for (size_t i = 0; i < all.count; ++i) {
             o.claimed += (double)deviations[i] * (double)deviations[i] / (double)all.count;
         }

@@ -103,15 +103,15 @@ static void run_all(int s, int32_t threads, outcome *o) {
         for (int32_t i = 0; i <= shadow_methods(); ++i) { /* once more the cone, of the lamp */
             vsh_shade_options how = preview_options();
             how.method = i < shadow_methods() ? i : VSH_SHADOW_CONE;
-            how.triangles = triangles;
-            results[calls++] = vsh_shade_shadow(f, &points, &lights[i == 1 || i >= VSH_SHADOW_EXACT], &how,
-                                                &run, o->visible[i], NULL, &o->stats, &error);
+            results[calls++] = vsh_shade_shadow(occluders_traced(f, triangles), &points,
+                                                &lights[i == 1 || i >= VSH_SHADOW_EXACT], &how, &run,
+                                                o->visible[i], NULL, &o->stats, &error);
         }
         for (int32_t i = 0; i < ao_methods(); ++i) {
             vsh_shade_options how = preview_options();
             how.ao_method = i;
-            how.triangles = triangles;
-            results[calls++] = vsh_shade_ao(f, &points, &how, &run, o->open[i], NULL, &o->stats, &error);
+            results[calls++] = vsh_shade_ao(occluders_traced(f, triangles), &points, &how, &run, o->open[i],
+                                            NULL, &o->stats, &error);
         }
         if (triangles != NULL) {
             vshi_floats_set(setting);

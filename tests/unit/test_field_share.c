@@ -1,4 +1,5 @@
 /* What a bake says of its error holds against rays to the casters, the field's own share included. */
+#include "casts.h"
 #include "texels_of.h"
 
 #include <vdbshade/trace.h>
@@ -74,12 +75,11 @@ typedef struct baked {
     vsh_bake_error errors[CHANNELS];
 } baked;
 
-static vsh_lightmap_options options_of(const stage *s, int32_t method, int32_t ao_method) {
+static vsh_lightmap_options options_of(int32_t method, int32_t ao_method) {
     vsh_lightmap_options options = size_of(WIDTH, HEIGHT, 1);
     options.shade.method = method;
     options.shade.ao_method = ao_method;
     options.shade.ao_distance = 1.0;
-    options.shade.triangles = method == VSH_SHADOW_EXACT ? s->triangles : NULL;
     options.ao_spacing = 1;
     return options;
 }
@@ -102,9 +102,11 @@ static void bake_rows(const stage *s, const vsh_texels *texels, const vsh_shade_
     run.threads = threads;
     vsh_bake_stats stats = vsh_bake_stats_zero();
     stats.errors = b->errors;
-    stats.truth_triangles = truth;
+    const int exact = shade->method == VSH_SHADOW_EXACT;
+    const vsh_occluders casters = {
+        .field = s->field, .triangles = exact ? s->triangles : NULL, .true_triangles = truth};
     vsh_error error = {0};
-    if (vsh_bake_lightmap(s->field, texels, &light, 1, shade, &run, &lightmap, &stats, &error) != VSH_OK) {
+    if (vsh_bake_lightmap(&casters, texels, &light, 1, shade, &run, &lightmap, &stats, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
 }
@@ -122,7 +124,7 @@ static baked *bake_whole(const stage *s, vsh_lightmap_options options, int32_t t
 static void measure(const stage *s, const baked *b, double rmse[CHANNELS]) {
     enum { RAYS = 256 };
     const vsh_light light = sun();
-    vsh_texels *texels = create(&s->floor.mesh, 1, options_of(s, VSH_SHADOW_CONE, VSH_AO_CONES), NULL);
+    vsh_texels *texels = create(&s->floor.mesh, 1, options_of(VSH_SHADOW_CONE, VSH_AO_CONES), NULL);
     const vsh_texel_samples all = vsh_texels_samples(texels);
     float *truth = malloc(all.count * sizeof *truth);
     for (int c = 0; c < CHANNELS; ++c) {
@@ -148,7 +150,7 @@ static void what_voxels_lose_is_in_the_estimate(void **state) {
     if (s->triangles == NULL) {
         skip();
     }
-    baked *b = bake_whole(s, options_of(s, VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), 0, s->triangles);
+    baked *b = bake_whole(s, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), 0, s->triangles);
     double measured[CHANNELS];
     measure(s, b, measured);
     for (int c = 0; c < CHANNELS; ++c) {
@@ -170,7 +172,7 @@ static void exact_values_are_held_against_rays_too(void **state) {
     if (s->triangles == NULL) {
         skip();
     }
-    baked *b = bake_whole(s, options_of(s, VSH_SHADOW_EXACT, VSH_AO_EXACT), 0, s->triangles);
+    baked *b = bake_whole(s, options_of(VSH_SHADOW_EXACT, VSH_AO_EXACT), 0, s->triangles);
     double measured[CHANNELS];
     measure(s, b, measured);
     for (int c = 0; c < CHANNELS; ++c) {
@@ -183,7 +185,7 @@ static void exact_values_are_held_against_rays_too(void **state) {
 
 static void without_the_casters_only_rays_are_known(void **state) {
     const stage *s = *state;
-    baked *b = bake_whole(s, options_of(s, VSH_SHADOW_ADAPTIVE, VSH_AO_CONES), 0, NULL);
+    baked *b = bake_whole(s, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_CONES), 0, NULL);
     assert_true(b->errors[0].held == 0.0 && isnan(vsh_bake_error_field(&b->errors[0])));
     assert_true(vsh_bake_error_rmse(&b->errors[0]) == sqrt(b->errors[0].square_error / TEXELS));
     assert_true(isnan(vsh_bake_error_rmse(&b->errors[1]))); /* a preview knows nothing of its error */
@@ -192,7 +194,7 @@ static void without_the_casters_only_rays_are_known(void **state) {
 
 static void to_be_measured_changes_no_value(void **state) {
     const stage *s = *state;
-    const vsh_lightmap_options options = options_of(s, VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE);
+    const vsh_lightmap_options options = options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE);
     baked *plain = bake_whole(s, options, 0, NULL), *held = bake_whole(s, options, 0, s->triangles);
     assert_memory_equal(plain->shadow, held->shadow, sizeof plain->shadow);
     assert_memory_equal(plain->ao, held->ao, sizeof plain->ao);
@@ -202,7 +204,7 @@ static void to_be_measured_changes_no_value(void **state) {
 
 static void bands_and_threads_find_the_same(void **state) {
     const stage *s = *state;
-    const vsh_lightmap_options options = options_of(s, VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE);
+    const vsh_lightmap_options options = options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE);
     baked *whole = bake_whole(s, options, 1, s->triangles), *banded = calloc(1, sizeof *banded);
     vsh_charts *charts = NULL;
     assert_int_equal(vsh_charts_create(&s->floor.mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
@@ -245,7 +247,7 @@ static void what_is_filled_by_mistake_counts(void **state) {
         fail_msg("%s", error.message);
     }
     vsh_grid_free(grid);
-    baked *b = bake_whole(&low, options_of(s, VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), 0, low.triangles);
+    baked *b = bake_whole(&low, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), 0, low.triangles);
     double measured[CHANNELS];
     measure(&low, b, measured);
     for (int c = 0; c < CHANNELS; ++c) {

@@ -64,8 +64,8 @@ void values_that_are_no_distances_are_made_so(void **) {
 
 // Shadows under the sphere, seen as the reader left it.
 std::vector<float> shadows_of(const vsh_grid *grid) {
-    vsh_field *field = nullptr;
-    assert_said(vsh_field_create(grid, nullptr, nullptr, &field, &failure), VSH_OK, {});
+    vsh_occluders *occluders = nullptr;
+    assert_said(vsh_occluders_from_grid(grid, nullptr, nullptr, &occluders, &failure), VSH_OK, {});
     std::vector<double> positions;
     for (int i = 0; i < 60; ++i) {
         positions.insert(positions.end(), {0.03 * i, -2.5, 0.01});
@@ -74,10 +74,10 @@ std::vector<float> shadows_of(const vsh_grid *grid) {
     light.angle = 0.2;
     const vsh_points points = {positions.size() / 3, positions.data(), nullptr, nullptr};
     std::vector<float> visible(points.count);
-    assert_said(vsh_shade_shadow(field, &points, &light, nullptr, nullptr, visible.data(), nullptr, nullptr,
-                                 &failure),
+    assert_said(vsh_shade_shadow(occluders, &points, &light, nullptr, nullptr, visible.data(), nullptr,
+                                 nullptr, &failure),
                 VSH_OK, {});
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     return visible;
 }
 

@@ -66,7 +66,7 @@ Outcome work(int32_t threads = 0) {
     vsh_scene *scene = nullptr;
     vsh_assets *assets = nullptr;
     vsh_grid *grid = nullptr;
-    vsh_field *field = nullptr;
+    vsh_occluders *occluders = nullptr;
     vsh_provenance *provenance = nullptr;
     const std::string path = folder + "/scene.json";
     o.check(vsh_scene_read(path.c_str(), &scene, &error), error);
@@ -77,7 +77,7 @@ Outcome work(int32_t threads = 0) {
         o.check(vsh_scene_casters(scene, assets, &run, &grid, &error), error);
     }
     if (o.failure.empty()) {
-        o.check(vsh_field_create(grid, nullptr, &run, &field, &error), error);
+        o.check(vsh_occluders_from_grid(grid, nullptr, &run, &occluders, &error), error);
     }
     if (o.failure.empty()) {
         constexpr size_t COUNT = 400;
@@ -93,12 +93,12 @@ Outcome work(int32_t threads = 0) {
         options.rays = 16;
         for (const int32_t method : {VSH_SHADOW_CONE, VSH_SHADOW_ADAPTIVE}) {
             options.method = method;
-            o.check(vsh_shade_shadow(field, &points, &scene->lights[0], &options, &run, visible.data(),
+            o.check(vsh_shade_shadow(occluders, &points, &scene->lights[0], &options, &run, visible.data(),
                                      nullptr, nullptr, &error),
                     error);
             o.add(visible.data(), COUNT);
         }
-        o.check(vsh_shade_ao(field, &points, &options, &run, ao.data(), nullptr, nullptr, &error), error);
+        o.check(vsh_shade_ao(occluders, &points, &options, &run, ao.data(), nullptr, nullptr, &error), error);
         o.add(ao.data(), COUNT);
         vsh_provenance_source source = vsh_provenance_source_default();
         source.scene = scene;
@@ -111,7 +111,7 @@ Outcome work(int32_t threads = 0) {
         }
     }
     vsh_provenance_free(provenance);
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     vsh_grid_free(grid);
     vsh_assets_free(assets);
     vsh_scene_free(scene);
@@ -237,10 +237,10 @@ void many_threads_share_one_field(void **) {
     vsh_grid_options grid_options = vsh_grid_options_default();
     grid_options.voxel_size = 0.0625;
     vsh_grid *grid = nullptr;
-    vsh_field *field = nullptr;
+    vsh_occluders *occluders = nullptr;
     vsh_error error{};
     assert_int_equal(vsh_grid_from_sdf(&sdf, &grid_options, nullptr, &grid, &error), VSH_OK);
-    assert_int_equal(vsh_field_create(grid, nullptr, nullptr, &field, &error), VSH_OK);
+    assert_int_equal(vsh_occluders_from_grid(grid, nullptr, nullptr, &occluders, &error), VSH_OK);
     const vsh_light light = vsh_light_default();
     const auto bake = [&](int32_t threads) {
         Outcome o;
@@ -250,7 +250,7 @@ void many_threads_share_one_field(void **) {
         vsh_voxels *voxels = nullptr;
         vsh_volume *volume = nullptr;
         o.check(vsh_voxels_from_grid(grid, 2.0, &run, &voxels, &why), why);
-        o.check(vsh_bake_volume(field, voxels, &light, 1, nullptr, &run, &volume, nullptr, &why), why);
+        o.check(vsh_bake_volume(occluders, voxels, &light, 1, nullptr, &run, &volume, nullptr, &why), why);
         std::vector<float> values(40 * 40 * 40);
         const int32_t low[3] = {-20, -20, -20}, size[3] = {40, 40, 40};
         o.check(vsh_volume_copy(volume, 0, low, size, values.data(), &why), why);
@@ -272,7 +272,7 @@ void many_threads_share_one_field(void **) {
     for (const Outcome &o : all) {
         expect_same(expected, o, "a thread");
     }
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     vsh_grid_free(grid);
 }
 

@@ -147,17 +147,17 @@ static void shade_with(const caster *c, const vsh_light *light, int32_t method, 
     options.ao_method = light == NULL ? method : VSH_AO_CONES;
     options.ao_distance = 0.7;
     options.rays = 32;
-    options.triangles = c->triangles;
     vsh_run run = vsh_run_default();
     run.isa = isa;
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_error error = {VSH_OK, ""};
     memset(o, 0, sizeof *o);
     o->stats = vsh_shade_stats_zero();
-    const vsh_result result = light != NULL ? vsh_shade_shadow(c->field, &points, light, &options, &run,
-                                                               o->value, o->deviation, &o->stats, &error)
-                                            : vsh_shade_ao(c->field, &points, &options, &run, o->value,
-                                                           o->deviation, &o->stats, &error);
+    const vsh_result result = light != NULL
+                                  ? vsh_shade_shadow(occluders_of_caster(c), &points, light, &options, &run,
+                                                     o->value, o->deviation, &o->stats, &error)
+                                  : vsh_shade_ao(occluders_of_caster(c), &points, &options, &run, o->value,
+                                                 o->deviation, &o->stats, &error);
     if (result != VSH_OK) {
         fail_msg("%s", error.message);
     }
@@ -206,7 +206,7 @@ static void an_instruction_set_that_is_missing_or_unknown_is_refused_by_name(voi
     for (int32_t isa = -1; isa <= VSHI_ISA_COUNT; ++isa) {
         run.isa = isa;
         const vsh_result result =
-            vsh_shade_shadow(field, &points, &light, NULL, &run, &value, NULL, NULL, &error);
+            vsh_shade_shadow(occluders_of(field), &points, &light, NULL, &run, &value, NULL, NULL, &error);
         if (vsh_isa_available(isa)) {
             assert_int_equal(result, VSH_OK);
             continue;
@@ -218,8 +218,9 @@ static void an_instruction_set_that_is_missing_or_unknown_is_refused_by_name(voi
     /* a run from before it had an instruction set */
     run.isa = -1;
     run.struct_size = offsetof(vsh_run, isa);
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, &run, &value, NULL, NULL, &error),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, NULL, &run, &value, NULL, NULL, &error),
+        VSH_OK);
     vsh_field_free(field);
 }
 

@@ -1,4 +1,5 @@
 /* AO that is interpolated between texels, against the same AO at every texel. */
+#include "casts.h"
 #include "fields.h"
 #include "previews.h"
 
@@ -47,7 +48,8 @@ static baked *bake(const vsh_field *field, int32_t spacing, const vsh_shade_opti
     b->stats = vsh_bake_stats_zero();
     const vsh_lightmap lightmap = {.ao = b->ao, .ao_error = b->error, .coverage = b->coverage};
     if (vsh_texels_create(&mesh, 1, &options, NULL, NULL, &texels, &error) != VSH_OK ||
-        vsh_bake_lightmap(field, texels, NULL, 0, shade, &run, &lightmap, &b->stats, &error) != VSH_OK) {
+        vsh_bake_lightmap(occluders_of(field), texels, NULL, 0, shade, &run, &lightmap, &b->stats, &error) !=
+            VSH_OK) {
         fail_msg("%s", error.message);
     }
     vsh_texels_free(texels);
@@ -136,15 +138,17 @@ static void bands_are_interpolated_as_the_whole(void **state) {
     vsh_texels *texels;
     vsh_charts *charts;
     assert_int_equal(vsh_texels_create(&mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
-    assert_int_equal(vsh_bake_lightmap(*state, texels, NULL, 0, &shade, NULL, &lightmap, &stats, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_bake_lightmap(occluders_of(*state), texels, NULL, 0, &shade, NULL, &lightmap, &stats, NULL),
+        VSH_OK);
     vsh_texels_free(texels);
     assert_int_equal(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
     for (int32_t row = 0; row < SIZE; row += ROWS) {
         lightmap.ao = banded + (size_t)row * SIZE;
         assert_int_equal(vsh_texels_create_band(charts, row, ROWS, NULL, &texels, NULL), VSH_OK);
-        assert_int_equal(vsh_bake_lightmap(*state, texels, NULL, 0, &shade, NULL, &lightmap, &sum, NULL),
-                         VSH_OK);
+        assert_int_equal(
+            vsh_bake_lightmap(occluders_of(*state), texels, NULL, 0, &shade, NULL, &lightmap, &sum, NULL),
+            VSH_OK);
         vsh_texels_free(texels);
     }
     vsh_charts_free(charts);

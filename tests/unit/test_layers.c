@@ -1,4 +1,5 @@
 /* Layers beside the field: what they hide, and how it is combined. */
+#include "field/field.h"
 #include "previews.h"
 #include "shading.h"
 
@@ -23,24 +24,18 @@ static vsh_field *field_of_ball(double x, double y, double z, double radius, dou
 
 static vsh_field *nothing(double voxel) {
     vsh_field *field = NULL;
-    assert_int_equal(vsh_field_create_empty(voxel, &field, NULL), VSH_OK);
+    assert_int_equal(vshi_field_create_empty(voxel, &field, NULL), VSH_OK);
     return field;
 }
 
-static void shade(const vsh_field *field, const vsh_light *light, const vsh_shade_options *options,
+static void shade(const vsh_occluders *occluders, const vsh_light *light, const vsh_shade_options *options,
                   float *values, float *deviation) {
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(field, &points, light, options, NULL, values, deviation, NULL, &error) != VSH_OK) {
+    if (vsh_shade_shadow(occluders, &points, light, options, NULL, values, deviation, NULL, &error) !=
+        VSH_OK) {
         fail_msg("%s", error.message);
     }
-}
-
-static vsh_shade_options with(const vsh_layer *layers, size_t count) {
-    vsh_shade_options options = preview_options();
-    options.layers = layers;
-    options.layer_count = count;
-    return options;
 }
 
 static vsh_layer layer_of(const vsh_field *field) {
@@ -62,12 +57,12 @@ static void test_nothing_hides(void **state) {
     for (size_t m = 0; m < sizeof methods / sizeof methods[0]; ++m) {
         vsh_shade_options options = preview_options();
         options.method = methods[m];
-        shade(empty, &above, &options, values, NULL);
+        shade(occluders_of(empty), &above, &options, values, NULL);
         for (size_t i = 0; i < COUNT; ++i) {
             assert_float_equal(values[i], 1.0f, 0.0f);
         }
         if (methods[m] != VSH_SHADOW_HARD) {
-            shade(empty, &low, &options, values, NULL);
+            shade(occluders_of(empty), &low, &options, values, NULL);
             for (size_t i = 0; i < COUNT; ++i) {
                 assert_float_equal(values[i], 0.5f, 0.05f);
             }
@@ -75,7 +70,8 @@ static void test_nothing_hides(void **state) {
     }
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_shade_options options = preview_options();
-    assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, values, NULL, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_ao(occluders_of(empty), &points, &options, NULL, values, NULL, NULL, NULL),
+                     VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(values[i], 1.0f, 1e-6f);
     }
@@ -91,10 +87,10 @@ static void test_layer_alone(void **state) {
     const double low[3] = {1.0, 0.05, 0.2};
     const vsh_light lights[2] = {sun(towards, 0.2), sun(low, 0.2)};
     float alone[COUNT], layered[COUNT];
-    const vsh_shade_options plain = preview_options(), options = with(&layer, 1);
+    const vsh_shade_options plain = preview_options();
     for (int l = 0; l < 2; ++l) {
-        shade(field, &lights[l], &plain, alone, NULL);
-        shade(empty, &lights[l], &options, layered, NULL);
+        shade(occluders_of(field), &lights[l], &plain, alone, NULL);
+        shade(occluders_with(empty, &layer, 1), &lights[l], &plain, layered, NULL);
         double most = 0.0, dark = 0.0;
         for (size_t i = 0; i < COUNT; ++i) {
             most = fmax(most, fabs((double)(layered[i] - alone[i])));
@@ -116,10 +112,10 @@ static void test_product(void **state) {
     vsh_field *all = field_of((truth_scene){both, 2}, 0.025, 4.0);
     const vsh_light light = sun(towards, 0.2);
     const vsh_layer layer = layer_of(b);
-    const vsh_shade_options plain = preview_options(), options = with(&layer, 1);
+    const vsh_shade_options plain = preview_options();
     float united[COUNT], layered[COUNT];
-    shade(all, &light, &plain, united, NULL);
-    shade(a, &light, &options, layered, NULL);
+    shade(occluders_of(all), &light, &plain, united, NULL);
+    shade(occluders_with(a, &layer, 1), &light, &plain, layered, NULL);
     size_t dark = 0;
     double square = 0.0;
     for (size_t i = 0; i < COUNT; ++i) {
@@ -140,21 +136,21 @@ static void test_combinations(void **state) {
     vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05);
     const vsh_light light = sun(towards, 0.2);
     vsh_layer layer = layer_of(field);
-    const vsh_shade_options plain = preview_options(), options = with(&layer, 1);
+    const vsh_shade_options plain = preview_options();
     float alone[COUNT], combined[COUNT];
-    shade(field, &light, &plain, alone, NULL);
+    shade(occluders_of(field), &light, &plain, alone, NULL);
     layer.combine = VSH_COMBINE_MIN;
-    shade(field, &light, &options, combined, NULL);
+    shade(occluders_with(field, &layer, 1), &light, &plain, combined, NULL);
     assert_memory_equal(alone, combined, sizeof alone);
     layer.combine = VSH_COMBINE_MULTIPLY;
-    shade(field, &light, &options, combined, NULL);
+    shade(occluders_with(field, &layer, 1), &light, &plain, combined, NULL);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(combined[i], alone[i] * alone[i], 1e-6);
     }
     layer.combine = VSH_COMBINE_MIN;
     layer.remap[0] = 0.25;
     layer.remap[1] = 0.75;
-    shade(field, &light, &options, combined, NULL);
+    shade(occluders_with(field, &layer, 1), &light, &plain, combined, NULL);
     size_t between_edges = 0;
     for (size_t i = 0; i < COUNT; ++i) {
         const double x = fmin(1.0, fmax(0.0, ((double)alone[i] - 0.25) / 0.5));
@@ -172,15 +168,15 @@ static void test_softness(void **state) {
     const vsh_light full = sun(towards, 2.0 * atan(0.1)), half = sun(towards, 2.0 * atan(0.05));
     vsh_layer layer = layer_of(field);
     layer.softness = 0.5;
-    const vsh_shade_options plain = preview_options(), options = with(&layer, 1);
+    const vsh_shade_options plain = preview_options();
     float smaller[COUNT], layered[COUNT];
-    shade(field, &half, &plain, smaller, NULL);
-    shade(empty, &full, &options, layered, NULL);
+    shade(occluders_of(field), &half, &plain, smaller, NULL);
+    shade(occluders_with(empty, &layer, 1), &full, &plain, layered, NULL);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(layered[i], smaller[i], 1e-6);
     }
     layer.softness = 0.0;
-    shade(empty, &full, &options, layered, NULL);
+    shade(occluders_with(empty, &layer, 1), &full, &plain, layered, NULL);
     size_t dark = 0;
     for (size_t i = 0; i < COUNT; ++i) {
         assert_true(layered[i] == 0.0f || layered[i] == 1.0f);
@@ -200,14 +196,14 @@ static void test_where_it_counts(void **state) {
     vsh_layer layer = layer_of(field);
     layer.lights = names;
     layer.light_count = 1;
-    const vsh_shade_options options = with(&layer, 1);
+    const vsh_shade_options plain = preview_options();
     float values[COUNT], ao[COUNT], alone[COUNT];
-    shade(empty, &light, &options, values, NULL);
+    shade(occluders_with(empty, &layer, 1), &light, &plain, values, NULL);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(values[i], 1.0f, 0.0f);
     }
     layer.light_count = 2;
-    shade(empty, &light, &options, values, NULL);
+    shade(occluders_with(empty, &layer, 1), &light, &plain, values, NULL);
     float least = 1.0f;
     for (size_t i = 0; i < COUNT; ++i) {
         least = fminf(least, values[i]);
@@ -215,21 +211,24 @@ static void test_where_it_counts(void **state) {
     assert_true(least < 0.01f);
 
     const vsh_points points = {COUNT, positions, normals, NULL};
-    const vsh_shade_options plain = preview_options();
-    assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, ao, NULL, NULL, NULL), VSH_OK);
-    assert_int_equal(vsh_shade_ao(field, &points, &plain, NULL, alone, NULL, NULL, NULL), VSH_OK);
+    assert_int_equal(
+        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &plain, NULL, ao, NULL, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &plain, NULL, alone, NULL, NULL, NULL),
+                     VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(ao[i], alone[i], 1e-6);
     }
     /* a remap is of shadows */
     layer.remap[0] = 0.4;
     layer.remap[1] = 0.6;
-    assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, ao, NULL, NULL, NULL), VSH_OK);
+    assert_int_equal(
+        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &plain, NULL, ao, NULL, NULL, NULL), VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(ao[i], alone[i], 1e-6);
     }
     layer.ao = 0;
-    assert_int_equal(vsh_shade_ao(empty, &points, &options, NULL, ao, NULL, NULL, NULL), VSH_OK);
+    assert_int_equal(
+        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &plain, NULL, ao, NULL, NULL, NULL), VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(ao[i], 1.0f, 1e-6f);
     }
@@ -246,11 +245,9 @@ static void test_deviation(void **state) {
     vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_RAYS;
     float va[COUNT], vb[COUNT], both[COUNT], da[COUNT], db[COUNT], dboth[COUNT];
-    shade(a, &light, &options, va, da);
-    shade(b, &light, &options, vb, db);
-    options.layers = &layer;
-    options.layer_count = 1;
-    shade(a, &light, &options, both, dboth);
+    shade(occluders_of(a), &light, &options, va, da);
+    shade(occluders_of(b), &light, &options, vb, db);
+    shade(occluders_with(a, &layer, 1), &light, &options, both, dboth);
     size_t open = 0;
     for (size_t i = 0; i < COUNT; ++i) {
         if (va[i] > 0.0f && va[i] < 1.0f && vb[i] > 0.0f && vb[i] < 1.0f) {
@@ -290,13 +287,13 @@ static void bake_floor(const vsh_field *field, const vsh_layer *layers, size_t l
     assert_int_equal(vsh_texels_create(&mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
     const double over[3] = {-1.0, 0.7, 0.1};
     const vsh_light light = sun(over, 0.2);
-    const vsh_shade_options shade = with(layers, layer_count);
+    const vsh_shade_options shade = preview_options();
     float *planes[1] = {baked->shadow};
     const vsh_lightmap lightmap = {.shadow = planes, .ao = baked->ao};
     baked->stats = vsh_bake_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_bake_lightmap(field, texels, &light, 1, &shade, NULL, &lightmap, &baked->stats, &error) !=
-        VSH_OK) {
+    if (vsh_bake_lightmap(occluders_with(field, layers, layer_count), texels, &light, 1, &shade, NULL,
+                          &lightmap, &baked->stats, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     vsh_texels_free(texels);
@@ -360,27 +357,25 @@ static void test_refused(void **state) {
         {"layer 0: remap[1] 0.25 is out of range 0.5 … 1", {.remap = {0.5, 0.25}}},
         {"layer 0: remap from 0.5 to 0.5: expected a rise", {.remap = {0.5, 0.5}}},
         {"layer 0: start_offset 17 is out of range -1 … 16", {.start_offset = 17.0}},
-        {"layer 0: method exact: triangles is NULL: it traces those of the casters",
+        {"layer 0: method exact: the occluders have no triangles, which it traces",
          {.field = empty, .method = VSH_SHADOW_EXACT}},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
         vsh_layer layer = cases[i].layer;
         layer.struct_size = sizeof layer;
-        const vsh_shade_options options = with(&layer, 1);
-        assert_int_equal(vsh_shade_shadow(empty, &points, &light, &options, NULL, &value, NULL, NULL, &error),
-                         VSH_ERROR_ARGUMENT);
+        vsh_occluder_parts parts = vsh_occluder_parts_default();
+        parts.field = empty;
+        parts.layers = &layer;
+        parts.layer_count = 1;
+        vsh_occluders *made = NULL;
+        vsh_result result = vsh_occluders_from_parts(&parts, &made, &error);
+        if (result == VSH_OK) { /* only the call knows the method */
+            result = vsh_shade_shadow(made, &points, &light, NULL, NULL, &value, NULL, NULL, &error);
+        }
+        assert_int_equal(result, VSH_ERROR_ARGUMENT);
         assert_string_equal(error.message, cases[i].message);
+        vsh_occluders_free(made);
     }
-    vsh_shade_options many = with(NULL, 2);
-    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &many, NULL, &value, NULL, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
-    const vsh_layer fine = layer_of(empty);
-    many = with(&fine, VSH_MAX_LAYERS + 1);
-    assert_int_equal(vsh_shade_shadow(empty, &points, &light, &many, NULL, &value, NULL, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
-    vsh_field *none;
-    assert_int_equal(vsh_field_create_empty(0.0, &none, &error), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_field_create_empty(NAN, &none, &error), VSH_ERROR_ARGUMENT);
     vsh_field_free(empty);
 }
 

@@ -1,5 +1,6 @@
 /* Samples that are lifted off the facets of a smooth sphere: where rays to a light begin, and what is in a
  * lift's way. The truth is that of the facets. */
+#include "casts.h"
 #include "texels_of.h"
 
 #include <stdbool.h>
@@ -62,7 +63,6 @@ static void open_scene(scene *s, const box *other) {
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = 0.1;
     options.shade.rays = 64;
-    options.shade.triangles = s->triangles;
     vsh_mesh faceted = s->ball.mesh;
     faceted.normals = NULL;
     s->texels = create(&s->ball.mesh, 1, options, NULL);
@@ -82,7 +82,8 @@ static void close_scene(scene *s) {
 
 static void bake(const scene *s, const vsh_light *lights, size_t light_count, const vsh_lightmap *planes) {
     vsh_error error = {VSH_OK, ""};
-    check(vsh_bake_lightmap(s->field, s->texels, lights, light_count, NULL, NULL, planes, NULL, &error),
+    check(vsh_bake_lightmap(occluders_traced(s->field, s->triangles), s->texels, lights, light_count, NULL,
+                            NULL, planes, NULL, &error),
           &error);
 }
 

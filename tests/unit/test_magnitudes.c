@@ -291,8 +291,9 @@ static void a_hundred_thousand_least_steps_lose_nothing(void **state) {
     const vsh_points points = {1, p, NULL, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     float v = -1.0f;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, &v, NULL, &stats, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, &v, NULL, &stats, NULL),
+        VSH_OK);
     assert_true(v == 1.0f);
     assert_int_equal(stats.unfinished, 1);
     assert_int_equal(stats.samples, 65536);

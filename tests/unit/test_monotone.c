@@ -149,13 +149,13 @@ static void more_rays_are_never_farther_from_the_truth(void **state) {
                 vsh_shade_options options = preview_options();
                 *(ao ? &options.ao_method : &options.method) = method;
                 options.ao_distance = AO_DISTANCE;
-                options.triangles = c.triangles;
                 options.rays = method == first ? 4 << (2 * step) : 1024;
                 options.max_error = 0.08 / (1 << step);
-                assert_int_equal(
-                    ao ? vsh_shade_ao(c.field, &points, &options, NULL, values, NULL, NULL, NULL)
-                       : vsh_shade_shadow(c.field, &points, &light, &options, NULL, values, NULL, NULL, NULL),
-                    VSH_OK);
+                assert_int_equal(ao ? vsh_shade_ao(occluders_of_caster(&c), &points, &options, NULL, values,
+                                                   NULL, NULL, NULL)
+                                    : vsh_shade_shadow(occluders_of_caster(&c), &points, &light, &options,
+                                                       NULL, values, NULL, NULL, NULL),
+                                 VSH_OK);
                 const truth_metrics m = truth_compare(COUNT, values, truth, outside);
                 print_message("%s %s, step %d: rmse %.4f\n", ao ? "AO" : "shadow",
                               ao ? vsh_ao_method_name(method) : vsh_shadow_method_name(method), step, m.rmse);

@@ -145,15 +145,31 @@ static void scenes_are_not_made_of_nothing(void **state) {
     MAKES_NONE(vsh_scene_casters(NULL, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_scene_casters(&scene, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_scene_layer_casters(&scene, NULL, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_scene_occluders(NULL, NULL, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_scene_occluders(&scene, NULL, NULL, NULL, PLACE, &error));
+    vsh_triangles *triangles = NULL;
+    vsh_solids *solids = NULL;
+    REFUSED(vsh_scene_truth(NULL, NULL, NULL, &triangles, &solids, &error));
+    REFUSED(vsh_scene_truth(&scene, NULL, NULL, &triangles, &solids, &error));
+    REFUSED(vsh_scene_truth(&scene, NULL, NULL, NULL, &solids, &error));
+    REFUSED(vsh_scene_truth(&scene, NULL, NULL, &triangles, NULL, &error));
     MAKES_NONE(vsh_scene_triangles(&scene, NULL, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_flat_scene_casters(NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_provenance_create(NULL, NULL, PLACE, &error));
 }
 
+/* Something that casts nothing. */
+static vsh_occluders *no_casters(void) {
+    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    parts.voxel_size = 1.0;
+    vsh_occluders *casters = NULL;
+    assert_int_equal(vsh_occluders_from_parts(&parts, &casters, &error), VSH_OK);
+    return casters;
+}
+
 static void nothing_is_shaded_without_what_it_takes(void **state) {
     (void)state;
-    vsh_field *field = NULL;
-    assert_int_equal(vsh_field_create_empty(1.0, &field, &error), VSH_OK);
+    vsh_occluders *casters = no_casters();
     const vsh_light light = vsh_light_default();
     const double positions[3] = {0, 0, 0};
     const float normals[3] = {0, 1, 0};
@@ -162,26 +178,27 @@ static void nothing_is_shaded_without_what_it_takes(void **state) {
     float value, direction[3];
     REFUSED(vsh_light_check(NULL, &error));
     REFUSED(vsh_tint_check(NULL, &error));
+    MAKES_NONE(vsh_occluders_create(NULL, 1, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_occluders_from_parts(NULL, PLACE, &error));
     MAKES_NONE(vsh_field_create(NULL, NULL, NULL, PLACE, &error));
-    REFUSED(vsh_field_create_empty(1.0, NULL, &error));
     REFUSED(vsh_shade_shadow(NULL, &points, &light, NULL, NULL, &value, NULL, NULL, &error));
-    REFUSED(vsh_shade_shadow(field, NULL, &light, NULL, NULL, &value, NULL, NULL, &error));
-    REFUSED(vsh_shade_shadow(field, &nowhere, &light, NULL, NULL, &value, NULL, NULL, &error));
-    REFUSED(vsh_shade_shadow(field, &points, NULL, NULL, NULL, &value, NULL, NULL, &error));
-    REFUSED(vsh_shade_shadow(field, &points, &light, NULL, NULL, NULL, NULL, NULL, &error));
+    REFUSED(vsh_shade_shadow(casters, NULL, &light, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_shadow(casters, &nowhere, &light, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_shadow(casters, &points, NULL, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_shadow(casters, &points, &light, NULL, NULL, NULL, NULL, NULL, &error));
     REFUSED(vsh_shade_ao(NULL, &points, NULL, NULL, &value, NULL, NULL, &error));
-    REFUSED(vsh_shade_ao(field, NULL, NULL, NULL, &value, NULL, NULL, &error));
-    REFUSED(vsh_shade_ao(field, &nowhere, NULL, NULL, &value, NULL, NULL, &error));
-    REFUSED(vsh_shade_ao(field, &turned, NULL, NULL, &value, NULL, NULL, &error));
-    REFUSED(vsh_shade_ao(field, &points, NULL, NULL, NULL, NULL, NULL, &error));
+    REFUSED(vsh_shade_ao(casters, NULL, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_ao(casters, &nowhere, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_ao(casters, &turned, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_ao(casters, &points, NULL, NULL, NULL, NULL, NULL, &error));
     REFUSED(vsh_shade_bent(NULL, &points, NULL, NULL, &value, direction, NULL, &error));
-    REFUSED(vsh_shade_bent(field, &points, NULL, NULL, NULL, direction, NULL, &error));
-    REFUSED(vsh_shade_bent(field, &points, NULL, NULL, &value, NULL, NULL, &error));
+    REFUSED(vsh_shade_bent(casters, &points, NULL, NULL, NULL, direction, NULL, &error));
+    REFUSED(vsh_shade_bent(casters, &points, NULL, NULL, &value, NULL, NULL, &error));
     MAKES_NONE(vsh_query_create(NULL, &light, 1, NULL, PLACE, &error));
-    MAKES_NONE(vsh_query_create(field, NULL, 1, NULL, PLACE, &error));
-    REFUSED(vsh_query_create(field, &light, 1, NULL, NULL, &error));
+    MAKES_NONE(vsh_query_create(casters, NULL, 1, NULL, PLACE, &error));
+    REFUSED(vsh_query_create(casters, &light, 1, NULL, NULL, &error));
     vsh_query *query = NULL;
-    assert_int_equal(vsh_query_create(field, &light, 1, NULL, &query, &error), VSH_OK);
+    assert_int_equal(vsh_query_create(casters, &light, 1, NULL, &query, &error), VSH_OK);
     const vsh_query_output output = vsh_query_output_default();
     vsh_strided_points strided = vsh_strided_points_default();
     strided.count = 1;
@@ -196,12 +213,12 @@ static void nothing_is_shaded_without_what_it_takes(void **state) {
     vsh_query_free(query);
     REFUSED(vsh_trace_shadow(NULL, NULL, 1, positions, normals, 0.0, &light, 1, NULL, &value, &error));
     REFUSED(vsh_trace_ao(NULL, NULL, 1, positions, normals, 0.0, 1.0, 1, NULL, &value, &error));
-    vsh_field_free(field);
+    vsh_occluders_free(casters);
 }
 
 static void nothing_is_baked_without_what_it_takes(void **state) {
     (void)state;
-    vsh_field *field = NULL;
+    vsh_occluders *casters = no_casters();
     vsh_voxels *voxels = NULL;
     vsh_volume *volume = NULL;
     const double low[3] = {0, 0, 0}, high[3] = {1, 1, 1};
@@ -214,16 +231,15 @@ static void nothing_is_baked_without_what_it_takes(void **state) {
     float values[COUNT];
     double bounds[3];
     const vsh_mesh mesh = {.name = "none", .vertex_count = 3, .triangle_count = 1};
-    assert_int_equal(vsh_field_create_empty(1.0, &field, &error), VSH_OK);
     assert_int_equal(vsh_voxels_from_box(low, high, 0.5, NULL, &voxels, &error), VSH_OK);
-    assert_int_equal(vsh_bake_volume(field, voxels, &light, 1, NULL, NULL, &volume, NULL, &error), VSH_OK);
+    assert_int_equal(vsh_bake_volume(casters, voxels, &light, 1, NULL, NULL, &volume, NULL, &error), VSH_OK);
     MAKES_NONE(vsh_texels_create(NULL, 1, NULL, NULL, NULL, PLACE, &error));
     REFUSED(vsh_texels_create(&mesh, 1, NULL, NULL, NULL, NULL, &error));
     MAKES_NONE(vsh_charts_create(NULL, 1, NULL, NULL, NULL, PLACE, &error));
     REFUSED(vsh_charts_create(&mesh, 1, NULL, NULL, NULL, NULL, &error));
     REFUSED(vsh_charts_bounds(NULL, NULL, bounds, bounds, &error));
     MAKES_NONE(vsh_texels_create_band(NULL, 0, 1, NULL, PLACE, &error));
-    REFUSED(vsh_bake_lightmap(field, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));
+    REFUSED(vsh_bake_lightmap(casters, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));
     REFUSED(vsh_bake_lightmap(NULL, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));
     REFUSED(vsh_flat_bake(NULL, NULL, 1, &plane, NULL, &flat, &error));
     REFUSED(vsh_flat_bake(NULL, &light, 1, &plane, NULL, NULL, &error));
@@ -232,9 +248,9 @@ static void nothing_is_baked_without_what_it_takes(void **state) {
     MAKES_NONE(vsh_voxels_from_box(low, NULL, 0.5, NULL, PLACE, &error));
     REFUSED(vsh_voxels_from_box(low, high, 0.5, NULL, NULL, &error));
     MAKES_NONE(vsh_bake_volume(NULL, voxels, &light, 1, NULL, NULL, PLACE, NULL, &error));
-    MAKES_NONE(vsh_bake_volume(field, NULL, &light, 1, NULL, NULL, PLACE, NULL, &error));
-    MAKES_NONE(vsh_bake_volume(field, voxels, NULL, 1, NULL, NULL, PLACE, NULL, &error));
-    REFUSED(vsh_bake_volume(field, voxels, &light, 1, NULL, NULL, NULL, NULL, &error));
+    MAKES_NONE(vsh_bake_volume(casters, NULL, &light, 1, NULL, NULL, PLACE, NULL, &error));
+    MAKES_NONE(vsh_bake_volume(casters, voxels, NULL, 1, NULL, NULL, PLACE, NULL, &error));
+    REFUSED(vsh_bake_volume(casters, voxels, &light, 1, NULL, NULL, NULL, NULL, &error));
     REFUSED(vsh_volume_sample(NULL, 0, 1, low, values, &error));
     REFUSED(vsh_volume_sample(volume, 0, 1, NULL, values, &error));
     REFUSED(vsh_volume_sample(volume, 0, 1, low, NULL, &error));
@@ -245,13 +261,12 @@ static void nothing_is_baked_without_what_it_takes(void **state) {
     REFUSED(vsh_volume_copy(volume, 0, index, size, NULL, &error));
     vsh_volume_free(volume);
     vsh_voxels_free(voxels);
-    vsh_field_free(field);
+    vsh_occluders_free(casters);
 }
 
 static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
     (void)state;
-    vsh_field *field = NULL;
-    assert_int_equal(vsh_field_create_empty(1.0, &field, &error), VSH_OK);
+    vsh_occluders *casters = no_casters();
     const vsh_surface nothing = {NULL, {0.5, 0.5, 0.5}};
     const vsh_light light = vsh_light_default();
     vsh_render_options options = vsh_render_options_default();
@@ -262,11 +277,11 @@ static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
     const double bounds[3] = {0, 0, 0};
     vsh_measures measures;
     const vsh_compared compared = {0};
-    REFUSED(vsh_render(NULL, 1, field, &light, 1, &options, NULL, &picture, NULL, &error));
-    REFUSED(vsh_render(&nothing, 1, field, &light, 1, &options, NULL, &picture, NULL, &error));
+    REFUSED(vsh_render(NULL, 1, casters, &light, 1, &options, NULL, &picture, NULL, &error));
+    REFUSED(vsh_render(&nothing, 1, casters, &light, 1, &options, NULL, &picture, NULL, &error));
     REFUSED(vsh_render(NULL, 0, NULL, &light, 1, &options, NULL, &picture, NULL, &error));
-    REFUSED(vsh_render(NULL, 0, field, NULL, 1, &options, NULL, &picture, NULL, &error));
-    REFUSED(vsh_render(NULL, 0, field, &light, 1, &options, NULL, NULL, NULL, &error));
+    REFUSED(vsh_render(NULL, 0, casters, NULL, 1, &options, NULL, &picture, NULL, &error));
+    REFUSED(vsh_render(NULL, 0, casters, &light, 1, &options, NULL, NULL, NULL, &error));
     REFUSED(vsh_camera_check(NULL, &error));
     REFUSED(vsh_camera_frame(NULL, bounds, bounds, 0.0, 0.0, 1.0, &error));
     REFUSED(vsh_camera_frame(&options.camera, NULL, bounds, 0.0, 0.0, 1.0, &error));
@@ -277,7 +292,7 @@ static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
     REFUSED(vsh_picture_encode(&picture, SIDE, SIDE, 1.0, no_green, NULL, &error));
     REFUSED(vsh_compare(NULL, NULL, NULL, &measures, &error));
     REFUSED(vsh_compare(&compared, NULL, NULL, NULL, &error));
-    vsh_field_free(field);
+    vsh_occluders_free(casters);
 }
 
 int main(void) {

@@ -97,8 +97,8 @@ static void parts_that_are_none_are_refused_by_name(void **state) {
     parts.voxel_size = -1.0;
     expect_refused(&parts, "voxel_size");
     parts = vsh_occluder_parts_default();
-    parts.layer_count = 1;
-    expect_refused(&parts, "layers at NULL");
+    parts.layer_count = (size_t)1 << 40; /* is no reason to ask for memory */
+    expect_refused(&parts, "1099511627776 layers at NULL: expected at most 128");
     vsh_layer layers[2] = {vsh_layer_default(), vsh_layer_default()};
     layers[0].spheres = spheres;
     parts.layers = layers;
@@ -147,6 +147,72 @@ static void layers_alone_say_what_offsets_are_measured_in(void **state) {
     }
     vsh_field_free(field);
     vsh_spheres_free(spheres);
+}
+
+static void a_level_set_makes_the_field_that_vsh_field_create_makes(void **state) {
+    (void)state;
+    const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 0.5};
+    vsh_grid *grid = grid_of((truth_scene){&solid, 1}, 0.125);
+    vsh_field_options options = vsh_field_options_default();
+    options.reach = 3.0;
+    vsh_occluders *made = NULL;
+    assert_int_equal(vsh_occluders_from_grid(grid, &options, NULL, &made, &why), VSH_OK);
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(made, &parts);
+    assert_true(parts.triangles == NULL && parts.layer_count == 0);
+    vsh_field *field = field_of_grid(grid, 3.0);
+    vsh_field_info ours, theirs;
+    vsh_field_get_info(parts.field, &ours);
+    vsh_field_get_info(field, &theirs);
+    assert_memory_equal(&ours, &theirs, sizeof ours);
+    vsh_field_free(field);
+    options.reach = -1.0;
+    vsh_occluders_free(made);
+    made = (vsh_occluders *)&why;
+    assert_int_equal(
+        vsh_occluders_from_grid(grid = grid_of((truth_scene){&solid, 1}, 0.125), &options, NULL, &made, &why),
+        VSH_ERROR_ARGUMENT);
+    assert_null(made);
+    vsh_grid_free(grid);
+}
+
+/* A point under the plate, half in its shadow. */
+static float lit_under(const vsh_occluders *occluders, int32_t method, vsh_result expected) {
+    const double at[3] = {1.0, 0.0, 0.0};
+    const float up[3] = {0.0f, 1.0f, 0.0f};
+    const vsh_points points = {1, at, up, NULL};
+    vsh_light light = vsh_light_default();
+    light.angle = 0.3;
+    vsh_shade_options options = vsh_shade_options_default();
+    options.method = method;
+    float lit = -1.0f;
+    assert_int_equal(vsh_shade_shadow(occluders, &points, &light, &options, NULL, &lit, NULL, NULL, &why),
+                     expected);
+    return lit;
+}
+
+static void auto_is_exact_where_triangles_are_kept_and_adaptive_where_not(void **state) {
+    (void)state;
+    if (!vsh_triangles_available()) {
+        skip();
+    }
+    const vsh_mesh mesh = plate();
+    for (int32_t kept = 0; kept < 2; ++kept) {
+        vsh_occluders_options options = vsh_occluders_options_default();
+        options.grid.resolution = 16;
+        options.triangles = kept;
+        vsh_occluders *made = NULL;
+        assert_int_equal(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &why), VSH_OK);
+        const int32_t method = kept ? VSH_SHADOW_EXACT : VSH_SHADOW_ADAPTIVE;
+        const float lit = lit_under(made, VSH_SHADOW_AUTO, VSH_OK);
+        assert_true(lit > 0.3f && lit < 0.7f);
+        assert_int_equal(bits_of(lit), bits_of(lit_under(made, method, VSH_OK)));
+        if (!kept) {
+            lit_under(made, VSH_SHADOW_EXACT, VSH_ERROR_ARGUMENT);
+            assert_non_null(strstr(why.message, "the occluders have no triangles"));
+        }
+        vsh_occluders_free(made);
+    }
 }
 
 static vsh_occluders *of_scene(const char *text, const vsh_scene_occluders_options *options,
@@ -205,6 +271,8 @@ int main(void) {
         cmocka_unit_test(meshes_make_the_field_and_triangles_that_their_parts_make),
         cmocka_unit_test(bad_meshes_and_options_are_refused_with_nothing_made),
         cmocka_unit_test(parts_that_are_none_are_refused_by_name),
+        cmocka_unit_test(a_level_set_makes_the_field_that_vsh_field_create_makes),
+        cmocka_unit_test(auto_is_exact_where_triangles_are_kept_and_adaptive_where_not),
         cmocka_unit_test(layers_alone_say_what_offsets_are_measured_in),
         cmocka_unit_test(a_scene_keeps_the_truth_only_where_an_error_is_kept),
         cmocka_unit_test(a_box_without_a_half_is_refused),

@@ -1,4 +1,5 @@
 /* What outputs tell of where they come from, and the files that carry it. */
+#include "casts.h"
 #include "images.h"
 #include "previews.h"
 
@@ -198,7 +199,8 @@ static void level_sets_and_volumes_carry_them(void **state) {
     assert_ok(vsh_grid_write_with(grid, at("told.vdb"), NULL, &told, 1, &error), &error);
     assert_ok(vsh_field_create(grid, NULL, NULL, &field, &error), &error);
     assert_ok(vsh_voxels_from_grid(grid, 0.0, NULL, &voxels, &error), &error);
-    assert_ok(vsh_bake_volume(field, voxels, &sun, 1, NULL, NULL, &volume, NULL, &error), &error);
+    assert_ok(vsh_bake_volume(occluders_of(field), voxels, &sun, 1, NULL, NULL, &volume, NULL, &error),
+              &error);
     assert_ok(vsh_volume_write_with(volume, at("volume.vdb"), 0, &told, 1, &error), &error);
     static const char *const files[] = {"told.vdb", "volume.vdb"};
     for (size_t f = 0; f < 2; ++f) {

@@ -45,11 +45,11 @@ static void shuffle(void) {
     }
 }
 
-static vsh_query *query_of(const vsh_field *field, const vsh_light *lights, size_t count,
+static vsh_query *query_of(const vsh_occluders *occluders, const vsh_light *lights, size_t count,
                            const vsh_shade_options *options) {
     vsh_query *query = NULL;
     vsh_error error = {VSH_OK, ""};
-    if (vsh_query_create(field, lights, count, options, &query, &error) != VSH_OK) {
+    if (vsh_query_create(occluders, lights, count, options, &query, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return query;
@@ -78,10 +78,11 @@ static vsh_shade_stats ask(const vsh_query *query, const vsh_points *points, int
 static void expect(const caster *c, const vsh_points *points, const vsh_light *lights, int l,
                    const vsh_shade_options *options) {
     vsh_error error = {VSH_OK, ""};
-    const vsh_result result = l < LIGHTS ? vsh_shade_shadow(c->field, points, &lights[l], options, NULL,
-                                                            expected, expected_deviation, NULL, &error)
-                                         : vsh_shade_ao(c->field, points, options, NULL, expected,
-                                                        expected_deviation, NULL, &error);
+    const vsh_result result = l < LIGHTS
+                                  ? vsh_shade_shadow(occluders_of_caster(c), points, &lights[l], options,
+                                                     NULL, expected, expected_deviation, NULL, &error)
+                                  : vsh_shade_ao(occluders_of_caster(c), points, options, NULL, expected,
+                                                 expected_deviation, NULL, &error);
     if (result != VSH_OK) {
         fail_msg("%s", error.message);
     }
@@ -99,8 +100,7 @@ static void values_and_deviations_are_those_of_the_shade_calls(void **state) {
         options.method = method < shadow_methods() ? method : VSH_SHADOW_CONE;
         options.ao_method = method < ao_methods() ? method : VSH_AO_TAPS;
         options.rays = 16;
-        options.triangles = c.triangles;
-        vsh_query *query = query_of(c.field, lights, LIGHTS, &options);
+        vsh_query *query = query_of(occluders_of_caster(&c), lights, LIGHTS, &options);
         const size_t counts[] = {1, 2, 64, 65, FEW};
         for (size_t n = 0; n < sizeof counts / sizeof counts[0]; ++n) {
             const vsh_points points = {counts[n], positions + 3 * 9000, normals, texels};
@@ -132,7 +132,7 @@ static void values_follow_points_that_are_shuffled_on_any_number_of_threads(void
         options.method = methods[m];
         options.ao_method = m == 2 ? VSH_AO_RAYS : VSH_AO_TAPS;
         options.rays = 4;
-        vsh_query *query = query_of(c.field, lights, LIGHTS, &options);
+        vsh_query *query = query_of(occluders_of(c.field), lights, LIGHTS, &options);
         static float in_order[LIGHTS + 1][MANY];
         const vsh_points points = {MANY, positions, normals, NULL};
         ask(query, &points, 2);
@@ -164,7 +164,7 @@ static void points_without_texels_are_told_apart_by_their_numbers_in_any_order(v
     options.method = VSH_SHADOW_RAYS;
     options.ao_method = VSH_AO_RAYS;
     options.rays = 2;
-    vsh_query *query = query_of(c.field, lights, LIGHTS, &options);
+    vsh_query *query = query_of(occluders_of(c.field), lights, LIGHTS, &options);
     const vsh_points points = {MANY, shuffled_positions, shuffled_normals, NULL};
     ask(query, &points, 2);
     for (int l = 0; l <= LIGHTS; ++l) {
@@ -184,7 +184,7 @@ static void points_that_are_invalid_are_nan_and_leave_the_others_alone(void **st
     fill_points();
     shuffle();
     const vsh_shade_options preview = preview_options(); /* rays of adaptive are shared with neighbours */
-    vsh_query *query = query_of(field, lights, LIGHTS, &preview);
+    vsh_query *query = query_of(occluders_of(field), lights, LIGHTS, &preview);
     static float before[LIGHTS + 1][MANY];
     const vsh_points all = {MANY, shuffled_positions, shuffled_normals, NULL};
     const size_t bad[] = {0, 31000, 31001, MANY - 1};
@@ -229,7 +229,7 @@ static void one_point_has_the_value_that_it_has_among_many(void **state) {
         vsh_shade_options options = preview_options();
         options.method = methods[m];
         options.rays = 8;
-        vsh_query *query = query_of(field, lights, LIGHTS, &options);
+        vsh_query *query = query_of(occluders_of(field), lights, LIGHTS, &options);
         const vsh_points points = {MANY, positions, normals, texels};
         static float among[LIGHTS + 1][MANY];
         ask(query, &points, 2);
@@ -252,7 +252,7 @@ static void what_is_not_asked_for_is_not_marched(void **state) {
     vsh_light lights[LIGHTS];
     lights_of(lights);
     fill_points();
-    vsh_query *query = query_of(field, lights, LIGHTS, NULL);
+    vsh_query *query = query_of(occluders_of(field), lights, LIGHTS, NULL);
     const vsh_points points = {FEW, positions, normals, NULL};
     vsh_query_output output = vsh_query_output_default();
     vsh_shade_stats none = vsh_shade_stats_zero(), one = none, alone = none;
@@ -261,8 +261,9 @@ static void what_is_not_asked_for_is_not_marched(void **state) {
     float *const second[LIGHTS] = {NULL, values[1]};
     output.visibility = second;
     assert_int_equal(vsh_query_points(query, &points, NULL, &output, &one, NULL), VSH_OK);
-    assert_int_equal(vsh_shade_shadow(field, &points, &lights[1], NULL, NULL, expected, NULL, &alone, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &lights[1], NULL, NULL, expected, NULL, &alone, NULL),
+        VSH_OK);
     assert_memory_equal(&one, &alone, sizeof one);
     assert_memory_equal(expected, values[1], FEW * sizeof expected[0]);
     /* nor is anything of no points, which need no arrays */
@@ -300,7 +301,7 @@ static void a_handle_is_shared_by_threads(void **state) {
     fill_points();
     vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_ADAPTIVE;
-    vsh_query *query = query_of(field, &light, 1, &options);
+    vsh_query *query = query_of(occluders_of(field), &light, 1, &options);
     static asker askers[5];
     pthread_t threads[4];
     for (int i = 0; i < 5; ++i) {
@@ -330,7 +331,7 @@ static void limits_and_cancelling_have_their_codes(void **state) {
     lights_of(lights);
     fill_points();
     shuffle();
-    vsh_query *query = query_of(field, lights, LIGHTS, NULL);
+    vsh_query *query = query_of(occluders_of(field), lights, LIGHTS, NULL);
     float *const visibility[LIGHTS] = {values[0], NULL};
     vsh_query_output output = vsh_query_output_default();
     output.visibility = visibility;
@@ -366,23 +367,27 @@ static void bad_arguments_are_refused_by_name(void **state) {
     vsh_error error = {VSH_OK, ""};
     vsh_query *query = NULL;
     lights[1].radius = -1.0;
-    assert_int_equal(vsh_query_create(field, lights, LIGHTS, NULL, &query, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_query_create(occluders_of(field), lights, LIGHTS, NULL, &query, &error),
+                     VSH_ERROR_ARGUMENT);
     assert_null(query);
     assert_non_null(strstr(error.message, "light 1"));
     lights_of(lights);
     vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_EXACT;
-    assert_int_equal(vsh_query_create(field, lights, LIGHTS, &options, &query, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_query_create(occluders_of(field), lights, LIGHTS, &options, &query, &error),
+                     VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "triangles"));
-    vsh_query_free(query_of(field, NULL, 0, &options)); /* of no light's shadow */
+    vsh_query_free(query_of(occluders_of(field), NULL, 0, &options)); /* of no light's shadow */
     options.ao_method = VSH_AO_EXACT;
-    assert_int_equal(vsh_query_create(field, NULL, 0, &options, &query, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_query_create(occluders_of(field), NULL, 0, &options, &query, &error),
+                     VSH_ERROR_ARGUMENT);
     options = preview_options();
     options.rays = 4097;
-    assert_int_equal(vsh_query_create(field, NULL, 0, &options, &query, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_query_create(occluders_of(field), NULL, 0, &options, &query, &error),
+                     VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "rays"));
 
-    query = query_of(field, lights, LIGHTS, NULL);
+    query = query_of(occluders_of(field), lights, LIGHTS, NULL);
     const vsh_points bare = {FEW, positions, NULL, NULL};
     vsh_query_output output = vsh_query_output_default();
     output.ao = values[0];

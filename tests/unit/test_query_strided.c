@@ -49,7 +49,8 @@ static vsh_query *query_of(const vsh_field *field, const vsh_light *light, int32
     options.method = method;
     options.ao_method = VSH_AO_TAPS;
     options.rays = method == VSH_SHADOW_ADAPTIVE ? 64 : 8;
-    if (vsh_query_create(field, light, light != NULL ? 1 : 0, &options, &query, &error) != VSH_OK) {
+    if (vsh_query_create(occluders_of(field), light, light != NULL ? 1 : 0, &options, &query, &error) !=
+        VSH_OK) {
         fail_msg("%s", error.message);
     }
     return query;

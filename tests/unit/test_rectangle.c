@@ -1,5 +1,6 @@
 /* Rectangular area lights against brute force: every part of the rectangle, weighed by the solid angle that
  * it is seen under, and segments to it against boxes in closed form. Shares no code with the library. */
+#include "field/field.h"
 #include "traced.h"
 #include "volumes.h"
 
@@ -102,22 +103,26 @@ static double look(const vsh_light *light, const double *from, const float *norm
     return seen / all;
 }
 
-static vsh_shade_options options_of(const caster *c, int32_t method) {
+static vsh_shade_options options_of(int32_t method) {
     vsh_shade_options options = vsh_shade_options_default();
     options.method = method;
-    options.triangles = c->triangles;
     options.rays = 256;
     return options;
 }
 
-static void shade(const caster *c, const vsh_light *light, const vsh_shade_options *options, float *values,
-                  float *deviation) {
+static void shade_by(const vsh_occluders *occluders, const vsh_light *light, const vsh_shade_options *options,
+                     float *values, float *deviation) {
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(c->field, &points, light, options, NULL, values, deviation, NULL, &error) !=
+    if (vsh_shade_shadow(occluders, &points, light, options, NULL, values, deviation, NULL, &error) !=
         VSH_OK) {
         fail_msg("%s", error.message);
     }
+}
+
+static void shade(const caster *c, const vsh_light *light, const vsh_shade_options *options, float *values,
+                  float *deviation) {
+    shade_by(occluders_of_caster(c), light, options, values, deviation);
 }
 
 typedef struct difference {
@@ -157,7 +162,7 @@ static void rays_of_every_kind_see_what_brute_force_sees(void **state) {
             if (METHODS[m] == VSH_SHADOW_EXACT && c->triangles == NULL) {
                 continue;
             }
-            const vsh_shade_options options = options_of(c, METHODS[m]);
+            const vsh_shade_options options = options_of(METHODS[m]);
             shade(c, &light, &options, values, NULL);
             const difference d = compare(values, truth);
             if (!(d.root_mean_square < MOST[m][l]) || (m == 2 && !(fabs(d.bias) < 0.001))) {
@@ -190,7 +195,7 @@ static void what_is_said_of_the_error_holds(void **state) {
         for (size_t i = 0; i < COUNT; ++i) {
             truth[i] = look(&light, positions + 3 * i, normals + 3 * i, true, NULL);
         }
-        const vsh_shade_options options = options_of(c, VSH_SHADOW_EXACT);
+        const vsh_shade_options options = options_of(VSH_SHADOW_EXACT);
         shade(c, &light, &options, values, said);
         double square = 0.0;
         for (size_t i = 0; i < COUNT; ++i) {
@@ -214,7 +219,7 @@ static void one_march_takes_the_disc_of_equal_solid_angle(void **state) {
             truth[i] = look(&light, positions + 3 * i, normals + 3 * i, true, NULL);
         }
         for (int32_t method = VSH_SHADOW_SMOOTH; method <= VSH_SHADOW_CONE; ++method) {
-            const vsh_shade_options options = options_of(c, method);
+            const vsh_shade_options options = options_of(method);
             shade(c, &light, &options, values, NULL);
             const difference d = compare(values, truth);
             if (!(d.root_mean_square < 0.12)) {
@@ -231,7 +236,7 @@ static void one_march_takes_the_disc_of_equal_solid_angle(void **state) {
     const vsh_light ball = lamp(high, 1e5 * sin(half));
     float of_ball[COUNT];
     for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
-        const vsh_shade_options options = options_of(c, method);
+        const vsh_shade_options options = options_of(method);
         shade(c, &square, &options, values, NULL);
         shade(c, &ball, &options, of_ball, NULL);
         for (size_t i = 0; i < COUNT; ++i) {
@@ -249,7 +254,7 @@ static void a_tiny_rectangle_is_a_point(void **state) {
     const vsh_light tiny = panel(centre, u, v), point = lamp(centre, 0.0);
     float values[COUNT], of_point[COUNT];
     for (int32_t method = VSH_SHADOW_HARD; method < shadow_methods(); ++method) {
-        const vsh_shade_options options = options_of(c, method);
+        const vsh_shade_options options = options_of(method);
         shade(c, &tiny, &options, values, NULL);
         shade(c, &point, &options, of_point, NULL);
         for (size_t i = 0; i < COUNT; ++i) {
@@ -265,7 +270,7 @@ static void behind_a_one_sided_one_is_nothing_and_two_sides_are_alike(void **sta
     const caster *c = *state;
     float front[COUNT], values[COUNT];
     for (int32_t method = VSH_SHADOW_HARD; method < shadow_methods(); ++method) {
-        const vsh_shade_options options = options_of(c, method);
+        const vsh_shade_options options = options_of(method);
         vsh_light light = light_of(0);
         light.two_sided = 0;
         shade(c, &light, &options, front, NULL);
@@ -286,14 +291,14 @@ static void behind_a_one_sided_one_is_nothing_and_two_sides_are_alike(void **sta
     }
     /* blocks of voxels above and below it; nothing casts */
     vsh_field *nothing = NULL;
-    assert_int_equal(vsh_field_create_empty(0.1, &nothing, NULL), VSH_OK);
+    assert_int_equal(vshi_field_create_empty(0.1, &nothing, NULL), VSH_OK);
     vsh_light light = light_of(0);
     light.two_sided = 0;
     light.position[1] = 0.015;
     vsh_voxels *voxels = cube_of(1.6, 0.1);
     vsh_volume_options options = vsh_volume_options_default();
     options.shade.method = VSH_SHADOW_ADAPTIVE;
-    vsh_volume *volume = bake(nothing, voxels, &light, 1, &options, NULL);
+    vsh_volume *volume = bake(occluders_of(nothing), voxels, &light, 1, &options, NULL);
     const dense d = copy_of(volume, 0, voxels);
     for (size_t i = 0; i < d.count; ++i) {
         const int32_t y = (int32_t)(i / (size_t)d.size[2] % (size_t)d.size[1]);
@@ -333,7 +338,7 @@ static void edge_on_is_a_share_all_the_same(void **state) {
 static void the_horizon_cuts_it_by_solid_angle(void **state) {
     (void)state;
     vsh_field *nothing = NULL;
-    assert_int_equal(vsh_field_create_empty(0.1, &nothing, NULL), VSH_OK);
+    assert_int_equal(vshi_field_create_empty(0.1, &nothing, NULL), VSH_OK);
     vsh_layer layer = vsh_layer_default();
     layer.field = nothing;
     uint64_t counter = 5;
@@ -349,14 +354,14 @@ static void the_horizon_cuts_it_by_solid_angle(void **state) {
         options.rays = 1024;
         const vsh_points points = {1, at, normal, NULL};
         float alone, layered;
-        assert_int_equal(vsh_shade_shadow(nothing, &points, &light, &options, NULL, &alone, NULL, NULL, NULL),
+        assert_int_equal(vsh_shade_shadow(occluders_of(nothing), &points, &light, &options, NULL, &alone,
+                                          NULL, NULL, NULL),
                          VSH_OK);
         assert_true(fabs((double)alone - truth) < 0.01);
         /* of a layer's share nothing is lost below the horizon twice */
-        options.layers = &layer;
-        options.layer_count = 1;
-        assert_int_equal(
-            vsh_shade_shadow(nothing, &points, &light, &options, NULL, &layered, NULL, NULL, NULL), VSH_OK);
+        assert_int_equal(vsh_shade_shadow(occluders_with(nothing, &layer, 1), &points, &light, &options, NULL,
+                                          &layered, NULL, NULL, NULL),
+                         VSH_OK);
         assert_true(fabs((double)layered - truth) < 0.02);
     }
     vsh_field_free(nothing);
@@ -367,26 +372,22 @@ static void layers_and_casters_without_voxels_know_it(void **state) {
     static const double BALLS[2][4] = {{0.2, 0.8, 0.0, 0.3}, {-0.8, 0.5, 0.6, 0.25}};
     vsh_spheres *spheres = NULL;
     vsh_field *nothing = NULL;
-    assert_int_equal(vsh_field_create_empty(0.1, &nothing, NULL), VSH_OK);
+    assert_int_equal(vshi_field_create_empty(0.1, &nothing, NULL), VSH_OK);
     assert_int_equal(vsh_spheres_create(&BALLS[0][0], 2, NULL, NULL, &spheres, NULL), VSH_OK);
     const vsh_light light = light_of(0);
     vsh_layer layer = vsh_layer_default();
     layer.field = c->field;
-    vsh_shade_options options = options_of(c, VSH_SHADOW_RAYS);
+    vsh_shade_options options = options_of(VSH_SHADOW_RAYS);
     float whole[COUNT], layered[COUNT];
     shade(c, &light, &options, whole, NULL);
-    options.layers = &layer;
-    options.layer_count = 1;
-    const caster empty = {nothing, NULL};
-    shade(&empty, &light, &options, layered, NULL);
+    shade_by(occluders_with(nothing, &layer, 1), &light, &options, layered, NULL);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_true(fabsf(layered[i] - whole[i]) < 0.08f); /* by other rays */
     }
     /* without size it is hard */
     layer.softness = 0.0;
-    shade(&empty, &light, &options, layered, NULL);
+    shade_by(occluders_with(nothing, &layer, 1), &light, &options, layered, NULL);
     vsh_light point = lamp(light.position, 0.0);
-    options.layer_count = 0;
     shade(c, &point, &options, whole, NULL);
     size_t others = 0;
     for (size_t i = 0; i < COUNT; ++i) {
@@ -398,14 +399,11 @@ static void layers_and_casters_without_voxels_know_it(void **state) {
     const truth_solid solids[2] = {{.shape = TRUTH_SPHERE, .center = {0.2, 0.8, 0.0}, .radius = 0.3},
                                    {.shape = TRUTH_SPHERE, .center = {-0.8, 0.5, 0.6}, .radius = 0.25}};
     caster balls = caster_of((truth_scene){solids, 2}, 0.03, 2.0);
-    options = options_of(&balls, VSH_SHADOW_RAYS);
-    options.triangles = NULL;
+    options = options_of(VSH_SHADOW_RAYS);
     shade(&balls, &light, &options, whole, NULL);
     vsh_layer analytic = vsh_layer_default();
     analytic.spheres = spheres;
-    options.layers = &analytic;
-    options.layer_count = 1;
-    shade(&empty, &light, &options, layered, NULL);
+    shade_by(occluders_with(nothing, &analytic, 1), &light, &options, layered, NULL);
     double square = 0.0;
     for (size_t i = 0; i < COUNT; ++i) {
         square += pow((double)layered[i] - (double)whole[i], 2.0) / COUNT;
@@ -422,16 +420,18 @@ static void threads_and_instruction_sets_give_the_same_bits(void **state) {
     float values[COUNT], others[COUNT];
     for (int32_t method = VSH_SHADOW_HARD; method < shadow_methods(); ++method) {
         const vsh_light light = light_of(method % LIGHTS);
-        const vsh_shade_options options = options_of(c, method);
+        const vsh_shade_options options = options_of(method);
         vsh_run run = vsh_run_default();
         run.threads = 1;
         run.isa = VSH_ISA_BASE;
-        assert_int_equal(
-            vsh_shade_shadow(c->field, &points, &light, &options, &run, values, NULL, NULL, NULL), VSH_OK);
+        assert_int_equal(vsh_shade_shadow(occluders_of_caster(c), &points, &light, &options, &run, values,
+                                          NULL, NULL, NULL),
+                         VSH_OK);
         run.threads = 3;
         run.isa = VSH_ISA_BEST;
-        assert_int_equal(
-            vsh_shade_shadow(c->field, &points, &light, &options, &run, others, NULL, NULL, NULL), VSH_OK);
+        assert_int_equal(vsh_shade_shadow(occluders_of_caster(c), &points, &light, &options, &run, others,
+                                          NULL, NULL, NULL),
+                         VSH_OK);
         assert_memory_equal(values, others, sizeof values);
     }
 }

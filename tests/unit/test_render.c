@@ -122,7 +122,8 @@ static float floor_light(const vsh_field *field, const vsh_light *light, const d
     const vsh_points points = {1, at, up, NULL};
     float open = -1.0f;
     const vsh_shade_options shade = preview_options();
-    assert_int_equal(vsh_shade_ao(field, &points, &shade, NULL, &open, NULL, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &shade, NULL, &open, NULL, NULL, NULL),
+                     VSH_OK);
     return open;
 }
 
@@ -262,11 +263,11 @@ static void a_render_can_be_cancelled_and_limited(void **state) {
     double seen = 0.0;
     run.progress = stop;
     run.user = &seen;
-    assert_int_equal(vsh_render(&surface, 1, field, NULL, 0, &o, &run, &picture, NULL, &error),
+    assert_int_equal(vsh_render(&surface, 1, occluders_of(field), NULL, 0, &o, &run, &picture, NULL, &error),
                      VSH_ERROR_CANCELLED);
     run = vsh_run_default();
     run.memory_limit = 100000;
-    assert_int_equal(vsh_render(&surface, 1, field, NULL, 0, &o, &run, &picture, NULL, &error),
+    assert_int_equal(vsh_render(&surface, 1, occluders_of(field), NULL, 0, &o, &run, &picture, NULL, &error),
                      VSH_ERROR_LIMIT);
     vsh_field_free(field);
 }
@@ -294,16 +295,19 @@ static void options_out_of_range_are_refused(void **state) {
     bad[7].camera.fov = 4.0;
     vsh_error error;
     for (int i = 0; i < 8; ++i) {
-        assert_int_equal(vsh_render(&surface, 1, field, NULL, 0, &bad[i], NULL, &picture, NULL, &error),
-                         VSH_ERROR_ARGUMENT);
+        assert_int_equal(
+            vsh_render(&surface, 1, occluders_of(field), NULL, 0, &bad[i], NULL, &picture, NULL, &error),
+            VSH_ERROR_ARGUMENT);
         assert_non_null(strstr(error.message, parts[i]));
     }
-    assert_int_equal(vsh_render(&bright, 1, field, NULL, 0, &good, NULL, &picture, NULL, &error),
+    assert_int_equal(
+        vsh_render(&bright, 1, occluders_of(field), NULL, 0, &good, NULL, &picture, NULL, &error),
+        VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_render(&none, 1, occluders_of(field), NULL, 0, &good, NULL, &picture, NULL, &error),
                      VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_render(&none, 1, field, NULL, 0, &good, NULL, &picture, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_render(&surface, 1, field, NULL, 1, &good, NULL, &picture, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(
+        vsh_render(&surface, 1, occluders_of(field), NULL, 1, &good, NULL, &picture, NULL, &error),
+        VSH_ERROR_ARGUMENT);
     assert_int_equal(vsh_render(&surface, 1, NULL, NULL, 0, &good, NULL, &picture, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     vsh_field_free(field);

@@ -91,16 +91,19 @@ static void a_lightmap_is_looked_up_where_it_was_baked(void **state) {
     vsh_lit_meshes wrong = {&mesh, 1, &missing, {0.5, 0.5, 0.5}, 0};
     vsh_error error;
     o.lit = &wrong;
-    assert_int_equal(vsh_render(&surface, 1, field, &light, 1, &o, NULL, &picture, NULL, &error),
-                     VSH_ERROR_INPUT);
+    assert_int_equal(
+        vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &error),
+        VSH_ERROR_INPUT);
     assert_non_null(strstr(error.message, "shadow.sun"));
     wrong.meshes = NULL;
-    assert_int_equal(vsh_render(&surface, 1, field, &light, 1, &o, NULL, &picture, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(
+        vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &error),
+        VSH_ERROR_ARGUMENT);
     assert_string_equal(error.message, "lit meshes 0: no lightmap, or no meshes");
     o.lit = NULL;
-    assert_int_equal(vsh_render(&surface, 1, field, &light, 1, &o, NULL, &picture, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(
+        vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &error),
+        VSH_ERROR_ARGUMENT);
     assert_string_equal(error.message, "lit is NULL with a lit_count of 1");
     vsh_field_free(field);
 }

@@ -310,19 +310,23 @@ static void jittered_steps_leave_grain(void **state) {
     vsh_shade_options options = preview_options();
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_shade_stats whole = vsh_shade_stats_zero(), shorter = vsh_shade_stats_zero();
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, plain, NULL, &whole, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, plain, NULL, &whole, NULL),
+        VSH_OK);
     options.jitter = 0.5;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, jittered, NULL, &shorter, NULL),
+    assert_int_equal(vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, jittered, NULL,
+                                      &shorter, NULL),
                      VSH_OK);
     vsh_run one = vsh_run_default();
     one.threads = 1;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, &one, again, NULL, NULL, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, &options, &one, again, NULL, NULL, NULL),
+        VSH_OK);
     assert_memory_equal(jittered, again, sizeof again);
     options.frame = 1;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, other, NULL, NULL, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, other, NULL, NULL, NULL),
+        VSH_OK);
     size_t changed = 0, moved = 0, grey = 0;
     for (size_t i = 0; i < COUNT; ++i) {
         grey += plain[i] > 0.05f && plain[i] < 0.95f;

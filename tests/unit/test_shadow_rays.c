@@ -18,7 +18,8 @@ static vsh_shade_stats shade(const vsh_field *field, const vsh_light *light, con
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(field, &points, light, options, NULL, values, errors, &stats, &error) != VSH_OK) {
+    if (vsh_shade_shadow(occluders_of(field), &points, light, options, NULL, values, errors, &stats,
+                         &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;
@@ -241,7 +242,7 @@ static void threads_and_order_do_not_show(void **state) {
             run.threads = i == 0 ? 1 : i == 1 ? 2 : 5;
             stats[i] = vsh_shade_stats_zero();
             const vsh_points points = {64 * 64, positions, normals, texels};
-            assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, &run,
+            assert_int_equal(vsh_shade_shadow(occluders_of(field), &points, &light, &options, &run,
                                               i == 0 ? reference : visible, deviation, &stats[i], NULL),
                              VSH_OK);
             assert_memory_equal(reference, i == 0 ? reference : visible, sizeof visible[0] * 64 * 64);
@@ -252,14 +253,15 @@ static void threads_and_order_do_not_show(void **state) {
         for (int32_t method = VSH_SHADOW_RAYS; method <= VSH_SHADOW_ADAPTIVE; ++method) {
             options.method = method;
             const vsh_points points = {64 * 64, positions, normals, texels};
-            assert_int_equal(
-                vsh_shade_shadow(field, &points, &light, &options, NULL, reference, NULL, NULL, NULL),
-                VSH_OK);
+            assert_int_equal(vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, reference,
+                                              NULL, NULL, NULL),
+                             VSH_OK);
             for (size_t i = 100; i < 4096; i += 397) {
                 const vsh_points one = {1, positions + 3 * i, normals + 3 * i, texels + i};
                 float value;
-                assert_int_equal(
-                    vsh_shade_shadow(field, &one, &light, &options, NULL, &value, NULL, NULL, NULL), VSH_OK);
+                assert_int_equal(vsh_shade_shadow(occluders_of(field), &one, &light, &options, NULL, &value,
+                                                  NULL, NULL, NULL),
+                                 VSH_OK);
                 const double room = method == VSH_SHADOW_RAYS ? 0.0 : 3.0 * options.max_error;
                 assert_true(fabs((double)value - (double)reference[i]) <= room);
             }

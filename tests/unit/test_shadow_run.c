@@ -42,7 +42,7 @@ static void neither_threads_nor_neighbours_show_in_the_bits(void **state) {
                 vsh_run run = vsh_run_default();
                 run.threads = threads[i];
                 stats[i] = vsh_shade_stats_zero();
-                assert_int_equal(vsh_shade_shadow(field, &points, &lights[l], &options, &run,
+                assert_int_equal(vsh_shade_shadow(occluders_of(field), &points, &lights[l], &options, &run,
                                                   i == 0 ? first : other, NULL, &stats[i], NULL),
                                  VSH_OK);
                 if (i > 0) {
@@ -120,9 +120,13 @@ static void every_point_is_marched_skipped_certified_or_invalid(void **state) {
     /* calls add to what is there */
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_shade_stats sum = vsh_shade_stats_zero();
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, NULL, visible, NULL, &sum, NULL), VSH_OK);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, NULL, NULL, visible, NULL, &sum, NULL),
+        VSH_OK);
     const vsh_shade_stats once = sum;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, NULL, visible, NULL, &sum, NULL), VSH_OK);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, NULL, NULL, visible, NULL, &sum, NULL),
+        VSH_OK);
     assert_int_equal(sum.marches, 2 * once.marches);
     assert_int_equal(sum.samples, 2 * once.samples);
     assert_int_equal(sum.certified, 2 * once.certified);
@@ -183,14 +187,16 @@ static void running_out_of_steps_is_counted_and_stays_in_range(void **state) {
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_shade_stats few = vsh_shade_stats_zero(), many = vsh_shade_stats_zero();
     options.max_steps = 16;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &few, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, visible, NULL, &few, NULL),
+        VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_true(visible[i] >= 0.0f && visible[i] <= 1.0f);
     }
     options.max_steps = 65536;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, &many, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, visible, NULL, &many, NULL),
+        VSH_OK);
     print_message("of %d grazing rays, %d out of 16 steps\n", COUNT, (int)few.unfinished);
     assert_true(few.unfinished > 100);
     assert_true(few.samples <= 16 * few.marches);
@@ -226,30 +232,34 @@ static void options_lights_and_cancelling_have_their_codes(void **state) {
     vsh_error error = {VSH_OK, ""};
     vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_AUTO + 1;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, visible, NULL, NULL, &error),
+        VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "method"));
     options = preview_options();
     options.max_steps = 15;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, visible, NULL, NULL, &error),
+        VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "max_steps"));
     const double offsets[] = {-0.1, 17.0, (double)NAN};
     for (int i = 0; i < 3; ++i) {
         options = preview_options();
         options.start_offset = offsets[i];
-        assert_int_equal(
-            vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
-            VSH_ERROR_ARGUMENT);
+        assert_int_equal(vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, visible, NULL,
+                                          NULL, &error),
+                         VSH_ERROR_ARGUMENT);
         assert_non_null(strstr(error.message, "start_offset"));
     }
     options = preview_options();
     options.struct_size = 3;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, visible, NULL, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, visible, NULL, NULL, &error),
+        VSH_ERROR_ARGUMENT);
     light.angle = -1.0;
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, NULL, visible, NULL, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, NULL, NULL, visible, NULL, NULL, &error),
+        VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "angle"));
 
     light.angle = 0.2;
@@ -259,11 +269,13 @@ static void options_lights_and_cancelling_have_their_codes(void **state) {
         vsh_run run = vsh_run_default();
         run.progress = stop_at;
         run.user = &stop;
-        assert_int_equal(vsh_shade_shadow(field, &points, &light, NULL, &run, visible, NULL, NULL, &error),
-                         VSH_ERROR_CANCELLED);
+        assert_int_equal(
+            vsh_shade_shadow(occluders_of(field), &points, &light, NULL, &run, visible, NULL, NULL, &error),
+            VSH_ERROR_CANCELLED);
     }
     const vsh_points none = {0, NULL, NULL, NULL};
-    assert_int_equal(vsh_shade_shadow(field, &none, &light, NULL, NULL, NULL, NULL, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_shadow(occluders_of(field), &none, &light, NULL, NULL, NULL, NULL, NULL, NULL),
+                     VSH_OK);
     assert_true(shadow_at(field, &light, VSH_SHADOW_CONE, (const double[]){0.0, 9.0, 0.0}, UP) == 1.0f);
     vsh_field_free(field);
 }

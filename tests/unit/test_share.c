@@ -247,8 +247,9 @@ static vsh_shade_stats shade(const vsh_field *field, const uint32_t *at, int32_t
     options.rays = 1024;
     options.max_error = max_error;
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    assert_int_equal(vsh_shade_shadow(field, &points, &light, &options, NULL, values, errors, &stats, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, values, errors, &stats, NULL),
+        VSH_OK);
     return stats;
 }
 

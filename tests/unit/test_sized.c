@@ -1,4 +1,5 @@
 /* Structs of another version of the headers: what a call fills ends where the caller's struct does. */
+#include "casts.h"
 #include "grids.h"
 #include "scenes.h"
 
@@ -60,9 +61,19 @@ static void a_call_fills_the_struct_that_the_caller_has(void **state) {
     assert_int_equal(vsh_field_create(grid, NULL, NULL, &field, &why), VSH_OK);
     assert_int_equal(vsh_voxels_from_grid(grid, 1.0, NULL, &voxels, &why), VSH_OK);
     const vsh_light light = vsh_light_default();
-    assert_int_equal(vsh_bake_volume(field, voxels, &light, 1, NULL, NULL, &volume, NULL, &why), VSH_OK);
+    assert_int_equal(vsh_bake_volume(occluders_of(field), voxels, &light, 1, NULL, NULL, &volume, NULL, &why),
+                     VSH_OK);
     HOLDS(vsh_grid_info, 1, vsh_grid_get_info_sized(grid, (void *)room, size));
     HOLDS(vsh_field_info, 1, vsh_field_get_info_sized(field, (void *)room, size));
+    vsh_occluders *casters = NULL;
+    assert_int_equal(vsh_occluders_from_grid(grid, NULL, NULL, &casters, &why), VSH_OK);
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(casters, &parts);
+    vsh_occluders_free(casters);
+    parts.field = field;
+    assert_int_equal(vsh_occluders_from_parts(&parts, &casters, &why), VSH_OK); /* no seconds in it */
+    HOLDS(vsh_occluders_info, 1, vsh_occluders_get_info_sized(casters, (void *)room, size));
+    vsh_occluders_free(casters);
     HOLDS(vsh_voxels_info, 1, vsh_voxels_get_info_sized(voxels, (void *)room, size));
     HOLDS(vsh_volume_info, 1, vsh_volume_get_info_sized(volume, (void *)room, size));
     HOLDS(vsh_volume_grid, 1, vsh_volume_get_grid_sized(volume, 0, (void *)room, size));
@@ -133,6 +144,11 @@ static void bindings_have_the_defaults_of_the_headers(void **state) {
     STARTS(vsh_shade_options, vsh_shade_options_default, 0, offsetof(vsh_shade_options, method),
            offsetof(vsh_shade_options, ao_method), offsetof(vsh_shade_options, max_error) + 4);
     STARTS(vsh_lightmap_options, vsh_lightmap_options_default, 0, offsetof(vsh_lightmap_options, width));
+    STARTS(vsh_occluders_options, vsh_occluders_options_default, 0,
+           offsetof(vsh_occluders_options, triangles), offsetof(vsh_occluders_options, grid));
+    STARTS(vsh_occluder_parts, vsh_occluder_parts_default, 0, offsetof(vsh_occluder_parts, layer_count));
+    STARTS(vsh_scene_occluders_options, vsh_scene_occluders_options_default, 0,
+           offsetof(vsh_scene_occluders_options, triangles));
     STARTS(vsh_light, vsh_light_default, offsetof(vsh_light, name), offsetof(vsh_light, type));
     STARTS(vsh_sdf_node, vsh_sdf_node_default, offsetof(vsh_sdf_node, scale) + 4,
            offsetof(vsh_sdf_node, radius) + 4);

@@ -30,7 +30,7 @@ static void a_box_around_a_ball_holds_its_umbra_its_penumbra_and_light(void **st
     vsh_field *field = field_of(ball(), voxel, 4.0);
     vsh_voxels *voxels = cube_of(3.0, 0.1);
     const vsh_light light = sun(TOWARDS, angle);
-    vsh_volume *volume = bake(field, voxels, &light, 1, NULL, NULL);
+    vsh_volume *volume = bake(occluders_of(field), voxels, &light, 1, NULL, NULL);
     dense d = copy_of(volume, 0, voxels);
     double *centre = centres_of(&d, voxels);
     double square = 0.0;
@@ -76,7 +76,7 @@ static void ao_of_free_space_is_the_free_share_of_all_directions(void **state) {
         options.shade.ao_distance = 8.0;
         options.shade.ao_method = methods[m].method;
         options.shade.ao_cones = options.shade.rays = methods[m].number;
-        vsh_volume *volume = bake(field, voxels, NULL, 0, &options, NULL);
+        vsh_volume *volume = bake(occluders_of(field), voxels, NULL, 0, &options, NULL);
         dense d = copy_of(volume, 0, voxels);
         double *centre = centres_of(&d, voxels), square = 0.0;
         size_t count = 0;
@@ -187,11 +187,12 @@ static void values_are_those_of_queries_at_the_voxels_centres(void **state) {
         options.ao = method == VSH_SHADOW_CONE;
         options.shade.ao_distance = 0.5;
         vsh_query *query = NULL;
-        assert_int_equal(vsh_query_create(field, lights, LIGHTS, &options.shade, &query, NULL), VSH_OK);
+        assert_int_equal(vsh_query_create(occluders_of(field), lights, LIGHTS, &options.shade, &query, NULL),
+                         VSH_OK);
         const vsh_voxels *all[] = {band, fine, coarse};
         for (size_t v = 0; v < 3; ++v) {
             options.ao = method == VSH_SHADOW_CONE && v == 0;
-            vsh_volume *volume = bake(field, all[v], lights, LIGHTS, &options, NULL);
+            vsh_volume *volume = bake(occluders_of(field), all[v], lights, LIGHTS, &options, NULL);
             vsh_volume_info info;
             vsh_volume_get_info(volume, &info);
             assert_int_equal(info.grids, LIGHTS + options.ao);
@@ -217,7 +218,7 @@ static void blocks_that_are_proved_open_are_open(void **state) {
     vsh_volume_options options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_distance = 0.3;
-    vsh_volume *volume = bake(field, voxels, NULL, 0, &options, NULL);
+    vsh_volume *volume = bake(occluders_of(field), voxels, NULL, 0, &options, NULL);
     dense d = copy_of(volume, 0, voxels);
     double *centre = centres_of(&d, voxels);
     size_t open = 0, closed = 0;
@@ -251,12 +252,11 @@ static void layers_hide_light_and_are_solid(void **state) {
     vsh_volume_options options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_distance = 0.5;
-    options.shade.layers = &layer;
-    options.shade.layer_count = 1;
     const vsh_light light = sun(TOWARDS, 0.1);
-    vsh_volume *volume = bake(field, voxels, &light, 1, &options, NULL);
+    vsh_volume *volume = bake(occluders_with(field, &layer, 1), voxels, &light, 1, &options, NULL);
     vsh_query *query = NULL;
-    assert_int_equal(vsh_query_create(field, &light, 1, &options.shade, &query, NULL), VSH_OK);
+    assert_int_equal(
+        vsh_query_create(occluders_with(field, &layer, 1), &light, 1, &options.shade, &query, NULL), VSH_OK);
     dense d = copy_of(volume, 0, voxels), ao = copy_of(volume, 1, voxels);
     double *centre = centres_of(&d, voxels);
     float *one = distances_of(field, d.count, centre), *two = distances_of(of_layer, d.count, centre);
@@ -311,7 +311,7 @@ static void a_lightmap_and_a_band_agree_where_texel_and_voxel_meet(void **state)
     options.ao = 1;
     options.shade.ao_distance = 0.5;
     options.shade.ao_cones = 64;
-    vsh_volume *volume = bake(field, voxels, &light, 1, &options, NULL);
+    vsh_volume *volume = bake(occluders_of(field), voxels, &light, 1, &options, NULL);
 
     const float low = (float)(-half - 0.5 * voxel), high = (float)(half - 0.5 * voxel);
     const float positions[12] = {low, 0, high, high, 0, high, high, 0, low, low, 0, low};
@@ -328,8 +328,9 @@ static void a_lightmap_and_a_band_agree_where_texel_and_voxel_meet(void **state)
     static float shadow[TEXELS], ao[TEXELS], coverage[TEXELS];
     float *const shadows_of[1] = {shadow};
     const vsh_lightmap planes = {.shadow = shadows_of, .ao = ao, .coverage = coverage};
-    assert_int_equal(vsh_bake_lightmap(field, texels, &light, 1, &options.shade, NULL, &planes, NULL, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_bake_lightmap(occluders_of(field), texels, &light, 1, &options.shade, NULL, &planes, NULL, NULL),
+        VSH_OK);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     assert_int_equal(samples.count, TEXELS);
     double worst[2] = {0.0, 0.0}, square[2] = {0.0, 0.0};
@@ -389,12 +390,11 @@ static void casters_without_voxels_hide_light_and_are_solid(void **state) {
     layers[1].heights = heights;
     vsh_voxels *voxels = cube_of(2.6, 0.05);
     vsh_volume_options options = preview_volume_options();
-    options.shade.layers = layers;
-    options.shade.layer_count = 2;
     const vsh_light light = sun(TOWARDS, 0.1);
-    vsh_volume *volume = bake(field, voxels, &light, 1, &options, NULL);
+    vsh_volume *volume = bake(occluders_with(field, layers, 2), voxels, &light, 1, &options, NULL);
     vsh_query *query = NULL;
-    assert_int_equal(vsh_query_create(field, &light, 1, &options.shade, &query, NULL), VSH_OK);
+    assert_int_equal(
+        vsh_query_create(occluders_with(field, layers, 2), &light, 1, &options.shade, &query, NULL), VSH_OK);
     dense d = copy_of(volume, 0, voxels);
     double *centre = centres_of(&d, voxels);
     float *distance = distances_of(field, d.count, centre), *answer = malloc(d.count * sizeof *answer);
@@ -429,12 +429,13 @@ static void casters_without_voxels_hide_light_and_are_solid(void **state) {
 
     options.ao = 1;
     vsh_error error;
-    assert_int_equal(vsh_bake_volume(field, voxels, &light, 1, &options, NULL, &volume, NULL, &error),
+    assert_int_equal(vsh_bake_volume(occluders_with(field, layers, 2), voxels, &light, 1, &options, NULL,
+                                     &volume, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     assert_string_equal(error.message,
                         "AO in free space: heightfields and spheres know of none without voxels");
     layers[0].ao = layers[1].ao = 0;
-    volume = bake(field, voxels, &light, 1, &options, NULL);
+    volume = bake(occluders_with(field, layers, 2), voxels, &light, 1, &options, NULL);
     vsh_volume_free(volume);
     free(answer);
     free(distance);

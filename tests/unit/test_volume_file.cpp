@@ -65,26 +65,27 @@ vsh_voxels_info info_of(const vsh_voxels *voxels) {
 }
 
 // A unit ball at the origin.
-vsh_field *ball() {
+vsh_occluders *ball() {
     vsh_sdf_node node = vsh_sdf_node_default();
     const vsh_sdf tree = {&node, 1};
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = 0.1;
     vsh_grid *grid = nullptr;
-    vsh_field *field = nullptr;
+    vsh_occluders *occluders = nullptr;
     assert_int_equal(vsh_grid_from_sdf(&tree, &options, nullptr, &grid, &failure), VSH_OK);
-    assert_int_equal(vsh_field_create(grid, nullptr, nullptr, &field, &failure), VSH_OK);
+    assert_int_equal(vsh_occluders_from_grid(grid, nullptr, nullptr, &occluders, &failure), VSH_OK);
     vsh_grid_free(grid);
-    return field;
+    return occluders;
 }
 
-vsh_volume *bake(const vsh_field *field, const vsh_voxels *voxels, bool ao) {
+vsh_volume *bake(const vsh_occluders *occluders, const vsh_voxels *voxels, bool ao) {
     vsh_light light = vsh_light_default();
     light.angle = 0.1;
     vsh_volume_options options = preview_volume_options();
     options.ao = ao;
     vsh_volume *volume = nullptr;
-    if (vsh_bake_volume(field, voxels, &light, 1, &options, nullptr, &volume, nullptr, &failure) != VSH_OK) {
+    if (vsh_bake_volume(occluders, voxels, &light, 1, &options, nullptr, &volume, nullptr, &failure) !=
+        VSH_OK) {
         fail_msg("%s", failure.message);
     }
     return volume;
@@ -133,8 +134,8 @@ void a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles(void **) {
     vsh_voxels_centre(voxels, index, centre);
     assert_true((Vec3d(centre) - source->indexToWorld(Coord(17, 18, 19))).length() < 1e-12);
 
-    vsh_field *field = ball();
-    vsh_volume *volume = bake(field, voxels, false);
+    vsh_occluders *occluders = ball();
+    vsh_volume *volume = bake(occluders, voxels, false);
     const FloatGrid::Ptr lit = written(volume, "lit.vdb", "shadow.sun", false);
     assert_true(lit->transform() == source->transform());
     vsh_volume_info done;
@@ -158,7 +159,7 @@ void a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles(void **) {
     }
     assert_true(dark > 1000 && light > 100);
     vsh_volume_free(volume);
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     vsh_voxels_free(voxels);
 }
 
@@ -195,8 +196,8 @@ void a_frustum_keeps_its_map(void **) {
                                                  Vec3d(0.0, 0.275, -0.415), 0.5, 8.0, 32, 32, 32);
     source->setTransform(std::make_shared<openvdb::math::Transform>(map.copy()));
     vsh_voxels *voxels = like(save("frustum.vdb", {source}), nullptr);
-    vsh_field *field = ball();
-    vsh_volume *volume = bake(field, voxels, false);
+    vsh_occluders *occluders = ball();
+    vsh_volume *volume = bake(occluders, voxels, false);
     const FloatGrid::Ptr lit = written(volume, "frustum-lit.vdb", "shadow.sun", false);
     assert_true(lit->transform() == source->transform());
     size_t dark = 0;
@@ -211,7 +212,7 @@ void a_frustum_keeps_its_map(void **) {
     }
     assert_true(dark > 10);
     vsh_volume_free(volume);
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
     vsh_voxels_free(voxels);
 }
 
@@ -253,11 +254,11 @@ void what_has_no_voxels_is_refused(void **) {
 }
 
 void other_programs_read_names_class_metadata_and_halves(void **) {
-    vsh_field *field = ball();
+    vsh_occluders *occluders = ball();
     const double low[3] = {-2, -2, -2}, high[3] = {2, 2, 2};
     vsh_voxels *voxels = nullptr;
     assert_int_equal(vsh_voxels_from_box(low, high, 0.1, nullptr, &voxels, &failure), VSH_OK);
-    vsh_volume *volume = bake(field, voxels, true);
+    vsh_volume *volume = bake(occluders, voxels, true);
     const FloatGrid::Ptr full = written(volume, "full.vdb", "shadow.sun", false);
     const FloatGrid::Ptr rounded = written(volume, "half.vdb", "shadow.sun", true);
     assert_true(!full->saveFloatAsHalf() && rounded->saveFloatAsHalf());
@@ -306,15 +307,15 @@ void other_programs_read_names_class_metadata_and_halves(void **) {
     }
     vsh_volume_free(volume);
     vsh_voxels_free(voxels);
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
 }
 
 void a_failed_write_leaves_the_old_file(void **) {
-    vsh_field *field = ball();
+    vsh_occluders *occluders = ball();
     const double low[3] = {-1.5, -1.5, -1.5}, high[3] = {1.5, 1.5, 1.5};
     vsh_voxels *voxels = nullptr;
     assert_int_equal(vsh_voxels_from_box(low, high, 0.1, nullptr, &voxels, &failure), VSH_OK);
-    vsh_volume *volume = bake(field, voxels, false);
+    vsh_volume *volume = bake(occluders, voxels, false);
     const std::string inner = in_folder("closed"), path = inner + "/out.vdb";
     assert_int_equal(std::system(("mkdir '" + inner + "'").c_str()), 0);
     assert_int_equal(vsh_volume_write(volume, inner.c_str(), 0, &failure), VSH_ERROR_WRITE); // a folder
@@ -327,7 +328,7 @@ void a_failed_write_leaves_the_old_file(void **) {
     assert_true(content(path) != "old");
     vsh_volume_free(volume);
     vsh_voxels_free(voxels);
-    vsh_field_free(field);
+    vsh_occluders_free(occluders);
 }
 
 int remove_folder(void **) {

@@ -34,7 +34,7 @@ static void interpolating_at_the_surface_darkens_nothing(void **state) {
     vsh_voxels *voxels = band_of(grid, 0.0);
     vsh_field *field = field_of_grid(grid, 1.0);
     const vsh_light light = sun(UP, RADIANS(5.0));
-    vsh_volume *volume = bake(field, voxels, &light, 1, NULL, NULL);
+    vsh_volume *volume = bake(occluders_of(field), voxels, &light, 1, NULL, NULL);
     uint64_t counter = 5;
     size_t lit = 0, dark = 0;
     for (int i = 0; i < 4000; ++i) {
@@ -67,9 +67,9 @@ static void inside_voxels_take_the_nearest_outside_value_or_are_off(void **state
     const vsh_light light = sun(towards, RADIANS(60.0));
     for (int v = 0; v < 2; ++v) {
         vsh_volume_options options = preview_volume_options();
-        vsh_volume *nearest = bake(field, all[v], &light, 1, &options, NULL);
+        vsh_volume *nearest = bake(occluders_of(field), all[v], &light, 1, &options, NULL);
         options.inside = VSH_INSIDE_OFF;
-        vsh_volume *off = bake(field, all[v], &light, 1, &options, NULL);
+        vsh_volume *off = bake(occluders_of(field), all[v], &light, 1, &options, NULL);
         vsh_volume_info filled, left;
         vsh_volume_get_info(nearest, &filled);
         vsh_volume_get_info(off, &left);
@@ -141,7 +141,7 @@ static void a_narrower_band_holds_only_voxels_so_near(void **state) {
     assert_true(info[0].has_normals == 1);
     vsh_field *field = field_of_grid(grid, 1.0);
     const vsh_light light = sun(UP, 0.1);
-    vsh_volume *volume = bake(field, narrow, &light, 1, NULL, NULL);
+    vsh_volume *volume = bake(occluders_of(field), narrow, &light, 1, NULL, NULL);
     dense d = copy_of(volume, 0, narrow);
     vsh_volume_grid made;
     vsh_volume_get_grid(volume, 0, &made);
@@ -162,7 +162,7 @@ static void uniform_regions_are_tiles(void **state) {
     vsh_field *field = field_of(ball(), 0.05, 4.0);
     vsh_voxels *voxels = box_of(low, high, 0.1);
     const vsh_light light = sun(UP, RADIANS(3.0));
-    vsh_volume *volume = bake(field, voxels, &light, 1, NULL, NULL);
+    vsh_volume *volume = bake(occluders_of(field), voxels, &light, 1, NULL, NULL);
     vsh_volume_grid grid;
     vsh_volume_info info;
     vsh_volume_get_grid(volume, 0, &grid);
@@ -217,7 +217,7 @@ static void the_same_file_for_any_number_of_threads_and_instruction_set(void **s
                 vsh_run run = vsh_run_default();
                 run.threads = n == 0 ? 1 : 7;
                 run.isa = n == 2 ? VSH_ISA_BASE : VSH_ISA_BEST;
-                vsh_volume *volume = bake(field, all[v], &light, 1, &options, &run);
+                vsh_volume *volume = bake(occluders_of(field), all[v], &light, 1, &options, &run);
                 vsh_volume_info info;
                 vsh_volume_get_info(volume, &info);
                 assert_int_equal(info.grids, m == 0 ? 2 : 4);
@@ -250,7 +250,7 @@ static void samples_are_interpolated_between_voxels(void **state) {
     vsh_field *field = field_of(ball(), 0.1, 4.0);
     vsh_voxels *voxels = cube_of(2.0, 0.25);
     const vsh_light light = sun(UP, RADIANS(40.0));
-    vsh_volume *volume = bake(field, voxels, &light, 1, NULL, NULL);
+    vsh_volume *volume = bake(occluders_of(field), voxels, &light, 1, NULL, NULL);
     dense d = copy_of(volume, 0, voxels);
     assert_true(d.size[0] == 16 && d.size[1] == 16 && d.size[2] == 16);
     float value;
@@ -317,7 +317,7 @@ static void progress_goes_to_one_and_cancels_anywhere(void **state) {
         vsh_volume *volume = NULL;
         vsh_shade_stats stats = vsh_shade_stats_zero();
         const vsh_result result =
-            vsh_bake_volume(field, voxels, &light, 1, NULL, &run, &volume, &stats, &failure);
+            vsh_bake_volume(occluders_of(field), voxels, &light, 1, NULL, &run, &volume, &stats, &failure);
         if (i == 0) {
             assert_int_equal(result, VSH_OK);
             assert_true(w.last == 1.0 && stats.samples > 0);
@@ -349,7 +349,7 @@ static void memory_is_estimated_before_it_is_taken(void **state) {
     strcpy(lights[1].name, "moon");
     vsh_volume *volume = NULL;
     run.memory_limit = 1600000; /* 1000 blocks: enough for the one, not for its values */
-    assert_fails(vsh_bake_volume(field, voxels, lights, 2, NULL, &run, &volume, NULL, &failure),
+    assert_fails(vsh_bake_volume(occluders_of(field), voxels, lights, 2, NULL, &run, &volume, NULL, &failure),
                  VSH_ERROR_LIMIT, "2 grids of 512000 voxels");
     run.memory_limit = 0;
     /* 2^31 voxels and more: refused by memory, or by what indices hold, wherever it runs */
@@ -399,33 +399,36 @@ static void bad_boxes_bands_and_options_are_refused(void **state) {
     vsh_volume *volume = NULL;
     vsh_volume_options options = preview_volume_options();
     vsh_light lights[2] = {sun(UP, 0.1), sun(UP, 0.2)};
-    assert_fails(vsh_bake_volume(field, voxels, NULL, 0, NULL, NULL, &volume, NULL, &failure),
+    assert_fails(vsh_bake_volume(occluders_of(field), voxels, NULL, 0, NULL, NULL, &volume, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "nothing to bake");
-    assert_fails(vsh_bake_volume(field, voxels, lights, 2, NULL, NULL, &volume, NULL, &failure),
+    assert_fails(vsh_bake_volume(occluders_of(field), voxels, lights, 2, NULL, NULL, &volume, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "both named 'sun'");
     lights[1].name[0] = '\0';
-    assert_fails(vsh_bake_volume(field, voxels, lights, 2, NULL, NULL, &volume, NULL, &failure),
+    assert_fails(vsh_bake_volume(occluders_of(field), voxels, lights, 2, NULL, NULL, &volume, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "light 1: no name");
     lights[0].angle = -1.0;
-    assert_fails(vsh_bake_volume(field, voxels, lights, 1, NULL, NULL, &volume, NULL, &failure),
+    assert_fails(vsh_bake_volume(occluders_of(field), voxels, lights, 1, NULL, NULL, &volume, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "light 0");
     lights[0].angle = 0.1;
     options.inside = 7;
-    assert_fails(vsh_bake_volume(field, voxels, lights, 1, &options, NULL, &volume, NULL, &failure),
-                 VSH_ERROR_ARGUMENT, "inside 7");
+    assert_fails(
+        vsh_bake_volume(occluders_of(field), voxels, lights, 1, &options, NULL, &volume, NULL, &failure),
+        VSH_ERROR_ARGUMENT, "inside 7");
     options = preview_volume_options();
     options.shade.rays = 4097;
-    assert_fails(vsh_bake_volume(field, voxels, lights, 1, &options, NULL, &volume, NULL, &failure),
-                 VSH_ERROR_ARGUMENT, "rays 4097");
+    assert_fails(
+        vsh_bake_volume(occluders_of(field), voxels, lights, 1, &options, NULL, &volume, NULL, &failure),
+        VSH_ERROR_ARGUMENT, "rays 4097");
     options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_method = VSH_AO_TAPS;
-    assert_fails(vsh_bake_volume(field, voxels, lights, 1, &options, NULL, &volume, NULL, &failure),
-                 VSH_ERROR_ARGUMENT, "taps");
+    assert_fails(
+        vsh_bake_volume(occluders_of(field), voxels, lights, 1, &options, NULL, &volume, NULL, &failure),
+        VSH_ERROR_ARGUMENT, "taps");
     options.ao = 0; /* not asked for */
-    vsh_volume *made = bake(field, voxels, lights, 1, &options, NULL);
+    vsh_volume *made = bake(occluders_of(field), voxels, lights, 1, &options, NULL);
     assert_fails(vsh_bake_volume(NULL, voxels, lights, 1, NULL, NULL, &volume, NULL, &failure),
-                 VSH_ERROR_ARGUMENT, "field is NULL");
+                 VSH_ERROR_ARGUMENT, "occluders is NULL");
     assert_null(volume);
     assert_fails(vsh_volume_write(made, "/nowhere/at/all/x.vdb", 0, &failure), VSH_ERROR_WRITE, "/nowhere");
     vsh_volume_free(made);

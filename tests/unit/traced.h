@@ -15,6 +15,8 @@ typedef struct caster {
     vsh_triangles *triangles; /* NULL without Embree */
 } caster;
 
+#define occluders_of_caster(c) occluders_traced((c)->field, (c)->triangles)
+
 /* Numbers of methods that can be asked for here: the exact ones are the last. */
 static inline int32_t shadow_methods(void) {
     return vsh_triangles_available() ? VSH_SHADOW_EXACT + 1 : VSH_SHADOW_EXACT;
@@ -149,11 +151,11 @@ static inline vsh_shade_stats cast_shadows(const caster *c, const vsh_light *lig
                                            float *visible) {
     vsh_shade_options options = preview_options();
     options.method = method;
-    options.triangles = c->triangles;
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(c->field, &points, light, &options, NULL, visible, NULL, &stats, &error) != VSH_OK) {
+    if (vsh_shade_shadow(occluders_of_caster(c), &points, light, &options, NULL, visible, NULL, &stats,
+                         &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;
@@ -171,11 +173,10 @@ static inline vsh_shade_stats cast_ao(const caster *c, int32_t method, double di
     vsh_shade_options options = preview_options();
     options.ao_method = method;
     options.ao_distance = distance;
-    options.triangles = c->triangles;
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_ao(c->field, &points, &options, NULL, open, NULL, &stats, &error) != VSH_OK) {
+    if (vsh_shade_ao(occluders_of_caster(c), &points, &options, NULL, open, NULL, &stats, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;

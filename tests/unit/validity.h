@@ -2,6 +2,7 @@
 #ifndef TESTS_VALIDITY_H
 #define TESTS_VALIDITY_H
 
+#include "casts.h"
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -121,14 +122,15 @@ static inline baked bake(const vsh_mesh *mesh, int32_t resolution, int32_t threa
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = distance;
     options.shade.rays = 16;
-    options.shade.triangles = triangles;
     check(vsh_texels_create(mesh, 1, &options, &run, NULL, &b.texels, &error), &error);
     b.samples = vsh_texels_samples(b.texels);
     b.ao = calloc(SIZE * SIZE, sizeof *b.ao);
     b.coverage = calloc(SIZE * SIZE, sizeof *b.coverage);
     b.stats.invalid_by_mesh = &b.invalid;
     const vsh_lightmap lightmap = {.ao = b.ao, .coverage = b.coverage};
-    check(vsh_bake_lightmap(field, b.texels, NULL, 0, NULL, &run, &lightmap, &b.stats, &error), &error);
+    check(vsh_bake_lightmap(occluders_traced(field, triangles), b.texels, NULL, 0, NULL, &run, &lightmap,
+                            &b.stats, &error),
+          &error);
     vsh_triangles_free(triangles);
     vsh_field_free(field);
     vsh_grid_free(grid);

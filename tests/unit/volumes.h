@@ -31,11 +31,12 @@ static inline vsh_voxels *band_of(const vsh_grid *grid, double band) {
     return voxels;
 }
 
-static inline vsh_volume *bake(const vsh_field *field, const vsh_voxels *voxels, const vsh_light *lights,
-                               size_t count, const vsh_volume_options *options, const vsh_run *run) {
+static inline vsh_volume *bake(const vsh_occluders *occluders, const vsh_voxels *voxels,
+                               const vsh_light *lights, size_t count, const vsh_volume_options *options,
+                               const vsh_run *run) {
     vsh_volume *volume = NULL;
     vsh_error error = {VSH_OK, ""};
-    if (vsh_bake_volume(field, voxels, lights, count, options, run, &volume, NULL, &error) != VSH_OK) {
+    if (vsh_bake_volume(occluders, voxels, lights, count, options, run, &volume, NULL, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return volume;

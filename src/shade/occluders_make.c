@@ -1,27 +1,50 @@
-/* What casts, from arrays of meshes. */
+/* What casts, from a level set or from arrays of meshes. */
 #include "base/clock.h"
 #include "base/floats.h"
 #include "base/job.h"
 #include "shade/occluders.h"
 
-static vsh_result make_field(const vsh_mesh *meshes, size_t count, const vsh_occluders_options *options,
-                             const vsh_run *run, vshi_occluders_own *own, vsh_error *error) {
+static vsh_result make_field(const vsh_grid *grid, const vsh_field_options *options, const vsh_run *run,
+                             vshi_occluders_own *own, vsh_error *error) {
+    const double start = vshi_seconds();
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    const vsh_result result = vsh_field_create(grid, options, run, &own->field, error);
+    own->grid_bytes = info.bytes;
+    own->field_s = vshi_seconds() - start;
+    return result;
+}
+
+vsh_result vsh_occluders_from_grid(const vsh_grid *grid, const vsh_field_options *options, const vsh_run *run,
+                                   vsh_occluders **occluders, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(occluders);
+    *occluders = NULL;
+    VSHI_NEEDS(grid);
+    vshi_occluders_own own = {.field = NULL};
+    const vsh_result result = make_field(grid, options, run, &own, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    parts.field = own.field;
+    return vshi_occluders_make(&parts, &own, occluders, error);
+}
+
+static vsh_result make_field_of_meshes(const vsh_mesh *meshes, size_t count,
+                                       const vsh_occluders_options *options, const vsh_run *run,
+                                       vshi_occluders_own *own, vsh_error *error) {
     vsh_grid *grid = NULL;
     const double start = vshi_seconds();
     vsh_result result = vsh_grid_from_meshes(meshes, count, &options->grid, run, &grid, error);
     if (result != VSH_OK) {
         return result;
     }
-    const double voxelized = vshi_seconds();
-    vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
-    own->grid_bytes = info.bytes;
+    own->voxelize_s = vshi_seconds() - start;
     vsh_field_options reach = vsh_field_options_default();
     reach.reach = options->reach;
-    result = vsh_field_create(grid, &reach, run, &own->field, error);
+    result = make_field(grid, &reach, run, own, error);
     vsh_grid_free(grid);
-    own->voxelize_s = voxelized - start;
-    own->field_s = vshi_seconds() - voxelized;
     return result;
 }
 
@@ -38,7 +61,7 @@ vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_count,
     if (result != VSH_OK) {
         return result;
     }
-    result = make_field(meshes, mesh_count, &full, run, &own, error);
+    result = make_field_of_meshes(meshes, mesh_count, &full, run, &own, error);
     if (result == VSH_OK && full.triangles != 0 && vsh_triangles_available()) {
         const double start = vshi_seconds();
         result = vsh_triangles_create(meshes, mesh_count, run, &own.triangles, error);

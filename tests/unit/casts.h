@@ -1,0 +1,12 @@
+/* What casts, of what a test made by hand: as long as the block that it stands in. */
+#ifndef TESTS_CASTS_H
+#define TESTS_CASTS_H
+
+#include "shade/occluders.h"
+
+#define occluders_of(casters) (&(const vsh_occluders){.field = (casters)})
+#define occluders_traced(casters, meshes) (&(const vsh_occluders){.field = (casters), .triangles = (meshes)})
+#define occluders_with(casters, beside, count)                                                               \
+    (&(const vsh_occluders){.field = (casters), .layers = (beside), .layer_count = (count)})
+
+#endif
