@@ -34,6 +34,7 @@
 #define VDBSHADE_H
 
 #include "bake.h"
+#include "bake_scene.h"
 #include "base.h"
 #include "compare.h"
 #include "field.h"

@@ -17,6 +17,7 @@
         made->struct_size = size;                                                                            \
     }
 
+INIT_SIZED(vsh_bake_job_options, vsh_bake_job_options_default)
 INIT_SIZED(vsh_bake_stats, vsh_bake_stats_zero)
 INIT_SIZED(vsh_camera, vsh_camera_default)
 INIT_SIZED(vsh_compare_options, vsh_compare_options_default)
@@ -32,6 +33,7 @@ INIT_SIZED(vsh_occluders_options, vsh_occluders_options_default)
 INIT_SIZED(vsh_provenance_source, vsh_provenance_source_default)
 INIT_SIZED(vsh_query_output, vsh_query_output_default)
 INIT_SIZED(vsh_render_options, vsh_render_options_default)
+INIT_SIZED(vsh_row_sink, vsh_row_sink_default)
 INIT_SIZED(vsh_run, vsh_run_default)
 INIT_SIZED(vsh_scene_occluders_options, vsh_scene_occluders_options_default)
 INIT_SIZED(vsh_shade_options, vsh_shade_options_default)

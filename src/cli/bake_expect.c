@@ -127,13 +127,13 @@ static const double valid_us = 0.25, traced_valid_us = 1.0;
 /* Of a channel's texel, one thread. */
 static const double write_us = 0.07;
 
-static void expect_receiver(const vsh_scene *scene, const cli_expected_receiver *r, double threads) {
-    const double texel = (double)r->texels * micro / threads, sample = (double)r->samples * micro / threads;
+static void expect_lightmap(const vsh_scene *scene, const vsh_job_lightmap *r, double threads) {
+    const double texel = (double)r->covered * micro / threads, sample = (double)r->samples * micro / threads;
     const double valid = is_traced(scene) ? traced_valid_us : valid_us;
     const double shadows = sample * light_us(&scene->shade),
                  ao = scene->ao ? sample * ao_us(&scene->shade) : 0.0;
     cli_progress_expect("charts", CLI_ESTIMATE_SHADE, texel * chart_us);
-    if (r->banded) {
+    if (r->bands > 1) { /* told as one stage */
         const double others = sample * (texel_us + valid) + texel * padding_us;
         cli_progress_expect("bake", CLI_ESTIMATE_SHADE, (double)scene->light_count * shadows + ao + others);
         return;
@@ -154,7 +154,7 @@ static void expect_receiver(const vsh_scene *scene, const cli_expected_receiver 
     cli_progress_expect("padding", CLI_ESTIMATE_SHADE, texel * padding_us);
     const double channels = (double)scene->light_count + (scene->ao ? 1.0 : 0.0) +
                             (scene->irradiance ? 3.0 : 0.0) + 4.0; /* A, and R, G, B */
-    cli_progress_expect("write", CLI_ESTIMATE_FILE, (double)r->texels * channels * write_us * micro);
+    cli_progress_expect("write", CLI_ESTIMATE_FILE, (double)r->covered * channels * write_us * micro);
 }
 
 /* What auto comes to, and the rays that a value may take. */
@@ -167,14 +167,15 @@ static void resolve(vsh_shade_options *shade, int32_t traced) {
     }
 }
 
-void cli_bake_expect(const vsh_scene *given, const vsh_assets *assets, const cli_expected_receiver *receivers,
-                     int32_t threads) {
+void cli_bake_expect(const vsh_scene *given, const vsh_bake_job *job, int32_t threads) {
     const long cores = sysconf(_SC_NPROCESSORS_ONLN);
     const double used = threads > 0 ? (double)threads : cores > 0 ? (double)cores : 1.0;
     vsh_scene scene = *given;
     resolve(&scene.shade, vsh_scene_traceable(given, NULL) && vsh_triangles_available());
-    expect_shape(&scene, assets);
-    for (size_t i = 0; i < scene.receiver_count; ++i) {
-        expect_receiver(&scene, &receivers[i], used);
+    expect_shape(&scene, vsh_bake_job_assets(job));
+    for (size_t i = 0; i < vsh_bake_job_count(job); ++i) {
+        vsh_job_lightmap lightmap;
+        vsh_bake_job_lightmap(job, i, &lightmap);
+        expect_lightmap(&scene, &lightmap, used);
     }
 }

@@ -2,17 +2,9 @@
 #ifndef CLI_BAKE_EXPECT_H
 #define CLI_BAKE_EXPECT_H
 
-#include <stdbool.h>
 #include <vdbshade/vdbshade.h>
 
-/* A receiver, counted. */
-typedef struct cli_expected_receiver {
-    uint64_t texels, samples;
-    bool banded; /* several bands: told as one stage, "bake" */
-} cli_expected_receiver;
-
-/* Expects all that comes behind the counting of the receivers [scene->receiver_count]. */
-void cli_bake_expect(const vsh_scene *scene, const vsh_assets *assets, const cli_expected_receiver *receivers,
-                     int32_t threads);
+/* Expects all that comes behind a job's vsh_bake_job_measure(). */
+void cli_bake_expect(const vsh_scene *scene, const vsh_bake_job *job, int32_t threads);
 
 #endif

@@ -2,8 +2,8 @@
 #include "bake_options.h"
 #include "bake_shade.h"
 #include "message.h"
+#include "object_output.h"
 #include "paths.h"
-#include "targets.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -120,7 +120,7 @@ static int mark_outputs(cli_bake_scene *made) {
         return cli_out_of_memory("outputs");
     }
     for (size_t i = 0; i < made->scene.receiver_count; ++i) {
-        marked[i] = cli_targets_template(made->receivers[i].output);
+        marked[i] = cli_object_output(made->receivers[i].output);
         made->receivers[i].output = marked[i];
     }
     free_outputs(made);

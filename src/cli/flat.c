@@ -1,6 +1,7 @@
 /* vdbshade flat: light maps of a plane, for 2D games. */
+#include "base/bytes.h"
+#include "base/clock.h"
 #include "clipping.h"
-#include "clock.h"
 #include "commands.h"
 #include "message.h"
 #include "origin.h"
@@ -164,8 +165,8 @@ static int allocate_planes(const flat_settings *s, const vsh_flat_scene *scene,
         char need[32], have[32];
         cli_say("%s: %d × %d texels in %zu channels need %s; the memory limit is %s", scene->output,
                 scene->options.width, scene->options.height, p->count,
-                cli_bytes_text((uint64_t)bytes, need, sizeof need),
-                cli_bytes_text(s->common.memory_limit, have, sizeof have));
+                vshi_bytes_text((uint64_t)bytes, need, sizeof need),
+                vshi_bytes_text(s->common.memory_limit, have, sizeof have));
         return CLI_LIMIT;
     }
     for (size_t i = 0; i < p->count; ++i) {
@@ -263,7 +264,7 @@ static int bake(const flat_settings *s, const vsh_flat_scene *scene, const flat_
                 const vsh_image_options *image, const vsh_run *run, cli_stats *stats) {
     vsh_outline *casters = NULL;
     vsh_error error;
-    double now = cli_seconds();
+    double now = vshi_seconds();
     vsh_result result = vsh_flat_scene_casters(scene, run, &casters, &error);
     now = cli_stats_stage(stats, CLI_STAGE_LOAD, now);
     if (result == VSH_OK) {

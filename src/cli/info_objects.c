@@ -1,7 +1,6 @@
 /* The objects of a mesh file at a glance, and what `bake` would say of their UVs in one image. */
 #include "info.h"
 #include "message.h"
-#include "receiver.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -97,7 +96,7 @@ static void print_verdict(const vsh_mesh *meshes, const vsh_uv_report *reports, 
     if (texels == 0) {
         return;
     }
-    const bool refused = (double)texels > CLI_LARGEST_OVERLAP * (double)covered;
+    const bool refused = (double)texels > VSH_LARGEST_OVERLAP * (double)covered;
     printf("%s: objects share texels: %zu of %zu meshes lie over others, on %" PRIu64
            " texels, most of all '%s', on %zu over '%s'%s\n",
            refused ? "problem" : "note", over, count, texels, object_name(&meshes[worst - reports]),

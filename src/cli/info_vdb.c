@@ -1,3 +1,4 @@
+#include "base/bytes.h"
 #include "info.h"
 #include "message.h"
 #include "options.h"
@@ -31,7 +32,7 @@ static void print_grid(const vsh_vdb_entry *grid) {
     printf("  active voxels: %" PRIu64 ", %d %d %d to %d %d %d\n", grid->active_voxels, grid->index_min[0],
            grid->index_min[1], grid->index_min[2], grid->index_max[0], grid->index_max[1],
            grid->index_max[2]);
-    printf("  memory: %s\n", cli_bytes_text(grid->bytes, bytes, sizeof bytes));
+    printf("  memory: %s\n", vshi_bytes_text(grid->bytes, bytes, sizeof bytes));
     for (const char *line = grid->attributes; *line != '\0';) {
         const size_t length = strcspn(line, "\n");
         printf("  %.*s\n", (int)length, line);

@@ -109,15 +109,3 @@ int cli_out_of_memory(const char *what) {
     cli_say("%s: the system refused memory", what);
     return CLI_LIMIT;
 }
-
-const char *cli_bytes_text(uint64_t bytes, char *text, size_t capacity) {
-    static const char *const units[] = {"bytes", "KiB", "MiB", "GiB", "TiB"};
-    double value = (double)bytes;
-    size_t unit = 0;
-    while (value >= 1000.0 && unit + 1 < sizeof units / sizeof units[0]) {
-        value /= 1024.0;
-        ++unit;
-    }
-    snprintf(text, capacity, "%.*f %s", unit > 0 && value < 100.0 ? 1 : 0, value, units[unit]);
-    return text;
-}

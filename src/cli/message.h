@@ -33,7 +33,4 @@ void cli_message_input(const char *path);
 /* Says that there is no memory for `what` and returns CLI_LIMIT. */
 int cli_out_of_memory(const char *what);
 
-/* "1.5 GiB", into text[capacity], which is returned. */
-const char *cli_bytes_text(uint64_t bytes, char *text, size_t capacity);
-
 #endif

@@ -1,6 +1,6 @@
 #include "progress.h"
 
-#include "clock.h"
+#include "base/clock.h"
 #include "estimate.h"
 #include "message.h"
 #include "signals.h"
@@ -30,7 +30,7 @@ static struct {
 void cli_progress_begin(bool wanted, bool quiet) {
     state.terminal = isatty(STDERR_FILENO) != 0;
     state.shown = !quiet && (wanted || state.terminal);
-    cli_estimate_begin(&state.estimate, cli_seconds());
+    cli_estimate_begin(&state.estimate, vshi_seconds());
 }
 
 void cli_progress_expect(const char *stage, int kind, double seconds) {
@@ -86,7 +86,7 @@ int32_t cli_progress_report(void *user, const char *stage, double fraction) {
     (void)user;
     if (state.shown) {
         pthread_mutex_lock(&state.lock);
-        const double now = cli_seconds();
+        const double now = vshi_seconds();
         const bool fresh = strncmp(state.estimate.name, stage, sizeof state.estimate.name - 1) != 0;
         cli_estimate_report(&state.estimate, stage, fraction, now);
         if (now - state.last >= (state.terminal ? terminal_interval : log_interval) ||

@@ -1,7 +1,6 @@
 /* vdbshade query: shadow, AO and distance at points of a file or a pipe. */
 #include "query.h"
-#include "clock.h"
-#include "meshes.h"
+#include "base/clock.h"
 #include "message.h"
 #include "paths.h"
 #include "progress.h"
@@ -212,10 +211,11 @@ static int choose_answers(query_work *work) {
 }
 
 static int load(query_work *work) {
-    const double start = cli_seconds();
-    const int code = cli_load_assets(work->scene, &work->run, &work->assets);
+    const double start = vshi_seconds();
+    vsh_error error;
+    const vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return code;
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 static int make_query(query_work *work) {
@@ -226,7 +226,9 @@ static int make_query(query_work *work) {
         VSH_OK) {
         return cli_fail_of(NULL, &error);
     }
-    cli_stats_occluders(&work->stats, work->scene, work->occluders);
+    vsh_occluders_info casters;
+    vsh_occluders_get_info(work->occluders, &casters);
+    cli_stats_casters(&work->stats, work->scene, &casters);
     vsh_shade_options shade = work->scene->shade;
     if (!work->scene->ao) {
         shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */

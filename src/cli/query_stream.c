@@ -1,6 +1,7 @@
 /* Points read, answered and written a batch at a time. A batch is VSH_QUERY_BATCH rows, so that every bit is
  * that of one call of the library for all, or as many as the memory limit holds. */
-#include "clock.h"
+#include "base/bytes.h"
+#include "base/clock.h"
 #include "message.h"
 #include "progress.h"
 #include "query.h"
@@ -92,8 +93,8 @@ static int plan(const query_settings *s, const query_answers *answers, uint64_t 
     if (limit > 0 && held + (uint64_t)*rows * each > limit) {
         char all[32], most[32];
         cli_say("%s: the field and %zu points at a time need %s, over the memory limit of %s",
-                reader->source.name, *rows, cli_bytes_text(held + (uint64_t)*rows * each, all, sizeof all),
-                cli_bytes_text(limit, most, sizeof most));
+                reader->source.name, *rows, vshi_bytes_text(held + (uint64_t)*rows * each, all, sizeof all),
+                vshi_bytes_text(limit, most, sizeof most));
         return CLI_LIMIT;
     }
     *most_kept = *rows * (own > 0 ? own : 1) / 2; /* room is taken twice what is used */
@@ -113,7 +114,7 @@ static int32_t report(void *user, const char *stage, double fraction) {
 
 static int answer_batch(const vsh_query *query, const query_answers *answers, const cli_points *points,
                         batch_progress *progress, cli_stats *stats) {
-    const double start = cli_seconds();
+    const double start = vshi_seconds();
     vsh_run run = *progress->run;
     run.progress = report;
     run.user = progress;
@@ -139,7 +140,7 @@ int query_stream(const query_settings *s, const vsh_query *query, query_answers 
     }
     batch_progress progress = {run, 0.0, 0.0};
     while (code == CLI_OK) {
-        double start = cli_seconds();
+        double start = vshi_seconds();
         code = cli_points_read(reader, most_kept, &points);
         cli_stats_stage(stats, CLI_STAGE_LOAD, start);
         if (code != CLI_OK || points.count == 0) {
@@ -150,7 +151,7 @@ int query_stream(const query_settings *s, const vsh_query *query, query_answers 
         progress.begin = size > 0 ? progress.begin + progress.share : 0.0;
         progress.share = (done < 1.0 ? done : 1.0) - progress.begin;
         code = answer_batch(query, answers, &points, &progress, stats);
-        start = cli_seconds();
+        start = vshi_seconds();
         code = code == CLI_OK ? cli_points_write(&writer, &points) : code;
         if (code == CLI_OK && (s->batch > 0 || size == 0)) {
             code = cli_points_writer_flush(&writer);
@@ -158,7 +159,7 @@ int query_stream(const query_settings *s, const vsh_query *query, query_answers 
         cli_stats_stage(stats, CLI_STAGE_WRITE, start);
     }
     if (code == CLI_OK) {
-        const double start = cli_seconds();
+        const double start = vshi_seconds();
         code = cli_points_writer_commit(&writer, reader);
         cli_stats_stage(stats, CLI_STAGE_WRITE, start);
     }

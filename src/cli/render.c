@@ -1,9 +1,9 @@
 /* vdbshade render: pictures of a scene, to look at what bake makes of it. */
 #include "render.h"
-#include "clock.h"
-#include "meshes.h"
+#include "base/bytes.h"
+#include "base/clock.h"
+#include "base/rounds.h"
 #include "message.h"
-#include "overall.h"
 #include "paths.h"
 #include "progress.h"
 #include "signals.h"
@@ -35,8 +35,11 @@ typedef struct render_work {
 } render_work;
 
 static int load(render_work *work) {
-    const double start = cli_seconds();
-    int code = cli_load_assets(work->scene, &work->run, &work->assets);
+    const double start = vshi_seconds();
+    vsh_error error;
+    int code = vsh_assets_load(work->scene, &work->run, &work->assets, &error) == VSH_OK
+                   ? CLI_OK
+                   : cli_fail_of(NULL, &error);
     code = code == CLI_OK ? render_lightmaps_read(work->settings, work->scene, work->assets, &work->run,
                                                   &work->lightmaps)
                           : code;
@@ -50,8 +53,10 @@ static int make_occluders(render_work *work) {
         VSH_OK) {
         return cli_fail_of(NULL, &error);
     }
-    cli_stats_occluders(&work->stats, work->scene, work->occluders);
-    const double start = cli_seconds();
+    vsh_occluders_info casters;
+    vsh_occluders_get_info(work->occluders, &casters);
+    cli_stats_casters(&work->stats, work->scene, &casters);
+    const double start = vshi_seconds();
     const int code =
         render_surfaces_make(work->scene, work->assets, work->occluders, &work->run, &work->surfaces);
     cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
@@ -109,7 +114,7 @@ static const char *lightmap_named(const render_settings *s, const char *message)
 
 static int render_frame(render_work *work, int32_t index, const vsh_run *run) {
     const render_settings *s = work->settings;
-    double start = cli_seconds();
+    double start = vshi_seconds();
     vsh_error error;
     vsh_render_options o = work->options;
     if (s->frames > 0) {
@@ -139,15 +144,15 @@ static int render_frames(render_work *work) {
         work->page = render_page_begin(s);
         code = work->page != NULL ? CLI_OK : cli_out_of_memory("page");
     }
-    cli_overall overall;
-    cli_overall_begin(&overall, &work->run, "render", 1);
+    vshi_rounds rounds;
+    vshi_rounds_begin(&rounds, &work->run, "render", 1);
     for (int32_t i = 0; i < count && code == CLI_OK; ++i) {
-        const vsh_run run = cli_overall_round(&overall, 1.0 / count);
+        const vsh_run run = vshi_rounds_run(&rounds, 1.0 / count);
         code = render_frame(work, i, &run);
-        cli_overall_next(&overall);
+        vshi_rounds_next(&rounds);
     }
     if (code == CLI_OK && s->page) {
-        const double start = cli_seconds();
+        const double start = vshi_seconds();
         code = render_page_end(work->page);
         work->page = NULL;
         cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
@@ -222,7 +227,8 @@ static int check_files(const render_settings *s, const vsh_scene *scene) {
     if (code == CLI_OK && limit > 0 && bytes > limit) {
         char all[32], most[32];
         cli_say("%s: a picture of %d × %d needs %s, over the memory limit of %s", s->bake.output, s->width,
-                s->height, cli_bytes_text(bytes, all, sizeof all), cli_bytes_text(limit, most, sizeof most));
+                s->height, vshi_bytes_text(bytes, all, sizeof all),
+                vshi_bytes_text(limit, most, sizeof most));
         return CLI_LIMIT;
     }
     return code;

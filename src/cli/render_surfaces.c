@@ -1,7 +1,7 @@
 /* What the camera sees: of casters that have triangles these, and of the others a field for each colour.
  * Those of a layer are all in one field, which knows nothing of casters; where they differ in colour, or some
  * have triangles, each colour gets a field of its own, for camera rays alone. */
-#include "meshes.h"
+#include "casters.h"
 #include "message.h"
 #include "render.h"
 
@@ -161,8 +161,11 @@ static int make_split(const vsh_scene *scene, const vsh_assets *assets, const vs
         p->casters[i].voxelised = 1;
     }
     vsh_assets *again = NULL; /* what is direct was not read as something to voxelise */
-    int code = direct ? cli_load_assets(&colored, run, &again) : CLI_OK;
-    code = code == CLI_OK ? make_own(&colored, direct ? again : assets, run, p, s) : code;
+    vsh_error error;
+    if (direct && vsh_assets_load(&colored, run, &again, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    const int code = make_own(&colored, direct ? again : assets, run, p, s);
     vsh_assets_free(again);
     return code;
 }

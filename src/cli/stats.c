@@ -1,6 +1,7 @@
 #include "stats.h"
 
-#include "clock.h"
+#include "base/bytes.h"
+#include "base/clock.h"
 #include "message.h"
 #include "signals.h"
 #include "temporary.h"
@@ -17,7 +18,7 @@
 static const char *const stage_names[CLI_STAGE_COUNT] = {"load", "voxelize", "field", "bake", "write"};
 
 double cli_stats_stage(cli_stats *stats, int stage, double since) {
-    const double now = cli_seconds();
+    const double now = vshi_seconds();
     stats->seconds[stage] += now - since;
     return now;
 }
@@ -43,8 +44,8 @@ static cli_method method_of(const char *name, uint32_t traits) {
     return (cli_method){name, (traits & VSH_METHOD_KEEPS_ERROR) != 0, (traits & VSH_METHOD_TRIANGLES) != 0};
 }
 
-void cli_stats_occluders(cli_stats *stats, const vsh_scene *scene, const vsh_occluders *occluders) {
-    vsh_occluders_get_info(occluders, &stats->casters);
+void cli_stats_casters(cli_stats *stats, const vsh_scene *scene, const vsh_occluders_info *casters) {
+    stats->casters = *casters;
     stats->seconds[CLI_STAGE_VOXELIZE] += stats->casters.voxelize_s;
     stats->seconds[CLI_STAGE_FIELD] += stats->casters.triangles_s + stats->casters.field_s;
     cli_stats_methods(stats, scene, stats->casters.has_triangles);
@@ -63,18 +64,6 @@ void cli_stats_methods(cli_stats *stats, const vsh_scene *scene, int32_t has_tri
         stats->methods[CLI_STATS_AO] =
             method_of(vsh_ao_method_name(ao_method), vsh_ao_method_traits(ao_method));
     }
-}
-
-int cli_stats_errors(cli_stats *stats, const vsh_scene *scene) {
-    stats->lights = scene->lights;
-    stats->light_count = scene->light_count;
-    stats->errors = calloc(scene->light_count + 1, sizeof *stats->errors);
-    return stats->errors != NULL ? CLI_OK : cli_out_of_memory("stats");
-}
-
-void cli_stats_end(cli_stats *stats) {
-    free(stats->errors);
-    stats->errors = NULL;
 }
 
 vsh_bake_error cli_stats_error(const cli_stats *stats, int kind) {
@@ -322,16 +311,16 @@ void cli_stats_say(const cli_stats *stats) {
     char field[32], peak[32];
     if (stats->casters.field_bytes == 0) {
         cli_say("no voxels, %d thread%s, peak %s", stats->threads, stats->threads == 1 ? "" : "s",
-                cli_bytes_text(peak_bytes(), peak, sizeof peak));
+                vshi_bytes_text(peak_bytes(), peak, sizeof peak));
     } else {
         cli_say("voxel %.4g, %" PRIu64
                 " active voxels, field of %d level%s in %s (%.1f bytes a voxel), %d thread%s, "
                 "peak %s",
                 stats->casters.voxel_size, stats->casters.active_voxels, stats->casters.levels,
                 stats->casters.levels == 1 ? "" : "s",
-                cli_bytes_text(stats->casters.field_bytes, field, sizeof field), bytes_per_voxel(stats),
+                vshi_bytes_text(stats->casters.field_bytes, field, sizeof field), bytes_per_voxel(stats),
                 stats->threads, stats->threads == 1 ? "" : "s",
-                cli_bytes_text(peak_bytes(), peak, sizeof peak));
+                vshi_bytes_text(peak_bytes(), peak, sizeof peak));
     }
     char methods[128];
     if (*cli_stats_methods_text(stats, methods, sizeof methods) != '\0') {

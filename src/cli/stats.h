@@ -34,8 +34,8 @@ typedef struct cli_stats {
     uint64_t resumed_rows; /* of lightmaps, that an earlier bake had kept */
     uint64_t bands;        /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
-    vsh_bake_error *errors;  /* [light_count + 1]: of each light, then of AO; NULL: none are known */
-    const vsh_light *lights; /* of `errors` */
+    const vsh_bake_error *errors; /* [light_count + 1]: of each light, then of AO; NULL: none are known */
+    const vsh_light *lights;      /* of `errors` */
     size_t light_count;
     cli_method methods[2]; /* CLI_STATS_SHADOW and …_AO; NULL names where nothing is baked by one */
     double max_error;      /* that was asked for */
@@ -53,12 +53,7 @@ cli_stats cli_stats_begin(int32_t of, int32_t threads);
 void cli_stats_methods(cli_stats *stats, const vsh_scene *scene, int32_t has_triangles);
 
 /* Takes what casts and the seconds that it took to make, and what the scene's methods come to with it. */
-void cli_stats_occluders(cli_stats *stats, const vsh_scene *scene, const vsh_occluders *occluders);
-
-/* Room for the errors of a scene's channels, which must outlive them. CLI_OK, or an exit code, having said
- * why; to be freed with cli_stats_end(). */
-int cli_stats_errors(cli_stats *stats, const vsh_scene *scene);
-void cli_stats_end(cli_stats *stats);
+void cli_stats_casters(cli_stats *stats, const vsh_scene *scene, const vsh_occluders_info *casters);
 
 /* What is known of the errors of a kind's values, all lights together. */
 vsh_bake_error cli_stats_error(const cli_stats *stats, int kind);

@@ -1,7 +1,7 @@
 /* vdbshade trade: speed against accuracy, measured on the user's own scene. */
 #include "trade.h"
-#include "clock.h"
-#include "meshes.h"
+#include "base/clock.h"
+#include "casters.h"
 #include "message.h"
 #include "paths.h"
 #include "progress.h"
@@ -137,7 +137,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
 /* With one thread it is the processor's time, so that other work on the machine does not show. */
 double trade_now(const trade_work *work) {
     if (work->run.threads != 1) {
-        return cli_seconds();
+        return vshi_seconds();
     }
     struct timespec now = {0, 0};
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
@@ -145,7 +145,7 @@ double trade_now(const trade_work *work) {
 }
 
 double trade_left(const trade_work *work) {
-    return work->settings->budget - (cli_seconds() - work->measuring);
+    return work->settings->budget - (vshi_seconds() - work->measuring);
 }
 
 /* A measurement that is as short as this is repeated. */
@@ -225,7 +225,7 @@ static int measure(trade_work *work) {
     code = code == CLI_OK ? trade_take_masks(work) : code;
     code = code == CLI_OK ? trade_place_points(work) : code;
     code = code == CLI_OK ? trade_take_truth(work, work->fields[0].resolution) : code;
-    work->measuring = cli_seconds();
+    work->measuring = vshi_seconds();
     code = code == CLI_OK ? trade_measure_embree(work) : code;
     code = code == CLI_OK ? trade_measure(work) : code;
     mark_fronts(work);
@@ -264,7 +264,7 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
     trade_work work = {.settings = settings,
                        .scene = scene,
                        .run = cli_common_run(&settings->bake.common),
-                       .began = cli_seconds()};
+                       .began = vshi_seconds()};
     if (scene->light_count > 0) {
         work.subjects[work.subject_count++] = (trade_subject){.name = "shadow", .planes = scene->light_count};
     }
@@ -280,7 +280,7 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
         cli_signals_end();
         if (!settings->bake.common.quiet) {
             cli_say("%s: %zu runs in %.1f s, %zu left out", settings->report,
-                    work.subjects[0].run_count + work.subjects[1].run_count, cli_seconds() - work.began,
+                    work.subjects[0].run_count + work.subjects[1].run_count, vshi_seconds() - work.began,
                     work.skipped);
         }
     }

@@ -1,9 +1,8 @@
 /* Which texels are measured. Every voxel size has its own view of what is valid (not inside a solid nor
  * behind a wall); runs are compared on the texels that all of them find valid, and each on its own beside.
  */
-#include "meshes.h"
+#include "casters.h"
 #include "message.h"
-#include "receiver.h"
 #include "trade.h"
 
 #include <math.h>
@@ -26,17 +25,19 @@ static int load_receivers(trade_work *work) {
     }
     for (size_t i = 0; i < count; ++i) {
         trade_receiver *receiver = &work->receivers[i];
-        cli_receiver_job job = {.scene = work->scene, .run = &work->run, .index = i, .allow_overlap = true};
-        job.meshes = vsh_assets_receiver(work->assets, i, &job.mesh_count);
+        size_t mesh_count;
+        const vsh_mesh *meshes = vsh_assets_receiver(work->assets, i, &mesh_count);
         vsh_charts *charts = NULL;
-        int code = cli_receiver_charts(&job, true, &charts);
-        if (code == CLI_OK) {
-            code = cli_receiver_texels(charts, 0, work->scene->receivers[i].height, &work->run,
-                                       &receiver->texels);
+        vsh_error error;
+        vsh_result result =
+            vsh_receiver_charts(work->scene, i, meshes, mesh_count, 1, &work->run, &charts, &error);
+        if (result == VSH_OK) {
+            result = vsh_texels_create_band(charts, 0, work->scene->receivers[i].height, &work->run,
+                                            &receiver->texels, &error);
         }
         vsh_charts_free(charts);
-        if (code != CLI_OK) {
-            return code;
+        if (result != VSH_OK) {
+            return cli_fail_of(NULL, &error);
         }
         ++work->receiver_count;
         vsh_texels_get_info(receiver->texels, &receiver->info);
@@ -72,8 +73,7 @@ int trade_load(trade_work *work) {
     if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
         return cli_fail_of(NULL, &error);
     }
-    int code = cli_warn_meshes(work->scene, work->assets);
-    code = code == CLI_OK ? load_receivers(work) : code;
+    const int code = load_receivers(work);
     return code == CLI_OK ? load_casters(work) : code;
 }
 

@@ -1,7 +1,6 @@
 /* What a scene's values are: rays against its casters themselves, or, where some caster is only a level set,
  * rays against a field finer than all that are measured. And Embree's own curve, which every method has to
  * beat. */
-#include "meshes.h"
 #include "message.h"
 #include "trade.h"
 

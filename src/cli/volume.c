@@ -1,7 +1,8 @@
 /* vdbshade volume: shadow and AO on voxels, as .vdb grids. */
 #include "bake_options.h"
-#include "clock.h"
-#include "meshes.h"
+#include "base/bytes.h"
+#include "base/clock.h"
+#include "casters.h"
 #include "message.h"
 #include "origin.h"
 #include "paths.h"
@@ -160,7 +161,7 @@ typedef struct volume_work {
 } volume_work;
 
 static int load(volume_work *work) {
-    const double start = cli_seconds();
+    const double start = vshi_seconds();
     const volume_settings *s = work->settings;
     vsh_error error;
     vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
@@ -168,7 +169,7 @@ static int load(volume_work *work) {
         result = vsh_voxels_from_vdb(s->like, s->like_grid, &work->run, &work->voxels, &error);
     }
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return result == VSH_OK ? cli_warn_meshes(work->scene, work->assets) : cli_fail_of(NULL, &error);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
 /* Of the casters' band, or of the box, whose voxels may be of the casters' size. */
@@ -206,7 +207,7 @@ static int make_grid(volume_work *work) {
             "and --box-voxel-size, or --like",
             s->bake.input);
     }
-    const double start = cli_seconds();
+    const double start = vshi_seconds();
     vsh_error error;
     const vsh_result result = vsh_scene_casters(work->scene, work->assets, &work->run, &work->grid, &error);
     cli_stats_stage(&work->stats, CLI_STAGE_VOXELIZE, start);
@@ -231,13 +232,15 @@ static int make_occluders(volume_work *work) {
     vsh_grid_free(work->grid); /* neither what casts nor the voxels need it */
     work->grid = NULL;
     if (code == CLI_OK) {
-        cli_stats_occluders(&work->stats, work->scene, work->occluders);
+        vsh_occluders_info casters;
+        vsh_occluders_get_info(work->occluders, &casters);
+        cli_stats_casters(&work->stats, work->scene, &casters);
     }
     return code;
 }
 
 static int bake_volume(volume_work *work) {
-    const double start = cli_seconds();
+    const double start = vshi_seconds();
     vsh_volume_options bake = vsh_volume_options_default();
     bake.inside = work->settings->inside;
     bake.ao = work->scene->ao;
@@ -252,7 +255,7 @@ static int bake_volume(volume_work *work) {
 }
 
 static int write_volume(volume_work *work) {
-    const double start = cli_seconds();
+    const double start = vshi_seconds();
     const char *output = work->settings->bake.output;
     if (cli_progress_report(NULL, "write", 0.0) != 0) {
         const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
@@ -292,7 +295,7 @@ static void say_results(const volume_work *work, const vsh_volume_info *info) {
     char bytes[32];
     cli_say("%s: %zu grid%s of %" PRIu64 " voxels, %" PRIu64 " more inside, %" PRIu64 " of them filled; %s",
             work->settings->bake.output, info->grids, info->grids == 1 ? "" : "s", info->shaded,
-            info->filled + info->off, info->filled, cli_bytes_text(info->bytes, bytes, sizeof bytes));
+            info->filled + info->off, info->filled, vshi_bytes_text(info->bytes, bytes, sizeof bytes));
     cli_stats_say(&work->stats);
 }
 

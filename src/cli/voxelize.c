@@ -1,7 +1,7 @@
 /* vdbshade voxelize: casters to a .vdb level set. */
-#include "clock.h"
+#include "base/bytes.h"
+#include "base/clock.h"
 #include "commands.h"
-#include "meshes.h"
 #include "message.h"
 #include "origin.h"
 #include "paths.h"
@@ -102,24 +102,25 @@ static void say_summary(const voxelize_settings *s, const vsh_grid *grid, double
     vsh_grid_get_info(grid, &info);
     char bytes[32];
     cli_say("%s: voxel %.4g, %" PRIu64 " active voxels, %s in memory, %.2f s", s->output, info.voxel_size,
-            info.active_voxels, cli_bytes_text(info.bytes, bytes, sizeof bytes), seconds);
+            info.active_voxels, vshi_bytes_text(info.bytes, bytes, sizeof bytes), seconds);
 }
 
 static int voxelize(const voxelize_settings *s, const vsh_scene *scene) {
-    const double start = cli_seconds();
+    const double start = vshi_seconds();
     const vsh_run run = cli_common_run(&s->common);
     vsh_assets *assets = NULL;
     vsh_grid *grid = NULL;
     vsh_error error;
-    int code = cli_load_assets(scene, &run, &assets);
+    vsh_result result = vsh_assets_load(scene, &run, &assets, &error);
+    int code = result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
     if (code == CLI_OK) {
-        const vsh_result result = vsh_scene_casters(scene, assets, &run, &grid, &error);
+        result = vsh_scene_casters(scene, assets, &run, &grid, &error);
         code = result == VSH_OK ? write_grid(s, scene, &run, grid) : cli_fail_of(NULL, &error);
     }
     if (code == CLI_OK) {
         cli_signals_end();
         if (!s->common.quiet) {
-            say_summary(s, grid, cli_seconds() - start);
+            say_summary(s, grid, vshi_seconds() - start);
         }
     }
     vsh_grid_free(grid);

@@ -304,6 +304,9 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     if (result == VSH_OK) {
         result = settle_solidity(loaded, scene, &full, error);
     }
+    if (result == VSH_OK) { /* with the places in it, which the check asks for */
+        result = vshi_assets_check(loaded, scene, &full, error);
+    }
     if (result != VSH_OK) {
         vsh_assets_free(loaded);
         return result;

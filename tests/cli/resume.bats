@@ -1,7 +1,7 @@
 # `bake --resume`: finished rows are kept, and a bake that was ended goes on from them to the same bytes.
 load helper
 
-options=(--sun -0.5,0.8,-0.6 --sun-angle 10 --ao 2 --irradiance --size 256 --resolution 96 --method adaptive --quiet)
+options=(--sun -0.5,0.8,-0.6 --sun-angle 10 --ao 2 --irradiance --size 256 --resolution 96 --method adaptive)
 
 bake() { # OUT [options]
     local out=$1

@@ -73,6 +73,12 @@ cmake -S "$here/../../examples" -B "$work/examples" -DCMAKE_PREFIX_PATH="$prefix
     ./points | tee points.log && grep -qx '0 1' points.log
     ./lightmap | tee lightmap.log && grep -qx '0 under the box, 1 in the corner' lightmap.log
     "$prefix/bin/vdbshade" info floor.exr | grep -q "shadow.sun"
+    # the program's own bytes, but for the command in them
+    cp "$here"/../../assets/seeds.json "$here"/../../assets/seeds_floor.obj .
+    sed -i 's/"size": 512/"size": 64/' seeds.json
+    ./scene seeds.json | tee scene.log && grep -qx 'seeds.exr: 4096 texels' scene.log
+    mkdir program && "$prefix/bin/vdbshade" bake seeds.json --output-folder program --quiet
+    "$prefix/bin/vdbshade" compare seeds.exr program/seeds.exr --max-difference 0 >/dev/null
     # of the sky over a point on the axis the tube hides a ring between two angles, the difference of their sines' squares
     ./callback | tee callback.log && awk '{ open = $NF == "open" ? $(NF - 1) : -1 }
         /^0.4 / { hidden = sin(1.4732)^2 - sin(0.9074)^2 } /^1 / { hidden = sin(0.9992)^2 - sin(0.5716)^2 }

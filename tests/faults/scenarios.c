@@ -97,6 +97,16 @@ end:
     return result;
 }
 
+static vsh_result bake_scene(const vsh_run *run, vsh_error *error) {
+    vsh_scene *scene = NULL;
+    vsh_result result;
+    MAKE(scene, vsh_scene_read("scene.json", &scene, error));
+    TRY(vsh_bake_scene(scene, NULL, run, NULL, error));
+end:
+    vsh_scene_free(scene);
+    return result;
+}
+
 static double ball(void *user, const double p[3]) {
     (void)user;
     return 2.0 * (sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - 1.0);
@@ -287,6 +297,7 @@ const scenario scenarios[] = {
     {"scene files", read_scenes},
     {"models", read_models},
     {"a scene's assets", load_scene},
+    {"a scene baked", bake_scene},
     {"grids", make_grids},
     {"a grid written", write_grid},
     {"points shaded", shade_points},

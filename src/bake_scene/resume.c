@@ -1,6 +1,6 @@
-#include "resume.h"
+#include "bake_scene/resume.h"
 
-#include "message.h"
+#include "base/job.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -31,29 +31,29 @@ static uint64_t checksum_of(uint64_t sum, const void *bytes, size_t size) {
     return sum;
 }
 
-static uint64_t checksum(const cli_planes *planes, size_t texels, const uint64_t *invalid, size_t mesh_count,
-                         const vsh_bake_error *errors, size_t error_count) {
+static uint64_t checksum(const vshi_channels *channels, size_t texels, const uint64_t *invalid,
+                         size_t mesh_count, const vsh_bake_error *errors, size_t error_count) {
     uint64_t sum = checksum_of(UINT64_C(0xcbf29ce484222325), invalid, mesh_count * sizeof *invalid);
-    for (int32_t c = 0; c < planes->image.channel_count; ++c) {
-        sum = checksum_of(sum, planes->planes[c], texels * sizeof(float));
+    for (int32_t c = 0; c < channels->image.channel_count; ++c) {
+        sum = checksum_of(sum, channels->planes[c], texels * sizeof(float));
     }
     return checksum_of(sum, errors, error_count * sizeof *errors);
 }
 
 /* What must be the same for bands to be taken: text, to be freed; NULL where memory is short. */
-static char *key_of(const cli_origin *origin, const vsh_image *image, int32_t band_rows) {
+static char *text_of(const vshi_resume_key *key) {
     char *text = NULL;
     size_t size = 0;
     FILE *out = open_memstream(&text, &size);
     if (out == NULL) {
         return NULL;
     }
-    fprintf(out, "%s2: %d x %d by %d\n", magic, image->width, image->height, band_rows);
-    for (int32_t c = 0; c < image->channel_count; ++c) {
-        fprintf(out, "%s\n", image->names[c]);
+    fprintf(out, "%s2: %d x %d by %d\n", magic, key->image->width, key->image->height, key->band_rows);
+    for (int32_t c = 0; c < key->image->channel_count; ++c) {
+        fprintf(out, "%s\n", key->image->names[c]);
     }
-    for (size_t i = 0; i < origin->count; ++i) {
-        fprintf(out, "%s: %s\n", origin->attributes[i].name, origin->attributes[i].value);
+    for (size_t i = 0; i < key->attribute_count; ++i) {
+        fprintf(out, "%s: %s\n", key->attributes[i].name, key->attributes[i].value);
     }
     if (fclose(out) != 0) {
         free(text);
@@ -75,8 +75,8 @@ static bool has_key(FILE *file, const char *key) {
     }
 }
 
-static void give_up(cli_resume *r) {
-    cli_say("warning: %s: could not be written: %s; nothing is kept any more", r->path, strerror(errno));
+static void give_up(vshi_resume *r) {
+    vshi_warn(r->run, "%s: could not be written: %s; nothing is kept any more", r->path, strerror(errno));
     fclose(r->file);
     r->file = NULL;
     unlink(r->path);
@@ -91,77 +91,79 @@ static bool is_ours(FILE *file) {
 }
 
 /* Nobody asked for this name: whatever else stands there is left as it is, and not waited for. */
-static int open_file(cli_resume *r) {
+static vsh_result open_file(vshi_resume *r, vsh_error *error) {
     const int file = open(r->path, O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
     struct stat status;
-    const bool link = file < 0 && errno == ELOOP;
-    const bool regular = file >= 0 && fstat(file, &status) == 0 && S_ISREG(status.st_mode);
+    if (file < 0) {
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", r->path,
+                         errno == ELOOP ? "it is a link" : strerror(errno));
+    }
+    const bool regular = fstat(file, &status) == 0 && S_ISREG(status.st_mode);
     r->file = regular ? fdopen(file, "r+b") : NULL;
     if (r->file == NULL) {
-        cli_say("%s: cannot be written: %s", r->path,
-                link                    ? "it is a link"
-                : file >= 0 && !regular ? "it is no regular file"
-                                        : strerror(errno));
-        if (file >= 0) {
-            close(file);
-        }
-        return CLI_FILE;
+        const char *why = regular ? strerror(errno) : "it is no regular file";
+        close(file);
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", r->path, why);
     }
     if (!is_ours(r->file)) {
-        cli_say("%s: is no file of --resume, and stays as it is; move it away, or bake without --resume",
-                r->path);
-        fclose(r->file);
-        r->file = NULL;
-        return CLI_FILE;
+        return vshi_fail(
+            error, VSH_ERROR_WRITE,
+            "%s: is no file of --resume, and stays as it is; move it away, or bake without --resume",
+            r->path);
     }
     if (flock(fileno(r->file), LOCK_EX | LOCK_NB) != 0) {
-        cli_say("%s: another run has it open", r->path);
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: another run has it open", r->path);
+    }
+    return VSH_OK;
+}
+
+/* Begins the file anew. */
+static void begin_file(vshi_resume *r, const char *key) {
+    if (fseek(r->file, 0, SEEK_END) == 0 && ftell(r->file) > 0) {
+        vshi_warn(r->run, "%s: is of another bake, of other inputs or options; begun anew", r->path);
+    }
+    rewind(r->file);
+    if (ftruncate(fileno(r->file), 0) != 0 || fwrite(key, strlen(key) + 1, 1, r->file) != 1 ||
+        fflush(r->file) != 0) {
+        give_up(r);
+    }
+}
+
+vsh_result vshi_resume_open(const char *output, const vshi_resume_key *key, size_t error_count,
+                            const vsh_run *run, vshi_resume *r, vsh_error *error) {
+    *r = (vshi_resume){.run = run, .error_count = error_count};
+    if (snprintf(r->path, sizeof r->path, "%s.resume", output) >= (int)sizeof r->path) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%.64s…: the name is too long", output);
+    }
+    char *text = text_of(key);
+    if (text == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", r->path);
+    }
+    const vsh_result result = open_file(r, error);
+    if (result == VSH_OK) {
+        r->taking = has_key(r->file, text);
+        if (!r->taking) {
+            begin_file(r, text);
+        }
+    } else if (r->file != NULL) {
         fclose(r->file);
         r->file = NULL;
-        return CLI_FILE;
     }
-    return CLI_OK;
+    free(text);
+    return result;
 }
 
-int cli_resume_open(cli_resume *r, const char *output, const cli_origin *origin, const vsh_image *image,
-                    int32_t band_rows, size_t error_count) {
-    *r = (cli_resume){.file = NULL, .error_count = error_count};
-    if (snprintf(r->path, sizeof r->path, "%s.resume", output) >= (int)sizeof r->path) {
-        return cli_usage("%.64s…: the name is too long", output);
-    }
-    char *key = key_of(origin, image, band_rows);
-    if (key == NULL) {
-        return cli_out_of_memory(r->path);
-    }
-    const int code = open_file(r);
-    if (code == CLI_OK) {
-        r->taking = has_key(r->file, key);
-        if (!r->taking) {
-            if (fseek(r->file, 0, SEEK_END) == 0 && ftell(r->file) > 0) {
-                cli_say("warning: %s: is of another bake, of other inputs or options; begun anew", r->path);
-            }
-            rewind(r->file);
-            if (ftruncate(fileno(r->file), 0) != 0 || fwrite(key, strlen(key) + 1, 1, r->file) != 1 ||
-                fflush(r->file) != 0) {
-                give_up(r);
-            }
-        }
-    }
-    free(key);
-    return code;
-}
-
-static bool read_band(cli_resume *r, const band_head *want, cli_planes *planes, vsh_bake_stats *stats,
+static bool read_band(vshi_resume *r, const band_head *want, vshi_channels *channels, vsh_bake_stats *stats,
                       size_t mesh_count, uint64_t *invalid, vsh_bake_error *errors) {
-    const size_t texels = (size_t)planes->image.width * (size_t)want->rows;
+    const size_t texels = (size_t)channels->image.width * (size_t)want->rows;
     band_head head;
     bool good = fread(&head, sizeof head, 1, r->file) == 1 && head.first == want->first &&
                 head.rows == want->rows && fread(invalid, sizeof *invalid, mesh_count, r->file) == mesh_count;
-    for (int32_t c = 0; good && c < planes->image.channel_count; ++c) {
-        good = fread(planes->planes[c], sizeof(float), texels, r->file) == texels;
+    for (int32_t c = 0; good && c < channels->image.channel_count; ++c) {
+        good = fread(channels->planes[c], sizeof(float), texels, r->file) == texels;
     }
     good = good && fread(errors, sizeof *errors, r->error_count, r->file) == r->error_count;
-    if (!good || checksum(planes, texels, invalid, mesh_count, errors, r->error_count) != head.checksum) {
+    if (!good || checksum(channels, texels, invalid, mesh_count, errors, r->error_count) != head.checksum) {
         return false;
     }
     stats->texels = head.texels;
@@ -173,8 +175,8 @@ static bool read_band(cli_resume *r, const band_head *want, cli_planes *planes, 
     return true;
 }
 
-bool cli_resume_take(cli_resume *r, int32_t first, int32_t rows, cli_planes *planes, vsh_bake_stats *stats,
-                     size_t mesh_count) {
+bool vshi_resume_take(vshi_resume *r, int32_t first, int32_t rows, vshi_channels *channels,
+                      vsh_bake_stats *stats, size_t mesh_count) {
     if (r->file == NULL || !r->taking) {
         return false;
     }
@@ -182,8 +184,8 @@ bool cli_resume_take(cli_resume *r, int32_t first, int32_t rows, cli_planes *pla
     const band_head want = {.first = first, .rows = rows};
     uint64_t *invalid = calloc(mesh_count + 1, sizeof *invalid);
     vsh_bake_error *errors = calloc(r->error_count + 1, sizeof *errors);
-    r->taking =
-        invalid != NULL && errors != NULL && read_band(r, &want, planes, stats, mesh_count, invalid, errors);
+    r->taking = invalid != NULL && errors != NULL &&
+                read_band(r, &want, channels, stats, mesh_count, invalid, errors);
     free(errors);
     free(invalid);
     if (r->taking) {
@@ -197,12 +199,12 @@ bool cli_resume_take(cli_resume *r, int32_t first, int32_t rows, cli_planes *pla
     return false;
 }
 
-void cli_resume_keep(cli_resume *r, int32_t first, int32_t rows, const cli_planes *planes,
-                     const vsh_bake_stats *stats, size_t mesh_count) {
+void vshi_resume_keep(vshi_resume *r, int32_t first, int32_t rows, const vshi_channels *channels,
+                      const vsh_bake_stats *stats, size_t mesh_count) {
     if (r->file == NULL) {
         return;
     }
-    const size_t texels = (size_t)planes->image.width * (size_t)rows;
+    const size_t texels = (size_t)channels->image.width * (size_t)rows;
     band_head head;
     memset(&head, 0, sizeof head); /* what lies between members too */
     head.first = first;
@@ -212,11 +214,11 @@ void cli_resume_keep(cli_resume *r, int32_t first, int32_t rows, const cli_plane
     head.seen_texels = stats->seen_texels;
     head.shade = stats->shade;
     head.checksum =
-        checksum(planes, texels, stats->invalid_by_mesh, mesh_count, stats->errors, r->error_count);
+        checksum(channels, texels, stats->invalid_by_mesh, mesh_count, stats->errors, r->error_count);
     bool good = fwrite(&head, sizeof head, 1, r->file) == 1 &&
                 fwrite(stats->invalid_by_mesh, sizeof(uint64_t), mesh_count, r->file) == mesh_count;
-    for (int32_t c = 0; good && c < planes->image.channel_count; ++c) {
-        good = fwrite(planes->planes[c], sizeof(float), texels, r->file) == texels;
+    for (int32_t c = 0; good && c < channels->image.channel_count; ++c) {
+        good = fwrite(channels->planes[c], sizeof(float), texels, r->file) == texels;
     }
     good = good && fwrite(stats->errors, sizeof *stats->errors, r->error_count, r->file) == r->error_count;
     if (!good || fflush(r->file) != 0 || fdatasync(fileno(r->file)) != 0) {
@@ -226,20 +228,17 @@ void cli_resume_keep(cli_resume *r, int32_t first, int32_t rows, const cli_plane
     r->rows = first + rows;
 }
 
-void cli_resume_close(cli_resume *r, const char *output, int32_t height, int code) {
+int32_t vshi_resume_close(vshi_resume *r) {
     if (r->file == NULL) {
-        return;
+        return 0;
     }
     fclose(r->file);
     r->file = NULL;
-    if (code != CLI_OK && r->rows > 0) {
-        cli_say("%s: %d of %d rows are kept in %s; the same command goes on from there", output, r->rows,
-                height, r->path);
-    }
+    return r->rows;
 }
 
-void cli_resume_remove(const char *output) {
-    char path[sizeof((cli_resume *)NULL)->path];
+void vshi_resume_remove(const char *output) {
+    char path[sizeof((vshi_resume *)NULL)->path];
     if (snprintf(path, sizeof path, "%s.resume", output) < (int)sizeof path) {
         unlink(path);
     }

@@ -1,0 +1,204 @@
+/* Baking a scene: from its files to its lightmaps' files, in one call or step by step. */
+#ifndef VDBSHADE_BAKE_SCENE_H
+#define VDBSHADE_BAKE_SCENE_H
+
+#include "image.h"
+#include "scene.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* The share of a lightmap's covered texels that objects may take from each other: charts that touch. */
+#define VSH_LARGEST_OVERLAP 0.01
+
+/* --- where rows go */
+
+/* A lightmap of a job. The pointers belong to the job and hold until it is freed. */
+typedef struct vsh_job_lightmap {
+    size_t receiver;    /* its number in the scene */
+    const char *path;   /* of the receiver's file */
+    const char *output; /* file that it goes to; of an object its own */
+    const vsh_mesh *meshes;
+    size_t mesh_count;
+    int32_t width; /* texels */
+    int32_t height;
+    uint64_t covered;        /* texels with at least one sample; these four from vsh_bake_job_measure() on */
+    uint64_t samples;        /* evaluated positions, supersampling counted */
+    int32_t bands;           /* that it is baked in; 1: whole */
+    int32_t band_rows;       /* of each band but the last */
+    uint64_t invalid_texels; /* these three once it is baked: as in vsh_bake_stats */
+    uint64_t resumed_rows;   /* that an earlier bake had kept */
+    int32_t kept_rows; /* where its bake failed and `resume` was asked for: rows that the next one need not
+                          bake */
+} vsh_job_lightmap;
+
+/* Takes the rows of lightmaps, one lightmap after the other, from the top on, in the thread that called
+ * vsh_bake_job_run(). A call that does not return VSH_OK ends the bake with that result; it fills `error`. */
+typedef struct vsh_row_sink {
+    size_t struct_size;
+    /* The lightmap's rows follow. `image` has its channels' names, and no planes. */
+    vsh_result (*begin)(void *user, const vsh_job_lightmap *lightmap, const vsh_image *image,
+                        vsh_error *error);
+    /* The next `rows` rows: planes[image->channel_count][rows × width]. */
+    vsh_result (*add)(void *user, int32_t rows, const float *const *planes, vsh_error *error);
+    /* It is whole, or `result` (not VSH_OK) says why it will not be, which what `end` returns then does not
+     * change. Called once for each `begin` that returned VSH_OK. */
+    vsh_result (*end)(void *user, vsh_result result, vsh_error *error);
+    void *user;
+} vsh_row_sink;
+
+static inline vsh_row_sink vsh_row_sink_default(void) {
+    vsh_row_sink sink = {sizeof(vsh_row_sink), NULL, NULL, NULL, NULL};
+    return sink;
+}
+VSH_API void vsh_row_sink_init(vsh_row_sink *sink, size_t size);
+
+/* --- jobs */
+
+typedef struct vsh_bake_job_options {
+    size_t struct_size;
+    int32_t per_object; /* nonzero: a lightmap for each object of every receiver, whose output holds "%s" in
+                           its file's name for the object's */
+    int32_t allow_overlap; /* nonzero: objects may share texels, whatever their receivers say */
+    int32_t band_rows;     /* rows that are baked at a time, up to a multiple of VSH_BAND_STEP; 0: all, or as
+                              many as run->memory_limit lets */
+    int32_t
+        resume; /* nonzero: bands are kept in OUTPUT.resume until all lightmaps are whole, and taken from
+                   there by the next bake of the same scene with the same settings. Needs files as outputs */
+    const char *invalid_picture; /* PNG of the texels that are not valid, for each lightmap: where there are
+                                    several, FILE.OUTPUT.png. NULL: none. Not with `resume` */
+    const vsh_row_sink *sink; /* NULL: image files at the receivers' outputs, which say where they come from
+                                 (vsh_provenance) */
+    const char *command;      /* these three as in vsh_provenance_source */
+    const char *const *files;
+    size_t file_count;
+    /* A lightmap is done, or (`result`) failed. May be NULL. */
+    void (*done)(void *user, const vsh_job_lightmap *lightmap, vsh_result result);
+    /* A file is written from here on, beside its place under a temporary name; NULL: no more. For programs
+     * that may end in the middle of it, and take it away then. May be NULL. */
+    void (*writing)(void *user, const char *path);
+    void *user; /* handed to both */
+} vsh_bake_job_options;
+
+static inline vsh_bake_job_options vsh_bake_job_options_default(void) {
+    vsh_bake_job_options options = {
+        sizeof(vsh_bake_job_options), 0, 0, 0, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL};
+    return options;
+}
+VSH_API void vsh_bake_job_options_init(vsh_bake_job_options *options, size_t size);
+
+/* The lightmaps of a scene under way. Not for several threads at once. Free it with vsh_bake_job_free(). */
+typedef struct vsh_bake_job vsh_bake_job;
+
+/* Whether the image of receiver `index` can be written as it asks, its channels included, without reading a
+ * file. Errors: as vsh_image_check(); VSH_ERROR_ARGUMENT (scene NULL, no such receiver, more channels than
+ * VSH_MAX_CHANNELS). */
+VSH_API vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *error);
+
+/* Loads the scene's files and finds its lightmaps. Scene, options and what they point to must outlive the
+ * job. Errors: as vsh_assets_load() and vsh_receiver_check(); VSH_ERROR_ARGUMENT (a pointer NULL, options,
+ * run; an output without "%s" where per_object wants one; no receivers). */
+VSH_API vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_options *options,
+                                       const vsh_run *run, vsh_bake_job **job, vsh_error *error);
+VSH_API void vsh_bake_job_free(vsh_bake_job *job); /* NULL does nothing */
+
+/* Rasterises the lightmaps to count their texels, and warns of what is wrong with their UVs. Errors:
+ * VSH_ERROR_INPUT (as vsh_charts_create(); UVs that cover no texel; objects that share more than
+ * VSH_LARGEST_OVERLAP of the texels), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_bake_job_measure(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
+
+/* Makes what casts, if vsh_bake_job_measure() went well. Errors: as vsh_scene_occluders(); VSH_ERROR_ARGUMENT
+ * (not measured). */
+VSH_API vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
+
+/* Bakes every lightmap and hands over its rows, once vsh_bake_job_prepare() went well. Errors: as
+ * vsh_bake_lightmap() and the sink, and for files as vsh_image_writer_create() to …_finish();
+ * VSH_ERROR_INPUT (a lightmap whose texels are all invalid); VSH_ERROR_LIMIT (not even VSH_BAND_STEP rows fit
+ * the limit); VSH_ERROR_WRITE (`resume`: the file of bands is not ours, or open elsewhere). Lightmaps that
+ * are done by then stay. */
+VSH_API vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
+
+/* How many lightmaps there are, and one of them. Cannot fail, but that `index` must be below the count. */
+VSH_API size_t vsh_bake_job_count(const vsh_bake_job *job);
+VSH_API void vsh_bake_job_lightmap_sized(const vsh_bake_job *job, size_t index, vsh_job_lightmap *lightmap,
+                                         size_t lightmap_size);
+static inline void vsh_bake_job_lightmap(const vsh_bake_job *job, size_t index, vsh_job_lightmap *lightmap) {
+    vsh_bake_job_lightmap_sized(job, index, lightmap, sizeof *lightmap);
+}
+
+/* The files that it loaded; NULL before. They belong to the job. */
+VSH_API const vsh_assets *vsh_bake_job_assets(const vsh_bake_job *job);
+
+/* What a job has done so far. */
+typedef struct vsh_bake_report {
+    double load_s; /* seconds: files read and hashed */
+    double bake_s; /* texels made and shaded */
+    double write_s;
+    uint64_t texels; /* these two of all lightmaps, as in vsh_bake_stats */
+    uint64_t invalid_texels;
+    uint64_t resumed_rows;
+    uint64_t bands;
+    vsh_shade_stats shade;
+    vsh_occluders_info occluders;
+    const vsh_bake_error *errors; /* [error_count]: of each light, then of AO; belong to the job */
+    size_t error_count;           /* 1 + lights of the scene; 0 before vsh_bake_job_prepare() */
+} vsh_bake_report;
+
+/* Cannot fail. */
+VSH_API void vsh_bake_job_get_report_sized(const vsh_bake_job *job, vsh_bake_report *report,
+                                           size_t report_size);
+static inline void vsh_bake_job_get_report(const vsh_bake_job *job, vsh_bake_report *report) {
+    vsh_bake_job_get_report_sized(job, report, sizeof *report);
+}
+
+/* All of it: vsh_bake_job_create(), …_measure(), …_prepare() and …_run(). `report` (may be NULL) is filled on
+ * success, without `errors`. Errors: as these. */
+VSH_API vsh_result vsh_bake_scene_sized(const vsh_scene *scene, const vsh_bake_job_options *options,
+                                        const vsh_run *run, vsh_bake_report *report, size_t report_size,
+                                        vsh_error *error);
+static inline vsh_result vsh_bake_scene(const vsh_scene *scene, const vsh_bake_job_options *options,
+                                        const vsh_run *run, vsh_bake_report *report, vsh_error *error) {
+    return vsh_bake_scene_sized(scene, options, run, report, sizeof *report, error);
+}
+
+/* --- what a job will take */
+
+/* Found out by a small one: few voxels and a part of the texels are really made, by the same methods, and
+ * what they took is scaled up. Texels, voxels and bands are close; times may be half or twice as much. */
+typedef struct vsh_bake_forecast {
+    uint64_t texels;
+    uint64_t samples;
+    double voxels; /* active, of all level sets */
+    double voxel_size;
+    double resolution;  /* voxels along the longest side */
+    double peak_bytes;  /* at most */
+    double grid_bytes;  /* of the level sets */
+    double field_bytes; /* of the fields */
+    double voxelize_s;  /* seconds */
+    double field_s;
+    double bake_s;
+    int32_t has_triangles; /* nonzero: they are traced, and auto is exact */
+} vsh_bake_forecast;
+
+/* Of a job that was created and not measured. The job is then measured, without warnings. Errors: as
+ * vsh_bake_job_measure() and …_prepare(), vsh_bake_lightmap(). */
+VSH_API vsh_result vsh_bake_job_forecast_sized(vsh_bake_job *job, const vsh_run *run,
+                                               vsh_bake_forecast *forecast, size_t forecast_size,
+                                               vsh_error *error);
+static inline vsh_result vsh_bake_job_forecast(vsh_bake_job *job, const vsh_run *run,
+                                               vsh_bake_forecast *forecast, vsh_error *error) {
+    return vsh_bake_job_forecast_sized(job, run, forecast, sizeof *forecast, error);
+}
+
+/* The charts of a receiver's meshes, sorted and counted as its bake does, with the warnings of
+ * vsh_bake_job_measure(). The meshes must outlive them. Free them with vsh_charts_free(). Errors: as there;
+ * VSH_ERROR_ARGUMENT (a pointer NULL, no such receiver). */
+VSH_API vsh_result vsh_receiver_charts(const vsh_scene *scene, size_t index, const vsh_mesh *meshes,
+                                       size_t mesh_count, int32_t allow_overlap, const vsh_run *run,
+                                       vsh_charts **charts, vsh_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

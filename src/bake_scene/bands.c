@@ -1,0 +1,111 @@
+#include "bake_scene/bands.h"
+
+#include "base/bytes.h"
+#include "base/try.h"
+
+enum { RESUME_BANDS = 16 }; /* a bake that is ended loses a sixteenth of a lightmap at most */
+
+/* What a lightmap takes, whatever is baked at a time. */
+typedef struct cost {
+    const vsh_scene *scene;
+    const vsh_charts *charts;
+    vsh_charts_info info;
+    int32_t floats;      /* of all planes, a texel */
+    int32_t interleaved; /* those that are baked interleaved, and take memory twice */
+    uint64_t held, writer, limit;
+} cost;
+
+/* Bytes that the largest of bands of so many rows takes. */
+static uint64_t largest(const cost *c, int32_t rows) {
+    const vsh_scene *scene = c->scene;
+    const bool tint = scene->tint.type != VSH_TINT_NONE && scene->light_count > 0;
+    uint64_t most = 0;
+    for (int32_t first = 0; first < c->info.height; first += rows) {
+        const int32_t left = c->info.height - first, here = left < rows ? left : rows;
+        uint64_t bytes = vsh_charts_band_bytes(c->charts, first, here, c->floats, scene->error != 0,
+                                               scene->irradiance != 0, scene->bent != 0, tint);
+        bytes += (uint64_t)c->interleaved * sizeof(float) * (uint64_t)c->info.width * (uint64_t)here;
+        most = bytes > most ? bytes : most;
+        if (left <= rows) {
+            break;
+        }
+    }
+    return c->held + c->info.bytes + c->writer + most;
+}
+
+static vsh_result refuse(const cost *c, const char *output, uint64_t bytes, vsh_error *error) {
+    char all[VSHI_BYTES_ROOM], held[VSHI_BYTES_ROOM], writer[VSHI_BYTES_ROOM], limit[VSHI_BYTES_ROOM];
+    return vshi_fail(
+        error, VSH_ERROR_LIMIT,
+        "%s: %d × %d texels need %s even %d rows at a time (field and charts %s, writing %s), over "
+        "the memory limit of %s; %s",
+        output, c->info.width, c->info.height, vshi_bytes_text(bytes, all, sizeof all), VSH_BAND_STEP,
+        vshi_bytes_text(c->held + c->info.bytes, held, sizeof held),
+        vshi_bytes_text(c->writer, writer, sizeof writer), vshi_bytes_text(c->limit, limit, sizeof limit),
+        c->writer > c->limit / 4
+            ? "this format is put together in memory: write .exr, .png or .tif, or raise "
+              "--memory-limit"
+            : "raise --memory-limit, or take larger voxels");
+}
+
+static int32_t up_to_step(int32_t rows) {
+    return (rows + VSH_BAND_STEP - 1) / VSH_BAND_STEP * VSH_BAND_STEP;
+}
+
+/* The most rows within the limit, where a step of them is within it and all are not. */
+static int32_t most_rows(const cost *c) {
+    const int32_t height = c->info.height;
+    int32_t low = 1, high = (height + VSH_BAND_STEP - 1) / VSH_BAND_STEP; /* steps: fit, do not */
+    while (high - low > 1) {
+        const int32_t middle = low + (high - low) / 2;
+        if (largest(c, middle * VSH_BAND_STEP) <= c->limit) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    const int32_t most = low * VSH_BAND_STEP, count = (height + most - 1) / most;
+    const int32_t even = up_to_step((height + count - 1) / count);
+    return largest(c, even) <= c->limit ? even : most; /* evened out, they lie elsewhere */
+}
+
+/* `wanted` rows, or (0) as many as go. */
+static vsh_result plan(const cost *c, int32_t wanted, const char *output, vshi_bands *bands,
+                       vsh_error *error) {
+    const int32_t height = c->info.height;
+    int32_t rows = wanted > 0 && up_to_step(wanted) < height ? up_to_step(wanted) : height;
+    if (wanted == 0 && c->limit > 0 && largest(c, rows) > c->limit) {
+        const uint64_t least = largest(c, VSH_BAND_STEP);
+        if (least > c->limit) {
+            return refuse(c, output, least, error);
+        }
+        rows = most_rows(c);
+    }
+    *bands = (vshi_bands){rows, (height + rows - 1) / rows, largest(c, rows)};
+    return VSH_OK;
+}
+
+vsh_result vshi_bands_plan(const vsh_scene *scene, const vshi_target *target, const vsh_charts *charts,
+                           const vshi_bands_need *need, vshi_bands *bands, vsh_error *error) {
+    const vsh_receiver *receiver = &target->receiver;
+    const vsh_image_options image = vshi_receiver_image(receiver);
+    vshi_channels channels;
+    vsh_result result = vshi_channels_name(scene, receiver->width, receiver->height, &channels, error);
+    if (result == VSH_OK) {
+        cost c = {.scene = scene,
+                  .charts = charts,
+                  .floats = channels.image.channel_count + (need->picture ? 4 : 0) + (scene->invalid ? 1 : 0),
+                  .interleaved = 3 * (int32_t)channels.triple_count,
+                  .held = need->held,
+                  .limit = need->limit};
+        c.writer = need->files ? vsh_image_writer_bytes(receiver->output, &channels.image, &image) : 0;
+        vsh_charts_get_info(charts, &c.info);
+        result = plan(&c, need->rows, receiver->output, bands, error);
+        const int32_t kept = (receiver->height + RESUME_BANDS - 1) / RESUME_BANDS;
+        if (result == VSH_OK && need->resume && need->rows == 0 && bands->rows > kept) {
+            result = plan(&c, kept, receiver->output, bands, error);
+        }
+    }
+    vshi_channels_free(&channels);
+    return result;
+}

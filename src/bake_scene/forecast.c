@@ -1,0 +1,144 @@
+/* What a bake will take, found out by a small one. */
+#include "bake_scene/job.h"
+#include "base/clock.h"
+#include "base/job.h"
+#include "base/memory.h"
+#include "base/try.h"
+
+#include <math.h>
+#include <sys/resource.h>
+
+/* The trial: voxels along the longest side, and texels on a side. */
+enum { TRIAL_RESOLUTION = 96, TRIAL_SIZE = 128 };
+/* A march takes a few samples more on each finer level: this much more for twice the resolution, measured on
+ * the project's scenes. */
+static const double MORE_PER_DOUBLING = 1.15;
+/* Making a level set takes this many times its own memory (the cloister, 96 to 512 voxels: 6 to 4.2). */
+static const double MAKING = 4.3;
+
+/* What was measured on the trial. */
+typedef struct trial {
+    double finer;    /* the scene's resolution over the trial's */
+    double sample_s; /* of one texel's sample, all lights and AO */
+    vsh_occluders_info made;
+} trial;
+
+static vsh_result make_texels(const vsh_bake_job *job, const vsh_run *run, vsh_texels **texels,
+                              vsh_error *error) {
+    const vshi_target *target = &job->targets.list[0];
+    const vsh_receiver *receiver = &target->receiver;
+    const bool smaller = TRIAL_SIZE < receiver->width;
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = smaller ? TRIAL_SIZE : receiver->width;
+    options.height = receiver->height < TRIAL_SIZE ? receiver->height : TRIAL_SIZE;
+    options.supersample = smaller ? 1 : receiver->supersample;
+    options.padding = smaller ? 0 : receiver->padding;
+    return vsh_texels_create(target->meshes, target->mesh_count, &options, run, NULL, texels, error);
+}
+
+static vsh_result bake_part(const vsh_bake_job *job, const vsh_occluders *occluders, const vsh_run *run,
+                            trial *t, vsh_error *error) {
+    const vsh_scene *scene = &job->scene;
+    vsh_texels *texels = NULL;
+    vshi_channels channels = {.rows = 0};
+    vsh_result result;
+    VSHI_TRY_DONE(make_texels(job, run, &texels, error));
+    vsh_texels_info info;
+    vsh_texels_get_info(texels, &info);
+    VSHI_TRY_DONE(vshi_channels_name(scene, info.width, info.height, &channels, error));
+    VSHI_TRY_DONE(vshi_channels_allocate(&channels, scene, info.height, scene->invalid != 0,
+                                         run->memory_limit, job->lightmaps[0].output, error));
+    const double start = vshi_seconds();
+    VSHI_TRY_DONE(vsh_bake_lightmap(occluders, texels, scene->lights, scene->light_count, &scene->shade, run,
+                                    &channels.lightmap, NULL, error));
+    t->sample_s = (vshi_seconds() - start) / fmax(1.0, (double)info.samples);
+done:
+    vshi_channels_free(&channels);
+    vsh_texels_free(texels);
+    return result;
+}
+
+/* Voxels of the scene over those of the trial, on a side. */
+static double finer(const vsh_scene *scene, double trial_voxel) {
+    return scene->grid.voxel_size > 0.0 ? trial_voxel / scene->grid.voxel_size
+                                        : (double)scene->grid.resolution / TRIAL_RESOLUTION;
+}
+
+static vsh_result try_small(const vsh_bake_job *job, const vsh_run *run, trial *t, vsh_error *error) {
+    vsh_scene small = job->scene;
+    small.grid.voxel_size = 0.0;
+    small.grid.resolution = TRIAL_RESOLUTION;
+    vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
+    options.receivers_min = job->receivers[0];
+    options.receivers_max = job->receivers[1];
+    options.silent_voxels = 1; /* what coarse voxels lose is not lost by the scene's */
+    vsh_occluders *occluders = NULL;
+    VSHI_TRY(vsh_scene_occluders(&small, job->assets, &options, run, &occluders, error));
+    vsh_occluders_get_info(occluders, &t->made);
+    t->finer = finer(&job->scene, t->made.voxel_size);
+    const vsh_result result = bake_part(job, occluders, run, t, error);
+    vsh_occluders_free(occluders);
+    return result;
+}
+
+static double resident_bytes(void) {
+    struct rusage usage;
+    return getrusage(RUSAGE_SELF, &usage) == 0 ? 1024.0 * (double)usage.ru_maxrss : 0.0;
+}
+
+/* Bytes that the largest lightmap takes, the fields with it; plans all of them. */
+static vsh_result plan_bands(vsh_bake_job *job, double field_bytes, const vsh_run *run, uint64_t *largest,
+                             vsh_error *error) {
+    *largest = 0;
+    for (size_t i = 0; i < job->targets.count; ++i) {
+        vsh_charts *own = NULL;
+        vshi_bands bands;
+        if (job->charts == NULL) {
+            VSHI_TRY(vshi_target_charts(&job->scene, &job->targets.list[i], job->options.allow_overlap != 0,
+                                        false, run, &own, error));
+        }
+        const vsh_result result =
+            vshi_job_plan(job, i, own != NULL ? own : job->charts, (uint64_t)field_bytes, run, &bands, error);
+        vsh_charts_free(own);
+        VSHI_TRY(result);
+        job->lightmaps[i].bands = bands.count;
+        job->lightmaps[i].band_rows = bands.rows;
+        *largest = bands.bytes > *largest ? bands.bytes : *largest;
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_bake_job_forecast_sized(vsh_bake_job *job, const vsh_run *run, vsh_bake_forecast *forecast,
+                                       size_t forecast_size, vsh_error *error) {
+    VSHI_NEEDS(job);
+    VSHI_NEEDS(forecast);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    if (!job->measured) {
+        VSHI_TRY(vshi_job_measure(job, false, &full, error));
+    }
+    trial t;
+    VSHI_TRY(try_small(job, &full, &t, error));
+    const double more = t.finer * t.finer; /* surfaces: voxels grow with the square */
+    vsh_bake_forecast f = {.voxels = (double)t.made.active_voxels * more,
+                           .voxel_size = t.made.voxel_size / t.finer,
+                           .resolution = TRIAL_RESOLUTION * t.finer,
+                           .grid_bytes = (double)t.made.grid_bytes * more,
+                           .field_bytes = (double)t.made.field_bytes * more,
+                           .voxelize_s = t.made.voxelize_s * more,
+                           .field_s = t.made.field_s * more,
+                           .has_triangles = t.made.has_triangles};
+    for (size_t i = 0; i < job->targets.count; ++i) {
+        f.texels += job->lightmaps[i].covered;
+        f.samples += job->lightmaps[i].samples;
+    }
+    f.bake_s = job->report.bake_s +
+               (double)f.samples * t.sample_s * pow(MORE_PER_DOUBLING, fmax(0.0, log2(t.finer)));
+    uint64_t largest;
+    VSHI_TRY(plan_bands(job, f.field_bytes, &full, &largest, error));
+    const double base =
+        fmax(0.0, resident_bytes() - MAKING * (double)t.made.grid_bytes); /* program and assets */
+    f.peak_bytes = base + fmax(fmax(MAKING * f.grid_bytes, f.grid_bytes + f.field_bytes), (double)largest);
+    vshi_give(forecast, forecast_size, &f, sizeof f);
+    return VSH_OK;
+}

@@ -1,0 +1,333 @@
+#include "bake_scene/job.h"
+
+#include "bake_scene/resume.h"
+#include "base/clock.h"
+#include "base/job.h"
+#include "base/memory.h"
+#include "base/try.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *error) {
+    VSHI_NEEDS(scene);
+    if (index >= scene->receiver_count) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "receivers[%zu]: there are %zu", index,
+                         scene->receiver_count);
+    }
+    const vsh_receiver *receiver = &scene->receivers[index];
+    const vsh_image_options options = vshi_receiver_image(receiver);
+    vshi_channels channels;
+    vsh_result result = vshi_channels_name(scene, receiver->width, receiver->height, &channels, error);
+    if (result == VSH_OK) {
+        result = vsh_image_check(receiver->output, &channels.image, &options, error);
+    }
+    vshi_channels_free(&channels);
+    return result;
+}
+
+vsh_result vsh_receiver_charts(const vsh_scene *scene, size_t index, const vsh_mesh *meshes,
+                               size_t mesh_count, int32_t allow_overlap, const vsh_run *run,
+                               vsh_charts **charts, vsh_error *error) {
+    VSHI_NEEDS(charts);
+    *charts = NULL;
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS_OF(mesh_count, meshes);
+    if (index >= scene->receiver_count) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "receivers[%zu]: there are %zu", index,
+                         scene->receiver_count);
+    }
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    const vshi_target target = {scene->receivers[index], index, meshes, mesh_count, NULL};
+    return vshi_target_charts(scene, &target, allow_overlap != 0, true, &full, charts, error);
+}
+
+/* --- made and freed */
+
+static vsh_result check_sink(const vsh_row_sink *given, vsh_row_sink *sink, vsh_error *error) {
+    *sink = vsh_row_sink_default();
+    VSHI_TRY(vshi_options_resolve(given, sink, sizeof *sink, "vsh_row_sink", error));
+    if (given != NULL && (sink->begin == NULL || sink->add == NULL || sink->end == NULL)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_row_sink: begin, add or end is NULL");
+    }
+    return VSH_OK;
+}
+
+static vsh_result check(const vsh_scene *scene, const vsh_bake_job_options *options, vsh_error *error) {
+    if (scene->receiver_count == 0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "scene: no receivers");
+    }
+    if (options->resume && (options->sink != NULL || options->invalid_picture != NULL)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.resume: not together with %s",
+                         options->sink != NULL ? "a sink" : "invalid_picture");
+    }
+    for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
+        VSHI_TRY(vsh_receiver_check(scene, i, error));
+    }
+    return VSH_OK;
+}
+
+static vsh_result list_lightmaps(vsh_bake_job *job, vsh_error *error) {
+    const vshi_targets *targets = &job->targets;
+    job->lightmaps = calloc(targets->count + 1, sizeof *job->lightmaps);
+    if (job->lightmaps == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "lightmaps: the system refused memory");
+    }
+    for (size_t i = 0; i < targets->count; ++i) {
+        const vshi_target *target = &targets->list[i];
+        job->lightmaps[i] = (vsh_job_lightmap){.receiver = target->index,
+                                               .path = target->receiver.path,
+                                               .output = target->receiver.output,
+                                               .meshes = target->meshes,
+                                               .mesh_count = target->mesh_count,
+                                               .width = target->receiver.width,
+                                               .height = target->receiver.height};
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_options *options,
+                               const vsh_run *run, vsh_bake_job **job, vsh_error *error) {
+    VSHI_NEEDS(job);
+    *job = NULL;
+    VSHI_NEEDS(scene);
+    const double start = vshi_seconds();
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    vsh_bake_job_options own = vsh_bake_job_options_default();
+    VSHI_TRY(vshi_options_resolve(options, &own, sizeof own, "vsh_bake_job_options", error));
+    vsh_row_sink sink;
+    VSHI_TRY(check_sink(own.sink, &sink, error));
+    VSHI_TRY(check(scene, &own, error));
+    vsh_bake_job *made = calloc(1, sizeof *made);
+    if (made == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "bake job: the system refused memory");
+    }
+    made->scene = *scene;
+    made->options = own;
+    made->sink = sink;
+    made->report.shade = vsh_shade_stats_zero();
+    vsh_result result;
+    VSHI_TRY_DONE(vsh_assets_load(scene, &full, &made->assets, error));
+    VSHI_TRY_DONE(vshi_targets_make(scene, made->assets, own.per_object != 0, &made->targets, error));
+    VSHI_TRY_DONE(list_lightmaps(made, error));
+    made->report.load_s = vshi_seconds() - start;
+    *job = made;
+    return VSH_OK;
+done:
+    vsh_bake_job_free(made);
+    return result;
+}
+
+void vsh_bake_job_free(vsh_bake_job *job) {
+    if (job == NULL) {
+        return;
+    }
+    free(job->errors);
+    vsh_provenance_free(job->provenance);
+    vsh_occluders_free(job->occluders);
+    vsh_texels_free(job->texels);
+    vsh_charts_free(job->charts);
+    free(job->lightmaps);
+    vshi_targets_free(&job->targets);
+    vsh_assets_free(job->assets);
+    free(job);
+}
+
+size_t vsh_bake_job_count(const vsh_bake_job *job) {
+    return job->targets.count;
+}
+
+void vsh_bake_job_lightmap_sized(const vsh_bake_job *job, size_t index, vsh_job_lightmap *lightmap,
+                                 size_t lightmap_size) {
+    vshi_give(lightmap, lightmap_size, &job->lightmaps[index], sizeof job->lightmaps[index]);
+}
+
+const vsh_assets *vsh_bake_job_assets(const vsh_bake_job *job) {
+    return job->assets;
+}
+
+void vsh_bake_job_get_report_sized(const vsh_bake_job *job, vsh_bake_report *report, size_t report_size) {
+    vshi_give(report, report_size, &job->report, sizeof job->report);
+}
+
+/* --- measured */
+
+/* Where its samples are: looked at in passing, or (whole) all of them are made. */
+static vsh_result find_bounds(const vsh_charts *charts, const vshi_bands *bands, bool whole,
+                              const vsh_run *run, vsh_texels **texels, double low[3], double high[3],
+                              vsh_error *error) {
+    if (!whole) {
+        return vsh_charts_bounds(charts, run, low, high, error);
+    }
+    VSHI_TRY(vsh_texels_create_band(charts, 0, bands->rows, run, texels, error));
+    vsh_texels_info info;
+    vsh_texels_get_info(*texels, &info);
+    memcpy(low, info.bounds_min, sizeof info.bounds_min);
+    memcpy(high, info.bounds_max, sizeof info.bounds_max);
+    return VSH_OK;
+}
+
+static vsh_result measure(vsh_bake_job *job, size_t index, bool bakes, const vsh_run *run, vsh_error *error) {
+    vsh_job_lightmap *lightmap = &job->lightmaps[index];
+    vsh_charts *charts = NULL;
+    vsh_texels *texels = NULL;
+    vshi_bands bands;
+    double low[3], high[3];
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_target_charts(&job->scene, &job->targets.list[index], job->options.allow_overlap != 0,
+                                     bakes, run, &charts, error));
+    VSHI_TRY_DONE(vshi_job_plan(job, index, charts, 0, run, &bands, error));
+    VSHI_TRY_DONE(find_bounds(charts, &bands, bakes && bands.count == 1, run, &texels, low, high, error));
+    vsh_charts_info counted;
+    vsh_charts_get_info(charts, &counted);
+    lightmap->covered = counted.covered;
+    lightmap->samples = counted.samples;
+    lightmap->bands = bands.count;
+    lightmap->band_rows = bands.rows;
+    for (int axis = 0; axis < 3 && counted.samples > 0; ++axis) {
+        job->receivers[0][axis] = fmin(job->receivers[0][axis], low[axis]);
+        job->receivers[1][axis] = fmax(job->receivers[1][axis], high[axis]);
+    }
+    if (job->targets.count == 1) {
+        job->charts = charts;
+        job->texels = texels;
+        return VSH_OK;
+    }
+done:
+    vsh_texels_free(texels);
+    vsh_charts_free(charts);
+    return result;
+}
+
+vsh_result vshi_job_measure(vsh_bake_job *job, bool bakes, const vsh_run *run, vsh_error *error) {
+    const double start = vshi_seconds();
+    for (int axis = 0; axis < 3; ++axis) {
+        job->receivers[0][axis] = INFINITY;
+        job->receivers[1][axis] = -INFINITY;
+    }
+    for (size_t i = 0; i < job->targets.count; ++i) {
+        VSHI_TRY(measure(job, i, bakes, run, error));
+    }
+    job->measured = true;
+    job->report.bake_s += vshi_seconds() - start;
+    return VSH_OK;
+}
+
+vsh_result vsh_bake_job_measure(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
+    VSHI_NEEDS(job);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    return job->measured ? VSH_OK : vshi_job_measure(job, true, &full, error);
+}
+
+/* --- prepared */
+
+static vsh_result find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
+    const double start = vshi_seconds();
+    vsh_provenance_source source = vsh_provenance_source_default();
+    source.scene = &job->scene;
+    source.command = job->options.command;
+    source.files = job->options.files;
+    source.file_count = job->options.file_count;
+    source.voxel_size = job->report.occluders.voxel_size;
+    source.has_triangles = job->report.occluders.has_triangles;
+    const vsh_result result = vsh_provenance_create(&source, run, &job->provenance, error);
+    job->report.load_s += vshi_seconds() - start;
+    return result;
+}
+
+vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
+    VSHI_NEEDS(job);
+    if (!job->measured) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: vsh_bake_job_measure() comes first", __func__);
+    }
+    if (job->occluders != NULL) {
+        return VSH_OK;
+    }
+    vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
+    options.receivers_min = job->receivers[0];
+    options.receivers_max = job->receivers[1];
+    options.truth = 1;
+    VSHI_TRY(vsh_scene_occluders(&job->scene, job->assets, &options, run, &job->occluders, error));
+    vsh_occluders_get_info(job->occluders, &job->report.occluders);
+    const size_t count = job->scene.light_count + 1;
+    job->errors = calloc(count, sizeof *job->errors);
+    if (job->errors == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "bake job: the system refused memory");
+    }
+    job->report.errors = job->errors;
+    job->report.error_count = count;
+    return VSH_OK;
+}
+
+/* --- run */
+
+static vsh_result bake(vsh_bake_job *job, size_t index, const vsh_run *run, vsh_error *error) {
+    vshi_lightmap_input input = {.charts = job->charts};
+    vsh_charts *own = NULL;
+    if (job->charts == NULL) {
+        const double start = vshi_seconds();
+        VSHI_TRY(vshi_target_charts(&job->scene, &job->targets.list[index], job->options.allow_overlap != 0,
+                                    false, run, &own, error));
+        job->report.bake_s += vshi_seconds() - start;
+        input.charts = own;
+    }
+    const vsh_occluders_info *casters = &job->report.occluders;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_job_plan(job, index, input.charts, casters->field_bytes + casters->triangles_bytes,
+                                run, &input.bands, error));
+    if (input.bands.count > 1) {
+        vsh_texels_free(job->texels);
+        job->texels = NULL;
+    }
+    input.kept = job->texels;
+    VSHI_TRY_DONE(vshi_job_bake(job, index, &input, run, error));
+done:
+    vsh_charts_free(own);
+    if (job->options.done != NULL) {
+        job->options.done(job->options.user, &job->lightmaps[index], result);
+    }
+    return result;
+}
+
+vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
+    VSHI_NEEDS(job);
+    if (job->errors == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: vsh_bake_job_prepare() comes first", __func__);
+    }
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    if (job->options.sink == NULL && job->provenance == NULL) {
+        VSHI_TRY(find_provenance(job, &full, error));
+    }
+    for (size_t i = 0; i < job->targets.count; ++i) {
+        VSHI_TRY(bake(job, i, &full, error));
+    }
+    /* not before all are whole: a bake that goes on writes those that were again */
+    for (size_t i = 0; i < job->targets.count && job->options.resume; ++i) {
+        vshi_resume_remove(job->lightmaps[i].output);
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_bake_scene_sized(const vsh_scene *scene, const vsh_bake_job_options *options,
+                                const vsh_run *run, vsh_bake_report *report, size_t report_size,
+                                vsh_error *error) {
+    vsh_bake_job *job = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vsh_bake_job_create(scene, options, run, &job, error));
+    VSHI_TRY_DONE(vsh_bake_job_measure(job, run, error));
+    VSHI_TRY_DONE(vsh_bake_job_prepare(job, run, error));
+    VSHI_TRY_DONE(vsh_bake_job_run(job, run, error));
+    if (report != NULL) {
+        job->report.errors = NULL;
+        job->report.error_count = 0;
+        vsh_bake_job_get_report_sized(job, report, report_size);
+    }
+done:
+    vsh_bake_job_free(job);
+    return result;
+}

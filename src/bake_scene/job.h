@@ -1,0 +1,54 @@
+/* A scene's bake under way, and the steps of it. */
+#ifndef VSHI_BAKE_JOB_H
+#define VSHI_BAKE_JOB_H
+
+#include "bake_scene/bands.h"
+#include "bake_scene/target.h"
+
+#include <vdbshade/bake_scene.h>
+#include <vdbshade/provenance.h>
+
+struct vsh_bake_job {
+    vsh_scene scene;
+    vsh_bake_job_options options;
+    vsh_row_sink sink; /* that of the options, where there is one */
+    vsh_assets *assets;
+    vshi_targets targets;
+    vsh_job_lightmap *lightmaps; /* [targets.count] */
+    /* of the only lightmap, kept from counting it; several are rasterised again, so as not to hold all at
+     * once */
+    vsh_charts *charts;
+    vsh_texels *texels;         /* NULL where it is baked in bands */
+    double receivers[2][3];     /* world box of all samples, min and max; min > max where there are none */
+    vsh_occluders *occluders;   /* NULL: not prepared */
+    vsh_provenance *provenance; /* NULL where a caller's sink takes the rows, and nothing is kept */
+    vsh_bake_error *errors;     /* [error_count], as in the report */
+    vsh_bake_report report;
+    bool measured;
+};
+
+/* The texels of some rows, or (`kept`, where they are all of them) those that are there already. */
+typedef struct vshi_lightmap_input {
+    const vsh_charts *charts;
+    const vsh_texels *kept; /* NULL: none */
+    vshi_bands bands;
+} vshi_lightmap_input;
+
+/* Sorts and counts a target's charts; warns of its UVs where asked to, and refuses those that cannot be
+ * baked.
+ */
+vsh_result vshi_target_charts(const vsh_scene *scene, const vshi_target *target, bool allow_overlap,
+                              bool warn, const vsh_run *run, vsh_charts **charts, vsh_error *error);
+
+/* Plans the bands of target `index`, where `held` bytes are taken beside them. */
+vsh_result vshi_job_plan(const vsh_bake_job *job, size_t index, const vsh_charts *charts, uint64_t held,
+                         const vsh_run *run, vshi_bands *bands, vsh_error *error);
+
+/* Counts all targets; for a bake warns of their UVs, and keeps the texels of the only one. */
+vsh_result vshi_job_measure(vsh_bake_job *job, bool bakes, const vsh_run *run, vsh_error *error);
+
+/* Shades the texels of target `index` and hands its rows to the sink. */
+vsh_result vshi_job_bake(vsh_bake_job *job, size_t index, const vshi_lightmap_input *input,
+                         const vsh_run *run, vsh_error *error);
+
+#endif

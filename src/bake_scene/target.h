@@ -1,0 +1,34 @@
+/* The lightmaps of a job: one a receiver, or one for each object of every receiver. */
+#ifndef VSHI_TARGET_H
+#define VSHI_TARGET_H
+
+#include "base/error.h"
+
+#include <stdbool.h>
+#include <vdbshade/image.h>
+#include <vdbshade/scene.h>
+
+/* One lightmap. */
+typedef struct vshi_target {
+    vsh_receiver receiver;  /* the scene's, with this lightmap's output */
+    size_t index;           /* of the receiver in the scene */
+    const vsh_mesh *meshes; /* belong to the assets */
+    size_t mesh_count;
+    char *output; /* of an object; NULL: it is the receiver's own */
+} vshi_target;
+
+typedef struct vshi_targets {
+    vshi_target *list; /* [count] */
+    size_t count;
+} vshi_targets;
+
+/* Errors: VSH_ERROR_ARGUMENT (per_object: an output without "%s" in its name), VSH_ERROR_MEMORY. Free them
+ * also after a failure. */
+vsh_result vshi_targets_make(const vsh_scene *scene, const vsh_assets *assets, bool per_object,
+                             vshi_targets *targets, vsh_error *error);
+void vshi_targets_free(vshi_targets *targets);
+
+/* A receiver's image, of its bits, packing and colours. */
+vsh_image_options vshi_receiver_image(const vsh_receiver *receiver);
+
+#endif

@@ -1,0 +1,26 @@
+/* What is odd about a lightmap, as warnings and as errors: its UVs, its texels, its file. */
+#ifndef VSHI_WARN_H
+#define VSHI_WARN_H
+
+#include "bake_scene/target.h"
+
+/* Warns of what is wrong with its UVs, a line a mesh and kind, and of charts that are too close for the size.
+ */
+void vshi_warn_uvs(const vshi_target *target, const vsh_uv_report *reports, const vsh_run *run);
+
+/* Charts that cover no texel's centre, or objects that lie over each other on more than VSH_LARGEST_OVERLAP
+ * of the texels: VSH_ERROR_INPUT, with why. */
+vsh_result vshi_refuse_uvs(const vshi_target *target, const vsh_uv_report *reports, uint64_t covered,
+                           bool allow_overlap, vsh_error *error);
+
+/* A lightmap without one valid texel is no lightmap: VSH_ERROR_INPUT. */
+vsh_result vshi_refuse_invalid(const vshi_target *target, const vsh_bake_stats *baked, vsh_error *error);
+
+/* Warns of texels that are not valid, and of marches that did not end or widened too far. */
+void vshi_warn_baked(const vsh_scene *scene, const vshi_target *target, const vsh_bake_stats *baked,
+                     const vsh_run *run);
+
+/* Warns of light that the file's integers cut. */
+void vshi_warn_clipping(const char *output, const vsh_image_clipping *cut, const vsh_run *run);
+
+#endif
