@@ -266,6 +266,69 @@ static void a_box_without_a_half_is_refused(void **state) {
     assert_null(of_scene(SCENE(BALL, "\"method\": \"cone\""), &options, VSH_ERROR_ARGUMENT));
 }
 
+static void more_layers_than_can_be_are_refused(void **state) {
+    (void)state;
+    const double ball[4] = {0, 0, 0, 1};
+    vsh_caster casters[VSH_MAX_LAYERS + 1] = {{.type = VSH_CASTER_SPHERES}};
+    for (size_t i = 0; i <= VSH_MAX_LAYERS; ++i) {
+        casters[i] = (vsh_caster){.type = VSH_CASTER_SPHERES, .spheres = ball, .sphere_count = 1};
+        casters[i].transform[0] = casters[i].transform[5] = casters[i].transform[10] = 1.0;
+    }
+    vsh_scene scene = {.casters = casters, .grid = vsh_grid_options_default()};
+    for (size_t more = 0; more < 2; ++more) {
+        scene.caster_count = VSH_MAX_LAYERS + more;
+        vsh_assets *assets = NULL;
+        vsh_occluders *made = NULL;
+        assert_int_equal(vsh_assets_load(&scene, NULL, &assets, &why), VSH_OK);
+        const vsh_result result = vsh_scene_occluders(&scene, assets, NULL, NULL, &made, &why);
+        assert_int_equal(result, more ? VSH_ERROR_INPUT : VSH_OK);
+        vsh_occluders_free(made);
+        vsh_assets_free(assets);
+    }
+    assert_string_equal(why.message, "0 layers and 129 casters that are not voxelised: at most 128 together");
+}
+
+static void count_lost(void *user, const char *message) {
+    *(int *)user += strstr(message, "of its area is lost") != NULL;
+}
+
+static void what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial(void **state) {
+    (void)state;
+    static const struct {
+        int32_t method, silent;
+        bool told;
+    } cases[] = {{VSH_SHADOW_CONE, 0, true}, {VSH_SHADOW_CONE, 1, false}, {VSH_SHADOW_EXACT, 0, false}};
+    vsh_caster caster = {.type = VSH_CASTER_MESH, .path = VSH_ASSETS "/thin.glb"};
+    caster.transform[0] = caster.transform[5] = caster.transform[10] = 1.0;
+    const vsh_light light = vsh_light_default();
+    vsh_scene scene = {.casters = &caster,
+                       .caster_count = 1,
+                       .lights = &light,
+                       .light_count = 1,
+                       .grid = vsh_grid_options_default(),
+                       .shade = vsh_shade_options_default()};
+    scene.grid.resolution = 32;
+    vsh_assets *assets = NULL;
+    assert_int_equal(vsh_assets_load(&scene, NULL, &assets, &why), VSH_OK);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+        int told = 0;
+        vsh_run run = vsh_run_default();
+        run.warning = count_lost;
+        run.user = &told;
+        scene.shade.method = cases[i].method;
+        vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
+        options.silent_voxels = cases[i].silent;
+        vsh_occluders *made = NULL;
+        if (cases[i].method == VSH_SHADOW_EXACT && !vsh_triangles_available()) {
+            continue;
+        }
+        assert_int_equal(vsh_scene_occluders(&scene, assets, &options, &run, &made, &why), VSH_OK);
+        assert_int_equal(told > 0, cases[i].told);
+        vsh_occluders_free(made);
+    }
+    vsh_assets_free(assets);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(meshes_make_the_field_and_triangles_that_their_parts_make),
@@ -276,6 +339,8 @@ int main(void) {
         cmocka_unit_test(layers_alone_say_what_offsets_are_measured_in),
         cmocka_unit_test(a_scene_keeps_the_truth_only_where_an_error_is_kept),
         cmocka_unit_test(a_box_without_a_half_is_refused),
+        cmocka_unit_test(more_layers_than_can_be_are_refused),
+        cmocka_unit_test(what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
