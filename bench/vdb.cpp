@@ -1,7 +1,7 @@
 // What OpenVDB and NanoVDB do with the same level set. An exception ends the program: this is no library.
 #include "vdb.h"
 
-#include "shim/openvdb_grid.h"
+#include "levelset/grid.h"
 
 #include <openvdb/tools/RayIntersector.h>
 

@@ -54,7 +54,7 @@ function(vsh_add_kernels target)
                                 COMPILE_OPTIONS "-O3;${VSH_KERNEL_${kind}_FLAGS}"
                                 OBJECT_DEPENDS ${folder}/lanes.inc)
   endforeach()
-  set(folder ${PROJECT_SOURCE_DIR}/src/analytic/kernel)
+  set(folder ${PROJECT_SOURCE_DIR}/src/heightfield/kernel)
   list(REMOVE_ITEM kinds few)
   foreach(kind ${kinds})
     target_sources(${target} PRIVATE ${folder}/walk_${kind}.c)

@@ -30,7 +30,7 @@ set(VSH_WATCH_thread_ENVIRONMENT
 
 # What TBB's headers expand into is not watched by `thread`: the scheduler, which is not seen, orders what it does on its
 # callers' stacks, and a later use of such a stack would seem to race with it. What the loops call is watched.
-set_source_files_properties(${PROJECT_SOURCE_DIR}/src/shim/tbb.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=thread)
+set_source_files_properties(${PROJECT_SOURCE_DIR}/src/extern/tbb.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=thread)
 
 function(vsh_watch target watch)
   target_compile_options(${target} PRIVATE -O1 -g1 -fsanitize=${VSH_WATCH_${watch}} ${VSH_SANITIZE_FLAGS})

@@ -4,6 +4,7 @@
 
 #include "base.h"
 #include "mesh.h"
+#include "outline.h"
 #include "sdf.h"
 
 #ifdef __cplusplus
@@ -50,6 +51,18 @@ VSH_API vsh_result vsh_grid_from_meshes(const vsh_mesh *meshes, size_t mesh_coun
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options *options, const vsh_run *run,
                                      vsh_grid **grid, vsh_error *error);
+
+/* The solid that the outline makes between z = -thickness / 2 and z = +thickness / 2, with its true distance.
+ * `transform` [12], local to world, three rows of four: any of rotation, translation, mirroring and one scale
+ * (to 1e-6); NULL: identity. Errors:
+ * - VSH_ERROR_ARGUMENT: outline or grid NULL, thickness (local units, > 0 … 1e15), a transform other than
+ * those, options out of range, run;
+ * - VSH_ERROR_INPUT: a solid too thin for the voxels;
+ * - VSH_ERROR_LIMIT: as vsh_grid_from_meshes(), but for triangles;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_grid_from_outline(const vsh_outline *outline, double thickness,
+                                         const double *transform, const vsh_grid_options *options,
+                                         const vsh_run *run, vsh_grid **grid, vsh_error *error);
 
 /* Signed distance at a world position, negative inside. Called by many threads at once, for positions outside
  * the bounds too; must return, and the same value for the same position. */

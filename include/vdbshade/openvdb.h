@@ -4,7 +4,7 @@
 #define VDBSHADE_OPENVDB_H
 
 #include "grid.h"
-#include "volume.h"
+#include "voxels.h"
 
 #include <openvdb/openvdb.h>
 

@@ -3,7 +3,7 @@
 #ifndef VDBSHADE_OUTLINE_H
 #define VDBSHADE_OUTLINE_H
 
-#include "grid.h"
+#include "base.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -124,18 +124,6 @@ VSH_API const double *vsh_outline_contour(const vsh_outline *outline, size_t ind
  * time with the logarithm of the number of points. */
 VSH_API double vsh_outline_distance(const vsh_outline *outline, const double point[2]);
 VSH_API void vsh_outline_free(vsh_outline *outline); /* NULL does nothing */
-
-/* The solid that the outline makes between z = -thickness / 2 and z = +thickness / 2, with its true distance.
- * `transform` [12], local to world, three rows of four: any of rotation, translation, mirroring and one scale
- * (to 1e-6); NULL: identity. Errors:
- * - VSH_ERROR_ARGUMENT: outline or grid NULL, thickness (local units, > 0 … 1e15), a transform other than
- * those, options out of range, run;
- * - VSH_ERROR_INPUT: a solid too thin for the voxels;
- * - VSH_ERROR_LIMIT: as vsh_grid_from_meshes(), but for triangles;
- * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_grid_from_outline(const vsh_outline *outline, double thickness,
-                                         const double *transform, const vsh_grid_options *options,
-                                         const vsh_run *run, vsh_grid **grid, vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -37,6 +37,7 @@
 #include "bake_scene.h"
 #include "base.h"
 #include "compare.h"
+#include "digest.h"
 #include "field.h"
 #include "flat.h"
 #include "grid.h"
@@ -45,8 +46,10 @@
 #include "layer.h"
 #include "light.h"
 #include "mesh.h"
+#include "method.h"
 #include "occluders.h"
 #include "outline.h"
+#include "points.h"
 #include "provenance.h"
 #include "query.h"
 #include "reader.h"
@@ -58,5 +61,6 @@
 #include "spheres.h"
 #include "trace.h"
 #include "volume.h"
+#include "voxels.h"
 
 #endif

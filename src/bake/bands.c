@@ -9,8 +9,8 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "caster/mesh.h"
-#include "caster/solidity.h"
+#include "mesh/mesh.h"
+#include "mesh/solidity.h"
 #include "shade/layers.h"
 
 #include <stdlib.h>

@@ -1,7 +1,19 @@
 #include "bake/bend.h"
 
+#include "base/names.h"
 #include "base/parallel.h"
 #include "shade/ao.h"
+
+static const char *const spaces_table[] = {[VSH_BENT_WORLD] = "world", [VSH_BENT_TANGENT] = "tangent"};
+static const vshi_names spaces = VSHI_NAMES(spaces_table);
+
+int32_t vsh_bent_space(const char *name) {
+    return vshi_name_find(spaces, name);
+}
+
+const char *vsh_bent_space_name(int32_t space) {
+    return vshi_name_at(spaces, space);
+}
 
 typedef struct bending {
     const vsh_texels *texels;

@@ -1,6 +1,6 @@
 #include "bake/charts.h"
 #include "bake/take.h"
-#include "caster/mesh.h"
+#include "mesh/mesh.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -6,7 +6,7 @@
 #include "base/hash.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "caster/mesh.h"
+#include "mesh/mesh.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -14,7 +14,7 @@
 #include "base/hash.h"
 #include "base/parallel.h"
 #include "shade/inside.h"
-#include "shim/embree.h"
+#include "trace/embree.h"
 
 #include <math.h>
 #include <stdlib.h>

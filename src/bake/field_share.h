@@ -3,7 +3,7 @@
 #define VSHI_BAKE_FIELD_SHARE_H
 
 #include "bake/lift.h"
-#include "shade/trace.h"
+#include "trace/trace.h"
 
 /* The most samples of a lightmap, and what each takes, bytes. */
 enum { VSHI_FIELD_SHARE_MOST = 16384, VSHI_FIELD_SHARE_BYTES = 80 };

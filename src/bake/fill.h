@@ -3,7 +3,7 @@
 #define VSHI_BAKE_FILL_H
 
 #include "bake/solid.h"
-#include "shim/openvdb_volume.h"
+#include "levelset/volume.h"
 
 #include <stdatomic.h>
 #include <stdbool.h>

@@ -1,7 +1,7 @@
 #include "bake/lift.h"
 #include "base/elementary.h"
 #include "base/parallel.h"
-#include "shim/embree.h"
+#include "trace/embree.h"
 
 #include <math.h>
 

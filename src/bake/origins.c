@@ -1,13 +1,13 @@
 #include "bake/origins.h"
-#include "analytic/heights.h"
-#include "analytic/spheres.h"
 #include "bake/lift.h"
 #include "bake/take.h"
 #include "base/parallel.h"
+#include "heightfield/heights.h"
 #include "shade/inside.h"
 #include "shade/kernel/march.h"
 #include "shade/layers.h"
-#include "shim/embree.h"
+#include "spheres/spheres.h"
+#include "trace/embree.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,8 +1,8 @@
 #include "bake/solid.h"
 
-#include "analytic/balls.h"
-#include "analytic/heights.h"
+#include "heightfield/heights.h"
 #include "shade/occluders.h"
+#include "spheres/balls.h"
 
 #include <math.h>
 

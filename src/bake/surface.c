@@ -2,7 +2,7 @@
  * "Hacking the Shadow Terminator" (Ray Tracing Gems II, 2021): p' = p + Σ b_i (-min(0, (p - v_i)·n_i)) n_i.
  * Only convex parts are lifted, by about the sagitta of the arc over the triangle. */
 #include "bake/surface.h"
-#include "caster/mesh.h"
+#include "mesh/mesh.h"
 
 /* Vertex normals nearer to the geometric normal than this are those of a flat triangle (0.08°): exporters
  * write them with a float's noise, and a flat mesh is to stay exactly flat. */

@@ -4,7 +4,7 @@
 
 #include "base/job.h"
 
-#include <vdbshade/provenance.h>
+#include <vdbshade/digest.h>
 
 /* vsh_file_digest(), which the job can cancel; NULL: nobody. */
 vsh_result vshi_file_digest(const char *path, char digest[VSH_DIGEST_TEXT], vshi_job *job, vsh_error *error);

@@ -1,4 +1,4 @@
-#include "rounds.h"
+#include "base/rounds.h"
 
 #include "base/clock.h"
 

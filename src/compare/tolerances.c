@@ -1,8 +1,8 @@
 /* Limits from a file of JSON, read as scenes are. */
 #include "base/floats.h"
+#include "base/job.h"
 #include "compare/limits.h"
-#include "scene/keys.h"
-#include "scene/scene.h"
+#include "json/keys.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -102,7 +102,7 @@ vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vs
     size_t size;
     vsh_run run = vsh_run_default();
     run.memory_limit = MOST_BYTES;
-    vsh_result result = vshi_scene_text(path, &run, &text, &size, error);
+    vsh_result result = vshi_json_text(path, &run, &text, &size, error);
     if (result != VSH_OK) {
         return result;
     }

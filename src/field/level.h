@@ -4,7 +4,7 @@
 
 #include "base/job.h"
 #include "field/field.h"
-#include "shim/openvdb.h"
+#include "levelset/leaves.h"
 
 #include <math.h>
 #include <stdbool.h>

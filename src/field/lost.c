@@ -4,10 +4,10 @@
  * there, at places all over a mesh, each standing for as much area. A slab that is 1.25 voxels thick has a
  * voxel's centre an eighth of a voxel under its surface, wherever it lies. */
 #include "base/memory.h"
-#include "caster/mesh.h"
 #include "field/field.h"
 #include "field/level.h"
-#include "shim/embree.h"
+#include "mesh/mesh.h"
+#include "trace/embree.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 #ifndef VSHI_FLAT_VISIBLE_H
 #define VSHI_FLAT_VISIBLE_H
 
-#include "caster/outline.h"
+#include "outline/outline.h"
 
 #include <vdbshade/light.h>
 

@@ -1,7 +1,7 @@
 /* An image between a reader and its caller. */
 #include "base/memory.h"
 #include "image/planes.h"
-#include "read/takers.h"
+#include "sandbox/reader.h"
 
 #include <string.h>
 

@@ -4,8 +4,8 @@
 #include "base/input.h"
 #include "base/job.h"
 #include "image/exr.h"
+#include "image/oiio.h"
 #include "image/png.h"
-#include "shim/oiio.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -2,8 +2,8 @@
 #ifndef VSHI_WRITE_PLAN_H
 #define VSHI_WRITE_PLAN_H
 
+#include "image/oiio.h"
 #include "image/picture.h"
-#include "shim/oiio.h"
 
 typedef struct vshi_write_plan {
     bool exr;

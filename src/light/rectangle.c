@@ -180,7 +180,7 @@ static vshi_light_side look(const vshi_light_place *place, vshi_vec from, bool h
 
 /* --- rays */
 
-/* The unit disc to the unit square: back by the map of Shirley and Chiu (shade/sampler.c), areas kept. */
+/* The unit disc to the unit square: back by the map of Shirley and Chiu (trace/sampler.c), areas kept. */
 static void to_square(const double disc[2], double square[2]) {
     const double radius = sqrt(disc[0] * disc[0] + disc[1] * disc[1]);
     double x = 0.0, y = 0.0;

@@ -1,7 +1,7 @@
 #include "render/lit.h"
 
 #include "base/memory.h"
-#include "caster/mesh.h"
+#include "mesh/mesh.h"
 #include "shade/shade.h"
 
 #include <stdio.h>

@@ -4,7 +4,7 @@
 
 #include "base/vec.h"
 #include "render/film.h"
-#include "shade/sampler.h"
+#include "trace/sampler.h"
 
 #include <vdbshade/query.h>
 

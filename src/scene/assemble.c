@@ -1,8 +1,8 @@
 /* From a scene's casters to one level set. */
-#include "analytic/balls.h"
 #include "base/floats.h"
 #include "base/similarity.h"
 #include "scene/assets.h"
+#include "spheres/balls.h"
 
 #include "base/job.h"
 #include "base/memory.h"

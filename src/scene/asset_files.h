@@ -2,7 +2,7 @@
 #ifndef VSHI_ASSET_FILES_H
 #define VSHI_ASSET_FILES_H
 
-#include "analytic/heightmap.h"
+#include "heightfield/heightmap.h"
 
 #include <vdbshade/scene.h>
 

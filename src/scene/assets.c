@@ -5,7 +5,7 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "caster/solidity.h"
+#include "mesh/solidity.h"
 #include "scene/asset_files.h"
 #include "scene/select.h"
 #include "scene/solidity.h"

@@ -1,91 +1,21 @@
-/* vsh_scene_read(): the scene file's text, brought into memory within a limit. */
+/* vsh_scene_read(): a scene file, from its text. */
 #include "scene/scene.h"
 
 #include "base/error.h"
 #include "base/floats.h"
-#include "base/input.h"
 #include "base/job.h"
-#include "base/memory.h"
-#include "caster/foreign.h"
+#include "base/try.h"
+#include "model/foreign.h"
+#include "json/reader.h"
 
-#include <errno.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-
-static const size_t MAX_BYTES = (size_t)64 << 20;
-
-static vsh_result fail_read(const char *path, int reason, vsh_error *error) {
-    char why[128] = "";
-    if (strerror_r(reason, why, sizeof why) != 0) {
-        snprintf(why, sizeof why, "error %d", reason);
-    }
-    return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, why);
-}
-
-/* Read in pieces, not by the size that the system told: the file may grow. */
-static vsh_result read_all(const char *path, FILE *file, char **text, size_t *size, vsh_error *error) {
-    size_t capacity = 0;
-    do {
-        capacity = capacity == 0 ? (size_t)1 << 16 : 2 * capacity;
-        capacity = capacity > MAX_BYTES ? MAX_BYTES + 1 : capacity;
-        char *grown = realloc(*text, capacity + 1);
-        if (grown == NULL) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, capacity);
-        }
-        *text = grown;
-        errno = 0;
-        *size += fread(*text + *size, 1, capacity - *size, file);
-        if (ferror(file)) {
-            return fail_read(path, errno, error);
-        }
-        if (*size > MAX_BYTES) {
-            return vshi_fail(error, VSH_ERROR_LIMIT, "%s: is larger than the %zu bytes that a scene may have",
-                             path, MAX_BYTES);
-        }
-    } while (*size == capacity);
-    return VSH_OK;
-}
-
-/* Bytes, at most, that reading a text takes: its own, Jansson's tree of it, and what is made of that. Objects
- * and arrays bring the first slots of their tables; members and items double them. (The C library's blocks
- * counted, Jansson 2.14 and glibc 2.36 on 64 bits: tests/unit/test_scene_memory.c.) */
-static double tree_bytes(const char *text, size_t size) {
-    double objects = 0.0, arrays = 0.0, members = 0.0, items = 0.0;
-    bool in_string = false;
-    for (size_t i = 0; i < size; ++i) {
-        const char c = text[i];
-        i += in_string && c == '\\';
-        in_string ^= c == '"';
-        if (!in_string) {
-            objects += c == '{';
-            arrays += c == '[';
-            members += c == ':';
-            items += c == ',';
-        }
-    }
-    return 288.0 * objects + 176.0 * arrays + 144.0 * members + 112.0 * items + 3.0 * (double)size;
-}
 
 vsh_result vshi_scene_text(const char *path, const vsh_run *run, char **text, size_t *size,
                            vsh_error *error) {
     *text = NULL;
     *size = 0;
-    FILE *file;
-    uint64_t told;
-    vsh_result result = vshi_input_open(path, path, UINT64_MAX, &file, &told, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    result = vshi_foreign_check(path, error);
-    if (result == VSH_OK) {
-        result = read_all(path, file, text, size, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_check_limit(run, tree_bytes(*text, *size), path, error);
-    }
-    fclose(file);
-    return result;
+    VSHI_TRY(vshi_foreign_check(path, error));
+    return vshi_json_text(path, run, text, size, error);
 }
 
 vsh_result vsh_scene_read(const char *path, vsh_scene **scene, vsh_error *error) {

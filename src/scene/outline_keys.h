@@ -2,7 +2,7 @@
 #ifndef VSHI_SCENE_OUTLINE_KEYS_H
 #define VSHI_SCENE_OUTLINE_KEYS_H
 
-#include "scene/keys.h"
+#include "json/keys.h"
 
 #include <vdbshade/outline.h>
 

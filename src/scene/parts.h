@@ -3,7 +3,7 @@
 #ifndef VSHI_SCENE_PARTS_H
 #define VSHI_SCENE_PARTS_H
 
-#include "scene/keys.h"
+#include "json/keys.h"
 
 #include <vdbshade/scene.h>
 

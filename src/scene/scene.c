@@ -1,8 +1,8 @@
 #include "scene/scene.h"
 
 #include "base/memory.h"
-#include "scene/keys.h"
 #include "scene/parts.h"
+#include "json/keys.h"
 
 #include <vdbshade/image.h>
 

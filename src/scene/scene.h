@@ -8,8 +8,7 @@
 vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh_scene **scene,
                             vsh_error *error);
 
-/* The text of a scene file, to be freed with free() also where it fails, which reading as JSON keeps within
- * run->memory_limit. Errors: as vsh_scene_read_run(). */
+/* The text of a scene file, as vshi_json_text(); files of other programs' scenes are told by name. */
 vsh_result vshi_scene_text(const char *path, const vsh_run *run, char **text, size_t *size, vsh_error *error);
 
 #endif

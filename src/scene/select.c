@@ -2,9 +2,9 @@
 
 #include "base/job.h"
 #include "base/memory.h"
-#include "caster/mesh.h"
+#include "mesh/mesh.h"
 #include "scene/parts.h"
-#include "scene/suggest.h"
+#include "json/suggest.h"
 
 #include <stdbool.h>
 #include <stdint.h>

@@ -1,7 +1,7 @@
 #include "scene/solidity.h"
 
 #include "base/memory.h"
-#include "caster/solidity.h"
+#include "mesh/solidity.h"
 #include "scene/select.h"
 
 #include <stdbool.h>

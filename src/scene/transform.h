@@ -2,7 +2,7 @@
 #ifndef VSHI_SCENE_TRANSFORM_H
 #define VSHI_SCENE_TRANSFORM_H
 
-#include "scene/keys.h"
+#include "json/keys.h"
 
 /* [x, y, z] degrees into double[4], the quaternion x, y, z, w: about x first, then y, then z, each about the
  * fixed axes (Blender's "XYZ Euler"). */

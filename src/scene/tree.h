@@ -2,7 +2,7 @@
 #ifndef VSHI_SCENE_TREE_H
 #define VSHI_SCENE_TREE_H
 
-#include "scene/keys.h"
+#include "json/keys.h"
 
 /* Into a vsh_sdf. */
 vsh_result vshi_read_sdf(vshi_reader *reader, const vshi_value *value, void *sdf);

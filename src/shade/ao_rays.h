@@ -3,7 +3,7 @@
 #define VSHI_AO_RAYS_H
 
 #include "shade/ao.h"
-#include "shim/embree.h"
+#include "trace/embree.h"
 
 enum { VSHI_AO_BALLS = 4 };
 

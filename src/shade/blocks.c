@@ -10,7 +10,7 @@
  * neighbours are clear of the surface. */
 #include "shade/blocks.h"
 
-#include "shim/embree.h"
+#include "trace/embree.h"
 
 #include <math.h>
 

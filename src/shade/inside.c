@@ -4,7 +4,7 @@
  * holes and flipped faces, so a clear majority decides, and who is seen by many from outside is outside. */
 #include "shade/inside.h"
 #include "base/vec.h"
-#include "shim/embree.h"
+#include "trace/embree.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,10 +1,10 @@
 #include "shade/layers.h"
 
-#include "analytic/heights.h"
-#include "analytic/relief.h"
-#include "analytic/spheres.h"
 #include "base/memory.h"
+#include "heightfield/heights.h"
+#include "heightfield/relief.h"
 #include "light/light.h"
+#include "spheres/spheres.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -5,7 +5,7 @@
 #include "base/job.h"
 #include "shade/occluders.h"
 #include "shade/rays.h"
-#include "shade/sampler.h"
+#include "trace/sampler.h"
 
 /* Resolves and checks options. Errors: VSH_ERROR_ARGUMENT, naming field, value and limit. */
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,

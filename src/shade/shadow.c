@@ -4,7 +4,7 @@
 #include "base/hash.h"
 #include "shade/blocks.h"
 #include "shade/layers.h"
-#include "shim/embree.h"
+#include "trace/embree.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,7 +1,7 @@
 /* Shadow values from rays over the light's disc: all of them (rays), or as many as a cone leaves open
  * (adaptive, on the field; exact, on the triangles). */
 #include "shade/share.h"
-#include "shim/embree.h"
+#include "trace/embree.h"
 
 #include <math.h>
 #include <string.h>

@@ -5,7 +5,7 @@
 #define _GNU_SOURCE
 #include "hostile.h"
 
-#include "read/reader.h"
+#include "sandbox/reader.h"
 
 #include <vdbshade/reader.h>
 

@@ -5,8 +5,8 @@
  * MiB. */
 #include "fuzz.h"
 
-#include "../../src/cli/commands.h"
-#include "../../src/cli/message.h"
+#include "cli/commands.h"
+#include "cli/message.h"
 
 #include <dirent.h>
 #include <errno.h>

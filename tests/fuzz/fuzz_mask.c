@@ -3,6 +3,7 @@
  */
 #include "fuzz.h"
 
+#include <vdbshade/grid.h>
 #include <vdbshade/heights.h>
 #include <vdbshade/image.h>
 #include <vdbshade/outline.h>

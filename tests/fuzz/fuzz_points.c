@@ -3,8 +3,8 @@
  * without a bad row more. */
 #include "fuzz.h"
 
-#include "../../src/cli/message.h"
-#include "../../src/cli/points.h"
+#include "cli/message.h"
+#include "cli/query/points.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* Our own look at mesh files, before Assimp sees them: every scanner on any bytes. */
 #include "fuzz.h"
 
-#include "caster/scan.h"
+#include "model/scan.h"
 
 #include <stdlib.h>
 #include <string.h>

@@ -25,7 +25,7 @@
 #include <vdbshade/shade.h>
 #include <vector>
 
-#include "shim/openvdb.h"
+#include "levelset/leaves.h"
 
 // Last: it has macros named as OpenVDB's members are.
 #include <csetjmp>

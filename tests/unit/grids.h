@@ -16,7 +16,7 @@
 
 #include <vdbshade/grid.h>
 
-#include "shim/openvdb.h"
+#include "levelset/leaves.h"
 
 typedef struct leaves {
     vshi_leaf *leaf;

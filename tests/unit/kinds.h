@@ -4,7 +4,7 @@
 
 #include "shapes.h"
 
-#include "caster/solidity.h"
+#include "mesh/solidity.h"
 
 static inline vshi_solidity *solidity_of(const vsh_mesh *meshes, size_t count) {
     vshi_solidity *made = NULL;

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "caster/mesh.h"
+#include "mesh/mesh.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -4,14 +4,14 @@
 
 #include "grid_files.h"
 
-#include "caster/model.h"
-#include "caster/outline.h"
-#include "read/confine.h"
-#include "read/reader.h"
-#include "read/takers.h"
-#include "shim/openvdb_file.h"
-#include "shim/openvdb_handover.h"
-#include "shim/openvdb_volume.h"
+#include "image/planes.h"
+#include "levelset/file.h"
+#include "levelset/handover.h"
+#include "levelset/volume.h"
+#include "model/model.h"
+#include "outline/outline.h"
+#include "sandbox/confine.h"
+#include "sandbox/reader.h"
 
 #include <chrono>
 #include <string>

@@ -1,9 +1,9 @@
 /* How a reader is confined, as the library tells and is told; and reading what is no reader's in this
  * process. This program is a reader of its own, in which libraries have begun threads before its main. */
-#include "read/confine.h"
-#include "read/landlock.h"
-#include "read/reader.h"
-#include "read/tasks.h"
+#include "sandbox/confine.h"
+#include "sandbox/landlock.h"
+#include "sandbox/reader.h"
+#include "sandbox/tasks.h"
 
 #include <pthread.h>
 #include <setjmp.h>

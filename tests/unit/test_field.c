@@ -2,7 +2,7 @@
 #include "fields.h"
 
 #include "field/field.h"
-#include "shim/openvdb.h"
+#include "levelset/leaves.h"
 
 #include <stdlib.h>
 

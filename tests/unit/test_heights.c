@@ -1,10 +1,10 @@
 /* Heightfields that are marched as they are, against Embree's rays on their triangles. */
 #include "terrain.h"
 
-#include "analytic/heights.h"
-#include "analytic/place.h"
-#include "analytic/slices.h"
 #include "base/vec.h"
+#include "heightfield/heights.h"
+#include "heightfield/place.h"
+#include "heightfield/slices.h"
 
 #include <vdbshade/trace.h>
 

@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "caster/mesh.h"
+#include "mesh/mesh.h"
 
 #include <stdlib.h>
 #include <string.h>

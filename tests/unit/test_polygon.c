@@ -6,7 +6,7 @@
 
 #include <cmocka.h>
 
-#include "caster/polygon.h"
+#include "model/polygon.h"
 
 #include <math.h>
 #include <stdlib.h>

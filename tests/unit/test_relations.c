@@ -4,7 +4,7 @@
 #include "traced.h"
 
 #include "field/field.h"
-#include "shim/openvdb.h"
+#include "levelset/leaves.h"
 
 #include <stdlib.h>
 

@@ -10,7 +10,7 @@
 #include <cmocka.h>
 
 #include "shade/rays.h"
-#include "shade/sampler.h"
+#include "trace/sampler.h"
 #include "truth/directions.h"
 
 enum { MOST = 256, TEXELS = 2048 };

@@ -10,8 +10,8 @@
 #include <vdbshade/scene.h>
 #include <vector>
 
+#include "levelset/leaves.h"
 #include "previews.h"
-#include "shim/openvdb.h"
 
 // Last: it has macros named as OpenVDB's members are.
 #include <csetjmp>

@@ -9,7 +9,7 @@
 
 #include <cmocka.h>
 
-#include "read/reader.h"
+#include "sandbox/reader.h"
 
 #include <vdbshade/flat.h>
 #include <vdbshade/scene.h>

@@ -2,7 +2,7 @@
  * cut is said to be. */
 #include "shading.h"
 
-#include "caster/sheet.h"
+#include "mesh/sheet.h"
 
 #include <stdlib.h>
 

@@ -2,8 +2,8 @@
  * winding numbers that are summed over all triangles here. */
 #include "kinds.h"
 
-#include "caster/components.h"
-#include "caster/edges.h"
+#include "mesh/components.h"
+#include "mesh/edges.h"
 
 static const double ORIGIN[3] = {0, 0, 0};
 static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};

@@ -4,8 +4,8 @@
 #include "truth/directions.h"
 #include "truth/metrics.h"
 
-#include "analytic/caps.h"
-#include "analytic/spheres.h"
+#include "spheres/caps.h"
+#include "spheres/spheres.h"
 
 #include <stdio.h>
 #include <stdlib.h>

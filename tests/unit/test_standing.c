@@ -1,7 +1,7 @@
 /* Open components that others close: what stands on something, or runs into it, and what does not. */
 #include "kinds.h"
 
-#include "caster/face_tree.h"
+#include "mesh/face_tree.h"
 
 static const double ORIGIN[3] = {0, 0, 0};
 static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};

@@ -1,7 +1,7 @@
 /* Rays against triangles: closed forms, the same scene elsewhere and in another size, bad input. */
 #include "shading.h"
 
-#include "shim/embree.h"
+#include "trace/embree.h"
 #include "truth/directions.h"
 
 #include <pthread.h>

@@ -1,0 +1,228 @@
+/* vdbshade bake: from files to lightmaps. */
+#include "cli/message.h"
+#include "cli/object_output.h"
+#include "cli/paths.h"
+#include "cli/progress.h"
+#include "cli/signals.h"
+#include "cli/stats.h"
+#include "cli/temporary.h"
+#include "cli/warnings.h"
+#include "expect.h"
+#include "forecast.h"
+#include "options.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static int make_folder_of(const char *output) {
+    char *folder = cli_object_folder(output);
+    const int code = folder != NULL ? cli_make_folder(folder) : cli_out_of_memory(output);
+    free(folder);
+    return code;
+}
+
+/* Whether the image of a receiver can be written, which the scene's file names or the command line. */
+static int check_image(const cli_bake_settings *settings, const vsh_scene *scene, size_t index) {
+    vsh_error error;
+    if (vsh_receiver_check(scene, index, &error) == VSH_OK) {
+        return CLI_OK;
+    }
+    return settings->output == NULL && error.code == VSH_ERROR_ARGUMENT
+               ? cli_usage("%s: receivers[%zu]: output %s", settings->input, index, error.message)
+               : cli_fail(&error);
+}
+
+static int check_picture(const cli_bake_settings *settings) {
+    const char *path = settings->invalid_picture;
+    if (path != NULL && settings->resume) {
+        return cli_usage("--invalid '%s': not together with --resume", path);
+    }
+    if (path != NULL && !cli_has_ending(path, "png")) {
+        return cli_usage("--invalid '%s': expected a name that ends in .png", path);
+    }
+    return CLI_OK;
+}
+
+/* What can be refused before anything is read. */
+static int check_files(const cli_bake_settings *settings, const vsh_scene *scene) {
+    int code = settings->stats != NULL ? cli_temporary_check(settings->stats) : CLI_OK;
+    code = code == CLI_OK ? check_picture(settings) : code;
+    const bool makes = settings->output_folder != NULL || settings->per_object;
+    for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
+        const char *output = scene->receivers[i].output;
+        if (makes && settings->dry_run) {
+            continue; /* its folder need not be there yet */
+        }
+        code = makes ? make_folder_of(output) : cli_check_folder(output);
+        code = code == CLI_OK ? check_image(settings, scene, i) : code;
+    }
+    return code;
+}
+
+/* Outputs of objects have their names only now. */
+static int check_outputs(const cli_bake_settings *settings, const vsh_scene *scene, const vsh_bake_job *job) {
+    int code = CLI_OK;
+    for (size_t i = 0; i < vsh_bake_job_count(job) && code == CLI_OK; ++i) {
+        vsh_job_lightmap lightmap;
+        vsh_bake_job_lightmap(job, i, &lightmap);
+        code = cli_bake_check_output(settings, scene, lightmap.output);
+    }
+    return code;
+}
+
+/* --- what is told */
+
+enum { MOST_TOLD = 8 }; /* lightmaps that have a line each */
+
+typedef struct telling {
+    const cli_common *common;
+    size_t count; /* lightmaps */
+} telling;
+
+static bool is_each_told(const telling *t) {
+    return t->count <= MOST_TOLD || t->common->verbose;
+}
+
+static void say_lightmap(void *user, const vsh_job_lightmap *lightmap, vsh_result result) {
+    const telling *t = user;
+    if (result != VSH_OK && lightmap->kept_rows > 0) {
+        cli_say("%s: %d of %d rows are kept in %s.resume; the same command goes on from there",
+                lightmap->output, lightmap->kept_rows, lightmap->height, lightmap->output);
+    }
+    if (result != VSH_OK || t->common->quiet || !is_each_told(t)) {
+        return;
+    }
+    char banded[64] = "", taken[64] = "";
+    if (lightmap->bands > 1) {
+        snprintf(banded, sizeof banded, ", in %d bands of %d rows", lightmap->bands, lightmap->band_rows);
+    }
+    if (lightmap->resumed_rows > 0) {
+        snprintf(taken, sizeof taken, ", %" PRIu64 " rows of them from before", lightmap->resumed_rows);
+    }
+    cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid%s%s", lightmap->output,
+            lightmap->width, lightmap->height, lightmap->covered, lightmap->invalid_texels, banded, taken);
+}
+
+/* Where there are too many for a line each. */
+static void say_all(const telling *t, const vsh_bake_job *job, const vsh_bake_report *report) {
+    if (is_each_told(t)) {
+        return;
+    }
+    vsh_job_lightmap first, last;
+    vsh_bake_job_lightmap(job, 0, &first);
+    vsh_bake_job_lightmap(job, t->count - 1, &last);
+    cli_say("%zu lightmaps, %s to %s: %" PRIu64 " texels, %" PRIu64
+            " of them invalid; --verbose tells of each",
+            t->count, first.output, last.output, report->texels, report->invalid_texels);
+}
+
+static void say_writing(void *user, const char *path) {
+    (void)user;
+    cli_signals_writing(path);
+}
+
+static cli_stats stats_of(const vsh_scene *scene, const vsh_bake_report *report, int32_t threads) {
+    cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, threads);
+    stats.texels = report->texels;
+    stats.invalid_texels = report->invalid_texels;
+    stats.resumed_rows = report->resumed_rows;
+    stats.bands = report->bands;
+    stats.shade = report->shade;
+    stats.errors = report->errors;
+    stats.lights = scene->lights;
+    stats.light_count = scene->light_count;
+    stats.seconds[CLI_STAGE_LOAD] = report->load_s;
+    stats.seconds[CLI_STAGE_BAKE] = report->bake_s;
+    stats.seconds[CLI_STAGE_WRITE] = report->write_s;
+    cli_stats_casters(&stats, scene, &report->occluders);
+    return stats;
+}
+
+/* --- steps */
+
+/* Warnings are told as soon as they are known: what is wrong with the files, before the long work. */
+static vsh_result run_job(vsh_bake_job *job, const vsh_scene *scene, const vsh_run *run, vsh_error *error) {
+    vsh_result result = vsh_bake_job_measure(job, run, error);
+    if (result == VSH_OK) {
+        cli_bake_expect(scene, job, run->threads);
+        cli_warnings_tell();
+        result = vsh_bake_job_prepare(job, run, error);
+    }
+    if (result == VSH_OK) {
+        cli_warnings_tell();
+        result = vsh_bake_job_run(job, run, error);
+    }
+    return result;
+}
+
+static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, vsh_bake_job *job,
+                    const vsh_run *run, telling *t) {
+    t->count = vsh_bake_job_count(job);
+    vsh_error error;
+    if (run_job(job, scene, run, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    vsh_bake_report report;
+    vsh_bake_job_get_report(job, &report);
+    const cli_stats stats = stats_of(scene, &report, run->threads);
+    cli_stats_warn(&stats, scene, run);
+    const int code = cli_stats_finish(&stats, run, settings->stats);
+    if (code == CLI_OK) {
+        cli_warnings_tell();
+        if (!settings->common.quiet) {
+            say_all(t, job, &report);
+            cli_stats_say(&stats);
+        }
+    }
+    return code;
+}
+
+static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
+    const vsh_run run = cli_common_run(&settings->common);
+    telling t = {.common = &settings->common};
+    vsh_bake_job_options options = vsh_bake_job_options_default();
+    options.per_object = settings->per_object;
+    options.band_rows = settings->band_rows;
+    options.resume = settings->resume;
+    options.invalid_picture = settings->invalid_picture;
+    options.command = cli_parsed_command();
+    options.files = &settings->input;
+    options.file_count = 1;
+    options.done = say_lightmap;
+    options.writing = say_writing;
+    options.user = &t;
+    vsh_bake_job *job = NULL;
+    vsh_error error;
+    if (vsh_bake_job_create(scene, &options, &run, &job, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    int code = check_outputs(settings, scene, job);
+    if (code == CLI_OK) {
+        code = settings->dry_run ? cli_bake_forecast(scene, job, &run)
+                                 : bake_job(settings, scene, job, &run, &t);
+    }
+    vsh_bake_job_free(job);
+    return code;
+}
+
+int cli_bake_main(int argc, char **argv) {
+    cli_bake_settings settings;
+    bool help;
+    int code = cli_bake_parse(argc, argv, &settings, &help);
+    if (code != CLI_OK || help) {
+        return code;
+    }
+    cli_progress_begin(settings.common.progress, settings.common.quiet);
+    cli_bake_scene made;
+    code = cli_bake_scene_make(&settings, &made);
+    code = code == CLI_OK ? check_files(&settings, &made.scene) : code;
+    if (code == CLI_OK) {
+        cli_signals_watch();
+        code = bake(&settings, &made.scene);
+    }
+    cli_bake_scene_free(&made);
+    cli_progress_end();
+    return code;
+}

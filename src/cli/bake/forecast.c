@@ -1,0 +1,52 @@
+#include "forecast.h"
+
+#include "base/bytes.h"
+#include "cli/message.h"
+#include "cli/stats.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+
+/* Whole numbers of texels and voxels are close, times are not: other work, caches, the share in penumbra. */
+static const char *const time_note = "by a small bake; half or twice as much is possible";
+
+static void print_methods(const vsh_scene *scene, int32_t has_triangles) {
+    cli_stats stats = {.of = CLI_STATS_TEXELS};
+    char text[128];
+    cli_stats_methods(&stats, scene, has_triangles);
+    printf("methods       %s\n", cli_stats_methods_text(&stats, text, sizeof text));
+}
+
+/* A line for each lightmap that is baked in bands. */
+static void print_bands(const vsh_bake_job *job) {
+    for (size_t i = 0; i < vsh_bake_job_count(job); ++i) {
+        vsh_job_lightmap lightmap;
+        vsh_bake_job_lightmap(job, i, &lightmap);
+        if (lightmap.bands > 1) {
+            printf("bands         %d of %d rows: %s\n", lightmap.bands, lightmap.band_rows, lightmap.output);
+        }
+    }
+}
+
+int cli_bake_forecast(const vsh_scene *scene, vsh_bake_job *job, const vsh_run *run) {
+    vsh_bake_forecast f;
+    vsh_error error;
+    if (vsh_bake_job_forecast(job, run, &f, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    const size_t count = vsh_bake_job_count(job);
+    char grid[32], field[32], peak[32];
+    print_methods(scene, f.has_triangles);
+    printf("texels        %" PRIu64 " in %zu lightmap%s, %" PRIu64 " samples\n", f.texels, count,
+           count == 1 ? "" : "s", f.samples);
+    print_bands(job);
+    printf("voxels        about %.3g of %.4g, %.4g along the longest side\n", f.voxels, f.voxel_size,
+           f.resolution);
+    printf("memory        about %s at most: level set %s, field %s\n",
+           vshi_bytes_text((uint64_t)f.peak_bytes, peak, sizeof peak),
+           vshi_bytes_text((uint64_t)f.grid_bytes, grid, sizeof grid),
+           vshi_bytes_text((uint64_t)f.field_bytes, field, sizeof field));
+    printf("time          about %.2g s: voxelize %.2g s, field %.2g s, bake %.2g s (%s)\n",
+           f.voxelize_s + f.field_s + f.bake_s, f.voxelize_s, f.field_s, f.bake_s, time_note);
+    return CLI_OK;
+}

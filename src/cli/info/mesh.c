@@ -1,0 +1,146 @@
+#include "cli/message.h"
+#include "info.h"
+
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <vdbshade/vdbshade.h>
+
+static const char *name_of(const vsh_mesh *mesh) {
+    return mesh->name != NULL ? mesh->name : "";
+}
+
+static void print_count(size_t count, const char *what) {
+    if (count > 0) {
+        printf("  problem: %zu %s\n", count, what);
+    }
+}
+
+/* Counts one kind of components: "2 sheets". */
+static void print_kind(size_t count, const char *one, const char *many, bool *first) {
+    if (count > 0) {
+        printf("%s%zu %s", *first ? "" : ", ", count, count == 1 ? one : many);
+        *first = false;
+    }
+}
+
+static void print_solidity(const vsh_solidity_report *report) {
+    bool first = true;
+    printf("  taken for: ");
+    print_kind(report->solids, "solid", "solids", &first);
+    print_kind(report->rooms, "room in a solid", "rooms in solids", &first);
+    print_kind(report->walls, "wall with air in front of its faces", "walls with air in front of their faces",
+               &first);
+    print_kind(report->sheets, "sheet with air on both sides", "sheets with air on both sides", &first);
+    puts(first ? "nothing" : "");
+    if (report->closed_over > 0) {
+        printf("  closed over: %zu hole%s with %zu open edges, of %zu of these\n", report->holes,
+               report->holes == 1 ? "" : "s", report->open_edges, report->closed_over);
+    }
+    if (report->standing > 0) {
+        printf("  closed by what %s: %zu of these\n",
+               report->standing == 1 ? "it stands on or runs into" : "they stand on or run into",
+               report->standing);
+    }
+    print_count(report->turned_triangles, "triangles that face the other way than those around");
+}
+
+/* What positions are multiplied by, where the user says what unit they are in. */
+static double scale_for(const vsh_model *model, double unit) {
+    const double own = vsh_model_unit(model);
+    return unit > 0.0 ? unit / (own > 0.0 ? own : 1.0) : 1.0;
+}
+
+static void print_unit(const vsh_model *model, double unit) {
+    const double own = vsh_model_unit(model);
+    if (unit > 0.0) {
+        printf("unit: %g m (as asked)\n", unit);
+    } else if (own > 0.0) {
+        printf("unit: %g m; bounds are in metres\n", own);
+    } else {
+        printf("unit: none in this format; bounds are the file's own numbers\n");
+    }
+}
+
+static int print_mesh(const vsh_model *model, size_t index, double scale,
+                      const vsh_solidity_report *solidity) {
+    vsh_mesh mesh = vsh_model_mesh(model, index, -1);
+    double scaled[12];
+    for (int i = 0; i < 12; ++i) {
+        scaled[i] = mesh.transform[i] * scale;
+    }
+    mesh.transform = scaled;
+    vsh_mesh_report report;
+    vsh_error error;
+    if (vsh_mesh_check(&mesh, &report, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    printf("mesh %zu '%s'\n", index, name_of(&mesh));
+    printf("  triangles: %zu\n  vertices: %zu\n", mesh.triangle_count, mesh.vertex_count);
+    printf("  UV sets: %d\n  normals: %s\n", vsh_model_uv_sets(model, index),
+           mesh.normals != NULL ? "yes" : "no, flat");
+    printf("  bounds: %g %g %g to %g %g %g\n  area: %g\n", report.bounds_min[0], report.bounds_min[1],
+           report.bounds_min[2], report.bounds_max[0], report.bounds_max[1], report.bounds_max[2],
+           report.area);
+    if (mesh.alpha != VSH_ALPHA_OPAQUE) {
+        printf("  material: %s\n", mesh.alpha == VSH_ALPHA_BLENDED
+                                       ? "blended (glass, smoke): it casts no shadow, unless --cast-blended"
+                                       : "masked (leaves, fences): it casts whole, without the mask's holes");
+    }
+    print_count(report.open_edges, "open edges");
+    print_count(report.flipped_edges, "edges whose triangles disagree about the outside");
+    print_count(report.degenerate_triangles, "triangles of zero area, which are skipped");
+    print_solidity(solidity);
+    return CLI_OK;
+}
+
+int cli_info_mesh(const char *path, const cli_info_look *given, const vsh_run *run) {
+    vsh_model *model = NULL;
+    vsh_error error;
+    if (vsh_model_read(path, run, &model, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    const size_t count = vsh_model_mesh_count(model);
+    vsh_mesh *with_uvs = calloc(count, sizeof *with_uvs);
+    size_t with_uv_count = 0;
+    vsh_mesh *meshes = calloc(count, sizeof *meshes);
+    vsh_solidity_report *solidity = calloc(count, sizeof *solidity);
+    cli_info_look look = *given;
+    look.table = count > CLI_INFO_PARAGRAPHS && !look.all;
+    look.solidity = solidity;
+    int code = CLI_OK;
+    cli_info_summary(model);
+    if (with_uvs == NULL || meshes == NULL || solidity == NULL) {
+        cli_say("%s: the system refused memory", path);
+        code = CLI_LIMIT;
+    }
+    if (code == CLI_OK) {
+        print_unit(model, look.unit);
+    }
+    for (size_t i = 0; i < count && code == CLI_OK; ++i) {
+        meshes[i] = vsh_model_mesh(model, i, -1);
+    }
+    if (code == CLI_OK && vsh_mesh_solidity(meshes, count, run, solidity, &error) != VSH_OK) {
+        code = cli_fail_of(NULL, &error);
+    }
+    for (size_t i = 0; i < count && code == CLI_OK; ++i) {
+        code = look.table ? CLI_OK : print_mesh(model, i, scale_for(model, look.unit), &solidity[i]);
+        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
+        if (mesh.uvs != NULL) {
+            with_uvs[with_uv_count++] = mesh;
+        }
+    }
+    if (code == CLI_OK) {
+        code = cli_info_uvs(model, with_uvs, with_uv_count, &look, run);
+    }
+    if (code == CLI_OK && with_uv_count < count) {
+        printf("problem: %zu of %zu meshes have no UVs to bake into: they only cast with --per-object or "
+               "--no-receive; or unwrap them\n",
+               count - with_uv_count, count);
+    }
+    free(solidity);
+    free(meshes);
+    free(with_uvs);
+    vsh_model_free(model);
+    return code;
+}

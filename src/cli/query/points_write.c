@@ -1,0 +1,323 @@
+/* Rows of points with their answers behind them: the rows as they came where the format is the same, position
+ * and normal else. */
+#include "base/decimal.h"
+#include "cli/message.h"
+#include "cli/signals.h"
+#include "points.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BUFFER = 1 << 20, ROW_ROOM = 6 * VSHI_DECIMAL_ROOM + 16, COUNT_WIDTH = 20 };
+
+static int fail(const cli_points_writer *w) {
+    cli_say("%s: cannot be written: %s", w->name, strerror(errno));
+    return CLI_FILE;
+}
+
+/* --- heads */
+
+/* "x", "y" … of what stands before the answers, where rows are not kept; NULL behind the last. */
+static const char *own_name(const cli_points_writer *w, int i) {
+    static const char *const names[] = {"x", "y", "z", "nx", "ny", "nz"};
+    return w->answers_only || w->keep || i >= (w->normals ? 6 : 3) ? NULL : names[i];
+}
+
+static void write_csv_head(cli_points_writer *w, const cli_points_reader *reader) {
+    const char *between = "";
+    const char delimiter[2] = {w->delimiter, '\0'};
+    if (w->keep) {
+        if (reader->header == NULL) {
+            return; /* none came, none goes */
+        }
+        fwrite(reader->header, 1, reader->header_size, w->file);
+        between = delimiter;
+    }
+    for (int i = 0; own_name(w, i) != NULL; ++i) {
+        fprintf(w->file, "%s%s", between, own_name(w, i));
+        between = delimiter;
+    }
+    for (size_t c = 0; c < w->column_count; ++c) {
+        fprintf(w->file, "%s%s", between, w->columns[c].name);
+        between = delimiter;
+    }
+    putc('\n', w->file);
+}
+
+static void write_ply_properties(const cli_points_writer *w) {
+    for (int i = 0; own_name(w, i) != NULL; ++i) {
+        fprintf(w->file, "property %s %s\n", i < CLI_POINTS_NX && !w->floats ? "double" : "float",
+                own_name(w, i));
+    }
+    for (size_t c = 0; c < w->column_count; ++c) {
+        fprintf(w->file, "property float %s\n", w->columns[c].name);
+    }
+}
+
+/* As long for any number of rows: what the number leaves goes into a comment. */
+static void write_ply_head(const cli_points_writer *w, uint64_t rows) {
+    char count[COUNT_WIDTH + 8];
+    const int length = snprintf(count, sizeof count, "%" PRIu64, rows);
+    fprintf(w->file, "ply\nformat %s 1.0\ncomment vdbshade query%*s\nelement vertex %s\n",
+            w->ascii        ? "ascii"
+            : w->big_endian ? "binary_big_endian"
+                            : "binary_little_endian",
+            COUNT_WIDTH - length, "", count);
+    write_ply_properties(w);
+    fputs("end_header\n", w->file);
+}
+
+static void write_kept_ply_head(const cli_points_writer *w, const cli_points_reader *reader) {
+    fwrite(reader->header, 1, reader->header_insert, w->file);
+    write_ply_properties(w);
+    fwrite(reader->header + reader->header_insert, 1, reader->header_size - reader->header_insert, w->file);
+}
+
+/* Names that are there already would stand for two things. */
+static int check_names(const cli_points_writer *w, const cli_points_reader *reader) {
+    for (size_t c = 0; w->keep && c < w->column_count; ++c) {
+        const char *name = w->columns[c].name;
+        const size_t size = strlen(name);
+        bool there = false;
+        if (reader->format == CLI_POINTS_PLY) {
+            const ply_element *e = &reader->ply.element[reader->ply.vertex];
+            for (int p = e->first; p < e->end; ++p) {
+                there = there || strcmp(reader->ply.property[p].name, name) == 0;
+            }
+        } else if (reader->header != NULL) {
+            const char *end = reader->header + reader->header_size;
+            for (const char *at = reader->header; at + size <= end; ++at) {
+                const bool begins = at == reader->header || strchr(",;\t \"", at[-1]) != NULL;
+                const bool ends = at + size == end || strchr(",;\t \"", at[size]) != NULL;
+                there = there || (begins && ends && memcmp(at, name, size) == 0);
+            }
+        }
+        if (there) {
+            return cli_usage("%s: it has a column '%s' already; --answers-only leaves its columns out",
+                             reader->source.name, name);
+        }
+    }
+    return CLI_OK;
+}
+
+int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
+                           const cli_points_reader *reader, const cli_points_column *columns,
+                           size_t column_count, cli_points_writer *w) {
+    const bool standard = strcmp(path, "-") == 0, same = format == reader->format;
+    *w = (cli_points_writer){.name = standard ? "standard output" : path,
+                             .format = format,
+                             .answers_only = answers_only,
+                             .keep = !answers_only && same && cli_points_can_keep(reader),
+                             .ascii = same && reader->ply.ascii,
+                             .big_endian = same && reader->ply.big_endian,
+                             .floats = reader->floats,
+                             .normals = reader->has_normals,
+                             .delimiter = same && reader->delimiter != ' ' ? reader->delimiter : ',',
+                             .columns = columns,
+                             .column_count = column_count,
+                             .file = stdout,
+                             .count_at = -1};
+    if (w->keep && reader->format == CLI_POINTS_CSV) {
+        w->delimiter = reader->delimiter;
+    }
+    int code = check_names(w, reader);
+    if (code != CLI_OK) {
+        return code;
+    }
+    const bool counted = format == CLI_POINTS_PLY && reader->format != CLI_POINTS_PLY;
+    if (!standard) {
+        cli_signals_writing(path);
+        code = cli_temporary_begin(&w->temporary, path);
+        if (code != CLI_OK) {
+            return code;
+        }
+        w->file = w->temporary.file;
+    } else if (counted) {
+        w->file = w->spool = tmpfile();
+        if (w->spool == NULL) {
+            return fail(w);
+        }
+    }
+    w->buffer = malloc(BUFFER);
+    if (w->buffer == NULL) {
+        cli_say("%s: the system refused memory", w->name);
+        return CLI_LIMIT;
+    }
+    if (format == CLI_POINTS_CSV) {
+        write_csv_head(w, reader);
+    } else if (format == CLI_POINTS_PLY && w->keep) {
+        write_kept_ply_head(w, reader);
+    } else if (format == CLI_POINTS_PLY) {
+        w->count_at = counted && w->spool == NULL ? 0 : -1;
+        if (w->spool == NULL) {
+            write_ply_head(w, counted ? 0 : reader->ply.element[reader->ply.vertex].count);
+        }
+    }
+    return ferror(w->file) ? fail(w) : CLI_OK;
+}
+
+/* --- rows */
+
+static bool drain(cli_points_writer *w) {
+    const size_t size = w->used;
+    w->used = 0;
+    return size == 0 || fwrite(w->buffer, 1, size, w->file) == size;
+}
+
+/* Room for `size` more bytes, no more than BUFFER; NULL where writing failed. */
+static char *room(cli_points_writer *w, size_t size) {
+    if (w->used + size > BUFFER && !drain(w)) {
+        return NULL;
+    }
+    return w->buffer + w->used;
+}
+
+static bool put_bytes(cli_points_writer *w, const char *bytes, size_t size) {
+    if (size > BUFFER / 2) {
+        return drain(w) && fwrite(bytes, 1, size, w->file) == size;
+    }
+    char *to = room(w, size);
+    if (to != NULL) {
+        memcpy(to, bytes, size);
+        w->used += size;
+    }
+    return to != NULL;
+}
+
+static char *put_binary(const cli_points_writer *w, char *at, const void *value, size_t size) {
+    uint64_t bits = 0;
+    uint32_t low;
+    if (size == sizeof low) {
+        memcpy(&low, value, sizeof low);
+        bits = low;
+    } else {
+        memcpy(&bits, value, sizeof bits);
+    }
+    for (size_t i = 0; i < size; ++i) {
+        at[i] = (char)(bits >> 8 * (w->big_endian ? size - 1 - i : i));
+    }
+    return at + size;
+}
+
+static char *put_position(const cli_points_writer *w, char *at, double value) {
+    const float single = (float)value;
+    const bool floats = w->floats || w->format == CLI_POINTS_RAW;
+    return floats ? put_binary(w, at, &single, sizeof single) : put_binary(w, at, &value, sizeof value);
+}
+
+static bool put_binary_row(cli_points_writer *w, const cli_points *points, size_t i) {
+    char *at = room(w, ROW_ROOM + sizeof(float) * w->column_count), *start = at;
+    if (at == NULL) {
+        return false;
+    }
+    if (!w->keep && !w->answers_only) {
+        for (size_t k = 0; k < 3; ++k) {
+            at = put_position(w, at, points->positions[3 * i + k]);
+        }
+        for (size_t k = 0; w->normals && k < 3; ++k) {
+            at = put_binary(w, at, &points->normals[3 * i + k], sizeof(float));
+        }
+    }
+    for (size_t c = 0; c < w->column_count; ++c) {
+        at = put_binary(w, at, &w->columns[c].values[i * w->columns[c].stride], sizeof(float));
+    }
+    w->used += (size_t)(at - start);
+    return true;
+}
+
+static bool put_text_row(cli_points_writer *w, const cli_points *points, size_t i) {
+    char *at = room(w, ROW_ROOM + (VSHI_DECIMAL_ROOM + 1) * w->column_count), *start = at;
+    if (at == NULL) {
+        return false;
+    }
+    const char delimiter = w->format == CLI_POINTS_PLY ? ' ' : w->delimiter;
+    if (!w->keep && !w->answers_only) {
+        for (size_t k = 0; k < 3; ++k) {
+            /* of a float too all digits that its double has: who reads it gets the same point */
+            at = vshi_decimal_write_double(at, points->positions[3 * i + k]);
+            *at++ = delimiter;
+        }
+        for (size_t k = 0; w->normals && k < 3; ++k) {
+            at = vshi_decimal_write_float(at, points->normals[3 * i + k]);
+            *at++ = delimiter;
+        }
+    } else if (w->keep) {
+        *at++ = delimiter;
+    }
+    for (size_t c = 0; c < w->column_count; ++c) {
+        at = vshi_decimal_write_float(at, w->columns[c].values[i * w->columns[c].stride]);
+        *at++ = delimiter;
+    }
+    at[-1] = '\n';
+    w->used += (size_t)(at - start);
+    return true;
+}
+
+int cli_points_write(cli_points_writer *w, const cli_points *points) {
+    const bool text = w->format == CLI_POINTS_CSV || (w->format == CLI_POINTS_PLY && w->ascii);
+    bool good = true;
+    for (size_t i = 0; good && i < points->count; ++i) {
+        if (w->keep) {
+            const size_t begin = i > 0 ? points->kept_end[i - 1] : 0;
+            good = put_bytes(w, points->kept + begin, points->kept_end[i] - begin);
+        }
+        good = good && (text ? put_text_row(w, points, i) : put_binary_row(w, points, i));
+    }
+    w->rows += points->count;
+    return good && drain(w) ? CLI_OK : fail(w);
+}
+
+int cli_points_writer_flush(cli_points_writer *w) {
+    return fflush(w->file) == 0 ? CLI_OK : fail(w);
+}
+
+/* The head and then what waits in the spool. */
+static int write_spool(cli_points_writer *w) {
+    FILE *spool = w->spool;
+    if (fflush(spool) != 0 || fseek(spool, 0, SEEK_SET) != 0) {
+        return fail(w);
+    }
+    w->file = stdout;
+    write_ply_head(w, w->rows);
+    size_t got;
+    while ((got = fread(w->buffer, 1, BUFFER, spool)) > 0) {
+        if (fwrite(w->buffer, 1, got, stdout) != got) {
+            return fail(w);
+        }
+    }
+    return ferror(spool) ? fail(w) : CLI_OK;
+}
+
+int cli_points_writer_commit(cli_points_writer *w, cli_points_reader *reader) {
+    int code = CLI_OK;
+    if (reader->format == CLI_POINTS_PLY) {
+        code = points_ply_rest(reader, w->keep ? w->file : NULL);
+    }
+    if (code == CLI_OK && w->spool != NULL) {
+        code = write_spool(w);
+    }
+    if (code == CLI_OK && w->count_at >= 0) {
+        if (fseek(w->file, w->count_at, SEEK_SET) != 0) {
+            return fail(w);
+        }
+        write_ply_head(w, w->rows);
+    }
+    if (code == CLI_OK && w->temporary.file == NULL) {
+        code = fflush(stdout) == 0 && !ferror(stdout) ? CLI_OK : fail(w);
+    } else if (code == CLI_OK) {
+        code = cli_temporary_commit(&w->temporary);
+    }
+    cli_signals_writing(NULL);
+    return code;
+}
+
+void cli_points_writer_free(cli_points_writer *w) {
+    cli_temporary_abandon(&w->temporary);
+    if (w->spool != NULL) {
+        fclose(w->spool);
+    }
+    free(w->buffer);
+    *w = (cli_points_writer){0};
+}

@@ -1,0 +1,309 @@
+/* vdbshade query: shadow, AO and distance at points of a file or a pipe. */
+#include "query.h"
+#include "base/clock.h"
+#include "cli/message.h"
+#include "cli/paths.h"
+#include "cli/progress.h"
+#include "cli/signals.h"
+#include "cli/warnings.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+enum {
+    KEY_POINTS = 0x2000,
+    KEY_POINTS_FORMAT,
+    KEY_FORMAT,
+    KEY_NORMALS,
+    KEY_ANSWERS_ONLY,
+    KEY_STRICT,
+    KEY_BATCH,
+    KEY_DISTANCE,
+    KEY_GRADIENT,
+    KEY_WITHIN,
+    KEY_STATS
+};
+
+static const cli_option options[] = {
+    {0, NULL, NULL, "Points and output"},
+    {KEY_POINTS, "points", "FILE",
+     "points: .csv .tsv .txt .xyz, .ply, or .raw .f32 .bin of\nfloats (32 bits, little endian); - is "
+     "standard input"},
+    {KEY_POINTS_FORMAT, "points-format", "NAME", "csv, ply or raw, whatever the ending"},
+    {'o', "output", "OUT", "file to write, by the same endings; - is standard output"},
+    {KEY_FORMAT, "format", "NAME", "csv, ply or raw, whatever the ending (for -, as the\npoints)"},
+    {KEY_NORMALS, "normals", "yes|no",
+     "whether rows have normals, and they are taken (csv and\nply: where there are any; raw: no, rows of 3 "
+     "floats;\nyes: of 6)"},
+    {KEY_ANSWERS_ONLY, "answers-only", NULL,
+     "write answers alone; else behind each row as it came,\nor (formats differ) behind x y z nx ny nz"},
+    {KEY_STRICT, "strict", NULL, "end at the first bad row, with code 2"},
+    {KEY_BATCH, "batch", "N",
+     "rows answered and written at a time, 1 to 1048576\n(1048576, or as many as --memory-limit allows)"},
+    {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
+    {0, NULL, NULL, "What is answered"},
+    CLI_LIGHT_OPTIONS,
+    {KEY_DISTANCE, "distance", NULL, "also distance: to the nearest surface, scene units,\nnegative inside"},
+    {KEY_GRADIENT, "gradient", NULL,
+     "also gradient.x, .y, .z: unit, the way that distance\ngrows; next to a surface its normal"},
+    CLI_ACCURACY_OPTIONS,
+    CLI_CASTER_OPTIONS,
+    CLI_GRID_OPTIONS,
+    {KEY_WITHIN, "within", "DISTANCE",
+     "how far from the casters' box points may be for wide\nlights to be right there (four times its "
+     "diagonal)"},
+    CLI_COMMON_OPTIONS,
+    CLI_ISA_OPTION,
+};
+
+static int query_main(int argc, char **argv);
+
+const cli_command cli_query = {
+    "query",
+    "INPUT --points FILE -o OUT [options]",
+    "Answers at points what a light's shadow, ambient occlusion and the distance are there. INPUT is a\n"
+    "mesh file, a .vdb level set or a scene file (.json; its lights and ao, not its receivers). Bad rows\n"
+    "are told by number and answered nan. Formats and columns: docs/query.md. Numbers in brackets are\n"
+    "what holds without the option.",
+    options,
+    sizeof options / sizeof options[0],
+    query_main};
+
+/* --- options */
+
+static int take(void *settings, int key, const char *name, const char *value) {
+    query_settings *s = settings;
+    switch (key) {
+    case 'o':
+        s->bake.output = value;
+        return CLI_OK;
+    case KEY_POINTS:
+        s->points = value;
+        return CLI_OK;
+    case KEY_POINTS_FORMAT:
+        return cli_take_name(name, value, cli_points_format, cli_points_format_name, &s->points_format);
+    case KEY_FORMAT:
+        return cli_take_name(name, value, cli_points_format, cli_points_format_name, &s->format);
+    case KEY_NORMALS:
+        s->normals = strcmp(value, "yes") == 0;
+        return s->normals == 1 || strcmp(value, "no") == 0
+                   ? CLI_OK
+                   : cli_usage("%s '%s': expected yes or no", name, value);
+    case KEY_ANSWERS_ONLY:
+        s->answers_only = true;
+        return CLI_OK;
+    case KEY_STRICT:
+        s->strict = true;
+        return CLI_OK;
+    case KEY_BATCH:
+        return cli_take_integer(name, value, 1, VSH_QUERY_BATCH, &s->batch);
+    case KEY_DISTANCE:
+        s->distance = true;
+        return CLI_OK;
+    case KEY_GRADIENT:
+        s->gradient = true;
+        return CLI_OK;
+    case KEY_WITHIN:
+        return cli_take_positive(name, value, &s->within);
+    case KEY_STATS:
+        s->bake.stats = value;
+        return CLI_OK;
+    default:
+        break;
+    }
+    return cli_shared_take(&s->bake, key, name, value);
+}
+
+static bool is_standard(const char *path) {
+    return strcmp(path, "-") == 0;
+}
+
+/* What is not said of formats. */
+static int find_formats(query_settings *s) {
+    if (s->points == NULL) {
+        return cli_usage("query: no points; give --points FILE, or - for standard input");
+    }
+    if (s->bake.output == NULL) {
+        return cli_usage("query: no output; give -o OUT, or - for standard output");
+    }
+    if (s->points_format < 0) {
+        s->points_format = cli_points_format_of_path(s->points);
+    }
+    if (s->points_format < 0) {
+        return cli_usage(
+            "--points '%s': is called as no file of points (.csv .tsv .txt .xyz, .ply, .raw .f32 "
+            ".bin); %s",
+            s->points,
+            cli_is_model(s->points) ? "export the mesh's vertices as .ply, with normals for --ao"
+                                    : "--points-format csv, ply or raw says which of these it holds");
+    }
+    if (s->format < 0) {
+        s->format =
+            is_standard(s->bake.output) ? s->points_format : cli_points_format_of_path(s->bake.output);
+    }
+    if (s->format < 0) {
+        return cli_usage("-o '%s': give --format csv, ply or raw", s->bake.output);
+    }
+    return CLI_OK;
+}
+
+static int check_output(const query_settings *s, const vsh_scene *scene, const char *output) {
+    if (!is_standard(s->points) && cli_same_file(output, s->points)) {
+        return cli_usage("%s: the output is also the points' file", output);
+    }
+    const int code = cli_bake_check_output(&s->bake, scene, output);
+    return code == CLI_OK ? cli_temporary_check(output) : code;
+}
+
+/* What can be refused before anything is read. */
+static int check_files(const query_settings *s, const vsh_scene *scene) {
+    const char *output = s->bake.output, *stats = s->bake.stats;
+    if (stats != NULL && cli_same_file(output, stats)) {
+        return cli_usage("%s: both the output and the --stats file", output);
+    }
+    int code = is_standard(output) ? CLI_OK : check_output(s, scene, output);
+    code = code == CLI_OK && stats != NULL ? check_output(s, scene, stats) : code;
+    return code;
+}
+
+/* --- the work */
+
+typedef struct query_work {
+    const query_settings *settings;
+    vsh_scene *scene;
+    vsh_run run;
+    vsh_assets *assets;
+    vsh_occluders *occluders;
+    vsh_query *query;
+    cli_points_reader reader;
+    query_answers answers;
+    cli_stats stats;
+} query_work;
+
+/* What the scene, the options and the points' normals let be asked. */
+static int choose_answers(query_work *work) {
+    const query_settings *s = work->settings;
+    query_answers *a = &work->answers;
+    vsh_scene *scene = work->scene;
+    if (scene->ao && !work->reader.has_normals) {
+        if (s->bake.has_ao) {
+            return cli_usage("%s: no normals, which --ao needs", work->reader.source.name);
+        }
+        cli_warn("%s: no normals: no ao", work->reader.source.name);
+        scene->ao = 0;
+    }
+    *a = (query_answers){.lights = scene->light_count,
+                         .light = scene->lights,
+                         .ao = scene->ao != 0,
+                         .distance = s->distance,
+                         .gradient = s->gradient};
+    a->shadow_error = scene->error && scene->light_count > 0 &&
+                      (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_RAYS) != 0;
+    a->ao_error =
+        scene->error && scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
+    if (query_answers_floats(a) == 0) {
+        return cli_usage(
+            "%s: nothing to answer: no lights and no ao; give --sun, --ao, --distance or --gradient",
+            s->bake.input);
+    }
+    return CLI_OK;
+}
+
+static int load(query_work *work) {
+    const double start = vshi_seconds();
+    vsh_error error;
+    const vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
+    cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+}
+
+static int make_query(query_work *work) {
+    vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
+    what.within = work->settings->within;
+    vsh_error error;
+    if (vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error) !=
+        VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    vsh_occluders_info casters;
+    vsh_occluders_get_info(work->occluders, &casters);
+    cli_stats_casters(&work->stats, work->scene, &casters);
+    vsh_shade_options shade = work->scene->shade;
+    if (!work->scene->ao) {
+        shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
+    }
+    const vsh_result result = vsh_query_create(work->occluders, work->scene->lights, work->scene->light_count,
+                                               &shade, &work->query, &error);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+}
+
+static void say_results(const query_work *work) {
+    const cli_stats *stats = &work->stats;
+    if (stats->bad_rows > 0) {
+        cli_say("%s: %" PRIu64 " of %" PRIu64 " rows are bad; their answers are nan",
+                work->reader.source.name, stats->bad_rows, stats->points);
+    }
+    if (work->settings->bake.common.quiet) {
+        return;
+    }
+    if (stats->shade.beyond_reach > 0) {
+        cli_warn("%" PRIu64 " cones are wider than the field reaches: points are far from the casters; "
+                 "see --within",
+                 stats->shade.beyond_reach);
+    }
+    cli_say("%s: %" PRIu64 " points", work->settings->bake.output, stats->points);
+    cli_stats_say(stats);
+}
+
+static int run_query(const query_settings *s, vsh_scene *scene) {
+    query_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
+    work.stats = cli_stats_begin(CLI_STATS_POINTS, work.run.threads);
+    int code = cli_points_open(s->points, s->points_format, s->normals, s->strict, &work.reader);
+    code = code == CLI_OK ? choose_answers(&work) : code;
+    code = code == CLI_OK ? load(&work) : code;
+    code = code == CLI_OK ? make_query(&work) : code;
+    if (code == CLI_OK) {
+        const uint64_t held = work.stats.casters.field_bytes + work.stats.casters.triangles_bytes;
+        code = query_stream(s, work.query, &work.answers, held, &work.run, &work.reader, &work.stats);
+    }
+    code = code == CLI_OK ? cli_stats_finish(&work.stats, &work.run, s->bake.stats) : code;
+    if (code == CLI_OK) {
+        say_results(&work);
+    }
+    query_answers_free(&work.answers);
+    vsh_query_free(work.query);
+    vsh_occluders_free(work.occluders);
+    vsh_assets_free(work.assets);
+    cli_points_close(&work.reader);
+    return code;
+}
+
+static int query_main(int argc, char **argv) {
+    query_settings s;
+    memset(&s, 0, sizeof s);
+    s.bake.common = cli_common_default();
+    s.bake.grid.options = vsh_grid_options_default();
+    s.format = s.points_format = s.normals = -1;
+    bool help;
+    int code = cli_parse(&cli_query, argc, argv, take, &s, "INPUT", &s.bake.input, &help);
+    if (code != CLI_OK || help) {
+        return code;
+    }
+    code = cli_grid_check(&s.bake.grid);
+    code = code == CLI_OK ? find_formats(&s) : code;
+    if (code != CLI_OK) {
+        return code;
+    }
+    cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
+    cli_bake_scene made;
+    code = cli_bake_scene_for_points(&s.bake, &made);
+    code = code == CLI_OK ? check_files(&s, &made.scene) : code;
+    if (code == CLI_OK) {
+        cli_signals_watch();
+        code = run_query(&s, &made.scene);
+    }
+    cli_bake_scene_free(&made);
+    cli_progress_end();
+    return code;
+}

@@ -1,0 +1,240 @@
+/* What a bake and its verdict depend on, and what of it changed since it last was alike. */
+#define _GNU_SOURCE /* asprintf */
+#include "cli/commands.h"
+#include "cli/message.h"
+#include "cli/temporary.h"
+#include "regress.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <vdbshade/flat.h>
+#include <vdbshade/provenance.h>
+
+static int no_memory(const regress_work *work) {
+    return cli_out_of_memory(work->folder);
+}
+
+static int add_digest(const regress_work *work, regress_case *one, const char *what, const char *path) {
+    char digest[VSH_DIGEST_TEXT] = "none";
+    vsh_error error;
+    if (access(path, F_OK) == 0 && vsh_file_digest(path, digest, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    return regress_lines_add(&one->inputs, "%s: %s", what, digest) ? CLI_OK : no_memory(work);
+}
+
+/* The limits of the command line, which are over those of files. */
+static int add_limits(const regress_work *work, regress_case *one) {
+    const cli_compare_settings *s = &work->settings->compare;
+    bool good = regress_lines_add(&one->inputs, "coverage: %s, at most %.9g, padding %d", s->coverage,
+                                  s->max_coverage, s->padding);
+    good = good && regress_lines_add(&one->inputs, "threshold %.9g, step %.9g, reach %d", s->threshold,
+                                     s->step, s->reach);
+    for (int i = 0; i < VSH_MEASURE_COUNT && good; ++i) {
+        if (!isnan(s->limits[i])) {
+            good = regress_lines_add(&one->inputs, "limit of %s: %.9g", vsh_measure_name(i), s->limits[i]);
+        }
+    }
+    return good ? CLI_OK : no_memory(work);
+}
+
+/* Files that a flat scene names. */
+static int add_flat_files(const regress_work *work, const char *path, regress_lines *files) {
+    const vsh_run run = cli_common_run(&work->settings->compare.common);
+    vsh_flat_scene *scene = NULL;
+    vsh_error error;
+    if (vsh_flat_scene_read_run(path, &run, &scene, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    bool good = true;
+    for (size_t i = 0; i < scene->caster_count && good; ++i) {
+        good = scene->casters[i].path == NULL || regress_lines_add(files, "%s", scene->casters[i].path);
+    }
+    vsh_flat_scene_free(scene);
+    return good ? CLI_OK : no_memory(work);
+}
+
+/* Options that name a file, behind which there may be the name of a grid. */
+static int add_option_files(const regress_work *work, const regress_case *one, regress_lines *files) {
+    for (size_t i = 0; i < one->options.count; ++i) {
+        const char *word = one->options.line[i];
+        char *path = word[0] == '/' ? strdup(word) : regress_path(work->folder, word);
+        if (path == NULL) {
+            return no_memory(work);
+        }
+        struct stat status;
+        bool good = stat(path, &status) == 0;
+        char *colon = strrchr(path, ':');
+        if (!good && colon != NULL) {
+            *colon = '\0';
+            good = stat(path, &status) == 0;
+        }
+        const bool added = !good || !S_ISREG(status.st_mode) || regress_lines_add(files, "%s", path);
+        free(path);
+        if (!added) {
+            return no_memory(work);
+        }
+    }
+    return CLI_OK;
+}
+
+/* The scene's own file and what it names, as outputs tell it. */
+static int add_provenance(const regress_work *work, regress_case *one, const char *path) {
+    const bool flat = one->command == &cli_flat;
+    const vsh_run run = cli_common_run(&work->settings->compare.common);
+    vsh_scene *scene = NULL;
+    vsh_error error;
+    if (!flat && vsh_scene_read_run(path, &run, &scene, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    regress_lines files = {NULL, 0};
+    int code = regress_lines_add(&files, "%s", path) ? CLI_OK : no_memory(work);
+    code = code == CLI_OK && flat ? add_flat_files(work, path, &files) : code;
+    code = code == CLI_OK ? add_option_files(work, one, &files) : code;
+    vsh_provenance *provenance = NULL;
+    if (code == CLI_OK) {
+        vsh_provenance_source source = vsh_provenance_source_default();
+        source.scene = scene;
+        source.files = (const char *const *)files.line;
+        source.file_count = files.count;
+        code =
+            vsh_provenance_create(&source, &run, &provenance, &error) == VSH_OK ? CLI_OK : cli_fail(&error);
+    }
+    size_t count = 0;
+    const vsh_attribute *attributes = vsh_provenance_attributes(provenance, &count);
+    for (size_t i = 0; i < count && code == CLI_OK; ++i) {
+        code = regress_lines_add(&one->inputs, "%s: %s", attributes[i].name, attributes[i].value)
+                   ? CLI_OK
+                   : no_memory(work);
+    }
+    vsh_provenance_free(provenance);
+    regress_lines_free(&files);
+    vsh_scene_free(scene);
+    return code;
+}
+
+/* Golden bakes and their tolerances. */
+static int add_golden(const regress_work *work, regress_case *one) {
+    int code = CLI_OK;
+    for (size_t i = 0; i < one->outputs.count && code == CLI_OK; ++i) {
+        const char *const endings[] = {"", ".tolerance.json"};
+        for (size_t k = 0; k < 2 && code == CLI_OK; ++k) {
+            char *path, *what = NULL;
+            if (asprintf(&path, "%s/%s%s", work->golden, one->outputs.line[i], endings[k]) < 0) {
+                return no_memory(work);
+            }
+            if (asprintf(&what, "golden %s%s", one->outputs.line[i], endings[k]) < 0) {
+                free(path);
+                return no_memory(work);
+            }
+            code = add_digest(work, one, what, path);
+            free(what);
+            free(path);
+        }
+    }
+    const char *tolerances = work->settings->compare.tolerances;
+    return code == CLI_OK && tolerances != NULL ? add_digest(work, one, "tolerances", tolerances) : code;
+}
+
+int regress_list_inputs(const regress_work *work, regress_case *one) {
+    regress_lines_free(&one->inputs);
+    char *path = regress_path(work->folder, one->scene);
+    if (path == NULL) {
+        return no_memory(work);
+    }
+    bool good = regress_lines_add(&one->inputs, "program: %s", work->program) &&
+                regress_lines_add(&one->inputs, "command: %s", one->command->name);
+    for (size_t i = 0; i < one->options.count && good; ++i) {
+        good = regress_lines_add(&one->inputs, "option: %s", one->options.line[i]);
+    }
+    int code = good ? add_provenance(work, one, path) : no_memory(work);
+    code = code == CLI_OK ? add_limits(work, one) : code;
+    code = code == CLI_OK ? add_golden(work, one) : code;
+    free(path);
+    return code;
+}
+
+/* --- the cache: for each case that was alike the lines above */
+
+static bool has_line(json_t *lines, const char *text) {
+    size_t i;
+    json_t *line;
+    json_array_foreach(lines, i, line) {
+        const char *one = json_string_value(line);
+        if (one != NULL && strcmp(one, text) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* What is told of a line: of an input its file's name, of others what stands before the colon. */
+static char *name_of(const char *line) {
+    static const char input[] = "vdbshade_input_", sum[] = "sha256:";
+    const char *colon = strchr(line, ':');
+    const char *digest = strncmp(line, input, sizeof input - 1) == 0 ? strstr(line, sum) : NULL;
+    const char *name = digest != NULL ? strchr(digest, ' ') : NULL;
+    return name != NULL ? strdup(name + 1)
+                        : strndup(line, colon != NULL ? (size_t)(colon - line) : strlen(line));
+}
+
+static void look_up(json_t *lines, regress_case *one) {
+    if (!json_is_array(lines)) {
+        return;
+    }
+    const char *first = NULL;
+    for (size_t i = 0; i < one->inputs.count && first == NULL; ++i) {
+        first = has_line(lines, one->inputs.line[i]) ? NULL : one->inputs.line[i];
+    }
+    if (first != NULL) {
+        one->changed = name_of(first);
+    } else if (json_array_size(lines) == one->inputs.count) {
+        one->status = REGRESS_UNCHANGED;
+    }
+}
+
+void regress_read_cache(regress_work *work) {
+    json_t *root = regress_load(work->cache);
+    for (size_t i = 0; i < work->case_count; ++i) {
+        regress_case *one = &work->cases[i];
+        if (one->status == REGRESS_FAILED) {
+            continue;
+        }
+        one->status = REGRESS_UNLIKE;
+        look_up(json_object_get(json_object_get(root, "alike"), one->name), one);
+    }
+    json_decref(root);
+}
+
+static bool was_alike(const regress_case *one) {
+    return one->status == REGRESS_UNCHANGED || one->status == REGRESS_ALIKE || one->status == REGRESS_UPDATED;
+}
+
+/* Cases that --only left out stay as they were. */
+int regress_write_cache(const regress_work *work) {
+    json_t *old = regress_load(work->cache), *alike = json_object(), *root = json_object();
+    if (work->settings->only != NULL) {
+        json_object_update(alike, json_object_get(old, "alike"));
+    }
+    for (size_t i = 0; i < work->case_count; ++i) {
+        const regress_case *one = &work->cases[i];
+        json_object_del(alike, one->name);
+        if (was_alike(one)) {
+            json_t *lines = json_array();
+            for (size_t k = 0; k < one->inputs.count; ++k) {
+                json_array_append_new(lines, json_string(one->inputs.line[k]));
+            }
+            json_object_set_new(alike, one->name, lines);
+        }
+    }
+    json_object_set_new(root, "alike", alike);
+    char *text = json_dumps(root, JSON_INDENT(1));
+    json_decref(root);
+    json_decref(old);
+    const int code = text != NULL ? cli_temporary_write(work->cache, text) : no_memory(work);
+    free(text);
+    return code;
+}

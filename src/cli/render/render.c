@@ -1,0 +1,258 @@
+/* vdbshade render: pictures of a scene, to look at what bake makes of it. */
+#include "render.h"
+#include "base/bytes.h"
+#include "base/clock.h"
+#include "base/rounds.h"
+#include "cli/message.h"
+#include "cli/paths.h"
+#include "cli/progress.h"
+#include "cli/signals.h"
+#include "cli/stats.h"
+#include "cli/warnings.h"
+
+#include <inttypes.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double degree = 0.017453292519943295;
+
+typedef struct render_work {
+    const render_settings *settings;
+    vsh_scene *scene;
+    vsh_run run;
+    vsh_assets *assets;
+    vsh_occluders *occluders;
+    render_surfaces surfaces;
+    render_lightmaps lightmaps;
+    vsh_lit_meshes *lit; /* of lightmaps, and of surfaces */
+    vsh_render_options options;
+    cli_origin origin;
+    render_picture picture;
+    render_page *page;
+    cli_stats stats;
+} render_work;
+
+static int load(render_work *work) {
+    const double start = vshi_seconds();
+    vsh_error error;
+    int code = vsh_assets_load(work->scene, &work->run, &work->assets, &error) == VSH_OK
+                   ? CLI_OK
+                   : cli_fail_of(NULL, &error);
+    code = code == CLI_OK ? render_lightmaps_read(work->settings, work->scene, work->assets, &work->run,
+                                                  &work->lightmaps)
+                          : code;
+    cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
+    return code;
+}
+
+static int make_occluders(render_work *work) {
+    vsh_error error;
+    if (vsh_scene_occluders(work->scene, work->assets, NULL, &work->run, &work->occluders, &error) !=
+        VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    vsh_occluders_info casters;
+    vsh_occluders_get_info(work->occluders, &casters);
+    cli_stats_casters(&work->stats, work->scene, &casters);
+    const double start = vshi_seconds();
+    const int code =
+        render_surfaces_make(work->scene, work->assets, work->occluders, &work->run, &work->surfaces);
+    cli_stats_stage(&work->stats, CLI_STAGE_FIELD, start);
+    return code;
+}
+
+/* Meshes with lightmaps first: where both are, they are what is seen. */
+static int join_lit(render_work *work) {
+    const size_t count = work->lightmaps.count, more = work->surfaces.mesh_count;
+    work->lit = calloc(count + more + 1, sizeof *work->lit);
+    if (work->lit == NULL) {
+        return cli_out_of_memory("meshes");
+    }
+    if (count > 0) {
+        memcpy(work->lit, work->lightmaps.lit, count * sizeof *work->lit);
+    }
+    if (more > 0) {
+        memcpy(work->lit + count, work->surfaces.meshes, more * sizeof *work->lit);
+    }
+    work->options.lit = work->lit;
+    work->options.lit_count = count + more;
+    return CLI_OK;
+}
+
+static int set_options(render_work *work) {
+    const render_settings *s = work->settings;
+    vsh_render_options *o = &work->options;
+    *o = vsh_render_options_default();
+    o->width = s->width;
+    o->height = s->height;
+    o->samples = s->samples;
+    o->ao = work->scene->ao;
+    memcpy(o->sky, s->has_sky || !work->scene->has_ambient ? s->sky : work->scene->ambient, sizeof o->sky);
+    for (int c = 0; c < 3 && work->scene->light_count == 0 && !s->has_sky && !work->scene->has_ambient; ++c) {
+        o->sky[c] = 1.0; /* all the light there is */
+    }
+    o->tint = work->scene->tint;
+    memcpy(o->background, s->background, sizeof o->background);
+    o->shafts = s->shafts;
+    o->shaft_steps = s->shaft_steps;
+    o->shade = work->scene->shade;
+    if (!work->scene->ao) {
+        o->shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
+    }
+    const int code = join_lit(work);
+    return code == CLI_OK ? render_camera_place(s, &work->surfaces, o) : code;
+}
+
+/* The file that a message is of which begins with "lightmap N: ", as vsh_render() counts them; else NULL. */
+static const char *lightmap_named(const render_settings *s, const char *message) {
+    size_t index;
+    return sscanf(message, "lightmap %zu: ", &index) == 1 && index < s->lightmap_count ? s->lightmaps[index]
+                                                                                       : NULL;
+}
+
+static int render_frame(render_work *work, int32_t index, const vsh_run *run) {
+    const render_settings *s = work->settings;
+    double start = vshi_seconds();
+    vsh_error error;
+    vsh_render_options o = work->options;
+    if (s->frames > 0) {
+        vsh_camera_orbit(&o.camera, 360.0 * degree * index / s->frames);
+    }
+    const vsh_result result =
+        vsh_render(work->surfaces.surfaces, work->surfaces.count, work->occluders, work->scene->lights,
+                   work->scene->light_count, &o, run, &work->picture.picture, &work->stats.shade, &error);
+    start = cli_stats_stage(&work->stats, CLI_STAGE_BAKE, start);
+    if (result != VSH_OK) {
+        return cli_fail_of(lightmap_named(s, error.message), &error);
+    }
+    work->stats.points += (uint64_t)s->width * (uint64_t)s->height * (uint64_t)(s->samples * s->samples);
+    char path[PATH_MAX];
+    render_output_path(s, index, path, sizeof path);
+    const int code =
+        s->page ? render_page_add(work->page, &work->picture) : render_output_write(s, &work->picture, path);
+    cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
+    return code;
+}
+
+static int render_frames(render_work *work) {
+    const render_settings *s = work->settings;
+    const int32_t count = s->frames > 0 ? s->frames : 1;
+    int code = render_picture_create(s, &work->origin, &work->picture);
+    if (code == CLI_OK && s->page) {
+        work->page = render_page_begin(s);
+        code = work->page != NULL ? CLI_OK : cli_out_of_memory("page");
+    }
+    vshi_rounds rounds;
+    vshi_rounds_begin(&rounds, &work->run, "render", 1);
+    for (int32_t i = 0; i < count && code == CLI_OK; ++i) {
+        const vsh_run run = vshi_rounds_run(&rounds, 1.0 / count);
+        code = render_frame(work, i, &run);
+        vshi_rounds_next(&rounds);
+    }
+    if (code == CLI_OK && s->page) {
+        const double start = vshi_seconds();
+        code = render_page_end(work->page);
+        work->page = NULL;
+        cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
+    }
+    return code;
+}
+
+/* Lightmaps that are shown are inputs, too. */
+static int find_origin(render_work *work) {
+    const render_settings *s = work->settings;
+    const char *files[1 + RENDER_MOST_LIGHTMAPS] = {s->bake.input};
+    memcpy(files + 1, s->lightmaps, s->lightmap_count * sizeof *files);
+    return cli_origin_make(work->scene, files, 1 + s->lightmap_count, &work->stats.casters, &work->run,
+                           &work->origin);
+}
+
+static void say_results(const render_work *work) {
+    const render_settings *s = work->settings;
+    if (s->bake.common.quiet) {
+        return;
+    }
+    if (work->stats.shade.unfinished > 0) {
+        cli_warn("%" PRIu64 " rays ran out of steps", work->stats.shade.unfinished);
+    }
+    const double *at = work->options.camera.position, *to = work->options.camera.target;
+    cli_say("%s: %d × %d, camera %.5g,%.5g,%.5g looking at %.5g,%.5g,%.5g", s->bake.output, s->width,
+            s->height, at[0], at[1], at[2], to[0], to[1], to[2]);
+    cli_stats_say(&work->stats);
+}
+
+static int run_render(const render_settings *s, vsh_scene *scene) {
+    render_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
+    work.run.memory_held += render_picture_bytes(s);
+    work.stats = cli_stats_begin(CLI_STATS_POINTS, work.run.threads);
+    int code = load(&work);
+    code = code == CLI_OK ? make_occluders(&work) : code;
+    code = code == CLI_OK ? set_options(&work) : code;
+    code = code == CLI_OK ? find_origin(&work) : code;
+    code = code == CLI_OK ? render_frames(&work) : code;
+    code = code == CLI_OK ? cli_stats_finish(&work.stats, &work.run, s->bake.stats) : code;
+    if (code == CLI_OK) {
+        say_results(&work);
+    }
+    render_page_abandon(work.page);
+    render_picture_free(&work.picture);
+    cli_origin_free(&work.origin);
+    free(work.lit);
+    render_lightmaps_free(&work.lightmaps);
+    render_surfaces_free(&work.surfaces);
+    vsh_occluders_free(work.occluders);
+    vsh_assets_free(work.assets);
+    return code;
+}
+
+/* What can be refused before anything is read but the scene. */
+static int check_files(const render_settings *s, const vsh_scene *scene) {
+    const int32_t count = s->frames > 0 && !s->page ? s->frames : 1;
+    int code = CLI_OK;
+    for (int32_t i = 0; i < count && code == CLI_OK; ++i) {
+        char path[PATH_MAX];
+        render_output_path(s, i, path, sizeof path);
+        code = cli_bake_check_output(&s->bake, scene, path);
+    }
+    if (code == CLI_OK && s->bake.stats != NULL) {
+        code = cli_bake_check_output(&s->bake, scene, s->bake.stats);
+    }
+    if (code == CLI_OK && scene->light_count == 0 && !scene->ao && s->lightmap_count == 0) {
+        return cli_usage("%s: no lights and no ao; give --sun X,Y,Z or --ao DISTANCE, or both",
+                         s->bake.input);
+    }
+    const uint64_t limit = s->bake.common.memory_limit, bytes = render_picture_bytes(s);
+    if (code == CLI_OK && limit > 0 && bytes > limit) {
+        char all[32], most[32];
+        cli_say("%s: a picture of %d × %d needs %s, over the memory limit of %s", s->bake.output, s->width,
+                s->height, vshi_bytes_text(bytes, all, sizeof all),
+                vshi_bytes_text(limit, most, sizeof most));
+        return CLI_LIMIT;
+    }
+    return code;
+}
+
+int cli_render_main(int argc, char **argv) {
+    render_settings s;
+    bool help;
+    int code = render_parse(argc, argv, &s, &help);
+    if (code != CLI_OK || help) {
+        return code;
+    }
+    cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
+    cli_bake_scene made;
+    code = cli_bake_scene_for_points(&s.bake, &made);
+    if (code == CLI_OK && s.lightmap_count > 0) {
+        code = cli_bake_scene_receivers(&s.bake, &made);
+    }
+    code = code == CLI_OK ? check_files(&s, &made.scene) : code;
+    if (code == CLI_OK) {
+        cli_signals_watch();
+        code = run_render(&s, &made.scene);
+    }
+    cli_bake_scene_free(&made);
+    cli_progress_end();
+    return code;
+}

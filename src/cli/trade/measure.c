@@ -1,0 +1,218 @@
+/* Bakes the scene in every way that is worth a look, and takes the time. */
+#include "cli/box.h"
+#include "cli/message.h"
+#include "trade.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+typedef struct plan {
+    int32_t method;
+    int32_t number;   /* rays or cones; 0: none */
+    double max_error; /* 0: none */
+} plan;
+
+static const plan shadow_plans[] = {
+    {VSH_SHADOW_HARD, 0, 0.0},      {VSH_SHADOW_CLASSIC, 0, 0.0},   {VSH_SHADOW_IMPROVED, 0, 0.0},
+    {VSH_SHADOW_SMOOTH, 0, 0.0},    {VSH_SHADOW_CONE, 0, 0.0},      {VSH_SHADOW_RAYS, 4, 0.0},
+    {VSH_SHADOW_ADAPTIVE, 0, 0.05}, {VSH_SHADOW_EXACT, 0, 0.05},    {VSH_SHADOW_ADAPTIVE, 0, 0.02},
+    {VSH_SHADOW_EXACT, 0, 0.02},    {VSH_SHADOW_ADAPTIVE, 0, 0.01}, {VSH_SHADOW_EXACT, 0, 0.01},
+    {VSH_SHADOW_RAYS, 16, 0.0},     {VSH_SHADOW_EXACT, 0, 0.005},   {VSH_SHADOW_ADAPTIVE, 0, 0.005},
+    {VSH_SHADOW_RAYS, 64, 0.0},
+};
+
+static const plan ao_plans[] = {
+    {VSH_AO_TAPS, 0, 0.0},      {VSH_AO_CONES, 4, 0.0},     {VSH_AO_CONES, 16, 0.0},
+    {VSH_AO_RAYS, 4, 0.0},      {VSH_AO_ADAPTIVE, 0, 0.05}, {VSH_AO_EXACT, 0, 0.05},
+    {VSH_AO_ADAPTIVE, 0, 0.02}, {VSH_AO_EXACT, 0, 0.02},    {VSH_AO_RAYS, 16, 0.0},
+    {VSH_AO_ADAPTIVE, 0, 0.01}, {VSH_AO_EXACT, 0, 0.01},    {VSH_AO_RAYS, 64, 0.0},
+    {VSH_AO_CONES, 64, 0.0},    {VSH_AO_EXACT, 0, 0.005},   {VSH_AO_ADAPTIVE, 0, 0.005},
+};
+
+int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds) {
+    const double start = trade_now(work);
+    vsh_scene scene = *work->scene;
+    scene.grid.resolution = resolution;
+    scene.grid.voxel_size = 0.0;
+    cli_box receivers = cli_box_empty();
+    for (size_t r = 0; r < work->receiver_count; ++r) {
+        cli_box_grow(&receivers, &work->receivers[r].info);
+    }
+    vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
+    options.receivers_min = receivers.min;
+    options.receivers_max = receivers.max;
+    options.triangles = 0; /* the same for all resolutions */
+    vsh_error error;
+    const vsh_result result =
+        vsh_scene_occluders(&scene, work->assets, &options, &work->run, occluders, &error);
+    *seconds = trade_now(work) - start;
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+}
+
+int trade_add_triangles(const trade_work *work, trade_field *field) {
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(field->occluders, &parts);
+    parts.triangles = work->meshes ? work->triangles : NULL;
+    vsh_error error;
+    return vsh_occluders_from_parts(&parts, &field->traced, &error) == VSH_OK ? CLI_OK
+                                                                              : cli_fail_of(NULL, &error);
+}
+
+/* The options of one plan, for the library and in `bake`'s words. */
+static vsh_shade_options shade_of(const trade_work *work, const trade_subject *subject, const plan *p,
+                                  trade_run *run) {
+    vsh_shade_options shade = work->scene->shade;
+    shade.early_rays = 0;
+    const char *flag = subject->ao ? "--ao-method" : "--method";
+    const bool rays = subject->ao ? p->method == VSH_AO_RAYS : p->method == VSH_SHADOW_RAYS;
+    if (subject->ao) {
+        shade.ao_method = p->method;
+        shade.ao_cones = !rays && p->number > 0 ? p->number : shade.ao_cones;
+        run->method = vsh_ao_method_name(p->method);
+    } else {
+        shade.method = p->method;
+        run->method = vsh_shadow_method_name(p->method);
+    }
+    char more[64] = "";
+    if (p->max_error > 0.0) {
+        shade.max_error = p->max_error;
+        shade.rays = 0; /* as many as that takes */
+        snprintf(more, sizeof more, " --max-error %g", p->max_error);
+    } else if (rays) {
+        shade.rays = p->number;
+        snprintf(more, sizeof more, " --rays %d", p->number);
+    } else if (p->number > 0) {
+        snprintf(more, sizeof more, " --ao-cones %d", p->number);
+    }
+    snprintf(run->options, sizeof run->options, "%s %s%s --resolution %d", flag, run->method, more,
+             run->resolution);
+    return shade;
+}
+
+/* Share of the subject's values that a cone proved. */
+static double certified_share(const trade_subject *subject, size_t valid, const vsh_shade_options *shade,
+                              const vsh_shade_stats *stats) {
+    const int32_t method = subject->ao ? shade->ao_method : shade->method;
+    const int32_t rays = subject->ao ? (int32_t)VSH_AO_RAYS : (int32_t)VSH_SHADOW_RAYS;
+    if (method == rays || (subject->ao && method == VSH_AO_TAPS)) {
+        return NAN;
+    }
+    double values = (double)(subject->planes * valid);
+    double proved = (double)(stats->certified + stats->skipped);
+    if (method > rays) {
+        proved = values - (double)stats->refined;
+    } else if (subject->ao) {
+        values *= (double)shade->ao_cones;
+    }
+    return fmax(0.0, fmin(1.0, proved / values));
+}
+
+int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh_shade_options *shade,
+               float *shadow, float *ao, float *coverage, vsh_shade_stats *stats) {
+    const size_t lights = shadow != NULL ? work->scene->light_count : 0;
+    float **planes = calloc(lights + 1, sizeof *planes);
+    if (planes == NULL) {
+        return cli_out_of_memory("planes");
+    }
+    vsh_bake_stats baked = vsh_bake_stats_zero();
+    int code = CLI_OK;
+    for (size_t r = 0; r < work->receiver_count && code == CLI_OK; ++r) {
+        const size_t first = work->receivers[r].first;
+        for (size_t i = 0; i < lights; ++i) {
+            planes[i] = shadow + i * work->texels + first;
+        }
+        const vsh_lightmap lightmap = {.shadow = lights > 0 ? planes : NULL,
+                                       .ao = ao != NULL ? ao + first : NULL,
+                                       .coverage = coverage != NULL ? coverage + first : NULL};
+        vsh_error error;
+        if (vsh_bake_lightmap(occluders, work->receivers[r].texels, work->scene->lights, lights, shade,
+                              &work->run, &lightmap, &baked, &error) != VSH_OK) {
+            code = cli_fail_of(NULL, &error);
+        }
+    }
+    free(planes);
+    if (stats != NULL) {
+        *stats = baked.shade;
+    }
+    return code;
+}
+
+/* Bakes the run's values, several times where it is quick. */
+static int bake(const trade_work *work, const trade_subject *subject, const vsh_occluders *occluders,
+                const vsh_shade_options *shade, trade_run *run, vsh_shade_stats *stats) {
+    trade_clock clock = {.count = 0};
+    int code = CLI_OK;
+    do {
+        const double start = trade_now(work);
+        code = trade_bake(work, occluders, shade, subject->ao ? NULL : run->values,
+                          subject->ao ? run->values : NULL, NULL, stats);
+        clock.times[clock.count++] = trade_now(work) - start;
+    } while (code == CLI_OK && trade_again(&clock));
+    run->bake_s = trade_median(&clock);
+    return code;
+}
+
+/* A guess: what the method took last time, or several times that where the plan asks for more. */
+static double expected(const trade_subject *subject, const trade_run *run, bool first) {
+    double seconds = 0.0;
+    for (size_t i = 0; i < subject->run_count; ++i) {
+        if (subject->runs[i].method == run->method) {
+            seconds = subject->runs[i].bake_s;
+        }
+    }
+    return first ? 4.0 * seconds : seconds;
+}
+
+static int run_plan(trade_work *work, trade_subject *subject, const plan *p, const trade_field *on) {
+    trade_run run = {.resolution = on->resolution, .build_s = on->build_s, .valid = on->valid};
+    const vsh_shade_options shade = shade_of(work, subject, p, &run);
+    const bool exact =
+        subject->ao ? p->method == (int32_t)VSH_AO_EXACT : p->method == (int32_t)VSH_SHADOW_EXACT;
+    if (exact && !work->meshes) {
+        return CLI_OK;
+    }
+    if (trade_left(work) < expected(subject, &run, on == work->fields)) {
+        ++work->skipped;
+        return CLI_OK;
+    }
+    run.values = calloc(subject->planes * work->texels, sizeof *run.values);
+    if (run.values == NULL) {
+        return cli_out_of_memory("values");
+    }
+    vsh_occluders_info info;
+    vsh_occluders_get_info(on->occluders, &info);
+    run.bytes = info.field_bytes + (exact ? vsh_triangles_bytes(work->triangles) : 0);
+    run.build_s += exact ? work->triangles_s : 0.0;
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    int code = bake(work, subject, on->traced, &shade, &run, &stats);
+    if (code == CLI_OK) {
+        run.certified = certified_share(subject, run.valid, &shade, &stats);
+        code = trade_compare(work, subject, on->mask, on->valid, &run);
+    }
+    if (code == CLI_OK && trade_add(work, subject, &run) != NULL) {
+        return CLI_OK;
+    }
+    free(run.values);
+    return code != CLI_OK ? code : cli_out_of_memory("runs");
+}
+
+/* The first plans of all come first, on every field: where the budget ends, it is the dear ones that are
+ * missing. */
+int trade_measure(trade_work *work) {
+    static const size_t shadow_count = sizeof shadow_plans / sizeof shadow_plans[0];
+    static const size_t ao_count = sizeof ao_plans / sizeof ao_plans[0];
+    for (size_t i = 0; i < shadow_count || i < ao_count; ++i) {
+        for (size_t s = 0; s < work->subject_count; ++s) {
+            trade_subject *subject = &work->subjects[s];
+            for (size_t f = 0; f < work->field_count && i < (subject->ao ? ao_count : shadow_count); ++f) {
+                const plan *p = subject->ao ? &ao_plans[i] : &shadow_plans[i];
+                const int code = run_plan(work, subject, p, &work->fields[f]);
+                if (code != CLI_OK) {
+                    return code;
+                }
+            }
+        }
+    }
+    return CLI_OK;
+}

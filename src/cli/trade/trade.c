@@ -1,0 +1,373 @@
+/* vdbshade trade: speed against accuracy, measured on the user's own scene. */
+#include "trade.h"
+#include "base/clock.h"
+#include "cli/casters.h"
+#include "cli/message.h"
+#include "cli/paths.h"
+#include "cli/progress.h"
+#include "cli/signals.h"
+#include "cli/temporary.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    KEY_CSV = 0x2000,
+    KEY_PLOT,
+    KEY_RECEIVER,
+    KEY_SIZE,
+    KEY_RESOLUTIONS,
+    KEY_TRUTH_RAYS,
+    KEY_BUDGET,
+    KEY_SUN,
+    KEY_SUN_ANGLE,
+    KEY_AO,
+    KEY_UV_SET
+};
+
+static const cli_option options[] = {
+    {0, NULL, NULL, "Output"},
+    {'o', "output", "OUT.html", "page to write: plot, table and pictures in one file"},
+    {KEY_CSV, "csv", "FILE.csv", "write the table as CSV too"},
+    {KEY_PLOT, "plot", "FILE.svg",
+     "write the plot of the shadow (without lights, of AO)\nas a picture of its own too"},
+    {0, NULL, NULL, "What is measured"},
+    {KEY_RECEIVER, "receiver", "N", "one receiver of the scene only, from 0 (all)"},
+    {KEY_SIZE, "size", "W[xH]", "texels of each lightmap, 1 to 4096 (256)"},
+    {KEY_RESOLUTIONS, "resolutions", "N,N,...",
+     "voxels along the longest side, up to 16 of them\n(64,128,256)"},
+    {KEY_TRUTH_RAYS, "truth-rays", "N", "rays a texel of the truth, 16 to 65536 (1024)"},
+    {KEY_BUDGET, "budget", "SECONDS",
+     "time to spend on runs, once there is a truth: those that\ndo not fit are left out, and counted (120)"},
+    {0, NULL, NULL, "Light and occlusion, where INPUT is a mesh"},
+    {KEY_SUN, "sun", "X,Y,Z", "direction towards the sun"},
+    {KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},
+    {KEY_AO, "ao", "DISTANCE", "ambient occlusion within a distance, scene units"},
+    {KEY_UV_SET, "uv-set", "N", "UV set of the lightmap, from 0"},
+    CLI_COMMON_OPTIONS,
+    CLI_ISA_OPTION,
+};
+
+static int trade_main(int argc, char **argv);
+
+const cli_command cli_trade = {
+    "trade",
+    "INPUT -o OUT.html [options]",
+    "Bakes a mesh or a scene (.json) by every method, at several voxel sizes and settings, and compares\n"
+    "with the truth: rays against the triangles and the procedural shapes themselves, or against a finer\n"
+    "field where a caster is a .vdb file. The page shows error against time, what is fastest for a given\n"
+    "error, and what it looks like. Numbers in brackets are what holds without the option.",
+    options,
+    sizeof options / sizeof options[0],
+    trade_main};
+
+/* --- options */
+
+static int take_resolutions(trade_settings *s, const char *name, const char *value) {
+    s->resolution_count = 0;
+    for (const char *at = value; s->resolution_count < TRADE_MAX_RESOLUTIONS; ++at) {
+        char *end = NULL;
+        const long number = *at >= '0' && *at <= '9' ? strtol(at, &end, 10) : 0;
+        if (number < 2 || number > 65536 || (*end != ',' && *end != '\0')) {
+            break;
+        }
+        s->resolutions[s->resolution_count++] = (int32_t)number;
+        at = end;
+        if (*at == '\0') {
+            return CLI_OK;
+        }
+    }
+    return cli_usage("%s '%s': expected up to %d whole numbers from 2 to 65536, with commas between them",
+                     name, value, TRADE_MAX_RESOLUTIONS);
+}
+
+static int take_size(trade_settings *s, const char *name, const char *value) {
+    const int code = cli_take_size(name, value, &s->bake.width, &s->bake.height);
+    if (code == CLI_OK && (s->bake.width > 4096 || s->bake.height > 4096)) {
+        return cli_usage("%s '%s': expected at most 4096 texels", name, value);
+    }
+    return code;
+}
+
+static int take(void *settings, int key, const char *name, const char *value) {
+    trade_settings *s = settings;
+    switch (key) {
+    case 'o':
+        s->report = value;
+        return CLI_OK;
+    case KEY_CSV:
+        s->csv = value;
+        return CLI_OK;
+    case KEY_PLOT:
+        s->plot = value;
+        return CLI_OK;
+    case KEY_RECEIVER:
+        return cli_take_integer(name, value, 0, INT32_MAX, &s->receiver);
+    case KEY_SIZE:
+        return take_size(s, name, value);
+    case KEY_RESOLUTIONS:
+        return take_resolutions(s, name, value);
+    case KEY_TRUTH_RAYS:
+        return cli_take_integer(name, value, 16, 65536, &s->truth_rays);
+    case KEY_BUDGET:
+        return cli_take_positive(name, value, &s->budget);
+    case KEY_SUN:
+        s->bake.has_sun = true;
+        return cli_take_vector(name, value, s->bake.sun);
+    case KEY_SUN_ANGLE:
+        s->bake.has_sun_angle = true;
+        return cli_take_number(name, value, 0.0, 179.0, &s->bake.sun_angle_deg);
+    case KEY_AO:
+        s->bake.has_ao = true;
+        return cli_take_positive(name, value, &s->bake.ao_distance);
+    case KEY_UV_SET:
+        s->bake.has_uv_set = true;
+        return cli_take_integer(name, value, 0, VSH_MAX_UV_SETS - 1, &s->bake.uv_set);
+    default:
+        break;
+    }
+    bool taken;
+    return cli_common_take(&s->bake.common, key, name, value, &taken);
+}
+
+/* --- what the measurements share */
+
+/* With one thread it is the processor's time, so that other work on the machine does not show. */
+double trade_now(const trade_work *work) {
+    if (work->run.threads != 1) {
+        return vshi_seconds();
+    }
+    struct timespec now = {0, 0};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+double trade_left(const trade_work *work) {
+    return work->settings->budget - (vshi_seconds() - work->measuring);
+}
+
+/* A measurement that is as short as this is repeated. */
+static const double SHORT_SECONDS = 0.3;
+
+bool trade_again(const trade_clock *clock) {
+    return (size_t)clock->count < sizeof clock->times / sizeof clock->times[0] &&
+           clock->times[0] < SHORT_SECONDS;
+}
+
+static int by_value(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+double trade_median(trade_clock *clock) {
+    qsort(clock->times, (size_t)clock->count, sizeof clock->times[0], by_value);
+    return clock->times[clock->count / 2];
+}
+
+trade_run *trade_add(trade_work *work, trade_subject *subject, const trade_run *run) {
+    trade_run *more = realloc(subject->runs, (subject->run_count + 1) * sizeof *more);
+    if (more == NULL) {
+        return NULL;
+    }
+    subject->runs = more;
+    more[subject->run_count] = *run;
+    if (!work->settings->bake.common.quiet) {
+        char line[256];
+        snprintf(line, sizeof line, "%s%s: RMSE %.4f, %.3f s", run->embree ? "Embree, " : "", run->options,
+                 run->metrics.rmse, run->bake_s);
+        cli_progress_line(line);
+    }
+    return &more[subject->run_count++];
+}
+
+/* --- the work */
+
+static int by_size(const void *a, const void *b) {
+    const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
+    return (x > y) - (x < y);
+}
+
+/* Whether a run is neither slower nor farther from the truth than another, and better in one of the two. */
+static bool beats(const trade_run *a, const trade_run *b) {
+    return a->rate <= b->rate && a->metrics.rmse <= b->metrics.rmse &&
+           (a->rate < b->rate || a->metrics.rmse < b->metrics.rmse);
+}
+
+static void mark_fronts(trade_work *work) {
+    for (size_t s = 0; s < work->subject_count; ++s) {
+        trade_subject *subject = &work->subjects[s];
+        for (size_t i = 0; i < subject->run_count; ++i) {
+            trade_run *run = &subject->runs[i];
+            run->front = !run->embree;
+            for (size_t k = 0; k < subject->run_count && run->front; ++k) {
+                run->front = subject->runs[k].embree || !beats(&subject->runs[k], run);
+            }
+        }
+    }
+}
+
+/* The finest field comes first. */
+static int measure(trade_work *work) {
+    const trade_settings *s = work->settings;
+    int32_t resolutions[TRADE_MAX_RESOLUTIONS];
+    memcpy(resolutions, s->resolutions, sizeof resolutions);
+    qsort(resolutions, s->resolution_count, sizeof resolutions[0], by_size);
+    int code = CLI_OK;
+    for (size_t i = 0; i < s->resolution_count && code == CLI_OK; ++i) {
+        trade_field *next = &work->fields[work->field_count];
+        next->resolution = resolutions[s->resolution_count - 1 - i];
+        code = trade_make_occluders(work, next->resolution, &next->occluders, &next->build_s);
+        code = code == CLI_OK ? trade_add_triangles(work, next) : code;
+        work->field_count += next->occluders != NULL;
+    }
+    code = code == CLI_OK ? trade_take_masks(work) : code;
+    code = code == CLI_OK ? trade_place_points(work) : code;
+    code = code == CLI_OK ? trade_take_truth(work, work->fields[0].resolution) : code;
+    work->measuring = vshi_seconds();
+    code = code == CLI_OK ? trade_measure_embree(work) : code;
+    code = code == CLI_OK ? trade_measure(work) : code;
+    mark_fronts(work);
+    return code;
+}
+
+static void free_work(trade_work *work) {
+    for (size_t s = 0; s < work->subject_count; ++s) {
+        trade_subject *subject = &work->subjects[s];
+        for (size_t i = 0; i < subject->run_count; ++i) {
+            free(subject->runs[i].values);
+        }
+        free(subject->runs);
+        free(subject->truth);
+    }
+    for (size_t i = 0; i < work->field_count; ++i) {
+        free(work->fields[i].mask);
+        vsh_occluders_free(work->fields[i].traced); /* refers to the other */
+        vsh_occluders_free(work->fields[i].occluders);
+    }
+    for (size_t i = 0; i < work->receiver_count; ++i) {
+        vsh_texels_free(work->receivers[i].texels);
+    }
+    free(work->receivers);
+    free(work->any);
+    free(work->common);
+    free(work->positions);
+    free(work->normals);
+    free(work->texel);
+    vsh_triangles_free(work->triangles);
+    vsh_solids_free(work->solids);
+    vsh_assets_free(work->assets);
+}
+
+static int trade(const trade_settings *settings, vsh_scene *scene) {
+    trade_work work = {.settings = settings,
+                       .scene = scene,
+                       .run = cli_common_run(&settings->bake.common),
+                       .began = vshi_seconds()};
+    if (scene->light_count > 0) {
+        work.subjects[work.subject_count++] = (trade_subject){.name = "shadow", .planes = scene->light_count};
+    }
+    if (scene->ao) {
+        work.subjects[work.subject_count++] = (trade_subject){.name = "ao", .ao = true, .planes = 1};
+    }
+    int code = trade_load(&work);
+    code = code == CLI_OK ? measure(&work) : code;
+    code = code == CLI_OK ? trade_write_csv(&work) : code;
+    code = code == CLI_OK ? trade_write_plot(&work) : code;
+    code = code == CLI_OK ? trade_write_report(&work) : code;
+    if (code == CLI_OK) {
+        cli_signals_end();
+        if (!settings->bake.common.quiet) {
+            cli_say("%s: %zu runs in %.1f s, %zu left out", settings->report,
+                    work.subjects[0].run_count + work.subjects[1].run_count, vshi_seconds() - work.began,
+                    work.skipped);
+        }
+    }
+    free_work(&work);
+    return code;
+}
+
+/* --- beforehand */
+
+/* What can be refused before anything is read. */
+static int check_files(const trade_settings *s, const vsh_scene *scene) {
+    const char *const outputs[] = {s->report, s->csv, s->plot};
+    static const char *const names[] = {"output", "--csv file", "--plot file"};
+    cli_bake_settings named = s->bake; /* by the command line, not by the scene */
+    int code = CLI_OK;
+    if (scene->layer_count > 0) {
+        code = cli_usage("%s: trade measures one field, not layers", s->bake.input);
+    }
+    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
+        if (cli_caster_is_direct(&scene->casters[i])) {
+            code =
+                cli_usage("%s: trade measures one field, and caster %zu is not part of it", s->bake.input, i);
+        }
+    }
+    for (size_t i = 0; i < sizeof outputs / sizeof outputs[0] && code == CLI_OK; ++i) {
+        if (outputs[i] == NULL) {
+            continue;
+        }
+        for (size_t k = 0; k < i && code == CLI_OK; ++k) {
+            if (outputs[k] != NULL && cli_same_file(outputs[i], outputs[k])) {
+                code = cli_usage("%s: both the %s and the %s", outputs[i], names[k], names[i]);
+            }
+        }
+        named.output = outputs[i];
+        code = code == CLI_OK ? cli_bake_check_output(&named, scene, outputs[i]) : code;
+        code = code == CLI_OK ? cli_temporary_check(outputs[i]) : code;
+    }
+    return code;
+}
+
+/* Leaves the scene with the one receiver that was asked for. */
+static int choose_receiver(const trade_settings *s, vsh_scene *scene) {
+    if (s->receiver < 0) {
+        return CLI_OK;
+    }
+    if ((size_t)s->receiver >= scene->receiver_count) {
+        return cli_usage("--receiver '%d': %s has %zu receiver%s, counted from 0", s->receiver, s->bake.input,
+                         scene->receiver_count, scene->receiver_count == 1 ? "" : "s");
+    }
+    scene->receivers += s->receiver;
+    scene->receiver_count = 1;
+    return CLI_OK;
+}
+
+static int trade_main(int argc, char **argv) {
+    trade_settings s;
+    memset(&s, 0, sizeof s);
+    s.bake.common = cli_common_default();
+    s.bake.grid.options = vsh_grid_options_default();
+    s.bake.has_size = s.bake.has_supersample = s.bake.has_padding = true;
+    s.bake.width = s.bake.height = 256;
+    s.bake.supersample = 1; /* a sample a texel: the truth is one of the sample's too */
+    memcpy(s.resolutions, (const int32_t[]){64, 128, 256}, 3 * sizeof s.resolutions[0]);
+    s.resolution_count = 3;
+    s.truth_rays = 1024;
+    s.receiver = -1;
+    s.budget = 120.0;
+    bool help;
+    int code = cli_parse(&cli_trade, argc, argv, take, &s, "INPUT", &s.bake.input, &help);
+    if (code != CLI_OK || help) {
+        return code;
+    }
+    if (s.report == NULL || !cli_has_ending(s.report, "html")) {
+        return cli_usage("%s: give -o OUT.html", s.report != NULL ? s.report : s.bake.input);
+    }
+    /* a mesh needs an output to be a scene; a scene's own are not written */
+    s.bake.output = cli_has_ending(s.bake.input, "json") ? NULL : s.report;
+    cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
+    cli_bake_scene made;
+    code = cli_bake_scene_make(&s.bake, &made);
+    code = code == CLI_OK ? check_files(&s, &made.scene) : code;
+    code = code == CLI_OK ? choose_receiver(&s, &made.scene) : code;
+    if (code == CLI_OK) {
+        cli_signals_watch();
+        code = trade(&s, &made.scene);
+    }
+    cli_bake_scene_free(&made);
+    cli_progress_end();
+    return code;
+}

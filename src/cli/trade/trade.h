@@ -1,0 +1,143 @@
+/* Error against time on the user's own scene: what `vdbshade trade` measures and what its report shows. */
+#ifndef CLI_TRADE_H
+#define CLI_TRADE_H
+
+#include "cli/bake/options.h"
+
+enum { TRADE_MAX_RESOLUTIONS = 16 };
+
+typedef struct trade_settings {
+    cli_bake_settings bake; /* the scene, as `bake` takes it */
+    const char *report;
+    const char *csv;
+    const char *plot;
+    int32_t resolutions[TRADE_MAX_RESOLUTIONS];
+    size_t resolution_count;
+    int32_t truth_rays;
+    int32_t receiver; /* -1: all */
+    double budget;    /* seconds */
+} trade_settings;
+
+/* Every plane of values holds the texels of all receivers, one receiver after the other. */
+typedef struct trade_receiver {
+    const char *path;
+    vsh_texels *texels;
+    vsh_texels_info info;
+    size_t first; /* of its texels, in a plane */
+} trade_receiver;
+
+typedef struct trade_metrics {
+    size_t count;         /* texels, over all lights */
+    size_t penumbra;      /* of them with a truth in 0.02 … 0.98 */
+    double rmse;          /* over all */
+    double penumbra_rmse; /* 0 where there is no penumbra */
+    double bias;          /* mean of value - truth */
+    double p95, p99, max; /* of |value - truth| */
+    double width_error;   /* of the 10 % to 90 % distance, relative to it; NaN where no penumbra has one */
+} trade_metrics;
+
+/* One way to bake, and what came of it. */
+typedef struct trade_run {
+    const char *method;
+    char options[128];  /* as `bake` takes them */
+    int32_t resolution; /* 0: no voxels */
+    bool embree;        /* rays alone, no cone before them */
+    bool front;         /* nothing is both faster and nearer to the truth */
+    double build_s;
+    double bake_s;
+    double rate;      /* microseconds that the bake takes for a value: one light's at a texel, or its AO */
+    uint64_t bytes;   /* of field and triangles */
+    double certified; /* share of the values that a cone proved; NaN for rays alone */
+    size_t valid;     /* texels that it gave a value, over one plane */
+    trade_metrics metrics; /* over the texels that all runs have */
+    double valid_rmse;     /* over all texels that it gave a value */
+    float *values;         /* as trade_subject.truth */
+} trade_run;
+
+typedef struct trade_field {
+    int32_t resolution;
+    vsh_occluders *occluders; /* of voxels alone */
+    vsh_occluders *traced;    /* with triangles, where casters are all meshes */
+    double build_s;
+    uint8_t *mask; /* [texels]: 1 where a bake on this field finds a texel valid */
+    size_t valid;  /* how many those are */
+} trade_field;
+
+/* Shadows of all lights, or AO. */
+typedef struct trade_subject {
+    const char *name; /* "shadow", "ao" */
+    bool ao;
+    size_t planes; /* lights, or 1 */
+    float *truth;  /* [planes][texels] */
+    trade_run *runs;
+    size_t run_count;
+} trade_subject;
+
+typedef struct trade_work {
+    const trade_settings *settings;
+    vsh_scene *scene;
+    vsh_run run;
+    vsh_assets *assets;
+    trade_receiver *receivers;
+    size_t receiver_count;
+    size_t texels; /* of all receivers' lightmaps */
+    size_t covered;
+    vsh_triangles *triangles; /* of the mesh casters; NULL where there are none, or there is no Embree */
+    vsh_solids *solids;       /* of the procedural casters; NULL where there are none */
+    bool meshes;              /* casters are all meshes, and there is Embree: exact, and Embree's own curve */
+    double triangles_s;
+    trade_field fields[TRADE_MAX_RESOLUTIONS]; /* finest first */
+    size_t field_count;
+    uint8_t *common; /* [texels]: 1 where all fields find a texel valid: what all runs are measured on */
+    size_t common_count;
+    size_t points;     /* texels that any field finds valid: what truth is for */
+    double *positions; /* [points][3]: lifted, see trade_texels.c */
+    float *normals;    /* [points][3] */
+    uint32_t *texel;   /* [points], in a plane */
+    uint8_t *any;      /* [texels]: 1 where any field finds a texel valid */
+    trade_subject subjects[2];
+    size_t subject_count;
+    size_t skipped; /* runs that did not fit into the budget */
+    double began;
+    double measuring; /* since when: what the budget is for */
+    double truth_s;
+    char truth_text[320]; /* what the truth is, for the report */
+} trade_work;
+
+/* Takes the values, which belong to the subject from then on; NULL where memory is short. */
+trade_run *trade_add(trade_work *work, trade_subject *subject, const trade_run *run);
+
+double trade_now(const trade_work *work);  /* seconds to take differences of */
+double trade_left(const trade_work *work); /* seconds of the budget */
+
+/* A measured time is the median of a few, where they are short. */
+typedef struct trade_clock {
+    double times[3];
+    int count;
+} trade_clock;
+bool trade_again(const trade_clock *clock); /* whether to measure once more */
+double trade_median(trade_clock *clock);
+
+/* All of these return CLI_OK or an exit code, having said why. */
+int trade_load(trade_work *work);
+int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds);
+int trade_add_triangles(const trade_work *work, trade_field *field);
+int trade_take_masks(trade_work *work);
+int trade_place_points(trade_work *work);
+int trade_measure(trade_work *work);
+int trade_take_truth(trade_work *work, int32_t finest);
+int trade_measure_embree(trade_work *work);
+int trade_write_report(const trade_work *work);
+int trade_write_csv(const trade_work *work);
+int trade_write_plot(const trade_work *work);
+
+/* Bakes all receivers into planes of shadow [lights][texels], of AO or of coverage (each may be NULL). */
+int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh_shade_options *shade,
+               float *shadow, float *ao, float *coverage, vsh_shade_stats *stats);
+
+/* Measures run->values and the rate, on the texels that all runs have and on all of `mask`, `valid` of them.
+ */
+int trade_compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask, size_t valid,
+                  trade_run *run);
+
+#endif

@@ -1,0 +1,139 @@
+/* What a scene's values are: rays against its casters themselves, or, where some caster is only a level set,
+ * rays against a field finer than all that are measured. And Embree's own curve, which every method has to
+ * beat. */
+#include "cli/message.h"
+#include "trade.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+/* Embree's curve ends at so many rays, or at half of the truth's. */
+enum { CURVE_RAYS = 256 };
+
+/* Traces the subject's planes into `values`; `seconds` is of the library's call alone. */
+static int trace(const trade_work *work, const trade_subject *subject, int32_t rays, float *values,
+                 double *seconds) {
+    float *packed = calloc(work->points, sizeof *packed);
+    if (packed == NULL) {
+        return cli_out_of_memory("rays");
+    }
+    int code = CLI_OK;
+    *seconds = 0.0;
+    for (size_t plane = 0; plane < subject->planes && code == CLI_OK; ++plane) {
+        const double start = trade_now(work);
+        vsh_error error;
+        const vsh_result result =
+            subject->ao
+                ? vsh_trace_ao(work->triangles, work->solids, work->points, work->positions, work->normals,
+                               0.0, work->scene->shade.ao_distance, rays, &work->run, packed, &error)
+                : vsh_trace_shadow(work->triangles, work->solids, work->points, work->positions,
+                                   work->normals, 0.0, &work->scene->lights[plane], rays, &work->run, packed,
+                                   &error);
+        *seconds += trade_now(work) - start;
+        if (result != VSH_OK) {
+            code = cli_fail_of(NULL, &error);
+        }
+        for (size_t i = 0; i < work->points && code == CLI_OK; ++i) {
+            values[plane * work->texels + work->texel[i]] = packed[i];
+        }
+    }
+    free(packed);
+    return code;
+}
+
+/* Of a scene whose casters rays cannot meet: rays against a field of twice the finest resolution. */
+static int march(trade_work *work, int32_t resolution) {
+    vsh_occluders *occluders = NULL;
+    double seconds;
+    int code = trade_make_occluders(work, resolution, &occluders, &seconds);
+    vsh_shade_options shade = work->scene->shade;
+    shade.method = VSH_SHADOW_RAYS;
+    shade.ao_method = VSH_AO_RAYS;
+    shade.rays = work->settings->truth_rays < 4096 ? work->settings->truth_rays : 4096;
+    shade.early_rays = 0;
+    float *shadow = NULL, *ao = NULL;
+    for (size_t s = 0; s < work->subject_count; ++s) {
+        trade_subject *subject = &work->subjects[s];
+        *(subject->ao ? &ao : &shadow) = subject->truth;
+    }
+    code = code == CLI_OK ? trade_bake(work, occluders, &shade, shadow, ao, NULL, NULL) : code;
+    vsh_occluders_free(occluders);
+    snprintf(work->truth_text, sizeof work->truth_text,
+             "%d rays a texel marched against a field of %d voxels along the longest side, as %s", shade.rays,
+             resolution,
+             vsh_triangles_available() ? "a caster is neither a mesh nor procedural"
+                                       : "this build has no Embree");
+    return code;
+}
+
+static void describe(trade_work *work) {
+    static const char *const whats[] = {
+        "procedural casters themselves (sphere tracing in double precision)",
+        "triangles (Embree)",
+        "triangles (Embree) and procedural casters (sphere tracing in double precision), hidden by either",
+    };
+    const char *what = whats[work->triangles == NULL ? 0 : work->solids == NULL ? 1 : 2];
+    snprintf(work->truth_text, sizeof work->truth_text, "%d rays a texel, from just above it, against the %s",
+             work->settings->truth_rays, what);
+}
+
+int trade_take_truth(trade_work *work, int32_t finest) {
+    for (size_t s = 0; s < work->subject_count; ++s) {
+        trade_subject *subject = &work->subjects[s];
+        subject->truth = calloc(subject->planes * work->texels, sizeof *subject->truth);
+        if (subject->truth == NULL) {
+            return cli_out_of_memory("truth");
+        }
+    }
+    const double start = trade_now(work);
+    int code = CLI_OK;
+    if (vsh_scene_has_truth(work->scene)) {
+        describe(work);
+        for (size_t s = 0; s < work->subject_count && code == CLI_OK; ++s) {
+            double seconds;
+            code = trace(work, &work->subjects[s], work->settings->truth_rays, work->subjects[s].truth,
+                         &seconds);
+        }
+    } else {
+        code = march(work, finest <= 32768 ? 2 * finest : finest);
+    }
+    work->truth_s = trade_now(work) - start;
+    return code;
+}
+
+static int measure_rays(trade_work *work, trade_subject *subject, int32_t rays) {
+    trade_run run = {.method = "embree",
+                     .embree = true,
+                     .build_s = work->triangles_s,
+                     .bytes = vsh_triangles_bytes(work->triangles),
+                     .certified = NAN,
+                     .valid = work->points,
+                     .values = calloc(subject->planes * work->texels, sizeof *run.values)};
+    if (run.values == NULL) {
+        return cli_out_of_memory("values");
+    }
+    snprintf(run.options, sizeof run.options, "%d ray%s a texel", rays, rays == 1 ? "" : "s");
+    trade_clock clock = {.count = 0};
+    int code = CLI_OK;
+    do {
+        code = trace(work, subject, rays, run.values, &clock.times[clock.count++]);
+    } while (code == CLI_OK && trade_again(&clock));
+    run.bake_s = trade_median(&clock);
+    code = code == CLI_OK ? trade_compare(work, subject, work->any, work->points, &run) : code;
+    if (code == CLI_OK && trade_add(work, subject, &run) != NULL) {
+        return CLI_OK;
+    }
+    free(run.values);
+    return code != CLI_OK ? code : cli_out_of_memory("runs");
+}
+
+int trade_measure_embree(trade_work *work) {
+    int code = CLI_OK;
+    for (size_t s = 0; s < work->subject_count && work->meshes && code == CLI_OK; ++s) {
+        for (int32_t rays = 1; rays <= CURVE_RAYS && 2 * rays <= work->settings->truth_rays; rays *= 2) {
+            code = code == CLI_OK ? measure_rays(work, &work->subjects[s], rays) : code;
+        }
+    }
+    return code;
+}

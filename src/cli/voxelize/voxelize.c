@@ -1,0 +1,174 @@
+/* vdbshade voxelize: casters to a .vdb level set. */
+#include "base/bytes.h"
+#include "base/clock.h"
+#include "cli/commands.h"
+#include "cli/message.h"
+#include "cli/origin.h"
+#include "cli/paths.h"
+#include "cli/progress.h"
+#include "cli/signals.h"
+#include "cli/temporary.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { KEY_NAME = 0x2000 };
+
+typedef struct voxelize_settings {
+    const char *input;
+    const char *output;
+    const char *name;
+    cli_common common;
+    cli_grid_settings grid;
+} voxelize_settings;
+
+static const cli_option options[] = {
+    {0, NULL, NULL, "Output"},
+    {'o', "output", "OUT.vdb", "OpenVDB file to write"},
+    {KEY_NAME, "name", "NAME", "name of the grid in it (surface)"},
+    {0, NULL, NULL, "Voxels"},
+    CLI_GRID_OPTIONS,
+    CLI_COMMON_OPTIONS,
+};
+
+static int voxelize_main(int argc, char **argv);
+
+const cli_command cli_voxelize = {
+    "voxelize",
+    "INPUT -o OUT.vdb [options]",
+    "Turns a mesh file, or all casters of a scene file (.json), into one narrow-band level set.\n"
+    "Numbers in brackets are what holds without the option.",
+    options,
+    sizeof options / sizeof options[0],
+    voxelize_main};
+
+static int take(void *settings, int key, const char *name, const char *value) {
+    voxelize_settings *s = settings;
+    if (key == 'o') {
+        s->output = value;
+        return CLI_OK;
+    }
+    if (key == KEY_NAME) {
+        s->name = value;
+        return value[0] != '\0' ? CLI_OK : cli_usage("%s '': expected a name", name);
+    }
+    bool taken;
+    const int code = cli_grid_take(&s->grid, key, name, value, &taken);
+    return taken ? code : cli_common_take(&s->common, key, name, value, &taken);
+}
+
+/* What can be refused before anything is read. */
+static int check_files(const voxelize_settings *s, const vsh_scene *scene) {
+    if (cli_same_file(s->output, s->input)) {
+        return cli_usage("%s: the output is the input", s->output);
+    }
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const vsh_caster *caster = &scene->casters[i];
+        if (caster->path != NULL && cli_same_file(s->output, caster->path)) {
+            return cli_usage("%s: the output is also a caster's file", s->output);
+        }
+    }
+    return cli_temporary_check(s->output);
+}
+
+static int write_grid(const voxelize_settings *s, const vsh_scene *scene, const vsh_run *run,
+                      const vsh_grid *grid) {
+    const vsh_scene casters = {.casters = scene->casters, .caster_count = scene->caster_count};
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    cli_origin origin;
+    const vsh_occluders_info made = {.voxel_size = info.voxel_size};
+    const int code = cli_origin_make(&casters, &s->input, 1, &made, run, &origin);
+    if (code != CLI_OK) {
+        return code;
+    }
+    if (cli_progress_report(NULL, "write", 0.0) != 0) {
+        const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
+        cli_origin_free(&origin);
+        return cli_fail(&cancelled);
+    }
+    vsh_error error;
+    cli_signals_writing(s->output);
+    const vsh_result result =
+        vsh_grid_write_with(grid, s->output, s->name, origin.attributes, origin.count, &error);
+    cli_signals_writing(NULL);
+    cli_origin_free(&origin);
+    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+}
+
+static void say_summary(const voxelize_settings *s, const vsh_grid *grid, double seconds) {
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    char bytes[32];
+    cli_say("%s: voxel %.4g, %" PRIu64 " active voxels, %s in memory, %.2f s", s->output, info.voxel_size,
+            info.active_voxels, vshi_bytes_text(info.bytes, bytes, sizeof bytes), seconds);
+}
+
+static int voxelize(const voxelize_settings *s, const vsh_scene *scene) {
+    const double start = vshi_seconds();
+    const vsh_run run = cli_common_run(&s->common);
+    vsh_assets *assets = NULL;
+    vsh_grid *grid = NULL;
+    vsh_error error;
+    vsh_result result = vsh_assets_load(scene, &run, &assets, &error);
+    int code = result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+    if (code == CLI_OK) {
+        result = vsh_scene_casters(scene, assets, &run, &grid, &error);
+        code = result == VSH_OK ? write_grid(s, scene, &run, grid) : cli_fail_of(NULL, &error);
+    }
+    if (code == CLI_OK) {
+        cli_signals_end();
+        if (!s->common.quiet) {
+            say_summary(s, grid, vshi_seconds() - start);
+        }
+    }
+    vsh_grid_free(grid);
+    vsh_assets_free(assets);
+    return code;
+}
+
+static int voxelize_main(int argc, char **argv) {
+    voxelize_settings s;
+    memset(&s, 0, sizeof s);
+    s.common = cli_common_default();
+    s.grid.options = vsh_grid_options_default();
+    bool help;
+    int code = cli_parse(&cli_voxelize, argc, argv, take, &s, "INPUT", &s.input, &help);
+    if (code != CLI_OK || help) {
+        return code;
+    }
+    code = cli_grid_check(&s.grid);
+    if (code != CLI_OK) {
+        return code;
+    }
+    if (s.output == NULL || !cli_has_ending(s.output, "vdb")) {
+        return cli_usage("%s: give -o OUT.vdb", s.output != NULL ? s.output : s.input);
+    }
+    cli_progress_begin(s.common.progress, s.common.quiet);
+    const vsh_caster mesh = {
+        .type = VSH_CASTER_MESH, .path = s.input, .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+    vsh_scene scene = {.casters = &mesh, .caster_count = 1, .grid = vsh_grid_options_default()};
+    vsh_scene *read = NULL;
+    if (cli_has_ending(s.input, "json")) {
+        const vsh_run run = cli_common_run(&s.common);
+        vsh_error error;
+        if (vsh_scene_read_run(s.input, &run, &read, &error) != VSH_OK) {
+            return cli_fail(&error);
+        }
+        scene.casters = read->casters;
+        scene.caster_count = read->caster_count;
+        scene.grid = read->grid;
+        scene.unit = read->unit;
+        scene.cast_blended = read->cast_blended;
+    }
+    cli_grid_apply(&s.grid, &scene);
+    code = check_files(&s, &scene);
+    if (code == CLI_OK) {
+        cli_signals_watch();
+        code = voxelize(&s, &scene);
+    }
+    vsh_scene_free(read);
+    cli_progress_end();
+    return code;
+}

@@ -1,0 +1,82 @@
+#define _GNU_SOURCE
+
+#include "extern/module.h"
+
+#include "base/error.h"
+#include "base/threads.h"
+
+#include <dlfcn.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/mman.h>
+
+/* Beside this library, and then as every library is searched for: in a host with a sanitizer, whose dlopen()
+ * is not libc's, the search does not begin at this one. */
+static void *open_module(const char *file) {
+    static const char of_this_library = 0;
+    Dl_info here;
+    char path[4096];
+    const bool known = dladdr(&of_this_library, &here) != 0 && here.dli_fname != NULL;
+    /* a path that is not absolute would be looked for where the host is by now */
+    const char *end = known && here.dli_fname[0] == '/' ? strrchr(here.dli_fname, '/') : NULL;
+    void *module = NULL;
+    if (end != NULL && (size_t)snprintf(path, sizeof path, "%.*s/%s", (int)(end - here.dli_fname),
+                                        here.dli_fname, file) < sizeof path) {
+        module = dlopen(path, RTLD_LAZY | RTLD_LOCAL);
+    }
+    return module != NULL ? module : dlopen(file, RTLD_LAZY | RTLD_LOCAL);
+}
+
+static bool has_room(size_t bytes) {
+    void *room = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (room != MAP_FAILED) {
+        munmap(room, bytes);
+    }
+    return room != MAP_FAILED;
+}
+
+/* What throws while libraries are loaded (their statics, refused memory or a thread) is caught by nobody and
+ * ends the process: what they take is asked for before. */
+static vsh_result check_room(const vshi_module *module, vsh_error *error) {
+    if (!vshi_threads_left(VSHI_OPENVDB_THREADS)) {
+        return vshi_fail(error, VSH_ERROR_MEMORY,
+                         "threads: the system refuses the %d that OpenVDB's libraries begin; %s need it",
+                         VSHI_OPENVDB_THREADS, module->what);
+    }
+    return has_room(module->room)
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused the %zu MB that %s takes",
+                           module->what, module->room / 1000000, module->file);
+}
+
+static vsh_result load(vshi_module *module, vsh_error *error) {
+    const vsh_result result = check_room(module, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    void *opened = open_module(module->file);
+    const void *table = opened != NULL ? dlsym(opened, module->symbol) : NULL;
+    if (table == NULL) {
+        const char *why = dlerror();
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: need a module that cannot be had: %s",
+                         module->what, why != NULL ? why : module->file);
+    }
+    const char *version = *(const char *const *)table;
+    if (strcmp(version, VSHI_VERSION) != 0) {
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: need %s, which is of version %s here",
+                         module->what, module->file, version);
+    }
+    atomic_store_explicit(&module->table, table, memory_order_release);
+    return VSH_OK;
+}
+
+vsh_result vshi_module_load(vshi_module *module, vsh_error *error) {
+    if (vshi_module_table(module) != NULL) {
+        return VSH_OK;
+    }
+    pthread_mutex_lock(&module->lock);
+    const vsh_result result = vshi_module_table(module) == NULL ? load(module, error) : VSH_OK;
+    pthread_mutex_unlock(&module->lock);
+    return result;
+}

@@ -1,0 +1,2 @@
+#define WALK_NAME vshi_walk_avx2
+#include "heightfield/kernel/walk.inc"

@@ -1,0 +1,2 @@
+#define WALK_NAME vshi_walk_avx512
+#include "heightfield/kernel/walk.inc"

@@ -1,0 +1,38 @@
+/* OpenVDB is loaded when the first level set is made or read: loading it takes ten times as long as all other
+ * libraries together (30 ms, 20 MB), and one of its own, liblog4cplus, begins threads in whoever loads it. */
+#include "levelset/calls.h"
+#include "extern/module.h"
+
+static vshi_module module = VSHI_MODULE("level sets", "openvdb", 48 << 20);
+
+static const vshi_openvdb_table *at(void) {
+    return vshi_module_table(&module);
+}
+
+static int *const nothing = NULL;
+
+#define MAKE(name, parameters, arguments, none)                                                              \
+    vsh_result name parameters {                                                                             \
+        const vsh_result result = vshi_module_load(&module, error);                                          \
+        if (result == VSH_OK) {                                                                              \
+            return at()->name arguments;                                                                     \
+        }                                                                                                    \
+        if ((none) != NULL) {                                                                                \
+            *(none) = 0;                                                                                     \
+        }                                                                                                    \
+        return result;                                                                                       \
+    }
+#define GIVE(result, name, parameters, arguments)                                                            \
+    result name parameters {                                                                                 \
+        return at()->name arguments;                                                                         \
+    }
+#define DO(name, parameters, arguments)                                                                      \
+    void name parameters {                                                                                   \
+        if (at() != NULL) {                                                                                  \
+            at()->name arguments;                                                                            \
+        }                                                                                                    \
+    }
+
+VSHI_OPENVDB_MAKES(MAKE)
+VSHI_OPENVDB_GIVES(GIVE)
+VSHI_OPENVDB_DOES(DO)

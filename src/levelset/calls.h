@@ -1,0 +1,172 @@
+/* What the module of level sets gives, and openvdb.c passes on: everything that is compiled against OpenVDB.
+ */
+#ifndef VSHI_OPENVDB_TABLE_H
+#define VSHI_OPENVDB_TABLE_H
+
+#include "levelset/leaves.h"
+#include "levelset/volume.h"
+#include "sandbox/reader.h"
+
+#include <vdbshade/grid.h>
+#include <vdbshade/voxels.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Calls that return a vsh_result, the first of which loads the module: MAKE(name, parameters, arguments, what
+ * is set to none where it cannot be had). The last parameter is `vsh_error *error`. */
+#define VSHI_OPENVDB_MAKES(MAKE)                                                                             \
+    MAKE(vsh_grid_from_meshes,                                                                               \
+         (const vsh_mesh *meshes, size_t count, const vsh_grid_options *options, const vsh_run *run,         \
+          vsh_grid **grid, vsh_error *error),                                                                \
+         (meshes, count, options, run, grid, error), grid)                                                   \
+    MAKE(vsh_grid_from_sdf,                                                                                  \
+         (const vsh_sdf *sdf, const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,          \
+          vsh_error *error),                                                                                 \
+         (sdf, options, run, grid, error), grid)                                                             \
+    MAKE(vsh_grid_from_distance,                                                                             \
+         (const vsh_distance *field, const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,   \
+          vsh_error *error),                                                                                 \
+         (field, options, run, grid, error), grid)                                                           \
+    MAKE(vsh_grid_unite,                                                                                     \
+         (const vsh_grid_instance *instances, size_t count, const vsh_grid_options *options,                 \
+          const vsh_run *run, vsh_grid **grid, vsh_error *error),                                            \
+         (instances, count, options, run, grid, error), grid)                                                \
+    MAKE(vsh_grid_read,                                                                                      \
+         (const char *path, const char *name, const vsh_run *run, vsh_grid **grid, vsh_error *error),        \
+         (path, name, run, grid, error), grid)                                                               \
+    MAKE(vsh_vdb_list_sized,                                                                                 \
+         (const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t size, size_t capacity,        \
+          size_t *count, vsh_error *error),                                                                  \
+         (path, run, entries, size, capacity, count, error), count)                                          \
+    MAKE(vsh_vdb_copy,                                                                                       \
+         (const char *path, const char *name, const int32_t index_min[3], const int32_t size[3],             \
+          const vsh_run *run, float *values, float *active, vsh_error *error),                               \
+         (path, name, index_min, size, run, values, active, error), nothing)                                 \
+    MAKE(vsh_voxels_from_grid,                                                                               \
+         (const vsh_grid *grid, double band, const vsh_run *run, vsh_voxels **voxels, vsh_error *error),     \
+         (grid, band, run, voxels, error), voxels)                                                           \
+    MAKE(vsh_voxels_from_box,                                                                                \
+         (const double box_min[3], const double box_max[3], double voxel_size, const vsh_run *run,           \
+          vsh_voxels **voxels, vsh_error *error),                                                            \
+         (box_min, box_max, voxel_size, run, voxels, error), voxels)                                         \
+    MAKE(vsh_voxels_from_vdb,                                                                                \
+         (const char *path, const char *name, const vsh_run *run, vsh_voxels **voxels, vsh_error *error),    \
+         (path, name, run, voxels, error), voxels)                                                           \
+    MAKE(vshi_serve_grid,                                                                                    \
+         (const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload, vsh_error *error),    \
+         (path, request, run, payload, error), nothing)                                                      \
+    MAKE(vshi_serve_list,                                                                                    \
+         (const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload, vsh_error *error),    \
+         (path, request, run, payload, error), nothing)                                                      \
+    MAKE(vshi_serve_voxels,                                                                                  \
+         (const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload, vsh_error *error),    \
+         (path, request, run, payload, error), nothing)                                                      \
+    MAKE(vshi_serve_copy,                                                                                    \
+         (const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload, vsh_error *error),    \
+         (path, request, run, payload, error), nothing)                                                      \
+    MAKE(vsh_grid_write, (const vsh_grid *grid, const char *path, const char *name, vsh_error *error),       \
+         (grid, path, name, error), nothing)                                                                 \
+    MAKE(vsh_grid_write_with,                                                                                \
+         (const vsh_grid *grid, const char *path, const char *name, const vsh_attribute *attributes,         \
+          size_t count, vsh_error *error),                                                                   \
+         (grid, path, name, attributes, count, error), nothing)                                              \
+    MAKE(vsh_grid_copy,                                                                                      \
+         (const vsh_grid *grid, const int32_t index_min[3], const int32_t size[3], float *values,            \
+          vsh_error *error),                                                                                 \
+         (grid, index_min, size, values, error), nothing)                                                    \
+    MAKE(vsh_grid_from_openvdb,                                                                              \
+         (const void *level_set, uint32_t version, uint32_t abi, const vsh_run *run, vsh_grid **grid,        \
+          vsh_error *error),                                                                                 \
+         (level_set, version, abi, run, grid, error), grid)                                                  \
+    MAKE(vsh_grid_to_openvdb,                                                                                \
+         (const vsh_grid *grid, uint32_t version, uint32_t abi, void *level_set, vsh_error *error),          \
+         (grid, version, abi, level_set, error), nothing)                                                    \
+    MAKE(vsh_volume_to_openvdb,                                                                              \
+         (const vsh_volume *volume, size_t grid, uint32_t version, uint32_t abi, void *values,               \
+          vsh_error *error),                                                                                 \
+         (volume, grid, version, abi, values, error), nothing)                                               \
+    MAKE(vsh_volume_copy,                                                                                    \
+         (const vsh_volume *volume, size_t grid, const int32_t index_min[3], const int32_t size[3],          \
+          float *values, vsh_error *error),                                                                  \
+         (volume, grid, index_min, size, values, error), nothing)                                            \
+    MAKE(vsh_volume_sample,                                                                                  \
+         (const vsh_volume *volume, size_t grid, size_t count, const double *positions, float *values,       \
+          vsh_error *error),                                                                                 \
+         (volume, grid, count, positions, values, error), nothing)                                           \
+    MAKE(vsh_volume_write, (const vsh_volume *volume, const char *path, int32_t half, vsh_error *error),     \
+         (volume, path, half, error), nothing)                                                               \
+    MAKE(vsh_volume_write_with,                                                                              \
+         (const vsh_volume *volume, const char *path, int32_t half, const vsh_attribute *attributes,         \
+          size_t count, vsh_error *error),                                                                   \
+         (volume, path, half, attributes, count, error), nothing)                                            \
+    MAKE(vshi_volume_begin,                                                                                  \
+         (const vsh_voxels *voxels, const vshi_channel *channels, size_t count, const vsh_run *run,          \
+          double held, vsh_volume **volume, vsh_error *error),                                               \
+         (voxels, channels, count, run, held, volume, error), volume)                                        \
+    MAKE(vshi_volume_close, (vsh_volume * volume, const vsh_volume_info *counts, vsh_error *error),          \
+         (volume, counts, error), nothing)
+
+/* Calls with what those have made: GIVE(result, name, parameters, arguments), and DO(name, parameters,
+ * arguments), which does nothing where there is no module yet, and so nothing to free. */
+#define VSHI_OPENVDB_GIVES(GIVE)                                                                             \
+    GIVE(size_t, vshi_grid_leaves, (const vsh_grid *grid, vshi_leaf *leaves, size_t capacity),               \
+         (grid, leaves, capacity))                                                                           \
+    GIVE(const double *, vshi_grid_transform, (const vsh_grid *grid), (grid))                                \
+    GIVE(float, vshi_volume_value, (const vsh_volume *volume, size_t channel, size_t block, int voxel),      \
+         (volume, channel, block, voxel))                                                                    \
+    GIVE(float *, vshi_volume_values, (vsh_volume * volume, size_t channel, size_t block),                   \
+         (volume, channel, block))                                                                           \
+    GIVE(const vshi_block *, vshi_voxels_blocks, (const vsh_voxels *voxels, size_t *count), (voxels, count)) \
+    GIVE(size_t, vshi_voxels_find, (const vsh_voxels *voxels, const int32_t origin[3]), (voxels, origin))    \
+    GIVE(double, vshi_voxels_longest_axis, (const vsh_voxels *voxels), (voxels))
+
+#define VSHI_OPENVDB_DOES(DO)                                                                                \
+    DO(vsh_grid_get_info_sized, (const vsh_grid *grid, vsh_grid_info *info, size_t size),                    \
+       (grid, info, size))                                                                                   \
+    DO(vsh_grid_free, (vsh_grid * grid), (grid))                                                             \
+    DO(vsh_voxels_get_info_sized, (const vsh_voxels *voxels, vsh_voxels_info *info, size_t size),            \
+       (voxels, info, size))                                                                                 \
+    DO(vsh_voxels_centre, (const vsh_voxels *voxels, const int32_t index[3], double centre[3]),              \
+       (voxels, index, centre))                                                                              \
+    DO(vsh_voxels_free, (vsh_voxels * voxels), (voxels))                                                     \
+    DO(vsh_volume_get_info_sized, (const vsh_volume *volume, vsh_volume_info *info, size_t size),            \
+       (volume, info, size))                                                                                 \
+    DO(vsh_volume_get_grid_sized,                                                                            \
+       (const vsh_volume *volume, size_t grid, vsh_volume_grid *info, size_t size),                          \
+       (volume, grid, info, size))                                                                           \
+    DO(vsh_volume_free, (vsh_volume * volume), (volume))                                                     \
+    DO(vshi_grid_block_signs,                                                                                \
+       (const vsh_grid *grid, const int32_t origin[3], const int32_t size[3], int8_t *signs),                \
+       (grid, origin, size, signs))                                                                          \
+    DO(vshi_volume_set_tile, (vsh_volume * volume, size_t channel, size_t block, float value),               \
+       (volume, channel, block, value))                                                                      \
+    DO(vshi_volume_settle, (vsh_volume * volume, size_t block, const uint64_t mask[VSHI_MASK_WORDS]),        \
+       (volume, block, mask))                                                                                \
+    DO(vshi_voxels_ball, (const vsh_voxels *voxels, size_t block, double centre[3], double *radius),         \
+       (voxels, block, centre, radius))                                                                      \
+    DO(vshi_voxels_centres,                                                                                  \
+       (const vsh_voxels *voxels, size_t block, size_t count, const uint16_t *voxel, double(*centres)[3]),   \
+       (voxels, block, count, voxel, centres))
+
+typedef struct vshi_openvdb_table {
+    const char *version; /* of the header that it was built with */
+#define MAKE(name, parameters, arguments, none) vsh_result(*name) parameters;
+#define GIVE(result, name, parameters, arguments) result(*name) parameters;
+#define DO(name, parameters, arguments) void(*name) parameters;
+    VSHI_OPENVDB_MAKES(MAKE)
+    VSHI_OPENVDB_GIVES(GIVE)
+    VSHI_OPENVDB_DOES(DO)
+#undef MAKE
+#undef GIVE
+#undef DO
+} vshi_openvdb_table;
+
+/* The module's one symbol. */
+extern const vshi_openvdb_table vshi_openvdb_module;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,361 @@
+// Sparse voxelising of distance callbacks and procedural trees.
+//
+// A field that changes by at most L per unit and is d at the middle of a box cannot come nearer to 0 than
+// |d| - L · (half the box's diagonal) anywhere in it. So boxes of voxels are halved only where the surface or
+// its band may be, from the whole bounds down to leaves of 8³, and the work follows the surface's area.
+#include "base/floats.h"
+#include "levelset/grid.h"
+#include "levelset/redistance.h"
+#include "sdf/sdf.h"
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+namespace vshi {
+
+namespace {
+
+constexpr double SQRT3 = 1.7320508075688772;
+// From this many boxes on, their number at one level foretells the number of leaves: fewer are so large that
+// edges and corners count for too much.
+constexpr size_t FORETELLING_BOXES = 4096;
+
+// Boxes of one size; `size` voxels an edge, at multiples of it.
+struct Level {
+    int32_t size;
+    std::vector<Coord> origins;
+};
+
+class Voxelizer {
+  public:
+    Voxelizer(const vsh_distance &field_, const Lattice &lattice_, double band_, Stage &stage_,
+              vsh_error *error_)
+        : field(field_), lattice(lattice_), band(band_), stage(stage_), error(error_) {}
+
+    FloatGrid::Ptr run(const Vec3d &low, const Vec3d &high);
+
+  private:
+    double distance(const Vec3d &index) const {
+        const Vec3d position = index * lattice.voxel + lattice.translation;
+        return field.distance(field.user, position.asPointer());
+    }
+    // How far the field may lie from its value at the middle of a box of `size` voxels an edge, at its
+    // voxels.
+    double slack(int32_t size) const { return field.lipschitz * 0.5 * SQRT3 * (size - 1) * lattice.voxel; }
+    void note_bad(size_t index);
+    [[noreturn]] void fail_bad(const Vec3d &index) const;
+
+    Level start(const Vec3d &low, const Vec3d &high);
+    Level split(const Level &level);
+    void fill_inside(const Coord &origin, int32_t size);
+    void foretell(const Level &level) const;
+    void check_tiles(const Level &level, const std::vector<int8_t> &signs) const;
+    Leaf *leaf(const Coord &origin, int8_t &sign, size_t index);
+    bool sample_block(Leaf &leaf, const Coord &corner, float &deepest, size_t index);
+    void leaves(const Level &level);
+
+    const vsh_distance &field;
+    const Lattice &lattice;
+    const double band; // world units of the field's value
+    Stage &stage;
+    vsh_error *error;
+    openvdb::CoordBBox region;
+    Vec3d sides; // of the bounds, voxels
+    FloatGrid::Ptr grid;
+    std::atomic<size_t> bad{SIZE_MAX}; // first box with a value that is not finite
+    static constexpr int32_t BLOCK = 4;
+};
+
+// Boxes are handled by many threads; the lowest number wins, so that the message does not depend on them.
+void Voxelizer::note_bad(size_t index) {
+    size_t first = bad.load();
+    while (index < first && !bad.compare_exchange_weak(first, index)) {
+    }
+}
+
+void Voxelizer::fail_bad(const Vec3d &index) const {
+    const Vec3d p = index * lattice.voxel + lattice.translation;
+    throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
+                            "distance callback: %g at (%.9g, %.9g, %.9g): expected a finite value",
+                            distance(index), p[0], p[1], p[2])};
+}
+
+Level Voxelizer::start(const Vec3d &low, const Vec3d &high) {
+    const double margin = lattice.half_width + 1.0;
+    const Vec3d first = lattice.index(low) - Vec3d(margin);
+    const Vec3d last = lattice.index(high) + Vec3d(margin);
+    region = openvdb::CoordBBox(Coord::floor(first), Coord::ceil(last));
+    sides = (high - low) / lattice.voxel;
+    Level level{8, {}};
+    while (level.size < region.dim()[region.maxExtent()] / 4) {
+        level.size *= 2;
+    }
+    const int32_t mask = ~(level.size - 1);
+    const Coord begin = region.min() & mask;
+    for (int32_t x = begin[0]; x <= region.max()[0]; x += level.size) {
+        for (int32_t y = begin[1]; y <= region.max()[1]; y += level.size) {
+            for (int32_t z = begin[2]; z <= region.max()[2]; z += level.size) {
+                level.origins.emplace_back(x, y, z);
+            }
+        }
+    }
+    return level;
+}
+
+// The coarsest tiles that fit: nodes of the tree span 8, 128 and 4096 voxels.
+void Voxelizer::fill_inside(const Coord &origin, int32_t size) {
+    const int32_t tile = size >= 4096 ? 4096 : size >= 128 ? 128 : 8;
+    const openvdb::Index level = tile == 4096 ? 3 : tile == 128 ? 2 : 1;
+    const float inside = -grid->background();
+    for (int32_t x = 0; x < size; x += tile) {
+        for (int32_t y = 0; y < size; y += tile) {
+            for (int32_t z = 0; z < size; z += tile) {
+                grid->tree().addTile(level, origin.offsetBy(x, y, z), inside, false);
+            }
+        }
+    }
+}
+
+// The boxes are the children of those that slack() and the band leave on either side of the surface. Leaves
+// are kept by their own voxels.
+void Voxelizer::foretell(const Level &level) const {
+    if (level.size > 8 && level.origins.size() < FORETELLING_BOXES) {
+        return;
+    }
+    const double edge = level.size;
+    const double width = 2.0 * band / (field.lipschitz * lattice.voxel);
+    const double reach = SQRT3 * (2.0 * edge - 1.0) + width;
+    const double area = double(level.origins.size()) * edge * edge * edge / reach;
+    const double leaves = area * (SQRT3 * 8.0 + width) / double(Leaf::SIZE);
+    if (field.exact) {
+        check_memory(&stage.options, lattice.voxel, leaves, leaves * BYTES_PER_LEAF, error);
+    } else {
+        check_redistance(stage.options, lattice, area, sides, leaves, 0.0, error);
+    }
+}
+
+// Of what is filled by tiles of the root: it keeps a list of them.
+void Voxelizer::check_tiles(const Level &level, const std::vector<int8_t> &signs) const {
+    constexpr double TILE = 4096.0, BYTES_PER_TILE = 112.0; // voxels along its side; a node of std::map
+    if (level.size < TILE) {
+        return;
+    }
+    const double boxes = double(std::count(signs.begin(), signs.end(), int8_t(-1)));
+    const double tiles = boxes * std::pow(level.size / TILE, 3.0);
+    check_memory(&stage.options, lattice.voxel, tiles * std::pow(TILE / 8.0, 3.0), tiles * BYTES_PER_TILE,
+                 error);
+}
+
+Level Voxelizer::split(const Level &level) {
+    const size_t count = level.origins.size();
+    std::vector<int8_t> signs(count); // 0: to be halved
+    const Vec3d middle(0.5 * (level.size - 1));
+    stage.loop(count, 256, 0.0, 0.0, [&](size_t i) {
+        const double d = distance(level.origins[i].asVec3d() + middle);
+        if (!std::isfinite(d)) {
+            note_bad(i);
+        } else if (std::fabs(d) > slack(level.size) + band) {
+            signs[i] = d < 0.0 ? -1 : 1;
+        }
+    });
+    if (bad != SIZE_MAX) {
+        fail_bad(level.origins[bad].asVec3d() + middle);
+    }
+    check_tiles(level, signs);
+    Level next{level.size / 2, {}};
+    for (size_t i = 0; i < count; ++i) {
+        if (signs[i] < 0) {
+            fill_inside(level.origins[i], level.size);
+        }
+        for (int32_t child = 0; signs[i] == 0 && child < 8; ++child) {
+            const Coord origin = level.origins[i].offsetBy(
+                (child & 4) ? next.size : 0, (child & 2) ? next.size : 0, (child & 1) ? next.size : 0);
+            if (region.hasOverlap(openvdb::CoordBBox::createCube(origin, next.size))) {
+                next.origins.push_back(origin);
+            }
+        }
+    }
+    return next;
+}
+
+// Samples 4³ voxels of a leaf, or none but the middle where the band cannot reach them. Returns whether one
+// of them is in the band; `deepest` becomes the sign's witness where none is.
+bool Voxelizer::sample_block(Leaf &leaf, const Coord &corner, float &witness, size_t index) {
+    const double middle = distance(corner.asVec3d() + Vec3d(0.5 * (BLOCK - 1)));
+    if (!std::isfinite(middle)) {
+        note_bad(index);
+        return false;
+    }
+    const float background = grid->background();
+    const bool far = std::fabs(middle) > slack(BLOCK) + band;
+    bool in_band = false;
+    for (int32_t x = 0; x < BLOCK; ++x) {
+        for (int32_t y = 0; y < BLOCK; ++y) {
+            for (int32_t z = 0; z < BLOCK; ++z) {
+                const Coord voxel = corner.offsetBy(x, y, z);
+                const double d = far ? middle : distance(voxel.asVec3d());
+                if (!std::isfinite(d)) {
+                    note_bad(index);
+                    return false;
+                }
+                const float value = float(d);
+                const bool near = !far && std::fabs(value) < background;
+                witness = near ? value : std::copysign(background, value);
+                if (near) {
+                    leaf.setValueOn(voxel, witness); // meshing looks at active voxels only
+                } else {
+                    leaf.setValueOff(voxel, witness);
+                }
+                in_band |= near;
+            }
+        }
+    }
+    return in_band;
+}
+
+Leaf *Voxelizer::leaf(const Coord &origin, int8_t &sign, size_t index) {
+    auto leaf = std::make_unique<Leaf>(origin, grid->background(), false);
+    bool in_band = false;
+    bool inside = false;
+    bool outside = false;
+    for (int32_t block = 0; block < 8; ++block) {
+        float witness = 0.0f;
+        in_band |= sample_block(
+            *leaf, origin.offsetBy((block & 4) ? BLOCK : 0, (block & 2) ? BLOCK : 0, (block & 1) ? BLOCK : 0),
+            witness, index);
+        inside |= witness < 0.0f;
+        outside |= witness >= 0.0f;
+    }
+    // Both signs without a voxel in the band: a field that keeps no distance near its surface. Kept: the
+    // re-distancing, or the field's reader, must see where it changes sign.
+    if (in_band || (inside && outside)) {
+        return leaf.release();
+    }
+    sign = inside ? -1 : 1;
+    return nullptr;
+}
+
+void Voxelizer::leaves(const Level &level) {
+    const size_t count = level.origins.size();
+    std::vector<std::unique_ptr<Leaf>> made(count);
+    std::vector<int8_t> signs(count);
+    stage.loop(count, 16, 0.0, field.exact ? 1.0 : 0.5, [&](size_t i) {
+        if (i < bad.load()) {
+            made[i].reset(leaf(level.origins[i], signs[i], i));
+        }
+    });
+    if (bad != SIZE_MAX) {
+        for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
+            const Vec3d index = (Leaf::offsetToLocalCoord(i) + level.origins[bad]).asVec3d();
+            if (!std::isfinite(distance(index))) {
+                fail_bad(index);
+            }
+        }
+        throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
+                                "distance callback: a value that is not finite between voxels")};
+    }
+    for (size_t i = 0; i < count; ++i) {
+        if (made[i] != nullptr) {
+            grid->tree().addLeaf(made[i].release());
+        } else if (signs[i] < 0) {
+            fill_inside(level.origins[i], 8);
+        }
+    }
+}
+
+FloatGrid::Ptr Voxelizer::run(const Vec3d &low, const Vec3d &high) {
+    grid = FloatGrid::create(float(band));
+    grid->setTransform(lattice.transform());
+    Level level = start(low, high);
+    while (level.size > 8) {
+        level = split(level);
+        foretell(level);
+    }
+    leaves(level);
+    if (grid->tree().leafCount() == 0) {
+        throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
+                                "no surface in the box (%.9g, %.9g, %.9g) … (%.9g, %.9g, %.9g): the distance "
+                                "does not change sign at voxel size %g",
+                                low[0], low[1], low[2], high[0], high[1], high[2], lattice.voxel)};
+    }
+    return grid;
+}
+
+void check_field(const vsh_distance *field, vsh_error *error) {
+    if (field == nullptr || field->distance == nullptr) {
+        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT, "distance field: no callback")};
+    }
+    if (!(field->lipschitz > 0.0 && std::isfinite(field->lipschitz))) {
+        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT,
+                                "distance field: lipschitz %g: expected more than 0", field->lipschitz)};
+    }
+    for (int i = 0; i < 3; ++i) {
+        const double low = field->bounds_min[i];
+        const double high = field->bounds_max[i];
+        if (!(std::isfinite(low) && std::isfinite(high) && low <= high && std::isfinite(high - low))) {
+            throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT,
+                                    "distance field: bounds[%d] %g … %g: expected finite, the lower first", i,
+                                    low, high)};
+        }
+    }
+}
+
+vsh_result from_distance(const vsh_distance *field, const vsh_grid_options *options, const vsh_run *given,
+                         vsh_grid **grid, vsh_error *error) {
+    vsh_run run;
+    const vsh_result result = vshi_run_resolve(given, &run, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    check_field(field, error);
+    const Vec3d low(field->bounds_min);
+    const Vec3d high(field->bounds_max);
+    const Lattice lattice = make_lattice(options, low, high, error);
+    Stage stage(run, "voxelize", error);
+    // A field to be re-distanced is needed only where cells of 2³ voxels may hold its zero.
+    const double band =
+        field->exact ? lattice.half_width * lattice.voxel : 1.01 * SQRT3 * field->lipschitz * lattice.voxel;
+    FloatGrid::Ptr level_set = Voxelizer(*field, lattice, band, stage, error).run(low, high);
+    if (!field->exact) {
+        const double unit = 1.0 / (field->lipschitz * lattice.voxel);
+        const IndexDistance exact = [&](const Vec3d &index) {
+            const Vec3d position = index * lattice.voxel + lattice.translation;
+            return unit * field->distance(field->user, position.asPointer());
+        };
+        level_set = redistance(*level_set, exact, lattice, 0.5, 1.0, stage, error);
+    }
+    *grid = close_grid(level_set, 0.0, stage);
+    return VSH_OK;
+}
+
+double tree_distance(void *user, const double position[3]) {
+    return vsh_sdf_distance(static_cast<const vsh_sdf *>(user), position);
+}
+
+} // namespace
+
+} // namespace vshi
+
+vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_grid_options *options,
+                                  const vsh_run *run, vsh_grid **grid, vsh_error *error) {
+    VSHI_NEEDS(grid);
+    *grid = nullptr;
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize",
+                       [&] { return vshi::from_distance(field, options, run, grid, error); });
+}
+
+vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options *options, const vsh_run *run,
+                             vsh_grid **grid, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(grid);
+    *grid = nullptr;
+    const vsh_result result = vsh_sdf_check(sdf, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_sdf tree = *sdf;
+    vsh_distance field = {vshi::tree_distance, &tree, 1.0, vshi_sdf_exact(sdf), {0, 0, 0}, {0, 0, 0}};
+    vsh_sdf_bounds(sdf, field.bounds_min, field.bounds_max);
+    return vsh_grid_from_distance(&field, options, run, grid, error);
+}

@@ -1,0 +1,423 @@
+// Reading .vdb files. The reader of OpenVDB 10.0.1 crashes on some damaged files (it writes past its buffers
+// where Blosc data lie about their size): positions and sizes are checked here and a short file shows as an
+// error, but damage inside the packed data cannot be seen beforehand. Untrusted files are for a reader
+// (vsh_run.reader), which runs what stands here in a process of its own.
+#include "levelset/file.h"
+
+#include "levelset/stream.h"
+
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/GridDescriptor.h>
+#include <openvdb/io/Stream.h>
+#include <sys/stat.h>
+#include <vector>
+
+namespace vshi {
+
+void initialize() {
+    static const bool once = (openvdb::initialize(), true);
+    static_cast<void>(once);
+}
+
+namespace {
+
+using openvdb::GridBase;
+using openvdb::MetaMap;
+using openvdb::io::GridDescriptor;
+
+constexpr size_t HEADER = UUID_AT + UUID_LENGTH;
+constexpr unsigned char MAGIC[8] = {0x20, 0x42, 0x44, 0x56, 0, 0, 0, 0};
+
+// The file's size, once it is known to be a .vdb file that OpenVDB has a chance to read.
+uint64_t check_file(const char *path, vsh_error *error) {
+    const auto fail = [&](const char *reason) {
+        return Failure{vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, reason)};
+    };
+    struct stat status;
+    if (::stat(path, &status) != 0) {
+        throw fail(std::strerror(errno));
+    }
+    if (!S_ISREG(status.st_mode)) {
+        throw fail(S_ISDIR(status.st_mode) ? "it is a folder" : "it is no regular file");
+    }
+    const std::unique_ptr<FILE, int (*)(FILE *)> file(std::fopen(path, "rbe"), std::fclose);
+    if (file == nullptr) {
+        throw fail(std::strerror(errno));
+    }
+    unsigned char header[HEADER];
+    const size_t size = std::fread(header, 1, sizeof header, file.get());
+    if (size == 0 && std::ferror(file.get())) {
+        throw fail(std::strerror(errno));
+    }
+    if (std::memcmp(header, MAGIC, std::min(size, sizeof MAGIC)) != 0 || size == 0) {
+        throw fail("it is no OpenVDB file");
+    }
+    if (size < sizeof header) {
+        throw fail("it is cut short within its header");
+    }
+    const uint32_t version =
+        header[8] | uint32_t(header[9]) << 8 | uint32_t(header[10]) << 16 | uint32_t(header[11]) << 24;
+    if (version > openvdb::OPENVDB_FILE_VERSION) {
+        throw Failure{vshi_fail(error, VSH_ERROR_READ,
+                                "%s: cannot be read: format version %u, this OpenVDB reads up to %u", path,
+                                version, uint32_t(openvdb::OPENVDB_FILE_VERSION))};
+    }
+    return uint64_t(status.st_size);
+}
+
+std::string shown_name(const GridDescriptor &entry) {
+    return GridDescriptor::nameAsString(entry.uniqueName());
+}
+
+// A file's grids in the order in which it holds them. OpenVDB's own class for this loads late (a handle to
+// the file would linger) and goes on past the end of a file that is cut short.
+class Reader final : public openvdb::io::Archive {
+  public:
+    Reader(const char *path, const vsh_run &run, vsh_error *error);
+
+    size_t count() const { return entries.size(); }
+    std::string name(size_t i) const { return shown_name(entries[i]); }
+    bool is_named(size_t i, const char *wanted) const {
+        return name(i) == wanted || entries[i].gridName() == wanted;
+    }
+    MetaMap metadata(size_t i);
+    double bytes(size_t i);               // in memory, by what the file says of it
+    GridBase::Ptr without_tree(size_t i); // metadata and transform
+    GridBase::Ptr grid(size_t i, const char *path, vsh_error *error);
+
+    const uint64_t size;
+
+  private:
+    void list(std::istream &in, const char *path, vsh_error *error);
+    GridBase::Ptr read_tree(size_t i);
+
+    // The stream keeps this pointer's address.
+    openvdb::io::StreamMetadata::Ptr state = std::make_shared<openvdb::io::StreamMetadata>();
+    CheckedFile file;
+    std::istream stream{&file};
+    std::vector<GridDescriptor> entries;
+    std::vector<GridBase::Ptr> grids; // without a tree yet, but for streamed files
+    bool streamed = false;
+};
+
+Reader::Reader(const char *path, const vsh_run &run, vsh_error *error) : size(check_file(path, error)) {
+    if (file.open(path, std::ios::in | std::ios::binary) == nullptr) {
+        throw Failure{vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, std::strerror(errno))};
+    }
+    stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
+    openvdb::io::setStreamMetadataPtr(stream, state, false);
+    readHeader(stream);
+    setFormatVersion(stream); // what is read from it from here on depends on these
+    setLibraryVersion(stream);
+    setDataCompression(stream);
+    streamed = !inputHasGridOffsets();
+    if (streamed) { // all of it has to be read: at least as much as the file is long
+        const vsh_result result = check_bytes(&run, double(size), path, error);
+        if (result != VSH_OK) {
+            throw Failure{result};
+        }
+        stream.seekg(0);
+        openvdb::io::Stream all(stream, false);
+        for (const GridBase::Ptr &one : *all.getGrids()) {
+            entries.emplace_back(one->getName(), one->type());
+            grids.push_back(one);
+        }
+    } else {
+        MetaMap().readMeta(stream);
+        list(stream, path, error);
+    }
+}
+
+void Reader::list(std::istream &in, const char *path, vsh_error *error) {
+    const int32_t number = readGridCount(in);
+    for (int32_t i = 0; i < number; ++i) {
+        GridDescriptor entry;
+        grids.push_back(entry.read(in));
+        const int64_t begin = entry.getGridPos(), blocks = entry.getBlockPos(), end = entry.getEndPos();
+        if (begin < int64_t(HEADER) || end <= in.tellg() ||
+            (!entry.isInstance() && (blocks < begin || end < blocks))) {
+            throw Failure{vshi_fail(error, VSH_ERROR_READ, "%s: damaged: grid '%s' at bytes %lld … %lld",
+                                    path, shown_name(entry).c_str(), static_cast<long long>(begin),
+                                    static_cast<long long>(end))};
+        }
+        if (uint64_t(end) > size) {
+            throw Failure{vshi_fail(error, VSH_ERROR_READ,
+                                    "%s: cut short: grid '%s' ends at byte %lld, the file at %llu", path,
+                                    shown_name(entry).c_str(), static_cast<long long>(end),
+                                    static_cast<unsigned long long>(size))};
+        }
+        entries.push_back(entry);
+        entry.seekToEnd(in);
+    }
+}
+
+MetaMap Reader::metadata(size_t i) {
+    if (streamed) {
+        return *grids[i];
+    }
+    entries[i].seekToGrid(stream);
+    readGridCompression(stream);
+    MetaMap metadata;
+    metadata.readMeta(stream);
+    return metadata;
+}
+
+double Reader::bytes(size_t i) {
+    const MetaMap known = metadata(i);
+    const auto bytes = known.getMetadata<openvdb::Int64Metadata>(GridBase::META_FILE_MEM_BYTES);
+    return bytes ? double(bytes->value()) : double(size);
+}
+
+GridBase::Ptr Reader::without_tree(size_t i) {
+    const GridBase::Ptr result = grids[i]->copyGrid();
+    if (!streamed) {
+        entries[i].seekToGrid(stream);
+        readGridCompression(stream);
+        result->readMeta(stream);
+        if (openvdb::io::getFormatVersion(stream) >= openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) {
+            result->readTransform(stream); // behind the tree in older files
+        }
+    }
+    return result;
+}
+
+GridBase::Ptr Reader::grid(size_t i, const char *path, vsh_error *error) {
+    const GridBase::Ptr result = streamed ? grids[i] : read_tree(i);
+    if (!file.sound()) {
+        throw Failure{vshi_fail(error, VSH_ERROR_READ,
+                                "%s: damaged: grid '%s': Zip data that do not fit their check sum", path,
+                                name(i).c_str())};
+    }
+    return result;
+}
+
+GridBase::Ptr Reader::read_tree(size_t i) {
+    const GridDescriptor &entry = entries[i];
+    const GridBase::Ptr result = grids[i]->copyGrid();
+    entry.seekToGrid(stream);
+    readGrid(result, entry, stream);
+    if (entry.isInstance()) { // of another grid's tree
+        NamedGridMap named{{entry.uniqueName(), result}};
+        for (size_t j = 0; j < entries.size(); ++j) {
+            if (j != i && !entries[j].isInstance() && entries[j].uniqueName() == entry.instanceParentName()) {
+                const GridBase::Ptr parent = grids[j]->copyGrid();
+                entries[j].seekToGrid(stream);
+                readGrid(parent, entries[j], stream);
+                named[entries[j].uniqueName()] = parent;
+            }
+        }
+        connectInstance(entry, named);
+    }
+    return result;
+}
+
+vsh_result fail_cut_short(const char *path, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_READ, "%s: cut short or damaged", path);
+}
+
+// Reading past the end of the file shows as this exception, whose own words are of no use.
+std::string class_of(const MetaMap &metadata) {
+    const auto text = metadata.getMetadata<openvdb::StringMetadata>(GridBase::META_GRID_CLASS);
+    return text ? text->value() : "";
+}
+
+// The first grid of that name, or (nullptr) that `wanted(i)` holds for; else the first one, to be refused
+// with its reason.
+template <typename Wanted>
+size_t choose(Reader &reader, const char *path, const char *name, vsh_error *error, Wanted &&wanted) {
+    if (reader.count() == 0) {
+        throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no grids", path)};
+    }
+    std::string names;
+    for (size_t i = 0; i < reader.count(); ++i) {
+        if (name != nullptr ? reader.is_named(i, name) : wanted(i)) {
+            return i;
+        }
+        names += (i > 0 ? ", '" : "'") + reader.name(i) + "'";
+    }
+    if (name == nullptr) {
+        return 0;
+    }
+    throw Failure{
+        vshi_fail(error, VSH_ERROR_INPUT, "%s: no grid '%s'; it holds %.700s", path, name, names.c_str())};
+}
+
+// As floats, without what else the file said about it.
+FloatGrid::Ptr to_floats(const GridBase::Ptr &grid) {
+    FloatTree::Ptr tree;
+    if (grid->isType<openvdb::DoubleGrid>()) {
+        tree = std::make_shared<FloatTree>(openvdb::gridPtrCast<openvdb::DoubleGrid>(grid)->tree());
+    } else {
+        tree = openvdb::gridPtrCast<FloatGrid>(grid)->treePtr();
+    }
+    const FloatGrid::Ptr floats = FloatGrid::create(tree);
+    floats->setTransform(restore_transform(describe_transform(grid->transform())));
+    return floats;
+}
+
+bool has_numbers(const GridBase &grid) {
+    return grid.apply<NumberGrids>([](const auto &) {});
+}
+
+template <size_t Capacity> void copy_text(char (&to)[Capacity], const std::string &from) {
+    std::snprintf(to, Capacity, "%s", from.c_str());
+    vshi_one_line(to);
+}
+
+// What begins with our name, one line each.
+std::string attributes_of(const MetaMap &metadata) {
+    std::string lines;
+    for (auto item = metadata.beginMeta(); item != metadata.endMeta(); ++item) {
+        if (item->second != nullptr && item->first.compare(0, 9, "vdbshade_") == 0) {
+            std::string line = item->first + ": " + item->second->str();
+            std::replace_if(
+                line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+            lines += line + '\n';
+        }
+    }
+    return lines;
+}
+
+void describe_kind(const GridBase &grid, vsh_vdb_entry &entry) {
+    std::snprintf(entry.attributes, sizeof entry.attributes, "%s", attributes_of(grid).c_str());
+    copy_text(entry.type, grid.type());
+    copy_text(entry.grid_class, GridBase::gridClassToString(grid.getGridClass()));
+    for (int axis = 0; axis < 3; ++axis) {
+        entry.voxel_size[axis] = grid.voxelSize()[axis];
+    }
+    copy_text(entry.problem, examine_kind(grid).text);
+}
+
+void describe_box(const openvdb::CoordBBox &box, vsh_vdb_entry &entry) {
+    for (int axis = 0; axis < 3; ++axis) {
+        entry.index_min[axis] = box.empty() ? 0 : box.min()[axis];
+        entry.index_max[axis] = box.empty() ? 0 : box.max()[axis];
+    }
+}
+
+// What the file says of a grid that is too large to be read.
+void describe_unread(Reader &reader, size_t i, const char *why, vsh_vdb_entry &entry) {
+    const GridBase::Ptr grid = reader.without_tree(i);
+    describe_kind(*grid, entry);
+    const auto low = grid->getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MIN);
+    const auto high = grid->getMetadata<openvdb::Vec3IMetadata>(GridBase::META_FILE_BBOX_MAX);
+    const auto voxels = grid->getMetadata<openvdb::Int64Metadata>(GridBase::META_FILE_VOXEL_COUNT);
+    if (low && high) {
+        describe_box(openvdb::CoordBBox(Coord(low->value()), Coord(high->value())), entry);
+    }
+    entry.active_voxels = voxels ? uint64_t(std::max<int64_t>(voxels->value(), 0)) : 0;
+    entry.bytes = uint64_t(std::max(reader.bytes(i), 0.0));
+    if (entry.problem[0] == '\0') {
+        copy_text(entry.problem, why);
+    }
+}
+
+void describe(Reader &reader, size_t i, const char *path, const vsh_run &run, Stage &stage,
+              vsh_vdb_entry &entry, vsh_error *error) {
+    copy_text(entry.name, reader.name(i));
+    vsh_error over;
+    if (check_bytes(&run, reader.bytes(i), "its values were not read", &over) != VSH_OK) {
+        describe_unread(reader, i, over.message, entry);
+        return;
+    }
+    const GridBase::Ptr grid = reader.grid(i, path, error);
+    describe_kind(*grid, entry);
+    describe_box(grid->evalActiveVoxelBoundingBox(), entry);
+    entry.active_voxels = grid->activeVoxelCount();
+    entry.bytes = grid->memUsage();
+    if (grid->isType<FloatGrid>()) {
+        entry.background = double(openvdb::gridPtrCast<FloatGrid>(grid)->background());
+    } else if (grid->isType<openvdb::DoubleGrid>()) {
+        entry.background = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid)->background();
+    }
+    if (entry.problem[0] == '\0') {
+        copy_text(entry.problem, examine_values(*to_floats(grid), stage).text);
+    }
+}
+
+} // namespace
+
+void refuse_bad(const Named &named, const Finding &finding, vsh_error *error) {
+    if (finding.kind == Finding::BAD) {
+        throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s cannot cast shadows: %s", named.text().c_str(),
+                                finding.text.c_str())};
+    }
+}
+
+void refuse_large(const Named &named, const vsh_run &run, double bytes, vsh_error *error) {
+    const vsh_result result = check_bytes(&run, bytes, named.text().c_str(), error);
+    if (result != VSH_OK) {
+        throw Failure{result};
+    }
+}
+
+double shell_of(const GridBase &grid) {
+    const auto shell = grid.getMetadata<openvdb::DoubleMetadata>(SHELL_THICKNESS);
+    return shell && std::isfinite(shell->value()) && shell->value() > 0.0 ? shell->value() : 0.0;
+}
+
+LevelSet load_level_set(const char *path, const char *name, Stage &stage, vsh_error *error) {
+    initialize();
+    try {
+        Reader reader(path, stage.options, error);
+        const size_t chosen = choose(reader, path, name, error, [&](size_t i) {
+            return class_of(reader.metadata(i)) == GridBase::gridClassToString(openvdb::GRID_LEVEL_SET);
+        });
+        LevelSet loaded{{path, reader.name(chosen)}, nullptr, 0.0};
+        refuse_large(loaded.named, stage.options, reader.bytes(chosen), error);
+        const GridBase::Ptr found = reader.grid(chosen, path, error);
+        refuse_bad(loaded.named, examine_kind(*found), error);
+        loaded.grid = to_floats(found);
+        loaded.shell = shell_of(*found);
+        return loaded;
+    } catch (const std::ios_base::failure &) {
+        throw Failure{fail_cut_short(path, error)};
+    }
+}
+
+void list_grids(const char *path, const vsh_run &run, std::vector<vsh_vdb_entry> &entries, size_t capacity,
+                size_t &count, vsh_error *error) {
+    initialize();
+    try {
+        Reader reader(path, run, error);
+        for (size_t i = 0; i < std::min(capacity, reader.count()); ++i) {
+            Stage stage(run, "load", error);
+            stage.check();
+            entries.push_back({});
+            describe(reader, i, path, run, stage, entries.back(), error);
+        }
+        count = reader.count();
+    } catch (const std::ios_base::failure &) {
+        throw Failure{fail_cut_short(path, error)};
+    }
+}
+
+GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &run, vsh_error *error) {
+    initialize();
+    try {
+        Reader reader(path, run, error);
+        const size_t chosen =
+            choose(reader, path, name, error, [&](size_t i) { return has_numbers(*reader.without_tree(i)); });
+        const Named named{path, reader.name(chosen)};
+        const GridBase::Ptr bare = reader.without_tree(chosen);
+        if (!has_numbers(*bare)) {
+            throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s is a %s, expected a grid of numbers",
+                                    named.text().c_str(), bare->type().c_str())};
+        }
+        refuse_large(named, run, reader.bytes(chosen), error);
+        const GridBase::Ptr grid = reader.grid(chosen, path, error);
+        refuse_large(named, run, double(grid->memUsage()), error);
+        grid->setTransform(restore_transform(describe_transform(grid->transform())));
+        return grid;
+    } catch (const std::ios_base::failure &) {
+        throw Failure{fail_cut_short(path, error)};
+    }
+}
+
+} // namespace vshi

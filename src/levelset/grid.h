@@ -1,0 +1,128 @@
+// What the OpenVDB shims share: the handle, the lattice of a new grid, and a stage of work under way.
+#pragma once
+
+#include "base/job.h"
+#include "base/memory.h"
+#include "extern/guard.h"
+#include "extern/handover.h"
+#include "levelset/leaves.h"
+
+#include <algorithm>
+#include <atomic>
+#include <openvdb/Grid.h>
+#include <openvdb/openvdb.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+struct vsh_grid {
+    openvdb::FloatGrid::Ptr level_set; // never changed once the handle exists
+    double transform[12];
+    vsh_grid_info info;
+};
+
+namespace vshi {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using openvdb::Vec3d;
+using Leaf = FloatTree::LeafNodeType;
+
+// Bytes of a grid per leaf: 512 values, two masks, origin, and its share of the nodes above.
+constexpr double BYTES_PER_LEAF = 2400.0;
+
+// Voxel sizes, world units: distances are 32-bit floats, and their squares and volumes must be such too.
+constexpr double SMALLEST_VOXEL = 1e-12;
+constexpr double LARGEST_VOXEL = 1e12;
+
+// About how many leaves the band takes that reaches `half_width` voxels to either side of a surface of `area`
+// voxel² in a box of `sides` voxels.
+double band_leaves(double area, const Vec3d &sides, double half_width);
+
+// Where the voxels of a new grid lie: world = voxel · index + translation, the translation being a whole
+// number of voxels near the middle of the bounds, so that indices stay small far from the origin.
+struct Lattice {
+    double voxel;      // world units
+    double half_width; // voxels
+    double shell;      // thickness of an open mesh, voxels
+    Vec3d translation;
+
+    Vec3d world(const Coord &index) const { return index.asVec3d() * voxel + translation; }
+    Vec3d index(const Vec3d &world) const { return (world - translation) / voxel; }
+    float background() const { return float(half_width * voxel); }
+    openvdb::math::Transform::Ptr transform() const;
+};
+
+// Checks the options and lays the lattice over the bounds; throws Failure. Indices beyond ±2^28 are refused.
+Lattice make_lattice(const vsh_grid_options *options, const Vec3d &low, const Vec3d &high, vsh_error *error);
+
+// VSH_ERROR_LIMIT, naming `what`, where `bytes` pass the run's memory limit or the machine's memory: OpenVDB
+// ends the process when its thread pool runs out.
+vsh_result check_bytes(const vsh_run *run, double bytes, const char *what, vsh_error *error);
+
+// The same for a grid that is to be made, as Failure; `leaves` are named in the message as voxels of the
+// band.
+void check_memory(const vsh_run *run, double voxel, double leaves, double bytes, vsh_error *error);
+
+// A stage of work with progress given as a fraction, on as many threads as the run says.
+class Stage {
+  public:
+    Stage(const vsh_run &run, const char *name, vsh_error *error);
+    ~Stage() { vshi_job_end(job); }
+    Stage(const Stage &) = delete;
+    Stage &operator=(const Stage &) = delete;
+
+    void reach(double fraction); // any thread; a smaller fraction than before does nothing
+    bool cancelled() { return vshi_job_advance(job, 0); } // polls the callback
+    void check();                                         // throws Failure when cancelled
+
+    // body(i) for 0 … count - 1, the fraction going from `begin` to `end` meanwhile; throws when cancelled.
+    template <typename Body> void loop(size_t count, size_t grain, double begin, double end, Body &&body) {
+        std::atomic<size_t> done{0};
+        give(&done);
+        arena.execute([&] {
+            tbb::parallel_for(
+                tbb::blocked_range<size_t>(0, count, grain),
+                [&](const tbb::blocked_range<size_t> &range) {
+                    take(&done); // before anything of this loop is read
+                    if (!vshi_job_cancelled(job)) {
+                        for (size_t i = range.begin(); i != range.end(); ++i) {
+                            body(i);
+                        }
+                        const size_t so_far = done.fetch_add(range.size()) + range.size();
+                        reach(begin + (end - begin) * double(so_far) / double(count));
+                    }
+                    give(&done);
+                },
+                tbb::simple_partitioner());
+        });
+        take(&done);
+        check();
+    }
+
+    template <typename Body> void run(Body &&body) { arena.execute(body); }
+
+    const vsh_run &options;
+
+  private:
+    static constexpr size_t UNITS = 1000000;
+    vshi_job *job;
+    vsh_error *error;
+    tbb::task_arena arena;
+    std::atomic<size_t> reached{0};
+};
+
+// Closes a level set into a handle: values at or beyond the background become ± background and inactive, all
+// others active; `shell` is the thickness of open meshes in it, world units.
+vsh_grid *close_grid(const FloatGrid::Ptr &level_set, double shell, Stage &stage);
+
+// A dense copy of a tree's values, z fastest.
+vsh_result copy_dense(const FloatTree &tree, const int32_t index_min[3], const int32_t size[3], float *values,
+                      vsh_error *error);
+
+// Throws Failure for a caller that was compiled against another OpenVDB: its grids are other classes, though
+// their names are alike.
+void check_openvdb(uint32_t version, uint32_t abi, vsh_error *error);
+
+} // namespace vshi

@@ -1,0 +1,341 @@
+// The union of grids: those on the new lattice are shifted by whole voxels, others are meshed, moved and
+// measured again; then each voxel takes the least value of all.
+#include "levelset/redistance.h"
+#include "levelset/tiles.h"
+
+#include <cmath>
+#include <limits>
+#include <openvdb/tools/Interpolation.h>
+#include <set>
+
+namespace vshi {
+
+namespace {
+
+constexpr double LARGEST_INDEX = 268435456.0;
+constexpr double SAME_SIZE =
+    1e-9; // relative difference of voxel sizes that stays below the next, at any index
+constexpr double SAME_PLACE = 1e-3; // voxels by which a lattice may be off
+constexpr double UNEVEN = 1e-6;     // of an instance's axes, relative
+
+// An instance, and where its index space lies in the world: rows of four.
+struct Placed {
+    const vsh_grid *grid;
+    double transform[12];
+    double scale; // of the instance
+    double voxel; // world units
+};
+
+// A level set whose voxel `index - shift` is the union's voxel `index`.
+struct Part {
+    FloatGrid::ConstPtr grid;
+    Coord shift;
+};
+
+Placed place(const vsh_grid_instance &instance, size_t number, vsh_error *error) {
+    static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    if (instance.grid == nullptr) {
+        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT, "unite: instance %zu has no grid", number)};
+    }
+    const double *m = instance.transform != nullptr ? instance.transform : identity;
+    const Vec3d axis[3] = {{m[0], m[4], m[8]}, {m[1], m[5], m[9]}, {m[2], m[6], m[10]}};
+    const double scale = axis[0].length();
+    bool even = scale > 0.0 && std::isfinite(scale) && Vec3d(m[3], m[7], m[11]).isFinite();
+    for (int i = 0; i < 3; ++i) {
+        even = even && std::fabs(axis[i].length() - scale) <= UNEVEN * scale &&
+               std::fabs(axis[i].dot(axis[(i + 1) % 3])) <= UNEVEN * scale * scale;
+    }
+    if (!even) {
+        throw Failure{
+            vshi_fail(error, VSH_ERROR_ARGUMENT,
+                      "unite: instance %zu: axes of length %g, %g, %g: expected a rotation, mirroring "
+                      "and one scale",
+                      number, axis[0].length(), axis[1].length(), axis[2].length())};
+    }
+    Placed placed{instance.grid, {}, scale, scale * instance.grid->info.voxel_size};
+    const double *g = instance.grid->transform;
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 4; ++column) {
+            placed.transform[4 * row + column] = m[4 * row] * g[column] + m[4 * row + 1] * g[4 + column] +
+                                                 m[4 * row + 2] * g[8 + column] +
+                                                 (column == 3 ? m[4 * row + 3] : 0.0);
+        }
+    }
+    return placed;
+}
+
+Vec3d apply(const double *m, const Vec3d &p) {
+    return Vec3d(m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3],
+                 m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
+                 m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]);
+}
+
+// Back through a rotation times the voxel size: its inverse is its transpose over the square.
+Vec3d apply_back(const Placed &placed, const Vec3d &world) {
+    const double *m = placed.transform;
+    const Vec3d p = (world - Vec3d(m[3], m[7], m[11])) / (placed.voxel * placed.voxel);
+    return Vec3d(m[0] * p[0] + m[4] * p[1] + m[8] * p[2], m[1] * p[0] + m[5] * p[1] + m[9] * p[2],
+                 m[2] * p[0] + m[6] * p[1] + m[10] * p[2]);
+}
+
+bool is_upright(const Placed &placed, double voxel) {
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) {
+            const double expected = row == column ? voxel : 0.0;
+            if (std::fabs(placed.transform[4 * row + column] - expected) > SAME_SIZE * voxel) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+// Whether the instance's voxels are voxels of the lattice, wide enough a band included; then by what shift.
+bool lies_on(const Placed &placed, const Lattice &lattice, Coord &shift) {
+    if (!is_upright(placed, lattice.voxel) ||
+        placed.grid->info.half_width < lattice.half_width * (1.0 - 1e-5)) {
+        return false;
+    }
+    const Vec3d offset =
+        (Vec3d(placed.transform[3], placed.transform[7], placed.transform[11]) - lattice.translation) /
+        lattice.voxel;
+    for (int i = 0; i < 3; ++i) {
+        if (std::fabs(offset[i] - std::round(offset[i])) > SAME_PLACE ||
+            std::fabs(offset[i]) > LARGEST_INDEX) {
+            return false;
+        }
+        shift[i] = int32_t(std::round(offset[i]));
+    }
+    return true;
+}
+
+// Corners of an instance's solid in the world.
+void grow_bounds(const Placed &placed, Vec3d &low, Vec3d &high) {
+    const openvdb::CoordBBox box = placed.grid->level_set->evalActiveVoxelBoundingBox();
+    for (int corner = 0; corner < 8; ++corner) {
+        const Vec3d at = apply(placed.transform, Vec3d((corner & 1) ? box.max()[0] : box.min()[0],
+                                                       (corner & 2) ? box.max()[1] : box.min()[1],
+                                                       (corner & 4) ? box.max()[2] : box.min()[2]));
+        low = openvdb::math::minComponent(low, at);
+        high = openvdb::math::maxComponent(high, at);
+    }
+}
+
+// The lattice of the union: that of the first instance which has its voxel size and stands upright, so that
+// at least this one is taken as it is.
+Lattice choose_lattice(const std::vector<Placed> &placed, const vsh_grid_options *given, vsh_error *error) {
+    vsh_grid_options options = vsh_grid_options_default();
+    const vsh_result result =
+        vshi_options_resolve(given, &options, sizeof options, "vsh_grid_options", error);
+    if (result != VSH_OK) {
+        throw Failure{result};
+    }
+    Vec3d low(std::numeric_limits<double>::max());
+    Vec3d high(-low);
+    double finest = placed[0].voxel;
+    for (const Placed &instance : placed) {
+        finest = std::min(finest, instance.voxel);
+        grow_bounds(instance, low, high);
+    }
+    if (options.voxel_size == 0.0) {
+        options.voxel_size = finest;
+    }
+    Lattice lattice = make_lattice(&options, low, high, error);
+    for (const Placed &instance : placed) {
+        const Vec3d origin(instance.transform[3], instance.transform[7], instance.transform[11]);
+        double farthest = 0.0;
+        for (int i = 0; i < 3; ++i) {
+            farthest = std::max({farthest, std::fabs(low[i] - origin[i]), std::fabs(high[i] - origin[i])});
+        }
+        if (is_upright(instance, lattice.voxel) &&
+            farthest / lattice.voxel + lattice.half_width < LARGEST_INDEX) {
+            lattice.voxel = instance.voxel;
+            lattice.translation = origin;
+            break;
+        }
+    }
+    return lattice;
+}
+
+constexpr double COPIES = 5.0; // of far inner nodes that are there at a time, beside the instance's own
+
+void foretell(const std::vector<Placed> &placed, const Lattice &lattice, const vsh_run &run,
+              vsh_error *error) {
+    double leaves = 0.0;
+    double bytes = 0.0;
+    for (const Placed &instance : placed) {
+        const double finer = instance.voxel / lattice.voxel;
+        const double count = double(instance.grid->level_set->tree().leafCount());
+        // what band_leaves() makes of a thin band, turned around
+        const double area = count * double(Leaf::SIZE) / (2.0 * instance.grid->info.half_width + 12.0);
+        const Vec3d sides = instance.grid->level_set->evalActiveVoxelDim().asVec3d();
+        leaves += band_leaves(area * finer * finer, sides * finer, lattice.half_width + RIM);
+        const double held = double(instance.grid->info.bytes);
+        bytes += held + count * SOURCE_BYTES_PER_LEAF + COPIES * far_node_bytes(held, count);
+    }
+    check_memory(&run, lattice.voxel, leaves, bytes + leaves * REDISTANCE_BYTES_PER_LEAF, error);
+}
+
+// An instance measured on the lattice. Signs come from its own values, between which they are interpolated.
+FloatGrid::Ptr resample(const Placed &placed, size_t number, const Lattice &lattice, double begin, double end,
+                        Stage &stage, vsh_error *error) {
+    Surface surface = mesh_surface(*placed.grid->level_set, stage);
+    if (surface.polygons.empty()) {
+        throw Failure{
+            vshi_fail(error, VSH_ERROR_INPUT, "unite: instance %zu: the grid has no surface", number)};
+    }
+    stage.loop(surface.points.size(), 4096, begin, begin, [&](size_t i) {
+        const Vec3d point(surface.points[i]);
+        surface.points[i] = openvdb::Vec3s(lattice.index(apply(placed.transform, point)));
+    });
+    FloatGrid::Ptr measured = measure_surface(surface, lattice, lattice.half_width, begin, end, stage);
+
+    // Upper nodes of the lattice that the instance's inside may cover without a surface.
+    std::vector<Coord> origins;
+    const openvdb::CoordBBox box = measured->evalActiveVoxelBoundingBox();
+    const Coord first = box.min() & ~(UPPER_SIZE - 1);
+    for (int32_t x = first[0]; x <= box.max()[0]; x += UPPER_SIZE) {
+        for (int32_t y = first[1]; y <= box.max()[1]; y += UPPER_SIZE) {
+            for (int32_t z = first[2]; z <= box.max()[2]; z += UPPER_SIZE) {
+                origins.emplace_back(x, y, z);
+            }
+        }
+    }
+    take_signs(*measured, origins, stage, [&] {
+        return
+            [&, tree = FloatGrid::ConstUnsafeAccessor(placed.grid->level_set->constTree())](const Coord &at) {
+                const Vec3d source = apply_back(placed, lattice.world(at));
+                return openvdb::tools::BoxSampler::sample(tree, source) < 0.0f;
+            };
+    });
+    return measured;
+}
+
+// Origins of the union's leaves: all that a part's leaf passes after its shift.
+std::vector<Coord> leaf_origins(const std::vector<Part> &parts) {
+    std::set<Coord> origins;
+    for (const Part &part : parts) {
+        for (auto leaf = part.grid->constTree().cbeginLeaf(); leaf; ++leaf) {
+            const Coord low = leaf->origin() + part.shift;
+            for (int corner = 0; corner < 8; ++corner) {
+                const Coord at =
+                    low.offsetBy((corner & 1) ? 7 : 0, (corner & 2) ? 7 : 0, (corner & 4) ? 7 : 0);
+                origins.insert(at & ~7);
+            }
+        }
+    }
+    return std::vector<Coord>(origins.begin(), origins.end());
+}
+
+// The same for upper nodes.
+std::vector<Coord> upper_origins(const std::vector<Part> &parts) {
+    std::set<Coord> origins;
+    for (const Part &part : parts) {
+        for (const Coord &origin : root_origins(part.grid->constTree())) {
+            const int32_t last = UPPER_SIZE - 1;
+            for (int corner = 0; corner < 8; ++corner) {
+                const Coord at =
+                    origin + part.shift +
+                    Coord((corner & 1) ? last : 0, (corner & 2) ? last : 0, (corner & 4) ? last : 0);
+                origins.insert(at & ~last);
+            }
+        }
+    }
+    return std::vector<Coord>(origins.begin(), origins.end());
+}
+
+FloatGrid::Ptr unite_parts(const std::vector<Part> &parts, const Lattice &lattice, double begin,
+                           Stage &stage) {
+    const float background = lattice.background();
+    FloatGrid::Ptr united = FloatGrid::create(background);
+    united->setTransform(lattice.transform());
+    const std::vector<Coord> origins = leaf_origins(parts);
+    std::vector<Leaf *> leaves;
+    leaves.reserve(origins.size());
+    for (const Coord &origin : origins) {
+        leaves.push_back(united->tree().touchLeaf(origin));
+    }
+    stage.loop(leaves.size(), 16, begin, 1.0, [&](size_t i) {
+        Leaf &leaf = *leaves[i];
+        for (const Part &part : parts) {
+            FloatGrid::ConstUnsafeAccessor tree(part.grid->constTree());
+            for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
+                const float value = tree.getValue(leaf.offsetToGlobalCoord(n) - part.shift);
+                leaf.setValueOnly(n, std::max(std::min(value, leaf.getValue(n)), -background));
+            }
+        }
+    });
+    fill_tiles(united->tree(), upper_origins(parts), background, stage, [&] {
+        std::vector<FloatGrid::ConstUnsafeAccessor> trees;
+        trees.reserve(parts.size());
+        for (const Part &part : parts) {
+            trees.emplace_back(part.grid->constTree());
+        }
+        return [&parts, trees](const Coord &at) {
+            for (size_t i = 0; i < parts.size(); ++i) {
+                if (trees[i].getValue(at - parts[i].shift) < 0.0f) {
+                    return true;
+                }
+            }
+            return false;
+        };
+    });
+    return united;
+}
+
+bool stands_as_it_is(const vsh_grid_instance &instance) {
+    static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    return instance.transform == nullptr || std::equal(identity, identity + 12, instance.transform);
+}
+
+vsh_result unite(const vsh_grid_instance *instances, size_t count, const vsh_grid_options *options,
+                 const vsh_run *given, vsh_grid **grid, vsh_error *error) {
+    vsh_run run;
+    const vsh_result result = vshi_run_resolve(given, &run, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (instances == nullptr || count == 0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "unite: no grids");
+    }
+    std::vector<Placed> placed;
+    for (size_t i = 0; i < count; ++i) {
+        placed.push_back(place(instances[i], i, error));
+    }
+    const bool own_voxel = options == nullptr || options->voxel_size == 0.0;
+    if (count == 1 && own_voxel && stands_as_it_is(instances[0])) {
+        *grid = new vsh_grid(*instances[0].grid); // the tree is shared: no handle ever changes it
+        return VSH_OK;
+    }
+    const Lattice lattice = choose_lattice(placed, options, error);
+    foretell(placed, lattice, run, error);
+    Stage stage(run, "voxelize", error);
+    std::vector<Part> parts;
+    double shell = 0.0;
+    for (size_t i = 0; i < count; ++i) {
+        stage.check(); // meshing, the first step of resampling, asks nobody
+        Part part{placed[i].grid->level_set, Coord(0)};
+        if (!lies_on(placed[i], lattice, part.shift)) {
+            part = {resample(placed[i], i, lattice, 0.9 * double(i) / double(count),
+                             0.9 * double(i + 1) / double(count), stage, error),
+                    Coord(0)};
+        }
+        parts.push_back(part);
+        shell = std::max(shell, placed[i].scale * placed[i].grid->info.shell_thickness);
+    }
+    *grid = close_grid(unite_parts(parts, lattice, 0.9, stage), shell, stage);
+    return VSH_OK;
+}
+
+} // namespace
+
+} // namespace vshi
+
+vsh_result vsh_grid_unite(const vsh_grid_instance *instances, size_t instance_count,
+                          const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
+                          vsh_error *error) {
+    VSHI_NEEDS(grid);
+    *grid = nullptr;
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "unite",
+                       [&] { return vshi::unite(instances, instance_count, options, run, grid, error); });
+}

@@ -1,0 +1,72 @@
+/* Voxels that are to be shaded, and the grids that their values become. */
+#ifndef VSHI_OPENVDB_VOLUME_H
+#define VSHI_OPENVDB_VOLUME_H
+
+#include "base/job.h"
+
+#include <vdbshade/voxels.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { VSHI_BLOCK_VOXELS = 512, VSHI_MASK_WORDS = 8 };
+
+/* A block of 8³ voxels, which is a leaf of the trees: voxel index-space origin + (x, y, z) is bit y·8 + z of
+ * word x, and value x·64 + y·8 + z. */
+typedef struct vshi_block {
+    int32_t origin[3]; /* multiples of 8 */
+    uint64_t mask[VSHI_MASK_WORDS];
+} vshi_block;
+
+/* The blocks of the voxels, sorted by origin (x, then y, then z). */
+const vshi_block *vshi_voxels_blocks(const vsh_voxels *voxels, size_t *count);
+
+/* Number of the block with this origin; SIZE_MAX where there is none. Thread safe, as what follows. */
+size_t vshi_voxels_find(const vsh_voxels *voxels, const int32_t origin[3]);
+
+/* Longest axis of a voxel, world units; infinite where it is not the same everywhere. */
+double vshi_voxels_longest_axis(const vsh_voxels *voxels);
+
+/* A ball that holds the centres of all voxels of a block. */
+void vshi_voxels_ball(const vsh_voxels *voxels, size_t block, double centre[3], double *radius);
+
+/* Centres of `count` voxels of a block, by their numbers in it. */
+void vshi_voxels_centres(const vsh_voxels *voxels, size_t block, size_t count, const uint16_t *voxel,
+                         double (*centres)[3]);
+
+/* One grid of a volume that is made: what its name and metadata say. Strings are copied. */
+typedef struct vshi_channel {
+    char name[80];
+    char description[200];
+    const char *method;
+    char light[384]; /* empty: none */
+    double caster_voxel_size;
+} vshi_channel;
+
+/* Begins a volume; `held` bytes are taken already. Errors: VSH_ERROR_LIMIT, for all leaves of all grids;
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_volume_begin(const vsh_voxels *voxels, const vshi_channel *channels, size_t count,
+                             const vsh_run *run, double held, vsh_volume **volume, vsh_error *error);
+
+/* The values [512] of a block in a grid that is made; background at first. NULL where memory is short.
+ * Different blocks on different threads. */
+float *vshi_volume_values(vsh_volume *volume, size_t channel, size_t block);
+
+/* Gives all voxels of a block one value, without memory for them. */
+void vshi_volume_set_tile(vsh_volume *volume, size_t channel, size_t block, float value);
+
+/* A value that is there, also once it was settled. */
+float vshi_volume_value(const vsh_volume *volume, size_t channel, size_t block, int voxel);
+
+/* The block's values are final, and these its active voxels: where all are active and one value, memory goes
+ * back. Different blocks on different threads. */
+void vshi_volume_settle(vsh_volume *volume, size_t block, const uint64_t mask[VSHI_MASK_WORDS]);
+
+/* Makes the trees of what was settled. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_volume_close(vsh_volume *volume, const vsh_volume_info *counts, vsh_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

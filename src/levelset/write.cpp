@@ -1,0 +1,221 @@
+// Writing .vdb files: whole, or not at all, and the same bytes for the same grids.
+#include "base/attributes.h"
+#include "base/file.h"
+#include "levelset/file.h"
+
+#include <cstdio>
+#include <cstring>
+#include <openvdb/io/Archive.h>
+#include <ostream>
+#include <streambuf>
+#include <vector>
+
+namespace vshi {
+
+namespace {
+
+// Writes through a sink: OpenVDB's own file writing does not look whether the last bytes arrived.
+class SinkBuffer final : public std::streambuf {
+  public:
+    explicit SinkBuffer(const char *path) : sink(vshi_sink_open(path)), bytes(size_t(1) << 20) {}
+    ~SinkBuffer() override { finish(); }
+    SinkBuffer(const SinkBuffer &) = delete;
+    SinkBuffer &operator=(const SinkBuffer &) = delete;
+
+    int finish() { // the errno of the first failure, or 0
+        flush();
+        return vshi_sink_close(&sink);
+    }
+
+  protected:
+    std::streamsize xsputn(const char *data, std::streamsize count) override {
+        if (size_t(count) > bytes.size() - used) {
+            flush();
+        }
+        if (size_t(count) > bytes.size()) {
+            vshi_sink_write(&sink, data, size_t(count), at);
+            at += uint64_t(count);
+        } else {
+            std::memcpy(bytes.data() + used, data, size_t(count));
+            used += size_t(count);
+        }
+        return count; // failures are told by finish()
+    }
+    int_type overflow(int_type value) override {
+        const char byte = traits_type::to_char_type(value);
+        xsputn(&byte, 1);
+        return traits_type::not_eof(value);
+    }
+    int sync() override {
+        flush();
+        return 0;
+    }
+    pos_type seekpos(pos_type position, std::ios_base::openmode) override {
+        flush();
+        at = uint64_t(std::streamoff(position));
+        return position;
+    }
+    pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode mode) override {
+        if (from == std::ios_base::end) {
+            return pos_type(off_type(-1)); // never asked for
+        }
+        const off_type now = off_type(at + used);
+        return from == std::ios_base::cur && offset == 0
+                   ? pos_type(now)
+                   : seekpos(pos_type(from == std::ios_base::cur ? now + offset : offset), mode);
+    }
+
+  private:
+    void flush() {
+        if (used > 0 && sink.file >= 0) {
+            vshi_sink_write(&sink, bytes.data(), used, at);
+        }
+        at += used;
+        used = 0;
+    }
+
+    vshi_sink sink;
+    std::vector<char> bytes;
+    size_t used = 0;
+    uint64_t at = 0; // of the first byte of `bytes`
+};
+
+class Writer final : public openvdb::io::Archive {
+  public:
+    Writer() {
+        setCompression(openvdb::io::COMPRESS_ACTIVE_MASK |
+                       (hasBloscCompression()  ? openvdb::io::COMPRESS_BLOSC
+                        : hasZLibCompression() ? openvdb::io::COMPRESS_ZIP
+                                               : openvdb::io::COMPRESS_NONE));
+    }
+    void put(std::ostream &out, const openvdb::GridCPtrVec &grids) const { Archive::write(out, grids, true); }
+};
+
+// In place of OpenVDB's random one: the same grids give the same bytes. FNV-1a over the values.
+class ContentHash {
+  public:
+    void add(uint64_t word) {
+        for (uint64_t &h : hash) {
+            h = (h ^ word) * 0x100000001b3u;
+        }
+        hash[1] ^= hash[1] >> 29;
+    }
+    void add(float value) {
+        uint32_t bits;
+        std::memcpy(&bits, &value, sizeof bits);
+        add(uint64_t(bits));
+    }
+    void add(const FloatTree &tree) {
+        for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+            const float *values = leaf->buffer().data();
+            for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
+                add(values[i]);
+            }
+        }
+        auto tile = tree.cbeginValueOn();
+        tile.setMaxDepth(FloatTree::ValueOnCIter::LEAF_DEPTH - 1);
+        for (; tile; ++tile) {
+            add(uint64_t(tile.getVoxelCount()));
+            add(tile.getValue());
+        }
+    }
+    std::string uuid() const {
+        char text[UUID_LENGTH + 1];
+        std::snprintf(text, sizeof text, "%08x-%04x-4%03x-8%03x-%012llx", unsigned(hash[0] >> 32),
+                      unsigned(hash[0] >> 16) & 0xffffu, unsigned(hash[0]) & 0xfffu,
+                      unsigned(hash[1] >> 48) & 0xfffu,
+                      static_cast<unsigned long long>(hash[1] & 0xffffffffffffu));
+        return text;
+    }
+
+  private:
+    uint64_t hash[2] = {0xcbf29ce484222325u, 0x84222325cbf29ce4u};
+};
+
+struct Output {
+    vshi_output file{nullptr, nullptr, 0};
+    ~Output() { vshi_output_abandon(&file); } // nothing, once committed
+};
+
+} // namespace
+
+vsh_result check_writable(const char *path, double voxel_size, vsh_error *error) {
+    return voxel_size >= SMALLEST_WRITTEN
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_LIMIT,
+                           "%s: voxel size %g: OpenVDB writes %g and more; scale the scene", path, voxel_size,
+                           SMALLEST_WRITTEN);
+}
+
+vsh_result write_grids(const openvdb::GridCPtrVec &grids, const char *path, vsh_error *error) {
+    Output output;
+    const vsh_result result = vshi_output_begin(&output.file, path, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    ContentHash hash;
+    for (const openvdb::GridBase::ConstPtr &grid : grids) {
+        hash.add(openvdb::gridConstPtrCast<FloatGrid>(grid)->tree());
+    }
+    SinkBuffer buffer(output.file.temporary);
+    std::ostream stream(&buffer);
+    Writer().put(stream, grids);
+    stream.seekp(std::streamoff(UUID_AT));
+    stream << hash.uuid();
+    const bool good = stream.good();
+    const int number = buffer.finish();
+    if (number != 0 || !good) {
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", path,
+                         number != 0 ? std::strerror(number) : "OpenVDB gave no reason");
+    }
+    return vshi_output_commit(&output.file, error);
+}
+
+FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Transform &transform,
+                          const std::string &name, openvdb::GridClass grid_class) {
+    const FloatGrid::Ptr grid = FloatGrid::create(tree);
+    grid->setTransform(transform.copy());
+    grid->setName(name);
+    grid->setGridClass(grid_class);
+    grid->setCreator(std::string("vdbshade ") + vsh_version());
+    return grid;
+}
+
+FloatGrid::Ptr named_surface(const vsh_grid &grid, const char *name) {
+    const FloatGrid::Ptr named =
+        named_grid(grid.level_set->treePtr(), grid.level_set->transform(), name, openvdb::GRID_LEVEL_SET);
+    if (grid.info.shell_thickness > 0.0) {
+        named->insertMeta(SHELL_THICKNESS, openvdb::DoubleMetadata(grid.info.shell_thickness));
+    }
+    return named;
+}
+
+void put_attributes(FloatGrid &grid, const vsh_attribute *attributes, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        grid.insertMeta(attributes[i].name, openvdb::StringMetadata(attributes[i].value));
+    }
+}
+
+} // namespace vshi
+
+vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name, vsh_error *error) {
+    return vsh_grid_write_with(grid, path, name, nullptr, 0, error);
+}
+
+vsh_result vsh_grid_write_with(const vsh_grid *grid, const char *path, const char *name,
+                               const vsh_attribute *attributes, size_t attribute_count, vsh_error *error) {
+    VSHI_NEEDS(grid);
+    return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
+        vshi::initialize();
+        vsh_result result = vshi_attributes_check(path, attributes, attribute_count, error);
+        if (result == VSH_OK) {
+            result = vshi::check_writable(path, grid->info.voxel_size, error);
+        }
+        if (result != VSH_OK) {
+            return result;
+        }
+        const openvdb::FloatGrid::Ptr named = vshi::named_surface(*grid, name != nullptr ? name : "surface");
+        vshi::put_attributes(*named, attributes, attribute_count);
+        return vshi::write_grids({named}, path, error);
+    });
+}

@@ -1,0 +1,377 @@
+/* Sides of triangles are filed under the lower of their vertices and sorted, so that those of one edge follow
+ * each other. Two at an edge are partners. Where there are more, the triangles are sorted by their angle
+ * around the edge: one whose back looks onwards begins a wedge of solid, the next whose back looks back ends
+ * it. So boxes that share an edge or a face in one mesh stay boxes. */
+#include "mesh/edges.h"
+
+#include "base/elementary.h"
+#include "base/memory.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct use {
+    uint32_t upper; /* vertex of the edge */
+    uint32_t third; /* vertex of the triangle */
+    uint32_t side;
+    uint32_t downwards; /* it runs from the upper to the lower vertex */
+} use;
+
+typedef struct finding {
+    const vsh_mesh *mesh;
+    bool mirrored;
+    vshi_edges *edges;
+    const uint8_t *flat; /* [triangle_count]: of no area */
+    size_t *ends;        /* [vertex_count + 1]: past the last use filed under a vertex, once filled */
+    use *uses;
+    size_t odd;            /* edges of three triangles, five, … */
+    const uint8_t *frayed; /* [triangle_count]; NULL: not known */
+} finding;
+
+static int compare_uses(const void *a, const void *b) {
+    const use *x = a, *y = b;
+    if (x->upper != y->upper) {
+        return x->upper < y->upper ? -1 : 1;
+    }
+    if (x->third != y->third) {
+        return x->third < y->third ? -1 : 1;
+    }
+    if (x->downwards != y->downwards) {
+        return x->downwards < y->downwards ? -1 : 1;
+    }
+    return (x->side > y->side) - (x->side < y->side);
+}
+
+static void sort_uses(use *uses, size_t count) {
+    enum { FEW = 24 };
+    if (count > FEW) {
+        qsort(uses, count, sizeof *uses, compare_uses);
+        return;
+    }
+    for (size_t i = 1; i < count; ++i) {
+        const use one = uses[i];
+        size_t k = i;
+        for (; k > 0 && compare_uses(&uses[k - 1], &one) > 0; --k) {
+            uses[k] = uses[k - 1];
+        }
+        uses[k] = one;
+    }
+}
+
+static vshi_vec place_of(const finding *f, uint32_t vertex) {
+    return vshi_transform_point(f->mesh->transform, vshi_vec_off(f->mesh->positions + 3 * (size_t)vertex));
+}
+
+static void join(vshi_edges *edges, uint32_t a, uint32_t b) {
+    edges->partner[a] = b;
+    edges->partner[b] = a;
+}
+
+/* A use by its angle around the edge. */
+typedef struct spoke {
+    double angle;
+    uint32_t side;
+    uint32_t downwards;
+    bool frayed; /* its triangle hangs together with one at an edge that has no other */
+    bool taken;
+} spoke;
+
+static int compare_spokes(const void *a, const void *b) {
+    const spoke *x = a, *y = b;
+    if (x->angle != y->angle) {
+        return x->angle < y->angle ? -1 : 1;
+    }
+    if (x->downwards != y->downwards) { /* faces that coincide: one wedge ends before the next begins */
+        return x->downwards < y->downwards ? -1 : 1;
+    }
+    return (x->side > y->side) - (x->side < y->side);
+}
+
+/* Which of three spokes ends at the edge while the two others go on in each other: a card that is stuck to a
+ * solid, where one of them hangs together with edges of one triangle; else the two that come nearest to a
+ * plane go on, one of which begins a wedge and one ends it if there are such. */
+static size_t ending_of_three(const spoke *s) {
+    static const double PI = 3.14159265358979323846;
+    size_t best = 0;
+    double least = INFINITY;
+    for (size_t left_out = 0; left_out < 3; ++left_out) {
+        const spoke *a = &s[left_out == 0 ? 1 : 0], *b = &s[left_out == 2 ? 1 : 2];
+        const double bend = fabs(fabs(b->angle - a->angle) - PI) +
+                            (a->downwards == b->downwards ? 10.0 : 0.0) + (s[left_out].frayed ? 0.0 : 100.0);
+        if (bend < least) {
+            least = bend;
+            best = left_out;
+        }
+    }
+    return best;
+}
+
+static void join_spokes(vshi_edges *edges, spoke *s, size_t count) {
+    qsort(s, count, sizeof *s, compare_spokes);
+    if (count == 3) {
+        s[ending_of_three(s)].taken = true;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        const size_t next = (i + 1) % count;
+        if (s[i].downwards && !s[next].downwards && !s[i].taken && !s[next].taken) {
+            join(edges, s[i].side, s[next].side);
+            s[i].taken = s[next].taken = true;
+        }
+    }
+    /* faces that disagree: neighbours */
+    size_t waiting = count;
+    for (size_t i = 0; i < count; ++i) {
+        if (s[i].taken) {
+            continue;
+        }
+        if (waiting == count) {
+            waiting = i;
+        } else {
+            join(edges, s[waiting].side, s[i].side);
+            waiting = count;
+        }
+    }
+}
+
+/* More than two triangles at the edge from `lower` to the uses' upper vertex. */
+static vsh_result join_many(finding *f, uint32_t lower, const use *uses, size_t count, vsh_error *error) {
+    spoke *spokes = NULL;
+    const vsh_result result =
+        vshi_allocate((void **)&spokes, count, sizeof *spokes, "triangles of an edge", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    const vshi_vec origin = place_of(f, lower);
+    const vshi_vec axis = vshi_unit(vshi_sub(place_of(f, uses[0].upper), origin));
+    vshi_vec u, v;
+    vshi_frame(axis, &u, &v);
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_vec to = vshi_sub(place_of(f, uses[i].third), origin);
+        spokes[i] = (spoke){vshi_atan2(vshi_dot(to, v), vshi_dot(to, u)), uses[i].side, uses[i].downwards,
+                            f->frayed != NULL && f->frayed[uses[i].side / 3], false};
+    }
+    join_spokes(f->edges, spokes, count);
+    free(spokes);
+    return VSH_OK;
+}
+
+/* The uses of one edge, in which those of triangles given before go to the end; returns how many stay. */
+static size_t leave_out_repeated(finding *f, use *uses, size_t count) {
+    vshi_edges *edges = f->edges;
+    size_t kept = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const use one = uses[i], *before = kept > 0 ? &uses[kept - 1] : NULL;
+        if (edges->skipped[one.side / 3]) { /* by another of its edges, or an earlier call */
+            continue;
+        }
+        if (before != NULL && before->third == one.third) {
+            if (before->downwards == one.downwards) {
+                edges->first[one.side / 3] = before->side / 3;
+                edges->skipped[one.side / 3] = 1;
+                continue;
+            }
+            edges->doubled[one.side / 3] = 1;
+            edges->doubled[before->side / 3] = 1;
+        }
+        uses[i] = uses[kept];
+        uses[kept++] = one;
+    }
+    return kept;
+}
+
+static vsh_result join_edge(finding *f, uint32_t lower, use *uses, size_t given, vsh_error *error) {
+    const size_t count = leave_out_repeated(f, uses, given);
+    if (count == 2) {
+        join(f->edges, uses[0].side, uses[1].side);
+    } else if (count > 2 && count % 2 == 0) {
+        return join_many(f, lower, uses, count, error);
+    } else if (count > 2) {
+        ++f->odd; /* later, when it is known what is frayed */
+    }
+    return VSH_OK;
+}
+
+/* Marks the triangles that hang together with one at an edge of its own. */
+static vsh_result find_frayed(finding *f, uint8_t *frayed, vsh_error *error) {
+    const vshi_edges *edges = f->edges;
+    const size_t count = f->mesh->triangle_count;
+    uint32_t *queue = NULL;
+    size_t waiting = 0;
+    const vsh_result result =
+        vshi_allocate((void **)&queue, count, sizeof *queue, "edges of triangles", error);
+    for (size_t vertex = 0, begin = 0; result == VSH_OK && vertex < f->mesh->vertex_count;
+         begin = f->ends[vertex], ++vertex) {
+        for (size_t i = begin, next; i < f->ends[vertex]; i = next) {
+            for (next = i + 1; next < f->ends[vertex] && f->uses[next].upper == f->uses[i].upper; ++next) {
+            }
+            const uint32_t triangle = f->uses[i].side / 3;
+            if (next - i == 1 && !frayed[triangle]) {
+                frayed[triangle] = 1;
+                queue[waiting++] = triangle;
+            }
+        }
+    }
+    for (size_t at = 0; at < waiting; ++at) {
+        for (uint32_t side = 3 * queue[at]; side < 3 * queue[at] + 3; ++side) {
+            const uint32_t other = edges->partner[side] / 3;
+            if (edges->partner[side] != VSHI_NO_PARTNER && !frayed[other]) {
+                frayed[other] = 1;
+                queue[waiting++] = other;
+            }
+        }
+    }
+    free(queue);
+    return result;
+}
+
+/* Joins what goes on at edges of odd numbers of triangles. */
+static vsh_result join_odd(finding *f, vsh_error *error) {
+    uint8_t *frayed = NULL;
+    vsh_result result =
+        vshi_allocate((void **)&frayed, f->mesh->triangle_count, 1, "edges of triangles", error);
+    if (result == VSH_OK) {
+        result = find_frayed(f, frayed, error);
+    }
+    f->frayed = frayed;
+    for (size_t vertex = 0, begin = 0; result == VSH_OK && vertex < f->mesh->vertex_count;
+         begin = f->ends[vertex], ++vertex) {
+        for (size_t i = begin, next; i < f->ends[vertex] && result == VSH_OK; i = next) {
+            for (next = i + 1; next < f->ends[vertex] && f->uses[next].upper == f->uses[i].upper; ++next) {
+            }
+            const size_t count = leave_out_repeated(f, f->uses + i, next - i);
+            if (count > 2 && count % 2 != 0) {
+                result = join_many(f, (uint32_t)vertex, f->uses + i, count, error);
+            }
+        }
+    }
+    f->frayed = NULL;
+    free(frayed);
+    return result;
+}
+
+static size_t count_open(const vsh_mesh *mesh, const vshi_edges *edges) {
+    size_t open = 0;
+    for (size_t side = 0; side < 3 * mesh->triangle_count; ++side) {
+        open += !edges->skipped[side / 3] && edges->partner[side] == VSHI_NO_PARTNER;
+    }
+    return open;
+}
+
+/* Fills partner, skipped, first, doubled and open. Flat triangles may be what joins two long edges to one. */
+static vsh_result join_edges(finding *f, bool with_flat, vsh_error *error) {
+    const vsh_mesh *mesh = f->mesh;
+    vshi_edges *edges = f->edges;
+    uint32_t v[3];
+    f->odd = 0;
+    memset(f->ends, 0, (mesh->vertex_count + 1) * sizeof *f->ends);
+    memset(edges->partner, 0xff, 3 * mesh->triangle_count * sizeof *edges->partner);
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        edges->first[i] = (uint32_t)i;
+        edges->doubled[i] = 0;
+        const bool whole = vshi_edges_corners(mesh, edges->weld, f->mirrored, i, v);
+        edges->skipped[i] = !whole || (!with_flat && f->flat[i]);
+        for (int k = 0; k < 3 && !edges->skipped[i]; ++k) {
+            const uint32_t a = v[k], b = v[(k + 1) % 3];
+            ++f->ends[(a < b ? a : b) + (size_t)1];
+        }
+    }
+    for (size_t i = 0; i < mesh->vertex_count; ++i) {
+        f->ends[i + 1] += f->ends[i];
+    }
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        if (edges->skipped[i]) {
+            continue;
+        }
+        vshi_edges_corners(mesh, edges->weld, f->mirrored, i, v);
+        for (int k = 0; k < 3; ++k) {
+            const uint32_t a = v[k], b = v[(k + 1) % 3];
+            f->uses[f->ends[a < b ? a : b]++] =
+                (use){a < b ? b : a, v[(k + 2) % 3], (uint32_t)(3 * i) + (uint32_t)k, a > b};
+        }
+    }
+    vsh_result result = VSH_OK;
+    for (size_t vertex = 0, begin = 0; vertex < mesh->vertex_count && result == VSH_OK;
+         begin = f->ends[vertex], ++vertex) {
+        const size_t end = f->ends[vertex];
+        sort_uses(f->uses + begin, end - begin);
+        for (size_t i = begin, next; i < end && result == VSH_OK; i = next) {
+            for (next = i + 1; next < end && f->uses[next].upper == f->uses[i].upper; ++next) {
+            }
+            result = join_edge(f, (uint32_t)vertex, f->uses + i, next - i, error);
+        }
+    }
+    if (result == VSH_OK && f->odd > 0) {
+        result = join_odd(f, error);
+    }
+    edges->open = count_open(mesh, edges);
+    return result;
+}
+
+static vsh_result take(const vsh_mesh *mesh, vshi_edges *edges, finding *f, uint8_t **flat,
+                       vsh_error *error) {
+    const struct {
+        void **memory;
+        size_t count, size;
+    } wanted[] = {{(void **)&edges->weld, mesh->vertex_count, sizeof *edges->weld},
+                  {(void **)&edges->skipped, mesh->triangle_count, 1},
+                  {(void **)&edges->first, mesh->triangle_count, sizeof *edges->first},
+                  {(void **)&edges->doubled, mesh->triangle_count, 1},
+                  {(void **)&edges->partner, 3 * mesh->triangle_count, sizeof *edges->partner},
+                  {(void **)flat, mesh->triangle_count, 1},
+                  {(void **)&f->ends, mesh->vertex_count + 1, sizeof *f->ends},
+                  {(void **)&f->uses, 3 * mesh->triangle_count, sizeof *f->uses}};
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0] && result == VSH_OK; ++i) {
+        result =
+            vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "edges of triangles", error);
+    }
+    return result;
+}
+
+vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, vshi_edges *edges, vsh_error *error) {
+    *edges = (vshi_edges){0};
+    if (mesh->triangle_count > UINT32_MAX / 3) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu triangles, %u at most",
+                         vshi_mesh_label(mesh, index).text, mesh->triangle_count, UINT32_MAX / 3);
+    }
+    if (mesh->triangle_count == 0) {
+        return VSH_OK;
+    }
+    finding f = {.mesh = mesh, .mirrored = vshi_transform_determinant(mesh->transform) < 0.0, .edges = edges};
+    uint8_t *flat = NULL;
+    size_t flats = 0;
+    vsh_result result = take(mesh, edges, &f, &flat, error);
+    if (result == VSH_OK) {
+        result = vshi_mesh_weld(mesh, edges->weld, error);
+    }
+    if (result != VSH_OK) {
+        goto cleanup;
+    }
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        flat[i] = vshi_mesh_degenerate(mesh, i);
+        flats += flat[i];
+    }
+    f.flat = flat;
+    result = join_edges(&f, false, error);
+    const size_t open = edges->open;
+    if (result == VSH_OK && flats > 0 && open > 0) { /* closed with them or without them is closed */
+        result = join_edges(&f, true, error);
+        if (result == VSH_OK && edges->open >= open) {
+            result = join_edges(&f, false, error);
+        }
+    }
+cleanup:
+    free(f.uses);
+    free(f.ends);
+    free(flat);
+    return result;
+}
+
+void vshi_edges_free(vshi_edges *edges) {
+    free(edges->partner);
+    free(edges->doubled);
+    free(edges->first);
+    free(edges->skipped);
+    free(edges->weld);
+    *edges = (vshi_edges){0};
+}

@@ -1,0 +1,35 @@
+/* Which triangles of a mesh meet at their edges. */
+#ifndef VSHI_EDGES_H
+#define VSHI_EDGES_H
+
+#include "mesh/mesh.h"
+
+#include <stdint.h>
+
+#define VSHI_NO_PARTNER UINT32_MAX
+
+/* Side 3 i + k of a mesh runs from corner k to corner k + 1 of triangle i, in the world's order. */
+typedef struct vshi_edges {
+    uint32_t *weld;    /* [vertex_count]: vshi_mesh_weld() */
+    uint8_t *skipped;  /* [triangle_count]: of no area, or given before with the same corners */
+    uint32_t *first;   /* [triangle_count]: the triangle that was, or the triangle itself */
+    uint8_t *doubled;  /* [triangle_count]: see vshi_components */
+    uint32_t *partner; /* [3 triangle_count]: the side that goes on beyond this one; VSHI_NO_PARTNER: open */
+    size_t open;       /* sides without a partner, but for those of triangles that are skipped */
+} vshi_edges;
+
+/* Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Free with vshi_edges_free(), after a failure too. */
+vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, vshi_edges *edges, vsh_error *error);
+void vshi_edges_free(vshi_edges *edges);
+
+/* The welded vertices of triangle i in the world's order; false where two are one. */
+static inline bool vshi_edges_corners(const vsh_mesh *mesh, const uint32_t *weld, bool mirrored, size_t i,
+                                      uint32_t v[3]) {
+    const uint32_t *given = mesh->indices + 3 * i;
+    v[0] = weld[given[0]];
+    v[1] = weld[given[mirrored ? 2 : 1]];
+    v[2] = weld[given[mirrored ? 1 : 2]];
+    return v[0] != v[1] && v[1] != v[2] && v[2] != v[0];
+}
+
+#endif

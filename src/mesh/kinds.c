@@ -1,0 +1,217 @@
+/* What each component is for itself. */
+#include "base/memory.h"
+#include "mesh/solidity_parts.h"
+
+#include <stdlib.h>
+
+/* Of one that looks inwards: nothing is filled behind its faces but a thin wall, so that a room may lack a
+ * whole side. */
+static const double WALL_ENCLOSES = 0.86;
+/* Of the area, at least, that must look inwards: where faces disagree more, what is closed is solid. */
+static const double INWARD_SHARE = 2.0 / 3.0;
+/* Volume over the area to the power of 1.5: less is what rounding leaves of none. A sphere has 0.094. */
+static const double LEAST_VOLUME = 1e-6;
+/* Of the area that is given once more facing the other way: such faces are double-sided sheets. */
+static const double DOUBLED_SHARE = 0.5;
+
+/* What is known of a component before its kind. */
+typedef struct measure {
+    double turned_area, doubled_area;
+} measure;
+
+static void grow(vshi_component *c, vshi_vec p) {
+    c->low = (vshi_vec){fmin(c->low.x, p.x), fmin(c->low.y, p.y), fmin(c->low.z, p.z)};
+    c->high = (vshi_vec){fmax(c->high.x, p.x), fmax(c->high.y, p.y), fmax(c->high.z, p.z)};
+}
+
+/* Six times the volume of the tetrahedron over a triangle from `origin`. */
+static double volume_from(const vshi_vec corner[3], vshi_vec origin) {
+    return vshi_dot(vshi_sub(corner[0], origin),
+                    vshi_cross(vshi_sub(corner[1], origin), vshi_sub(corner[2], origin)));
+}
+
+vshi_surface_part vshi_component_part(const vshi_solidity *s, const vshi_component *c) {
+    return (vshi_surface_part){&s->wholes.meshes[c->whole], c->list, c->triangles, s->found[c->whole].turned};
+}
+
+static measure measure_component(const vshi_solidity *s, vshi_component *c) {
+    const vshi_components *found = &s->found[c->whole];
+    const vshi_surface_part part = vshi_component_part(s, c);
+    measure m = {0.0, 0.0};
+    double volume = 0.0;
+    vshi_vec origin = {0.0, 0.0, 0.0};
+    c->low = (vshi_vec){INFINITY, INFINITY, INFINITY};
+    c->high = (vshi_vec){-INFINITY, -INFINITY, -INFINITY};
+    for (size_t at = 0; at < c->triangles; ++at) {
+        const uint32_t i = c->list[at];
+        vshi_vec corner[3];
+        vshi_part_corners(&part, at, corner);
+        origin = at == 0 ? corner[0] : origin;
+        const double area =
+            0.5 * vshi_length(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
+        c->area += area;
+        m.turned_area += found->turned[i] ? area : 0.0;
+        m.doubled_area += found->doubled[i] ? area : 0.0;
+        volume += volume_from(corner, origin);
+        for (int k = 0; k < 3; ++k) {
+            grow(c, corner[k]);
+        }
+    }
+    for (size_t k = 0; k < c->open_edges; ++k) {
+        volume += volume_from(c->cap[k], origin);
+    }
+    c->volume = volume / 6.0;
+    return m;
+}
+
+void vshi_component_turn(vshi_solidity *s, vshi_component *c) {
+    uint8_t *turned = s->found[c->whole].turned;
+    for (size_t at = 0; at < c->triangles; ++at) {
+        turned[c->list[at]] ^= 1;
+    }
+    for (size_t k = 0; k < c->open_edges; ++k) {
+        vshi_vec *corner = s->caps[(size_t)(c->cap - (const vshi_vec(*)[3])s->caps) + k];
+        const vshi_vec swapped = corner[0];
+        corner[0] = corner[1];
+        corner[1] = swapped;
+    }
+}
+
+/* --- holes: each group of open edges that hang together is closed by triangles to its middle */
+
+typedef struct hole {
+    vshi_vec sum; /* of its edges' middles by their lengths */
+    double length;
+} hole;
+
+typedef struct closing {
+    const vsh_mesh *mesh;
+    uint32_t *parent; /* [vertex_count] */
+    uint32_t *number; /* [vertex_count]: of a root's hole */
+    hole *holes;      /* as many as there are open edges */
+} closing;
+
+static uint32_t root_of(uint32_t *parent, uint32_t v) {
+    while (parent[v] != v) {
+        parent[v] = parent[parent[v]];
+        v = parent[v];
+    }
+    return v;
+}
+
+static vshi_vec place_of(const vsh_mesh *mesh, uint32_t vertex) {
+    return vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * (size_t)vertex));
+}
+
+static size_t close_holes(closing *k, const vshi_rim *rims, size_t count, vshi_vec (*caps)[3],
+                          uint32_t *hole_of) {
+    size_t holes = 0;
+    for (size_t i = 0; i < count; ++i) {
+        k->parent[rims[i].a] = rims[i].a;
+        k->parent[rims[i].b] = rims[i].b;
+        k->number[rims[i].a] = k->number[rims[i].b] = UINT32_MAX;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        const uint32_t a = root_of(k->parent, rims[i].a), b = root_of(k->parent, rims[i].b);
+        k->parent[a < b ? b : a] = a < b ? a : b;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        uint32_t *number = &k->number[root_of(k->parent, rims[i].a)];
+        if (*number == UINT32_MAX) {
+            *number = (uint32_t)holes;
+            k->holes[holes++] = (hole){{0.0, 0.0, 0.0}, 0.0};
+        }
+        hole *h = &k->holes[*number];
+        const vshi_vec a = place_of(k->mesh, rims[i].a), b = place_of(k->mesh, rims[i].b);
+        const double length = vshi_length(vshi_sub(a, b));
+        h->sum = vshi_add(h->sum, vshi_scale(vshi_add(a, b), 0.5 * length));
+        h->length += length;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        hole_of[i] = k->number[root_of(k->parent, rims[i].a)];
+        const hole *h = &k->holes[hole_of[i]];
+        caps[i][0] = place_of(k->mesh, rims[i].b);
+        caps[i][1] = place_of(k->mesh, rims[i].a);
+        caps[i][2] = h->length > 0.0 ? vshi_scale(h->sum, 1.0 / h->length) : caps[i][0];
+    }
+    return holes;
+}
+
+/* --- kinds */
+
+static void decide(vshi_solidity *s, vshi_component *c, const measure *m) {
+    const int32_t asked = s->wholes.meshes[c->whole].solidity;
+    const vshi_components *found = &s->found[c->whole];
+    const bool twisted = found->twisted[found->of[c->list[0]]] != 0;
+    double turned_area = m->turned_area;
+    if (turned_area > 0.5 * c->area) { /* most are right */
+        vshi_component_turn(s, c);
+        turned_area = c->area - turned_area;
+        c->volume = -c->volume;
+    }
+    const double least = LEAST_VOLUME * c->area * sqrt(c->area);
+    c->kind = VSHI_KIND_SHEET;
+    c->enclosed = 0.5;
+    if (!(fabs(c->volume) > least) || (twisted && c->open_edges > 0)) {
+        c->volume = 0.0;
+        return;
+    }
+    const bool agreed = turned_area <= (1.0 - INWARD_SHARE) * c->area;
+    const bool inward = asked == VSH_SOLIDITY_INWARD ||
+                        (asked != VSH_SOLIDITY_SOLID && c->volume < 0.0 && agreed && !twisted);
+    if (inward != (c->volume < 0.0) && !twisted) {
+        vshi_component_turn(s, c);
+    }
+    c->volume = fabs(c->volume);
+    const vshi_surface_part part = vshi_component_part(s, c);
+    c->enclosed = vshi_part_encloses(&part, c->area, c->cap, c->open_edges);
+    const bool single = m->doubled_area < DOUBLED_SHARE * c->area;
+    const bool encloses = c->enclosed >= (inward ? WALL_ENCLOSES : VSHI_SOLID_ENCLOSES) && single;
+    if (asked != VSH_SOLIDITY_SHELL && (encloses || asked != VSH_SOLIDITY_AUTO)) {
+        c->kind = inward ? VSHI_KIND_WALL : VSHI_KIND_SOLID;
+        c->inward = inward;
+    }
+    c->vessel = c->kind == VSHI_KIND_SHEET && c->open_edges > 0 && asked == VSH_SOLIDITY_AUTO && !inward &&
+                agreed && single;
+}
+
+static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t *caps, vsh_error *error) {
+    const vshi_components *found = &s->found[whole];
+    closing k = {.mesh = &s->wholes.meshes[whole]};
+    const size_t vertices = found->rim_count > 0 ? k.mesh->vertex_count : 0;
+    vsh_result result = vshi_allocate((void **)&k.parent, vertices, sizeof *k.parent, "holes", error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&k.number, vertices, sizeof *k.number, "holes", error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&k.holes, found->rim_count, sizeof *k.holes, "holes", error);
+    }
+    for (size_t i = 0, rim = 0; i < found->count && result == VSH_OK; ++i) {
+        vshi_component *c = &s->components[s->first[whole] + i];
+        *c = (vshi_component){.whole = (uint32_t)whole,
+                              .triangles = found->begin[i + 1] - found->begin[i],
+                              .list = found->list + found->begin[i],
+                              .cap = (const vshi_vec(*)[3])(s->caps + *caps)};
+        while (rim + c->open_edges < found->rim_count && found->rims[rim + c->open_edges].component == i) {
+            ++c->open_edges;
+        }
+        c->holes = close_holes(&k, found->rims + rim, c->open_edges, s->caps + *caps, s->hole_of + *caps);
+        rim += c->open_edges;
+        *caps += c->open_edges;
+        const measure m = measure_component(s, c);
+        decide(s, c, &m);
+    }
+    free(k.holes);
+    free(k.number);
+    free(k.parent);
+    return result;
+}
+
+vsh_result vshi_kinds_find(vshi_solidity *s, vsh_error *error) {
+    size_t caps = 0;
+    vsh_result result = VSH_OK;
+    for (size_t m = 0; m < s->wholes.count && result == VSH_OK; ++m) {
+        result = find_of_whole(s, m, &caps, error);
+    }
+    return result;
+}

@@ -1,0 +1,55 @@
+#include "base/floats.h"
+#include "base/job.h"
+#include "base/memory.h"
+#include "mesh/solidity.h"
+
+#include <vdbshade/solidity.h>
+
+static void add(const vshi_component *c, vsh_solidity_report *report) {
+    size_t *const counts[] = {[VSHI_KIND_SHEET] = &report->sheets,
+                              [VSHI_KIND_SOLID] = &report->solids,
+                              [VSHI_KIND_ROOM] = &report->rooms,
+                              [VSHI_KIND_WALL] = &report->walls};
+    ++*counts[c->kind];
+    report->turned_triangles += c->turned;
+    report->standing += c->stands;
+    if (c->open_edges > 0 && !c->stands && (c->kind == VSHI_KIND_SOLID || c->kind == VSHI_KIND_ROOM)) {
+        ++report->closed_over;
+        report->holes += c->holes;
+        report->open_edges += c->open_edges;
+    }
+}
+
+vsh_result vsh_mesh_solidity_sized(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                   vsh_solidity_report *reports, size_t reports_size, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS_OF(mesh_count, meshes);
+    VSHI_NEEDS_OF(mesh_count, reports);
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    for (size_t m = 0; m < mesh_count && result == VSH_OK; ++m) {
+        result = vshi_mesh_check_data(&meshes[m], m, error);
+    }
+    vshi_solidity *found = NULL;
+    full.progress = NULL;
+    if (result == VSH_OK) {
+        result = vshi_solidity_create(meshes, mesh_count, &full, &found, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    const vshi_wholes *wholes = vshi_solidity_wholes(found);
+    for (size_t w = 0; w < wholes->count; ++w) {
+        vsh_solidity_report report = {0};
+        size_t count;
+        const vshi_component *components = vshi_solidity_of_whole(found, w, &count);
+        for (size_t i = 0; i < count; ++i) {
+            add(&components[i], &report);
+        }
+        for (size_t m = wholes->first[w]; m < wholes->first[w + 1]; ++m) {
+            vshi_give((char *)reports + m * reports_size, reports_size, &report, sizeof report);
+        }
+    }
+    vshi_solidity_free(found);
+    return VSH_OK;
+}

@@ -1,0 +1,152 @@
+/* glTF 2.0, read by the text of its specification (Khronos, "glTF 2.0 Specification", 2.0.1): what the files
+ * gltf*.c know of the file that they read. Nothing in it is trusted: every index, offset and length is held
+ * against what is there. */
+#ifndef VSHI_CASTER_GLTF_H
+#define VSHI_CASTER_GLTF_H
+
+#include "model/model.h"
+
+#include <jansson.h>
+#include <stdbool.h>
+
+/* Bytes of a buffer, or a part of one. */
+typedef struct vshi_gltf_bytes {
+    const unsigned char *at;
+    size_t size;
+} vshi_gltf_bytes;
+
+typedef struct vshi_gltf_buffer {
+    vshi_gltf_bytes bytes;
+    unsigned char *owned; /* of what came from a URI; may be NULL */
+    bool loaded;
+} vshi_gltf_buffer;
+
+typedef struct vshi_gltf {
+    const char *path;
+    const vsh_run *run;
+    vshi_job *job;
+    json_t *root;
+    vshi_gltf_bytes chunk; /* the binary one of a GLB */
+    bool binary;
+    vshi_gltf_buffer *buffers;
+    size_t buffer_count;
+    double bytes_held; /* by buffers and the model, for the memory limit */
+
+    vsh_model *model;
+    size_t shape_capacity;
+    size_t *mesh_shapes; /* first shape + 1 of each mesh that has been read as it is; 0: not yet */
+    bool *node_seen;
+    double (*node_world)[12]; /* of every node of the scene that has been visited */
+    size_t node_count;
+} vshi_gltf;
+
+/* --- looking up (gltf_json.c) */
+
+/* An element of an array of the root, NULL where there is none. */
+const json_t *vshi_gltf_element(const vshi_gltf *gltf, const char *array, size_t index);
+
+/* A whole number of at least 0; `fallback` where the key is absent; false where the value is anything else.
+ */
+bool vshi_gltf_count(const json_t *object, const char *key, size_t fallback, size_t *value);
+
+/* An index into an array of the root that has such an element, or, where the key is absent, SIZE_MAX.
+ * Errors: VSH_ERROR_INPUT, naming `where`. */
+vsh_result vshi_gltf_index(const vshi_gltf *gltf, const json_t *object, const char *key, const char *array,
+                           const char *where, size_t *index, vsh_error *error);
+
+/* Up to `count` numbers of an array; values that are not there stay. False where one is no number. */
+bool vshi_gltf_numbers(const json_t *object, const char *key, size_t count, double *values);
+
+/* The object of an extension, or NULL. */
+const json_t *vshi_gltf_extension(const json_t *object, const char *name);
+
+vsh_result vshi_gltf_fail(const vshi_gltf *gltf, vsh_error *error, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+/* Adds to what is held, and checks it against the memory limit. */
+vsh_result vshi_gltf_hold(vshi_gltf *gltf, double bytes, vsh_error *error);
+
+/* --- extensions that a file cannot be read without (gltf_extensions.c) */
+
+/* Errors: VSH_ERROR_UNSUPPORTED, naming the extension and what could be done. */
+vsh_result vshi_gltf_check_extensions(const vshi_gltf *gltf, vsh_error *error);
+
+/* --- bytes (gltf_buffer.c) */
+
+/* The bytes of buffer view `index`, and its stride (0: none). Reads the buffer where that is the first time.
+ */
+vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes, size_t *stride,
+                          vsh_error *error);
+
+void vshi_gltf_free_buffers(vshi_gltf *gltf);
+
+/* --- accessors (gltf_accessor.c) */
+
+enum {
+    VSHI_GLTF_BYTE = 5120,
+    VSHI_GLTF_UBYTE = 5121,
+    VSHI_GLTF_SHORT = 5122,
+    VSHI_GLTF_USHORT = 5123,
+    VSHI_GLTF_UINT = 5125,
+    VSHI_GLTF_FLOAT = 5126
+};
+
+typedef struct vshi_gltf_accessor {
+    size_t count;
+    int components; /* 1 … 16 */
+    int type;       /* VSHI_GLTF_… */
+    bool normalized;
+    const unsigned char *at; /* of the first element; NULL: all are 0 */
+    size_t stride;
+    size_t sparse_count; /* elements that are replaced */
+    const unsigned char *sparse_at, *sparse_values;
+    int sparse_type;
+} vshi_gltf_accessor;
+
+/* Looks accessor `index` up, and checks that all of it is there. */
+vsh_result vshi_gltf_accessor_open(vshi_gltf *gltf, size_t index, vshi_gltf_accessor *accessor,
+                                   vsh_error *error);
+
+/* Its elements as floats, `components` each; what is normalized is 0 … 1 or -1 … 1. */
+void vshi_gltf_accessor_floats(const vshi_gltf_accessor *accessor, float *values);
+
+/* Its elements as unsigned integers; the type is one. */
+void vshi_gltf_accessor_integers(const vshi_gltf_accessor *accessor, uint32_t *values);
+
+/* --- meshes (gltf_primitive.c, gltf_draco.c, gltf_pose.c) */
+
+/* What moves the vertices of a mesh that a node uses. All 0: nothing. */
+typedef struct vshi_gltf_pose {
+    const double *weights; /* of the morph targets */
+    size_t weight_count;
+    const double (*joints)[12]; /* world matrix × inverse bind matrix of each joint of the skin; NULL: none */
+    size_t joint_count;
+} vshi_gltf_pose;
+
+/* Reads a primitive into a shape that is all 0; one that has no triangles stays so. `where` names it. */
+vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+                                    const char *where, vshi_model_shape *shape, vsh_error *error);
+
+/* Reads an attribute of `components` floats that has an element a vertex, into new memory. */
+vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, const char *name,
+                                    int components, size_t vertex_count, const char *where, float **values,
+                                    vsh_error *error);
+
+/* Moves positions (and normals) to where the pose has them. */
+vsh_result vshi_gltf_apply_pose(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+                                const char *where, vshi_model_shape *shape, vsh_error *error);
+
+/* The same of a primitive under KHR_draco_mesh_compression: fills positions, normals, UVs and indices. */
+vsh_result vshi_gltf_read_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
+                                vshi_model_shape *shape, vsh_error *error);
+
+/* --- nodes (gltf_nodes.c) */
+
+/* Adds what the file's scene shows to the model. */
+vsh_result vshi_gltf_add_scene(vshi_gltf *gltf, vsh_error *error);
+
+/* Reads a glTF or GLB of `size` bytes that lie at `text`. Errors: as vsh_model_read(). */
+vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, const vsh_run *run, vshi_job *job,
+                          vsh_model **model, vsh_error *error);
+
+#endif

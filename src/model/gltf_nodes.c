@@ -1,0 +1,392 @@
+/* The nodes of a glTF's scene: where they stand, and the meshes that they show. */
+#include "model/gltf.h"
+
+#include "base/memory.h"
+#include "base/vec.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+
+/* Translation × rotation (a quaternion x, y, z, w) × scale, in floats, as transforms have always come out of
+ * files: bakes keep their bits. A quaternion that is no unit one is made one. */
+static void from_parts(const double t[3], const double r[4], const double s[3], double own[12]) {
+    static const double unit_slack = 1e-5;
+    const double square = r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3];
+    const double scale = fabs(square - 1.0) < unit_slack ? 1.0 : square > 0.0 ? 1.0 / sqrt(square) : 0.0;
+    const float x = (float)(r[0] * scale), y = (float)(r[1] * scale), z = (float)(r[2] * scale);
+    const float w = (float)(r[3] * scale);
+    const float turn[9] = {
+        1.0F - 2.0F * (y * y + z * z), 2.0F * (x * y - z * w),        2.0F * (x * z + y * w),
+        2.0F * (x * y + z * w),        1.0F - 2.0F * (x * x + z * z), 2.0F * (y * z - x * w),
+        2.0F * (x * z - y * w),        2.0F * (y * z + x * w),        1.0F - 2.0F * (x * x + y * y),
+    };
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) {
+            own[4 * row + column] = (double)(turn[3 * row + column] * (float)s[column]);
+        }
+        own[4 * row + 3] = (double)(float)t[row];
+    }
+}
+
+static bool own_transform(const json_t *node, double own[12]) {
+    double matrix[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}; /* by columns */
+    double t[3] = {0, 0, 0}, r[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1};
+    if (json_object_get(node, "matrix") != NULL) {
+        const bool good = vshi_gltf_numbers(node, "matrix", 16, matrix);
+        for (int i = 0; i < 12; ++i) {
+            own[i] = (double)(float)matrix[4 * (i % 4) + i / 4];
+        }
+        return good;
+    }
+    const bool good = vshi_gltf_numbers(node, "translation", 3, t) &&
+                      vshi_gltf_numbers(node, "rotation", 4, r) && vshi_gltf_numbers(node, "scale", 3, s);
+    from_parts(t, r, s, own);
+    return good;
+}
+
+/* "nodes[3]" where it has no name, and the same of meshes. */
+static void name_of(const char *array, size_t index, const json_t *item, char *text, size_t size) {
+    const char *name = json_string_value(json_object_get(item, "name"));
+    if (name != NULL && name[0] != '\0') {
+        snprintf(text, size, "%s", name);
+    } else {
+        snprintf(text, size, "%s[%zu]", array, index);
+    }
+}
+
+/* --- shapes */
+
+static vsh_result grow_shapes(vshi_gltf *gltf, size_t more, vsh_error *error) {
+    vsh_model *model = gltf->model;
+    if (more <= gltf->shape_capacity - model->shape_count) {
+        return VSH_OK;
+    }
+    const size_t capacity = 2 * gltf->shape_capacity + more;
+    vshi_model_shape *shapes = NULL;
+    vsh_result result = vshi_gltf_hold(gltf, (double)capacity * sizeof *shapes, error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&shapes, capacity, sizeof *shapes, gltf->path, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (model->shape_count > 0) {
+        memcpy(shapes, model->shapes, model->shape_count * sizeof *shapes);
+    }
+    free(model->shapes);
+    model->shapes = shapes;
+    gltf->shape_capacity = capacity;
+    return VSH_OK;
+}
+
+/* A shape for each primitive of a mesh, from *first on. */
+static vsh_result read_mesh(vshi_gltf *gltf, size_t mesh, const vshi_gltf_pose *pose, size_t *first,
+                            vsh_error *error) {
+    const json_t *given = vshi_gltf_element(gltf, "meshes", mesh);
+    const json_t *primitives = json_object_get(given, "primitives");
+    const size_t count = json_array_size(primitives);
+    const char *name = json_string_value(json_object_get(given, "name"));
+    *first = gltf->model->shape_count;
+    vsh_result result = grow_shapes(gltf, count, error);
+    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+        char where[256];
+        snprintf(where, sizeof where, "mesh %zu '%.150s': primitive %zu", mesh, name != NULL ? name : "", i);
+        vshi_model_shape *shape = &gltf->model->shapes[gltf->model->shape_count++];
+        result = vshi_job_cancelled(gltf->job) ? vshi_job_fail_cancelled(gltf->job, error)
+                                               : vshi_gltf_read_primitive(gltf, json_array_get(primitives, i),
+                                                                          pose, where, shape, error);
+    }
+    return result;
+}
+
+/* --- skins and weights */
+
+static vsh_result read_joints(vshi_gltf *gltf, size_t skin, double (**joints)[12], size_t *count,
+                              vsh_error *error) {
+    char where[64];
+    snprintf(where, sizeof where, "skins[%zu]", skin);
+    const json_t *given = vshi_gltf_element(gltf, "skins", skin);
+    const json_t *list = json_object_get(given, "joints");
+    float *inverse = NULL;
+    size_t accessor;
+    *count = json_array_size(list);
+    vsh_result result =
+        vshi_gltf_index(gltf, given, "inverseBindMatrices", "accessors", where, &accessor, error);
+    if (result == VSH_OK && accessor != SIZE_MAX) {
+        vshi_gltf_accessor opened;
+        result = vshi_gltf_accessor_open(gltf, accessor, &opened, error);
+        if (result == VSH_OK && (opened.count < *count || opened.components != 16)) {
+            result = vshi_gltf_fail(gltf, error, "%s: %zu joints, but %zu matrices of %d components", where,
+                                    *count, opened.count, opened.components);
+        }
+        if (result == VSH_OK) {
+            result = vshi_gltf_hold(gltf, (double)opened.count * sizeof(float[16]), error);
+        }
+        if (result == VSH_OK) {
+            result = vshi_gltf_read_attribute(gltf, given, "inverseBindMatrices", 16, opened.count, where,
+                                              &inverse, error);
+        }
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)joints, *count, sizeof **joints, gltf->path, error);
+    }
+    for (size_t i = 0; i < *count && result == VSH_OK; ++i) {
+        const double node = json_number_value(json_array_get(list, i));
+        if (!(node >= 0.0 && node < (double)gltf->node_count) || !gltf->node_seen[(size_t)node]) {
+            result = vshi_gltf_fail(gltf, error, "%s: joint %zu is no node of the scene", where, i);
+            break;
+        }
+        double bind[12];
+        for (int k = 0; k < 12; ++k) {
+            bind[k] = inverse != NULL ? (double)inverse[16 * i + (size_t)(4 * (k % 4) + k / 4)] : identity[k];
+        }
+        vshi_model_compose(gltf->node_world[(size_t)node], bind, (*joints)[i]);
+    }
+    free(inverse);
+    return result;
+}
+
+/* The default weights of a mesh's morph targets: the node's, else the mesh's; SIZE_MAX: no numbers. */
+static vsh_result read_weights(const vshi_gltf *gltf, const json_t *owner, double **weights, size_t *count,
+                               vsh_error *error) {
+    *count = json_array_size(json_object_get(owner, "weights"));
+    const vsh_result result = vshi_allocate((void **)weights, *count, sizeof **weights, gltf->path, error);
+    if (result == VSH_OK && !vshi_gltf_numbers(owner, "weights", *count, *weights)) {
+        return vshi_gltf_fail(gltf, error, "the weights of morph targets are no numbers");
+    }
+    return result;
+}
+
+/* --- entries */
+
+static vsh_result add_entries(vshi_gltf *gltf, size_t node, size_t mesh, size_t first, const char *suffix,
+                              const double world[12], vsh_error *error) {
+    const json_t *given = vshi_gltf_element(gltf, "meshes", mesh);
+    const size_t count = json_array_size(json_object_get(given, "primitives"));
+    char node_name[256], mesh_name[256];
+    const uint32_t object = vshi_model_next_object(gltf->model);
+    name_of("nodes", node, vshi_gltf_element(gltf, "nodes", node), node_name, sizeof node_name);
+    name_of("meshes", mesh, given, mesh_name, sizeof mesh_name);
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+        if (gltf->model->shapes[first + i].triangle_count == 0) {
+            continue;
+        }
+        char one[320], part[320];
+        snprintf(one, sizeof one, "%s%s", node_name, suffix);
+        if (count > 1) {
+            snprintf(part, sizeof part, "%s-%zu", mesh_name, i);
+        } else {
+            snprintf(part, sizeof part, "%s", mesh_name);
+        }
+        result = vshi_gltf_hold(gltf, sizeof(vshi_model_entry) + (double)strlen(one), error);
+        const vshi_model_place place = {
+            .node = one, .mesh = part, .object = object, .shape = first + i, .world = world};
+        if (result == VSH_OK) {
+            result = vshi_model_add(gltf->model, gltf->path, gltf->run, &place, error);
+        }
+    }
+    return result;
+}
+
+/* EXT_mesh_gpu_instancing: the mesh once for every element of its accessors, each with a transform behind the
+ * node's. */
+static vsh_result add_instances(vshi_gltf *gltf, size_t node, size_t mesh, size_t first,
+                                const json_t *instancing, vsh_error *error) {
+    static const struct {
+        const char *name;
+        int components;
+    } parts[3] = {{"TRANSLATION", 3}, {"ROTATION", 4}, {"SCALE", 3}};
+    const json_t *attributes = json_object_get(instancing, "attributes");
+    float *values[3] = {NULL, NULL, NULL};
+    size_t count = SIZE_MAX;
+    char where[64];
+    snprintf(where, sizeof where, "nodes[%zu]: EXT_mesh_gpu_instancing", node);
+    vsh_result result = VSH_OK;
+    for (int k = 0; k < 3 && result == VSH_OK; ++k) {
+        size_t index;
+        vshi_gltf_accessor accessor;
+        result = vshi_gltf_index(gltf, attributes, parts[k].name, "accessors", where, &index, error);
+        if (result != VSH_OK || index == SIZE_MAX) {
+            continue;
+        }
+        result = vshi_gltf_accessor_open(gltf, index, &accessor, error);
+        count = count == SIZE_MAX ? accessor.count : count;
+        if (result == VSH_OK) {
+            result = vshi_gltf_read_attribute(gltf, attributes, parts[k].name, parts[k].components, count,
+                                              where, &values[k], error);
+        }
+    }
+    if (result == VSH_OK && count == SIZE_MAX) {
+        result = vshi_gltf_fail(gltf, error, "%s has neither TRANSLATION nor ROTATION nor SCALE", where);
+    }
+    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+        double t[3] = {0, 0, 0}, r[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1}, own[12], world[12];
+        double *const given[3] = {t, r, s};
+        for (int k = 0; k < 3; ++k) {
+            for (int c = 0; c < parts[k].components && values[k] != NULL; ++c) {
+                given[k][c] = (double)values[k][(size_t)parts[k].components * i + (size_t)c];
+            }
+        }
+        from_parts(t, r, s, own);
+        vshi_model_compose(gltf->node_world[node], own, world);
+        char suffix[32];
+        snprintf(suffix, sizeof suffix, "[%zu]", i);
+        result = vshi_job_cancelled(gltf->job) ? vshi_job_fail_cancelled(gltf->job, error)
+                                               : add_entries(gltf, node, mesh, first, suffix, world, error);
+    }
+    for (int k = 0; k < 3; ++k) {
+        free(values[k]);
+    }
+    return result;
+}
+
+static vsh_result add_node(vshi_gltf *gltf, size_t node, vsh_error *error) {
+    char where[64];
+    snprintf(where, sizeof where, "nodes[%zu]", node);
+    const json_t *given = vshi_gltf_element(gltf, "nodes", node);
+    size_t mesh, skin, first = 0;
+    double *weights = NULL, (*joints)[12] = NULL;
+    vshi_gltf_pose pose = {0};
+    vsh_result result = vshi_gltf_index(gltf, given, "mesh", "meshes", where, &mesh, error);
+    if (result == VSH_OK) {
+        result = vshi_gltf_index(gltf, given, "skin", "skins", where, &skin, error);
+    }
+    if (result != VSH_OK || mesh == SIZE_MAX) {
+        return result;
+    }
+    const bool own_weights = json_object_get(given, "weights") != NULL;
+    const json_t *mesh_given = vshi_gltf_element(gltf, "meshes", mesh);
+    const bool shared = skin == SIZE_MAX && !own_weights;
+    if (shared && gltf->mesh_shapes[mesh] > 0) {
+        first = gltf->mesh_shapes[mesh] - 1;
+    } else {
+        result = read_weights(gltf, own_weights ? given : mesh_given, &weights, &pose.weight_count, error);
+        if (result == VSH_OK && skin != SIZE_MAX) {
+            result = read_joints(gltf, skin, &joints, &pose.joint_count, error);
+        }
+        pose.weights = weights;
+        pose.joints = (const double(*)[12])joints;
+        if (result == VSH_OK) {
+            result = read_mesh(gltf, mesh, &pose, &first, error);
+        }
+        free(joints);
+        free(weights);
+        if (result == VSH_OK && shared) {
+            gltf->mesh_shapes[mesh] = first + 1;
+        }
+    }
+    const json_t *instancing = vshi_gltf_extension(given, "EXT_mesh_gpu_instancing");
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (pose.joint_count > 0) {
+        return add_entries(gltf, node, mesh, first, "", identity, error);
+    }
+    return instancing != NULL ? add_instances(gltf, node, mesh, first, instancing, error)
+                              : add_entries(gltf, node, mesh, first, "", gltf->node_world[node], error);
+}
+
+/* --- the tree */
+
+typedef struct walk {
+    size_t *order; /* of the nodes that have been visited, parents before children */
+    size_t count;
+} walk;
+
+static vsh_result visit(vshi_gltf *gltf, const json_t *nodes, const double parent[12], int depth,
+                        walk *walked, vsh_error *error) {
+    enum { DEEPEST = 1024 };
+    size_t i;
+    const json_t *item;
+    if (depth > DEEPEST) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: its nodes are nested deeper than %d", gltf->path,
+                         DEEPEST);
+    }
+    json_array_foreach(nodes, i, item) {
+        const double number = json_number_value(item);
+        if (!json_is_number(item) || !(number >= 0.0 && number < (double)gltf->node_count)) {
+            return vshi_gltf_fail(gltf, error, "a list of nodes names node %g, but there are only %zu",
+                                  number, gltf->node_count);
+        }
+        const size_t node = (size_t)number;
+        const json_t *given = vshi_gltf_element(gltf, "nodes", node);
+        double own[12];
+        if (gltf->node_seen[node]) {
+            return vshi_gltf_fail(gltf, error, "nodes[%zu] is its own descendant, or has two parents", node);
+        }
+        gltf->node_seen[node] = true;
+        walked->order[walked->count++] = node;
+        if (!own_transform(given, own)) {
+            return vshi_gltf_fail(gltf, error, "nodes[%zu]: its transform holds what is no number", node);
+        }
+        vshi_model_compose(parent, own, gltf->node_world[node]);
+        const vsh_result result =
+            visit(gltf, json_object_get(given, "children"), gltf->node_world[node], depth + 1, walked, error);
+        if (result != VSH_OK) {
+            return result;
+        }
+    }
+    return VSH_OK;
+}
+
+/* All nodes that are nobody's child, in new memory: what a file without scenes shows. */
+static json_t *find_roots(const vshi_gltf *gltf) {
+    json_t *roots = json_array();
+    bool *child = calloc(gltf->node_count + 1, sizeof *child);
+    for (size_t n = 0; n < gltf->node_count && child != NULL; ++n) {
+        size_t i;
+        const json_t *item;
+        json_array_foreach(json_object_get(vshi_gltf_element(gltf, "nodes", n), "children"), i, item) {
+            const double number = json_number_value(item);
+            if (number >= 0.0 && number < (double)gltf->node_count) {
+                child[(size_t)number] = true;
+            }
+        }
+    }
+    for (size_t n = 0; n < gltf->node_count && child != NULL; ++n) {
+        if (!child[n]) {
+            json_array_append_new(roots, json_integer((json_int_t)n));
+        }
+    }
+    free(child);
+    return roots;
+}
+
+static vsh_result visit_scene(vshi_gltf *gltf, walk *walked, vsh_error *error) {
+    size_t index;
+    const json_t *scenes = json_object_get(gltf->root, "scenes");
+    vsh_result result = vshi_gltf_index(gltf, gltf->root, "scene", "scenes", "glTF", &index, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (json_array_size(scenes) > 0) { /* the first where none is named */
+        const json_t *scene = json_array_get(scenes, index == SIZE_MAX ? 0 : index);
+        return visit(gltf, json_object_get(scene, "nodes"), identity, 0, walked, error);
+    }
+    json_t *roots = find_roots(gltf);
+    result = visit(gltf, roots, identity, 0, walked, error);
+    json_decref(roots);
+    return result;
+}
+
+vsh_result vshi_gltf_add_scene(vshi_gltf *gltf, vsh_error *error) {
+    walk walked = {NULL, 0};
+    vsh_result result =
+        vshi_allocate((void **)&walked.order, gltf->node_count, sizeof *walked.order, gltf->path, error);
+    if (result == VSH_OK) {
+        result = visit_scene(gltf, &walked, error);
+    }
+    for (size_t i = 0; i < walked.count && result == VSH_OK; ++i) {
+        result = add_node(gltf, walked.order[i], error);
+    }
+    free(walked.order);
+    if (result == VSH_OK && gltf->model->entry_count == 0) {
+        result = vshi_gltf_fail(gltf, error, "holds no triangles");
+    }
+    return result;
+}

@@ -1,0 +1,159 @@
+/* The rest pose: morph targets at their default weights (glTF 2.0, 3.7.2.2), then skins, which move vertices
+ * by their joints and leave the node's own transform out (3.7.3.3). */
+#include "model/gltf.h"
+
+#include "base/memory.h"
+#include "base/vec.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static vsh_result add_target(vshi_gltf *gltf, const json_t *target, const char *name, double weight,
+                             const char *where, size_t vertex_count, float *values, vsh_error *error) {
+    float *moves = NULL;
+    const vsh_result result =
+        vshi_gltf_read_attribute(gltf, target, name, 3, vertex_count, where, &moves, error);
+    for (size_t i = 0; result == VSH_OK && moves != NULL && i < 3 * vertex_count; ++i) {
+        values[i] = (float)((double)values[i] + weight * (double)moves[i]);
+    }
+    free(moves);
+    return result;
+}
+
+static vsh_result morph(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+                        const char *where, vshi_model_shape *shape, vsh_error *error) {
+    const json_t *targets = json_object_get(primitive, "targets");
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < json_array_size(targets) && i < pose->weight_count && result == VSH_OK; ++i) {
+        const json_t *target = json_array_get(targets, i);
+        const double weight = pose->weights[i];
+        if (weight == 0.0) {
+            continue;
+        }
+        result =
+            add_target(gltf, target, "POSITION", weight, where, shape->vertex_count, shape->positions, error);
+        if (result == VSH_OK && shape->normals != NULL) {
+            result =
+                add_target(gltf, target, "NORMAL", weight, where, shape->vertex_count, shape->normals, error);
+        }
+    }
+    return result;
+}
+
+/* The sums of each vertex's joint matrices, and of its weights. */
+typedef struct blend {
+    double matrix[12], sum;
+} blend;
+
+static vsh_result add_joints(vshi_gltf *gltf, const vshi_gltf_pose *pose, size_t index, const float *weights,
+                             const char *where, size_t vertex_count, blend *blends, vsh_error *error) {
+    vshi_gltf_accessor accessor;
+    vsh_result result = vshi_gltf_accessor_open(gltf, index, &accessor, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (accessor.components != 4 || (accessor.type != VSHI_GLTF_UBYTE && accessor.type != VSHI_GLTF_USHORT) ||
+        accessor.count != vertex_count) {
+        return vshi_gltf_fail(gltf, error,
+                              "%s: its joints are no four bytes or shorts for each of %zu vertices", where,
+                              vertex_count);
+    }
+    uint32_t *joints = NULL;
+    result = vshi_gltf_hold(gltf, (double)vertex_count * sizeof(uint32_t[4]), error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&joints, vertex_count, sizeof(uint32_t[4]), gltf->path, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    vshi_gltf_accessor_integers(&accessor, joints);
+    for (size_t i = 0; i < 4 * vertex_count && result == VSH_OK; ++i) {
+        const double weight = (double)weights[i];
+        if (weight == 0.0) {
+            continue;
+        }
+        if (joints[i] >= pose->joint_count) {
+            result = vshi_gltf_fail(gltf, error, "%s: vertex %zu uses joint %u, but its skin has only %zu",
+                                    where, i / 4, joints[i], pose->joint_count);
+            break;
+        }
+        blends[i / 4].sum += weight;
+        for (int k = 0; k < 12; ++k) {
+            blends[i / 4].matrix[k] += weight * pose->joints[joints[i]][k];
+        }
+    }
+    free(joints);
+    return result;
+}
+
+static vsh_result add_sets(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+                           const char *where, size_t vertex_count, blend *blends, vsh_error *error) {
+    const json_t *attributes = json_object_get(primitive, "attributes");
+    vsh_result result = VSH_OK;
+    for (int set = 0; set < VSH_MAX_UV_SETS && result == VSH_OK; ++set) {
+        char name[32];
+        size_t index;
+        float *weights = NULL;
+        snprintf(name, sizeof name, "JOINTS_%d", set);
+        result = vshi_gltf_index(gltf, attributes, name, "accessors", where, &index, error);
+        if (result != VSH_OK || index == SIZE_MAX) {
+            break;
+        }
+        snprintf(name, sizeof name, "WEIGHTS_%d", set);
+        result = vshi_gltf_read_attribute(gltf, attributes, name, 4, vertex_count, where, &weights, error);
+        if (result == VSH_OK && weights != NULL) {
+            result = add_joints(gltf, pose, index, weights, where, vertex_count, blends, error);
+        }
+        free(weights);
+    }
+    return result;
+}
+
+/* Weights that do not add up to 1 are scaled; a vertex without any follows the first joint. */
+static void finish(const vshi_gltf_pose *pose, blend *b) {
+    if (!(b->sum > 0.0)) {
+        memcpy(b->matrix, pose->joints[0], sizeof b->matrix);
+        return;
+    }
+    for (int k = 0; k < 12; ++k) {
+        b->matrix[k] /= b->sum;
+    }
+}
+
+static void store(vshi_vec v, float *to) {
+    to[0] = (float)v.x;
+    to[1] = (float)v.y;
+    to[2] = (float)v.z;
+}
+
+static vsh_result skin(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+                       const char *where, vshi_model_shape *shape, vsh_error *error) {
+    blend *blends = NULL;
+    vsh_result result = vshi_gltf_hold(gltf, (double)shape->vertex_count * sizeof *blends, error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&blends, shape->vertex_count, sizeof *blends, gltf->path, error);
+    }
+    if (result == VSH_OK) {
+        result = add_sets(gltf, primitive, pose, where, shape->vertex_count, blends, error);
+    }
+    for (size_t v = 0; v < shape->vertex_count && result == VSH_OK; ++v) {
+        finish(pose, &blends[v]);
+        const double *m = blends[v].matrix;
+        store(vshi_transform_point(m, vshi_vec_off(shape->positions + 3 * v)), shape->positions + 3 * v);
+        if (shape->normals != NULL) {
+            store(vshi_unit(vshi_transform_normal(m, vshi_vec_off(shape->normals + 3 * v))),
+                  shape->normals + 3 * v);
+        }
+    }
+    free(blends);
+    return result;
+}
+
+vsh_result vshi_gltf_apply_pose(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+                                const char *where, vshi_model_shape *shape, vsh_error *error) {
+    const vsh_result result = morph(gltf, primitive, pose, where, shape, error);
+    return result == VSH_OK && pose->joints != NULL && pose->joint_count > 0
+               ? skin(gltf, primitive, pose, where, shape, error)
+               : result;
+}

@@ -1,0 +1,272 @@
+/* A mesh's primitive: its vertices, and its triangles from lists, strips and fans. */
+#include "model/gltf.h"
+
+#include "base/memory.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MODE_TRIANGLES = 4, MODE_STRIP = 5, MODE_FAN = 6 };
+
+vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, const char *name,
+                                    int components, size_t vertex_count, const char *where, float **values,
+                                    vsh_error *error) {
+    size_t index;
+    vshi_gltf_accessor accessor;
+    *values = NULL;
+    vsh_result result = vshi_gltf_index(gltf, attributes, name, "accessors", where, &index, error);
+    if (result != VSH_OK || index == SIZE_MAX) {
+        return result;
+    }
+    result = vshi_gltf_accessor_open(gltf, index, &accessor, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (accessor.components != components || accessor.type == VSHI_GLTF_UINT) {
+        return vshi_gltf_fail(gltf, error,
+                              "%s: %s has %d components of type %d, expected %d of type 5120 to 5123 or 5126",
+                              where, name, accessor.components, accessor.type, components);
+    }
+    if (accessor.count != vertex_count) {
+        return vshi_gltf_fail(gltf, error, "%s: %s has %zu elements for %zu vertices", where, name,
+                              accessor.count, vertex_count);
+    }
+    const size_t size = (size_t)components * sizeof(float);
+    result = vshi_gltf_hold(gltf, (double)(accessor.count * size), error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)values, accessor.count, size, gltf->path, error);
+    }
+    if (result == VSH_OK) {
+        vshi_gltf_accessor_floats(&accessor, *values);
+    }
+    return result;
+}
+
+static vsh_result read_vertices(vshi_gltf *gltf, const json_t *primitive, const char *where,
+                                vshi_model_shape *shape, vsh_error *error) {
+    const json_t *attributes = json_object_get(primitive, "attributes");
+    const size_t count = shape->vertex_count;
+    vsh_result result =
+        vshi_gltf_read_attribute(gltf, attributes, "POSITION", 3, count, where, &shape->positions, error);
+    if (result == VSH_OK) {
+        result =
+            vshi_gltf_read_attribute(gltf, attributes, "NORMAL", 3, count, where, &shape->normals, error);
+    }
+    for (int set = 0; set < VSH_MAX_UV_SETS && result == VSH_OK; ++set) {
+        char name[32];
+        snprintf(name, sizeof name, "TEXCOORD_%d", set);
+        result = vshi_gltf_read_attribute(gltf, attributes, name, 2, count, where, &shape->uvs[set], error);
+        shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;
+    }
+    return result;
+}
+
+/* The vertices in the order that a primitive draws them in: *order, *count of them. */
+static vsh_result read_order(vshi_gltf *gltf, const json_t *primitive, size_t vertex_count, const char *where,
+                             uint32_t **order, size_t *count, vsh_error *error) {
+    size_t index;
+    vshi_gltf_accessor accessor = {.count = vertex_count};
+    vsh_result result = vshi_gltf_index(gltf, primitive, "indices", "accessors", where, &index, error);
+    if (result == VSH_OK && index != SIZE_MAX) {
+        result = vshi_gltf_accessor_open(gltf, index, &accessor, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (index != SIZE_MAX &&
+        (accessor.components != 1 || (accessor.type != VSHI_GLTF_UBYTE && accessor.type != VSHI_GLTF_USHORT &&
+                                      accessor.type != VSHI_GLTF_UINT))) {
+        return vshi_gltf_fail(gltf, error,
+                              "%s: its indices have %d components of type %d, expected one of "
+                              "type 5121, 5123 or 5125",
+                              where, accessor.components, accessor.type);
+    }
+    *count = accessor.count;
+    result = vshi_gltf_hold(gltf, (double)(accessor.count * sizeof **order), error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)order, accessor.count, sizeof **order, gltf->path, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (index != SIZE_MAX) {
+        vshi_gltf_accessor_integers(&accessor, *order);
+    }
+    for (size_t i = 0; i < accessor.count && index == SIZE_MAX; ++i) {
+        (*order)[i] = (uint32_t)i;
+    }
+    for (size_t i = 0; i < accessor.count; ++i) {
+        if ((*order)[i] >= vertex_count) {
+            return vshi_gltf_fail(gltf, error, "%s: index %zu of %zu is %u, but there are only %zu vertices",
+                                  where, i, accessor.count, (*order)[i], vertex_count);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Triangle i of a strip or a fan (glTF 2.0, 3.7.2.1). */
+static void pick(size_t mode, const uint32_t *order, size_t i, uint32_t corner[3]) {
+    if (mode == MODE_STRIP) {
+        corner[0] = order[i];
+        corner[1] = order[i + 1 + i % 2];
+        corner[2] = order[i + 2 - i % 2];
+    } else {
+        corner[0] = order[i + 1];
+        corner[1] = order[i + 2];
+        corner[2] = order[0];
+    }
+}
+
+/* Strips and fans; triangles of fewer than three vertices, by which strips are joined, are left out. */
+static vsh_result unroll(vshi_gltf *gltf, size_t mode, const uint32_t *order, size_t count,
+                         vshi_model_shape *shape, vsh_error *error) {
+    vsh_result result = vshi_gltf_hold(gltf, (double)count * sizeof(uint32_t[3]), error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&shape->indices, count - 2, sizeof(uint32_t[3]), gltf->path, error);
+    }
+    for (size_t i = 0; i + 2 < count && result == VSH_OK; ++i) {
+        uint32_t corner[3];
+        pick(mode, order, i, corner);
+        if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
+            memcpy(shape->indices + 3 * shape->triangle_count++, corner, sizeof corner);
+        }
+    }
+    return result;
+}
+
+static vsh_result read_plain(vshi_gltf *gltf, const json_t *primitive, size_t mode, const char *where,
+                             vshi_model_shape *shape, vsh_error *error) {
+    size_t index;
+    vshi_gltf_accessor accessor;
+    uint32_t *order = NULL;
+    size_t count = 0;
+    vsh_result result = vshi_gltf_index(gltf, json_object_get(primitive, "attributes"), "POSITION",
+                                        "accessors", where, &index, error);
+    if (result != VSH_OK || index == SIZE_MAX) {
+        return result; /* without positions there is nothing to see (3.7.2.1) */
+    }
+    result = vshi_gltf_accessor_open(gltf, index, &accessor, error);
+    shape->vertex_count = accessor.count;
+    if (result == VSH_OK) {
+        result = read_order(gltf, primitive, accessor.count, where, &order, &count, error);
+    }
+    if (result == VSH_OK && count >= 3 && mode == MODE_TRIANGLES) {
+        shape->indices = order;
+        shape->triangle_count = count / 3;
+        order = NULL;
+    } else if (result == VSH_OK && count >= 3) {
+        result = unroll(gltf, mode, order, count, shape, error);
+    }
+    free(order);
+    return result == VSH_OK && shape->triangle_count > 0 ? read_vertices(gltf, primitive, where, shape, error)
+                                                         : result;
+}
+
+/* Many primitives may share one large accessor, of which each uses a part: only that is kept. */
+static vsh_result drop_unused(const vshi_gltf *gltf, vshi_model_shape *shape, vsh_error *error) {
+    uint32_t *place = NULL;
+    const vsh_result result =
+        vshi_allocate((void **)&place, shape->vertex_count, sizeof *place, gltf->path, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    for (size_t i = 0; i < 3 * shape->triangle_count; ++i) {
+        place[shape->indices[i]] = 1;
+    }
+    uint32_t used = 0;
+    for (size_t v = 0; v < shape->vertex_count; ++v) {
+        const bool keep = place[v] != 0;
+        place[v] = used;
+        if (keep && used < v) {
+            memcpy(shape->positions + 3 * (size_t)used, shape->positions + 3 * v, sizeof(float[3]));
+            if (shape->normals != NULL) {
+                memcpy(shape->normals + 3 * (size_t)used, shape->normals + 3 * v, sizeof(float[3]));
+            }
+            for (int set = 0; set < shape->uv_sets; ++set) {
+                if (shape->uvs[set] != NULL) {
+                    memcpy(shape->uvs[set] + 2 * (size_t)used, shape->uvs[set] + 2 * v, sizeof(float[2]));
+                }
+            }
+        }
+        used += keep;
+    }
+    for (size_t i = 0; i < 3 * shape->triangle_count && used < shape->vertex_count; ++i) {
+        shape->indices[i] = place[shape->indices[i]];
+    }
+    shape->vertex_count = used;
+    free(place);
+    return VSH_OK;
+}
+
+/* Directions that are not finite become zero, which no direction is: flat there. */
+static void check_normals(const vshi_gltf *gltf, const char *where, const vshi_model_shape *shape) {
+    size_t bad = 0;
+    for (size_t v = 0; v < shape->vertex_count && shape->normals != NULL; ++v) {
+        float *n = shape->normals + 3 * v;
+        if (!isfinite(n[0]) || !isfinite(n[1]) || !isfinite(n[2])) {
+            memset(n, 0, sizeof(float[3]));
+            ++bad;
+        }
+    }
+    if (bad > 0) {
+        vshi_warn(gltf->run, "%s: %s: %zu normals are not finite: flat there", gltf->path, where, bad);
+    }
+}
+
+static vsh_result check_vertices(const vshi_gltf *gltf, const char *where, const vshi_model_shape *shape,
+                                 vsh_error *error) {
+    for (size_t v = 0; v < shape->vertex_count; ++v) {
+        const float *p = shape->positions + 3 * v;
+        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) {
+            return vshi_gltf_fail(gltf, error,
+                                  "%s: vertex %zu of %zu lies at (%g, %g, %g), expected finite numbers",
+                                  where, v, shape->vertex_count, (double)p[0], (double)p[1], (double)p[2]);
+        }
+    }
+    return VSH_OK;
+}
+
+static int32_t alpha_of(const vshi_gltf *gltf, const json_t *primitive) {
+    size_t material;
+    if (!vshi_gltf_count(primitive, "material", SIZE_MAX, &material) || material == SIZE_MAX) {
+        return VSH_ALPHA_OPAQUE;
+    }
+    const char *mode =
+        json_string_value(json_object_get(vshi_gltf_element(gltf, "materials", material), "alphaMode"));
+    return mode != NULL && strcmp(mode, "BLEND") == 0  ? VSH_ALPHA_BLENDED
+           : mode != NULL && strcmp(mode, "MASK") == 0 ? VSH_ALPHA_MASKED
+                                                       : VSH_ALPHA_OPAQUE;
+}
+
+vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+                                    const char *where, vshi_model_shape *shape, vsh_error *error) {
+    size_t mode;
+    if (!vshi_gltf_count(primitive, "mode", MODE_TRIANGLES, &mode) || mode > MODE_FAN) {
+        return vshi_gltf_fail(gltf, error, "%s: its mode is none", where);
+    }
+    if (mode < MODE_TRIANGLES) {
+        return VSH_OK; /* points or lines */
+    }
+    const json_t *draco = vshi_gltf_extension(primitive, "KHR_draco_mesh_compression");
+    vsh_result result = draco != NULL ? vshi_gltf_read_draco(gltf, draco, where, shape, error)
+                                      : read_plain(gltf, primitive, mode, where, shape, error);
+    if (result != VSH_OK || shape->triangle_count == 0) {
+        return result;
+    }
+    shape->alpha = alpha_of(gltf, primitive);
+    result = vshi_gltf_apply_pose(gltf, primitive, pose, where, shape, error);
+    result = result == VSH_OK ? drop_unused(gltf, shape, error) : result;
+    result = result == VSH_OK ? check_vertices(gltf, where, shape, error) : result;
+    if (result != VSH_OK) {
+        return result;
+    }
+    check_normals(gltf, where, shape);
+    for (int set = 0; set < shape->uv_sets; ++set) {
+        for (size_t v = 0; v < shape->vertex_count && shape->uvs[set] != NULL; ++v) {
+            shape->uvs[set][2 * v + 1] = 1.0F - shape->uvs[set][2 * v + 1]; /* v points down in glTF */
+        }
+    }
+    return VSH_OK;
+}

@@ -1,0 +1,127 @@
+/* A model: the arrays of each mesh of a file once, and an entry for every node that uses them. glTF is read
+ * by gltf*.c, other formats by Assimp (model_file.c, model_build.c). v of UVs points up in every format. */
+#include "model/model.h"
+
+#include "base/floats.h"
+#include "model/model_file.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void vsh_model_free(vsh_model *model) {
+    if (model == NULL) {
+        return;
+    }
+    for (size_t i = 0; i < model->entry_count; ++i) {
+        free(model->entries[i].object_name);
+        free(model->entries[i].name);
+    }
+    free(model->entries);
+    for (size_t i = 0; i < model->shape_count; ++i) {
+        vshi_model_shape *shape = &model->shapes[i];
+        free(shape->indices);
+        for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
+            free(shape->uvs[set]);
+        }
+        free(shape->normals);
+        free(shape->positions);
+    }
+    free(model->shapes);
+    free(model);
+}
+
+size_t vsh_model_mesh_count(const vsh_model *model) {
+    return model->entry_count;
+}
+
+double vsh_unit(const char *name) {
+    static const struct {
+        const char *name;
+        double metres;
+    } units[] = {{"m", 1.0}, {"cm", 0.01}, {"mm", 0.001}, {"in", 0.0254}, {"ft", 0.3048}};
+    for (size_t i = 0; name != NULL && i < sizeof units / sizeof units[0]; ++i) {
+        if (strcmp(name, units[i].name) == 0) {
+            return units[i].metres;
+        }
+    }
+    return 0.0;
+}
+
+double vsh_model_unit(const vsh_model *model) {
+    return model->unit;
+}
+
+int32_t vsh_model_uv_sets(const vsh_model *model, size_t index) {
+    return model->shapes[model->entries[index].shape].uv_sets;
+}
+
+vsh_mesh vsh_model_mesh(const vsh_model *model, size_t index, int32_t uv_set) {
+    const vshi_model_entry *entry = &model->entries[index];
+    const vshi_model_shape *shape = &model->shapes[entry->shape];
+    const int32_t set = uv_set == -1 ? shape->uv_sets > 1 : uv_set;
+    return (vsh_mesh){
+        .name = entry->name,
+        .positions = shape->positions,
+        .normals = shape->normals,
+        .uvs = set >= 0 && set < VSH_MAX_UV_SETS ? shape->uvs[set] : NULL,
+        .indices = shape->indices,
+        .vertex_count = shape->vertex_count,
+        .triangle_count = shape->triangle_count,
+        .transform = entry->transform,
+        .object_name = entry->object_name,
+        .object = entry->object,
+        .alpha = shape->alpha,
+    };
+}
+
+/* STL's normals are those of its facets, often zero or wrong: the triangles know better. */
+static bool wants_normals(const char *path) {
+    const char *dot = strrchr(path, '.');
+    return dot == NULL || (strcmp(dot, ".stl") != 0 && strcmp(dot, ".STL") != 0);
+}
+
+static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job, vsh_model **model,
+                            vsh_error *error) {
+    vshi_import *import = NULL;
+    double unit = 0.0;
+    vsh_result result = vshi_model_file_read(path, run, job, &import, model, &unit, error);
+    if (result == VSH_OK && import != NULL) {
+        const vshi_model_source source = {.path = path,
+                                          .run = run,
+                                          .job = job,
+                                          .scene = vshi_import_scene(import),
+                                          .keep_normals = wants_normals(path),
+                                          .unit = unit > 0.0 ? unit : vshi_import_unit(import),
+                                          .in_metres = unit > 0.0};
+        result = vshi_model_build(&source, model, error);
+    }
+    vshi_import_free(import);
+    return result;
+}
+
+vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error) {
+    VSHI_FLOATS;
+    enum { BUILD_UNITS = 100 };
+    VSHI_NEEDS(model);
+    *model = NULL;
+    VSHI_NEEDS(path);
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    vshi_job *job = vshi_job_begin(&full, "load", VSHI_MODEL_FILE_UNITS + BUILD_UNITS);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    }
+    result = full.reader != NULL
+                 ? vshi_model_from_reader(path, &full, job, VSHI_MODEL_FILE_UNITS, model, error)
+                 : read_here(path, &full, job, model, error);
+    if (result == VSH_OK && vshi_job_advance(job, BUILD_UNITS)) {
+        vsh_model_free(*model);
+        *model = NULL;
+        result = vshi_job_fail_cancelled(job, error);
+    }
+    vshi_job_end(job);
+    return result;
+}

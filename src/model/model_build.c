@@ -1,0 +1,248 @@
+/* From Assimp's scene to a model: arrays, polygons cut into triangles, skins at rest, places. */
+#include "base/memory.h"
+#include "mesh/mesh.h"
+#include "model/model.h"
+#include "model/model_skin.h"
+#include "model/polygon.h"
+
+#include <assimp/material.h>
+#include <assimp/scene.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Most triangles that a mesh's faces make. */
+static size_t count_triangles(const struct aiMesh *mesh) {
+    size_t count = 0;
+    for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
+        const unsigned corners = mesh->mFaces[f].mNumIndices;
+        count += corners >= 3 ? corners - 2 : 0;
+    }
+    return count;
+}
+
+static vsh_result check_size(const vshi_model_source *source, vsh_error *error) {
+    double bytes = 0.0;
+    for (unsigned m = 0; m < source->scene->mNumMeshes; ++m) {
+        const struct aiMesh *mesh = source->scene->mMeshes[m];
+        double vertex = 0.0; /* our bytes and Assimp's */
+        vertex += sizeof(float[3]) + sizeof(struct aiVector3D);
+        vertex += mesh->mNormals != NULL ? sizeof(float[3]) + sizeof(struct aiVector3D) : 0;
+        for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
+            vertex += mesh->mTextureCoords[set] != NULL ? sizeof(float[2]) + sizeof(struct aiVector3D) : 0;
+        }
+        vertex += mesh->mNumBones > 0 ? VSHI_SKIN_BYTES_A_VERTEX : 0;
+        /* Each of Assimp's faces has an array of its own, of 32 bytes with malloc's header. */
+        bytes += vertex * mesh->mNumVertices + (sizeof(struct aiFace) + 32.0) * mesh->mNumFaces +
+                 (double)sizeof(uint32_t[3]) * (double)count_triangles(mesh);
+    }
+    return vshi_check_limit(source->run, bytes, source->path, error);
+}
+
+/* Vectors that are not finite become zero, which no direction is: flat there. Returns how many. */
+static size_t copy_normals(float *to, const struct aiVector3D *from, size_t count) {
+    size_t bad = 0;
+    for (size_t v = 0; v < count; ++v) {
+        const vshi_vec n = {from[v].x, from[v].y, from[v].z};
+        const bool good = vshi_finite(n);
+        to[3 * v] = good ? from[v].x : 0.0F;
+        to[3 * v + 1] = good ? from[v].y : 0.0F;
+        to[3 * v + 2] = good ? from[v].z : 0.0F;
+        bad += !good;
+    }
+    return bad;
+}
+
+/* Polygons that shared their first corner with the face before have always begun at another one (Assimp's
+ * encoding of polygons as fans), and so bakes keep their bits. */
+static void turn_fan(uint32_t *triangles, size_t count, uint32_t *last_first) {
+    if (triangles[0] == *last_first) {
+        uint32_t *t = triangles;
+        const uint32_t first[3] = {t[2], t[0], t[1]};
+        memcpy(t, first, sizeof first);
+        if (count == 2) {
+            const uint32_t second[3] = {t[4], t[5], t[3]};
+            memcpy(t + 3, second, sizeof second);
+        }
+    }
+    *last_first = triangles[0];
+}
+
+static vsh_result copy_faces(const vshi_model_source *source, const struct aiMesh *mesh,
+                             vshi_model_shape *shape, vsh_error *error) {
+    enum { FACES_A_POLL = 1 << 14 };
+    vshi_polygon_cutter cutter = {0};
+    uint32_t last_first = UINT32_MAX;
+    size_t crossing = 0;
+    vsh_result result = VSH_OK;
+    const bool polygons = shape->triangle_count > mesh->mNumFaces;
+    shape->triangle_count = 0;
+    for (unsigned f = 0; f < mesh->mNumFaces && result == VSH_OK; ++f) {
+        const struct aiFace *face = &mesh->mFaces[f];
+        uint32_t *to = shape->indices + 3 * shape->triangle_count;
+        if (face->mNumIndices < 3) {
+            continue;
+        }
+        if (f % FACES_A_POLL == 0 && vshi_job_cancelled(source->job)) {
+            result = vshi_job_fail_cancelled(source->job, error);
+            break;
+        }
+        size_t made;
+        bool simple;
+        result = vshi_polygon_cut(&cutter, shape->positions, face->mIndices, face->mNumIndices, source->job,
+                                  to, &made, &simple, error);
+        shape->triangle_count += made;
+        crossing += !simple;
+        if (polygons && face->mNumIndices <= 4 && made > 0) {
+            turn_fan(to, made, &last_first);
+        }
+        for (size_t i = 0; face->mNumIndices > 4 && i < made; ++i) {
+            turn_fan(to + 3 * i, 1, &last_first);
+        }
+    }
+    vshi_polygon_free(&cutter);
+    if (result == VSH_OK && crossing > 0) {
+        vshi_warn(source->run,
+                  "%s: mesh '%s': edges of %zu polygons cross each other: which triangles they mean cannot "
+                  "be told",
+                  source->path, mesh->mName.data, crossing);
+    }
+    return result;
+}
+
+static int32_t alpha_of(const struct aiScene *scene, const struct aiMesh *mesh) {
+    float opacity = 1.0F;
+    return mesh->mMaterialIndex < scene->mNumMaterials &&
+                   aiGetMaterialFloat(scene->mMaterials[mesh->mMaterialIndex], AI_MATKEY_OPACITY, &opacity) ==
+                       aiReturn_SUCCESS &&
+                   opacity < 1.0F
+               ? VSH_ALPHA_BLENDED
+               : VSH_ALPHA_OPAQUE;
+}
+
+static vsh_result copy_shape(const vshi_model_source *source, const struct aiMesh *mesh,
+                             vshi_model_shape *shape, vsh_error *error) {
+    const char *what = source->path;
+    const size_t count = mesh->mNumVertices;
+    shape->vertex_count = count;
+    shape->triangle_count = count_triangles(mesh);
+    if (shape->triangle_count == 0) {
+        return VSH_OK; /* points or lines */
+    }
+    shape->alpha = alpha_of(source->scene, mesh);
+    vsh_result result = vshi_allocate((void **)&shape->positions, count, sizeof(float[3]), what, error);
+    if (result == VSH_OK) {
+        result =
+            vshi_allocate((void **)&shape->indices, shape->triangle_count, sizeof(uint32_t[3]), what, error);
+    }
+    if (result == VSH_OK && mesh->mNormals != NULL && source->keep_normals) {
+        result = vshi_allocate((void **)&shape->normals, count, sizeof(float[3]), what, error);
+    }
+    for (int set = 0; set < VSH_MAX_UV_SETS && result == VSH_OK; ++set) {
+        if (mesh->mTextureCoords[set] != NULL) {
+            shape->uv_sets = set + 1;
+            result = vshi_allocate((void **)&shape->uvs[set], count, sizeof(float[2]), what, error);
+        }
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    for (size_t v = 0; v < count; ++v) {
+        const struct aiVector3D p = mesh->mVertices[v];
+        memcpy(shape->positions + 3 * v, (float[3]){p.x, p.y, p.z}, sizeof(float[3]));
+    }
+    for (int set = 0; set < shape->uv_sets; ++set) {
+        const struct aiVector3D *uv = mesh->mTextureCoords[set];
+        for (size_t v = 0; v < count && uv != NULL; ++v) {
+            memcpy(shape->uvs[set] + 2 * v, (float[2]){uv[v].x, uv[v].y}, sizeof(float[2]));
+        }
+    }
+    if (shape->normals != NULL) {
+        const size_t bad = copy_normals(shape->normals, mesh->mNormals, count);
+        if (bad > 0) {
+            vshi_warn(source->run, "%s: mesh '%s': %zu normals are not finite: flat there", what,
+                      mesh->mName.data, bad);
+        }
+    }
+    return copy_faces(source, mesh, shape, error);
+}
+
+static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, vshi_skins *skins,
+                            const struct aiNode *node, const double parent[12], int depth, vsh_error *error) {
+    enum { DEEPEST = 1024 };
+    static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    if (depth > DEEPEST) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: its nodes are nested deeper than %d", source->path,
+                         DEEPEST);
+    }
+    if (vshi_job_cancelled(source->job)) {
+        return vshi_job_fail_cancelled(source->job, error);
+    }
+    double world[12];
+    vshi_node_world(parent, node, world);
+    vsh_result result = VSH_OK;
+    const uint32_t object = vshi_model_next_object(model);
+    for (unsigned i = 0; i < node->mNumMeshes && result == VSH_OK; ++i) {
+        const unsigned shape = node->mMeshes[i];
+        if (shape >= model->shape_count || model->shapes[shape].triangle_count == 0) {
+            continue;
+        }
+        const struct aiMesh *mesh = source->scene->mMeshes[shape];
+        const bool skinned = mesh->mNumBones > 0;
+        if (skinned) {
+            result = vshi_skins_apply(skins, shape, &model->shapes[shape], world, error);
+        }
+        const vshi_model_place place = {.node = node->mName.data,
+                                        .mesh = mesh->mName.data,
+                                        .object = object,
+                                        .shape = shape,
+                                        .world = skinned ? identity : world};
+        if (result == VSH_OK) {
+            result = vshi_model_add(model, source->path, source->run, &place, error);
+        }
+    }
+    for (unsigned i = 0; i < node->mNumChildren && result == VSH_OK; ++i) {
+        result = add_nodes(source, model, skins, node->mChildren[i], world, depth + 1, error);
+    }
+    return result;
+}
+
+vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **out, vsh_error *error) {
+    vsh_model *model = NULL;
+    vshi_skins skins = {.source = source};
+    vsh_result result = check_size(source, error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&model, 1, sizeof *model, source->path, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&model->shapes, source->scene->mNumMeshes, sizeof *model->shapes,
+                               source->path, error);
+    }
+    if (result == VSH_OK) {
+        model->shape_count = source->scene->mNumMeshes;
+        model->unit = source->unit;
+    }
+    for (size_t m = 0; result == VSH_OK && m < model->shape_count; ++m) {
+        result = vshi_job_cancelled(source->job)
+                     ? vshi_job_fail_cancelled(source->job, error)
+                     : copy_shape(source, source->scene->mMeshes[m], &model->shapes[m], error);
+    }
+    if (result == VSH_OK && source->scene->mRootNode != NULL) {
+        const double metres = model->unit > 0.0 && !source->in_metres ? model->unit : 1.0;
+        const double root[12] = {metres, 0, 0, 0, 0, metres, 0, 0, 0, 0, metres, 0};
+        memcpy(skins.root, root, sizeof root);
+        result = add_nodes(source, model, &skins, source->scene->mRootNode, root, 0, error);
+    }
+    if (result == VSH_OK && model->entry_count == 0) {
+        result = vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles: no node uses its meshes",
+                           source->path);
+    }
+    vshi_skins_free(&skins);
+    if (result == VSH_OK) {
+        *out = model;
+    } else {
+        vsh_model_free(model);
+    }
+    return result;
+}

@@ -1,0 +1,19 @@
+/* A mesh file on the way in: opened, measured, looked over, handed to Assimp. */
+#ifndef VSHI_CASTER_MODEL_FILE_H
+#define VSHI_CASTER_MODEL_FILE_H
+
+#include "base/job.h"
+#include "extern/assimp.h"
+
+#include <vdbshade/mesh.h>
+
+enum { VSHI_MODEL_FILE_UNITS = 900 }; /* of the job */
+
+/* Reads the file's meshes: a glTF as a model; of other formats what Assimp sees, with every position finite
+ * and every index in range. The other of the two is NULL. Errors: as vsh_model_read(). Free with
+ * vshi_import_free(). *unit: metres in one of the file, where Assimp has multiplied by them already; else 0.
+ */
+vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *job, vshi_import **import,
+                                vsh_model **model, double *unit, vsh_error *error);
+
+#endif

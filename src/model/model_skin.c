@@ -1,0 +1,152 @@
+#include "model/model_skin.h"
+
+#include "base/memory.h"
+#include "base/vec.h"
+
+#include <assimp/scene.h>
+
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct vshi_skin_node {
+    const char *name;
+    double world[12];
+} skin_node;
+
+/* Assimp stores rows one after the other. */
+static void rows_of(const struct aiMatrix4x4 *m, double rows[12]) {
+    const double own[12] = {m->a1, m->a2, m->a3, m->a4, m->b1, m->b2,
+                            m->b3, m->b4, m->c1, m->c2, m->c3, m->c4};
+    memcpy(rows, own, sizeof own);
+}
+
+void vshi_node_world(const double parent[12], const struct aiNode *node, double world[12]) {
+    double own[12];
+    rows_of(&node->mTransformation, own);
+    vshi_model_compose(parent, own, world);
+}
+
+static size_t count_nodes(const struct aiNode *node, int depth) {
+    enum { DEEPEST = 1024 };
+    size_t count = 1;
+    for (unsigned i = 0; depth < DEEPEST && i < node->mNumChildren; ++i) {
+        count += count_nodes(node->mChildren[i], depth + 1);
+    }
+    return count;
+}
+
+static void gather(vshi_skins *skins, size_t room, const struct aiNode *node, const double parent[12]) {
+    if (skins->node_count == room) {
+        return;
+    }
+    skin_node *to = &skins->nodes[skins->node_count++];
+    to->name = node->mName.data;
+    vshi_node_world(parent, node, to->world);
+    double world[12];
+    memcpy(world, to->world, sizeof world);
+    for (unsigned i = 0; i < node->mNumChildren; ++i) {
+        gather(skins, room, node->mChildren[i], world);
+    }
+}
+
+static int by_name(const void *a, const void *b) {
+    return strcmp(((const skin_node *)a)->name, ((const skin_node *)b)->name);
+}
+
+static vsh_result find_nodes(vshi_skins *skins, vsh_error *error) {
+    const vshi_model_source *source = skins->source;
+    const size_t count = count_nodes(source->scene->mRootNode, 0);
+    vsh_result result = vshi_allocate((void **)&skins->done, source->scene->mNumMeshes, sizeof *skins->done,
+                                      source->path, error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&skins->nodes, count, sizeof *skins->nodes, source->path, error);
+    }
+    if (result == VSH_OK) {
+        gather(skins, count, source->scene->mRootNode, skins->root);
+        qsort(skins->nodes, skins->node_count, sizeof *skins->nodes, by_name);
+    }
+    return result;
+}
+
+/* The sums of a vertex's matrices, and of its weights. */
+typedef struct blend {
+    double matrix[12], sum;
+} blend;
+
+static vsh_result add_bone(const vshi_skins *skins, const struct aiBone *bone, size_t vertex_count,
+                           blend *blends, vsh_error *error) {
+    const char *path = skins->source->path;
+    const skin_node wanted = {.name = bone->mName.data};
+    const skin_node *node = bsearch(&wanted, skins->nodes, skins->node_count, sizeof *skins->nodes, by_name);
+    if (node == NULL) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: bone '%s' is no node", path, bone->mName.data);
+    }
+    double offset[12], moved[12];
+    rows_of(&bone->mOffsetMatrix, offset);
+    vshi_model_compose(node->world, offset, moved);
+    for (unsigned i = 0; i < bone->mNumWeights; ++i) {
+        const struct aiVertexWeight given = bone->mWeights[i];
+        if (given.mVertexId >= vertex_count || !isfinite(given.mWeight)) {
+            return vshi_fail(error, VSH_ERROR_INPUT, "%s: bone '%s': weight %u is %g of vertex %u of %zu",
+                             path, bone->mName.data, i, (double)given.mWeight, given.mVertexId, vertex_count);
+        }
+        blend *b = &blends[given.mVertexId];
+        b->sum += (double)given.mWeight;
+        for (int k = 0; k < 12; ++k) {
+            b->matrix[k] += (double)given.mWeight * moved[k];
+        }
+    }
+    return VSH_OK;
+}
+
+static void store(vshi_vec v, float *to) {
+    to[0] = (float)v.x;
+    to[1] = (float)v.y;
+    to[2] = (float)v.z;
+}
+
+static vsh_result move(const vshi_skins *skins, vshi_model_shape *shape, const double world[12],
+                       blend *blends, vsh_error *error) {
+    for (size_t v = 0; v < shape->vertex_count; ++v) {
+        blend *b = &blends[v];
+        for (int k = 0; k < 12; ++k) {
+            b->matrix[k] = b->sum > 0.0 ? b->matrix[k] / b->sum : world[k];
+        }
+        float *p = shape->positions + 3 * v;
+        store(vshi_transform_point(b->matrix, vshi_vec_off(p)), p);
+        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) {
+            return vshi_fail(error, VSH_ERROR_INPUT, "%s: bones move vertex %zu of %zu beyond every number",
+                             skins->source->path, v, shape->vertex_count);
+        }
+        if (shape->normals != NULL) {
+            float *n = shape->normals + 3 * v;
+            store(vshi_unit(vshi_transform_normal(b->matrix, vshi_vec_off(n))), n);
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_skins_apply(vshi_skins *skins, size_t mesh, vshi_model_shape *shape, const double world[12],
+                            vsh_error *error) {
+    const struct aiMesh *given = skins->source->scene->mMeshes[mesh];
+    vsh_result result = skins->nodes == NULL ? find_nodes(skins, error) : VSH_OK;
+    if (result != VSH_OK || skins->done[mesh]) {
+        return result;
+    }
+    blend *blends = NULL;
+    skins->done[mesh] = true;
+    result = vshi_allocate((void **)&blends, shape->vertex_count, sizeof *blends, skins->source->path, error);
+    for (unsigned i = 0; i < given->mNumBones && result == VSH_OK; ++i) {
+        result = add_bone(skins, given->mBones[i], shape->vertex_count, blends, error);
+    }
+    if (result == VSH_OK) {
+        result = move(skins, shape, world, blends, error);
+    }
+    free(blends);
+    return result;
+}
+
+void vshi_skins_free(vshi_skins *skins) {
+    free(skins->nodes);
+    free(skins->done);
+}

@@ -1,0 +1,405 @@
+/* The caller's side: starts a reader, waits for its end, and looks over what every answer has in common. */
+#define _GNU_SOURCE
+
+#include "base/memory.h"
+#include "sandbox/reader.h"
+#include "sandbox/request.h"
+#include "sandbox/spawn.h"
+
+#include <vdbshade/reader.h>
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+enum {
+    POLL_MS = 20,
+    FIRST_FREE = 16,    /* descriptors of ours go here and above, clear of those that a reader gets */
+    MAX_WARNINGS = 4096 /* of one file that are passed on */
+};
+
+/* Seconds that a file may take where run->reader_seconds is 0: Assimp's reader of OBJ takes 0.03 s a MB on an
+ * idle core, and ten times as long where many share it. */
+static const double seconds_at_least = 60.0, seconds_a_byte = 1e-6;
+
+/* How long a reader that has closed its descriptors may live on. */
+static const double seconds_to_end = 5.0;
+
+/* A reader under way. Descriptors are -1 where there is none. */
+typedef struct reader_process {
+    pid_t pid;
+    int answer, progress;
+    double begin;
+} reader_process;
+
+static double now_seconds(void) {
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static double seconds_for(const char *path, const vsh_run *run) {
+    struct stat status;
+    if (run->reader_seconds > 0.0) {
+        return run->reader_seconds;
+    }
+    return seconds_at_least + (stat(path, &status) == 0 ? seconds_a_byte * (double)status.st_size : 0.0);
+}
+
+static vsh_result fail_start(const vshi_ask *ask, int reason, vsh_error *error) {
+    const char *why = strerrordesc_np(reason);
+    const bool missing = reason == ENOENT || reason == EACCES || reason == ENOEXEC || reason == ENOTDIR;
+    return vshi_fail(error, missing ? VSH_ERROR_ARGUMENT : VSH_ERROR_MEMORY,
+                     "%s: no process to read it in: '%s': %s; a file that is trusted can be read without "
+                     "(--trusted; no vsh_run.reader)",
+                     ask->path, ask->run->reader, why != NULL ? why : "?");
+}
+
+/* Moves a descriptor up, and keeps it from other programs that the host may start meanwhile. */
+static int lift(int file) {
+    if (file < 0 || file >= FIRST_FREE) {
+        return file;
+    }
+    const int lifted = fcntl(file, F_DUPFD_CLOEXEC, FIRST_FREE);
+    const int reason = errno == EINVAL ? EMFILE : errno; /* the process may have no more than FIRST_FREE */
+    close(file);
+    errno = reason;
+    return lifted;
+}
+
+vsh_result vshi_ask_begin(vshi_ask *ask, int32_t kind, const char *path, const vsh_run *run,
+                          vsh_error *error) {
+    ask->path = path;
+    ask->run = run;
+    const int file = lift(memfd_create("vdbshade request", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+    vshi_put_begin(&ask->put, file, 0);
+    if (file < 0) {
+        return fail_start(ask, errno, error);
+    }
+    vshi_put_count(&ask->put, VSHI_REQUEST_MAGIC);
+    vshi_put_count(&ask->put, VSHI_READER_PROTOCOL);
+    vshi_put_count(&ask->put, (uint64_t)kind);
+    vshi_put_count(&ask->put, (uint64_t)getpid());
+    vshi_put_count(&ask->put, vshi_memory_left(run));
+    vshi_put_number(&ask->put, seconds_for(path, run));
+    vshi_put_count(&ask->put, run->confined != 0);
+    vshi_put_count(&ask->put, run->allow_outside != 0);
+    vshi_put_text(&ask->put, path);
+    vshi_put_folders(&ask->put);
+    return VSH_OK;
+}
+
+/* --- starting */
+
+static vsh_result start(const vshi_ask *ask, reader_process *process, vsh_error *error) {
+    int ends[2] = {-1, -1};
+    *process = (reader_process){-1, -1, -1, now_seconds()};
+    process->answer = lift(memfd_create("vdbshade answer", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+    int reason = process->answer < 0 || pipe2(ends, O_CLOEXEC | O_NONBLOCK) != 0 ? errno : 0;
+    process->progress = ends[0];
+    if (reason == 0) {
+        ends[1] = lift(ends[1]);
+        reason = ends[1] < 0 ? errno : vshi_spawn_reader(ask, process->answer, ends[1], &process->pid);
+    }
+    if (ends[1] >= 0) {
+        close(ends[1]);
+    }
+    return reason == 0 ? VSH_OK : fail_start(ask, reason, error);
+}
+
+/* --- waiting */
+
+/* Drains the pipe; false once the other side has closed it. */
+static bool take_progress(int file, double *fraction) {
+    double told[64];
+    for (;;) {
+        const ssize_t size = read(file, told, sizeof told);
+        if (size <= 0) {
+            return size < 0 && (errno == EAGAIN || errno == EINTR);
+        }
+        const size_t count = (size_t)size / sizeof told[0];
+        const double last = count > 0 ? told[count - 1] : 0.0;
+        *fraction = last > *fraction && last <= 1.0 ? last : *fraction;
+    }
+}
+
+static void kill_reader(reader_process *process, int *status) {
+    kill(process->pid, SIGKILL);
+    while (waitpid(process->pid, status, 0) < 0 && errno == EINTR) {
+    }
+    process->pid = -1;
+}
+
+static vsh_result fail_time(const vshi_ask *ask, double seconds, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_LIMIT,
+                     "%s: reading it takes longer than the limit of %g s: damaged, or very large", ask->path,
+                     seconds);
+}
+
+/* Waits for the end, which shows in *status. A host that ignores SIGCHLD, or waits for all its children,
+ * takes that away: *status is then 0, and the answer alone tells. */
+static vsh_result await(const vshi_ask *ask, reader_process *process, vshi_poll_fn *poll_user, void *user,
+                        int *status, vsh_error *error) {
+    const double limit = seconds_for(ask->path, ask->run);
+    double closed = INFINITY, fraction = 0.0;
+    for (;;) {
+        if (closed < INFINITY) { /* it is about to end */
+            nanosleep(&(struct timespec){0, 200000}, NULL);
+        } else {
+            struct pollfd pipe_end = {process->progress, POLLIN, 0};
+            poll(&pipe_end, 1, POLL_MS);
+            closed = take_progress(process->progress, &fraction) ? INFINITY : now_seconds();
+        }
+        const pid_t ended = waitpid(process->pid, status, WNOHANG);
+        if (ended == process->pid || (ended < 0 && errno == ECHILD)) {
+            *status = ended < 0 ? 0 : *status;
+            process->pid = -1;
+            return VSH_OK;
+        }
+        const double now = now_seconds();
+        if (poll_user(user, fraction)) {
+            kill_reader(process, status);
+            return vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", ask->path);
+        }
+        if (now - process->begin > limit || now - closed > seconds_to_end) {
+            kill_reader(process, status);
+            return fail_time(ask, limit, error);
+        }
+    }
+}
+
+/* --- the answer */
+
+vsh_result vshi_answer_fail(const char *path, const char *what, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: what its reader sent does not hold: %s", path,
+                     what);
+}
+
+static vsh_result fail_memory(const vshi_ask *ask, vsh_error *error) {
+    if (ask->run->memory_limit == 0) {
+        return vshi_fail(error, VSH_ERROR_LIMIT,
+                         "%s: reading it takes more than this machine's memory: damaged, or very large",
+                         ask->path);
+    }
+    return vshi_fail(error, VSH_ERROR_LIMIT,
+                     "%s: reading it takes more than the memory limit of %.0f MB: damaged, or very large",
+                     ask->path, (double)ask->run->memory_limit / 1e6);
+}
+
+/* Why there is no answer. */
+static vsh_result fail_end(const vshi_ask *ask, int status, bool begun, vsh_error *error) {
+    if (WIFSIGNALED(status)) {
+        const int number = WTERMSIG(status);
+        if (number == SIGXCPU) {
+            return fail_time(ask, seconds_for(ask->path, ask->run), error);
+        }
+        const char *name = sigabbrev_np(number);
+        return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: the reader crashed (SIG%s)", ask->path,
+                         name != NULL ? name : "?");
+    }
+    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_HUNGRY) {
+        return fail_memory(ask, error);
+    }
+    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_CRAMPED) {
+        return vshi_fail(error, VSH_ERROR_LIMIT,
+                         "%s: what its reader sends is more than this process's limit on the size of files "
+                         "(ulimit -f); raise it, or read without a reader",
+                         ask->path);
+    }
+    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_LOOSE) {
+        return vshi_fail(error, VSH_ERROR_INTERNAL,
+                         "%s: not read: a thread of its reader is not confined as the others are", ask->path);
+    }
+    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_EMPTY) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "%s: its reader, '%s', cannot load the library of vdbshade %s", ask->path,
+                         ask->run->reader, vsh_version());
+    }
+    if (!begun) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: '%s' is no reader of vdbshade %s", ask->path,
+                         ask->run->reader, vsh_version());
+    }
+    return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: the reader ended without an answer (%d)", ask->path,
+                     WIFEXITED(status) ? WEXITSTATUS(status) : -1);
+}
+
+/* Maps what the reader has written once nobody can write there any more. */
+static vsh_result map_answer(const vshi_ask *ask, int file, vshi_answer *answer, vsh_error *error) {
+    struct stat status;
+    if (fcntl(file, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL) != 0 ||
+        fstat(file, &status) != 0) {
+        return vshi_answer_fail(ask->path, "it is still being written", error);
+    }
+    if (status.st_size < (off_t)sizeof(vshi_answer_head)) {
+        return VSH_OK; /* nothing was answered */
+    }
+    /* what it holds is copied before it goes */
+    const vsh_result result = vshi_check_limit(ask->run, 2.0 * (double)status.st_size, ask->path, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    void *map = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_SHARED, file, 0);
+    if (map == MAP_FAILED) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %lld bytes", ask->path,
+                         (long long)status.st_size);
+    }
+    answer->map = map;
+    answer->size = (size_t)status.st_size;
+    return VSH_OK;
+}
+
+static void pass_warnings(const vshi_ask *ask, vshi_take warnings, uint64_t count) {
+    for (uint64_t i = 0; i < count && i < MAX_WARNINGS; ++i) {
+        const char *text = vshi_take_text(&warnings, false);
+        if (text != NULL) {
+            vshi_warn(ask->run, "%s", text);
+        }
+    }
+}
+
+/* Said with every file: whoever gets the warnings folds those that are alike. */
+static void warn_of_missing(const vshi_ask *ask, uint64_t confined) {
+    char missing[VSHI_MISSING_TEXT];
+    /* many a system has no Landlock: a warning in every run would be noise, and others would drown in it */
+    const uint64_t expected = VSH_CONFINED_LIMITS | VSH_CONFINED_CALLS;
+    if ((confined & expected) != expected && !VSHI_SANITIZED) {
+        vshi_warn(ask->run,
+                  "the process that files are read in is confined in part only: this system refuses it %s",
+                  vshi_missing_text(confined, missing));
+    }
+}
+
+static vsh_result take_head(const vshi_ask *ask, int status, vshi_answer *answer, vsh_error *error) {
+    vshi_answer_head head = {0};
+    if (answer->map != NULL) {
+        memcpy(&head, answer->map, sizeof head);
+    }
+    const bool begun = head.magic == VSHI_ANSWER_MAGIC && head.protocol == VSHI_READER_PROTOCOL;
+    if (!begun || head.code == VSHI_ANSWER_BEGUN || status != 0) {
+        return fail_end(ask, status, begun, error);
+    }
+    if (head.code == VSH_ERROR_MEMORY) {
+        return fail_memory(ask, error);
+    }
+    head.message[sizeof head.message - 1] = '\0';
+    if (head.code < VSH_OK || head.code > VSH_ERROR_INTERNAL || head.code == VSH_ERROR_CANCELLED) {
+        return vshi_answer_fail(ask->path, "an unknown result", error);
+    }
+    const size_t room = answer->size - sizeof head;
+    if (head.payload > room || head.payload % 8 != 0) {
+        return vshi_answer_fail(ask->path, "its sizes", error);
+    }
+    const unsigned char *start = (const unsigned char *)answer->map + sizeof head;
+    const unsigned char *end = start + head.payload;
+    answer->confined = (uint32_t)(head.confined & VSH_CONFINED_ALL);
+    if (head.code != VSH_ERROR_UNSUPPORTED || ask->run->confined == 0) {
+        warn_of_missing(ask, head.confined);
+    }
+    pass_warnings(ask, (vshi_take){end, start + room, false}, head.warnings);
+    if (head.code != VSH_OK) {
+        return vshi_fail(error, head.code, "%s", head.message);
+    }
+    answer->payload = (vshi_take){start, end, false};
+    return VSH_OK;
+}
+
+vsh_result vshi_ask_send(vshi_ask *ask, vshi_poll_fn *poll_user, void *user, vshi_answer *answer,
+                         vsh_error *error) {
+    *answer = (vshi_answer){NULL, 0, 0, {NULL, NULL, true}};
+    reader_process process = {-1, -1, -1, 0.0};
+    int status = 0;
+    vsh_result result = VSH_OK;
+    if (!vshi_put_flush(&ask->put)) {
+        result = fail_start(ask, ask->put.error, error);
+    } else if (poll_user(user, 0.0)) {
+        result = vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", ask->path);
+    }
+    result = result == VSH_OK ? start(ask, &process, error) : result;
+    close(ask->put.file);
+    result = result == VSH_OK ? await(ask, &process, poll_user, user, &status, error) : result;
+    result = result == VSH_OK ? map_answer(ask, process.answer, answer, error) : result;
+    result = result == VSH_OK ? take_head(ask, status, answer, error) : result;
+    if (process.answer >= 0) {
+        close(process.answer);
+    }
+    if (process.progress >= 0) {
+        close(process.progress);
+    }
+    if (result != VSH_OK) {
+        vshi_answer_free(answer);
+    }
+    return result;
+}
+
+typedef struct job_share {
+    vshi_job *job;
+    size_t units, done;
+} job_share;
+
+static bool poll_job(void *user, double fraction) {
+    job_share *share = user;
+    const size_t reached = (size_t)(fraction * (double)share->units);
+    const size_t more = reached > share->done ? reached - share->done : 0;
+    share->done += more;
+    return vshi_job_advance(share->job, more);
+}
+
+vsh_result vshi_ask_send_job(vshi_ask *ask, vshi_job *job, size_t units, vshi_answer *answer,
+                             vsh_error *error) {
+    job_share share = {job, units, 0};
+    vsh_result result = vshi_ask_send(ask, poll_job, &share, answer, error);
+    if (result == VSH_OK && poll_job(&share, 1.0)) {
+        vshi_answer_free(answer);
+        result = vshi_job_fail_cancelled(job, error);
+    }
+    return result;
+}
+
+void vshi_answer_free(vshi_answer *answer) {
+    if (answer->map != NULL) {
+        munmap(answer->map, answer->size);
+    }
+    *answer = (vshi_answer){NULL, 0, 0, {NULL, NULL, true}};
+}
+
+static bool poll_nothing(void *user, double fraction) {
+    (void)fraction;
+    const vsh_run *run = user;
+    return run->progress != NULL && run->progress(run->user, "load", 0.0) != 0;
+}
+
+vsh_result vsh_reader_confinement(const vsh_run *run, uint32_t *confined, vsh_error *error) {
+    VSHI_NEEDS(confined);
+    *confined = 0;
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result == VSH_OK && full.reader == NULL) {
+        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_reader_confinement: vsh_run.reader is NULL");
+    }
+    vshi_ask *ask = NULL;
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&ask, 1, sizeof *ask, "reader", error);
+    }
+    vshi_answer answer;
+    if (result == VSH_OK) {
+        full.warning = NULL; /* what is missing is the result */
+        result = vshi_ask_begin(ask, VSHI_READ_CONFINEMENT, "reader", &full, error);
+        result = result == VSH_OK ? vshi_ask_send(ask, poll_nothing, &full, &answer, error) : result;
+    }
+    if (result == VSH_OK) {
+        *confined = answer.confined;
+        vshi_answer_free(&answer);
+    }
+    free(ask);
+    return result;
+}

@@ -1,0 +1,47 @@
+/* vdbshade-reader: confines itself, and only then loads the library, whose own libraries begin threads before
+ * any main (liblog4cplus, which OpenVDB brings, begins four), and parse. */
+#include "sandbox/reader.h"
+#include "sandbox/request.h"
+
+#include <vdbshade/reader.h>
+
+#include <dlfcn.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+typedef int32_t serve_fn(int argc, char **argv);
+
+static int serve(char *name, char *argument, const vshi_reader_state *state) {
+    void *library = dlopen(VSHI_LIBRARY, RTLD_LAZY | RTLD_GLOBAL);
+    void *symbol = library != NULL ? dlsym(library, "vsh_reader_serve") : NULL;
+    if (symbol == NULL) {
+        return VSHI_READER_EMPTY;
+    }
+    serve_fn *function;
+    memcpy(&function, &symbol, sizeof function);
+    char word[sizeof VSHI_READER_HELD + 16];
+    snprintf(word, sizeof word, VSHI_READER_HELD "%d",
+             (int)state->confined + (state->cramped ? VSHI_HELD_CRAMPED : 0));
+    char *words[] = {name, argument, word, NULL};
+    return function(3, words);
+}
+
+int main(int argc, char **argv) {
+    vshi_request request;
+    if (argc < 2 || strcmp(argv[1], VSH_READER_ARGUMENT) != 0) {
+        fputs(VSH_READER
+              ": reads files for vdbshade and for programs that use its library; not to be called\n",
+              stderr);
+        return VSHI_READER_CANNOT;
+    }
+    if (!vshi_request_read(&request)) {
+        return VSHI_READER_CANNOT;
+    }
+    const vshi_reader_state state = vshi_reader_begin(argc, argv, &request);
+    if (state.code >= 0) {
+        return state.code;
+    }
+    /* what it holds goes with it: no destructor of a library is to run */
+    _exit(request.kind == VSHI_READ_CONFINEMENT ? vshi_reader_tell(&state) : serve(argv[0], argv[1], &state));
+}

@@ -1,0 +1,130 @@
+/* Asking a reader (vsh_run.reader) for the content of a file, and what every answer has in common. */
+#ifndef VSHI_READ_READER_H
+#define VSHI_READ_READER_H
+
+#include "base/job.h"
+#include "base/shared.h"
+#include "sandbox/message.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What can be asked for. */
+enum {
+    VSHI_READ_GRID = 0,
+    VSHI_READ_LIST = 1,
+    VSHI_READ_VOXELS = 2,
+    VSHI_READ_MODEL = 3,
+    VSHI_READ_IMAGE = 4,
+    VSHI_READ_TEXT = 5,
+    VSHI_READ_COPY = 6,
+    VSHI_READ_CONFINEMENT = 7, /* how its reader is confined; the path is of no matter */
+    VSHI_READ_KINDS = 8
+};
+
+/* --- the caller */
+
+/* A request under way: begin, put what the kind wants to know into `put`, send. */
+typedef struct vshi_ask {
+    const char *path;
+    const vsh_run *run;
+    vshi_put put;
+} vshi_ask;
+
+/* What came back; the payload's arrays lie in the mapping, which nobody can change any more. */
+typedef struct vshi_answer {
+    void *map;
+    size_t size;
+    uint32_t confined; /* VSH_CONFINED_… of the reader */
+    vshi_take payload;
+} vshi_answer;
+
+/* Told how much the reader has done, 0 … 1, about every 20 ms; returns whether to stop. */
+typedef bool vshi_poll_fn(void *user, double fraction);
+
+/* `run` is a resolved one with a reader; it and the path live until the request is sent. Errors:
+ * VSH_ERROR_MEMORY. */
+VSHI_SHARED vsh_result vshi_ask_begin(vshi_ask *ask, int32_t kind, const char *path, const vsh_run *run,
+                                      vsh_error *error);
+
+/* Starts the reader, waits for its end, passes its warnings on. Ends the request, also where it fails.
+ * Errors: those of the reader; VSH_ERROR_READ (it crashed, or its answer does not hold), VSH_ERROR_LIMIT
+ * (time, memory), VSH_ERROR_ARGUMENT (no such program, or none that is a reader), VSH_ERROR_CANCELLED. */
+VSHI_SHARED vsh_result vshi_ask_send(vshi_ask *ask, vshi_poll_fn *poll, void *user, vshi_answer *answer,
+                                     vsh_error *error);
+
+/* The same with progress and cancelling by a job, `units` of it. */
+VSHI_SHARED vsh_result vshi_ask_send_job(vshi_ask *ask, vshi_job *job, size_t units, vshi_answer *answer,
+                                         vsh_error *error);
+
+VSHI_SHARED void vshi_answer_free(vshi_answer *answer);
+
+/* VSH_ERROR_READ: what came back is not what a sound reader sends. */
+VSHI_SHARED vsh_result vshi_answer_fail(const char *path, const char *what, vsh_error *error);
+
+/* --- the reader */
+
+/* Parses `path` for a request and puts the answer's payload. */
+typedef vsh_result vshi_serve_fn(const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload,
+                                 vsh_error *error);
+
+vshi_serve_fn vshi_serve_grid, vshi_serve_list, vshi_serve_voxels, vshi_serve_model, vshi_serve_image,
+    vshi_serve_text, vshi_serve_copy;
+
+/* --- both */
+
+/* The descriptors of a reader, behind the standard ones. */
+enum { VSHI_READER_ANSWER = 3, VSHI_READER_REQUEST = 4, VSHI_READER_PROGRESS = 5 };
+
+/* Begins the word by which vdbshade-reader tells the library how it is confined already; a sum of
+ * VSH_CONFINED_… and this follows. */
+#define VSHI_READER_HELD "held="
+enum { VSHI_HELD_CRAMPED = 256 };
+
+/* A reader's exit codes. */
+enum {
+    VSHI_READER_HUNGRY = 86,  /* memory was refused */
+    VSHI_READER_CRAMPED = 87, /* the caller's limit on the size of files does not let the answer through */
+    VSHI_READER_LOOSE = 88,   /* some thread of it is not confined: it read nothing */
+    VSHI_READER_CANNOT = 89,  /* it could not begin */
+    VSHI_READER_EMPTY = 90    /* it could not load the library */
+};
+
+#define VSHI_REQUEST_MAGIC UINT64_C(0x6b7361687376)
+#define VSHI_ANSWER_MAGIC UINT64_C(0x726577736e61)
+
+/* Of the messages' form; goes up with every change of one. */
+enum { VSHI_READER_PROTOCOL = 3 };
+
+/* An answer begins with this. It is written twice: with code VSHI_ANSWER_BEGUN before anything is parsed,
+ * and at the end. */
+typedef struct vshi_answer_head {
+    uint64_t magic;
+    uint32_t protocol;
+    int32_t code;      /* a vsh_result */
+    uint64_t payload;  /* bytes, behind the head */
+    uint64_t warnings; /* how many texts follow the payload */
+    uint64_t confined; /* VSH_CONFINED_… of what held before it began */
+    char message[1024];
+} vshi_answer_head;
+
+enum { VSHI_ANSWER_BEGUN = -1 };
+
+/* A sanitizer's shadow memory takes terabytes of address space, and its runtime calls what a filter forbids.
+ */
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define VSHI_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
+#define VSHI_SANITIZED 1
+#endif
+#endif
+#ifndef VSHI_SANITIZED
+#define VSHI_SANITIZED 0
+#endif
+
+#ifdef __cplusplus
+}
+#endif
+#endif

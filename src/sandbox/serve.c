@@ -1,0 +1,137 @@
+/* The reader's side: takes the request, limits itself, parses, answers. */
+#include "sandbox/confine.h"
+#include "sandbox/reader.h"
+#include "sandbox/request.h"
+
+#include <vdbshade/reader.h>
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { MOST_WARNINGS = 1 << 20 /* bytes of all that are passed on */ };
+
+/* Between two reports of progress, seconds. */
+static const double report_interval = 0.01;
+
+static vshi_serve_fn *const servers[VSHI_READ_KINDS] = {
+    [VSHI_READ_GRID] = vshi_serve_grid,     [VSHI_READ_LIST] = vshi_serve_list,
+    [VSHI_READ_VOXELS] = vshi_serve_voxels, [VSHI_READ_MODEL] = vshi_serve_model,
+    [VSHI_READ_IMAGE] = vshi_serve_image,   [VSHI_READ_TEXT] = vshi_serve_text,
+    [VSHI_READ_COPY] = vshi_serve_copy,
+};
+
+typedef struct serving {
+    char *warnings; /* texts, one behind the other with their ends */
+    size_t used, count;
+    double reported;
+    uint64_t confined;
+    bool limited; /* the size of files, by the caller's own limit */
+} serving;
+
+/* May come from any thread of the pool, one at a time. */
+static void keep_warning(void *user, const char *message) {
+    serving *s = user;
+    const size_t size = strlen(message) + 1;
+    if (size <= MOST_WARNINGS - s->used) {
+        memcpy(s->warnings + s->used, message, size);
+        s->used += size;
+        ++s->count;
+    }
+}
+
+/* The pipe blocks nobody: what finds no room is left out. */
+static int32_t report(void *user, const char *stage, double fraction) {
+    serving *s = user;
+    (void)stage;
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    const double seconds = (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+    if (seconds - s->reported >= report_interval) {
+        s->reported = seconds;
+        if (write(VSHI_READER_PROGRESS, &fraction, sizeof fraction) < 0) {
+            errno = 0;
+        }
+    }
+    return 0;
+}
+
+/* Bytes of the heap that a reader of anything takes, and more. */
+static const uint64_t heap_slack = (uint64_t)16 << 20;
+
+static bool write_head(const vshi_answer_head *head) {
+    return pwrite(VSHI_READER_ANSWER, head, sizeof *head, 0) == (ssize_t)sizeof *head;
+}
+
+/* Why an answer could not be written: the size of files is the memory that the caller has room for, or less
+ * where it has a limit of its own (ulimit -f), which holds for memory that is a file, too. */
+static int exit_code_of_write(const serving *s) {
+    return s->limited ? VSHI_READER_CRAMPED : VSHI_READER_HUNGRY;
+}
+
+static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_take *request,
+                  const vsh_run *run) {
+    static vshi_put put;
+    vshi_answer_head head = {.magic = VSHI_ANSWER_MAGIC,
+                             .protocol = VSHI_READER_PROTOCOL,
+                             .code = VSHI_ANSWER_BEGUN,
+                             .confined = s->confined};
+    if (!write_head(&head)) {
+        return s->limited ? VSHI_READER_CRAMPED : VSHI_READER_CANNOT;
+    }
+    vsh_error error = {VSH_OK, ""};
+    vshi_put_begin(&put, VSHI_READER_ANSWER, sizeof head);
+    put.room = run->memory_limit > 0 && !VSHI_SANITIZED ? run->memory_limit + heap_slack : 0;
+    vsh_result result = serve(path, request, run, &put, &error);
+    head.payload = put.size - sizeof head;
+    const char *text = s->warnings;
+    for (size_t i = 0; i < s->count; ++i) {
+        vshi_put_text(&put, text);
+        text += strlen(text) + 1;
+    }
+    if (!vshi_put_flush(&put)) {
+        return put.error == ENOMEM ? VSHI_READER_HUNGRY : exit_code_of_write(s);
+    }
+    head.code = result;
+    head.warnings = s->count;
+    snprintf(head.message, sizeof head.message, "%s", error.message);
+    return write_head(&head) ? 0 : VSHI_READER_CANNOT;
+}
+
+static int32_t serve_request(serving *s, int argc, char **argv) {
+    vshi_request request;
+    if (!vshi_request_read(&request) || s->warnings == NULL) {
+        return VSHI_READER_CANNOT;
+    }
+    const vshi_reader_state state = vshi_reader_begin(argc, argv, &request);
+    if (state.code >= 0) {
+        return state.code;
+    }
+    if (request.kind == VSHI_READ_CONFINEMENT) {
+        return vshi_reader_tell(&state);
+    }
+    s->confined = state.confined;
+    s->limited = state.cramped;
+    vsh_run run = vsh_run_default();
+    run.threads = 1;
+    run.memory_limit = request.memory;
+    run.allow_outside = request.outside;
+    run.progress = report;
+    run.warning = keep_warning;
+    run.user = s;
+    vshi_confine_hunger();
+    return answer(s, servers[request.kind], request.path, &request.rest, &run);
+}
+
+int32_t vsh_reader_serve(int argc, char **argv) {
+    if (argc < 2 || strcmp(argv[1], VSH_READER_ARGUMENT) != 0) {
+        return -1;
+    }
+    serving s = {.warnings = malloc(MOST_WARNINGS)};
+    const int32_t code = serve_request(&s, argc, argv);
+    free(s.warnings);
+    return code;
+}

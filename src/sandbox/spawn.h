@@ -1,0 +1,22 @@
+/* Which program reads, and how it is started. */
+#ifndef VSHI_READ_SPAWN_H
+#define VSHI_READ_SPAWN_H
+
+#include "sandbox/reader.h"
+
+#include <sys/types.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Puts the folders that this process's libraries are loaded from: the reader loads the same. */
+void vshi_put_folders(vshi_put *put);
+
+/* Starts ask->run->reader with these descriptors. Returns 0 or what errno says. */
+int vshi_spawn_reader(const vshi_ask *ask, int answer, int progress, pid_t *pid);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

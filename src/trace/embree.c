@@ -1,0 +1,343 @@
+#include "trace/embree_scene.h"
+
+#include "base/floats.h"
+#include "base/job.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "mesh/mesh.h"
+#include "mesh/solidity.h"
+
+#include <float.h>
+#include <stdlib.h>
+#include <string.h>
+
+#ifndef VSH_EMBREE
+
+struct vsh_triangles {
+    int none;
+};
+
+int vsh_triangles_available(void) {
+    return 0;
+}
+
+vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                vsh_triangles **triangles, vsh_error *error) {
+    (void)meshes, (void)mesh_count, (void)run;
+    if (triangles != NULL) {
+        *triangles = NULL;
+    }
+    return vshi_fail(
+        error, VSH_ERROR_UNSUPPORTED,
+        "triangles: exact methods trace rays with Embree; this library was built without Embree");
+}
+
+void vsh_triangles_free(vsh_triangles *triangles) {
+    (void)triangles;
+}
+
+uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
+    (void)triangles;
+    return 0;
+}
+
+#else
+
+/* A triangle's share of buffers and tree, bytes: 180 to 230 measured, more while the tree is made. */
+static const double TRIANGLE_BYTES = 300.0;
+
+int vsh_triangles_available(void) {
+    return 1;
+}
+
+static bool watch_memory(void *user, ssize_t bytes, bool post) {
+    (void)post;
+    vsh_triangles *triangles = user;
+    const long long held = atomic_fetch_add(&triangles->bytes, (long long)bytes) + (long long)bytes;
+    if (bytes > 0 && triangles->limit > 0 && held > (long long)triangles->limit) {
+        atomic_store(&triangles->refused, true);
+        return false;
+    }
+    return true;
+}
+
+/* Also called while a tree is made, by any thread: a cancelled job ends it. Embree flushes denormals to zero
+ * on the threads that build, which the host's callback must not see. */
+static bool watch_progress(void *user, double fraction) {
+    VSHI_FLOATS;
+    (void)fraction;
+    return !vshi_job_advance(user, 0);
+}
+
+static void measure(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count) {
+    double low[3] = {DBL_MAX, DBL_MAX, DBL_MAX}, high[3] = {-DBL_MAX, -DBL_MAX, -DBL_MAX};
+    for (size_t m = 0; m < mesh_count; ++m) {
+        for (size_t i = 0; i < meshes[m].triangle_count; ++i) {
+            vshi_vec corner[3];
+            vshi_mesh_triangle(&meshes[m], i, corner);
+            for (int k = 0; k < 3; ++k) {
+                const double at[3] = {corner[k].x, corner[k].y, corner[k].z};
+                for (int axis = 0; axis < 3; ++axis) {
+                    low[axis] = at[axis] < low[axis] ? at[axis] : low[axis];
+                    high[axis] = at[axis] > high[axis] ? at[axis] : high[axis];
+                }
+            }
+        }
+    }
+    double half = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double side = 0.5 * high[axis] - 0.5 * low[axis];
+        triangles->centre[axis] = low[axis] <= high[axis] ? low[axis] + side : 0.0;
+        half = side > half ? side : half;
+    }
+    int exponent = 0;
+    if (half > 0.0) {
+        frexp(half, &exponent);
+    }
+    triangles->scale = ldexp(1.0, exponent < -1000 ? 1000 : -exponent);
+    triangles->size = 2.0 * half;
+}
+
+static void put(const vsh_triangles *triangles, vshi_vec world, float *out) {
+    out[0] = (float)((world.x - triangles->centre[0]) * triangles->scale);
+    out[1] = (float)((world.y - triangles->centre[1]) * triangles->scale);
+    out[2] = (float)((world.z - triangles->centre[2]) * triangles->scale);
+}
+
+/* VSHI_SOLID_… of triangle i of a mesh, as its corners turn, also where the transform mirrors. */
+static uint8_t find_solid(const vsh_mesh *mesh, const uint8_t *sides, const uint8_t *holed, size_t i) {
+    if (sides[i] == VSHI_SIDE_SHEET) {
+        return VSHI_AIR_AROUND;
+    }
+    const bool mirrored = vshi_transform_determinant(mesh->transform) < 0.0;
+    const bool behind = (sides[i] == VSHI_SIDE_BEHIND) != mirrored;
+    return (uint8_t)((behind ? VSHI_SOLID_BEHIND : VSHI_SOLID_BEFORE) | (holed[i] ? VSHI_SOLID_HOLED : 0));
+}
+
+/* The sheet of all meshes: their vertices, welded, and the triangles that are not degenerate. */
+static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count,
+                             const vshi_solidity *solidity, vsh_error *error) {
+    size_t vertex_count = 0, triangle_count = 0, most = 0;
+    for (size_t m = 0; m < mesh_count; ++m) {
+        vertex_count += meshes[m].vertex_count;
+        most = meshes[m].vertex_count > most ? meshes[m].vertex_count : most;
+        for (size_t i = 0; i < meshes[m].triangle_count; ++i) {
+            triangle_count += !vshi_mesh_degenerate(&meshes[m], i);
+        }
+    }
+    if (vertex_count > UINT32_MAX || triangle_count >= UINT32_MAX) {
+        return vshi_fail(error, VSH_ERROR_LIMIT,
+                         "triangles: %zu vertices and %zu triangles, at most 2^32 - 2", vertex_count,
+                         triangle_count);
+    }
+    vshi_sheet *sheet = &triangles->sheet;
+    uint32_t *weld = NULL;
+    vsh_result result = vshi_sheet_allocate(sheet, vertex_count, triangle_count, error);
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&triangles->first, mesh_count, sizeof(uint32_t), "triangles", error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&weld, most, sizeof *weld, "welded vertices", error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_allocate((void **)&triangles->solid, triangle_count, 1, "triangles", error);
+    }
+    size_t vertex = 0, triangle = 0;
+    for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
+        const vsh_mesh *mesh = &meshes[m];
+        const uint8_t *sides = vshi_solidity_sides(solidity, m), *holed = vshi_solidity_holed(solidity, m);
+        result = vshi_mesh_weld(mesh, weld, error);
+        triangles->first[m] = (uint32_t)triangle;
+        for (size_t i = 0; result == VSH_OK && i < mesh->triangle_count; ++i) {
+            if (!vshi_mesh_degenerate(mesh, i)) {
+                for (size_t k = 0; k < 3; ++k) {
+                    sheet->corners[3 * triangle + k] = (uint32_t)vertex + weld[mesh->indices[3 * i + k]];
+                }
+                triangles->solid[triangle] = find_solid(mesh, sides, holed, i);
+                triangles->has_solids =
+                    triangles->has_solids || triangles->solid[triangle] != VSHI_AIR_AROUND;
+                triangles->has_holes =
+                    triangles->has_holes || (triangles->solid[triangle] & VSHI_SOLID_HOLED) != 0;
+                ++triangle;
+            }
+        }
+        for (size_t v = 0; v < mesh->vertex_count; ++v) {
+            const vshi_vec local = vshi_vec_off(mesh->positions + 3 * v);
+            put(triangles, vshi_transform_point(mesh->transform, local), sheet->vertices + 3 * vertex++);
+        }
+    }
+    free(weld);
+    return result == VSH_OK ? vshi_sheet_join(sheet, error) : result;
+}
+
+/* Geometry `mesh`, with that number; false where Embree refuses: its error says why. */
+static bool attach(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count, size_t mesh,
+                   size_t first_vertex) {
+    const vshi_sheet *sheet = &triangles->sheet;
+    const size_t begin = triangles->first[mesh];
+    const size_t end = mesh + 1 < mesh_count ? triangles->first[mesh + 1] : sheet->triangle_count;
+    if (begin == end) {
+        return true;
+    }
+    const RTCGeometry geometry = rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    if (geometry == NULL) {
+        return false;
+    }
+    float *vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                              3 * sizeof(float), meshes[mesh].vertex_count);
+    uint32_t *indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                3 * sizeof(uint32_t), end - begin);
+    if (vertices != NULL && indices != NULL) {
+        memcpy(vertices, sheet->vertices + 3 * first_vertex, meshes[mesh].vertex_count * 3 * sizeof(float));
+        for (size_t i = 0; i < 3 * (end - begin); ++i) {
+            indices[i] = sheet->corners[3 * begin + i] - (uint32_t)first_vertex;
+        }
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometryByID(triangles->scene, geometry, (unsigned)mesh);
+    }
+    rtcReleaseGeometry(geometry);
+    return vertices != NULL && indices != NULL;
+}
+
+static vsh_result refuse(const vsh_triangles *triangles, vshi_job *job, vsh_error *error) {
+    const enum RTCError code = rtcGetDeviceError(triangles->device);
+    if (atomic_load(&triangles->refused)) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "triangles: the memory limit of %.0f MB is passed",
+                         (double)triangles->limit / 1e6);
+    }
+    if (vshi_job_cancelled(job)) {
+        return vshi_job_fail_cancelled(job, error);
+    }
+    if (code == RTC_ERROR_OUT_OF_MEMORY) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
+    }
+    return vshi_fail(error, VSH_ERROR_INTERNAL, "triangles: Embree's error %d", (int)code);
+}
+
+/* The tree is made on the pool's threads, as many as the arena around the call has. */
+static void commit(void *user) {
+    rtcCommitScene(user);
+}
+
+static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count,
+                        const vshi_solidity *solidity, vshi_job *job, vsh_error *error) {
+    triangles->device = rtcNewDevice(NULL);
+    if (triangles->device == NULL) {
+        const enum RTCError code = rtcGetDeviceError(NULL);
+        return code == RTC_ERROR_OUT_OF_MEMORY
+                   ? vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory")
+                   : vshi_fail(error, VSH_ERROR_UNSUPPORTED,
+                               "triangles: Embree refuses this machine, error %d", (int)code);
+    }
+    rtcSetDeviceMemoryMonitorFunction(triangles->device, watch_memory, triangles);
+    triangles->scene = rtcNewScene(triangles->device);
+    if (triangles->scene == NULL) {
+        return refuse(triangles, job, error);
+    }
+    rtcSetSceneFlags(triangles->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
+    rtcSetSceneProgressMonitorFunction(triangles->scene, watch_progress, job);
+    vsh_result result = make_sheet(triangles, meshes, mesh_count, solidity, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    size_t vertex = 0;
+    for (size_t m = 0; m < mesh_count; ++m) {
+        if (!attach(triangles, meshes, mesh_count, m, vertex)) {
+            return refuse(triangles, job, error);
+        }
+        vertex += meshes[m].vertex_count;
+        if (vshi_job_advance(job, 0)) {
+            return vshi_job_fail_cancelled(job, error);
+        }
+    }
+    result = vshi_parallel_call(job, commit, triangles->scene, error);
+    rtcSetSceneProgressMonitorFunction(triangles->scene, NULL, NULL);
+    if (result != VSH_OK) {
+        return result;
+    }
+    if (vshi_job_advance(job, 1)) {
+        return vshi_job_fail_cancelled(job, error);
+    }
+    const enum RTCError code = rtcGetDeviceError(triangles->device);
+    if (code != RTC_ERROR_NONE || atomic_load(&triangles->refused)) {
+        return refuse(triangles, job, error);
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                vsh_triangles **triangles, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(triangles);
+    *triangles = NULL;
+    VSHI_NEEDS_OF(mesh_count, meshes);
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    double bytes = 0.0;
+    for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
+        result = vshi_mesh_check_data(&meshes[m], m, error);
+        const double vertices = (double)meshes[m].vertex_count, faces = (double)meshes[m].triangle_count;
+        bytes += 12.0 * vertices + TRIANGLE_BYTES * faces + vshi_sheet_bytes(vertices, faces);
+    }
+    if (result == VSH_OK) {
+        result = vshi_check_limit(&full, bytes, "triangles", error);
+    }
+    void *memory = NULL;
+    if (result == VSH_OK) {
+        result = vshi_allocate(&memory, 1, sizeof **triangles, "triangles", error);
+    }
+    vshi_solidity *solidity = NULL;
+    if (result == VSH_OK) {
+        vsh_run quiet = full;
+        quiet.progress = NULL;
+        result = vshi_solidity_create(meshes, mesh_count, &quiet, &solidity, error);
+    }
+    if (result != VSH_OK) {
+        free(memory);
+        return result;
+    }
+    vsh_triangles *made = memory;
+    made->limit = full.memory_limit;
+    measure(made, meshes, mesh_count);
+    vshi_job *job = vshi_job_begin(&full, "triangles", 1);
+    if (job == NULL) {
+        vshi_solidity_free(solidity);
+        free(made);
+        return vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
+    }
+    result = vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error)
+                                     : build(made, meshes, mesh_count, solidity, job, error);
+    vshi_job_end(job);
+    vshi_solidity_free(solidity);
+    if (result != VSH_OK) {
+        vsh_triangles_free(made);
+        return result;
+    }
+    *triangles = made;
+    return VSH_OK;
+}
+
+void vsh_triangles_free(vsh_triangles *triangles) {
+    if (triangles == NULL) {
+        return;
+    }
+    if (triangles->scene != NULL) {
+        rtcReleaseScene(triangles->scene);
+    }
+    if (triangles->device != NULL) {
+        rtcReleaseDevice(triangles->device);
+    }
+    vshi_sheet_free(&triangles->sheet);
+    free(triangles->solid);
+    free(triangles->first);
+    free(triangles);
+}
+
+uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
+    const long long bytes = atomic_load(&triangles->bytes);
+    const vshi_sheet *sheet = &triangles->sheet;
+    return sizeof *triangles + (bytes > 0 ? (uint64_t)bytes : 0) + sheet->triangle_count +
+           (uint64_t)vshi_sheet_bytes((double)sheet->vertex_count, (double)sheet->triangle_count);
+}
+
+#endif

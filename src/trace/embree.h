@@ -1,0 +1,44 @@
+/* Rays against triangles. Without Embree (VSH_EMBREE not defined) no vsh_triangles ever exists. */
+#ifndef VSHI_EMBREE_H
+#define VSHI_EMBREE_H
+
+#include "base/segment.h"
+#include "mesh/sheet.h"
+
+#include <stdbool.h>
+#include <vdbshade/trace.h>
+
+/* Whether each of `count` rays meets a triangle. Thread safe. */
+void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                            bool *blocked);
+
+/* Whether every ray of each of `count` beams, in world space, meets a triangle; false also where that cannot
+ * be told from `most` triangles that hang together. Thread safe. */
+void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *beams, size_t count, int most,
+                        bool *cut);
+
+/* What a ray meets first that is no sheet: those have air on both sides. */
+enum {
+    VSHI_MEETS_NOTHING,
+    VSHI_MEETS_AIR,   /* the side of a solid, or of a wall, that is to be seen */
+    VSHI_MEETS_SOLID, /* the other one: the ray begins in a solid, or behind a wall */
+    VSHI_MEETS_HOLED, /* the other one of a solid with holes: so it seems */
+    VSHI_MEETS_COUNT
+};
+void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                         uint8_t *meets);
+
+/* How many solids hold the origin of a ray, by what it crosses on its way: the most that it leaves before it
+ * enters as many. Also right where solids lie in each other. Walls count as solids behind them. */
+int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray *ray, bool *meets_nothing);
+
+/* Whether any triangle is a solid's or a wall's. */
+bool vshi_triangles_have_solids(const vsh_triangles *triangles);
+
+/* Whether any solid or wall has holes, by which rays go in and out. */
+bool vshi_triangles_have_holes(const vsh_triangles *triangles);
+
+/* How far off a surface rays begin, world units: above the rounding of floats, below what shows. */
+double vshi_triangles_lift(const vsh_triangles *triangles);
+
+#endif

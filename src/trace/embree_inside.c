@@ -1,0 +1,193 @@
+/* Rays that tell where solids are: which side of a triangle they meet, and how often they cross one. */
+#include "trace/embree_scene.h"
+
+#ifndef VSH_EMBREE
+
+void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                         uint8_t *meets) {
+    (void)triangles, (void)rays, (void)count, (void)meets;
+}
+
+int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray *ray, bool *meets_nothing) {
+    (void)triangles, (void)ray, (void)meets_nothing;
+    return 0;
+}
+
+bool vshi_triangles_have_solids(const vsh_triangles *triangles) {
+    (void)triangles;
+    return false;
+}
+
+bool vshi_triangles_have_holes(const vsh_triangles *triangles) {
+    (void)triangles;
+    return false;
+}
+
+double vshi_triangles_lift(const vsh_triangles *triangles) {
+    (void)triangles;
+    return 0.0;
+}
+
+#else
+
+/* Of the casters' size: 64 times what a float's rounding moves a point of theirs. */
+static const double LIFT = 0x1p-18;
+
+/* Crossings of one ray that are kept; what a ray crosses beyond them is not looked at. */
+enum { MOST_CROSSINGS = 256 };
+
+typedef struct crossing {
+    float distance;
+    int8_t out; /* 1: out of a solid, -1: into one */
+} crossing;
+
+/* A context of Embree's, and what the filter is to know. */
+typedef struct looking {
+    struct RTCIntersectContext context; /* first: the filter is given this */
+    const vsh_triangles *triangles;
+    size_t count;
+    crossing *crossings; /* NULL: the first is looked for */
+} looking;
+
+/* 1 where a ray of this direction leaves the triangle's solid, -1 where it enters it, 0 for a sheet. */
+static int8_t crosses(const vsh_triangles *triangles, unsigned mesh, unsigned local, vshi_vec direction) {
+    const uint32_t triangle = triangles->first[mesh] + local;
+    const uint8_t solid = triangles->solid[triangle] & VSHI_SOLID_SIDE;
+    if (solid == VSHI_AIR_AROUND) {
+        return 0;
+    }
+    const uint32_t *corners = triangles->sheet.corners + 3 * (size_t)triangle;
+    const vshi_vec a = vshi_vec_off(triangles->sheet.vertices + 3 * (size_t)corners[0]);
+    const vshi_vec b = vshi_vec_off(triangles->sheet.vertices + 3 * (size_t)corners[1]);
+    const vshi_vec c = vshi_vec_off(triangles->sheet.vertices + 3 * (size_t)corners[2]);
+    const bool forwards = vshi_dot(vshi_cross(vshi_sub(b, a), vshi_sub(c, a)), direction) > 0.0;
+    return forwards == (solid == VSHI_SOLID_BEHIND) ? 1 : -1;
+}
+
+/* Rows of N values that rays and hits are made of; Embree has names for them in C++ only. */
+enum { RAY_DIRECTION = 4, RAY_FAR = 8, HIT_TRIANGLE = 5, HIT_MESH = 6 };
+
+/* Sheets are passed by; where all crossings are asked for, each is noted and passed by. */
+static void filter(const struct RTCFilterFunctionNArguments *args) {
+    looking *look = (looking *)args->context;
+    const size_t n = args->N;
+    const float *ray = (const float *)args->ray;
+    const unsigned *hit = (const unsigned *)args->hit;
+    for (size_t i = 0; i < n; ++i) {
+        if (args->valid[i] != -1) {
+            continue;
+        }
+        const unsigned mesh = hit[HIT_MESH * n + i], local = hit[HIT_TRIANGLE * n + i];
+        const uint8_t solid = look->triangles->solid[look->triangles->first[mesh] + local];
+        if (solid == VSHI_AIR_AROUND || look->crossings != NULL) {
+            args->valid[i] = 0;
+        }
+        if (solid != VSHI_AIR_AROUND && look->crossings != NULL && look->count < MOST_CROSSINGS) {
+            const vshi_vec direction = {(double)ray[RAY_DIRECTION * n + i],
+                                        (double)ray[(RAY_DIRECTION + 1) * n + i],
+                                        (double)ray[(RAY_DIRECTION + 2) * n + i]};
+            look->crossings[look->count++] =
+                (crossing){ray[RAY_FAR * n + i], crosses(look->triangles, mesh, local, direction)};
+        }
+    }
+}
+
+static void begin_look(looking *look, const vsh_triangles *triangles, crossing *crossings) {
+    *look = (looking){.triangles = triangles, .crossings = crossings};
+    rtcInitIntersectContext(&look->context);
+    look->context.filter = filter;
+}
+
+static uint8_t met(const vsh_triangles *triangles, unsigned mesh, unsigned local,
+                   const vshi_segment_ray *ray) {
+    if (mesh == RTC_INVALID_GEOMETRY_ID) {
+        return VSHI_MEETS_NOTHING;
+    }
+    const bool holed = (triangles->solid[triangles->first[mesh] + local] & VSHI_SOLID_HOLED) != 0;
+    const bool out = crosses(triangles, mesh, local, vshi_vec_of(ray->direction)) > 0;
+    return !out ? VSHI_MEETS_AIR : holed ? VSHI_MEETS_HOLED : VSHI_MEETS_SOLID;
+}
+
+void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                         uint8_t *meets) {
+    looking look;
+    begin_look(&look, triangles, NULL);
+    for (size_t begin = 0; begin < count; begin += VSHI_PACKET) {
+        struct RTCRayHit8 packet = {0};
+        _Alignas(32) int valid[VSHI_PACKET] = {0};
+        const int lanes = count - begin < VSHI_PACKET ? (int)(count - begin) : VSHI_PACKET;
+        for (int lane = 0; lane < lanes; ++lane) {
+            valid[lane] =
+                vshi_triangles_aim(triangles, &rays[begin + (size_t)lane], &packet.ray, lane) ? -1 : 0;
+            packet.hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
+        }
+        look.context.flags = vshi_rays_together(rays + begin, lanes) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                                                                     : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+        rtcIntersect8(valid, triangles->scene, &look.context, &packet);
+        for (int lane = 0; lane < lanes; ++lane) {
+            meets[begin + (size_t)lane] =
+                met(triangles, packet.hit.geomID[lane], packet.hit.primID[lane], &rays[begin + (size_t)lane]);
+        }
+    }
+}
+
+/* Whether one crossing comes before another; of two in the same place that into a solid, so that no order in
+ * which Embree finds them shows. */
+static bool before(crossing a, crossing b) {
+    return a.distance < b.distance || (a.distance == b.distance && a.out < b.out);
+}
+
+/* There are few. */
+static void sort(crossing *crossings, size_t count) {
+    for (size_t i = 1; i < count; ++i) {
+        const crossing moved = crossings[i];
+        size_t k = i;
+        for (; k > 0 && before(moved, crossings[k - 1]); --k) {
+            crossings[k] = crossings[k - 1];
+        }
+        crossings[k] = moved;
+    }
+}
+
+int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray *ray, bool *meets_nothing) {
+    crossing crossings[MOST_CROSSINGS];
+    looking look;
+    begin_look(&look, triangles, crossings);
+    struct RTCRay8 aimed;
+    *meets_nothing = true;
+    if (!vshi_triangles_aim(triangles, ray, &aimed, 0)) {
+        return 0;
+    }
+    struct RTCRayHit one = {.ray = {.org_x = aimed.org_x[0],
+                                    .org_y = aimed.org_y[0],
+                                    .org_z = aimed.org_z[0],
+                                    .dir_x = aimed.dir_x[0],
+                                    .dir_y = aimed.dir_y[0],
+                                    .dir_z = aimed.dir_z[0],
+                                    .tfar = aimed.tfar[0],
+                                    .mask = 0xffffffffu},
+                            .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
+    rtcIntersect1(triangles->scene, &look.context, &one);
+    *meets_nothing = look.count == 0;
+    sort(crossings, look.count);
+    int left = 0, most = 0;
+    for (size_t i = 0; i < look.count; ++i) {
+        left += crossings[i].out;
+        most = left > most ? left : most;
+    }
+    return most;
+}
+
+bool vshi_triangles_have_solids(const vsh_triangles *triangles) {
+    return triangles->has_solids;
+}
+
+bool vshi_triangles_have_holes(const vsh_triangles *triangles) {
+    return triangles->has_holes;
+}
+
+double vshi_triangles_lift(const vsh_triangles *triangles) {
+    return LIFT * triangles->size;
+}
+
+#endif

@@ -1,0 +1,148 @@
+/* Rays against the triangles of a vsh_triangles: whether they meet any. */
+#include "trace/embree_scene.h"
+
+#ifndef VSH_EMBREE
+
+void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                            bool *blocked) {
+    (void)triangles, (void)rays, (void)count, (void)blocked;
+}
+
+void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *beams, size_t count, int most,
+                        bool *cut) {
+    (void)triangles, (void)beams, (void)count, (void)most, (void)cut;
+}
+
+#else
+
+#include <float.h>
+
+static const double COHERENT = 0.9; /* cosine between a packet's rays, at least */
+
+bool vshi_rays_together(const vshi_segment_ray *rays, int count) {
+    for (int i = 1; i < count; ++i) {
+        const double *a = rays[0].direction, *b = rays[i].direction;
+        if (!(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] > COHERENT)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Moves a ray that begins far away up to the scene; false where it passes it by, or ends before it. Rounding
+ * leaves each move as far off as a double is at that distance, so that the next one begins from there. */
+static bool approach(double origin[3], const double direction[3], double *far) {
+    enum { MOVES = 24 };                /* 1e308 by 1e15 a move */
+    static const double MOVED = 0x1p-6; /* what is left of a move that needs no other */
+    for (int move = 0; move < MOVES; ++move) {
+        double distance = 0.0, along = 0.0;
+        for (int axis = 0; axis < 3; ++axis) {
+            distance += origin[axis] * origin[axis];
+            along -= origin[axis] * direction[axis];
+        }
+        if (distance <= VSHI_FAR_ORIGIN * VSHI_FAR_ORIGIN) {
+            return true;
+        }
+        const double skip = along - VSHI_FAR_ORIGIN;
+        if (!(skip < *far)) { /* not finite either */
+            return false;
+        }
+        if (!(skip > (move == 0 ? 0.0 : MOVED))) {
+            /* the scene is in the ball of √3 around 0: what is this far beside or behind it does not meet it
+             */
+            return distance <= 2.0 * VSHI_FAR_ORIGIN * VSHI_FAR_ORIGIN;
+        }
+        for (int axis = 0; axis < 3; ++axis) {
+            origin[axis] += skip * direction[axis];
+        }
+        *far -= skip;
+    }
+    return false;
+}
+
+bool vshi_triangles_aim(const vsh_triangles *triangles, const vshi_segment_ray *ray, struct RTCRay8 *packet,
+                        int lane) {
+    double origin[3], far = ray->far * triangles->scale;
+    for (int axis = 0; axis < 3; ++axis) {
+        origin[axis] = (ray->origin[axis] - triangles->centre[axis]) * triangles->scale;
+    }
+    if (!approach(origin, ray->direction, &far)) {
+        return false;
+    }
+    packet->org_x[lane] = (float)origin[0];
+    packet->org_y[lane] = (float)origin[1];
+    packet->org_z[lane] = (float)origin[2];
+    packet->dir_x[lane] = (float)ray->direction[0];
+    packet->dir_y[lane] = (float)ray->direction[1];
+    packet->dir_z[lane] = (float)ray->direction[2];
+    packet->tnear[lane] = 0.0f;
+    packet->time[lane] = 0.0f;
+    packet->tfar[lane] = far < (double)FLT_MAX ? (float)far : INFINITY;
+    packet->mask[lane] = 0xffffffffu;
+    packet->flags[lane] = 0;
+    return true;
+}
+
+void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                            bool *blocked) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    for (size_t begin = 0; begin < count; begin += VSHI_PACKET) {
+        struct RTCRay8 packet = {0};
+        _Alignas(32) int valid[VSHI_PACKET] = {0};
+        const int lanes = count - begin < VSHI_PACKET ? (int)(count - begin) : VSHI_PACKET;
+        for (int lane = 0; lane < lanes; ++lane) {
+            valid[lane] = vshi_triangles_aim(triangles, &rays[begin + (size_t)lane], &packet, lane) ? -1 : 0;
+        }
+        context.flags = vshi_rays_together(rays + begin, lanes) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                                                                : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+        rtcOccluded8(valid, triangles->scene, &context, &packet);
+        for (int lane = 0; lane < lanes; ++lane) {
+            blocked[begin + (size_t)lane] = valid[lane] != 0 && packet.tfar[lane] < 0.0f;
+        }
+    }
+}
+
+/* Where the axis of a beam meets what is past `from`; false where nothing. */
+static bool next_hit(const vsh_triangles *triangles, const vshi_sheet_beam *beam, double from,
+                     struct RTCRayHit *hit) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    *hit = (struct RTCRayHit){.ray = {.org_x = (float)beam->origin.x,
+                                      .org_y = (float)beam->origin.y,
+                                      .org_z = (float)beam->origin.z,
+                                      .dir_x = (float)beam->axis.x,
+                                      .dir_y = (float)beam->axis.y,
+                                      .dir_z = (float)beam->axis.z,
+                                      .tnear = (float)from,
+                                      .tfar = beam->end < (double)FLT_MAX ? (float)beam->end : INFINITY,
+                                      .mask = 0xffffffffu},
+                              .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
+    rtcIntersect1(triangles->scene, &context, hit);
+    return hit->hit.geomID != RTC_INVALID_GEOMETRY_ID;
+}
+
+void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *beams, size_t count, int most,
+                        bool *cut) {
+    enum { LAYERS = 3 }; /* that may lie before the one that cuts */
+    for (size_t b = 0; b < count; ++b) {
+        vshi_sheet_beam beam = beams[b];
+        const double *centre = triangles->centre, scale = triangles->scale;
+        beam.origin = vshi_scale(vshi_sub(beam.origin, (vshi_vec){centre[0], centre[1], centre[2]}), scale);
+        beam.wide *= scale;
+        beam.end *= scale;
+        cut[b] = false;
+        double from = beam.wide;
+        struct RTCRayHit hit;
+        const bool near = vshi_dot(beam.origin, beam.origin) < VSHI_FAR_ORIGIN * VSHI_FAR_ORIGIN;
+        for (int layer = 0; near && layer < LAYERS && !cut[b] && next_hit(triangles, &beam, from, &hit);
+             ++layer) {
+            const double distance = (double)hit.ray.tfar;
+            const uint32_t triangle = triangles->first[hit.hit.geomID] + hit.hit.primID;
+            cut[b] = vshi_sheet_cuts(&triangles->sheet, &beam, triangle, distance, most);
+            from = distance * (1.0 + 0x1p-16) + 0x1p-16;
+        }
+    }
+}
+
+#endif

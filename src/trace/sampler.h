@@ -1,0 +1,31 @@
+/* Where the rays of a point go: points in the unit square, the disc and the hemisphere. */
+#ifndef VSHI_SAMPLER_H
+#define VSHI_SAMPLER_H
+
+#include "base/vec.h"
+
+#include <vdbshade/method.h>
+
+/* Made once for a call, shared by its threads. Immutable; about 64 KB. */
+typedef struct vshi_sampler vshi_sampler;
+
+/* NULL where memory is short. `rays`: the most that any point takes. */
+vshi_sampler *vshi_sampler_create(int32_t kind, int32_t rays, int32_t frame);
+void vshi_sampler_free(vshi_sampler *sampler); /* NULL does nothing */
+
+/* Points first … first + count - 1 of the sequence of `texel` (vsh_points.texels), uniform in area over the
+ * unit disc. `purpose` keeps sequences of one texel apart (one a light, one for AO). Prefixes of 2^k points
+ * are the best spread. */
+void vshi_sampler_disc(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t first,
+                       int32_t count, double (*points)[2]);
+
+/* The same of a texel whose values are averaged with those of the others of its tile (VSHI_TILED texels of a
+ * square of 8 × 8, `texel` as vsh_points.texels): not only the points of each, but those of all texels of a
+ * square of 2^k of them are well spread together. For VSH_SAMPLER_SOBOL; others are as above. */
+void vshi_sampler_tile(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t first,
+                       int32_t count, double (*points)[2]);
+
+/* Blue noise: a number in [0, 1) that neighbouring texels have far apart. Of VSH_SAMPLER_BLUE. */
+double vshi_sampler_mask(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose);
+
+#endif

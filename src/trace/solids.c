@@ -1,0 +1,307 @@
+/* Sphere tracing (J. C. Hart, "Sphere tracing: a geometric method for the antialiased ray tracing of implicit
+ * surfaces", 1996) of procedural solids: a tree's distance never passes the true one and changes by at most 1
+ * per unit (sdf/sdf.c), so a step of that length meets nothing. */
+#include "trace/solids.h"
+
+#include "base/elementary.h"
+#include "base/floats.h"
+#include "base/memory.h"
+#include "base/similarity.h"
+#include "base/vec.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Of the diagonal of the box around all solids: a ray that comes this near has met one. Far above the
+ * rounding of doubles, far below what a texel shows; a ray that only grazes a solid takes some 10^4 steps. */
+static const double HIT = 1e-9;
+enum { MOST_STEPS = 100000, CONE_STEPS = 96 };
+/* Of the diagonal: the least step of a cone that looks for a solid to be covered by. */
+static const double CONE_STEP = 1e-3;
+
+/* A tree without the unions at its root: a ray meets a union where it meets one of its operands, and each of
+ * those has a box of its own that most rays miss. */
+typedef struct member {
+    vsh_sdf sdf;        /* its nodes belong to the solids */
+    double inverse[12]; /* world to local */
+    double scale;       /* local to world */
+    vshi_vec low, high; /* box, world; inside out where it is empty */
+} member;
+
+struct vsh_solids {
+    vsh_sdf_node **nodes; /* [tree_count] */
+    size_t tree_count;
+    member *members;
+    size_t count;
+    vshi_vec low, high; /* box around all; inside out where there is none */
+    double size;        /* its diagonal */
+};
+
+static void invert(const double *m, double inverse[12]) {
+    const double by = 1.0 / vshi_transform_determinant(m);
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) {
+            const int a = (column + 1) % 3, b = (column + 2) % 3, c = (row + 1) % 3, d = (row + 2) % 3;
+            inverse[4 * row + column] = by * (m[4 * a + c] * m[4 * b + d] - m[4 * a + d] * m[4 * b + c]);
+        }
+    }
+    const vshi_vec moved = vshi_transform_vector(inverse, (vshi_vec){m[3], m[7], m[11]});
+    inverse[3] = -moved.x;
+    inverse[7] = -moved.y;
+    inverse[11] = -moved.z;
+}
+
+/* outer × inner, both of three rows of four. */
+static void compose(const double outer[12], const double inner[12], double result[12]) {
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 4; ++column) {
+            double sum = column == 3 ? outer[4 * row + 3] : 0.0;
+            for (int k = 0; k < 3; ++k) {
+                sum += outer[4 * row + k] * inner[4 * k + column];
+            }
+            result[4 * row + column] = sum;
+        }
+    }
+}
+
+/* Where a node puts what it combines. */
+static void node_transform(const vsh_sdf_node *node, double m[12]) {
+    const double *q = node->rotation;
+    const double by = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), s = node->scale;
+    const double x = q[0], y = q[1], z = q[2], w = q[3];
+    const double rows[12] = {s * (1.0 - by * (y * y + z * z)), s * by * (x * y - w * z),
+                             s * by * (x * z + w * y),         node->translation[0],
+                             s * by * (x * y + w * z),         s * (1.0 - by * (x * x + z * z)),
+                             s * by * (y * z - w * x),         node->translation[1],
+                             s * by * (x * z - w * y),         s * by * (y * z + w * x),
+                             s * (1.0 - by * (x * x + y * y)), node->translation[2]};
+    memcpy(m, rows, sizeof rows);
+}
+
+static void grow(vshi_vec *low, vshi_vec *high, vshi_vec p) {
+    *low = (vshi_vec){fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z)};
+    *high = (vshi_vec){fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z)};
+}
+
+/* Adds the subtree under node `root` of a tree that lies in the world as `transform` says. */
+static void add_members(vsh_solids *solids, const vsh_sdf_node *nodes, int32_t root,
+                        const double *transform) {
+    const vsh_sdf_node *node = &nodes[root];
+    if (node->shape == VSH_SDF_UNION) {
+        double own[12], below[12];
+        node_transform(node, own);
+        compose(transform, own, below);
+        add_members(solids, nodes, node->left, below);
+        add_members(solids, nodes, node->right, below);
+        return;
+    }
+    member *m = &solids->members[solids->count++];
+    m->sdf = (vsh_sdf){nodes, (size_t)root + 1};
+    m->scale = vshi_cbrt(fabs(vshi_transform_determinant(transform)));
+    m->low = (vshi_vec){INFINITY, INFINITY, INFINITY};
+    m->high = (vshi_vec){-INFINITY, -INFINITY, -INFINITY};
+    invert(transform, m->inverse);
+    double min[3], max[3];
+    vsh_sdf_bounds(&m->sdf, min, max);
+    if (!(min[0] <= max[0] && min[1] <= max[1] && min[2] <= max[2])) {
+        return;
+    }
+    for (int i = 0; i < 8; ++i) {
+        const vshi_vec corner = {i & 1 ? max[0] : min[0], i & 2 ? max[1] : min[1], i & 4 ? max[2] : min[2]};
+        grow(&m->low, &m->high, vshi_transform_point(transform, corner));
+    }
+    grow(&solids->low, &solids->high, m->low);
+    grow(&solids->low, &solids->high, m->high);
+}
+
+/* Copies a tree that has been checked; there is room for all of its nodes as members. */
+static vsh_result add_tree(vsh_solids *solids, const vsh_sdf *sdf, const double *transform,
+                           vsh_error *error) {
+    void *nodes;
+    const vsh_result result = vshi_allocate(&nodes, sdf->node_count, sizeof *sdf->nodes, "sdf nodes", error);
+    if (result == VSH_OK) {
+        memcpy(nodes, sdf->nodes, sdf->node_count * sizeof *sdf->nodes);
+        solids->nodes[solids->tree_count++] = nodes;
+        add_members(solids, nodes, (int32_t)sdf->node_count - 1, transform);
+    }
+    return result;
+}
+
+/* Checks all trees and counts their nodes. */
+static vsh_result check(const vsh_sdf *sdfs, const double *transforms, size_t count, size_t *nodes,
+                        vsh_error *error) {
+    *nodes = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const vsh_result result = vsh_sdf_check(&sdfs[i], error);
+        if (result != VSH_OK) {
+            return result;
+        }
+        if (transforms != NULL && !(vshi_similarity_scale(transforms + 12 * i) > 0.0)) {
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "solid %zu: the transform of an sdf must neither shear nor scale unevenly", i);
+        }
+        *nodes += sdfs[i].node_count;
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_solids_create(const vsh_sdf *sdfs, const double *transforms, size_t count, vsh_solids **solids,
+                             vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(solids);
+    *solids = NULL;
+    VSHI_NEEDS_OF(count, sdfs);
+    static const double identity[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+    size_t nodes;
+    vsh_result result = check(sdfs, transforms, count, &nodes, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    void *memory = NULL, *trees = NULL, *members = NULL;
+    result = vshi_allocate(&memory, 1, sizeof **solids, "solids", error);
+    result =
+        result == VSH_OK ? vshi_allocate(&trees, count, sizeof(vsh_sdf_node *), "solids", error) : result;
+    result = result == VSH_OK ? vshi_allocate(&members, nodes, sizeof(member), "solids", error) : result;
+    if (result != VSH_OK) {
+        free(trees);
+        free(memory);
+        return result;
+    }
+    vsh_solids *made = memory;
+    made->nodes = trees;
+    made->members = members;
+    made->low = (vshi_vec){INFINITY, INFINITY, INFINITY};
+    made->high = (vshi_vec){-INFINITY, -INFINITY, -INFINITY};
+    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+        result = add_tree(made, &sdfs[i], transforms != NULL ? transforms + 12 * i : identity, error);
+    }
+    if (result != VSH_OK) {
+        vsh_solids_free(made);
+        return result;
+    }
+    made->size = made->low.x <= made->high.x ? vshi_length(vshi_sub(made->high, made->low)) : 0.0;
+    *solids = made;
+    return VSH_OK;
+}
+
+void vsh_solids_free(vsh_solids *solids) {
+    if (solids == NULL) {
+        return;
+    }
+    for (size_t i = 0; i < solids->tree_count; ++i) {
+        free(solids->nodes[i]);
+    }
+    free(solids->members);
+    free(solids->nodes);
+    free(solids);
+}
+
+static double member_distance(const member *m, vshi_vec p) {
+    const vshi_vec local = vshi_transform_point(m->inverse, p);
+    const double at[3] = {local.x, local.y, local.z};
+    return m->scale * vsh_sdf_distance(&m->sdf, at);
+}
+
+static double distance_at(const vsh_solids *solids, vshi_vec p) {
+    double nearest = INFINITY;
+    for (size_t i = 0; i < solids->count; ++i) {
+        const double distance = member_distance(&solids->members[i], p);
+        nearest = distance < nearest ? distance : nearest;
+    }
+    return nearest;
+}
+
+double vsh_solids_distance(const vsh_solids *solids, const double position[3]) {
+    VSHI_FLOATS;
+    const vshi_vec p = vshi_vec_of(position);
+    return vshi_finite(p) ? distance_at(solids, p) : NAN;
+}
+
+/* The part of a ray within a member's box; false where there is none. */
+static bool clip(const member *m, const vshi_segment_ray *ray, double *begin, double *end) {
+    const double low[3] = {m->low.x, m->low.y, m->low.z};
+    const double high[3] = {m->high.x, m->high.y, m->high.z};
+    *begin = 0.0;
+    *end = ray->far;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double o = ray->origin[axis], d = ray->direction[axis];
+        if (d == 0.0) {
+            if (!(o >= low[axis] && o <= high[axis])) {
+                return false;
+            }
+            continue;
+        }
+        const double a = (low[axis] - o) / d, b = (high[axis] - o) / d;
+        *begin = fmax(*begin, fmin(a, b));
+        *end = fmin(*end, fmax(a, b));
+    }
+    return *begin <= *end;
+}
+
+static bool meets(const member *m, const vshi_segment_ray *ray, double hit) {
+    double t, end;
+    if (!clip(m, ray, &t, &end)) {
+        return false;
+    }
+    const vshi_vec origin = vshi_vec_of(ray->origin), direction = vshi_vec_of(ray->direction);
+    for (int step = 0; step < MOST_STEPS; ++step) {
+        if (t > end) {
+            return false;
+        }
+        const double distance = member_distance(m, vshi_add(origin, vshi_scale(direction, t)));
+        if (distance <= hit) {
+            return true;
+        }
+        t += distance;
+    }
+    return true; /* it has not got away from the surface */
+}
+
+void vshi_solids_blocked(const vsh_solids *solids, const vshi_segment_ray *rays, size_t count,
+                         bool *blocked) {
+    for (size_t i = 0; i < count; ++i) {
+        for (size_t k = 0; k < solids->count && !blocked[i]; ++k) {
+            blocked[i] = meets(&solids->members[k], &rays[i], HIT * solids->size);
+        }
+    }
+}
+
+/* Where along the axis the box around all solids ends. */
+static double last_of(const vsh_solids *solids, vshi_vec origin, vshi_vec axis) {
+    const vshi_vec to = {axis.x > 0.0 ? solids->high.x : solids->low.x,
+                         axis.y > 0.0 ? solids->high.y : solids->low.y,
+                         axis.z > 0.0 ? solids->high.z : solids->low.z};
+    return vshi_dot(vshi_sub(to, origin), axis);
+}
+
+/* The ball of radius |distance| around a point of the axis holds the cone's disc there, or does not reach it:
+ * all of the disc is then inside one solid, or free; and distances change by at most 1 per unit, which says
+ * for how much of the axis that goes on. */
+vshi_cone_state vshi_solids_cone(const vsh_solids *solids, const double origin[3], const double axis[3],
+                                 double tangent, double near, double far) {
+    const vshi_vec from = vshi_vec_of(origin), along = vshi_vec_of(axis);
+    const double hit = HIT * solids->size, last = last_of(solids, from, along);
+    bool free_so_far = true;
+    double t = 0.0;
+    for (int step = 0; step < CONE_STEPS; ++step) {
+        if (!(t <= last)) {
+            return free_so_far ? VSHI_CONE_FREE : VSHI_CONE_UNKNOWN;
+        }
+        const double distance = distance_at(solids, vshi_add(from, vshi_scale(along, t)));
+        const double width = tangent * t;
+        if (t > 0.0 && t < near && distance < -width - hit) {
+            return VSHI_CONE_COVERED;
+        }
+        double ahead = (distance - width - hit) / (1.0 + tangent);
+        if (!(ahead > hit)) {
+            free_so_far = false;
+            ahead = (distance + width) / (1.0 + tangent);
+            ahead = fmax(ahead, CONE_STEP * solids->size);
+        }
+        t += ahead;
+        if (free_so_far && t > far) {
+            return VSHI_CONE_FREE;
+        }
+    }
+    return VSHI_CONE_UNKNOWN;
+}

@@ -1,0 +1,340 @@
+/* Lights and open sky seen from points, by rays against the casters themselves: no field, no estimate but the
+ * number of rays. */
+#include "trace/trace.h"
+#include "base/elementary.h"
+#include "base/floats.h"
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "base/vec.h"
+#include "light/view.h"
+#include "trace/embree.h"
+#include "trace/solids.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_RAYS = 65536, AT_ONCE = 256, GRAIN = 64 };
+
+typedef struct tracing {
+    const vsh_triangles *triangles; /* NULL: none */
+    const vsh_solids *solids;       /* NULL: none */
+    const double *positions;
+    const float *normals;
+    double lift;
+    const vsh_light *light; /* NULL: AO */
+    double distance;        /* AO */
+    int32_t rays;
+    double (*disc)[2]; /* [rays], the same for all points; NULL: each point has its own */
+    float *values;
+    vshi_light_place place; /* of the light */
+} tracing;
+
+/* A light as a disc a unit away: its radius, and the most that a ray goes along it. */
+typedef struct target {
+    vshi_vec axis, u, v;
+    double radius;
+    double distance; /* of the light's centre; infinite for a directional light */
+    double size;     /* of the sphere */
+    vshi_light_view view;
+} target;
+
+/* Vogel's spiral ("A better way to construct the sunflower head", 1979), radii √((i + ½) / n), so that every
+ * ring has its share. */
+static void place(tracing *task) {
+    static const double PI = 3.14159265358979323846, TURN = 0.38196601125010515;
+    for (int32_t i = 0; i < task->rays; ++i) {
+        const double radius = sqrt((i + 0.5) / task->rays), angle = 2.0 * PI * fmod(i * TURN, 1.0);
+        task->disc[i][0] = radius * vshi_cos(angle);
+        task->disc[i][1] = radius * vshi_sin(angle);
+    }
+}
+
+/* Where the light stands, seen from a point. */
+static vshi_light_side aim(const vshi_light_place *place, vshi_vec from, target *t) {
+    vshi_light_view view;
+    const vshi_light_side side = vshi_light_look(place, from, false, &view);
+    if (side == VSHI_LIGHT_SEEN) {
+        *t = (target){.axis = view.axis,
+                      .radius = vshi_light_tangent(place, &view),
+                      .distance = view.distance,
+                      .size = place->radius,
+                      .view = view};
+        vshi_frame(t->axis, &t->u, &t->v);
+    }
+    return side;
+}
+
+/* How far a ray at `cosine` to the axis goes: up to the sphere's near side. */
+static double far_of(const target *t, double cosine) {
+    if (!isfinite(t->distance)) {
+        return INFINITY;
+    }
+    const double across = t->size * t->size - t->distance * t->distance * (1.0 - cosine * cosine);
+    return t->distance * cosine - (across > 0.0 ? sqrt(across) : 0.0);
+}
+
+/* The same to a light that is no disc. */
+static bool direct_to_shape(const vshi_light_place *place, const target *t, const double disc[2],
+                            const vshi_vec *normal, vshi_segment_ray *ray) {
+    const vshi_vec way = place->shape->ray(place, &t->view, disc), d = vshi_unit(way);
+    ray->direction[0] = d.x;
+    ray->direction[1] = d.y;
+    ray->direction[2] = d.z;
+    ray->far = vshi_length(way);
+    return normal == NULL || vshi_dot(d, *normal) > 0.0;
+}
+
+/* The direction of a place on the unit disc, and how far it goes; false below the horizon of `normal` (NULL:
+ * none). */
+static bool direct(const tracing *task, const target *t, const double disc[2], const vshi_vec *normal,
+                   vshi_segment_ray *ray) {
+    if (task->place.shape != NULL) {
+        return direct_to_shape(&task->place, t, disc, normal, ray);
+    }
+    const double x = disc[0] * t->radius, y = disc[1] * t->radius;
+    double up, scale = 1.0;
+    if (task->light != NULL) {
+        scale = 1.0 / sqrt(1.0 + x * x + y * y);
+        up = scale;
+        ray->far = far_of(t, up);
+    } else {
+        const double square = 1.0 - x * x - y * y;
+        up = square > 0.0 ? sqrt(square) : 0.0;
+        ray->far = task->distance;
+    }
+    const vshi_vec d =
+        vshi_add(vshi_add(vshi_scale(t->u, scale * x), vshi_scale(t->v, scale * y)), vshi_scale(t->axis, up));
+    ray->direction[0] = d.x;
+    ray->direction[1] = d.y;
+    ray->direction[2] = d.z;
+    return normal == NULL || vshi_dot(d, *normal) > 0.0;
+}
+
+/* What the solids leave of all rays to a target, as far as can be proved at once. */
+static vshi_cone_state look(const tracing *task, vshi_vec origin, const target *t) {
+    const double from[3] = {origin.x, origin.y, origin.z};
+    if (task->solids == NULL) {
+        return VSHI_CONE_FREE;
+    }
+    if (task->light == NULL) {
+        return vsh_solids_distance(task->solids, from) > task->distance ? VSHI_CONE_FREE : VSHI_CONE_UNKNOWN;
+    }
+    const double axis[3] = {t->axis.x, t->axis.y, t->axis.z}, bound = t->view.bound;
+    if (task->place.shape == NULL) {
+        return vshi_solids_cone(task->solids, from, axis, t->radius, t->distance - t->size, t->distance);
+    }
+    return isfinite(bound) ? vshi_solids_cone(task->solids, from, axis, bound / sqrt(1.0 - bound * bound),
+                                              t->view.near, t->view.end)
+                           : VSHI_CONE_UNKNOWN;
+}
+
+static void meet(const tracing *task, const vsh_solids *solids, const vshi_segment_ray *rays, size_t count,
+                 bool *blocked) {
+    memset(blocked, 0, count * sizeof *blocked);
+    if (task->triangles != NULL) {
+        vshi_triangles_blocked(task->triangles, rays, count, blocked);
+    }
+    if (solids != NULL) {
+        vshi_solids_blocked(solids, rays, count, blocked);
+    }
+}
+
+/* A point that rays begin at, and what they go to. */
+typedef struct viewpoint {
+    vshi_vec origin, normal; /* no normal: zero */
+    target target;
+    bool horizon;             /* rays below the normal's plane count as hidden */
+    const vsh_solids *solids; /* that rays may meet */
+} viewpoint;
+
+/* False where the point's value needs no rays: it is then in *value. */
+static bool place_point(const tracing *task, const double position[3], const float *normal, viewpoint *from,
+                        double *value) {
+    *from = (viewpoint){.origin = vshi_vec_of(position)};
+    if (normal != NULL) {
+        from->normal = vshi_unit(vshi_vec_off(normal));
+        if (!(vshi_dot(from->normal, from->normal) > 0.5)) {
+            *value = NAN;
+            return false;
+        }
+        from->origin = vshi_add(from->origin, vshi_scale(from->normal, task->lift));
+    }
+    if (!vshi_finite(from->origin)) {
+        *value = NAN;
+        return false;
+    }
+    from->target = (target){.axis = from->normal, .radius = 1.0};
+    if (task->light == NULL) {
+        vshi_frame(from->target.axis, &from->target.u, &from->target.v);
+    } else {
+        const vshi_light_side side = aim(&task->place, from->origin, &from->target);
+        if (side != VSHI_LIGHT_SEEN) {
+            *value = side == VSHI_LIGHT_WITHIN ? 1.0 : 0.0;
+            return false;
+        }
+    }
+    const vshi_cone_state state = look(task, from->origin, &from->target);
+    if (state == VSHI_CONE_COVERED) {
+        *value = 0.0;
+        return false;
+    }
+    from->solids = state == VSHI_CONE_FREE ? NULL : task->solids;
+    from->horizon = task->light != NULL && normal != NULL;
+    return true;
+}
+
+/* How many of the rays to places [count] on the disc meet nothing. */
+static int32_t count_free(const tracing *task, const viewpoint *from, const double (*disc)[2],
+                          int32_t count) {
+    const vshi_vec o = from->origin;
+    vshi_segment_ray rays[AT_ONCE];
+    bool blocked[AT_ONCE];
+    size_t waiting = 0;
+    int32_t free = 0;
+    for (int32_t i = 0; i < count; ++i) {
+        vshi_segment_ray *ray = &rays[waiting];
+        *ray = (vshi_segment_ray){{o.x, o.y, o.z}, {0.0, 0.0, 0.0}, 0.0};
+        waiting += direct(task, &from->target, disc[i], from->horizon ? &from->normal : NULL, ray);
+        if (waiting == AT_ONCE || (i + 1 == count && waiting > 0)) {
+            meet(task, from->solids, rays, waiting, blocked);
+            for (size_t r = 0; r < waiting; ++r) {
+                free += !blocked[r];
+            }
+            waiting = 0;
+        }
+    }
+    return free;
+}
+
+static float trace_point(const tracing *task, size_t point) {
+    viewpoint from;
+    double value;
+    const float *normal = task->normals != NULL ? task->normals + 3 * point : NULL;
+    if (!place_point(task, task->positions + 3 * point, normal, &from, &value)) {
+        return (float)value;
+    }
+    const int32_t free = count_free(task, &from, (const double(*)[2])task->disc, task->rays);
+    return (float)((double)free / (double)task->rays);
+}
+
+bool vshi_truth_twice(const vshi_truth *truth, const double position[3], const float normal[3],
+                      uint32_t texel, double expected, double seen[2]) {
+    /* the samplers' sequences: no others' */
+    static const uint32_t PURPOSE[2] = {0x7e570001u, 0x7e570002u};
+    static const double ENOUGH = 1e-3;
+    const tracing task = {.triangles = truth->triangles,
+                          .solids = truth->solids,
+                          .lift = truth->lift,
+                          .light = truth->light,
+                          .distance = truth->distance,
+                          .place = truth->place};
+    viewpoint from;
+    if (!place_point(&task, position, normal, &from, &seen[0])) {
+        seen[1] = seen[0];
+        return !isnan(seen[0]);
+    }
+    int32_t free[2] = {0, 0}, taken = 0;
+    while (taken < truth->rays) {
+        double disc[VSHI_TRUTH_FIRST][2];
+        const int32_t left = truth->rays - taken, count = left < VSHI_TRUTH_FIRST ? left : VSHI_TRUTH_FIRST;
+        for (int k = 0; k < 2; ++k) {
+            vshi_sampler_disc(truth->sampler, texel, PURPOSE[k], taken, count, disc);
+            free[k] += count_free(&task, &from, (const double(*)[2])disc, count);
+        }
+        taken += count;
+        /* rays that all agree are no reason to end where they don't agree with the value: few rays miss what
+         * is small, always to one side */
+        if ((free[0] == 0 || free[0] == taken) && free[0] == free[1] &&
+            fabs(free[0] - expected * taken) < ENOUGH * taken) {
+            break;
+        }
+    }
+    for (int k = 0; k < 2; ++k) {
+        seen[k] = (double)free[k] / (double)taken;
+    }
+    return true;
+}
+
+static void trace_points(void *user, size_t begin, size_t end) {
+    const tracing *task = user;
+    for (size_t i = begin; i < end; ++i) {
+        task->values[i] = trace_point(task, i);
+    }
+}
+
+static vsh_result trace(tracing *task, size_t count, const vsh_run *run, const char *stage,
+                        vsh_error *error) {
+    vsh_run full;
+    vsh_result result = vshi_run_resolve(run, &full, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    void *disc;
+    result = vshi_allocate(&disc, (size_t)task->rays, sizeof *task->disc, stage, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    task->disc = disc;
+    place(task);
+    vshi_job *job = vshi_job_begin(&full, stage, count);
+    result = job == NULL ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage)
+                         : vshi_parallel_for(job, count, GRAIN, 1, trace_points, task, error);
+    vshi_job_end(job);
+    free(disc);
+    return result;
+}
+
+static vsh_result check(const tracing *task, size_t count, const char *call, vsh_error *error) {
+    const bool nothing = task->triangles == NULL && task->solids == NULL;
+    if (nothing || (count > 0 && (task->positions == NULL || task->values == NULL))) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %s NULL", call,
+                         nothing                   ? "both triangles and solids are"
+                         : task->positions == NULL ? "positions is"
+                                                   : "the result's array is");
+    }
+    if (task->rays < 1 || task->rays > MAX_RAYS) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: rays %d is out of range 1 … %d", call, task->rays,
+                         MAX_RAYS);
+    }
+    if (!(task->lift >= 0.0 && isfinite(task->lift))) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: lift %g: expected a finite number, at least 0", call,
+                         task->lift);
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_trace_shadow(const vsh_triangles *triangles, const vsh_solids *solids, size_t count,
+                            const double *positions, const float *normals, double lift,
+                            const vsh_light *light, int32_t rays, const vsh_run *run, float *visibility,
+                            vsh_error *error) {
+    VSHI_FLOATS;
+    tracing task = {triangles, solids, positions, normals, lift, light, 0.0, rays, NULL, visibility, {0}};
+    vsh_result result = check(&task, count, "vsh_trace_shadow", error);
+    if (result == VSH_OK) {
+        result = vsh_light_check(light, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    task.place = vshi_light_in_world(light);
+    /* all rays to a point are one ray */
+    task.rays = vshi_light_is_point(&task.place) ? 1 : rays;
+    return trace(&task, count, run, "trace", error);
+}
+
+vsh_result vsh_trace_ao(const vsh_triangles *triangles, const vsh_solids *solids, size_t count,
+                        const double *positions, const float *normals, double lift, double distance,
+                        int32_t rays, const vsh_run *run, float *ao, vsh_error *error) {
+    VSHI_FLOATS;
+    tracing task = {triangles, solids, positions, normals, lift, NULL, distance, rays, NULL, ao, {0}};
+    const vsh_result result = check(&task, count, "vsh_trace_ao", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    VSHI_NEEDS_OF(count, normals);
+    if (!(distance > 0.0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_trace_ao: distance %g: expected more than 0",
+                         distance);
+    }
+    return trace(&task, count, run, "trace", error);
+}

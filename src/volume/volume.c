@@ -1,0 +1,220 @@
+/* Volumes: voxels are shaded block by block, then what is inside solids is filled. */
+#include "base/floats.h"
+#include "base/memory.h"
+#include "base/names.h"
+#include "base/parallel.h"
+#include "shade/layers.h"
+#include "volume/channels.h"
+#include "volume/volume_blocks.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Share of the progress: filling what is inside costs little. */
+enum { SHADE_UNITS = 15, FILL_UNITS = 1 };
+
+static const char *const insides_table[] = {[VSH_INSIDE_NEAREST] = "nearest", [VSH_INSIDE_OFF] = "off"};
+static const vshi_names insides = VSHI_NAMES(insides_table);
+
+int32_t vsh_inside(const char *name) {
+    return vshi_name_find(insides, name);
+}
+
+const char *vsh_inside_name(int32_t inside) {
+    return vshi_name_at(insides, inside);
+}
+
+static void fill_blocks(void *user, size_t begin, size_t end) {
+    vshi_volume_bake *bake = user;
+    for (size_t b = begin; b < end && !atomic_load(&bake->out_of_memory); ++b) {
+        if (!vshi_fill_block(&bake->fill, b)) {
+            atomic_store(&bake->out_of_memory, true);
+        }
+    }
+}
+
+static void settle_blocks(void *user, size_t begin, size_t end) {
+    vshi_volume_bake *bake = user;
+    for (size_t b = begin; b < end; ++b) {
+        uint64_t active[VSHI_MASK_WORDS];
+        if (vshi_fill_active(&bake->fill, b, active)) {
+            vshi_volume_settle(bake->volume, b, active);
+        }
+    }
+}
+
+/* --- the whole */
+
+static vsh_result run_passes(vshi_volume_bake *bake, const vsh_run *run, vsh_error *error) {
+    static vshi_range_fn *const passes[] = {vshi_volume_shade_blocks, fill_blocks, settle_blocks};
+    static const size_t units[] = {SHADE_UNITS, FILL_UNITS, 0};
+    vshi_job *job = vshi_job_begin(run, "volume", (SHADE_UNITS + FILL_UNITS) * bake->block_count);
+    vsh_result result = VSH_OK;
+    if (job == NULL) {
+        atomic_store(&bake->out_of_memory, true);
+    }
+    for (size_t i = 0; i < sizeof units / sizeof units[0] && result == VSH_OK && job != NULL; ++i) {
+        result =
+            vshi_parallel_for(job, bake->block_count, VSHI_VOLUME_GRAIN, units[i], passes[i], bake, error);
+    }
+    vshi_job_end(job);
+    if (result == VSH_OK && atomic_load(&bake->out_of_memory)) {
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "volume: the system refused memory");
+    }
+    return result;
+}
+
+static void find_half_axes(vshi_volume_bake *bake) {
+    double centre[3], next[3];
+    const int32_t *index = bake->blocks[0].origin;
+    vsh_voxels_centre(bake->voxels, index, centre);
+    for (int axis = 0; axis < 3; ++axis) {
+        int32_t beside[3] = {index[0], index[1], index[2]};
+        ++beside[axis];
+        vsh_voxels_centre(bake->voxels, beside, next);
+        for (int k = 0; k < 3; ++k) {
+            bake->half_axis[axis][k] = 0.5 * (next[k] - centre[k]);
+        }
+    }
+}
+
+static vsh_result begin_volume(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,
+                               vsh_error *error) {
+    vshi_channel *channels = NULL;
+    vsh_result result =
+        vshi_allocate((void **)&channels, bake->channel_count, sizeof *channels, "volume", error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    const vsh_occluders *casters = bake->occluders;
+    vsh_field_info info;
+    vsh_field_get_info(casters->field, &info);
+    const vshi_channels what = {
+        lights,          bake->light_count,         &bake->options, bake->shadow_error, bake->ao_error,
+        info.voxel_size, casters->triangles != NULL};
+    vshi_channels_describe(&what, channels);
+    double layers = 0.0;
+    for (size_t i = 0; i < casters->layer_count; ++i) {
+        layers += vshi_layer_bytes(&casters->layers[i]);
+    }
+    const double held = (double)info.bytes + layers +
+                        2.0 * (double)bake->block_count * sizeof *bake->fill.shaded +
+                        (casters->triangles != NULL ? (double)vsh_triangles_bytes(casters->triangles) : 0.0);
+    result = vshi_volume_begin(bake->voxels, channels, bake->channel_count, run, held, &bake->volume, error);
+    free(channels);
+    return result;
+}
+
+static vsh_result bake_all(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,
+                           vsh_error *error) {
+    vsh_shade_options shade = bake->options.shade;
+    if (bake->options.ao == 0) {
+        shade.ao_method = VSH_AO_CONES; /* not asked for: it may want what is not there */
+    }
+    const bool around = !bake->normals && bake->options.ao != 0; /* AO over all directions */
+    vsh_result result =
+        vshi_query_create(bake->occluders, lights, bake->light_count, &shade, around, &bake->query, error);
+    if (result == VSH_OK) {
+        result = begin_volume(bake, lights, run, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_fill_begin(&bake->fill, &bake->solid, bake->voxels, bake->volume, bake->channel_count,
+                                 bake->options.inside == VSH_INSIDE_NEAREST, error);
+    }
+    if (result == VSH_OK) {
+        result = run_passes(bake, run, error);
+    }
+    if (result == VSH_OK) {
+        const vsh_volume_info counts = vshi_fill_counts(&bake->fill);
+        result = vshi_volume_close(bake->volume, &counts, error);
+    }
+    vshi_fill_end(&bake->fill);
+    vsh_query_free(bake->query);
+    return result;
+}
+
+static vsh_result check(const vsh_light *lights, const vshi_volume_bake *bake, vsh_error *error) {
+    const vsh_volume_options *options = &bake->options;
+    if (vsh_inside_name(options->inside) == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "inside %d: expected %d … %d", options->inside, 0,
+                         insides.count - 1);
+    }
+    if (bake->light_count == 0 && options->ao == 0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "volume: nothing to bake: no lights and no AO");
+    }
+    for (size_t l = 0; l < bake->light_count; ++l) {
+        vsh_error why;
+        const vsh_result result = vsh_light_check(&lights[l], &why);
+        if (result != VSH_OK) {
+            return vshi_fail(error, result, "light %zu: %s", l, why.message);
+        }
+        if (lights[l].name[0] == '\0') {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "light %zu: no name, which its grid is named after",
+                             l);
+        }
+        for (size_t k = 0; k < l; ++k) {
+            if (strcmp(lights[k].name, lights[l].name) == 0) {
+                return vshi_fail(error, VSH_ERROR_ARGUMENT, "lights %zu and %zu are both named '%s'", k, l,
+                                 lights[l].name);
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *voxels, const vsh_light *lights,
+                           size_t light_count, const vsh_volume_options *options, const vsh_run *run,
+                           vsh_volume **volume, vsh_shade_stats *stats, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(volume);
+    *volume = NULL;
+    VSHI_NEEDS(occluders);
+    VSHI_NEEDS(voxels);
+    VSHI_NEEDS_OF(light_count, lights);
+    vsh_run full;
+    vshi_volume_bake bake = {.occluders = occluders,
+                             .solid = vshi_solid_of(occluders),
+                             .voxels = voxels,
+                             .light_count = light_count,
+                             .options = vsh_volume_options_default(),
+                             .one = vsh_run_default(),
+                             .lock = PTHREAD_MUTEX_INITIALIZER,
+                             .stats = vsh_shade_stats_zero()};
+    vsh_result result =
+        vshi_options_resolve(options, &bake.options, sizeof bake.options, "vsh_volume_options", error);
+    if (result == VSH_OK) {
+        vsh_shade_options shade;
+        result = vshi_shade_options_resolve(&bake.options.shade, &shade, error);
+        bake.options.shade = shade;
+    }
+    if (result == VSH_OK) {
+        result = vshi_run_resolve(run, &full, error);
+    }
+    if (result == VSH_OK) {
+        result = check(lights, &bake, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_voxels_info info;
+    vsh_voxels_get_info(voxels, &info);
+    const vsh_shade_options *shade = &bake.options.shade;
+    bake.normals = info.has_normals != 0;
+    bake.blocks = vshi_voxels_blocks(voxels, &bake.block_count);
+    bake.shadow_error = bake.options.error != 0 && light_count > 0 && vshi_shadow_has_rays(shade);
+    bake.ao_error = bake.options.error != 0 && bake.options.ao != 0 && vshi_ao_has_rays(shade);
+    bake.channel_count = light_count * (bake.shadow_error ? 2 : 1) + (bake.options.ao != 0) + bake.ao_error;
+    bake.one.threads = 1;
+    bake.one.isa = full.isa;
+    find_half_axes(&bake);
+    result = bake_all(&bake, lights, &full, error);
+    if (stats != NULL) {
+        vshi_shade_stats_add(stats, &bake.stats);
+    }
+    if (result != VSH_OK) {
+        vsh_volume_free(bake.volume);
+        return result;
+    }
+    *volume = bake.volume;
+    return VSH_OK;
+}
