@@ -11,8 +11,10 @@ extern "C" {
 enum { VSH_DIGEST_TEXT = 65 }; /* bytes of a digest as text, NUL included */
 
 /* SHA-256 (FIPS 180-4) of a file's bytes, as 64 hexadecimal digits: what `sha256sum` prints. Errors:
- * VSH_ERROR_ARGUMENT (path NULL or empty), VSH_ERROR_READ (no such file, no permission, no regular file). */
-VSH_API vsh_result vsh_file_digest(const char *path, char digest[VSH_DIGEST_TEXT], vsh_error *error);
+ * VSH_ERROR_ARGUMENT (path NULL or empty, run), VSH_ERROR_READ (no such file, no permission, no regular
+ * file), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (under the stage "hash", 16 times a MB). */
+VSH_API vsh_result vsh_file_digest(const char *path, const vsh_run *run, char digest[VSH_DIGEST_TEXT],
+                                   vsh_error *error);
 
 #ifdef __cplusplus
 }

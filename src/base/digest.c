@@ -2,6 +2,7 @@
 #include "base/digest.h"
 
 #include "base/input.h"
+#include "base/try.h"
 
 #include <sha256.h>
 #include <stdio.h>
@@ -15,7 +16,7 @@ static vsh_result digest_stream(FILE *file, const char *path, char *digest, vshi
     size_t count;
     while ((count = fread(bytes, 1, sizeof bytes, file)) > 0) {
         SHA256Update(&context, bytes, count);
-        if (job != NULL && vshi_job_advance(job, 0)) {
+        if (vshi_job_advance(job, 0)) {
             return vshi_job_fail_cancelled(job, error);
         }
     }
@@ -38,11 +39,20 @@ vsh_result vshi_file_digest(const char *path, char digest[VSH_DIGEST_TEXT], vshi
     return result;
 }
 
-vsh_result vsh_file_digest(const char *path, char digest[VSH_DIGEST_TEXT], vsh_error *error) {
+vsh_result vsh_file_digest(const char *path, const vsh_run *run, char digest[VSH_DIGEST_TEXT],
+                           vsh_error *error) {
     VSHI_NEEDS(path);
     VSHI_NEEDS(digest);
     if (path[0] == '\0') {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "digest: no path");
     }
-    return vshi_file_digest(path, digest, NULL, error);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    vshi_job *job = vshi_job_begin(&full, "hash", 1);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    }
+    const vsh_result result = vshi_file_digest(path, digest, job, error);
+    vshi_job_end(job);
+    return result;
 }

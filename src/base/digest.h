@@ -6,7 +6,7 @@
 
 #include <vdbshade/digest.h>
 
-/* vsh_file_digest(), which the job can cancel; NULL: nobody. */
+/* vsh_file_digest(), within a job that is under way. */
 vsh_result vshi_file_digest(const char *path, char digest[VSH_DIGEST_TEXT], vshi_job *job, vsh_error *error);
 
 #endif

@@ -2,6 +2,7 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 const char *vsh_version(void) {
@@ -27,7 +28,7 @@ const char *vsh_result_name(vsh_result result) {
 }
 
 enum {
-    LONGEST = 3 * 4096, /* two paths and what is said of them */
+    LONGEST = 3 * 4096, /* two paths and what is said of them; more is allocated */
     KEPT_BEFORE = 120   /* of what is too long: where the path begins; the rest is its end and the reason */
 };
 
@@ -50,18 +51,29 @@ vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...)
         return code;
     }
     error->code = code;
-    char full[LONGEST];
-    va_list arguments;
+    char few[LONGEST], *more = NULL;
+    va_list arguments, again;
     va_start(arguments, format);
-    const int written = vsnprintf(full, sizeof full, format, arguments);
+    va_copy(again, arguments);
+    const int written = vsnprintf(few, sizeof few, format, arguments);
+    size_t length = written < 0 ? 0 : (size_t)written;
+    if (length >= sizeof few) {
+        more = malloc(length + 1);
+        length = more != NULL ? length : sizeof few - 1; /* the reason is lost then */
+    }
+    if (more != NULL) {
+        vsnprintf(more, length + 1, format, again);
+    }
+    va_end(again);
     va_end(arguments);
-    const size_t length = written < 0 ? 0 : (size_t)written < sizeof full ? (size_t)written : sizeof full - 1;
+    const char *full = more != NULL ? more : few;
     if (length < sizeof error->message) {
         memcpy(error->message, full, length);
         error->message[length] = '\0';
     } else {
         shorten(error->message, sizeof error->message, full, length);
     }
+    free(more);
     vshi_one_line(error->message);
     return code;
 }

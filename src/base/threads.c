@@ -1,6 +1,7 @@
 /* TBB's threads begin each other, and where the system refuses one of them that, nobody is there to catch
  * what is thrown: std::terminate() ends the host. So as many are begun here first, and no more asked of TBB
  * than there were. What is known of it belongs to the process, as its threads do. */
+#define _GNU_SOURCE /* gettid */
 #include "base/threads.h"
 
 #include <pthread.h>
@@ -8,12 +9,16 @@
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
 
 enum {
     SPARE = VSHI_OPENVDB_THREADS + 2, /* left to others: the host's, another process of the user */
-    LOOKS = 1000                      /* for the end of a thread, a yield each */
+    YIELDS = 100,                     /* for the end of a thread; then */
+    NAPS = 10000                      /* of a tenth of a millisecond */
 };
 
 static pthread_mutex_t looking = PTHREAD_MUTEX_INITIALIZER;
@@ -24,11 +29,14 @@ typedef struct gate {
     pthread_mutex_t lock;
     pthread_cond_t opens;
     bool open;
+    pid_t *tasks; /* [count]: those that came */
+    int32_t count;
 } gate;
 
 static void *wait_at(void *user) {
     gate *at = user;
     pthread_mutex_lock(&at->lock);
+    at->tasks[at->count++] = gettid();
     while (!at->open) {
         pthread_cond_wait(&at->opens, &at->lock);
     }
@@ -43,22 +51,31 @@ static void open_gate(gate *at) {
     pthread_mutex_unlock(&at->lock);
 }
 
-/* Links of the folder that has one a thread; 0 where there is no /proc. */
-static nlink_t count_tasks(void) {
+/* Not where there is no /proc. */
+static bool is_there(pid_t task) {
+    char path[48];
     struct stat status;
-    return stat("/proc/self/task", &status) == 0 ? status.st_nlink : 0;
+    snprintf(path, sizeof path, "/proc/self/task/%d", (int)task);
+    return stat(path, &status) == 0;
 }
 
-/* A thread that was joined counts against limits for a moment yet. */
-static void await_ends(nlink_t before) {
-    for (int i = 0; i < LOOKS && count_tasks() > before; ++i) {
-        sched_yield();
+/* A thread that was joined counts against limits until the system has ended its task: on a busy machine, for
+ * milliseconds. */
+static void await_ends(const gate *at) {
+    int looks = 0;
+    for (int32_t i = 0; i < at->count; ++i) {
+        for (; looks < YIELDS + NAPS && is_there(at->tasks[i]); ++looks) {
+            if (looks < YIELDS) {
+                sched_yield();
+            } else {
+                nanosleep(&(struct timespec){.tv_nsec = 100000}, NULL);
+            }
+        }
     }
 }
 
-static int32_t begin(int32_t wanted, const pthread_attr_t *attributes, pthread_t *threads) {
-    gate at = {PTHREAD_MUTEX_INITIALIZER, PTHREAD_COND_INITIALIZER, false};
-    const nlink_t before = count_tasks();
+static int32_t begin(int32_t wanted, const pthread_attr_t *attributes, pthread_t *threads, pid_t *tasks) {
+    gate at = {PTHREAD_MUTEX_INITIALIZER, PTHREAD_COND_INITIALIZER, false, tasks, 0};
     int32_t begun = 0;
     while (begun < wanted && pthread_create(&threads[begun], attributes, wait_at, &at) == 0) {
         ++begun;
@@ -67,7 +84,7 @@ static int32_t begin(int32_t wanted, const pthread_attr_t *attributes, pthread_t
     for (int32_t i = 0; i < begun; ++i) {
         pthread_join(threads[i], NULL);
     }
-    await_ends(before);
+    await_ends(&at);
     return begun;
 }
 
@@ -75,7 +92,7 @@ static int32_t begin(int32_t wanted, const pthread_attr_t *attributes, pthread_t
 static int32_t try(int32_t wanted, size_t stack) {
     sigset_t all, before;
     pthread_attr_t attributes;
-    pthread_t *threads = malloc((size_t)wanted * sizeof *threads);
+    pthread_t *threads = malloc((size_t)wanted * (sizeof *threads + sizeof(pid_t)));
     if (threads == NULL || pthread_attr_init(&attributes) != 0) {
         free(threads);
         return 0;
@@ -85,7 +102,7 @@ static int32_t try(int32_t wanted, size_t stack) {
     }
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    const int32_t begun = begin(wanted, &attributes, threads);
+    const int32_t begun = begin(wanted, &attributes, threads, (pid_t *)(threads + wanted));
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     pthread_attr_destroy(&attributes);
     free(threads);

@@ -1,5 +1,6 @@
 #include "message.h"
 
+#include "paths.h"
 #include "plain.h"
 #include "progress.h"
 #include "signals.h"
@@ -96,7 +97,8 @@ int cli_fail_of(const char *path, const vsh_error *error) {
     const bool of_values = error->code == VSH_ERROR_INPUT || error->code == VSH_ERROR_LIMIT ||
                            error->code == VSH_ERROR_UNSUPPORTED;
     const char *of = path != NULL ? path : input;
-    if ((!of_values && !of_caster) || of == NULL || names_file(error->message)) {
+    const bool of_scene = error->code == VSH_ERROR_READ && of != NULL && cli_has_ending(of, "json");
+    if ((!of_values && !of_caster && !of_scene) || of == NULL || names_file(error->message)) {
         return cli_fail(error);
     }
     cli_warnings_tell();

@@ -111,7 +111,7 @@ static bool next(source *from, char text[LINE]) {
     if (from->cancelled || fgets(text, LINE, from->file) == NULL) {
         return false;
     }
-    from->unreported += strlen(text);
+    from->unreported += strchr(text, '\n') != NULL ? strlen(text) : LINE - 1; /* of zeros, too */
     if (from->unreported >= REPORTED) {
         from->cancelled = vshi_job_advance(from->job, from->unreported);
         from->unreported = 0;

@@ -92,3 +92,17 @@ by_each() {
     shade bake scene.json --size 8 --quiet
     refused 2 "scene.json: receivers[0]: output bake.xyz: ending 'xyz'"
 }
+
+@test "a file that a scene names and that cannot be read is told with the scene, and why, however long its name is" {
+    local name
+    for name in none.obj "$(printf 'x%.0s' {1..300})" "$(printf 'x%.0s' {1..70000})"; do
+        printf '{"casters": [{"mesh": "%s"}], "receivers": [{"mesh": "box.obj", "output": "out.exr"}],
+            "lights": [{"name": "a", "type": "directional", "direction": [0, 1, 0]}]}' "$name" >scene.json
+        for command in "bake scene.json -o out.exr" "voxelize scene.json -o out.vdb"; do
+            # shellcheck disable=SC2086 # words of a command
+            shade $command --quiet
+            [[ $name != none.obj ]] || refused 3 "scene.json: none.obj: No such file or directory"
+            [[ $name == none.obj ]] || refused 3 "scene.json: xxx" "xxx: File name too long"
+        done
+    done
+}

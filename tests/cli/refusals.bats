@@ -48,6 +48,14 @@ setup() {
     done
 }
 
+@test "threads that were joined and count for a while yet are waited for" {
+    local most
+    for most in 6 8 16; do
+        LD_PRELOAD=$calls REFUSE_THREADS=$most LINGER=200 run --separate-stderr "${bake[@]}" --threads 8
+        done_well
+    done
+}
+
 @test "where it gives fewer than OpenVDB's libraries begin, that is said" {
     old_output out.exr
     local most

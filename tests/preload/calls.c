@@ -1,5 +1,6 @@
 /* Preloaded by tests/cli/refusals.bats: system calls that are refused, or told of.
- * REFUSE_THREADS=N: no more than N threads at a time; REFUSE_MEMFD: none; TELL_SYNCS=FILE: a line for each
+ * REFUSE_THREADS=N: no more than N threads at a time, LINGER=MS: one that was joined counts for so long yet;
+ * REFUSE_MEMFD: none; TELL_SYNCS=FILE: a line for each
  * fsync(), fdatasync() and rename(), with the names. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -23,18 +24,27 @@ static void *next(const char *name) {
 
 static atomic_int living;
 
-/* What a thread was to do. */
+/* A thread, and what it was to do; one that ended long ago stays in the list. */
 typedef struct call {
     void *(*fn)(void *);
-    void *user;
+    void *user, *result;
+    pthread_t thread;
+    atomic_int ended;
+    struct call *next;
 } call;
 
+static _Atomic(call *) calls;
+
 static void *live(void *user) {
-    const call made = *(call *)user;
-    free(user);
-    void *result = made.fn(made.user);
+    call *made = user;
+    made->result = made->fn(made->user);
+    atomic_store(&made->ended, 1);
+    const char *linger = getenv("LINGER");
+    if (linger != NULL) {
+        usleep((useconds_t)(1000 * atoi(linger)));
+    }
     atomic_fetch_sub(&living, 1);
-    return result;
+    return made->result;
 }
 
 int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*fn)(void *), void *user) {
@@ -45,14 +55,41 @@ int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*
     if (most == NULL) {
         return real(thread, attributes, fn, user);
     }
-    call *made = malloc(sizeof *made);
+    call *made = calloc(1, sizeof *made);
     if (made == NULL || atomic_fetch_add(&living, 1) >= atoi(most)) {
         atomic_fetch_sub(&living, 1);
         free(made);
         return EAGAIN;
     }
-    *made = (call){fn, user};
-    return real(thread, attributes, live, made);
+    made->fn = fn;
+    made->user = user;
+    const int result = real(&made->thread, attributes, live, made);
+    *thread = made->thread;
+    made->next = atomic_load(&calls);
+    while (!atomic_compare_exchange_weak(&calls, &made->next, made)) {
+    }
+    return result;
+}
+
+/* As the system's, which may come back before the thread is out of its counts. */
+int pthread_join(pthread_t thread, void **result) {
+    int (*real)(pthread_t, void **);
+    void *found = next("pthread_join");
+    memcpy(&real, &found, sizeof real);
+    call *made = getenv("LINGER") != NULL ? atomic_load(&calls) : NULL;
+    while (made != NULL && !pthread_equal(made->thread, thread)) {
+        made = made->next;
+    }
+    if (made == NULL) {
+        return real(thread, result);
+    }
+    while (atomic_load(&made->ended) == 0) {
+        usleep(100);
+    }
+    if (result != NULL) {
+        *result = made->result;
+    }
+    return pthread_detach(thread);
 }
 
 int memfd_create(const char *name, unsigned flags) {

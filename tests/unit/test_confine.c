@@ -149,6 +149,29 @@ static void spheres_are_cancelled_within_a_file_of_any_size(void **state) {
     assert_true(seen > 0.2 && seen < 0.5);
 }
 
+static int32_t cancel_soon(void *user, const char *stage, double fraction) {
+    (void)stage;
+    (void)fraction;
+    int *calls = user;
+    return ++*calls > 10;
+}
+
+static void spheres_are_cancelled_within_a_file_of_zeros(void **state) {
+    (void)state;
+    FILE *file = fopen(at("zeros.csv"), "wb");
+    assert_int_equal(ftruncate(fileno(file), (off_t)1 << 34), 0); /* takes many seconds to read */
+    assert_int_equal(fclose(file), 0);
+    int calls = 0;
+    double *spheres;
+    size_t count;
+    vsh_error error;
+    vsh_run run = vsh_run_default();
+    run.progress = cancel_soon;
+    run.user = &calls;
+    assert_int_equal(vsh_spheres_read(at("zeros.csv"), &run, &spheres, &count, &error), VSH_ERROR_CANCELLED);
+    assert_int_equal(calls, 11);
+}
+
 static void a_file_of_spheres_past_every_measure_is_a_limit(void **state) {
     (void)state;
     FILE *file = fopen(at("sparse.csv"), "wb");
@@ -159,13 +182,6 @@ static void a_file_of_spheres_past_every_measure_is_a_limit(void **state) {
     vsh_error error;
     assert_int_equal(vsh_spheres_read(at("sparse.csv"), NULL, &spheres, &count, &error), VSH_ERROR_LIMIT);
     assert_non_null(strstr(error.message, "17179869184"));
-}
-
-static int32_t cancel_soon(void *user, const char *stage, double fraction) {
-    (void)stage;
-    (void)fraction;
-    int *calls = user;
-    return ++*calls > 10;
 }
 
 static void hashing_is_cancelled_within_a_file(void **state) {
@@ -187,6 +203,10 @@ static void hashing_is_cancelled_within_a_file(void **state) {
     vsh_error error;
     assert_int_equal(vsh_provenance_create(&source, &run, &made, &error), VSH_ERROR_CANCELLED);
     assert_null(made);
+    calls = 0;
+    char digest[VSH_DIGEST_TEXT];
+    assert_int_equal(vsh_file_digest(path, &run, digest, &error), VSH_ERROR_CANCELLED);
+    assert_int_equal(calls, 11);
 }
 
 static int make_folder(void **state) {
@@ -198,6 +218,7 @@ static int remove_folder(void **state) {
     (void)state;
     unlink(at("spheres.csv"));
     unlink(at("sparse.csv"));
+    unlink(at("zeros.csv"));
     unlink(at("large.bin"));
     return rmdir(folder);
 }
@@ -213,6 +234,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test(what_cannot_be_asked_is_an_argument),
         cmocka_unit_test(a_missing_reader_is_an_error_that_says_how_to_do_without),
         cmocka_unit_test(spheres_are_cancelled_within_a_file_of_any_size),
+        cmocka_unit_test(spheres_are_cancelled_within_a_file_of_zeros),
         cmocka_unit_test(a_file_of_spheres_past_every_measure_is_a_limit),
         cmocka_unit_test(hashing_is_cancelled_within_a_file),
     };

@@ -124,8 +124,8 @@ static void files_have_paths_and_places(void **state) {
     REFUSED(vsh_flat_scene_read("a.json", NULL, &error));
     MAKES_NONE(vsh_tolerances_read(NULL, PLACE, &error));
     REFUSED(vsh_tolerances_read("a.json", NULL, &error));
-    REFUSED(vsh_file_digest(NULL, digest, &error));
-    REFUSED(vsh_file_digest("a.exr", NULL, &error));
+    REFUSED(vsh_file_digest(NULL, NULL, digest, &error));
+    REFUSED(vsh_file_digest("a.exr", NULL, NULL, &error));
     MAKES_NONE(vsh_image_read(NULL, PLACE, &error));
     REFUSED(vsh_image_read("a.exr", NULL, &error));
     REFUSED(vsh_image_write(NULL, &empty, NULL, &error));

@@ -29,7 +29,7 @@ static void digests_are_those_of_the_standard(void **state) {
         assert_int_equal(fclose(file), 0);
         char digest[VSH_DIGEST_TEXT];
         vsh_error error;
-        assert_ok(vsh_file_digest(at("digest.bin"), digest, &error), &error);
+        assert_ok(vsh_file_digest(at("digest.bin"), NULL, digest, &error), &error);
         assert_string_equal(digest, cases[i].digest);
     }
 }
@@ -38,13 +38,13 @@ static void digests_of_what_is_no_file_are_refused(void **state) {
     (void)state;
     char digest[VSH_DIGEST_TEXT];
     vsh_error error;
-    assert_int_equal(vsh_file_digest(at("nothing"), digest, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_file_digest(at("nothing"), NULL, digest, &error), VSH_ERROR_READ);
     assert_non_null(strstr(error.message, "nothing: cannot be read: No such file"));
-    assert_int_equal(vsh_file_digest(folder, digest, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_file_digest(folder, NULL, digest, &error), VSH_ERROR_READ);
     assert_non_null(strstr(error.message, "it is a folder"));
     assert_int_equal(mkfifo(at("pipe"), 0600), 0);
-    assert_int_equal(vsh_file_digest(at("pipe"), digest, &error), VSH_ERROR_READ);
-    assert_int_equal(vsh_file_digest(NULL, digest, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_file_digest(at("pipe"), NULL, digest, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_file_digest(NULL, NULL, digest, &error), VSH_ERROR_ARGUMENT);
 }
 
 static const char *value_of(const vsh_attribute *list, size_t count, const char *name) {

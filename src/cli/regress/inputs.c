@@ -18,9 +18,10 @@ static int no_memory(const regress_work *work) {
 }
 
 static int add_digest(const regress_work *work, regress_case *one, const char *what, const char *path) {
+    const vsh_run run = cli_common_run(&work->settings->compare.common);
     char digest[VSH_DIGEST_TEXT] = "none";
     vsh_error error;
-    if (access(path, F_OK) == 0 && vsh_file_digest(path, digest, &error) != VSH_OK) {
+    if (access(path, F_OK) == 0 && vsh_file_digest(path, &run, digest, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     return regress_lines_add(&one->inputs, "%s: %s", what, digest) ? CLI_OK : no_memory(work);

@@ -77,7 +77,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
 static int hash_program(regress_work *work) {
     char program[VSH_DIGEST_TEXT], library[VSH_DIGEST_TEXT] = "";
     vsh_error error;
-    if (vsh_file_digest("/proc/self/exe", program, &error) != VSH_OK) {
+    if (vsh_file_digest("/proc/self/exe", NULL, program, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     Dl_info found;
@@ -85,7 +85,7 @@ static int hash_program(regress_work *work) {
     void *address;
     memcpy(&address, &version, sizeof address);
     if (dladdr(address, &found) != 0 && found.dli_fname != NULL) {
-        vsh_file_digest(found.dli_fname, library, &error); /* a name that is not there adds nothing */
+        vsh_file_digest(found.dli_fname, NULL, library, &error); /* a name that is not there adds nothing */
     }
     return asprintf(&work->program, "%s %s %s", vsh_version(), program, library) >= 0
                ? CLI_OK
