@@ -16,8 +16,10 @@ enum { ROUND = 1024, MOST_TEXELS = 1 << 13 };
 /* Whether all is printed, in full sizes. */
 static bool everything;
 
-/* Half angle of the sun as a tangent, height and thickness of what casts, AO distance. */
-static const double WIDE = 0.25, HEIGHT = 1.0, THICK = 0.5, DISTANCE = 1.0;
+/* Half angle of the sun as a tangent, */
+static double WIDE = 0.25;
+/* height and thickness of what casts, AO distance. */
+static const double HEIGHT = 1.0, THICK = 0.5, DISTANCE = 1.0;
 /* Half the slit, the disc's radius. */
 static const double GAP = 0.125, RADIUS = 0.15;
 
@@ -433,6 +435,25 @@ static void adaptive_on_a_field_of_flat_faces_does_too(void **state) {
     }
 }
 
+/* All of a point's first rays may miss what hides a small part of a wide sun. */
+static void what_few_rays_miss_is_claimed(void **state) {
+    (void)state;
+    need_triangles();
+    const double before = WIDE;
+    WIDE = 0.45;
+    int wrong = 0;
+    for (int k = 0; k < 2; ++k) {
+        stage *s = make_stage(k == 0 ? SLIT : DISC, false, 0.0625);
+        const trial t = {
+            .method = VSH_SHADOW_EXACT, .max_error = k == 0 ? 0.05 : 0.02, .width = 48, .height = 48};
+        const outcome o = try(s, &t);
+        wrong += judge(s, &t, &o);
+        free_stage(s);
+    }
+    WIDE = before;
+    assert_int_equal(wrong, 0);
+}
+
 /* At the ends of a penumbra nearly all rays agree: there the light's last hundredth was lost. */
 static void ends_of_penumbrae_do_not_collapse(void **state) {
     (void)state;
@@ -482,6 +503,7 @@ int main(void) {
         cmocka_unit_test(ao_of_exact_claims_its_error_and_keeps_what_is_asked),
         cmocka_unit_test(white_and_blue_noise_claim_theirs),
         cmocka_unit_test(adaptive_on_a_field_of_flat_faces_does_too),
+        cmocka_unit_test(what_few_rays_miss_is_claimed),
         cmocka_unit_test(ends_of_penumbrae_do_not_collapse),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
