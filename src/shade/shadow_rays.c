@@ -294,13 +294,12 @@ static void settle_cast(ray_batch *batch, const size_t *some, size_t count) {
     const bool keeps = batch->task->options->method != VSH_SHADOW_RAYS && !is_hard(batch->task);
     for (size_t i = 0; i < count; ++i) {
         open_point *p = &batch->open[some[i]];
-        p->deviation = said_of(batch, some[i]);
-        /* where all rays agree, what they may have missed; others are interpolated by the deviation alone, so
-         * that no value is by what is said */
+        const double said = said_of(batch, some[i]);
+        /* where all rays agree, what they may have missed */
         const bool agree = keeps && (p->lit == 0 || p->lit == p->taken);
         const double unseen = agree ? fmin(error_of(batch, some[i]), batch->task->options->max_error) : 0.0;
-        const double said = fmax(p->deviation, unseen);
-        settle(batch, p->point, (float)p->lit / (float)p->taken, (float)said);
+        p->deviation = fmax(said, unseen);
+        settle(batch, p->point, (float)p->lit / (float)p->taken, (float)p->deviation);
     }
 }
 

@@ -444,10 +444,12 @@ static void what_few_rays_miss_is_claimed(void **state) {
     int wrong = 0;
     for (int k = 0; k < 2; ++k) {
         stage *s = make_stage(k == 0 ? SLIT : DISC, false, 0.0625);
-        const trial t = {
-            .method = VSH_SHADOW_EXACT, .max_error = k == 0 ? 0.05 : 0.02, .width = 48, .height = 48};
-        const outcome o = try(s, &t);
-        wrong += judge(s, &t, &o);
+        trial t = {.method = VSH_SHADOW_EXACT, .max_error = k == 0 ? 0.05 : 0.02, .width = 48, .height = 48};
+        for (int lightmap = 0; lightmap < 2; ++lightmap) {
+            t.lightmap = lightmap != 0;
+            const outcome o = try(s, &t);
+            wrong += judge(s, &t, &o);
+        }
         free_stage(s);
     }
     WIDE = before;
