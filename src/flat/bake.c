@@ -79,8 +79,8 @@ static vsh_result check_lights(const vsh_light *lights, size_t count, vsh_error 
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "light %zu: '%s': a plane knows no %s lights", i,
                              lights[i].name, vshi_light_type_of(lights[i].type)->name);
         }
-        if (lights[i].type != VSH_LIGHT_SPHERE &&
-            !(vshi_hypot(lights[i].direction[0], lights[i].direction[1]) > 0.0)) {
+        const double *way = lights[i].type == VSH_LIGHT_SPOT ? lights[i].axis : lights[i].direction;
+        if (lights[i].type != VSH_LIGHT_SPHERE && !(vshi_hypot(way[0], way[1]) > 0.0)) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT,
                              "light %zu: '%s': its direction has no length in the plane", i, lights[i].name);
         }
@@ -115,7 +115,7 @@ static double see(const bake *b, const vsh_light *light, vshi_point p, double *g
         const vshi_vec to = {view.towards.x, view.towards.y, 0.0};
         /* in the light the falloff is that of its rim, and a spot shines everywhere */
         vsh_light flat = *light;
-        flat.direction[2] = 0.0;
+        flat.axis[2] = 0.0;
         flat.type = outside ? light->type : VSH_LIGHT_SPHERE;
         *gain = vshi_light_gain(&flat, to, fmax(view.distance, fmax(light->radius, 1e-30)));
         if (light->falloff == VSH_FALLOFF_QUADRATIC && view.distance >= light->reach) {

@@ -9,7 +9,7 @@ vsh_result vshi_serve_image(const char *path, vshi_take *request, const vsh_run 
                             vsh_error *error) {
     (void)request;
     vsh_image_file *file = NULL;
-    const vsh_result result = vsh_image_read_run(path, run, &file, error);
+    const vsh_result result = vsh_image_read(path, run, &file, error);
     if (result != VSH_OK) {
         return result;
     }

@@ -42,11 +42,7 @@ static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *err
     return VSH_OK;
 }
 
-vsh_result vsh_image_read(const char *path, vsh_image_file **file, vsh_error *error) {
-    return vsh_image_read_run(path, NULL, file, error);
-}
-
-vsh_result vsh_image_read_run(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
+vsh_result vsh_image_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(file);
     *file = NULL;

@@ -53,7 +53,7 @@ static vsh_result copy_texts(vsh_image_writer *writer, const char *path, const v
         strcpy(writer->names[c], image->names[c]); /* the plan has looked at their lengths */
     }
     for (int32_t p = 0; p < writer->plan.planes.count; ++p) {
-        vshi_plane *plane = &writer->plan.planes.planes[p];
+        vshi_image_plane *plane = &writer->plan.planes.planes[p];
         const int32_t channel = writer->plan.channel[p];
         if (channel >= 0 && plane->name == image->names[channel]) {
             plane->name = writer->names[channel];

@@ -123,7 +123,7 @@ static void add_channels(const vsh_image *image, vshi_write_plan *plan) {
     vshi_planes *planes = &plan->planes;
     for (int32_t c = 0; c < image->channel_count; ++c) {
         plan->channel[planes->count] = c;
-        planes->planes[planes->count++] = (vshi_plane){.name = image->names[c]};
+        planes->planes[planes->count++] = (vshi_image_plane){.name = image->names[c]};
     }
 }
 
@@ -137,7 +137,7 @@ static bool add_picture(const vsh_image *image, vshi_write_plan *plan) {
     for (int c = 0; c < 3; ++c) {
         plan->channel[planes->count] = picture.rgb[c];
         planes->planes[planes->count++] =
-            (vshi_plane){.name = vshi_pack_keys[c], .is_grey = picture.rgb[c] < 0};
+            (vshi_image_plane){.name = vshi_pack_keys[c], .is_grey = picture.rgb[c] < 0};
     }
     if (picture.rgb[0] < 0) {
         plan->picture = picture;
@@ -166,7 +166,7 @@ static vsh_result pack_picture(const char *path, const vsh_image *image, vshi_wr
     if (format_alpha == VSHI_ALPHA_ALWAYS || (format_alpha == VSHI_ALPHA_KEPT && alpha >= 0)) {
         plan->channel[planes->count] = alpha;
         planes->planes[planes->count++] =
-            (vshi_plane){.name = vshi_pack_keys[VSHI_PACK_ALPHA], .constant = 1.0f};
+            (vshi_image_plane){.name = vshi_pack_keys[VSHI_PACK_ALPHA], .constant = 1.0f};
     }
     return VSH_OK;
 }
@@ -208,7 +208,7 @@ static vsh_result plan_planes(const char *path, const vsh_image *image, const ch
         if (entry->given || (!plan->exr && key < (plan->format.grey ? 1 : VSHI_PACK_ALPHA))) {
             const int32_t channel = entry->given ? entry->channel : -1;
             plan->channel[planes->count] = channel;
-            planes->planes[planes->count++] = (vshi_plane){
+            planes->planes[planes->count++] = (vshi_image_plane){
                 .name = vshi_pack_keys[key],
                 .constant = entry->constant,
                 .is_signed = channel >= 0 && strncmp(image->names[channel], SIGNED, strlen(SIGNED)) == 0};
@@ -243,7 +243,7 @@ static vsh_result plan_colors(const char *path, const vsh_image *image, int32_t 
     vshi_planes *planes = &plan->planes;
     int32_t lights = 0, others = 0;
     for (int32_t p = 0; p < planes->count; ++p) {
-        vshi_plane *plane = &planes->planes[p];
+        vshi_image_plane *plane = &planes->planes[p];
         const int32_t channel = plan->channel[p];
         const char *name = channel >= 0 ? image->names[channel] : NULL;
         plane->is_color = name != NULL && (begins_with(name, "irradiance.") || begins_with(name, "tint."));
@@ -256,7 +256,7 @@ static vsh_result plan_colors(const char *path, const vsh_image *image, int32_t 
         color_space == VSH_COLOR_SRGB || (color_space == VSH_COLOR_AUTO && lights > 0 && others == 0);
     planes->is_srgb = encode || color_space == VSH_COLOR_ENCODED;
     for (int32_t p = 0; p < planes->count && encode; ++p) {
-        vshi_plane *plane = &planes->planes[p];
+        vshi_image_plane *plane = &planes->planes[p];
         if (!plane->is_signed && strcmp(plane->name, vshi_pack_keys[VSHI_PACK_ALPHA]) != 0) {
             plane->encode = encode_srgb;
         }

@@ -18,11 +18,7 @@ vsh_result vshi_scene_text(const char *path, const vsh_run *run, char **text, si
     return vshi_json_text(path, run, text, size, error);
 }
 
-vsh_result vsh_scene_read(const char *path, vsh_scene **scene, vsh_error *error) {
-    return vsh_scene_read_run(path, NULL, scene, error);
-}
-
-vsh_result vsh_scene_read_run(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error) {
+vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(scene);
     *scene = NULL;

@@ -21,7 +21,7 @@ enum {
 /* What vsh_flat_scene_free() gets is the first member. */
 typedef struct owner {
     vsh_flat_scene scene;
-    vshi_block *blocks;
+    vshi_json_block *blocks;
 } owner;
 
 static vsh_result read_casters(vshi_reader *reader, const vshi_value *value, void *member) {
@@ -114,12 +114,8 @@ static vsh_result parse(vshi_reader *reader, owner *made) {
     return result;
 }
 
-vsh_result vsh_flat_scene_read(const char *path, vsh_flat_scene **scene, vsh_error *error) {
-    return vsh_flat_scene_read_run(path, NULL, scene, error);
-}
-
-vsh_result vsh_flat_scene_read_run(const char *path, const vsh_run *run, vsh_flat_scene **scene,
-                                   vsh_error *error) {
+vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_scene **scene,
+                               vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(scene);
     *scene = NULL;

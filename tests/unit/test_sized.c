@@ -126,9 +126,9 @@ static void a_call_fills_the_struct_that_the_caller_has(void **state) {
         type begun;                                                                                          \
         const size_t offsets[] = {__VA_ARGS__};                                                              \
         guard();                                                                                             \
-        type##_init((void *)room, sizeof now - 8);                                                           \
+        assert_int_equal(vsh_struct_init(#type, (void *)room, sizeof now - 8), 1);                           \
         assert_ends(sizeof now - 8, #type);                                                                  \
-        type##_init((void *)room, sizeof now);                                                               \
+        assert_int_equal(vsh_struct_init(#type, (void *)room, sizeof now), 1);                               \
         assert_ends(sizeof now, #type);                                                                      \
         memcpy(&begun, room, sizeof begun);                                                                  \
         for (size_t i = 0; i < sizeof offsets / sizeof *offsets; ++i) {                                      \
@@ -154,10 +154,14 @@ static void bindings_have_the_defaults_of_the_headers(void **state) {
            offsetof(vsh_sdf_node, radius) + 4);
     STARTS(vsh_bake_stats, vsh_bake_stats_zero, 0, offsetof(vsh_bake_stats, texels));
     vsh_run run;
-    vsh_run_init(&run, sizeof run);
+    assert_int_equal(vsh_struct_init("vsh_run", &run, sizeof run), 1);
     assert_int_equal(run.struct_size, sizeof run);
-    vsh_run_init((void *)room, sizeof run + 32); /* of a later header: refused where it is used */
+    /* of a later header: refused where it is used */
+    assert_int_equal(vsh_struct_init("vsh_run", (void *)room, sizeof run + 32), 1);
     assert_int_equal(((vsh_run *)(void *)room)->struct_size, sizeof run + 32);
+    assert_int_equal(vsh_struct_init("vsh_mesh", &run, sizeof run), 0);
+    assert_int_equal(vsh_struct_init(NULL, &run, sizeof run), 0);
+    assert_int_equal(vsh_struct_init("vsh_run", NULL, sizeof run), 0);
     vsh_grid *grid = NULL;
     assert_int_equal(vsh_grid_read("none.vdb", NULL, (void *)room, &grid, &why), VSH_ERROR_ARGUMENT);
 }
