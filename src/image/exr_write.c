@@ -10,17 +10,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* OpenEXR would print its messages; ours come from the sink and from its codes.
- * It may hold its lock on the context here, so the context must not be asked
- * for anything. */
+/* OpenEXR would print its messages; ours come from the sink and from its codes. It may hold its lock on the
+ * context here, so the context must not be asked for anything. */
 static void say_nothing(exr_const_context_t context, exr_result_t code, const char *message) {
     (void)context;
     (void)code;
     (void)message;
 }
 
-/* After a failed write OpenEXR 3.1.5 waits for ever on its own lock, so it is
- * told of none: the sink keeps it, and the caller looks there. */
+/* After a failed write OpenEXR 3.1.5 waits for ever on its own lock, so it is told of none: the sink keeps
+ * it, and the caller looks there. */
 static int64_t write_bytes(exr_const_context_t context, void *user, const void *data, uint64_t size,
                            uint64_t offset, exr_stream_error_func_ptr_t fail) {
     (void)context;
@@ -38,8 +37,7 @@ struct vshi_exr_writer {
     int part;
     const char *path;
     int32_t width, height, count;
-    int32_t order[VSH_MAX_CHANNELS]; /* file's channel → index of planes: by name,
-                                        as EXR keeps them */
+    int32_t order[VSH_MAX_CHANNELS]; /* file's channel → index of planes: by name, as EXR keeps them */
     exr_pixel_type_t type;
     size_t value_size;    /* bytes */
     int32_t lines;        /* scan lines in a chunk */
@@ -170,9 +168,8 @@ vsh_result vshi_exr_begin(const char *temporary, const char *path, const vshi_pl
         (double)planes->count * (double)planes->width * (double)value_size * MAX_CHUNK_LINES;
     if (chunk_bytes > (double)INT32_MAX) {
         return vshi_fail(error, VSH_ERROR_LIMIT,
-                         "%s: %d pixels of %d channels in a row are more than "
-                         "OpenEXR's 2 GiB a chunk",
-                         path, planes->width, planes->count);
+                         "%s: %d pixels of %d channels in a row are more than OpenEXR's 2 GiB a chunk", path,
+                         planes->width, planes->count);
     }
     void *memory = NULL;
     vsh_result result = vshi_allocate(&memory, 1, sizeof(vshi_exr_writer), path, error);

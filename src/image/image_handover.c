@@ -1,5 +1,6 @@
 /* An image between a reader and its caller. */
 #include "base/memory.h"
+#include "base/try.h"
 #include "image/planes.h"
 #include "sandbox/reader.h"
 
@@ -86,17 +87,13 @@ vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_imag
     vshi_ask ask;
     vshi_answer answer;
     vshi_job *job = NULL;
-    vsh_result result = vshi_image_job(path, run, UNITS, &job, error);
-    if (result == VSH_OK) {
-        result = vshi_ask_begin(&ask, VSHI_READ_IMAGE, path, run, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_ask_send_job(&ask, job, UNITS, &answer, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_image_take(&answer.payload, path, file, error);
-        vshi_answer_free(&answer);
-    }
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_image_job(path, run, UNITS, &job, error));
+    VSHI_TRY_DONE(vshi_ask_begin(&ask, VSHI_READ_IMAGE, path, run, error));
+    VSHI_TRY_DONE(vshi_ask_send_job(&ask, job, UNITS, &answer, error));
+    result = vshi_image_take(&answer.payload, path, file, error);
+    vshi_answer_free(&answer);
+done:
     vshi_job_end(job);
     return result;
 }

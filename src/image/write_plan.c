@@ -5,6 +5,7 @@
 #include "base/file.h"
 #include "base/job.h"
 #include "base/srgb.h"
+#include "base/try.h"
 #include "image/pack.h"
 
 #include <string.h>
@@ -267,33 +268,19 @@ static vsh_result plan_colors(const char *path, const vsh_image *image, int32_t 
 vsh_result vshi_write_plan_make(const char *path, const vsh_image *image, const vsh_image_options *options,
                                 vshi_write_plan *plan, vsh_error *error) {
     vsh_image_options full = vsh_image_options_default();
-    vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_image_options", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_options_resolve(options, &full, sizeof full, "vsh_image_options", error));
     if (path == NULL || path[0] == '\0') {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "image path: it is empty");
     }
-    result = check_image(path, image, error);
-    if (result == VSH_OK) {
-        result = plan_format(path, image, plan, error);
+    VSHI_TRY(check_image(path, image, error));
+    VSHI_TRY(plan_format(path, image, plan, error));
+    if (!plan->exr) { /* whose rows are written as they come */
+        VSHI_TRY(vshi_check_values(path, image->width, image->height, image->channel_count, error));
     }
-    if (result == VSH_OK && !plan->exr) { /* whose rows are written as they come */
-        result = vshi_check_values(path, image->width, image->height, image->channel_count, error);
-    }
-    if (result == VSH_OK) {
-        result = plan_bits(path, full.bits, plan, error);
-    }
-    if (result == VSH_OK) {
-        result = plan_planes(path, image, full.pack, plan, error);
-    }
-    if (result == VSH_OK) {
-        result = plan_colors(path, image, full.color_space, plan, error);
-    }
-    if (result == VSH_OK) {
-        plan->planes.attributes = full.attributes;
-        plan->planes.attribute_count = full.attribute_count;
-        result = vshi_attributes_check(path, full.attributes, full.attribute_count, error);
-    }
-    return result;
+    VSHI_TRY(plan_bits(path, full.bits, plan, error));
+    VSHI_TRY(plan_planes(path, image, full.pack, plan, error));
+    VSHI_TRY(plan_colors(path, image, full.color_space, plan, error));
+    plan->planes.attributes = full.attributes;
+    plan->planes.attribute_count = full.attribute_count;
+    return vshi_attributes_check(path, full.attributes, full.attribute_count, error);
 }

@@ -26,13 +26,11 @@ vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scen
     char *text = NULL;
     size_t size;
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result == VSH_OK) {
-        result = vshi_scene_text(path, &full, &text, &size, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_scene_parse(path, text, size, scene, error);
-    }
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_run_resolve(run, &full, error));
+    VSHI_TRY_DONE(vshi_scene_text(path, &full, &text, &size, error));
+    VSHI_TRY_DONE(vshi_scene_parse(path, text, size, scene, error));
+done:
     free(text);
     return result;
 }

@@ -107,10 +107,12 @@ static void a_call_fills_the_struct_that_the_caller_has(void **state) {
     assert_int_equal(vsh_texels_create(meshes, 1, &lightmap, NULL, NULL, &texels, &why), VSH_OK);
     HOLDS(vsh_charts_info, 1, vsh_charts_get_info_sized(charts, (void *)room, size));
     HOLDS(vsh_texels_info, 1, vsh_texels_get_info_sized(texels, (void *)room, size));
+    HOLDS(vsh_texel_samples, 1, vsh_texels_samples_sized(texels, (void *)room, size));
     vsh_charts_free(charts);
     vsh_texels_free(texels);
 
     const float values[4] = {0, 0.25f, 0.5f, 1};
+    HOLDS(vsh_coverage, 1, vsh_compare_coverage_sized(4, values, NULL, NULL, (void *)room, size));
     const vsh_compared compared = {{2, 2, 1}, values, values, NULL};
     HOLDS(vsh_measures, 1, vsh_compare_sized(&compared, NULL, NULL, (void *)room, size, &why));
     vsh_volume_free(volume);
