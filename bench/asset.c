@@ -46,7 +46,7 @@ static receiver take_texels(const vsh_field *field, const vsh_texels *texels) {
                   bench_take(s.count * 3 * sizeof(float)),
                   bench_take(s.count * sizeof(float))};
     for (size_t i = 0; i < s.count; ++i) {
-        if ((s.texel[i] % SIZE) % STRIDE != 0 || (s.texel[i] / SIZE) % STRIDE != 0) {
+        if (vsh_texel_column(s.texels[i]) % STRIDE != 0 || vsh_texel_row(s.texels[i]) % STRIDE != 0) {
             continue;
         }
         double probe[3];

@@ -33,7 +33,7 @@ typedef struct opened {
 static opened open_image(const char *path) {
     vsh_error error;
     opened o = {.path = path};
-    if (vsh_image_read(path, &o.file, &error) != VSH_OK) {
+    if (vsh_image_read(path, NULL, &o.file, &error) != VSH_OK) {
         fprintf(stderr, "judge: %s\n", error.message);
         exit(2);
     }

@@ -20,13 +20,14 @@ typedef struct planes {
     float *shadow, *ao, *coverage;
 } planes;
 
-static void average(const vsh_texel_samples *s, const float *values, size_t texels, float *plane) {
+static void average(const vsh_texel_samples *s, const float *values, size_t texels, int32_t width,
+                    float *plane) {
     float *count = bench_take(texels * sizeof *count);
     memset(plane, 0, texels * sizeof *plane);
     memset(count, 0, texels * sizeof *count);
     for (size_t i = 0; i < s->count; ++i) {
-        plane[s->texel[i]] += values[i];
-        count[s->texel[i]] += 1.0f;
+        plane[vsh_texel_place(s->texels[i], width)] += values[i];
+        count[vsh_texel_place(s->texels[i], width)] += 1.0f;
     }
     for (size_t i = 0; i < texels; ++i) {
         plane[i] = count[i] > 0.0f ? plane[i] / count[i] : 0.0f;
@@ -77,13 +78,13 @@ static int make_truth(char **arguments) {
                                .distance = atof(arguments[4]),
                                .rays = (size_t)atoi(arguments[5])};
     truth_mesh_packets(mesh, TRUTH_NEIGHBOURS_16, &question, 0, values);
-    average(&s, values, count, plane[0]);
+    average(&s, values, count, size.width, plane[0]);
     question.towards = NULL;
     truth_mesh_packets(mesh, TRUTH_NEIGHBOURS_16, &question, 0, values);
-    average(&s, values, count, plane[1]);
+    average(&s, values, count, size.width, plane[1]);
     memset(plane[2], 0, count * sizeof *plane[2]);
     for (size_t i = 0; i < s.count; ++i) {
-        plane[2][s.texel[i]] = 1.0f;
+        plane[2][vsh_texel_place(s.texels[i], size.width)] = 1.0f;
     }
     const char *const names[] = {"shadow.sun", "ao", "A"};
     const float *const view[] = {plane[0], plane[1], plane[2]};
@@ -123,8 +124,8 @@ static void same_size(const vsh_image *a, const vsh_image *b, const char *path) 
 static int compare(char **arguments, int valid_count, char **valid) {
     vsh_error error;
     vsh_image_file *truth = NULL, *file = NULL;
-    bench_check(vsh_image_read(arguments[0], &truth, &error), &error);
-    bench_check(vsh_image_read(arguments[2], &file, &error), &error);
+    bench_check(vsh_image_read(arguments[0], NULL, &truth, &error), &error);
+    bench_check(vsh_image_read(arguments[2], NULL, &file, &error), &error);
     const vsh_image size = vsh_image_view(truth), other = vsh_image_view(file);
     same_size(&size, &other, arguments[2]);
     const size_t count = (size_t)size.width * (size_t)size.height;
@@ -132,7 +133,7 @@ static int compare(char **arguments, int valid_count, char **valid) {
     memcpy(mask, channel(truth, arguments[0], "A"), count * sizeof *mask);
     for (int v = 0; v < valid_count; ++v) {
         vsh_image_file *judge = NULL;
-        bench_check(vsh_image_read(valid[v], &judge, &error), &error);
+        bench_check(vsh_image_read(valid[v], NULL, &judge, &error), &error);
         const vsh_image view = vsh_image_view(judge);
         same_size(&size, &view, valid[v]);
         const float *a = channel(judge, valid[v], "A");

@@ -88,7 +88,7 @@ static void measure(FILE *csv, const bench_scene *scene, bool sunlit, const ladd
             origins[3 * count + k] =
                 samples.positions[3 * i + k] + LIFT * (double)samples.geometric_normals[3 * i + k];
         }
-        at[count++] = samples.texel[i];
+        at[count++] = (uint32_t)vsh_texel_place(samples.texels[i], SIZE);
     }
     vsh_light sun = vsh_light_default();
     memcpy(sun.direction, SUN, sizeof SUN);

@@ -48,7 +48,7 @@ static void read_model(const char *path, const vsh_run *run) {
 static void read_image(const char *path, const vsh_run *run) {
     vsh_error error;
     vsh_image_file *image = NULL;
-    bench_check(vsh_image_read_run(path, run, &image, &error), &error);
+    bench_check(vsh_image_read(path, run, &image, &error), &error);
     vsh_image_free(image);
 }
 
@@ -88,7 +88,7 @@ static void write_ball(const char *path, double voxel) {
     options.voxel_size = voxel;
     vsh_grid *grid = NULL;
     bench_check(vsh_grid_from_sdf(&tree, &options, NULL, &grid, &error), &error);
-    bench_check(vsh_grid_write(grid, path, NULL, &error), &error);
+    bench_check(vsh_grid_write(grid, path, NULL, NULL, 0, &error), &error);
     vsh_grid_free(grid);
 }
 

@@ -36,7 +36,7 @@ void bench_seeds_make(bench_seeds_scene *seeds) {
     seeds->positions = bench_take(seeds->count * 3 * sizeof *seeds->positions);
     seeds->normals = bench_take(seeds->count * 3 * sizeof *seeds->normals);
     place_texels(seeds->positions, seeds->normals);
-    bench_check(vsh_scene_read(VSH_ASSETS "/seeds.json", &scene, &error), &error);
+    bench_check(vsh_scene_read(VSH_ASSETS "/seeds.json", NULL, &scene, &error), &error);
     bench_check(vsh_assets_load(scene, &run, &assets, &error), &error);
     bench_check(vsh_scene_casters(scene, assets, &run, &seeds->grid, &error), &error);
     vsh_field_options options = vsh_field_options_default();

@@ -28,7 +28,7 @@ int main(void) {
     vsh_grid *grid = NULL;
     vsh_occluders *occluders = NULL;
     if (vsh_grid_from_distance(&distance, &voxels, NULL, &grid, &error) != VSH_OK ||
-        vsh_grid_write(grid, "torus.vdb", "torus", &error) != VSH_OK ||
+        vsh_grid_write(grid, "torus.vdb", "torus", NULL, 0, &error) != VSH_OK ||
         vsh_occluders_from_grid(grid, NULL, NULL, &occluders, &error) != VSH_OK) {
         fprintf(stderr, "callback: %s\n", error.message);
         vsh_grid_free(grid);

@@ -14,7 +14,7 @@ int main(int argc, char **argv) {
     vsh_error error;
     vsh_scene *scene = NULL;
     vsh_bake_report report;
-    if (vsh_scene_read(argc > 1 ? argv[1] : "scene.json", &scene, &error) != VSH_OK ||
+    if (vsh_scene_read(argc > 1 ? argv[1] : "scene.json", NULL, &scene, &error) != VSH_OK ||
         vsh_bake_scene(scene, NULL, &run, &report, &error) != VSH_OK) {
         fprintf(stderr, "scene: %s\n", error.message);
         vsh_scene_free(scene);

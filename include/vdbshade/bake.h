@@ -30,7 +30,6 @@ static inline vsh_lightmap_options vsh_lightmap_options_default(void) {
                                     vsh_shade_options_default(),  4,    0};
     return options;
 }
-VSH_API void vsh_lightmap_options_init(vsh_lightmap_options *options, size_t size);
 
 /* What is wrong with a receiver's UVs, mesh by mesh. */
 typedef struct vsh_uv_report {
@@ -155,14 +154,6 @@ enum { VSH_BAND_STEP = 8 }; /* bands of rows begin at multiples of it */
 VSH_API vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t first_row, int32_t rows,
                                           const vsh_run *run, vsh_texels **texels, vsh_error *error);
 
-/* Bytes that baking such a band takes at most, beside charts and field: texels, planes and what
- * vsh_bake_lightmap() takes, with the shading options given to vsh_charts_create(). `floats` is the sum of
- * all planes' channels; `errors`, `irradiance`, `bent` and `tint` tell (not 0) whether there are such planes.
- * 0 where the rows are no band. */
-VSH_API uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows,
-                                       int32_t floats, int32_t errors, int32_t irradiance, int32_t bent,
-                                       int32_t tint);
-
 /* The samples behind a lightmap, in the order in which they are shaded. A view into the texels. Positions are
  * lifted off coarse triangles towards the smooth surface (Hanika, "Hacking the shadow terminator", 2021).
  * Rays against triangles begin on the sample's own where others are in the lift's way, or all of a light is
@@ -172,11 +163,17 @@ typedef struct vsh_texel_samples {
     const double *positions; /* [count][3], world units */
     const float *normals;    /* [count][3], unit, decide shadow: smooth where the mesh is, or geometric */
     const float *geometric_normals; /* [count][3], unit */
-    const uint32_t *texel;          /* [count], row × width + column, row 0 at v = 1 */
+    const uint32_t *texels;         /* [count], each vsh_texel(), in the whole lightmap */
 } vsh_texel_samples;
 
 /* Cannot fail; the arrays belong to the texels. */
-VSH_API vsh_texel_samples vsh_texels_samples(const vsh_texels *texels);
+VSH_API void vsh_texels_samples_sized(const vsh_texels *texels, vsh_texel_samples *samples,
+                                      size_t samples_size);
+static inline vsh_texel_samples vsh_texels_samples(const vsh_texels *texels) {
+    vsh_texel_samples samples;
+    vsh_texels_samples_sized(texels, &samples, sizeof samples);
+    return samples;
+}
 
 /* What the axes of bent normals are. Tangent space: x along growing u of the lightmap's UVs, orthogonal to
  * the normal; z along the normal that decides shadow; y across both, towards growing v (as in OpenGL).
@@ -210,6 +207,13 @@ typedef struct vsh_lightmap {
     float *invalid; /* 1: a chart covers it, but no sample of it is valid; 2: and it is in plain sight, as of
                        vsh_bake_stats; 0 elsewhere. Not padded */
 } vsh_lightmap;
+
+/* Bytes that baking a band into such planes takes at most, beside charts and field: texels, the planes of its
+ * rows and what vsh_bake_lightmap() takes, with the shading options given to vsh_charts_create(). Of
+ * `lightmap` only which members are NULL is looked at, so whatever is not stands for a plane, or for
+ * light_count of them. 0 where the rows are no band. */
+VSH_API uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows,
+                                       const vsh_lightmap *lightmap, size_t light_count);
 
 /* What is known of a channel's error, in sums over its values, so that those of bands add up. Begins as
  * zeros. */
@@ -252,7 +256,6 @@ static inline vsh_bake_stats vsh_bake_stats_zero(void) {
     vsh_bake_stats stats = {sizeof(vsh_bake_stats), 0, 0, NULL, vsh_shade_stats_zero(), 0, NULL};
     return stats;
 }
-VSH_API void vsh_bake_stats_init(vsh_bake_stats *stats, size_t size);
 
 /* Shades the texels and fills the lightmap's planes. NULL options are those given to vsh_texels_create().
  * Rays begin start_offset + surface_offset above the surface (a voxel at least in creases), for sheets

@@ -52,7 +52,6 @@ static inline vsh_row_sink vsh_row_sink_default(void) {
     vsh_row_sink sink = {sizeof(vsh_row_sink), NULL, NULL, NULL, NULL};
     return sink;
 }
-VSH_API void vsh_row_sink_init(vsh_row_sink *sink, size_t size);
 
 /* --- jobs */
 
@@ -86,7 +85,6 @@ static inline vsh_bake_job_options vsh_bake_job_options_default(void) {
         sizeof(vsh_bake_job_options), 0, 0, 0, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL};
     return options;
 }
-VSH_API void vsh_bake_job_options_init(vsh_bake_job_options *options, size_t size);
 
 /* The lightmaps of a scene under way. Not for several threads at once. Free it with vsh_bake_job_free(). */
 typedef struct vsh_bake_job vsh_bake_job;

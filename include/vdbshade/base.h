@@ -13,13 +13,16 @@
  *   options, run, stats or error: NULL options and a NULL run stand for what their …_default() gives. A call
  *   that returns a vsh_result answers any other NULL with VSH_ERROR_ARGUMENT, and says which it is.
  * - Arrays and structs that are passed in stay the caller's and are not used after the call.
+ * - Arrays of voxels are [depth][height][width]: x fastest, then y, then z, as images have columns fastest. A
+ *   texel is one number everywhere: vsh_texel() (points.h).
  * - A call that makes a handle leaves NULL in its place where it fails.
  * - Structs may get more members at their end; programs that were compiled against an older header then go on
  *   working. Those that begin with struct_size are filled by their …_default() or …_zero() function;
  *   VSH_ERROR_ARGUMENT where struct_size is 0, more than this library knows, or the size of no such struct.
  *   Calls that fill another struct are inline functions here, which hand its size to a …_sized() one.
- *   Bindings of other languages call these, and the …_init() of a struct, `size` being the bytes of it that
- *   they know. All else changes with the library's soname alone, which is that of the minor version.
+ *   Bindings of other languages call these, and vsh_struct_init(). All else changes with the library's soname
+ *   alone, which is that of the minor version: what is passed in without a size (vsh_mesh, vsh_light,
+ *   vsh_lightmap, vsh_image …), and vsh_error, vsh_attribute and vsh_bake_error, which get no more members.
  * - Calls compute in the default floating-point environment (round to nearest, denormals kept, no traps),
  *   whatever the caller has set, which is given back. Callbacks are called in the default one.
  * - Files that somebody else made: the libraries that parse .vdb files, meshes, images and fonts can crash on
@@ -46,10 +49,10 @@ extern "C" {
 #endif
 
 #define VSH_VERSION_MAJOR 0
-#define VSH_VERSION_MINOR 1
+#define VSH_VERSION_MINOR 2
 #define VSH_VERSION_PATCH 0
 
-/* "0.1.0"; a static string. */
+/* "0.2.0"; a static string. */
 VSH_API const char *vsh_version(void);
 
 /* What a call came to. Zero is success; every other value comes with a message in the caller's vsh_error. */
@@ -76,6 +79,11 @@ typedef struct vsh_error {
     vsh_result code;
     char message[1020];
 } vsh_error;
+
+/* For bindings of other languages, which cannot call inline functions: what the …_default() or …_zero() of a
+ * struct gives, by its name ("vsh_run"), into `size` bytes, as many as they know of it. 1; or 0 where there
+ * is no such struct, or an argument is NULL. */
+VSH_API int32_t vsh_struct_init(const char *name, void *made, size_t size);
 
 /* A line of text that a file carries beside its values (provenance.h makes some). */
 typedef struct vsh_attribute {
@@ -140,7 +148,6 @@ static inline vsh_run vsh_run_default(void) {
     vsh_run run = {sizeof(vsh_run), 0, 0, NULL, NULL, NULL, VSH_ISA_BEST, NULL, 0.0, 0, 0, 0};
     return run;
 }
-VSH_API void vsh_run_init(vsh_run *run, size_t size);
 
 #ifdef __cplusplus
 }

@@ -25,8 +25,12 @@ typedef struct vsh_coverage {
 
 /* Compares two planes of coverage [count], a texel being covered where its value is above 1/2 (NULL: all
  * are), and writes 1 into mask[count] (may be NULL) where both are, else 0. Cannot fail. */
-VSH_API void vsh_compare_coverage(uint64_t count, const float *golden, const float *values, uint8_t *mask,
-                                  vsh_coverage *coverage);
+VSH_API void vsh_compare_coverage_sized(uint64_t count, const float *golden, const float *values,
+                                        uint8_t *mask, vsh_coverage *coverage, size_t coverage_size);
+static inline void vsh_compare_coverage(uint64_t count, const float *golden, const float *values,
+                                        uint8_t *mask, vsh_coverage *coverage) {
+    vsh_compare_coverage_sized(count, golden, values, mask, coverage, sizeof *coverage);
+}
 
 /* --- values */
 
@@ -52,7 +56,6 @@ static inline vsh_compare_options vsh_compare_options_default(void) {
     vsh_compare_options options = {sizeof(vsh_compare_options), 0.02, 0.1, 2, 0.0};
     return options;
 }
-VSH_API void vsh_compare_options_init(vsh_compare_options *options, size_t size);
 
 /* What is held against a limit. Values are taken in units of the range (vsh_measures.range), lengths in
  * texels.
@@ -127,13 +130,19 @@ static inline vsh_result vsh_compare(const vsh_compared *compared, const vsh_com
 
 /* What a channel is allowed. */
 typedef struct vsh_limits {
+    size_t struct_size;
     double value[VSH_MEASURE_COUNT]; /* of VSH_MEASURE_NONFINITE it is not looked at: it is 0 */
     vsh_compare_options options;
 } vsh_limits;
 
 /* Limits that bakes pass which differ by rounding: another compiler, files of 16 instead of 32 bits; and that
  * fail penumbrae a tenth wider, a shift of a quarter of a texel, a lost caster of four texels. */
-VSH_API vsh_limits vsh_limits_default(void);
+VSH_API void vsh_limits_default_sized(vsh_limits *limits, size_t limits_size);
+static inline vsh_limits vsh_limits_default(void) {
+    vsh_limits limits;
+    vsh_limits_default_sized(&limits, sizeof limits);
+    return limits;
+}
 
 /* Widens limits, and sets options.noise, for values that were estimated: bakes whose standard errors are a
  * and b differ by noise of √(a² + b²), in units of the range, 0 … 1, and are alike all the same.

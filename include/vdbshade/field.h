@@ -23,7 +23,6 @@ static inline vsh_field_options vsh_field_options_default(void) {
     vsh_field_options options = {sizeof(vsh_field_options), 0.0};
     return options;
 }
-VSH_API void vsh_field_options_init(vsh_field_options *options, size_t size);
 
 /* Makes the field of a grid; free it with vsh_field_free(). Time and memory follow the surface's area; each
  * level above the finest adds about a quarter of the one below. Errors:

@@ -49,7 +49,6 @@ static inline vsh_flat_options vsh_flat_options_default(void) {
                                 VSH_FLAT_EXACT,           1,   4,   1024};
     return options;
 }
-VSH_API void vsh_flat_options_init(vsh_flat_options *options, size_t size);
 
 /* Where a bake's values go; each plane [height][width], row 0 on top. */
 typedef struct vsh_flat_map {
@@ -62,9 +61,9 @@ typedef struct vsh_flat_map {
 
 /* Bakes a light map: each texel's values are the mean of those of its samples that are outside solids; where
  * there is none they are 0, but for padding. `casters` NULL is a plane without any. Lights are as in light.h,
- * but for the third components of direction and position, which are ignored; their radius is that of a disc,
- * a spot's angles are in the plane. A point inside a light's disc sees all of it. Values depend on no number
- * of threads. Errors (the planes then hold nothing of use):
+ * but for the third components of direction, axis and position, which are ignored; their radius is that of a
+ * disc, a spot's angles are in the plane. A point inside a light's disc sees all of it. Values depend on no
+ * number of threads. Errors (the planes then hold nothing of use):
  * - VSH_ERROR_ARGUMENT: map NULL, options out of range, lights NULL with a count above 0, a light that
  *   vsh_light_check() refuses or whose direction has no length in the plane (with its number), run;
  * - VSH_ERROR_LIMIT: run->memory_limit, with outline and planes; classic: more than 2^31 distances in its
@@ -117,11 +116,8 @@ typedef struct vsh_flat_scene {
 
 /* Reads a flat scene's file (docs/flat.md); what it names is not opened. The scene and all it points to
  * belong to *scene; free it with vsh_flat_scene_free(). Errors: as vsh_scene_read(). */
-VSH_API vsh_result vsh_flat_scene_read(const char *path, vsh_flat_scene **scene, vsh_error *error);
-
-/* The same, as vsh_scene_read_run(). */
-VSH_API vsh_result vsh_flat_scene_read_run(const char *path, const vsh_run *run, vsh_flat_scene **scene,
-                                           vsh_error *error);
+VSH_API vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_scene **scene,
+                                       vsh_error *error);
 VSH_API void
 vsh_flat_scene_free(vsh_flat_scene *scene); /* of vsh_flat_scene_read() only; NULL does nothing */
 

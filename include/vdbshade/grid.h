@@ -26,7 +26,6 @@ static inline vsh_grid_options vsh_grid_options_default(void) {
     vsh_grid_options options = {sizeof(vsh_grid_options), 0.0, 256, 3.0, 2.0};
     return options;
 }
-VSH_API void vsh_grid_options_init(vsh_grid_options *options, size_t size);
 
 /* The union of what the meshes are taken for (vsh_mesh.solidity): solids (closed over their holes, with a
  * warning) less the rooms in them; walls of shell_thickness behind faces that look inwards; shells of
@@ -104,18 +103,14 @@ VSH_API vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_g
 VSH_API vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run, vsh_grid **grid,
                                  vsh_error *error);
 
-/* Writes one .vdb file with the grid as `name` (NULL: "surface"); the same grid gives the same bytes. Atomic:
- * written beside `path` and renamed, so a failure leaves an old file alone. Errors: VSH_ERROR_ARGUMENT (path
- * NULL or empty), VSH_ERROR_LIMIT (voxels below 1.45e-5 world units, which OpenVDB cannot write),
- * VSH_ERROR_WRITE (no such folder, no permission, a folder or device in the way, disk full),
+/* Writes one .vdb file with the grid as `name` (NULL: "surface") and attributes [attribute_count] as its
+ * metadata (may be NULL where that is 0); the same grid gives the same bytes. Atomic: written beside `path`
+ * and renamed, so a failure leaves an old file alone. Errors: VSH_ERROR_ARGUMENT (path NULL or empty,
+ * attributes other than vsh_attribute says), VSH_ERROR_LIMIT (voxels below 1.45e-5 world units, which OpenVDB
+ * cannot write), VSH_ERROR_WRITE (no such folder, no permission, a folder or device in the way, disk full),
  * VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name, vsh_error *error);
-
-/* The same with lines of text beside the values, as the grid's metadata. VSH_ERROR_ARGUMENT too where they
- * are not as vsh_attribute says. */
-VSH_API vsh_result vsh_grid_write_with(const vsh_grid *grid, const char *path, const char *name,
-                                       const vsh_attribute *attributes, size_t attribute_count,
-                                       vsh_error *error);
+VSH_API vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name,
+                                  const vsh_attribute *attributes, size_t attribute_count, vsh_error *error);
 
 /* A caster for vsh_grid_unite(): a grid and where it stands. A view; nothing is owned. */
 typedef struct vsh_grid_instance {
@@ -155,9 +150,9 @@ static inline void vsh_grid_get_info(const vsh_grid *grid, vsh_grid_info *info) 
     vsh_grid_get_info_sized(grid, info, sizeof *info);
 }
 
-/* A dense copy: the distances of size[0] × size[1] × size[2] voxels from `index_min` on into values, z
- * fastest, world units, negative inside; beyond the band ± its half width. Runs on the calling thread.
- * Errors: VSH_ERROR_ARGUMENT (a size below 1, indices beyond 32 bits). */
+/* A dense copy: the distances of size[0] × size[1] × size[2] voxels from `index_min` on into values, x
+ * fastest (base.h), world units, negative inside; beyond the band ± its half width. Runs on the calling
+ * thread. Errors: VSH_ERROR_ARGUMENT (a size below 1, indices beyond 32 bits). */
 VSH_API vsh_result vsh_grid_copy(const vsh_grid *grid, const int32_t index_min[3], const int32_t size[3],
                                  float *values, vsh_error *error);
 VSH_API void vsh_grid_free(vsh_grid *grid); /* NULL does nothing */

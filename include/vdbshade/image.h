@@ -62,7 +62,6 @@ static inline vsh_image_options vsh_image_options_default(void) {
     vsh_image_options options = {sizeof(vsh_image_options), 0, NULL, NULL, 0, VSH_COLOR_AUTO};
     return options;
 }
-VSH_API void vsh_image_options_init(vsh_image_options *options, size_t size);
 
 /* Writes an image; the ending of `path`, in any case, chooses the format (docs/formats.md lists them).
  * Integer formats clamp to 0 … 1 and round to nearest, NaN to 0, with the curve that options->color_space
@@ -139,22 +138,18 @@ VSH_API void vsh_image_default_pack(const vsh_image *image, char *text, size_t c
 typedef struct vsh_image_file vsh_image_file;
 
 /* Reads an image file: EXR and PNG by their first bytes, others by the ending of `path`. Integers become 0
- * … 1 as they stand: no transfer curve, no multiplication by alpha. The readers of OpenImageIO
- * can crash on damaged files: those from strangers are for vsh_image_read_run(). Errors:
- * - VSH_ERROR_ARGUMENT: path NULL or empty, file NULL;
- * - VSH_ERROR_READ: no such file, no permission, a folder; damaged, cut short;
+ * … 1 as they stand: no transfer curve, no multiplication by alpha. The readers of OpenImageIO can crash on
+ * damaged files: those from strangers are for run->reader (base.h). The stage is "load". Errors:
+ * - VSH_ERROR_ARGUMENT: path NULL or empty, file NULL, run;
+ * - VSH_ERROR_READ: no such file, no permission, a folder; damaged, cut short; the reader crashed;
  * - VSH_ERROR_INPUT: an ending of no format that is read;
  * - VSH_ERROR_UNSUPPORTED: deep, volume and subsampled images, compressions and formats that the installed
  *   OpenEXR and OpenImageIO do not read;
- * - VSH_ERROR_LIMIT: more than 2^31 values or VSH_MAX_CHANNELS channels;
- * - VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_image_read(const char *path, vsh_image_file **file, vsh_error *error);
-
-/* The same with a run: by run->reader where there is one (base.h), with progress ("load") and within
- * run->memory_limit. Errors: the same; VSH_ERROR_ARGUMENT (run), VSH_ERROR_READ (the reader crashed),
- * VSH_ERROR_LIMIT (memory, time), VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_image_read_run(const char *path, const vsh_run *run, vsh_image_file **file,
-                                      vsh_error *error);
+ * - VSH_ERROR_LIMIT: more than 2^31 values or VSH_MAX_CHANNELS channels; run->memory_limit, the reader's
+ * time;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_image_read(const char *path, const vsh_run *run, vsh_image_file **file,
+                                  vsh_error *error);
 
 /* The planes and names of a file, which they belong to; names are the file's own in EXR, else R, G, B, A or
  * Y. NULL is an image of 0 × 0. */

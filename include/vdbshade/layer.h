@@ -61,7 +61,6 @@ static inline vsh_layer vsh_layer_default(void) {
                        NULL};
     return layer;
 }
-VSH_API void vsh_layer_init(vsh_layer *layer, size_t size);
 
 /* "multiply" to VSH_COMBINE_MULTIPLY and back; -1 and NULL for what is none. Names are static; NULL is none.
  */

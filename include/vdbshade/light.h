@@ -11,7 +11,7 @@ extern "C" {
 enum {
     VSH_LIGHT_DIRECTIONAL = 0, /* direction, angle */
     VSH_LIGHT_SPHERE = 1,      /* position, radius */
-    VSH_LIGHT_SPOT = 2,        /* position, radius, direction, inner_angle, outer_angle */
+    VSH_LIGHT_SPOT = 2,        /* position, radius, axis, inner_angle, outer_angle */
     VSH_LIGHT_RECTANGLE = 3    /* position, edge_u, edge_v, two_sided */
 };
 
@@ -34,10 +34,11 @@ enum {
 typedef struct vsh_light {
     int32_t type;        /* VSH_LIGHT_… */
     int32_t falloff;     /* VSH_FALLOFF_…; not directional */
-    double direction[3]; /* directional: towards the light; spot: the way it shines. Any length but 0 */
+    double direction[3]; /* directional: towards the light. Any length but 0 */
     double position[3];  /* of the centre, world units */
     double angle;        /* directional: angular diameter, radians, 0 … π (excluded) */
     double radius;       /* sphere, spot: world units, ≥ 0 */
+    double axis[3];      /* spot: the way it shines, away from it. Any length but 0 */
     double inner_angle;  /* spot: half angle of full light, radians, 0 … outer_angle */
     double outer_angle;  /* spot: half angle where light ends, radians, > 0 … π */
     double reach;        /* with VSH_FALLOFF_QUADRATIC, not directional: world units, > 0 */
@@ -58,6 +59,7 @@ static inline vsh_light vsh_light_default(void) {
                        {0.0, 0.0, 0.0},
                        0.00925,
                        0.0,
+                       {0.0, -1.0, 0.0},
                        0.35,
                        0.5,
                        1.0,
@@ -68,7 +70,6 @@ static inline vsh_light vsh_light_default(void) {
                        0};
     return light;
 }
-VSH_API void vsh_light_init(vsh_light *light, size_t size);
 
 /* Checks a light against the ranges above. Errors: VSH_ERROR_ARGUMENT (light NULL, too), naming the light,
  * the field, the value and the limit. */

@@ -28,7 +28,6 @@ static inline vsh_occluders_options vsh_occluders_options_default(void) {
     vsh_occluders_options options = {sizeof(vsh_occluders_options), 0.0, 1, vsh_grid_options_default()};
     return options;
 }
-VSH_API void vsh_occluders_options_init(vsh_occluders_options *options, size_t size);
 
 /* Meshes as what casts: voxelised, a field made of them, their triangles kept. The meshes need not outlive
  * the call. Errors:
@@ -68,7 +67,6 @@ static inline vsh_occluder_parts vsh_occluder_parts_default(void) {
     vsh_occluder_parts parts = {sizeof(vsh_occluder_parts), NULL, NULL, NULL, 0, NULL, NULL, 0.0};
     return parts;
 }
-VSH_API void vsh_occluder_parts_init(vsh_occluder_parts *parts, size_t size);
 
 /* Parts as what casts. The layers are copied; what they and the parts refer to must outlive the handle.
  * Errors: VSH_ERROR_ARGUMENT (neither field nor layers nor a voxel size; more layers than VSH_MAX_LAYERS; a

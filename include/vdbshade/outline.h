@@ -28,7 +28,6 @@ static inline vsh_mask_options vsh_mask_options_default(void) {
     vsh_mask_options options = {sizeof(vsh_mask_options), 1.0, 0.0, 0.5, NULL, 0};
     return options;
 }
-VSH_API void vsh_mask_options_init(vsh_mask_options *options, size_t size);
 
 /* The area of an image where a channel is at least the threshold. The image's middle is the origin, its first
  * row on top. Its border runs where values interpolated between the pixels' centres cross the threshold
@@ -62,7 +61,6 @@ static inline vsh_text_options vsh_text_options_default(void) {
     vsh_text_options options = {sizeof(vsh_text_options), 1.0, 1.0, VSH_ALIGN_LEFT};
     return options;
 }
-VSH_API void vsh_text_options_init(vsh_text_options *options, size_t size);
 
 /* The area of a text's letters. `text` is UTF-8, lines end in "\n" or "\r\n"; the first baseline is y = 0.
  * `font` is a file of outlines that FreeType reads (TrueType, OpenType, Type 1 …), its first face. Letters

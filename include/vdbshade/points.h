@@ -8,6 +8,21 @@
 extern "C" {
 #endif
 
+/* A texel of a lightmap as one number, the same wherever there are texels: column + 65536 row, both 0 …
+ * 65535, row 0 at v = 1; its column, its row, and its place in a plane of `width` columns. */
+static inline uint32_t vsh_texel(uint32_t column, uint32_t row) {
+    return column + 65536u * row;
+}
+static inline uint32_t vsh_texel_column(uint32_t texel) {
+    return texel % 65536u;
+}
+static inline uint32_t vsh_texel_row(uint32_t texel) {
+    return texel / 65536u;
+}
+static inline size_t vsh_texel_place(uint32_t texel, int32_t width) {
+    return (size_t)vsh_texel_row(texel) * (size_t)width + vsh_texel_column(texel);
+}
+
 /* Receivers: a view of the caller's arrays. Points that follow each other and lie within a few voxels of each
  * other share proofs, which makes them several times as fast: sort them along a curve that fills space
  * (query.h does so). adaptive and exact also take from them how many rays a point needs, and where `texels`
@@ -20,7 +35,7 @@ typedef struct vsh_points {
     const double *positions; /* [count][3], world units */
     const float *normals;   /* [count][3], geometric, of any length, pointing away from the solid; may be NULL
                                for shadows: then there is no start offset, no horizon and no back side */
-    const uint32_t *texels; /* [count], column + 65536 row: what the samplers tell points apart by, so that a
+    const uint32_t *texels; /* [count], each vsh_texel(): what the samplers tell points apart by, so that a
                              * lightmap's noise does not depend on the order of its points, and where they lie
                              * in it; NULL: the points' numbers, and no lightmap */
 } vsh_points;
@@ -47,7 +62,6 @@ static inline vsh_shade_stats vsh_shade_stats_zero(void) {
     vsh_shade_stats stats = {sizeof(vsh_shade_stats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.0, 0.0};
     return stats;
 }
-VSH_API void vsh_shade_stats_init(vsh_shade_stats *stats, size_t size);
 
 #ifdef __cplusplus
 }

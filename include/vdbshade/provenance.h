@@ -28,11 +28,10 @@ static inline vsh_provenance_source vsh_provenance_source_default(void) {
     vsh_provenance_source source = {sizeof(vsh_provenance_source), NULL, NULL, 0, NULL, 0.0, NULL, 0, 0};
     return source;
 }
-VSH_API void vsh_provenance_source_init(vsh_provenance_source *source, size_t size);
 
 /* Attributes that do not vary between two runs: no date, host, path or number of threads is in them. In this
  * order, where there is something to tell:
- * - vdbshade_version: "0.1.0";
+ * - vdbshade_version: "0.2.0";
  * - vdbshade_command;
  * - vdbshade_shadow: "exact, max error 0.02, 64 rays, sobol"; vdbshade_ao: "cones, 16 within 2";
  * - vdbshade_light_NAME: type, place and size of each light;

@@ -44,7 +44,6 @@ static inline vsh_query_output vsh_query_output_default(void) {
     vsh_query_output output = {sizeof(vsh_query_output), NULL, NULL, NULL, NULL, NULL, NULL, 0};
     return output;
 }
-VSH_API void vsh_query_output_init(vsh_query_output *output, size_t size);
 
 /* Shades points for every light and AO that the output asks for.
  *
@@ -88,7 +87,6 @@ static inline vsh_strided_points vsh_strided_points_default(void) {
     vsh_strided_points points = {sizeof(vsh_strided_points), 0, NULL, NULL, 0, NULL, 0, NULL, 0};
     return points;
 }
-VSH_API void vsh_strided_points_init(vsh_strided_points *points, size_t size);
 
 /* As vsh_query_points(), with the same bits. Errors: as there; VSH_ERROR_ARGUMENT too for points' size, a
  * stride that is none, both or neither of the positions with a count above 0. */

@@ -28,7 +28,6 @@ static inline vsh_camera vsh_camera_default(void) {
         sizeof(vsh_camera), {0.0, 0.0, 1.0}, {0.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, 0.61086523819801535};
     return camera;
 }
-VSH_API void vsh_camera_init(vsh_camera *camera, size_t size);
 
 /* Checks a camera against the ranges above. Errors: VSH_ERROR_ARGUMENT, naming the field, the value and the
  * limit. */
@@ -113,7 +112,6 @@ static inline vsh_render_options vsh_render_options_default(void) {
                                   vsh_shade_options_default()};
     return options;
 }
-VSH_API void vsh_render_options_init(vsh_render_options *options, size_t size);
 
 /* Planes of the caller's, [height][width] with row 0 on top; those that are NULL are left out. */
 typedef struct vsh_picture {

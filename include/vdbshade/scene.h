@@ -130,18 +130,14 @@ typedef struct vsh_scene {
 
 /* Reads a scene file; what it names is not opened. The scene and all it points to belong to *scene; free it
  * with vsh_scene_free(). Errors:
- * - VSH_ERROR_ARGUMENT: path or scene NULL;
+ * - VSH_ERROR_ARGUMENT: path or scene NULL, run;
  * - VSH_ERROR_READ: no such file, no permission, no regular file;
  * - VSH_ERROR_INPUT, with line and column: no JSON, an unknown or missing key, a value of the wrong type or
  *   out of range;
- * - VSH_ERROR_LIMIT: a file of more than 64 MiB;
+ * - VSH_ERROR_LIMIT: a file of more than 64 MiB; one whose values may take more than run->memory_limit,
+ * before they are read;
  * - VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_scene_read(const char *path, vsh_scene **scene, vsh_error *error);
-
-/* The same within run->memory_limit: a text whose values may take more is refused before they are read.
- * Errors: the same; VSH_ERROR_ARGUMENT (run), VSH_ERROR_LIMIT (memory). */
-VSH_API vsh_result vsh_scene_read_run(const char *path, const vsh_run *run, vsh_scene **scene,
-                                      vsh_error *error);
+VSH_API vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error);
 VSH_API void vsh_scene_free(vsh_scene *scene); /* of vsh_scene_read() only; NULL does nothing */
 
 /* What a scene's files hold, each file read once, however many casters and receivers use it. */
@@ -235,7 +231,6 @@ static inline vsh_scene_occluders_options vsh_scene_occluders_options_default(vo
         sizeof(vsh_scene_occluders_options), NULL, NULL, 0.0, NULL, 1, 0, 0};
     return options;
 }
-VSH_API void vsh_scene_occluders_options_init(vsh_scene_occluders_options *options, size_t size);
 
 /* What casts in a scene: a field of the casters in no layer and one of each layer's, triangles where methods
  * trace them, heightfields and spheres that cast as they are. Warns (run->warning) of casters that voxels

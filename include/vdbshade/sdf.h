@@ -48,7 +48,6 @@ static inline vsh_sdf_node vsh_sdf_node_default(void) {
         {0.0, 0.0, 0.0}};
     return node;
 }
-VSH_API void vsh_sdf_node_init(vsh_sdf_node *node, size_t size);
 
 /* A tree: the last node is its root, every other node is the operand of exactly one operation, and no path
  * from the root is longer than 2048 nodes. A view; nothing is owned. */

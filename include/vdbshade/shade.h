@@ -50,7 +50,6 @@ static inline vsh_shade_options vsh_shade_options_default(void) {
                                  0.0};
     return options;
 }
-VSH_API void vsh_shade_options_init(vsh_shade_options *options, size_t size);
 
 /* Fraction of the light that each point sees, 0 dark … 1 lit, into visibility[count]: before any cosine,
  * colour or falloff (a spot's edge counts as falloff). Points turned away from the light are 0, points inside

@@ -32,7 +32,6 @@ static inline vsh_volume_options vsh_volume_options_default(void) {
                                   vsh_shade_options_default()};
     return options;
 }
-VSH_API void vsh_volume_options_init(vsh_volume_options *options, size_t size);
 
 /* "nearest" to VSH_INSIDE_NEAREST and back; -1 and NULL for what is none. Names are static strings; NULL is
  * none. */

@@ -110,7 +110,7 @@ static inline void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vs
 VSH_API vsh_result vsh_volume_sample(const vsh_volume *volume, size_t grid, size_t count,
                                      const double *positions, float *values, vsh_error *error);
 
-/* A dense copy: the values of size[0] × size[1] × size[2] voxels from `index_min` on into values, z fastest;
+/* A dense copy: the values of size[0] × size[1] × size[2] voxels from `index_min` on into values, x fastest;
  * the background where they are not active. Runs on the calling thread. Errors: VSH_ERROR_ARGUMENT (no such
  * grid, a size below 1, indices beyond 32 bits). */
 VSH_API vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const int32_t index_min[3],
@@ -120,18 +120,14 @@ VSH_API vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const 
 VSH_API vsh_result vsh_volume_to_openvdb(const vsh_volume *volume, size_t grid, uint32_t version,
                                          uint32_t abi, void *values, vsh_error *error);
 
-/* Writes all grids as one .vdb file, `half` (nonzero) as 16-bit floats; the same volume gives the same bytes.
- * Metadata tell method, light and voxel size (docs/volume.md). Atomic, as vsh_grid_write(). Errors:
- * VSH_ERROR_ARGUMENT (path NULL or empty), VSH_ERROR_LIMIT (as vsh_grid_write()), VSH_ERROR_WRITE,
- * VSH_ERROR_MEMORY. */
+/* Writes all grids as one .vdb file, `half` (nonzero) as 16-bit floats, with attributes [attribute_count] as
+ * metadata of every grid (may be NULL where that is 0); the same volume gives the same bytes. Metadata tell
+ * method, light and voxel size, too (docs/volume.md). Atomic, as vsh_grid_write(). Errors: VSH_ERROR_ARGUMENT
+ * (path NULL or empty, attributes other than vsh_attribute says), VSH_ERROR_LIMIT (as vsh_grid_write()),
+ * VSH_ERROR_WRITE, VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t half,
+                                    const vsh_attribute *attributes, size_t attribute_count,
                                     vsh_error *error);
-
-/* The same with lines of text as metadata of every grid. VSH_ERROR_ARGUMENT too where they are not as
- * vsh_attribute says. */
-VSH_API vsh_result vsh_volume_write_with(const vsh_volume *volume, const char *path, int32_t half,
-                                         const vsh_attribute *attributes, size_t attribute_count,
-                                         vsh_error *error);
 
 /* --- what is in a file */
 

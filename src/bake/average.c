@@ -6,10 +6,10 @@
 /* The texel whose first sample is *sample, the *next of the valid ones; moves both on to the next texel's. */
 static void average_texel(const vshi_average *a, size_t *sample, size_t *next) {
     const vsh_texels *texels = a->texels;
-    const uint32_t texel = texels->texel[*sample];
+    const size_t first = *sample;
     double sum[3] = {0.0, 0.0, 0.0};
-    size_t count = 0, i = *sample;
-    for (; i < texels->count && texels->texel[i] == texel; ++i) {
+    size_t count = 0, i = first;
+    for (; i < texels->count && texels->texel[i] == texels->texel[first]; ++i) {
         if (!a->origins->valid[i]) {
             continue;
         }
@@ -24,7 +24,7 @@ static void average_texel(const vshi_average *a, size_t *sample, size_t *next) {
         ++count;
     }
     *sample = i;
-    const size_t at = texel - vshi_texels_base(texels);
+    const size_t at = vshi_sample_held(texels, first);
     if (a->values == NULL) {
         a->state[at] = count > 0 ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
     } else if (count == 0 && !a->deviation) {

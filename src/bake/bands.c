@@ -404,10 +404,20 @@ double vshi_bake_bytes(const vshi_bake_need *need) {
            (need->windows ? vshi_ao_texels_bytes(need->samples, need->threads, need->bent) : 0.0);
 }
 
-uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows, int32_t floats,
-                               int32_t errors, int32_t irradiance, int32_t bent, int32_t tint) {
+/* Floats a texel of all planes that are there. */
+static double floats_of(const vsh_lightmap *planes, size_t light_count) {
+    const int of_each_light =
+        (planes->shadow != NULL) + (planes->shadow_error != NULL) + 3 * (planes->tint != NULL);
+    const int others = (planes->ao != NULL) + (planes->ao_error != NULL) + (planes->coverage != NULL) +
+                       (planes->invalid != NULL) + 3 * (planes->irradiance != NULL) +
+                       3 * (planes->bent != NULL);
+    return (double)others + (double)light_count * of_each_light;
+}
+
+uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows,
+                               const vsh_lightmap *lightmap, size_t light_count) {
     vshi_band band;
-    if (vshi_band_set(charts, first_row, rows, &band, NULL) != VSH_OK) {
+    if (charts == NULL || lightmap == NULL || vshi_band_set(charts, first_row, rows, &band, NULL) != VSH_OK) {
         return 0;
     }
     const double width = charts->info.width;
@@ -417,17 +427,18 @@ uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int3
     vshi_bake_need need = {.texels = width * band.rows,
                            .traced = vshi_shadow_traces(&shade, NULL) || vshi_ao_traces(&shade, NULL),
                            .values = true,
-                           .errors = errors != 0,
-                           .irradiance = irradiance != 0,
-                           .bent = bent != 0,
-                           .tint = tint != 0,
+                           .errors = lightmap->shadow_error != NULL || lightmap->ao_error != NULL,
+                           .irradiance = lightmap->irradiance != NULL,
+                           .bent = lightmap->bent != NULL,
+                           .tint = lightmap->tint != NULL,
                            .lattice = charts->ao_spacing > 1 && !vshi_ao_traces(&shade, NULL),
                            .windows = charts->ao_spacing > 1 && vshi_ao_traces(&shade, NULL)};
     for (size_t row = band.held_begin; row < band.held_end; ++row) {
         need.samples += (double)charts->rows[row].samples;
     }
     const bool halo = band.rows > rows;
-    const double planes = width * (rows + (halo ? band.rows : 0)) * (double)floats * sizeof(float);
+    const double planes =
+        width * (rows + (halo ? band.rows : 0)) * floats_of(lightmap, light_count) * sizeof(float);
     return (uint64_t)(need.samples * (double)vshi_sample_bytes(charts->tangents) + vshi_bake_bytes(&need) +
                       planes);
 }

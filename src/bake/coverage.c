@@ -12,27 +12,26 @@ static bool is_seen(const vsh_texels *texels, const vshi_origins *origins, size_
 void vshi_coverage_write(const vsh_texels *texels, const vshi_origins *origins, const uint8_t *state,
                          const vsh_lightmap *lightmap, vsh_bake_stats *stats) {
     const vshi_band *band = &texels->band;
-    const size_t base = vshi_texels_base(texels);
     const size_t first = texels->row_start[band->own_begin - band->held_begin];
     const size_t last = texels->row_start[band->own_end - band->held_begin];
     size_t invalid = 0;
     for (size_t i = first; i < last; ++i) {
-        const uint32_t texel = texels->texel[i];
-        if (i > first && texel == texels->texel[i - 1]) {
+        if (i > first && texels->texel[i] == texels->texel[i - 1]) {
             continue;
         }
-        if (state[texel - base] == VSHI_TEXEL_INVALID) {
+        const size_t texel = vshi_sample_held(texels, i);
+        if (state[texel] == VSHI_TEXEL_INVALID) {
             const bool seen = is_seen(texels, origins, i);
             ++invalid;
             stats->seen_texels += seen;
             if (lightmap->invalid != NULL) {
-                lightmap->invalid[texel - base] = seen ? 2.0f : 1.0f;
+                lightmap->invalid[texel] = seen ? 2.0f : 1.0f;
             }
             if (stats->invalid_by_mesh != NULL) {
                 ++stats->invalid_by_mesh[vshi_sample_mesh(texels, i)];
             }
         } else if (lightmap->coverage != NULL) {
-            lightmap->coverage[texel - base] = 1.0f;
+            lightmap->coverage[texel] = 1.0f;
         }
     }
     stats->texels = texels->info.covered;

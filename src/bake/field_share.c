@@ -78,7 +78,6 @@ static size_t pack_of(const vshi_origins *origins, size_t i) {
 
 static void choose(vshi_field_share *share, const vshi_origins *origins, const uint8_t *state, size_t step) {
     const vsh_texels *texels = share->texels;
-    const size_t base = vshi_texels_base(texels);
     const vshi_band *band = &texels->band;
     share->count = 0;
     for (size_t row = band->own_begin; row < band->own_end; ++row) {
@@ -86,8 +85,8 @@ static void choose(vshi_field_share *share, const vshi_origins *origins, const u
         for (size_t first = start[0]; first < start[1]; first += step) {
             const size_t left = start[1] - first, size = left < step ? left : step;
             const uint64_t bits =
-                vshi_mix(((uint64_t)texels->texel[first] + 1) * UINT64_C(0x9e3779b97f4a7c15));
-            const size_t i = first + (size_t)(bits % size), texel = texels->texel[i] - base;
+                vshi_mix(((uint64_t)vshi_sample_place(texels, first) + 1) * UINT64_C(0x9e3779b97f4a7c15));
+            const size_t i = first + (size_t)(bits % size), texel = vshi_sample_held(texels, i);
             share->samples[share->count++] =
                 (vshi_field_share_sample){.sample = i,
                                           .packed = pack_of(origins, i),
@@ -232,7 +231,7 @@ static void hold(void *user, size_t begin, size_t end) {
         }
         h->share->square[k] = NAN;
         if (!isnan(value) && vshi_truth_twice(&h->truth, position, texels->normal + 3 * s->sample,
-                                              texels->texel[s->sample], value, seen)) {
+                                              (uint32_t)vshi_sample_place(texels, s->sample), value, seen)) {
             h->share->square[k] = (value - seen[0]) * (value - seen[1]);
         }
     }

@@ -205,17 +205,17 @@ static vsh_result keep_needed(const lifting *l, vshi_origins_keep *keep, void *u
     return result;
 }
 
-/* Samplers tell points apart by it: column + 65536 row, and for the further samples of a texel a place some
+/* Samplers tell points apart by it: the texel, and for the further samples of a texel a place some
  * way off, so that they do not all send their rays the same way. */
 static uint32_t sampler_texel(const vsh_texels *texels, size_t i) {
     static const uint32_t COLUMN_STEP = 47, ROW_STEP = 29;
-    const uint32_t width = (uint32_t)texels->info.width, texel = texels->texel[i];
+    const uint32_t texel = texels->texel[i];
     uint32_t sample = 0;
     for (size_t k = i; k > 0 && texels->texel[k - 1] == texel; --k) {
         ++sample;
     }
-    const uint32_t column = (texel % width + COLUMN_STEP * sample) & 0xffff;
-    return column + 65536u * ((texel / width + ROW_STEP * sample) & 0xffff);
+    return vsh_texel((vsh_texel_column(texel) + COLUMN_STEP * sample) & 0xffff,
+                     (vsh_texel_row(texel) + ROW_STEP * sample) & 0xffff);
 }
 
 static void pack(void *user, size_t begin, size_t end) {

@@ -95,7 +95,7 @@ static void run_waves(spreading *s, size_t texels) {
 
 vsh_result vshi_spread_find(const vsh_texels *texels, const uint8_t *state, vshi_spread *spread,
                             vsh_error *error) {
-    const size_t held = vshi_texels_held(texels), base = vshi_texels_base(texels);
+    const size_t held = vshi_texels_held(texels);
     const char *what = "invalid texels";
     size_t invalid = 0;
     *spread = (vshi_spread){0};
@@ -116,7 +116,7 @@ vsh_result vshi_spread_find(const vsh_texels *texels, const uint8_t *state, vshi
     spread->source = vshi_take(invalid, sizeof *spread->source, what, &result, error);
     if (result == VSH_OK) {
         for (size_t i = texels->count; i > 0; --i) { /* that of its first sample */
-            s.mesh[texels->texel[i - 1] - base] = vshi_sample_mesh(texels, i - 1);
+            s.mesh[vshi_sample_held(texels, i - 1)] = vshi_sample_mesh(texels, i - 1);
         }
         for (size_t i = 0; i < held; ++i) {
             s.source[i] = state[i] == VSHI_TEXEL_VALID ? (uint32_t)i : NONE;

@@ -95,7 +95,7 @@ static void write_tile(writer *w) {
     for (size_t place = 0; place < (size_t)VSHI_TILE * VSHI_TILE; ++place) {
         const size_t x = even_bits(place), y = even_bits(place >> 1), bit = VSHI_TILE * y + x;
         const size_t column = tile->column * VSHI_TILE + x, row = tile->row * VSHI_TILE + y;
-        const uint32_t texel = (uint32_t)(row * (size_t)raster->width + column);
+        const uint32_t texel = vsh_texel((uint32_t)column, (uint32_t)row);
         double weight[3];
         if ((tile->border >> bit) & 1) {
             const uint32_t number = tile->nearest[bit];
@@ -321,10 +321,11 @@ void vsh_texels_get_info_sized(const vsh_texels *texels, vsh_texels_info *info, 
     vshi_give(info, info_size, &texels->info, sizeof texels->info);
 }
 
-vsh_texel_samples vsh_texels_samples(const vsh_texels *texels) {
+void vsh_texels_samples_sized(const vsh_texels *texels, vsh_texel_samples *samples, size_t samples_size) {
     const vshi_band *band = &texels->band;
     const size_t first = texels->row_start[band->own_begin - band->held_begin];
     const size_t last = texels->row_start[band->own_end - band->held_begin];
-    return (vsh_texel_samples){last - first, texels->position + 3 * first, texels->normal + 3 * first,
-                               texels->geometric + 3 * first, texels->texel + first};
+    const vsh_texel_samples own = {last - first, texels->position + 3 * first, texels->normal + 3 * first,
+                                   texels->geometric + 3 * first, texels->texel + first};
+    vshi_give(samples, samples_size, &own, sizeof own);
 }

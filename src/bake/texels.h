@@ -78,7 +78,7 @@ struct vsh_texels {
     float *normal;           /* [count][3] */
     float *geometric;        /* [count][3] */
     float *lift;             /* [count][3]: of the position off its triangle, world units */
-    uint32_t *texel;         /* [count]: in the whole lightmap */
+    uint32_t *texel;         /* [count]: vsh_texel() in the whole lightmap */
     uint32_t *mesh;          /* [count]: index of the mesh, and VSHI_SAMPLE_SHEET: vshi_sample_mesh() */
     float *tangent;          /* [count][4]: of the triangle, unit, and its handedness; NULL: not asked for */
     size_t mesh_count;
@@ -95,9 +95,13 @@ static inline bool vshi_sample_is_sheet(const vsh_texels *texels, size_t sample)
     return (texels->mesh[sample] & VSHI_SAMPLE_SHEET) != 0;
 }
 
-/* Number of the first texel that is held. */
-static inline size_t vshi_texels_base(const vsh_texels *texels) {
-    return (size_t)texels->band.first * (size_t)texels->info.width;
+/* Place of a sample's texel in the whole lightmap, and among those that are held. */
+static inline size_t vshi_sample_place(const vsh_texels *texels, size_t sample) {
+    return vsh_texel_place(texels->texel[sample], texels->info.width);
+}
+
+static inline size_t vshi_sample_held(const vsh_texels *texels, size_t sample) {
+    return vshi_sample_place(texels, sample) - (size_t)texels->band.first * (size_t)texels->info.width;
 }
 
 /* Texels that are held. */

@@ -7,24 +7,21 @@ enum { RESUME_BANDS = 16 }; /* a bake that is ended loses a sixteenth of a light
 
 /* What a lightmap takes, whatever is baked at a time. */
 typedef struct cost {
-    const vsh_scene *scene;
     const vsh_charts *charts;
     vsh_charts_info info;
-    int32_t floats;      /* of all planes, a texel */
-    int32_t interleaved; /* those that are baked interleaved, and take memory twice */
+    vsh_lightmap lightmap; /* which planes are baked */
+    size_t light_count;
+    int32_t floats; /* beside those a texel: pictures, and what is baked interleaved and then split */
     uint64_t held, writer, limit;
 } cost;
 
 /* Bytes that the largest of bands of so many rows takes. */
 static uint64_t largest(const cost *c, int32_t rows) {
-    const vsh_scene *scene = c->scene;
-    const bool tint = scene->tint.type != VSH_TINT_NONE && scene->light_count > 0;
     uint64_t most = 0;
     for (int32_t first = 0; first < c->info.height; first += rows) {
         const int32_t left = c->info.height - first, here = left < rows ? left : rows;
-        uint64_t bytes = vsh_charts_band_bytes(c->charts, first, here, c->floats, scene->error != 0,
-                                               scene->irradiance != 0, scene->bent != 0, tint);
-        bytes += (uint64_t)c->interleaved * sizeof(float) * (uint64_t)c->info.width * (uint64_t)here;
+        uint64_t bytes = vsh_charts_band_bytes(c->charts, first, here, &c->lightmap, c->light_count);
+        bytes += (uint64_t)c->floats * sizeof(float) * (uint64_t)c->info.width * (uint64_t)here;
         most = bytes > most ? bytes : most;
         if (left <= rows) {
             break;
@@ -92,10 +89,11 @@ vsh_result vshi_bands_plan(const vsh_scene *scene, const vshi_target *target, co
     vshi_channels channels;
     vsh_result result = vshi_channels_name(scene, receiver->width, receiver->height, &channels, error);
     if (result == VSH_OK) {
-        cost c = {.scene = scene,
-                  .charts = charts,
-                  .floats = channels.image.channel_count + (need->picture ? 4 : 0) + (scene->invalid ? 1 : 0),
-                  .interleaved = 3 * (int32_t)channels.triple_count,
+        cost c = {.charts = charts,
+                  .lightmap = vshi_channels_shape(scene),
+                  .light_count = scene->light_count,
+                  .floats =
+                      3 * (int32_t)channels.triple_count + (need->picture ? 4 : 0) + (scene->invalid ? 1 : 0),
                   .held = need->held,
                   .limit = need->limit};
         c.writer = need->files ? vsh_image_writer_bytes(receiver->output, &channels.image, &image) : 0;

@@ -187,6 +187,18 @@ static void bind_all(vshi_channels *channels, const vsh_scene *scene) {
     channels->lightmap.invalid = channels->invalid;
 }
 
+vsh_lightmap vshi_channels_shape(const vsh_scene *scene) {
+    static float plane;
+    float *const any[] = {&plane};
+    vsh_lightmap lightmap = {.invalid = scene->invalid ? &plane : NULL};
+    for (size_t k = 0; k < KINDS; ++k) {
+        if (count_of(&kinds[k], scene) > 0 && kinds[k].bind != NULL) {
+            kinds[k].bind(&lightmap, scene, any);
+        }
+    }
+    return lightmap;
+}
+
 vsh_result vshi_channels_allocate(vshi_channels *channels, const vsh_scene *scene, int32_t rows, bool invalid,
                                   uint64_t limit, const char *output, vsh_error *error) {
     const size_t count = (size_t)channels->image.channel_count;

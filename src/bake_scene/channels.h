@@ -30,6 +30,9 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
 vsh_result vshi_channels_allocate(vshi_channels *channels, const vsh_scene *scene, int32_t rows, bool invalid,
                                   uint64_t limit, const char *output, vsh_error *error);
 
+/* Which planes a scene's bake fills: those that are not NULL, which are none to be written to. */
+vsh_lightmap vshi_channels_shape(const vsh_scene *scene);
+
 /* After the bake: what is interleaved, and what is invalid, into its planes. */
 void vshi_channels_split(vshi_channels *channels, const vsh_scene *scene);
 

@@ -12,7 +12,7 @@
 extern "C" {
 #endif
 
-/* The header's version, which is that of whatever is compiled with it: "0.1.0". */
+/* The header's version, which is that of whatever is compiled with it: "0.2.0". */
 #define VSHI_TEXT_OF(number) #number
 #define VSHI_TEXT(number) VSHI_TEXT_OF(number)
 #define VSHI_VERSION                                                                                         \

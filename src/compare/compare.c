@@ -9,8 +9,8 @@
 
 enum { MOST_VALUES = INT32_MAX, MOST_REACH = 16 };
 
-void vsh_compare_coverage(uint64_t count, const float *golden, const float *values, uint8_t *mask,
-                          vsh_coverage *coverage) {
+void vsh_compare_coverage_sized(uint64_t count, const float *golden, const float *values, uint8_t *mask,
+                                vsh_coverage *coverage, size_t coverage_size) {
     VSHI_FLOATS;
     vsh_coverage c = {0, 0, 0, 0, count, 0.0};
     for (uint64_t i = 0; i < count; ++i) {
@@ -26,7 +26,7 @@ void vsh_compare_coverage(uint64_t count, const float *golden, const float *valu
     }
     const uint64_t either = c.golden + c.values - c.both;
     c.share = either > 0 ? (double)c.differs / (double)either : 0.0;
-    *coverage = c;
+    vshi_give(coverage, coverage_size, &c, sizeof c);
 }
 
 /* --- beforehand */

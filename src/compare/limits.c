@@ -3,6 +3,7 @@
 #include "compare/pair.h"
 
 #include "base/floats.h"
+#include "base/memory.h"
 
 #include <math.h>
 #include <string.h>
@@ -40,12 +41,12 @@ int32_t vsh_measure_at_least(int32_t measure) {
     return measure >= 0 && measure < VSH_MEASURE_COUNT ? vshi_limits[measure].at_least : 0;
 }
 
-vsh_limits vsh_limits_default(void) {
-    vsh_limits limits = {.options = vsh_compare_options_default()};
+void vsh_limits_default_sized(vsh_limits *limits, size_t limits_size) {
+    vsh_limits known = {.struct_size = limits_size, .options = vsh_compare_options_default()};
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        limits.value[i] = vshi_limits[i].value;
+        known.value[i] = vshi_limits[i].value;
     }
-    return limits;
+    vshi_give(limits, limits_size, &known, sizeof known);
 }
 
 /* Differences within the limits, and independent noise on top of them. Squares of errors add; the largest of

@@ -24,7 +24,7 @@ struct vsh_tolerances {
     entry all;
     entry *channels; /* in the file's order */
     size_t channel_count;
-    vshi_block *blocks;
+    vshi_json_block *blocks;
 };
 
 static entry no_entry(const char *channel) {

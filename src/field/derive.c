@@ -11,6 +11,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -252,13 +253,8 @@ static vsh_result place_blocks(vshi_derivation *d, vsh_error *error) {
         b->size[axis] = (high - low) / 8 + 1;
     }
     const size_t total = (size_t)b->size[0] * (size_t)b->size[1] * (size_t)b->size[2];
-    vsh_result result = vshi_allocate((void **)&b->map, total, sizeof(int32_t), "field blocks", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&b->signs, total, sizeof(int8_t), "field signs", error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&b->map, total, sizeof(int32_t), "field blocks", error));
+    VSHI_TRY(vshi_allocate((void **)&b->signs, total, sizeof(int8_t), "field signs", error));
     const int32_t grow = (int32_t)VSHI_COARSE_BAND + 1;
     for (size_t n = 0; n < d->below.brick_count; ++n) {
         const int8_t *box = d->below.boxes + 6 * n;
@@ -284,10 +280,7 @@ static vsh_result place_blocks(vshi_derivation *d, vsh_error *error) {
     for (size_t i = 0; i < total; ++i) {
         b->count += b->map[i] != 0;
     }
-    result = vshi_allocate((void **)&d->corners, b->count, 3 * sizeof(int32_t), "field blocks", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&d->corners, b->count, 3 * sizeof(int32_t), "field blocks", error));
     int32_t number = 0;
     for (size_t i = 0; i < total; ++i) {
         int32_t corner[3];
@@ -321,11 +314,11 @@ static vsh_result allocate_voxels(vshi_derivation *d, vshi_budget *budget, vsh_e
     for (size_t i = 0; i < wanted_count; ++i) {
         budget->held += (double)count * (double)wanted[i].size;
     }
-    vsh_result result = vshi_check_limit(budget->run, budget->held, "field", error);
-    for (size_t i = 0; i < wanted_count && result == VSH_OK; ++i) {
-        result = vshi_allocate(wanted[i].memory, count, wanted[i].size, "field level", error);
+    VSHI_TRY(vshi_check_limit(budget->run, budget->held, "field", error));
+    for (size_t i = 0; i < wanted_count; ++i) {
+        VSHI_TRY(vshi_allocate(wanted[i].memory, count, wanted[i].size, "field level", error));
     }
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_level_derive(vsh_field *field, vshi_below *below, vshi_budget budget, vshi_job *job,
@@ -334,31 +327,21 @@ vsh_result vshi_level_derive(vsh_field *field, vshi_below *below, vshi_budget bu
     budget.held += (double)below->count * BLOCK * 3 * sizeof *below->feet +
                    (double)below->brick_count * (sizeof *below->bricks + 6);
     vshi_below next = {.bricks = NULL};
-    vsh_result result = place_blocks(&d, error);
-    if (result == VSH_OK) {
-        result = allocate_voxels(&d, &budget, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, d.blocks.count, 16, 0, take_core, &d, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_feet_spread(&d, job, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, d.blocks.count, 16, 0, settle, &d, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_level_append(field, &d.blocks, budget, job, &next, error);
-    }
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(place_blocks(&d, error));
+    VSHI_TRY_DONE(allocate_voxels(&d, &budget, error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, d.blocks.count, 16, 0, take_core, &d, error));
+    VSHI_TRY_DONE(vshi_feet_spread(&d, job, error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, d.blocks.count, 16, 0, settle, &d, error));
+    VSHI_TRY_DONE(vshi_level_append(field, &d.blocks, budget, job, &next, error));
     vshi_below_free(below);
-    if (result == VSH_OK) {
-        *below = next;
-        below->count = d.blocks.count;
-        below->map = d.blocks.map;
-        below->feet = d.feet;
-        d.blocks.map = NULL;
-        d.feet = NULL;
-    }
+    *below = next;
+    below->count = d.blocks.count;
+    below->map = d.blocks.map;
+    below->feet = d.feet;
+    d.blocks.map = NULL;
+    d.feet = NULL;
+done:
     free(d.seen);
     free(d.changed);
     free(d.feet);

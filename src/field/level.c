@@ -3,6 +3,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -29,16 +30,11 @@ static vsh_result allocate_map(vshi_blocks *blocks, vshi_budget budget, vsh_erro
                 blocks->size[0], blocks->size[1], blocks->size[2]);
         }
     }
-    vsh_result result = vshi_check_limit(
-        budget.run, budget.held + (double)count * (sizeof *blocks->map + sizeof *blocks->signs), "field",
-        error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&blocks->map, count, sizeof(int32_t), "field blocks", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&blocks->signs, count, sizeof(int8_t), "field signs", error);
-    }
-    return result;
+    VSHI_TRY(vshi_check_limit(budget.run,
+                              budget.held + (double)count * (sizeof *blocks->map + sizeof *blocks->signs),
+                              "field", error));
+    VSHI_TRY(vshi_allocate((void **)&blocks->map, count, sizeof(int32_t), "field blocks", error));
+    return vshi_allocate((void **)&blocks->signs, count, sizeof(int8_t), "field signs", error);
 }
 
 static size_t block_at(const vshi_blocks *blocks, int32_t x, int32_t y, int32_t z) {
@@ -76,13 +72,9 @@ vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, vshi_budget 
     vshi_blocks_set_band(blocks, band);
     blocks->count = vshi_grid_leaves(grid, NULL, 0);
     budget.held += (double)blocks->count * (double)(sizeof *leaves + 512 * sizeof *blocks->values);
-    vsh_result result = vshi_check_limit(budget.run, budget.held, "field", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&leaves, blocks->count, sizeof *leaves, "leaves", error);
-    }
-    if (result != VSH_OK) {
-        goto done;
-    }
+    VSHI_TRY(vshi_check_limit(budget.run, budget.held, "field", error));
+    VSHI_TRY(vshi_allocate((void **)&leaves, blocks->count, sizeof *leaves, "leaves", error));
+    vsh_result result = VSH_OK;
     vshi_grid_leaves(grid, leaves, blocks->count);
     int32_t low[3] = {INT32_MAX, INT32_MAX, INT32_MAX}, high[3] = {INT32_MIN, INT32_MIN, INT32_MIN};
     for (size_t i = 0; i < blocks->count; ++i) {
@@ -97,14 +89,9 @@ vsh_result vshi_level_blocks_read(const vsh_grid *grid, float band, vshi_budget 
             low[axis] - 8; /* room for cells between a block without values and one with them */
         blocks->size[axis] = (high[axis] - low[axis]) / 8 + 2;
     }
-    result = allocate_map(blocks, budget, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&blocks->values, blocks->count, 512 * sizeof *blocks->values,
-                               "field values", error);
-    }
-    if (result != VSH_OK) {
-        goto done;
-    }
+    VSHI_TRY_DONE(allocate_map(blocks, budget, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&blocks->values, blocks->count, 512 * sizeof *blocks->values,
+                                "field values", error));
     vshi_grid_block_signs(grid, blocks->origin, blocks->size, blocks->signs);
     memset(blocks->map, 0xff, sizeof(int32_t) * block_at(blocks, blocks->size[0], 0, 0));
     for (size_t i = 0; i < blocks->count; ++i) {
@@ -271,14 +258,9 @@ vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, vshi_b
     int32_t *slots = NULL, *offsets = NULL;
     *below = (vshi_below){.bricks = NULL};
     assembly a = {.blocks = blocks};
-    vsh_result result = vshi_allocate((void **)&a.keep, block_count, 1, "field blocks", error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    result = vshi_parallel_for(job, block_count, 1024, 0, mark_bricks, &a, error);
-    if (result != VSH_OK) {
-        goto done;
-    }
+    VSHI_TRY(vshi_allocate((void **)&a.keep, block_count, 1, "field blocks", error));
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_parallel_for(job, block_count, 1024, 0, mark_bricks, &a, error));
     size_t brick_count = 0;
     for (size_t i = 0; i < block_count; ++i) {
         brick_count += a.keep[i];
@@ -307,28 +289,14 @@ vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, vshi_b
     }
     budget.held += (double)level->brick_count * (VSHI_BRICK_VALUES * sizeof(int16_t) + 2 * sizeof *slots + 6);
     budget.held += (double)block_count * (double)(sizeof(int32_t) + 1);
-    result = vshi_check_limit(budget.run, budget.held, "field", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&slots, brick_count, sizeof *slots, "field bricks", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&offsets, brick_count, sizeof *offsets, "field bricks", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&a.boxes, brick_count, 6, "field bricks", error);
-    }
-    if (result != VSH_OK) {
-        goto done;
-    }
+    VSHI_TRY_DONE(vshi_check_limit(budget.run, budget.held, "field", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&slots, brick_count, sizeof *slots, "field bricks", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&offsets, brick_count, sizeof *offsets, "field bricks", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&a.boxes, brick_count, 6, "field bricks", error));
     const uint64_t first = level->first_value + 2 * VSHI_BRICK_VALUES;
     const uint64_t value_count = first + place_bricks(&a, first, slots, offsets);
-    result = grow((void **)&field->values, value_count, sizeof *field->values, error);
-    if (result == VSH_OK) {
-        result = grow((void **)&field->index, level->first_index + block_count, sizeof(int32_t), error);
-    }
-    if (result != VSH_OK) {
-        goto done;
-    }
+    VSHI_TRY_DONE(grow((void **)&field->values, value_count, sizeof *field->values, error));
+    VSHI_TRY_DONE(grow((void **)&field->index, level->first_index + block_count, sizeof(int32_t), error));
 
     const int32_t outside = (int32_t)level->first_value, inside = outside + VSHI_BRICK_VALUES;
     for (int v = 0; v < VSHI_BRICK_VALUES; ++v) {
@@ -348,14 +316,12 @@ vsh_result vshi_level_append(vsh_field *field, const vshi_blocks *blocks, vshi_b
     a.slots = slots;
     a.offsets = offsets;
     a.values = field->values;
-    result = vshi_parallel_for(job, brick_count, 64, 0, write_bricks, &a, error);
-    if (result == VSH_OK) {
-        field->value_count = value_count;
-        ++field->level_count;
-        *below = (vshi_below){.brick_count = brick_count, .bricks = slots, .boxes = a.boxes};
-        slots = NULL;
-        a.boxes = NULL;
-    }
+    VSHI_TRY_DONE(vshi_parallel_for(job, brick_count, 64, 0, write_bricks, &a, error));
+    field->value_count = value_count;
+    ++field->level_count;
+    *below = (vshi_below){.brick_count = brick_count, .bricks = slots, .boxes = a.boxes};
+    slots = NULL;
+    a.boxes = NULL;
 done:
     free(a.boxes);
     free(offsets);

@@ -4,6 +4,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 #include "flat/distances.h"
 #include "light/light.h"
 #include "light/types.h"
@@ -79,8 +80,8 @@ static vsh_result check_lights(const vsh_light *lights, size_t count, vsh_error 
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "light %zu: '%s': a plane knows no %s lights", i,
                              lights[i].name, vshi_light_type_of(lights[i].type)->name);
         }
-        if (lights[i].type != VSH_LIGHT_SPHERE &&
-            !(vshi_hypot(lights[i].direction[0], lights[i].direction[1]) > 0.0)) {
+        const double *way = lights[i].type == VSH_LIGHT_SPOT ? lights[i].axis : lights[i].direction;
+        if (lights[i].type != VSH_LIGHT_SPHERE && !(vshi_hypot(way[0], way[1]) > 0.0)) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT,
                              "light %zu: '%s': its direction has no length in the plane", i, lights[i].name);
         }
@@ -115,7 +116,7 @@ static double see(const bake *b, const vsh_light *light, vshi_point p, double *g
         const vshi_vec to = {view.towards.x, view.towards.y, 0.0};
         /* in the light the falloff is that of its rim, and a spot shines everywhere */
         vsh_light flat = *light;
-        flat.direction[2] = 0.0;
+        flat.axis[2] = 0.0;
         flat.type = outside ? light->type : VSH_LIGHT_SPHERE;
         *gain = vshi_light_gain(&flat, to, fmax(view.distance, fmax(light->radius, 1e-30)));
         if (light->falloff == VSH_FALLOFF_QUADRATIC && view.distance >= light->reach) {
@@ -249,16 +250,16 @@ static vsh_result prepare(bake *b, const vsh_run *run, vsh_error *error) {
         }
         bytes += grid;
     }
-    vsh_result result = vshi_check_limit(run, bytes, "flat", error);
-    if (result == VSH_OK && padded) {
+    VSHI_TRY(vshi_check_limit(run, bytes, "flat", error));
+    if (padded) {
         void *memory = NULL;
-        result = vshi_allocate(&memory, (size_t)texels, 1, "padding", error);
+        VSHI_TRY(vshi_allocate(&memory, (size_t)texels, 1, "padding", error));
         b->state = memory;
     }
-    if (result == VSH_OK && classic) {
-        result = vshi_flat_grid_make(b->casters, margin_of(b), cell, run, &b->grid, error);
+    if (classic) {
+        VSHI_TRY(vshi_flat_grid_make(b->casters, margin_of(b), cell, run, &b->grid, error));
     }
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vsh_flat_bake(const vsh_outline *casters, const vsh_light *lights, size_t light_count,
@@ -273,33 +274,23 @@ vsh_result vsh_flat_bake(const vsh_outline *casters, const vsh_light *lights, si
               .options = vsh_flat_options_default(),
               .map = map};
     vsh_run full;
-    vsh_result result =
-        vshi_options_resolve(options, &b.options, sizeof b.options, "vsh_flat_options", error);
-    if (result == VSH_OK) {
-        result = check_options(&b.options, error);
-    }
-    if (result == VSH_OK) {
-        result = check_lights(lights, light_count, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_run_resolve(run, &full, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_options_resolve(options, &b.options, sizeof b.options, "vsh_flat_options", error));
+    VSHI_TRY(check_options(&b.options, error));
+    VSHI_TRY(check_lights(lights, light_count, error));
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
     b.texel[0] = (b.options.region_max[0] - b.options.region_min[0]) / b.options.width;
     b.texel[1] = (b.options.region_max[1] - b.options.region_min[1]) / b.options.height;
-    result = prepare(&b, &full, error);
-    if (result == VSH_OK) {
-        const size_t width = (size_t)b.options.width, height = (size_t)b.options.height;
-        vshi_job *job = vshi_job_begin(&full, "flat", width * height);
-        result = job != NULL ? vshi_parallel_for(job, height, 1, width, bake_rows, &b, error)
-                             : vshi_fail(error, VSH_ERROR_MEMORY, "flat: the system refused memory");
-        vshi_job_end(job);
-    }
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(prepare(&b, &full, error));
+    const size_t width = (size_t)b.options.width, height = (size_t)b.options.height;
+    vshi_job *job = vshi_job_begin(&full, "flat", width * height);
+    result = job != NULL ? vshi_parallel_for(job, height, 1, width, bake_rows, &b, error)
+                         : vshi_fail(error, VSH_ERROR_MEMORY, "flat: the system refused memory");
+    vshi_job_end(job);
     if (result == VSH_OK && b.state != NULL) {
         result = pad(&b, &full, error);
     }
+done:
     free(b.grid.values);
     free(b.state);
     return result;

@@ -31,7 +31,7 @@ static void take_values(const vsh_image *image, size_t count, float *values) {
 vsh_result vshi_heightmap_read(const char *path, const vsh_run *run, vshi_heightmap *map, vsh_error *error) {
     *map = (vshi_heightmap){0, 0, NULL};
     vsh_image_file *file = NULL;
-    vsh_result result = vsh_image_read_run(path, run, &file, error);
+    vsh_result result = vsh_image_read(path, run, &file, error);
     if (result != VSH_OK) {
         return result;
     }

@@ -1,3 +1,4 @@
+#include "base/try.h"
 #include "image/exr.h"
 
 #include <openexr.h>
@@ -129,12 +130,11 @@ static vsh_result read_header(exr_reader *reader, const char *path, const vsh_ru
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %lld pixels wide, expected at most %d", path,
                          (long long)width, INT32_MAX / (int32_t)sizeof(float));
     }
-    const vsh_result result =
-        vshi_image_file_new(path, run, width, height, channels->num_channels, &reader->image, error);
-    for (int32_t c = 0; result == VSH_OK && c < channels->num_channels; ++c) {
+    VSHI_TRY(vshi_image_file_new(path, run, width, height, channels->num_channels, &reader->image, error));
+    for (int32_t c = 0; c < channels->num_channels; ++c) {
         vshi_image_file_name(reader->image, c, channels->entries[c].name.str);
     }
-    return result == VSH_OK ? vshi_image_job(path, run, height, &reader->job, error) : result;
+    return vshi_image_job(path, run, height, &reader->job, error);
 }
 
 /* String attributes, in the file's order. */

@@ -94,8 +94,8 @@ static exr_result_t write_header(vshi_exr_writer *writer, const vshi_planes *pla
     return status;
 }
 
-static void fill_values(const vshi_exr_writer *writer, const vshi_planes *planes, const vshi_plane *plane,
-                        size_t first, size_t count, unsigned char *to) {
+static void fill_values(const vshi_exr_writer *writer, const vshi_planes *planes,
+                        const vshi_image_plane *plane, size_t first, size_t count, unsigned char *to) {
     if (writer->type == EXR_PIXEL_FLOAT && plane->values != NULL) {
         memcpy(to, plane->values + first, count * sizeof(float));
         return;

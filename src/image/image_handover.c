@@ -1,5 +1,6 @@
 /* An image between a reader and its caller. */
 #include "base/memory.h"
+#include "base/try.h"
 #include "image/planes.h"
 #include "sandbox/reader.h"
 
@@ -9,7 +10,7 @@ vsh_result vshi_serve_image(const char *path, vshi_take *request, const vsh_run 
                             vsh_error *error) {
     (void)request;
     vsh_image_file *file = NULL;
-    const vsh_result result = vsh_image_read_run(path, run, &file, error);
+    const vsh_result result = vsh_image_read(path, run, &file, error);
     if (result != VSH_OK) {
         return result;
     }
@@ -86,17 +87,13 @@ vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_imag
     vshi_ask ask;
     vshi_answer answer;
     vshi_job *job = NULL;
-    vsh_result result = vshi_image_job(path, run, UNITS, &job, error);
-    if (result == VSH_OK) {
-        result = vshi_ask_begin(&ask, VSHI_READ_IMAGE, path, run, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_ask_send_job(&ask, job, UNITS, &answer, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_image_take(&answer.payload, path, file, error);
-        vshi_answer_free(&answer);
-    }
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_image_job(path, run, UNITS, &job, error));
+    VSHI_TRY_DONE(vshi_ask_begin(&ask, VSHI_READ_IMAGE, path, run, error));
+    VSHI_TRY_DONE(vshi_ask_send_job(&ask, job, UNITS, &answer, error));
+    result = vshi_image_take(&answer.payload, path, file, error);
+    vshi_answer_free(&answer);
+done:
     vshi_job_end(job);
     return result;
 }

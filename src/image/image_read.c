@@ -3,6 +3,7 @@
 #include "base/floats.h"
 #include "base/input.h"
 #include "base/job.h"
+#include "base/try.h"
 #include "image/exr.h"
 #include "image/oiio.h"
 #include "image/png.h"
@@ -42,11 +43,7 @@ static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *err
     return VSH_OK;
 }
 
-vsh_result vsh_image_read(const char *path, vsh_image_file **file, vsh_error *error) {
-    return vsh_image_read_run(path, NULL, file, error);
-}
-
-vsh_result vsh_image_read_run(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
+vsh_result vsh_image_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(file);
     *file = NULL;
@@ -55,11 +52,11 @@ vsh_result vsh_image_read_run(const char *path, const vsh_run *run, vsh_image_fi
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_image_read: no path was given");
     }
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result == VSH_OK && full.reader != NULL) {
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    if (full.reader != NULL) {
         return vshi_image_from_reader(path, &full, file, error);
     }
     read_fn *reader = NULL;
-    result = result == VSH_OK ? find_reader(path, &reader, error) : result;
-    return result == VSH_OK ? reader(path, &full, file, error) : result;
+    VSHI_TRY(find_reader(path, &reader, error));
+    return reader(path, &full, file, error);
 }

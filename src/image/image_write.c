@@ -2,6 +2,7 @@
 #include "base/file.h"
 #include "base/floats.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "image/exr.h"
 #include "image/pack.h"
 #include "image/write_plan.h"
@@ -22,6 +23,9 @@ struct vsh_image_writer {
 };
 
 static void free_writer(vsh_image_writer *writer) {
+    if (writer == NULL) {
+        return;
+    }
     vshi_output_abandon(&writer->output);
     free(writer->names);
     free(writer->path);
@@ -53,7 +57,7 @@ static vsh_result copy_texts(vsh_image_writer *writer, const char *path, const v
         strcpy(writer->names[c], image->names[c]); /* the plan has looked at their lengths */
     }
     for (int32_t p = 0; p < writer->plan.planes.count; ++p) {
-        vshi_plane *plane = &writer->plan.planes.planes[p];
+        vshi_image_plane *plane = &writer->plan.planes.planes[p];
         const int32_t channel = writer->plan.channel[p];
         if (channel >= 0 && plane->name == image->names[channel]) {
             plane->name = writer->names[channel];
@@ -67,33 +71,25 @@ vsh_result vsh_image_writer_create(const char *path, const vsh_image *image, con
     VSHI_FLOATS;
     VSHI_NEEDS(writer);
     *writer = NULL;
-    void *memory = NULL;
-    vsh_result result = vshi_allocate(&memory, 1, sizeof **writer, "image", error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    vsh_image_writer *made = memory;
-    result = vshi_write_plan_make(path, image, options, &made->plan, error);
-    if (result == VSH_OK) {
-        result = copy_texts(made, path, image, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_output_begin(&made->output, path, error);
-    }
-    if (result == VSH_OK) {
-        const vshi_write_plan *plan = &made->plan;
-        const char *temporary = made->output.temporary;
-        result = plan->exr
-                     ? vshi_exr_begin(temporary, made->path, &plan->planes, plan->bits, &made->exr, error)
-                     : vshi_oiio_begin(temporary, made->path, &plan->format, &plan->planes, plan->bits,
-                                       &made->oiio, error);
-    }
-    if (result != VSH_OK) {
-        free_writer(made);
-        return result;
+    vsh_image_writer *made = NULL;
+    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "image", error));
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_write_plan_make(path, image, options, &made->plan, error));
+    VSHI_TRY_DONE(copy_texts(made, path, image, error));
+    VSHI_TRY_DONE(vshi_output_begin(&made->output, path, error));
+    const vshi_write_plan *plan = &made->plan;
+    const char *temporary = made->output.temporary;
+    if (plan->exr) {
+        VSHI_TRY_DONE(vshi_exr_begin(temporary, made->path, &plan->planes, plan->bits, &made->exr, error));
+    } else {
+        VSHI_TRY_DONE(vshi_oiio_begin(temporary, made->path, &plan->format, &plan->planes, plan->bits,
+                                      &made->oiio, error));
     }
     *writer = made;
-    return VSH_OK;
+    made = NULL;
+done:
+    free_writer(made);
+    return result;
 }
 
 /* Texels of light that integers cut. */
@@ -193,37 +189,30 @@ vsh_result vsh_image_write(const char *path, const vsh_image *image, const vsh_i
                            vsh_error *error) {
     VSHI_FLOATS;
     vshi_write_plan plan;
-    vsh_result result = vshi_write_plan_make(path, image, options, &plan, error);
-    if (result == VSH_OK) {
-        result = vshi_check_values(path, image->width, image->height, image->channel_count, error);
-    }
-    for (int32_t c = 0; result == VSH_OK && c < image->channel_count; ++c) {
+    VSHI_TRY(vshi_write_plan_make(path, image, options, &plan, error));
+    VSHI_TRY(vshi_check_values(path, image->width, image->height, image->channel_count, error));
+    for (int32_t c = 0; c < image->channel_count; ++c) {
         if (image->planes == NULL || image->planes[c] == NULL) {
-            result =
-                vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: channel '%s' has no values", path, image->names[c]);
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: channel '%s' has no values", path,
+                             image->names[c]);
         }
-    }
-    if (result != VSH_OK) {
-        return result;
     }
     vsh_image_writer *writer = NULL;
-    result = vsh_image_writer_create(path, image, options, &writer, error);
-    if (result == VSH_OK) {
-        result = vsh_image_writer_add(writer, image->height, image->planes, error);
-        if (result == VSH_OK) {
-            return vsh_image_writer_finish(writer, error);
-        }
+    VSHI_TRY(vsh_image_writer_create(path, image, options, &writer, error));
+    const vsh_result result = vsh_image_writer_add(writer, image->height, image->planes, error);
+    if (result != VSH_OK) {
         vsh_image_writer_abandon(writer);
+        return result;
     }
-    return result;
+    return vsh_image_writer_finish(writer, error);
 }
 
 vsh_result vsh_image_check(const char *path, const vsh_image *image, const vsh_image_options *options,
                            vsh_error *error) {
     VSHI_FLOATS;
     vshi_write_plan plan;
-    const vsh_result result = vshi_write_plan_make(path, image, options, &plan, error);
-    return result == VSH_OK ? vshi_output_check(path, error) : result;
+    VSHI_TRY(vshi_write_plan_make(path, image, options, &plan, error));
+    return vshi_output_check(path, error);
 }
 
 uint64_t vsh_image_writer_bytes(const char *path, const vsh_image *image, const vsh_image_options *options) {

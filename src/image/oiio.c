@@ -2,6 +2,7 @@
  * longer to load (0.2 s) than a small bake takes, and most runs read and write EXR alone. */
 #include "image/oiio.h"
 
+#include "base/try.h"
 #include "extern/module.h"
 #include "image/oiio_table.h"
 
@@ -50,6 +51,6 @@ double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *plan
 
 vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     *file = NULL;
-    const vsh_result result = vshi_oiio_have(path, error);
-    return result == VSH_OK ? at()->read(path, run, file, error) : result;
+    VSHI_TRY(vshi_oiio_have(path, error));
+    return at()->read(path, run, file, error);
 }

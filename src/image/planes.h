@@ -17,7 +17,7 @@ extern "C" {
 /* The most values that one image may have: 8 GiB of floats. */
 #define VSHI_MAX_VALUES (UINT64_C(1) << 31)
 
-typedef struct vshi_plane {
+typedef struct vshi_image_plane {
     const char *name;
     const float *values; /* [height × width]; NULL: `constant` everywhere */
     float constant;
@@ -25,7 +25,7 @@ typedef struct vshi_plane {
     bool is_grey;           /* vshi_grey_at() instead of all of these */
     bool is_color;          /* light: cut where it is over 1 */
     float (*encode)(float); /* into integers; NULL: as it is */
-} vshi_plane;
+} vshi_image_plane;
 
 /* One picture of several channels: the mean of the lights' shadows, times AO. */
 typedef struct vshi_grey {
@@ -48,7 +48,7 @@ typedef struct vshi_planes {
     int32_t width;
     int32_t height;
     int32_t count;
-    vshi_plane planes[VSH_MAX_CHANNELS];
+    vshi_image_plane planes[VSH_MAX_CHANNELS];
     vshi_grey grey;                  /* where a plane is */
     bool is_srgb;                    /* R, G and B of integers have the sRGB curve */
     char rgb[2 * VSH_CHANNEL_NAME];  /* what R, G and B are made of, beside channels by name; or empty */
@@ -56,7 +56,7 @@ typedef struct vshi_planes {
     size_t attribute_count;
 } vshi_planes;
 
-static inline float vshi_plane_at(const vshi_planes *planes, const vshi_plane *plane, size_t at) {
+static inline float vshi_plane_at(const vshi_planes *planes, const vshi_image_plane *plane, size_t at) {
     const float value = plane->is_grey          ? vshi_grey_at(&planes->grey, at)
                         : plane->values != NULL ? plane->values[at]
                                                 : plane->constant;
@@ -93,7 +93,7 @@ VSHI_SHARED vsh_result vshi_image_job(const char *path, const vsh_run *run, int6
 /* Cut to VSHI_FILE_NAME, without control characters. */
 VSHI_SHARED void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *name);
 
-/* Has run->reader read the file. Errors: as vsh_image_read_run(). */
+/* Has run->reader read the file. Errors: as vsh_image_read(). */
 vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_image_file **file,
                                   vsh_error *error);
 

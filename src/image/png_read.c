@@ -2,6 +2,7 @@
 
 #include "base/input.h"
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <png.h>
 
@@ -132,11 +133,9 @@ static vsh_result read_all(png_reader *reader) {
         return vshi_fail(reader->error, VSH_ERROR_READ, "%s: could not be read as png: %s", reader->path,
                          reader->message);
     }
-    vsh_result result = read_header(reader);
-    if (result == VSH_OK) {
-        result = read_texts(reader);
-    }
-    return result == VSH_OK ? read_rows(reader) : result;
+    VSHI_TRY(read_header(reader));
+    VSHI_TRY(read_texts(reader));
+    return read_rows(reader);
 }
 
 vsh_result vshi_png_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {

@@ -5,6 +5,7 @@
 #include "base/file.h"
 #include "base/job.h"
 #include "base/srgb.h"
+#include "base/try.h"
 #include "image/pack.h"
 
 #include <string.h>
@@ -123,7 +124,7 @@ static void add_channels(const vsh_image *image, vshi_write_plan *plan) {
     vshi_planes *planes = &plan->planes;
     for (int32_t c = 0; c < image->channel_count; ++c) {
         plan->channel[planes->count] = c;
-        planes->planes[planes->count++] = (vshi_plane){.name = image->names[c]};
+        planes->planes[planes->count++] = (vshi_image_plane){.name = image->names[c]};
     }
 }
 
@@ -137,7 +138,7 @@ static bool add_picture(const vsh_image *image, vshi_write_plan *plan) {
     for (int c = 0; c < 3; ++c) {
         plan->channel[planes->count] = picture.rgb[c];
         planes->planes[planes->count++] =
-            (vshi_plane){.name = vshi_pack_keys[c], .is_grey = picture.rgb[c] < 0};
+            (vshi_image_plane){.name = vshi_pack_keys[c], .is_grey = picture.rgb[c] < 0};
     }
     if (picture.rgb[0] < 0) {
         plan->picture = picture;
@@ -166,7 +167,7 @@ static vsh_result pack_picture(const char *path, const vsh_image *image, vshi_wr
     if (format_alpha == VSHI_ALPHA_ALWAYS || (format_alpha == VSHI_ALPHA_KEPT && alpha >= 0)) {
         plan->channel[planes->count] = alpha;
         planes->planes[planes->count++] =
-            (vshi_plane){.name = vshi_pack_keys[VSHI_PACK_ALPHA], .constant = 1.0f};
+            (vshi_image_plane){.name = vshi_pack_keys[VSHI_PACK_ALPHA], .constant = 1.0f};
     }
     return VSH_OK;
 }
@@ -208,7 +209,7 @@ static vsh_result plan_planes(const char *path, const vsh_image *image, const ch
         if (entry->given || (!plan->exr && key < (plan->format.grey ? 1 : VSHI_PACK_ALPHA))) {
             const int32_t channel = entry->given ? entry->channel : -1;
             plan->channel[planes->count] = channel;
-            planes->planes[planes->count++] = (vshi_plane){
+            planes->planes[planes->count++] = (vshi_image_plane){
                 .name = vshi_pack_keys[key],
                 .constant = entry->constant,
                 .is_signed = channel >= 0 && strncmp(image->names[channel], SIGNED, strlen(SIGNED)) == 0};
@@ -243,7 +244,7 @@ static vsh_result plan_colors(const char *path, const vsh_image *image, int32_t 
     vshi_planes *planes = &plan->planes;
     int32_t lights = 0, others = 0;
     for (int32_t p = 0; p < planes->count; ++p) {
-        vshi_plane *plane = &planes->planes[p];
+        vshi_image_plane *plane = &planes->planes[p];
         const int32_t channel = plan->channel[p];
         const char *name = channel >= 0 ? image->names[channel] : NULL;
         plane->is_color = name != NULL && (begins_with(name, "irradiance.") || begins_with(name, "tint."));
@@ -256,7 +257,7 @@ static vsh_result plan_colors(const char *path, const vsh_image *image, int32_t 
         color_space == VSH_COLOR_SRGB || (color_space == VSH_COLOR_AUTO && lights > 0 && others == 0);
     planes->is_srgb = encode || color_space == VSH_COLOR_ENCODED;
     for (int32_t p = 0; p < planes->count && encode; ++p) {
-        vshi_plane *plane = &planes->planes[p];
+        vshi_image_plane *plane = &planes->planes[p];
         if (!plane->is_signed && strcmp(plane->name, vshi_pack_keys[VSHI_PACK_ALPHA]) != 0) {
             plane->encode = encode_srgb;
         }
@@ -267,33 +268,19 @@ static vsh_result plan_colors(const char *path, const vsh_image *image, int32_t 
 vsh_result vshi_write_plan_make(const char *path, const vsh_image *image, const vsh_image_options *options,
                                 vshi_write_plan *plan, vsh_error *error) {
     vsh_image_options full = vsh_image_options_default();
-    vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_image_options", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_options_resolve(options, &full, sizeof full, "vsh_image_options", error));
     if (path == NULL || path[0] == '\0') {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "image path: it is empty");
     }
-    result = check_image(path, image, error);
-    if (result == VSH_OK) {
-        result = plan_format(path, image, plan, error);
+    VSHI_TRY(check_image(path, image, error));
+    VSHI_TRY(plan_format(path, image, plan, error));
+    if (!plan->exr) { /* whose rows are written as they come */
+        VSHI_TRY(vshi_check_values(path, image->width, image->height, image->channel_count, error));
     }
-    if (result == VSH_OK && !plan->exr) { /* whose rows are written as they come */
-        result = vshi_check_values(path, image->width, image->height, image->channel_count, error);
-    }
-    if (result == VSH_OK) {
-        result = plan_bits(path, full.bits, plan, error);
-    }
-    if (result == VSH_OK) {
-        result = plan_planes(path, image, full.pack, plan, error);
-    }
-    if (result == VSH_OK) {
-        result = plan_colors(path, image, full.color_space, plan, error);
-    }
-    if (result == VSH_OK) {
-        plan->planes.attributes = full.attributes;
-        plan->planes.attribute_count = full.attribute_count;
-        result = vshi_attributes_check(path, full.attributes, full.attribute_count, error);
-    }
-    return result;
+    VSHI_TRY(plan_bits(path, full.bits, plan, error));
+    VSHI_TRY(plan_planes(path, image, full.pack, plan, error));
+    VSHI_TRY(plan_colors(path, image, full.color_space, plan, error));
+    plan->planes.attributes = full.attributes;
+    plan->planes.attribute_count = full.attribute_count;
+    return vshi_attributes_check(path, full.attributes, full.attribute_count, error);
 }

@@ -114,7 +114,7 @@ vsh_result vshi_reader_allocate(vshi_reader *reader, void **memory, size_t count
     if (count == 0) {
         return VSH_OK;
     }
-    vshi_block *block = malloc(sizeof *block);
+    vshi_json_block *block = malloc(sizeof *block);
     if (block == NULL) {
         return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: %s: the system refused %zu bytes",
                          reader->path, what, sizeof *block);
@@ -130,9 +130,9 @@ vsh_result vshi_reader_allocate(vshi_reader *reader, void **memory, size_t count
     return VSH_OK;
 }
 
-void vshi_blocks_free(vshi_block *blocks) {
+void vshi_blocks_free(vshi_json_block *blocks) {
     while (blocks != NULL) {
-        vshi_block *next = blocks->next;
+        vshi_json_block *next = blocks->next;
         free(blocks->memory);
         free(blocks);
         blocks = next;

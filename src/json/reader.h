@@ -8,16 +8,16 @@
 #include <stdbool.h>
 
 /* Memory that lives as long as the scene. */
-typedef struct vshi_block {
-    struct vshi_block *next;
+typedef struct vshi_json_block {
+    struct vshi_json_block *next;
     void *memory;
-} vshi_block;
+} vshi_json_block;
 
 typedef struct vshi_reader {
     const char *path; /* of the scene file, for messages and as the folder of the paths in it */
     const char *text;
     size_t size;
-    vshi_block *blocks;
+    vshi_json_block *blocks;
     vsh_error *error;
 } vshi_reader;
 
@@ -57,7 +57,7 @@ vsh_result vshi_reject_both(const vshi_reader *reader, const vshi_value *object,
 /* Zeroed memory that belongs to the scene. */
 vsh_result vshi_reader_allocate(vshi_reader *reader, void **memory, size_t count, size_t size,
                                 const char *what);
-void vshi_blocks_free(vshi_block *blocks);
+void vshi_blocks_free(vshi_json_block *blocks);
 
 /* A copy of `string`, behind the first `prefix` bytes of the scene's path. */
 vsh_result vshi_reader_copy(vshi_reader *reader, size_t prefix, const char *string, const char **copy);

@@ -66,9 +66,7 @@ extern "C" {
     MAKE(vshi_serve_copy,                                                                                    \
          (const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload, vsh_error *error),    \
          (path, request, run, payload, error), nothing)                                                      \
-    MAKE(vsh_grid_write, (const vsh_grid *grid, const char *path, const char *name, vsh_error *error),       \
-         (grid, path, name, error), nothing)                                                                 \
-    MAKE(vsh_grid_write_with,                                                                                \
+    MAKE(vsh_grid_write,                                                                                     \
          (const vsh_grid *grid, const char *path, const char *name, const vsh_attribute *attributes,         \
           size_t count, vsh_error *error),                                                                   \
          (grid, path, name, attributes, count, error), nothing)                                              \
@@ -95,9 +93,7 @@ extern "C" {
          (const vsh_volume *volume, size_t grid, size_t count, const double *positions, float *values,       \
           vsh_error *error),                                                                                 \
          (volume, grid, count, positions, values, error), nothing)                                           \
-    MAKE(vsh_volume_write, (const vsh_volume *volume, const char *path, int32_t half, vsh_error *error),     \
-         (volume, path, half, error), nothing)                                                               \
-    MAKE(vsh_volume_write_with,                                                                              \
+    MAKE(vsh_volume_write,                                                                                   \
          (const vsh_volume *volume, const char *path, int32_t half, const vsh_attribute *attributes,         \
           size_t count, vsh_error *error),                                                                   \
          (volume, path, half, attributes, count, error), nothing)                                            \

@@ -41,7 +41,8 @@ vsh_result copy_dense(const FloatTree &tree, const int32_t index_min[3], const i
         }
     }
     const Coord low(index_min[0], index_min[1], index_min[2]);
-    openvdb::tools::Dense<float> dense(
+    openvdb::tools::Dense<float, openvdb::tools::LayoutXYZ> dense( // x fastest
+
         openvdb::CoordBBox(low, low + Coord(size[0] - 1, size[1] - 1, size[2] - 1)), values);
     openvdb::tools::copyToDense(tree, dense, true);
     return VSH_OK;

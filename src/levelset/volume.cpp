@@ -234,12 +234,8 @@ vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const int32_t 
     });
 }
 
-vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t as_half, vsh_error *error) {
-    return vsh_volume_write_with(volume, path, as_half, nullptr, 0, error);
-}
-
-vsh_result vsh_volume_write_with(const vsh_volume *volume, const char *path, int32_t as_half,
-                                 const vsh_attribute *attributes, size_t attribute_count, vsh_error *error) {
+vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t as_half,
+                            const vsh_attribute *attributes, size_t attribute_count, vsh_error *error) {
     VSHI_NEEDS(volume);
     return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
         vshi::initialize();

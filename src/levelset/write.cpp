@@ -198,12 +198,8 @@ void put_attributes(FloatGrid &grid, const vsh_attribute *attributes, size_t cou
 
 } // namespace vshi
 
-vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name, vsh_error *error) {
-    return vsh_grid_write_with(grid, path, name, nullptr, 0, error);
-}
-
-vsh_result vsh_grid_write_with(const vsh_grid *grid, const char *path, const char *name,
-                               const vsh_attribute *attributes, size_t attribute_count, vsh_error *error) {
+vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *name,
+                          const vsh_attribute *attributes, size_t attribute_count, vsh_error *error) {
     VSHI_NEEDS(grid);
     return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
         vshi::initialize();

@@ -3,6 +3,7 @@
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/numbers.h"
+#include "base/try.h"
 #include "light/types.h"
 
 #include <math.h>
@@ -95,14 +96,14 @@ vsh_result vsh_light_check(const vsh_light *light, vsh_error *error) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "light '%s': falloff %d is out of range 0 … %d",
                          light->name, light->falloff, VSH_FALLOFF_QUADRATIC);
     }
-    vsh_result result = check_members(light, error);
-    if (result == VSH_OK && type->check != NULL) {
-        result = type->check(light, error);
+    VSHI_TRY(check_members(light, error));
+    if (type->check != NULL) {
+        VSHI_TRY(type->check(light, error));
     }
-    if (result == VSH_OK && light->falloff == VSH_FALLOFF_QUADRATIC && type->falls_off) {
-        result = check_range(light, &reach_member, error);
+    if (light->falloff == VSH_FALLOFF_QUADRATIC && type->falls_off) {
+        VSHI_TRY(check_range(light, &reach_member, error));
     }
-    return result;
+    return VSH_OK;
 }
 
 double vshi_light_falloff(const vsh_light *light, double distance) {

@@ -67,7 +67,7 @@ static double smoothstep(double from, double to, double x) {
 
 /* Smooth edge between the cosines of the outer and the inner angle. */
 static double spot_edge(const vsh_light *light, vshi_vec to_light) {
-    const double cosine = -vshi_dot(vshi_unit(vshi_vec_of(light->direction)), to_light);
+    const double cosine = -vshi_dot(vshi_unit(vshi_vec_of(light->axis)), to_light);
     const double outer = vshi_cos(light->outer_angle), inner = vshi_cos(light->inner_angle);
     return inner > outer ? smoothstep(outer, inner, cosine) : (cosine >= outer ? 1.0 : 0.0);
 }
@@ -77,7 +77,7 @@ static double spot_gain(const vsh_light *light, vshi_vec to_light, double distan
 }
 
 static int describe_spot(const vsh_light *light, char *text, size_t size) {
-    const double *d = light->direction, *p = light->position;
+    const double *d = light->axis, *p = light->position;
     return snprintf(text, size,
                     "spot at %.9g %.9g %.9g towards %.9g %.9g %.9g, radius %.9g, %.9g to %.9g degrees", p[0],
                     p[1], p[2], d[0], d[1], d[2], light->radius, DEGREES * light->inner_angle,
@@ -160,11 +160,15 @@ uint32_t vshi_light_types_flat(void) {
     .key = name, .kind = VSHI_LIGHT_VECTOR, .types = RECTANGLE, .required = RECTANGLE, .lowest = -INFINITY,  \
     .highest = INFINITY, .above = true, .below = true, .nonzero = true
 
+/* One key of two members: what a sun's direction and a spot's are called in scene files. */
+#define TOWARDS_OR_AXIS(type)                                                                                \
+    .key = "direction", .kind = VSHI_LIGHT_VECTOR, .types = (type), .required = (type), .lowest = -INFINITY, \
+    .highest = INFINITY, .above = true, .below = true, .nonzero = true
+
 /* In the order in which they are checked. */
 const vshi_light_member vshi_light_members[] = {
-    {MEMBER(direction), .key = "direction", .kind = VSHI_LIGHT_VECTOR, .types = DIRECTIONAL | SPOT,
-     .required = DIRECTIONAL | SPOT, .lowest = -INFINITY, .highest = INFINITY, .above = true, .below = true,
-     .nonzero = true},
+    {MEMBER(direction), TOWARDS_OR_AXIS(DIRECTIONAL)},
+    {MEMBER(axis), TOWARDS_OR_AXIS(SPOT)},
     {MEMBER(position), .key = "position", .kind = VSHI_LIGHT_VECTOR, .types = SPHERE | SPOT | RECTANGLE,
      .required = SPHERE | SPOT | RECTANGLE, .lowest = -INFINITY, .highest = INFINITY, .above = true,
      .below = true},

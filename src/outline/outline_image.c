@@ -351,7 +351,7 @@ vsh_result vsh_outline_from_image(const char *path, const vsh_mask_options *opti
     }
     vsh_image_file *file = NULL;
     if (result == VSH_OK) {
-        result = vsh_image_read_run(path, &full_run, &file, error);
+        result = vsh_image_read(path, &full_run, &file, error);
     }
     if (result == VSH_OK) {
         const vsh_image image = vsh_image_view(file);

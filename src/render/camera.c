@@ -4,6 +4,7 @@
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/job.h"
+#include "base/try.h"
 
 #include <string.h>
 
@@ -25,15 +26,15 @@ static vsh_result check_vector(const char *name, const double v[3], vsh_error *e
 /* What does not concern where the camera is. */
 static vsh_result check_lens(const vsh_camera *camera, vsh_error *error) {
     const double *up = camera->up;
-    vsh_result result = check_vector("up", up, error);
-    if (result == VSH_OK && up[0] == 0.0 && up[1] == 0.0 && up[2] == 0.0) {
-        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: up is (0, 0, 0)");
+    VSHI_TRY(check_vector("up", up, error));
+    if (up[0] == 0.0 && up[1] == 0.0 && up[2] == 0.0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: up is (0, 0, 0)");
     }
-    if (result == VSH_OK && !(camera->fov >= FOV_LEAST && camera->fov <= FOV_MOST)) {
-        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: fov %g is out of range %g … %g", camera->fov,
-                           FOV_LEAST, FOV_MOST);
+    if (!(camera->fov >= FOV_LEAST && camera->fov <= FOV_MOST)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: fov %g is out of range %g … %g", camera->fov,
+                         FOV_LEAST, FOV_MOST);
     }
-    return result;
+    return VSH_OK;
 }
 
 /* Copies the caller's struct over defaults. */
@@ -46,13 +47,10 @@ static vsh_result resolve(const vsh_camera *camera, vsh_camera *full, vsh_error 
 vsh_result vsh_camera_check(const vsh_camera *camera, vsh_error *error) {
     VSHI_FLOATS;
     vsh_camera full;
-    vsh_result result = resolve(camera, &full, error);
-    result = result == VSH_OK ? check_vector("position", full.position, error) : result;
-    result = result == VSH_OK ? check_vector("target", full.target, error) : result;
-    result = result == VSH_OK ? check_lens(&full, error) : result;
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(resolve(camera, &full, error));
+    VSHI_TRY(check_vector("position", full.position, error));
+    VSHI_TRY(check_vector("target", full.target, error));
+    VSHI_TRY(check_lens(&full, error));
     const vshi_vec view = vshi_unit(vshi_sub(vshi_vec_of(full.target), vshi_vec_of(full.position)));
     if (!(vshi_dot(view, view) > 0.5)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: position and target are both (%g, %g, %g)",
@@ -110,12 +108,9 @@ vsh_result vsh_camera_frame_points(vsh_camera *camera, size_t count, const doubl
     VSHI_FLOATS;
     VSHI_NEEDS(points);
     vsh_camera full;
-    vsh_result result = resolve(camera, &full, error);
-    result = result == VSH_OK ? check_lens(&full, error) : result;
-    result = result == VSH_OK ? check_view(azimuth, elevation, aspect, error) : result;
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(resolve(camera, &full, error));
+    VSHI_TRY(check_lens(&full, error));
+    VSHI_TRY(check_view(azimuth, elevation, aspect, error));
     const view_axes axes = axes_of(&full, azimuth, elevation);
     const double tangent[2] = {aspect * vshi_tan(0.5 * full.fov) / POINTS_MARGIN,
                                vshi_tan(0.5 * full.fov) / POINTS_MARGIN};

@@ -1,6 +1,7 @@
 #include "render/lit.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/mesh.h"
 #include "shade/shade.h"
 
@@ -121,11 +122,10 @@ vsh_result vshi_lit_check(const vsh_render_options *options, vsh_error *error) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "lit is NULL with a lit_count of %zu",
                          options->lit_count);
     }
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; result == VSH_OK && i < options->lit_count; ++i) {
-        result = check_meshes(&options->lit[i], i, error);
+    for (size_t i = 0; i < options->lit_count; ++i) {
+        VSHI_TRY(check_meshes(&options->lit[i], i, error));
     }
-    return result;
+    return VSH_OK;
 }
 
 /* --- triangles on the samples */

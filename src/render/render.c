@@ -2,6 +2,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 #include "field/level.h"
 #include "render/tile.h"
 #include "shade/layers.h"
@@ -43,38 +44,35 @@ static vsh_result check_options(const vsh_render_options *o, size_t light_count,
                    {"shaft_steps", o->shaft_steps, 1, 64},
                    {"light_count", (double)light_count, 0, VSHI_MOST_LIGHTS}};
     for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i) {
-        const vsh_result result =
-            check_number(numbers[i].name, numbers[i].value, numbers[i].least, numbers[i].most, error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(check_number(numbers[i].name, numbers[i].value, numbers[i].least, numbers[i].most, error));
     }
     const int32_t side = o->width > o->height ? o->width : o->height;
     if ((side + 2) * o->samples > MOST_SIDE) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "samples %d: %d pixels a side take at most %d",
                          o->samples, side, MOST_SIDE / (side + 2));
     }
-    vsh_result result = check_colors("sky", o->sky, BRIGHTEST, error);
-    result = result == VSH_OK ? check_colors("background", o->background, BRIGHTEST, error) : result;
-    result = result == VSH_OK ? vshi_lit_check(o, error) : result;
-    for (size_t i = 0; result == VSH_OK && i < o->lit_count; ++i) {
-        result = check_colors("color of lit meshes", o->lit[i].color, 1.0, error);
+    VSHI_TRY(check_colors("sky", o->sky, BRIGHTEST, error));
+    VSHI_TRY(check_colors("background", o->background, BRIGHTEST, error));
+    VSHI_TRY(vshi_lit_check(o, error));
+    for (size_t i = 0; i < o->lit_count; ++i) {
+        VSHI_TRY(check_colors("color of lit meshes", o->lit[i].color, 1.0, error));
     }
-    result = result == VSH_OK ? vsh_tint_check(&o->tint, error) : result;
-    return result == VSH_OK ? vsh_camera_check(&o->camera, error) : result;
+    VSHI_TRY(vsh_tint_check(&o->tint, error));
+    return vsh_camera_check(&o->camera, error);
 }
 
 static vsh_result check_surfaces(const vsh_surface *surfaces, size_t count, vsh_error *error) {
-    vsh_result result = count <= VSH_MAX_SURFACES && (surfaces != NULL || count == 0)
-                            ? VSH_OK
-                            : vshi_fail(error, VSH_ERROR_ARGUMENT, "%zu surfaces: NULL, or more than %d",
-                                        count, VSH_MAX_SURFACES);
-    for (size_t i = 0; result == VSH_OK && i < count; ++i) {
-        result = surfaces[i].field != NULL
-                     ? check_colors("color of a surface", surfaces[i].color, 1.0, error)
-                     : vshi_fail(error, VSH_ERROR_ARGUMENT, "surface %zu: field is NULL", i);
+    if (count > VSH_MAX_SURFACES || (surfaces == NULL && count > 0)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%zu surfaces: NULL, or more than %d", count,
+                         VSH_MAX_SURFACES);
     }
-    return result;
+    for (size_t i = 0; i < count; ++i) {
+        if (surfaces[i].field == NULL) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "surface %zu: field is NULL", i);
+        }
+        VSHI_TRY(check_colors("color of a surface", surfaces[i].color, 1.0, error));
+    }
+    return VSH_OK;
 }
 
 /* --- the work */
@@ -135,22 +133,16 @@ static vsh_result allocate(rendering *r, vsh_error *error) {
     const size_t rows = (size_t)rows_at_once(&r->grid), columns = (size_t)r->grid.columns;
     r->tiles_across = (columns + VSHI_TILE - 1) / VSHI_TILE;
     const size_t tiles = r->tiles_across * (rows / VSHI_TILE);
-    vsh_result result =
-        vshi_allocate((void **)&r->rows.seen, rows * columns, sizeof *r->rows.seen, "samples", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&r->stats, tiles, sizeof *r->stats, "tiles", error);
+    VSHI_TRY(vshi_allocate((void **)&r->rows.seen, rows * columns, sizeof *r->rows.seen, "samples", error));
+    VSHI_TRY(vshi_allocate((void **)&r->stats, tiles, sizeof *r->stats, "tiles", error));
+    VSHI_TRY(vshi_allocate((void **)&r->results, tiles, sizeof *r->results, "tiles", error));
+    if (r->scenery.lit != NULL) {
+        VSHI_TRY(
+            vshi_allocate((void **)&r->rows.lit.depth, rows * columns, sizeof(double), "samples", error));
+        VSHI_TRY(vshi_allocate((void **)&r->rows.lit.triangle, rows * columns, sizeof(uint32_t), "samples",
+                               error));
     }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&r->results, tiles, sizeof *r->results, "tiles", error);
-    }
-    if (result == VSH_OK && r->scenery.lit != NULL) {
-        result = vshi_allocate((void **)&r->rows.lit.depth, rows * columns, sizeof(double), "samples", error);
-        if (result == VSH_OK) {
-            result = vshi_allocate((void **)&r->rows.lit.triangle, rows * columns, sizeof(uint32_t),
-                                   "samples", error);
-        }
-    }
-    return result;
+    return VSH_OK;
 }
 
 static void release(rendering *r) {
@@ -162,47 +154,41 @@ static void release(rendering *r) {
 }
 
 static vsh_result render_rows(rendering *r, vshi_job *job, vsh_shade_stats *stats, vsh_error *error) {
-    vsh_result result = VSH_OK;
     const size_t tiles = r->tiles_across * (size_t)((r->rows.count + VSHI_TILE - 1) / VSHI_TILE);
     r->rows.lit.first_row = r->rows.first;
     r->rows.lit.rows = r->rows.count;
     if (r->scenery.lit != NULL) {
         const size_t strips = ((size_t)r->grid.columns + VSHI_LIT_STRIP - 1) / VSHI_LIT_STRIP;
-        result = vshi_parallel_for(job, strips, 1, 0, raster_strips, r, error);
+        VSHI_TRY(vshi_parallel_for(job, strips, 1, 0, raster_strips, r, error));
     }
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, tiles, 4, 1, render_tiles, r, error);
-    }
-    for (size_t i = 0; i < tiles && result == VSH_OK; ++i) {
-        result = r->results[i] == VSH_OK ? VSH_OK : vshi_fail(error, r->results[i], "render: tile %zu", i);
+    VSHI_TRY(vshi_parallel_for(job, tiles, 4, 1, render_tiles, r, error));
+    for (size_t i = 0; i < tiles; ++i) {
+        if (r->results[i] != VSH_OK) {
+            return vshi_fail(error, r->results[i], "render: tile %zu", i);
+        }
         add_stats(stats, &r->stats[i]);
     }
-    return result == VSH_OK ? vshi_film_add(&r->film, r->rows.seen, r->rows.first, r->rows.count, job, error)
-                            : result;
+    return vshi_film_add(&r->film, r->rows.seen, r->rows.first, r->rows.count, job, error);
 }
 
 static vsh_result render_picture(rendering *r, const vsh_picture *picture, vsh_shade_stats *stats,
                                  vsh_error *error) {
-    vsh_result result = allocate(r, error);
-    vshi_job *job = NULL;
-    if (result == VSH_OK) {
-        const size_t rows = ((size_t)r->grid.rows + VSHI_TILE - 1) / VSHI_TILE;
-        job = vshi_job_begin(&r->scenery.run, "render", rows * r->tiles_across);
-        result =
-            job != NULL ? VSH_OK : vshi_fail(error, VSH_ERROR_MEMORY, "render: the system refused memory");
+    VSHI_TRY(allocate(r, error));
+    const size_t rows = ((size_t)r->grid.rows + VSHI_TILE - 1) / VSHI_TILE;
+    vshi_job *job = vshi_job_begin(&r->scenery.run, "render", rows * r->tiles_across);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "render: the system refused memory");
     }
-    if (result == VSH_OK) {
-        vshi_film_begin(&r->film, &r->grid, picture);
-    }
+    vsh_result result = VSH_OK;
+    vshi_film_begin(&r->film, &r->grid, picture);
     const int32_t most = rows_at_once(&r->grid);
-    for (r->rows.first = 0; result == VSH_OK && r->rows.first < r->grid.rows; r->rows.first += most) {
+    for (r->rows.first = 0; r->rows.first < r->grid.rows; r->rows.first += most) {
         const int32_t left = r->grid.rows - r->rows.first;
         r->rows.count = left < most ? left : most;
-        result = render_rows(r, job, stats, error);
+        VSHI_TRY_DONE(render_rows(r, job, stats, error));
     }
-    if (result == VSH_OK) {
-        vshi_film_end(&r->film);
-    }
+    vshi_film_end(&r->film);
+done:
     vshi_job_end(job);
     return result;
 }
@@ -267,13 +253,10 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     VSHI_NEEDS(picture);
     VSHI_NEEDS(occluders);
     VSHI_NEEDS_OF(light_count, lights);
-    vsh_result result = vshi_options_resolve(options, &o, sizeof o, "vsh_render_options", error);
-    result = result == VSH_OK ? vshi_run_resolve(run, &r.scenery.run, error) : result;
-    result = result == VSH_OK ? check_options(&o, light_count, error) : result;
-    result = result == VSH_OK ? check_surfaces(surfaces, surface_count, error) : result;
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_options_resolve(options, &o, sizeof o, "vsh_render_options", error));
+    VSHI_TRY(vshi_run_resolve(run, &r.scenery.run, error));
+    VSHI_TRY(check_options(&o, light_count, error));
+    VSHI_TRY(check_surfaces(surfaces, surface_count, error));
     r.grid = vshi_sample_grid_of(&o);
     r.scenery.options = &o;
     r.scenery.grid = &r.grid;
@@ -281,18 +264,19 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     r.scenery.surface_count = surface_count;
     r.scenery.lights = lights;
     r.scenery.light_count = light_count;
-    result = check_memory(&r, surfaces, surface_count, occluders->field, error);
-    result =
-        result == VSH_OK ? vsh_query_create(occluders, lights, light_count, &o.shade, &query, error) : result;
-    result = result == VSH_OK ? vshi_lit_create(&o, lights, light_count, &r.grid, &lit, error) : result;
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(check_memory(&r, surfaces, surface_count, occluders->field, error));
+    VSHI_TRY_DONE(vsh_query_create(occluders, lights, light_count, &o.shade, &query, error));
+    VSHI_TRY_DONE(vshi_lit_create(&o, lights, light_count, &r.grid, &lit, error));
     r.scenery.query = query;
     r.scenery.field = occluders->field;
-    r.scenery.lift = result == VSH_OK && needs_lift(occluders, &o, light_count) ? LIFT : 0.0;
+    r.scenery.lift = needs_lift(occluders, &o, light_count) ? LIFT : 0.0;
     r.scenery.lit = lit;
-    if (result == VSH_OK && o.shafts > 0.0 && light_count > 0 && place_fog(&r)) {
+    if (o.shafts > 0.0 && light_count > 0 && place_fog(&r)) {
         sampler = vshi_sampler_create(VSH_SAMPLER_BLUE, 1, o.shade.frame);
-        result = sampler != NULL ? VSH_OK
-                                 : vshi_fail(error, VSH_ERROR_MEMORY, "render: the system refused memory");
+        if (sampler == NULL) {
+            VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, "render: the system refused memory"));
+        }
         r.scenery.shafts.query = query;
         r.scenery.shafts.lights = lights;
         r.scenery.shafts.light_count = light_count;
@@ -300,9 +284,8 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
         r.scenery.shafts.sampler = sampler;
         r.scenery.shafts.steps = o.shaft_steps;
     }
-    if (result == VSH_OK) {
-        result = render_picture(&r, picture, stats != NULL ? stats : &own, error);
-    }
+    result = render_picture(&r, picture, stats != NULL ? stats : &own, error);
+done:
     release(&r);
     vshi_sampler_free(sampler);
     vshi_lit_free(lit);

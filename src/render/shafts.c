@@ -1,6 +1,7 @@
 #include "render/shafts.h"
 
 #include "base/elementary.h"
+#include "base/try.h"
 #include "light/view.h"
 
 /* The part of a ray within the box. */
@@ -76,8 +77,7 @@ vsh_result vshi_shafts_add(const vshi_shafts *shafts, size_t count, const vshi_s
             }
         }
     }
-    vsh_result result = VSH_OK;
-    for (int32_t k = 0; k < shafts->steps && passing > 0 && result == VSH_OK; ++k) {
+    for (int32_t k = 0; k < shafts->steps && passing > 0; ++k) {
         step s = {.count = passing};
         for (size_t j = 0; j < passing; ++j) {
             const size_t i = in[j];
@@ -86,12 +86,12 @@ vsh_result vshi_shafts_add(const vshi_shafts *shafts, size_t count, const vshi_s
             s.positions[j][0] = at.x, s.positions[j][1] = at.y, s.positions[j][2] = at.z;
             s.share[j] = vshi_exp(-shafts->extinction * along) * shafts->extinction * stretch;
         }
-        result = light_step(shafts, &s, stats, error);
-        for (size_t j = 0; j < passing && result == VSH_OK; ++j) {
+        VSHI_TRY(light_step(shafts, &s, stats, error));
+        for (size_t j = 0; j < passing; ++j) {
             for (int c = 0; c < 3; ++c) {
                 seen[in[j]]->color[c] += (float)(s.share[j] * (double)s.light[j][c]);
             }
         }
     }
-    return result;
+    return VSH_OK;
 }

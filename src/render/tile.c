@@ -1,5 +1,6 @@
 #include "render/tile.h"
 
+#include "base/try.h"
 #include "render/hit.h"
 #include "shade/shade.h"
 
@@ -91,29 +92,28 @@ static void add_bare(const vshi_scenery *scenery, hits *h, uint32_t triangle, vs
 /* Light at the hits, one after the other of the lights, so that room for one is enough. */
 static vsh_result light_hits(const vshi_scenery *scenery, hits *h, vsh_shade_stats *stats, vsh_error *error) {
     const vsh_points points = {h->count, &h->positions[0][0], &h->normals[0][0], h->texels};
-    vsh_result result = VSH_OK;
     vsh_query_output output = vsh_query_output_default();
     if (scenery->options->ao) {
         output.ao = h->ao;
-        result = vsh_query_points(scenery->query, &points, &scenery->run, &output, stats, error);
+        VSHI_TRY(vsh_query_points(scenery->query, &points, &scenery->run, &output, stats, error));
         output.ao = NULL;
     }
-    for (size_t l = 0; l < scenery->light_count && result == VSH_OK; ++l) {
+    for (size_t l = 0; l < scenery->light_count; ++l) {
         float *visibility[VSHI_MOST_LIGHTS] = {NULL};
         visibility[l] = h->visibility;
         output.visibility = visibility;
-        result = vsh_query_points(scenery->query, &points, &scenery->run, &output, stats, error);
+        VSHI_TRY(vsh_query_points(scenery->query, &points, &scenery->run, &output, stats, error));
         vshi_shade_irradiance(&points, NULL, &scenery->lights[l], h->visibility, &scenery->options->tint,
                               &h->light[0][0]);
     }
-    for (size_t i = 0; i < h->count && result == VSH_OK; ++i) {
+    for (size_t i = 0; i < h->count; ++i) {
         const double open = !scenery->options->ao ? 1.0 : h->ao[i] > 0.0f ? (double)h->ao[i] : 0.0;
         for (int c = 0; c < 3; ++c) {
             h->seen[i]->color[c] =
                 (float)(h->color[i][c] * ((double)h->light[i][c] + scenery->options->sky[c] * open));
         }
     }
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_tile_render(const vshi_scenery *scenery, const vshi_rows *rows, int32_t column, int32_t row,

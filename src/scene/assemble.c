@@ -6,6 +6,7 @@
 
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "base/vec.h"
 
 #include <stdlib.h>
@@ -85,44 +86,31 @@ static vsh_result allocate_assembly(assembly *a, vsh_error *error) {
         vsh_assets_caster(a->assets, i, &count);
         meshes += count;
     }
-    void *memory[4] = {NULL, NULL, NULL, NULL};
-    vsh_result result = vshi_allocate(&memory[0], meshes, sizeof *a->meshes, "meshes", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory[1], casters, sizeof *a->sdfs, "casters", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory[2], casters + 1, sizeof *a->instances, "casters", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory[3], casters + 1, sizeof *a->made, "casters", error);
-    }
-    a->meshes = memory[0];
-    a->sdfs = memory[1];
-    a->instances = memory[2];
-    a->made = memory[3];
-    return result;
+    VSHI_TRY(vshi_allocate((void **)&a->meshes, meshes, sizeof *a->meshes, "meshes", error));
+    VSHI_TRY(vshi_allocate((void **)&a->sdfs, casters, sizeof *a->sdfs, "casters", error));
+    VSHI_TRY(vshi_allocate((void **)&a->instances, casters + 1, sizeof *a->instances, "casters", error));
+    return vshi_allocate((void **)&a->made, casters + 1, sizeof *a->made, "casters", error);
 }
 
 static vsh_result gather(assembly *a, vsh_error *error) {
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; i < a->scene->caster_count && result == VSH_OK; ++i) {
+    for (size_t i = 0; i < a->scene->caster_count; ++i) {
         const vsh_caster *caster = &a->scene->casters[i];
         if (!a->taken[i]) {
             continue;
         }
         if (caster->type == VSH_CASTER_SDF) {
-            result = place_sdf(caster, i, &a->sdfs[i], error);
+            VSHI_TRY(place_sdf(caster, i, &a->sdfs[i], error));
         } else if (caster->type == VSH_CASTER_VDB && vshi_similarity_scale(caster->transform) <= 0.0) {
-            result = vshi_fail(error, VSH_ERROR_INPUT,
-                               "caster %zu: %s: the transform of a level set must neither shear nor scale "
-                               "unevenly",
-                               i, caster->path);
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "caster %zu: %s: the transform of a level set must neither shear nor scale "
+                             "unevenly",
+                             i, caster->path);
         }
         if (vshi_assets_outline(a->assets, i) != NULL && vshi_similarity_scale(caster->transform) <= 0.0) {
-            result = vshi_fail(error, VSH_ERROR_INPUT,
-                               "caster %zu: the transform of a mask or text must neither shear nor scale "
-                               "unevenly",
-                               i);
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "caster %zu: the transform of a mask or text must neither shear nor scale "
+                             "unevenly",
+                             i);
         }
         size_t count = 0;
         const vsh_mesh *views = vsh_assets_caster(a->assets, i, &count);
@@ -130,7 +118,7 @@ static vsh_result gather(assembly *a, vsh_error *error) {
             a->meshes[a->mesh_count++] = views[k];
         }
     }
-    return result;
+    return VSH_OK;
 }
 
 typedef struct world_box {
@@ -249,8 +237,8 @@ static vsh_result voxelise_spheres(assembly *a, const vsh_spheres *spheres, vsh_
     memcpy(field.bounds_min, info.bounds_min, sizeof field.bounds_min);
     memcpy(field.bounds_max, info.bounds_max, sizeof field.bounds_max);
     vsh_grid **made = &a->made[a->made_count];
-    const vsh_result result = vsh_grid_from_distance(&field, &a->options, run, made, error);
-    return result == VSH_OK ? add_made(a, NULL, run, error) : result;
+    VSHI_TRY(vsh_grid_from_distance(&field, &a->options, run, made, error));
+    return add_made(a, NULL, run, error);
 }
 
 /* The limit of memory is that of all the grids together: run->memory_held grows by each. */
@@ -276,18 +264,17 @@ static vsh_result make_grid(assembly *a, size_t i, vsh_run *run, vsh_error *erro
 }
 
 static vsh_result make_grids(assembly *a, vsh_run *run, vsh_error *error) {
-    vsh_result result = VSH_OK;
     if (a->mesh_count > 0) {
         vsh_grid **made = &a->made[a->made_count];
-        result = vsh_grid_from_meshes(a->meshes, a->mesh_count, &a->options, run, made, error);
-        if (result == VSH_OK) {
-            result = add_made(a, NULL, run, error);
+        VSHI_TRY(vsh_grid_from_meshes(a->meshes, a->mesh_count, &a->options, run, made, error));
+        VSHI_TRY(add_made(a, NULL, run, error));
+    }
+    for (size_t i = 0; i < a->scene->caster_count; ++i) {
+        if (a->taken[i]) {
+            VSHI_TRY(make_grid(a, i, run, error));
         }
     }
-    for (size_t i = 0; i < a->scene->caster_count && result == VSH_OK; ++i) {
-        result = a->taken[i] ? make_grid(a, i, run, error) : VSH_OK;
-    }
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result unite(assembly *a, const vsh_run *run, vsh_grid **grid, vsh_error *error) {
@@ -318,27 +305,18 @@ static vsh_result assemble(const vsh_scene *scene, const vsh_assets *assets, con
                            vsh_error *error) {
     assembly a = {.scene = scene, .assets = assets, .taken = taken, .options = vsh_grid_options_default()};
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result == VSH_OK) {
-        result = vshi_options_resolve(options, &a.options, sizeof a.options, "vsh_grid_options", error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(vshi_options_resolve(options, &a.options, sizeof a.options, "vsh_grid_options", error));
+    vsh_result result = VSH_OK;
     full.memory_held += scene->caster_count * BYTES_PER_CASTER;
-    result = allocate_assembly(&a, error);
-    if (result == VSH_OK) {
-        result = gather(&a, error);
+    VSHI_TRY_DONE(allocate_assembly(&a, error));
+    VSHI_TRY_DONE(gather(&a, error));
+    if (a.options.voxel_size == 0.0) {
+        VSHI_TRY_DONE(choose_voxel_size(&a, error));
     }
-    if (result == VSH_OK && a.options.voxel_size == 0.0) {
-        result = choose_voxel_size(&a, error);
-    }
-    if (result == VSH_OK) {
-        result = make_grids(&a, &full, error);
-    }
-    if (result == VSH_OK) {
-        result = unite(&a, run, grid, error); /* which counts the instances itself */
-    }
+    VSHI_TRY_DONE(make_grids(&a, &full, error));
+    VSHI_TRY_DONE(unite(&a, run, grid, error)); /* which counts the instances itself */
+done:
     free_assembly(&a);
     return result;
 }
@@ -365,15 +343,13 @@ vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, c
         return vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters");
     }
     bool *taken;
-    vsh_result result = vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error);
-    if (result == VSH_OK) {
-        result = take(scene, true, NULL, taken) > 0
-                     ? VSH_OK
-                     : vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters that are voxelised");
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error));
+    if (take(scene, true, NULL, taken) == 0) {
+        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters that are voxelised"));
     }
-    if (result == VSH_OK) {
-        result = assemble(scene, assets, taken, &scene->grid, run, grid, error);
-    }
+    VSHI_TRY_DONE(assemble(scene, assets, taken, &scene->grid, run, grid, error));
+done:
     free(taken);
     return result;
 }
@@ -392,10 +368,12 @@ vsh_result vsh_scene_layer_casters(const vsh_scene *scene, const vsh_assets *ass
         options.resolution = layer->resolution;
     }
     bool *taken;
-    vsh_result result = vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error);
-    if (result == VSH_OK && take(scene, false, layer, taken) > 0) {
-        result = assemble(scene, assets, taken, &options, run, grid, error);
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_allocate((void **)&taken, scene->caster_count, sizeof *taken, "casters", error));
+    if (take(scene, false, layer, taken) > 0) {
+        VSHI_TRY_DONE(assemble(scene, assets, taken, &options, run, grid, error));
     }
+done:
     free(taken);
     return result;
 }

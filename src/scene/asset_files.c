@@ -1,5 +1,6 @@
 #include "scene/asset_files.h"
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -7,11 +8,9 @@
 static vsh_result copy_text(const char *text, char **copy, vsh_error *error) {
     const size_t size = strlen(text) + 1;
     void *memory = NULL;
-    const vsh_result result = vshi_allocate(&memory, size, 1, "file name", error);
-    if (result == VSH_OK) {
-        *copy = memcpy(memory, text, size);
-    }
-    return result;
+    VSHI_TRY(vshi_allocate(&memory, size, 1, "file name", error));
+    *copy = memcpy(memory, text, size);
+    return VSH_OK;
 }
 
 vsh_result vshi_asset_model(vshi_asset_files *files, const char *path, const vsh_run *run,
@@ -23,12 +22,10 @@ vsh_result vshi_asset_model(vshi_asset_files *files, const char *path, const vsh
         }
     }
     vshi_asset_model_entry *entry = &files->models[files->model_count++];
-    vsh_result result = copy_text(path, &entry->path, error);
-    if (result == VSH_OK) {
-        result = vsh_model_read(path, run, &entry->model, error);
-    }
+    VSHI_TRY(copy_text(path, &entry->path, error));
+    VSHI_TRY(vsh_model_read(path, run, &entry->model, error));
     *model = entry->model;
-    return result;
+    return VSH_OK;
 }
 
 static bool same_text(const char *a, const char *b) {
@@ -45,15 +42,13 @@ vsh_result vshi_asset_grid(vshi_asset_files *files, const char *path, const char
         }
     }
     vshi_asset_grid_entry *entry = &files->grids[files->grid_count++];
-    vsh_result result = copy_text(path, &entry->path, error);
-    if (result == VSH_OK && name != NULL) {
-        result = copy_text(name, &entry->name, error);
+    VSHI_TRY(copy_text(path, &entry->path, error));
+    if (name != NULL) {
+        VSHI_TRY(copy_text(name, &entry->name, error));
     }
-    if (result == VSH_OK) {
-        result = vsh_grid_read(path, name, run, &entry->grid, error);
-    }
+    VSHI_TRY(vsh_grid_read(path, name, run, &entry->grid, error));
     *grid = entry->grid;
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_asset_map(vshi_asset_files *files, const char *path, const vsh_run *run,
@@ -65,26 +60,19 @@ vsh_result vshi_asset_map(vshi_asset_files *files, const char *path, const vsh_r
         }
     }
     vshi_asset_map_entry *entry = &files->maps[files->map_count++];
-    vsh_result result = copy_text(path, &entry->path, error);
-    if (result == VSH_OK) {
-        result = vshi_heightmap_read(path, run, &entry->map, error);
-    }
+    VSHI_TRY(copy_text(path, &entry->path, error));
+    VSHI_TRY(vshi_heightmap_read(path, run, &entry->map, error));
     *map = &entry->map;
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_asset_files_create(const vsh_scene *scene, vshi_asset_files *files, vsh_error *error) {
-    void *memory[3] = {NULL, NULL, NULL};
     const size_t count = scene->caster_count + scene->receiver_count;
-    vsh_result result = vshi_allocate(&memory[0], count, sizeof *files->models, "models", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory[1], scene->caster_count, sizeof *files->grids, "grids", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory[2], count, sizeof *files->maps, "heightfields", error);
-    }
-    *files = (vshi_asset_files){.models = memory[0], .grids = memory[1], .maps = memory[2]};
-    return result;
+    *files = (vshi_asset_files){.models = NULL};
+    VSHI_TRY(vshi_allocate((void **)&files->models, count, sizeof *files->models, "models", error));
+    VSHI_TRY(
+        vshi_allocate((void **)&files->grids, scene->caster_count, sizeof *files->grids, "grids", error));
+    return vshi_allocate((void **)&files->maps, count, sizeof *files->maps, "heightfields", error);
 }
 
 void vshi_asset_files_free(vshi_asset_files *files) {

@@ -5,6 +5,7 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/solidity.h"
 #include "scene/asset_files.h"
 #include "scene/select.h"
@@ -46,17 +47,8 @@ static vsh_result place_chosen(asset_place *place, const vsh_model *model, const
     for (size_t i = 0; i < all; ++i) {
         count += chosen == NULL || chosen[i] != 0;
     }
-    void *meshes = NULL;
-    void *transforms = NULL;
-    vsh_result result = vshi_allocate(&meshes, count, sizeof *place->meshes, "meshes", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate(&transforms, count, 12 * sizeof(double), "transforms", error);
-    }
-    place->meshes = meshes;
-    place->transforms = transforms;
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&place->meshes, count, sizeof *place->meshes, "meshes", error));
+    VSHI_TRY(vshi_allocate((void **)&place->transforms, count, 12 * sizeof(double), "transforms", error));
     for (size_t i = 0; i < all; ++i) {
         if (chosen != NULL && chosen[i] == 0) {
             continue;
@@ -84,20 +76,16 @@ static vsh_result place_heights(vsh_assets *assets, asset_place *place, vsh_heig
                                 int32_t what, const double transform[12], const vsh_run *run,
                                 vsh_error *error) {
     const vshi_heightmap *map = NULL;
-    vsh_result result = vshi_asset_map(&assets->files, source->name, run, &map, error);
-    if (result == VSH_OK) {
-        source->columns = map->columns;
-        source->rows = map->rows;
-        source->values = map->values;
-    }
-    if (result == VSH_OK && place->direct) {
+    VSHI_TRY(vshi_asset_map(&assets->files, source->name, run, &map, error));
+    source->columns = map->columns;
+    source->rows = map->rows;
+    source->values = map->values;
+    if (place->direct) {
         source->transform = transform;
         return vsh_heights_create(source, run, &place->heights, error);
     }
-    if (result == VSH_OK) {
-        result = vsh_model_from_heights(source, what, run, &place->made, error);
-    }
-    return result == VSH_OK ? place_model(place, place->made, 0, transform, error) : result;
+    VSHI_TRY(vsh_model_from_heights(source, what, run, &place->made, error));
+    return place_model(place, place->made, 0, transform, error);
 }
 
 static vsh_result place_spheres(asset_place *place, const vsh_caster *caster, size_t index,
@@ -192,19 +180,13 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
                                      .base = caster->base};
         return place_heights(assets, place, &source, VSH_HEIGHTS_SOLID, caster->transform, run, error);
     }
-    const vsh_model *model = NULL;
-    vsh_result result = vshi_asset_model(&assets->files, caster->path, run, &model, error);
+    VSHI_TRY(vshi_asset_model(&assets->files, caster->path, run, &place->model, error));
     unsigned char *chosen = NULL;
-    if (result == VSH_OK) {
-        result = vshi_select(model, caster->path, &caster->objects, &chosen, error);
-    }
-    if (result == VSH_OK) {
-        result = leave_out_blended(scene, model, caster->path, run, chosen, error);
-    }
-    if (result == VSH_OK) {
-        result = place_chosen(place, model, chosen, -1, scene->unit, caster->transform, error);
-    }
-    place->model = model;
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_select(place->model, caster->path, &caster->objects, &chosen, error));
+    VSHI_TRY_DONE(leave_out_blended(scene, place->model, caster->path, run, chosen, error));
+    VSHI_TRY_DONE(place_chosen(place, place->model, chosen, -1, scene->unit, caster->transform, error));
+done:
     free(chosen);
     return result;
 }
@@ -243,38 +225,26 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
     }
     const vsh_model *model = NULL;
     unsigned char *chosen = NULL;
-    vsh_result result = vshi_asset_model(&assets->files, receiver->path, run, &model, error);
-    if (result == VSH_OK) {
-        result = vshi_select(model, receiver->path, &receiver->objects, &chosen, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_select_uvs(model, receiver, run, chosen, error);
-    }
-    if (result == VSH_OK) {
-        result = place_chosen(&assets->receivers[index], model, chosen, receiver->uv_set, scene->unit,
-                              receiver->transform, error);
-    }
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_asset_model(&assets->files, receiver->path, run, &model, error));
+    VSHI_TRY_DONE(vshi_select(model, receiver->path, &receiver->objects, &chosen, error));
+    VSHI_TRY_DONE(vshi_select_uvs(model, receiver, run, chosen, error));
+    VSHI_TRY_DONE(place_chosen(&assets->receivers[index], model, chosen, receiver->uv_set, scene->unit,
+                               receiver->transform, error));
+done:
     free(chosen);
     return result;
 }
 
 static vsh_result allocate_places(vsh_assets *assets, const vsh_scene *scene, vsh_error *error) {
-    void *casters = NULL, *receivers = NULL;
-    vsh_result result = vshi_asset_files_create(scene, &assets->files, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate(&casters, scene->caster_count, sizeof *assets->casters, "casters", error);
-    }
-    if (result == VSH_OK) {
-        result =
-            vshi_allocate(&receivers, scene->receiver_count, sizeof *assets->receivers, "receivers", error);
-    }
-    assets->casters = casters;
-    assets->receivers = receivers;
-    if (result == VSH_OK) {
-        assets->caster_count = scene->caster_count;
-        assets->receiver_count = scene->receiver_count;
-    }
-    return result;
+    VSHI_TRY(vshi_asset_files_create(scene, &assets->files, error));
+    VSHI_TRY(vshi_allocate((void **)&assets->casters, scene->caster_count, sizeof *assets->casters, "casters",
+                           error));
+    VSHI_TRY(vshi_allocate((void **)&assets->receivers, scene->receiver_count, sizeof *assets->receivers,
+                           "receivers", error));
+    assets->caster_count = scene->caster_count;
+    assets->receiver_count = scene->receiver_count;
+    return VSH_OK;
 }
 
 vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
@@ -283,36 +253,27 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     VSHI_NEEDS(assets);
     *assets = NULL;
     VSHI_NEEDS(scene);
-    void *memory = NULL;
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory, 1, sizeof(vsh_assets), "assets", error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
-    vsh_assets *loaded = memory;
-    result = allocate_places(loaded, scene, error);
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    vsh_assets *loaded = NULL;
+    VSHI_TRY(vshi_allocate((void **)&loaded, 1, sizeof *loaded, "assets", error));
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(allocate_places(loaded, scene, error));
     /* Receivers first: what is wrong with them is cheaper to find than a caster's volume is to read. */
-    for (size_t i = 0; i < scene->receiver_count && result == VSH_OK; ++i) {
-        result = place_receiver(loaded, scene, i, &full, error);
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        VSHI_TRY_DONE(place_receiver(loaded, scene, i, &full, error));
     }
-    for (size_t i = 0; i < scene->caster_count && result == VSH_OK; ++i) {
-        result = place_caster(loaded, scene, i, &full, error);
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        VSHI_TRY_DONE(place_caster(loaded, scene, i, &full, error));
     }
-    if (result == VSH_OK) {
-        result = settle_solidity(loaded, scene, &full, error);
-    }
-    if (result == VSH_OK) { /* with the places in it, which the check asks for */
-        result = vshi_assets_check(loaded, scene, &full, error);
-    }
-    if (result != VSH_OK) {
-        vsh_assets_free(loaded);
-        return result;
-    }
+    VSHI_TRY_DONE(settle_solidity(loaded, scene, &full, error));
+    /* with the places in it, which the check asks for */
+    VSHI_TRY_DONE(vshi_assets_check(loaded, scene, &full, error));
     *assets = loaded;
-    return VSH_OK;
+    loaded = NULL;
+done:
+    vsh_assets_free(loaded);
+    return result;
 }
 
 static void free_places(asset_place *places, size_t count) {

@@ -18,11 +18,7 @@ vsh_result vshi_scene_text(const char *path, const vsh_run *run, char **text, si
     return vshi_json_text(path, run, text, size, error);
 }
 
-vsh_result vsh_scene_read(const char *path, vsh_scene **scene, vsh_error *error) {
-    return vsh_scene_read_run(path, NULL, scene, error);
-}
-
-vsh_result vsh_scene_read_run(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error) {
+vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(scene);
     *scene = NULL;
@@ -30,13 +26,11 @@ vsh_result vsh_scene_read_run(const char *path, const vsh_run *run, vsh_scene **
     char *text = NULL;
     size_t size;
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result == VSH_OK) {
-        result = vshi_scene_text(path, &full, &text, &size, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_scene_parse(path, text, size, scene, error);
-    }
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_run_resolve(run, &full, error));
+    VSHI_TRY_DONE(vshi_scene_text(path, &full, &text, &size, error));
+    VSHI_TRY_DONE(vshi_scene_parse(path, text, size, scene, error));
+done:
     free(text);
     return result;
 }

@@ -3,6 +3,7 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "scene/parts.h"
 #include "scene/scene.h"
 
@@ -21,7 +22,7 @@ enum {
 /* What vsh_flat_scene_free() gets is the first member. */
 typedef struct owner {
     vsh_flat_scene scene;
-    vshi_block *blocks;
+    vshi_json_block *blocks;
 } owner;
 
 static vsh_result read_casters(vshi_reader *reader, const vshi_value *value, void *member) {
@@ -36,11 +37,10 @@ static vsh_result read_casters(vshi_reader *reader, const vshi_value *value, voi
 static vsh_result read_lights(vshi_reader *reader, const vshi_value *value, void *member) {
     vsh_flat_scene *scene = member;
     void *items = NULL;
-    const vsh_result result = vshi_read_list(reader, value, 1, MAX_LIGHTS, sizeof *scene->lights,
-                                             vshi_read_flat_light, &items, &scene->light_count);
+    VSHI_TRY(vshi_read_list(reader, value, 1, MAX_LIGHTS, sizeof *scene->lights, vshi_read_flat_light, &items,
+                            &scene->light_count));
     scene->lights = items;
-    return result == VSH_OK ? vshi_check_light_names(reader, value, scene->lights, scene->light_count)
-                            : result;
+    return vshi_check_light_names(reader, value, scene->lights, scene->light_count);
 }
 
 static vsh_result read_size(vshi_reader *reader, const vshi_value *value, void *member) {
@@ -103,23 +103,19 @@ static const vshi_table scene_table = VSHI_TABLE(scene_keys);
 
 static vsh_result parse(vshi_reader *reader, owner *made) {
     json_t *json = NULL;
-    vsh_result result = vshi_reader_load(reader, &json);
-    if (result == VSH_OK) {
-        const vshi_value root = {NULL, NULL, 0, 0, json};
-        made->scene.options = vsh_flat_options_default();
-        result = vshi_read_object(reader, &root, &scene_table, 1, "a flat scene", &made->scene);
-    }
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_reader_load(reader, &json));
+    const vshi_value root = {NULL, NULL, 0, 0, json};
+    made->scene.options = vsh_flat_options_default();
+    VSHI_TRY_DONE(vshi_read_object(reader, &root, &scene_table, 1, "a flat scene", &made->scene));
+done:
     made->blocks = reader->blocks;
     json_decref(json);
     return result;
 }
 
-vsh_result vsh_flat_scene_read(const char *path, vsh_flat_scene **scene, vsh_error *error) {
-    return vsh_flat_scene_read_run(path, NULL, scene, error);
-}
-
-vsh_result vsh_flat_scene_read_run(const char *path, const vsh_run *run, vsh_flat_scene **scene,
-                                   vsh_error *error) {
+vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_scene **scene,
+                               vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(scene);
     *scene = NULL;

@@ -2,6 +2,7 @@
 
 #include "base/file.h"
 #include "base/input.h"
+#include "base/try.h"
 #include "base/uri.h"
 
 #include <jansson.h>
@@ -80,23 +81,22 @@ static vsh_result add_buffers(vshi_inputs *inputs, const char *model, bool outsi
 
 vsh_result vshi_inputs_find(const vsh_scene *scene, const char *const *files, size_t file_count, bool outside,
                             vshi_inputs *inputs, vsh_error *error) {
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; i < file_count && result == VSH_OK; ++i) {
-        result = add(inputs, files[i], error);
+    for (size_t i = 0; i < file_count; ++i) {
+        VSHI_TRY(add(inputs, files[i], error));
     }
-    for (size_t i = 0; scene != NULL && i < scene->caster_count && result == VSH_OK; ++i) {
-        result = add(inputs, scene->casters[i].path, error);
+    for (size_t i = 0; scene != NULL && i < scene->caster_count; ++i) {
+        VSHI_TRY(add(inputs, scene->casters[i].path, error));
     }
-    for (size_t i = 0; scene != NULL && i < scene->receiver_count && result == VSH_OK; ++i) {
-        result = add(inputs, scene->receivers[i].path, error);
+    for (size_t i = 0; scene != NULL && i < scene->receiver_count; ++i) {
+        VSHI_TRY(add(inputs, scene->receivers[i].path, error));
     }
     const size_t named = inputs->count;
-    for (size_t i = 0; i < named && result == VSH_OK; ++i) {
+    for (size_t i = 0; i < named; ++i) {
         if (strcasecmp(vshi_path_ending(inputs->paths[i]), "gltf") == 0) {
-            result = add_buffers(inputs, inputs->paths[i], outside, error);
+            VSHI_TRY(add_buffers(inputs, inputs->paths[i], outside, error));
         }
     }
-    return result;
+    return VSH_OK;
 }
 
 void vshi_inputs_free(vshi_inputs *inputs) {

@@ -1,3 +1,4 @@
+#include "base/try.h"
 #include "scene/assets.h"
 #include "scene/parts.h"
 
@@ -67,17 +68,14 @@ static const vshi_table layer_table = VSHI_TABLE(layer_keys);
 vsh_result vshi_read_layer(vshi_reader *reader, const vshi_value *value, void *member) {
     vsh_scene_layer *layer = member;
     layer->shade = vsh_layer_default();
-    vsh_result result = vshi_read_object(reader, value, &layer_table, 1, "a layer", layer);
-    if (result == VSH_OK) {
-        result = vshi_reject_both(reader, value, "voxel_size", "resolution");
-    }
+    VSHI_TRY(vshi_read_object(reader, value, &layer_table, 1, "a layer", layer));
+    VSHI_TRY(vshi_reject_both(reader, value, "voxel_size", "resolution"));
     vshi_value remap;
-    if (result == VSH_OK && vshi_member(value, "remap", &remap) &&
-        !(layer->shade.remap[0] < layer->shade.remap[1])) {
+    if (vshi_member(value, "remap", &remap) && !(layer->shade.remap[0] < layer->shade.remap[1])) {
         return vshi_reader_fail(reader, &remap, "expected two numbers that rise, found %g and %g",
                                 layer->shade.remap[0], layer->shade.remap[1]);
     }
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result check_casters(vshi_reader *reader, const vshi_value *root, const vsh_scene *scene) {
@@ -146,27 +144,27 @@ static vsh_result take_out(vshi_reader *reader, const vsh_scene *scene, const vs
 static vsh_result choose_layers(vshi_reader *reader, const vshi_value *names, const vsh_light *light,
                                 const vsh_scene *scene, vsh_scene_layer *layers) {
     bool named[VSH_MAX_LAYERS] = {false};
-    vsh_result result = vshi_expect(reader, names, JSON_ARRAY);
-    for (size_t n = 0; result == VSH_OK && n < json_array_size(names->json); ++n) {
+    VSHI_TRY(vshi_expect(reader, names, JSON_ARRAY));
+    for (size_t n = 0; n < json_array_size(names->json); ++n) {
         const vshi_value name = vshi_item(names, n);
-        result = vshi_expect(reader, &name, JSON_STRING);
+        VSHI_TRY(vshi_expect(reader, &name, JSON_STRING));
         bool found = false;
-        for (size_t k = 0; result == VSH_OK && k < scene->layer_count; ++k) {
+        for (size_t k = 0; k < scene->layer_count; ++k) {
             const bool is = strcmp(json_string_value(name.json), layers[k].name) == 0;
             named[k] = named[k] || is;
             found = found || is;
         }
-        if (result == VSH_OK && !found) {
+        if (!found) {
             return vshi_reader_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
                                     json_string_value(name.json));
         }
     }
-    for (size_t k = 0; result == VSH_OK && k < scene->layer_count; ++k) {
+    for (size_t k = 0; k < scene->layer_count; ++k) {
         if (!named[k] && casts_for(&layers[k].shade, light)) {
-            result = take_out(reader, scene, light, &layers[k].shade);
+            VSHI_TRY(take_out(reader, scene, light, &layers[k].shade));
         }
     }
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result choose_all(vshi_reader *reader, const vshi_value *root, vsh_scene *scene) {
@@ -194,9 +192,9 @@ static vsh_result choose_all(vshi_reader *reader, const vshi_value *root, vsh_sc
 /* What names what: casters their layers, layers their lights, lights their layers. */
 vsh_result vshi_check_layers(vshi_reader *reader, const vshi_value *root, vsh_scene *scene) {
     vshi_value layers, name;
-    vsh_result result = check_casters(reader, root, scene);
+    VSHI_TRY(check_casters(reader, root, scene));
     const bool layered = vshi_member(root, "layers", &layers);
-    for (size_t i = 0; result == VSH_OK && layered && i < scene->layer_count; ++i) {
+    for (size_t i = 0; layered && i < scene->layer_count; ++i) {
         const vshi_value at = vshi_item(&layers, i);
         for (size_t k = 0; k < i; ++k) {
             if (strcmp(scene->layers[i].name, scene->layers[k].name) == 0 &&
@@ -205,7 +203,7 @@ vsh_result vshi_check_layers(vshi_reader *reader, const vshi_value *root, vsh_sc
                                         scene->layers[i].name, k);
             }
         }
-        result = check_lights(reader, &layers, scene, i);
+        VSHI_TRY(check_lights(reader, &layers, scene, i));
     }
-    return result == VSH_OK ? choose_all(reader, root, scene) : result;
+    return choose_all(reader, root, scene);
 }

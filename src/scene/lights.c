@@ -180,7 +180,7 @@ vsh_result vshi_read_light(vshi_reader *reader, const vshi_value *value, void *m
 vsh_result vshi_read_flat_light(vshi_reader *reader, const vshi_value *value, void *member) {
     vsh_light *light = member;
     *light = vsh_light_default();
-    light->direction[1] = 0.0; /* so that what is read is all there is */
+    light->direction[1] = light->axis[1] = 0.0; /* so that what is read is all there is */
     const vsh_result result = read_keys(reader, value, true, light);
     if (result != VSH_OK) {
         return result;

@@ -1,6 +1,7 @@
 /* Casters that are thinner than voxels: named, where what is baked depends on them. */
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "scene/occluders.h"
 
 #include <stdio.h>
@@ -27,19 +28,17 @@ static void warn(const vsh_caster *caster, const vsh_mesh *mesh, const vsh_lost 
 /* Finds what is lost of one caster's meshes, a second time with triangles where something is. */
 static vsh_result find(const vsh_mesh *meshes, size_t count, const vsh_field *field, const vsh_run *run,
                        vsh_lost *lost, vsh_error *error) {
-    vsh_result result = vsh_field_find_lost(field, meshes, count, NULL, lost, error);
+    VSHI_TRY(vsh_field_find_lost(field, meshes, count, NULL, lost, error));
     bool any = false;
-    for (size_t m = 0; m < count && result == VSH_OK; ++m) {
+    for (size_t m = 0; m < count; ++m) {
         any = any || lost[m].share >= TOLD;
     }
     if (!any || !vsh_triangles_available()) {
-        return result;
+        return VSH_OK;
     }
     vsh_triangles *triangles = NULL;
-    result = vsh_triangles_create(meshes, count, run, &triangles, error);
-    if (result == VSH_OK) {
-        result = vsh_field_find_lost(field, meshes, count, triangles, lost, error);
-    }
+    VSHI_TRY(vsh_triangles_create(meshes, count, run, &triangles, error));
+    const vsh_result result = vsh_field_find_lost(field, meshes, count, triangles, lost, error);
     vsh_triangles_free(triangles);
     return result;
 }
@@ -47,19 +46,18 @@ static vsh_result find(const vsh_mesh *meshes, size_t count, const vsh_field *fi
 static vsh_result look(const vsh_caster *caster, const vsh_mesh *meshes, size_t count, const vsh_field *field,
                        const vsh_run *run, vsh_error *error) {
     void *memory;
-    vsh_result result = vshi_allocate(&memory, count, sizeof(vsh_lost), "lost casters", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate(&memory, count, sizeof(vsh_lost), "lost casters", error));
+    vsh_result result = VSH_OK;
     vsh_lost *lost = memory;
     vsh_field_info info;
     vsh_field_get_info(field, &info);
-    result = find(meshes, count, field, run, lost, error);
-    for (size_t m = 0; m < count && result == VSH_OK; ++m) {
+    VSHI_TRY_DONE(find(meshes, count, field, run, lost, error));
+    for (size_t m = 0; m < count; ++m) {
         if (lost[m].share >= TOLD) {
             warn(caster, &meshes[m], &lost[m], info.voxel_size, run);
         }
     }
+done:
     free(lost);
     return result;
 }

@@ -5,6 +5,7 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "shade/occluders.h"
 
 #include <math.h>
@@ -118,12 +119,12 @@ static vsh_result make_triangles(making *m, const vsh_scene_layer *layer, vsh_tr
     if (m->options.triangles == 0 || !vshi_scene_method_is(m->scene, layer, VSH_METHOD_TRIANGLES, true)) {
         return VSH_OK;
     }
-    vsh_result result = vsh_scene_triangles(m->scene, m->assets, layer, &m->run, triangles, error);
+    VSHI_TRY(vsh_scene_triangles(m->scene, m->assets, layer, &m->run, triangles, error));
     /* no caster outside of layers: none, where methods want to be given those that there are */
-    if (result == VSH_OK && *triangles == NULL && layer == NULL) {
-        result = vsh_triangles_create(NULL, 0, &m->run, triangles, error);
+    if (*triangles == NULL && layer == NULL) {
+        VSHI_TRY(vsh_triangles_create(NULL, 0, &m->run, triangles, error));
     }
-    return result;
+    return VSH_OK;
 }
 
 /* Whether auto would have been exact. */
@@ -171,17 +172,13 @@ static void add_direct(making *m) {
 }
 
 static vsh_result allocate_layers(making *m, size_t count, vsh_error *error) {
-    vsh_result result = vshi_allocate((void **)&m->layers, count, sizeof *m->layers, "layers", error);
-    if (result == VSH_OK) {
-        result =
-            vshi_allocate((void **)&m->own.layer_fields, count, sizeof *m->own.layer_fields, "layers", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&m->own.layer_triangles, count, sizeof *m->own.layer_triangles,
-                               "layers", error);
-    }
+    VSHI_TRY(vshi_allocate((void **)&m->layers, count, sizeof *m->layers, "layers", error));
+    VSHI_TRY(
+        vshi_allocate((void **)&m->own.layer_fields, count, sizeof *m->own.layer_fields, "layers", error));
+    VSHI_TRY(vshi_allocate((void **)&m->own.layer_triangles, count, sizeof *m->own.layer_triangles, "layers",
+                           error));
     m->own.layer_capacity = count;
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result make_layers(making *m, vsh_error *error) {
@@ -196,14 +193,14 @@ static vsh_result make_layers(making *m, vsh_error *error) {
                          "%zu layers and %zu casters that are not voxelised: at most %d together",
                          scene->layer_count, direct, VSH_MAX_LAYERS);
     }
-    vsh_result result = allocate_layers(m, most, error);
-    for (size_t i = 0; i < scene->layer_count && result == VSH_OK; ++i) {
+    VSHI_TRY(allocate_layers(m, most, error));
+    for (size_t i = 0; i < scene->layer_count; ++i) {
         const vsh_scene_layer *of_scene = &scene->layers[i];
         vsh_field **field = &m->own.layer_fields[i];
         vsh_triangles **triangles = &m->own.layer_triangles[i];
-        result = make_field_of(m, of_scene, field, error);
-        if (result == VSH_OK && *field != NULL) {
-            result = make_triangles(m, of_scene, triangles, error);
+        VSHI_TRY(make_field_of(m, of_scene, field, error));
+        if (*field != NULL) {
+            VSHI_TRY(make_triangles(m, of_scene, triangles, error));
             vsh_layer *layer = &m->layers[m->parts.layer_count++];
             *layer = of_scene->shade;
             layer->name = of_scene->name;
@@ -211,34 +208,25 @@ static vsh_result make_layers(making *m, vsh_error *error) {
             layer->triangles = *triangles;
         }
     }
-    if (result == VSH_OK) {
-        add_direct(m);
-    }
-    return result;
+    add_direct(m);
+    return VSH_OK;
 }
 
 static vsh_result make(making *m, vsh_error *error) {
     const double start = vshi_seconds();
-    vsh_result result = make_triangles(m, NULL, &m->own.triangles, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(make_triangles(m, NULL, &m->own.triangles, error));
     if (m->options.triangles != 0 && misses_embree(m->scene)) {
         vshi_warn(&m->run, "this build has no Embree to trace triangles with: adaptive takes the place of "
                            "exact, and its error is that of the voxels");
     }
-    result = make_truth(m, error);
+    VSHI_TRY(make_truth(m, error));
     m->own.triangles_s = vshi_seconds() - start;
-    if (result == VSH_OK) {
-        result = make_field_of(m, NULL, &m->own.field, error);
+    VSHI_TRY(make_field_of(m, NULL, &m->own.field, error));
+    VSHI_TRY(make_layers(m, error));
+    if (m->own.field == NULL && m->parts.layer_count == 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "the scene has no casters");
     }
-    if (result == VSH_OK) {
-        result = make_layers(m, error);
-    }
-    if (result == VSH_OK && m->own.field == NULL && m->parts.layer_count == 0) {
-        result = vshi_fail(error, VSH_ERROR_INPUT, "the scene has no casters");
-    }
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,

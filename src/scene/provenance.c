@@ -5,6 +5,7 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/numbers.h"
+#include "base/try.h"
 #include "light/light.h"
 #include "scene/inputs.h"
 
@@ -80,39 +81,38 @@ static vsh_result add_ao(vsh_provenance *p, const vsh_provenance_source *source,
 
 static vsh_result add_scene(vsh_provenance *p, const vsh_provenance_source *source, vsh_error *error) {
     const vsh_scene *scene = source->scene;
-    vsh_result result = VSH_OK;
     if (scene->light_count > 0) {
-        result = add_shadow(p, source, error);
+        VSHI_TRY(add_shadow(p, source, error));
     }
-    if (result == VSH_OK && scene->ao) {
-        result = add_ao(p, source, error);
+    if (scene->ao) {
+        VSHI_TRY(add_ao(p, source, error));
     }
-    for (size_t i = 0; i < scene->light_count && result == VSH_OK; ++i) {
+    for (size_t i = 0; i < scene->light_count; ++i) {
         char name[NAME_SIZE], text[LINE_SIZE];
         snprintf(name, sizeof name, "vdbshade_light_%.64s", scene->lights[i].name);
         vsh_light_text(&scene->lights[i], text, sizeof text);
-        result = add(p, name, text, error);
+        VSHI_TRY(add(p, name, text, error));
     }
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result add_settings(vsh_provenance *p, const vsh_provenance_source *source, vsh_error *error) {
-    vsh_result result = add(p, "vdbshade_version", vsh_version(), error);
-    if (result == VSH_OK && source->command != NULL) {
-        result = add(p, "vdbshade_command", source->command, error);
+    VSHI_TRY(add(p, "vdbshade_version", vsh_version(), error));
+    if (source->command != NULL) {
+        VSHI_TRY(add(p, "vdbshade_command", source->command, error));
     }
-    if (result == VSH_OK && source->scene != NULL) {
-        result = add_scene(p, source, error);
+    if (source->scene != NULL) {
+        VSHI_TRY(add_scene(p, source, error));
     }
-    if (result == VSH_OK && source->voxel_size > 0.0) {
+    if (source->voxel_size > 0.0) {
         char text[LINE_SIZE];
         snprintf(text, sizeof text, "%.9g", source->voxel_size);
-        result = add(p, "vdbshade_voxel_size", text, error);
+        VSHI_TRY(add(p, "vdbshade_voxel_size", text, error));
     }
-    for (size_t i = 0; i < source->attribute_count && result == VSH_OK; ++i) {
-        result = add(p, source->attributes[i].name, source->attributes[i].value, error);
+    for (size_t i = 0; i < source->attribute_count; ++i) {
+        VSHI_TRY(add(p, source->attributes[i].name, source->attributes[i].value, error));
     }
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result add_inputs(vsh_provenance *p, const vshi_inputs *inputs, vshi_job *job, vsh_error *error) {
@@ -120,10 +120,7 @@ static vsh_result add_inputs(vsh_provenance *p, const vshi_inputs *inputs, vshi_
         const char *path = inputs->paths[i];
         const char *slash = strrchr(path, '/');
         char name[NAME_SIZE], digest[VSH_DIGEST_TEXT];
-        vsh_result result = vshi_file_digest(path, digest, job, error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vshi_file_digest(path, digest, job, error));
         const char *last = slash != NULL ? slash + 1 : path;
         const size_t size = HASH_PREFIX + VSH_DIGEST_TEXT + 1 + strlen(last);
         char *text = malloc(size);
@@ -132,7 +129,7 @@ static vsh_result add_inputs(vsh_provenance *p, const vshi_inputs *inputs, vshi_
         }
         snprintf(text, size, "sha256:%s %s", digest, last);
         snprintf(name, sizeof name, "vdbshade_input_%zu", i);
-        result = add(p, name, text, error);
+        const vsh_result result = add(p, name, text, error);
         free(text);
         if (result != VSH_OK) {
             return result;
@@ -147,17 +144,15 @@ static vsh_result add_inputs(vsh_provenance *p, const vshi_inputs *inputs, vshi_
 static vsh_result fill(vsh_provenance *p, const vsh_provenance_source *source, const vsh_run *run,
                        vsh_error *error) {
     VSHI_NUMBERS;
-    vsh_result result = add_settings(p, source, error);
+    VSHI_TRY(add_settings(p, source, error));
     vshi_inputs inputs = {NULL, 0, 0};
-    if (result == VSH_OK) {
-        result = vshi_inputs_find(source->scene, source->files, source->file_count, run->allow_outside != 0,
-                                  &inputs, error);
-    }
-    if (result == VSH_OK) {
-        vshi_job *job = vshi_job_begin(run, "hash", inputs.count);
-        result = job != NULL ? add_inputs(p, &inputs, job, error) : out_of_memory(error);
-        vshi_job_end(job);
-    }
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_inputs_find(source->scene, source->files, source->file_count, run->allow_outside != 0,
+                                   &inputs, error));
+    vshi_job *job = vshi_job_begin(run, "hash", inputs.count);
+    result = job != NULL ? add_inputs(p, &inputs, job, error) : out_of_memory(error);
+    vshi_job_end(job);
+done:
     vshi_inputs_free(&inputs);
     return result;
 }
@@ -170,19 +165,11 @@ vsh_result vsh_provenance_create(const vsh_provenance_source *source, const vsh_
     VSHI_NEEDS(source);
     vsh_provenance_source full = vsh_provenance_source_default();
     vsh_run settings;
-    vsh_result result = vshi_options_resolve(source, &full, sizeof full, "provenance source", error);
-    if (result == VSH_OK) {
-        result = vshi_run_resolve(run, &settings, error);
-    }
-    void *memory = NULL;
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory, 1, sizeof(vsh_provenance), "provenance", error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
-    vsh_provenance *made = memory;
-    result = fill(made, &full, &settings, error);
+    VSHI_TRY(vshi_options_resolve(source, &full, sizeof full, "provenance source", error));
+    VSHI_TRY(vshi_run_resolve(run, &settings, error));
+    vsh_provenance *made = NULL;
+    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "provenance", error));
+    const vsh_result result = fill(made, &full, &settings, error);
     if (result != VSH_OK) {
         vsh_provenance_free(made);
         return result;

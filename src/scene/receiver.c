@@ -1,3 +1,4 @@
+#include "base/try.h"
 #include "scene/parts.h"
 #include "scene/transform.h"
 
@@ -28,11 +29,11 @@ static vsh_result read_size(vshi_reader *reader, const vshi_value *value, void *
 vsh_result vshi_read_bits(vshi_reader *reader, const vshi_value *value, void *member) {
     const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 0.0, .highest = 32.0};
     int32_t *bits = member;
-    const vsh_result result = vshi_read_value(reader, value, &key, bits);
-    if (result == VSH_OK && *bits != 0 && *bits != 8 && *bits != 16 && *bits != 32) {
+    VSHI_TRY(vshi_read_value(reader, value, &key, bits));
+    if (*bits != 0 && *bits != 8 && *bits != 16 && *bits != 32) {
         return vshi_reader_fail(reader, value, "%d is none of 0, 8, 16, 32", *bits);
     }
-    return result;
+    return VSH_OK;
 }
 
 enum { MESH = 1 << VSH_RECEIVER_MESH, HEIGHTFIELD = 1 << VSH_RECEIVER_HEIGHTFIELD };

@@ -17,7 +17,7 @@ enum {
 /* What vsh_scene_free() gets is the first member. */
 typedef struct owner {
     vsh_scene scene;
-    vshi_block *blocks;
+    vshi_json_block *blocks;
 } owner;
 
 static vsh_result read_casters(vshi_reader *reader, const vshi_value *value, void *member) {

@@ -2,6 +2,7 @@
 
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/mesh.h"
 #include "scene/parts.h"
 #include "json/suggest.h"
@@ -180,20 +181,15 @@ static vsh_result apply(const vsh_model *model, const char *path, const char *co
 vsh_result vshi_select(const vsh_model *model, const char *path, const vsh_selection *selection,
                        unsigned char **chosen, vsh_error *error) {
     const size_t count = vsh_model_mesh_count(model);
-    vsh_result result = vshi_allocate((void **)chosen, count, 1, "objects", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)chosen, count, 1, "objects", error));
     memset(*chosen, selection->only_count == 0, count);
-    result = apply(model, path, selection->only, selection->only_count, 1, *chosen, error);
-    if (result == VSH_OK) {
-        result = apply(model, path, selection->except, selection->except_count, 0, *chosen, error);
+    VSHI_TRY(apply(model, path, selection->only, selection->only_count, 1, *chosen, error));
+    VSHI_TRY(apply(model, path, selection->except, selection->except_count, 0, *chosen, error));
+    if (memchr(*chosen, 1, count) == NULL) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: no object is left: all that are chosen are excepted, too", path);
     }
-    if (result == VSH_OK && memchr(*chosen, 1, count) == NULL) {
-        result = vshi_fail(error, VSH_ERROR_INPUT,
-                           "%s: no object is left: all that are chosen are excepted, too", path);
-    }
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result fail_without_uvs(const vsh_receiver *receiver, const char *mesh, int32_t sets,

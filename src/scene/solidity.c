@@ -1,6 +1,7 @@
 #include "scene/solidity.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/solidity.h"
 #include "scene/select.h"
 
@@ -74,36 +75,38 @@ static vsh_result list_all(const vshi_mesh_list *casters, size_t caster_count, v
     for (size_t i = 0; i < caster_count; ++i) {
         *count += casters[i].count;
     }
-    vsh_result result = vshi_allocate((void **)all, *count, sizeof **all, "meshes", error);
-    for (size_t i = 0, at = 0; i < caster_count && result == VSH_OK; at += casters[i++].count) {
+    VSHI_TRY(vshi_allocate((void **)all, *count, sizeof **all, "meshes", error));
+    for (size_t i = 0, at = 0; i < caster_count; at += casters[i++].count) {
         if (casters[i].count > 0) {
             memcpy(*all + at, casters[i].meshes, casters[i].count * sizeof **all);
         }
     }
-    for (size_t i = 0; i < *count && result == VSH_OK; ++i) {
-        result = vshi_mesh_check_data(*all + i, i, error);
+    for (size_t i = 0; i < *count; ++i) {
+        VSHI_TRY(vshi_mesh_check_data(*all + i, i, error));
     }
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result find(const vshi_mesh_list *casters, size_t caster_count, const vshi_mesh_list *receivers,
                        size_t receiver_count, const vsh_run *run, vshi_solidity **found, vsh_error *error) {
     vsh_mesh *all = NULL;
     size_t count;
-    vsh_result result = list_all(casters, caster_count, &all, &count, error);
-    if (result == VSH_OK && count > 0) {
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(list_all(casters, caster_count, &all, &count, error));
+    if (count > 0) {
         vsh_run quiet = *run; /* a small part of a second for a million triangles: no stage of its own */
         quiet.progress = NULL;
-        result = vshi_solidity_create(all, count, &quiet, found, error);
+        VSHI_TRY_DONE(vshi_solidity_create(all, count, &quiet, found, error));
     }
-    for (size_t i = 0, at = 0; i < caster_count && result == VSH_OK; ++i) {
+    for (size_t i = 0, at = 0; i < caster_count; ++i) {
         for (size_t k = 0; k < casters[i].count; ++k, ++at) {
             all[at].sides = casters[i].meshes[k].sides = vshi_solidity_sides(*found, at);
         }
     }
-    for (size_t i = 0; i < receiver_count && result == VSH_OK; ++i) {
+    for (size_t i = 0; i < receiver_count; ++i) {
         share(all, count, &receivers[i]);
     }
+done:
     free(all);
     return result;
 }
@@ -111,15 +114,10 @@ static vsh_result find(const vshi_mesh_list *casters, size_t caster_count, const
 vsh_result vshi_solidity_settle(const vsh_scene *scene, const vshi_mesh_list *casters,
                                 const vshi_mesh_list *receivers, const vsh_run *run, vshi_solidity **found,
                                 vsh_error *error) {
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; i < scene->caster_count && result == VSH_OK; ++i) {
+    for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        result = apply_rules(caster->solidity, caster->solidity_count, &casters[i], 1, error);
+        VSHI_TRY(apply_rules(caster->solidity, caster->solidity_count, &casters[i], 1, error));
     }
-    if (result == VSH_OK) {
-        result = apply_rules(scene->solidity, scene->solidity_count, casters, scene->caster_count, error);
-    }
-    return result == VSH_OK
-               ? find(casters, scene->caster_count, receivers, scene->receiver_count, run, found, error)
-               : result;
+    VSHI_TRY(apply_rules(scene->solidity, scene->solidity_count, casters, scene->caster_count, error));
+    return find(casters, scene->caster_count, receivers, scene->receiver_count, run, found, error);
 }

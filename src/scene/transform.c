@@ -3,6 +3,7 @@
 #include "scene/assets.h"
 
 #include "base/elementary.h"
+#include "base/try.h"
 #include "base/vec.h"
 
 #include <math.h>
@@ -45,11 +46,11 @@ static vsh_result read_scale(vshi_reader *reader, const vshi_value *value, void 
                           .lowest = SMALLEST_SCALE,
                           .highest = LARGEST_SCALE};
     double *scale = member;
-    const vsh_result result = vshi_read_value(reader, value, &key, scale);
-    if (result == VSH_OK && key.kind == VSHI_NUMBER) {
+    VSHI_TRY(vshi_read_value(reader, value, &key, scale));
+    if (key.kind == VSHI_NUMBER) {
         scale[1] = scale[2] = scale[0];
     }
-    return result;
+    return VSH_OK;
 }
 
 typedef struct parts {

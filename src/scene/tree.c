@@ -1,6 +1,7 @@
 #include "scene/tree.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 #include "scene/transform.h"
 
 #include <vdbshade/sdf.h>
@@ -48,12 +49,10 @@ static const char *operation_name(int32_t i) {
 static vsh_result read_plane_size(vshi_reader *reader, const vshi_value *value, void *member) {
     const vshi_key key = {.kind = VSHI_VECTOR, .count = 2, .highest = VSHI_LARGEST, .flags = VSHI_ABOVE};
     double size[2];
-    const vsh_result result = vshi_read_value(reader, value, &key, size);
-    if (result == VSH_OK) {
-        ((double *)member)[0] = size[0];
-        ((double *)member)[2] = size[1];
-    }
-    return result;
+    VSHI_TRY(vshi_read_value(reader, value, &key, size));
+    ((double *)member)[0] = size[0];
+    ((double *)member)[2] = size[1];
+    return VSH_OK;
 }
 
 #define LENGTH(key, bits, member)                                                                            \
@@ -154,25 +153,19 @@ static vsh_result push(vshi_reader *reader, const vshi_value *value, tree *t, co
 }
 
 static vsh_result read_kind(vshi_reader *reader, const vshi_value *value, int32_t *shape) {
-    vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
-    if (result == VSH_OK) {
-        result = vshi_reject_both(reader, value, "shape", "op");
-    }
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
+    VSHI_TRY(vshi_reject_both(reader, value, "shape", "op"));
     int32_t operation = -1;
     *shape = -1;
-    if (result == VSH_OK) {
-        result = vshi_read_choice(reader, value, "shape", shape_name, shape);
-    }
-    if (result == VSH_OK) {
-        result = vshi_read_choice(reader, value, "op", operation_name, &operation);
-    }
-    if (result == VSH_OK && operation >= 0) {
+    VSHI_TRY(vshi_read_choice(reader, value, "shape", shape_name, shape));
+    VSHI_TRY(vshi_read_choice(reader, value, "op", operation_name, &operation));
+    if (operation >= 0) {
         *shape = VSH_SDF_UNION + operation;
     }
-    if (result == VSH_OK && *shape < 0) {
+    if (*shape < 0) {
         return vshi_reader_fail(reader, value, "key \"shape\" or \"op\" is missing");
     }
-    return result;
+    return VSH_OK;
 }
 
 /* `scale` is that of the nodes above. */
@@ -182,20 +175,12 @@ static vsh_result read_node(vshi_reader *reader, const vshi_value *value, tree *
         return vshi_reader_fail(reader, value, "is nested more than %d deep", MAX_LEVELS);
     }
     vsh_sdf_node node = vsh_sdf_node_default();
-    vsh_result result = read_kind(reader, value, &node.shape);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(read_kind(reader, value, &node.shape));
     if (node.shape == VSH_SDF_CONE) {
         node.minor_radius = 0.0; /* a tip, unless "top_radius" is given */
     }
-    result = vshi_read_object(reader, value, &node_table, BIT(node.shape), shapes[node.shape].what, &node);
-    if (result == VSH_OK) {
-        result = vshi_reject_both(reader, value, "rotate_deg", "rotate_quat");
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_read_object(reader, value, &node_table, BIT(node.shape), shapes[node.shape].what, &node));
+    VSHI_TRY(vshi_reject_both(reader, value, "rotate_deg", "rotate_quat"));
     scale *= node.scale;
     if (!(scale >= 1.0 / VSHI_LARGEST && scale <= VSHI_LARGEST)) {
         return vshi_reader_fail(reader, value, "the scales of all levels make %.9g, out of range %.9g … %.9g",
@@ -205,9 +190,9 @@ static vsh_result read_node(vshi_reader *reader, const vshi_value *value, tree *
     if (!vshi_member(value, "of", &of)) {
         return push(reader, value, t, &node, index);
     }
-    result = vshi_expect(reader, &of, JSON_ARRAY);
-    const size_t size = result == VSH_OK ? json_array_size(of.json) : 0;
-    if (result == VSH_OK && size < 2) {
+    VSHI_TRY(vshi_expect(reader, &of, JSON_ARRAY));
+    const size_t size = json_array_size(of.json);
+    if (size < 2) {
         return vshi_reader_fail(reader, &of, "has %zu items, out of range 2 … %d", size, MAX_NODES);
     }
     /* Folded from the left; the operation's own transform belongs to the last of the pairs alone. */
@@ -215,35 +200,33 @@ static vsh_result read_node(vshi_reader *reader, const vshi_value *value, tree *
     pair.shape = node.shape;
     pair.smoothing = node.smoothing;
     int32_t left = -1;
-    for (size_t i = 0; i < size && result == VSH_OK; ++i) {
+    for (size_t i = 0; i < size; ++i) {
         const vshi_value item = vshi_item(&of, i);
         int32_t right;
-        result = read_node(reader, &item, t, level + 1, scale, &right);
-        if (result == VSH_OK && i == 0) {
+        VSHI_TRY(read_node(reader, &item, t, level + 1, scale, &right));
+        if (i == 0) {
             left = right;
-        } else if (result == VSH_OK) {
-            vsh_sdf_node *next = i + 1 < size ? &pair : &node;
-            next->left = left;
-            next->right = right;
-            result = push(reader, &item, t, next, &left);
+            continue;
         }
+        vsh_sdf_node *next = i + 1 < size ? &pair : &node;
+        next->left = left;
+        next->right = right;
+        VSHI_TRY(push(reader, &item, t, next, &left));
     }
     *index = left;
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_read_sdf(vshi_reader *reader, const vshi_value *value, void *member) {
     tree t = {NULL, 0, 0};
     int32_t root;
-    vsh_result result = read_node(reader, value, &t, 1, 1.0, &root);
     void *nodes = NULL;
-    if (result == VSH_OK) {
-        result = vshi_reader_allocate(reader, &nodes, t.count, sizeof *t.nodes, "sdf nodes");
-    }
-    if (result == VSH_OK) {
-        memcpy(nodes, t.nodes, t.count * sizeof *t.nodes);
-        *(vsh_sdf *)member = (vsh_sdf){nodes, t.count};
-    }
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(read_node(reader, value, &t, 1, 1.0, &root));
+    VSHI_TRY_DONE(vshi_reader_allocate(reader, &nodes, t.count, sizeof *t.nodes, "sdf nodes"));
+    memcpy(nodes, t.nodes, t.count * sizeof *t.nodes);
+    *(vsh_sdf *)member = (vsh_sdf){nodes, t.count};
+done:
     free(t.nodes);
     return result;
 }

@@ -1,6 +1,7 @@
 /* The casters themselves, as rays meet them: what errors are measured against. */
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "scene/occluders.h"
 
 #include <stdlib.h>
@@ -23,14 +24,10 @@ static vsh_result allocate(const vsh_scene *scene, const vsh_assets *assets, vie
         vsh_assets_caster(assets, i, &own);
         meshes += own;
     }
-    vsh_result result = vshi_allocate((void **)&v->meshes, meshes + 1, sizeof *v->meshes, "casters", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&v->meshes, meshes + 1, sizeof *v->meshes, "casters", error));
     const size_t most = scene->caster_count + 1;
-    result = vshi_allocate((void **)&v->solids, most, sizeof *v->solids, "casters", error);
-    return result == VSH_OK ? vshi_allocate((void **)&v->places, most, sizeof *v->places, "casters", error)
-                            : result;
+    VSHI_TRY(vshi_allocate((void **)&v->solids, most, sizeof *v->solids, "casters", error));
+    return vshi_allocate((void **)&v->places, most, sizeof *v->places, "casters", error);
 }
 
 static void collect(const vsh_scene *scene, const vsh_assets *assets, views *v) {

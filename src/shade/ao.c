@@ -1,6 +1,7 @@
 /* Ambient occlusion: options, and which method shades the points. */
 #include "shade/ao.h"
 #include "base/floats.h"
+#include "base/try.h"
 #include "shade/layers.h"
 
 #include <math.h>
@@ -133,12 +134,11 @@ vsh_result vsh_shade_bent(const vsh_occluders *occluders, const vsh_points *poin
     VSHI_NEEDS_OF(points->count, points->positions);
     VSHI_NEEDS_OF(points->count, ao);
     VSHI_NEEDS_OF(points->count, bent);
-    const vsh_result result =
-        vshi_shade_ao(occluders, points, NULL, options, run, ao, NULL, bent, NULL, stats, error);
-    for (size_t i = 0; result == VSH_OK && i < points->count; ++i) {
+    VSHI_TRY(vshi_shade_ao(occluders, points, NULL, options, run, ao, NULL, bent, NULL, stats, error));
+    for (size_t i = 0; i < points->count; ++i) {
         vshi_ao_bend(bent + 3 * i, points->normals + 3 * i);
     }
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
@@ -152,44 +152,36 @@ vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *point
     vshi_ao_cones cones;
     vshi_sampler *sampler = NULL;
     vshi_layers *layers = NULL;
-    vsh_result result = vshi_shade_options_resolve(options, &full, error);
-    if (result == VSH_OK) {
-        result = vshi_run_resolve(run, &full_run, error);
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_shade_options_resolve(options, &full, error));
+    VSHI_TRY_DONE(vshi_run_resolve(run, &full_run, error));
+    VSHI_TRY_DONE(vshi_ao_check_points(points, error));
+    if (bent != NULL && full.ao_method == VSH_AO_TAPS) {
+        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_ARGUMENT,
+                                "bent normals: AO by taps knows no directions; use cones or rays"));
     }
-    if (result == VSH_OK) {
-        result = vshi_ao_check_points(points, error);
+    VSHI_TRY_DONE(vshi_layers_prepare(occluders, &full, NULL, &layers, error));
+    vshi_shade_options_settle(&full, occluders->triangles);
+    if (rays != NULL) {
+        full.sampler = vshi_ao_tile_sampler(full.sampler);
     }
-    if (result == VSH_OK && bent != NULL && full.ao_method == VSH_AO_TAPS) {
-        result = vshi_fail(error, VSH_ERROR_ARGUMENT,
-                           "bent normals: AO by taps knows no directions; use cones or rays");
+    VSHI_TRY_DONE(vshi_ao_prepare(occluders, &full, &cones, &task, error));
+    if (vshi_ao_has_rays(&full)) {
+        VSHI_TRY_DONE(vshi_shade_sampler(&full, vshi_ao_most_rays(&full), "ao", &sampler, error));
     }
-    if (result == VSH_OK) {
-        result = vshi_layers_prepare(occluders, &full, NULL, &layers, error);
-    }
-    if (result == VSH_OK) {
-        vshi_shade_options_settle(&full, occluders->triangles);
-        if (rays != NULL) {
-            full.sampler = vshi_ao_tile_sampler(full.sampler);
-        }
-        result = vshi_ao_prepare(occluders, &full, &cones, &task, error);
-    }
-    if (result == VSH_OK && vshi_ao_has_rays(&full)) {
-        result = vshi_shade_sampler(&full, vshi_ao_most_rays(&full), "ao", &sampler, error);
-    }
-    if (result == VSH_OK) {
-        task.layers = layers;
-        task.sampler = sampler;
-        task.kernel = vshi_kernel_of(full_run.isa);
-        task.outside = rows != NULL;
-        task.points = points;
-        task.ao = ao;
-        task.deviation = deviation;
-        task.bent = bent;
-        task.rays = rays;
-        const size_t grain = full.ao_method == VSH_AO_TAPS ? VSHI_CHUNK : VSHI_AO_GRAIN;
-        result =
-            vshi_shade_run(&full_run, "ao", points->count, rows, grain, vshi_ao_shade, &task, stats, error);
-    }
+    task.layers = layers;
+    task.sampler = sampler;
+    task.kernel = vshi_kernel_of(full_run.isa);
+    task.outside = rows != NULL;
+    task.points = points;
+    task.ao = ao;
+    task.deviation = deviation;
+    task.bent = bent;
+    task.rays = rays;
+    const size_t grain = full.ao_method == VSH_AO_TAPS ? VSHI_CHUNK : VSHI_AO_GRAIN;
+    VSHI_TRY_DONE(
+        vshi_shade_run(&full_run, "ao", points->count, rows, grain, vshi_ao_shade, &task, stats, error));
+done:
     vshi_sampler_free(sampler);
     vshi_layers_free(layers);
     return result;

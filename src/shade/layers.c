@@ -1,6 +1,7 @@
 #include "shade/layers.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 #include "heightfield/heights.h"
 #include "heightfield/relief.h"
 #include "light/light.h"
@@ -147,15 +148,14 @@ vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_o
 }
 
 vsh_result vshi_layers_prepare_sphere(vshi_layers *layers, vsh_error *error) {
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; layers != NULL && i < layers->count && result == VSH_OK; ++i) {
+    for (size_t i = 0; layers != NULL && i < layers->count; ++i) {
         if (layers->items[i].layer.field == NULL) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT,
                              "AO in free space: heightfields and spheres know of none without voxels");
         }
-        result = vshi_ao_prepare_sphere(&layers->cones, &layers->items[i].ao, error);
+        VSHI_TRY(vshi_ao_prepare_sphere(&layers->cones, &layers->items[i].ao, error));
     }
-    return result;
+    return VSH_OK;
 }
 
 void vshi_layers_free(vshi_layers *layers) {

@@ -3,6 +3,7 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "field/field.h"
 #include "shade/layers.h"
 
@@ -58,12 +59,12 @@ static vsh_result copy_layers(const vsh_occluder_parts *parts, vshi_occluders_ow
                          parts->layers == NULL ? " at NULL" : "", VSH_MAX_LAYERS);
     }
     void *layers;
-    vsh_result result = vshi_allocate(&layers, parts->layer_count, sizeof *own->layers, "layers", error);
+    VSHI_TRY(vshi_allocate(&layers, parts->layer_count, sizeof *own->layers, "layers", error));
     own->layers = layers;
-    for (size_t i = 0; i < parts->layer_count && result == VSH_OK; ++i) {
-        result = vshi_layer_resolve(parts->layers, i, &own->layers[i], error);
+    for (size_t i = 0; i < parts->layer_count; ++i) {
+        VSHI_TRY(vshi_layer_resolve(parts->layers, i, &own->layers[i], error));
     }
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result make_empty(const vsh_occluder_parts *parts, vshi_occluders_own *own, vsh_error *error) {
@@ -125,8 +126,8 @@ vsh_result vsh_occluders_from_parts(const vsh_occluder_parts *parts, vsh_occlude
     VSHI_NEEDS(parts);
     vsh_occluder_parts full = vsh_occluder_parts_default();
     vshi_occluders_own own = {.field = NULL};
-    const vsh_result result = vshi_options_resolve(parts, &full, sizeof full, "vsh_occluder_parts", error);
-    return result == VSH_OK ? vshi_occluders_make(&full, &own, occluders, error) : result;
+    VSHI_TRY(vshi_options_resolve(parts, &full, sizeof full, "vsh_occluder_parts", error));
+    return vshi_occluders_make(&full, &own, occluders, error);
 }
 
 void vsh_occluders_free(vsh_occluders *occluders) {

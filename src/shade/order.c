@@ -5,6 +5,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -186,10 +187,8 @@ static vsh_result each_slice(vshi_job *job, vshi_range_fn *fn, sorting *s, vsh_e
 vsh_result vshi_order_points(vshi_job *job, const vsh_field *field, const vshi_view *view, size_t first,
                              size_t count, vshi_order *order, vsh_error *error) {
     sorting *s = NULL;
-    vsh_result result = vshi_allocate((void **)&s, 1, sizeof *s, "order of points", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&s, 1, sizeof *s, "order of points", error));
+    vsh_result result = VSH_OK;
     entry *buffers[2] = {order->memory, (entry *)order->memory + order->most};
     s->view = view;
     s->first = first;
@@ -198,22 +197,21 @@ vsh_result vshi_order_points(vshi_job *job, const vsh_field *field, const vshi_v
     s->slices = s->slices < SLICES ? s->slices : SLICES;
     s->slice = (count + s->slices - 1) / s->slices;
     s->to = buffers[0];
-    result = each_slice(job, find_box, s, error);
-    if (result == VSH_OK) {
-        lay_cells(s, field);
-        result = each_slice(job, make_keys, s, error);
-    }
-    for (int pass = 0; pass < PASSES && result == VSH_OK; ++pass) {
+    VSHI_TRY_DONE(each_slice(job, find_box, s, error));
+    lay_cells(s, field);
+    VSHI_TRY_DONE(each_slice(job, make_keys, s, error));
+    for (int pass = 0; pass < PASSES; ++pass) {
         s->from = buffers[pass & 1];
         s->to = buffers[1 - (pass & 1)];
         s->out = (uint32_t *)s->to;
         s->shift = DIGIT * pass;
-        result = pass > 0 ? each_slice(job, count_digits, s, error) : VSH_OK;
-        if (result == VSH_OK) {
-            add_up(s);
-            result = each_slice(job, pass < PASSES - 1 ? put_in_place : put_out, s, error);
+        if (pass > 0) {
+            VSHI_TRY_DONE(each_slice(job, count_digits, s, error));
         }
+        add_up(s);
+        VSHI_TRY_DONE(each_slice(job, pass < PASSES - 1 ? put_in_place : put_out, s, error));
     }
+done:
     order->point = s->out;
     free(s);
     return result;

@@ -3,6 +3,7 @@
 
 #include "base/floats.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "field/level.h"
 #include "shade/layers.h"
 #include "shade/order.h"
@@ -181,26 +182,25 @@ static vsh_result shade_many(query_call *call, const vsh_run *run, vshi_job *job
     const size_t most = count < VSHI_ORDER_MOST ? count : VSHI_ORDER_MOST;
     vshi_order order = {NULL, NULL, 0};
     vsh_result result = VSH_OK;
-    for (; result == VSH_OK && call->first < count; call->first += most) {
+    for (; call->first < count; call->first += most) {
         const size_t left = count - call->first;
         const size_t now = left < most ? left : most;
         const bool ordered = vshi_order_pays(field, &call->view, call->first, now);
         call->order = NULL;
         if (ordered && order.memory == NULL) {
-            result = vshi_check_limit(run, vshi_field_bytes(field) + (double)most * VSHI_ORDER_BYTES, "query",
-                                      error);
-            result = result == VSH_OK ? vshi_order_create(most, &order, error) : result;
+            VSHI_TRY_DONE(vshi_check_limit(run, vshi_field_bytes(field) + (double)most * VSHI_ORDER_BYTES,
+                                           "query", error));
+            VSHI_TRY_DONE(vshi_order_create(most, &order, error));
         }
-        if (result == VSH_OK && ordered) {
-            result = vshi_order_points(job, field, &call->view, call->first, now, &order, error);
+        if (ordered) {
+            VSHI_TRY_DONE(vshi_order_points(job, field, &call->view, call->first, now, &order, error));
             call->order = order.point;
         }
-        if (result == VSH_OK) {
-            result = vshi_shade_pieces(job, now, NULL, VSHI_PIECE,
-                                       ordered || call->points == NULL ? shade_gathered : shade_in_place,
-                                       call, stats, error);
-        }
+        VSHI_TRY_DONE(vshi_shade_pieces(job, now, NULL, VSHI_PIECE,
+                                        ordered || call->points == NULL ? shade_gathered : shade_in_place,
+                                        call, stats, error));
     }
+done:
     vshi_order_free(&order);
     return result;
 }

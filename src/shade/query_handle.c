@@ -1,6 +1,7 @@
 /* What queries of the same field, lights and options share. */
 #include "base/floats.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "shade/blocks.h"
 #include "shade/query.h"
 
@@ -22,53 +23,44 @@ void vsh_query_free(vsh_query *query) {
 
 static vsh_result prepare(vsh_query *q, const vsh_occluders *occluders, const vsh_light *lights,
                           size_t light_count, vsh_error *error) {
-    vsh_result result =
-        vshi_allocate((void **)&q->lights, light_count, sizeof *q->lights, "lights of a query", error);
-    if (result == VSH_OK) {
-        result =
-            vshi_allocate((void **)&q->shadow, light_count, sizeof *q->shadow, "lights of a query", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&q->layers, light_count + 1, sizeof *q->layers, "lights of a query",
-                               error);
-    }
-    q->light_count = result == VSH_OK ? light_count : 0;
-    for (size_t l = 0; result == VSH_OK && l < light_count; ++l) {
+    static const char what[] = "lights of a query";
+    VSHI_TRY(vshi_allocate((void **)&q->lights, light_count, sizeof *q->lights, what, error));
+    VSHI_TRY(vshi_allocate((void **)&q->shadow, light_count, sizeof *q->shadow, what, error));
+    VSHI_TRY(vshi_allocate((void **)&q->layers, light_count + 1, sizeof *q->layers, what, error));
+    q->light_count = light_count;
+    for (size_t l = 0; l < light_count; ++l) {
         vsh_error why;
         q->lights[l] = lights[l];
-        result = vsh_light_check(&q->lights[l], &why);
+        const vsh_result result = vsh_light_check(&q->lights[l], &why);
         if (result != VSH_OK) {
             return vshi_fail(error, result, "light %zu: %s", l, why.message);
         }
-        result = vshi_layers_prepare(occluders, &q->options, &q->lights[l], &q->layers[l], error);
+        VSHI_TRY(vshi_layers_prepare(occluders, &q->options, &q->lights[l], &q->layers[l], error));
     }
-    if (result == VSH_OK) {
-        result = vshi_layers_prepare(occluders, &q->options, NULL, &q->layers[light_count], error);
-    }
+    VSHI_TRY(vshi_layers_prepare(occluders, &q->options, NULL, &q->layers[light_count], error));
     vshi_shade_options_settle(&q->options, occluders->triangles);
-    for (size_t l = 0; result == VSH_OK && l < light_count; ++l) {
+    for (size_t l = 0; l < light_count; ++l) {
         vsh_error why;
-        result = vshi_shadow_prepare(occluders, &q->lights[l], &q->options, &q->shadow[l], &why);
+        const vsh_result result =
+            vshi_shadow_prepare(occluders, &q->lights[l], &q->options, &q->shadow[l], &why);
         if (result != VSH_OK) {
             return vshi_fail(error, result, "light %zu: %s", l, why.message);
         }
         q->shadow[l].layers = q->layers[l];
     }
-    if (result == VSH_OK) {
-        result = vshi_ao_prepare(occluders, &q->options, &q->cones, &q->ao, error);
-        q->ao.layers = q->layers[light_count];
-    }
+    VSHI_TRY(vshi_ao_prepare(occluders, &q->options, &q->cones, &q->ao, error));
+    q->ao.layers = q->layers[light_count];
     const bool shadow = light_count > 0 && vshi_shadow_has_rays(&q->options);
-    if (result == VSH_OK && (shadow || vshi_ao_has_rays(&q->options))) {
+    if (shadow || vshi_ao_has_rays(&q->options)) {
         const int32_t own = shadow ? vshi_shadow_most_rays(&q->options) : 0;
         const int32_t ao = vshi_ao_has_rays(&q->options) ? vshi_ao_most_rays(&q->options) : 0;
-        result = vshi_shade_sampler(&q->options, own > ao ? own : ao, "query", &q->sampler, error);
+        VSHI_TRY(vshi_shade_sampler(&q->options, own > ao ? own : ao, "query", &q->sampler, error));
     }
     for (size_t l = 0; l < q->light_count; ++l) {
         q->shadow[l].sampler = q->sampler;
     }
     q->ao.sampler = q->sampler;
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vsh_query_create(const vsh_occluders *occluders, const vsh_light *lights, size_t light_count,
@@ -86,25 +78,19 @@ vsh_result vshi_query_create(const vsh_occluders *occluders, const vsh_light *li
     VSHI_FLOATS;
     vsh_query *q = NULL;
     *query = NULL;
-    vsh_result result = vshi_allocate((void **)&q, 1, sizeof *q, "query", error);
-    if (result == VSH_OK) {
-        result = vshi_shade_options_resolve(options, &q->options, error);
-    }
-    if (result == VSH_OK) {
-        result = prepare(q, occluders, lights, light_count, error);
-    }
-    if (result == VSH_OK && sphere) {
-        result = vshi_ao_prepare_sphere(&q->cones, &q->ao, error);
-    }
-    if (result == VSH_OK && sphere) {
-        result = vshi_layers_prepare_sphere(q->layers[light_count], error);
-    }
-    if (result != VSH_OK) {
-        vsh_query_free(q);
-        return result;
+    VSHI_TRY(vshi_allocate((void **)&q, 1, sizeof *q, "query", error));
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_shade_options_resolve(options, &q->options, error));
+    VSHI_TRY_DONE(prepare(q, occluders, lights, light_count, error));
+    if (sphere) {
+        VSHI_TRY_DONE(vshi_ao_prepare_sphere(&q->cones, &q->ao, error));
+        VSHI_TRY_DONE(vshi_layers_prepare_sphere(q->layers[light_count], error));
     }
     *query = q;
-    return VSH_OK;
+    q = NULL;
+done:
+    vsh_query_free(q);
+    return result;
 }
 
 void vshi_query_prove(const vsh_query *query, int32_t isa, size_t light, size_t count,

@@ -2,6 +2,7 @@
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/hash.h"
+#include "base/try.h"
 #include "shade/blocks.h"
 #include "shade/layers.h"
 #include "trace/embree.h"
@@ -210,39 +211,27 @@ vsh_result vshi_shade_shadow(const vsh_occluders *occluders, const vsh_points *p
     vshi_shadow_task task;
     vshi_sampler *sampler = NULL;
     vshi_layers *layers = NULL;
-    vsh_result result = vshi_shade_options_resolve(options, &full, error);
-    if (result == VSH_OK) {
-        result = vshi_run_resolve(run, &full_run, error);
-    }
-    if (result == VSH_OK) {
-        result = vsh_light_check(light, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_layers_prepare(occluders, &full, light, &layers, error);
-    }
-    if (result == VSH_OK) {
-        vshi_shade_options_settle(&full, occluders->triangles);
-        result = vshi_shadow_prepare(occluders, light, &full, &task, error);
-    }
-    if (result != VSH_OK) {
-        vshi_layers_free(layers);
-        return result;
-    }
+    VSHI_TRY(vshi_shade_options_resolve(options, &full, error));
+    VSHI_TRY(vshi_run_resolve(run, &full_run, error));
+    VSHI_TRY(vsh_light_check(light, error));
+    VSHI_TRY(vshi_layers_prepare(occluders, &full, light, &layers, error));
+    vshi_shade_options_settle(&full, occluders->triangles);
+    vsh_result result = VSH_OK;
+    VSHI_TRY_DONE(vshi_shadow_prepare(occluders, light, &full, &task, error));
     char stage[sizeof light->name + 8];
     snprintf(stage, sizeof stage, "shadow.%.*s", (int)sizeof light->name, light->name);
     if (vshi_shadow_has_rays(&full)) {
-        result = vshi_shade_sampler(&full, vshi_shadow_most_rays(&full), stage, &sampler, error);
+        VSHI_TRY_DONE(vshi_shade_sampler(&full, vshi_shadow_most_rays(&full), stage, &sampler, error));
     }
-    if (result == VSH_OK) {
-        task.layers = layers;
-        task.sampler = sampler;
-        task.kernel = vshi_kernel_of(full_run.isa);
-        task.points = points;
-        task.visibility = visibility;
-        task.deviation = deviation;
-        result = vshi_shade_run(&full_run, stage, points->count, rows, VSHI_PIECE, vshi_shadow_shade, &task,
-                                stats, error);
-    }
+    task.layers = layers;
+    task.sampler = sampler;
+    task.kernel = vshi_kernel_of(full_run.isa);
+    task.points = points;
+    task.visibility = visibility;
+    task.deviation = deviation;
+    result = vshi_shade_run(&full_run, stage, points->count, rows, VSHI_PIECE, vshi_shadow_shade, &task,
+                            stats, error);
+done:
     vshi_sampler_free(sampler);
     vshi_layers_free(layers);
     return result;

@@ -7,7 +7,7 @@ load helper
     run -0 "$VDBSHADE" bake box.obj -o box.exr --sun 1,2,1 --sun-angle 5 --ao 2 --size 32 --resolution 16 \
         --method adaptive --max-error 0.1 --quiet
     run -0 "$VDBSHADE" info box.exr
-    [[ $output == *"vdbshade_version: 0.1.0"* ]]
+    [[ $output == *"vdbshade_version: 0.2.0"* ]]
     [[ $output == *"vdbshade_command: bake --sun 1,2,1 --sun-angle 5 --ao 2 --size 32 --resolution 16 --method adaptive --max-error 0.1 box.obj"* ]]
     [[ $output == *"vdbshade_shadow: adaptive, max error 0.1, sobol"* ]]
     [[ $output == *"vdbshade_ao: exact within 2, max error 0.1, sobol"* ]]

@@ -56,7 +56,7 @@ int main(int argc, char **argv) {
     vsh_assets *assets;
     vsh_occluders *occluders;
     vsh_query *query;
-    CHECK(vsh_scene_read("scene.json", &scene, &error));
+    CHECK(vsh_scene_read("scene.json", NULL, &scene, &error));
     CHECK(vsh_assets_load(scene, NULL, &assets, &error));
     CHECK(vsh_scene_occluders(scene, assets, NULL, NULL, &occluders, &error));
     vsh_shade_options shade = scene->shade;

@@ -108,7 +108,7 @@ static vsh_grid *from_file(const char *folder, vsh_error *error) {
         exit(1);
     }
     vsh_grid *made = from_callback(error);
-    check("write", vsh_grid_write(made, path, "ball", error), error);
+    check("write", vsh_grid_write(made, path, "ball", NULL, 0, error), error);
     vsh_grid_free(made);
     /* by the reader that is installed with the library */
     vsh_run run = vsh_run_default();
@@ -232,7 +232,7 @@ static void write_picture(const char *folder, vsh_error *error) {
     const vsh_image image = {SIZE, 1, 1, &name, &plane};
     check("write an image", vsh_image_write(path, &image, NULL, error), error);
     vsh_image_file *file = NULL;
-    check("read an image", vsh_image_read(path, &file, error), error);
+    check("read an image", vsh_image_read(path, NULL, &file, error), error);
     expect("its last value", vsh_image_view(file).planes[0][SIZE - 1], 31.0 / 255.0 - 1e-6,
            31.0 / 255.0 + 1e-6);
     vsh_image_free(file);

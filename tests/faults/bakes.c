@@ -76,7 +76,7 @@ vsh_result bake_volume(const vsh_run *run, vsh_error *error) {
     MAKE(on_band, vsh_bake_volume(occluders, band, &light, 1, &options, run, &on_band, NULL, error));
     MAKE(box, vsh_voxels_from_box(least, most, 0.4, run, &box, error));
     MAKE(in_box, vsh_bake_volume(occluders, box, &light, 1, &options, run, &in_box, NULL, error));
-    TRY(vsh_volume_write(in_box, "out.vdb", 1, error));
+    TRY(vsh_volume_write(in_box, "out.vdb", 1, NULL, 0, error));
 end:
     vsh_volume_free(in_box);
     vsh_volume_free(on_band);
@@ -131,7 +131,7 @@ vsh_result bake_flat(const vsh_run *run, vsh_error *error) {
     vsh_grid *grid = NULL;
     static float planes[4][FLAT_TEXELS];
     vsh_result result;
-    MAKE(scene, vsh_flat_scene_read("flat.json", &scene, error));
+    MAKE(scene, vsh_flat_scene_read("flat.json", NULL, &scene, error));
     MAKE(outline, vsh_flat_scene_casters(scene, run, &outline, error));
     MAKE(text, vsh_outline_from_text("A8", FONT, NULL, run, &text, error));
     const double star[] = {0, 0, 2, 0.1, 0, 0.3, 1, -1, 1, 1};
@@ -189,7 +189,7 @@ vsh_result read_images(const vsh_run *run, vsh_error *error) {
     vsh_image_file *file = NULL;
     vsh_result result = VSH_OK;
     for (size_t i = 0; i < IMAGES; ++i) {
-        MAKE(file, vsh_image_read_run(images[i], run, &file, error));
+        MAKE(file, vsh_image_read(images[i], run, &file, error));
         vsh_image_free(file);
         file = NULL;
     }

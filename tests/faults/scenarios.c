@@ -47,8 +47,8 @@ static vsh_result read_scenes(const vsh_run *run, vsh_error *error) {
     vsh_scene *scene = NULL;
     vsh_flat_scene *flat = NULL;
     vsh_result result;
-    MAKE(scene, vsh_scene_read("scene.json", &scene, error));
-    MAKE(flat, vsh_flat_scene_read("flat.json", &flat, error));
+    MAKE(scene, vsh_scene_read("scene.json", NULL, &scene, error));
+    MAKE(flat, vsh_flat_scene_read("flat.json", NULL, &flat, error));
 end:
     vsh_scene_free(scene);
     vsh_flat_scene_free(flat);
@@ -81,7 +81,7 @@ static vsh_result load_scene(const vsh_run *run, vsh_error *error) {
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
     options.truth = 1;
     vsh_result result;
-    MAKE(scene, vsh_scene_read("scene.json", &scene, error));
+    MAKE(scene, vsh_scene_read("scene.json", NULL, &scene, error));
     MAKE(assets, vsh_assets_load(scene, run, &assets, error));
     MAKE(grid, vsh_scene_casters(scene, assets, run, &grid, error));
     MAKE(layer, vsh_scene_layer_casters(scene, assets, &scene->layers[0], run, &layer, error));
@@ -100,7 +100,7 @@ end:
 static vsh_result bake_scene(const vsh_run *run, vsh_error *error) {
     vsh_scene *scene = NULL;
     vsh_result result;
-    MAKE(scene, vsh_scene_read("scene.json", &scene, error));
+    MAKE(scene, vsh_scene_read("scene.json", NULL, &scene, error));
     TRY(vsh_bake_scene(scene, NULL, run, NULL, error));
 end:
     vsh_scene_free(scene);
@@ -137,7 +137,7 @@ static vsh_result write_grid(const vsh_run *run, vsh_error *error) {
     vsh_occluders *occluders = NULL;
     vsh_result result;
     TRY(parts_occluders(run, &grid, &occluders, error));
-    TRY(vsh_grid_write(grid, "out.vdb", NULL, error));
+    TRY(vsh_grid_write(grid, "out.vdb", NULL, NULL, 0, error));
 end:
     vsh_occluders_free(occluders);
     vsh_grid_free(grid);
@@ -269,7 +269,7 @@ static vsh_result tell_origin(const vsh_run *run, vsh_error *error) {
     vsh_provenance *provenance = NULL;
     static const char *const file = "scene.json";
     vsh_result result;
-    MAKE(scene, vsh_scene_read(file, &scene, error));
+    MAKE(scene, vsh_scene_read(file, NULL, &scene, error));
     vsh_provenance_source source = vsh_provenance_source_default();
     source.scene = scene;
     source.files = &file;

@@ -34,7 +34,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const char *path = fuzz_file("a.png", data, size);
     vsh_error error;
     vsh_image_file *file;
-    const vsh_result result = vsh_image_read(path, &file, fuzz_error(&error));
+    const vsh_result result = vsh_image_read(path, NULL, &file, fuzz_error(&error));
     fuzz_ended(result, &error, file);
     if (result == VSH_OK) {
         const vsh_image image = vsh_image_view(file);

@@ -13,7 +13,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const vsh_run run = fuzz_run();
     vsh_error error;
     vsh_image_file *file;
-    FUZZ_MAKE(file, vsh_image_read_run(path, &run, &file, fuzz_error(&error)));
+    FUZZ_MAKE(file, vsh_image_read(path, &run, &file, fuzz_error(&error)));
     vsh_image_free(file);
     return 0;
 }

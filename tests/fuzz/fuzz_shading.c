@@ -113,7 +113,10 @@ static void lightmap(fuzz_input *input) {
         vsh_texels *band;
         FUZZ_MAKE(band, vsh_texels_create_band(charts, rows[0], rows[1], &run, &band, fuzz_error(&error)));
         vsh_texels_free(band);
-        vsh_charts_band_bytes(charts, rows[0], rows[1], 4, 1, 1, 1, 1);
+        static float one;
+        float *const planes[] = {&one};
+        const vsh_lightmap all = {planes, &one, &one, &one, planes, &one, &one, planes, .invalid = &one};
+        vsh_charts_band_bytes(charts, rows[0], rows[1], &all, 1);
     }
     vsh_charts_free(charts);
     if (texels != NULL && FITS(options)) {

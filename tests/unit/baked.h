@@ -108,7 +108,7 @@ static vsh_light spot(void) {
     vsh_light light = vsh_light_default();
     light.type = VSH_LIGHT_SPOT;
     light.falloff = VSH_FALLOFF_INVERSE_SQUARE;
-    light.direction[1] = -1.0;
+    light.axis[1] = -1.0;
     light.position[0] = 0.75;
     light.position[1] = 2.5;
     light.position[2] = -0.5;

@@ -268,7 +268,7 @@ static void ao_between_texels_keeps_the_error_beside_what_is_low(void **state) {
         VSH_OK);
     double sum = 0.0, count = 0.0;
     for (size_t i = 0; i < samples.count; ++i) {
-        const uint32_t at = samples.texel[i];
+        const size_t at = vsh_texel_place(samples.texels[i], SIZE);
         const double off = (double)plane[at] - (double)open[i];
         sum += covered[at] > 0.0f ? off * off : 0.0;
         count += covered[at] > 0.0f;

@@ -151,7 +151,7 @@ static void one_call_writes_the_file_that_a_sink_is_handed(void **state) {
     assert_int_equal(t.rows, SIZE);
     assert_int_equal(t.channels, 6);
     vsh_image_file *file;
-    assert_ok(vsh_image_read(c.output, &file, &error), &error);
+    assert_ok(vsh_image_read(c.output, NULL, &file, &error), &error);
     const vsh_image image = vsh_image_view(file);
     for (int32_t k = 0; k < t.channels; ++k) {
         assert_string_equal(t.names[k], names[k]);
@@ -249,7 +249,7 @@ static void what_was_kept_is_not_baked_again(void **state) {
     snprintf(path, sizeof path, "%s.resume", c.output);
     assert_int_not_equal(access(path, F_OK), 0);
     vsh_image_file *file;
-    assert_ok(vsh_image_read(c.output, &file, &error), &error);
+    assert_ok(vsh_image_read(c.output, NULL, &file, &error), &error);
     taken whole = {.fail_at = 0};
     assert_ok(bake_into(&c, 0, &whole, &error), &error);
     const vsh_image image = vsh_image_view(file);

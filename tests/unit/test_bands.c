@@ -254,11 +254,11 @@ static void bands_have_the_samples_of_the_whole(void **state) {
         assert_int_equal(vsh_texels_create_band(charts, first, rows, NULL, &texels, NULL), VSH_OK);
         const vsh_texel_samples part = vsh_texels_samples(texels);
         assert_true(at + part.count <= all.count);
-        assert_memory_equal(part.texel, all.texel + at, part.count * sizeof *part.texel);
+        assert_memory_equal(part.texels, all.texels + at, part.count * sizeof *part.texels);
         assert_memory_equal(part.positions, all.positions + 3 * at, 3 * part.count * sizeof *part.positions);
         assert_memory_equal(part.normals, all.normals + 3 * at, 3 * part.count * sizeof *part.normals);
         for (size_t i = 0; i < part.count; ++i) {
-            const int32_t row = (int32_t)(part.texel[i] / WIDTH);
+            const int32_t row = (int32_t)vsh_texel_row(part.texels[i]);
             assert_true(row >= first && row < first + rows);
         }
         vsh_texels_get_info(texels, &info);
@@ -278,6 +278,7 @@ static void rows_that_are_no_band_are_refused(void **state) {
     const vsh_lightmap_options options = size_of(WIDTH, HEIGHT, 1);
     vsh_charts *charts = NULL;
     assert_int_equal(vsh_charts_create(s->receivers, 2, &options, NULL, NULL, &charts, NULL), VSH_OK);
+    const vsh_lightmap nothing = {0};
     const int32_t bad[][2] = {{-8, 8}, {4, 8},  {HEIGHT, 8}, {96, 8}, {0, 0},
                               {0, 4},  {0, -8}, {0, 96},     {88, 1}, {80, 8 + HEIGHT}};
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
@@ -287,7 +288,7 @@ static void rows_that_are_no_band_are_refused(void **state) {
                          VSH_ERROR_ARGUMENT);
         assert_null(texels);
         assert_non_null(strstr(error.message, "band"));
-        assert_int_equal(vsh_charts_band_bytes(charts, bad[i][0], bad[i][1], 3, 0, 0, 0, 0), 0);
+        assert_int_equal(vsh_charts_band_bytes(charts, bad[i][0], bad[i][1], &nothing, 0), 0);
     }
     vsh_charts_free(charts);
 }
@@ -312,16 +313,17 @@ static void a_band_bakes_within_the_bytes_it_is_said_to_take(void **state) {
     vsh_charts_get_info(charts, &counted);
     vsh_field_get_info(s->field, &field);
     const int32_t first = 1024, rows = 64, floats = 4;
-    const uint64_t bytes = vsh_charts_band_bytes(charts, first, rows, floats, 0, 0, 0, 0);
-    assert_true(bytes > vsh_charts_band_bytes(charts, first, rows - 8, floats, 0, 0, 0, 0));
-    assert_int_equal(vsh_texels_create_band(charts, first, rows, &run, &texels, &error), VSH_OK);
-    vsh_light lights[2];
-    set_lights(lights);
     float *memory = malloc((size_t)floats * 2048 * rows * sizeof *memory);
     const size_t plane = (size_t)2048 * rows;
     float *const shadow[2] = {memory, memory + plane};
     const vsh_lightmap lightmap = {
         .shadow = shadow, .ao = memory + 2 * plane, .coverage = memory + 3 * plane};
+    const uint64_t bytes = vsh_charts_band_bytes(charts, first, rows, &lightmap, 2);
+    assert_true(bytes > vsh_charts_band_bytes(charts, first, rows - 8, &lightmap, 2));
+    assert_true(bytes - vsh_charts_band_bytes(charts, first, rows, &lightmap, 1) >= plane * sizeof *memory);
+    assert_int_equal(vsh_texels_create_band(charts, first, rows, &run, &texels, &error), VSH_OK);
+    vsh_light lights[2];
+    set_lights(lights);
     options.shade.ao_method = VSH_AO_TAPS;
     run.memory_limit = field.bytes + bytes;
     assert_int_equal(vsh_bake_lightmap(occluders_traced(s->field, s->triangles), texels, lights, 2,

@@ -185,7 +185,13 @@ static void volume_of_band(const context *c, int32_t unused, bits *b) {
     const int32_t low[3] = {-24, -8, -24}, size[3] = {48, 48, 48};
     for (size_t grid = 0; grid < 2; ++grid) {
         check(vsh_volume_copy(volume, grid, low, size, values, &error), &error);
-        add_floats(b, values, 48 * 48 * 48);
+        for (size_t row = 0; row < 48 * 48; ++row) { /* along z, in the order that the hashes were made in */
+            float along[48];
+            for (size_t z = 0; z < 48; ++z) {
+                along[z] = values[(z * 48 + row % 48) * 48 + row / 48];
+            }
+            add_floats(b, along, 48);
+        }
     }
     free(values);
     vsh_volume_free(volume);

@@ -306,7 +306,7 @@ static outcome try(const stage *s, const trial *t) {
     for (size_t i = 0; i < all.count; ++i) {
         const double *p = t->lightmap ? all.positions + 3 * i : places + 3 * i;
         const double truth = truth_at(s, p[0], p[2]);
-        const double off = (double)values[t->lightmap ? all.texel[i] : i] - truth;
+        const double off = (double)values[t->lightmap ? vsh_texel_place(all.texels[i], t->width) : i] - truth;
         sum += off * off;
         o.worst = fmax(o.worst, fabs(off));
         if (truth > 0.0 && truth < 1.0) {

@@ -136,7 +136,8 @@ static void measure(const stage *s, const baked *b, double rmse[CHANNELS]) {
         assert_int_equal(result, VSH_OK);
         double sum = 0.0;
         for (size_t i = 0; i < all.count; ++i) {
-            const double off = (double)(c == 0 ? b->shadow : b->ao)[all.texel[i]] - (double)truth[i];
+            const double off = (double)(c == 0 ? b->shadow : b->ao)[vsh_texel_place(all.texels[i], WIDTH)] -
+                               (double)truth[i];
             sum += off * off;
         }
         rmse[c] = sqrt(sum / (double)all.count);

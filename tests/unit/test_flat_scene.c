@@ -15,7 +15,7 @@ static void write_scene(const char *text) {
 static vsh_flat_scene *read_scene(const char *text) {
     vsh_flat_scene *scene = NULL;
     write_scene(text);
-    assert_ok(vsh_flat_scene_read(path, &scene, &failure));
+    assert_ok(vsh_flat_scene_read(path, NULL, &scene, &failure));
     return scene;
 }
 
@@ -56,6 +56,8 @@ static void every_key_lands_in_its_field(void **state) {
     assert_true(l[1].type == VSH_LIGHT_DIRECTIONAL && l[1].direction[0] == 3.0 && l[1].direction[1] == 4.0);
     assert_true(l[1].direction[2] == 0.0 && fabs(l[1].angle - 0.1 * PI) < 1e-15);
     assert_true(l[2].type == VSH_LIGHT_SPOT && l[2].falloff == VSH_FALLOFF_NONE);
+    assert_true(l[2].axis[0] == 0.0 && l[2].axis[1] == -1.0 && l[2].axis[2] == 0.0);
+    assert_true(l[2].direction[1] == 0.0);
     const vsh_flat_caster *c = scene->casters;
     assert_true(c[0].type == VSH_FLAT_MASK && c[0].mask.width == 2.0 && c[0].mask.height == 3.0);
     assert_true(c[0].mask.threshold == 0.25 && c[0].mask.invert);
@@ -147,13 +149,13 @@ static void errors_tell_their_place(void **state) {
         snprintf(expected, sizeof expected, "%s:1:%zu: %s", path, place + 1, bad[i].message);
         write_scene(text);
         vsh_flat_scene *scene = NULL;
-        assert_int_equal(vsh_flat_scene_read(path, &scene, &failure), VSH_ERROR_INPUT);
+        assert_int_equal(vsh_flat_scene_read(path, NULL, &scene, &failure), VSH_ERROR_INPUT);
         assert_string_equal(failure.message, expected);
         assert_null(scene);
     }
     vsh_flat_scene *scene = NULL;
-    assert_fails(vsh_flat_scene_read("none.json", &scene, &failure), VSH_ERROR_READ, "none.json");
-    assert_fails(vsh_flat_scene_read(NULL, &scene, &failure), VSH_ERROR_ARGUMENT, "NULL");
+    assert_fails(vsh_flat_scene_read("none.json", NULL, &scene, &failure), VSH_ERROR_READ, "none.json");
+    assert_fails(vsh_flat_scene_read(NULL, NULL, &scene, &failure), VSH_ERROR_ARGUMENT, "NULL");
     vsh_flat_scene_free(NULL);
 }
 
@@ -166,7 +168,7 @@ static void a_cut_file_is_an_error(void **state) {
         memcpy(text, whole, size);
         write_scene(text);
         vsh_flat_scene *scene = NULL;
-        assert_int_equal(vsh_flat_scene_read(path, &scene, &failure), VSH_ERROR_INPUT);
+        assert_int_equal(vsh_flat_scene_read(path, NULL, &scene, &failure), VSH_ERROR_INPUT);
     }
 }
 

@@ -41,9 +41,9 @@ static void a_dense_copy_has_every_distance(void **state) {
     const float band = (float)(info.half_width * info.voxel_size);
     size_t at = 0;
     uint64_t active = 0;
-    for (int32_t x = 0; x < size[0]; ++x) {
+    for (int32_t z = 0; z < size[2]; ++z) {
         for (int32_t y = 0; y < size[1]; ++y) {
-            for (int32_t z = 0; z < size[2]; ++z, ++at) {
+            for (int32_t x = 0; x < size[0]; ++x, ++at) {
                 const double index[3] = {low[0] + x, low[1] + y, low[2] + z};
                 double p[3];
                 for (int row = 0; row < 3; ++row) {

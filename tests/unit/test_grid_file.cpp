@@ -7,12 +7,12 @@ namespace {
 void a_written_grid_comes_back_bit_for_bit(void **) {
     vsh_grid *grid = own_sphere(), *back = nullptr;
     const std::string path = in_folder("round.vdb"), again = in_folder("again.vdb");
-    assert_int_equal(vsh_grid_write(grid, path.c_str(), nullptr, &failure), VSH_OK);
+    assert_int_equal(vsh_grid_write(grid, path.c_str(), nullptr, nullptr, 0, &failure), VSH_OK);
     Warnings warnings;
     assert_said(vsh_grid_read(path.c_str(), "surface", &warnings.run, &back, &failure), VSH_OK, {});
     assert_true(warnings.lines.empty());
     assert_same(grid, back);
-    assert_int_equal(vsh_grid_write(back, again.c_str(), "surface", &failure), VSH_OK);
+    assert_int_equal(vsh_grid_write(back, again.c_str(), "surface", nullptr, 0, &failure), VSH_OK);
     assert_true(content(path) == content(again));
     vsh_grid_free(back);
     vsh_grid_free(grid);
@@ -21,7 +21,7 @@ void a_written_grid_comes_back_bit_for_bit(void **) {
 void openvdb_reads_what_is_written(void **) {
     vsh_grid *grid = own_sphere();
     const std::string path = in_folder("own.vdb");
-    assert_int_equal(vsh_grid_write(grid, path.c_str(), "hull", &failure), VSH_OK);
+    assert_int_equal(vsh_grid_write(grid, path.c_str(), "hull", nullptr, 0, &failure), VSH_OK);
     openvdb::io::File file(path);
     file.open(false);
     const auto read = openvdb::gridPtrCast<FloatGrid>(file.readGrid("hull"));
@@ -142,7 +142,7 @@ void voxels_too_small_for_openvdb_are_refused_and_the_least_come_back(void **) {
         assert_said(vsh_grid_from_sdf(&tree, &options, nullptr, &grid, &failure), VSH_OK, {});
         const std::string path = in_folder("tiny.vdb");
         Warnings warnings;
-        const vsh_result result = vsh_grid_write(grid, path.c_str(), nullptr, &failure);
+        const vsh_result result = vsh_grid_write(grid, path.c_str(), nullptr, nullptr, 0, &failure);
         if (voxel < 1.45e-5) {
             assert_said(result, VSH_ERROR_LIMIT, {path.c_str(), "1.45e-05"});
         } else {
@@ -223,13 +223,13 @@ void a_full_disk_leaves_the_old_file(void **) {
     for (const rlim_t bytes : {rlim_t(0), rlim_t(100), rlim_t(20000)}) {
         const rlimit small = {bytes, old.rlim_max};
         setrlimit(RLIMIT_FSIZE, &small);
-        const vsh_result result = vsh_grid_write(grid, path.c_str(), nullptr, &failure);
+        const vsh_result result = vsh_grid_write(grid, path.c_str(), nullptr, nullptr, 0, &failure);
         setrlimit(RLIMIT_FSIZE, &old);
         assert_said(result, VSH_ERROR_WRITE, {path.c_str(), std::strerror(EFBIG)});
         assert_string_equal(content(path).c_str(), "old");
     }
-    assert_said(vsh_grid_write(grid, in_folder("no/where.vdb").c_str(), nullptr, &failure), VSH_ERROR_WRITE,
-                {"no/where.vdb"});
+    assert_said(vsh_grid_write(grid, in_folder("no/where.vdb").c_str(), nullptr, nullptr, 0, &failure),
+                VSH_ERROR_WRITE, {"no/where.vdb"});
     vsh_grid_free(grid);
 }
 

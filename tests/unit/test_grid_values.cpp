@@ -19,7 +19,7 @@ void turned_and_mirrored_grids_stay_where_they_are(void **) {
     assert_said(vsh_grid_read(path.c_str(), nullptr, &warnings.run, &read, &failure), VSH_OK, {});
     assert_true(warnings.lines.empty());
     assert_true(worst_error(read, 2.0 * RADIUS, openvdb::Vec3d(5.0, -3.0, 100.0)) < 0.01);
-    assert_int_equal(vsh_grid_write(read, copy.c_str(), nullptr, &failure), VSH_OK);
+    assert_int_equal(vsh_grid_write(read, copy.c_str(), nullptr, nullptr, 0, &failure), VSH_OK);
     assert_said(vsh_grid_read(copy.c_str(), nullptr, nullptr, &back, &failure), VSH_OK, {});
     assert_same(read, back);
     vsh_grid_free(back);

@@ -69,7 +69,7 @@ Outcome work(int32_t threads = 0) {
     vsh_occluders *occluders = nullptr;
     vsh_provenance *provenance = nullptr;
     const std::string path = folder + "/scene.json";
-    o.check(vsh_scene_read(path.c_str(), &scene, &error), error);
+    o.check(vsh_scene_read(path.c_str(), nullptr, &scene, &error), error);
     if (o.failure.empty()) {
         o.check(vsh_assets_load(scene, &run, &assets, &error), error);
     }

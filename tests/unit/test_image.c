@@ -20,7 +20,7 @@ static vsh_image_file *write_and_read(const char *path, const vsh_image *image, 
     assert_ok(vsh_image_check(path, image, &options, &error), &error);
     assert_ok(vsh_image_write(path, image, &options, &error), &error);
     vsh_image_file *file = NULL;
-    assert_ok(vsh_image_read(path, &file, &error), &error);
+    assert_ok(vsh_image_read(path, NULL, &file, &error), &error);
     return file;
 }
 
@@ -314,7 +314,7 @@ static void icons_of_fewer_bits_are_not_given_to_their_reader(void **state) {
     bytes[22 + 14] = 24;
     write_all(at("icon.ico"), bytes, size);
     vsh_image_file *file = NULL;
-    assert_int_equal(vsh_image_read(at("icon.ico"), &file, &error), VSH_ERROR_UNSUPPORTED);
+    assert_int_equal(vsh_image_read(at("icon.ico"), NULL, &file, &error), VSH_ERROR_UNSUPPORTED);
     assert_non_null(strstr(error.message, "32 bits"));
     free(bytes);
     unmake(&s);

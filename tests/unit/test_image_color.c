@@ -12,7 +12,7 @@ static vsh_image_file *write_as(const char *path, const vsh_image *image, int32_
     vsh_error error;
     assert_ok(vsh_image_write(path, image, &options, &error), &error);
     vsh_image_file *file = NULL;
-    assert_ok(vsh_image_read(path, &file, &error), &error);
+    assert_ok(vsh_image_read(path, NULL, &file, &error), &error);
     return file;
 }
 

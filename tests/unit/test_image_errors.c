@@ -246,7 +246,7 @@ static void cut_files_are_errors(void **state) {
         for (size_t cut = 0; cut < size; cut += cut < 500 ? 1 : 37) {
             write_all(path, bytes, cut);
             vsh_image_file *file = NULL;
-            const vsh_result result = vsh_image_read(path, &file, &error);
+            const vsh_result result = vsh_image_read(path, NULL, &file, &error);
             if (result == VSH_OK) {
                 if (cut + trailer < size) {
                     fail_msg("%s cut to %zu of %zu bytes was read", names[n], cut, size);
@@ -289,7 +289,7 @@ static void damaged_files_do_no_harm(void **state) {
             write_all(path, bytes, size);
             bytes[place] = old;
             vsh_image_file *file = NULL;
-            const vsh_result result = vsh_image_read(path, &file, &error);
+            const vsh_result result = vsh_image_read(path, NULL, &file, &error);
             assert_true((result == VSH_OK) == (file != NULL));
             vsh_image_free(file);
         }
@@ -302,15 +302,15 @@ static void unreadable_paths_are_read_errors(void **state) {
     (void)state;
     vsh_error error = {0};
     vsh_image_file *file = NULL;
-    assert_int_equal(vsh_image_read(at("nothing.exr"), &file, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_image_read(at("nothing.exr"), NULL, &file, &error), VSH_ERROR_READ);
     assert_non_null(strstr(error.message, "nothing.exr"));
-    assert_int_equal(vsh_image_read(folder, &file, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_image_read(folder, NULL, &file, &error), VSH_ERROR_READ);
     write_all(at("empty.png"), (const unsigned char *)"", 0);
-    assert_int_equal(vsh_image_read(at("empty.png"), &file, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_image_read(at("empty.png"), NULL, &file, &error), VSH_ERROR_READ);
     static const char *const never[] = {"text.txt", "x.iff", "x.fits"};
     for (size_t i = 0; i < sizeof never / sizeof never[0]; ++i) {
         write_all(at(never[i]), (const unsigned char *)"hello", 5);
-        assert_int_equal(vsh_image_read(at(never[i]), &file, &error), VSH_ERROR_INPUT);
+        assert_int_equal(vsh_image_read(at(never[i]), NULL, &file, &error), VSH_ERROR_INPUT);
         assert_non_null(strstr(error.message, "no image format that is read"));
     }
     assert_null(file);
@@ -327,14 +327,14 @@ static void the_memory_limit_holds_without_a_reader(void **state) {
         assert_ok(vsh_image_write(at(names[n]), &s.image, NULL, &error), &error);
         vsh_run run = vsh_run_default();
         vsh_image_file *file = NULL;
-        assert_ok(vsh_image_read_run(at(names[n]), &run, &file, &error), &error);
+        assert_ok(vsh_image_read(at(names[n]), &run, &file, &error), &error);
         const vsh_image image = vsh_image_view(file);
         run.memory_limit = (uint64_t)(image.width * image.height * image.channel_count) * sizeof(float);
         vsh_image_free(file);
-        assert_ok(vsh_image_read_run(at(names[n]), &run, &file, &error), &error);
+        assert_ok(vsh_image_read(at(names[n]), &run, &file, &error), &error);
         vsh_image_free(file);
         --run.memory_limit;
-        assert_int_equal(vsh_image_read_run(at(names[n]), &run, &file, &error), VSH_ERROR_LIMIT);
+        assert_int_equal(vsh_image_read(at(names[n]), &run, &file, &error), VSH_ERROR_LIMIT);
         assert_null(file);
         assert_non_null(strstr(error.message, names[n]));
     }

@@ -82,9 +82,9 @@ static void a_spot_fades_smoothly_between_its_angles(void **state) {
     float last = 2.0f;
     for (double degrees = 0.0; degrees <= 90.0; degrees += 0.5) {
         /* the axis leans by so much from the way down to the point */
-        light.direction[0] = 3.0 * sin(RADIANS(degrees));
-        light.direction[1] = -3.0 * cos(RADIANS(degrees));
-        light.direction[2] = 0.0;
+        light.axis[0] = 3.0 * sin(RADIANS(degrees));
+        light.axis[1] = -3.0 * cos(RADIANS(degrees));
+        light.axis[2] = 0.0;
         const float value = red(&light);
         const double t = (cos(RADIANS(degrees)) - cos(light.outer_angle)) /
                          (cos(light.inner_angle) - cos(light.outer_angle));

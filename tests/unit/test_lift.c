@@ -141,7 +141,7 @@ static void rays_to_a_light_well_above_a_facet_begin_on_it(void **state) {
                 continue;
             }
             hidden += truth[i] < 0.5f;
-            off += fabsf(shadow[s.lifted.texel[i]] - truth[i]) > 0.5f;
+            off += fabsf(shadow[vsh_texel_place(s.lifted.texels[i], WIDTH)] - truth[i]) > 0.5f;
         }
         assert_true(hidden > 100);
         assert_int_equal(off, 0);
@@ -175,7 +175,7 @@ static void facets_do_not_hide_a_light_that_is_over_the_smooth_sphere(void **sta
             if (dot(s.flat.geometric_normals + 3 * i, to) < sine &&
                 dot(s.lifted.normals + 3 * i, to) > sine + 0.02) {
                 ++cut;
-                dark += shadow[s.lifted.texel[i]] < 0.95f;
+                dark += shadow[vsh_texel_place(s.lifted.texels[i], WIDTH)] < 0.95f;
             }
         }
         assert_true(cut > 200);
@@ -198,7 +198,7 @@ static void samples_are_valid_by_where_their_facets_are(void **state) {
     size_t between = 0, wrong = 0;
     for (size_t i = 0; i < s.flat.count; ++i) {
         const double x = s.flat.positions[3 * i];
-        const bool valid = coverage[s.lifted.texel[i]] == 1.0f;
+        const bool valid = coverage[vsh_texel_place(s.lifted.texels[i], WIDTH)] == 1.0f;
         between += x < FACE && s.lifted.positions[3 * i] > FACE;
         wrong += fabs(x - FACE) > CLEAR && valid != (x < FACE);
     }
@@ -228,7 +228,7 @@ static void samples_are_not_lifted_close_to_what_is_over_them(void **state) {
     for (size_t i = 0; i < s.flat.count; ++i) {
         if (FACE - s.flat.positions[3 * i] < 0.045) {
             ++under;
-            worst = fmax(worst, fabs((double)(ao[s.lifted.texel[i]] - truth[i])));
+            worst = fmax(worst, fabs((double)(ao[vsh_texel_place(s.lifted.texels[i], WIDTH)] - truth[i])));
         }
     }
     assert_true(under > 50);

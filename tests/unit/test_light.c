@@ -118,6 +118,11 @@ static void bad_values_are_named_with_field_and_limit(void **state) {
     light.reach = 0.0;
     refuses(&light, "light 'lamp': reach 0 is out of range 0 (excluded) … inf (excluded)");
     light = spot();
+    light.axis[1] = 0.0;
+    refuses(&light, "light 'spot': axis (0, 0, 0): expected a length over 0");
+    light = spot();
+    memset(light.direction, 0, sizeof light.direction); /* a sun's */
+    accepts(&light);
     light.inner_angle = 0.75;
     refuses(&light, "light 'spot': inner_angle 0.75 is out of range 0 … outer_angle 0.5");
     light = sun();
@@ -138,7 +143,7 @@ static void no_value_that_is_not_a_number_passes(void **state) {
     lights[3].inner_angle = NAN;
     lights[4].outer_angle = NAN;
     lights[5].color[0] = NAN;
-    lights[6].direction[0] = NAN;
+    lights[6].axis[0] = NAN;
     for (size_t i = 0; i < sizeof lights / sizeof lights[0]; ++i) {
         assert_int_equal(vsh_light_check(&lights[i], NULL), VSH_ERROR_ARGUMENT);
     }

@@ -101,7 +101,7 @@ static void settings_and_inputs_are_told_in_order_and_once(void **state) {
     size_t count = 0;
     const vsh_attribute *list = vsh_provenance_attributes(made, &count);
     static const char *const expected[][2] = {
-        {"vdbshade_version", "0.1.0"},
+        {"vdbshade_version", "0.2.0"},
         {"vdbshade_command", "bake scene.json"},
         {"vdbshade_shadow", "exact, max error 0.05, 64 rays, sobol"},
         {"vdbshade_ao", "cones within 2.5, 16 cones"},
@@ -133,7 +133,7 @@ static void settings_and_inputs_are_told_in_order_and_once(void **state) {
 
 static void the_error_that_a_channel_was_made_to_is_told(void **state) {
     (void)state;
-    const vsh_attribute list[] = {{"vdbshade_version", "0.1.0"},
+    const vsh_attribute list[] = {{"vdbshade_version", "0.2.0"},
                                   {"vdbshade_shadow", "adaptive, max error 0.005, sobol, frame 3"},
                                   {"vdbshade_ao", "exact within 2.5, max error 0.02, sobol"}};
     assert_true(vsh_provenance_max_error(list, 3, "shadow.sun") == 0.005);
@@ -158,7 +158,7 @@ static void the_error_that_a_channel_was_made_to_is_told(void **state) {
 static void images_carry_them_and_give_them_back(void **state) {
     (void)state;
     static const char *const files[] = {"told.exr", "told.png"};
-    static const vsh_attribute told[] = {{"vdbshade_version", "0.1.0"}, {"long", "a line, with = and ;"}};
+    static const vsh_attribute told[] = {{"vdbshade_version", "0.2.0"}, {"long", "a line, with = and ;"}};
     sample s;
     make(&s, 5, 4, 3, LIGHTMAP);
     for (size_t f = 0; f < 2; ++f) {
@@ -168,7 +168,7 @@ static void images_carry_them_and_give_them_back(void **state) {
         vsh_error error;
         vsh_image_file *file = NULL;
         assert_ok(vsh_image_write(at(files[f]), &s.image, &options, &error), &error);
-        assert_ok(vsh_image_read(at(files[f]), &file, &error), &error);
+        assert_ok(vsh_image_read(at(files[f]), NULL, &file, &error), &error);
         size_t count = 0;
         const vsh_attribute *list = vsh_image_attributes(file, &count);
         for (size_t i = 0; i < 2; ++i) {
@@ -196,12 +196,12 @@ static void level_sets_and_volumes_carry_them(void **state) {
     const vsh_light sun = vsh_light_default();
     const vsh_attribute told = {"vdbshade_command", "voxelize ball"};
     assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &error), &error);
-    assert_ok(vsh_grid_write_with(grid, at("told.vdb"), NULL, &told, 1, &error), &error);
+    assert_ok(vsh_grid_write(grid, at("told.vdb"), NULL, &told, 1, &error), &error);
     assert_ok(vsh_field_create(grid, NULL, NULL, &field, &error), &error);
     assert_ok(vsh_voxels_from_grid(grid, 0.0, NULL, &voxels, &error), &error);
     assert_ok(vsh_bake_volume(occluders_of(field), voxels, &sun, 1, NULL, NULL, &volume, NULL, &error),
               &error);
-    assert_ok(vsh_volume_write_with(volume, at("volume.vdb"), 0, &told, 1, &error), &error);
+    assert_ok(vsh_volume_write(volume, at("volume.vdb"), 0, &told, 1, &error), &error);
     static const char *const files[] = {"told.vdb", "volume.vdb"};
     for (size_t f = 0; f < 2; ++f) {
         vsh_vdb_entry entry;

@@ -124,15 +124,15 @@ void images_lists_voxels_and_texts_are_the_same(void **) {
     vsh_image_file *image[2] = {nullptr, nullptr};
     const std::string png = ASSETS + "/terrain.png", exr = in_folder("image.exr"),
                       tif = in_folder("image.tif");
-    assert_int_equal(vsh_image_read(png.c_str(), &image[0], &failure), VSH_OK);
+    assert_int_equal(vsh_image_read(png.c_str(), nullptr, &image[0], &failure), VSH_OK);
     vsh_image view = vsh_image_view(image[0]);
     for (const std::string &copy : {exr, tif}) {
         assert_int_equal(vsh_image_write(copy.c_str(), &view, nullptr, &failure), VSH_OK);
     }
     vsh_image_free(image[0]);
     for (const std::string &path : {png, exr, tif}) {
-        assert_int_equal(vsh_image_read_run(path.c_str(), &plain, &image[0], &failure), VSH_OK);
-        assert_int_equal(vsh_image_read_run(path.c_str(), &run, &image[1], &failure), VSH_OK);
+        assert_int_equal(vsh_image_read(path.c_str(), &plain, &image[0], &failure), VSH_OK);
+        assert_int_equal(vsh_image_read(path.c_str(), &run, &image[1], &failure), VSH_OK);
         const vsh_image a = vsh_image_view(image[0]), b = vsh_image_view(image[1]);
         size_t attributes[2];
         const vsh_attribute *left = vsh_image_attributes(image[0], &attributes[0]);
@@ -310,7 +310,7 @@ void cancelling_kills_the_reader(void **) {
                          VSH_ERROR_CANCELLED);
         calls = after;
         vsh_image_file *image = nullptr;
-        assert_int_equal(vsh_image_read_run((ASSETS + "/terrain.png").c_str(), &run, &image, &failure),
+        assert_int_equal(vsh_image_read((ASSETS + "/terrain.png").c_str(), &run, &image, &failure),
                          VSH_ERROR_CANCELLED);
         assert_no_child();
     }

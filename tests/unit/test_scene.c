@@ -28,7 +28,7 @@ static void the_seeds_scene_is_the_one_of_the_techniques(void **state) {
     (void)state;
     vsh_scene *scene = NULL;
     vsh_error error = {VSH_OK, ""};
-    if (vsh_scene_read(seeds_path, &scene, &error) != VSH_OK) {
+    if (vsh_scene_read(seeds_path, NULL, &scene, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     assert_int_equal(scene->caster_count, 1);
@@ -143,6 +143,8 @@ static void every_key_lands_in_its_field(void **state) {
     assert_vector(l[1].color, 1.0, 1.0, 1.0);
     assert_int_equal(l[2].type, VSH_LIGHT_SPOT);
     assert_string_equal(l[2].name, "head_-9");
+    assert_vector(l[2].axis, 0.0, -1.0, 0.0);
+    assert_vector(l[2].direction, 0.0, 1.0, 0.0); /* a sun's, as it was */
     assert_near(l[2].inner_angle, PI / 6.0, 1e-15);
     assert_true(l[2].outer_angle == PI);
     assert_int_equal(l[2].falloff, VSH_FALLOFF_INVERSE_SQUARE);

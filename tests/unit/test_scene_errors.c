@@ -439,12 +439,12 @@ static void a_file_that_is_not_there_or_is_a_folder_cannot_be_read(void **state)
     (void)state;
     vsh_scene *scene = NULL;
     vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_scene_read("no/such.json", &scene, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_scene_read("no/such.json", NULL, &scene, &error), VSH_ERROR_READ);
     assert_string_equal(error.message, "no/such.json: cannot be read: No such file or directory");
     assert_null(scene);
-    assert_int_equal(vsh_scene_read(VSH_ASSETS, &scene, &error), VSH_ERROR_READ);
-    assert_int_equal(vsh_scene_read(NULL, &scene, NULL), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_scene_read("x", NULL, NULL), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_scene_read(VSH_ASSETS, NULL, &scene, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_scene_read(NULL, NULL, &scene, NULL), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_scene_read("x", NULL, NULL, NULL), VSH_ERROR_ARGUMENT);
     vsh_scene_free(NULL);
 }
 
@@ -452,13 +452,13 @@ static void a_device_is_no_scene_and_a_large_file_over_the_limit(void **state) {
     (void)state;
     vsh_scene *scene = NULL;
     vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_scene_read("/dev/zero", &scene, &error), VSH_ERROR_READ);
+    assert_int_equal(vsh_scene_read("/dev/zero", NULL, &scene, &error), VSH_ERROR_READ);
     assert_string_equal(error.message, "/dev/zero: cannot be read: it is no regular file");
     char path[] = "scene-XXXXXX";
     const int file = mkstemp(path);
     assert_true(file >= 0 && ftruncate(file, (off_t)1 << 36) == 0);
     close(file);
-    assert_int_equal(vsh_scene_read(path, &scene, &error), VSH_ERROR_LIMIT);
+    assert_int_equal(vsh_scene_read(path, NULL, &scene, &error), VSH_ERROR_LIMIT);
     assert_non_null(strstr(error.message, ": is larger than the 67108864 bytes that a scene may have"));
     assert_null(scene);
     unlink(path);

@@ -50,10 +50,10 @@ static bool passes(size_t limit) {
     run.memory_limit = limit;
     vsh_scene *scene = NULL;
     vsh_error error = {VSH_OK, ""};
-    const vsh_result result = vsh_scene_read_run(file, &run, &scene, &error);
+    const vsh_result result = vsh_scene_read(file, &run, &scene, &error);
     vsh_scene_free(scene);
     vsh_flat_scene *flat = NULL;
-    assert_true((vsh_flat_scene_read_run(file, &run, &flat, NULL) == VSH_ERROR_LIMIT) ==
+    assert_true((vsh_flat_scene_read(file, &run, &flat, NULL) == VSH_ERROR_LIMIT) ==
                 (result == VSH_ERROR_LIMIT));
     vsh_flat_scene_free(flat);
     assert_true(result != VSH_ERROR_LIMIT || strstr(error.message, "memory.json") != NULL);

@@ -38,7 +38,7 @@ static void spread_over(map *m, int32_t width, const char *letters) {
         }
         const bool valid = letters[i] < 'a';
         m->state[i] = valid ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
-        m->texel[m->texels.count] = (uint32_t)i;
+        m->texel[m->texels.count] = vsh_texel((uint32_t)i % (uint32_t)width, (uint32_t)i / (uint32_t)width);
         m->mesh[m->texels.count++] = (uint32_t)(letters[i] - (valid ? 'A' : 'a'));
     }
     vshi_spread spread;

@@ -37,7 +37,7 @@ static void a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place(v
         double *sum = calloc((size_t)(w * h), 2 * sizeof *sum);
         int *count = calloc((size_t)(w * h), sizeof *count);
         for (size_t i = 0; i < samples.count; ++i) {
-            const uint32_t texel = samples.texel[i];
+            const size_t texel = vsh_texel_place(samples.texels[i], w);
             const double *p = samples.positions + 3 * i;
             ++count[texel];
             sum[2 * texel] += p[0];
@@ -45,7 +45,7 @@ static void a_quad_over_the_unit_square_puts_every_texel_at_its_analytic_place(v
             assert_true(p[2] == 0.0);
             assert_true(samples.normals[3 * i + 2] == 1.0f);
             assert_true(samples.geometric_normals[3 * i + 2] == 1.0f);
-            const double column = texel % (uint32_t)w, row = texel / (uint32_t)w;
+            const double column = vsh_texel_column(samples.texels[i]), row = vsh_texel_row(samples.texels[i]);
             assert_true(p[0] > 2.0 * column / w && p[0] < 2.0 * (column + 1) / w);
             assert_true(p[1] < 3.0 * (1.0 - row / h) && p[1] > 3.0 * (1.0 - (row + 1) / h));
         }
@@ -68,7 +68,7 @@ static void neighbouring_samples_come_tile_by_tile(void **state) {
     vsh_texels *texels = create(&q.mesh, 1, size_of(24, 16, 1), NULL);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     for (size_t i = 0; i < samples.count; ++i) {
-        const size_t column = samples.texel[i] % 24, row = samples.texel[i] / 24;
+        const size_t column = vsh_texel_column(samples.texels[i]), row = vsh_texel_row(samples.texels[i]);
         assert_int_equal(row / 8 * 3 + column / 8, i / 64);
     }
     vsh_texels_free(texels);
@@ -140,8 +140,8 @@ static void a_chart_that_does_not_fit_has_border_texels_at_the_nearest_point(voi
         int border = 0;
         for (size_t i = 0; i < samples.count; ++i) {
             const double low = (double)0.3f, high = (double)0.7f;
-            const double u = (samples.texel[i] % 16 + 0.5) / 16.0,
-                         v = 1.0 - (samples.texel[i] / 16 + 0.5) / 16;
+            const double u = (vsh_texel_column(samples.texels[i]) + 0.5) / 16.0,
+                         v = 1.0 - (vsh_texel_row(samples.texels[i]) + 0.5) / 16;
             if (u > low && u < high && v > low && v < high) {
                 continue;
             }
@@ -170,7 +170,7 @@ static void a_triangle_smaller_than_a_texel_still_has_one(void **state) {
     vsh_texels *texels = create(&mesh, 1, size_of(8, 8, 1), NULL);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     assert_int_equal(samples.count, 1);
-    assert_int_equal(samples.texel[0], 3 * 8 + 4);
+    assert_int_equal(samples.texels[0], vsh_texel(4, 3));
     const double *p = samples.positions;
     assert_true(p[0] >= 0.0 && p[1] >= 0.0 && p[0] + p[1] <= 1.0 + 1e-12);
     vsh_texels_free(texels);
@@ -239,7 +239,7 @@ static void any_number_of_threads_gives_the_same_bits(void **state) {
         assert_memory_equal(a.positions, b.positions, a.count * 3 * sizeof(double));
         assert_memory_equal(a.normals, b.normals, a.count * 3 * sizeof(float));
         assert_memory_equal(a.geometric_normals, b.geometric_normals, a.count * 3 * sizeof(float));
-        assert_memory_equal(a.texel, b.texel, a.count * sizeof(uint32_t));
+        assert_memory_equal(a.texels, b.texels, a.count * sizeof(uint32_t));
         assert_memory_equal(reports[0], reports[t], sizeof reports[0]);
     }
     assert_true(reports[0][1].overlap_texels > 301 * 203 / 2);
@@ -266,7 +266,7 @@ static void huge_uvs_are_clipped_and_counted(void **state) {
         assert_true(samples.count > 0 && samples.count <= 64 * 32 * 4);
         for (size_t i = 0; i < samples.count; ++i) {
             const double *p = samples.positions + 3 * i;
-            assert_true(samples.texel[i] < 64 * 32);
+            assert_true(vsh_texel_column(samples.texels[i]) < 64 && vsh_texel_row(samples.texels[i]) < 32);
             assert_true(p[0] >= 0.0 && p[1] >= 0.0 && p[0] + p[1] <= 1.0 + 1e-9 && p[2] == 0.0);
         }
         vsh_texels_free(texels);

@@ -156,9 +156,10 @@ static void a_mirrored_transform_keeps_uvs_on_their_corners(void **state) {
     vsh_texels *texels = create(&q.mesh, 1, size_of(8, 8, 1), NULL);
     const vsh_texel_samples samples = vsh_texels_samples(texels);
     for (size_t i = 0; i < samples.count; ++i) {
-        assert_true(fabs(samples.positions[3 * i] + 2.0 * (samples.texel[i] % 8 + 0.5) / 8) < 1e-12);
-        assert_true(fabs(samples.positions[3 * i + 1] - 3.0 * (1.0 - (samples.texel[i] / 8 + 0.5) / 8)) <
+        assert_true(fabs(samples.positions[3 * i] + 2.0 * (vsh_texel_column(samples.texels[i]) + 0.5) / 8) <
                     1e-12);
+        assert_true(fabs(samples.positions[3 * i + 1] -
+                         3.0 * (1.0 - (vsh_texel_row(samples.texels[i]) + 0.5) / 8)) < 1e-12);
     }
     vsh_texels_free(texels);
 }

@@ -90,7 +90,7 @@ static void a_straight_edge_leaves_the_circular_segment(void **state) {
         }
         vsh_light spot = lights[1];
         spot.type = VSH_LIGHT_SPOT;
-        spot.direction[0] = 1.0; /* where it shines to does not matter */
+        spot.axis[0] = 1.0; /* where it shines to does not matter */
         NEAR(seen(triangles, ORIGIN, UP, &spot, 8192), truth_disc_share(x[i]), 0.003);
         vsh_triangles_free(triangles);
     }

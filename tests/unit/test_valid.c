@@ -126,7 +126,7 @@ static void decals_a_hair_off_a_floor_and_what_lies_under_cloth_are_valid(void *
         const bool up = b.samples.geometric_normals[3 * i + 1] > 0.5f;
         if (up && p[1] > 5e-5 && p[1] < 2e-4) {
             ++decal;
-            assert_true(b.ao[b.samples.texel[i]] > 0.9f);
+            assert_true(b.ao[vsh_texel_place(b.samples.texels[i], SIZE)] > 0.9f);
         }
         cloth += up && p[1] == 0.0 && p[0] > 1.2 && p[0] < 2.8 && p[2] > 1.2 && p[2] < 2.8;
     }
@@ -265,7 +265,8 @@ static void invalid_texels_take_the_nearest_value_of_their_chart(void **state) {
             assert_false(is_valid(&b, i));
             /* half of the sky is hidden beside a wall; nothing is as dark as no value, nor as light as what
              * is far away */
-            assert_true(b.ao[b.samples.texel[i]] > 0.2f && b.ao[b.samples.texel[i]] < 0.85f);
+            assert_true(b.ao[vsh_texel_place(b.samples.texels[i], SIZE)] > 0.2f &&
+                        b.ao[vsh_texel_place(b.samples.texels[i], SIZE)] < 0.85f);
         }
     }
     assert_true(filled > 5000);

@@ -26,7 +26,7 @@ static void write_ball(double voxel) {
     options.voxel_size = voxel;
     vsh_grid *grid = NULL;
     assert_int_equal(vsh_grid_from_sdf(&tree, &options, NULL, &grid, NULL), VSH_OK);
-    assert_int_equal(vsh_grid_write(grid, path, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_grid_write(grid, path, NULL, NULL, 0, NULL), VSH_OK);
     vsh_grid_free(grid);
 }
 

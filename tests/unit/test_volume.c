@@ -337,7 +337,7 @@ static void a_lightmap_and_a_band_agree_where_texel_and_voxel_meet(void **state)
     size_t count = 0, alone = 0;
     for (size_t i = 0; i < samples.count; ++i) {
         const double *p = samples.positions + 3 * i;
-        const uint32_t texel = samples.texel[i];
+        const size_t texel = vsh_texel_place(samples.texels[i], SIDE);
         if (coverage[texel] == 0.0f) {
             continue;
         }

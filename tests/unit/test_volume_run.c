@@ -97,7 +97,7 @@ static void inside_voxels_take_the_nearest_outside_value_or_are_off(void **state
                 const int step[3] = {k / 121 - 5, k / 11 % 11 - 5, k % 11 - 5};
                 size_t n = 0;
                 bool within = true;
-                for (int axis = 0; axis < 3; ++axis) {
+                for (int axis = 2; axis >= 0; --axis) {
                     const int32_t place = at[axis] - d.low[axis] + step[axis];
                     within = within && place >= 0 && place < d.size[axis];
                     n = n * (size_t)d.size[axis] + (size_t)place;
@@ -221,7 +221,7 @@ static void the_same_file_for_any_number_of_threads_and_instruction_set(void **s
                 vsh_volume_info info;
                 vsh_volume_get_info(volume, &info);
                 assert_int_equal(info.grids, m == 0 ? 2 : 4);
-                assert_int_equal(vsh_volume_write(volume, path, 0, NULL), VSH_OK);
+                assert_int_equal(vsh_volume_write(volume, path, 0, NULL, 0, NULL), VSH_OK);
                 vsh_volume_free(volume);
                 unsigned char *bytes;
                 const long size = size_of_file(path, &bytes);
@@ -268,9 +268,9 @@ static void samples_are_interpolated_between_voxels(void **state) {
             continue;
         }
         memcpy(next, index, sizeof next);
-        ++next[2];
+        ++next[0];
         vsh_voxels_centre(voxels, next, b);
-        const double between_them[3] = {a[0], a[1], 0.75 * a[2] + 0.25 * b[2]};
+        const double between_them[3] = {0.75 * a[0] + 0.25 * b[0], a[1], a[2]};
         vsh_volume_sample(volume, 0, 1, between_them, &value, NULL);
         assert_true(fabsf(value - (0.75f * d.values[i] + 0.25f * d.values[i + 1])) < 1e-6f);
     }
@@ -430,7 +430,8 @@ static void bad_boxes_bands_and_options_are_refused(void **state) {
     assert_fails(vsh_bake_volume(NULL, voxels, lights, 1, NULL, NULL, &volume, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "occluders is NULL");
     assert_null(volume);
-    assert_fails(vsh_volume_write(made, "/nowhere/at/all/x.vdb", 0, &failure), VSH_ERROR_WRITE, "/nowhere");
+    assert_fails(vsh_volume_write(made, "/nowhere/at/all/x.vdb", 0, NULL, 0, &failure), VSH_ERROR_WRITE,
+                 "/nowhere");
     vsh_volume_free(made);
     assert_int_equal(vsh_inside("off"), VSH_INSIDE_OFF);
     assert_int_equal(vsh_inside("none"), -1);

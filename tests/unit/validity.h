@@ -144,7 +144,7 @@ static inline void free_baked(baked *b) {
 }
 
 static inline bool is_valid(const baked *b, size_t i) {
-    return b->coverage[b->samples.texel[i]] == 1.0f;
+    return b->coverage[vsh_texel_place(b->samples.texels[i], SIZE)] == 1.0f;
 }
 
 #endif

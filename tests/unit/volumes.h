@@ -42,7 +42,7 @@ static inline vsh_volume *bake(const vsh_occluders *occluders, const vsh_voxels 
     return volume;
 }
 
-/* A grid's values over the voxels' box, z fastest. */
+/* A grid's values over the voxels' box, x fastest. */
 typedef struct dense {
     int32_t low[3], size[3];
     size_t count;
@@ -66,10 +66,10 @@ static inline dense copy_of(const vsh_volume *volume, size_t grid, const vsh_vox
 
 /* Index of the i-th value. */
 static inline void index_of(const dense *d, size_t i, int32_t index[3]) {
-    const size_t row = (size_t)d->size[2], plane = row * (size_t)d->size[1];
-    index[0] = d->low[0] + (int32_t)(i / plane);
+    const size_t row = (size_t)d->size[0], plane = row * (size_t)d->size[1];
+    index[0] = d->low[0] + (int32_t)(i % row);
     index[1] = d->low[1] + (int32_t)(i % plane / row);
-    index[2] = d->low[2] + (int32_t)(i % row);
+    index[2] = d->low[2] + (int32_t)(i / plane);
 }
 
 /* The centres of all of them, [count][3]; to be freed. */

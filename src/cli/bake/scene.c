@@ -319,7 +319,7 @@ static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scen
     if (cli_has_ending(settings->input, "json")) {
         const vsh_run run = cli_common_run(&settings->common);
         vsh_error error;
-        if (vsh_scene_read_run(settings->input, &run, &made->read, &error) != VSH_OK) {
+        if (vsh_scene_read(settings->input, &run, &made->read, &error) != VSH_OK) {
             return cli_fail(&error);
         }
         made->scene = *made->read;

@@ -59,7 +59,7 @@ static int read_both(compare_work *work, images *both) {
     const char *const paths[2] = {work->comparison->golden, work->comparison->fresh};
     for (int which = 0; which < 2; ++which) {
         vsh_error error;
-        if (vsh_image_read_run(paths[which], &work->run, &both->file[which], &error) != VSH_OK) {
+        if (vsh_image_read(paths[which], &work->run, &both->file[which], &error) != VSH_OK) {
             return cli_fail(&error);
         }
         const vsh_image all = vsh_image_view(both->file[which]);

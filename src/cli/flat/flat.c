@@ -331,7 +331,7 @@ static int flat_main(int argc, char **argv) {
     const vsh_run run = cli_common_run(&s.common);
     vsh_flat_scene *scene = NULL;
     vsh_error error;
-    if (vsh_flat_scene_read_run(s.input, &run, &scene, &error) != VSH_OK) {
+    if (vsh_flat_scene_read(s.input, &run, &scene, &error) != VSH_OK) {
         code = cli_fail(&error);
     }
     code = code == CLI_OK ? apply(&s, scene) : code;

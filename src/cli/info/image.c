@@ -30,7 +30,7 @@ static void print_channel(const char *name, const float *plane, size_t count) {
 int cli_info_image(const char *path, const vsh_run *run) {
     vsh_image_file *file = NULL;
     vsh_error error;
-    if (vsh_image_read_run(path, run, &file, &error) != VSH_OK) {
+    if (vsh_image_read(path, run, &file, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     const vsh_image image = vsh_image_view(file);

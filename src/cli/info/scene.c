@@ -70,7 +70,7 @@ static bool print_flat(const char *path, const vsh_run *run) {
     static const char *const casters[] = {"mask", "text", "circle", "box", "polygon"};
     vsh_flat_scene *scene = NULL;
     vsh_error error;
-    if (vsh_flat_scene_read_run(path, run, &scene, &error) != VSH_OK) {
+    if (vsh_flat_scene_read(path, run, &scene, &error) != VSH_OK) {
         return false;
     }
     const vsh_flat_options *o = &scene->options;
@@ -91,7 +91,7 @@ static bool print_flat(const char *path, const vsh_run *run) {
 int cli_info_scene(const char *path, const vsh_run *run) {
     vsh_scene *scene = NULL;
     vsh_error error;
-    if (vsh_scene_read_run(path, run, &scene, &error) != VSH_OK) {
+    if (vsh_scene_read(path, run, &scene, &error) != VSH_OK) {
         return error.code == VSH_ERROR_INPUT && print_flat(path, run) ? CLI_OK : cli_fail(&error);
     }
     for (size_t i = 0; i < scene->caster_count; ++i) {

@@ -102,7 +102,7 @@ static int find_command(const regress_work *work, regress_case *one, const char 
     const vsh_run run = cli_common_run(&work->settings->compare.common);
     vsh_error error;
     vsh_flat_scene *scene = NULL;
-    bool flat = vsh_flat_scene_read_run(path, &run, &scene, &error) == VSH_OK;
+    bool flat = vsh_flat_scene_read(path, &run, &scene, &error) == VSH_OK;
     vsh_flat_scene_free(scene);
     if (!flat && error.code == VSH_ERROR_LIMIT) {
         return cli_fail(&error);
@@ -120,7 +120,7 @@ static int list_scene_outputs(const regress_work *work, regress_case *one, const
     const vsh_run run = cli_common_run(&work->settings->compare.common);
     vsh_error error;
     vsh_scene *scene = NULL;
-    if (vsh_scene_read_run(path, &run, &scene, &error) != VSH_OK) {
+    if (vsh_scene_read(path, &run, &scene, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     bool good = true;
@@ -135,7 +135,7 @@ static int list_flat_output(const regress_work *work, regress_case *one, const c
     const vsh_run run = cli_common_run(&work->settings->compare.common);
     vsh_error error;
     vsh_flat_scene *scene = NULL;
-    if (vsh_flat_scene_read_run(path, &run, &scene, &error) != VSH_OK) {
+    if (vsh_flat_scene_read(path, &run, &scene, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     if (scene->output != NULL) {

@@ -47,7 +47,7 @@ static int add_flat_files(const regress_work *work, const char *path, regress_li
     const vsh_run run = cli_common_run(&work->settings->compare.common);
     vsh_flat_scene *scene = NULL;
     vsh_error error;
-    if (vsh_flat_scene_read_run(path, &run, &scene, &error) != VSH_OK) {
+    if (vsh_flat_scene_read(path, &run, &scene, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     bool good = true;
@@ -88,7 +88,7 @@ static int add_provenance(const regress_work *work, regress_case *one, const cha
     const vsh_run run = cli_common_run(&work->settings->compare.common);
     vsh_scene *scene = NULL;
     vsh_error error;
-    if (!flat && vsh_scene_read_run(path, &run, &scene, &error) != VSH_OK) {
+    if (!flat && vsh_scene_read(path, &run, &scene, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     regress_lines files = {NULL, 0};

@@ -110,7 +110,7 @@ int render_lightmaps_read(const render_settings *s, const vsh_scene *scene, cons
         render_lightmap *map = &lightmaps->maps[i];
         vsh_lit_meshes *lit = &lightmaps->lit[i];
         vsh_error error;
-        if (vsh_image_read_run(s->lightmaps[i], run, &map->file, &error) != VSH_OK) {
+        if (vsh_image_read(s->lightmaps[i], run, &map->file, &error) != VSH_OK) {
             return cli_fail(&error);
         }
         map->image = vsh_image_view(map->file);

@@ -148,7 +148,8 @@ int trade_place_points(trade_work *work) {
     for (size_t r = 0; r < work->receiver_count; ++r) {
         const vsh_texel_samples samples = vsh_texels_samples(work->receivers[r].texels);
         for (size_t i = 0; i < samples.count; ++i) {
-            const size_t texel = work->receivers[r].first + samples.texel[i];
+            const size_t texel =
+                work->receivers[r].first + vsh_texel_place(samples.texels[i], work->receivers[r].info.width);
             if (!work->any[texel]) {
                 continue;
             }

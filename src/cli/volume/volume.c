@@ -269,8 +269,8 @@ static int write_volume(volume_work *work) {
     }
     vsh_error error;
     cli_signals_writing(output);
-    const vsh_result result = vsh_volume_write_with(work->volume, output, work->settings->half,
-                                                    origin.attributes, origin.count, &error);
+    const vsh_result result =
+        vsh_volume_write(work->volume, output, work->settings->half, origin.attributes, origin.count, &error);
     cli_signals_writing(NULL);
     cli_origin_free(&origin);
     cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);

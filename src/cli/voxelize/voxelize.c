@@ -91,7 +91,7 @@ static int write_grid(const voxelize_settings *s, const vsh_scene *scene, const 
     vsh_error error;
     cli_signals_writing(s->output);
     const vsh_result result =
-        vsh_grid_write_with(grid, s->output, s->name, origin.attributes, origin.count, &error);
+        vsh_grid_write(grid, s->output, s->name, origin.attributes, origin.count, &error);
     cli_signals_writing(NULL);
     cli_origin_free(&origin);
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
@@ -153,7 +153,7 @@ static int voxelize_main(int argc, char **argv) {
     if (cli_has_ending(s.input, "json")) {
         const vsh_run run = cli_common_run(&s.common);
         vsh_error error;
-        if (vsh_scene_read_run(s.input, &run, &read, &error) != VSH_OK) {
+        if (vsh_scene_read(s.input, &run, &read, &error) != VSH_OK) {
             return cli_fail(&error);
         }
         scene.casters = read->casters;

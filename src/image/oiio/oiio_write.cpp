@@ -91,7 +91,7 @@ void interleave(const vshi_planes &planes, int32_t first, int32_t last, Value *r
     const size_t begin = static_cast<size_t>(first) * width;
     const size_t texels = static_cast<size_t>(last - first) * width;
     for (size_t c = 0; c < count; ++c) {
-        const vshi_plane &plane = planes.planes[c];
+        const vshi_image_plane &plane = planes.planes[c];
         const bool halve = plane.is_signed && std::is_integral_v<Value>;
         for (size_t i = 0; i < texels; ++i) {
             const float value = vshi_plane_at(&planes, &plane, begin + i);
