@@ -20,6 +20,7 @@
 INIT_SIZED(vsh_bake_job_options, vsh_bake_job_options_default)
 INIT_SIZED(vsh_bake_stats, vsh_bake_stats_zero)
 INIT_SIZED(vsh_camera, vsh_camera_default)
+INIT_SIZED(vsh_compare_files_options, vsh_compare_files_options_default)
 INIT_SIZED(vsh_compare_options, vsh_compare_options_default)
 INIT_SIZED(vsh_field_options, vsh_field_options_default)
 INIT_SIZED(vsh_flat_options, vsh_flat_options_default)

@@ -4,19 +4,8 @@
 #include "cli/temporary.h"
 #include "comparison.h"
 
-#include <math.h>
-
 cli_compare_settings cli_compare_settings_default(void) {
-    cli_compare_settings s = {.common = cli_common_default(),
-                              .coverage = "A",
-                              .max_coverage = NAN,
-                              .threshold = NAN,
-                              .step = NAN,
-                              .noise = NAN,
-                              .reach = -1};
-    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        s.limits[i] = NAN;
-    }
+    cli_compare_settings s = {.common = cli_common_default(), .options = vsh_compare_files_options_default()};
     return s;
 }
 
@@ -24,27 +13,28 @@ int cli_compare_take(cli_compare_settings *s, int key, const char *name, const c
     if (key >= CLI_KEY_LIMIT && key < CLI_KEY_LIMIT + VSH_MEASURE_COUNT) {
         const int32_t measure = key - CLI_KEY_LIMIT;
         const bool least = vsh_measure_at_least(measure) != 0;
-        return cli_take_number(name, value, least ? -1.0 : 0.0, least ? 1.0 : 1e15, &s->limits[measure]);
+        return cli_take_number(name, value, least ? -1.0 : 0.0, least ? 1.0 : 1e15,
+                               &s->options.limits[measure]);
     }
     switch (key) {
     case CLI_KEY_TOLERANCES:
-        s->tolerances = value;
+        s->options.tolerances = value;
         return CLI_OK;
     case CLI_KEY_COVERAGE:
-        s->coverage = value;
+        s->options.coverage = value;
         return CLI_OK;
     case CLI_KEY_MAX_COVERAGE:
-        return cli_take_number(name, value, 0.0, 1.0, &s->max_coverage);
+        return cli_take_number(name, value, 0.0, 1.0, &s->options.coverage_limit);
     case CLI_KEY_THRESHOLD:
-        return cli_take_number(name, value, 0.0, 1.0, &s->threshold);
+        return cli_take_number(name, value, 0.0, 1.0, &s->options.threshold);
     case CLI_KEY_STEP:
-        return cli_take_number(name, value, 1e-6, 1.0, &s->step);
+        return cli_take_number(name, value, 1e-6, 1.0, &s->options.step);
     case CLI_KEY_REACH:
-        return cli_take_integer(name, value, 0, 16, &s->reach);
+        return cli_take_integer(name, value, 0, 16, &s->options.reach);
     case CLI_KEY_NOISE:
-        return cli_take_number(name, value, 0.0, 1.0, &s->noise);
+        return cli_take_number(name, value, 0.0, 1.0, &s->options.noise);
     case CLI_KEY_COMPARE_PADDING:
-        s->padding = true;
+        s->options.padding = 1;
         return CLI_OK;
     case CLI_KEY_JSON:
         s->json = true;
