@@ -1,5 +1,5 @@
 /* A comparison as JSON. */
-#include "cli/utf8.h"
+#include "cli/document.h"
 #include "comparison.h"
 
 #include <math.h>

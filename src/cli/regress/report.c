@@ -1,7 +1,7 @@
 /* What came of the cases: lines, JSON, and the reports that comparisons have. */
 #define _GNU_SOURCE /* asprintf */
+#include "cli/document.h"
 #include "cli/message.h"
-#include "cli/utf8.h"
 #include "regress.h"
 
 #include <stdlib.h>
