@@ -255,7 +255,7 @@ void bench_nanovdb(FILE *csv) {
         subject s = prepare(which, CLEAR_LIFT);
         vdb_nano *nano = vdb_nano_create(s.grid);
         if (nano == NULL) {
-            puts("nanovdb: this program was built without NanoVDB (tools/packages-bench.txt): left out");
+            puts("nanovdb: this program was built without NanoVDB (tools/packages.txt): left out");
             release(&s);
             return;
         }

@@ -35,31 +35,34 @@ function(vsh_set_source_flags target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:C>:-Wconversion -Wno-sign-conversion>)
 endfunction()
 
-# The marching kernels are one source, built once for each instruction set and chosen at run time.
-set(VSH_KERNEL_base_FLAGS "")
-set(VSH_KERNEL_few_FLAGS "")
-set(VSH_KERNEL_avx2_FLAGS -mavx2)
-set(VSH_KERNEL_avx512_FLAGS -mavx512f -mavx512dq -mavx512vl)
+# The kernels are one source each, built once for each instruction set and chosen at run time: lanes at once and in a vector.
+set(VSH_KERNEL_base 16 4)
+set(VSH_KERNEL_few 4 4)
+set(VSH_KERNEL_avx2 16 8 -mavx2)
+set(VSH_KERNEL_avx512 16 16 -mavx512f -mavx512dq -mavx512vl)
 
 function(vsh_add_kernels target)
-  set(folder ${PROJECT_SOURCE_DIR}/src/shade/kernel)
   set(kinds base few)
   if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
     list(APPEND kinds avx2 avx512)
   endif()
-  target_sources(${target} PRIVATE ${folder}/march.c)
+  target_sources(${target} PRIVATE ${PROJECT_SOURCE_DIR}/src/shade/kernel/march.c)
   foreach(kind ${kinds})
-    target_sources(${target} PRIVATE ${folder}/march_${kind}.c)
-    set_source_files_properties(${folder}/march_${kind}.c PROPERTIES
-                                COMPILE_OPTIONS "-O3;${VSH_KERNEL_${kind}_FLAGS}"
-                                OBJECT_DEPENDS ${folder}/lanes.inc)
+    set(flags ${VSH_KERNEL_${kind}})
+    list(POP_FRONT flags lanes width)
+    vsh_add_kernel(${target} march_${kind} shade/kernel/lanes.inc "${flags}"
+                   "#define KERNEL_NAME vshi_kernel_${kind}\n#define MARCH_LANES ${lanes}\n#define MARCH_WIDTH ${width}\n")
+    if(NOT kind STREQUAL few)
+      vsh_add_kernel(${target} walk_${kind} heightfield/kernel/walk.inc "${flags}" "#define WALK_NAME vshi_walk_${kind}\n")
+    endif()
   endforeach()
-  set(folder ${PROJECT_SOURCE_DIR}/src/heightfield/kernel)
-  list(REMOVE_ITEM kinds few)
-  foreach(kind ${kinds})
-    target_sources(${target} PRIVATE ${folder}/walk_${kind}.c)
-    set_source_files_properties(${folder}/walk_${kind}.c PROPERTIES
-                                COMPILE_OPTIONS "-O3;${VSH_KERNEL_${kind}_FLAGS}"
-                                OBJECT_DEPENDS ${folder}/walk.inc)
-  endforeach()
+endfunction()
+
+# vsh_add_kernel(TARGET NAME SOURCE FLAGS DEFINITIONS)
+function(vsh_add_kernel target name source flags definitions)
+  set(file ${PROJECT_BINARY_DIR}/kernels/${name}.c)
+  file(CONFIGURE OUTPUT ${file} CONTENT "${definitions}#include \"${source}\"\n")
+  target_sources(${target} PRIVATE ${file})
+  set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS "-O3;${flags}"
+                              OBJECT_DEPENDS ${PROJECT_SOURCE_DIR}/src/${source})
 endfunction()

@@ -6,7 +6,9 @@
 #ifndef VDBSHADE_COMPARE_H
 #define VDBSHADE_COMPARE_H
 
-#include "base.h"
+#include "image.h"
+
+#include <math.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -166,6 +168,73 @@ VSH_API void vsh_tolerances_free(vsh_tolerances *tolerances); /* NULL does nothi
  * share that may differ). tolerances NULL: nothing. Cannot fail. */
 VSH_API void vsh_tolerances_apply(const vsh_tolerances *tolerances, const char *channel, vsh_limits *limits,
                                   double *coverage);
+
+/* --- two files */
+
+/* What came of a channel of two images, or of a grid of two .vdb files. */
+typedef struct vsh_channel_comparison {
+    char name[VSH_CHANNEL_NAME];
+    int32_t size[3];       /* depth 1: an image */
+    int32_t origin[3];     /* index of the first voxel; 0 in images */
+    int32_t is_coverage;   /* 1: it tells what is covered; the measures are not taken */
+    vsh_coverage coverage; /* of this channel, or this grid's active voxels */
+    double coverage_limit;
+    double max_error[2]; /* that golden and new say they were made to; NaN: they don't */
+    vsh_limits limits;
+    vsh_measures measures;
+    uint32_t failed;                /* as of vsh_compare_judge() */
+    int32_t coverage_failed, alike; /* 1 or 0 */
+} vsh_channel_comparison;
+
+/* NaN, and a reach of -1: what the tolerance file says, else what holds without. */
+typedef struct vsh_compare_files_options {
+    size_t struct_size;
+    const char
+        *tolerances; /* a file as of vsh_tolerances_read(); NULL: GOLDEN.tolerance.json, if it is there */
+    const char *coverage; /* channel of images that tells what is covered; one that is not there: all is */
+    double limits[VSH_MEASURE_COUNT]; /* of all channels */
+    double coverage_limit;            /* covered texels that may be in one file alone, as a share */
+    double threshold, step;           /* as of vsh_compare_options */
+    double noise; /* as of vsh_limits_allow_noise(); NaN: by the max errors of the files where these differ */
+    int32_t reach;   /* as of vsh_compare_options */
+    int32_t padding; /* 1: what is not covered is compared too */
+    /* Sees the values of each channel that was measured, which hold until it returns; `index` is the
+     * channel's. Other than 0 ends the comparison with VSH_ERROR_CANCELLED. May be NULL. */
+    int32_t (*look)(void *user, size_t index, const vsh_channel_comparison *channel,
+                    const vsh_compared *compared);
+    void *user;
+} vsh_compare_files_options;
+
+static inline vsh_compare_files_options vsh_compare_files_options_default(void) {
+    vsh_compare_files_options options = {
+        sizeof(vsh_compare_files_options), NULL, "A", {0}, NAN, NAN, NAN, NAN, -1, 0, NULL, NULL};
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        options.limits[i] = NAN;
+    }
+    return options;
+}
+
+typedef struct vsh_comparison vsh_comparison;
+
+/* Compares two images channel by channel, or two .vdb files grid by grid, over what both cover. That they
+ * are not alike is no error, and neither are other sizes, channels, voxels or formats: those are problems of
+ * the comparison. Free it with vsh_comparison_free(). Files from strangers are for run->reader (base.h).
+ * Errors: as of vsh_tolerances_read(), vsh_image_read_run(), vsh_vdb_copy() and vsh_compare(), and
+ * - VSH_ERROR_ARGUMENT: golden, fresh or comparison NULL, options, run;
+ * - VSH_ERROR_INPUT: more than 4096 grids. */
+VSH_API vsh_result vsh_compare_files(const char *golden, const char *fresh,
+                                     const vsh_compare_files_options *options, const vsh_run *run,
+                                     vsh_comparison **comparison, vsh_error *error);
+
+/* 1: all channels and grids are alike, and there is no problem; 0. */
+VSH_API int32_t vsh_comparison_alike(const vsh_comparison *comparison);
+
+/* Channels, and lines of text that tell of problems, from index 0; NULL behind the last. They belong to the
+ * comparison. */
+VSH_API const vsh_channel_comparison *vsh_comparison_channel(const vsh_comparison *comparison, size_t index);
+VSH_API const char *vsh_comparison_problem(const vsh_comparison *comparison, size_t index);
+
+VSH_API void vsh_comparison_free(vsh_comparison *comparison); /* NULL does nothing */
 
 #ifdef __cplusplus
 }

@@ -65,8 +65,8 @@ vsh_result vshi_output_check(const char *path, vsh_error *error) {
     struct stat status;
     vsh_result result;
     if (stat(folder, &status) != 0 || access(folder, W_OK | X_OK) != 0) {
-        result = vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: folder '%s': %s", path, folder,
-                           strerror(errno));
+        result =
+            vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: its folder: %s", path, strerror(errno));
     } else {
         result = check_target(path, error);
     }

@@ -14,8 +14,8 @@ extern "C" {
 /* Opens a regular file for reading, without waiting: a pipe waits for its writer, a device has no end. *size
  * is its bytes, at most `most`. Messages begin with `name`. Errors: VSH_ERROR_READ, VSH_ERROR_LIMIT (larger
  * than `most`), VSH_ERROR_MEMORY. */
-vsh_result vshi_input_open(const char *path, const char *name, uint64_t most, FILE **file, uint64_t *size,
-                           vsh_error *error);
+VSHI_SHARED vsh_result vshi_input_open(const char *path, const char *name, uint64_t most, FILE **file,
+                                       uint64_t *size, vsh_error *error);
 
 /* Whether a file that `model` names lies in the model's folder or below, links followed; where the model is a
  * link, the folder of what it leads to is as good. A file that is not there lies nowhere else: true. */

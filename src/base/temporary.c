@@ -107,7 +107,8 @@ static bool is_left(int file, long process) {
     return errno != EWOULDBLOCK && errno != EINTR && kill((pid_t)process, 0) != 0 && errno == ESRCH;
 }
 
-void vshi_temporary_clean(const char *target) {
+/* Those of `own`, a process, or (0) those that nobody holds. */
+static void take_away(const char *target, long own) {
     const naming n = naming_of(target);
     char folder[PATH_MAX];
     if (n.folder_length >= PATH_MAX) {
@@ -124,6 +125,12 @@ void vshi_temporary_clean(const char *target) {
         if (process == 0) {
             continue;
         }
+        if (own != 0) {
+            if (process == own) {
+                unlinkat(dirfd(listing), entry->d_name, 0);
+            }
+            continue;
+        }
         const int file =
             openat(dirfd(listing), entry->d_name, O_WRONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
         struct stat status;
@@ -136,4 +143,13 @@ void vshi_temporary_clean(const char *target) {
         }
     }
     closedir(listing);
+}
+
+void vshi_temporary_clean(const char *target) {
+    take_away(target, 0);
+}
+
+void vshi_temporary_remove(const char *path) {
+    char real[PATH_MAX];
+    take_away(realpath(path, real) != NULL ? real : path, (long)getpid());
 }

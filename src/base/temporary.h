@@ -2,6 +2,8 @@
 #ifndef VSHI_TEMPORARY_H
 #define VSHI_TEMPORARY_H
 
+#include "base/shared.h"
+
 #include <stddef.h>
 
 #ifdef __cplusplus
@@ -22,6 +24,9 @@ int vshi_temporary_create(const char *target, char *path, size_t capacity);
  * other machines do; where a file system knows no locks, the process's number does. Others' files, and all
  * that cannot be looked at, stay. */
 void vshi_temporary_clean(const char *target);
+
+/* Removes this process's temporaries of the path, or of what it leads to. */
+VSHI_SHARED void vshi_temporary_remove(const char *path);
 
 #ifdef __cplusplus
 }

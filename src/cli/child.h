@@ -1,9 +1,14 @@
-/* This program in a child process. */
+/* This program's own process, and others of it. */
 #ifndef CLI_CHILD_H
 #define CLI_CHILD_H
 
 /* Runs it in `folder` by the command line `words`, NULL behind the last, and returns its exit code. Where the
  * child dies instead, says so of `what` and returns CLI_DEFECT. */
 int cli_in_child(const char *what, const char *folder, char **words);
+
+/* To be called before any file is read. A reader that a file has taken over is kept by Landlock from the
+ * memory and environment of other processes; where the kernel has none, this process closes its own. That
+ * takes debuggers and core files from it, so it is not done elsewhere. */
+void cli_self_close(void);
 
 #endif

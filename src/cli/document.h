@@ -2,11 +2,15 @@
 #ifndef CLI_DOCUMENT_H
 #define CLI_DOCUMENT_H
 
+#include <jansson.h>
 #include <stdint.h>
 #include <stdio.h>
 
 /* Composes a text in memory and writes it, whole or not at all. CLI_OK or an exit code, having said why. */
 int cli_document_write(const char *path, void (*compose)(FILE *out, const void *user), const void *user);
+
+/* A JSON string, U+FFFD for each byte that is no UTF-8: names come from files; NULL where memory is short. */
+json_t *cli_utf8_json(const char *text);
 
 /* Text within HTML or XML, attributes too: bytes that are no UTF-8 become U+FFFD. */
 void cli_document_escape(FILE *out, const char *text);

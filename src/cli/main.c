@@ -1,8 +1,8 @@
 /* vdbshade: the command line. Which subcommand, and the exit code. */
+#include "child.h"
 #include "commands.h"
 #include "message.h"
 #include "plain.h"
-#include "self.h"
 #include "signals.h"
 #include "warnings.h"
 

@@ -1,7 +1,7 @@
 #include "signals.h"
 
+#include "base/temporary.h"
 #include "message.h"
-#include "temporary.h"
 
 #include <errno.h>
 #include <pthread.h>
@@ -79,7 +79,7 @@ static void *watch(void *unused) {
     }
     pthread_mutex_lock(&ending);
     if (writing != NULL) {
-        cli_temporary_remove(writing);
+        vshi_temporary_remove(writing);
     }
     cli_signals_tell();
     _exit(CLI_INTERRUPTED);

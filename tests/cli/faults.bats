@@ -13,8 +13,8 @@ setup() {
 QUERY=(query box.obj --sun 0.3,1,0.2 --sun-angle 5 --resolution 24 --points points.csv --quiet)
 
 @test "what killed runs have left is taken away by the next, and nothing else" {
-    local mine=(.out.99999999.tmp.exr .out.99999998-3.tmp.exr .stats.json.99999999.tmp)
-    local other=(.out.99999999.tmp.png .out.tmp.exr .out2.99999999.tmp.exr .out.x.tmp.exr .stats.99999999.tmp.json)
+    local mine=(.out.99999999.tmp.exr .out.99999998-3.tmp.exr .stats.99999999.tmp.json)
+    local other=(.out.99999999.tmp.png .out.tmp.exr .out2.99999999.tmp.exr .out.x.tmp.exr .stats.json.99999999.tmp)
     touch "${mine[@]}" "${other[@]}"
     touch .out.99999997.tmp.exr # of a process that another machine knows
     exec 9>.out.99999997.tmp.exr

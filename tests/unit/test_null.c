@@ -301,6 +301,14 @@ static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
     REFUSED(vsh_picture_encode(&picture, SIDE, SIDE, 1.0, no_green, NULL, &error));
     REFUSED(vsh_compare(NULL, NULL, NULL, &measures, &error));
     REFUSED(vsh_compare(&compared, NULL, NULL, NULL, &error));
+    vsh_comparison *comparison;
+    REFUSED(vsh_compare_files(NULL, "new.exr", NULL, NULL, &comparison, &error));
+    REFUSED(vsh_compare_files("golden.exr", NULL, NULL, NULL, &comparison, &error));
+    REFUSED(vsh_compare_files("golden.exr", "new.exr", NULL, NULL, NULL, &error));
+    assert_int_equal(vsh_comparison_alike(NULL), 0);
+    assert_null(vsh_comparison_channel(NULL, 0));
+    assert_null(vsh_comparison_problem(NULL, 0));
+    vsh_comparison_free(NULL);
     vsh_occluders_free(casters);
 }
 

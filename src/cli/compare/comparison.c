@@ -1,43 +1,32 @@
-/* Two files, of one kind or not: images, or grids. */
+/* Two files compared by the library, and pictures of their channels where a page is asked for. */
 #include "comparison.h"
 #include "cli/message.h"
-#include "cli/paths.h"
-#include "comparison_parts.h"
 
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
-#include <unistd.h>
 
-static int read_tolerances(compare_work *work, const char *golden) {
-    char path[4096];
-    const char *file = work->settings->tolerances;
-    if (file == NULL) {
-        if (snprintf(path, sizeof path, "%s.tolerance.json", golden) >= (int)sizeof path ||
-            access(path, F_OK) != 0) {
-            return CLI_OK;
-        }
-        file = path;
-    }
-    vsh_error error;
-    return vsh_tolerances_read(file, &work->tolerances, &error) == VSH_OK ? CLI_OK : cli_fail(&error);
-}
+typedef struct looking {
+    const char *page;
+    cli_comparison *comparison;
+    int code;
+} looking;
 
-/* One name for each format. */
-static const char *format_of(const char *path) {
-    static const struct {
-        const char *ending, *format;
-    } other[] = {{"tiff", "tif"}, {"jpeg", "jpg"},  {"jpe", "jpg"},  {"jif", "jpg"}, {"jfif", "jpg"},
-                 {"jfi", "jpg"},  {"heif", "heic"}, {"rgbe", "hdr"}, {"j2k", "jp2"}};
-    const char *slash = strrchr(path, '/');
-    const char *dot = strrchr(slash != NULL ? slash : path, '.');
-    const char *ending = dot != NULL ? dot + 1 : "";
-    for (size_t i = 0; i < sizeof other / sizeof other[0]; ++i) {
-        if (strcasecmp(other[i].ending, ending) == 0) {
-            return other[i].format;
-        }
+static int32_t look(void *user, size_t index, const vsh_channel_comparison *channel,
+                    const vsh_compared *compared) {
+    looking *l = user;
+    cli_comparison *c = l->comparison;
+    char **more = realloc(c->pictures, (index + 1) * sizeof *more);
+    if (more == NULL) {
+        l->code = cli_out_of_memory(l->page);
+        return 1;
     }
-    return ending;
+    c->pictures = more;
+    while (c->picture_count <= index) {
+        c->pictures[c->picture_count++] = NULL;
+    }
+    c->pictures[index] = cli_comparison_pictures(l->page, channel, compared);
+    l->code = c->pictures[index] != NULL ? CLI_OK : CLI_LIMIT;
+    return l->code;
 }
 
 int cli_comparison_make(const cli_compare_settings *settings, const char *golden, const char *fresh,
@@ -48,21 +37,34 @@ int cli_comparison_make(const cli_compare_settings *settings, const char *golden
     if (c->golden == NULL || c->fresh == NULL) {
         return cli_out_of_memory(golden);
     }
-    compare_work work = {.settings = settings, .run = cli_common_run(&settings->common), .comparison = c};
-    int code = read_tolerances(&work, golden);
-    const bool grids = cli_has_ending(golden, "vdb");
-    const char *was = format_of(golden), *is = format_of(fresh);
-    if (code == CLI_OK && strcasecmp(was, is) != 0 &&
-        !cli_comparison_add_problem(c, "format: golden is '%.100s', new is '%.100s'", was, is)) {
-        code = cli_out_of_memory(golden);
+    const vsh_run run = cli_common_run(&settings->common);
+    looking l = {settings->html, c, CLI_OK};
+    vsh_compare_files_options options = settings->options;
+    options.look = settings->html != NULL ? look : NULL;
+    options.user = &l;
+    vsh_error error;
+    if (vsh_compare_files(golden, fresh, &options, &run, &c->made, &error) != VSH_OK) {
+        return l.code != CLI_OK ? l.code : cli_fail(&error);
     }
-    if (code == CLI_OK && grids == cli_has_ending(fresh, "vdb")) {
-        code = grids ? compare_grids(&work) : compare_images(&work);
+    c->alike = vsh_comparison_alike(c->made) != 0;
+    return CLI_OK;
+}
+
+const char *cli_comparison_problem(const cli_comparison *c, size_t index) {
+    if (c->problem[0] != '\0') {
+        return index == 0 ? c->problem : NULL;
     }
-    c->alike = c->problem_count == 0;
-    for (size_t i = 0; i < c->channel_count; ++i) {
-        c->alike = c->alike && cli_channel_alike(&c->channels[i]);
+    return vsh_comparison_problem(c->made, index);
+}
+
+void cli_comparison_free(cli_comparison *c) {
+    for (size_t i = 0; i < c->picture_count; ++i) {
+        free(c->pictures[i]);
     }
-    vsh_tolerances_free(work.tolerances);
-    return code;
+    free(c->pictures);
+    vsh_comparison_free(c->made);
+    free(c->name);
+    free(c->golden);
+    free(c->fresh);
+    memset(c, 0, sizeof *c);
 }

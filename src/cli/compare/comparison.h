@@ -11,14 +11,8 @@
 
 typedef struct cli_compare_settings {
     cli_common common;
-    const char *tolerances;           /* file; NULL: the golden's own, where there is one */
-    const char *coverage;             /* channel that tells it */
-    double limits[VSH_MEASURE_COUNT]; /* of all channels, over those of the file; NaN: not given */
-    double max_coverage, threshold, step;
-    double noise;  /* NaN: what the files say */
-    int32_t reach; /* -1: not given, as NaN above */
-    bool padding;  /* texels that are not covered are compared too */
-    bool json;     /* on standard output, in place of lines */
+    vsh_compare_files_options options;
+    bool json; /* on standard output, in place of lines */
     const char *junit, *html;
 } cli_compare_settings;
 
@@ -88,30 +82,15 @@ int cli_compare_check_reports(const cli_compare_settings *settings, const char *
 
 /* --- what comes out */
 
-typedef struct cli_channel {
-    char name[VSH_CHANNEL_NAME];
-    int32_t size[3];   /* depth 1: an image */
-    int32_t origin[3]; /* index of the first voxel; 0 in images */
-    bool is_coverage;  /* the measures are not taken */
-    vsh_coverage coverage;
-    double coverage_limit;
-    double max_error[2]; /* that golden and new say they were made to; NaN: they don't */
-    vsh_limits limits;
-    vsh_measures measures;
-    uint32_t failed; /* bits of measures */
-    bool coverage_failed;
-    char *pictures; /* HTML; NULL: none */
-} cli_channel;
-
 enum { CLI_PROBLEM = 320 };
 
 typedef struct cli_comparison {
     char *name; /* of a scene; NULL: the files' */
     char *golden, *fresh;
-    cli_channel *channels;
-    size_t channel_count;
-    char (*problems)[CLI_PROBLEM]; /* other sizes, channels, units, formats */
-    size_t problem_count;
+    vsh_comparison *made; /* NULL: nothing was compared */
+    char **pictures;      /* [picture_count]: HTML of each channel; NULL: none */
+    size_t picture_count;
+    char problem[CLI_PROBLEM]; /* that is none of the files'; "": none */
     bool alike;
 } cli_comparison;
 
@@ -120,19 +99,16 @@ int cli_comparison_make(const cli_compare_settings *settings, const char *golden
                         cli_comparison *comparison);
 void cli_comparison_free(cli_comparison *comparison);
 
-/* Adds what is not alike without being values. False where memory is short. */
-bool cli_comparison_add_problem(cli_comparison *comparison, const char *format, ...)
-    __attribute__((format(printf, 2, 3)));
-
-bool cli_channel_alike(const cli_channel *channel);
+/* What is not alike without being values, from index 0; NULL behind the last. */
+const char *cli_comparison_problem(const cli_comparison *comparison, size_t index);
 
 /* --- how it is told */
 
 /* What is wrong with a channel in words, by what names the fault best first; "" where nothing is. */
-void cli_channel_explain(const cli_channel *channel, char *text, size_t capacity);
+void cli_channel_explain(const vsh_channel_comparison *channel, char *text, size_t capacity);
 
 /* Place of a value: "(3, 4)". */
-const char *cli_channel_place(const cli_channel *channel, uint64_t index, char text[64]);
+const char *cli_channel_place(const vsh_channel_comparison *channel, uint64_t index, char text[64]);
 
 /* A line a channel and problem, each after `prefix`. */
 void cli_comparison_print(FILE *out, const cli_comparison *comparison, const char *prefix);
@@ -146,6 +122,7 @@ int cli_comparison_report(const cli_compare_settings *settings, const cli_compar
 
 /* Golden, new and difference as HTML; `page` is where it will stand. NULL where memory is short or, having
  * said why, a file could not be written. */
-char *cli_comparison_pictures(const char *page, const cli_channel *channel, const vsh_compared *compared);
+char *cli_comparison_pictures(const char *page, const vsh_channel_comparison *channel,
+                              const vsh_compared *compared);
 
 #endif

@@ -1,5 +1,5 @@
 /* A comparison as JSON. */
-#include "cli/utf8.h"
+#include "cli/document.h"
 #include "comparison.h"
 
 #include <math.h>
@@ -8,14 +8,14 @@ static json_t *number(double value) {
     return isfinite(value) ? json_real(value) : json_null();
 }
 
-static json_t *place(const cli_channel *channel, uint64_t index) {
+static json_t *place(const vsh_channel_comparison *channel, uint64_t index) {
     const uint64_t width = (uint64_t)channel->size[0], height = (uint64_t)channel->size[1];
     const json_int_t x = (json_int_t)(index % width), y = (json_int_t)(index / width % height);
     const json_int_t z = (json_int_t)(index / width / height);
     return json_pack("[I,I,I]", x + channel->origin[0], y + channel->origin[1], z + channel->origin[2]);
 }
 
-static json_t *region(const cli_channel *channel, const vsh_region *r) {
+static json_t *region(const vsh_channel_comparison *channel, const vsh_region *r) {
     if (r->count == 0) {
         return json_null();
     }
@@ -28,13 +28,13 @@ static json_t *region(const cli_channel *channel, const vsh_region *r) {
                      place(channel, r->worst), "by", r->by, "min", min, "max", max);
 }
 
-static json_t *nonfinite(const cli_channel *channel, int which) {
+static json_t *nonfinite(const vsh_channel_comparison *channel, int which) {
     const vsh_measures *m = &channel->measures;
     return json_pack("{s:I,s:o}", "count", (json_int_t)m->nonfinite[which], "first",
                      m->nonfinite[which] > 0 ? place(channel, m->nonfinite_first[which]) : json_null());
 }
 
-static void set_measures(json_t *root, const cli_channel *channel) {
+static void set_measures(json_t *root, const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     json_t *values = json_object(), *limits = json_object(), *failed = json_array();
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
@@ -73,17 +73,17 @@ static void set_measures(json_t *root, const cli_channel *channel) {
     json_object_set_new(root, "gained", region(channel, &m->gained));
 }
 
-static json_t *coverage(const cli_channel *channel) {
+static json_t *coverage(const vsh_channel_comparison *channel) {
     const vsh_coverage *c = &channel->coverage;
     return json_pack("{s:I,s:I,s:I,s:f,s:f}", "golden", (json_int_t)c->golden, "new", (json_int_t)c->values,
                      "differs", (json_int_t)c->differs, "share", c->share, "limit", channel->coverage_limit);
 }
 
-static json_t *describe(const cli_channel *channel) {
+static json_t *describe(const vsh_channel_comparison *channel) {
     char what[2048];
     cli_channel_explain(channel, what, sizeof what);
-    json_t *root = json_pack("{s:o,s:b,s:o}", "name", cli_utf8_json(channel->name), "alike",
-                             cli_channel_alike(channel), "what", cli_utf8_json(what));
+    json_t *root = json_pack("{s:o,s:b,s:o}", "name", cli_utf8_json(channel->name), "alike", channel->alike,
+                             "what", cli_utf8_json(what));
     if (root != NULL && (channel->is_coverage || channel->coverage.golden + channel->coverage.values > 0)) {
         json_object_set_new(root, "coverage", coverage(channel));
     }
@@ -99,11 +99,13 @@ static json_t *path(const char *name) {
 
 json_t *cli_comparison_json(const cli_comparison *c) {
     json_t *problems = json_array(), *channels = json_array();
-    for (size_t i = 0; i < c->problem_count; ++i) {
-        json_array_append_new(problems, cli_utf8_json(c->problems[i]));
+    const char *problem;
+    const vsh_channel_comparison *channel;
+    for (size_t i = 0; (problem = cli_comparison_problem(c, i)) != NULL; ++i) {
+        json_array_append_new(problems, cli_utf8_json(problem));
     }
-    for (size_t i = 0; i < c->channel_count; ++i) {
-        json_array_append_new(channels, describe(&c->channels[i]));
+    for (size_t i = 0; (channel = vsh_comparison_channel(c->made, i)) != NULL; ++i) {
+        json_array_append_new(channels, describe(channel));
     }
     return json_pack("{s:o,s:o,s:b,s:o,s:o}", "golden", path(c->golden), "new", path(c->fresh), "alike",
                      c->alike, "problems", problems, "channels", channels);

@@ -87,7 +87,7 @@ static int write_picture(FILE *out, const char *page, const view *v, int what) {
 }
 
 /* The scale of greys, from 0 to 1 where that is what there is; and of differences, up to a round number. */
-static void set_scales(view *v, const cli_channel *channel) {
+static void set_scales(view *v, const vsh_channel_comparison *channel) {
     const vsh_compared *c = v->compared;
     const size_t count = (size_t)c->size[0] * (size_t)c->size[1] * (size_t)c->size[2];
     v->least = 0.0;
@@ -122,7 +122,8 @@ static void write_scale(FILE *out, const view *v, int what) {
     }
 }
 
-char *cli_comparison_pictures(const char *page, const cli_channel *channel, const vsh_compared *compared) {
+char *cli_comparison_pictures(const char *page, const vsh_channel_comparison *channel,
+                              const vsh_compared *compared) {
     static const char *const what[PICTURES] = {"golden", "new", "difference"};
     const int32_t w = compared->size[0], h = compared->size[1], longest = w > h ? w : h;
     const int32_t most = longest < LONGEST ? longest : LONGEST;

@@ -17,12 +17,15 @@ static const char *name_of(const cli_comparison *c) {
 
 /* --- JUnit (the schema of Ant's and Jenkins' reports) */
 
-static size_t failures_of(const cli_comparison *c) {
-    size_t failures = c->problem_count > 0;
-    for (size_t i = 0; i < c->channel_count; ++i) {
-        failures += !cli_channel_alike(&c->channels[i]);
+/* A test of the files, and one of each channel. */
+static size_t count_tests(const cli_comparison *c, size_t *failures) {
+    const vsh_channel_comparison *channel;
+    size_t tests = 1;
+    *failures += cli_comparison_problem(c, 0) != NULL;
+    for (; (channel = vsh_comparison_channel(c->made, tests - 1)) != NULL; ++tests) {
+        *failures += !channel->alike;
     }
-    return failures;
+    return tests;
 }
 
 static void write_case(FILE *out, const cli_comparison *c, const char *name, const char *failure) {
@@ -43,8 +46,7 @@ static void write_junit(FILE *out, const void *user) {
     const all *a = user;
     size_t tests = 0, failures = 0;
     for (size_t i = 0; i < a->count; ++i) {
-        tests += a->comparisons[i].channel_count + 1;
-        failures += failures_of(&a->comparisons[i]);
+        tests += count_tests(&a->comparisons[i], &failures);
     }
     fprintf(out, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites tests=\"%zu\" failures=\"%zu\">\n",
             tests, failures);
@@ -52,19 +54,21 @@ static void write_junit(FILE *out, const void *user) {
         const cli_comparison *c = &a->comparisons[i];
         fputs("  <testsuite name=\"", out);
         cli_document_escape(out, name_of(c));
-        fprintf(out, "\" tests=\"%zu\" failures=\"%zu\" errors=\"0\">\n", c->channel_count + 1,
-                failures_of(c));
+        failures = 0;
+        tests = count_tests(c, &failures);
+        fprintf(out, "\" tests=\"%zu\" failures=\"%zu\" errors=\"0\">\n", tests, failures);
+        const char *problem;
+        const vsh_channel_comparison *channel;
         char text[2048];
         size_t used = 0;
         text[0] = '\0';
-        for (size_t k = 0; k < c->problem_count && used < sizeof text; ++k) {
-            used +=
-                (size_t)snprintf(text + used, sizeof text - used, "%s%s", k > 0 ? "; " : "", c->problems[k]);
+        for (size_t k = 0; (problem = cli_comparison_problem(c, k)) != NULL && used < sizeof text; ++k) {
+            used += (size_t)snprintf(text + used, sizeof text - used, "%s%s", k > 0 ? "; " : "", problem);
         }
         write_case(out, c, "files", text);
-        for (size_t k = 0; k < c->channel_count; ++k) {
-            cli_channel_explain(&c->channels[k], text, sizeof text);
-            write_case(out, c, c->channels[k].name, text);
+        for (size_t k = 0; (channel = vsh_comparison_channel(c->made, k)) != NULL; ++k) {
+            cli_channel_explain(channel, text, sizeof text);
+            write_case(out, c, channel->name, text);
         }
         fputs("  </testsuite>\n", out);
     }
@@ -95,7 +99,7 @@ static const char *verdict(bool alike) {
     return alike ? "<span class=\"good\">alike</span>" : "<span class=\"bad\">not alike</span>";
 }
 
-static void write_measures(FILE *out, const cli_channel *channel) {
+static void write_measures(FILE *out, const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     fputs("<div class=\"wide\"><table><tr><th>measure</th>", out);
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
@@ -125,12 +129,12 @@ static void write_measures(FILE *out, const cli_channel *channel) {
     fputs("</p>\n", out);
 }
 
-static void write_channel(FILE *out, const cli_channel *channel) {
+static void write_channel(FILE *out, const vsh_channel_comparison *channel, const char *pictures) {
     char what[2048];
     cli_channel_explain(channel, what, sizeof what);
     fputs("<h3>", out);
     cli_document_escape(out, channel->name);
-    fprintf(out, ": %s</h3>\n", verdict(cli_channel_alike(channel)));
+    fprintf(out, ": %s</h3>\n", verdict(channel->alike));
     if (what[0] != '\0') {
         fputs("<p>", out);
         cli_document_escape(out, what);
@@ -143,7 +147,7 @@ static void write_channel(FILE *out, const cli_channel *channel) {
                 channel->coverage.golden, channel->coverage.values, channel->coverage.differs);
         return;
     }
-    fputs(channel->pictures != NULL ? channel->pictures : "", out);
+    fputs(pictures != NULL ? pictures : "", out);
     if (channel->measures.count > 0) {
         write_measures(out, channel);
     }
@@ -166,13 +170,15 @@ static void write_page(FILE *out, const void *user) {
             fputs("</code>", out);
         }
         fputs("</p>\n", out);
-        for (size_t k = 0; k < c->problem_count; ++k) {
+        const char *problem;
+        for (size_t k = 0; (problem = cli_comparison_problem(c, k)) != NULL; ++k) {
             fputs("<p class=\"bad\">", out);
-            cli_document_escape(out, c->problems[k]);
+            cli_document_escape(out, problem);
             fputs("</p>\n", out);
         }
-        for (size_t k = 0; k < c->channel_count; ++k) {
-            write_channel(out, &c->channels[k]);
+        const vsh_channel_comparison *channel;
+        for (size_t k = 0; (channel = vsh_comparison_channel(c->made, k)) != NULL; ++k) {
+            write_channel(out, channel, k < c->picture_count ? c->pictures[k] : NULL);
         }
     }
     fprintf(

@@ -27,7 +27,7 @@ static void __attribute__((format(printf, 2, 3))) add(text *t, const char *forma
     t->left -= used;
 }
 
-const char *cli_channel_place(const cli_channel *channel, uint64_t index, char place[64]) {
+const char *cli_channel_place(const vsh_channel_comparison *channel, uint64_t index, char place[64]) {
     const uint64_t width = (uint64_t)channel->size[0], height = (uint64_t)channel->size[1];
     const int64_t x = (int64_t)(index % width) + channel->origin[0];
     const int64_t y = (int64_t)(index / width % height) + channel->origin[1];
@@ -40,11 +40,11 @@ const char *cli_channel_place(const cli_channel *channel, uint64_t index, char p
     return place;
 }
 
-static const char *texel(const cli_channel *channel) {
+static const char *texel(const vsh_channel_comparison *channel) {
     return channel->size[2] == 1 && channel->origin[2] == 0 ? "texel" : "voxel";
 }
 
-static void add_nonfinite(text *t, const cli_channel *channel) {
+static void add_nonfinite(text *t, const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     char place[64];
     for (int which = 0; which < 2; ++which) {
@@ -57,7 +57,7 @@ static void add_nonfinite(text *t, const cli_channel *channel) {
     }
 }
 
-static void add_region(text *t, const cli_channel *channel, const vsh_region *region, double limit,
+static void add_region(text *t, const vsh_channel_comparison *channel, const vsh_region *region, double limit,
                        const char *caster) {
     const uint32_t others = UINT32_C(1) << VSH_MEASURE_SHIFT | UINT32_C(1) << VSH_MEASURE_PENUMBRA;
     char place[64];
@@ -67,7 +67,7 @@ static void add_region(text *t, const cli_channel *channel, const vsh_region *re
         (channel->failed & others) == 0 ? caster : "", limit);
 }
 
-static void add_shift(text *t, const cli_channel *channel) {
+static void add_shift(text *t, const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     add(t, "shifted by (%.2f, %.2f", m->shift[0], m->shift[1]);
     if (channel->size[2] > 1) {
@@ -77,13 +77,13 @@ static void add_shift(text *t, const cli_channel *channel) {
         channel->limits.value[VSH_MEASURE_SHIFT]);
 }
 
-static void add_penumbra(text *t, const cli_channel *channel) {
+static void add_penumbra(text *t, const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     add(t, "penumbrae %.3f times as wide, %.2f for %.2f %ss (limit ±%g %%)", m->width[1] / m->width[0],
         m->width[1], m->width[0], texel(channel), 100.0 * channel->limits.value[VSH_MEASURE_PENUMBRA]);
 }
 
-static void add_failure(text *t, const cli_channel *channel, int measure) {
+static void add_failure(text *t, const vsh_channel_comparison *channel, int measure) {
     const vsh_measures *m = &channel->measures;
     const double limit = channel->limits.value[measure];
     switch (measure) {
@@ -107,7 +107,7 @@ static void add_failure(text *t, const cli_channel *channel, int measure) {
     }
 }
 
-void cli_channel_explain(const cli_channel *channel, char *out, size_t capacity) {
+void cli_channel_explain(const vsh_channel_comparison *channel, char *out, size_t capacity) {
     text t = {out, capacity};
     out[0] = '\0';
     if (channel->coverage_failed) {
@@ -138,7 +138,7 @@ void cli_channel_explain(const cli_channel *channel, char *out, size_t capacity)
 
 /* --- lines */
 
-static void print_measures(FILE *out, const cli_channel *channel) {
+static void print_measures(FILE *out, const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     char place[64];
     fprintf(out, "; rmse %.3g, bias %+.2g, max %.3g at %s, p99 %.3g, share %.3g, ssim %.5g",
@@ -160,7 +160,7 @@ static void print_measures(FILE *out, const cli_channel *channel) {
             m->lost.count, m->gained.count);
 }
 
-static void print_noise(FILE *out, const cli_channel *channel) {
+static void print_noise(FILE *out, const vsh_channel_comparison *channel) {
     const double *made_to = channel->max_error;
     fprintf(out, "; noise of %.3g is allowed for", channel->limits.options.noise);
     if (!isnan(made_to[0]) && !isnan(made_to[1])) {
@@ -168,10 +168,10 @@ static void print_noise(FILE *out, const cli_channel *channel) {
     }
 }
 
-static void print_channel(FILE *out, const cli_channel *channel) {
+static void print_channel(FILE *out, const vsh_channel_comparison *channel) {
     char what[2048];
     cli_channel_explain(channel, what, sizeof what);
-    fprintf(out, "%s: %s%s%s", channel->name, cli_channel_alike(channel) ? "alike" : "not alike",
+    fprintf(out, "%s: %s%s%s", channel->name, channel->alike ? "alike" : "not alike",
             what[0] != '\0' ? ": " : "", what);
     if (!channel->is_coverage && channel->limits.options.noise > 0.0) {
         print_noise(out, channel);
@@ -185,12 +185,14 @@ static void print_channel(FILE *out, const cli_channel *channel) {
 }
 
 void cli_comparison_print(FILE *out, const cli_comparison *c, const char *prefix) {
-    for (size_t i = 0; i < c->problem_count; ++i) {
-        fprintf(out, "%snot alike: %s\n", prefix, c->problems[i]);
+    const char *problem;
+    const vsh_channel_comparison *channel;
+    for (size_t i = 0; (problem = cli_comparison_problem(c, i)) != NULL; ++i) {
+        fprintf(out, "%snot alike: %s\n", prefix, problem);
     }
-    for (size_t i = 0; i < c->channel_count; ++i) {
+    for (size_t i = 0; (channel = vsh_comparison_channel(c->made, i)) != NULL; ++i) {
         fputs(prefix, out);
-        print_channel(out, &c->channels[i]);
+        print_channel(out, channel);
         fputc('\n', out);
     }
 }

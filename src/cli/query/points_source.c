@@ -1,6 +1,6 @@
 #include "points_source.h"
 
-#include "cli/input.h"
+#include "base/input.h"
 #include "cli/message.h"
 
 #include <errno.h>
@@ -13,18 +13,22 @@ enum { ROOM = 1 << 18, MOST = 1 << 26 /* bytes of a line */ };
 
 int points_source_open(const char *path, points_source *source) {
     const bool standard = strcmp(path, "-") == 0;
-    *source = (points_source){.name = standard ? "standard input" : path, .file = -1, .room = ROOM};
-    const char *why = "it is a folder";
-    source->file = standard ? STDIN_FILENO : cli_input_open(path, UINT64_MAX, &why);
+    *source = (points_source){.name = standard ? "standard input" : path, .room = ROOM};
     struct stat status;
-    if (source->file < 0 || fstat(source->file, &status) != 0 || S_ISDIR(status.st_mode)) {
-        cli_say("%s: cannot be read: %s%s", source->name, why,
-                standard || stat(path, &status) != 0 || S_ISREG(status.st_mode) || S_ISDIR(status.st_mode)
-                    ? ""
-                    : "; a pipe is read as standard input, by --points -");
+    vsh_error error;
+    if (!standard &&
+        vshi_input_open(path, path, UINT64_MAX, &source->file, &source->size, &error) != VSH_OK) {
+        const bool waits = stat(path, &status) == 0 && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
+        cli_say("%s%s", error.message, waits ? "; a pipe is read as standard input, by --points -" : "");
         return CLI_FILE;
     }
-    source->size = S_ISREG(status.st_mode) ? (uint64_t)status.st_size : 0;
+    if (standard && (fstat(STDIN_FILENO, &status) != 0 || S_ISDIR(status.st_mode))) {
+        cli_say("%s: cannot be read: it is a folder", source->name);
+        return CLI_FILE;
+    }
+    if (standard && S_ISREG(status.st_mode)) {
+        source->size = (uint64_t)status.st_size;
+    }
     source->buffer = malloc(source->room);
     if (source->buffer == NULL) {
         cli_say("%s: the system refused memory", source->name);
@@ -34,12 +38,12 @@ int points_source_open(const char *path, points_source *source) {
 }
 
 void points_source_close(points_source *source) {
-    if (source->file > STDIN_FILENO) {
-        close(source->file);
+    if (source->file != NULL) {
+        fclose(source->file);
     }
     free(source->buffer);
     source->buffer = NULL;
-    source->file = -1;
+    source->file = NULL;
 }
 
 /* Some more bytes behind those that there are, which may move. */
@@ -60,7 +64,7 @@ static int fill(points_source *s) {
     }
     ssize_t got;
     do {
-        got = read(s->file, s->buffer + s->end, s->room - s->end);
+        got = read(s->file != NULL ? fileno(s->file) : STDIN_FILENO, s->buffer + s->end, s->room - s->end);
     } while (got < 0 && errno == EINTR);
     if (got < 0) {
         cli_say("%s: cannot be read: %s", s->name, strerror(errno));

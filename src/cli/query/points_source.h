@@ -5,10 +5,11 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 typedef struct points_source {
     const char *name; /* for messages */
-    int file;
+    FILE *file;       /* NULL: standard input */
     bool ended;
     char *buffer;
     size_t begin, end, room;

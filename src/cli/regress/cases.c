@@ -1,7 +1,7 @@
 /* What there is to bake in a folder: its scenes, and what its regress.json says of them. */
 #define _GNU_SOURCE /* asprintf */
+#include "base/input.h"
 #include "cli/commands.h"
-#include "cli/input.h"
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "regress.h"
@@ -11,6 +11,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include <vdbshade/flat.h>
 
 static const char list_name[] = "regress.json";
@@ -83,12 +84,13 @@ static const char *last_part(const char *path) {
 /* --- what a scene writes */
 
 static json_t *load(const char *path, uint64_t most) {
-    const char *why;
-    FILE *file = cli_input_stream(path, most, &why);
-    json_t *root = file != NULL ? json_loadf(file, 0, NULL) : NULL;
-    if (file != NULL) {
-        fclose(file);
+    FILE *file;
+    uint64_t size;
+    if (vshi_input_open(path, path, most, &file, &size, NULL) != VSH_OK) {
+        return NULL;
     }
+    json_t *root = json_loadf(file, 0, NULL);
+    fclose(file);
     return root;
 }
 
@@ -259,18 +261,15 @@ static int read_list(regress_work *work) {
     if (path == NULL) {
         return no_memory(work);
     }
-    const char *why;
-    errno = 0;
-    FILE *file = cli_input_stream(path, MOST_BYTES, &why);
-    int code = CLI_OK;
-    if (file == NULL) {
-        if (errno != ENOENT) {
-            cli_say("%s: cannot be read: %s", path, why);
-            code = CLI_FILE;
-        }
+    FILE *file;
+    uint64_t size;
+    vsh_error error;
+    if (vshi_input_open(path, path, MOST_BYTES, &file, &size, &error) != VSH_OK) {
+        const int failed = access(path, F_OK) != 0 && errno == ENOENT ? CLI_OK : cli_fail(&error);
         free(path);
-        return code;
+        return failed;
     }
+    int code = CLI_OK;
     json_error_t where;
     json_t *root = json_loadf(file, JSON_REJECT_DUPLICATES, &where);
     fclose(file);

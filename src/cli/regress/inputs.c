@@ -29,11 +29,11 @@ static int add_digest(const regress_work *work, regress_case *one, const char *w
 
 /* The limits of the command line, which are over those of files. */
 static int add_limits(const regress_work *work, regress_case *one) {
-    const cli_compare_settings *s = &work->settings->compare;
+    const vsh_compare_files_options *s = &work->settings->compare.options;
     bool good = regress_lines_add(&one->inputs, "coverage: %s, at most %.9g, padding %d", s->coverage,
-                                  s->max_coverage, s->padding);
-    good = good && regress_lines_add(&one->inputs, "threshold %.9g, step %.9g, reach %d", s->threshold,
-                                     s->step, s->reach);
+                                  s->coverage_limit, s->padding);
+    good = good && regress_lines_add(&one->inputs, "threshold %.9g, step %.9g, reach %d, noise %.9g",
+                                     s->threshold, s->step, s->reach, s->noise);
     for (int i = 0; i < VSH_MEASURE_COUNT && good; ++i) {
         if (!isnan(s->limits[i])) {
             good = regress_lines_add(&one->inputs, "limit of %s: %.9g", vsh_measure_name(i), s->limits[i]);
@@ -136,7 +136,7 @@ static int add_golden(const regress_work *work, regress_case *one) {
             free(path);
         }
     }
-    const char *tolerances = work->settings->compare.tolerances;
+    const char *tolerances = work->settings->compare.options.tolerances;
     return code == CLI_OK && tolerances != NULL ? add_digest(work, one, "tolerances", tolerances) : code;
 }
 

@@ -1,7 +1,7 @@
 /* What came of the cases: lines, JSON, and the reports that comparisons have. */
 #define _GNU_SOURCE /* asprintf */
+#include "cli/document.h"
 #include "cli/message.h"
-#include "cli/utf8.h"
 #include "regress.h"
 
 #include <stdlib.h>
@@ -18,14 +18,16 @@ static void print_updated(const cli_comparison *c, const char *output) {
         return;
     }
     printf("  %s: is the golden bake now; the one before differed:\n", output);
-    for (size_t i = 0; i < c->problem_count; ++i) {
-        printf("    %s\n", c->problems[i]);
+    const char *problem;
+    const vsh_channel_comparison *channel;
+    for (size_t i = 0; (problem = cli_comparison_problem(c, i)) != NULL; ++i) {
+        printf("    %s\n", problem);
     }
-    for (size_t i = 0; i < c->channel_count; ++i) {
+    for (size_t i = 0; (channel = vsh_comparison_channel(c->made, i)) != NULL; ++i) {
         char what[2048];
-        cli_channel_explain(&c->channels[i], what, sizeof what);
+        cli_channel_explain(channel, what, sizeof what);
         if (what[0] != '\0') {
-            printf("    %s: %s\n", c->channels[i].name, what);
+            printf("    %s: %s\n", channel->name, what);
         }
     }
 }
@@ -90,8 +92,8 @@ static int write_files(const regress_work *work) {
                 good = asprintf(&c->name, "%s/%s", one->name, one->outputs.line[k]) >= 0;
                 c->alike = one->status == REGRESS_UNCHANGED;
             }
-            if (good && one->status == REGRESS_FAILED && c->problem_count == 0) {
-                good = cli_comparison_add_problem(c, "the bake ended with exit code %d", one->code);
+            if (one->status == REGRESS_FAILED && cli_comparison_problem(c, 0) == NULL) {
+                snprintf(c->problem, sizeof c->problem, "the bake ended with exit code %d", one->code);
             }
             all[at++] = *c;
         }

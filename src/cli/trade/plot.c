@@ -1,4 +1,5 @@
-#include "plot.h"
+/* Error against time, as a picture. */
+#include "trade.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,9 +1,9 @@
 /* The report: one page that needs nothing beside it, and the same numbers as CSV. */
 #include "cli/document.h"
 #include "cli/message.h"
-#include "parts.h"
-#include "plot.h"
+#include "trade.h"
 
+#include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -197,6 +197,35 @@ static void write_page(FILE *out, const void *user) {
           out);
 }
 
+/* --- the table as CSV: what the page shows, with every digit */
+
+/* covered: texels under charts; invalid: of them, those that a bake of this voxel size marks so; left_out:
+ * valid ones that are invalid at another of the voxel sizes; texels: the rest, measured, the same in all
+ * rows. */
+static const char row_names[] = "subject,method,options,resolution,build_s,bake_s,us_per_value,bytes,covered,"
+                                "invalid,left_out,texels,rmse,"
+                                "penumbra_rmse,bias,p95,p99,max,width_error,certified,front,valid_rmse\n";
+
+static void write_rows(FILE *out, const void *user) {
+    const trade_work *work = user;
+    fputs(row_names, out);
+    for (size_t s = 0; s < work->subject_count; ++s) {
+        const trade_subject *subject = &work->subjects[s];
+        for (size_t i = 0; i < subject->run_count; ++i) {
+            const trade_run *r = &subject->runs[i];
+            const trade_metrics *m = &r->metrics;
+            fprintf(out, "%s,%s,%s,%d,%.6g,%.6g,%.6g,%" PRIu64 ",%zu,%zu,%zu,%zu,", subject->name, r->method,
+                    r->options, r->resolution, r->build_s, r->bake_s, r->rate, r->bytes, work->covered,
+                    work->covered - r->valid, r->valid - work->common_count, work->common_count);
+            fprintf(out, "%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,", m->rmse, m->penumbra_rmse, m->bias, m->p95, m->p99,
+                    m->max);
+            fprintf(out, isnan(m->width_error) ? "," : "%.6f,", m->width_error);
+            fprintf(out, isnan(r->certified) ? "," : "%.6f,", r->certified);
+            fprintf(out, "%d,%.6f\n", r->front, r->valid_rmse);
+        }
+    }
+}
+
 /* Of the shadow, or of AO where there are no lights. */
 static void write_picture(FILE *out, const void *user) {
     const trade_work *work = user;
@@ -208,8 +237,7 @@ int trade_write_report(const trade_work *work) {
 }
 
 int trade_write_csv(const trade_work *work) {
-    return work->settings->csv != NULL ? cli_document_write(work->settings->csv, trade_rows_write, work)
-                                       : CLI_OK;
+    return work->settings->csv != NULL ? cli_document_write(work->settings->csv, write_rows, work) : CLI_OK;
 }
 
 int trade_write_plot(const trade_work *work) {

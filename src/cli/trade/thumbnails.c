@@ -1,6 +1,6 @@
 /* Small pictures of truth, bake and difference. */
 #include "cli/document.h"
-#include "parts.h"
+#include "trade.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -4,6 +4,8 @@
 
 #include "cli/bake/options.h"
 
+#include <stdio.h>
+
 enum { TRADE_MAX_RESOLUTIONS = 16 };
 
 typedef struct trade_settings {
@@ -139,5 +141,17 @@ int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh
  */
 int trade_compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask, size_t valid,
                   trade_run *run);
+
+/* --- parts of the report */
+
+/* Options as code, to be broken between them only. */
+void trade_options_write(FILE *out, const char *options);
+
+/* Truth, bake and difference of each run on the front, for the first receivers; ends the paragraph before. */
+void trade_thumbnails_write(FILE *out, const trade_work *work, const trade_subject *subject);
+
+/* Writes an SVG, to stand in a page or alone: RMSE over time, both logarithmic; the runs of a method at a
+ * voxel size, the Pareto front and Embree's rays as lines. */
+void trade_plot_write(FILE *out, const trade_work *work, const trade_subject *subject);
 
 #endif

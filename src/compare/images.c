@@ -1,6 +1,7 @@
 /* Images: their channels by name, over the texels that both cover. */
-#include "cli/message.h"
-#include "comparison_parts.h"
+#include "base/memory.h"
+#include "base/try.h"
+#include "compare/files.h"
 
 #include <stdbool.h>
 #include <stdlib.h>
@@ -9,7 +10,7 @@
 typedef struct images {
     vsh_image_file *file[2]; /* golden, new */
     vsh_image image[2];
-    compare_texts texts[2];
+    vshi_texts texts[2];
     const char *names[2][VSH_MAX_CHANNELS]; /* of the images */
     const float *planes[2][VSH_MAX_CHANNELS];
     uint8_t *mask; /* of the texels to be compared */
@@ -55,36 +56,30 @@ static void view(images *both, int which) {
     }
 }
 
-static int read_both(compare_work *work, images *both) {
-    const char *const paths[2] = {work->comparison->golden, work->comparison->fresh};
+static vsh_result read_both(vshi_compare_work *work, images *both, vsh_error *error) {
     for (int which = 0; which < 2; ++which) {
-        vsh_error error;
-        if (vsh_image_read(paths[which], &work->run, &both->file[which], &error) != VSH_OK) {
-            return cli_fail(&error);
-        }
+        VSHI_TRY(vsh_image_read(work->path[which], &work->run, &both->file[which], error));
         const vsh_image all = vsh_image_view(both->file[which]);
         work->run.memory_held +=
             sizeof(float) * (uint64_t)all.width * (uint64_t)all.height * (uint64_t)all.channel_count;
         both->texts[which].list = vsh_image_attributes(both->file[which], &both->texts[which].count);
         view(both, which);
     }
-    return CLI_OK;
+    return VSH_OK;
 }
 
 /* Channels that one has and the other has not. */
-static int compare_names(const compare_work *work, const images *both) {
-    cli_comparison *c = work->comparison;
+static vsh_result compare_names(const vshi_compare_work *work, const images *both, vsh_error *error) {
     for (int which = 0; which < 2; ++which) {
         const vsh_image *image = &both->image[which];
         for (int32_t i = 0; i < image->channel_count; ++i) {
-            if (find_channel(&both->image[1 - which], image->names[i]) < 0 &&
-                !cli_comparison_add_problem(c, "channel '%s': in %s alone", image->names[i],
-                                            which == 0 ? "golden" : "the new image")) {
-                return cli_out_of_memory(c->golden);
+            if (find_channel(&both->image[1 - which], image->names[i]) < 0) {
+                VSHI_TRY(vshi_compare_problem(work, error, "channel '%s': in %s alone", image->names[i],
+                                              which == 0 ? "golden" : "the new image"));
             }
         }
     }
-    return CLI_OK;
+    return VSH_OK;
 }
 
 static const float *plane_of(const vsh_image *image, const char *name) {
@@ -93,74 +88,66 @@ static const float *plane_of(const vsh_image *image, const char *name) {
 }
 
 /* Coverage is a channel of its own among the results, where one of the two has it. */
-static int compare_coverage(const compare_work *work, images *both) {
-    const vsh_image *golden = &both->image[0], *fresh = &both->image[1];
-    const char *name = work->settings->coverage;
+static vsh_result compare_coverage(const vshi_compare_work *work, images *both, vsh_error *error) {
+    const vsh_image *golden = &both->image[0];
+    const char *name = work->options.coverage;
     const size_t count = (size_t)golden->width * (size_t)golden->height;
-    both->mask = malloc(count);
-    if (both->mask == NULL) {
-        return cli_out_of_memory(work->comparison->golden);
-    }
-    const float *was = plane_of(golden, name), *is = plane_of(fresh, name);
+    void *mask;
+    VSHI_TRY(vshi_allocate(&mask, count, 1, work->path[0], error));
+    both->mask = mask;
+    const float *was = plane_of(golden, name), *is = plane_of(&both->image[1], name);
     vsh_coverage coverage;
     vsh_compare_coverage(count, was, is, both->mask, &coverage);
-    if (work->settings->padding) {
+    if (work->options.padding) {
         memset(both->mask, 1, count);
     }
     if (was == NULL && is == NULL) {
-        return CLI_OK;
+        return VSH_OK;
     }
-    cli_channel *channel = cli_comparison_add(work->comparison, name);
-    if (channel == NULL) {
-        return cli_out_of_memory(work->comparison->golden);
-    }
-    cli_channel_set_limits(work, both->texts, channel);
+    vsh_channel_comparison *channel;
+    VSHI_TRY(vshi_compare_channel(work, name, both->texts, &channel, error));
     memcpy(channel->size, (const int32_t[]){golden->width, golden->height, 1}, sizeof channel->size);
-    channel->is_coverage = true;
+    channel->is_coverage = 1;
     channel->coverage = coverage;
     channel->coverage_failed = coverage.share > channel->coverage_limit;
-    return CLI_OK;
+    return VSH_OK;
 }
 
-static int compare_channels(const compare_work *work, const images *both) {
-    const vsh_image *golden = &both->image[0], *fresh = &both->image[1];
-    int code = CLI_OK;
-    for (int32_t i = 0; i < golden->channel_count && code == CLI_OK; ++i) {
+static vsh_result compare_channels(const vshi_compare_work *work, const images *both, vsh_error *error) {
+    const vsh_image *golden = &both->image[0];
+    for (int32_t i = 0; i < golden->channel_count; ++i) {
         const char *name = golden->names[i];
-        const float *values = plane_of(fresh, name);
-        if (values == NULL || strcmp(name, work->settings->coverage) == 0) {
+        const float *values = plane_of(&both->image[1], name);
+        if (values == NULL || strcmp(name, work->options.coverage) == 0) {
             continue;
         }
-        cli_channel *channel = cli_comparison_add(work->comparison, name);
-        if (channel == NULL) {
-            return cli_out_of_memory(work->comparison->golden);
-        }
-        cli_channel_set_limits(work, both->texts, channel);
+        vsh_channel_comparison *channel;
+        VSHI_TRY(vshi_compare_channel(work, name, both->texts, &channel, error));
         const vsh_compared compared = {
             {golden->width, golden->height, 1}, golden->planes[i], values, both->mask};
         memcpy(channel->size, compared.size, sizeof channel->size);
-        code = cli_channel_measure(work, channel, &compared);
+        VSHI_TRY(vshi_compare_measure(work, channel, &compared, error));
     }
-    return code;
+    return VSH_OK;
 }
 
-int compare_images(compare_work *work) {
-    cli_comparison *c = work->comparison;
-    images both = {.mask = NULL};
-    int code = read_both(work, &both);
-    const vsh_image *golden = &both.image[0], *fresh = &both.image[1];
-    code = code == CLI_OK ? compare_names(work, &both) : code;
-    if (code == CLI_OK && (golden->width != fresh->width || golden->height != fresh->height)) {
-        if (!cli_comparison_add_problem(c, "size: golden is %d × %d, new is %d × %d", golden->width,
-                                        golden->height, fresh->width, fresh->height)) {
-            code = cli_out_of_memory(c->golden);
-        }
-    } else if (code == CLI_OK) {
-        code = compare_coverage(work, &both);
-        code = code == CLI_OK ? compare_channels(work, &both) : code;
+static vsh_result compare(vshi_compare_work *work, images *both, vsh_error *error) {
+    VSHI_TRY(read_both(work, both, error));
+    VSHI_TRY(compare_names(work, both, error));
+    const vsh_image *golden = &both->image[0], *fresh = &both->image[1];
+    if (golden->width != fresh->width || golden->height != fresh->height) {
+        return vshi_compare_problem(work, error, "size: golden is %d × %d, new is %d × %d", golden->width,
+                                    golden->height, fresh->width, fresh->height);
     }
+    VSHI_TRY(compare_coverage(work, both, error));
+    return compare_channels(work, both, error);
+}
+
+vsh_result vshi_compare_images(vshi_compare_work *work, vsh_error *error) {
+    images both = {.mask = NULL};
+    const vsh_result result = compare(work, &both, error);
     free(both.mask);
     vsh_image_free(both.file[0]);
     vsh_image_free(both.file[1]);
-    return code;
+    return result;
 }

@@ -1,4 +1,5 @@
-/* Files of tolerances: what they say is put over the defaults, and what they must not say is refused. */
+/* Files compared: what tolerances say is put over the defaults, what they must not say is refused, and what
+ * two images come to. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -124,12 +125,93 @@ static void bad_files_are_refused_with_the_place(void **unused) {
     assert_int_equal(vsh_tolerances_read(path, NULL, NULL), VSH_ERROR_ARGUMENT);
 }
 
+/* --- whole files */
+
+enum { SIDE = 16, COUNT = SIDE * SIDE };
+
+/* An image beside the tolerance file: `ao` of a slope, with one texel `spot` off; and A, where it is named.
+ */
+static void write_image(const char *image, int32_t width, float spot, int32_t channels) {
+    float ao[COUNT], covered[COUNT];
+    for (size_t i = 0; i < COUNT; ++i) {
+        ao[i] = (float)(i % SIDE) / SIDE + (i == COUNT / 2 ? spot : 0.0f);
+        covered[i] = 1.0f;
+    }
+    const char *const names[] = {"ao", "A"};
+    const float *const planes[] = {ao, covered};
+    const vsh_image view = {width, COUNT / width, channels, names, planes};
+    assert_int_equal(vsh_image_write(image, &view, NULL, NULL), VSH_OK);
+}
+
+static int32_t seen;
+
+static int32_t look(void *user, size_t index, const vsh_channel_comparison *channel,
+                    const vsh_compared *compared) {
+    assert_string_equal(channel->name, "ao");
+    assert_int_equal(index, 1);
+    assert_int_equal(compared->size[0], SIDE);
+    ++seen;
+    return user != NULL;
+}
+
+static void two_files_are_compared_channel_by_channel(void **state) {
+    (void)state;
+    char golden[80], fresh[80];
+    snprintf(golden, sizeof golden, "%s.golden.exr", path);
+    snprintf(fresh, sizeof fresh, "%s.new.exr", path);
+    vsh_compare_files_options options = vsh_compare_files_options_default();
+    vsh_comparison *c = NULL;
+    vsh_error error;
+    write_image(golden, SIDE, 0.0f, 2);
+    write_image(fresh, SIDE, 0.0f, 2);
+    assert_int_equal(vsh_compare_files(golden, fresh, NULL, NULL, &c, &error), VSH_OK);
+    assert_int_equal(vsh_comparison_alike(c), 1);
+    assert_null(vsh_comparison_problem(c, 0));
+    assert_int_equal(vsh_comparison_channel(c, 0)->is_coverage, 1);
+    assert_string_equal(vsh_comparison_channel(c, 1)->name, "ao");
+    assert_int_equal(vsh_comparison_channel(c, 1)->measures.count, COUNT);
+    assert_null(vsh_comparison_channel(c, 2));
+    vsh_comparison_free(c);
+
+    write_image(fresh, SIDE, 0.4f, 2);
+    options.look = look;
+    assert_int_equal(vsh_compare_files(golden, fresh, &options, NULL, &c, &error), VSH_OK);
+    assert_int_equal(seen, 1);
+    assert_int_equal(vsh_comparison_alike(c), 0);
+    const vsh_channel_comparison *ao = vsh_comparison_channel(c, 1);
+    assert_true(ao->failed >> VSH_MEASURE_MAX & 1);
+    assert_int_equal(ao->measures.worst, COUNT / 2);
+    vsh_comparison_free(c);
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        options.limits[i] = i == VSH_MEASURE_SSIM ? -1.0 : 1e9;
+    }
+    assert_int_equal(vsh_compare_files(golden, fresh, &options, NULL, &c, &error), VSH_OK);
+    assert_int_equal(vsh_comparison_alike(c), 1);
+    vsh_comparison_free(c);
+    options.user = &options;
+    assert_int_equal(vsh_compare_files(golden, fresh, &options, NULL, &c, &error), VSH_ERROR_CANCELLED);
+    assert_null(c);
+
+    write_image(fresh, 2 * SIDE, 0.0f, 1);
+    assert_int_equal(vsh_compare_files(golden, fresh, NULL, NULL, &c, &error), VSH_OK);
+    assert_int_equal(vsh_comparison_alike(c), 0);
+    assert_string_equal(vsh_comparison_problem(c, 0), "channel 'A': in golden alone");
+    assert_string_equal(vsh_comparison_problem(c, 1), "size: golden is 16 × 16, new is 32 × 8");
+    assert_null(vsh_comparison_channel(c, 0));
+    vsh_comparison_free(c);
+
+    assert_int_equal(unlink(fresh), 0);
+    assert_int_equal(vsh_compare_files(golden, fresh, NULL, NULL, &c, &error), VSH_ERROR_READ);
+    assert_int_equal(unlink(golden), 0);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_a_file_does_not_say_stays),
         cmocka_unit_test(every_measure_but_one_has_a_key_of_its_name),
         cmocka_unit_test(channels_come_over_the_rest_in_their_order),
         cmocka_unit_test(bad_files_are_refused_with_the_place),
+        cmocka_unit_test(two_files_are_compared_channel_by_channel),
     };
     return cmocka_run_group_tests(tests, make_file, remove_file);
 }

@@ -1,2 +1,0 @@
-#define WALK_NAME vshi_walk_avx2
-#include "heightfield/kernel/walk.inc"
