@@ -40,12 +40,12 @@ typedef struct vsh_mesh {
     const double *transform; /* [12], local to world, three rows of four (column 3 translates), may mirror,
                                 scale unevenly and shear, but not flatten; NULL: identity */
     const char *object_name; /* of the object that it is a part of; may be NULL: `name` */
-    uint32_t object;      /* meshes of one number are parts of one object (a part for each of its materials);
-                             0: an object of its own */
-    int32_t solidity;     /* VSH_SOLIDITY_…; where it casts */
-    const uint8_t *sides; /* [triangle_count]: what was found to be solid, so that it is not looked for
-                             again; of views from a scene's assets. Else NULL */
-    int32_t alpha;        /* VSH_ALPHA_…; what scenes make of it: vsh_caster.cast_blended */
+    uint32_t object;  /* meshes of one number are parts of one object (a part for each of its materials);
+                         0: an object of its own */
+    int32_t solidity; /* VSH_SOLIDITY_…; where it casts */
+    const struct vsh_checked_mesh *checked; /* what is known of views from a scene's assets, so that it is
+                                               not looked for again. Else NULL */
+    int32_t alpha; /* VSH_ALPHA_…; what scenes make of it: vsh_caster.cast_blended */
 } vsh_mesh;
 
 /* Whether a mesh is meant by `pattern`: its name, its object's name, or what its name has behind its object's

@@ -9,8 +9,8 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "mesh/mesh.h"
-#include "mesh/solidity.h"
+#include "base/try.h"
+#include "mesh/mesh_set.h"
 #include "shade/layers.h"
 
 #include <stdlib.h>
@@ -226,29 +226,25 @@ static void warn(const counting *all, const vsh_run *run, const vsh_uv_report *r
 }
 
 /* Which triangles are sheets: as was found where all casters are known, else of these meshes alone. */
-static vsh_result find_sheets(vsh_charts *charts, vshi_job *job, const vsh_run *run, vsh_error *error) {
-    const vshi_charts *sorted = &charts->sorted;
-    vsh_result result = VSH_OK;
+static vsh_result find_sheets(vsh_charts *charts, vshi_mesh_set *set, vshi_job *job, const vsh_run *run,
+                              vsh_error *error) {
     bool known = true;
-    for (size_t m = 0; m < sorted->mesh_count; ++m) {
-        known = known && sorted->meshes[m].sides != NULL;
+    for (size_t m = 0; m < set->count; ++m) {
+        known = known && vshi_mesh_sides(&set->meshes[m]) != NULL;
     }
-    charts->sheet = vshi_take(sorted->first[sorted->mesh_count], 1, "texels", &result, error);
-    vshi_solidity *found = NULL;
-    if (result == VSH_OK && !known) {
-        vsh_run quiet = *run;
-        quiet.progress = NULL;
-        result = vshi_solidity_create(sorted->meshes, sorted->mesh_count, &quiet, &found, error);
+    if (!known) {
+        VSHI_TRY(vshi_mesh_set_solve(set, run, error));
     }
-    for (size_t m = 0; result == VSH_OK && m < sorted->mesh_count; ++m) {
-        const uint8_t *given = sorted->meshes[m].sides;
-        const uint8_t *sides = given != NULL ? given : vshi_solidity_sides(found, m);
-        for (size_t i = 0; i < sorted->meshes[m].triangle_count; ++i) {
-            charts->sheet[sorted->first[m] + i] = sides[i] == VSHI_SIDE_SHEET;
+    const size_t *first = charts->sorted.first;
+    vsh_result result = VSH_OK;
+    charts->sheet = vshi_take(first[set->count], 1, "texels", &result, error);
+    for (size_t m = 0; result == VSH_OK && m < set->count; ++m) {
+        const uint8_t *sides = vshi_mesh_sides(&set->meshes[m]);
+        for (size_t i = 0; i < set->meshes[m].triangle_count; ++i) {
+            charts->sheet[first[m] + i] = sides[i] == VSHI_SIDE_SHEET;
         }
         result = vshi_job_advance(job, 0) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
     }
-    vshi_solidity_free(found);
     return result;
 }
 
@@ -258,10 +254,15 @@ static vsh_result make(const vsh_mesh *meshes, size_t mesh_count, const vsh_ligh
     counting all = {.charts = charts};
     const vshi_raster raster = {options->width, options->height, options->supersample};
     vshi_charts *sorted = &charts->sorted;
-    vsh_result result = vshi_charts_create(meshes, mesh_count, raster, run, job, reports, sorted, error);
+    vshi_mesh_set set;
+    vsh_result result = vshi_mesh_set_create(meshes, mesh_count, &set, error);
     if (result == VSH_OK) {
-        result = find_sheets(charts, job, run, error);
+        result = vshi_charts_create(meshes, mesh_count, raster, run, job, reports, sorted, error);
     }
+    if (result == VSH_OK) {
+        result = find_sheets(charts, &set, job, run, error);
+    }
+    vshi_mesh_set_free(&set);
     if (result == VSH_OK) {
         charts->rows = vshi_take(sorted->rows, sizeof *charts->rows, "texels", &result, error);
         charts->info.bytes =

@@ -94,10 +94,7 @@ vsh_result vshi_charts_create(const vsh_mesh *meshes, size_t mesh_count, vshi_ra
     vsh_result result = VSH_OK;
     charts->first = vshi_take(mesh_count + 1, sizeof *charts->first, "mesh list", &result, error);
     for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
-        result = vshi_mesh_check_data(&meshes[m], m, error);
-        if (result == VSH_OK) {
-            result = check_uvs(&meshes[m], m, error);
-        }
+        result = check_uvs(&meshes[m], m, error);
         if (result == VSH_OK && meshes[m].triangle_count > UINT32_MAX - 1 - charts->first[m]) {
             result =
                 vshi_fail(error, VSH_ERROR_LIMIT, "%s: triangle %zu of the receiver, over the limit of %u",

@@ -19,9 +19,9 @@ typedef struct vshi_charts {
     uint64_t bytes;
 } vshi_charts;
 
-/* Checks the meshes and their UVs, sorts the triangles into tile rows and counts what is outside or
- * degenerate into reports[mesh_count]. Errors: VSH_ERROR_INPUT, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY,
- * VSH_ERROR_CANCELLED. Free with vshi_charts_free() also after an error. */
+/* Checks the UVs of meshes that passed vshi_mesh_check_data(), sorts the triangles into tile rows and counts
+ * what is outside or degenerate into reports[mesh_count]. Errors: VSH_ERROR_INPUT, VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free with vshi_charts_free() also after an error. */
 vsh_result vshi_charts_create(const vsh_mesh *meshes, size_t mesh_count, vshi_raster raster,
                               const vsh_run *run, vshi_job *job, vsh_uv_report *reports, vshi_charts *charts,
                               vsh_error *error);

@@ -40,7 +40,7 @@ vsh_result vsh_receiver_charts(const vsh_scene *scene, size_t index, const vsh_m
     }
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    const vshi_target target = {scene->receivers[index], index, meshes, mesh_count, NULL};
+    const vshi_target target = {scene->receivers[index], index, meshes, mesh_count, NULL, {NULL}};
     return vshi_target_charts(scene, &target, allow_overlap != 0, true, &full, charts, error);
 }
 
@@ -111,7 +111,7 @@ vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_option
     made->report.shade = vsh_shade_stats_zero();
     vsh_result result;
     VSHI_TRY_DONE(vsh_assets_load(scene, &full, &made->assets, error));
-    VSHI_TRY_DONE(vshi_targets_make(scene, made->assets, own.per_object != 0, &made->targets, error));
+    VSHI_TRY_DONE(vshi_targets_make(scene, made->assets, own.per_object != 0, &full, &made->targets, error));
     VSHI_TRY_DONE(list_lightmaps(made, error));
     made->report.load_s = vshi_seconds() - start;
     *job = made;

@@ -86,17 +86,34 @@ static size_t object_size(const vsh_mesh *meshes, size_t first, size_t count) {
     return end - first;
 }
 
-static void add(vshi_targets *t, const vsh_scene *scene, size_t index, const vsh_mesh *meshes, size_t count,
-                char *output) {
+/* What casts is known already; what does not is looked at by itself, once for all passes. */
+static vsh_result find_solid(vshi_target *target, const vsh_run *run, vsh_error *error) {
+    bool known = true;
+    for (size_t m = 0; m < target->mesh_count; ++m) {
+        known = known && vshi_mesh_sides(&target->meshes[m]) != NULL;
+    }
+    if (known) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_mesh_set_create(target->meshes, target->mesh_count, &target->set, error));
+    target->meshes = target->set.meshes;
+    vsh_error why;
+    const vsh_result result = vshi_mesh_set_solve(&target->set, run, &why);
+    return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "%s: %s", target->receiver.path, why.message);
+}
+
+static vsh_result add(vshi_targets *t, const vsh_scene *scene, size_t index, const vsh_mesh *meshes,
+                      size_t count, char *output, const vsh_run *run, vsh_error *error) {
     vshi_target *target = &t->list[t->count++];
-    *target = (vshi_target){scene->receivers[index], index, meshes, count, output};
+    *target = (vshi_target){scene->receivers[index], index, meshes, count, output, {NULL}};
     if (output != NULL) {
         target->receiver.output = output;
     }
+    return find_solid(target, run, error);
 }
 
 static vsh_result add_objects(vshi_targets *t, const vsh_scene *scene, size_t index, const vsh_mesh *meshes,
-                              size_t count, vsh_error *error) {
+                              size_t count, const vsh_run *run, vsh_error *error) {
     const char *output = scene->receivers[index].output;
     if (find_place(output) == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
@@ -110,13 +127,13 @@ static vsh_result add_objects(vshi_targets *t, const vsh_scene *scene, size_t in
         if (own == NULL) {
             return refuse_memory(error);
         }
-        add(t, scene, index, meshes + i, size, own);
+        VSHI_TRY(add(t, scene, index, meshes + i, size, own, run, error));
     }
     return VSH_OK;
 }
 
 vsh_result vshi_targets_make(const vsh_scene *scene, const vsh_assets *assets, bool per_object,
-                             vshi_targets *targets, vsh_error *error) {
+                             const vsh_run *run, vshi_targets *targets, vsh_error *error) {
     *targets = (vshi_targets){NULL, 0};
     size_t most = scene->receiver_count;
     for (size_t i = 0; i < scene->receiver_count && per_object; ++i) {
@@ -132,9 +149,9 @@ vsh_result vshi_targets_make(const vsh_scene *scene, const vsh_assets *assets, b
         size_t count;
         const vsh_mesh *meshes = vsh_assets_receiver(assets, i, &count);
         if (per_object) {
-            VSHI_TRY(add_objects(targets, scene, i, meshes, count, error));
+            VSHI_TRY(add_objects(targets, scene, i, meshes, count, run, error));
         } else {
-            add(targets, scene, i, meshes, count, NULL);
+            VSHI_TRY(add(targets, scene, i, meshes, count, NULL, run, error));
         }
     }
     return VSH_OK;
@@ -142,6 +159,7 @@ vsh_result vshi_targets_make(const vsh_scene *scene, const vsh_assets *assets, b
 
 void vshi_targets_free(vshi_targets *targets) {
     for (size_t i = 0; i < targets->count; ++i) {
+        vshi_mesh_set_free(&targets->list[i].set);
         free(targets->list[i].output);
     }
     free(targets->list);

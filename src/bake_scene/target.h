@@ -3,6 +3,7 @@
 #define VSHI_TARGET_H
 
 #include "base/error.h"
+#include "mesh/mesh_set.h"
 
 #include <stdbool.h>
 #include <vdbshade/image.h>
@@ -10,11 +11,12 @@
 
 /* One lightmap. */
 typedef struct vshi_target {
-    vsh_receiver receiver;  /* the scene's, with this lightmap's output */
-    size_t index;           /* of the receiver in the scene */
-    const vsh_mesh *meshes; /* belong to the assets */
+    vsh_receiver receiver; /* the scene's, with this lightmap's output */
+    size_t index;          /* of the receiver in the scene */
+    const vsh_mesh *meshes;
     size_t mesh_count;
-    char *output; /* of an object; NULL: it is the receiver's own */
+    char *output;      /* of an object; NULL: it is the receiver's own */
+    vshi_mesh_set set; /* whose the meshes are */
 } vshi_target;
 
 typedef struct vshi_targets {
@@ -22,10 +24,12 @@ typedef struct vshi_targets {
     size_t count;
 } vshi_targets;
 
-/* Errors: VSH_ERROR_ARGUMENT (per_object: an output without "%s" in its name), VSH_ERROR_MEMORY. Free them
- * also after a failure. */
+/* Finds what is solid of receivers that do not cast. Errors: VSH_ERROR_ARGUMENT (per_object: an output
+ * without
+ * "%s" in its name), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free them also after a failure.
+ */
 vsh_result vshi_targets_make(const vsh_scene *scene, const vsh_assets *assets, bool per_object,
-                             vshi_targets *targets, vsh_error *error);
+                             const vsh_run *run, vshi_targets *targets, vsh_error *error);
 void vshi_targets_free(vshi_targets *targets);
 
 /* A receiver's image, of its bits, packing and colours. */

@@ -1,11 +1,10 @@
 // Level sets from meshes: solids together, rooms cut out of them, walls behind the faces of others, sheets as
 // shells.
-#include "mesh/mesh.h"
 #include "levelset/shells.h"
+#include "mesh/mesh_set.h"
 
 #include <cfloat>
 #include <cmath>
-#include <memory>
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Composite.h>
 
@@ -20,30 +19,35 @@ constexpr double MESH_BYTES_PER_LEAF = 5.0 * BYTES_PER_LEAF;
 constexpr double BYTES_PER_TRIANGLE = 96.0;
 
 struct Meshes {
-    const vsh_mesh *mesh;
-    size_t count;
-    std::vector<vsh_mesh_report> reports;
+    vshi_mesh_set set{};
     Vec3d low{DBL_MAX};
     Vec3d high{-DBL_MAX};
     size_t triangles = 0;
+
+    Meshes() = default;
+    ~Meshes() { vshi_mesh_set_free(&set); }
+    Meshes(const Meshes &) = delete;
+    Meshes &operator=(const Meshes &) = delete;
+
+    const vsh_mesh_report &report(size_t i) const { return set.checked[i].report; }
 };
 
-Meshes look_over(const vsh_mesh *mesh, size_t count, vsh_error *error) {
+void check(vsh_result result) {
+    if (result != VSH_OK) {
+        throw Failure{result};
+    }
+}
+
+void look_over(const vsh_mesh *mesh, size_t count, Meshes &meshes, vsh_error *error) {
     if (mesh == nullptr || count == 0) {
         throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT, "voxelize: no meshes")};
     }
-    Meshes meshes{mesh, count, std::vector<vsh_mesh_report>(count)};
+    check(vshi_mesh_set_create(mesh, count, &meshes.set, error));
     for (size_t i = 0; i < count; ++i) {
-        vsh_result result = vshi_mesh_check_data(&mesh[i], i, error);
-        if (result == VSH_OK) {
-            result = vsh_mesh_check(&mesh[i], &meshes.reports[i], error);
-        }
-        if (result != VSH_OK) {
-            throw Failure{result};
-        }
-        meshes.low = openvdb::math::minComponent(meshes.low, Vec3d(meshes.reports[i].bounds_min));
-        meshes.high = openvdb::math::maxComponent(meshes.high, Vec3d(meshes.reports[i].bounds_max));
-        meshes.triangles += mesh[i].triangle_count - meshes.reports[i].degenerate_triangles;
+        const vsh_mesh_report &report = meshes.report(i);
+        meshes.low = openvdb::math::minComponent(meshes.low, Vec3d(report.bounds_min));
+        meshes.high = openvdb::math::maxComponent(meshes.high, Vec3d(report.bounds_max));
+        meshes.triangles += mesh[i].triangle_count - report.degenerate_triangles;
     }
     if (meshes.triangles == 0) {
         throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "voxelize: %zu mesh%s without a triangle of any area",
@@ -53,20 +57,6 @@ Meshes look_over(const vsh_mesh *mesh, size_t count, vsh_error *error) {
         throw Failure{vshi_fail(error, VSH_ERROR_LIMIT, "voxelize: %zu triangles, %d at most",
                                 meshes.triangles, INT32_MAX)};
     }
-    return meshes;
-}
-
-using Solidity = std::unique_ptr<vshi_solidity, void (*)(vshi_solidity *)>;
-
-Solidity find_solidity(const Meshes &meshes, const vsh_run &run, vsh_error *error) {
-    vsh_run quiet = run; // a small part of a second for a million triangles: no stage of its own
-    quiet.progress = nullptr;
-    vshi_solidity *made = nullptr;
-    const vsh_result result = vshi_solidity_create(meshes.mesh, meshes.count, &quiet, &made, error);
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
-    return {made, vshi_solidity_free};
 }
 
 // Of a wide band to either side of a surface, voxels.
@@ -77,9 +67,9 @@ double band_of(const vshi_component &component, const Lattice &lattice) {
     return lattice.half_width + RIM + shell;
 }
 
-void foretell(const Meshes &meshes, const vshi_solidity *solidity, const Lattice &lattice, const vsh_run &run,
-              vsh_error *error) {
+void foretell(const Meshes &meshes, const Lattice &lattice, const vsh_run &run, vsh_error *error) {
     double leaves = 0.0;
+    const vshi_solidity *solidity = meshes.set.solidity;
     const vshi_wholes &wholes = *vshi_solidity_wholes(solidity);
     for (size_t w = 0; w < wholes.count; ++w) {
         size_t count = 0;
@@ -92,9 +82,9 @@ void foretell(const Meshes &meshes, const vshi_solidity *solidity, const Lattice
         double area = twice;
         Vec3d low(DBL_MAX), high(-DBL_MAX);
         for (size_t i = wholes.first[w]; i < wholes.first[w + 1]; ++i) {
-            area += meshes.reports[i].area;
-            low = openvdb::math::minComponent(low, Vec3d(meshes.reports[i].bounds_min));
-            high = openvdb::math::maxComponent(high, Vec3d(meshes.reports[i].bounds_max));
+            area += meshes.report(i).area;
+            low = openvdb::math::minComponent(low, Vec3d(meshes.report(i).bounds_min));
+            high = openvdb::math::maxComponent(high, Vec3d(meshes.report(i).bounds_max));
         }
         if (area > 0.0) {
             leaves += band_leaves(area / (lattice.voxel * lattice.voxel), (high - low) / lattice.voxel, band);
@@ -152,14 +142,15 @@ const char *plural(size_t count) {
     return count == 1 ? "" : "s";
 }
 
-void warn(const Meshes &meshes, const vshi_solidity *solidity, const Lattice &lattice, const vsh_run &run) {
+void warn(const vshi_mesh_set &meshes, const Lattice &lattice, const vsh_run &run) {
+    const vshi_solidity *solidity = meshes.solidity;
     const vshi_wholes &wholes = *vshi_solidity_wholes(solidity);
     for (size_t w = 0; w < wholes.count; ++w) {
         size_t count = 0;
         const vshi_component *components = vshi_solidity_of_whole(solidity, w, &count);
         const Tally tally = tally_of(components, count);
         const size_t first = wholes.first[w];
-        const vshi_mesh_name name = vshi_mesh_label(&meshes.mesh[first], first);
+        const vshi_mesh_name name = vshi_mesh_label(&meshes.meshes[first], first);
         if (tally.around_all) {
             vshi_warn(&run,
                       "%s (%zu of %zu): everything else lies within it: baked as a shell with air on both "
@@ -271,19 +262,17 @@ FloatGrid::Ptr fill_sheets(const Surface &sheets, const Lattice &lattice, Progre
 vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_options *options,
                        const vsh_run *given, vsh_grid **grid, vsh_error *error) {
     vsh_run run;
-    const vsh_result result = vshi_run_resolve(given, &run, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    const Meshes meshes = look_over(mesh, count, error);
+    check(vshi_run_resolve(given, &run, error));
+    Meshes meshes;
+    look_over(mesh, count, meshes, error);
     const Lattice lattice = make_lattice(options, meshes.low, meshes.high, error);
-    const Solidity solidity = find_solidity(meshes, run, error);
-    foretell(meshes, solidity.get(), lattice, run, error);
+    check(vshi_mesh_set_solve(&meshes.set, &run, error));
+    foretell(meshes, lattice, run, error);
     Stage stage(run, "voxelize", error);
-    warn(meshes, solidity.get(), lattice, run);
+    warn(meshes.set, lattice, run);
 
     const double reach = 2.0 * (lattice.half_width + lattice.shell + RIM) + 2.0;
-    const Parts parts = sort_parts(solidity.get(), lattice, reach);
+    const Parts parts = sort_parts(meshes.set.solidity, lattice, reach);
     Progress progress{0.0, 1.0 / double(meshes.triangles)};
     FloatGrid::Ptr united;
     for (const Solid &solid : parts.solids) {

@@ -1,14 +1,18 @@
 #include "mesh/components.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/edges.h"
 
 #include <stdlib.h>
+
+#define NO_COMPONENT UINT32_MAX
 
 typedef struct walking {
     const vsh_mesh *mesh;
     vshi_edges edges;
     bool mirrored;
+    uint32_t *of;    /* [triangle_count]: its component; NO_COMPONENT for those without area */
     uint32_t *queue; /* [triangle_count] */
     vshi_components *found;
 } walking;
@@ -26,7 +30,7 @@ static void walk(walking *w, uint32_t seed, uint8_t *twisted) {
     const uint32_t number = (uint32_t)c->count++;
     size_t waiting = 1;
     w->queue[0] = seed;
-    c->of[seed] = number;
+    w->of[seed] = number;
     for (size_t at = 0; at < waiting; ++at) {
         const uint32_t i = w->queue[at];
         for (uint32_t side = 3 * i; side < 3 * i + 3; ++side) {
@@ -36,8 +40,8 @@ static void walk(walking *w, uint32_t seed, uint8_t *twisted) {
             }
             const uint32_t other = partner / 3;
             const uint8_t turned = c->turned[i] ^ (uint8_t)(upwards(w, side) == upwards(w, partner));
-            if (c->of[other] == VSHI_NO_COMPONENT) {
-                c->of[other] = number;
+            if (w->of[other] == NO_COMPONENT) {
+                w->of[other] = number;
                 c->turned[other] = turned;
                 w->queue[waiting++] = other;
             } else if (c->turned[other] != turned) {
@@ -54,29 +58,29 @@ static vsh_result walk_all(walking *w, vsh_error *error) {
     vshi_components *c = w->found;
     const size_t count = w->mesh->triangle_count;
     uint8_t *twisted = NULL; /* as many as there may be */
-    vsh_result result = vshi_allocate((void **)&twisted, count, 1, "components", error);
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&twisted, count, 1, "components", error));
     for (size_t i = 0; i < count; ++i) {
-        c->of[i] = VSHI_NO_COMPONENT;
+        w->of[i] = NO_COMPONENT;
     }
-    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
-        if (c->of[i] == VSHI_NO_COMPONENT && !w->edges.skipped[i]) {
+    for (size_t i = 0; i < count; ++i) {
+        if (w->of[i] == NO_COMPONENT && !w->edges.skipped[i]) {
             walk(w, (uint32_t)i, &twisted[c->count]);
         }
     }
-    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+    for (size_t i = 0; i < count; ++i) {
         const uint32_t first = w->edges.first[i];
         if (first != i) {
-            c->of[i] = c->of[first];
+            w->of[i] = w->of[first];
             c->turned[i] = c->turned[first];
             c->doubled[i] = c->doubled[first];
         }
     }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&c->twisted, c->count, 1, "components", error);
-    }
-    for (size_t i = 0; i < c->count && result == VSH_OK; ++i) {
+    VSHI_TRY_DONE(vshi_allocate((void **)&c->twisted, c->count, 1, "components", error));
+    for (size_t i = 0; i < c->count; ++i) {
         c->twisted[i] = twisted[i];
     }
+done:
     free(twisted);
     return result;
 }
@@ -84,26 +88,20 @@ static vsh_result walk_all(walking *w, vsh_error *error) {
 /* Lists triangles by component. */
 static vsh_result list(walking *w, vsh_error *error) {
     vshi_components *c = w->found;
-    vsh_result result =
-        vshi_allocate((void **)&c->begin, c->count + 2, sizeof *c->begin, "components", error);
-    if (result == VSH_OK) {
-        result =
-            vshi_allocate((void **)&c->list, w->mesh->triangle_count, sizeof *c->list, "components", error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
-    for (size_t i = 0; i < w->mesh->triangle_count; ++i) {
-        if (c->of[i] != VSHI_NO_COMPONENT) {
-            ++c->begin[c->of[i] + (size_t)2];
+    const size_t count = w->mesh->triangle_count;
+    VSHI_TRY(vshi_allocate((void **)&c->begin, c->count + 2, sizeof *c->begin, "components", error));
+    VSHI_TRY(vshi_allocate((void **)&c->list, count, sizeof *c->list, "components", error));
+    for (size_t i = 0; i < count; ++i) {
+        if (w->of[i] != NO_COMPONENT) {
+            ++c->begin[w->of[i] + (size_t)2];
         }
     }
     for (size_t i = 2; i < c->count + 2; ++i) {
         c->begin[i] += c->begin[i - 1];
     }
-    for (size_t i = 0; i < w->mesh->triangle_count; ++i) {
-        if (c->of[i] != VSHI_NO_COMPONENT) {
-            c->list[c->begin[c->of[i] + (size_t)1]++] = (uint32_t)i;
+    for (size_t i = 0; i < count; ++i) {
+        if (w->of[i] != NO_COMPONENT) {
+            c->list[c->begin[w->of[i] + (size_t)1]++] = (uint32_t)i;
         }
     }
     return VSH_OK;
@@ -111,20 +109,19 @@ static vsh_result list(walking *w, vsh_error *error) {
 
 static vsh_result list_rims(walking *w, vsh_error *error) {
     vshi_components *c = w->found;
-    const vsh_result result =
-        vshi_allocate((void **)&c->rims, w->edges.open, sizeof *c->rims, "open edges", error);
-    for (size_t at = 0; at < c->begin[c->count] && result == VSH_OK; ++at) {
+    VSHI_TRY(vshi_allocate((void **)&c->rims, w->edges.open, sizeof *c->rims, "open edges", error));
+    for (size_t at = 0; at < c->begin[c->count]; ++at) {
         const uint32_t i = c->list[at];
         for (uint32_t k = 0; k < 3 && !w->edges.skipped[i]; ++k) {
             if (w->edges.partner[3 * i + k] == VSHI_NO_PARTNER) {
                 uint32_t v[3];
                 vshi_edges_corners(w->mesh, w->edges.weld, w->mirrored, i, v);
                 const uint32_t a = v[k], b = v[(k + 1) % 3];
-                c->rims[c->rim_count++] = (vshi_rim){c->of[i], c->turned[i] ? b : a, c->turned[i] ? a : b};
+                c->rims[c->rim_count++] = (vshi_rim){w->of[i], c->turned[i] ? b : a, c->turned[i] ? a : b};
             }
         }
     }
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_components_find(const vsh_mesh *mesh, size_t index, vshi_components *found,
@@ -132,28 +129,21 @@ vsh_result vshi_components_find(const vsh_mesh *mesh, size_t index, vshi_compone
     *found = (vshi_components){0};
     walking w = {.mesh = mesh, .mirrored = vshi_transform_determinant(mesh->transform) < 0.0, .found = found};
     const size_t count = mesh->triangle_count;
-    vsh_result result = vshi_edges_find(mesh, index, &w.edges, error);
-    if (result == VSH_OK) {
-        found->doubled = w.edges.doubled;
-        w.edges.doubled = NULL;
-        result = vshi_allocate((void **)&found->of, count, sizeof *found->of, "components", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&found->turned, count, 1, "components", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&w.queue, count, sizeof *w.queue, "components", error);
-    }
-    if (result == VSH_OK) {
-        result = walk_all(&w, error);
-    }
-    if (result == VSH_OK) {
-        result = list(&w, error);
-    }
-    if (result == VSH_OK) {
-        result = list_rims(&w, error);
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_edges_find(mesh, index, &w.edges, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&found->turned, count, 1, "components", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&w.of, count, sizeof *w.of, "components", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&w.queue, count, sizeof *w.queue, "components", error));
+    found->doubled = w.edges.doubled;
+    w.edges.doubled = NULL;
+    VSHI_TRY_DONE(walk_all(&w, error));
+    VSHI_TRY_DONE(list(&w, error));
+    VSHI_TRY_DONE(list_rims(&w, error));
+    found->weld = w.edges.weld;
+    w.edges.weld = NULL;
+done:
     free(w.queue);
+    free(w.of);
     vshi_edges_free(&w.edges);
     return result;
 }
@@ -165,6 +155,6 @@ void vshi_components_free(vshi_components *components) {
     free(components->begin);
     free(components->doubled);
     free(components->turned);
-    free(components->of);
+    free(components->weld);
     *components = (vshi_components){0};
 }

@@ -6,8 +6,6 @@
 
 #include <stdint.h>
 
-#define VSHI_NO_COMPONENT UINT32_MAX
-
 /* An open edge, from vertex a to b as the triangle beside it runs once it is turned. */
 typedef struct vshi_rim {
     uint32_t component;
@@ -16,7 +14,7 @@ typedef struct vshi_rim {
 
 typedef struct vshi_components {
     size_t count;
-    uint32_t *of;     /* [triangle_count]: VSHI_NO_COMPONENT for those without area */
+    uint32_t *weld;   /* [vertex_count]: vshi_mesh_weld() */
     uint8_t *turned;  /* [triangle_count]: against the others of its component */
     uint8_t *doubled; /* [triangle_count]: there is one with the same corners that faces the other way */
     size_t *begin;    /* [count + 1] in `list` */

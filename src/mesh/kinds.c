@@ -31,7 +31,8 @@ static double volume_from(const vshi_vec corner[3], vshi_vec origin) {
 }
 
 vshi_surface_part vshi_component_part(const vshi_solidity *s, const vshi_component *c) {
-    return (vshi_surface_part){&s->wholes.meshes[c->whole], c->list, c->triangles, s->found[c->whole].turned};
+    return (vshi_surface_part){&s->wholes.meshes[c->whole], c->list, c->triangles,
+                               vshi_solidity_turned(s, c)};
 }
 
 static measure measure_component(const vshi_solidity *s, vshi_component *c) {
@@ -50,7 +51,7 @@ static measure measure_component(const vshi_solidity *s, vshi_component *c) {
         const double area =
             0.5 * vshi_length(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
         c->area += area;
-        m.turned_area += found->turned[i] ? area : 0.0;
+        m.turned_area += part.turned[i] ? area : 0.0;
         m.doubled_area += found->doubled[i] ? area : 0.0;
         volume += volume_from(corner, origin);
         for (int k = 0; k < 3; ++k) {
@@ -65,7 +66,7 @@ static measure measure_component(const vshi_solidity *s, vshi_component *c) {
 }
 
 void vshi_component_turn(vshi_solidity *s, vshi_component *c) {
-    uint8_t *turned = s->found[c->whole].turned;
+    uint8_t *turned = vshi_solidity_turned(s, c);
     for (size_t at = 0; at < c->triangles; ++at) {
         turned[c->list[at]] ^= 1;
     }
@@ -142,7 +143,7 @@ static size_t close_holes(closing *k, const vshi_rim *rims, size_t count, vshi_v
 static void decide(vshi_solidity *s, vshi_component *c, const measure *m) {
     const int32_t asked = s->wholes.meshes[c->whole].solidity;
     const vshi_components *found = &s->found[c->whole];
-    const bool twisted = found->twisted[found->of[c->list[0]]] != 0;
+    const bool twisted = found->twisted[(size_t)(c - s->components) - s->first[c->whole]] != 0;
     double turned_area = m->turned_area;
     if (turned_area > 0.5 * c->area) { /* most are right */
         vshi_component_turn(s, c);

@@ -1,10 +1,9 @@
 #include "mesh/mesh.h"
 
-#include "base/floats.h"
-#include "base/memory.h"
+#include "base/try.h"
 
-#include <float.h>
 #include <stdio.h>
+#include <string.h>
 
 /* A linear part whose unit columns span less volume than this squeezes the mesh flat: what is left of its
  * third direction is rounding. */
@@ -28,6 +27,10 @@ vshi_mesh_name vshi_mesh_label(const vsh_mesh *mesh, size_t index) {
         snprintf(name.text, sizeof name.text, "mesh %zu", index);
     }
     return name;
+}
+
+bool vshi_mesh_same_transform(const double *a, const double *b) {
+    return a == b || (a != NULL && b != NULL && memcmp(a, b, 12 * sizeof *a) == 0);
 }
 
 vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_error *error) {
@@ -55,7 +58,7 @@ vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_err
     return VSH_OK;
 }
 
-vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *error) {
+vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *error) {
     if ((mesh->positions == NULL && mesh->vertex_count > 0) ||
         (mesh->indices == NULL && mesh->triangle_count > 0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %s are NULL", vshi_mesh_label(mesh, index).text,
@@ -67,10 +70,7 @@ vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *e
                          vshi_mesh_label(mesh, index).text, mesh->vertex_count, mesh->triangle_count,
                          UINT32_MAX, SIZE_MAX / 64);
     }
-    const vsh_result result = vshi_mesh_check_transform(mesh, index, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_mesh_check_transform(mesh, index, error));
     for (size_t v = 0; v < mesh->vertex_count; ++v) {
         const float *p = mesh->positions + 3 * v;
         const vshi_vec local = vshi_vec_off(p);
@@ -99,43 +99,4 @@ bool vshi_mesh_degenerate(const vsh_mesh *mesh, size_t i) {
     const vshi_vec c = vshi_vec_off(mesh->positions + 3 * (size_t)index[2]);
     const vshi_vec normal = vshi_cross(vshi_sub(b, a), vshi_sub(c, a));
     return normal.x == 0.0 && normal.y == 0.0 && normal.z == 0.0;
-}
-
-static void grow(vsh_mesh_report *report, vshi_vec p) {
-    const double at[3] = {p.x, p.y, p.z};
-    for (int k = 0; k < 3; ++k) {
-        report->bounds_min[k] = at[k] < report->bounds_min[k] ? at[k] : report->bounds_min[k];
-        report->bounds_max[k] = at[k] > report->bounds_max[k] ? at[k] : report->bounds_max[k];
-    }
-}
-
-vsh_result vsh_mesh_check_sized(const vsh_mesh *mesh, vsh_mesh_report *report, size_t report_size,
-                                vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(mesh);
-    VSHI_NEEDS(report);
-    vsh_result result = vshi_mesh_check_data(mesh, VSHI_MESH_ALONE, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    vsh_mesh_report found = {.bounds_min = {DBL_MAX, DBL_MAX, DBL_MAX},
-                             .bounds_max = {-DBL_MAX, -DBL_MAX, -DBL_MAX}};
-    for (size_t i = 0; i < mesh->triangle_count; ++i) {
-        if (vshi_mesh_degenerate(mesh, i)) {
-            ++found.degenerate_triangles;
-            continue;
-        }
-        vshi_vec corner[3];
-        vshi_mesh_triangle(mesh, i, corner);
-        found.area +=
-            0.5 * vshi_length(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
-        for (int k = 0; k < 3; ++k) {
-            grow(&found, corner[k]);
-        }
-    }
-    result = vshi_mesh_count_edges(mesh, &found, error);
-    if (result == VSH_OK) {
-        vshi_give(report, report_size, &found, sizeof found);
-    }
-    return result;
 }

@@ -22,13 +22,22 @@ typedef struct vshi_mesh_name {
 
 VSHI_SHARED vshi_mesh_name vshi_mesh_label(const vsh_mesh *mesh, size_t index);
 
-/* The checks that vsh_mesh_check() refuses a mesh for, without its report: cheap, and nothing is allocated.
- * Whoever takes meshes from a caller calls this first. `index` is the mesh's place in a list, for messages.
- */
-VSHI_SHARED vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *error);
+/* The checks that vsh_mesh_check() refuses a mesh for. Whoever takes meshes from a caller calls this first,
+ * or makes a set of them (mesh/mesh_set.h): nothing is done for a mesh of which it is known that it passes.
+ * `index` is the mesh's place in a list, for messages. */
+vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *error);
+
+/* The same, whatever is known. */
+vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *error);
+
+/* Validates a mesh, and fills the report but for its edges. */
+vsh_result vshi_mesh_look_over(const vsh_mesh *mesh, size_t index, vsh_mesh_report *report, vsh_error *error);
 
 /* The transform's part of it: finite, and no flattening. */
 vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_error *error);
+
+/* NULL, the identity, is like itself only. */
+bool vshi_mesh_same_transform(const double *a, const double *b);
 
 /* World corners of triangle i, anticlockwise from outside also where the transform mirrors. The mesh has
  * passed vshi_mesh_check_data(). Returns the vertices behind them in `vertex` (may be NULL), in the same

@@ -3,39 +3,42 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/try.h"
+#include "mesh/mesh_set.h"
 #include "mesh/solidity_parts.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 /* What a triangle and a vertex take while edges are found, and afterwards at most. */
 static const double BYTES_PER_TRIANGLE = 120.0, BYTES_PER_VERTEX = 24.0;
 
-static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, size_t mesh_count, vsh_error *error) {
-    vsh_result result =
-        vshi_allocate((void **)&s->first_side, mesh_count + 1, sizeof *s->first_side, "what is solid", error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    for (size_t m = 0; m < mesh_count; ++m) {
+static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, vsh_error *error) {
+    VSHI_TRY(vshi_allocate((void **)&s->first_side, s->mesh_count + 1, sizeof *s->first_side, "what is solid",
+                           error));
+    for (size_t m = 0; m < s->mesh_count; ++m) {
         s->first_side[m + 1] = s->first_side[m] + meshes[m].triangle_count;
     }
+    const size_t triangles = s->first_side[s->mesh_count];
     const struct {
         void **memory;
         size_t count, size;
     } wanted[] = {{(void **)&s->found, s->wholes.count, sizeof *s->found},
+                  {(void **)&s->lent, s->wholes.count, sizeof *s->lent},
                   {(void **)&s->first, s->wholes.count + 1, sizeof *s->first},
-                  {(void **)&s->sides, s->first_side[mesh_count], 1},
-                  {(void **)&s->holed, s->first_side[mesh_count], 1}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0] && result == VSH_OK; ++i) {
-        result = vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "what is solid", error);
+                  {(void **)&s->turned, triangles, 1},
+                  {(void **)&s->sides, triangles, 1},
+                  {(void **)&s->holed, triangles, 1}};
+    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
+        VSHI_TRY(vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "what is solid", error));
     }
-    return result;
+    return VSH_OK;
 }
 
 static void set_sides(vshi_solidity *s) {
     for (size_t i = 0; i < s->count; ++i) {
         vshi_component *c = &s->components[i];
-        const uint8_t *turned = s->found[c->whole].turned;
+        const uint8_t *turned = vshi_solidity_turned(s, c);
         const size_t first = s->first_side[s->wholes.first[c->whole]];
         c->stands = c->stands && c->kind == VSHI_KIND_SOLID;
         for (size_t at = 0; at < c->triangles && c->kind != VSHI_KIND_SHEET; ++at) {
@@ -47,49 +50,70 @@ static void set_sides(vshi_solidity *s) {
     }
 }
 
-static vsh_result find(vshi_solidity *s, vshi_job *job, vsh_error *error) {
-    vsh_result result = VSH_OK;
-    for (size_t m = 0; m < s->wholes.count && result == VSH_OK; ++m) {
-        result = vshi_components_find(&s->wholes.meshes[m], m, &s->found[m], error);
-        s->first[m + 1] = s->first[m] + s->found[m].count;
-        s->cap_count += s->found[m].rim_count;
-        if (result == VSH_OK && vshi_job_advance(job, 1)) {
-            result = vshi_job_fail_cancelled(job, error);
+/* The whole that a mesh is a part of. */
+static size_t whole_of(const vshi_solidity *s, size_t mesh) {
+    size_t low = 0, high = s->wholes.count;
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        if (s->wholes.first[middle] <= mesh) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
+/* The components of a whole of these meshes, where another solidity found them; else NULL. */
+static const vshi_components *find_known(const vsh_mesh *meshes, const vshi_wholes *wholes, size_t whole) {
+    const size_t first = wholes->first[whole], count = wholes->first[whole + 1] - first;
+    const struct vsh_checked_mesh *known = vshi_mesh_known(&meshes[first]);
+    const vshi_solidity *s = known != NULL ? known->solidity : NULL;
+    for (size_t m = 0; m < count; ++m) {
+        const struct vsh_checked_mesh *part = vshi_mesh_known(&meshes[first + m]);
+        if (s == NULL || part == NULL || part->solidity != s || part->place != known->place + m) {
+            return NULL;
+        }
+    }
+    const size_t place = whole_of(s, known->place);
+    return s->wholes.first[place] == known->place && s->wholes.first[place + 1] == known->place + count
+               ? &s->found[place]
+               : NULL;
+}
+
+static vsh_result find_components(vshi_solidity *s, const vsh_mesh *meshes, vshi_job *job, vsh_error *error) {
+    for (size_t w = 0; w < s->wholes.count; ++w) {
+        const vshi_components *known = find_known(meshes, &s->wholes, w);
+        if (known != NULL) {
+            s->found[w] = *known;
+            s->lent[w] = true;
+        } else {
+            VSHI_TRY(vshi_components_find(&s->wholes.meshes[w], w, &s->found[w], error));
+        }
+        const size_t triangles = s->wholes.meshes[w].triangle_count;
+        if (triangles > 0) {
+            memcpy(s->turned + s->first_side[s->wholes.first[w]], s->found[w].turned, triangles);
+        }
+        s->first[w + 1] = s->first[w] + s->found[w].count;
+        s->cap_count += s->found[w].rim_count;
+        if (vshi_job_advance(job, 1)) {
+            return vshi_job_fail_cancelled(job, error);
         }
     }
     s->count = s->first[s->wholes.count];
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&s->components, s->count, sizeof *s->components, "components", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&s->caps, s->cap_count, sizeof *s->caps, "holes", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&s->hole_of, s->cap_count, sizeof *s->hole_of, "holes", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_kinds_find(s, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_standing_find(s, job, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_rooms_find(s, error);
-    }
-    if (result == VSH_OK) {
-        set_sides(s);
-    }
-    return result;
+    return VSH_OK;
 }
 
-/* Keeps what the components list; the rest was for finding them. */
-static void tidy(vshi_solidity *s) {
-    for (size_t m = 0; m < s->wholes.count; ++m) {
-        uint32_t *list = s->found[m].list;
-        s->found[m].list = NULL;
-        vshi_components_free(&s->found[m]);
-        s->found[m].list = list;
-    }
+static vsh_result find(vshi_solidity *s, const vsh_mesh *meshes, vshi_job *job, vsh_error *error) {
+    VSHI_TRY(find_components(s, meshes, job, error));
+    VSHI_TRY(vshi_allocate((void **)&s->components, s->count, sizeof *s->components, "components", error));
+    VSHI_TRY(vshi_allocate((void **)&s->caps, s->cap_count, sizeof *s->caps, "holes", error));
+    VSHI_TRY(vshi_allocate((void **)&s->hole_of, s->cap_count, sizeof *s->hole_of, "holes", error));
+    VSHI_TRY(vshi_kinds_find(s, error));
+    VSHI_TRY(vshi_standing_find(s, job, error));
+    VSHI_TRY(vshi_rooms_find(s, error));
+    set_sides(s);
+    return VSH_OK;
 }
 
 vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
@@ -100,31 +124,24 @@ vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const
         bytes += BYTES_PER_TRIANGLE * (double)meshes[m].triangle_count +
                  BYTES_PER_VERTEX * (double)meshes[m].vertex_count;
     }
-    vsh_result result = vshi_check_limit(run, bytes, "what is solid", error);
+    VSHI_TRY(vshi_check_limit(run, bytes, "what is solid", error));
     vshi_solidity *s = NULL;
+    VSHI_TRY(vshi_allocate((void **)&s, 1, sizeof *s, "what is solid", error));
+    s->mesh_count = mesh_count;
     vshi_job *job = NULL;
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&s, 1, sizeof *s, "what is solid", error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
-    result = vshi_wholes_make(meshes, mesh_count, &s->wholes, error);
-    if (result == VSH_OK) {
-        result = allocate(s, meshes, mesh_count, error);
-    }
-    if (result == VSH_OK) {
-        job = vshi_job_begin(run, "solids", s->wholes.count);
-        result = job == NULL ? vshi_fail(error, VSH_ERROR_MEMORY, "what is solid: the system refused memory")
-                             : find(s, job, error);
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_wholes_make(meshes, mesh_count, &s->wholes, error));
+    VSHI_TRY_DONE(allocate(s, meshes, error));
+    job = vshi_job_begin(run, "solids", s->wholes.count);
+    result = job == NULL ? vshi_fail(error, VSH_ERROR_MEMORY, "what is solid: the system refused memory")
+                         : find(s, meshes, job, error);
+done:
     vshi_job_end(job);
-    if (result == VSH_OK) {
-        tidy(s);
-        *made = s;
-    } else {
+    if (result != VSH_OK) {
         vshi_solidity_free(s);
+        s = NULL;
     }
+    *made = s;
     return result;
 }
 
@@ -136,16 +153,45 @@ void vshi_solidity_free(vshi_solidity *s) {
     free(s->hole_of);
     free(s->caps);
     free(s->components);
-    for (size_t m = 0; s->found != NULL && m < s->wholes.count; ++m) {
-        vshi_components_free(&s->found[m]);
+    for (size_t m = 0; s->found != NULL && s->lent != NULL && m < s->wholes.count; ++m) {
+        if (!s->lent[m]) {
+            vshi_components_free(&s->found[m]);
+        }
     }
     free(s->holed);
     free(s->sides);
+    free(s->turned);
     free(s->first_side);
     free(s->first);
+    free(s->lent);
     free(s->found);
     vshi_wholes_free(&s->wholes);
     free(s);
+}
+
+size_t vshi_solidity_mesh_count(const vshi_solidity *s) {
+    return s->mesh_count;
+}
+
+vsh_result vshi_solidity_weld(const vshi_solidity *s, const vsh_mesh *meshes, size_t mesh, uint32_t *weld,
+                              vsh_error *error) {
+    const size_t w = whole_of(s, mesh), count = meshes[mesh].vertex_count;
+    const uint32_t *of_whole = s->found[w].weld; /* NULL where it has no triangles */
+    uint32_t begin = 0;
+    for (size_t m = s->wholes.first[w]; m < mesh; ++m) {
+        begin += (uint32_t)meshes[m].vertex_count;
+    }
+    uint32_t *lowest = NULL; /* of this mesh, at the place of a vertex of the meshes before; 0: none */
+    VSHI_TRY(vshi_allocate((void **)&lowest, begin, sizeof *lowest, "welded vertices", error));
+    for (size_t v = 0; v < count; ++v) {
+        const uint32_t at = of_whole != NULL ? of_whole[begin + v] : begin + (uint32_t)v;
+        if (at < begin && lowest[at] == 0) {
+            lowest[at] = begin + (uint32_t)v;
+        }
+        weld[v] = (at < begin ? lowest[at] : at) - begin;
+    }
+    free(lowest);
+    return VSH_OK;
 }
 
 const uint8_t *vshi_solidity_sides(const vshi_solidity *s, size_t mesh) {

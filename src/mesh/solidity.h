@@ -57,9 +57,10 @@ typedef struct vshi_component {
 
 typedef struct vshi_solidity vshi_solidity;
 
-/* Looks at meshes that have passed vshi_mesh_check_data(), which must live as long as the result. A mesh's
- * `solidity` overrules what is found of its components. Errors: VSH_ERROR_LIMIT (more than 2^32 / 3 triangles
- * in one object, run->memory_limit), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the result with
+/* Looks at meshes that have passed vshi_mesh_check_data(), which must live as long as the result, as must
+ * the solidity that they are known from (mesh/mesh_set.h): what it found of a whole is not found again. A
+ * mesh's `solidity` overrules what is found of its components. Errors: VSH_ERROR_LIMIT (more than 2^32 / 3
+ * triangles in one object, run->memory_limit), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the result with
  * vshi_solidity_free(). */
 VSHI_SHARED vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
                                             vshi_solidity **made, vsh_error *error);
@@ -71,6 +72,14 @@ const uint8_t *vshi_solidity_sides(const vshi_solidity *solidity, size_t mesh);
 /* 1 for triangles of a mesh [triangle_count] whose solid, room or wall has holes: what it encloses is not
  * shut off from the rest, and rays may go in by one hole and out by another. */
 const uint8_t *vshi_solidity_holed(const vshi_solidity *solidity, size_t mesh);
+
+/* The number of meshes that were looked at. */
+size_t vshi_solidity_mesh_count(const vshi_solidity *solidity);
+
+/* weld[v] = the lowest vertex of one of the meshes at the very position of v, as was found for its whole.
+ * Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_solidity_weld(const vshi_solidity *solidity, const vsh_mesh *meshes, size_t mesh,
+                              uint32_t *weld, vsh_error *error);
 
 /* The objects, put together from the meshes. */
 VSHI_SHARED const vshi_wholes *vshi_solidity_wholes(const vshi_solidity *solidity);

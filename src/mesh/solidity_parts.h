@@ -9,10 +9,13 @@
 
 struct vshi_solidity {
     vshi_wholes wholes;
-    vshi_components *found; /* [wholes.count] */
-    uint8_t *sides;         /* of all meshes */
-    uint8_t *holed;         /* likewise */
-    size_t *first_side;     /* [mesh count + 1] */
+    vshi_components *found; /* [wholes.count]: as they are by themselves */
+    bool *lent;             /* [wholes.count]: of another solidity, where a whole was found before */
+    size_t mesh_count;
+    uint8_t *turned;    /* of all meshes: found[].turned, and what was decided since */
+    uint8_t *sides;     /* of all meshes */
+    uint8_t *holed;     /* likewise */
+    size_t *first_side; /* [mesh_count + 1] */
     vshi_component *components;
     size_t count;
     size_t *first; /* [wholes.count + 1]: the wholes' first components */
@@ -22,6 +25,11 @@ struct vshi_solidity {
     vshi_cut *cuts;
     size_t cut_count, cut_room;
 };
+
+/* Of the triangles of the component's whole: which run against what their component faces. */
+static inline uint8_t *vshi_solidity_turned(const vshi_solidity *s, const vshi_component *component) {
+    return s->turned + s->first_side[s->wholes.first[component->whole]];
+}
 
 /* Measures all components, closes their holes, and tells sheets, solids and walls apart, each for itself. */
 vsh_result vshi_kinds_find(vshi_solidity *solidity, vsh_error *error);

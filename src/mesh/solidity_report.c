@@ -1,7 +1,8 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "mesh/solidity.h"
+#include "base/try.h"
+#include "mesh/mesh_set.h"
 
 #include <vdbshade/solidity.h>
 
@@ -26,23 +27,16 @@ vsh_result vsh_mesh_solidity_sized(const vsh_mesh *meshes, size_t mesh_count, co
     VSHI_NEEDS_OF(mesh_count, meshes);
     VSHI_NEEDS_OF(mesh_count, reports);
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    for (size_t m = 0; m < mesh_count && result == VSH_OK; ++m) {
-        result = vshi_mesh_check_data(&meshes[m], m, error);
-    }
-    vshi_solidity *found = NULL;
-    full.progress = NULL;
-    if (result == VSH_OK) {
-        result = vshi_solidity_create(meshes, mesh_count, &full, &found, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
-    const vshi_wholes *wholes = vshi_solidity_wholes(found);
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    vshi_mesh_set set;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_mesh_set_create(meshes, mesh_count, &set, error));
+    VSHI_TRY_DONE(vshi_mesh_set_solve(&set, &full, error));
+    const vshi_wholes *wholes = vshi_solidity_wholes(set.solidity);
     for (size_t w = 0; w < wholes->count; ++w) {
         vsh_solidity_report report = {0};
         size_t count;
-        const vshi_component *components = vshi_solidity_of_whole(found, w, &count);
+        const vshi_component *components = vshi_solidity_of_whole(set.solidity, w, &count);
         for (size_t i = 0; i < count; ++i) {
             add(&components[i], &report);
         }
@@ -50,6 +44,7 @@ vsh_result vsh_mesh_solidity_sized(const vsh_mesh *meshes, size_t mesh_count, co
             vshi_give((char *)reports + m * reports_size, reports_size, &report, sizeof report);
         }
     }
-    vshi_solidity_free(found);
-    return VSH_OK;
+done:
+    vshi_mesh_set_free(&set);
+    return result;
 }

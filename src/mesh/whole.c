@@ -5,13 +5,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool same_transform(const double *a, const double *b) {
-    return a == b || (a != NULL && b != NULL && memcmp(a, b, 12 * sizeof *a) == 0);
-}
-
 static bool one_object(const vsh_mesh *a, const vsh_mesh *b) {
     return a->object != 0 && a->object == b->object && a->solidity == b->solidity &&
-           same_transform(a->transform, b->transform);
+           vshi_mesh_same_transform(a->transform, b->transform);
 }
 
 static vsh_result put_together(const vsh_mesh *parts, size_t count, vshi_wholes *w, vsh_error *error) {

@@ -107,7 +107,7 @@ static vsh_result check_shape(const vshi_model_shape *shape, const char *path, v
                            .vertex_count = shape->vertex_count,
                            .triangle_count = shape->triangle_count};
     vsh_error why;
-    if (vshi_mesh_check_data(&view, VSHI_MESH_ALONE, &why) != VSH_OK) {
+    if (vshi_mesh_validate(&view, VSHI_MESH_ALONE, &why) != VSH_OK) {
         return vshi_answer_fail(path, why.message, error);
     }
     for (size_t i = 0; shape->normals != NULL && i < 3 * shape->vertex_count; ++i) {

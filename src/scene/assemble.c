@@ -1,6 +1,7 @@
 /* From a scene's casters to one level set. */
 #include "base/floats.h"
 #include "base/similarity.h"
+#include "mesh/mesh_set.h"
 #include "scene/assets.h"
 #include "spheres/balls.h"
 
@@ -158,12 +159,8 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
     world_box all = empty_box;
     double finest = INFINITY; /* of the level sets */
     for (size_t i = 0; i < a->mesh_count; ++i) {
-        vsh_mesh_report report;
-        const vsh_result result = vsh_mesh_check(&a->meshes[i], &report, error);
-        if (result != VSH_OK) {
-            return result;
-        }
-        grow_box(&all, report.bounds_min, report.bounds_max, NULL);
+        const vsh_mesh_report *report = &a->meshes[i].checked->report;
+        grow_box(&all, report->bounds_min, report->bounds_max, NULL);
     }
     for (size_t i = 0; i < a->scene->caster_count; ++i) {
         const vsh_caster *caster = &a->scene->casters[i];

@@ -6,7 +6,6 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "mesh/solidity.h"
 #include "scene/asset_files.h"
 #include "scene/select.h"
 #include "scene/solidity.h"
@@ -26,6 +25,7 @@ typedef struct asset_place {
     vsh_heights *heights;   /* direct ones */
     vsh_spheres *spheres;
     bool direct;
+    vshi_mesh_set set; /* of a receiver */
 } asset_place;
 
 struct vsh_assets {
@@ -34,7 +34,7 @@ struct vsh_assets {
     size_t caster_count;
     asset_place *receivers;
     size_t receiver_count;
-    vshi_solidity *solidity; /* of the casters' meshes */
+    vshi_mesh_set set; /* of the casters' meshes */
 };
 
 /* The meshes of the model that are `chosen`; NULL: all. */
@@ -204,9 +204,25 @@ static vsh_result settle_solidity(vsh_assets *assets, const vsh_scene *scene, co
         lists[i] = (vshi_mesh_list){place->meshes, place->count, place->model,
                                     i < casters ? scene->casters[i].path : NULL};
     }
-    result = vshi_solidity_settle(scene, lists, lists + casters, run, &assets->solidity, error);
+    result = vshi_solidity_settle(scene, lists, lists + casters, run, &assets->set, error);
     free(lists);
     return result;
+}
+
+/* Those that do not cast, too. */
+static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, vsh_error *error) {
+    for (size_t i = 0; i < assets->receiver_count; ++i) {
+        asset_place *place = &assets->receivers[i];
+        vsh_error why;
+        const vsh_result result = vshi_mesh_set_create(place->meshes, place->count, &place->set, &why);
+        if (result != VSH_OK) {
+            return vshi_fail(error, result, "%s: %s", scene->receivers[i].path, why.message);
+        }
+        for (size_t m = 0; m < place->count; ++m) {
+            place->meshes[m].checked = place->set.meshes[m].checked;
+        }
+    }
+    return VSH_OK;
 }
 
 static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, size_t index, const vsh_run *run,
@@ -267,6 +283,7 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
         VSHI_TRY_DONE(place_caster(loaded, scene, i, &full, error));
     }
     VSHI_TRY_DONE(settle_solidity(loaded, scene, &full, error));
+    VSHI_TRY_DONE(check_receivers(loaded, scene, error));
     /* with the places in it, which the check asks for */
     VSHI_TRY_DONE(vshi_assets_check(loaded, scene, &full, error));
     *assets = loaded;
@@ -281,6 +298,7 @@ static void free_places(asset_place *places, size_t count) {
         vsh_spheres_free(places[i].spheres);
         vsh_heights_free(places[i].heights);
         vsh_model_free(places[i].made);
+        vshi_mesh_set_free(&places[i].set);
         free(places[i].transforms);
         free(places[i].meshes);
         vsh_outline_free(places[i].outline);
@@ -292,7 +310,7 @@ void vsh_assets_free(vsh_assets *assets) {
     if (assets == NULL) {
         return;
     }
-    vshi_solidity_free(assets->solidity);
+    vshi_mesh_set_free(&assets->set);
     free_places(assets->receivers, assets->receiver_count);
     free_places(assets->casters, assets->caster_count);
     vshi_asset_files_free(&assets->files);

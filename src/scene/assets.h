@@ -31,7 +31,7 @@ const vsh_outline *vshi_assets_outline(const vsh_assets *assets, size_t index);
 const vsh_spheres *vshi_assets_spheres(const vsh_assets *assets, size_t index);
 
 /* Warns of triangles of zero area, and refuses a file of nothing else, each file once. Errors:
- * VSH_ERROR_INPUT, as vsh_mesh_check(). */
+ * VSH_ERROR_INPUT. */
 vsh_result vshi_assets_check(const vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
                              vsh_error *error);
 

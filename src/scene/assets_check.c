@@ -1,51 +1,29 @@
 /* What is odd about a scene's meshes. */
 #include "base/job.h"
 #include "base/try.h"
+#include "mesh/mesh_set.h"
 #include "scene/assets.h"
 
-#include <stdlib.h>
 #include <string.h>
 
-/* A message about arrays, with the file that they came from. */
-static vsh_result name_file(const char *path, vsh_result result, vsh_error *error) {
-    if (error != NULL) {
-        const vsh_error of_mesh = *error;
-        vshi_fail(error, result, "%s: %s", path, of_mesh.message);
-    }
-    return result;
-}
-
-/* Counts the triangles of zero area, which everything skips. What is open is told by the voxeliser. */
+/* Tells of the triangles of zero area, which everything skips. What is open is told by the voxeliser. */
 static vsh_result check_file(const char *path, const vsh_mesh *meshes, size_t count, const vsh_run *run,
                              vsh_error *error) {
-    size_t *skipped = calloc(count + 1, sizeof *skipped), sound = 0;
-    if (skipped == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
-    }
-    vsh_result result = VSH_OK;
+    size_t sound = 0;
     for (size_t i = 0; i < count; ++i) {
-        vsh_mesh_report report;
-        result = vsh_mesh_check(&meshes[i], &report, error);
-        if (result != VSH_OK) {
-            result = name_file(path, result, error);
-            goto done;
-        }
-        skipped[i] = report.degenerate_triangles;
-        sound += meshes[i].triangle_count - skipped[i];
+        sound += meshes[i].triangle_count - meshes[i].checked->report.degenerate_triangles;
     }
     if (sound == 0) {
-        result = vshi_fail(error, VSH_ERROR_INPUT, "%s: every triangle has zero area", path);
-        goto done;
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: every triangle has zero area", path);
     }
     for (size_t i = 0; i < count; ++i) {
-        if (skipped[i] > 0) {
+        const size_t skipped = meshes[i].checked->report.degenerate_triangles;
+        if (skipped > 0) {
             vshi_warn(run, "%s: mesh '%s': %zu triangles of zero area are skipped", path,
-                      meshes[i].name != NULL ? meshes[i].name : "", skipped[i]);
+                      meshes[i].name != NULL ? meshes[i].name : "", skipped);
         }
     }
-done:
-    free(skipped);
-    return result;
+    return VSH_OK;
 }
 
 /* Whether one of the first casters and receivers is of that file, too. */

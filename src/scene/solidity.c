@@ -2,7 +2,6 @@
 
 #include "base/memory.h"
 #include "base/try.h"
-#include "mesh/solidity.h"
 #include "scene/select.h"
 
 #include <stdbool.h>
@@ -50,19 +49,18 @@ static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
 
 static bool same_place(const vsh_mesh *a, const vsh_mesh *b) {
     return a->positions == b->positions && a->indices == b->indices &&
-           (a->transform == b->transform ||
-            (a->transform != NULL && b->transform != NULL &&
-             memcmp(a->transform, b->transform, 12 * sizeof *a->transform) == 0));
+           vshi_mesh_same_transform(a->transform, b->transform);
 }
 
-static void share(const vsh_mesh *casters, size_t count, const vshi_mesh_list *receiver) {
+static void share(const vshi_mesh_set *casters, const vshi_mesh_list *receiver) {
     for (size_t i = 0; i < receiver->count; ++i) {
-        for (size_t k = 0; k < count && receiver->meshes[i].sides == NULL; ++k) {
+        vsh_mesh *mesh = &receiver->meshes[i];
+        for (size_t k = 0; k < casters->count && mesh->checked == NULL; ++k) {
             /* a file's meshes stand in the same order where all of them cast */
-            const vsh_mesh *caster = &casters[(i + k) % count];
-            if (same_place(&receiver->meshes[i], caster)) {
-                receiver->meshes[i].sides = caster->sides;
-                receiver->meshes[i].solidity = caster->solidity;
+            const vsh_mesh *caster = &casters->meshes[(i + k) % casters->count];
+            if (same_place(mesh, caster)) {
+                mesh->checked = caster->checked;
+                mesh->solidity = caster->solidity;
             }
         }
     }
@@ -81,43 +79,35 @@ static vsh_result list_all(const vshi_mesh_list *casters, size_t caster_count, v
             memcpy(*all + at, casters[i].meshes, casters[i].count * sizeof **all);
         }
     }
-    for (size_t i = 0; i < *count; ++i) {
-        VSHI_TRY(vshi_mesh_check_data(*all + i, i, error));
-    }
     return VSH_OK;
 }
 
-static vsh_result find(const vshi_mesh_list *casters, size_t caster_count, const vshi_mesh_list *receivers,
-                       size_t receiver_count, const vsh_run *run, vshi_solidity **found, vsh_error *error) {
-    vsh_mesh *all = NULL;
-    size_t count;
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(list_all(casters, caster_count, &all, &count, error));
-    if (count > 0) {
-        vsh_run quiet = *run; /* a small part of a second for a million triangles: no stage of its own */
-        quiet.progress = NULL;
-        VSHI_TRY_DONE(vshi_solidity_create(all, count, &quiet, found, error));
-    }
-    for (size_t i = 0, at = 0; i < caster_count; ++i) {
-        for (size_t k = 0; k < casters[i].count; ++k, ++at) {
-            all[at].sides = casters[i].meshes[k].sides = vshi_solidity_sides(*found, at);
-        }
-    }
-    for (size_t i = 0; i < receiver_count; ++i) {
-        share(all, count, &receivers[i]);
-    }
-done:
-    free(all);
-    return result;
-}
-
 vsh_result vshi_solidity_settle(const vsh_scene *scene, const vshi_mesh_list *casters,
-                                const vshi_mesh_list *receivers, const vsh_run *run, vshi_solidity **found,
+                                const vshi_mesh_list *receivers, const vsh_run *run, vshi_mesh_set *set,
                                 vsh_error *error) {
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
         VSHI_TRY(apply_rules(caster->solidity, caster->solidity_count, &casters[i], 1, error));
     }
     VSHI_TRY(apply_rules(scene->solidity, scene->solidity_count, casters, scene->caster_count, error));
-    return find(casters, scene->caster_count, receivers, scene->receiver_count, run, found, error);
+    vsh_mesh *all = NULL;
+    size_t count;
+    vsh_result result;
+    VSHI_TRY_DONE(list_all(casters, scene->caster_count, &all, &count, error));
+    if (count == 0) {
+        goto done;
+    }
+    VSHI_TRY_DONE(vshi_mesh_set_create(all, count, set, error));
+    VSHI_TRY_DONE(vshi_mesh_set_solve(set, run, error));
+    for (size_t i = 0, at = 0; i < scene->caster_count; ++i) {
+        for (size_t k = 0; k < casters[i].count; ++k, ++at) {
+            casters[i].meshes[k].checked = set->meshes[at].checked;
+        }
+    }
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        share(set, &receivers[i]);
+    }
+done:
+    free(all);
+    return result;
 }

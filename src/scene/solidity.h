@@ -2,6 +2,8 @@
 #ifndef VSHI_SCENE_SOLIDITY_H
 #define VSHI_SCENE_SOLIDITY_H
 
+#include "mesh/mesh_set.h"
+
 #include <vdbshade/scene.h>
 
 /* Views of meshes that stand somewhere. */
@@ -12,14 +14,13 @@ typedef struct vshi_mesh_list {
     const char *path;
 } vshi_mesh_list;
 
-typedef struct vshi_solidity vshi_solidity;
-
-/* Applies the rules of solidity to the casters' meshes, finds what they are, together, and sets their
- * `sides`; also those of receivers that are one of them: the same triangles in the same place. Lists are as
- * the scene's. Errors: VSH_ERROR_ARGUMENT (a pattern that is NULL, no VSH_SOLIDITY_…), VSH_ERROR_INPUT (a
- * pattern that matches nothing, as vsh_mesh_check()), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+/* Applies the rules of solidity to the casters' meshes, makes one set of them all and finds what they are,
+ * together; their views know it then, and so do those of receivers that are one of them: the same triangles
+ * in the same place. Lists are as the scene's. Free the set also after a failure. Errors: VSH_ERROR_ARGUMENT
+ * (a pattern that is NULL, no VSH_SOLIDITY_…), VSH_ERROR_INPUT (a pattern that matches nothing, as
+ * vsh_mesh_check()), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 vsh_result vshi_solidity_settle(const vsh_scene *scene, const vshi_mesh_list *casters,
-                                const vshi_mesh_list *receivers, const vsh_run *run, vshi_solidity **found,
+                                const vshi_mesh_list *receivers, const vsh_run *run, vshi_mesh_set *set,
                                 vsh_error *error);
 
 #endif

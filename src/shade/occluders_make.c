@@ -2,6 +2,8 @@
 #include "base/clock.h"
 #include "base/floats.h"
 #include "base/job.h"
+#include "base/try.h"
+#include "mesh/mesh_set.h"
 #include "shade/occluders.h"
 
 static vsh_result make_field(const vsh_grid *grid, const vsh_field_options *options, const vsh_run *run,
@@ -56,23 +58,27 @@ vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_count,
     *occluders = NULL;
     VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_occluders_options full = vsh_occluders_options_default();
+    VSHI_TRY(vshi_options_resolve(options, &full, sizeof full, "vsh_occluders_options", error));
+    vsh_run resolved;
+    VSHI_TRY(vshi_run_resolve(run, &resolved, error));
     vshi_occluders_own own = {.field = NULL};
-    vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_occluders_options", error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    result = make_field_of_meshes(meshes, mesh_count, &full, run, &own, error);
-    if (result == VSH_OK && full.triangles != 0 && vsh_triangles_available()) {
+    vshi_mesh_set set;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_mesh_set_create(meshes, mesh_count, &set, error));
+    VSHI_TRY_DONE(vshi_mesh_set_solve(&set, &resolved, error));
+    VSHI_TRY_DONE(make_field_of_meshes(set.meshes, mesh_count, &full, run, &own, error));
+    if (full.triangles != 0 && vsh_triangles_available()) {
         const double start = vshi_seconds();
-        result = vsh_triangles_create(meshes, mesh_count, run, &own.triangles, error);
+        VSHI_TRY_DONE(vsh_triangles_create(set.meshes, mesh_count, run, &own.triangles, error));
         own.triangles_s = vshi_seconds() - start;
-    }
-    if (result != VSH_OK) {
-        vshi_occluders_own_free(&own);
-        return result;
     }
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.field = own.field;
     parts.triangles = parts.true_triangles = own.triangles;
+    vshi_mesh_set_free(&set);
     return vshi_occluders_make(&parts, &own, occluders, error);
+done:
+    vshi_mesh_set_free(&set);
+    vshi_occluders_own_free(&own);
+    return result;
 }

@@ -4,8 +4,9 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 #include "mesh/mesh.h"
-#include "mesh/solidity.h"
+#include "mesh/mesh_set.h"
 
 #include <float.h>
 #include <stdlib.h>
@@ -115,15 +116,14 @@ static uint8_t find_solid(const vsh_mesh *mesh, const uint8_t *sides, const uint
 }
 
 /* The sheet of all meshes: their vertices, welded, and the triangles that are not degenerate. */
-static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count,
-                             const vshi_solidity *solidity, vsh_error *error) {
+static vsh_result make_sheet(vsh_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
+    const vsh_mesh *meshes = set->meshes;
+    const size_t mesh_count = set->count;
     size_t vertex_count = 0, triangle_count = 0, most = 0;
     for (size_t m = 0; m < mesh_count; ++m) {
         vertex_count += meshes[m].vertex_count;
         most = meshes[m].vertex_count > most ? meshes[m].vertex_count : most;
-        for (size_t i = 0; i < meshes[m].triangle_count; ++i) {
-            triangle_count += !vshi_mesh_degenerate(&meshes[m], i);
-        }
+        triangle_count += meshes[m].triangle_count - set->checked[m].report.degenerate_triangles;
     }
     if (vertex_count > UINT32_MAX || triangle_count >= UINT32_MAX) {
         return vshi_fail(error, VSH_ERROR_LIMIT,
@@ -132,42 +132,40 @@ static vsh_result make_sheet(vsh_triangles *triangles, const vsh_mesh *meshes, s
     }
     vshi_sheet *sheet = &triangles->sheet;
     uint32_t *weld = NULL;
-    vsh_result result = vshi_sheet_allocate(sheet, vertex_count, triangle_count, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&triangles->first, mesh_count, sizeof(uint32_t), "triangles", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&weld, most, sizeof *weld, "welded vertices", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&triangles->solid, triangle_count, 1, "triangles", error);
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_sheet_allocate(sheet, vertex_count, triangle_count, error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&triangles->first, mesh_count, sizeof(uint32_t), "triangles", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&weld, most, sizeof *weld, "welded vertices", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&triangles->solid, triangle_count, 1, "triangles", error));
     size_t vertex = 0, triangle = 0;
-    for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
+    for (size_t m = 0; m < mesh_count; ++m) {
         const vsh_mesh *mesh = &meshes[m];
-        const uint8_t *sides = vshi_solidity_sides(solidity, m), *holed = vshi_solidity_holed(solidity, m);
-        result = vshi_mesh_weld(mesh, weld, error);
+        const uint8_t *sides = vshi_solidity_sides(set->solidity, m);
+        const uint8_t *holed = vshi_solidity_holed(set->solidity, m);
+        VSHI_TRY_DONE(vshi_solidity_weld(set->solidity, meshes, m, weld, error));
         triangles->first[m] = (uint32_t)triangle;
-        for (size_t i = 0; result == VSH_OK && i < mesh->triangle_count; ++i) {
-            if (!vshi_mesh_degenerate(mesh, i)) {
-                for (size_t k = 0; k < 3; ++k) {
-                    sheet->corners[3 * triangle + k] = (uint32_t)vertex + weld[mesh->indices[3 * i + k]];
-                }
-                triangles->solid[triangle] = find_solid(mesh, sides, holed, i);
-                triangles->has_solids =
-                    triangles->has_solids || triangles->solid[triangle] != VSHI_AIR_AROUND;
-                triangles->has_holes =
-                    triangles->has_holes || (triangles->solid[triangle] & VSHI_SOLID_HOLED) != 0;
-                ++triangle;
+        for (size_t i = 0; i < mesh->triangle_count; ++i) {
+            if (vshi_mesh_degenerate(mesh, i)) {
+                continue;
             }
+            for (size_t k = 0; k < 3; ++k) {
+                sheet->corners[3 * triangle + k] = (uint32_t)vertex + weld[mesh->indices[3 * i + k]];
+            }
+            const uint8_t solid = find_solid(mesh, sides, holed, i);
+            triangles->solid[triangle++] = solid;
+            triangles->has_solids = triangles->has_solids || solid != VSHI_AIR_AROUND;
+            triangles->has_holes = triangles->has_holes || (solid & VSHI_SOLID_HOLED) != 0;
         }
         for (size_t v = 0; v < mesh->vertex_count; ++v) {
             const vshi_vec local = vshi_vec_off(mesh->positions + 3 * v);
             put(triangles, vshi_transform_point(mesh->transform, local), sheet->vertices + 3 * vertex++);
         }
     }
+    result = vshi_sheet_join(sheet, error);
+done:
     free(weld);
-    return result == VSH_OK ? vshi_sheet_join(sheet, error) : result;
+    return result;
 }
 
 /* Geometry `mesh`, with that number; false where Embree refuses: its error says why. */
@@ -219,8 +217,7 @@ static void commit(void *user) {
     rtcCommitScene(user);
 }
 
-static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count,
-                        const vshi_solidity *solidity, vshi_job *job, vsh_error *error) {
+static vsh_result build(vsh_triangles *triangles, const vshi_mesh_set *set, vshi_job *job, vsh_error *error) {
     triangles->device = rtcNewDevice(NULL);
     if (triangles->device == NULL) {
         const enum RTCError code = rtcGetDeviceError(NULL);
@@ -236,21 +233,18 @@ static vsh_result build(vsh_triangles *triangles, const vsh_mesh *meshes, size_t
     }
     rtcSetSceneFlags(triangles->scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
     rtcSetSceneProgressMonitorFunction(triangles->scene, watch_progress, job);
-    vsh_result result = make_sheet(triangles, meshes, mesh_count, solidity, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(make_sheet(triangles, set, error));
     size_t vertex = 0;
-    for (size_t m = 0; m < mesh_count; ++m) {
-        if (!attach(triangles, meshes, mesh_count, m, vertex)) {
+    for (size_t m = 0; m < set->count; ++m) {
+        if (!attach(triangles, set->meshes, set->count, m, vertex)) {
             return refuse(triangles, job, error);
         }
-        vertex += meshes[m].vertex_count;
+        vertex += set->meshes[m].vertex_count;
         if (vshi_job_advance(job, 0)) {
             return vshi_job_fail_cancelled(job, error);
         }
     }
-    result = vshi_parallel_call(job, commit, triangles->scene, error);
+    const vsh_result result = vshi_parallel_call(job, commit, triangles->scene, error);
     rtcSetSceneProgressMonitorFunction(triangles->scene, NULL, NULL);
     if (result != VSH_OK) {
         return result;
@@ -272,49 +266,37 @@ vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const
     *triangles = NULL;
     VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    vshi_mesh_set set;
+    vsh_triangles *made = NULL;
+    vshi_job *job = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_mesh_set_create(meshes, mesh_count, &set, error));
     double bytes = 0.0;
-    for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
-        result = vshi_mesh_check_data(&meshes[m], m, error);
+    for (size_t m = 0; m < mesh_count; ++m) {
         const double vertices = (double)meshes[m].vertex_count, faces = (double)meshes[m].triangle_count;
         bytes += 12.0 * vertices + TRIANGLE_BYTES * faces + vshi_sheet_bytes(vertices, faces);
     }
-    if (result == VSH_OK) {
-        result = vshi_check_limit(&full, bytes, "triangles", error);
-    }
-    void *memory = NULL;
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory, 1, sizeof **triangles, "triangles", error);
-    }
-    vshi_solidity *solidity = NULL;
-    if (result == VSH_OK) {
-        vsh_run quiet = full;
-        quiet.progress = NULL;
-        result = vshi_solidity_create(meshes, mesh_count, &quiet, &solidity, error);
-    }
-    if (result != VSH_OK) {
-        free(memory);
-        return result;
-    }
-    vsh_triangles *made = memory;
+    VSHI_TRY_DONE(vshi_check_limit(&full, bytes, "triangles", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "triangles", error));
+    VSHI_TRY_DONE(vshi_mesh_set_solve(&set, &full, error));
     made->limit = full.memory_limit;
-    measure(made, meshes, mesh_count);
-    vshi_job *job = vshi_job_begin(&full, "triangles", 1);
+    measure(made, set.meshes, set.count);
+    job = vshi_job_begin(&full, "triangles", 1);
     if (job == NULL) {
-        vshi_solidity_free(solidity);
-        free(made);
-        return vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
+        goto done;
     }
-    result = vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error)
-                                     : build(made, meshes, mesh_count, solidity, job, error);
+    result = vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error) : build(made, &set, job, error);
+done:
     vshi_job_end(job);
-    vshi_solidity_free(solidity);
+    vshi_mesh_set_free(&set);
     if (result != VSH_OK) {
         vsh_triangles_free(made);
-        return result;
+        made = NULL;
     }
     *triangles = made;
-    return VSH_OK;
+    return result;
 }
 
 void vsh_triangles_free(vsh_triangles *triangles) {

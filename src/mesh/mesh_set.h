@@ -1,0 +1,50 @@
+/* Meshes that are checked and welded once, however many rooms they pass through. Views of such meshes know it
+ * (vsh_mesh.checked): a set of views that are known takes from there what was found, and so does each call
+ * that they are given to. */
+#ifndef VSHI_MESH_SET_H
+#define VSHI_MESH_SET_H
+
+#include "mesh/mesh.h"
+#include "mesh/solidity.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What is known of a mesh. */
+struct vsh_checked_mesh {
+    vsh_mesh of;                   /* to tell a view that was changed since */
+    vsh_mesh_report report;        /* but for its edges, which are 0 */
+    const vshi_solidity *solidity; /* of the meshes it was looked at with; NULL: not yet */
+    size_t place;                  /* among those */
+};
+
+typedef struct vshi_mesh_set {
+    vsh_mesh *meshes; /* [count]: views that know what is found here */
+    size_t count;
+    struct vsh_checked_mesh *checked; /* [count] */
+    const vshi_solidity *solidity;    /* of exactly these meshes; NULL before vshi_mesh_set_solve() */
+    vshi_solidity *own;               /* where no other had it */
+} vshi_mesh_set;
+
+/* What is known of a mesh, or NULL. */
+const struct vsh_checked_mesh *vshi_mesh_known(const vsh_mesh *mesh);
+
+/* VSHI_SIDE_… of the triangles of a mesh, or NULL where it is not known what is solid. */
+const uint8_t *vshi_mesh_sides(const vsh_mesh *mesh);
+
+/* Checks the meshes that are not known; their arrays, and what the others know it from, must outlive the set.
+ * Errors: as vsh_mesh_check(), with a mesh's place in the list. Free with vshi_mesh_set_free(), after a
+ * failure too. */
+VSHI_SHARED vsh_result vshi_mesh_set_create(const vsh_mesh *meshes, size_t count, vshi_mesh_set *set,
+                                            vsh_error *error);
+VSHI_SHARED void vshi_mesh_set_free(vshi_mesh_set *set);
+
+/* Finds what is solid, unless it is known of just these meshes; not a stage of its own in the progress, as it
+ * is a small part of a second for a million triangles. Errors: as vshi_solidity_create(). */
+VSHI_SHARED vsh_result vshi_mesh_set_solve(vshi_mesh_set *set, const vsh_run *run, vsh_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
