@@ -56,6 +56,7 @@
 #include "render.h"
 #include "scene.h"
 #include "sdf.h"
+#include "settings.h"
 #include "shade.h"
 #include "solidity.h"
 #include "spheres.h"

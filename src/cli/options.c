@@ -8,7 +8,88 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_OPTIONS = 96, HELP_COLUMN = 30 };
+enum { MAX_OPTIONS = 128, HELP_COLUMN = 30, HELP_WIDTH = 56 };
+
+/* --- settings of the library */
+
+typedef struct setting_text {
+    vsh_setting setting;
+    char help[sizeof(vsh_setting)];
+} setting_text;
+
+static setting_text listed[CLI_MOST_SETTINGS]; /* read once */
+static size_t listed_count;
+
+static void tell_help(const vsh_setting *s, char *help, size_t size) {
+    const bool counts = strchr("0123456789ma", s->range[0]) != NULL && strchr(s->range, ',') == NULL;
+    const bool plain = s->range[0] == '\0', always = s->otherwise[0] == '\0';
+    snprintf(help, size, "%s%s%s%s%s%s", s->help,
+             plain    ? ""
+             : counts ? ", "
+                      : ": ",
+             s->range, always ? "" : " (", s->otherwise, always ? "" : ")");
+}
+
+static void read_settings(void) {
+    vsh_setting setting;
+    while (listed_count < CLI_MOST_SETTINGS && vsh_setting_get(listed_count, &setting) != 0) {
+        setting_text *text = &listed[listed_count++];
+        text->setting = setting;
+        tell_help(&setting, text->help, sizeof text->help);
+    }
+}
+
+const vsh_setting *cli_setting(size_t index) {
+    read_settings();
+    return index < listed_count ? &listed[index].setting : NULL;
+}
+
+/* A command's options, with settings in the place of their groups. */
+typedef struct option_list {
+    cli_option options[MAX_OPTIONS];
+    size_t count;
+} option_list;
+
+static void add_option(option_list *list, const cli_option *option) {
+    if (list->count < MAX_OPTIONS) {
+        list->options[list->count++] = *option;
+    }
+}
+
+static void list_options(const cli_command *command, option_list *list) {
+    list->count = 0;
+    for (size_t i = 0; i < command->option_count; ++i) {
+        const cli_option *option = &command->options[i];
+        if (option->key < CLI_KEY_SETTINGS) {
+            add_option(list, option);
+            continue;
+        }
+        const vsh_setting *setting;
+        for (size_t k = 0; (setting = cli_setting(k)) != NULL; ++k) {
+            if (option->name != NULL ? strcmp(setting->option, option->name) == 0
+                                     : setting->group == option->key - CLI_KEY_SETTINGS) {
+                add_option(list,
+                           &(cli_option){CLI_KEY_SETTING + (int)k, setting->option,
+                                         setting->value[0] != '\0' ? setting->value : NULL, listed[k].help});
+            }
+        }
+    }
+}
+
+bool cli_find_option(const cli_command *command, const char *name, size_t length, cli_option *option) {
+    option_list list;
+    list_options(command, &list);
+    for (size_t i = 0; i < list.count; ++i) {
+        const cli_option *one = &list.options[i];
+        if (one->key != 0 && strlen(one->name) == length && strncmp(one->name, name, length) == 0) {
+            *option = *one;
+            return true;
+        }
+    }
+    return false;
+}
+
+/* --- words that are none */
 
 static int least(int a, int b) {
     return a < b ? a : b;
@@ -51,12 +132,12 @@ const char *cli_nearest(const char *text, const char *const *candidates, size_t 
     return nearest;
 }
 
-static int unknown_option(const cli_command *command, const char *text) {
+static int unknown_option(const cli_command *command, const option_list *list, const char *text) {
     const char *names[MAX_OPTIONS];
     size_t count = 0;
-    for (size_t i = 0; i < command->option_count; ++i) {
-        if (command->options[i].key != 0) {
-            names[count++] = command->options[i].name;
+    for (size_t i = 0; i < list->count; ++i) {
+        if (list->options[i].key != 0) {
+            names[count++] = list->options[i].name;
         }
     }
     char word[64];
@@ -69,20 +150,20 @@ static int unknown_option(const cli_command *command, const char *text) {
     return cli_usage("%s: no such option; see 'vdbshade %s --help'", text, command->name);
 }
 
-static const cli_option *option_of_key(const cli_command *command, int key) {
-    for (size_t i = 0; i < command->option_count; ++i) {
-        if (command->options[i].key == key) {
-            return &command->options[i];
+static const cli_option *option_of_key(const option_list *list, int key) {
+    for (size_t i = 0; i < list->count; ++i) {
+        if (list->options[i].key == key) {
+            return &list->options[i];
         }
     }
     return NULL;
 }
 
-static size_t make_getopt_tables(const cli_command *command, struct option *longs, char *shorts) {
+static void make_getopt_tables(const option_list *list, struct option *longs, char *shorts) {
     size_t count = 0;
     *shorts++ = ':'; /* a missing value is told from an unknown option */
-    for (size_t i = 0; i < command->option_count && count + 1 < MAX_OPTIONS; ++i) {
-        const cli_option *option = &command->options[i];
+    for (size_t i = 0; i < list->count && count + 1 < MAX_OPTIONS; ++i) {
+        const cli_option *option = &list->options[i];
         if (option->key == 0) {
             continue;
         }
@@ -97,7 +178,6 @@ static size_t make_getopt_tables(const cli_command *command, struct option *long
     }
     *shorts = '\0';
     longs[count] = (struct option){NULL, 0, NULL, 0};
-    return count;
 }
 
 /* getopt_long() takes any beginning of a name; a script that relies on one would break at the next option.
@@ -183,7 +263,9 @@ int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_op
                        const char *const *what, const char **operands, int count, bool *help) {
     struct option longs[MAX_OPTIONS];
     char shorts[2 * MAX_OPTIONS + 2];
-    make_getopt_tables(command, longs, shorts);
+    option_list list;
+    list_options(command, &list);
+    make_getopt_tables(&list, longs, shorts);
     *help = false;
     opterr = 0;
     optind = 1;
@@ -196,22 +278,22 @@ int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_op
             return cli_usage("%s: needs a value", argv[optind - 1]);
         }
         if (key == '?') {
-            const cli_option *known = optopt != 0 ? option_of_key(command, optopt) : NULL;
+            const cli_option *known = optopt != 0 ? option_of_key(&list, optopt) : NULL;
             if (known != NULL && known->value == NULL) {
                 return cli_usage("--%s: takes no value", known->name);
             }
             char letter[3] = {'-', (char)optopt, '\0'};
-            return unknown_option(command, optopt > 0 && optopt < 256 ? letter : argv[optind - 1]);
+            return unknown_option(command, &list, optopt > 0 && optopt < 256 ? letter : argv[optind - 1]);
         }
         if (key == 'h') {
             *help = true;
             cli_print_help(command);
             return CLI_OK;
         }
-        const cli_option *option = option_of_key(command, key);
+        const cli_option *option = option_of_key(&list, key);
         const char *word;
         if (abbreviated(option, argv, optarg, &word)) {
-            return unknown_option(command, word);
+            return unknown_option(command, &list, word);
         }
         char name[64];
         snprintf(name, sizeof name, "--%s", option->name);
@@ -236,32 +318,53 @@ int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_op
     return CLI_OK;
 }
 
+/* As many bytes of `text` as go on a line: to where it is broken, or to the last blank that fits. */
+static size_t line_length(const char *text) {
+    size_t fits = 0;
+    int columns = 0;
+    for (size_t i = 0;; ++i) {
+        const bool ends = text[i] == '\0' || text[i] == '\n';
+        if (ends || text[i] == ' ') {
+            fits = columns <= HELP_WIDTH || fits == 0 ? i : fits;
+        }
+        if (ends || columns > HELP_WIDTH) {
+            return fits > 0 ? fits : i;
+        }
+        columns += ((unsigned char)text[i] & 0xc0) != 0x80; /* characters, not bytes */
+    }
+}
+
+static void print_option(const cli_option *option) {
+    char left[128];
+    int used = option->key < 256 ? snprintf(left, sizeof left, "  -%c, --%s", option->key, option->name)
+                                 : snprintf(left, sizeof left, "      --%s", option->name);
+    if (option->value != NULL) {
+        used += snprintf(left + used, sizeof left - (size_t)used, " %s", option->value);
+    }
+    printf("%-*s", HELP_COLUMN, left);
+    if (used >= HELP_COLUMN) {
+        printf("\n%*s", HELP_COLUMN, "");
+    }
+    for (const char *line = option->help;;) {
+        const size_t length = line_length(line);
+        printf("%.*s\n", (int)length, line);
+        if (line[length] == '\0') {
+            return;
+        }
+        line += length + 1;
+        printf("%*s", HELP_COLUMN, "");
+    }
+}
+
 void cli_print_help(const cli_command *command) {
+    option_list list;
+    list_options(command, &list);
     printf("Usage: vdbshade %s %s\n\n%s\n", command->name, command->usage, command->summary);
-    for (size_t i = 0; i < command->option_count; ++i) {
-        const cli_option *option = &command->options[i];
-        if (option->key == 0) {
-            printf("\n%s:\n", option->help);
-            continue;
-        }
-        char left[64];
-        int used = option->key < 256 ? snprintf(left, sizeof left, "  -%c, --%s", option->key, option->name)
-                                     : snprintf(left, sizeof left, "      --%s", option->name);
-        if (option->value != NULL) {
-            used += snprintf(left + used, sizeof left - (size_t)used, " %s", option->value);
-        }
-        printf("%-*s", HELP_COLUMN, left);
-        if (used >= HELP_COLUMN) {
-            printf("\n%*s", HELP_COLUMN, "");
-        }
-        for (const char *line = option->help;;) {
-            const size_t length = strcspn(line, "\n");
-            printf("%.*s\n", (int)length, line);
-            if (line[length] == '\0') {
-                break;
-            }
-            line += length + 1;
-            printf("%*s", HELP_COLUMN, "");
+    for (size_t i = 0; i < list.count; ++i) {
+        if (list.options[i].key == 0) {
+            printf("\n%s:\n", list.options[i].help);
+        } else {
+            print_option(&list.options[i]);
         }
     }
 }

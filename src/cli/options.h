@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <vdbshade/vdbshade.h>
 
-/* An option, or (key 0) a heading of the help. Keys below 256 are also short options. */
+/* An option, or (key 0) a heading of the help, or CLI_SETTINGS. Keys below 256 are also short options. */
 typedef struct cli_option {
     int key;
     const char *name;
@@ -22,6 +22,23 @@ typedef struct cli_command {
     size_t option_count;
     int (*main)(int argc, char **argv); /* argv[0] is the command's name */
 } cli_command;
+
+/* A row of a table that stands for the library's settings of a group, VSH_SETTINGS_…: their names, help,
+ * ranges and defaults are taken from there, and their keys are CLI_KEY_SETTING + the number of each. */
+#define CLI_SETTINGS(group)                                                                                  \
+    { CLI_KEY_SETTINGS + (group), NULL, NULL, NULL }
+
+/* A row that stands for one of them, by its option's name. */
+#define CLI_SETTING(option)                                                                                  \
+    { CLI_KEY_SETTINGS, option, NULL, NULL }
+
+enum { CLI_KEY_SETTINGS = 0x8000, CLI_KEY_SETTING = 0x9000, CLI_MOST_SETTINGS = 64 };
+
+/* Setting `index` of the library; NULL beyond the last. */
+const vsh_setting *cli_setting(size_t index);
+
+/* The option of that name, of `length` bytes; false: it is none of the command's. */
+bool cli_find_option(const cli_command *command, const char *name, size_t length, cli_option *option);
 
 /* Takes one option; returns CLI_OK or an exit code after saying why. `name` is "--sun". */
 typedef int cli_option_fn(void *settings, int key, const char *name, const char *value);
@@ -88,15 +105,9 @@ enum {
     CLI_KEY_TRUSTED,
     CLI_KEY_CONFINED,
     CLI_KEY_ALLOW_OUTSIDE,
-    CLI_KEY_RESOLUTION,
-    CLI_KEY_VOXEL_SIZE,
-    CLI_KEY_HALF_WIDTH,
-    CLI_KEY_SHELL_THICKNESS,
     CLI_KEY_SOLID,
     CLI_KEY_SHELL,
-    CLI_KEY_INWARD,
-    CLI_KEY_UNIT,
-    CLI_KEY_CAST_BLENDED
+    CLI_KEY_INWARD
 };
 
 #define CLI_READER_OPTIONS                                                                                   \
@@ -137,54 +148,17 @@ enum {
             "the same for any"                                                                               \
     }
 
-#define CLI_UNIT_OPTION                                                                                      \
-    {                                                                                                        \
-        CLI_KEY_UNIT, "unit", "UNIT",                                                                        \
-            "of the numbers in mesh files: m, cm, mm, in, ft, or\nmetres; FBX and DAE know theirs, and "     \
-            "OBJ, PLY and STL\nstay as they are"                                                             \
-    }
-
+/* Voxels, and what meshes are taken for. */
 #define CLI_GRID_OPTIONS                                                                                     \
-    {CLI_KEY_RESOLUTION, "resolution", "N",                                                                  \
-     "voxels along the longest side of the casters,\n2 to 65536 (256; for bake 128 where all is exact)"},    \
-        {CLI_KEY_VOXEL_SIZE, "voxel-size", "SIZE", "or the edge of a voxel, in scene units"},                \
+    CLI_SETTINGS(VSH_SETTINGS_CASTERS),                                                                      \
         {CLI_KEY_SOLID, "solid", "PATTERN",                                                                  \
          "objects of casters that are solid whatever way their\nfaces look, closed over their holes; "       \
          "repeatable"},                                                                                      \
-        {CLI_KEY_SHELL, "shell", "PATTERN", "objects that are sheets with air on both sides"},               \
-        {CLI_KEY_INWARD, "inward", "PATTERN", "objects that are rooms: air in what they enclose"},           \
-        CLI_UNIT_OPTION,                                                                                     \
-        {CLI_KEY_CAST_BLENDED, "cast-blended", NULL, "meshes of blended materials (glass) cast too, whole"}, \
-        {CLI_KEY_HALF_WIDTH, "half-width", "VOXELS",                                                         \
-         "half width of the narrow band, in voxels,\n3 to 100 (3)"},                                         \
-    {                                                                                                        \
-        CLI_KEY_SHELL_THICKNESS, "shell-thickness", "VOXELS",                                                \
-            "thickness of sheets and of walls behind rooms' faces,\nin voxels, 1 to 50 (2)"                  \
+        {CLI_KEY_SHELL, "shell", "PATTERN", "objects that are sheets with air on both sides"}, {             \
+        CLI_KEY_INWARD, "inward", "PATTERN", "objects that are rooms: air in what they enclose"              \
     }
 
-enum { CLI_MOST_RULES = 64 };
-
-/* What of the grid's options was given on the command line. */
-typedef struct cli_grid_settings {
-    bool has_resolution, has_voxel_size, has_half_width, has_shell_thickness;
-    vsh_grid_options options;
-    vsh_solidity_rule rules[CLI_MOST_RULES];
-    size_t rule_count;
-    double unit; /* 0: as the files say */
-    bool cast_blended;
-} cli_grid_settings;
-
-/* Take an option of the tables above; *taken tells whether it was one of them. */
+/* Takes an option of the tables above but the last; *taken tells whether it was one of them. */
 int cli_common_take(cli_common *common, int key, const char *name, const char *value, bool *taken);
-int cli_grid_take(cli_grid_settings *settings, int key, const char *name, const char *value, bool *taken);
-
-/* --resolution and --voxel-size exclude each other. */
-int cli_grid_check(const cli_grid_settings *settings);
-
-/* Puts the given ones over a scene's, which then refers to the settings. */
-void cli_grid_apply(const cli_grid_settings *settings, vsh_scene *scene);
-
-/* Metres: a unit's name, or a number. */
-int cli_take_unit(const char *name, const char *value, double *unit);
 
 #endif

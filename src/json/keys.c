@@ -206,6 +206,9 @@ vsh_result vshi_read_object(vshi_reader *reader, const vshi_value *object, const
         if (result != VSH_OK) {
             return result;
         }
+        if (key->then != NULL) {
+            key->then(target);
+        }
     }
     for (size_t k = 0; k < table->key_count; ++k) {
         const vshi_key *key = &table->keys[k];

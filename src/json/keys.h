@@ -34,6 +34,17 @@ typedef const char *vshi_name_fn(int32_t i);
 /* Reads a value into the struct's member at the key's offset. */
 typedef vsh_result vshi_read_fn(vshi_reader *reader, const vshi_value *value, void *member);
 
+/* How a key is given as a text, on a command line say, and told of. All zero: it stands in files alone. */
+typedef struct vshi_option {
+    const char *name;      /* "max-error" */
+    const char *value;     /* what stands for the value: "N", "VOXELS"; NULL: of VSHI_BOOL */
+    const char *help;      /* what it is for, without range and default */
+    const char *range;     /* of VSHI_CUSTOM, and where numbers do not say it: in words */
+    const char *otherwise; /* what holds without it, where that is not its default's number or name */
+    int32_t group;         /* the caller's */
+    bool by;               /* numbers have an x between them, not a comma */
+} vshi_option;
+
 typedef struct vshi_key {
     const char *name;
     vshi_kind kind;
@@ -46,6 +57,8 @@ typedef struct vshi_key {
     int32_t count;
     vshi_name_fn *name_of;
     vshi_read_fn *read;
+    void (*then)(void *target); /* after it was read: what else follows for the struct; may be NULL */
+    vshi_option option;
 } vshi_key;
 
 #define VSHI_ALL UINT32_MAX
@@ -66,6 +79,21 @@ vsh_result vshi_read_object(vshi_reader *reader, const vshi_value *object, const
 
 /* Reads one value as `key` says into `member`. */
 vsh_result vshi_read_value(vshi_reader *reader, const vshi_value *value, const vshi_key *key, void *member);
+
+/* Reads a text as `key` says into `target`: numbers with commas between them, names, VSHI_BOOL "true",
+ * "false", or NULL for true. Strings are kept as the pointers that they are. Errors: VSH_ERROR_INPUT, "NAME
+ * 'TEXT': expected …"; VSH_ERROR_MEMORY. */
+vsh_result vshi_read_text(const vshi_key *key, const char *name, const char *text, void *target,
+                          vsh_error *error);
+
+/* What vshi_read_text() takes, in words: "a whole number from 1 to 4096"; and the range alone, "1 to 4096",
+ * or
+ * "" where there is none to tell. */
+void vshi_key_expected(const vshi_key *key, char *text, size_t size);
+void vshi_key_range(const vshi_key *key, char *text, size_t size);
+
+/* What `target` holds, "64"; "" where it holds nothing that is not off. */
+void vshi_key_value(const vshi_key *key, const void *target, char *text, size_t size);
 
 /* Number of the name that is the value of `key`; *index is left alone where there is no such key. */
 vsh_result vshi_read_choice(vshi_reader *reader, const vshi_value *object, const char *key,

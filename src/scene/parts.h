@@ -7,6 +7,9 @@
 
 #include <vdbshade/scene.h>
 
+/* Keys with options are settings: of a vsh_scene the first two, and of a vsh_receiver. */
+extern const vshi_table vshi_scene_table, vshi_ao_table, vshi_receiver_table;
+
 vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *caster);
 vsh_result vshi_read_layer(vshi_reader *reader, const vshi_value *value, void *layer);
 vsh_result vshi_read_light(vshi_reader *reader, const vshi_value *value, void *light);

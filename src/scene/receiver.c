@@ -3,7 +3,7 @@
 #include "scene/transform.h"
 
 #include <vdbshade/image.h>
-#include <vdbshade/scene.h>
+#include <vdbshade/settings.h>
 
 vsh_result vshi_read_size(vshi_reader *reader, const vshi_value *value, int32_t *width, int32_t *height) {
     const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 1.0, .highest = VSH_MAX_LIGHTMAP_SIZE};
@@ -75,7 +75,12 @@ static const vshi_key receiver_keys[] = {
      .kind = VSHI_INTEGER,
      .variants = MESH,
      .offset = offsetof(vsh_receiver, uv_set),
-     .highest = VSH_MAX_UV_SETS - 1},
+     .highest = VSH_MAX_UV_SETS - 1,
+     .option = {.name = "uv-set",
+                .value = "N",
+                .group = VSH_SETTINGS_TEXELS,
+                .help = "UV set of the lightmap",
+                .otherwise = "the second where there is one, else the first"}},
     {.name = "objects",
      .kind = VSHI_CUSTOM,
      .variants = MESH,
@@ -89,41 +94,85 @@ static const vshi_key receiver_keys[] = {
     {.name = "allow_overlap",
      .kind = VSHI_BOOL,
      .variants = MESH,
-     .offset = offsetof(vsh_receiver, allow_overlap)},
-    {.name = "size", .kind = VSHI_CUSTOM, .read = read_size},
+     .offset = offsetof(vsh_receiver, allow_overlap),
+     .option =
+         {.name = "allow-overlap",
+          .group = VSH_SETTINGS_TEXELS,
+          .help = "bake objects that lie over each other in the lightmap, too: the first keeps the texels"}},
+    {.name = "size",
+     .kind = VSHI_CUSTOM,
+     .read = read_size,
+     .option = {.name = "size",
+                .value = "W[xH]",
+                .group = VSH_SETTINGS_IMAGE,
+                .help = "texels of the lightmap",
+                .range = "W or WxH, each from 1 to 65536 texels",
+                .otherwise = "1024",
+                .by = true}},
     {.name = "supersample",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_receiver, supersample),
      .lowest = 1.0,
-     .highest = 16.0},
-    {.name = "padding", .kind = VSHI_INTEGER, .offset = offsetof(vsh_receiver, padding), .highest = 4096.0},
+     .highest = 16.0,
+     .option = {.name = "supersample",
+                .value = "N",
+                .group = VSH_SETTINGS_TEXELS,
+                .help = "N × N samples a texel"}},
+    {.name = "padding",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_receiver, padding),
+     .highest = 4096.0,
+     .option = {.name = "padding",
+                .value = "N",
+                .group = VSH_SETTINGS_TEXELS,
+                .help = "texels that charts are grown by"}},
     {.name = "ao_spacing",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_receiver, ao_spacing),
      .lowest = 1.0,
-     .highest = 8.0},
+     .highest = 8.0,
+     .option = {.name = "ao-spacing",
+                .value = "N",
+                .group = VSH_SETTINGS_TEXELS,
+                .help = "texels: AO by cones or adaptive is interpolated between texels so far "
+                        "apart where casters are far; texels share the rays of exact AO; 1: neither",
+                .range = "1, 2, 4 or 8"}},
     {.name = "output", .kind = VSHI_PATH, .required = VSHI_ALL, .offset = offsetof(vsh_receiver, output)},
-    {.name = "bits", .kind = VSHI_CUSTOM, .offset = offsetof(vsh_receiver, bits), .read = vshi_read_bits},
-    {.name = "pack", .kind = VSHI_STRING, .offset = offsetof(vsh_receiver, pack)},
+    {.name = "bits",
+     .kind = VSHI_CUSTOM,
+     .offset = offsetof(vsh_receiver, bits),
+     .read = vshi_read_bits,
+     .option = {.name = "bits",
+                .value = "N",
+                .group = VSH_SETTINGS_IMAGE,
+                .help = "bits a channel",
+                .range = "8, 16 or 32",
+                .otherwise = "32 for EXR, else 16 where the format has it, else 8"}},
+    {.name = "pack",
+     .kind = VSHI_STRING,
+     .offset = offsetof(vsh_receiver, pack),
+     .option = {.name = "pack",
+                .value = "R=NAME,…",
+                .group = VSH_SETTINGS_IMAGE,
+                .help = "what goes where in formats that cannot name channels: R=shadow.sun,G=ao,A=A; 0 and "
+                        "1 are constants; rgb: the irradiance, or shadow * ao in grey",
+                .otherwise = "irradiance or the first three but A to R, G, B; A to A; EXR: all by name and "
+                             "the picture; channels: without the picture"}},
     {.name = "color_space",
      .kind = VSHI_NAME,
      .offset = offsetof(vsh_receiver, color_space),
-     .name_of = vshi_color_space_key},
+     .name_of = vshi_color_space_key,
+     .option = {.name = "color-space",
+                .value = "SPACE",
+                .group = VSH_SETTINGS_IMAGE,
+                .help = "of R, G, B in 8 and 16 bits",
+                .otherwise = "auto: srgb for irradiance and tints, linear for the rest"}},
 };
-static const vshi_table receiver_table = VSHI_TABLE(receiver_keys);
+const vshi_table vshi_receiver_table = VSHI_TABLE(receiver_keys);
 
 vsh_result vshi_read_receiver(vshi_reader *reader, const vshi_value *value, void *member) {
-    const vsh_lightmap_options lightmap = vsh_lightmap_options_default();
-    const vsh_image_options image = vsh_image_options_default();
     vsh_receiver *receiver = member;
-    vshi_transform_identity(receiver->transform);
-    receiver->uv_set = -1;
-    receiver->width = lightmap.width;
-    receiver->height = lightmap.height;
-    receiver->supersample = lightmap.supersample;
-    receiver->padding = lightmap.padding;
-    receiver->ao_spacing = lightmap.ao_spacing;
-    receiver->bits = image.bits;
+    *receiver = vsh_receiver_default();
     vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
     if (result == VSH_OK) {
         result = vshi_reject_both(reader, value, "mesh", "heightfield");
@@ -134,6 +183,6 @@ vsh_result vshi_read_receiver(vshi_reader *reader, const vshi_value *value, void
     vshi_value given;
     const bool heightfield = vshi_member(value, "heightfield", &given);
     receiver->type = heightfield ? VSH_RECEIVER_HEIGHTFIELD : VSH_RECEIVER_MESH;
-    return vshi_read_object(reader, value, &receiver_table, 1U << receiver->type,
+    return vshi_read_object(reader, value, &vshi_receiver_table, 1U << receiver->type,
                             heightfield ? "a heightfield receiver" : "a receiver", receiver);
 }

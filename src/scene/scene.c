@@ -1,10 +1,12 @@
 #include "scene/scene.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 #include "scene/parts.h"
 #include "json/keys.h"
 
 #include <vdbshade/image.h>
+#include <vdbshade/settings.h>
 
 #include <stdlib.h>
 #include <string.h>
@@ -91,49 +93,68 @@ static vsh_result read_receivers(vshi_reader *reader, const vshi_value *value, v
     return result == VSH_OK ? check_outputs(reader, value, scene) : result;
 }
 
+static void wants_ao(void *target) {
+    vsh_scene *scene = target;
+    scene->ao = 1;
+}
+
+static void wants_bent(void *target) {
+    vsh_scene *scene = target;
+    ++scene->bent; /* behind 0, which is none */
+}
+
 static const vshi_key ao_keys[] = {
     {.name = "distance",
      .kind = VSHI_NUMBER,
      .required = VSHI_ALL,
-     .offset = offsetof(vsh_shade_options, ao_distance),
+     .offset = offsetof(vsh_scene, shade.ao_distance),
      .highest = VSHI_LARGEST,
-     .flags = VSHI_ABOVE},
+     .flags = VSHI_ABOVE,
+     .then = wants_ao,
+     .option = {.name = "ao",
+                .value = "DISTANCE",
+                .group = VSH_SETTINGS_OCCLUSION,
+                .help = "ambient occlusion within a distance, scene units",
+                .otherwise = "none"}},
     {.name = "method",
      .kind = VSHI_NAME,
-     .offset = offsetof(vsh_shade_options, ao_method),
-     .name_of = vsh_ao_method_name},
+     .offset = offsetof(vsh_scene, shade.ao_method),
+     .name_of = vsh_ao_method_name,
+     .option = {.name = "ao-method",
+                .value = "NAME",
+                .group = VSH_SETTINGS_OCCLUSION,
+                .help = "of AO; cones and taps are previews"}},
     {.name = "cones",
      .kind = VSHI_INTEGER,
      .variants = 1U << VSH_AO_CONES | 1U << VSH_AO_ADAPTIVE | 1U << VSH_AO_EXACT | 1U << VSH_AO_AUTO,
-     .offset = offsetof(vsh_shade_options, ao_cones),
+     .offset = offsetof(vsh_scene, shade.ao_cones),
      .lowest = 1.0,
-     .highest = 256.0},
-    {.name = "bent_normals", .kind = VSHI_LATER, .variants = ~(1U << VSH_AO_TAPS)},
+     .highest = 256.0,
+     .option = {.name = "ao-cones", .value = "N", .group = VSH_SETTINGS_OCCLUSION, .help = "cones a texel"}},
+    {.name = "bent_normals",
+     .kind = VSHI_NAME,
+     .variants = ~(1U << VSH_AO_TAPS),
+     .offset = offsetof(vsh_scene, bent),
+     .name_of = vsh_bent_space_name,
+     .then = wants_bent,
+     .option = {.name = "bent-normals",
+                .value = "SPACE",
+                .group = VSH_SETTINGS_CHANNELS,
+                .help = "with --ao also bent.X, .Y, .Z: the mean direction that is open, in world or tangent "
+                        "space; -1 to 1, in integer formats (1 + x) / 2",
+                .otherwise = "none"}},
 };
-static const vshi_table ao_table = VSHI_TABLE(ao_keys);
+const vshi_table vshi_ao_table = VSHI_TABLE(ao_keys);
 
 static vsh_result read_ao(vshi_reader *reader, const vshi_value *value, void *member) {
-    vsh_scene *scene = member;
-    scene->ao = 1;
-    vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
-    if (result == VSH_OK) {
-        result = vshi_read_choice(reader, value, "method", vsh_ao_method_name, &scene->shade.ao_method);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
     static const char *const whats[] = {
         [VSH_AO_TAPS] = "ao by taps", [VSH_AO_RAYS] = "ao by rays", [VSH_AO_AUTO] = NULL};
+    vsh_scene *scene = member;
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
+    VSHI_TRY(vshi_read_choice(reader, value, "method", vsh_ao_method_name, &scene->shade.ao_method));
     const char *what = whats[scene->shade.ao_method];
-    result = vshi_read_object(reader, value, &ao_table, 1U << scene->shade.ao_method,
-                              what != NULL ? what : "ao", &scene->shade);
-    vshi_value bent;
-    if (result == VSH_OK && vshi_member(value, "bent_normals", &bent)) {
-        int32_t space = VSH_BENT_WORLD;
-        result = vshi_read_choice(reader, value, "bent_normals", vsh_bent_space_name, &space);
-        scene->bent = 1 + space;
-    }
-    return result;
+    return vshi_read_object(reader, value, &vshi_ao_table, 1U << scene->shade.ao_method,
+                            what != NULL ? what : "ao", scene);
 }
 
 /* "quadratic", or the powers of R, G and B. */
@@ -153,11 +174,20 @@ static vsh_result read_tint(vshi_reader *reader, const vshi_value *value, void *
     return result;
 }
 
-static vsh_result read_ambient(vshi_reader *reader, const vshi_value *value, void *member) {
-    vsh_scene *scene = member;
-    const vshi_key color = {.kind = VSHI_VECTOR, .highest = VSHI_LARGEST, .count = 3};
+static void has_ambient(void *target) {
+    vsh_scene *scene = target;
     scene->has_ambient = 1;
-    return vshi_read_value(reader, value, &color, scene->ambient);
+}
+
+static void voxels_are_named(void *target) {
+    vsh_scene *scene = target;
+    scene->voxels_named = 1;
+}
+
+static void resolution_is_named(void *target) {
+    vsh_scene *scene = target;
+    scene->voxels_named = 1;
+    scene->grid.voxel_size = 0.0; /* which would stand in its place */
 }
 
 /* A name, or metres. */
@@ -179,54 +209,147 @@ static const vshi_key scene_keys[] = {
      .kind = VSHI_NUMBER,
      .offset = offsetof(vsh_scene, grid.voxel_size),
      .highest = VSHI_LARGEST,
-     .flags = VSHI_ABOVE},
+     .flags = VSHI_ABOVE,
+     .then = voxels_are_named,
+     .option = {.name = "voxel-size",
+                .value = "SIZE",
+                .group = VSH_SETTINGS_CASTERS,
+                .help = "in place of --resolution: the edge of a voxel, scene units",
+                .otherwise = "as --resolution says"}},
     {.name = "resolution",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_scene, grid.resolution),
      .lowest = 2.0,
-     .highest = 65536.0},
+     .highest = 65536.0,
+     .then = resolution_is_named,
+     .option = {.name = "resolution",
+                .value = "N",
+                .group = VSH_SETTINGS_CASTERS,
+                .help = "voxels along the longest side of the casters",
+                .otherwise = "256; for bake 96 where all is exact"}},
     {.name = "half_width",
      .kind = VSHI_NUMBER,
      .offset = offsetof(vsh_scene, grid.half_width),
      .lowest = 3.0,
-     .highest = 100.0},
+     .highest = 100.0,
+     .option = {.name = "half-width",
+                .value = "VOXELS",
+                .group = VSH_SETTINGS_CASTERS,
+                .help = "half width of the narrow band"}},
     {.name = "shell_thickness",
      .kind = VSHI_NUMBER,
      .offset = offsetof(vsh_scene, grid.shell_thickness),
      .lowest = 1.0,
-     .highest = 50.0},
+     .highest = 50.0,
+     .option = {.name = "shell-thickness",
+                .value = "VOXELS",
+                .group = VSH_SETTINGS_CASTERS,
+                .help = "thickness of sheets and of walls behind rooms' faces"}},
     {.name = "layers", .kind = VSHI_CUSTOM, .read = read_layers},
     {.name = "lights", .kind = VSHI_CUSTOM, .read = read_lights},
     {.name = "ao", .kind = VSHI_CUSTOM, .read = read_ao},
-    {.name = "irradiance", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, irradiance)},
-    {.name = "ambient", .kind = VSHI_CUSTOM, .read = read_ambient},
-    {.name = "tint", .kind = VSHI_CUSTOM, .read = read_tint},
+    {.name = "irradiance",
+     .kind = VSHI_BOOL,
+     .offset = offsetof(vsh_scene, irradiance),
+     .option =
+         {.name = "irradiance",
+          .group = VSH_SETTINGS_CHANNELS,
+          .help =
+              "also irradiance.R, .G, .B: visibility × colour × falloff × cosine, summed, × AO where baked"}},
+    {.name = "ambient",
+     .kind = VSHI_VECTOR,
+     .offset = offsetof(vsh_scene, ambient),
+     .highest = VSHI_LARGEST,
+     .count = 3,
+     .then = has_ambient,
+     .option = {.name = "ambient",
+                .value = "R,G,B",
+                .group = VSH_SETTINGS_CHANNELS,
+                .help = "light from all around, linear: irradiance is then that of the lights + ambient × AO",
+                .otherwise = "none"}},
+    {.name = "tint",
+     .kind = VSHI_CUSTOM,
+     .read = read_tint,
+     .option = {.name = "tint",
+                .value = "TINT",
+                .group = VSH_SETTINGS_CHANNELS,
+                .help = "also tint.NAME.R, .G, .B of each light, its penumbra coloured: (V, V²/2 + V/2, V²) "
+                        "or powers of V such as 1,1.2,1.5; irradiance takes it too",
+                .range = "quadratic, or R,G,B: powers from 0.0625 to 16",
+                .otherwise = "none"}},
     {.name = "method",
      .kind = VSHI_NAME,
      .offset = offsetof(vsh_scene, shade.method),
-     .name_of = vsh_shadow_method_name},
+     .name_of = vsh_shadow_method_name,
+     .option = {.name = "method",
+                .value = "NAME",
+                .group = VSH_SETTINGS_OCCLUSION,
+                .help = "of the shadow; auto: exact where all casters are triangles, else adaptive; all but "
+                        "these and rays are previews, which keep no error; classic, practical and improved "
+                        "have the outer half of the penumbra only"}},
     {.name = "rays",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_scene, shade.rays),
      .lowest = 1.0,
-     .highest = 4096.0},
+     .highest = 4096.0,
+     .option = {.name = "rays",
+                .value = "N",
+                .group = VSH_SETTINGS_ACCURACY,
+                .help = "rays a texel; with adaptive and exact a limit",
+                .otherwise = "64, or as many as the error takes"}},
     {.name = "sampler",
      .kind = VSHI_NAME,
      .offset = offsetof(vsh_scene, shade.sampler),
-     .name_of = vsh_sampler_name},
-    {.name = "frame", .kind = VSHI_INTEGER, .offset = offsetof(vsh_scene, shade.frame), .highest = INT32_MAX},
+     .name_of = vsh_sampler_name,
+     .option = {.name = "sampler", .value = "NAME", .group = VSH_SETTINGS_ACCURACY, .help = "where they go"}},
+    {.name = "frame",
+     .kind = VSHI_INTEGER,
+     .offset = offsetof(vsh_scene, shade.frame),
+     .highest = INT32_MAX,
+     .option = {.name = "frame",
+                .value = "N",
+                .group = VSH_SETTINGS_ACCURACY,
+                .help = "another set of them: bakes of frames 0, 1, 2 … may be averaged"}},
     {.name = "early_rays",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_scene, shade.early_rays),
-     .highest = 4096.0},
+     .highest = 4096.0,
+     .option = {.name = "early-rays",
+                .value = "N",
+                .group = VSH_SETTINGS_ACCURACY,
+                .help = "with rays: where the first N agree, the rest are not marched",
+                .otherwise = "0: never"}},
     {.name = "max_error",
      .kind = VSHI_NUMBER,
      .offset = offsetof(vsh_scene, shade.max_error),
      .lowest = 1e-4,
-     .highest = 1.0},
-    {.name = "jitter", .kind = VSHI_NUMBER, .offset = offsetof(vsh_scene, shade.jitter), .highest = 1.0},
-    {.name = "error", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, error)},
-    {.name = "invalid", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, invalid)},
+     .highest = 1.0,
+     .option = {.name = "max-error",
+                .value = "E",
+                .group = VSH_SETTINGS_ACCURACY,
+                .help = "standard error that a value may keep, which rays follow from; takes the place of a "
+                        "scene's preview methods by auto"}},
+    {.name = "jitter",
+     .kind = VSHI_NUMBER,
+     .offset = offsetof(vsh_scene, shade.jitter),
+     .highest = 1.0,
+     .option = {.name = "jitter",
+                .value = "J",
+                .group = VSH_SETTINGS_ACCURACY,
+                .help =
+                    "shadows by one march: steps are shortened by a part of up to this, another a texel"}},
+    {.name = "error",
+     .kind = VSHI_BOOL,
+     .offset = offsetof(vsh_scene, error),
+     .option = {.name = "error",
+                .group = VSH_SETTINGS_ACCURACY,
+                .help = "also error.NAME of each light and error.ao: the standard error left in each value"}},
+    {.name = "invalid",
+     .kind = VSHI_BOOL,
+     .offset = offsetof(vsh_scene, invalid),
+     .option = {.name = "invalid-channel",
+                .group = VSH_SETTINGS_CHANNELS,
+                .help = "also the channel invalid: 1 for texels inside solids or behind walls, else 0"}},
     {.name = "max_steps",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_scene, shade.max_steps),
@@ -236,11 +359,24 @@ static const vshi_key scene_keys[] = {
      .kind = VSHI_NUMBER,
      .offset = offsetof(vsh_scene, shade.start_offset),
      .highest = 16.0},
-    {.name = "unit", .kind = VSHI_CUSTOM, .read = read_unit},
-    {.name = "cast_blended", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, cast_blended)},
+    {.name = "unit",
+     .kind = VSHI_CUSTOM,
+     .read = read_unit,
+     .option = {.name = "unit",
+                .value = "UNIT",
+                .group = VSH_SETTINGS_CASTERS,
+                .help = "of the numbers in mesh files",
+                .range = "m, cm, mm, in, ft, or metres",
+                .otherwise = "as FBX and DAE say; OBJ, PLY and STL stay as they are"}},
+    {.name = "cast_blended",
+     .kind = VSHI_BOOL,
+     .offset = offsetof(vsh_scene, cast_blended),
+     .option = {.name = "cast-blended",
+                .group = VSH_SETTINGS_CASTERS,
+                .help = "meshes of blended materials (glass) cast too, whole"}},
     {.name = "receivers", .kind = VSHI_CUSTOM, .read = read_receivers},
 };
-static const vshi_table scene_table = VSHI_TABLE(scene_keys);
+const vshi_table vshi_scene_table = VSHI_TABLE(scene_keys);
 
 vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh_scene **scene,
                             vsh_error *error) {
@@ -257,14 +393,11 @@ vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh
         result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
         goto done;
     }
-    made->scene.grid = vsh_grid_options_default();
-    made->scene.shade = vsh_shade_options_default();
+    made->scene = vsh_scene_default();
     const vshi_value root = {NULL, NULL, 0, 0, json};
-    result = vshi_read_object(&reader, &root, &scene_table, 1, "a scene", &made->scene);
+    result = vshi_read_object(&reader, &root, &vshi_scene_table, 1, "a scene", &made->scene);
     if (result == VSH_OK) {
         result = vshi_reject_both(&reader, &root, "voxel_size", "resolution");
-        made->scene.voxels_named =
-            json_object_get(json, "voxel_size") != NULL || json_object_get(json, "resolution") != NULL;
     }
     if (result == VSH_OK) {
         result = vshi_check_layers(&reader, &root, &made->scene);

@@ -42,7 +42,7 @@ load helper
     run -2 "$VDBSHADE" bake box.obj --ao 1 --bent-normals up -o box.exr
     [[ $output == *"'up'"*"world, tangent"* ]]
     run -2 "$VDBSHADE" bake box.obj --sun 1,1,1 --tint 0,1,1 -o box.exr
-    [[ $output == *"power[0] 0 is out of range"* ]]
+    [[ $output == *"powers from 0.0625 to 16"* ]]
     run -2 "$VDBSHADE" bake box.obj --sun 1,1,1 --ambient -1,1,1 -o box.exr
     [[ $output == *"expected three numbers of at least 0"* ]]
 }

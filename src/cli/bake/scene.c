@@ -49,40 +49,13 @@ static int add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
     return CLI_OK;
 }
 
-static void override_receiver(const cli_bake_settings *s, vsh_receiver *receiver) {
+static int override_receiver(const cli_bake_settings *s, vsh_receiver *receiver) {
     if (s->receive.count > 0 || s->no_receive.count > 0) {
         receiver->objects = selection(&s->receive, &s->no_receive);
     }
     receiver->partial = s->per_object || receiver->partial;
-    receiver->allow_overlap = s->allow_overlap || receiver->allow_overlap;
-    if (s->output != NULL) {
-        receiver->output = s->output;
-    }
-    if (s->has_size) {
-        receiver->width = s->width;
-        receiver->height = s->height;
-    }
-    if (s->has_uv_set) {
-        receiver->uv_set = s->uv_set;
-    }
-    if (s->has_supersample) {
-        receiver->supersample = s->supersample;
-    }
-    if (s->has_padding) {
-        receiver->padding = s->padding;
-    }
-    if (s->has_ao_spacing) {
-        receiver->ao_spacing = s->ao_spacing;
-    }
-    if (s->has_bits) {
-        receiver->bits = s->bits;
-    }
-    if (s->pack != NULL) {
-        receiver->pack = s->pack;
-    }
-    if (s->has_color_space) {
-        receiver->color_space = s->color_space;
-    }
+    receiver->output = s->output != NULL ? s->output : receiver->output;
+    return cli_patch_receiver(&s->patch, receiver);
 }
 
 static void free_outputs(cli_bake_scene *made) {
@@ -142,26 +115,16 @@ int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     if (made->receivers == NULL) {
         return cli_out_of_memory("receivers");
     }
-    const vsh_lightmap_options defaults = vsh_lightmap_options_default();
-    for (size_t i = 0; i < count; ++i) {
+    int code = CLI_OK;
+    for (size_t i = 0; i < count && code == CLI_OK; ++i) {
         vsh_receiver *receiver = &made->receivers[i];
-        if (made->read != NULL) {
-            *receiver = made->read->receivers[i];
-        } else {
-            receiver->path = s->input;
-            set_identity(receiver->transform);
-            receiver->uv_set = -1;
-            receiver->width = defaults.width;
-            receiver->height = defaults.height;
-            receiver->supersample = defaults.supersample;
-            receiver->padding = defaults.padding;
-            receiver->ao_spacing = defaults.ao_spacing;
-        }
-        override_receiver(s, receiver);
+        *receiver = made->read != NULL ? made->read->receivers[i] : vsh_receiver_default();
+        receiver->path = made->read != NULL ? receiver->path : s->input;
+        code = override_receiver(s, receiver);
     }
     made->scene.receivers = made->receivers;
     made->scene.receiver_count = count;
-    return CLI_OK;
+    return code;
 }
 
 /* Whether it is meant for a folder: one that is called as an image is, is in the way. */
@@ -249,7 +212,7 @@ static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
 }
 
 int cli_bake_check_work(const cli_bake_settings *s, const cli_bake_scene *made) {
-    if (made->read == NULL && !s->has_sun && !s->has_ao) {
+    if (made->read == NULL && !s->has_sun && !cli_patch_has(&s->patch, "--ao")) {
         return cli_usage("%s: nothing to bake; give --sun X,Y,Z or --ao DISTANCE, or both", s->input);
     }
     if (made->scene.light_count == 0 && !made->scene.ao) {
@@ -327,15 +290,14 @@ static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scen
         if (receivers && settings->output == NULL) {
             return cli_usage("%s: no output; give -o OUT", settings->input);
         }
-        made->scene.grid = vsh_grid_options_default();
-        made->scene.shade = vsh_shade_options_default();
+        made->scene = vsh_scene_default();
         if (cli_has_ending(settings->input, "vdb")) {
             made->scene.grid.resolution = 0; /* its own voxels */
         }
     }
-    cli_grid_apply(&settings->grid, &made->scene);
-    int code = add_lights(settings, made);
-    code = code == CLI_OK ? cli_bake_set_shade(settings, &made->scene) : code;
+    int code = cli_patch_scene(&settings->patch, &made->scene);
+    code = code == CLI_OK ? add_lights(settings, made) : code;
+    code = code == CLI_OK ? cli_bake_check_shade(settings, &made->scene) : code;
     code = code == CLI_OK && receivers ? cli_bake_check_work(settings, made) : code;
     code = code == CLI_OK ? add_casters(settings, made) : code;
     if (code == CLI_OK && receivers) {

@@ -3,6 +3,7 @@
 
 #include "cli/commands.h"
 #include "cli/message.h"
+#include "cli/patch.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
@@ -13,7 +14,7 @@ static const cli_option options[] = {
     {0, NULL, NULL, "Options"},
     {KEY_SIZE, "size", "W[xH]", "texels of the lightmap that UVs are looked at in (1024)"},
     {CLI_KEY_VERBOSE, "verbose", NULL, "a paragraph for each mesh, however many there are"},
-    CLI_UNIT_OPTION,
+    CLI_SETTING("unit"),
     CLI_MEMORY_OPTION,
     CLI_READER_OPTIONS,
     {'h', "help", NULL, "show this help"},
@@ -35,6 +36,7 @@ const cli_command cli_info = {
 
 typedef struct info_settings {
     cli_common common;
+    cli_patch patch;
     cli_info_look look;
 } info_settings;
 
@@ -44,11 +46,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
     if (key == KEY_SIZE) {
         return cli_take_size(name, value, &s->look.width, &s->look.height);
     }
-    if (key == CLI_KEY_UNIT) {
-        return cli_take_unit(name, value, &s->look.unit);
-    }
-    const int code = cli_common_take(&s->common, key, name, value, &taken);
-    return taken ? code : cli_usage("%s: no such option", name);
+    const int code = cli_patch_take(&s->patch, key, name, value, &taken);
+    return taken ? code : cli_common_take(&s->common, key, name, value, &taken);
 }
 
 static int print_info(const char *path, const cli_info_look *look, const vsh_run *run) {
@@ -81,5 +80,8 @@ static int info_main(int argc, char **argv) {
     cli_signals_watch();
     const vsh_run run = cli_common_run(&s.common);
     s.look.all = s.common.verbose;
+    vsh_scene scene = vsh_scene_default();
+    cli_patch_scene(&s.patch, &scene);
+    s.look.unit = scene.unit;
     return print_info(path, &s.look, &run);
 }

@@ -187,7 +187,7 @@ static int choose_answers(query_work *work) {
     query_answers *a = &work->answers;
     vsh_scene *scene = work->scene;
     if (scene->ao && !work->reader.has_normals) {
-        if (s->bake.has_ao) {
+        if (cli_patch_has(&s->bake.patch, "--ao")) {
             return cli_usage("%s: no normals, which --ao needs", work->reader.source.name);
         }
         cli_warn("%s: no normals: no ao", work->reader.source.name);
@@ -283,14 +283,13 @@ static int query_main(int argc, char **argv) {
     query_settings s;
     memset(&s, 0, sizeof s);
     s.bake.common = cli_common_default();
-    s.bake.grid.options = vsh_grid_options_default();
     s.format = s.points_format = s.normals = -1;
     bool help;
     int code = cli_parse(&cli_query, argc, argv, take, &s, "INPUT", &s.bake.input, &help);
     if (code != CLI_OK || help) {
         return code;
     }
-    code = cli_grid_check(&s.bake.grid);
+    code = cli_patch_check(&s.bake.patch);
     code = code == CLI_OK ? find_formats(&s) : code;
     if (code != CLI_OK) {
         return code;

@@ -174,7 +174,6 @@ int render_parse(int argc, char **argv, render_settings *s, bool *help) {
     const vsh_render_options defaults = vsh_render_options_default();
     memset(s, 0, sizeof *s);
     s->bake.common = cli_common_default();
-    s->bake.grid.options = vsh_grid_options_default();
     s->up[1] = 1.0;
     s->fov_deg = 35.0;
     s->width = defaults.width;
@@ -189,6 +188,6 @@ int render_parse(int argc, char **argv, render_settings *s, bool *help) {
     if (code != CLI_OK || *help) {
         return code;
     }
-    code = cli_grid_check(&s->bake.grid);
+    code = cli_patch_check(&s->bake.patch);
     return code == CLI_OK ? check(s) : code;
 }

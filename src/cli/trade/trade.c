@@ -22,9 +22,7 @@ enum {
     KEY_TRUTH_RAYS,
     KEY_BUDGET,
     KEY_SUN,
-    KEY_SUN_ANGLE,
-    KEY_AO,
-    KEY_UV_SET
+    KEY_SUN_ANGLE
 };
 
 static const cli_option options[] = {
@@ -44,8 +42,8 @@ static const cli_option options[] = {
     {0, NULL, NULL, "Light and occlusion, where INPUT is a mesh"},
     {KEY_SUN, "sun", "X,Y,Z", "direction towards the sun"},
     {KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},
-    {KEY_AO, "ao", "DISTANCE", "ambient occlusion within a distance, scene units"},
-    {KEY_UV_SET, "uv-set", "N", "UV set of the lightmap, from 0"},
+    CLI_SETTING("ao"),
+    CLI_SETTING("uv-set"),
     CLI_COMMON_OPTIONS,
     CLI_ISA_OPTION,
 };
@@ -84,11 +82,12 @@ static int take_resolutions(trade_settings *s, const char *name, const char *val
 }
 
 static int take_size(trade_settings *s, const char *name, const char *value) {
-    const int code = cli_take_size(name, value, &s->bake.width, &s->bake.height);
-    if (code == CLI_OK && (s->bake.width > 4096 || s->bake.height > 4096)) {
+    int32_t width, height;
+    const int code = cli_take_size(name, value, &width, &height);
+    if (code == CLI_OK && (width > 4096 || height > 4096)) {
         return cli_usage("%s '%s': expected at most 4096 texels", name, value);
     }
-    return code;
+    return code == CLI_OK ? cli_patch_set(&s->bake.patch, name, value) : code;
 }
 
 static int take(void *settings, int key, const char *name, const char *value) {
@@ -119,17 +118,12 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_SUN_ANGLE:
         s->bake.has_sun_angle = true;
         return cli_take_number(name, value, 0.0, 179.0, &s->bake.sun_angle_deg);
-    case KEY_AO:
-        s->bake.has_ao = true;
-        return cli_take_positive(name, value, &s->bake.ao_distance);
-    case KEY_UV_SET:
-        s->bake.has_uv_set = true;
-        return cli_take_integer(name, value, 0, VSH_MAX_UV_SETS - 1, &s->bake.uv_set);
     default:
         break;
     }
     bool taken;
-    return cli_common_take(&s->bake.common, key, name, value, &taken);
+    const int code = cli_patch_take(&s->bake.patch, key, name, value, &taken);
+    return taken ? code : cli_common_take(&s->bake.common, key, name, value, &taken);
 }
 
 /* --- what the measurements share */
@@ -339,10 +333,9 @@ static int trade_main(int argc, char **argv) {
     trade_settings s;
     memset(&s, 0, sizeof s);
     s.bake.common = cli_common_default();
-    s.bake.grid.options = vsh_grid_options_default();
-    s.bake.has_size = s.bake.has_supersample = s.bake.has_padding = true;
-    s.bake.width = s.bake.height = 256;
-    s.bake.supersample = 1; /* a sample a texel: the truth is one of the sample's too */
+    cli_patch_set(&s.bake.patch, "--size", "256");
+    cli_patch_set(&s.bake.patch, "--supersample", "1"); /* the truth is one of the sample's too */
+    cli_patch_set(&s.bake.patch, "--padding", "0");
     memcpy(s.resolutions, (const int32_t[]){64, 128, 256}, 3 * sizeof s.resolutions[0]);
     s.resolution_count = 3;
     s.truth_rays = 1024;

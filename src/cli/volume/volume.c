@@ -125,7 +125,7 @@ static int check_options(const volume_settings *s) {
     if (s->box_voxel_size > 0.0 && !s->has_box) {
         return cli_usage("--box-voxel-size: there is no --box");
     }
-    return cli_grid_check(&s->bake.grid);
+    return cli_patch_check(&s->bake.patch);
 }
 
 static int check_output(const volume_settings *s, const vsh_scene *scene, const char *output) {
@@ -325,7 +325,6 @@ static int volume_main(int argc, char **argv) {
     volume_settings s;
     memset(&s, 0, sizeof s);
     s.bake.common = cli_common_default();
-    s.bake.grid.options = vsh_grid_options_default();
     bool help;
     int code = cli_parse(&cli_volume, argc, argv, take, &s, "INPUT", &s.bake.input, &help);
     if (code != CLI_OK || help) {
@@ -338,7 +337,7 @@ static int volume_main(int argc, char **argv) {
     cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
     cli_bake_scene made;
     code = cli_bake_scene_for_points(&s.bake, &made);
-    if (s.band > made.scene.grid.half_width && !s.bake.grid.has_half_width) {
+    if (s.band > made.scene.grid.half_width && !cli_patch_has(&s.bake.patch, "--half-width")) {
         made.scene.grid.half_width = s.band;
     }
     code = code == CLI_OK ? cli_bake_check_work(&s.bake, &made) : code;

@@ -4,6 +4,7 @@
 #include "cli/commands.h"
 #include "cli/message.h"
 #include "cli/origin.h"
+#include "cli/patch.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
@@ -20,7 +21,7 @@ typedef struct voxelize_settings {
     const char *output;
     const char *name;
     cli_common common;
-    cli_grid_settings grid;
+    cli_patch patch;
 } voxelize_settings;
 
 static const cli_option options[] = {
@@ -54,7 +55,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return value[0] != '\0' ? CLI_OK : cli_usage("%s '': expected a name", name);
     }
     bool taken;
-    const int code = cli_grid_take(&s->grid, key, name, value, &taken);
+    const int code = cli_patch_take(&s->patch, key, name, value, &taken);
     return taken ? code : cli_common_take(&s->common, key, name, value, &taken);
 }
 
@@ -132,13 +133,12 @@ static int voxelize_main(int argc, char **argv) {
     voxelize_settings s;
     memset(&s, 0, sizeof s);
     s.common = cli_common_default();
-    s.grid.options = vsh_grid_options_default();
     bool help;
     int code = cli_parse(&cli_voxelize, argc, argv, take, &s, "INPUT", &s.input, &help);
     if (code != CLI_OK || help) {
         return code;
     }
-    code = cli_grid_check(&s.grid);
+    code = cli_patch_check(&s.patch);
     if (code != CLI_OK) {
         return code;
     }
@@ -148,7 +148,9 @@ static int voxelize_main(int argc, char **argv) {
     cli_progress_begin(s.common.progress, s.common.quiet);
     const vsh_caster mesh = {
         .type = VSH_CASTER_MESH, .path = s.input, .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
-    vsh_scene scene = {.casters = &mesh, .caster_count = 1, .grid = vsh_grid_options_default()};
+    vsh_scene scene = vsh_scene_default();
+    scene.casters = &mesh;
+    scene.caster_count = 1;
     vsh_scene *read = NULL;
     if (cli_has_ending(s.input, "json")) {
         const vsh_run run = cli_common_run(&s.common);
@@ -162,8 +164,8 @@ static int voxelize_main(int argc, char **argv) {
         scene.unit = read->unit;
         scene.cast_blended = read->cast_blended;
     }
-    cli_grid_apply(&s.grid, &scene);
-    code = check_files(&s, &scene);
+    code = cli_patch_scene(&s.patch, &scene);
+    code = code == CLI_OK ? check_files(&s, &scene) : code;
     if (code == CLI_OK) {
         cli_signals_watch();
         code = voxelize(&s, &scene);

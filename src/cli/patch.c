@@ -1,0 +1,95 @@
+#include "patch.h"
+
+#include "message.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static int set(const vsh_setting *setting, const char *text, vsh_scene *scene, vsh_receiver *receiver) {
+    char name[sizeof setting->option + 2];
+    snprintf(name, sizeof name, "--%s", setting->option);
+    vsh_error error;
+    const vsh_result result = setting->of_receiver ? vsh_receiver_set(receiver, name, text, &error)
+                                                   : vsh_scene_set(scene, name, text, &error);
+    return result == VSH_OK ? CLI_OK : cli_fail(&error);
+}
+
+/* A text is held against its range at once: before anything is read. */
+static int give(cli_patch *patch, size_t index, const char *value) {
+    vsh_scene scene = vsh_scene_default();
+    vsh_receiver receiver = vsh_receiver_default();
+    patch->text[index] = value != NULL ? value : "true";
+    return set(cli_setting(index), patch->text[index], &scene, &receiver);
+}
+
+static int take_rule(cli_patch *patch, const char *name, const char *pattern, int32_t solidity) {
+    if (patch->rule_count == CLI_MOST_RULES) {
+        return cli_usage("%s %s: more than %d patterns", name, pattern, CLI_MOST_RULES);
+    }
+    patch->rules[patch->rule_count++] = (vsh_solidity_rule){pattern, solidity};
+    return CLI_OK;
+}
+
+int cli_patch_take(cli_patch *patch, int key, const char *name, const char *value, bool *taken) {
+    *taken = true;
+    if (key >= CLI_KEY_SETTING) {
+        return give(patch, (size_t)(key - CLI_KEY_SETTING), value);
+    }
+    switch (key) {
+    case CLI_KEY_SOLID:
+        return take_rule(patch, name, value, VSH_SOLIDITY_SOLID);
+    case CLI_KEY_SHELL:
+        return take_rule(patch, name, value, VSH_SOLIDITY_SHELL);
+    case CLI_KEY_INWARD:
+        return take_rule(patch, name, value, VSH_SOLIDITY_INWARD);
+    default:
+        *taken = false;
+        return CLI_OK;
+    }
+}
+
+static size_t index_of(const char *name) {
+    size_t i = 0;
+    while (cli_setting(i) != NULL && strcmp(cli_setting(i)->option, name + strlen("--")) != 0) {
+        ++i;
+    }
+    return i;
+}
+
+int cli_patch_set(cli_patch *patch, const char *name, const char *value) {
+    return give(patch, index_of(name), value);
+}
+
+bool cli_patch_has(const cli_patch *patch, const char *name) {
+    return patch->text[index_of(name)] != NULL;
+}
+
+int cli_patch_check(const cli_patch *patch) {
+    if (cli_patch_has(patch, "--resolution") && cli_patch_has(patch, "--voxel-size")) {
+        return cli_usage("--resolution and --voxel-size: give one of the two");
+    }
+    return CLI_OK;
+}
+
+static int apply(const cli_patch *patch, vsh_scene *scene, vsh_receiver *receiver) {
+    int code = CLI_OK;
+    for (size_t i = 0; cli_setting(i) != NULL && code == CLI_OK; ++i) {
+        const vsh_setting *setting = cli_setting(i);
+        if (patch->text[i] != NULL && (setting->of_receiver ? receiver != NULL : scene != NULL)) {
+            code = set(setting, patch->text[i], scene, receiver);
+        }
+    }
+    return code;
+}
+
+int cli_patch_scene(const cli_patch *patch, vsh_scene *scene) {
+    if (patch->rule_count > 0) {
+        scene->solidity = patch->rules;
+        scene->solidity_count = patch->rule_count;
+    }
+    return apply(patch, scene, NULL);
+}
+
+int cli_patch_receiver(const cli_patch *patch, vsh_receiver *receiver) {
+    return apply(patch, NULL, receiver);
+}

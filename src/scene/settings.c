@@ -1,0 +1,102 @@
+/* Settings: the keys of a scene's file that are also options, one by one. */
+#include "base/error.h"
+#include "base/memory.h"
+#include "base/try.h"
+#include "scene/parts.h"
+
+#include <vdbshade/settings.h>
+
+#include <stdio.h>
+#include <string.h>
+
+/* Where settings stand, and what their keys are called from the scene on. */
+static const struct {
+    const vshi_table *table;
+    const char *prefix;
+    bool of_receiver;
+} places[] = {
+    {&vshi_scene_table, "", false},
+    {&vshi_ao_table, "ao.", false},
+    {&vshi_receiver_table, "receivers.", true},
+};
+enum { PLACES = sizeof places / sizeof places[0] };
+
+static const vshi_key *key_at(size_t index, size_t *place) {
+    for (*place = 0; *place < PLACES; ++*place) {
+        const vshi_table *table = places[*place].table;
+        for (size_t i = 0; i < table->key_count; ++i) {
+            if (table->keys[i].option.name != NULL && index-- == 0) {
+                return &table->keys[i];
+            }
+        }
+    }
+    return NULL;
+}
+
+static void tell_default(const vshi_key *key, bool of_receiver, char *text, size_t size) {
+    const vsh_scene scene = vsh_scene_default();
+    const vsh_receiver receiver = vsh_receiver_default();
+    if (key->option.otherwise != NULL) {
+        snprintf(text, size, "%s", key->option.otherwise);
+    } else if (of_receiver) {
+        vshi_key_value(key, &receiver, text, size);
+    } else {
+        vshi_key_value(key, &scene, text, size);
+    }
+}
+
+int32_t vsh_setting_get_sized(size_t index, vsh_setting *setting, size_t setting_size) {
+    size_t place;
+    const vshi_key *key = key_at(index, &place);
+    if (key == NULL) {
+        return 0;
+    }
+    vsh_setting told;
+    memset(&told, 0, sizeof told);
+    snprintf(told.key, sizeof told.key, "%s%s", places[place].prefix, key->name);
+    snprintf(told.option, sizeof told.option, "%s", key->option.name);
+    snprintf(told.value, sizeof told.value, "%s", key->option.value != NULL ? key->option.value : "");
+    snprintf(told.help, sizeof told.help, "%s", key->option.help);
+    vshi_key_range(key, told.range, sizeof told.range);
+    tell_default(key, places[place].of_receiver, told.otherwise, sizeof told.otherwise);
+    told.group = key->option.group;
+    told.of_receiver = places[place].of_receiver;
+    vshi_give(setting, setting_size, &told, sizeof told);
+    return 1;
+}
+
+static bool is_called(const vshi_key *key, const char *prefix, const char *name) {
+    const size_t length = strlen(prefix);
+    return (strncmp(name, "--", 2) == 0 && strcmp(name + 2, key->option.name) == 0) ||
+           (strncmp(name, prefix, length) == 0 && strcmp(name + length, key->name) == 0);
+}
+
+static vsh_result set(bool of_receiver, const char *name, const char *text, void *target, vsh_error *error) {
+    size_t place;
+    const vshi_key *key;
+    for (size_t i = 0; (key = key_at(i, &place)) != NULL; ++i) {
+        if (places[place].of_receiver == of_receiver && is_called(key, places[place].prefix, name)) {
+            return vshi_read_text(key, name, text, target, error);
+        }
+    }
+    return vshi_fail(error, VSH_ERROR_ARGUMENT, "%.64s: no such setting of a %s", name,
+                     of_receiver ? "receiver" : "scene");
+}
+
+vsh_result vsh_scene_set(vsh_scene *scene, const char *name, const char *text, vsh_error *error) {
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS(name);
+    vsh_scene changed = *scene;
+    VSHI_TRY(set(false, name, text, &changed, error));
+    *scene = changed;
+    return VSH_OK;
+}
+
+vsh_result vsh_receiver_set(vsh_receiver *receiver, const char *name, const char *text, vsh_error *error) {
+    VSHI_NEEDS(receiver);
+    VSHI_NEEDS(name);
+    vsh_receiver changed = *receiver;
+    VSHI_TRY(set(true, name, text, &changed, error));
+    *receiver = changed;
+    return VSH_OK;
+}

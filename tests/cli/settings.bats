@@ -1,0 +1,37 @@
+#!/usr/bin/env bats
+# Settings: what a scene's file and options say stands in one table; the documents and --help say the same.
+load helper
+
+# The help of option $1 as one line.
+help_of() {
+    awk -v option="--$1" '$1 ~ /^-/ || /^$/ { here = $1 == option } here { printf "%s ", $0 }' help.txt | tr -s ' '
+}
+
+@test "--help of bake has the range and the default that docs/scene.md has" {
+    "$VDBSHADE" bake --help >help.txt
+    local checked=0 key default range option text
+    while IFS='|' read -r _ key _ default range _; do
+        key=$(tr -d ' `' <<<"$key") range=$(xargs <<<"$range") default=$(tr -d '` "' <<<"$default")
+        option=${key//_/-}
+        [[ $range =~ ^([0-9.]+)\ …\ ([0-9.]+)$ ]] || continue
+        text=$(help_of "$option")
+        [ -n "$text" ] || continue
+        [[ $text == *" ${BASH_REMATCH[1]} to ${BASH_REMATCH[2]} "* ]] || fail "$key: $range; $text"
+        [[ ! $default =~ ^[0-9.]+$ ]] || [[ $text == *"($default"* ]] || [[ $text == *"($default)"* ]] ||
+            [[ $text == *"($default:"* ]] || fail "$key: $default; $text"
+        checked=$((checked + 1))
+    done < <(sed -n '/^## The scene/,/^## Casters/p' "$BATS_TEST_DIRNAME/../../docs/scene.md" | grep '^| `')
+    [ "$checked" -ge 8 ] || fail "only $checked"
+}
+
+@test "an option that is refused names itself, its value and what is expected" {
+    write_box box.obj
+    shade bake box.obj --sun 1,1,1 -o out.exr --rays 5000
+    refused 2 "--rays '5000': expected a whole number from 1 to 4096"
+    shade bake box.obj --sun 1,1,1 -o out.exr --size 64x
+    refused 2 "--size '64x': expected W or WxH, each from 1 to 65536 texels"
+    shade volume box.obj --sun 1,1,1 -o out.vdb --method soft
+    refused 2 "--method 'soft': expected one of hard,"
+    shade query box.obj --points p.csv -o out.csv --resolution 1
+    refused 2 "--resolution '1': expected a whole number from 2 to 65536"
+}
