@@ -7,7 +7,7 @@
  *       every VALID: "texels,rmse,bias,p99,max"
  */
 #include "bench.h"
-#include "packets.h"
+#include "embree.h"
 
 #include <math.h>
 #include <stdlib.h>

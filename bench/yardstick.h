@@ -3,7 +3,6 @@
 #define BENCH_YARDSTICK_H
 
 #include "embree.h"
-#include "packets.h"
 
 #include <stdio.h>
 

@@ -2,7 +2,6 @@
 #include "child.h"
 #include "commands.h"
 #include "message.h"
-#include "plain.h"
 #include "signals.h"
 #include "warnings.h"
 

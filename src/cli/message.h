@@ -2,6 +2,7 @@
 #ifndef CLI_MESSAGE_H
 #define CLI_MESSAGE_H
 
+#include <stddef.h>
 #include <vdbshade/base.h>
 
 enum {
@@ -32,5 +33,12 @@ void cli_message_input(const char *path);
 
 /* Says that there is no memory for `what` and returns CLI_LIMIT. */
 int cli_out_of_memory(const char *what);
+
+/* Text for terminals: names come from files, and terminals obey control characters. Those but newlines become
+ * '?': those of ASCII, and those that UTF-8 has of its own. */
+void cli_plain(char *text, size_t size);
+
+/* From here on standard output is text, and goes through cli_plain(). */
+void cli_plain_output(void);
 
 #endif

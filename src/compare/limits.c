@@ -1,5 +1,4 @@
 /* What the measures are called, what they may come to, and whether they do. */
-#include "compare/limits.h"
 #include "compare/pair.h"
 
 #include "base/floats.h"
@@ -8,7 +7,12 @@
 #include <math.h>
 #include <string.h>
 
-const vshi_limit vshi_limits[VSH_MEASURE_COUNT] = {
+/* The table of measures. */
+static const struct {
+    const char *name;
+    int32_t at_least; /* 1: the limit is the least that will do */
+    double value;     /* what holds without another */
+} table[VSH_MEASURE_COUNT] = {
     [VSH_MEASURE_NONFINITE] = {"nonfinite", 0, 0.0},
     [VSH_MEASURE_RMSE] = {"rmse", 0, 0.004},
     [VSH_MEASURE_BIAS] = {"bias", 0, 0.002},
@@ -26,7 +30,7 @@ const vshi_limit vshi_limits[VSH_MEASURE_COUNT] = {
 
 int32_t vsh_measure(const char *name) {
     for (int32_t i = 0; name != NULL && i < VSH_MEASURE_COUNT; ++i) {
-        if (strcmp(vshi_limits[i].name, name) == 0) {
+        if (strcmp(table[i].name, name) == 0) {
             return i;
         }
     }
@@ -34,17 +38,17 @@ int32_t vsh_measure(const char *name) {
 }
 
 const char *vsh_measure_name(int32_t measure) {
-    return measure >= 0 && measure < VSH_MEASURE_COUNT ? vshi_limits[measure].name : NULL;
+    return measure >= 0 && measure < VSH_MEASURE_COUNT ? table[measure].name : NULL;
 }
 
 int32_t vsh_measure_at_least(int32_t measure) {
-    return measure >= 0 && measure < VSH_MEASURE_COUNT ? vshi_limits[measure].at_least : 0;
+    return measure >= 0 && measure < VSH_MEASURE_COUNT ? table[measure].at_least : 0;
 }
 
 void vsh_limits_default_sized(vsh_limits *limits, size_t limits_size) {
     vsh_limits known = {.struct_size = limits_size, .options = vsh_compare_options_default()};
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        known.value[i] = vshi_limits[i].value;
+        known.value[i] = table[i].value;
     }
     vshi_give(limits, limits_size, &known, sizeof known);
 }
@@ -74,7 +78,7 @@ uint32_t vsh_compare_judge(const vsh_measures *measures, const vsh_limits *limit
     uint32_t failed = measures->nonfinite[0] + measures->nonfinite[1] > 0 ? 1 << VSH_MEASURE_NONFINITE : 0;
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         const double value = measures->value[i], limit = limits->value[i];
-        const bool holds = vshi_limits[i].at_least ? value >= limit : value <= limit;
+        const bool holds = table[i].at_least ? value >= limit : value <= limit;
         if (i != VSH_MEASURE_NONFINITE && !isnan(value) && !holds) {
             failed |= UINT32_C(1) << i;
         }

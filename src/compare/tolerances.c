@@ -1,12 +1,12 @@
 /* Limits from a file of JSON, read as scenes are. */
 #include "base/floats.h"
 #include "base/job.h"
-#include "compare/limits.h"
 #include "json/keys.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <vdbshade/compare.h>
 
 enum { MOST_REACH = 16, MOST_BYTES = 64 << 20 };
 

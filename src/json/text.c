@@ -45,7 +45,7 @@ static vsh_result read_all(const char *path, FILE *file, char **text, size_t *si
 
 /* Bytes, at most, that reading a text takes: its own, Jansson's tree of it, and what is made of that. Objects
  * and arrays bring the first slots of their tables; members and items double them. (The C library's blocks
- * counted, Jansson 2.14 and glibc 2.36 on 64 bits: tests/unit/test_scene_memory.c.) */
+ * counted, Jansson 2.14 and glibc 2.36 on 64 bits: tests/unit/test_scene.c.) */
 static double tree_bytes(const char *text, size_t size) {
     double objects = 0.0, arrays = 0.0, members = 0.0, items = 0.0;
     bool in_string = false;

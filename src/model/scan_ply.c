@@ -1,11 +1,11 @@
 /* PLY: the body holds all that the header announces, and positions are finite. Assimp 5.2 repeats the last
  * face where a file ends early, and takes memory for whatever number the header names. */
+#include "base/ply.h"
 #include "model/scan.h"
 
-#include <stdlib.h>
 #include <string.h>
 
-enum { MAX_ELEMENTS = 32, MAX_PROPERTIES = 128, ROWS_A_POLL = 4096 };
+enum { ROWS_A_POLL = 4096 };
 
 typedef struct ply_property {
     int size;       /* bytes */
@@ -16,98 +16,31 @@ typedef struct ply_property {
     bool is_corners;  /* the list of a face's vertices */
 } ply_property;
 
-typedef struct ply_element {
-    char name[32];
-    uint64_t count;
-    int first, end; /* properties */
-} ply_element;
-
 typedef struct ply_header {
-    bool ascii, big_endian;
+    vshi_ply_header head;
+    ply_property property[VSHI_PLY_PROPERTIES];
     int strips;        /* the element of triangle strips; -1: none */
     const char *lines; /* that the strips' element is described in */
     const char *lines_end;
-    ply_element element[MAX_ELEMENTS];
-    ply_property property[MAX_PROPERTIES];
-    int elements, properties;
 } ply_header;
 
-static const struct {
-    const char *name, *other;
-    int size;
-    bool is_float;
-} types[] = {
-    {"char", "int8", 1, false},     {"uchar", "uint8", 1, false},   {"short", "int16", 2, false},
-    {"ushort", "uint16", 2, false}, {"int", "int32", 4, false},     {"uint", "uint32", 4, false},
-    {"float", "float32", 4, true},  {"double", "float64", 8, true},
-};
-
-static bool read_type(vshi_token token, int *size, bool *is_float, bool *is_signed) {
-    for (size_t i = 0; i < sizeof types / sizeof types[0]; ++i) {
-        if (vshi_token_is(token, types[i].name) || vshi_token_is(token, types[i].other)) {
-            *size = types[i].size;
-            *is_float = types[i].is_float;
-            *is_signed = !types[i].is_float && types[i].name[0] != 'u';
-            return true;
-        }
+/* What the properties of an element are to us. */
+static void describe(ply_header *header, const vshi_ply_element *element) {
+    const bool vertex = strcmp(element->name, "vertex") == 0, face = strcmp(element->name, "face") == 0;
+    for (int p = element->first; p < element->end; ++p) {
+        const vshi_ply_property *from = &header->head.property[p];
+        const bool list = from->count_type >= 0;
+        const char *name = from->name;
+        header->property[p] = (ply_property){
+            .size = vshi_ply_size(from->type),
+            .count_size = list ? vshi_ply_size(from->count_type) : 0,
+            .is_float = from->type >= VSHI_PLY_FLOAT,
+            .is_signed = from->type < VSHI_PLY_FLOAT && from->type % 2 == 0,
+            .is_position = vertex && !list && name[0] >= 'x' && name[0] <= 'z' && name[1] == '\0',
+            .is_corners =
+                face && list && (strcmp(name, "vertex_index") == 0 || strcmp(name, "vertex_indices") == 0),
+        };
     }
-    return false;
-}
-
-static bool read_property(ply_header *header, const char *at, const char *end) {
-    if (header->elements == 0 || header->properties == MAX_PROPERTIES) {
-        return false;
-    }
-    const ply_element *element = &header->element[header->elements - 1];
-    ply_property property = {0};
-    bool ignored;
-    vshi_token token = vshi_scan_token(&at, end);
-    if (vshi_token_is(token, "list")) {
-        if (!read_type(vshi_scan_token(&at, end), &property.count_size, &ignored, &property.is_signed) ||
-            ignored) {
-            return false;
-        }
-        token = vshi_scan_token(&at, end);
-    }
-    if (!read_type(token, &property.size, &property.is_float, &property.is_signed)) {
-        return false;
-    }
-    const vshi_token name = vshi_scan_token(&at, end);
-    property.is_position = strcmp(element->name, "vertex") == 0 && property.count_size == 0 &&
-                           (vshi_token_is(name, "x") || vshi_token_is(name, "y") || vshi_token_is(name, "z"));
-    property.is_corners = strcmp(element->name, "face") == 0 && property.count_size > 0 &&
-                          (vshi_token_is(name, "vertex_index") || vshi_token_is(name, "vertex_indices"));
-    header->property[header->properties++] = property;
-    header->element[header->elements - 1].end = header->properties;
-    return name.text != NULL;
-}
-
-static bool read_element(ply_header *header, const char *at, const char *end) {
-    if (header->elements == MAX_ELEMENTS) {
-        return false;
-    }
-    const vshi_token name = vshi_scan_token(&at, end);
-    int64_t count;
-    if (!vshi_token_integer(vshi_scan_token(&at, end), &count) || count < 0) {
-        return false;
-    }
-    ply_element *element = &header->element[header->elements++];
-    const size_t length = name.size < sizeof element->name ? name.size : sizeof element->name - 1;
-    memcpy(element->name, name.text, length);
-    element->name[length] = '\0';
-    element->count = (uint64_t)count;
-    if (vshi_token_is(name, "tristrips") && count > 0) {
-        header->strips = header->elements - 1;
-    }
-    element->first = element->end = header->properties;
-    return true;
-}
-
-static bool read_format(ply_header *header, const char *at, const char *end) {
-    const vshi_token format = vshi_scan_token(&at, end);
-    header->ascii = vshi_token_is(format, "ascii");
-    header->big_endian = vshi_token_is(format, "binary_big_endian");
-    return header->ascii || header->big_endian || vshi_token_is(format, "binary_little_endian");
 }
 
 /* Returns the body; NULL with the error filled where there is none. */
@@ -119,21 +52,19 @@ static const char *read_header(const vshi_scan *scan, ply_header *header, vsh_re
         if (stop == NULL) {
             break;
         }
-        const char *word = at;
-        const vshi_token keyword = vshi_scan_token(&word, stop);
-        bool good = true;
-        if (line == 1) {
-            good = vshi_token_is(keyword, "ply");
-        } else if (vshi_token_is(keyword, "format")) {
-            good = read_format(header, word, stop);
-        } else if (vshi_token_is(keyword, "element")) {
-            good = read_element(header, word, stop);
-        } else if (vshi_token_is(keyword, "property")) {
-            good = read_property(header, word, stop);
-        } else if (vshi_token_is(keyword, "end_header")) {
+        vshi_ply_header *head = &header->head;
+        const bool good = vshi_ply_header_line(head, at, (size_t)(stop - at));
+        if (head->ended) {
+            for (int e = 0; e < head->elements; ++e) {
+                describe(header, &head->element[e]);
+            }
             return stop + 1;
         }
-        if (good && header->strips >= 0 && header->strips == header->elements - 1) {
+        const vshi_ply_element *last = head->elements > 0 ? &head->element[head->elements - 1] : NULL;
+        if (last != NULL && last->count > 0 && strcmp(last->name, "tristrips") == 0) {
+            header->strips = head->elements - 1;
+        }
+        if (good && header->strips >= 0 && header->strips == head->elements - 1) {
             header->lines = header->lines != NULL ? header->lines : at;
             header->lines_end = stop + 1;
         }
@@ -153,7 +84,7 @@ static const char *read_header(const vshi_scan *scan, ply_header *header, vsh_re
 typedef struct ply_cursor {
     vshi_scan *scan;
     const ply_header *header;
-    const ply_element *element;
+    const vshi_ply_element *element;
     uint64_t row;
     const char *at, *end;
 } ply_cursor;
@@ -204,7 +135,7 @@ static vsh_result read_binary(ply_cursor *c, const ply_property *property, vsh_e
         if (c->end - c->at < property->count_size) {
             return fail_short(c, error);
         }
-        values = vshi_scan_bytes(c->at, property->count_size, c->header->big_endian);
+        values = vshi_scan_bytes(c->at, property->count_size, c->header->head.big_endian);
         c->at += property->count_size;
     }
     if (values > (uint64_t)(c->end - c->at) / (uint64_t)property->size) {
@@ -217,11 +148,11 @@ static vsh_result read_binary(ply_cursor *c, const ply_property *property, vsh_e
 
 /* Strips take the place of faces: there can be no others, and nothing but vertices in their rows. */
 static vsh_result check_strips(const vshi_scan *scan, const ply_header *header, vsh_error *error) {
-    const ply_element *strips = &header->element[header->strips];
+    const vshi_ply_element *strips = &header->head.element[header->strips];
     const ply_property *list = &header->property[strips->first];
     bool others = false;
-    for (int e = 0; e < header->elements; ++e) {
-        const char *name = header->element[e].name;
+    for (int e = 0; e < header->head.elements; ++e) {
+        const char *name = header->head.element[e].name;
         others =
             others || strcmp(name, "face") == 0 || (e != header->strips && strcmp(name, "tristrips") == 0);
     }
@@ -245,11 +176,11 @@ static vsh_result scan_strips(ply_cursor *c, vsh_error *error) {
                                 .count_size = list->count_size,
                                 .index_size = list->size,
                                 .is_signed = list->is_signed,
-                                .ascii = header->ascii,
-                                .big_endian = header->big_endian};
-    for (int e = 0; e < header->elements; ++e) {
-        const bool vertices = strcmp(header->element[e].name, "vertex") == 0;
-        strips->vertices = vertices ? header->element[e].count : strips->vertices;
+                                .ascii = header->head.ascii,
+                                .big_endian = header->head.big_endian};
+    for (int e = 0; e < header->head.elements; ++e) {
+        const bool vertices = strcmp(header->head.element[e].name, "vertex") == 0;
+        strips->vertices = vertices ? header->head.element[e].count : strips->vertices;
     }
     const vsh_result result = vshi_ply_strips_scan(strips, c->scan->path, c->end, error);
     c->at = result == VSH_OK ? strips->body_end : c->at;
@@ -268,8 +199,8 @@ vsh_result vshi_scan_ply(vshi_scan *scan, vsh_error *error) {
         return result;
     }
     ply_cursor c = {scan, &header, NULL, 0, body, scan->text + scan->size};
-    for (int e = 0; e < header.elements; ++e) {
-        c.element = &header.element[e];
+    for (int e = 0; e < header.head.elements; ++e) {
+        c.element = &header.head.element[e];
         if (c.element->first == c.element->end) {
             continue;
         }
@@ -282,8 +213,8 @@ vsh_result vshi_scan_ply(vshi_scan *scan, vsh_error *error) {
         }
         for (c.row = 0; c.row < c.element->count; ++c.row) {
             for (int p = c.element->first; p < c.element->end; ++p) {
-                result = header.ascii ? read_ascii(&c, &header.property[p], error)
-                                      : read_binary(&c, &header.property[p], error);
+                result = header.head.ascii ? read_ascii(&c, &header.property[p], error)
+                                           : read_binary(&c, &header.property[p], error);
                 if (result != VSH_OK) {
                     return result;
                 }

@@ -1,4 +1,4 @@
-#include "allocations.h"
+#include "faults.h"
 
 #include <errno.h>
 #include <pthread.h>

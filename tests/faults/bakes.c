@@ -1,6 +1,6 @@
 /* Scenarios that bake, and that write and read images. */
 #include "../unit/previews.h"
-#include "parts.h"
+#include "scenarios.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* The files that scenarios read and write, in a folder of their own. */
-#include "parts.h"
+#include "scenarios.h"
 
 #include <dirent.h>
 #include <string.h>

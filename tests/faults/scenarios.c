@@ -1,5 +1,5 @@
+#include "scenarios.h"
 #include "../unit/previews.h"
-#include "parts.h"
 
 #include <math.h>
 

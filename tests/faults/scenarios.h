@@ -2,6 +2,8 @@
 #ifndef FAULTS_SCENARIOS_H
 #define FAULTS_SCENARIOS_H
 
+#include <stdio.h>
+#include <stdlib.h>
 #include <vdbshade/vdbshade.h>
 
 /* Runs to its end or to the first failure, whose code and error it returns, and frees what it made. Calls
@@ -24,5 +26,46 @@ int scenarios_end(void **state);
 /* Whether the outputs of a scenario that failed are as they were, and no other file is there; then they are
  * made so anew. */
 int scenarios_untouched(void);
+
+/* --- What scenarios are made of. */
+
+/* Runs a call; ends the scenario where it fails, and the test where it then left a handle. */
+#define TRY(call)                                                                                            \
+    do {                                                                                                     \
+        result = (call);                                                                                     \
+        if (result != VSH_OK) {                                                                              \
+            goto end;                                                                                        \
+        }                                                                                                    \
+    } while (0)
+
+#define MAKE(handle, call)                                                                                   \
+    do {                                                                                                     \
+        result = (call);                                                                                     \
+        if ((result == VSH_OK) != ((handle) != NULL)) {                                                      \
+            fprintf(stderr, "%s: %s with%s a handle\n", #handle, vsh_result_name(result),                    \
+                    (handle) != NULL ? "" : "out");                                                          \
+            abort();                                                                                         \
+        }                                                                                                    \
+        if (result != VSH_OK) {                                                                              \
+            goto end;                                                                                        \
+        }                                                                                                    \
+    } while (0)
+
+enum { SIDE = 12, POINTS = 80, IMAGES = 3 };
+
+/* Of SIDE by SIDE pixels, one of each reader. */
+extern const char *const images[IMAGES];
+
+/* Values 0 … 1, no two neighbours alike. */
+void parts_fill(float *values, size_t count);
+
+/* A cube of 1 in a few voxels. */
+vsh_result parts_occluders(const vsh_run *run, vsh_grid **grid, vsh_occluders **occluders, vsh_error *error);
+
+/* Points around it, with normals up. */
+void parts_place(double positions[3 * POINTS], float normals[3 * POINTS]);
+
+/* Scenarios that bake and write (bakes.c). */
+scenario_fn bake_lightmap, bake_volume, draw, bake_flat, write_exr, write_png, write_tif, read_images;
 
 #endif

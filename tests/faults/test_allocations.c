@@ -7,7 +7,7 @@
 
 #include <cmocka.h>
 
-#include "allocations.h"
+#include "faults.h"
 #include "scenarios.h"
 
 #include <inttypes.h>

@@ -9,8 +9,8 @@
 #include <cmocka.h>
 
 #include "base/file.h"
+#include "faults.h"
 #include "scenarios.h"
-#include "writes.h"
 
 #include <dirent.h>
 #include <errno.h>

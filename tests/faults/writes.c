@@ -1,4 +1,4 @@
-#include "writes.h"
+#include "faults.h"
 
 #include <errno.h>
 #include <fcntl.h>

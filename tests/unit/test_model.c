@@ -1,4 +1,4 @@
-/* Models: what files of every format become. test_model_errors.c has what is refused. */
+/* Models: what files of every format become, and what is refused. */
 #include "models.h"
 
 static void assert_near(double value, double expected, double tolerance) {
@@ -207,6 +207,218 @@ static void binary_ply_of_either_byte_order_is_read(void **state) {
     }
 }
 
+/* --- Model files that are wrong, cut, too large or not there; cancelling. */
+
+static void bad_obj_is_refused_with_line_and_value(void **state) {
+    (void)state;
+#define CORNERS "v 0 0 0\nv 1 0 0\nv 1 1 0\n"
+    refused("a.obj", "v nan 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n", VSH_ERROR_INPUT, "line 1", "'nan'");
+    refused("a.obj", "v 0 0 0\nv 1 -inf 0\nv 1 1 0\nf 1 2 3\n", VSH_ERROR_INPUT, "line 2", "'-inf'");
+    refused("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 1e39\nf 1 2 3\n", VSH_ERROR_INPUT, "vertex 2", "inf");
+    refused("a.obj", "v 0 0 0\nv 1 0,5 0\nv 1 1 0\nf 1 2 3\n", VSH_ERROR_INPUT, "line 2", "'0,5'");
+    refused("a.obj", "v 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n", VSH_ERROR_INPUT, "line 1", "at least 3");
+    refused("a.obj", CORNERS "f 1 2 3\nf 1 2 99\n", VSH_ERROR_INPUT, "line 5", "99");
+    refused("a.obj", CORNERS "f 1 2 -4\n", VSH_ERROR_INPUT, "line 4", "-4");
+    refused("a.obj", CORNERS "f 0 1 2\n", VSH_ERROR_INPUT, "line 4", "index 0");
+    refused("a.obj", CORNERS "f 1 2 99999999999999999999\n", VSH_ERROR_INPUT, "line 4", "9999");
+    refused("a.obj", CORNERS "vt 0 0\nf 1/1 2/1 3/2\n", VSH_ERROR_INPUT, "line 5",
+            "texture coordinate index 2");
+    refused("a.obj", CORNERS "vt 0 nan\nf 1/1 2/1 3/1\n", VSH_ERROR_INPUT, "line 4", "'nan'");
+    refused("a.obj", CORNERS "f 1 2 \\\n77\n", VSH_ERROR_INPUT, "line 4", "77");
+    refused("a.obj", CORNERS "f 1 2 3\n f 1 3 2\n", VSH_ERROR_INPUT, "line 5", "indented");
+    refused("a.obj", CORNERS "l 1 2\n", VSH_ERROR_INPUT, "holds no triangles", "");
+    refused("a.obj", CORNERS, VSH_ERROR_INPUT, "holds no triangles", "");
+#undef CORNERS
+    vsh_model_free(read_text("late.obj", "v 0 0 0\nv 1 0 0\nf 1 2 3\nv 1 1 0\n"));
+    vsh_model_free(read_text("dos.obj", "v 0 0 0\r\nv 1 0 0 # corner\r\nv 1 1 0\r\nf 1 2 \\\r\n3\r\n"));
+}
+
+static void bad_ply_and_stl_are_refused(void **state) {
+    (void)state;
+#define HEAD(n)                                                                                              \
+    "ply\nformat ascii 1.0\nelement vertex " n "\nproperty float x\nproperty float y\nproperty float z\n"    \
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    refused("a.ply", HEAD("3") "0 0 0\n1 nan 0\n0 1 0\n3 0 1 2\n", VSH_ERROR_INPUT, "vertex 1", "'nan'");
+    refused("a.ply", HEAD("3") "0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n", VSH_ERROR_INPUT, "face 0", "vertex 9");
+    refused("a.ply", HEAD("3") "0 0 0\n1 0 0\n0 1 0\n4 0 1 2 9\n", VSH_ERROR_INPUT, "face 0", "vertex 9");
+    refused("a.ply", HEAD("3") "0 0 0\n1 0 0\n0 1 0\n3 0 1 -2\n", VSH_ERROR_INPUT, "face 0", "'-2'");
+    refused("a.ply", HEAD("4000000000") "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", VSH_ERROR_READ, "cut short",
+            "4000000000");
+    refused("a.ply", HEAD("-3") "0 0 0\n", VSH_ERROR_INPUT, "header", "-3");
+#undef HEAD
+    refused("a.stl",
+            "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 inf 0\nvertex 0 1 0\nendloop\n"
+            "endfacet\nendsolid a\n",
+            VSH_ERROR_INPUT, "vertex 1 of facet 0", "'inf'");
+    const float bad[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, NAN, 0}};
+    unsigned char bytes[84 + 50];
+    vsh_model *model = NULL;
+    vsh_error error = {0};
+    assert_int_equal(read_bytes("b.stl", bytes, binary_stl(bytes, bad, 1), &model, &error), VSH_ERROR_INPUT);
+    assert_non_null(strstr(error.message, "nan"));
+}
+
+/* By their endings, and by their first bytes whatever the ending. */
+static void alembic_and_usd_are_refused_by_name(void **state) {
+    (void)state;
+    static const char *const endings[] = {"a.usd", "a.usda", "a.USDC", "a.usdz"};
+    for (size_t i = 0; i < sizeof endings / sizeof endings[0]; ++i) {
+        refused(endings[i], "anything", VSH_ERROR_INPUT, "is a USD file",
+                "OBJ, glTF, GLB, PLY, STL, FBX or DAE");
+    }
+    refused("a.blend", "anything", VSH_ERROR_INPUT, "is Blender's own file", "export it as GLB");
+    refused("a.obj", "BLENDER-v304", VSH_ERROR_INPUT, "is Blender's own file", "export it as GLB");
+    refused("a.abc", "anything", VSH_ERROR_INPUT, "is an Alembic file", "OBJ");
+    refused("a.obj", "Ogawa and more", VSH_ERROR_INPUT, "a.obj: is an Alembic file", "OBJ");
+    refused("a.obj", "\x89HDF\r\n\x1a\n and more", VSH_ERROR_INPUT, "is an Alembic file", "OBJ");
+    refused("a.obj", "#usda 1.0\n", VSH_ERROR_INPUT, "is a USD file", "OBJ");
+    refused("a", "PXR-USDC and more", VSH_ERROR_INPUT, "is a USD file", "OBJ");
+    unsigned char zip[64] = "PK\x03\x04";
+    zip[26] = 6;
+    memcpy(zip + 30, "a.usdc", 6);
+    vsh_model *model = NULL;
+    vsh_error error = {0};
+    assert_int_equal(read_bytes("b.obj", zip, sizeof zip, &model, &error), VSH_ERROR_INPUT);
+    assert_non_null(strstr(error.message, "is a USD file"));
+    memcpy(zip + 30, "a.text", 6); /* any other Zip file is what its ending says */
+    assert_int_equal(read_bytes("b.obj", zip, sizeof zip, &model, &error), VSH_ERROR_INPUT);
+    assert_null(strstr(error.message, "USD"));
+}
+
+static void bad_gltf_is_refused(void **state) {
+    (void)state;
+    char gltf[4096];
+    quad_gltf(gltf, one_node, (float[]){1, NAN, 0}, 3);
+    refused("a.gltf", gltf, VSH_ERROR_INPUT, "'quad'", "vertex 2");
+    quad_gltf(gltf, one_node, (float[]){INFINITY, 1, 0}, 3);
+    refused("a.gltf", gltf, VSH_ERROR_INPUT, "'quad'", "inf");
+    quad_gltf(gltf, one_node, NULL, 4);
+    refused("a.gltf", gltf, VSH_ERROR_INPUT, "index 5 of 6 is 4", "only 4 vertices");
+    memcpy(strstr(gltf, "\"scene\""), "\"xcene\"", 7); /* the first scene is meant then */
+    refused("a.gltf", gltf, VSH_ERROR_INPUT, "index 5 of 6 is 4", "only 4 vertices");
+    quad_gltf(gltf, "{\"name\":\"far\",\"mesh\":0,\"translation\":[1e39,0,0]}", NULL, 3);
+    refused("a.gltf", gltf, VSH_ERROR_INPUT, "far/quad", "row 0 column 3");
+    quad_gltf(gltf, "{\"name\":\"empty\"}", NULL, 3);
+    refused("a.gltf", gltf, VSH_ERROR_INPUT, "holds no triangles", "a.gltf");
+    refused("a.gltf", "{\"asset\": {\"version\": 2.0 \"x\"}}", VSH_ERROR_INPUT, "line 1", "column");
+}
+
+static void files_that_cannot_be_read_say_why(void **state) {
+    (void)state;
+    vsh_model *model;
+    vsh_error error = {0};
+    assert_int_equal(vsh_model_read(path_of("missing.obj").text, NULL, &model, &error), VSH_ERROR_READ);
+    assert_non_null(strstr(error.message, "missing.obj: No such file"));
+    assert_null(model);
+    char as_folder[512];
+    snprintf(as_folder, sizeof as_folder, "%s/.", folder);
+    assert_int_equal(vsh_model_read(as_folder, NULL, &model, NULL), VSH_ERROR_INPUT);
+    refused("empty.obj", "", VSH_ERROR_READ, "is empty", "");
+    refused("other.xyzzy", quad_obj, VSH_ERROR_INPUT, ".xyzzy", "no mesh format");
+    /* what Assimp would read, but has not been seen to read right */
+    refused("other.x3d", quad_obj, VSH_ERROR_INPUT, ".x3d", "OBJ, glTF, GLB, PLY, STL, FBX or DAE");
+    refused("other.3ds", quad_obj, VSH_ERROR_INPUT, ".3ds", "OBJ, glTF, GLB, PLY, STL, FBX or DAE");
+    refused("none", quad_obj, VSH_ERROR_INPUT, "no ending", "");
+    refused("text.fbx", "hello, world", VSH_ERROR_READ, "damaged or cut short", "");
+    assert_int_equal(vsh_model_read(NULL, NULL, &model, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_model_read("x.obj", NULL, NULL, &error), VSH_ERROR_ARGUMENT);
+    vsh_model_free(NULL);
+}
+
+static void the_memory_limit_is_checked(void **state) {
+    (void)state;
+    write_bytes("limit.obj", quad_obj, strlen(quad_obj));
+    vsh_run run = vsh_run_default();
+    vsh_model *model;
+    vsh_error error = {0};
+    run.memory_limit = 100;
+    assert_int_equal(vsh_model_read(path_of("limit.obj").text, &run, &model, &error), VSH_ERROR_LIMIT);
+    assert_non_null(strstr(error.message, "limit.obj"));
+    run.memory_limit = 1 << 20;
+    assert_int_equal(vsh_model_read(path_of("limit.obj").text, &run, &model, &error), VSH_OK);
+    vsh_model_free(model);
+    unlink(path_of("limit.obj").text);
+}
+
+typedef struct watch {
+    double last, stop;
+    int calls;
+} watch;
+
+static int32_t watch_progress(void *user, const char *stage, double fraction) {
+    watch *w = user;
+    assert_string_equal(stage, "load");
+    assert_true(fraction >= w->last && fraction <= 1.0);
+    w->last = fraction;
+    ++w->calls;
+    return fraction >= w->stop;
+}
+
+static void progress_rises_to_one_and_can_cancel_anywhere(void **state) {
+    (void)state;
+    static const double stops[] = {2.0, 0.0, 0.1, 0.5, 0.99, 1.0};
+    write_bytes("watch.obj", quad_obj, strlen(quad_obj));
+    for (size_t i = 0; i < sizeof stops / sizeof stops[0]; ++i) {
+        watch w = {0.0, stops[i], 0};
+        vsh_run run = vsh_run_default();
+        run.progress = watch_progress;
+        run.user = &w;
+        vsh_model *model;
+        const vsh_result result = vsh_model_read(path_of("watch.obj").text, &run, &model, NULL);
+        assert_int_equal(result, stops[i] > 1.0 ? VSH_OK : VSH_ERROR_CANCELLED);
+        assert_int_equal(model == NULL, stops[i] <= 1.0);
+        assert_true(w.calls >= 1 && (stops[i] <= 1.0 || w.last == 1.0));
+        vsh_model_free(model);
+    }
+    unlink(path_of("watch.obj").text);
+}
+
+/* Cuts a file at every length. What still reads must be a mesh that passes its check; formats that know their
+ * own length must notice every cut that loses more than white space. */
+static void cut_everywhere(const char *name, const void *bytes, size_t size, bool knows_its_length) {
+    char *copy = malloc(size + 1); /* of the very size, so that a sanitizer sees what is read past it */
+    assert_non_null(copy);
+    memcpy(copy, bytes, size);
+    size_t last = size;
+    while (last > 0 && (copy[last - 1] == '\n' || copy[last - 1] == ' ')) {
+        --last;
+    }
+    for (size_t length = 0; length < last; ++length) {
+        vsh_model *model = NULL;
+        vsh_error error = {0};
+        const vsh_result result = read_bytes(name, copy, length, &model, &error);
+        if (result == VSH_OK) {
+            for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+                check(model, i);
+            }
+            if (knows_its_length) {
+                fail_msg("%s: nothing noticed at %zu of %zu bytes", name, length, size);
+            }
+        } else if (strstr(error.message, name) == NULL) {
+            fail_msg("%s at %zu bytes: '%s' does not name the file", name, length, error.message);
+        }
+        vsh_model_free(model);
+    }
+    free(copy);
+}
+
+static void files_cut_at_any_length_do_no_harm(void **state) {
+    (void)state;
+    char gltf[4096];
+    quad_gltf(gltf, instances, NULL, 3);
+    unsigned char bytes[8192];
+    cut_everywhere("cut.obj", quad_obj, strlen(quad_obj), false);
+    cut_everywhere("cut.ply", quad_ply, strlen(quad_ply), true);
+    cut_everywhere("cut.ply", bytes, binary_ply(bytes, false), true);
+    cut_everywhere("cut.ply", bytes, binary_ply(bytes, true), true);
+    cut_everywhere("cut.stl", triangle_stl, strlen(triangle_stl) - strlen(" a b\n"), true);
+    const float corners[6][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
+    cut_everywhere("cut.stl", bytes, binary_stl(bytes, corners, 2), true);
+    cut_everywhere("cut.gltf", gltf, strlen(gltf), true);
+    cut_everywhere("cut.glb", bytes, quad_glb(bytes), true);
+    cut_everywhere("cut.fbx", quad_fbx, strlen(quad_fbx), false);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(uvs_point_up_whatever_the_format),
@@ -217,6 +429,14 @@ int main(void) {
         cmocka_unit_test(an_fbx_is_in_metres),
         cmocka_unit_test(a_cube_in_stl_is_closed),
         cmocka_unit_test(binary_ply_of_either_byte_order_is_read),
+        cmocka_unit_test(bad_obj_is_refused_with_line_and_value),
+        cmocka_unit_test(bad_ply_and_stl_are_refused),
+        cmocka_unit_test(alembic_and_usd_are_refused_by_name),
+        cmocka_unit_test(bad_gltf_is_refused),
+        cmocka_unit_test(files_that_cannot_be_read_say_why),
+        cmocka_unit_test(the_memory_limit_is_checked),
+        cmocka_unit_test(progress_rises_to_one_and_can_cancel_anywhere),
+        cmocka_unit_test(files_cut_at_any_length_do_no_harm),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

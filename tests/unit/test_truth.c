@@ -3,7 +3,6 @@
 #include "directions.h"
 #include "embree.h"
 #include "metrics.h"
-#include "packets.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -6,6 +6,7 @@
 #ifndef CLI_POINTS_H
 #define CLI_POINTS_H
 
+#include "base/ply.h"
 #include "cli/temporary.h"
 #include "points_source.h"
 
@@ -38,29 +39,6 @@ size_t cli_points_bytes(bool normals, bool keep);
 int cli_points_create(size_t room, bool normals, bool keep, cli_points *points);
 void cli_points_free(cli_points *points);
 
-/* A property of a PLY element. */
-typedef struct ply_property {
-    char name[64];
-    int8_t type, count_type; /* of the table of types; count_type -1: no list */
-} ply_property;
-
-enum { PLY_MAX_PROPERTIES = 256, PLY_MAX_ELEMENTS = 32 };
-
-typedef struct ply_element {
-    char name[64];
-    uint64_t count;
-    int first, end; /* properties */
-} ply_element;
-
-typedef struct ply_header {
-    bool ascii, big_endian;
-    int elements, properties, vertex; /* vertex: number of the element */
-    ply_element element[PLY_MAX_ELEMENTS];
-    ply_property property[PLY_MAX_PROPERTIES];
-    size_t row_size; /* of a vertex, binary */
-    int offset[CLI_POINTS_SLOTS], type[CLI_POINTS_SLOTS];
-} ply_header;
-
 typedef struct cli_points_reader {
     points_source source;
     int32_t format;
@@ -74,7 +52,10 @@ typedef struct cli_points_reader {
     int columns;     /* that a row has at least */
     int width;       /* that the first line has */
     int8_t *slot_of; /* [columns]: CLI_POINTS_…, or -1 */
-    ply_header ply;
+    vshi_ply_header ply;
+    int vertex;      /* number of that element */
+    size_t row_size; /* of a vertex, binary */
+    int offset[CLI_POINTS_SLOTS], type[CLI_POINTS_SLOTS];
 } cli_points_reader;
 
 /* Opens a file, or standard input for "-", and reads its header. `normals`: 1 they are there and are taken, 0

@@ -82,7 +82,7 @@ static int check_names(const cli_points_writer *w, const cli_points_reader *read
         const size_t size = strlen(name);
         bool there = false;
         if (reader->format == CLI_POINTS_PLY) {
-            const ply_element *e = &reader->ply.element[reader->ply.vertex];
+            const vshi_ply_element *e = &reader->ply.element[reader->vertex];
             for (int p = e->first; p < e->end; ++p) {
                 there = there || strcmp(reader->ply.property[p].name, name) == 0;
             }
@@ -152,7 +152,7 @@ int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
     } else if (format == CLI_POINTS_PLY) {
         w->count_at = counted && w->spool == NULL ? 0 : -1;
         if (w->spool == NULL) {
-            write_ply_head(w, counted ? 0 : reader->ply.element[reader->ply.vertex].count);
+            write_ply_head(w, counted ? 0 : reader->ply.element[reader->vertex].count);
         }
     }
     return ferror(w->file) ? fail(w) : CLI_OK;

@@ -82,7 +82,7 @@ static int plan(const query_settings *s, const query_answers *answers, uint64_t 
     const size_t own = !keep                              ? 0
                        : text                             ? TEXT_BYTES
                        : reader->format == CLI_POINTS_RAW ? RAW_BYTES
-                                                          : reader->ply.row_size;
+                                                          : reader->row_size;
     const size_t each = cli_points_bytes(reader->has_normals, keep) + ORDER_BYTES + own +
                         query_answers_floats(answers) * sizeof(float);
     const size_t least = s->batch > 0 && s->batch < LEAST_ROWS ? (size_t)s->batch : LEAST_ROWS;

@@ -1,0 +1,52 @@
+/* The header of a PLY file, line by line (G. Turk, "The PLY polygon file format", 1994). */
+#ifndef VSHI_PLY_H
+#define VSHI_PLY_H
+
+#include "base/shared.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Types of numbers: those below are whole, every second one of them unsigned. */
+enum { VSHI_PLY_FLOAT = 6, VSHI_PLY_DOUBLE = 7 };
+
+enum { VSHI_PLY_PROPERTIES = 256, VSHI_PLY_ELEMENTS = 32, VSHI_PLY_NAME = 64 };
+
+typedef struct vshi_ply_property {
+    char name[VSHI_PLY_NAME];
+    int8_t type, count_type; /* count_type -1: no list */
+} vshi_ply_property;
+
+typedef struct vshi_ply_element {
+    char name[VSHI_PLY_NAME];
+    uint64_t count;
+    int first, end; /* properties */
+} vshi_ply_element;
+
+/* Begins as zeros. */
+typedef struct vshi_ply_header {
+    int lines;
+    bool ascii, big_endian, ended;
+    int elements, properties;
+    vshi_ply_element element[VSHI_PLY_ELEMENTS];
+    vshi_ply_property property[VSHI_PLY_PROPERTIES];
+} vshi_ply_header;
+
+/* Takes the next line, without its end; `ended` tells that it was the last. False where it is not understood.
+ * Names are cut to VSHI_PLY_NAME - 1 bytes. */
+VSHI_SHARED bool vshi_ply_header_line(vshi_ply_header *header, const char *line, size_t size);
+
+/* Bytes of a binary number. */
+static inline int vshi_ply_size(int type) {
+    return type < VSHI_PLY_FLOAT ? 1 << type / 2 : type == VSHI_PLY_FLOAT ? 4 : 8;
+}
+
+#ifdef __cplusplus
+}
+#endif
+#endif
