@@ -74,6 +74,13 @@ vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_optio
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "AO method exact: the occluders have no triangles, which it traces");
     }
+    const vshi_vec up = vshi_vec_of(options->ao_up);
+    const bool horizon = vshi_dot(up, up) > 0.0;
+    if (horizon && !vshi_ao_has_rays(options)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "AO over a horizon: method %s knows none; rays, adaptive and exact do",
+                         vsh_ao_method_name(options->ao_method));
+    }
     if (options->ao_method == VSH_AO_CONES) {
         vshi_ao_cones_place(cones, options->ao_cones);
     }
@@ -81,6 +88,7 @@ vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_optio
                            .triangles = occluders->triangles,
                            .options = options,
                            .cones = cones,
+                           .up = horizon ? vshi_unit(up) : up,
                            .distance = options->ao_distance / occluders->field->voxel_size};
     return VSH_OK;
 }
@@ -88,6 +96,10 @@ vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_optio
 vsh_result vshi_ao_prepare_sphere(vshi_ao_cones *cones, vshi_ao_task *task, vsh_error *error) {
     if (task->options->ao_method == VSH_AO_TAPS) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO method taps: free space has no normals to tap along");
+    }
+    if (vshi_ao_has_horizon(task)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "AO over a horizon: points in free space have no normals");
     }
     if (task->options->ao_method == VSH_AO_CONES) {
         vshi_ao_cones_place_sphere(cones, task->options->ao_cones);
@@ -162,6 +174,10 @@ vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *point
     if (result == VSH_OK && bent != NULL && full.ao_method == VSH_AO_TAPS) {
         result = vshi_fail(error, VSH_ERROR_ARGUMENT,
                            "bent normals: AO by taps knows no directions; use cones or rays");
+    }
+    if (result == VSH_OK && bent != NULL &&
+        vshi_dot(vshi_vec_of(full.ao_up), vshi_vec_of(full.ao_up)) > 0.0) {
+        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "bent normals: not of AO over a horizon");
     }
     if (result == VSH_OK) {
         result = vshi_layers_prepare(occluders, &full, NULL, &layers, error);
