@@ -187,6 +187,17 @@ enum { VSH_BENT_WORLD = 0, VSH_BENT_TANGENT = 1 };
 VSH_API int32_t vsh_bent_space(const char *name);
 VSH_API const char *vsh_bent_space_name(int32_t space);
 
+/* Planes that a scene asks for beside those of its lights and AO: 0 not, else how. */
+typedef struct vsh_planes {
+    int32_t invalid; /* nonzero: where texels are invalid */
+} vsh_planes;
+
+/* How many of them are shaded by themselves, as AO is. Cannot fail. */
+VSH_API int32_t vsh_planes_shaded(const vsh_planes *planes);
+
+/* Puts over `planes` what `more` asks for. Cannot fail. */
+VSH_API void vsh_planes_add(vsh_planes *planes, const vsh_planes *more);
+
 /* A lightmap in the caller's arrays; each plane is [height][width] with row 0 at v = 1, and for the texels of
  * a band [rows][width] from its first row on. NULL planes are not
  * baked and cost nothing. Texels that neither a chart covers nor padding reaches are 0. */
@@ -209,6 +220,7 @@ typedef struct vsh_lightmap {
     int32_t bent_space;    /* VSH_BENT_…; in tangent space the texels need vsh_lightmap_options.tangents */
     float *invalid; /* 1: a chart covers it, but no sample of it is valid; 2: and it is in plain sight, as of
                        vsh_bake_stats; 0 elsewhere. Not padded */
+    vsh_planes asked; /* how planes are asked for, where there is more to it than whether */
 } vsh_lightmap;
 
 /* What is known of a channel's error, in sums over its values, so that those of bands add up. Begins as

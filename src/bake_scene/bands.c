@@ -94,7 +94,8 @@ vsh_result vshi_bands_plan(const vsh_scene *scene, const vshi_target *target, co
     if (result == VSH_OK) {
         cost c = {.scene = scene,
                   .charts = charts,
-                  .floats = channels.image.channel_count + (need->picture ? 4 : 0) + (scene->invalid ? 1 : 0),
+                  .floats = channels.image.channel_count + (need->picture ? 4 : 0) +
+                            (scene->planes.invalid ? 1 : 0),
                   .interleaved = 3 * (int32_t)channels.triple_count,
                   .held = need->held,
                   .limit = need->limit};

@@ -226,7 +226,7 @@ static const vshi_key scene_keys[] = {
      .highest = 1.0},
     {.name = "jitter", .kind = VSHI_NUMBER, .offset = offsetof(vsh_scene, shade.jitter), .highest = 1.0},
     {.name = "error", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, error)},
-    {.name = "invalid", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, invalid)},
+    {.name = "invalid", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, planes.invalid)},
     {.name = "max_steps",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_scene, shade.max_steps),

@@ -237,7 +237,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
         s->invalid_picture = value;
         return CLI_OK;
     case KEY_INVALID_CHANNEL:
-        s->invalid = true;
+        s->planes.invalid = 1;
         return CLI_OK;
     case KEY_STATS:
         s->stats = value;

@@ -73,7 +73,8 @@ typedef struct cli_bake_settings {
     const char *output;
     const char *output_folder; /* for the outputs of a scene, by their names; NULL: where it says */
     cli_patterns receive, no_receive, no_cast;
-    bool per_object, allow_overlap, invalid;
+    bool per_object, allow_overlap;
+    vsh_planes planes; /* that options ask for */
     const char *stats;
     const char *invalid_picture; /* NULL: none */
     cli_common common;

@@ -6,7 +6,8 @@
 /* Whether a method that the scene is baked by has all of these traits. */
 static bool any_is(const vsh_scene *scene, uint32_t traits) {
     return (scene->light_count > 0 && (vsh_shadow_method_traits(scene->shade.method) & traits) == traits) ||
-           (scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & traits) == traits);
+           ((scene->ao || vsh_planes_shaded(&scene->planes) > 0) &&
+            (vsh_ao_method_traits(scene->shade.ao_method) & traits) == traits);
 }
 
 /* Methods that know the error of their values, and those that work until it is small enough. */
@@ -42,7 +43,6 @@ static int set_accuracy(const cli_bake_settings *s, vsh_scene *scene) {
     shade->frame = s->has_frame ? s->frame : shade->frame;
     shade->early_rays = s->has_early_rays ? s->early_rays : shade->early_rays;
     scene->error = scene->error || s->error;
-    scene->invalid = scene->invalid || s->invalid;
     const char *option = s->has_rays         ? "--rays"
                          : s->has_sampler    ? "--sampler"
                          : s->has_frame      ? "--frame"
@@ -58,6 +58,7 @@ static int set_accuracy(const cli_bake_settings *s, vsh_scene *scene) {
 }
 
 int cli_bake_set_shade(const cli_bake_settings *s, vsh_scene *scene) {
+    vsh_planes_add(&scene->planes, &s->planes);
     if (s->has_ao) {
         scene->ao = 1;
         scene->shade.ao_distance = s->ao_distance;
