@@ -2,14 +2,64 @@
 
 #include "bake/ambient.h"
 #include "bake/baking.h"
+#include "base/names.h"
 #include "base/try.h"
 
+#include <math.h>
 #include <string.h>
 
 static vsh_result fill_irradiance(vshi_baking *bake, float *plane, vsh_error *error) {
     VSHI_TRY(vshi_baking_average(bake, bake->irradiance, 3, plane, error));
     vshi_ambient_add(bake->texels, bake->state, bake->lightmap);
     return VSH_OK;
+}
+
+static const char *const ups_table[] = {
+    [VSH_UP_NONE] = "none",  [VSH_UP_X] = "x",        [VSH_UP_Y] = "y",        [VSH_UP_Z] = "z",
+    [VSH_UP_MINUS_X] = "-x", [VSH_UP_MINUS_Y] = "-y", [VSH_UP_MINUS_Z] = "-z",
+};
+static const vshi_names ups = VSHI_NAMES(ups_table);
+
+int32_t vsh_up(const char *name) {
+    return vshi_name_find(ups, name);
+}
+
+const char *vsh_up_name(int32_t up) {
+    return vshi_name_at(ups, up);
+}
+
+typedef struct skylight {
+    vshi_baking *bake;
+    vshi_vec up;
+} skylight;
+
+/* From the share of what is over the horizon to that of the whole hemisphere. */
+static void weigh_sky(void *user, size_t begin, size_t end) {
+    const skylight *s = user;
+    for (size_t i = begin; i < end; ++i) {
+        const vshi_vec normal = vshi_unit(vshi_vec_off(s->bake->origins.normal + 3 * i));
+        const double over = fmin(fmax(0.5 * (1.0 + vshi_dot(normal, s->up)), 0.0), 1.0);
+        s->bake->values[i] = (float)(over * (double)s->bake->values[i]);
+    }
+}
+
+/* AO of what is over the horizon, within a distance that no caster is beyond. */
+static vsh_result fill_sky(vshi_baking *bake, float *plane, vsh_error *error) {
+    static const double FAR = 0x1p60;
+    const int32_t up = bake->lightmap->asked.sky;
+    if (up <= VSH_UP_NONE || up > VSH_UP_MINUS_Z) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap asked.sky %d: expected %d … %d", up, VSH_UP_X,
+                         VSH_UP_MINUS_Z);
+    }
+    vsh_shade_options options = bake->shade;
+    options.ao_distance = FAR;
+    for (int axis = 0; axis < 3; ++axis) {
+        options.ao_up[axis] = up == VSH_UP_X + axis ? 1.0 : up == VSH_UP_MINUS_X + axis ? -1.0 : 0.0;
+    }
+    skylight s = {bake, vshi_vec_of(options.ao_up)};
+    VSHI_TRY(vshi_baking_open(bake, &options, NULL, NULL, error));
+    VSHI_TRY(vshi_baking_step(bake, "sky", weigh_sky, &s, error));
+    return vshi_baking_average(bake, bake->values, 1, plane, error);
 }
 
 #define PLANE(member) .plane = offsetof(vsh_lightmap, member), .wish = VSHI_NO_WISH
@@ -25,6 +75,7 @@ static const vshi_plane_kind kinds[] = {
     {"bent", "XYZ", .padded = true, .needs = VSHI_NEEDS_AO | VSHI_NEEDS_BENT, PLANE(bent)},
     {"tint", "RGB", .per_light = true, .padded = true, .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_TINT,
      PLANE(tint)},
+    {"sky", .padded = true, .needs = VSHI_NEEDS_OPEN, WISHED(sky), .fill = fill_sky},
     {"invalid", WISHED(invalid)},
     {"A", PLANE(coverage)},
 };

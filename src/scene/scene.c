@@ -227,6 +227,7 @@ static const vshi_key scene_keys[] = {
     {.name = "jitter", .kind = VSHI_NUMBER, .offset = offsetof(vsh_scene, shade.jitter), .highest = 1.0},
     {.name = "error", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, error)},
     {.name = "invalid", .kind = VSHI_BOOL, .offset = offsetof(vsh_scene, planes.invalid)},
+    {.name = "sky", .kind = VSHI_NAME, .offset = offsetof(vsh_scene, planes.sky), .name_of = vsh_up_name},
     {.name = "max_steps",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_scene, shade.max_steps),

@@ -10,6 +10,7 @@ enum {
     KEY_AMBIENT,
     KEY_TINT,
     KEY_BENT,
+    KEY_SKY,
     KEY_SIZE,
     KEY_UV_SET,
     KEY_SUPERSAMPLE,
@@ -87,6 +88,8 @@ static const cli_option options[] = {
      "with --ao also bent.X, .Y, .Z: the mean direction that\nis open, in world or tangent space; -1 to 1, "
      "in\n"
      "integer formats (1 + x) / 2"},
+    {KEY_SKY, "sky", "AXIS",
+     "also sky: what of an even sky is seen, however far the\ncasters; up is x, y, z, -x, -y or -z"},
     CLI_ACCURACY_OPTIONS,
     CLI_CASTER_OPTIONS,
     CLI_GRID_OPTIONS,
@@ -239,6 +242,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_INVALID_CHANNEL:
         s->planes.invalid = 1;
         return CLI_OK;
+    case KEY_SKY:
+        return cli_take_name(name, value, vsh_up, vsh_up_name, &s->planes.sky);
     case KEY_STATS:
         s->stats = value;
         return CLI_OK;
