@@ -184,6 +184,30 @@ enum { VSH_BENT_WORLD = 0, VSH_BENT_TANGENT = 1 };
 VSH_API int32_t vsh_bent_space(const char *name);
 VSH_API const char *vsh_bent_space_name(int32_t space);
 
+/* Which way is up. */
+enum {
+    VSH_UP_NONE = 0,
+    VSH_UP_X = 1,
+    VSH_UP_Y = 2,
+    VSH_UP_Z = 3,
+    VSH_UP_MINUS_X = 4,
+    VSH_UP_MINUS_Y = 5,
+    VSH_UP_MINUS_Z = 6
+};
+
+/* "none", "x", "-y", … to VSH_UP_… and back; -1 and NULL for what is none. Names are static; NULL is none. */
+VSH_API int32_t vsh_up(const char *name);
+VSH_API const char *vsh_up_name(int32_t up);
+
+/* Planes that a scene asks for beside those of its lights and AO: 0 not, else how. */
+typedef struct vsh_planes {
+    int32_t invalid; /* nonzero: where texels are invalid */
+    int32_t sky;     /* the sky that is seen, of a sky that is up: VSH_UP_… */
+} vsh_planes;
+
+/* How many of them are shaded by themselves, as AO is. Cannot fail. */
+VSH_API int32_t vsh_planes_shaded(const vsh_planes *planes);
+
 /* A lightmap in the caller's arrays; each plane is [height][width] with row 0 at v = 1, and for the texels of
  * a band [rows][width] from its first row on. NULL planes are not
  * baked and cost nothing. Texels that neither a chart covers nor padding reaches are 0. */
@@ -206,6 +230,13 @@ typedef struct vsh_lightmap {
     int32_t bent_space;    /* VSH_BENT_…; in tangent space the texels need vsh_lightmap_options.tangents */
     float *invalid; /* 1: a chart covers it, but no sample of it is valid; 2: and it is in plain sight, as of
                        vsh_bake_stats; 0 elsewhere. Not padded */
+    vsh_planes asked; /* how planes are asked for, where there is more to it than whether */
+    float *sky; /* what of the light of an even sky, over the horizon of `asked.sky`, comes straight to the
+                   texel: 1/π ∫ V(ω) max(0, n · ω) [ω · up > 0] dω. V is 0 where a caster is in the way,
+                   however far, else 1. 1: all that a surface may see, an open floor; an open wall has 1/2, an
+                   open ceiling 0: (1 + n · up) / 2 where nothing is in the way. By shade.ao_method, which is
+                   rays, adaptive or exact, to (1 + n · up) / 2 × shade.max_error; of layers, those that take
+                   part in AO */
 } vsh_lightmap;
 
 /* Bytes that baking a band into such planes takes at most, beside charts and field: texels, the planes of its

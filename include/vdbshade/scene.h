@@ -115,7 +115,7 @@ typedef struct vsh_scene {
     vsh_tint tint;      /* bake tinted shadows, and irradiance by them; VSH_TINT_NONE: none */
     int32_t has_ambient;
     double ambient[3]; /* of irradiance, as in vsh_lightmap; where has_ambient is not 0 */
-    int32_t invalid;   /* nonzero: bake where texels are invalid too, channel `invalid` */
+    vsh_planes planes; /* to be baked too */
     int32_t error; /* nonzero: bake the error left in each shadow and AO value too, where methods know it */
     const vsh_solidity_rule *solidity; /* [solidity_count]: of all mesh casters, over what they say
                                           themselves; each must match one's mesh */

@@ -31,6 +31,10 @@ typedef struct vsh_shade_options {
     double max_error;   /* adaptive, exact: standard error that a value may keep, 1e-4 … 1 (0.02) */
     double jitter;      /* shadows by one march, but for improved: steps are shortened by a part between 0 and
                          * this, 0 … 1, another for each texel. What steps have in common, bands, becomes grain */
+    double
+        ao_up[3]; /* of any length: AO is of the directions over this horizon, d · ao_up > 0, and says which
+                   * share of them is free; they are (1 + cosine to the normal) / 2 of the hemisphere, and
+                   * where that is 0 the share says nothing. {0, 0, 0}: of all. By rays, adaptive and exact */
 } vsh_shade_options;
 
 static inline vsh_shade_options vsh_shade_options_default(void) {
@@ -47,7 +51,8 @@ static inline vsh_shade_options vsh_shade_options_default(void) {
                                  0,
                                  0,
                                  0.02,
-                                 0.0};
+                                 0.0,
+                                 {0.0, 0.0, 0.0}};
     return options;
 }
 

@@ -1,8 +1,9 @@
 #include "bake/ao_texels.h"
 
 #include "bake/raster.h"
-#include "bake/take.h"
+#include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 #include "shade/ao.h"
 #include "shade/links.h"
 
@@ -247,10 +248,9 @@ double vshi_ao_texels_bytes(double samples, int32_t threads, bool bent) {
 /* Estimates all, once each texel's own rays are shot. */
 static vsh_result estimate_all(sharing *s, vshi_job *job, vsh_error *error) {
     const size_t blocks = (s->origins->rows.count + ROWS - 1) / ROWS * s->block_columns;
-    const vsh_result result = vshi_parallel_for(job, blocks, 1, 0, estimate_block, s, error);
-    return result == VSH_OK && s->refused > 0
-               ? vshi_fail(error, VSH_ERROR_MEMORY, "AO texels: the system refused memory")
-               : result;
+    VSHI_TRY(vshi_parallel_for(job, blocks, 1, 0, estimate_block, s, error));
+    return s->refused > 0 ? vshi_fail(error, VSH_ERROR_MEMORY, "AO texels: the system refused memory")
+                          : VSH_OK;
 }
 
 vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texels,
@@ -273,29 +273,33 @@ vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texe
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "ao: the system refused memory");
     }
-    vsh_result result = VSH_OK;
+    vsh_result result;
     const size_t tiles = list_tiles(origins, NULL, NULL);
-    s.tile = vshi_take(tiles + 1, sizeof *s.tile, what, &result, error);
-    s.row_tile = vshi_take(origins->rows.count + 1, sizeof *s.row_tile, what, &result, error);
-    s.shot = vshi_take(origins->count, sizeof *s.shot, what, &result, error);
-    s.rays = vshi_take(origins->count, sizeof *s.rays, what, &result, error);
-    s.open = vshi_take(bent != NULL ? origins->count : 0, 3 * sizeof *s.open, what, &result, error);
-    s.curved = vshi_take(s.block_columns * origins->rows.count, sizeof *s.curved, what, &result, error);
-    if (result == VSH_OK && tiles > 0) {
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.tile, tiles + 1, sizeof *s.tile, what, error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&s.row_tile, origins->rows.count + 1, sizeof *s.row_tile, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.shot, origins->count, sizeof *s.shot, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.rays, origins->count, sizeof *s.rays, what, error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&s.open, bent != NULL ? origins->count : 0, 3 * sizeof *s.open, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.curved, s.block_columns * origins->rows.count, sizeof *s.curved,
+                                what, error));
+    if (tiles > 0) {
         list_tiles(origins, s.tile, s.row_tile);
         const vshi_point_rows rows = {.count = tiles,
                                       .first = s.row_tile[origins->rows.first],
                                       .last = s.row_tile[origins->rows.last],
                                       .start = s.tile};
-        result =
-            vshi_shade_ao(occluders, points, &rows, options, run, s.shot, NULL, s.open, s.rays, stats, error);
-        result = result == VSH_OK ? estimate_all(&s, job, error) : result;
+        VSHI_TRY_DONE(vshi_shade_ao(occluders, points, &rows, options, run, s.shot, NULL, s.open, s.rays,
+                                    stats, error));
+        VSHI_TRY_DONE(estimate_all(&s, job, error));
     }
-    if (result == VSH_OK && stats != NULL) {
+    if (stats != NULL) {
         const double square = (double)s.square * VSHI_SQUARE_UNIT + sum_curved(&s);
         stats->square_error += square;
         stats->ao_square_error += square;
     }
+done:
     free(s.curved);
     free(s.open);
     free(s.rays);

@@ -3,9 +3,9 @@
 #include "bake/lattice.h"
 #include "bake/origins.h"
 #include "bake/padding.h"
+#include "bake/planes.h"
 #include "bake/rows.h"
 #include "bake/spread.h"
-#include "bake/take.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -30,22 +30,15 @@ static vsh_result check_range(int32_t value, int32_t low, int32_t high, const ch
 }
 
 static vsh_result check_options(const vsh_lightmap_options *options, vsh_error *error) {
-    vsh_result result = check_range(options->width, 1, VSH_MAX_LIGHTMAP_SIZE, "width", error);
-    if (result == VSH_OK) {
-        result = check_range(options->height, 1, VSH_MAX_LIGHTMAP_SIZE, "height", error);
-    }
-    if (result == VSH_OK) {
-        result = check_range(options->supersample, 1, VSHI_MAX_SUPERSAMPLE, "supersample", error);
-    }
-    if (result == VSH_OK) {
-        result = check_range(options->padding, 0, MAX_PADDING, "padding", error);
-    }
+    VSHI_TRY(check_range(options->width, 1, VSH_MAX_LIGHTMAP_SIZE, "width", error));
+    VSHI_TRY(check_range(options->height, 1, VSH_MAX_LIGHTMAP_SIZE, "height", error));
+    VSHI_TRY(check_range(options->supersample, 1, VSHI_MAX_SUPERSAMPLE, "supersample", error));
+    VSHI_TRY(check_range(options->padding, 0, MAX_PADDING, "padding", error));
     const int32_t spacing = options->ao_spacing;
-    if (result == VSH_OK && spacing != 1 && spacing != 2 && spacing != 4 && spacing != 8) {
-        result =
-            vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap ao_spacing %d: expected 1, 2, 4 or 8", spacing);
+    if (spacing != 1 && spacing != 2 && spacing != 4 && spacing != 8) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap ao_spacing %d: expected 1, 2, 4 or 8", spacing);
     }
-    return result;
+    return VSH_OK;
 }
 
 /* --- counting */
@@ -113,21 +106,17 @@ static vsh_result count(counting *all, const vsh_run *run, bool limited, vshi_jo
     const size_t triangles = sorted->first[sorted->mesh_count];
     const double held = (double)charts->info.bytes + (double)triangles + vshi_row_bytes(sorted, run->threads);
     const double sample = (double)vshi_sample_bytes(charts->tangents);
-    vsh_result result = vshi_check_limit(run, held, "texels", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_check_limit(run, held, "texels", error));
     all->most_samples = !limited || run->memory_limit == 0
                             ? UINT64_MAX
                             : (uint64_t)(((double)run->memory_limit - held) / sample);
-    if ((result = vshi_parallel_for(job, sorted->rows, 1, 1, count_rows, all, error)) != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_parallel_for(job, sorted->rows, 1, 1, count_rows, all, error));
     for (size_t row = 0; row < sorted->rows; ++row) {
         charts->info.samples += charts->rows[row].samples;
         charts->info.covered += charts->rows[row].texels;
     }
-    result = charts->info.samples > all->most_samples ? VSH_ERROR_LIMIT : atomic_load(&all->row_result);
+    const vsh_result result =
+        charts->info.samples > all->most_samples ? VSH_ERROR_LIMIT : atomic_load(&all->row_result);
     if (result == VSH_ERROR_LIMIT) {
         const double samples = fmax(estimate_samples(sorted), (double)all->most_samples + 1.0);
         return vshi_check_limit(run, held + samples * sample, "texels", error);
@@ -168,22 +157,21 @@ static vsh_result find_owners(counting *all, vshi_job *job, vsh_uv_report *repor
     if (reports[worst].other_texels == 0) {
         return VSH_OK;
     }
-    vsh_result result = VSH_OK;
+    vsh_result result;
     counting again = {.charts = all->charts, .overlaps = {.watched = worst}};
-    again.overlaps.owners = vshi_take(count, sizeof *again.overlaps.owners, "overlaps", &result, error);
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, all->charts->sorted.rows, 1, 0, count_owners, &again, error);
-    }
-    if (result == VSH_OK && (result = atomic_load(&again.row_result)) != VSH_OK) {
+    VSHI_TRY_DONE(vshi_allocate((void *)&again.overlaps.owners, count, sizeof *again.overlaps.owners,
+                                "overlaps", error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, all->charts->sorted.rows, 1, 0, count_owners, &again, error));
+    if ((result = atomic_load(&again.row_result)) != VSH_OK) {
         vshi_fail(error, result, "texels: the system refused memory for a row");
+        goto done;
     }
-    for (size_t m = 0; result == VSH_OK && m < count; ++m) {
+    for (size_t m = 0; m < count; ++m) {
         owner = again.overlaps.owners[m] > again.overlaps.owners[owner] ? m : owner;
     }
-    if (result == VSH_OK) {
-        reports[worst].other_mesh = owner;
-        reports[worst].other_mesh_texels = again.overlaps.owners[owner];
-    }
+    reports[worst].other_mesh = owner;
+    reports[worst].other_mesh_texels = again.overlaps.owners[owner];
+done:
     free(again.overlaps.owners);
     return result;
 }
@@ -236,16 +224,15 @@ static vsh_result find_sheets(vsh_charts *charts, vshi_mesh_set *set, vshi_job *
         VSHI_TRY(vshi_mesh_set_solve(set, run, error));
     }
     const size_t *first = charts->sorted.first;
-    vsh_result result = VSH_OK;
-    charts->sheet = vshi_take(first[set->count], 1, "texels", &result, error);
-    for (size_t m = 0; result == VSH_OK && m < set->count; ++m) {
+    VSHI_TRY(vshi_allocate((void **)&charts->sheet, first[set->count], 1, "texels", error));
+    for (size_t m = 0; m < set->count; ++m) {
         const uint8_t *sides = vshi_mesh_sides(&set->meshes[m]);
         for (size_t i = 0; i < set->meshes[m].triangle_count; ++i) {
             charts->sheet[first[m] + i] = sides[i] == VSHI_SIDE_SHEET;
         }
-        result = vshi_job_advance(job, 0) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+        VSHI_TRY(vshi_job_advance(job, 0) ? vshi_job_fail_cancelled(job, error) : VSH_OK);
     }
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result make(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
@@ -255,33 +242,25 @@ static vsh_result make(const vsh_mesh *meshes, size_t mesh_count, const vsh_ligh
     const vshi_raster raster = {options->width, options->height, options->supersample};
     vshi_charts *sorted = &charts->sorted;
     vshi_mesh_set set;
-    vsh_result result = vshi_mesh_set_create(meshes, mesh_count, &set, error);
-    if (result == VSH_OK) {
-        result = vshi_charts_create(meshes, mesh_count, raster, run, job, reports, sorted, error);
-    }
-    if (result == VSH_OK) {
-        result = find_sheets(charts, &set, job, run, error);
-    }
+    VSHI_TRY(vshi_mesh_set_create(meshes, mesh_count, &set, error));
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_charts_create(meshes, mesh_count, raster, run, job, reports, sorted, error));
+    VSHI_TRY_DONE(find_sheets(charts, &set, job, run, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&charts->rows, sorted->rows, sizeof *charts->rows, "texels", error));
+    charts->info.bytes =
+        sizeof *charts + sorted->bytes + sorted->first[mesh_count] + sorted->rows * sizeof *charts->rows;
+    VSHI_TRY_DONE(vshi_allocate((void *)&all.overlaps.texels, mesh_count, sizeof *all.overlaps.texels,
+                                "overlaps", error));
+    VSHI_TRY_DONE(vshi_allocate((void *)&all.overlaps.others, mesh_count, sizeof *all.overlaps.others,
+                                "overlaps", error));
+    VSHI_TRY_DONE(vshi_allocate((void *)&all.overlaps.triangles, sorted->first[mesh_count],
+                                sizeof *all.overlaps.triangles, "overlaps", error));
+    VSHI_TRY_DONE(count(&all, run, limited, job, error));
+    take_overlaps(&all, reports);
+    VSHI_TRY_DONE(find_owners(&all, job, reports, error));
+    warn(&all, run, reports);
+done:
     vshi_mesh_set_free(&set);
-    if (result == VSH_OK) {
-        charts->rows = vshi_take(sorted->rows, sizeof *charts->rows, "texels", &result, error);
-        charts->info.bytes =
-            sizeof *charts + sorted->bytes + sorted->first[mesh_count] + sorted->rows * sizeof *charts->rows;
-        all.overlaps.texels = vshi_take(mesh_count, sizeof *all.overlaps.texels, "overlaps", &result, error);
-        all.overlaps.others = vshi_take(mesh_count, sizeof *all.overlaps.others, "overlaps", &result, error);
-        all.overlaps.triangles =
-            vshi_take(sorted->first[mesh_count], sizeof *all.overlaps.triangles, "overlaps", &result, error);
-    }
-    if (result == VSH_OK) {
-        result = count(&all, run, limited, job, error);
-    }
-    if (result == VSH_OK) {
-        take_overlaps(&all, reports);
-        result = find_owners(&all, job, reports, error);
-    }
-    if (result == VSH_OK) {
-        warn(&all, run, reports);
-    }
     free(all.overlaps.triangles);
     free(all.overlaps.others);
     free(all.overlaps.texels);
@@ -293,13 +272,8 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
                             size_t uv_reports_size, vsh_charts **charts, vsh_error *error) {
     *charts = NULL;
     vsh_lightmap_options full = vsh_lightmap_options_default();
-    vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_lightmap_options", error);
-    if (result == VSH_OK) {
-        result = check_options(&full, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_options_resolve(options, &full, sizeof full, "vsh_lightmap_options", error));
+    VSHI_TRY(check_options(&full, error));
     if (mesh_count == 0 || mesh_count > INT32_MAX) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap of %zu meshes: expected 1 … %d", mesh_count,
                          INT32_MAX);
@@ -310,25 +284,23 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "texels: the system refused memory");
     }
-    reports = vshi_take(mesh_count, sizeof *reports, "UV reports", &result, error);
-    made = vshi_take(1, sizeof *made, "texels", &result, error);
-    if (result == VSH_OK) {
-        made->info.width = full.width;
-        made->info.height = full.height;
-        made->padding = full.padding;
-        made->ao_spacing = full.supersample == 1 ? full.ao_spacing : 1;
-        made->tangents = full.tangents != 0;
-        made->shade = full.shade;
-        result = make(meshes, mesh_count, &full, run, limited, job, reports, made, error);
-    }
-    if (result == VSH_OK && uv_reports != NULL) {
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&reports, mesh_count, sizeof *reports, "UV reports", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "texels", error));
+    made->info.width = full.width;
+    made->info.height = full.height;
+    made->padding = full.padding;
+    made->ao_spacing = full.supersample == 1 ? full.ao_spacing : 1;
+    made->tangents = full.tangents != 0;
+    made->shade = full.shade;
+    VSHI_TRY_DONE(make(meshes, mesh_count, &full, run, limited, job, reports, made, error));
+    if (uv_reports != NULL) {
         vshi_give_all(uv_reports, uv_reports_size, reports, sizeof *reports, mesh_count);
     }
-    if (result == VSH_OK) {
-        *charts = made;
-    } else {
-        vsh_charts_free(made);
-    }
+    *charts = made;
+    made = NULL;
+done:
+    vsh_charts_free(made);
     free(reports);
     vshi_job_end(job);
     return result;
@@ -343,10 +315,9 @@ vsh_result vsh_charts_create_sized(const vsh_mesh *meshes, size_t mesh_count,
     *charts = NULL;
     VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full;
-    const vsh_result result = vshi_run_resolve(run, &full, error);
-    return result == VSH_OK ? vshi_charts_make(meshes, mesh_count, options, &full, false, uv_reports,
-                                               uv_reports_size, charts, error)
-                            : result;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    return vshi_charts_make(meshes, mesh_count, options, &full, false, uv_reports, uv_reports_size, charts,
+                            error);
 }
 
 void vsh_charts_free(vsh_charts *charts) {
@@ -407,12 +378,14 @@ double vshi_bake_bytes(const vshi_bake_need *need) {
 
 /* Floats a texel of all planes that are there. */
 static double floats_of(const vsh_lightmap *planes, size_t light_count) {
-    const int of_each_light =
-        (planes->shadow != NULL) + (planes->shadow_error != NULL) + 3 * (planes->tint != NULL);
-    const int others = (planes->ao != NULL) + (planes->ao_error != NULL) + (planes->coverage != NULL) +
-                       (planes->invalid != NULL) + 3 * (planes->irradiance != NULL) +
-                       3 * (planes->bent != NULL);
-    return (double)others + (double)light_count * of_each_light;
+    size_t kind_count, floats = 0;
+    const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
+    for (size_t k = 0; k < kind_count; ++k) {
+        if (vshi_plane_given(planes, &kinds[k])) {
+            floats += vshi_plane_components(&kinds[k]) * (kinds[k].per_light ? light_count : 1);
+        }
+    }
+    return (double)floats;
 }
 
 uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int32_t rows,

@@ -1,5 +1,6 @@
 #include "bake/charts.h"
-#include "bake/take.h"
+#include "base/memory.h"
+#include "base/try.h"
 #include "mesh/mesh.h"
 
 #include <math.h>
@@ -91,31 +92,21 @@ vsh_result vshi_charts_create(const vsh_mesh *meshes, size_t mesh_count, vshi_ra
                               vsh_error *error) {
     *charts = (vshi_charts){.meshes = meshes, .mesh_count = mesh_count, .raster = raster};
     charts->rows = ((size_t)raster.height + VSHI_TILE - 1) / VSHI_TILE;
-    vsh_result result = VSH_OK;
-    charts->first = vshi_take(mesh_count + 1, sizeof *charts->first, "mesh list", &result, error);
-    for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
-        result = check_uvs(&meshes[m], m, error);
-        if (result == VSH_OK && meshes[m].triangle_count > UINT32_MAX - 1 - charts->first[m]) {
-            result =
-                vshi_fail(error, VSH_ERROR_LIMIT, "%s: triangle %zu of the receiver, over the limit of %u",
-                          vshi_mesh_label(&meshes[m], m).text, charts->first[m] + meshes[m].triangle_count,
-                          UINT32_MAX - 1);
+    VSHI_TRY(
+        vshi_allocate((void **)&charts->first, mesh_count + 1, sizeof *charts->first, "mesh list", error));
+    for (size_t m = 0; m < mesh_count; ++m) {
+        VSHI_TRY(check_uvs(&meshes[m], m, error));
+        if (meshes[m].triangle_count > UINT32_MAX - 1 - charts->first[m]) {
+            return vshi_fail(error, VSH_ERROR_LIMIT, "%s: triangle %zu of the receiver, over the limit of %u",
+                             vshi_mesh_label(&meshes[m], m).text, charts->first[m] + meshes[m].triangle_count,
+                             UINT32_MAX - 1);
         }
-        if (result == VSH_OK) {
-            charts->first[m + 1] = charts->first[m] + meshes[m].triangle_count;
-        }
+        charts->first[m + 1] = charts->first[m] + meshes[m].triangle_count;
     }
-    if (result == VSH_OK) {
-        /* One more than the starts: filling moves each start on to its end, which is the next one's start. */
-        charts->row_start =
-            vshi_take(charts->rows + 2, sizeof *charts->row_start, "tile rows", &result, error);
-    }
-    if (result == VSH_OK) {
-        result = sort_rows(charts, false, job, reports, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    /* One more than the starts: filling moves each start on to its end, which is the next one's start. */
+    VSHI_TRY(vshi_allocate((void **)&charts->row_start, charts->rows + 2, sizeof *charts->row_start,
+                           "tile rows", error));
+    VSHI_TRY(sort_rows(charts, false, job, reports, error));
     size_t total = 0;
     for (size_t row = 0; row <= charts->rows; ++row) {
         const size_t count = charts->row_start[row + 1];
@@ -123,10 +114,10 @@ vsh_result vshi_charts_create(const vsh_mesh *meshes, size_t mesh_count, vshi_ra
         total += row < charts->rows ? count : 0;
     }
     charts->bytes = (mesh_count + charts->rows + 3) * sizeof(size_t) + total * sizeof *charts->row_triangle;
-    result = vshi_check_limit(run, (double)charts->bytes, "lightmap triangles", error);
-    charts->row_triangle =
-        vshi_take(total, sizeof *charts->row_triangle, "lightmap triangles", &result, error);
-    return result == VSH_OK ? sort_rows(charts, true, job, reports, error) : result;
+    VSHI_TRY(vshi_check_limit(run, (double)charts->bytes, "lightmap triangles", error));
+    VSHI_TRY(vshi_allocate((void **)&charts->row_triangle, total, sizeof *charts->row_triangle,
+                           "lightmap triangles", error));
+    return sort_rows(charts, true, job, reports, error);
 }
 
 void vshi_charts_free(vshi_charts *charts) {

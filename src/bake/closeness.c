@@ -1,11 +1,11 @@
 /* Charts that lie closer to each other than a texel. Triangles that share an edge, in space and in the UVs,
  * are one chart; the edges that a triangle has to itself are borders. Borders are walked in steps of half a
  * texel and put into the texels they pass, so that near ones are found there. */
-#include "bake/take.h"
 #include "base/floats.h"
 #include "base/hash.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/mesh.h"
 
 #include <math.h>
@@ -250,39 +250,35 @@ static void measure(const closeness *c, uint64_t *by_mesh, vsh_closeness *found)
 
 static vsh_result find(closeness *c, const vsh_run *run, vsh_closeness *found, vsh_error *error) {
     const char *what = "closeness of charts";
-    vsh_result result = VSH_OK;
     c->slot_count = power_above(6 * c->triangles);
     const double bytes = (double)c->slot_count * sizeof *c->slots +
                          (double)c->triangles * (sizeof *c->parent + 3.0 * sizeof *c->borders);
-    if ((result = vshi_check_limit(run, bytes, what, error)) != VSH_OK) {
-        return result;
+    VSHI_TRY(vshi_check_limit(run, bytes, what, error));
+    uint64_t *by_mesh = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&by_mesh, c->mesh_count, sizeof *by_mesh, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&c->parent, c->triangles, sizeof *c->parent, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&c->slots, c->slot_count, sizeof *c->slots, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&c->borders, 3 * c->triangles, sizeof *c->borders, what, error));
+    for (size_t i = 0; i < c->slot_count; ++i) {
+        c->slots[i].edge = NO_EDGE;
     }
-    uint64_t *by_mesh = vshi_take(c->mesh_count, sizeof *by_mesh, what, &result, error);
-    c->parent = vshi_take(c->triangles, sizeof *c->parent, what, &result, error);
-    c->slots = vshi_take(c->slot_count, sizeof *c->slots, what, &result, error);
-    c->borders = vshi_take(3 * c->triangles, sizeof *c->borders, what, &result, error);
-    if (result == VSH_OK) {
-        for (size_t i = 0; i < c->slot_count; ++i) {
-            c->slots[i].edge = NO_EDGE;
-        }
-        join_charts(c);
-        list_borders(c);
-    }
+    join_charts(c);
+    list_borders(c);
     size_t most = 0;
     for (size_t b = 0; b < c->border_count; ++b) {
         most += steps_of(&c->borders[b]) + 1;
     }
     c->head_count = power_above(most);
     const double passings = (double)most * sizeof *c->passings + (double)c->head_count * sizeof *c->heads;
-    if (result == VSH_OK && most < NO_EDGE) {
-        result = vshi_check_limit(run, bytes + passings, what, error);
-        c->passings = vshi_take(most, sizeof *c->passings, what, &result, error);
-        c->heads = vshi_take(c->head_count, sizeof *c->heads, what, &result, error);
-        if (result == VSH_OK) {
-            put_borders(c);
-            measure(c, by_mesh, found);
-        }
+    if (most < NO_EDGE) {
+        VSHI_TRY_DONE(vshi_check_limit(run, bytes + passings, what, error));
+        VSHI_TRY_DONE(vshi_allocate((void **)&c->passings, most, sizeof *c->passings, what, error));
+        VSHI_TRY_DONE(vshi_allocate((void **)&c->heads, c->head_count, sizeof *c->heads, what, error));
+        put_borders(c);
+        measure(c, by_mesh, found);
     }
+done:
     free(c->heads);
     free(c->passings);
     free(c->borders);
@@ -299,30 +295,26 @@ vsh_result vsh_charts_closeness_sized(const vsh_mesh *meshes, size_t mesh_count,
     VSHI_NEEDS_OF(mesh_count, meshes);
     VSHI_NEEDS(found);
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result == VSH_OK &&
-        (width < 1 || height < 1 || width > VSH_MAX_LIGHTMAP_SIZE || height > VSH_MAX_LIGHTMAP_SIZE)) {
-        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "closeness of charts at %d × %d: expected 1 … %d",
-                           width, height, VSH_MAX_LIGHTMAP_SIZE);
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    if (width < 1 || height < 1 || width > VSH_MAX_LIGHTMAP_SIZE || height > VSH_MAX_LIGHTMAP_SIZE) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "closeness of charts at %d × %d: expected 1 … %d", width,
+                         height, VSH_MAX_LIGHTMAP_SIZE);
     }
     closeness c = {.meshes = meshes, .mesh_count = mesh_count, .width = width, .height = height};
-    for (size_t m = 0; result == VSH_OK && m < mesh_count; ++m) {
-        result = vshi_mesh_check_data(&meshes[m], m, error);
-        if (result == VSH_OK && meshes[m].uvs == NULL && meshes[m].triangle_count > 0) {
-            result = vshi_fail(error, VSH_ERROR_INPUT, "%s has no lightmap UVs",
-                               vshi_mesh_label(&meshes[m], m).text);
+    for (size_t m = 0; m < mesh_count; ++m) {
+        VSHI_TRY(vshi_mesh_check_data(&meshes[m], m, error));
+        if (meshes[m].uvs == NULL && meshes[m].triangle_count > 0) {
+            return vshi_fail(error, VSH_ERROR_INPUT, "%s has no lightmap UVs",
+                             vshi_mesh_label(&meshes[m], m).text);
         }
         c.triangles += meshes[m].triangle_count;
     }
-    if (result == VSH_OK && c.triangles > UINT32_MAX / 3 - 1) {
-        result = vshi_fail(error, VSH_ERROR_LIMIT, "closeness of charts: %zu triangles, at most %u",
-                           c.triangles, UINT32_MAX / 3 - 1);
-    }
-    if (result != VSH_OK) {
-        return result;
+    if (c.triangles > UINT32_MAX / 3 - 1) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "closeness of charts: %zu triangles, at most %u",
+                         c.triangles, UINT32_MAX / 3 - 1);
     }
     vsh_closeness all = {.gap = 1.0};
-    result = find(&c, &full, &all, error);
+    const vsh_result result = find(&c, &full, &all, error);
     vshi_give(found, found_size, &all, sizeof all);
     return result;
 }

@@ -9,10 +9,11 @@
  * filled with. */
 #include "bake/field_share.h"
 #include "bake/padding.h"
-#include "bake/take.h"
 #include "base/elementary.h"
 #include "base/hash.h"
+#include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 #include "shade/inside.h"
 #include "trace/embree.h"
 
@@ -192,11 +193,12 @@ vsh_result vshi_field_share_choose(const vsh_texels *texels, vshi_origins *origi
     *share =
         (vshi_field_share){.texels = texels, .truth = *truth, .traced = traced, .dropped = origins->dropped};
     const size_t step = step_of(texels, traced), count = count_groups(texels, step > 0 ? step : 1);
-    vsh_result result = VSH_OK;
-    share->samples = vshi_take(count, sizeof *share->samples, "error of the field", &result, error);
-    share->square = vshi_take(count, sizeof *share->square, "error of the field", &result, error);
-    if (result != VSH_OK || count == 0) {
-        return result;
+    VSHI_TRY(
+        vshi_allocate((void **)&share->samples, count, sizeof *share->samples, "error of the field", error));
+    VSHI_TRY(
+        vshi_allocate((void **)&share->square, count, sizeof *share->square, "error of the field", error));
+    if (count == 0) {
+        return VSH_OK;
     }
     choose(share, origins, state, step);
     return over_samples(share, look, share, run, error);

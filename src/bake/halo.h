@@ -12,9 +12,9 @@ typedef struct vshi_halo {
     vshi_plane *planes;    /* of it, those that are not NULL */
     vshi_plane *given;     /* the caller's of the same */
     size_t count;
-    size_t padded; /* the first of them are padded: values, not their errors and not the coverage */
-    float **shadow, **shadow_error, **tint; /* [light_count] */
-    float *memory;                          /* NULL: the planes are the caller's */
+    size_t padded;  /* the first of them are padded: values, not their errors and not the coverage */
+    float **lights; /* [kinds of planes][light_count]: the lightmap's lists */
+    float *memory;  /* NULL: the planes are the caller's */
 } vshi_halo;
 
 /* Bytes that the planes take beside the caller's. */

@@ -1,8 +1,9 @@
 #include "bake/lattice.h"
 
 #include "bake/lattice_cells.h"
-#include "bake/take.h"
+#include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 #include "shade/ao.h"
 
 #include <math.h>
@@ -160,31 +161,31 @@ static size_t sum_blocks(vshi_lattice *l) {
 
 static vsh_result shade_pass(vshi_lattice *l, const vsh_shade_options *options, size_t count,
                              const vsh_run *run, vshi_job *job, vsh_shade_stats *stats, vsh_error *error) {
-    vsh_result result = VSH_OK;
+    vsh_result result;
     const char *what = "AO texels";
-    l->number = vshi_take(count, sizeof *l->number, what, &result, error);
-    l->position = vshi_take(count, 3 * sizeof(double), what, &result, error);
-    l->normal = vshi_take(count, 3 * sizeof(float), what, &result, error);
-    l->texel = vshi_take(count, sizeof *l->texel, what, &result, error);
-    l->chosen_values = vshi_take(count, sizeof(float), what, &result, error);
-    l->chosen_deviation = vshi_take(l->deviation != NULL ? count : 0, sizeof(float), what, &result, error);
-    l->chosen_bent = vshi_take(l->bent != NULL ? count : 0, 3 * sizeof(float), what, &result, error);
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, l->blocks, 1, 0, pack, l, error);
+    l->number = l->texel = NULL;
+    l->position = NULL;
+    l->normal = l->chosen_values = l->chosen_deviation = l->chosen_bent = NULL;
+    VSHI_TRY_DONE(vshi_allocate((void **)&l->number, count, sizeof *l->number, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l->position, count, 3 * sizeof(double), what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l->normal, count, 3 * sizeof(float), what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l->texel, count, sizeof *l->texel, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l->chosen_values, count, sizeof(float), what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l->chosen_deviation, l->deviation != NULL ? count : 0,
+                                sizeof(float), what, error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&l->chosen_bent, l->bent != NULL ? count : 0, 3 * sizeof(float), what, error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, l->blocks, 1, 0, pack, l, error));
+    vsh_shade_options shade = *options;
+    if (l->spacing > 1) {
+        shade.max_error = fmax(FINER * shade.max_error, 1e-4);
     }
-    if (result == VSH_OK) {
-        vsh_shade_options shade = *options;
-        if (l->spacing > 1) {
-            shade.max_error = fmax(FINER * shade.max_error, 1e-4);
-        }
-        const vsh_points points = {count, l->position, l->normal, l->texel};
-        const vshi_point_rows rows = chosen_rows(l, count);
-        result = vshi_shade_ao(l->occluders, &points, &rows, &shade, run, l->chosen_values,
-                               l->chosen_deviation, l->chosen_bent, NULL, stats, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, count, 4096, 0, unpack, l, error);
-    }
+    const vsh_points points = {count, l->position, l->normal, l->texel};
+    const vshi_point_rows rows = chosen_rows(l, count);
+    VSHI_TRY_DONE(vshi_shade_ao(l->occluders, &points, &rows, &shade, run, l->chosen_values,
+                                l->chosen_deviation, l->chosen_bent, NULL, stats, error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, count, 4096, 0, unpack, l, error));
+done:
     free(l->chosen_bent);
     free(l->chosen_deviation);
     free(l->chosen_values);
@@ -211,20 +212,20 @@ static vsh_result run_passes(vshi_lattice *l, const vsh_shade_options *options, 
     part.user = &progress;
     part.progress = run->progress != NULL ? tell : NULL;
     part.warning = run->warning != NULL ? warn : NULL;
-    vsh_result result = vshi_parallel_for(job, l->origins->count, 4096, 0, find_texels, l, error);
-    for (l->spacing = l->texels->ao_spacing; result == VSH_OK && l->spacing > 0; l->spacing /= 2) {
-        result = vshi_parallel_for(job, l->blocks, 1, 0, choose, l, error);
-        const size_t count = result == VSH_OK ? sum_blocks(l) : 0;
+    VSHI_TRY(vshi_parallel_for(job, l->origins->count, 4096, 0, find_texels, l, error));
+    for (l->spacing = l->texels->ao_spacing; l->spacing > 0; l->spacing /= 2) {
+        VSHI_TRY(vshi_parallel_for(job, l->blocks, 1, 0, choose, l, error));
+        const size_t count = sum_blocks(l);
         progress.done = (double)count_known(l) / all;
         progress.share = (double)count / all;
-        if (result == VSH_OK && count > 0) {
-            result = shade_pass(l, options, count, &part, job, stats, error);
+        if (count > 0) {
+            VSHI_TRY(shade_pass(l, options, count, &part, job, stats, error));
         }
-        if (result == VSH_OK && l->spacing > 1) {
-            result = vshi_parallel_for(job, l->blocks, 1, 0, interpolate, l, error);
+        if (l->spacing > 1) {
+            VSHI_TRY(vshi_parallel_for(job, l->blocks, 1, 0, interpolate, l, error));
         }
     }
-    return result;
+    return VSH_OK;
 }
 
 /* What was interpolated adds to the squared error, as what was shaded has. */
@@ -264,21 +265,22 @@ vsh_result vshi_lattice_ao(const vsh_occluders *occluders, const vsh_texels *tex
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "ao: the system refused memory");
     }
-    vsh_result result = VSH_OK;
-    l.at = vshi_take(vshi_texels_held(texels), sizeof *l.at, what, &result, error);
-    l.state = vshi_take(origins->count, 1, what, &result, error);
-    l.before = vshi_take(l.blocks + 1, sizeof *l.before, what, &result, error);
-    l.row_start = vshi_take(origins->rows.count + 1, sizeof *l.row_start, what, &result, error);
+    vsh_result result;
+    float *own = NULL;
+    VSHI_TRY_DONE(vshi_allocate((void **)&l.at, vshi_texels_held(texels), sizeof *l.at, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l.state, origins->count, 1, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l.before, l.blocks + 1, sizeof *l.before, what, error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&l.row_start, origins->rows.count + 1, sizeof *l.row_start, what, error));
     const bool estimates = (vsh_ao_method_traits(options->ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
-    float *own =
-        vshi_take(estimates && deviation == NULL ? origins->count : 0, sizeof *own, what, &result, error);
+    VSHI_TRY_DONE(vshi_allocate((void **)&own, estimates && deviation == NULL ? origins->count : 0,
+                                sizeof *own, what, error));
     l.deviation = deviation == NULL && estimates ? own : deviation;
-    if (result == VSH_OK) {
-        result = run_passes(&l, options, run, job, stats, error);
-    }
-    if (result == VSH_OK && estimates && stats != NULL) {
+    VSHI_TRY_DONE(run_passes(&l, options, run, job, stats, error));
+    if (estimates && stats != NULL) {
         add_errors(&l, stats);
     }
+done:
     free(own);
     free(l.row_start);
     free(l.before);

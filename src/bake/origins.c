@@ -1,7 +1,8 @@
 #include "bake/origins.h"
 #include "bake/lift.h"
-#include "bake/take.h"
+#include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 #include "heightfield/heights.h"
 #include "shade/inside.h"
 #include "shade/kernel/march.h"
@@ -187,11 +188,9 @@ static vsh_result keep_needed(const lifting *l, vshi_origins_keep *keep, void *u
     const vsh_texels *texels = l->texels;
     const size_t rows = texels->band.held_end - texels->band.held_begin;
     uint8_t *needed = NULL;
-    vsh_result result = vshi_allocate((void **)&needed, rows, 1, "lightmap rows", error);
-    if (result == VSH_OK) {
-        memset(needed, 1, rows);
-        result = keep(user, origins, needed, error);
-    }
+    VSHI_TRY(vshi_allocate((void **)&needed, rows, 1, "lightmap rows", error));
+    memset(needed, 1, rows);
+    const vsh_result result = keep(user, origins, needed, error);
     for (size_t row = 0; result == VSH_OK && row < rows; ++row) {
         if (!needed[row]) {
             const size_t first = texels->row_start[row];
@@ -291,41 +290,37 @@ vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels 
             l.spheres[l.solid_count++] = layer->spheres;
         }
     }
-    vsh_result result = VSH_OK;
+    vsh_result result;
     vshi_job *job = vshi_job_begin(run, "validate", 2 * origins->blocks);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
     }
-    origins->valid = vshi_take(texels->count, 1, name, &result, error);
-    origins->seen = vshi_take(texels->count, 1, name, &result, error);
-    l.crease = vshi_take(texels->count, 1, name, &result, error);
-    origins->dropped = vshi_take(texels->count, 1, name, &result, error);
-    origins->before = vshi_take(origins->blocks + 1, sizeof(size_t), name, &result, error);
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, origins->blocks, 1, 1, validate, &l, error);
-    }
-    if (result == VSH_OK) {
-        result = keep_needed(&l, keep, user, error);
-    }
-    for (size_t block = 0; result == VSH_OK && block <= origins->blocks; ++block) {
+    VSHI_TRY_DONE(vshi_allocate((void **)&origins->valid, texels->count, 1, name, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&origins->seen, texels->count, 1, name, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l.crease, texels->count, 1, name, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&origins->dropped, texels->count, 1, name, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&origins->before, origins->blocks + 1, sizeof(size_t), name, error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, origins->blocks, 1, 1, validate, &l, error));
+    VSHI_TRY_DONE(keep_needed(&l, keep, user, error));
+    for (size_t block = 0; block <= origins->blocks; ++block) {
         const size_t valid = origins->before[block];
         origins->before[block] = origins->count;
         origins->count += valid;
     }
-    origins->row_start =
-        vshi_take(texels->band.held_end - texels->band.held_begin + 1, sizeof(size_t), name, &result, error);
-    if (result == VSH_OK) {
-        find_rows(texels, origins);
-    }
-    origins->position = vshi_take(origins->count, 3 * sizeof(double), name, &result, error);
+    VSHI_TRY_DONE(vshi_allocate((void **)&origins->row_start,
+                                texels->band.held_end - texels->band.held_begin + 1, sizeof(size_t), name,
+                                error));
+    find_rows(texels, origins);
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&origins->position, origins->count, 3 * sizeof(double), name, error));
     const bool traced =
         vshi_shadow_traces(options, occluders->triangles) || vshi_ao_traces(options, occluders->triangles);
-    origins->surface = vshi_take(traced ? origins->count : 0, 3 * sizeof(double), name, &result, error);
-    origins->texel = vshi_take(origins->count, sizeof(uint32_t), name, &result, error);
-    origins->normal = vshi_take(origins->count, 3 * sizeof(float), name, &result, error);
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, origins->blocks, 1, 1, pack, &l, error);
-    }
+    VSHI_TRY_DONE(vshi_allocate((void **)&origins->surface, traced ? origins->count : 0, 3 * sizeof(double),
+                                name, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&origins->texel, origins->count, sizeof(uint32_t), name, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&origins->normal, origins->count, 3 * sizeof(float), name, error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, origins->blocks, 1, 1, pack, &l, error));
+done:
     free(l.crease);
     vshi_job_end(job);
     return result;

@@ -2,8 +2,9 @@
  * columns of each row, outwards until no column can be nearer (Saito and Toriwaki, "New algorithms for
  * Euclidean distance transformation", 1994). Distances are whole numbers, so ties are exact. */
 #include "bake/padding.h"
-#include "bake/take.h"
+#include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -116,14 +117,12 @@ vsh_result vshi_padding_fill(const vsh_run *run, int32_t width, int32_t height, 
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "padding: the system refused memory");
     }
-    vsh_result result = VSH_OK;
-    f.down = vshi_take(f.width * f.height, VSHI_PADDING_TEXEL_BYTES, "padding", &result, error);
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, strips, 1, STRIP * f.height, search_columns, &f, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, f.height, 4, f.width, fill_rows, &f, error);
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&f.down, f.width * f.height, VSHI_PADDING_TEXEL_BYTES, "padding", error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, strips, 1, STRIP * f.height, search_columns, &f, error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, f.height, 4, f.width, fill_rows, &f, error));
+done:
     free(f.down);
     vshi_job_end(job);
     return result;

@@ -1,5 +1,6 @@
 #include "bake/rows.h"
-#include "bake/take.h"
+#include "base/memory.h"
+#include "base/try.h"
 
 #include <stdlib.h>
 
@@ -29,16 +30,13 @@ vsh_result vshi_row_open(const vshi_charts *charts, size_t row, vshi_row *work, 
     const size_t count = charts->row_start[row + 1] - charts->row_start[row];
     const size_t side = (size_t)VSHI_TILE * (size_t)raster->supersample;
     const char *what = "row of texels";
-    vsh_result result = VSH_OK;
-    work->triangle = vshi_take(count, sizeof *work->triangle, what, &result, error);
-    work->mesh = vshi_take(count, sizeof *work->mesh, what, &result, error);
-    work->local = vshi_take(count, sizeof *work->local, what, &result, error);
-    work->object = vshi_take(count, sizeof *work->object, what, &result, error);
-    work->tile_start = vshi_take(work->tiles + 2, sizeof *work->tile_start, what, &result, error);
-    work->tile.owner = vshi_take(side * side, sizeof *work->tile.owner, what, &result, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&work->triangle, count, sizeof *work->triangle, what, error));
+    VSHI_TRY(vshi_allocate((void **)&work->mesh, count, sizeof *work->mesh, what, error));
+    VSHI_TRY(vshi_allocate((void **)&work->local, count, sizeof *work->local, what, error));
+    VSHI_TRY(vshi_allocate((void **)&work->object, count, sizeof *work->object, what, error));
+    VSHI_TRY(
+        vshi_allocate((void **)&work->tile_start, work->tiles + 2, sizeof *work->tile_start, what, error));
+    VSHI_TRY(vshi_allocate((void **)&work->tile.owner, side * side, sizeof *work->tile.owner, what, error));
     size_t begin, end;
     for (size_t i = 0; i < count; ++i) {
         size_t local;
@@ -58,10 +56,7 @@ vsh_result vshi_row_open(const vshi_charts *charts, size_t row, vshi_row *work, 
         work->tile_start[column + 1] = total;
         total += here;
     }
-    work->tile_triangle = vshi_take(total, sizeof *work->tile_triangle, what, &result, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&work->tile_triangle, total, sizeof *work->tile_triangle, what, error));
     for (size_t i = 0; i < count; ++i) {
         vshi_uv_tiles(raster, &work->triangle[i], row, &begin, &end);
         for (size_t column = begin; column < end; ++column) {

@@ -2,7 +2,8 @@
  * that its neighbours have from the waves before. So a texel's source depends on nothing farther than the
  * waves go, and not on the order of work. */
 #include "bake/spread.h"
-#include "bake/take.h"
+#include "base/memory.h"
+#include "base/try.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -109,20 +110,19 @@ vsh_result vshi_spread_find(const vsh_texels *texels, const uint8_t *state, vshi
                    .height = (size_t)texels->band.rows,
                    .state = state,
                    .spread = spread};
-    vsh_result result = VSH_OK;
-    s.mesh = vshi_take(held, sizeof *s.mesh, what, &result, error);
-    s.source = vshi_take(held, sizeof *s.source, what, &result, error);
-    spread->texel = vshi_take(invalid, sizeof *spread->texel, what, &result, error);
-    spread->source = vshi_take(invalid, sizeof *spread->source, what, &result, error);
-    if (result == VSH_OK) {
-        for (size_t i = texels->count; i > 0; --i) { /* that of its first sample */
-            s.mesh[vshi_sample_held(texels, i - 1)] = vshi_sample_mesh(texels, i - 1);
-        }
-        for (size_t i = 0; i < held; ++i) {
-            s.source[i] = state[i] == VSHI_TEXEL_VALID ? (uint32_t)i : NONE;
-        }
-        run_waves(&s, held);
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.mesh, held, sizeof *s.mesh, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.source, held, sizeof *s.source, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&spread->texel, invalid, sizeof *spread->texel, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&spread->source, invalid, sizeof *spread->source, what, error));
+    for (size_t i = texels->count; i > 0; --i) { /* that of its first sample */
+        s.mesh[vshi_sample_held(texels, i - 1)] = vshi_sample_mesh(texels, i - 1);
     }
+    for (size_t i = 0; i < held; ++i) {
+        s.source[i] = state[i] == VSHI_TEXEL_VALID ? (uint32_t)i : NONE;
+    }
+    run_waves(&s, held);
+done:
     free(s.source);
     free(s.mesh);
     return result;

@@ -1,10 +1,10 @@
 #include "bake/texels.h"
 #include "bake/rows.h"
 #include "bake/surface.h"
-#include "bake/take.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -142,19 +142,18 @@ static void write_rows(void *user, size_t begin, size_t end) {
 
 /* Rasterises `rows` rows of tiles. */
 static vsh_result rasterise(creation *all, size_t rows, const vsh_run *run, vsh_error *error) {
-    vsh_result result = VSH_OK;
+    vsh_result result;
     vshi_job *job = vshi_job_begin(run, "texels", rows);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "texels: the system refused memory");
     }
-    all->boxes = vshi_take(rows, sizeof *all->boxes, "texels", &result, error);
-    if (result == VSH_OK) {
-        result = vshi_parallel_for(job, rows, 1, 1, write_rows, all, error);
-    }
-    if (result == VSH_OK && atomic_load(&all->row_result) != VSH_OK) {
+    VSHI_TRY_DONE(vshi_allocate((void **)&all->boxes, rows, sizeof *all->boxes, "texels", error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, rows, 1, 1, write_rows, all, error));
+    if (atomic_load(&all->row_result) != VSH_OK) {
         result =
             vshi_fail(error, atomic_load(&all->row_result), "texels: the system refused memory for a row");
     }
+done:
     vshi_job_end(job);
     return result;
 }
@@ -195,26 +194,23 @@ vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, doubl
 
 static vsh_result take_samples(vsh_texels *texels, bool tangents, vsh_error *error) {
     const char *what = "texels";
-    vsh_result result = VSH_OK;
-    texels->position = vshi_take(texels->count, 3 * sizeof(double), what, &result, error);
-    texels->normal = vshi_take(texels->count, 3 * sizeof(float), what, &result, error);
-    texels->geometric = vshi_take(texels->count, 3 * sizeof(float), what, &result, error);
-    texels->lift = vshi_take(texels->count, 3 * sizeof(float), what, &result, error);
-    texels->texel = vshi_take(texels->count, sizeof(uint32_t), what, &result, error);
-    texels->mesh = vshi_take(texels->count, sizeof(uint32_t), what, &result, error);
-    texels->tangent = vshi_take(tangents ? texels->count : 0, 4 * sizeof(float), what, &result, error);
-    return result;
+    VSHI_TRY(vshi_allocate((void **)&texels->position, texels->count, 3 * sizeof(double), what, error));
+    VSHI_TRY(vshi_allocate((void **)&texels->normal, texels->count, 3 * sizeof(float), what, error));
+    VSHI_TRY(vshi_allocate((void **)&texels->geometric, texels->count, 3 * sizeof(float), what, error));
+    VSHI_TRY(vshi_allocate((void **)&texels->lift, texels->count, 3 * sizeof(float), what, error));
+    VSHI_TRY(vshi_allocate((void **)&texels->texel, texels->count, sizeof(uint32_t), what, error));
+    VSHI_TRY(vshi_allocate((void **)&texels->mesh, texels->count, sizeof(uint32_t), what, error));
+    VSHI_TRY(vshi_allocate((void **)&texels->tangent, tangents ? texels->count : 0, 4 * sizeof(float), what,
+                           error));
+    return VSH_OK;
 }
 
 static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_texels *texels,
                             vsh_error *error) {
     const vshi_band *band = &texels->band;
     const size_t rows = band->held_end - band->held_begin;
-    vsh_result result = VSH_OK;
-    texels->row_start = vshi_take(rows + 1, sizeof *texels->row_start, "texels", &result, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(
+        vshi_allocate((void **)&texels->row_start, rows + 1, sizeof *texels->row_start, "texels", error));
     for (size_t row = 0; row < rows; ++row) {
         const vshi_tile_row *counted = &charts->rows[band->held_begin + row];
         const bool own = band->held_begin + row >= band->own_begin && band->held_begin + row < band->own_end;
@@ -226,15 +222,11 @@ static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_te
     const size_t sample = vshi_sample_bytes(charts->tangents);
     const double samples = (double)texels->count * (double)sample;
     const double held = (double)charts->info.bytes + vshi_row_bytes(&charts->sorted, run->threads);
-    if ((result = vshi_check_limit(run, held + samples, "texels", error)) != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_check_limit(run, held + samples, "texels", error));
     texels->info.bytes = sizeof *texels + texels->count * sample + (rows + 1) * sizeof *texels->row_start;
     creation all = {.charts = charts, .first = band->held_begin, .texels = texels};
-    result = take_samples(texels, charts->tangents, error);
-    if (result == VSH_OK) {
-        result = rasterise(&all, rows, run, error);
-    }
+    VSHI_TRY(take_samples(texels, charts->tangents, error));
+    const vsh_result result = rasterise(&all, rows, run, error);
     if (result == VSH_OK) {
         join(all.boxes, band->own_begin - band->held_begin, band->own_end - band->held_begin,
              texels->info.bounds_min, texels->info.bounds_max);
@@ -246,11 +238,9 @@ static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_te
 static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t rows, const vsh_run *run,
                          vsh_texels **texels, vsh_error *error) {
     vshi_band band;
-    vsh_result result = vshi_band_set(charts, first_row, rows, &band, error);
-    vsh_texels *made = vshi_take(1, sizeof *made, "texels", &result, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    vsh_texels *made = NULL;
+    VSHI_TRY(vshi_band_set(charts, first_row, rows, &band, error));
+    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "texels", error));
     made->band = band;
     made->info.width = charts->info.width;
     made->info.height = charts->info.height;
@@ -259,13 +249,13 @@ static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t ro
     made->shade = charts->shade;
     made->whole = charts->info.samples;
     made->mesh_count = charts->sorted.mesh_count;
-    result = make_band(charts, run, made, error);
-    if (result == VSH_OK) {
-        *texels = made;
-    } else {
+    const vsh_result result = make_band(charts, run, made, error);
+    if (result != VSH_OK) {
         vsh_texels_free(made);
+        return result;
     }
-    return result;
+    *texels = made;
+    return VSH_OK;
 }
 
 vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t first_row, int32_t rows,
@@ -275,8 +265,8 @@ vsh_result vsh_texels_create_band(const vsh_charts *charts, int32_t first_row, i
     *texels = NULL;
     VSHI_NEEDS(charts);
     vsh_run full;
-    const vsh_result result = vshi_run_resolve(run, &full, error);
-    return result == VSH_OK ? create(charts, first_row, rows, &full, texels, error) : result;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    return create(charts, first_row, rows, &full, texels, error);
 }
 
 vsh_result vsh_texels_create_sized(const vsh_mesh *meshes, size_t mesh_count,
@@ -288,16 +278,11 @@ vsh_result vsh_texels_create_sized(const vsh_mesh *meshes, size_t mesh_count,
     *texels = NULL;
     VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
     vsh_charts *charts = NULL;
-    result = vshi_charts_make(meshes, mesh_count, options, &full, true, uv_reports, uv_reports_size, &charts,
-                              error);
-    if (result == VSH_OK) {
-        result = create(charts, 0, charts->info.height, &full, texels, error);
-    }
+    VSHI_TRY(vshi_charts_make(meshes, mesh_count, options, &full, true, uv_reports, uv_reports_size, &charts,
+                              error));
+    const vsh_result result = create(charts, 0, charts->info.height, &full, texels, error);
     vsh_charts_free(charts);
     return result;
 }

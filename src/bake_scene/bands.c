@@ -92,8 +92,8 @@ vsh_result vshi_bands_plan(const vsh_scene *scene, const vshi_target *target, co
         cost c = {.charts = charts,
                   .lightmap = vshi_channels_shape(scene),
                   .light_count = scene->light_count,
-                  .floats =
-                      3 * (int32_t)channels.triple_count + (need->picture ? 4 : 0) + (scene->invalid ? 1 : 0),
+                  .floats = 3 * (int32_t)channels.triple_count + (need->picture ? 4 : 0) +
+                            (scene->planes.invalid ? 1 : 0),
                   .held = need->held,
                   .limit = need->limit};
         c.writer = need->files ? vsh_image_writer_bytes(receiver->output, &channels.image, &image) : 0;

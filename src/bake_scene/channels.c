@@ -1,5 +1,6 @@
 #include "bake_scene/channels.h"
 
+#include "bake/planes.h"
 #include "base/bytes.h"
 #include "base/try.h"
 
@@ -7,15 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- the table */
-
-static bool has_shadow(const vsh_scene *scene) {
-    return scene->light_count > 0;
-}
-
-static bool has_ao(const vsh_scene *scene) {
-    return scene->ao != 0;
-}
+/* --- which there are */
 
 /* Errors that are left: only where the method knows them. */
 static bool has_shadow_error(const vsh_scene *scene) {
@@ -26,102 +19,44 @@ static bool has_ao_error(const vsh_scene *scene) {
     return scene->error && scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
 }
 
-static bool has_irradiance(const vsh_scene *scene) {
-    return scene->irradiance != 0;
+/* Whether a scene's lights, AO and what goes with them ask for a plane; the others are wished for. */
+static bool is_asked(const vshi_plane_kind *kind, const vsh_scene *scene) {
+    const struct {
+        size_t plane;
+        bool asked;
+    } own[] = {
+        {offsetof(vsh_lightmap, shadow), scene->light_count > 0},
+        {offsetof(vsh_lightmap, ao), scene->ao != 0},
+        {offsetof(vsh_lightmap, shadow_error), has_shadow_error(scene)},
+        {offsetof(vsh_lightmap, ao_error), has_ao_error(scene)},
+        {offsetof(vsh_lightmap, irradiance), scene->irradiance != 0},
+        {offsetof(vsh_lightmap, bent), scene->bent != 0},
+        {offsetof(vsh_lightmap, tint), scene->tint.type != VSH_TINT_NONE},
+        {offsetof(vsh_lightmap, coverage), true},
+    };
+    for (size_t i = 0; i < sizeof own / sizeof own[0]; ++i) {
+        if (own[i].plane == kind->plane) {
+            return own[i].asked;
+        }
+    }
+    return vshi_plane_wished(kind, &scene->planes);
 }
-
-static bool has_bent(const vsh_scene *scene) {
-    return scene->bent != 0;
-}
-
-static bool has_tint(const vsh_scene *scene) {
-    return scene->tint.type != VSH_TINT_NONE;
-}
-
-static bool has_invalid(const vsh_scene *scene) {
-    return scene->invalid != 0;
-}
-
-static bool always(const vsh_scene *scene) {
-    (void)scene;
-    return true;
-}
-
-static void bind_shadow(vsh_lightmap *lightmap, const vsh_scene *scene, float *const *values) {
-    (void)scene;
-    lightmap->shadow = values;
-}
-
-static void bind_ao(vsh_lightmap *lightmap, const vsh_scene *scene, float *const *values) {
-    (void)scene;
-    lightmap->ao = values[0];
-}
-
-static void bind_shadow_error(vsh_lightmap *lightmap, const vsh_scene *scene, float *const *values) {
-    (void)scene;
-    lightmap->shadow_error = values;
-}
-
-static void bind_ao_error(vsh_lightmap *lightmap, const vsh_scene *scene, float *const *values) {
-    (void)scene;
-    lightmap->ao_error = values[0];
-}
-
-static void bind_irradiance(vsh_lightmap *lightmap, const vsh_scene *scene, float *const *values) {
-    lightmap->irradiance = values[0];
-    lightmap->ambient = scene->has_ambient ? scene->ambient : NULL;
-}
-
-static void bind_bent(vsh_lightmap *lightmap, const vsh_scene *scene, float *const *values) {
-    lightmap->bent = values[0];
-    lightmap->bent_space = scene->bent - 1;
-}
-
-static void bind_tint(vsh_lightmap *lightmap, const vsh_scene *scene, float *const *values) {
-    (void)scene;
-    lightmap->tint = values;
-}
-
-static void bind_coverage(vsh_lightmap *lightmap, const vsh_scene *scene, float *const *values) {
-    (void)scene;
-    lightmap->coverage = values[0];
-}
-
-/* A kind of value, and the channels that hold it, in the order of their names in files. To add one: a row
- * here, its member in vsh_lightmap and who fills that in src/bake. */
-static const struct kind {
-    const char *name; /* "ao"; "shadow.NAME" where there is one for each light */
-    bool per_light;
-    const char *axes; /* of three that are baked interleaved, "irradiance.R"; NULL: one channel */
-    bool (*is_baked)(const vsh_scene *scene);
-    /* tells the bake where its values go: [light_count] arrays, or one; NULL: vshi_channels.invalid */
-    void (*bind)(vsh_lightmap *lightmap, const vsh_scene *scene, float *const *values);
-} kinds[] = {
-    {"shadow", true, NULL, has_shadow, bind_shadow},
-    {"ao", false, NULL, has_ao, bind_ao},
-    {"error", true, NULL, has_shadow_error, bind_shadow_error},
-    {"error.ao", false, NULL, has_ao_error, bind_ao_error},
-    {"irradiance", false, "RGB", has_irradiance, bind_irradiance},
-    {"bent", false, "XYZ", has_bent, bind_bent},
-    {"tint", true, "RGB", has_tint, bind_tint},
-    {"invalid", false, NULL, has_invalid, NULL},
-    {"A", false, NULL, always, bind_coverage},
-};
-enum { KINDS = sizeof kinds / sizeof kinds[0] };
 
 /* Values of a kind that a scene has, each of one channel or three. */
-static size_t count_of(const struct kind *kind, const vsh_scene *scene) {
-    return !kind->is_baked(scene) ? 0 : kind->per_light ? scene->light_count : 1;
+static size_t count_of(const vshi_plane_kind *kind, const vsh_scene *scene) {
+    return !is_asked(kind, scene) ? 0 : kind->per_light ? scene->light_count : 1;
 }
 
-static size_t channels_of(const struct kind *kind) {
-    return kind->axes != NULL ? 3 : 1;
+/* The channel is 0 or 1, whatever else the bake tells of invalid texels. */
+static bool is_invalid(const vshi_plane_kind *kind) {
+    return kind->plane == offsetof(vsh_lightmap, invalid);
 }
 
 /* --- names */
 
 /* Names the channels of one value and returns how many there are. */
-static size_t name_value(const struct kind *kind, const vsh_light *light, char (*names)[VSH_CHANNEL_NAME]) {
+static size_t name_value(const vshi_plane_kind *kind, const vsh_light *light,
+                         char (*names)[VSH_CHANNEL_NAME]) {
     char value[VSH_CHANNEL_NAME - 2];
     snprintf(value, sizeof value, "%s%s%s", kind->name, light != NULL ? "." : "",
              light != NULL ? light->name : "");
@@ -138,10 +73,11 @@ static size_t name_value(const struct kind *kind, const vsh_light *light, char (
 vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t height, vshi_channels *channels,
                               vsh_error *error) {
     memset(channels, 0, sizeof *channels);
-    size_t count = 0;
-    for (size_t k = 0; k < KINDS; ++k) {
+    size_t kind_count, count = 0;
+    const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
+    for (size_t k = 0; k < kind_count; ++k) {
         const size_t values = count_of(&kinds[k], scene);
-        count += values * channels_of(&kinds[k]);
+        count += values * vshi_plane_components(&kinds[k]);
         channels->triple_count += kinds[k].axes != NULL ? values : 0;
     }
     if (count > VSH_MAX_CHANNELS) {
@@ -157,7 +93,7 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
         return vshi_fail(error, VSH_ERROR_MEMORY, "channels: the system refused memory");
     }
     size_t at = 0;
-    for (size_t k = 0; k < KINDS; ++k) {
+    for (size_t k = 0; k < kind_count; ++k) {
         for (size_t i = 0; i < count_of(&kinds[k], scene); ++i) {
             at += name_value(&kinds[k], kinds[k].per_light ? &scene->lights[i] : NULL, channels->names + at);
         }
@@ -174,26 +110,33 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
 
 static void bind_all(vshi_channels *channels, const vsh_scene *scene) {
     float *const *plane = channels->planes, *const *triple = channels->triples;
-    for (size_t k = 0; k < KINDS; ++k) {
-        const struct kind *kind = &kinds[k];
+    size_t kind_count;
+    const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
+    for (size_t k = 0; k < kind_count; ++k) {
+        const vshi_plane_kind *kind = &kinds[k];
         const size_t count = count_of(kind, scene);
-        if (count > 0 && kind->bind != NULL) {
-            kind->bind(&channels->lightmap, scene, kind->axes != NULL ? triple : plane);
+        if (count > 0) {
+            vshi_plane_put(&channels->lightmap, kind, kind->axes != NULL ? triple : plane);
         }
         triple += kind->axes != NULL ? count : 0;
-        plane += count * channels_of(kind);
+        plane += count * vshi_plane_components(kind);
     }
     channels->lightmap.tint_by = scene->tint; /* of irradiance too */
+    channels->lightmap.ambient = scene->has_ambient ? scene->ambient : NULL;
+    channels->lightmap.bent_space = scene->bent > 0 ? scene->bent - 1 : VSH_BENT_WORLD;
+    channels->lightmap.asked = scene->planes;
     channels->lightmap.invalid = channels->invalid;
 }
 
 vsh_lightmap vshi_channels_shape(const vsh_scene *scene) {
     static float plane;
     float *const any[] = {&plane};
-    vsh_lightmap lightmap = {.invalid = scene->invalid ? &plane : NULL};
-    for (size_t k = 0; k < KINDS; ++k) {
-        if (count_of(&kinds[k], scene) > 0 && kinds[k].bind != NULL) {
-            kinds[k].bind(&lightmap, scene, any);
+    vsh_lightmap lightmap = {.shadow = NULL};
+    size_t kind_count;
+    const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
+    for (size_t k = 0; k < kind_count; ++k) {
+        if (count_of(&kinds[k], scene) > 0) {
+            vshi_plane_put(&lightmap, &kinds[k], any);
         }
     }
     return lightmap;
@@ -241,12 +184,14 @@ static void split(const float *values, size_t texels, float *const *planes) {
 void vshi_channels_split(vshi_channels *channels, const vsh_scene *scene) {
     const size_t texels = (size_t)channels->image.width * (size_t)channels->rows;
     float *const *plane = channels->planes, *const *triple = channels->triples;
-    for (size_t k = 0; k < KINDS; ++k) {
-        const struct kind *kind = &kinds[k];
-        for (size_t i = 0; i < count_of(kind, scene); ++i, plane += channels_of(kind)) {
+    size_t kind_count;
+    const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
+    for (size_t k = 0; k < kind_count; ++k) {
+        const vshi_plane_kind *kind = &kinds[k];
+        for (size_t i = 0; i < count_of(kind, scene); ++i, plane += vshi_plane_components(kind)) {
             if (kind->axes != NULL) {
                 split(*triple++, texels, plane);
-            } else if (kind->bind == NULL) {
+            } else if (is_invalid(kind)) {
                 for (size_t t = 0; t < texels; ++t) {
                     plane[0][t] = channels->invalid[t] > 0.0f ? 1.0f : 0.0f;
                 }

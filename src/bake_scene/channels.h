@@ -9,7 +9,7 @@
 #include <vdbshade/scene.h>
 
 typedef struct vshi_channels {
-    vsh_image image; /* their names and planes, in the order of the table in channels.c; A is the last */
+    vsh_image image;       /* their names and planes, in the order of bake/planes.c; A is the last */
     vsh_lightmap lightmap; /* the same memory, as the bake takes it */
     char (*names)[VSH_CHANNEL_NAME];
     const char **name_list;

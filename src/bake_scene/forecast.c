@@ -46,7 +46,7 @@ static vsh_result bake_part(const vsh_bake_job *job, const vsh_occluders *occlud
     vsh_texels_info info;
     vsh_texels_get_info(texels, &info);
     VSHI_TRY_DONE(vshi_channels_name(scene, info.width, info.height, &channels, error));
-    VSHI_TRY_DONE(vshi_channels_allocate(&channels, scene, info.height, scene->invalid != 0,
+    VSHI_TRY_DONE(vshi_channels_allocate(&channels, scene, info.height, scene->planes.invalid != 0,
                                          run->memory_limit, job->lightmaps[0].output, error));
     const double start = vshi_seconds();
     VSHI_TRY_DONE(vsh_bake_lightmap(occluders, texels, scene->lights, scene->light_count, &scene->shade, run,

@@ -30,7 +30,7 @@ vsh_result vshi_target_charts(const vsh_scene *scene, const vshi_target *target,
     options.height = receiver->height;
     options.supersample = receiver->supersample;
     options.padding = receiver->padding;
-    options.ao_spacing = scene->ao ? receiver->ao_spacing : 1;
+    options.ao_spacing = scene->ao || vsh_planes_shaded(&scene->planes) > 0 ? receiver->ao_spacing : 1;
     options.shade = scene->shade;
     options.tangents = scene->bent == 1 + VSH_BENT_TANGENT;
     vsh_uv_report *reports = calloc(target->mesh_count + 1, sizeof *reports);
@@ -159,7 +159,8 @@ static vsh_result bake_bands(work *w, vsh_error *error) {
     const int32_t height = w->target->receiver.height;
     const bool several = bands->count > 1;
     if (several) { /* texels, validate, padding, and what is shaded */
-        vshi_rounds_begin(&w->rounds, w->run, "bake", 3 + (int)scene->light_count + (scene->ao ? 1 : 0));
+        const int shaded = (int)scene->light_count + (scene->ao ? 1 : 0) + vsh_planes_shaded(&scene->planes);
+        vshi_rounds_begin(&w->rounds, w->run, "bake", 3 + shaded);
     }
     for (int32_t first = 0;; first += bands->rows) {
         const int32_t left = height - first, rows = left < bands->rows ? left : bands->rows;
@@ -199,7 +200,7 @@ static vsh_result open_all(work *w, vsh_error *error) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", receiver->path);
     }
     VSHI_TRY(vshi_channels_name(scene, receiver->width, receiver->height, &w->channels, error));
-    VSHI_TRY(vshi_channels_allocate(&w->channels, scene, rows, picture != NULL || scene->invalid,
+    VSHI_TRY(vshi_channels_allocate(&w->channels, scene, rows, picture != NULL || scene->planes.invalid != 0,
                                     w->run->memory_limit, receiver->output, error));
     VSHI_TRY(vshi_invalid_picture_open(&w->picture, picture, receiver->output, job->targets.count > 1,
                                        receiver->width, receiver->height, rows, error));

@@ -2,6 +2,8 @@
 #ifndef VSHI_ANALYTIC_HEIGHTS_H
 #define VSHI_ANALYTIC_HEIGHTS_H
 
+#include "base/vec.h"
+
 #include <vdbshade/heights.h>
 #include <vdbshade/light.h>
 #include <vdbshade/method.h>
@@ -22,9 +24,10 @@ void vshi_heights_shadow(const vsh_heights *heights, const vsh_light *light, int
 /* Cosine-weighted fraction of the hemisphere that the heightfield leaves free within a distance, likewise;
  * points->normals must be given. `bent` [end - begin][3], where not NULL, takes the integral of the free
  * directions so weighted, world space: two thirds of the normal under an open sky; NaN where the point is
- * invalid. */
-void vshi_heights_ao(const vsh_heights *heights, double ao_distance, const vsh_points *points, size_t begin,
-                     size_t end, double lift, float *ao, float *bent, vsh_shade_stats *stats);
+ * invalid. `up` (unit, world space), where not NULL: of what is over its horizon, without `bent`. */
+void vshi_heights_ao(const vsh_heights *heights, double ao_distance, const vshi_vec *up,
+                     const vsh_points *points, size_t begin, size_t end, double lift, float *ao, float *bent,
+                     vsh_shade_stats *stats);
 
 /* World units that a layer's start offset is, in cells; -1 stands for 0. */
 double vshi_heights_lift(const vsh_heights *heights, double start_offset);

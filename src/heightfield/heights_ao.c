@@ -21,6 +21,14 @@ static void put_bent(const vsh_heights *heights, vshi_vec d, float *bent) {
     }
 }
 
+/* A direction of the world in the heightfield's axes. */
+static vshi_vec to_heights(const vsh_heights *heights, vshi_vec d) {
+    const double *m = heights->to_relief, unit = heights->unit;
+    return (vshi_vec){unit * (m[0] * d.x + m[1] * d.y + m[2] * d.z),
+                      unit * (m[4] * d.x + m[5] * d.y + m[6] * d.z),
+                      unit * (m[8] * d.x + m[9] * d.y + m[10] * d.z)};
+}
+
 /* Integral of the cosine to a normal (along the azimuth, up) over elevations, per azimuth. */
 static double light_between(double along, double up, double from, double to) {
     if (!(to > from)) {
@@ -59,12 +67,23 @@ static half_plane over(vshi_vec normal, double x, double z) {
     return p;
 }
 
+/* The same, above a horizon: `up` is zero where there is none. */
+static half_plane over_both(vshi_vec normal, vshi_vec up, double x, double z) {
+    half_plane p = over(normal, x, z);
+    if (vshi_dot(up, up) > 0.0) {
+        const half_plane sky = over(up, x, z);
+        p.low = fmax(p.low, sky.low);
+        p.high = fmin(p.high, sky.high);
+    }
+    return p;
+}
+
 static double slope_of(double elevation) {
     return elevation <= -0.5 * PI ? -STEEP : elevation >= 0.5 * PI ? STEEP : vshi_tan(elevation);
 }
 
 static float shade_point(const vsh_heights *heights, vshi_walk_fn *walk, double distance, const double at[3],
-                         vshi_vec normal, vshi_vec *bent, vsh_shade_stats *stats) {
+                         vshi_vec normal, vshi_vec up, vshi_vec *bent, vsh_shade_stats *stats) {
     double open = 0.0, all = 0.0;
     vshi_vec hidden = {0.0, 0.0, 0.0};
     for (int w = 0; w < WALKS; ++w) {
@@ -77,7 +96,7 @@ static float shade_point(const vsh_heights *heights, vshi_walk_fn *walk, double 
             const double azimuth = 2.0 * PI * (w * VSHI_FAN + k + 0.5) / AZIMUTHS;
             x[k] = vshi_cos(azimuth);
             z[k] = vshi_sin(azimuth);
-            planes[k] = over(normal, x[k], z[k]);
+            planes[k] = over_both(normal, up, x[k], z[k]);
             vshi_fan_set(&fan, k, x[k], z[k]);
             fan.slope[k] = least[k] = (float)slope_of(planes[k].low);
             fan.enough[k] = (float)slope_of(planes[k].high);
@@ -108,13 +127,15 @@ static float shade_point(const vsh_heights *heights, vshi_walk_fn *walk, double 
     if (bent != NULL) {
         *bent = vshi_sub(vshi_scale(normal, OPEN), vshi_scale(hidden, 1.0 / all));
     }
-    return (float)fmin(fmax(open / all, 0.0), 1.0);
+    return all > 0.0 ? (float)fmin(fmax(open / all, 0.0), 1.0) : 1.0f;
 }
 
-void vshi_heights_ao(const vsh_heights *heights, double ao_distance, const vsh_points *points, size_t begin,
-                     size_t end, double lift, float *ao, float *bent, vsh_shade_stats *stats) {
+void vshi_heights_ao(const vsh_heights *heights, double ao_distance, const vshi_vec *up,
+                     const vsh_points *points, size_t begin, size_t end, double lift, float *ao, float *bent,
+                     vsh_shade_stats *stats) {
     vshi_walk_fn *walk = vshi_walk_of_machine();
     const double distance = fmin(ao_distance / heights->unit, 1e12); /* its square is a float */
+    const vshi_vec sky = up != NULL ? to_heights(heights, *up) : (vshi_vec){0.0, 0.0, 0.0};
     for (size_t i = begin; i < end; ++i) {
         double at[3];
         vshi_vec normal, direction = {NAN, NAN, NAN};
@@ -127,8 +148,8 @@ void vshi_heights_ao(const vsh_heights *heights, double ao_distance, const vsh_p
             direction = (vshi_vec){0.0, 0.0, 0.0};
             break;
         case VSHI_STAND_FREE:
-            ao[i - begin] =
-                shade_point(heights, walk, distance, at, normal, bent != NULL ? &direction : NULL, stats);
+            ao[i - begin] = shade_point(heights, walk, distance, at, normal, sky,
+                                        bent != NULL ? &direction : NULL, stats);
             break;
         }
         if (bent != NULL) {

@@ -129,8 +129,9 @@ static vsh_result make_triangles(making *m, const vsh_scene_layer *layer, vsh_tr
 
 /* Whether auto would have been exact. */
 static bool misses_embree(const vsh_scene *scene) {
-    const bool asked = (scene->light_count > 0 && scene->shade.method == VSH_SHADOW_AUTO) ||
-                       (scene->ao && scene->shade.ao_method == VSH_AO_AUTO);
+    const bool asked =
+        (scene->light_count > 0 && scene->shade.method == VSH_SHADOW_AUTO) ||
+        ((scene->ao || vsh_planes_shaded(&scene->planes) > 0) && scene->shade.ao_method == VSH_AO_AUTO);
     return asked && !vsh_triangles_available() && vsh_scene_traceable(scene, NULL) != 0;
 }
 

@@ -32,5 +32,8 @@ double vsh_scene_reach(const vsh_scene *scene, const vsh_grid *grid, const doubl
             reach = fmax(reach, fmin(place.radius, widest_tangent * longest));
         }
     }
+    if (vsh_planes_shaded(&scene->planes) > 0) { /* rays across the scene, which coarse levels shorten */
+        reach = fmax(reach, longest);
+    }
     return scene->ao ? fmax(reach, scene->shade.ao_distance) : reach;
 }

@@ -33,7 +33,8 @@ bool vshi_scene_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, 
     const uint32_t shadow = vsh_shadow_method_traits(vsh_shadow_method_resolve(given, can));
     const uint32_t ao = vsh_ao_method_traits(vsh_ao_method_resolve(scene->shade.ao_method, can));
     return (scene->light_count > 0 && ((shadow & traits) == traits) == has) ||
-           (scene->ao && (layer == NULL || layer->shade.ao) && ((ao & traits) == traits) == has);
+           ((scene->ao || vsh_planes_shaded(&scene->planes) > 0) && (layer == NULL || layer->shade.ao) &&
+            ((ao & traits) == traits) == has);
 }
 
 int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer) {

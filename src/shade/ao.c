@@ -75,6 +75,13 @@ vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_optio
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "AO method exact: the occluders have no triangles, which it traces");
     }
+    const vshi_vec up = vshi_vec_of(options->ao_up);
+    const bool horizon = vshi_dot(up, up) > 0.0;
+    if (horizon && !vshi_ao_has_rays(options)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "AO over a horizon: method %s knows none; rays, adaptive and exact do",
+                         vsh_ao_method_name(options->ao_method));
+    }
     if (options->ao_method == VSH_AO_CONES) {
         vshi_ao_cones_place(cones, options->ao_cones);
     }
@@ -82,6 +89,7 @@ vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_optio
                            .triangles = occluders->triangles,
                            .options = options,
                            .cones = cones,
+                           .up = horizon ? vshi_unit(up) : up,
                            .distance = options->ao_distance / occluders->field->voxel_size};
     return VSH_OK;
 }
@@ -89,6 +97,10 @@ vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_optio
 vsh_result vshi_ao_prepare_sphere(vshi_ao_cones *cones, vshi_ao_task *task, vsh_error *error) {
     if (task->options->ao_method == VSH_AO_TAPS) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO method taps: free space has no normals to tap along");
+    }
+    if (vshi_ao_has_horizon(task)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "AO over a horizon: points in free space have no normals");
     }
     if (task->options->ao_method == VSH_AO_CONES) {
         vshi_ao_cones_place_sphere(cones, task->options->ao_cones);
@@ -159,6 +171,9 @@ vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *point
     if (bent != NULL && full.ao_method == VSH_AO_TAPS) {
         VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_ARGUMENT,
                                 "bent normals: AO by taps knows no directions; use cones or rays"));
+    }
+    if (bent != NULL && vshi_dot(vshi_vec_of(full.ao_up), vshi_vec_of(full.ao_up)) > 0.0) {
+        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_ARGUMENT, "bent normals: not of AO over a horizon"));
     }
     VSHI_TRY_DONE(vshi_layers_prepare(occluders, &full, NULL, &layers, error));
     vshi_shade_options_settle(&full, occluders->triangles);

@@ -25,6 +25,7 @@ typedef struct vshi_ao_task {
     const vshi_ao_cones *cones;  /* of cones */
     double distance;             /* finest voxels */
     bool sphere;                 /* in free space: all directions alike, no normals, no start offset */
+    vshi_vec up;                 /* unit, world space: AO is of what is over its horizon; zero: of all */
     const vshi_kernel *kernel;   /* of a call, as what follows */
     bool outside;                /* the points are known to lie in no solid: samples of a lightmap */
     const vsh_points *points;
@@ -46,6 +47,11 @@ static inline vshi_vec vshi_ao_mean(vshi_vec free, vshi_vec all, double open, in
                                     vshi_vec normal) {
     const vshi_vec lean = vshi_sub(vshi_scale(normal, VSHI_AO_OPEN), vshi_scale(all, 1.0 / count));
     return vshi_scale(vshi_add(free, vshi_scale(lean, open)), 1.0 / count);
+}
+
+/* Whether AO is of what is over a horizon only. */
+static inline bool vshi_ao_has_horizon(const vshi_ao_task *task) {
+    return vshi_dot(task->up, task->up) > 0.0;
 }
 
 static inline void vshi_ao_set_bent(const vshi_ao_task *task, size_t i, vshi_vec d) {

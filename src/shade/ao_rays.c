@@ -167,13 +167,32 @@ static void trace_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shad
     b->chunk.owner[b->traced++] = owner;
 }
 
+/* Turns axes about the normal so that `up` lies over the first; the cosine of up and the normal. */
+static double turn_to(vshi_vec up, vshi_vec axes[3]) {
+    static const double STRAIGHT = 1e-12; /* square of a sine: the axes may then be any */
+    const double rise = vshi_dot(up, axes[2]);
+    const vshi_vec along = vshi_sub(up, vshi_scale(axes[2], rise));
+    if (vshi_dot(along, along) > STRAIGHT) {
+        axes[0] = vshi_unit(along);
+        axes[1] = vshi_cross(axes[2], axes[0]);
+    }
+    return fmin(fmax(rise, -1.0), 1.0);
+}
+
 /* From a place on the disc: by its cosine over the hemisphere (Malley), or evenly over the sphere (Lambert's
- * azimuthal projection, 1772). */
-static vshi_vec direction_of(const vshi_ao_task *task, const double disc[2]) {
-    const double square = 1.0 - disc[0] * disc[0] - disc[1] * disc[1];
+ * azimuthal projection, 1772). What is over a horizon is the disc from half an ellipse on, x > -rise √(1 -
+ * y²): rows of the disc are shortened to it, all by the same, so that areas stay in proportion. */
+static vshi_vec direction_of(const vshi_ao_task *task, double rise, const double disc[2]) {
+    double x = disc[0];
+    const double y = disc[1];
+    if (rise < 1.0) {
+        const double edge = 1.0 - y * y;
+        x = 0.5 * ((1.0 + rise) * x + (1.0 - rise) * sqrt(edge > 0.0 ? edge : 0.0));
+    }
+    const double square = 1.0 - x * x - y * y;
     const double height = sqrt(square > 0.0 ? square : 0.0);
-    return task->sphere ? (vshi_vec){2.0 * height * disc[0], 2.0 * height * disc[1], 2.0 * square - 1.0}
-                        : (vshi_vec){disc[0], disc[1], height};
+    return task->sphere ? (vshi_vec){2.0 * height * x, 2.0 * height * y, 2.0 * square - 1.0}
+                        : (vshi_vec){x, y, height};
 }
 
 static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
@@ -188,7 +207,7 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
             vshi_sampler_disc(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
         }
         for (int32_t i = 0; i < count; ++i) {
-            const vshi_vec local = direction_of(b->task, disc[i]);
+            const vshi_vec local = direction_of(b->task, point->rise, disc[i]);
             point->all = vshi_add(point->all, local);
             if (b->exact) {
                 trace_ray(b, owner, local, stats);
@@ -204,7 +223,8 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
 static bool prepare(vshi_ao_piece *b, size_t i, vshi_ao_point *point, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
     const vsh_points *points = task->points;
-    *point = (vshi_ao_point){.texel = points->texels != NULL ? points->texels[i] : (uint32_t)i};
+    *point = (vshi_ao_point){.rise = 1.0, .texel = points->texels != NULL ? points->texels[i] : (uint32_t)i};
+    const bool horizon = vshi_ao_has_horizon(task);
     if (!vshi_ao_frame_at(task, i, &point->frame, stats)) {
         return false;
     }
@@ -213,11 +233,15 @@ static bool prepare(vshi_ao_piece *b, size_t i, vshi_ao_point *point, vsh_shade_
             task->sphere ? point->frame.axes[2] : vshi_unit(vshi_vec_off(points->normals + 3 * i));
         const double offset = vshi_triangles_lift(task->triangles) + task->options->surface_offset;
         vshi_ao_axes(normal, point->world_axes);
+        point->rise = horizon ? turn_to(task->up, point->world_axes) : 1.0;
         point->world_origin =
             vshi_add(vshi_vec_of(points->positions + 3 * i), vshi_scale(normal, task->sphere ? 0.0 : offset));
     } else {
         point->frame.grown = vshi_ao_grown(task->field, point->frame.origin);
         ++stats->samples;
+        if (horizon) {
+            point->rise = turn_to(vshi_direction_to_field(task->field, task->up), point->frame.axes);
+        }
         find_balls(task, point, stats);
     }
     return true;

@@ -14,6 +14,7 @@ typedef struct vshi_ao_ball {
 
 typedef struct vshi_ao_point {
     vshi_ao_frame frame;
+    double rise; /* cosine of `up` and the normal; 1: AO is of the whole hemisphere */
     uint32_t texel;
     int32_t taken, free; /* rays */
     int32_t next;        /* rays after this round; 0: done */

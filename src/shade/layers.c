@@ -281,12 +281,13 @@ static void occlude(const prepared *item, const vshi_ao_task *task, layer_piece 
     const vsh_layer *layer = &item->layer;
     const size_t count = piece->points.count;
     float *bent = task->bent != NULL ? piece->bent : NULL;
+    const vshi_vec *up = vshi_ao_has_horizon(task) ? &task->up : NULL;
     memset(piece->deviation, 0, count * sizeof *piece->deviation);
     if (layer->heights != NULL) {
-        vshi_heights_ao(layer->heights, item->options.ao_distance, &piece->points, 0, count,
+        vshi_heights_ao(layer->heights, item->options.ao_distance, up, &piece->points, 0, count,
                         vshi_heights_lift(layer->heights, layer->start_offset), piece->value, bent, stats);
     } else if (layer->spheres != NULL) {
-        vshi_spheres_ao(layer->spheres, item->options.ao_distance, &piece->points, 0, count, 0.0,
+        vshi_spheres_ao(layer->spheres, item->options.ao_distance, up, &piece->points, 0, count, 0.0,
                         piece->value, bent, stats);
     } else {
         vshi_ao_task own = item->ao;

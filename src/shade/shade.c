@@ -31,6 +31,9 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
         {"early_rays", full->early_rays, 0, 4096},
         {"max_error", full->max_error, 1e-4, 1},
         {"jitter", full->jitter, 0, 1},
+        {"ao_up[0]", full->ao_up[0], -0x1p500, 0x1p500},
+        {"ao_up[1]", full->ao_up[1], -0x1p500, 0x1p500},
+        {"ao_up[2]", full->ao_up[2], -0x1p500, 0x1p500},
     };
     for (size_t i = 0; i < sizeof fields / sizeof fields[0]; ++i) {
         if (!(fields[i].value >= fields[i].low && fields[i].value <= fields[i].high)) {

@@ -20,9 +20,10 @@ void vshi_spheres_shadow(const vsh_spheres *spheres, const vsh_light *light, int
                          vsh_shade_stats *stats);
 
 /* Cosine-weighted fraction of the hemisphere that the spheres leave free within a distance, likewise;
- * points->normals must be given. `bent` as of vshi_heights_ao(). */
-void vshi_spheres_ao(const vsh_spheres *spheres, double ao_distance, const vsh_points *points, size_t begin,
-                     size_t end, double lift, float *ao, float *bent, vsh_shade_stats *stats);
+ * points->normals must be given. `bent` and `up` as of vshi_heights_ao(). */
+void vshi_spheres_ao(const vsh_spheres *spheres, double ao_distance, const vshi_vec *up,
+                     const vsh_points *points, size_t begin, size_t end, double lift, float *ao, float *bent,
+                     vsh_shade_stats *stats);
 
 /* Point i lifted, and its unit normal (zero where there are none); false where it is not finite or has no
  * normal where normals are given. */

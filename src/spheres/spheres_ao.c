@@ -24,7 +24,8 @@ typedef struct sky {
     double sum;
     size_t counted;
     bool inside;
-    bool all; /* sample the first sphere too: directions are asked for */
+    bool all;           /* sample the first sphere too: directions are asked for */
+    const vshi_vec *up; /* of what is over its horizon; NULL: of all */
 } sky;
 
 /* Vogel's spiral ("A better way to construct the sunflower head", 1979) raised to the hemisphere. */
@@ -104,6 +105,24 @@ static void put_bent(const sky *s, double hidden, float *bent) {
     bent[2] = (float)open.z;
 }
 
+/* What is hidden of what is over the horizon, where `hidden` is of the hemisphere: the share that sampled
+ * directions tell. */
+static double over_horizon(const sky *s, double hidden) {
+    const double x = vshi_dot(s->u, *s->up), y = vshi_dot(s->v, *s->up), z = vshi_dot(s->normal, *s->up);
+    const double whole = 0.5 * (1.0 + z);
+    int32_t covered = 0, over = 0;
+    for (int i = 0; i < DIRECTIONS; ++i) {
+        const bool above = x * (double)s->x[i] + y * (double)s->y[i] + z * (double)s->z[i] > 0.0;
+        covered += s->covered[i];
+        over += above ? s->covered[i] : 0;
+    }
+    double part = vshi_dot(s->first.centre, *s->up) > 0.0 ? 1.0 : 0.0; /* too small a sphere to be met */
+    if (covered > 0) {
+        part = (double)over / covered;
+    }
+    return whole > 0.0 ? hidden * part / whole : 0.0;
+}
+
 static float shade_point(const vsh_spheres *spheres, sky *s, float *bent, vsh_shade_stats *stats) {
     s->caps = s->counted = 0;
     s->sum = 0.0;
@@ -134,16 +153,21 @@ static float shade_point(const vsh_spheres *spheres, sky *s, float *bent, vsh_sh
     if (bent != NULL) {
         put_bent(s, s->caps > 0 ? fmin(hidden, 1.0) : 0.0, bent);
     }
+    if (s->up != NULL) {
+        hidden = over_horizon(s, fmin(hidden, 1.0));
+    }
     return (float)(1.0 - fmin(hidden, 1.0));
 }
 
-void vshi_spheres_ao(const vsh_spheres *spheres, double ao_distance, const vsh_points *points, size_t begin,
-                     size_t end, double lift, float *ao, float *bent, vsh_shade_stats *stats) {
+void vshi_spheres_ao(const vsh_spheres *spheres, double ao_distance, const vshi_vec *up,
+                     const vsh_points *points, size_t begin, size_t end, double lift, float *ao, float *bent,
+                     vsh_shade_stats *stats) {
     sky s;
     set_directions(&s);
     s.distance = ao_distance;
     s.first.centre = (vshi_vec){0.0, 0.0, 0.0};
-    s.all = bent != NULL;
+    s.up = up;
+    s.all = bent != NULL || up != NULL;
     for (size_t i = begin; i < end; ++i) {
         float *direction = bent != NULL ? bent + 3 * (i - begin) : NULL;
         if (vshi_spheres_origin(points, i, lift, s.origin, &s.normal)) {

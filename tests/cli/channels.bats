@@ -33,6 +33,27 @@ load helper
     cmp whole.exr bands.exr
 }
 
+@test "the sky over a box is 1, 1/2 and 0, by option and scene, in bands as whole" {
+    write_box box.obj
+    options=(--size 64 --resolution 32 --quiet)
+    run -0 "$VDBSHADE" bake box.obj --sky z "${options[@]}" -o whole.exr
+    run -0 "$VDBSHADE" info whole.exr
+    [[ $output == *"'sky': min 0, "*", max 1"* ]]
+    run -0 "$VDBSHADE" bake box.obj --sky z "${options[@]}" --band-rows 16 -o bands.exr
+    cmp whole.exr bands.exr
+    for sky in z -z; do
+        printf '{"casters": [{"mesh": "box.obj"}], "resolution": 32, "sky": "%s",
+                 "receivers": [{"mesh": "box.obj", "size": 64, "padding": 4, "output": "scene%s.exr"}]}' $sky $sky >scene.json
+        run -0 "$VDBSHADE" bake scene.json --quiet
+    done
+    run -0 "$VDBSHADE" compare whole.exr scenez.exr
+    run -1 "$VDBSHADE" compare whole.exr scene-z.exr
+    run -2 "$VDBSHADE" bake box.obj --sky up -o box.exr
+    [[ $output == *"'up'"* ]]
+    run -2 "$VDBSHADE" bake box.obj --sky y --ao 1 --ao-method cones -o box.exr
+    [[ $output == *"AO over a horizon: method cones"* ]]
+}
+
 @test "what does not go together is told" {
     write_box box.obj
     run -2 "$VDBSHADE" bake box.obj --sun 1,1,1 --bent-normals world -o box.exr

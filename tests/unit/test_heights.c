@@ -195,7 +195,7 @@ static void points_that_are_no_points_are_nan_and_buried_ones_dark(void **state)
     for (size_t begin = 0; begin < 2; ++begin) { /* results begin at 0 whatever the first point */
         vshi_heights_shadow(s.heights, &light, VSH_SHADOW_CONE, &points, begin, begin + 3, 0.0, values,
                             &stats);
-        vshi_heights_ao(s.heights, 1.0, &points, begin, begin + 3, 0.0, ao, NULL, &stats);
+        vshi_heights_ao(s.heights, 1.0, NULL, &points, begin, begin + 3, 0.0, ao, NULL, &stats);
         assert_true(isnan(values[1 - begin]) && isnan(ao[1 - begin]));
         assert_true(values[2 - begin] == 0.0f && ao[2 - begin] == 0.0f);
         assert_true(begin == 0 ? isnan(values[0]) && isnan(ao[0]) : values[2] == 1.0f && ao[2] == 1.0f);
@@ -294,7 +294,7 @@ static void ambient_occlusion_is_the_rays(void **state) {
     for (size_t d = 0; d < 3; ++d) {
         const vsh_points points = {POINTS, s.positions, s.normals, NULL};
         vsh_shade_stats stats = vsh_shade_stats_zero();
-        vshi_heights_ao(s.heights, distances[d], &points, 0, POINTS, 0.0, values, NULL, &stats);
+        vshi_heights_ao(s.heights, distances[d], NULL, &points, 0, POINTS, 0.0, values, NULL, &stats);
         if (s.truth != NULL) {
             truth_mesh_ao(s.truth, POINTS, s.positions, s.normals, distances[d], 1024, 0, truth);
             const truth_metrics m = truth_compare(POINTS, values, truth, NULL);

@@ -222,7 +222,7 @@ static void ambient_occlusion_is_the_rays(void **state) {
         for (size_t d = 0; d < 3; ++d) {
             const vsh_points points = {POINTS, s->positions, s->normals, NULL};
             vsh_shade_stats stats = vsh_shade_stats_zero();
-            vshi_spheres_ao(s->made, distances[d], &points, 0, POINTS, 0.0, values, NULL, &stats);
+            vshi_spheres_ao(s->made, distances[d], NULL, &points, 0, POINTS, 0.0, values, NULL, &stats);
             for (size_t i = 0; i < POINTS; ++i) {
                 truth[i] = (float)truth_ao(scene, s->positions + 3 * i, up, distances[d], RAYS);
             }
@@ -256,7 +256,7 @@ static void a_sphere_leaves_its_own_surface_open(void **state) {
         vsh_shade_stats stats = vsh_shade_stats_zero();
         vshi_spheres_shadow(made, &light, VSH_SHADOW_CONE, &points, 0, 1, 0.0, &value, &stats);
         assert_true(value == 1.0f);
-        vshi_spheres_ao(made, 1.0, &points, 0, 1, 0.0, &value, NULL, &stats);
+        vshi_spheres_ao(made, 1.0, NULL, &points, 0, 1, 0.0, &value, NULL, &stats);
         assert_true(value == 1.0f);
     }
     vsh_spheres_free(made);
@@ -321,7 +321,7 @@ static void points_that_are_no_points_are_nan_and_inner_ones_dark(void **state) 
     float values[3], ao[3];
     for (size_t begin = 0; begin < 2; ++begin) {
         vshi_spheres_shadow(made, &light, VSH_SHADOW_CONE, &points, begin, begin + 3, 0.0, values, &stats);
-        vshi_spheres_ao(made, 1.0, &points, begin, begin + 3, 0.0, ao, NULL, &stats);
+        vshi_spheres_ao(made, 1.0, NULL, &points, begin, begin + 3, 0.0, ao, NULL, &stats);
         assert_true(isnan(values[1 - begin]) && isnan(ao[1 - begin]));
         assert_true(values[2 - begin] == 0.0f && ao[2 - begin] == 0.0f);
         assert_true(begin == 0 ? isnan(values[0]) && isnan(ao[0]) : values[2] == 1.0f && ao[2] == 1.0f);

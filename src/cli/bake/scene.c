@@ -212,10 +212,11 @@ static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
 }
 
 int cli_bake_check_work(const cli_bake_settings *s, const cli_bake_scene *made) {
-    if (made->read == NULL && !s->has_sun && !cli_patch_has(&s->patch, "--ao")) {
+    const bool shades = made->scene.ao || vsh_planes_shaded(&made->scene.planes) > 0;
+    if (made->read == NULL && !s->has_sun && !shades) {
         return cli_usage("%s: nothing to bake; give --sun X,Y,Z or --ao DISTANCE, or both", s->input);
     }
-    if (made->scene.light_count == 0 && !made->scene.ao) {
+    if (made->scene.light_count == 0 && !shades) {
         return cli_usage("%s: nothing to bake: no lights and no ao", s->input);
     }
     return CLI_OK;

@@ -4,7 +4,8 @@
 /* Whether a method that the scene is baked by has all of these traits. */
 static bool any_is(const vsh_scene *scene, uint32_t traits) {
     return (scene->light_count > 0 && (vsh_shadow_method_traits(scene->shade.method) & traits) == traits) ||
-           (scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & traits) == traits);
+           ((scene->ao || vsh_planes_shaded(&scene->planes) > 0) &&
+            (vsh_ao_method_traits(scene->shade.ao_method) & traits) == traits);
 }
 
 /* Methods that know the error of their values, and those that work until it is small enough. */
@@ -53,7 +54,7 @@ int cli_bake_check_shade(const cli_bake_settings *s, vsh_scene *scene) {
     static const char *const of_rays[] = {"--rays", "--sampler", "--frame", "--early-rays", "--error"};
     const cli_patch *given = &s->patch;
     const char *option = first_given(given, of_ao, sizeof of_ao / sizeof of_ao[0]);
-    if (option != NULL && !scene->ao) {
+    if (option != NULL && !scene->ao && vsh_planes_shaded(&scene->planes) == 0) {
         return cli_usage("%s: there is no --ao", option);
     }
     scene->irradiance = scene->irradiance || cli_patch_has(given, "--ambient");

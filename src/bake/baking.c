@@ -1,0 +1,215 @@
+#include "bake/baking.h"
+
+#include "bake/ao_texels.h"
+#include "bake/average.h"
+#include "bake/bend.h"
+#include "bake/lattice.h"
+#include "bake/lift.h"
+#include "bake/planes.h"
+#include "base/try.h"
+#include "shade/ao.h"
+#include "shade/shadow.h"
+
+/* Whether AO need not be shaded at every texel. `rays` are for those who want just them, taps cost no more;
+ * what is near in a layer is not looked at. */
+bool vshi_baking_interpolates(const vshi_baking *bake) {
+    const int32_t method = bake->shade.ao_method;
+    return bake->texels->ao_spacing > 1 && !bake->layered_ao &&
+           (method == VSH_AO_CONES || (vsh_ao_method_traits(method) & VSH_METHOD_KEEPS_ERROR) != 0);
+}
+
+bool vshi_baking_traces_shadow(const vshi_baking *bake) {
+    return vshi_shadow_traces(&bake->shade, bake->occluders->triangles);
+}
+
+bool vshi_baking_traces_ao(const vshi_baking *bake) {
+    return vshi_ao_traces(&bake->shade, bake->occluders->triangles);
+}
+
+bool vshi_baking_shares(const vshi_baking *bake) {
+    return vshi_baking_interpolates(bake) && vshi_baking_traces_ao(bake);
+}
+
+/* Where rays begin: lifted already, but for methods that trace triangles. Those know the surface better than
+ * any voxel does, and lift their cones themselves. */
+static vsh_points points_of(const vshi_baking *bake, bool traced, vsh_shade_options *shade,
+                            const vsh_occluders **occluders) {
+    const vshi_origins *origins = &bake->origins;
+    *occluders = traced ? bake->occluders : &bake->lifted;
+    if (!traced) {
+        shade->start_offset = 0.0;
+        shade->surface_offset = 0.0;
+    }
+    return (vsh_points){origins->count, traced ? origins->surface : origins->position, origins->normal,
+                        origins->texel};
+}
+
+vsh_result vshi_baking_average(vshi_baking *bake, const float *values, size_t components, float *plane,
+                               vsh_error *error) {
+    const vshi_average task = {.texels = bake->texels,
+                               .origins = &bake->origins,
+                               .values = values,
+                               .channels = components,
+                               .deviation = values != NULL && values == bake->deviation,
+                               .plane = plane,
+                               .state = bake->state};
+    return vshi_average_run(&task, &bake->quiet, error);
+}
+
+vsh_result vshi_baking_step(vshi_baking *bake, const char *what, vshi_range_fn *step, void *user,
+                            vsh_error *error) {
+    vshi_job *job = vshi_job_begin(&bake->quiet, what, bake->origins.count);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
+    }
+    const vsh_result result = vshi_parallel_for(job, bake->origins.count, 4096, 1, step, user, error);
+    vshi_job_end(job);
+    return result;
+}
+
+/* --- lights */
+
+typedef struct lighting {
+    vshi_baking *bake;
+    const vsh_light *light;
+} lighting;
+
+static void add_irradiance(void *user, size_t begin, size_t end) {
+    const lighting *l = user;
+    vshi_baking *bake = l->bake;
+    const vsh_points points = {end - begin, bake->origins.position + 3 * begin,
+                               bake->origins.normal + 3 * begin, NULL};
+    vshi_shade_irradiance(&points, NULL, l->light, bake->values + begin, &bake->lightmap->tint_by,
+                          bake->irradiance + 3 * begin);
+}
+
+static void tint(void *user, size_t begin, size_t end) {
+    const lighting *l = user;
+    vsh_shade_tint(end - begin, l->bake->values + begin, &l->bake->lightmap->tint_by,
+                   l->bake->tinted + 3 * begin);
+}
+
+vsh_result vshi_bake_light(vshi_baking *bake, size_t index, vsh_error *error) {
+    const vsh_lightmap *lightmap = bake->lightmap;
+    const vsh_light *light = &bake->lights[index];
+    vsh_shade_options shade = bake->shade;
+    const vsh_occluders *occluders;
+    const vsh_points points = points_of(bake, vshi_baking_traces_shadow(bake), &shade, &occluders);
+    const double square = bake->stats.shade.square_error;
+    float *shadow = lightmap->shadow != NULL ? lightmap->shadow[index] : NULL;
+    float *errors = lightmap->shadow_error != NULL ? lightmap->shadow_error[index] : NULL;
+    float *tinted = lightmap->tint != NULL ? lightmap->tint[index] : NULL;
+    VSHI_TRY(vshi_lift_for(bake->texels, light, &bake->quiet, &bake->origins, error));
+    VSHI_TRY(vshi_shade_shadow(occluders, &points, &bake->origins.rows, light, &shade, &bake->run,
+                               bake->values, errors != NULL ? bake->deviation : NULL, &bake->stats.shade,
+                               error));
+    if (errors != NULL) {
+        VSHI_TRY(vshi_baking_average(bake, bake->deviation, 1, errors, error));
+    }
+    if (shadow != NULL) {
+        VSHI_TRY(vshi_baking_average(bake, bake->values, 1, shadow, error));
+    }
+    VSHI_TRY(vshi_baking_add_error(bake, light, square, error));
+    lighting l = {bake, light};
+    if (tinted != NULL) {
+        VSHI_TRY(vshi_baking_step(bake, "tint", tint, &l, error));
+        VSHI_TRY(vshi_baking_average(bake, bake->tinted, 3, tinted, error));
+    }
+    return lightmap->irradiance != NULL ? vshi_baking_step(bake, "irradiance", add_irradiance, &l, error)
+                                        : VSH_OK;
+}
+
+/* --- AO */
+
+vsh_result vshi_baking_open(vshi_baking *bake, const vsh_shade_options *options, float *deviation,
+                            float *bent, vsh_error *error) {
+    vsh_shade_options shade = *options;
+    const vsh_occluders *occluders;
+    const vsh_points points = points_of(bake, vshi_baking_traces_ao(bake), &shade, &occluders);
+    VSHI_TRY(vshi_lift_for(bake->texels, NULL, &bake->quiet, &bake->origins, error));
+    if (!vshi_baking_interpolates(bake)) {
+        return vshi_shade_ao(occluders, &points, &bake->origins.rows, &shade, &bake->run, bake->values,
+                             deviation, bent, NULL, &bake->stats.shade, error);
+    }
+    return (vshi_baking_shares(bake) ? vshi_ao_texels : vshi_lattice_ao)(
+        occluders, bake->texels, &bake->origins, &points, &shade, &bake->run, bake->values, deviation, bent,
+        &bake->stats.shade, error);
+}
+
+vsh_result vshi_bake_ao(vshi_baking *bake, vsh_error *error) {
+    const vsh_lightmap *lightmap = bake->lightmap;
+    const double square = bake->stats.shade.square_error;
+    VSHI_TRY(vshi_baking_open(bake, &bake->shade, lightmap->ao_error != NULL ? bake->deviation : NULL,
+                              bake->bent, error));
+    if (lightmap->ao_error != NULL) {
+        VSHI_TRY(vshi_baking_average(bake, bake->deviation, 1, lightmap->ao_error, error));
+    }
+    if (lightmap->ao != NULL) {
+        VSHI_TRY(vshi_baking_average(bake, bake->values, 1, lightmap->ao, error));
+    }
+    VSHI_TRY(vshi_baking_add_error(bake, NULL, square, error));
+    if (lightmap->bent != NULL) {
+        VSHI_TRY(
+            vshi_bend(bake->texels, &bake->origins, lightmap->bent_space, &bake->quiet, bake->bent, error));
+        VSHI_TRY(vshi_baking_average(bake, bake->bent, 3, lightmap->bent, error));
+        vshi_bend_again(vshi_texels_held(bake->texels), lightmap->bent);
+    }
+    return VSH_OK;
+}
+
+/* --- what is known of their errors */
+
+static bool keeps_error(const vshi_baking *bake, const vsh_light *light) {
+    const uint32_t traits = light != NULL ? vsh_shadow_method_traits(bake->shade.method)
+                                          : vsh_ao_method_traits(bake->shade.ao_method);
+    return (traits & VSH_METHOD_KEEPS_ERROR) != 0;
+}
+
+bool vshi_baking_holds(const vshi_baking *bake) {
+    const vsh_occluders *casters = bake->occluders;
+    const bool estimates = ((bake->needs & VSHI_NEEDS_LIGHTS) != 0 && keeps_error(bake, bake->lights)) ||
+                           ((bake->needs & VSHI_NEEDS_AO) != 0 && keeps_error(bake, NULL));
+    return bake->stats.errors != NULL && (casters->true_triangles != NULL || casters->true_solids != NULL) &&
+           casters->layer_count == 0 && estimates;
+}
+
+vsh_result vshi_baking_choose_held(vshi_baking *bake, vsh_error *error) {
+    const vshi_truth truth = vshi_field_share_truth(bake->occluders, &bake->shade);
+    const bool traced =
+        ((bake->needs & VSHI_NEEDS_LIGHTS) == 0 || vshi_baking_traces_shadow(bake)) &&
+        ((bake->needs & (VSHI_NEEDS_AO | VSHI_NEEDS_OPEN)) == 0 || vshi_baking_traces_ao(bake));
+    return vshi_field_share_choose(bake->texels, &bake->origins, bake->state, &truth, traced, &bake->quiet,
+                                   &bake->held, error);
+}
+
+static vsh_bake_error *error_of(const vshi_baking *bake, const vsh_light *light) {
+    return &bake->stats.errors[light != NULL ? (size_t)(light - bake->lights) : bake->light_count];
+}
+
+vsh_result vshi_baking_add_error(vshi_baking *bake, const vsh_light *light, double square, vsh_error *error) {
+    if (bake->stats.errors == NULL || !keeps_error(bake, light)) {
+        return VSH_OK;
+    }
+    const vshi_point_rows *rows = &bake->origins.rows;
+    vsh_bake_error *sum = error_of(bake, light);
+    sum->values += (double)(rows->start[rows->last] - rows->start[rows->first]);
+    sum->square_error += bake->stats.shade.square_error - square;
+    return bake->held.count > 0 ? vshi_field_share_add(&bake->held, light, &bake->shade, bake->values, NULL,
+                                                       &bake->quiet, sum, error)
+                                : VSH_OK;
+}
+
+vsh_result vshi_baking_add_filled(vshi_baking *bake, vsh_error *error) {
+    const vsh_lightmap *lightmap = bake->lightmap;
+    for (size_t i = 0; i <= bake->light_count && bake->held.count > 0; ++i) {
+        const vsh_light *light = i < bake->light_count ? &bake->lights[i] : NULL;
+        const float *plane = light == NULL              ? lightmap->ao
+                             : lightmap->shadow != NULL ? lightmap->shadow[i]
+                                                        : NULL;
+        if (plane != NULL && keeps_error(bake, light)) {
+            VSHI_TRY(vshi_field_share_add(&bake->held, light, &bake->shade, NULL, plane, &bake->quiet,
+                                          error_of(bake, light), error));
+        }
+    }
+    return VSH_OK;
+}

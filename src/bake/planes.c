@@ -1,0 +1,134 @@
+#include "bake/planes.h"
+
+#include "bake/ambient.h"
+#include "bake/baking.h"
+#include "base/names.h"
+#include "base/try.h"
+
+#include <math.h>
+#include <string.h>
+
+static vsh_result fill_irradiance(vshi_baking *bake, float *plane, vsh_error *error) {
+    VSHI_TRY(vshi_baking_average(bake, bake->irradiance, 3, plane, error));
+    vshi_ambient_add(bake->texels, bake->state, bake->lightmap);
+    return VSH_OK;
+}
+
+static const char *const ups_table[] = {
+    [VSH_UP_NONE] = "none",  [VSH_UP_X] = "x",        [VSH_UP_Y] = "y",        [VSH_UP_Z] = "z",
+    [VSH_UP_MINUS_X] = "-x", [VSH_UP_MINUS_Y] = "-y", [VSH_UP_MINUS_Z] = "-z",
+};
+static const vshi_names ups = VSHI_NAMES(ups_table);
+
+int32_t vsh_up(const char *name) {
+    return vshi_name_find(ups, name);
+}
+
+const char *vsh_up_name(int32_t up) {
+    return vshi_name_at(ups, up);
+}
+
+typedef struct skylight {
+    vshi_baking *bake;
+    vshi_vec up;
+} skylight;
+
+/* From the share of what is over the horizon to that of the whole hemisphere. */
+static void weigh_sky(void *user, size_t begin, size_t end) {
+    const skylight *s = user;
+    for (size_t i = begin; i < end; ++i) {
+        const vshi_vec normal = vshi_unit(vshi_vec_off(s->bake->origins.normal + 3 * i));
+        const double over = fmin(fmax(0.5 * (1.0 + vshi_dot(normal, s->up)), 0.0), 1.0);
+        s->bake->values[i] = (float)(over * (double)s->bake->values[i]);
+    }
+}
+
+/* AO of what is over the horizon, within a distance that no caster is beyond. */
+static vsh_result fill_sky(vshi_baking *bake, float *plane, vsh_error *error) {
+    static const double FAR = 0x1p60;
+    const int32_t up = bake->lightmap->asked.sky;
+    if (up <= VSH_UP_NONE || up > VSH_UP_MINUS_Z) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap asked.sky %d: expected %d … %d", up, VSH_UP_X,
+                         VSH_UP_MINUS_Z);
+    }
+    vsh_shade_options options = bake->shade;
+    options.ao_distance = FAR;
+    for (int axis = 0; axis < 3; ++axis) {
+        options.ao_up[axis] = up == VSH_UP_X + axis ? 1.0 : up == VSH_UP_MINUS_X + axis ? -1.0 : 0.0;
+    }
+    skylight s = {bake, vshi_vec_of(options.ao_up)};
+    VSHI_TRY(vshi_baking_open(bake, &options, NULL, NULL, error));
+    VSHI_TRY(vshi_baking_step(bake, "sky", weigh_sky, &s, error));
+    return vshi_baking_average(bake, bake->values, 1, plane, error);
+}
+
+#define PLANE(member) .plane = offsetof(vsh_lightmap, member), .wish = VSHI_NO_WISH
+#define WISHED(member) .plane = offsetof(vsh_lightmap, member), .wish = offsetof(vsh_planes, member)
+
+static const vshi_plane_kind kinds[] = {
+    {"shadow", .per_light = true, .padded = true, .needs = VSHI_NEEDS_LIGHTS, PLANE(shadow)},
+    {"ao", .padded = true, .needs = VSHI_NEEDS_AO, PLANE(ao)},
+    {"error", .per_light = true, .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_DEVIATION, PLANE(shadow_error)},
+    {"error.ao", .needs = VSHI_NEEDS_AO | VSHI_NEEDS_DEVIATION, PLANE(ao_error)},
+    {"irradiance", "RGB", .padded = true, .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_IRRADIANCE,
+     PLANE(irradiance), .fill = fill_irradiance},
+    {"bent", "XYZ", .padded = true, .needs = VSHI_NEEDS_AO | VSHI_NEEDS_BENT, PLANE(bent)},
+    {"tint", "RGB", .per_light = true, .padded = true, .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_TINT,
+     PLANE(tint)},
+    {"sky", .padded = true, .needs = VSHI_NEEDS_OPEN, WISHED(sky), .fill = fill_sky},
+    {"invalid", WISHED(invalid)},
+    {"A", PLANE(coverage)},
+};
+enum { KINDS = sizeof kinds / sizeof kinds[0] };
+
+const vshi_plane_kind *vshi_plane_kinds(size_t *count) {
+    *count = KINDS;
+    return kinds;
+}
+
+float *vshi_plane_of(const vsh_lightmap *lightmap, const vshi_plane_kind *kind, size_t light) {
+    const char *at = (const char *)lightmap + kind->plane;
+    if (!kind->per_light) {
+        return *(float *const *)at;
+    }
+    float *const *list = *(float *const *const *)at;
+    return list != NULL ? list[light] : NULL;
+}
+
+void vshi_plane_put(vsh_lightmap *lightmap, const vshi_plane_kind *kind, float *const *planes) {
+    char *at = (char *)lightmap + kind->plane;
+    if (kind->per_light) {
+        *(float *const **)at = planes;
+    } else {
+        *(float **)at = planes[0];
+    }
+}
+
+uint32_t vshi_planes_need_of_light(const vsh_lightmap *lightmap, size_t light) {
+    uint32_t needs = 0;
+    for (size_t k = 0; k < KINDS; ++k) {
+        const bool of_lights = (kinds[k].needs & VSHI_NEEDS_LIGHTS) != 0;
+        needs |= of_lights && vshi_plane_of(lightmap, &kinds[k], light) != NULL ? kinds[k].needs : 0;
+    }
+    return needs;
+}
+
+uint32_t vshi_planes_need(const vsh_lightmap *lightmap, size_t light_count) {
+    uint32_t needs = 0;
+    for (size_t i = 0; i < light_count; ++i) {
+        needs |= vshi_planes_need_of_light(lightmap, i);
+    }
+    for (size_t k = 0; k < KINDS; ++k) {
+        const bool of_lights = (kinds[k].needs & VSHI_NEEDS_LIGHTS) != 0;
+        needs |= !of_lights && vshi_plane_of(lightmap, &kinds[k], 0) != NULL ? kinds[k].needs : 0;
+    }
+    return needs;
+}
+
+int32_t vsh_planes_shaded(const vsh_planes *planes) {
+    int32_t count = 0;
+    for (size_t k = 0; k < KINDS; ++k) {
+        count += (kinds[k].needs & VSHI_NEEDS_OPEN) != 0 && vshi_plane_wished(&kinds[k], planes);
+    }
+    return count;
+}

@@ -1,0 +1,217 @@
+/* AO of what is over a horizon: the share of those directions that is free. */
+#include "previews.h"
+#include "shading.h"
+
+#include "heightfield/heights.h"
+#include "spheres/spheres.h"
+#include "truth/directions.h"
+
+#include <stdlib.h>
+#include <vdbshade/trace.h>
+
+enum { SOLIDS = 3, POINTS = 240, RAYS = 8192 };
+
+static const truth_solid SCENE[SOLIDS] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {3.0, 0.5, 3.0}, 0.0, 0.0},
+                                          {TRUTH_BOX, {-1.5, 0.8, 0.0}, {0.2, 0.8, 2.0}, 0.0, 0.0},
+                                          {TRUTH_BOX, {1.4, 1.1, -0.6}, {0.6, 0.3, 0.5}, 0.0, 0.0}};
+static const double FAR = 20.0;
+
+typedef struct stage {
+    vsh_field *field;
+    vsh_triangles *triangles;
+    double positions[3 * POINTS];
+    float normals[3 * POINTS];
+    float values[POINTS], truth[POINTS];
+} stage;
+
+static vsh_triangles *triangles_of(const truth_solid *solids, size_t count) {
+    static const uint32_t indices[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                         2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    float corners[SOLIDS][24];
+    vsh_mesh meshes[SOLIDS];
+    for (size_t i = 0; i < count; ++i) {
+        for (size_t k = 0; k < 24; ++k) {
+            const size_t axis = k % 3;
+            const double half = solids[i].half[axis];
+            corners[i][k] = (float)(solids[i].center[axis] + ((k / 3) >> axis & 1 ? half : -half));
+        }
+        meshes[i] =
+            (vsh_mesh){.positions = corners[i], .indices = indices, .vertex_count = 8, .triangle_count = 12};
+    }
+    vsh_triangles *triangles = NULL;
+    if (vsh_triangles_available()) {
+        assert_int_equal(vsh_triangles_create(meshes, count, NULL, &triangles, NULL), VSH_OK);
+    }
+    return triangles;
+}
+
+/* Points a little off everything, their normals to all sides. */
+static stage *set_up(void) {
+    stage *s = calloc(1, sizeof *s);
+    const truth_scene scene = {SCENE, SOLIDS};
+    s->field = field_of(scene, 0.04, 4.0);
+    s->triangles = triangles_of(SCENE, SOLIDS);
+    uint64_t counter = 5;
+    for (size_t i = 0; i < POINTS;) {
+        double *p = s->positions + 3 * i, normal[3];
+        p[0] = between(&counter, -2.5, 2.5);
+        p[1] = between(&counter, 0.05, 2.0);
+        p[2] = between(&counter, -2.5, 2.5);
+        random_direction(&counter, normal);
+        for (int k = 0; k < 3; ++k) {
+            s->normals[3 * i + k] = (float)normal[k];
+        }
+        i += truth_distance(scene, p) > 0.05;
+    }
+    return s;
+}
+
+static void tear_down(stage *s) {
+    vsh_triangles_free(s->triangles);
+    vsh_field_free(s->field);
+    free(s);
+}
+
+static double whole(const float *normal, const double up[3]) {
+    return 0.5 * (1.0 + (double)normal[0] * up[0] + (double)normal[1] * up[1] + (double)normal[2] * up[2]);
+}
+
+static vsh_result shade(const stage *s, int32_t method, const double up[3], float *values, vsh_error *error) {
+    vsh_shade_options options = vsh_shade_options_default();
+    options.ao_method = method;
+    options.ao_distance = FAR;
+    options.max_error = 0.02;
+    options.rays = method == VSH_AO_RAYS ? 512 : 0;
+    for (int k = 0; k < 3; ++k) {
+        options.ao_up[k] = 3.0 * up[k]; /* of any length */
+    }
+    const vsh_points points = {POINTS, s->positions, s->normals, NULL};
+    return vsh_shade_ao(occluders_traced(s->field, s->triangles), &points, &options, NULL, values, NULL, NULL,
+                        error);
+}
+
+static void find_truth(stage *s, const double up[3]) {
+    const truth_scene scene = {SCENE, SOLIDS};
+    for (size_t i = 0; i < POINTS; ++i) {
+        const float *n = s->normals + 3 * i;
+        const truth_frame frame = truth_frame_around((double[]){n[0], n[1], n[2]});
+        size_t over = 0, open = 0;
+        for (size_t ray = 0; ray < RAYS; ++ray) {
+            double d[3];
+            truth_cosine_direction(&frame, ray, RAYS, d);
+            if (d[0] * up[0] + d[1] * up[1] + d[2] * up[2] > 0.0) {
+                ++over;
+                open += !truth_hit(scene, s->positions + 3 * i, d, FAR);
+            }
+        }
+        s->truth[i] = over > 0 ? (float)open / (float)over : 1.0f;
+    }
+}
+
+static void shares_of_what_is_over_a_horizon_are_the_rays(void **state) {
+    (void)state;
+    static const double ups[2][3] = {{0.0, 1.0, 0.0}, {0.48, -0.6, 0.64}};
+    static const int32_t methods[] = {VSH_AO_RAYS, VSH_AO_ADAPTIVE, VSH_AO_EXACT};
+    stage *s = set_up();
+    for (int u = 0; u < 2; ++u) {
+        find_truth(s, ups[u]);
+        for (int m = 0; m < (s->triangles != NULL ? 3 : 2); ++m) {
+            vsh_error error = {VSH_OK, ""};
+            if (shade(s, methods[m], ups[u], s->values, &error) != VSH_OK) {
+                fail_msg("%s", error.message);
+            }
+            double square = 0.0, mean = 0.0;
+            for (size_t i = 0; i < POINTS; ++i) {
+                const double off =
+                    whole(s->normals + 3 * i, ups[u]) * ((double)s->values[i] - (double)s->truth[i]);
+                square += off * off / POINTS;
+                mean += off / POINTS;
+            }
+            print_message("method %d: rmse %.4f, bias %.4f\n", methods[m], sqrt(square), mean);
+            assert_true(sqrt(square) < 0.02);
+            assert_true(fabs(mean) < 0.004);
+        }
+    }
+    tear_down(s);
+}
+
+/* What is over a horizon and what is under it are together the whole. */
+static void check_halves(const float *normals, const double up[3], const float *all, const float *over,
+                         const float *under, double most) {
+    for (size_t i = 0; i < POINTS; ++i) {
+        const double share = whole(normals + 3 * i, up);
+        const double sum = share * (double)over[i] + (1.0 - share) * (double)under[i];
+        if (!(fabs(sum - (double)all[i]) <= most)) {
+            fail_msg("point %zu: %g, of halves %g", i, (double)all[i], sum);
+        }
+    }
+}
+
+static void heights_and_spheres_have_two_halves(void **state) {
+    (void)state;
+    enum { SIDE = 24 };
+    static float samples[SIDE * SIDE], all[POINTS], over[POINTS], under[POINTS];
+    uint64_t counter = 11;
+    for (size_t i = 0; i < SIDE * SIDE; ++i) {
+        samples[i] = (float)between(&counter, 0.0, 1.0);
+    }
+    const vsh_heights_source source = {
+        .columns = SIDE, .rows = SIDE, .values = samples, .size = {6.0, 6.0}, .height = 1.0};
+    vsh_heights *heights = NULL;
+    vsh_error error = {VSH_OK, ""};
+    if (vsh_heights_create(&source, NULL, &heights, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    static const double balls[3][4] = {{0.4, 2.0, 0.1, 0.5}, {-0.6, 2.6, 0.4, 0.7}, {0.1, 1.8, -0.9, 0.3}};
+    vsh_spheres *spheres = NULL;
+    assert_int_equal(vsh_spheres_create(&balls[0][0], 3, NULL, NULL, &spheres, &error), VSH_OK);
+    stage *s = set_up();
+    const vsh_points points = {POINTS, s->positions, s->normals, NULL};
+    const vshi_vec up = {0.48, 0.64, -0.6}, down = {-0.48, -0.64, 0.6};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    vshi_heights_ao(heights, FAR, NULL, &points, 0, POINTS, 0.0, all, NULL, &stats);
+    vshi_heights_ao(heights, FAR, &up, &points, 0, POINTS, 0.0, over, NULL, &stats);
+    vshi_heights_ao(heights, FAR, &down, &points, 0, POINTS, 0.0, under, NULL, &stats);
+    check_halves(s->normals, (double[]){up.x, up.y, up.z}, all, over, under, 0.02);
+    vshi_spheres_ao(spheres, FAR, NULL, &points, 0, POINTS, 0.0, all, NULL, &stats);
+    vshi_spheres_ao(spheres, FAR, &up, &points, 0, POINTS, 0.0, over, NULL, &stats);
+    vshi_spheres_ao(spheres, FAR, &down, &points, 0, POINTS, 0.0, under, NULL, &stats);
+    check_halves(s->normals, (double[]){up.x, up.y, up.z}, all, over, under, 0.02);
+    vsh_spheres_free(spheres);
+    vsh_heights_free(heights);
+    tear_down(s);
+}
+
+static void what_knows_no_horizon_says_so(void **state) {
+    (void)state;
+    static const double up[3] = {0.0, 1.0, 0.0};
+    stage *s = set_up();
+    static const int32_t methods[] = {VSH_AO_TAPS, VSH_AO_CONES};
+    for (int m = 0; m < 2; ++m) {
+        vsh_error error = {VSH_OK, ""};
+        assert_int_equal(shade(s, methods[m], up, s->values, &error), VSH_ERROR_ARGUMENT);
+        assert_non_null(strstr(error.message, "over a horizon"));
+    }
+    vsh_shade_options options = vsh_shade_options_default();
+    options.ao_method = VSH_AO_ADAPTIVE;
+    options.ao_up[2] = NAN;
+    const vsh_points points = {POINTS, s->positions, s->normals, NULL};
+    assert_int_equal(
+        vsh_shade_ao(occluders_of(s->field), &points, &options, NULL, s->values, NULL, NULL, NULL),
+        VSH_ERROR_ARGUMENT);
+    options.ao_up[2] = 1.0;
+    static float bent[3 * POINTS];
+    assert_int_equal(
+        vsh_shade_bent(occluders_of(s->field), &points, &options, NULL, s->values, bent, NULL, NULL),
+        VSH_ERROR_ARGUMENT);
+    tear_down(s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shares_of_what_is_over_a_horizon_are_the_rays),
+        cmocka_unit_test(heights_and_spheres_have_two_halves),
+        cmocka_unit_test(what_knows_no_horizon_says_so),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

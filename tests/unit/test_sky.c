@@ -1,0 +1,224 @@
+/* The channel `sky`: what of an even sky is seen, however far the casters, against form factors. */
+#include "shading.h"
+
+#include <stdlib.h>
+#include <vdbshade/bake.h>
+#include <vdbshade/trace.h>
+
+enum { BOXES = 5, SIDE = 48, COUNT = SIDE * SIDE };
+
+/* A floor at y = 0 between four walls of a height: a well, or a trench where they are far apart along z. */
+typedef struct stage {
+    truth_solid boxes[BOXES];
+    double half[2], height;
+    vsh_field *field;
+    vsh_triangles *triangles;
+    float corners[12];
+    vsh_texels *texels;
+    float sky[COUNT], other[COUNT], coverage[COUNT];
+} stage;
+
+static void make_triangles(stage *s, size_t count) {
+    static const uint32_t indices[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                         2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    float corners[BOXES][24];
+    vsh_mesh meshes[BOXES];
+    for (size_t i = 0; i < count; ++i) {
+        for (size_t k = 0; k < 24; ++k) {
+            const double half = s->boxes[i].half[k % 3];
+            corners[i][k] = (float)(s->boxes[i].center[k % 3] + ((k / 3) >> (k % 3) & 1 ? half : -half));
+        }
+        meshes[i] =
+            (vsh_mesh){.positions = corners[i], .indices = indices, .vertex_count = 8, .triangle_count = 12};
+    }
+    if (vsh_triangles_available()) {
+        assert_int_equal(vsh_triangles_create(meshes, count, NULL, &s->triangles, NULL), VSH_OK);
+    }
+}
+
+static const float FLAT[8] = {0, 0, 1, 0, 1, 1, 0, 1};
+static const uint32_t QUAD[6] = {0, 1, 2, 0, 2, 3};
+
+static vsh_mesh receiver_of(const stage *s) {
+    return (vsh_mesh){.name = "receiver",
+                      .positions = s->corners,
+                      .uvs = FLAT,
+                      .indices = QUAD,
+                      .vertex_count = 4,
+                      .triangle_count = 2};
+}
+
+static vsh_lightmap_options sizes_of(int32_t spacing) {
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = SIDE;
+    options.ao_spacing = spacing;
+    return options;
+}
+
+/* A receiver by three of its corners; along u, then v. */
+static void receive(stage *s, const double origin[3], const double u[3], const double v[3], int32_t spacing) {
+    for (size_t axis = 0; axis < 3; ++axis) {
+        s->corners[axis] = (float)origin[axis];
+        s->corners[3 + axis] = (float)(origin[axis] + u[axis]);
+        s->corners[6 + axis] = (float)(origin[axis] + u[axis] + v[axis]);
+        s->corners[9 + axis] = (float)(origin[axis] + v[axis]);
+    }
+    const vsh_mesh mesh = receiver_of(s);
+    const vsh_lightmap_options options = sizes_of(spacing);
+    vsh_texels_free(s->texels);
+    s->texels = NULL;
+    assert_int_equal(vsh_texels_create(&mesh, 1, &options, NULL, NULL, &s->texels, NULL), VSH_OK);
+}
+
+/* The floor alone has no walls. */
+static stage *set_up(double half_x, double half_z, double height, size_t boxes) {
+    const double x = half_x, z = half_z, h = 0.5 * height;
+    stage *s = calloc(1, sizeof *s);
+    *s = (stage){.boxes = {{TRUTH_BOX, {0.0, -0.25, 0.0}, {x + 0.5, 0.25, z + 0.5}, 0.0, 0.0},
+                           {TRUTH_BOX, {-x - 0.25, h, 0.0}, {0.25, h, z + 0.5}, 0.0, 0.0},
+                           {TRUTH_BOX, {x + 0.25, h, 0.0}, {0.25, h, z + 0.5}, 0.0, 0.0},
+                           {TRUTH_BOX, {0.0, h, -z - 0.25}, {x + 0.5, h, 0.25}, 0.0, 0.0},
+                           {TRUTH_BOX, {0.0, h, z + 0.25}, {x + 0.5, h, 0.25}, 0.0, 0.0}},
+                 .half = {half_x, half_z},
+                 .height = height};
+    s->field = field_of((truth_scene){s->boxes, boxes}, 0.04, 4.0);
+    make_triangles(s, boxes);
+    receive(s, (double[]){-x, 0.0, z}, (double[]){2.0 * x, 0.0, 0.0}, (double[]){0.0, 0.0, -2.0 * z}, 4);
+    return s;
+}
+
+static void tear_down(stage *s) {
+    vsh_texels_free(s->texels);
+    vsh_triangles_free(s->triangles);
+    vsh_field_free(s->field);
+    free(s);
+}
+
+static vsh_result bake_sky(stage *s, const vsh_texels *texels, int32_t method, int32_t up, int32_t threads,
+                           float *sky, vsh_error *error) {
+    vsh_shade_options shade = vsh_shade_options_default();
+    shade.ao_method = method;
+    vsh_run run = vsh_run_default();
+    run.threads = threads;
+    const vsh_lightmap lightmap = {.sky = sky, .asked = {.sky = up}, .coverage = s->coverage};
+    return vsh_bake_lightmap(occluders_traced(s->field, s->triangles), texels, NULL, 0, &shade, &run,
+                             &lightmap, NULL, error);
+}
+
+static void bake_well(stage *s, int32_t method, int32_t up) {
+    vsh_error error = {VSH_OK, ""};
+    if (bake_sky(s, s->texels, method, up, 0, s->sky, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+}
+
+/* Form factor of a rectangle a × b that is c above a point, its corner straight above it. */
+static double corner(double a, double b, double c) {
+    const double x = a / c, y = b / c, p = sqrt(1.0 + x * x), q = sqrt(1.0 + y * y);
+    return (x / p * atan(y / p) + y / q * atan(x / q)) / (2.0 * PI);
+}
+
+static double opening(const stage *s, double x, double z) {
+    const double a = s->half[0] - x, b = s->half[0] + x, c = s->half[1] - z, d = s->half[1] + z;
+    return corner(a, c, s->height) + corner(a, d, s->height) + corner(b, c, s->height) +
+           corner(b, d, s->height);
+}
+
+static void check_floor(double half_x, double half_z, double height, const char *what) {
+    static const int32_t methods[] = {VSH_AO_EXACT, VSH_AO_ADAPTIVE};
+    stage *s = set_up(half_x, half_z, height, BOXES);
+    for (int m = s->triangles != NULL ? 0 : 1; m < 2; ++m) {
+        bake_well(s, methods[m], VSH_UP_Y);
+        double square = 0.0, mean = 0.0;
+        size_t count = 0;
+        for (size_t i = 0; i < COUNT; ++i) {
+            const double x = s->half[0] * (2.0 * ((double)(i % SIDE) + 0.5) / SIDE - 1.0);
+            const double z = s->half[1] * (2.0 * ((double)(i / SIDE) + 0.5) / SIDE - 1.0);
+            const double off = (double)s->sky[i] - opening(s, x, z);
+            count += s->coverage[i] > 0.0f;
+            square += s->coverage[i] > 0.0f ? off * off : 0.0;
+            mean += s->coverage[i] > 0.0f ? off : 0.0;
+        }
+        const double n = (double)count, rmse = sqrt(square / n);
+        print_message("%s, %s: rmse %.4f, bias %.4f of %zu\n", what, vsh_ao_method_name(methods[m]), rmse,
+                      mean / n, count);
+        assert_true(count > COUNT * 8 / 10);
+        assert_true(rmse < 0.02);
+    }
+    tear_down(s);
+}
+
+static void the_bottom_of_wells_and_trenches_sees_their_opening(void **state) {
+    (void)state;
+    check_floor(1.0, 1.0, 1.0, "well");
+    check_floor(0.5, 6.0, 1.0, "trench");
+}
+
+static void open_floors_walls_and_ceilings_see_one_half_and_nothing(void **state) {
+    (void)state;
+    static const int32_t methods[] = {VSH_AO_EXACT, VSH_AO_ADAPTIVE, VSH_AO_RAYS};
+    static const struct {
+        int32_t up;
+        float value;
+    } of_floor[] = {{VSH_UP_Y, 1.0f}, {VSH_UP_X, 0.5f}, {VSH_UP_MINUS_Z, 0.5f}, {VSH_UP_MINUS_Y, 0.0f}};
+    stage *s = set_up(2.0, 2.0, 1.0, 1);
+    for (int m = s->triangles != NULL ? 0 : 1; m < 3; ++m) {
+        for (size_t u = 0; u < sizeof of_floor / sizeof of_floor[0]; ++u) {
+            bake_well(s, methods[m], of_floor[u].up);
+            for (size_t i = 0; i < COUNT; ++i) {
+                assert_true(s->sky[i] == of_floor[u].value);
+            }
+        }
+    }
+    tear_down(s);
+}
+
+static void threads_and_bands_change_no_bit(void **state) {
+    (void)state;
+    static const int32_t methods[] = {VSH_AO_EXACT, VSH_AO_ADAPTIVE};
+    stage *s = set_up(1.0, 1.0, 1.0, BOXES);
+    const vsh_mesh mesh = receiver_of(s);
+    const vsh_lightmap_options options = sizes_of(4);
+    vsh_charts *charts = NULL;
+    assert_int_equal(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &charts, NULL), VSH_OK);
+    for (int m = s->triangles != NULL ? 0 : 1; m < 2; ++m) {
+        assert_int_equal(bake_sky(s, s->texels, methods[m], VSH_UP_Y, 1, s->sky, NULL), VSH_OK);
+        assert_int_equal(bake_sky(s, s->texels, methods[m], VSH_UP_Y, 3, s->other, NULL), VSH_OK);
+        assert_memory_equal(s->sky, s->other, sizeof s->sky);
+        memset(s->other, 0, sizeof s->other);
+        for (int32_t row = 0; row < SIDE; row += 16) {
+            vsh_texels *band = NULL;
+            assert_int_equal(vsh_texels_create_band(charts, row, 16, NULL, &band, NULL), VSH_OK);
+            assert_int_equal(bake_sky(s, band, methods[m], VSH_UP_Y, 2, s->other + (size_t)row * SIDE, NULL),
+                             VSH_OK);
+            vsh_texels_free(band);
+        }
+        assert_memory_equal(s->sky, s->other, sizeof s->sky);
+    }
+    vsh_charts_free(charts);
+    tear_down(s);
+}
+
+static void a_sky_without_an_axis_or_rays_is_refused(void **state) {
+    (void)state;
+    stage *s = set_up(1.0, 1.0, 1.0, 1);
+    vsh_error error = {VSH_OK, ""};
+    assert_int_equal(bake_sky(s, s->texels, VSH_AO_ADAPTIVE, 0, 0, s->sky, &error), VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "asked.sky 0"));
+    assert_int_equal(bake_sky(s, s->texels, VSH_AO_ADAPTIVE, 7, 0, s->sky, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(bake_sky(s, s->texels, VSH_AO_CONES, VSH_UP_Y, 0, s->sky, &error), VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "cones"));
+    assert_int_equal(vsh_up("-z"), VSH_UP_MINUS_Z);
+    assert_int_equal(vsh_up("w"), -1);
+    tear_down(s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_bottom_of_wells_and_trenches_sees_their_opening),
+        cmocka_unit_test(open_floors_walls_and_ceilings_see_one_half_and_nothing),
+        cmocka_unit_test(threads_and_bands_change_no_bit),
+        cmocka_unit_test(a_sky_without_an_axis_or_rays_is_refused),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
