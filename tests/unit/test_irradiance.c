@@ -101,16 +101,16 @@ static void a_spot_fades_smoothly_between_its_angles(void **state) {
     }
     /* without a soft edge */
     light.inner_angle = light.outer_angle;
-    light.direction[0] = sin(RADIANS(39.0));
-    light.direction[1] = -cos(RADIANS(39.0));
+    light.axis[0] = sin(RADIANS(39.0));
+    light.axis[1] = -cos(RADIANS(39.0));
     assert_true(red(&light) == 1.0f);
-    light.direction[0] = sin(RADIANS(41.0));
-    light.direction[1] = -cos(RADIANS(41.0));
+    light.axis[0] = sin(RADIANS(41.0));
+    light.axis[1] = -cos(RADIANS(41.0));
     assert_true(red(&light) == 0.0f);
     /* as wide as can be, it is a sphere */
     light.outer_angle = light.inner_angle = PI;
-    light.direction[0] = 0.0;
-    light.direction[1] = 1.0;
+    light.axis[0] = 0.0;
+    light.axis[1] = 1.0;
     assert_true(red(&light) == 1.0f);
 }
 
