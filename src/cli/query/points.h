@@ -8,7 +8,6 @@
 
 #include "base/ply.h"
 #include "cli/temporary.h"
-#include "points_source.h"
 
 #include <stdint.h>
 
@@ -38,6 +37,29 @@ typedef struct cli_points {
 size_t cli_points_bytes(bool normals, bool keep);
 int cli_points_create(size_t room, bool normals, bool keep, cli_points *points);
 void cli_points_free(cli_points *points);
+
+/* Bytes from a file or a pipe, in lines or runs. */
+typedef struct points_source {
+    const char *name; /* for messages */
+    FILE *file;       /* NULL: standard input */
+    bool ended;
+    char *buffer;
+    size_t begin, end, room;
+    uint64_t taken; /* bytes given out */
+    uint64_t size;  /* of a regular file; 0: not known */
+} points_source;
+
+/* "-" is standard input. These return CLI_OK or an exit code, having said why. */
+int points_source_open(const char *path, points_source *source);
+void points_source_close(points_source *source);
+
+/* The next line without its end (\n or \r\n), which is taken; *line NULL at the end of the bytes. Holds until
+ * the next call. */
+int points_source_line(points_source *source, const char **line, size_t *size);
+
+/* The next `size` bytes, which are not taken; *available tells how many there are, fewer at the end only. */
+int points_source_peek(points_source *source, size_t size, const char **bytes, size_t *available);
+void points_source_take(points_source *source, size_t size);
 
 typedef struct cli_points_reader {
     points_source source;

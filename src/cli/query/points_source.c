@@ -1,4 +1,4 @@
-#include "points_source.h"
+#include "points.h"
 
 #include "base/input.h"
 #include "cli/message.h"
