@@ -75,7 +75,7 @@ static void bake(const char *method) {
     write_text("scene.json", scene_text);
     vsh_scene *scene = NULL;
     vsh_error error;
-    assert_ok(vsh_scene_read(at("scene.json"), &scene, &error), &error);
+    assert_ok(vsh_scene_read(at("scene.json"), NULL, &scene, &error), &error);
     vsh_bake_job_options options = vsh_bake_job_options_default();
     options.allow_overlap = 1;
     validated = looked_over = welded = edges_counted = 0;
