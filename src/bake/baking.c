@@ -2,7 +2,7 @@
 
 #include "bake/ao_texels.h"
 #include "bake/average.h"
-#include "bake/bend.h"
+#include "bake/bent_normals.h"
 #include "bake/lattice.h"
 #include "bake/lift.h"
 #include "bake/planes.h"
@@ -149,10 +149,10 @@ vsh_result vshi_bake_ao(vshi_baking *bake, vsh_error *error) {
     }
     VSHI_TRY(vshi_baking_add_error(bake, NULL, square, error));
     if (lightmap->bent != NULL) {
-        VSHI_TRY(
-            vshi_bend(bake->texels, &bake->origins, lightmap->bent_space, &bake->quiet, bake->bent, error));
+        VSHI_TRY(vshi_bent_normals(bake->texels, &bake->origins, lightmap->bent_space, &bake->quiet,
+                                   bake->bent, error));
         VSHI_TRY(vshi_baking_average(bake, bake->bent, 3, lightmap->bent, error));
-        vshi_bend_again(vshi_texels_held(bake->texels), lightmap->bent);
+        vshi_bent_normals_again(vshi_texels_held(bake->texels), lightmap->bent);
     }
     return VSH_OK;
 }
@@ -174,11 +174,11 @@ bool vshi_baking_holds(const vshi_baking *bake) {
 }
 
 vsh_result vshi_baking_choose_held(vshi_baking *bake, vsh_error *error) {
-    const vshi_truth truth = vshi_field_share_truth(bake->occluders, &bake->shade);
+    const vshi_truth truth = vshi_field_error_truth(bake->occluders, &bake->shade);
     const bool traced =
         ((bake->needs & VSHI_NEEDS_LIGHTS) == 0 || vshi_baking_traces_shadow(bake)) &&
         ((bake->needs & (VSHI_NEEDS_AO | VSHI_NEEDS_OPEN)) == 0 || vshi_baking_traces_ao(bake));
-    return vshi_field_share_choose(bake->texels, &bake->origins, bake->state, &truth, traced, &bake->quiet,
+    return vshi_field_error_choose(bake->texels, &bake->origins, bake->state, &truth, traced, &bake->quiet,
                                    &bake->held, error);
 }
 
@@ -194,7 +194,7 @@ vsh_result vshi_baking_add_error(vshi_baking *bake, const vsh_light *light, doub
     vsh_bake_error *sum = error_of(bake, light);
     sum->values += (double)(rows->start[rows->last] - rows->start[rows->first]);
     sum->square_error += bake->stats.shade.square_error - square;
-    return bake->held.count > 0 ? vshi_field_share_add(&bake->held, light, &bake->shade, bake->values, NULL,
+    return bake->held.count > 0 ? vshi_field_error_add(&bake->held, light, &bake->shade, bake->values, NULL,
                                                        &bake->quiet, sum, error)
                                 : VSH_OK;
 }
@@ -207,7 +207,7 @@ vsh_result vshi_baking_add_filled(vshi_baking *bake, vsh_error *error) {
                              : lightmap->shadow != NULL ? lightmap->shadow[i]
                                                         : NULL;
         if (plane != NULL && keeps_error(bake, light)) {
-            VSHI_TRY(vshi_field_share_add(&bake->held, light, &bake->shade, NULL, plane, &bake->quiet,
+            VSHI_TRY(vshi_field_error_add(&bake->held, light, &bake->shade, NULL, plane, &bake->quiet,
                                           error_of(bake, light), error));
         }
     }

@@ -2,10 +2,10 @@
 #ifndef VSHI_BAKE_BAKING_H
 #define VSHI_BAKE_BAKING_H
 
-#include "bake/field_share.h"
-#include "bake/halo.h"
+#include "bake/field_error.h"
+#include "bake/nearest_valid.h"
 #include "bake/origins.h"
-#include "bake/spread.h"
+#include "bake/work_planes.h"
 #include "base/parallel.h"
 
 typedef struct vshi_baking {
@@ -18,7 +18,7 @@ typedef struct vshi_baking {
     vsh_run quiet; /* for steps of milliseconds that come once a plane: no stage of their own */
     const vsh_lightmap *lightmap; /* planes of all rows that the texels hold */
     uint32_t needs;               /* VSHI_NEEDS_… of its planes */
-    vshi_halo halo;
+    vshi_work_planes halo;
     vshi_origins origins;
     vshi_spread spread;
     uint8_t *state;       /* [rows held][width]: VSHI_TEXEL_… */
@@ -30,7 +30,7 @@ typedef struct vshi_baking {
     vsh_layer *layers;    /* the occluders', of points that are lifted already; NULL: none */
     vsh_occluders lifted; /* with them */
     bool layered_ao;
-    vshi_field_share held; /* samples that are held against the casters; none where that is not wanted */
+    vshi_field_error held; /* samples that are held against the casters; none where that is not wanted */
     vsh_bake_stats stats;
 } vshi_baking;
 

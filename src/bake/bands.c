@@ -1,11 +1,11 @@
 /* Charts that are counted once, and cut into bands of rows. */
 #include "bake/ao_texels.h"
 #include "bake/lattice.h"
+#include "bake/nearest_valid.h"
 #include "bake/origins.h"
 #include "bake/padding.h"
 #include "bake/planes.h"
 #include "bake/rows.h"
-#include "bake/spread.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"

@@ -111,8 +111,8 @@ static vsh_result check_limit(const vshi_baking *bake, vsh_error *error) {
                                  .threads = bake->run.threads};
     const double bytes =
         fields_bytes(bake) + (double)texels->info.bytes + vshi_bake_bytes(&need) +
-        vshi_halo_bytes(texels, bake->lightmap, bake->light_count) +
-        (vshi_baking_holds(bake) ? (double)VSHI_FIELD_SHARE_MOST * VSHI_FIELD_SHARE_BYTES : 0.0);
+        vshi_work_planes_bytes(texels, bake->lightmap, bake->light_count) +
+        (vshi_baking_holds(bake) ? (double)VSHI_FIELD_ERROR_MOST * VSHI_FIELD_ERROR_BYTES : 0.0);
     return vshi_check_limit(&bake->run, bytes, "lightmap", error);
 }
 
@@ -130,7 +130,7 @@ static vsh_result run_bake(vshi_baking *bake, vsh_error *error) {
     bake->lifted = *bake->occluders;
     bake->lifted.layers = bake->layers;
     VSHI_TRY_DONE(check_limit(bake, error));
-    VSHI_TRY_DONE(vshi_halo_open(texels, bake->lightmap, bake->light_count, &bake->halo, error));
+    VSHI_TRY_DONE(vshi_work_planes_open(texels, bake->lightmap, bake->light_count, &bake->halo, error));
     bake->lightmap = &bake->halo.lightmap;
     VSHI_TRY_DONE(vshi_allocate((void **)&bake->state, vshi_texels_held(texels), 1, "lightmap", error));
     const vshi_origins_for what = {needs(bake, VSHI_NEEDS_LIGHTS), needs(bake, NEEDS_ANY_AO)};
@@ -148,7 +148,7 @@ static vsh_result run_bake(vshi_baking *bake, vsh_error *error) {
     vshi_coverage_write(texels, &bake->origins, bake->state, bake->lightmap, &bake->stats);
     VSHI_TRY_DONE(pad(bake, bake->stats.invalid_texels, error));
     VSHI_TRY_DONE(vshi_baking_add_filled(bake, error));
-    vshi_halo_give(texels, &bake->halo);
+    vshi_work_planes_copy_back(texels, &bake->halo);
 done:
     free(bake->layers);
     free(bake->tinted);
@@ -157,10 +157,10 @@ done:
     free(bake->deviation);
     free(bake->values);
     free(bake->state);
-    vshi_field_share_free(&bake->held);
+    vshi_field_error_free(&bake->held);
     vshi_spread_free(&bake->spread);
     vshi_origins_free(&bake->origins);
-    vshi_halo_close(&bake->halo);
+    vshi_work_planes_close(&bake->halo);
     return result;
 }
 

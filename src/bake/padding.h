@@ -24,7 +24,7 @@ typedef struct vshi_plane {
     size_t channels;
 } vshi_plane;
 
-/* Invalid texels of charts that have nothing to give (see bake/spread.h) are filled at least this far,
+/* Invalid texels of charts that have nothing to give (see bake/nearest_valid.h) are filled at least this far,
  * texels, since filtering reads across them. */
 enum { VSHI_LEAST_INVALID_RADIUS = 8 };
 

@@ -135,8 +135,8 @@ static void sample_range(int64_t low, int64_t high, int64_t tile_first, int64_t 
     *last = *last < samples - 1 ? *last : samples - 1;
 }
 
-vshi_taken vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle, uint32_t number,
-                           const uint64_t *object, vshi_tile *tile) {
+vshi_tile_overlap vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle,
+                                  uint32_t number, const uint64_t *object, vshi_tile *tile) {
     const int32_t n = raster->supersample;
     const int64_t side = (int64_t)VSHI_TILE * n;
     const int64_t tile_x = (int64_t)tile->column * side, tile_y = (int64_t)tile->row * side;
@@ -146,7 +146,7 @@ vshi_taken vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *tr
                  &x0, &x1);
     sample_range(least(triangle->grid_y), greatest(triangle->grid_y), tile_y, rows < side ? rows : side, &y0,
                  &y1);
-    vshi_taken taken = {0, 0};
+    vshi_tile_overlap taken = {0, 0};
     if (x0 > x1 || y0 > y1) {
         return taken;
     }

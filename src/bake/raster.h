@@ -49,15 +49,15 @@ typedef struct vshi_tile {
 void vshi_tile_begin(const vshi_raster *raster, size_t column, size_t row, vshi_tile *tile);
 
 /* Texels of a tile where a triangle finds samples taken already; shared edges are none. */
-typedef struct vshi_taken {
+typedef struct vshi_tile_overlap {
     uint64_t texels;
     uint64_t others; /* of them, those with a sample that a triangle of another object took */
-} vshi_taken;
+} vshi_tile_overlap;
 
 /* Gives the free samples inside the triangle (top-left rule, so that shared edges are of one) to `number`
  * (triangle + 1). `object` [triangles] tells objects apart; NULL: not asked for. */
-vshi_taken vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle, uint32_t number,
-                           const uint64_t *object, vshi_tile *tile);
+vshi_tile_overlap vshi_tile_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle,
+                                  uint32_t number, const uint64_t *object, vshi_tile *tile);
 
 /* Texels without any covered sample that the triangle's inside reaches become border texels; called in the
  * order of the triangles once all have covered, so that the first of equally near ones stays. */

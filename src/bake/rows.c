@@ -78,7 +78,7 @@ void vshi_row_close(vshi_row *work) {
 }
 
 /* Texels that a mesh covers again, each counted once. */
-static void count_overlap(const vshi_overlaps *overlaps, size_t mesh, const vshi_taken *taken) {
+static void count_overlap(const vshi_overlaps *overlaps, size_t mesh, const vshi_tile_overlap *taken) {
     if (overlaps->texels != NULL && taken->texels != 0) {
         atomic_fetch_add_explicit(&overlaps->texels[mesh], (size_t)__builtin_popcountll(taken->texels),
                                   memory_order_relaxed);
@@ -109,18 +109,18 @@ void vshi_row_tile(const vshi_charts *charts, vshi_row *work, size_t column, con
     const size_t count = work->tile_start[column + 1] - work->tile_start[column];
     vshi_tile_begin(&charts->raster, column, work->row, &work->tile);
     size_t mesh = 0;
-    vshi_taken again = {0, 0};
+    vshi_tile_overlap again = {0, 0};
     for (size_t i = 0; i < count; ++i) {
         const uint32_t s = slot[i];
-        const vshi_taken taken = vshi_tile_cover(&charts->raster, &work->triangle[s], s + 1,
-                                                 overlaps != NULL ? work->object : NULL, &work->tile);
+        const vshi_tile_overlap taken = vshi_tile_cover(&charts->raster, &work->triangle[s], s + 1,
+                                                        overlaps != NULL ? work->object : NULL, &work->tile);
         if (overlaps == NULL || taken.texels == 0) {
             continue;
         }
         if (work->mesh[s] != mesh) {
             count_overlap(overlaps, mesh, &again);
             mesh = work->mesh[s];
-            again = (vshi_taken){0, 0};
+            again = (vshi_tile_overlap){0, 0};
         }
         if (overlaps->owners != NULL && mesh == overlaps->watched) {
             count_owners(charts, work, s, taken.others & ~again.others, overlaps);

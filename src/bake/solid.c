@@ -2,7 +2,7 @@
 
 #include "heightfield/heights.h"
 #include "shade/occluders.h"
-#include "spheres/balls.h"
+#include "spheres/sphere_tree.h"
 
 #include <math.h>
 
@@ -41,7 +41,7 @@ void vshi_solid_sample(const vshi_solid *solid, size_t count, const double *posi
     }
     for (size_t s = 0; s < solid->spheres_count; ++s) {
         for (size_t i = 0; i < count; ++i) {
-            lower(&distances[i], (float)vshi_balls_distance(solid->spheres[s], positions + 3 * i));
+            lower(&distances[i], (float)vshi_sphere_tree_distance(solid->spheres[s], positions + 3 * i));
         }
     }
 }

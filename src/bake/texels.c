@@ -1,6 +1,6 @@
 #include "bake/texels.h"
 #include "bake/rows.h"
-#include "bake/surface.h"
+#include "bake/smooth_surface.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"

@@ -48,7 +48,7 @@ vsh_run cli_common_run(const cli_common *common) {
     run.confined = common->confined;
     run.allow_outside = common->allow_outside;
     run.progress = cli_progress_report;
-    run.warning = cli_warnings_take;
+    run.warning = cli_warnings_parse;
     cli_warnings_begin(common->verbose, common->quiet);
     return run;
 }
@@ -60,15 +60,15 @@ static int check_reader(const cli_common *common) {
     return CLI_OK;
 }
 
-int cli_common_take(cli_common *common, int key, const char *name, const char *value, bool *taken) {
+int cli_common_parse(cli_common *common, int key, const char *name, const char *value, bool *taken) {
     *taken = true;
     switch (key) {
     case CLI_KEY_THREADS:
-        return cli_take_integer(name, value, 1, 1024, &common->threads);
+        return cli_parse_integer(name, value, 1, 1024, &common->threads);
     case CLI_KEY_MEMORY_LIMIT:
-        return cli_take_bytes(name, value, &common->memory_limit);
+        return cli_parse_bytes(name, value, &common->memory_limit);
     case CLI_KEY_ISA:
-        return cli_take_name(name, value, vsh_isa, vsh_isa_name, &common->isa);
+        return cli_parse_name(name, value, vsh_isa, vsh_isa_name, &common->isa);
     case CLI_KEY_TRUSTED:
         common->trusted = true;
         return check_reader(common);

@@ -62,22 +62,22 @@ void cli_print_help(const cli_command *command);
 const char *cli_nearest(const char *text, const char *const *candidates, size_t count);
 
 /* Strict parsing: the whole text, finite, in the range; says what was expected. */
-int cli_take_number(const char *name, const char *text, double least, double most, double *value);
-int cli_take_positive(const char *name, const char *text, double *value); /* > 0 */
-int cli_take_integer(const char *name, const char *text, int32_t least, int32_t most, int32_t *value);
-int cli_take_vector(const char *name, const char *text, double value[3]);           /* X,Y,Z, not all 0 */
-int cli_take_point(const char *name, const char *text, double value[3]);            /* X,Y,Z */
-int cli_take_color(const char *name, const char *text, double value[3]);            /* R,G,B, >= 0 */
-int cli_take_box(const char *name, const char *text, double min[3], double max[3]); /* X0,Y0,Z0,X1,Y1,Z1 */
-int cli_take_size(const char *name, const char *text, int32_t *w, int32_t *h);      /* W[xH] */
-int cli_take_bytes(const char *name, const char *text, uint64_t *value);            /* 500M, 2GiB */
+int cli_parse_number(const char *name, const char *text, double least, double most, double *value);
+int cli_parse_positive(const char *name, const char *text, double *value); /* > 0 */
+int cli_parse_integer(const char *name, const char *text, int32_t least, int32_t most, int32_t *value);
+int cli_parse_vector(const char *name, const char *text, double value[3]);           /* X,Y,Z, not all 0 */
+int cli_parse_point(const char *name, const char *text, double value[3]);            /* X,Y,Z */
+int cli_parse_color(const char *name, const char *text, double value[3]);            /* R,G,B, >= 0 */
+int cli_parse_box(const char *name, const char *text, double min[3], double max[3]); /* X0,Y0,Z0,X1,Y1,Z1 */
+int cli_parse_size(const char *name, const char *text, int32_t *w, int32_t *h);      /* W[xH] */
+int cli_parse_bytes(const char *name, const char *text, uint64_t *value);            /* 500M, 2GiB */
 
-int cli_take_bits(const char *name, const char *text, int32_t *bits);         /* 8, 16, 32 */
-int cli_take_color_space(const char *name, const char *text, int32_t *space); /* VSH_COLOR_… */
+int cli_parse_bits(const char *name, const char *text, int32_t *bits);         /* 8, 16, 32 */
+int cli_parse_color_space(const char *name, const char *text, int32_t *space); /* VSH_COLOR_… */
 
 /* A name out of the library's list, or an error that shows the list. */
-int cli_take_name(const char *name, const char *text, int32_t (*value_of)(const char *),
-                  const char *(*name_of)(int32_t), int32_t *value);
+int cli_parse_name(const char *name, const char *text, int32_t (*value_of)(const char *),
+                   const char *(*name_of)(int32_t), int32_t *value);
 
 /* Options that every long command has. */
 typedef struct cli_common {
@@ -159,6 +159,6 @@ enum {
     }
 
 /* Takes an option of the tables above but the last; *taken tells whether it was one of them. */
-int cli_common_take(cli_common *common, int key, const char *name, const char *value, bool *taken);
+int cli_common_parse(cli_common *common, int key, const char *name, const char *value, bool *taken);
 
 #endif

@@ -24,7 +24,7 @@ static bool read_number(const char *text, double *value, const char **rest) {
     return end != text && isfinite(*value);
 }
 
-int cli_take_number(const char *name, const char *text, double least, double most, double *value) {
+int cli_parse_number(const char *name, const char *text, double least, double most, double *value) {
     const char *rest;
     if (!read_number(text, value, &rest) || *rest != '\0' || *value < least || *value > most) {
         return cli_usage("%s '%s': expected a number from %g to %g", name, text, least, most);
@@ -32,7 +32,7 @@ int cli_take_number(const char *name, const char *text, double least, double mos
     return CLI_OK;
 }
 
-int cli_take_positive(const char *name, const char *text, double *value) {
+int cli_parse_positive(const char *name, const char *text, double *value) {
     const char *rest;
     if (!read_number(text, value, &rest) || *rest != '\0' || !(*value > 0.0)) {
         return cli_usage("%s '%s': expected a number greater than 0", name, text);
@@ -55,7 +55,7 @@ static bool read_integer(const char *text, int32_t *value, const char **rest) {
     return true;
 }
 
-int cli_take_integer(const char *name, const char *text, int32_t least, int32_t most, int32_t *value) {
+int cli_parse_integer(const char *name, const char *text, int32_t least, int32_t most, int32_t *value) {
     const char *rest;
     if (!read_integer(text, value, &rest) || *rest != '\0' || *value < least || *value > most) {
         return cli_usage("%s '%s': expected a whole number from %d to %d", name, text, least, most);
@@ -73,26 +73,26 @@ static bool read_numbers(const char *text, int count, double *value) {
     return good;
 }
 
-int cli_take_vector(const char *name, const char *text, double value[3]) {
+int cli_parse_vector(const char *name, const char *text, double value[3]) {
     if (!read_numbers(text, 3, value) || (value[0] == 0.0 && value[1] == 0.0 && value[2] == 0.0)) {
         return cli_usage("%s '%s': expected X,Y,Z, three numbers that are not all 0", name, text);
     }
     return CLI_OK;
 }
 
-int cli_take_point(const char *name, const char *text, double value[3]) {
+int cli_parse_point(const char *name, const char *text, double value[3]) {
     return read_numbers(text, 3, value) ? CLI_OK
                                         : cli_usage("%s '%s': expected X,Y,Z, three numbers", name, text);
 }
 
-int cli_take_color(const char *name, const char *text, double value[3]) {
+int cli_parse_color(const char *name, const char *text, double value[3]) {
     if (!read_numbers(text, 3, value) || value[0] < 0.0 || value[1] < 0.0 || value[2] < 0.0) {
         return cli_usage("%s '%s': expected R,G,B, three numbers from 0", name, text);
     }
     return CLI_OK;
 }
 
-int cli_take_box(const char *name, const char *text, double min[3], double max[3]) {
+int cli_parse_box(const char *name, const char *text, double min[3], double max[3]) {
     double value[6] = {0.0};
     const bool good = read_numbers(text, 6, value);
     memcpy(min, value, 3 * sizeof *min);
@@ -105,7 +105,7 @@ int cli_take_box(const char *name, const char *text, double min[3], double max[3
     return CLI_OK;
 }
 
-int cli_take_size(const char *name, const char *text, int32_t *w, int32_t *h) {
+int cli_parse_size(const char *name, const char *text, int32_t *w, int32_t *h) {
     const char *at;
     bool good = read_integer(text, w, &at);
     if (good && *at == 'x') {
@@ -121,7 +121,7 @@ int cli_take_size(const char *name, const char *text, int32_t *w, int32_t *h) {
     return CLI_OK;
 }
 
-int cli_take_bytes(const char *name, const char *text, uint64_t *value) {
+int cli_parse_bytes(const char *name, const char *text, uint64_t *value) {
     static const struct {
         const char *suffix;
         double factor;
@@ -140,8 +140,8 @@ int cli_take_bytes(const char *name, const char *text, uint64_t *value) {
     return cli_usage("%s '%s': expected bytes, with k, M, G, KiB, MiB or GiB behind the number", name, text);
 }
 
-int cli_take_name(const char *option, const char *text, int32_t (*value_of)(const char *),
-                  const char *(*name_of)(int32_t), int32_t *value) {
+int cli_parse_name(const char *option, const char *text, int32_t (*value_of)(const char *),
+                   const char *(*name_of)(int32_t), int32_t *value) {
     *value = value_of(text);
     if (*value >= 0) {
         return CLI_OK;
@@ -154,7 +154,7 @@ int cli_take_name(const char *option, const char *text, int32_t (*value_of)(cons
     return cli_usage("%s '%s': expected one of %s", option, text, list);
 }
 
-int cli_take_color_space(const char *name, const char *value, int32_t *space) {
+int cli_parse_color_space(const char *name, const char *value, int32_t *space) {
     for (int32_t i = VSH_COLOR_AUTO; i <= VSH_COLOR_SRGB; ++i) {
         if (strcmp(value, vsh_color_space_name(i)) == 0) {
             *space = i;
@@ -164,7 +164,7 @@ int cli_take_color_space(const char *name, const char *value, int32_t *space) {
     return cli_usage("%s '%s': expected auto, linear or srgb", name, value);
 }
 
-int cli_take_bits(const char *name, const char *value, int32_t *bits) {
+int cli_parse_bits(const char *name, const char *value, int32_t *bits) {
     static const char *const widths[] = {"8", "16", "32"};
     for (int i = 0; i < 3; ++i) {
         if (strcmp(value, widths[i]) == 0) {

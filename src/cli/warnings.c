@@ -152,7 +152,7 @@ static void keep(kind *of, const char *message, const example *about) {
     ++of->count;
 }
 
-void cli_warnings_take(void *user, const char *message) {
+void cli_warnings_parse(void *user, const char *message) {
     (void)user;
     if (state.quiet) {
         return;
@@ -214,5 +214,5 @@ void cli_warn(const char *format, ...) {
     va_start(arguments, format);
     vsnprintf(line, sizeof line, format, arguments);
     va_end(arguments);
-    cli_warnings_take(NULL, line);
+    cli_warnings_parse(NULL, line);
 }

@@ -9,7 +9,7 @@
 void cli_warnings_begin(bool all, bool quiet);
 
 /* Takes one: "file.glb: mesh 'sail': 4 open edges: …". For vsh_run; any thread. */
-void cli_warnings_take(void *user, const char *message);
+void cli_warnings_parse(void *user, const char *message);
 
 /* The same of one that the program makes. */
 void cli_warn(const char *format, ...) __attribute__((format(printf, 1, 2)));

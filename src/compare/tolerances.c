@@ -61,13 +61,13 @@ static entry no_entry(const char *channel) {
 static const vshi_key channel_keys[] = {LIMITS};
 static const vshi_table channel_table = VSHI_TABLE(channel_keys);
 
-static vsh_result read_channels(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_channels(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_tolerances *made = member;
     vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
     void *memory = NULL;
     const size_t count = result == VSH_OK ? json_object_size(value->json) : 0;
     result =
-        result == VSH_OK ? vshi_reader_allocate(reader, &memory, count, sizeof(entry), "channels") : result;
+        result == VSH_OK ? vshi_json_allocate(reader, &memory, count, sizeof(entry), "channels") : result;
     made->channels = memory;
     for (void *i = json_object_iter(value->json); i != NULL && result == VSH_OK;
          i = json_object_iter_next(value->json, i)) {
@@ -75,7 +75,7 @@ static vsh_result read_channels(vshi_reader *reader, const vshi_value *value, vo
                                  json_object_iter_value(i)};
         entry *e = &made->channels[made->channel_count];
         const char *name;
-        result = vshi_reader_copy(reader, 0, item.key, &name);
+        result = vshi_json_copy(reader, 0, item.key, &name);
         if (result == VSH_OK) {
             *e = no_entry(name);
             result = vshi_read_object(reader, &item, &channel_table, 1, "a channel's tolerances", e);
@@ -111,9 +111,9 @@ vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vs
     if (made == NULL) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
     } else {
-        vshi_reader reader = {path, text, size, NULL, error};
+        vshi_json reader = {path, text, size, NULL, error};
         made->all = no_entry(NULL);
-        result = vshi_reader_load(&reader, &json);
+        result = vshi_json_load(&reader, &json);
         if (result == VSH_OK) {
             const vshi_value root = {NULL, NULL, 0, 0, json};
             result = vshi_read_object(&reader, &root, &file_table, 1, "tolerances", made);

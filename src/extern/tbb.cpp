@@ -2,7 +2,7 @@
 #include "base/parallel.h"
 #include "base/threads.h"
 #include "extern/guard.h"
-#include "extern/handover.h"
+#include "extern/tsan.h"
 
 #include <algorithm>
 #include <optional>

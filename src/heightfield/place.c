@@ -37,9 +37,9 @@ vshi_stand vshi_heights_stand(const vsh_heights *heights, const vsh_points *poin
     if (!vshi_finite(p)) {
         return VSHI_STAND_INVALID;
     }
-    const vshi_relief *r = &heights->relief;
+    const vshi_height_pyramid *r = &heights->relief;
     if (p.x >= 0.0 && p.x <= r->columns - 1 && p.z >= 0.0 && p.z <= (r->rows - 1) * r->depth) {
-        const double surface = vshi_relief_height(r, p.x, p.z);
+        const double surface = vshi_height_pyramid_height(r, p.x, p.z);
         if (p.y < surface && p.y >= surface - UNDER) {
             p.y = surface;
         } else if (p.y < surface && p.y > r->bottom) {
@@ -52,7 +52,7 @@ vshi_stand vshi_heights_stand(const vsh_heights *heights, const vsh_points *poin
     return VSHI_STAND_FREE;
 }
 
-double vshi_heights_under(const vshi_relief *r, const double at[3], double x, double z) {
+double vshi_heights_under(const vshi_height_pyramid *r, const double at[3], double x, double z) {
     const double ends[2] = {r->columns - 1, (r->rows - 1) * r->depth};
     const double from[2] = {at[0], at[2]}, along[2] = {x, z};
     double near = 0.0, far = INFINITY;

@@ -2,8 +2,8 @@
 #ifndef VSHI_ANALYTIC_PLACE_H
 #define VSHI_ANALYTIC_PLACE_H
 
+#include "heightfield/height_pyramid.h"
 #include "heightfield/heights.h"
-#include "heightfield/relief.h"
 
 /* The walk of the best instruction set here. */
 vshi_walk_fn *vshi_walk_of_machine(void);
@@ -22,6 +22,6 @@ vshi_stand vshi_heights_stand(const vsh_heights *heights, const vsh_points *poin
 vshi_vec vshi_heights_direction(const vsh_heights *heights, vshi_vec direction);
 
 /* The slope below which a direction along the ground passes under the solid; -INFINITY where none does. */
-double vshi_heights_under(const vshi_relief *relief, const double at[3], double x, double z);
+double vshi_heights_under(const vshi_height_pyramid *relief, const double at[3], double x, double z);
 
 #endif

@@ -2,7 +2,7 @@
 #ifndef VSHI_ANALYTIC_SLICES_H
 #define VSHI_ANALYTIC_SLICES_H
 
-#include "heightfield/relief.h"
+#include "heightfield/height_pyramid.h"
 
 /* One slice: the directions of one azimuth within the disc. The disc is that of the tangent plane a unit away
  * along the light's axis; all azimuths' lines in it meet at the zenith. */

@@ -97,11 +97,12 @@ VSHI_SHARED void vshi_image_file_name(vsh_image_file *file, int32_t channel, con
 vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_image_file **file,
                                   vsh_error *error);
 
-struct vshi_take;
+struct vshi_decoder;
 
 /* What a reader has handed over; everything in it is checked. Errors: VSH_ERROR_READ where it does not hold,
  * and as for what was made in this process. */
-vsh_result vshi_image_take(struct vshi_take *take, const char *path, vsh_image_file **file, vsh_error *error);
+vsh_result vshi_image_decode(struct vshi_decoder *decoder, const char *path, vsh_image_file **file,
+                             vsh_error *error);
 
 #ifdef __cplusplus
 }

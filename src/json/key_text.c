@@ -138,7 +138,7 @@ vsh_result vshi_read_text(const vshi_key *key, const char *name, const char *tex
         }
     } else if (text != NULL || key->kind == VSHI_BOOL) {
         vsh_error unused; /* it tells of places in a file */
-        vshi_reader reader = {name, "", 0, NULL, &unused};
+        vshi_json reader = {name, "", 0, NULL, &unused};
         const vshi_value value = {NULL, NULL, 0, 0, json_of(key, text)};
         result = value.json != NULL ? vshi_read_value(&reader, &value, key, member) : VSH_ERROR_INPUT;
         json_decref(value.json);

@@ -15,12 +15,12 @@ static const char *type_name(json_type type) {
     return names[type];
 }
 
-vsh_result vshi_expect(const vshi_reader *reader, const vshi_value *value, json_type type) {
+vsh_result vshi_expect(const vshi_json *reader, const vshi_value *value, json_type type) {
     const json_type found = json_typeof(value->json);
     if (type_name(found) == type_name(type)) { /* one for both kinds of numbers, and of booleans */
         return VSH_OK;
     }
-    return vshi_reader_fail(reader, value, "expected %s, found %s", type_name(type), type_name(found));
+    return vshi_json_fail(reader, value, "expected %s, found %s", type_name(type), type_name(found));
 }
 
 static bool in_range(const vshi_key *key, double number) {
@@ -29,7 +29,7 @@ static bool in_range(const vshi_key *key, double number) {
     return above && below;
 }
 
-static vsh_result read_number(const vshi_reader *reader, const vshi_value *value, const vshi_key *key,
+static vsh_result read_number(const vshi_json *reader, const vshi_value *value, const vshi_key *key,
                               double *number) {
     const vsh_result result = vshi_expect(reader, value, JSON_REAL);
     if (result != VSH_OK) {
@@ -37,14 +37,14 @@ static vsh_result read_number(const vshi_reader *reader, const vshi_value *value
     }
     *number = json_number_value(value->json);
     if (!in_range(key, *number)) {
-        return vshi_reader_fail(reader, value, "%.9g is out of range %.9g%s … %.9g%s", *number, key->lowest,
-                                (key->flags & VSHI_ABOVE) != 0 ? " (excluded)" : "", key->highest,
-                                (key->flags & VSHI_BELOW) != 0 ? " (excluded)" : "");
+        return vshi_json_fail(reader, value, "%.9g is out of range %.9g%s … %.9g%s", *number, key->lowest,
+                              (key->flags & VSHI_ABOVE) != 0 ? " (excluded)" : "", key->highest,
+                              (key->flags & VSHI_BELOW) != 0 ? " (excluded)" : "");
     }
     return VSH_OK;
 }
 
-static vsh_result read_integer(const vshi_reader *reader, const vshi_value *value, const vshi_key *key,
+static vsh_result read_integer(const vshi_json *reader, const vshi_value *value, const vshi_key *key,
                                int32_t *integer) {
     double number;
     const vsh_result result = read_number(reader, value, key, &number);
@@ -52,13 +52,13 @@ static vsh_result read_integer(const vshi_reader *reader, const vshi_value *valu
         return result;
     }
     if (number != floor(number)) {
-        return vshi_reader_fail(reader, value, "%.9g is not a whole number", number);
+        return vshi_json_fail(reader, value, "%.9g is not a whole number", number);
     }
     *integer = (int32_t)number;
     return VSH_OK;
 }
 
-static vsh_result read_vector(const vshi_reader *reader, const vshi_value *value, const vshi_key *key,
+static vsh_result read_vector(const vshi_json *reader, const vshi_value *value, const vshi_key *key,
                               double *vector) {
     vsh_result result = vshi_expect(reader, value, JSON_ARRAY);
     if (result != VSH_OK) {
@@ -66,7 +66,7 @@ static vsh_result read_vector(const vshi_reader *reader, const vshi_value *value
     }
     const size_t size = json_array_size(value->json);
     if (size != (size_t)key->count) {
-        return vshi_reader_fail(reader, value, "expected %d numbers, found %zu", (int)key->count, size);
+        return vshi_json_fail(reader, value, "expected %d numbers, found %zu", (int)key->count, size);
     }
     bool zero = true;
     for (size_t i = 0; i < size; ++i) {
@@ -78,12 +78,12 @@ static vsh_result read_vector(const vshi_reader *reader, const vshi_value *value
         zero = zero && vector[i] == 0.0;
     }
     if (zero && (key->flags & VSHI_NONZERO) != 0) {
-        return vshi_reader_fail(reader, value, "is zero, and so points nowhere");
+        return vshi_json_fail(reader, value, "is zero, and so points nowhere");
     }
     return VSH_OK;
 }
 
-static vsh_result read_name(const vshi_reader *reader, const vshi_value *value, vshi_name_fn *name_of,
+static vsh_result read_name(const vshi_json *reader, const vshi_value *value, vshi_name_fn *name_of,
                             int32_t *index) {
     const vsh_result result = vshi_expect(reader, value, JSON_STRING);
     if (result != VSH_OK) {
@@ -100,23 +100,23 @@ static vsh_result read_name(const vshi_reader *reader, const vshi_value *value, 
         const size_t length = strlen(known);
         snprintf(known + length, sizeof known - length, "%s%s", i == 0 ? "" : ", ", name);
     }
-    return vshi_reader_fail(reader, value, "\"%.64s\" is none of %s", given, known);
+    return vshi_json_fail(reader, value, "\"%.64s\" is none of %s", given, known);
 }
 
-static vsh_result read_string(vshi_reader *reader, const vshi_value *value, bool path, const char **string) {
+static vsh_result read_string(vshi_json *reader, const vshi_value *value, bool path, const char **string) {
     const vsh_result result = vshi_expect(reader, value, JSON_STRING);
     if (result != VSH_OK) {
         return result;
     }
     const char *given = json_string_value(value->json);
     if (given[0] == '\0') {
-        return vshi_reader_fail(reader, value, "is empty");
+        return vshi_json_fail(reader, value, "is empty");
     }
     const char *slash = path && given[0] != '/' ? strrchr(reader->path, '/') : NULL;
-    return vshi_reader_copy(reader, slash == NULL ? 0 : (size_t)(slash - reader->path) + 1, given, string);
+    return vshi_json_copy(reader, slash == NULL ? 0 : (size_t)(slash - reader->path) + 1, given, string);
 }
 
-vsh_result vshi_read_value(vshi_reader *reader, const vshi_value *value, const vshi_key *key, void *member) {
+vsh_result vshi_read_value(vshi_json *reader, const vshi_value *value, const vshi_key *key, void *member) {
     vsh_result result = VSH_OK;
     switch (key->kind) {
     case VSHI_NUMBER:
@@ -148,7 +148,7 @@ vsh_result vshi_read_value(vshi_reader *reader, const vshi_value *value, const v
     return result;
 }
 
-vsh_result vshi_read_choice(vshi_reader *reader, const vshi_value *object, const char *key,
+vsh_result vshi_read_choice(vshi_json *reader, const vshi_value *object, const char *key,
                             vshi_name_fn *name_of, int32_t *index) {
     vshi_value value;
     return vshi_member(object, key, &value) ? read_name(reader, &value, name_of, index) : VSH_OK;
@@ -158,7 +158,7 @@ static bool has_variant(uint32_t variants, uint32_t variant) {
     return variants == 0 || (variants & variant) != 0;
 }
 
-static vsh_result fail_unknown(const vshi_reader *reader, const vshi_value *member, const vshi_table *table,
+static vsh_result fail_unknown(const vshi_json *reader, const vshi_value *member, const vshi_table *table,
                                uint32_t variant, const char *what) {
     const char *nearest = NULL;
     size_t distance = SIZE_MAX;
@@ -166,7 +166,7 @@ static vsh_result fail_unknown(const vshi_reader *reader, const vshi_value *memb
         const vshi_key *key = &table->keys[i];
         if (!has_variant(key->variants, variant)) {
             if (strcmp(key->name, member->key) == 0) {
-                return vshi_reader_fail_key(reader, member, "is no key of %s", what);
+                return vshi_json_fail_key(reader, member, "is no key of %s", what);
             }
             continue;
         }
@@ -177,12 +177,12 @@ static vsh_result fail_unknown(const vshi_reader *reader, const vshi_value *memb
         }
     }
     if (nearest != NULL && vshi_is_near(distance, nearest)) {
-        return vshi_reader_fail_key(reader, member, "unknown key; did you mean \"%s\"?", nearest);
+        return vshi_json_fail_key(reader, member, "unknown key; did you mean \"%s\"?", nearest);
     }
-    return vshi_reader_fail_key(reader, member, "unknown key");
+    return vshi_json_fail_key(reader, member, "unknown key");
 }
 
-vsh_result vshi_read_object(vshi_reader *reader, const vshi_value *object, const vshi_table *table,
+vsh_result vshi_read_object(vshi_json *reader, const vshi_value *object, const vshi_table *table,
                             uint32_t variant, const char *what, void *target) {
     vsh_result result = vshi_expect(reader, object, JSON_OBJECT);
     if (result != VSH_OK) {
@@ -215,13 +215,13 @@ vsh_result vshi_read_object(vshi_reader *reader, const vshi_value *object, const
         /* of an object that is no variant yet, only what all need */
         const bool needed = variant == VSHI_ALL ? key->required == VSHI_ALL : (key->required & variant) != 0;
         if (needed && json_object_get(object->json, key->name) == NULL) {
-            return vshi_reader_fail(reader, object, "key \"%s\" is missing: %s needs it", key->name, what);
+            return vshi_json_fail(reader, object, "key \"%s\" is missing: %s needs it", key->name, what);
         }
     }
     return VSH_OK;
 }
 
-vsh_result vshi_read_list(vshi_reader *reader, const vshi_value *array, size_t lowest, size_t highest,
+vsh_result vshi_read_list(vshi_json *reader, const vshi_value *array, size_t lowest, size_t highest,
                           size_t item_size, vshi_read_fn *read, void **items, size_t *count) {
     vsh_result result = vshi_expect(reader, array, JSON_ARRAY);
     if (result != VSH_OK) {
@@ -229,10 +229,9 @@ vsh_result vshi_read_list(vshi_reader *reader, const vshi_value *array, size_t l
     }
     const size_t size = json_array_size(array->json);
     if (size < lowest || size > highest) {
-        return vshi_reader_fail(reader, array, "has %zu items, out of range %zu … %zu", size, lowest,
-                                highest);
+        return vshi_json_fail(reader, array, "has %zu items, out of range %zu … %zu", size, lowest, highest);
     }
-    result = vshi_reader_allocate(reader, items, size, item_size, array->key);
+    result = vshi_json_allocate(reader, items, size, item_size, array->key);
     for (size_t i = 0; i < size && result == VSH_OK; ++i) {
         const vshi_value item = vshi_item(array, i);
         result = read(reader, &item, (char *)*items + i * item_size);

@@ -2,7 +2,7 @@
 #ifndef VSHI_KEYS_H
 #define VSHI_KEYS_H
 
-#include "json/reader.h"
+#include "json/json.h"
 
 /* Magnitudes over this are no scene: a double then no longer tells points a unit apart, and products of a few
  * such numbers are not finite. */
@@ -32,7 +32,7 @@ enum {
 typedef const char *vshi_name_fn(int32_t i);
 
 /* Reads a value into the struct's member at the key's offset. */
-typedef vsh_result vshi_read_fn(vshi_reader *reader, const vshi_value *value, void *member);
+typedef vsh_result vshi_read_fn(vshi_json *reader, const vshi_value *value, void *member);
 
 /* How a key is given as a text, on a command line say, and told of. All zero: it stands in files alone. */
 typedef struct vshi_option {
@@ -74,11 +74,11 @@ typedef struct vshi_table {
 /* Reads an object's members, in the order of the text, into `target`. `variant` is one bit; `what` describes
  * the object ("a spot light"). Errors: VSH_ERROR_INPUT at the first key that is unknown, not of this variant,
  * missing, of the wrong type or out of range. */
-vsh_result vshi_read_object(vshi_reader *reader, const vshi_value *object, const vshi_table *table,
+vsh_result vshi_read_object(vshi_json *reader, const vshi_value *object, const vshi_table *table,
                             uint32_t variant, const char *what, void *target);
 
 /* Reads one value as `key` says into `member`. */
-vsh_result vshi_read_value(vshi_reader *reader, const vshi_value *value, const vshi_key *key, void *member);
+vsh_result vshi_read_value(vshi_json *reader, const vshi_value *value, const vshi_key *key, void *member);
 
 /* Reads a text as `key` says into `target`: numbers with commas between them, names, VSHI_BOOL "true",
  * "false", or NULL for true. Strings are kept as the pointers that they are. Errors: VSH_ERROR_INPUT, "NAME
@@ -96,14 +96,14 @@ void vshi_key_range(const vshi_key *key, char *text, size_t size);
 void vshi_key_value(const vshi_key *key, const void *target, char *text, size_t size);
 
 /* Number of the name that is the value of `key`; *index is left alone where there is no such key. */
-vsh_result vshi_read_choice(vshi_reader *reader, const vshi_value *object, const char *key,
+vsh_result vshi_read_choice(vshi_json *reader, const vshi_value *object, const char *key,
                             vshi_name_fn *name_of, int32_t *index);
 
 /* Fails where `value` is not of a JSON type. */
-vsh_result vshi_expect(const vshi_reader *reader, const vshi_value *value, json_type type);
+vsh_result vshi_expect(const vshi_json *reader, const vshi_value *value, json_type type);
 
 /* Reads an array of objects, each into an item of `item_size` bytes, with `read`. */
-vsh_result vshi_read_list(vshi_reader *reader, const vshi_value *array, size_t lowest, size_t highest,
+vsh_result vshi_read_list(vshi_json *reader, const vshi_value *array, size_t lowest, size_t highest,
                           size_t item_size, vshi_read_fn *read, void **items, size_t *count);
 
 #endif

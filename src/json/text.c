@@ -2,7 +2,7 @@
 #include "base/input.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "json/reader.h"
+#include "json/json.h"
 
 #include <errno.h>
 #include <stdio.h>

@@ -55,16 +55,20 @@ extern "C" {
          (const char *path, const char *name, const vsh_run *run, vsh_voxels **voxels, vsh_error *error),    \
          (path, name, run, voxels, error), voxels)                                                           \
     MAKE(vshi_serve_grid,                                                                                    \
-         (const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload, vsh_error *error),    \
+         (const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,                \
+          vsh_error *error),                                                                                 \
          (path, request, run, payload, error), nothing)                                                      \
     MAKE(vshi_serve_list,                                                                                    \
-         (const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload, vsh_error *error),    \
+         (const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,                \
+          vsh_error *error),                                                                                 \
          (path, request, run, payload, error), nothing)                                                      \
     MAKE(vshi_serve_voxels,                                                                                  \
-         (const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload, vsh_error *error),    \
+         (const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,                \
+          vsh_error *error),                                                                                 \
          (path, request, run, payload, error), nothing)                                                      \
     MAKE(vshi_serve_copy,                                                                                    \
-         (const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload, vsh_error *error),    \
+         (const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,                \
+          vsh_error *error),                                                                                 \
          (path, request, run, payload, error), nothing)                                                      \
     MAKE(vsh_grid_write,                                                                                     \
          (const vsh_grid *grid, const char *path, const char *name, const vsh_attribute *attributes,         \

@@ -83,16 +83,16 @@ void copy_there(const Wanted &wanted, const vsh_run &run, float *values, float *
     if (job == nullptr) {
         throw std::bad_alloc();
     }
-    const auto request = std::make_unique<vshi_ask>();
+    const auto request = std::make_unique<vshi_exchange>();
     vshi_answer answer;
-    vsh_result result = vshi_ask_begin(request.get(), VSHI_READ_COPY, wanted.path, &run, error);
+    vsh_result result = vshi_exchange_begin(request.get(), VSHI_READ_COPY, wanted.path, &run, error);
     if (result == VSH_OK) {
-        vshi_put_text(&request->put, wanted.name);
-        vshi_put_array(&request->put, wanted.low, 3, sizeof wanted.low[0]);
-        vshi_put_array(&request->put, wanted.size, 3, sizeof wanted.size[0]);
-        vshi_put_count(&request->put, values != nullptr);
-        vshi_put_count(&request->put, active != nullptr);
-        result = vshi_ask_send_job(request.get(), job.get(), 1, &answer, error);
+        vshi_encode_text(&request->encoder, wanted.name);
+        vshi_encode_array(&request->encoder, wanted.low, 3, sizeof wanted.low[0]);
+        vshi_encode_array(&request->encoder, wanted.size, 3, sizeof wanted.size[0]);
+        vshi_encode_count(&request->encoder, values != nullptr);
+        vshi_encode_count(&request->encoder, active != nullptr);
+        result = vshi_exchange_send_job(request.get(), job.get(), 1, &answer, error);
     }
     if (result != VSH_OK) {
         throw Failure{result};
@@ -100,12 +100,12 @@ void copy_there(const Wanted &wanted, const vsh_run &run, float *values, float *
     const std::unique_ptr<vshi_answer, void (*)(vshi_answer *)> owner(&answer, vshi_answer_free);
     const size_t count = count_of(wanted);
     for (float *to : {values, active}) {
-        const void *from = to != nullptr ? vshi_take_array(&answer.payload, count, sizeof *to) : nullptr;
+        const void *from = to != nullptr ? vshi_decode_array(&answer.payload, count, sizeof *to) : nullptr;
         if (from != nullptr) {
             std::memcpy(to, from, count * sizeof *to);
         }
     }
-    if (!vshi_take_ends(&answer.payload)) {
+    if (!vshi_decoder_ends(&answer.payload)) {
         throw Failure{vshi_answer_fail(wanted.path, "the copy's size", error)};
     }
 }
@@ -114,20 +114,20 @@ void copy_there(const Wanted &wanted, const vsh_run &run, float *values, float *
 
 } // namespace vshi
 
-vsh_result vshi_serve_copy(const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload,
+vsh_result vshi_serve_copy(const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,
                            vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
         vshi::initialize();
-        vshi::Wanted wanted{path, vshi_take_text(request, false), {}, {}};
+        vshi::Wanted wanted{path, vshi_decode_text(request, false), {}, {}};
         for (int32_t *to : {wanted.low, wanted.size}) {
-            const void *from = vshi_take_array(request, 3, sizeof *to);
+            const void *from = vshi_decode_array(request, 3, sizeof *to);
             if (from != nullptr) {
                 std::memcpy(to, from, 3 * sizeof *to);
             }
         }
-        const bool has[2] = {vshi_take_count(request, 1) != 0, vshi_take_count(request, 1) != 0};
+        const bool has[2] = {vshi_decode_count(request, 1) != 0, vshi_decode_count(request, 1) != 0};
         const vsh_result result =
-            vshi_take_ends(request)
+            vshi_decoder_ends(request)
                 ? vshi::check(wanted, error)
                 : vshi_fail(error, VSH_ERROR_INTERNAL, "%s: the request to its reader does not hold", path);
         if (result != VSH_OK) {
@@ -140,7 +140,7 @@ vsh_result vshi_serve_copy(const char *path, vshi_take *request, const vsh_run *
         vshi::copy_here(wanted, *run, has[0] ? arrays[0].data() : nullptr,
                         has[1] ? arrays[1].data() : nullptr, error);
         for (const std::vector<float> &array : arrays) {
-            vshi_put_array(payload, array.data(), array.size(), sizeof(float));
+            vshi_encode_array(payload, array.data(), array.size(), sizeof(float));
         }
         return VSH_OK;
     });

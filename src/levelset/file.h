@@ -3,7 +3,7 @@
 
 #include "levelset/examine.h"
 #include "levelset/grid.h"
-#include "levelset/handover.h"
+#include "levelset/message.h"
 
 #include <string>
 #include <vector>

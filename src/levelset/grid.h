@@ -4,7 +4,7 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "extern/guard.h"
-#include "extern/handover.h"
+#include "extern/tsan.h"
 #include "levelset/leaves.h"
 
 #include <algorithm>

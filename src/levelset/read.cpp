@@ -1,7 +1,7 @@
 // vsh_grid_read() and vsh_vdb_list(): a file's content, from this process or from a reader, looked over.
 #include "levelset/examine.h"
 #include "levelset/file.h"
-#include "levelset/handover.h"
+#include "levelset/message.h"
 
 #include <cmath>
 #include <cstring>
@@ -57,14 +57,14 @@ class Answer {
     Answer(const Answer &) = delete;
     Answer &operator=(const Answer &) = delete;
 
-    vshi_take *ask(int32_t kind, const char *path, const char *name, uint64_t number, Stage &stage,
-                   vsh_error *error) {
-        const auto request = std::make_unique<vshi_ask>();
-        vsh_result result = vshi_ask_begin(request.get(), kind, path, &stage.options, error);
+    vshi_decoder *ask(int32_t kind, const char *path, const char *name, uint64_t number, Stage &stage,
+                      vsh_error *error) {
+        const auto request = std::make_unique<vshi_exchange>();
+        vsh_result result = vshi_exchange_begin(request.get(), kind, path, &stage.options, error);
         if (result == VSH_OK) {
-            vshi_put_text(&request->put, name);
-            vshi_put_count(&request->put, number);
-            result = vshi_ask_send(request.get(), poll_stage, &stage, &answer, error);
+            vshi_encode_text(&request->encoder, name);
+            vshi_encode_count(&request->encoder, number);
+            result = vshi_exchange_send(request.get(), poll_stage, &stage, &answer, error);
         }
         if (result != VSH_OK) {
             throw Failure{result};
@@ -107,11 +107,12 @@ template <size_t Capacity> bool is_text(const char (&text)[Capacity], bool lines
     return length < Capacity;
 }
 
-void take_list(vshi_take *take, const char *path, std::vector<vsh_vdb_entry> &entries, size_t capacity,
+void take_list(vshi_decoder *decoder, const char *path, std::vector<vsh_vdb_entry> &entries, size_t capacity,
                size_t &count, vsh_error *error) {
-    const uint64_t all = vshi_take_count(take, UINT32_MAX), listed = vshi_take_count(take, capacity);
-    const void *from = vshi_take_array(take, listed, sizeof(vsh_vdb_entry));
-    if (!vshi_take_ends(take) || listed > all) {
+    const uint64_t all = vshi_decode_count(decoder, UINT32_MAX),
+                   listed = vshi_decode_count(decoder, capacity);
+    const void *from = vshi_decode_array(decoder, listed, sizeof(vsh_vdb_entry));
+    if (!vshi_decoder_ends(decoder) || listed > all) {
         throw Failure{vshi_answer_fail(path, "the list's size", error)};
     }
     entries.resize(size_t(listed));
@@ -154,9 +155,9 @@ struct Wanted {
     const char *name;
     uint64_t number;
 
-    Wanted(vshi_take *request, const char *path, vsh_error *error)
-        : name(vshi_take_text(request, false)), number(vshi_take_count(request, UINT64_MAX)) {
-        if (!vshi_take_ends(request)) {
+    Wanted(vshi_decoder *request, const char *path, vsh_error *error)
+        : name(vshi_decode_text(request, false)), number(vshi_decode_count(request, UINT64_MAX)) {
+        if (!vshi_decoder_ends(request)) {
             throw Failure{
                 vshi_fail(error, VSH_ERROR_INTERNAL, "%s: the request to its reader does not hold", path)};
         }
@@ -167,7 +168,7 @@ struct Wanted {
 
 } // namespace vshi
 
-vsh_result vshi_serve_grid(const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload,
+vsh_result vshi_serve_grid(const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,
                            vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
         const vshi::Wanted wanted(request, path, error);
@@ -177,16 +178,16 @@ vsh_result vshi_serve_grid(const char *path, vshi_take *request, const vsh_run *
     });
 }
 
-vsh_result vshi_serve_list(const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload,
+vsh_result vshi_serve_list(const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,
                            vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
         const vshi::Wanted wanted(request, path, error);
         std::vector<vsh_vdb_entry> found;
         size_t count = 0;
         vshi::list_grids(path, *run, found, wanted.number, count, error);
-        vshi_put_count(payload, count);
-        vshi_put_count(payload, found.size());
-        vshi_put_array(payload, found.data(), found.size(), sizeof(vsh_vdb_entry));
+        vshi_encode_count(payload, count);
+        vshi_encode_count(payload, found.size());
+        vshi_encode_array(payload, found.data(), found.size(), sizeof(vsh_vdb_entry));
         return VSH_OK;
     });
 }

@@ -283,12 +283,12 @@ std::vector<vshi_block> blocks_of(const openvdb::GridBase &grid, const char *wha
 // The same by run.reader.
 VoxelSet ask_voxels(const char *path, const char *name, vshi_job *job, const vsh_run &run, std::string &grid,
                     vsh_error *error) {
-    const auto request = std::make_unique<vshi_ask>();
+    const auto request = std::make_unique<vshi_exchange>();
     vshi_answer answer;
-    vsh_result result = vshi_ask_begin(request.get(), VSHI_READ_VOXELS, path, &run, error);
+    vsh_result result = vshi_exchange_begin(request.get(), VSHI_READ_VOXELS, path, &run, error);
     if (result == VSH_OK) {
-        vshi_put_text(&request->put, name);
-        result = vshi_ask_send_job(request.get(), job, 1, &answer, error);
+        vshi_encode_text(&request->encoder, name);
+        result = vshi_exchange_send_job(request.get(), job, 1, &answer, error);
     }
     if (result != VSH_OK) {
         throw Failure{result};
@@ -374,11 +374,11 @@ vsh_result vsh_voxels_from_vdb(const char *path, const char *name, const vsh_run
                       [&](const vsh_run &full) { return vshi::from_vdb(path, name, full, error); });
 }
 
-vsh_result vshi_serve_voxels(const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload,
-                             vsh_error *error) {
+vsh_result vshi_serve_voxels(const char *path, vshi_decoder *request, const vsh_run *run,
+                             vshi_encoder *payload, vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
         vshi::initialize();
-        const char *name = vshi_take_text(request, false);
+        const char *name = vshi_decode_text(request, false);
         const openvdb::GridBase::Ptr grid = vshi::read_numbers(path, name, *run, error);
         const std::string what = std::string(path) + ": grid '" + grid->getName() + "'";
         vshi::put_blocks(payload, grid->getName(), grid->transform(),

@@ -77,11 +77,12 @@ vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **model, 
 vsh_result vshi_model_from_reader(const char *path, const vsh_run *run, vshi_job *job, size_t units,
                                   vsh_model **model, vsh_error *error);
 
-struct vshi_take;
+struct vshi_decoder;
 
 /* What a reader has handed over; everything in it is checked. Errors: VSH_ERROR_READ where it does not hold,
  * and as for what was made in this process. */
-vsh_result vshi_model_take(struct vshi_take *take, const char *path, vsh_model **model, vsh_error *error);
+vsh_result vshi_model_decode(struct vshi_decoder *decoder, const char *path, vsh_model **model,
+                             vsh_error *error);
 
 #ifdef __cplusplus
 }

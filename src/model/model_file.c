@@ -2,9 +2,9 @@
 
 #include "base/input.h"
 #include "base/memory.h"
-#include "model/foreign.h"
 #include "model/gltf.h"
 #include "model/scan.h"
+#include "model/unsupported.h"
 
 #include <assimp/scene.h>
 
@@ -203,7 +203,7 @@ vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *
     if (stat(path, &status) != 0) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: %s", path, strerror(errno));
     }
-    vsh_result result = vshi_foreign_check(path, error);
+    vsh_result result = vshi_unsupported_check(path, error);
     if (result == VSH_OK) {
         result = check_ending(path, &ending, error);
     }

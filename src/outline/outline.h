@@ -89,12 +89,12 @@ vsh_result vshi_contours_from_reader(const char *text, const char *path, const v
  * that touch along lines that are nearly the same; `result` is then of no use. */
 bool vshi_outline_resolve(const vsh_outline *outline, vshi_contours *result);
 
-struct vshi_take;
+struct vshi_decoder;
 
 /* What a reader has handed over; everything in it is checked. Errors: VSH_ERROR_READ where it does not hold,
  * and as for what was made in this process. */
-vsh_result vshi_contours_take(struct vshi_take *take, vshi_contours *contours, const char *path,
-                              vsh_error *error);
+vsh_result vshi_contours_decode(struct vshi_decoder *decoder, vshi_contours *contours, const char *path,
+                                vsh_error *error);
 
 #ifdef __cplusplus
 }

@@ -60,16 +60,16 @@ static void confine(const vshi_request *request, bool files, vshi_reader_state *
     if (calls == VSHI_CALLS_CONFINED) {
         state->confined |= VSH_CONFINED_CALLS;
     } else if (calls == VSHI_CALLS_IN_PART) {
-        state->code = VSHI_READER_LOOSE;
+        state->code = VSHI_READER_UNCONFINED;
     }
 }
 
 /* What vdbshade-reader, which has loaded this library, tells of itself. */
 static vshi_reader_state take_held(const char *word) {
     const int told = atoi(word);
-    vshi_reader_state state = {(uint32_t)told & VSH_CONFINED_ALL, (told & VSHI_HELD_CRAMPED) != 0, -1};
+    vshi_reader_state state = {(uint32_t)told & VSH_CONFINED_ALL, (told & VSHI_HELD_FILE_LIMIT) != 0, -1};
     if ((state.confined & VSH_CONFINED_CALLS) != 0 && vshi_tasks_filtered(0) != VSHI_TASKS_FILTERED) {
-        state.code = VSHI_READER_LOOSE;
+        state.code = VSHI_READER_UNCONFINED;
     }
     return state;
 }

@@ -56,13 +56,13 @@ static double seconds_for(const char *path, const vsh_run *run) {
     return seconds_at_least + (stat(path, &status) == 0 ? seconds_a_byte * (double)status.st_size : 0.0);
 }
 
-static vsh_result fail_start(const vshi_ask *ask, int reason, vsh_error *error) {
+static vsh_result fail_start(const vshi_exchange *exchange, int reason, vsh_error *error) {
     const char *why = strerrordesc_np(reason);
     const bool missing = reason == ENOENT || reason == EACCES || reason == ENOEXEC || reason == ENOTDIR;
     return vshi_fail(error, missing ? VSH_ERROR_ARGUMENT : VSH_ERROR_MEMORY,
                      "%s: no process to read it in: '%s': %s; a file that is trusted can be read without "
                      "(--trusted; no vsh_run.reader)",
-                     ask->path, ask->run->reader, why != NULL ? why : "?");
+                     exchange->path, exchange->run->reader, why != NULL ? why : "?");
 }
 
 /* Moves a descriptor up, and keeps it from other programs that the host may start meanwhile. */
@@ -77,31 +77,31 @@ static int lift(int file) {
     return lifted;
 }
 
-vsh_result vshi_ask_begin(vshi_ask *ask, int32_t kind, const char *path, const vsh_run *run,
-                          vsh_error *error) {
-    ask->path = path;
-    ask->run = run;
+vsh_result vshi_exchange_begin(vshi_exchange *exchange, int32_t kind, const char *path, const vsh_run *run,
+                               vsh_error *error) {
+    exchange->path = path;
+    exchange->run = run;
     const int file = lift(memfd_create("vdbshade request", MFD_CLOEXEC | MFD_ALLOW_SEALING));
-    vshi_put_begin(&ask->put, file, 0);
+    vshi_encoder_begin(&exchange->encoder, file, 0);
     if (file < 0) {
-        return fail_start(ask, errno, error);
+        return fail_start(exchange, errno, error);
     }
-    vshi_put_count(&ask->put, VSHI_REQUEST_MAGIC);
-    vshi_put_count(&ask->put, VSHI_READER_PROTOCOL);
-    vshi_put_count(&ask->put, (uint64_t)kind);
-    vshi_put_count(&ask->put, (uint64_t)getpid());
-    vshi_put_count(&ask->put, vshi_memory_left(run));
-    vshi_put_number(&ask->put, seconds_for(path, run));
-    vshi_put_count(&ask->put, run->confined != 0);
-    vshi_put_count(&ask->put, run->allow_outside != 0);
-    vshi_put_text(&ask->put, path);
-    vshi_put_folders(&ask->put);
+    vshi_encode_count(&exchange->encoder, VSHI_REQUEST_MAGIC);
+    vshi_encode_count(&exchange->encoder, VSHI_READER_PROTOCOL);
+    vshi_encode_count(&exchange->encoder, (uint64_t)kind);
+    vshi_encode_count(&exchange->encoder, (uint64_t)getpid());
+    vshi_encode_count(&exchange->encoder, vshi_memory_left(run));
+    vshi_encode_number(&exchange->encoder, seconds_for(path, run));
+    vshi_encode_count(&exchange->encoder, run->confined != 0);
+    vshi_encode_count(&exchange->encoder, run->allow_outside != 0);
+    vshi_encode_text(&exchange->encoder, path);
+    vshi_encode_folders(&exchange->encoder);
     return VSH_OK;
 }
 
 /* --- starting */
 
-static vsh_result start(const vshi_ask *ask, reader_process *process, vsh_error *error) {
+static vsh_result start(const vshi_exchange *exchange, reader_process *process, vsh_error *error) {
     int ends[2] = {-1, -1};
     *process = (reader_process){-1, -1, -1, now_seconds()};
     process->answer = lift(memfd_create("vdbshade answer", MFD_CLOEXEC | MFD_ALLOW_SEALING));
@@ -109,12 +109,12 @@ static vsh_result start(const vshi_ask *ask, reader_process *process, vsh_error 
     process->progress = ends[0];
     if (reason == 0) {
         ends[1] = lift(ends[1]);
-        reason = ends[1] < 0 ? errno : vshi_spawn_reader(ask, process->answer, ends[1], &process->pid);
+        reason = ends[1] < 0 ? errno : vshi_spawn_reader(exchange, process->answer, ends[1], &process->pid);
     }
     if (ends[1] >= 0) {
         close(ends[1]);
     }
-    return reason == 0 ? VSH_OK : fail_start(ask, reason, error);
+    return reason == 0 ? VSH_OK : fail_start(exchange, reason, error);
 }
 
 /* --- waiting */
@@ -140,17 +140,17 @@ static void kill_reader(reader_process *process, int *status) {
     process->pid = -1;
 }
 
-static vsh_result fail_time(const vshi_ask *ask, double seconds, vsh_error *error) {
+static vsh_result fail_time(const vshi_exchange *exchange, double seconds, vsh_error *error) {
     return vshi_fail(error, VSH_ERROR_LIMIT,
-                     "%s: reading it takes longer than the limit of %g s: damaged, or very large", ask->path,
-                     seconds);
+                     "%s: reading it takes longer than the limit of %g s: damaged, or very large",
+                     exchange->path, seconds);
 }
 
 /* Waits for the end, which shows in *status. A host that ignores SIGCHLD, or waits for all its children,
  * takes that away: *status is then 0, and the answer alone tells. */
-static vsh_result await(const vshi_ask *ask, reader_process *process, vshi_poll_fn *poll_user, void *user,
-                        int *status, vsh_error *error) {
-    const double limit = seconds_for(ask->path, ask->run);
+static vsh_result await(const vshi_exchange *exchange, reader_process *process, vshi_poll_fn *poll_user,
+                        void *user, int *status, vsh_error *error) {
+    const double limit = seconds_for(exchange->path, exchange->run);
     double closed = INFINITY, fraction = 0.0;
     for (;;) {
         if (closed < INFINITY) { /* it is about to end */
@@ -169,11 +169,11 @@ static vsh_result await(const vshi_ask *ask, reader_process *process, vshi_poll_
         const double now = now_seconds();
         if (poll_user(user, fraction)) {
             kill_reader(process, status);
-            return vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", ask->path);
+            return vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", exchange->path);
         }
         if (now - process->begin > limit || now - closed > seconds_to_end) {
             kill_reader(process, status);
-            return fail_time(ask, limit, error);
+            return fail_time(exchange, limit, error);
         }
     }
 }
@@ -185,72 +185,74 @@ vsh_result vshi_answer_fail(const char *path, const char *what, vsh_error *error
                      what);
 }
 
-static vsh_result fail_memory(const vshi_ask *ask, vsh_error *error) {
-    if (ask->run->memory_limit == 0) {
+static vsh_result fail_memory(const vshi_exchange *exchange, vsh_error *error) {
+    if (exchange->run->memory_limit == 0) {
         return vshi_fail(error, VSH_ERROR_LIMIT,
                          "%s: reading it takes more than this machine's memory: damaged, or very large",
-                         ask->path);
+                         exchange->path);
     }
     return vshi_fail(error, VSH_ERROR_LIMIT,
                      "%s: reading it takes more than the memory limit of %.0f MB: damaged, or very large",
-                     ask->path, (double)ask->run->memory_limit / 1e6);
+                     exchange->path, (double)exchange->run->memory_limit / 1e6);
 }
 
 /* Why there is no answer. */
-static vsh_result fail_end(const vshi_ask *ask, int status, bool begun, vsh_error *error) {
+static vsh_result fail_end(const vshi_exchange *exchange, int status, bool begun, vsh_error *error) {
     if (WIFSIGNALED(status)) {
         const int number = WTERMSIG(status);
         if (number == SIGXCPU) {
-            return fail_time(ask, seconds_for(ask->path, ask->run), error);
+            return fail_time(exchange, seconds_for(exchange->path, exchange->run), error);
         }
         const char *name = sigabbrev_np(number);
-        return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: the reader crashed (SIG%s)", ask->path,
+        return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: the reader crashed (SIG%s)", exchange->path,
                          name != NULL ? name : "?");
     }
-    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_HUNGRY) {
-        return fail_memory(ask, error);
+    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_OUT_OF_MEMORY) {
+        return fail_memory(exchange, error);
     }
-    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_CRAMPED) {
+    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_FILE_LIMIT) {
         return vshi_fail(error, VSH_ERROR_LIMIT,
                          "%s: what its reader sends is more than this process's limit on the size of files "
                          "(ulimit -f); raise it, or read without a reader",
-                         ask->path);
+                         exchange->path);
     }
-    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_LOOSE) {
+    if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_UNCONFINED) {
         return vshi_fail(error, VSH_ERROR_INTERNAL,
-                         "%s: not read: a thread of its reader is not confined as the others are", ask->path);
+                         "%s: not read: a thread of its reader is not confined as the others are",
+                         exchange->path);
     }
     if (WIFEXITED(status) && WEXITSTATUS(status) == VSHI_READER_EMPTY) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "%s: its reader, '%s', cannot load the library of vdbshade %s", ask->path,
-                         ask->run->reader, vsh_version());
+                         "%s: its reader, '%s', cannot load the library of vdbshade %s", exchange->path,
+                         exchange->run->reader, vsh_version());
     }
     if (!begun) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: '%s' is no reader of vdbshade %s", ask->path,
-                         ask->run->reader, vsh_version());
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: '%s' is no reader of vdbshade %s", exchange->path,
+                         exchange->run->reader, vsh_version());
     }
-    return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: the reader ended without an answer (%d)", ask->path,
-                     WIFEXITED(status) ? WEXITSTATUS(status) : -1);
+    return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: the reader ended without an answer (%d)",
+                     exchange->path, WIFEXITED(status) ? WEXITSTATUS(status) : -1);
 }
 
 /* Maps what the reader has written once nobody can write there any more. */
-static vsh_result map_answer(const vshi_ask *ask, int file, vshi_answer *answer, vsh_error *error) {
+static vsh_result map_answer(const vshi_exchange *exchange, int file, vshi_answer *answer, vsh_error *error) {
     struct stat status;
     if (fcntl(file, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL) != 0 ||
         fstat(file, &status) != 0) {
-        return vshi_answer_fail(ask->path, "it is still being written", error);
+        return vshi_answer_fail(exchange->path, "it is still being written", error);
     }
     if (status.st_size < (off_t)sizeof(vshi_answer_head)) {
         return VSH_OK; /* nothing was answered */
     }
     /* what it holds is copied before it goes */
-    const vsh_result result = vshi_check_limit(ask->run, 2.0 * (double)status.st_size, ask->path, error);
+    const vsh_result result =
+        vshi_check_limit(exchange->run, 2.0 * (double)status.st_size, exchange->path, error);
     if (result != VSH_OK) {
         return result;
     }
     void *map = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_SHARED, file, 0);
     if (map == MAP_FAILED) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %lld bytes", ask->path,
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %lld bytes", exchange->path,
                          (long long)status.st_size);
     }
     answer->map = map;
@@ -258,77 +260,78 @@ static vsh_result map_answer(const vshi_ask *ask, int file, vshi_answer *answer,
     return VSH_OK;
 }
 
-static void pass_warnings(const vshi_ask *ask, vshi_take warnings, uint64_t count) {
+static void pass_warnings(const vshi_exchange *exchange, vshi_decoder warnings, uint64_t count) {
     for (uint64_t i = 0; i < count && i < MAX_WARNINGS; ++i) {
-        const char *text = vshi_take_text(&warnings, false);
+        const char *text = vshi_decode_text(&warnings, false);
         if (text != NULL) {
-            vshi_warn(ask->run, "%s", text);
+            vshi_warn(exchange->run, "%s", text);
         }
     }
 }
 
 /* Said with every file: whoever gets the warnings folds those that are alike. */
-static void warn_of_missing(const vshi_ask *ask, uint64_t confined) {
+static void warn_of_missing(const vshi_exchange *exchange, uint64_t confined) {
     char missing[VSHI_MISSING_TEXT];
     /* many a system has no Landlock: a warning in every run would be noise, and others would drown in it */
     const uint64_t expected = VSH_CONFINED_LIMITS | VSH_CONFINED_CALLS;
     if ((confined & expected) != expected && !VSHI_SANITIZED) {
-        vshi_warn(ask->run,
+        vshi_warn(exchange->run,
                   "the process that files are read in is confined in part only: this system refuses it %s",
                   vshi_missing_text(confined, missing));
     }
 }
 
-static vsh_result take_head(const vshi_ask *ask, int status, vshi_answer *answer, vsh_error *error) {
+static vsh_result take_head(const vshi_exchange *exchange, int status, vshi_answer *answer,
+                            vsh_error *error) {
     vshi_answer_head head = {0};
     if (answer->map != NULL) {
         memcpy(&head, answer->map, sizeof head);
     }
     const bool begun = head.magic == VSHI_ANSWER_MAGIC && head.protocol == VSHI_READER_PROTOCOL;
     if (!begun || head.code == VSHI_ANSWER_BEGUN || status != 0) {
-        return fail_end(ask, status, begun, error);
+        return fail_end(exchange, status, begun, error);
     }
     if (head.code == VSH_ERROR_MEMORY) {
-        return fail_memory(ask, error);
+        return fail_memory(exchange, error);
     }
     head.message[sizeof head.message - 1] = '\0';
     if (head.code < VSH_OK || head.code > VSH_ERROR_INTERNAL || head.code == VSH_ERROR_CANCELLED) {
-        return vshi_answer_fail(ask->path, "an unknown result", error);
+        return vshi_answer_fail(exchange->path, "an unknown result", error);
     }
     const size_t room = answer->size - sizeof head;
     if (head.payload > room || head.payload % 8 != 0) {
-        return vshi_answer_fail(ask->path, "its sizes", error);
+        return vshi_answer_fail(exchange->path, "its sizes", error);
     }
     const unsigned char *start = (const unsigned char *)answer->map + sizeof head;
     const unsigned char *end = start + head.payload;
     answer->confined = (uint32_t)(head.confined & VSH_CONFINED_ALL);
-    if (head.code != VSH_ERROR_UNSUPPORTED || ask->run->confined == 0) {
-        warn_of_missing(ask, head.confined);
+    if (head.code != VSH_ERROR_UNSUPPORTED || exchange->run->confined == 0) {
+        warn_of_missing(exchange, head.confined);
     }
-    pass_warnings(ask, (vshi_take){end, start + room, false}, head.warnings);
+    pass_warnings(exchange, (vshi_decoder){end, start + room, false}, head.warnings);
     if (head.code != VSH_OK) {
         return vshi_fail(error, head.code, "%s", head.message);
     }
-    answer->payload = (vshi_take){start, end, false};
+    answer->payload = (vshi_decoder){start, end, false};
     return VSH_OK;
 }
 
-vsh_result vshi_ask_send(vshi_ask *ask, vshi_poll_fn *poll_user, void *user, vshi_answer *answer,
-                         vsh_error *error) {
+vsh_result vshi_exchange_send(vshi_exchange *exchange, vshi_poll_fn *poll_user, void *user,
+                              vshi_answer *answer, vsh_error *error) {
     *answer = (vshi_answer){NULL, 0, 0, {NULL, NULL, true}};
     reader_process process = {-1, -1, -1, 0.0};
     int status = 0;
     vsh_result result = VSH_OK;
-    if (!vshi_put_flush(&ask->put)) {
-        result = fail_start(ask, ask->put.error, error);
+    if (!vshi_encoder_flush(&exchange->encoder)) {
+        result = fail_start(exchange, exchange->encoder.error, error);
     } else if (poll_user(user, 0.0)) {
-        result = vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", ask->path);
+        result = vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", exchange->path);
     }
-    result = result == VSH_OK ? start(ask, &process, error) : result;
-    close(ask->put.file);
-    result = result == VSH_OK ? await(ask, &process, poll_user, user, &status, error) : result;
-    result = result == VSH_OK ? map_answer(ask, process.answer, answer, error) : result;
-    result = result == VSH_OK ? take_head(ask, status, answer, error) : result;
+    result = result == VSH_OK ? start(exchange, &process, error) : result;
+    close(exchange->encoder.file);
+    result = result == VSH_OK ? await(exchange, &process, poll_user, user, &status, error) : result;
+    result = result == VSH_OK ? map_answer(exchange, process.answer, answer, error) : result;
+    result = result == VSH_OK ? take_head(exchange, status, answer, error) : result;
     if (process.answer >= 0) {
         close(process.answer);
     }
@@ -354,10 +357,10 @@ static bool poll_job(void *user, double fraction) {
     return vshi_job_advance(share->job, more);
 }
 
-vsh_result vshi_ask_send_job(vshi_ask *ask, vshi_job *job, size_t units, vshi_answer *answer,
-                             vsh_error *error) {
+vsh_result vshi_exchange_send_job(vshi_exchange *exchange, vshi_job *job, size_t units, vshi_answer *answer,
+                                  vsh_error *error) {
     job_share share = {job, units, 0};
-    vsh_result result = vshi_ask_send(ask, poll_job, &share, answer, error);
+    vsh_result result = vshi_exchange_send(exchange, poll_job, &share, answer, error);
     if (result == VSH_OK && poll_job(&share, 1.0)) {
         vshi_answer_free(answer);
         result = vshi_job_fail_cancelled(job, error);
@@ -386,20 +389,21 @@ vsh_result vsh_reader_confinement(const vsh_run *run, uint32_t *confined, vsh_er
     if (result == VSH_OK && full.reader == NULL) {
         result = vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_reader_confinement: vsh_run.reader is NULL");
     }
-    vshi_ask *ask = NULL;
+    vshi_exchange *exchange = NULL;
     if (result == VSH_OK) {
-        result = vshi_allocate((void **)&ask, 1, sizeof *ask, "reader", error);
+        result = vshi_allocate((void **)&exchange, 1, sizeof *exchange, "reader", error);
     }
     vshi_answer answer;
     if (result == VSH_OK) {
         full.warning = NULL; /* what is missing is the result */
-        result = vshi_ask_begin(ask, VSHI_READ_CONFINEMENT, "reader", &full, error);
-        result = result == VSH_OK ? vshi_ask_send(ask, poll_nothing, &full, &answer, error) : result;
+        result = vshi_exchange_begin(exchange, VSHI_READ_CONFINEMENT, "reader", &full, error);
+        result =
+            result == VSH_OK ? vshi_exchange_send(exchange, poll_nothing, &full, &answer, error) : result;
     }
     if (result == VSH_OK) {
         *confined = answer.confined;
         vshi_answer_free(&answer);
     }
-    free(ask);
+    free(exchange);
     return result;
 }

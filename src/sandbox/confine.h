@@ -26,9 +26,9 @@ enum {
  * fail with EPERM, and calls of another kind of machine (32 bit, x32) end the process. */
 int vshi_confine_calls(void);
 
-/* From now on memory that operator new is refused ends the process with VSHI_READER_HUNGRY, before a library
- * can do worse. */
-void vshi_confine_hunger(void);
+/* From now on memory that operator new is refused ends the process with VSHI_READER_OUT_OF_MEMORY, before a
+ * library can do worse. */
+void vshi_confine_memory(void);
 
 #ifdef __cplusplus
 }

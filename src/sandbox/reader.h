@@ -25,19 +25,19 @@ enum {
 
 /* --- the caller */
 
-/* A request under way: begin, put what the kind wants to know into `put`, send. */
-typedef struct vshi_ask {
+/* A request under way: begin, put what the kind wants to know into `encoder`, send. */
+typedef struct vshi_exchange {
     const char *path;
     const vsh_run *run;
-    vshi_put put;
-} vshi_ask;
+    vshi_encoder encoder;
+} vshi_exchange;
 
 /* What came back; the payload's arrays lie in the mapping, which nobody can change any more. */
 typedef struct vshi_answer {
     void *map;
     size_t size;
     uint32_t confined; /* VSH_CONFINED_… of the reader */
-    vshi_take payload;
+    vshi_decoder payload;
 } vshi_answer;
 
 /* Told how much the reader has done, 0 … 1, about every 20 ms; returns whether to stop. */
@@ -45,18 +45,18 @@ typedef bool vshi_poll_fn(void *user, double fraction);
 
 /* `run` is a resolved one with a reader; it and the path live until the request is sent. Errors:
  * VSH_ERROR_MEMORY. */
-VSHI_SHARED vsh_result vshi_ask_begin(vshi_ask *ask, int32_t kind, const char *path, const vsh_run *run,
-                                      vsh_error *error);
+VSHI_SHARED vsh_result vshi_exchange_begin(vshi_exchange *exchange, int32_t kind, const char *path,
+                                           const vsh_run *run, vsh_error *error);
 
 /* Starts the reader, waits for its end, passes its warnings on. Ends the request, also where it fails.
  * Errors: those of the reader; VSH_ERROR_READ (it crashed, or its answer does not hold), VSH_ERROR_LIMIT
  * (time, memory), VSH_ERROR_ARGUMENT (no such program, or none that is a reader), VSH_ERROR_CANCELLED. */
-VSHI_SHARED vsh_result vshi_ask_send(vshi_ask *ask, vshi_poll_fn *poll, void *user, vshi_answer *answer,
-                                     vsh_error *error);
+VSHI_SHARED vsh_result vshi_exchange_send(vshi_exchange *exchange, vshi_poll_fn *poll, void *user,
+                                          vshi_answer *answer, vsh_error *error);
 
 /* The same with progress and cancelling by a job, `units` of it. */
-VSHI_SHARED vsh_result vshi_ask_send_job(vshi_ask *ask, vshi_job *job, size_t units, vshi_answer *answer,
-                                         vsh_error *error);
+VSHI_SHARED vsh_result vshi_exchange_send_job(vshi_exchange *exchange, vshi_job *job, size_t units,
+                                              vshi_answer *answer, vsh_error *error);
 
 VSHI_SHARED void vshi_answer_free(vshi_answer *answer);
 
@@ -66,8 +66,8 @@ VSHI_SHARED vsh_result vshi_answer_fail(const char *path, const char *what, vsh_
 /* --- the reader */
 
 /* Parses `path` for a request and puts the answer's payload. */
-typedef vsh_result vshi_serve_fn(const char *path, vshi_take *request, const vsh_run *run, vshi_put *payload,
-                                 vsh_error *error);
+typedef vsh_result vshi_serve_fn(const char *path, vshi_decoder *request, const vsh_run *run,
+                                 vshi_encoder *payload, vsh_error *error);
 
 vshi_serve_fn vshi_serve_grid, vshi_serve_list, vshi_serve_voxels, vshi_serve_model, vshi_serve_image,
     vshi_serve_text, vshi_serve_copy;
@@ -80,15 +80,15 @@ enum { VSHI_READER_ANSWER = 3, VSHI_READER_REQUEST = 4, VSHI_READER_PROGRESS = 5
 /* Begins the word by which vdbshade-reader tells the library how it is confined already; a sum of
  * VSH_CONFINED_… and this follows. */
 #define VSHI_READER_HELD "held="
-enum { VSHI_HELD_CRAMPED = 256 };
+enum { VSHI_HELD_FILE_LIMIT = 256 };
 
 /* A reader's exit codes. */
 enum {
-    VSHI_READER_HUNGRY = 86,  /* memory was refused */
-    VSHI_READER_CRAMPED = 87, /* the caller's limit on the size of files does not let the answer through */
-    VSHI_READER_LOOSE = 88,   /* some thread of it is not confined: it read nothing */
-    VSHI_READER_CANNOT = 89,  /* it could not begin */
-    VSHI_READER_EMPTY = 90    /* it could not load the library */
+    VSHI_READER_OUT_OF_MEMORY = 86, /* memory was refused */
+    VSHI_READER_FILE_LIMIT = 87, /* the caller's limit on the size of files does not let the answer through */
+    VSHI_READER_UNCONFINED = 88, /* some thread of it is not confined: it read nothing */
+    VSHI_READER_CANNOT = 89,     /* it could not begin */
+    VSHI_READER_EMPTY = 90       /* it could not load the library */
 };
 
 #define VSHI_REQUEST_MAGIC UINT64_C(0x6b7361687376)

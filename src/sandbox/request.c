@@ -18,25 +18,25 @@ bool vshi_request_read(vshi_request *request) {
     if (map == MAP_FAILED) {
         return false;
     }
-    vshi_take take = {map, (const unsigned char *)map + status.st_size, false};
-    if (vshi_take_count(&take, UINT64_MAX) != VSHI_REQUEST_MAGIC ||
-        vshi_take_count(&take, UINT64_MAX) != VSHI_READER_PROTOCOL) {
+    vshi_decoder decoder = {map, (const unsigned char *)map + status.st_size, false};
+    if (vshi_decode_count(&decoder, UINT64_MAX) != VSHI_REQUEST_MAGIC ||
+        vshi_decode_count(&decoder, UINT64_MAX) != VSHI_READER_PROTOCOL) {
         return false;
     }
-    *request = (vshi_request){.kind = vshi_take_count(&take, VSHI_READ_KINDS - 1)};
-    request->parent = vshi_take_count(&take, INT32_MAX);
-    request->memory = vshi_take_count(&take, UINT64_MAX);
-    request->seconds = vshi_take_number(&take);
-    request->demanded = vshi_take_count(&take, 1) != 0;
-    request->outside = vshi_take_count(&take, 1) != 0;
-    request->path = vshi_take_text(&take, false);
-    request->folder_count = (size_t)vshi_take_count(&take, VSHI_MOST_FOLDERS);
+    *request = (vshi_request){.kind = vshi_decode_count(&decoder, VSHI_READ_KINDS - 1)};
+    request->parent = vshi_decode_count(&decoder, INT32_MAX);
+    request->memory = vshi_decode_count(&decoder, UINT64_MAX);
+    request->seconds = vshi_decode_number(&decoder);
+    request->demanded = vshi_decode_count(&decoder, 1) != 0;
+    request->outside = vshi_decode_count(&decoder, 1) != 0;
+    request->path = vshi_decode_text(&decoder, false);
+    request->folder_count = (size_t)vshi_decode_count(&decoder, VSHI_MOST_FOLDERS);
     for (size_t i = 0; i < request->folder_count; ++i) {
-        request->folders[i] = vshi_take_text(&take, false);
-        take.bad = take.bad || request->folders[i] == NULL;
+        request->folders[i] = vshi_decode_text(&decoder, false);
+        decoder.bad = decoder.bad || request->folders[i] == NULL;
     }
-    request->rest = take;
-    return !take.bad && request->path != NULL;
+    request->rest = decoder;
+    return !decoder.bad && request->path != NULL;
 }
 
 const char *vshi_missing_text(uint64_t confined, char text[VSHI_MISSING_TEXT]) {

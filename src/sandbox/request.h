@@ -18,7 +18,7 @@ typedef struct vshi_request {
     const char *path;
     const char *folders[VSHI_MOST_FOLDERS]; /* that libraries are loaded from */
     size_t folder_count;
-    vshi_take rest; /* what the kind wants to know */
+    vshi_decoder rest; /* what the kind wants to know */
 } vshi_request;
 
 /* Maps the request of this reader for good. False where there is none, or none of this version. */

@@ -69,31 +69,31 @@ static bool write_head(const vshi_answer_head *head) {
 /* Why an answer could not be written: the size of files is the memory that the caller has room for, or less
  * where it has a limit of its own (ulimit -f), which holds for memory that is a file, too. */
 static int exit_code_of_write(const serving *s) {
-    return s->limited ? VSHI_READER_CRAMPED : VSHI_READER_HUNGRY;
+    return s->limited ? VSHI_READER_FILE_LIMIT : VSHI_READER_OUT_OF_MEMORY;
 }
 
-static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_take *request,
+static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_decoder *request,
                   const vsh_run *run) {
-    static vshi_put put;
+    static vshi_encoder encoder;
     vshi_answer_head head = {.magic = VSHI_ANSWER_MAGIC,
                              .protocol = VSHI_READER_PROTOCOL,
                              .code = VSHI_ANSWER_BEGUN,
                              .confined = s->confined};
     if (!write_head(&head)) {
-        return s->limited ? VSHI_READER_CRAMPED : VSHI_READER_CANNOT;
+        return s->limited ? VSHI_READER_FILE_LIMIT : VSHI_READER_CANNOT;
     }
     vsh_error error = {VSH_OK, ""};
-    vshi_put_begin(&put, VSHI_READER_ANSWER, sizeof head);
-    put.room = run->memory_limit > 0 && !VSHI_SANITIZED ? run->memory_limit + heap_slack : 0;
-    vsh_result result = serve(path, request, run, &put, &error);
-    head.payload = put.size - sizeof head;
+    vshi_encoder_begin(&encoder, VSHI_READER_ANSWER, sizeof head);
+    encoder.room = run->memory_limit > 0 && !VSHI_SANITIZED ? run->memory_limit + heap_slack : 0;
+    vsh_result result = serve(path, request, run, &encoder, &error);
+    head.payload = encoder.size - sizeof head;
     const char *text = s->warnings;
     for (size_t i = 0; i < s->count; ++i) {
-        vshi_put_text(&put, text);
+        vshi_encode_text(&encoder, text);
         text += strlen(text) + 1;
     }
-    if (!vshi_put_flush(&put)) {
-        return put.error == ENOMEM ? VSHI_READER_HUNGRY : exit_code_of_write(s);
+    if (!vshi_encoder_flush(&encoder)) {
+        return encoder.error == ENOMEM ? VSHI_READER_OUT_OF_MEMORY : exit_code_of_write(s);
     }
     head.code = result;
     head.warnings = s->count;
@@ -122,7 +122,7 @@ static int32_t serve_request(serving *s, int argc, char **argv) {
     run.progress = report;
     run.warning = keep_warning;
     run.user = s;
-    vshi_confine_hunger();
+    vshi_confine_memory();
     return answer(s, servers[request.kind], request.path, &request.rest, &run);
 }
 

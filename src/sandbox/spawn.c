@@ -46,12 +46,12 @@ static int add_folder(struct dl_phdr_info *info, size_t size, void *user) {
     return 0;
 }
 
-void vshi_put_folders(vshi_put *put) {
+void vshi_encode_folders(vshi_encoder *encoder) {
     folder_list list = {{NULL}, 0};
     dl_iterate_phdr(add_folder, &list);
-    vshi_put_count(put, list.count);
+    vshi_encode_count(encoder, list.count);
     for (size_t i = 0; i < list.count; ++i) {
-        vshi_put_text(put, list.folders[i]);
+        vshi_encode_text(encoder, list.folders[i]);
         free(list.folders[i]);
     }
 }
@@ -138,11 +138,13 @@ static char **make_environment(void) {
 
 /* --- starting */
 
-static int give_files(posix_spawn_file_actions_t *files, const vshi_ask *ask, int answer, int progress) {
+static int give_files(posix_spawn_file_actions_t *files, const vshi_exchange *exchange, int answer,
+                      int progress) {
     const struct {
         int from, to;
-    } given[] = {
-        {answer, VSHI_READER_ANSWER}, {ask->put.file, VSHI_READER_REQUEST}, {progress, VSHI_READER_PROGRESS}};
+    } given[] = {{answer, VSHI_READER_ANSWER},
+                 {exchange->encoder.file, VSHI_READER_REQUEST},
+                 {progress, VSHI_READER_PROGRESS}};
     int reason = posix_spawn_file_actions_addopen(files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
     reason = reason != 0 ? reason
                          : posix_spawn_file_actions_addopen(files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
@@ -169,10 +171,10 @@ static void set_attributes(posix_spawnattr_t *attributes) {
 
 /* Nothing but posix_spawn(): between fork and exec none of our code runs, as it must not in a process that
  * may have threads. */
-int vshi_spawn_reader(const vshi_ask *ask, int answer, int progress, pid_t *pid) {
+int vshi_spawn_reader(const vshi_exchange *exchange, int answer, int progress, pid_t *pid) {
     char own[PATH_MAX], name[] = VSH_READER, argument[] = VSH_READER_ARGUMENT;
     char *const arguments[] = {name, argument, NULL};
-    const char *program = ask->run->reader;
+    const char *program = exchange->run->reader;
     if (strcmp(program, VSH_READER) == 0) {
         /* sanitized programs of the tests are linked with the objects, and have none beside them */
         program = find_own(own) ? own : VSHI_SANITIZED ? "/proc/self/exe" : NULL;
@@ -191,7 +193,7 @@ int vshi_spawn_reader(const vshi_ask *ask, int answer, int progress, pid_t *pid)
     reason = posix_spawnattr_init(&attributes);
     if (reason == 0) {
         set_attributes(&attributes);
-        reason = give_files(&files, ask, answer, progress);
+        reason = give_files(&files, exchange, answer, progress);
         reason =
             reason != 0 ? reason : posix_spawnp(pid, program, &files, &attributes, arguments, environment);
         posix_spawnattr_destroy(&attributes);

@@ -11,10 +11,10 @@ extern "C" {
 #endif
 
 /* Puts the folders that this process's libraries are loaded from: the reader loads the same. */
-void vshi_put_folders(vshi_put *put);
+void vshi_encode_folders(vshi_encoder *encoder);
 
 /* Starts ask->run->reader with these descriptors. Returns 0 or what errno says. */
-int vshi_spawn_reader(const vshi_ask *ask, int answer, int progress, pid_t *pid);
+int vshi_spawn_reader(const vshi_exchange *exchange, int answer, int progress, pid_t *pid);
 
 #ifdef __cplusplus
 }

@@ -3,7 +3,7 @@
 #include "base/similarity.h"
 #include "mesh/mesh_set.h"
 #include "scene/assets.h"
-#include "spheres/balls.h"
+#include "spheres/sphere_tree.h"
 
 #include "base/job.h"
 #include "base/memory.h"
@@ -220,7 +220,7 @@ static vsh_result add_made(assembly *a, const double *transform, vsh_run *run, v
 }
 
 static double spheres_distance(void *user, const double position[3]) {
-    return vshi_balls_distance(user, position);
+    return vshi_sphere_tree_distance(user, position);
 }
 
 /* Distances to a union are true outside of it, and a bound within. */

@@ -52,7 +52,7 @@ vsh_result vshi_asset_grid(vshi_asset_files *files, const char *path, const char
 }
 
 vsh_result vshi_asset_map(vshi_asset_files *files, const char *path, const vsh_run *run,
-                          const vshi_heightmap **map, vsh_error *error) {
+                          const vshi_height_image **map, vsh_error *error) {
     for (size_t i = 0; i < files->map_count; ++i) {
         if (strcmp(files->maps[i].path, path) == 0) {
             *map = &files->maps[i].map;
@@ -61,7 +61,7 @@ vsh_result vshi_asset_map(vshi_asset_files *files, const char *path, const vsh_r
     }
     vshi_asset_map_entry *entry = &files->maps[files->map_count++];
     VSHI_TRY(copy_text(path, &entry->path, error));
-    VSHI_TRY(vshi_heightmap_read(path, run, &entry->map, error));
+    VSHI_TRY(vshi_height_image_read(path, run, &entry->map, error));
     *map = &entry->map;
     return VSH_OK;
 }

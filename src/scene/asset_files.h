@@ -2,7 +2,7 @@
 #ifndef VSHI_ASSET_FILES_H
 #define VSHI_ASSET_FILES_H
 
-#include "heightfield/heightmap.h"
+#include "heightfield/height_image.h"
 
 #include <vdbshade/scene.h>
 
@@ -19,7 +19,7 @@ typedef struct vshi_asset_grid_entry {
 
 typedef struct vshi_asset_map_entry {
     char *path;
-    vshi_heightmap map;
+    vshi_height_image map;
 } vshi_asset_map_entry;
 
 typedef struct vshi_asset_files {
@@ -42,6 +42,6 @@ vsh_result vshi_asset_model(vshi_asset_files *files, const char *path, const vsh
 vsh_result vshi_asset_grid(vshi_asset_files *files, const char *path, const char *name, const vsh_run *run,
                            const vsh_grid **grid, vsh_error *error);
 vsh_result vshi_asset_map(vshi_asset_files *files, const char *path, const vsh_run *run,
-                          const vshi_heightmap **map, vsh_error *error);
+                          const vshi_height_image **map, vsh_error *error);
 
 #endif

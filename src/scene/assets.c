@@ -75,7 +75,7 @@ static vsh_result place_model(asset_place *place, const vsh_model *model, int32_
 static vsh_result place_heights(vsh_assets *assets, asset_place *place, vsh_heights_source *source,
                                 int32_t what, const double transform[12], const vsh_run *run,
                                 vsh_error *error) {
-    const vshi_heightmap *map = NULL;
+    const vshi_height_image *map = NULL;
     VSHI_TRY(vshi_asset_map(&assets->files, source->name, run, &map, error));
     source->columns = map->columns;
     source->rows = map->rows;

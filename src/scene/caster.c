@@ -30,7 +30,7 @@ static const char *const whats[] = {[VSH_CASTER_MESH] = "a mesh caster",
                                     [VSH_CASTER_TEXT] = "a text caster"};
 
 /* A file's name, or [[x, y, z, radius], …]. */
-static vsh_result read_spheres(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_spheres(vshi_json *reader, const vshi_value *value, void *member) {
     static const vshi_key path = {.kind = VSHI_PATH};
     static const vshi_key sphere = {
         .kind = VSHI_VECTOR, .count = 4, .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST};
@@ -39,23 +39,23 @@ static vsh_result read_spheres(vshi_reader *reader, const vshi_value *value, voi
         return vshi_read_value(reader, value, &path, &caster->path);
     }
     if (!json_is_array(value->json)) {
-        return vshi_reader_fail(reader, value, "expected a file's name or an array of [x, y, z, radius]");
+        return vshi_json_fail(reader, value, "expected a file's name or an array of [x, y, z, radius]");
     }
     void *memory = NULL;
     caster->sphere_count = json_array_size(value->json);
     if (caster->sphere_count == 0) {
-        return vshi_reader_fail(reader, value, "is empty");
+        return vshi_json_fail(reader, value, "is empty");
     }
     vsh_result result =
-        vshi_reader_allocate(reader, &memory, caster->sphere_count, 4 * sizeof(double), "spheres");
+        vshi_json_allocate(reader, &memory, caster->sphere_count, 4 * sizeof(double), "spheres");
     double *spheres = memory;
     for (size_t i = 0; result == VSH_OK && i < caster->sphere_count; ++i) {
         const vshi_value item = vshi_item(value, i);
         result = vshi_read_value(reader, &item, &sphere, spheres + 4 * i);
         if (result == VSH_OK && !(spheres[4 * i + 3] > 0.0)) {
             const vshi_value radius = vshi_item(&item, 3);
-            return vshi_reader_fail(reader, &radius, "%.9g is out of range 0 (excluded) … %.9g",
-                                    spheres[4 * i + 3], VSHI_LARGEST);
+            return vshi_json_fail(reader, &radius, "%.9g is out of range 0 (excluded) … %.9g",
+                                  spheres[4 * i + 3], VSHI_LARGEST);
         }
     }
     caster->spheres = spheres;
@@ -131,7 +131,7 @@ static const vshi_key caster_keys[] = {
 };
 static const vshi_table caster_table = VSHI_TABLE(caster_keys);
 
-vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_caster *caster = member;
     caster->type = -1;
     vshi_transform_identity(caster->transform);
@@ -159,14 +159,14 @@ vsh_result vshi_read_caster(vshi_reader *reader, const vshi_value *value, void *
         return result;
     }
     if (caster->type < 0) {
-        return vshi_reader_fail(reader, value,
-                                "key \"mesh\", \"sdf\", \"vdb\", \"heightfield\", \"spheres\", \"mask\" "
-                                "or \"text\" is missing");
+        return vshi_json_fail(reader, value,
+                              "key \"mesh\", \"sdf\", \"vdb\", \"heightfield\", \"spheres\", \"mask\" "
+                              "or \"text\" is missing");
     }
     if (caster->type != VSH_CASTER_MESH && !vshi_transform_is_similarity(caster->transform) &&
         vshi_member(value, "transform", &transform)) {
-        return vshi_reader_fail(reader, &transform, "shears or scales unevenly, which %s cannot",
-                                whats[caster->type]);
+        return vshi_json_fail(reader, &transform, "shears or scales unevenly, which %s cannot",
+                              whats[caster->type]);
     }
     return VSH_OK;
 }

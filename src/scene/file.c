@@ -5,8 +5,8 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/try.h"
-#include "model/foreign.h"
-#include "json/reader.h"
+#include "model/unsupported.h"
+#include "json/json.h"
 
 #include <stdlib.h>
 
@@ -14,7 +14,7 @@ vsh_result vshi_scene_text(const char *path, const vsh_run *run, char **text, si
                            vsh_error *error) {
     *text = NULL;
     *size = 0;
-    VSHI_TRY(vshi_foreign_check(path, error));
+    VSHI_TRY(vshi_unsupported_check(path, error));
     return vshi_json_text(path, run, text, size, error);
 }
 

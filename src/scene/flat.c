@@ -25,7 +25,7 @@ typedef struct owner {
     vshi_json_block *blocks;
 } owner;
 
-static vsh_result read_casters(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_casters(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_flat_scene *scene = member;
     void *items = NULL;
     const vsh_result result = vshi_read_list(reader, value, 0, MAX_ITEMS, sizeof *scene->casters,
@@ -34,7 +34,7 @@ static vsh_result read_casters(vshi_reader *reader, const vshi_value *value, voi
     return result;
 }
 
-static vsh_result read_lights(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_lights(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_flat_scene *scene = member;
     void *items = NULL;
     VSHI_TRY(vshi_read_list(reader, value, 1, MAX_LIGHTS, sizeof *scene->lights, vshi_read_flat_light, &items,
@@ -43,13 +43,13 @@ static vsh_result read_lights(vshi_reader *reader, const vshi_value *value, void
     return vshi_check_light_names(reader, value, scene->lights, scene->light_count);
 }
 
-static vsh_result read_size(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_size(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_flat_scene *scene = member;
     return vshi_read_size(reader, value, &scene->options.width, &scene->options.height);
 }
 
 /* [x0, y0, x1, y1] */
-static vsh_result read_region(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_region(vshi_json *reader, const vshi_value *value, void *member) {
     static const vshi_key key = {
         .kind = VSHI_VECTOR, .count = 4, .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST};
     vsh_flat_scene *scene = member;
@@ -59,7 +59,7 @@ static vsh_result read_region(vshi_reader *reader, const vshi_value *value, void
         return result;
     }
     if (!(r[0] < r[2] && r[1] < r[3])) {
-        return vshi_reader_fail(reader, value, "is empty: expected [left, bottom, right, top]");
+        return vshi_json_fail(reader, value, "is empty: expected [left, bottom, right, top]");
     }
     for (int axis = 0; axis < 2; ++axis) {
         scene->options.region_min[axis] = r[axis];
@@ -101,10 +101,10 @@ static const vshi_key scene_keys[] = {
 };
 static const vshi_table scene_table = VSHI_TABLE(scene_keys);
 
-static vsh_result parse(vshi_reader *reader, owner *made) {
+static vsh_result parse(vshi_json *reader, owner *made) {
     json_t *json = NULL;
     vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(vshi_reader_load(reader, &json));
+    VSHI_TRY_DONE(vshi_json_load(reader, &json));
     const vshi_value root = {NULL, NULL, 0, 0, json};
     made->scene.options = vsh_flat_options_default();
     VSHI_TRY_DONE(vshi_read_object(reader, &root, &scene_table, 1, "a flat scene", &made->scene));
@@ -132,7 +132,7 @@ vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_sc
         result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
     }
     if (result == VSH_OK) {
-        vshi_reader reader = {path, text, size, NULL, error};
+        vshi_json reader = {path, text, size, NULL, error};
         result = parse(&reader, made);
     }
     free(text);

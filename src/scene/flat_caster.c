@@ -23,7 +23,7 @@ static const char *shape_name(int32_t i) {
     return names[i];
 }
 
-static vsh_result read_points(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_points(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_flat_caster *caster = member;
     vsh_result result = vshi_expect(reader, value, JSON_ARRAY);
     if (result != VSH_OK) {
@@ -31,10 +31,10 @@ static vsh_result read_points(vshi_reader *reader, const vshi_value *value, void
     }
     const size_t count = json_array_size(value->json);
     if (count < 3 || count > MAX_POINTS) {
-        return vshi_reader_fail(reader, value, "has %zu points, out of range 3 … %zu", count, MAX_POINTS);
+        return vshi_json_fail(reader, value, "has %zu points, out of range 3 … %zu", count, MAX_POINTS);
     }
     void *memory;
-    result = vshi_reader_allocate(reader, &memory, count, 2 * sizeof(double), "points");
+    result = vshi_json_allocate(reader, &memory, count, 2 * sizeof(double), "points");
     const vshi_key key = {.kind = VSHI_VECTOR, .count = 2, .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST};
     double *points = memory;
     for (size_t i = 0; i < count && result == VSH_OK; ++i) {
@@ -97,7 +97,7 @@ static void compose(const placed *p, double m[6]) {
     }
 }
 
-vsh_result vshi_read_flat_caster(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_flat_caster(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_flat_caster *caster = member;
     placed p = {.scale = 1.0};
     p.caster.mask = vsh_mask_options_default();
@@ -134,7 +134,7 @@ vsh_result vshi_read_flat_caster(vshi_reader *reader, const vshi_value *value, v
         return result;
     }
     if (type < 0) {
-        return vshi_reader_fail(reader, value, "key \"mask\", \"text\" or \"shape\" is missing");
+        return vshi_json_fail(reader, value, "key \"mask\", \"text\" or \"shape\" is missing");
     }
     compose(&p, p.caster.transform);
     *caster = p.caster;

@@ -6,7 +6,7 @@
 #include <vdbshade/scene.h>
 
 /* Names of lights, each a string that is the name of one. */
-static vsh_result read_light_names(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_light_names(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene_layer *layer = member;
     vsh_result result = vshi_expect(reader, value, JSON_ARRAY);
     if (result != VSH_OK) {
@@ -16,8 +16,8 @@ static vsh_result read_light_names(vshi_reader *reader, const vshi_value *value,
     void *memory = NULL;
     layer->shade.light_count = json_array_size(value->json);
     /* one more: no lights at all are not NULL, which is all of them */
-    result = vshi_reader_allocate(reader, &memory, layer->shade.light_count + 1, sizeof(const char *),
-                                  "lights of a layer");
+    result = vshi_json_allocate(reader, &memory, layer->shade.light_count + 1, sizeof(const char *),
+                                "lights of a layer");
     const char **names = memory;
     for (size_t i = 0; result == VSH_OK && i < layer->shade.light_count; ++i) {
         const vshi_value name = vshi_item(value, i);
@@ -65,20 +65,20 @@ static const vshi_key layer_keys[] = {
 };
 static const vshi_table layer_table = VSHI_TABLE(layer_keys);
 
-vsh_result vshi_read_layer(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_layer(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene_layer *layer = member;
     layer->shade = vsh_layer_default();
     VSHI_TRY(vshi_read_object(reader, value, &layer_table, 1, "a layer", layer));
     VSHI_TRY(vshi_reject_both(reader, value, "voxel_size", "resolution"));
     vshi_value remap;
     if (vshi_member(value, "remap", &remap) && !(layer->shade.remap[0] < layer->shade.remap[1])) {
-        return vshi_reader_fail(reader, &remap, "expected two numbers that rise, found %g and %g",
-                                layer->shade.remap[0], layer->shade.remap[1]);
+        return vshi_json_fail(reader, &remap, "expected two numbers that rise, found %g and %g",
+                              layer->shade.remap[0], layer->shade.remap[1]);
     }
     return VSH_OK;
 }
 
-static vsh_result check_casters(vshi_reader *reader, const vshi_value *root, const vsh_scene *scene) {
+static vsh_result check_casters(vshi_json *reader, const vshi_value *root, const vsh_scene *scene) {
     vshi_value casters, name;
     for (size_t i = 0; i < scene->caster_count && vshi_member(root, "casters", &casters); ++i) {
         bool found = scene->casters[i].layer == NULL;
@@ -87,8 +87,8 @@ static vsh_result check_casters(vshi_reader *reader, const vshi_value *root, con
         }
         const vshi_value caster = vshi_item(&casters, i);
         if (!found && vshi_member(&caster, "layer", &name)) {
-            return vshi_reader_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
-                                    scene->casters[i].layer);
+            return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
+                                  scene->casters[i].layer);
         }
     }
     return VSH_OK;
@@ -103,7 +103,7 @@ static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
     return casts;
 }
 
-static vsh_result check_lights(vshi_reader *reader, const vshi_value *layers, const vsh_scene *scene,
+static vsh_result check_lights(vshi_json *reader, const vshi_value *layers, const vsh_scene *scene,
                                size_t i) {
     const vsh_layer *layer = &scene->layers[i].shade;
     const vshi_value at = vshi_item(layers, i);
@@ -115,20 +115,19 @@ static vsh_result check_lights(vshi_reader *reader, const vshi_value *layers, co
         }
         if (!found && vshi_member(&at, "lights", &names)) {
             const vshi_value name = vshi_item(&names, k);
-            return vshi_reader_fail(reader, &name, "\"%.64s\" is none of the scene's lights",
-                                    layer->lights[k]);
+            return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's lights", layer->lights[k]);
         }
     }
     return VSH_OK;
 }
 
 /* Takes a light from those that a layer casts for. */
-static vsh_result take_out(vshi_reader *reader, const vsh_scene *scene, const vsh_light *light,
+static vsh_result take_out(vshi_json *reader, const vsh_scene *scene, const vsh_light *light,
                            vsh_layer *layer) {
     void *memory = NULL;
     size_t count = 0;
-    const vsh_result result = vshi_reader_allocate(reader, &memory, scene->light_count + 1,
-                                                   sizeof(const char *), "lights of a layer");
+    const vsh_result result = vshi_json_allocate(reader, &memory, scene->light_count + 1,
+                                                 sizeof(const char *), "lights of a layer");
     const char **left = memory;
     for (size_t l = 0; result == VSH_OK && l < scene->light_count; ++l) {
         if (&scene->lights[l] != light && casts_for(layer, &scene->lights[l])) {
@@ -141,7 +140,7 @@ static vsh_result take_out(vshi_reader *reader, const vsh_scene *scene, const vs
 }
 
 /* A light that names layers: the others do not cast for it. */
-static vsh_result choose_layers(vshi_reader *reader, const vshi_value *names, const vsh_light *light,
+static vsh_result choose_layers(vshi_json *reader, const vshi_value *names, const vsh_light *light,
                                 const vsh_scene *scene, vsh_scene_layer *layers) {
     bool named[VSH_MAX_LAYERS] = {false};
     VSHI_TRY(vshi_expect(reader, names, JSON_ARRAY));
@@ -155,8 +154,8 @@ static vsh_result choose_layers(vshi_reader *reader, const vshi_value *names, co
             found = found || is;
         }
         if (!found) {
-            return vshi_reader_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
-                                    json_string_value(name.json));
+            return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
+                                  json_string_value(name.json));
         }
     }
     for (size_t k = 0; k < scene->layer_count; ++k) {
@@ -167,14 +166,14 @@ static vsh_result choose_layers(vshi_reader *reader, const vshi_value *names, co
     return VSH_OK;
 }
 
-static vsh_result choose_all(vshi_reader *reader, const vshi_value *root, vsh_scene *scene) {
+static vsh_result choose_all(vshi_json *reader, const vshi_value *root, vsh_scene *scene) {
     vshi_value lights, names;
     void *memory = NULL;
     if (!vshi_member(root, "lights", &lights)) {
         return VSH_OK;
     }
     vsh_result result =
-        vshi_reader_allocate(reader, &memory, scene->layer_count + 1, sizeof *scene->layers, "layers");
+        vshi_json_allocate(reader, &memory, scene->layer_count + 1, sizeof *scene->layers, "layers");
     vsh_scene_layer *layers = memory;
     if (result == VSH_OK && scene->layer_count > 0) {
         memcpy(layers, scene->layers, scene->layer_count * sizeof *layers);
@@ -190,7 +189,7 @@ static vsh_result choose_all(vshi_reader *reader, const vshi_value *root, vsh_sc
 }
 
 /* What names what: casters their layers, layers their lights, lights their layers. */
-vsh_result vshi_check_layers(vshi_reader *reader, const vshi_value *root, vsh_scene *scene) {
+vsh_result vshi_check_layers(vshi_json *reader, const vshi_value *root, vsh_scene *scene) {
     vshi_value layers, name;
     VSHI_TRY(check_casters(reader, root, scene));
     const bool layered = vshi_member(root, "layers", &layers);
@@ -199,8 +198,8 @@ vsh_result vshi_check_layers(vshi_reader *reader, const vshi_value *root, vsh_sc
         for (size_t k = 0; k < i; ++k) {
             if (strcmp(scene->layers[i].name, scene->layers[k].name) == 0 &&
                 vshi_member(&at, "name", &name)) {
-                return vshi_reader_fail(reader, &name, "\"%.64s\" is the name of layers[%zu] too",
-                                        scene->layers[i].name, k);
+                return vshi_json_fail(reader, &name, "\"%.64s\" is the name of layers[%zu] too",
+                                      scene->layers[i].name, k);
             }
         }
         VSHI_TRY(check_lights(reader, &layers, scene, i));

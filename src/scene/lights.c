@@ -26,15 +26,15 @@ static const char *falloff_name(int32_t i) {
     return names[i];
 }
 
-static vsh_result read_name(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_name(vshi_json *reader, const vshi_value *value, void *member) {
     const vsh_result result = vshi_expect(reader, value, JSON_STRING);
     if (result != VSH_OK) {
         return result;
     }
     const char *name = json_string_value(value->json);
     if (!vshi_light_name_valid(name)) {
-        return vshi_reader_fail(reader, value,
-                                "\"%.64s\" is no light's name: 1 … 63 of A … Z, a … z, 0 … 9, _ and -", name);
+        return vshi_json_fail(reader, value,
+                              "\"%.64s\" is no light's name: 1 … 63 of A … Z, a … z, 0 … 9, _ and -", name);
     }
     memcpy(member, name, strlen(name) + 1);
     return VSH_OK;
@@ -123,7 +123,7 @@ static void make_keys(bool flat, light_keys *all) {
     add_key(all, &(vshi_key){.name = "layers", .kind = VSHI_LATER});
 }
 
-static vsh_result read_keys(vshi_reader *reader, const vshi_value *value, bool flat, vsh_light *light) {
+static vsh_result read_keys(vshi_json *reader, const vshi_value *value, bool flat, vsh_light *light) {
     vshi_name_fn *types = flat ? flat_type_name : type_name;
     int32_t type = -1;
     vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
@@ -145,21 +145,21 @@ static vsh_result read_keys(vshi_reader *reader, const vshi_value *value, bool f
 }
 
 /* What no key alone can tell. */
-static vsh_result check(vshi_reader *reader, const vshi_value *value, const vsh_light *light) {
+static vsh_result check(vshi_json *reader, const vshi_value *value, const vsh_light *light) {
     vshi_value inner, outer;
     if (light->inner_angle > light->outer_angle && light->type == VSH_LIGHT_SPOT &&
         vshi_member(value, "inner_deg", &inner) && vshi_member(value, "outer_deg", &outer)) {
-        return vshi_reader_fail(reader, &inner, "%.9g is over outer_deg, %.9g", json_number_value(inner.json),
-                                json_number_value(outer.json));
+        return vshi_json_fail(reader, &inner, "%.9g is over outer_deg, %.9g", json_number_value(inner.json),
+                              json_number_value(outer.json));
     }
     vsh_error error;
     if (vsh_light_check(light, &error) != VSH_OK) { /* a limit that the tables above do not know of */
-        return vshi_reader_fail(reader, value, "%.400s", error.message);
+        return vshi_json_fail(reader, value, "%.400s", error.message);
     }
     return VSH_OK;
 }
 
-vsh_result vshi_read_light(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_light(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_light *light = member;
     *light = vsh_light_default();
     const vsh_result result = read_keys(reader, value, false, light);
@@ -169,15 +169,15 @@ vsh_result vshi_read_light(vshi_reader *reader, const vshi_value *value, void *m
     vshi_value reach;
     const bool has_reach = vshi_member(value, "reach", &reach);
     if (light->falloff == VSH_FALLOFF_QUADRATIC && !has_reach) {
-        return vshi_reader_fail(reader, value, "key \"reach\" is missing: falloff \"quadratic\" needs it");
+        return vshi_json_fail(reader, value, "key \"reach\" is missing: falloff \"quadratic\" needs it");
     }
     if (light->falloff != VSH_FALLOFF_QUADRATIC && has_reach) {
-        return vshi_reader_fail_key(reader, &reach, "is of no use without falloff \"quadratic\"");
+        return vshi_json_fail_key(reader, &reach, "is of no use without falloff \"quadratic\"");
     }
     return check(reader, value, light);
 }
 
-vsh_result vshi_read_flat_light(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_flat_light(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_light *light = member;
     *light = vsh_light_default();
     light->direction[1] = light->axis[1] = 0.0; /* so that what is read is all there is */
@@ -192,15 +192,15 @@ vsh_result vshi_read_flat_light(vshi_reader *reader, const vshi_value *value, vo
     return check(reader, value, light);
 }
 
-vsh_result vshi_check_light_names(vshi_reader *reader, const vshi_value *value, const vsh_light *lights,
+vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *value, const vsh_light *lights,
                                   size_t count) {
     for (size_t i = 0; i < count; ++i) {
         for (size_t j = 0; j < i; ++j) {
             const vshi_value light = vshi_item(value, i);
             vshi_value name;
             if (strcmp(lights[i].name, lights[j].name) == 0 && vshi_member(&light, "name", &name)) {
-                return vshi_reader_fail(reader, &name, "\"%s\" is the name of lights[%zu] too",
-                                        lights[i].name, j);
+                return vshi_json_fail(reader, &name, "\"%s\" is the name of lights[%zu] too", lights[i].name,
+                                      j);
             }
         }
     }

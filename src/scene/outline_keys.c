@@ -1,6 +1,6 @@
 #include "scene/outline_keys.h"
 
-vsh_result vshi_read_mask_size(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_mask_size(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_mask_options *mask = member;
     const vshi_key key = {.kind = json_is_array(value->json) ? VSHI_VECTOR : VSHI_NUMBER,
                           .count = 2,

@@ -7,7 +7,7 @@
 #include <vdbshade/outline.h>
 
 /* `size`, one number or two, into a vsh_mask_options. */
-vsh_result vshi_read_mask_size(vshi_reader *reader, const vshi_value *value, void *mask);
+vsh_result vshi_read_mask_size(vshi_json *reader, const vshi_value *value, void *mask);
 
 /* Rows for a struct with path, text, mask and letters, which is filled with the options' defaults beforehand;
  * `of_mask` and `of_text` are the bits of the two variants. */

@@ -5,7 +5,7 @@
 #include <vdbshade/image.h>
 #include <vdbshade/settings.h>
 
-vsh_result vshi_read_size(vshi_reader *reader, const vshi_value *value, int32_t *width, int32_t *height) {
+vsh_result vshi_read_size(vshi_json *reader, const vshi_value *value, int32_t *width, int32_t *height) {
     const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 1.0, .highest = VSH_MAX_LIGHTMAP_SIZE};
     if (!json_is_array(value->json)) {
         const vsh_result result = vshi_read_value(reader, value, &key, width);
@@ -14,24 +14,24 @@ vsh_result vshi_read_size(vshi_reader *reader, const vshi_value *value, int32_t 
     }
     const size_t count = json_array_size(value->json);
     if (count != 2) {
-        return vshi_reader_fail(reader, value, "expected 2 numbers, found %zu", count);
+        return vshi_json_fail(reader, value, "expected 2 numbers, found %zu", count);
     }
     const vshi_value first = vshi_item(value, 0), second = vshi_item(value, 1);
     const vsh_result result = vshi_read_value(reader, &first, &key, width);
     return result == VSH_OK ? vshi_read_value(reader, &second, &key, height) : result;
 }
 
-static vsh_result read_size(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_size(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_receiver *receiver = member;
     return vshi_read_size(reader, value, &receiver->width, &receiver->height);
 }
 
-vsh_result vshi_read_bits(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_bits(vshi_json *reader, const vshi_value *value, void *member) {
     const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 0.0, .highest = 32.0};
     int32_t *bits = member;
     VSHI_TRY(vshi_read_value(reader, value, &key, bits));
     if (*bits != 0 && *bits != 8 && *bits != 16 && *bits != 32) {
-        return vshi_reader_fail(reader, value, "%d is none of 0, 8, 16, 32", *bits);
+        return vshi_json_fail(reader, value, "%d is none of 0, 8, 16, 32", *bits);
     }
     return VSH_OK;
 }
@@ -170,7 +170,7 @@ static const vshi_key receiver_keys[] = {
 };
 const vshi_table vshi_receiver_table = VSHI_TABLE(receiver_keys);
 
-vsh_result vshi_read_receiver(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_receiver(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_receiver *receiver = member;
     *receiver = vsh_receiver_default();
     vsh_result result = vshi_expect(reader, value, JSON_OBJECT);

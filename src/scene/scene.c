@@ -22,7 +22,7 @@ typedef struct owner {
     vshi_json_block *blocks;
 } owner;
 
-static vsh_result read_casters(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_casters(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene *scene = member;
     void *items = NULL;
     const vsh_result result = vshi_read_list(reader, value, 1, MAX_ITEMS, sizeof *scene->casters,
@@ -31,7 +31,7 @@ static vsh_result read_casters(vshi_reader *reader, const vshi_value *value, voi
     return result;
 }
 
-static vsh_result read_layers(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_layers(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene *scene = member;
     void *items = NULL;
     const vsh_result result = vshi_read_list(reader, value, 0, VSH_MAX_LAYERS, sizeof *scene->layers,
@@ -40,7 +40,7 @@ static vsh_result read_layers(vshi_reader *reader, const vshi_value *value, void
     return result;
 }
 
-static vsh_result read_lights(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_lights(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene *scene = member;
     void *items = NULL;
     const vsh_result result = vshi_read_list(reader, value, 0, MAX_LIGHTS, sizeof *scene->lights,
@@ -57,7 +57,7 @@ static int by_output(const void *a, const void *b) {
 }
 
 /* Two receivers with one output would overwrite each other. */
-static vsh_result check_outputs(vshi_reader *reader, const vshi_value *value, const vsh_scene *scene) {
+static vsh_result check_outputs(vshi_json *reader, const vshi_value *value, const vsh_scene *scene) {
     void *memory;
     vsh_result result = vshi_allocate(&memory, scene->receiver_count, sizeof(const vsh_receiver *),
                                       "receivers", reader->error);
@@ -75,8 +75,8 @@ static vsh_result check_outputs(vshi_reader *reader, const vshi_value *value, co
         if (strcmp(sorted[i - 1]->output, sorted[i]->output) == 0 &&
             vshi_member(&receiver, "output", &output)) {
             result =
-                vshi_reader_fail(reader, &output, "\"%.200s\" is the output of receivers[%zu] too",
-                                 json_string_value(output.json), (size_t)(sorted[i - 1] - scene->receivers));
+                vshi_json_fail(reader, &output, "\"%.200s\" is the output of receivers[%zu] too",
+                               json_string_value(output.json), (size_t)(sorted[i - 1] - scene->receivers));
             break;
         }
     }
@@ -84,7 +84,7 @@ static vsh_result check_outputs(vshi_reader *reader, const vshi_value *value, co
     return result;
 }
 
-static vsh_result read_receivers(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_receivers(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene *scene = member;
     void *items = NULL;
     const vsh_result result = vshi_read_list(reader, value, 0, MAX_ITEMS, sizeof *scene->receivers,
@@ -146,7 +146,7 @@ static const vshi_key ao_keys[] = {
 };
 const vshi_table vshi_ao_table = VSHI_TABLE(ao_keys);
 
-static vsh_result read_ao(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_ao(vshi_json *reader, const vshi_value *value, void *member) {
     static const char *const whats[] = {
         [VSH_AO_TAPS] = "ao by taps", [VSH_AO_RAYS] = "ao by rays", [VSH_AO_AUTO] = NULL};
     vsh_scene *scene = member;
@@ -158,7 +158,7 @@ static vsh_result read_ao(vshi_reader *reader, const vshi_value *value, void *me
 }
 
 /* "quadratic", or the powers of R, G and B. */
-static vsh_result read_tint(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_tint(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene *scene = member;
     const vshi_key powers = {.kind = VSHI_VECTOR, .lowest = 0.0625, .highest = 16.0, .count = 3};
     if (json_is_array(value->json)) {
@@ -168,8 +168,8 @@ static vsh_result read_tint(vshi_reader *reader, const vshi_value *value, void *
     const vsh_result result = vshi_expect(reader, value, JSON_STRING);
     scene->tint.type = result == VSH_OK ? vsh_tint_type(json_string_value(value->json)) : VSH_TINT_NONE;
     if (result == VSH_OK && scene->tint.type != VSH_TINT_NONE && scene->tint.type != VSH_TINT_QUADRATIC) {
-        return vshi_reader_fail(reader, value, "\"%.64s\" is none of none, quadratic, [r, g, b]",
-                                json_string_value(value->json));
+        return vshi_json_fail(reader, value, "\"%.64s\" is none of none, quadratic, [r, g, b]",
+                              json_string_value(value->json));
     }
     return result;
 }
@@ -191,7 +191,7 @@ static void resolution_is_named(void *target) {
 }
 
 /* A name, or metres. */
-static vsh_result read_unit(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_unit(vshi_json *reader, const vshi_value *value, void *member) {
     static const vshi_key metres = {.kind = VSHI_NUMBER, .highest = 1e12, .flags = VSHI_ABOVE};
     vsh_scene *scene = member;
     if (!json_is_string(value->json)) {
@@ -199,8 +199,8 @@ static vsh_result read_unit(vshi_reader *reader, const vshi_value *value, void *
     }
     scene->unit = vsh_unit(json_string_value(value->json));
     return scene->unit > 0.0 ? VSH_OK
-                             : vshi_reader_fail(reader, value, "\"%.64s\" is none of m, cm, mm, in, ft",
-                                                json_string_value(value->json));
+                             : vshi_json_fail(reader, value, "\"%.64s\" is none of m, cm, mm, in, ft",
+                                              json_string_value(value->json));
 }
 
 static const vshi_key scene_keys[] = {
@@ -389,10 +389,10 @@ const vshi_table vshi_scene_table = VSHI_TABLE(scene_keys);
 vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh_scene **scene,
                             vsh_error *error) {
     *scene = NULL;
-    vshi_reader reader = {path, text, size, NULL, error};
+    vshi_json reader = {path, text, size, NULL, error};
     json_t *json = NULL;
     owner *made = NULL;
-    vsh_result result = vshi_reader_load(&reader, &json);
+    vsh_result result = vshi_json_load(&reader, &json);
     if (result != VSH_OK) {
         return result;
     }

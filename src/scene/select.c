@@ -14,16 +14,16 @@
 
 /* --- in scene files */
 
-static vsh_result read_patterns(vshi_reader *reader, const vshi_value *value, const char *const **patterns,
+static vsh_result read_patterns(vshi_json *reader, const vshi_value *value, const char *const **patterns,
                                 size_t *count) {
     static const vshi_key key = {.kind = VSHI_STRING};
     const bool list = json_is_array(value->json);
     *count = list ? json_array_size(value->json) : 1;
     if (*count == 0) {
-        return vshi_reader_fail(reader, value, "is empty");
+        return vshi_json_fail(reader, value, "is empty");
     }
     void *memory = NULL;
-    vsh_result result = vshi_reader_allocate(reader, &memory, *count, sizeof **patterns, "patterns");
+    vsh_result result = vshi_json_allocate(reader, &memory, *count, sizeof **patterns, "patterns");
     const char **strings = memory;
     for (size_t i = 0; i < *count && result == VSH_OK; ++i) {
         const vshi_value item = list ? vshi_item(value, i) : *value;
@@ -33,24 +33,24 @@ static vsh_result read_patterns(vshi_reader *reader, const vshi_value *value, co
     return result;
 }
 
-vsh_result vshi_read_only(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_only(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_selection *selection = member;
     return read_patterns(reader, value, &selection->only, &selection->only_count);
 }
 
-vsh_result vshi_read_except(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_except(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_selection *selection = member;
     return read_patterns(reader, value, &selection->except, &selection->except_count);
 }
 
-static vsh_result read_rules(vshi_reader *reader, const vshi_value *value, vsh_caster *caster,
+static vsh_result read_rules(vshi_json *reader, const vshi_value *value, vsh_caster *caster,
                              int32_t solidity) {
     vsh_selection given = {.only = NULL};
     vsh_result result = vshi_read_only(reader, value, &given);
     void *memory = NULL;
     const size_t count = caster->solidity_count + given.only_count;
     if (result == VSH_OK) {
-        result = vshi_reader_allocate(reader, &memory, count, sizeof *caster->solidity, "patterns");
+        result = vshi_json_allocate(reader, &memory, count, sizeof *caster->solidity, "patterns");
     }
     if (result != VSH_OK) {
         return result;
@@ -66,15 +66,15 @@ static vsh_result read_rules(vshi_reader *reader, const vshi_value *value, vsh_c
     return VSH_OK;
 }
 
-vsh_result vshi_read_solid(vshi_reader *reader, const vshi_value *value, void *caster) {
+vsh_result vshi_read_solid(vshi_json *reader, const vshi_value *value, void *caster) {
     return read_rules(reader, value, caster, VSH_SOLIDITY_SOLID);
 }
 
-vsh_result vshi_read_shell(vshi_reader *reader, const vshi_value *value, void *caster) {
+vsh_result vshi_read_shell(vshi_json *reader, const vshi_value *value, void *caster) {
     return read_rules(reader, value, caster, VSH_SOLIDITY_SHELL);
 }
 
-vsh_result vshi_read_inward(vshi_reader *reader, const vshi_value *value, void *caster) {
+vsh_result vshi_read_inward(vshi_json *reader, const vshi_value *value, void *caster) {
     return read_rules(reader, value, caster, VSH_SOLIDITY_INWARD);
 }
 

@@ -17,7 +17,7 @@ static const double FLAT_TOLERANCE = 1e-12;
 static const double SMALLEST_SCALE = 1e-6;
 static const double LARGEST_SCALE = 1e6;
 
-vsh_result vshi_read_rotation(vshi_reader *reader, const vshi_value *value, void *quaternion) {
+vsh_result vshi_read_rotation(vshi_json *reader, const vshi_value *value, void *quaternion) {
     const vshi_key key = {.kind = VSHI_VECTOR, .count = 3, .lowest = -1e6, .highest = 1e6};
     double degrees[3];
     const vsh_result result = vshi_read_value(reader, value, &key, degrees);
@@ -40,7 +40,7 @@ vsh_result vshi_read_rotation(vshi_reader *reader, const vshi_value *value, void
 }
 
 /* One number for all axes, or one for each. */
-static vsh_result read_scale(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_scale(vshi_json *reader, const vshi_value *value, void *member) {
     const vshi_key key = {.kind = json_is_array(value->json) ? VSHI_VECTOR : VSHI_NUMBER,
                           .count = 3,
                           .lowest = SMALLEST_SCALE,
@@ -124,7 +124,7 @@ static vshi_vec axis(const double m[12], int column) {
     return (vshi_vec){m[column], m[4 + column], m[8 + column]};
 }
 
-vsh_result vshi_read_transform(vshi_reader *reader, const vshi_value *value, void *matrix) {
+vsh_result vshi_read_transform(vshi_json *reader, const vshi_value *value, void *matrix) {
     parts p = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}, {1.0, 1.0, 1.0}, {0.0}};
     vsh_result result = vshi_read_object(reader, value, &transform_table, 1, "a transform", &p);
     if (result == VSH_OK) {
@@ -146,7 +146,7 @@ vsh_result vshi_read_transform(vshi_reader *reader, const vshi_value *value, voi
     memcpy(m, p.matrix, sizeof p.matrix);
     const double cube = vshi_length(axis(m, 0)) * vshi_length(axis(m, 1)) * vshi_length(axis(m, 2));
     if (!(fabs(vshi_transform_determinant(m)) > FLAT_TOLERANCE * cube)) {
-        return vshi_reader_fail(reader, &given, "flattens: the determinant of its first three columns is 0");
+        return vshi_json_fail(reader, &given, "flattens: the determinant of its first three columns is 0");
     }
     return VSH_OK;
 }

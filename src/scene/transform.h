@@ -6,10 +6,10 @@
 
 /* [x, y, z] degrees into double[4], the quaternion x, y, z, w: about x first, then y, then z, each about the
  * fixed axes (Blender's "XYZ Euler"). */
-vsh_result vshi_read_rotation(vshi_reader *reader, const vshi_value *value, void *quaternion);
+vsh_result vshi_read_rotation(vshi_json *reader, const vshi_value *value, void *quaternion);
 
 /* A "transform" object into double[12]. Errors: also a transform that flattens. */
-vsh_result vshi_read_transform(vshi_reader *reader, const vshi_value *value, void *matrix);
+vsh_result vshi_read_transform(vshi_json *reader, const vshi_value *value, void *matrix);
 
 void vshi_transform_identity(double matrix[12]);
 

@@ -46,7 +46,7 @@ static const char *operation_name(int32_t i) {
 }
 
 /* [x, z] into size[0] and size[2]. */
-static vsh_result read_plane_size(vshi_reader *reader, const vshi_value *value, void *member) {
+static vsh_result read_plane_size(vshi_json *reader, const vshi_value *value, void *member) {
     const vshi_key key = {.kind = VSHI_VECTOR, .count = 2, .highest = VSHI_LARGEST, .flags = VSHI_ABOVE};
     double size[2];
     VSHI_TRY(vshi_read_value(reader, value, &key, size));
@@ -126,11 +126,11 @@ typedef struct tree {
     size_t capacity;
 } tree;
 
-static vsh_result push(vshi_reader *reader, const vshi_value *value, tree *t, const vsh_sdf_node *node,
+static vsh_result push(vshi_json *reader, const vshi_value *value, tree *t, const vsh_sdf_node *node,
                        int32_t *index) {
     if (t->count == MAX_NODES) {
-        return vshi_reader_fail(reader, value, "is node %zu of its tree, out of range 1 … %d", t->count + 1,
-                                MAX_NODES);
+        return vshi_json_fail(reader, value, "is node %zu of its tree, out of range 1 … %d", t->count + 1,
+                              MAX_NODES);
     }
     if (t->count == t->capacity) {
         const size_t capacity = t->capacity == 0 ? 16 : 2 * t->capacity;
@@ -152,7 +152,7 @@ static vsh_result push(vshi_reader *reader, const vshi_value *value, tree *t, co
     return VSH_OK;
 }
 
-static vsh_result read_kind(vshi_reader *reader, const vshi_value *value, int32_t *shape) {
+static vsh_result read_kind(vshi_json *reader, const vshi_value *value, int32_t *shape) {
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
     VSHI_TRY(vshi_reject_both(reader, value, "shape", "op"));
     int32_t operation = -1;
@@ -163,16 +163,16 @@ static vsh_result read_kind(vshi_reader *reader, const vshi_value *value, int32_
         *shape = VSH_SDF_UNION + operation;
     }
     if (*shape < 0) {
-        return vshi_reader_fail(reader, value, "key \"shape\" or \"op\" is missing");
+        return vshi_json_fail(reader, value, "key \"shape\" or \"op\" is missing");
     }
     return VSH_OK;
 }
 
 /* `scale` is that of the nodes above. */
-static vsh_result read_node(vshi_reader *reader, const vshi_value *value, tree *t, int level, double scale,
+static vsh_result read_node(vshi_json *reader, const vshi_value *value, tree *t, int level, double scale,
                             int32_t *index) {
     if (level > MAX_LEVELS) {
-        return vshi_reader_fail(reader, value, "is nested more than %d deep", MAX_LEVELS);
+        return vshi_json_fail(reader, value, "is nested more than %d deep", MAX_LEVELS);
     }
     vsh_sdf_node node = vsh_sdf_node_default();
     VSHI_TRY(read_kind(reader, value, &node.shape));
@@ -183,8 +183,8 @@ static vsh_result read_node(vshi_reader *reader, const vshi_value *value, tree *
     VSHI_TRY(vshi_reject_both(reader, value, "rotate_deg", "rotate_quat"));
     scale *= node.scale;
     if (!(scale >= 1.0 / VSHI_LARGEST && scale <= VSHI_LARGEST)) {
-        return vshi_reader_fail(reader, value, "the scales of all levels make %.9g, out of range %.9g … %.9g",
-                                scale, 1.0 / VSHI_LARGEST, VSHI_LARGEST);
+        return vshi_json_fail(reader, value, "the scales of all levels make %.9g, out of range %.9g … %.9g",
+                              scale, 1.0 / VSHI_LARGEST, VSHI_LARGEST);
     }
     vshi_value of;
     if (!vshi_member(value, "of", &of)) {
@@ -193,7 +193,7 @@ static vsh_result read_node(vshi_reader *reader, const vshi_value *value, tree *
     VSHI_TRY(vshi_expect(reader, &of, JSON_ARRAY));
     const size_t size = json_array_size(of.json);
     if (size < 2) {
-        return vshi_reader_fail(reader, &of, "has %zu items, out of range 2 … %d", size, MAX_NODES);
+        return vshi_json_fail(reader, &of, "has %zu items, out of range 2 … %d", size, MAX_NODES);
     }
     /* Folded from the left; the operation's own transform belongs to the last of the pairs alone. */
     vsh_sdf_node pair = vsh_sdf_node_default();
@@ -217,13 +217,13 @@ static vsh_result read_node(vshi_reader *reader, const vshi_value *value, tree *
     return VSH_OK;
 }
 
-vsh_result vshi_read_sdf(vshi_reader *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_sdf(vshi_json *reader, const vshi_value *value, void *member) {
     tree t = {NULL, 0, 0};
     int32_t root;
     void *nodes = NULL;
     vsh_result result = VSH_OK;
     VSHI_TRY_DONE(read_node(reader, value, &t, 1, 1.0, &root));
-    VSHI_TRY_DONE(vshi_reader_allocate(reader, &nodes, t.count, sizeof *t.nodes, "sdf nodes"));
+    VSHI_TRY_DONE(vshi_json_allocate(reader, &nodes, t.count, sizeof *t.nodes, "sdf nodes"));
     memcpy(nodes, t.nodes, t.count * sizeof *t.nodes);
     *(vsh_sdf *)member = (vsh_sdf){nodes, t.count};
 done:

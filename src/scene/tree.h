@@ -5,6 +5,6 @@
 #include "json/keys.h"
 
 /* Into a vsh_sdf. */
-vsh_result vshi_read_sdf(vshi_reader *reader, const vshi_value *value, void *sdf);
+vsh_result vshi_read_sdf(vshi_json *reader, const vshi_value *value, void *sdf);
 
 #endif

@@ -126,7 +126,7 @@ vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points
     return vshi_shade_ao(occluders, points, NULL, options, run, ao, deviation, NULL, NULL, stats, error);
 }
 
-void vshi_ao_bend(float *bent, const float *normal) {
+void vshi_ao_bent(float *bent, const float *normal) {
     const vshi_vec n = vshi_unit(vshi_vec_off(normal)), d = vshi_vec_off(bent);
     if (isnan(bent[0])) {
         return;
@@ -148,7 +148,7 @@ vsh_result vsh_shade_bent(const vsh_occluders *occluders, const vsh_points *poin
     VSHI_NEEDS_OF(points->count, bent);
     VSHI_TRY(vshi_shade_ao(occluders, points, NULL, options, run, ao, NULL, bent, NULL, stats, error));
     for (size_t i = 0; i < points->count; ++i) {
-        vshi_ao_bend(bent + 3 * i, points->normals + 3 * i);
+        vshi_ao_bent(bent + 3 * i, points->normals + 3 * i);
     }
     return VSH_OK;
 }

@@ -104,7 +104,7 @@ bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, 
 
 /* From an average of open directions to a unit bent normal: `normal` (of any length) where nothing is open.
  * NaN stays. */
-void vshi_ao_bend(float *bent, const float *normal);
+void vshi_ao_bent(float *bent, const float *normal);
 
 /* What the field's edges are short of, voxels, at a point where rays begin. */
 double vshi_ao_grown(const vsh_field *field, vshi_vec origin);

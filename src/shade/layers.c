@@ -2,8 +2,8 @@
 
 #include "base/memory.h"
 #include "base/try.h"
+#include "heightfield/height_pyramid.h"
 #include "heightfield/heights.h"
-#include "heightfield/relief.h"
 #include "light/light.h"
 #include "spheres/spheres.h"
 

@@ -1,6 +1,6 @@
 /* Shadow values from rays over the light's disc: all of them (rays), or as many as a cone leaves open
  * (adaptive, on the field; exact, on the triangles). */
-#include "shade/share.h"
+#include "shade/interpolation.h"
 #include "trace/embree.h"
 
 #include <math.h>
@@ -307,16 +307,17 @@ static void settle_cast(ray_batch *batch, const size_t *some, size_t count) {
  * leaves the rest in `some`. Returns their number. */
 static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *some) {
     const vshi_shadow_task *task = batch->task;
-    vshi_share share = {.points = task->points,
-                        .begin = begin,
-                        .count = end - begin,
-                        .max_error = task->options->max_error,
-                        .sampler = task->options->sampler,
-                        .rays = vshi_share_rays(task->options->max_error)};
+    vshi_interpolation share = {.points = task->points,
+                                .begin = begin,
+                                .count = end - begin,
+                                .max_error = task->options->max_error,
+                                .sampler = task->options->sampler,
+                                .rays = vshi_interpolation_rays(task->options->max_error)};
     for (size_t k = 0; k < share.count; ++k) {
         share.value[k] = task->visibility[begin + k];
         share.deviation[k] = 0.0f;
-        share.state[k] = (uint8_t)(isnan(share.value[k]) ? VSHI_SHARE_GONE : VSHI_SHARE_KNOWN);
+        share.state[k] =
+            (uint8_t)(isnan(share.value[k]) ? VSHI_INTERPOLATION_GONE : VSHI_INTERPOLATION_KNOWN);
     }
     for (size_t o = 0; o < batch->open_count; ++o) {
         cast(batch, o, share.rays);
@@ -324,16 +325,16 @@ static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *so
     flush(batch);
     for (size_t o = 0; o < batch->open_count; ++o) {
         const size_t k = batch->open[o].point - begin;
-        share.state[k] = VSHI_SHARE_OPEN;
+        share.state[k] = VSHI_INTERPOLATION_OPEN;
         share.lit[k] = (uint16_t)batch->open[o].lit;
     }
     bool anchor[VSHI_PIECE] = {false};
-    vshi_share_begin(&share);
-    for (int level = 0; level < VSHI_SHARE_LEVELS; ++level) {
+    vshi_interpolation_begin(&share);
+    for (int level = 0; level < VSHI_INTERPOLATION_LEVELS; ++level) {
         size_t wanted = 0;
-        if (vshi_share_want(&share, level)) {
+        if (vshi_interpolation_pick(&share, level)) {
             for (size_t o = 0; o < batch->open_count; ++o) {
-                if (share.state[batch->open[o].point - begin] == VSHI_SHARE_WANTED) {
+                if (share.state[batch->open[o].point - begin] == VSHI_INTERPOLATION_WANTED) {
                     some[wanted++] = o;
                 }
             }
@@ -344,16 +345,16 @@ static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *so
             const open_point *p = &batch->open[some[i]];
             const size_t k = p->point - begin;
             anchor[some[i]] = true;
-            share.state[k] = VSHI_SHARE_KNOWN;
+            share.state[k] = VSHI_INTERPOLATION_KNOWN;
             share.value[k] = task->visibility[p->point];
             share.deviation[k] = (float)p->deviation;
         }
-        vshi_share_interpolate(&share, level);
+        vshi_interpolation_fill(&share, level);
     }
     size_t left = 0;
     for (size_t o = 0; o < batch->open_count; ++o) {
         const size_t point = batch->open[o].point, k = point - begin;
-        if (share.state[k] == VSHI_SHARE_OPEN) {
+        if (share.state[k] == VSHI_INTERPOLATION_OPEN) {
             some[left++] = o;
         } else if (!anchor[o]) {
             settle(batch, point, share.value[k], share.deviation[k]);
@@ -443,8 +444,8 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
         some[o] = o;
     }
     batch.shared = task->options->method != VSH_SHADOW_RAYS &&
-                   vshi_shadow_most_rays(task->options) > vshi_share_rays(task->options->max_error) &&
-                   !is_hard(task) && vshi_share_can(task->points);
+                   vshi_shadow_most_rays(task->options) > vshi_interpolation_rays(task->options->max_error) &&
+                   !is_hard(task) && vshi_interpolation_can(task->points);
     if (batch.shared) {
         count = cast_shared(&batch, begin, end, some);
     }

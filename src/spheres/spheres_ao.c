@@ -2,8 +2,8 @@
  * distance heeded. What several cover together is their sum times (counted together / counted one by one), on
  * directions of the same density. */
 #include "base/elementary.h"
-#include "spheres/balls.h"
 #include "spheres/caps.h"
+#include "spheres/sphere_tree.h"
 #include "spheres/spheres.h"
 
 #include <string.h>
@@ -135,7 +135,7 @@ static float shade_point(const vsh_spheres *spheres, sky *s, float *bent, vsh_sh
                                        0.0,
                                        s->distance};
     ++stats->marches;
-    stats->samples += vshi_balls_search(spheres, &hemisphere, meets, s);
+    stats->samples += vshi_sphere_tree_search(spheres, &hemisphere, meets, s);
     if (s->inside) {
         if (bent != NULL) {
             bent[0] = bent[1] = bent[2] = 0.0f;

@@ -5,8 +5,8 @@
  * twice. */
 #include "base/elementary.h"
 #include "light/view.h"
-#include "spheres/balls.h"
 #include "spheres/caps.h"
+#include "spheres/sphere_tree.h"
 #include "spheres/spheres.h"
 
 #include <float.h>
@@ -225,7 +225,7 @@ static float shade_point(const vsh_spheres *spheres, covering *c, vsh_shade_stat
                                  vshi_cos(c->half),
                                  c->far};
     ++stats->marches;
-    stats->samples += vshi_balls_search(spheres, &cone, ray ? meets_ray : meets_disc, c);
+    stats->samples += vshi_sphere_tree_search(spheres, &cone, ray ? meets_ray : meets_disc, c);
     if (ray || c->visible <= 0.0) {
         return (float)c->visible;
     }
@@ -283,6 +283,6 @@ bool vshi_spheres_hold(const vsh_spheres *spheres, const double position[3]) {
     covering c = {.origin = {position[0], position[1], position[2]}, .visible = 1.0};
     /* whatever bound the point is in, as all directions begin there */
     const vshi_ball_cone here = {{position[0], position[1], position[2]}, {1.0, 0.0, 0.0}, 1.0, 0.0, 0.0};
-    vshi_balls_search(spheres, &here, is_outside, &c);
+    vshi_sphere_tree_search(spheres, &here, is_outside, &c);
     return c.visible <= 0.0;
 }

@@ -6,7 +6,7 @@
 
 #include "image/planes.h"
 #include "levelset/file.h"
-#include "levelset/handover.h"
+#include "levelset/message.h"
 #include "levelset/volume.h"
 #include "model/model.h"
 #include "outline/outline.h"
@@ -55,7 +55,7 @@ inline int as_reader(int argc, char **argv) {
         }
     } else if (how == "hungry") {
         vshi_confine_resources(uint64_t(1) << 20, uint64_t(64) << 20, 60.0);
-        vshi_confine_hunger();
+        vshi_confine_memory();
         std::vector<char *> kept;
         for (;;) {
             kept.push_back(new char[size_t(64) << 20]);
@@ -90,24 +90,24 @@ inline vsh_run with_reader(bool wanted = true) {
 // What a reader would send for a file; `request` is what follows the path in its request.
 template <typename Request>
 std::vector<unsigned char> payload_of(vshi_serve_fn *serve, const std::string &path, Request &&request) {
-    static vshi_put put;
+    static vshi_encoder encoder;
     const int asked = memfd_create("request", 0), sent = memfd_create("payload", 0);
-    vshi_put_begin(&put, asked, 0);
-    request(&put);
-    assert_true(vshi_put_flush(&put));
+    vshi_encoder_begin(&encoder, asked, 0);
+    request(&encoder);
+    assert_true(vshi_encoder_flush(&encoder));
     const auto bytes_of = [](int file, uint64_t size) {
         std::vector<unsigned char> bytes(size + 8); // never empty
         assert_int_equal(pread(file, bytes.data(), size, 0), ssize_t(size));
         bytes.resize(size);
         return bytes;
     };
-    const std::vector<unsigned char> question = bytes_of(asked, put.size);
-    vshi_take take = {question.data(), question.data() + question.size(), false};
+    const std::vector<unsigned char> question = bytes_of(asked, encoder.size);
+    vshi_decoder decoder = {question.data(), question.data() + question.size(), false};
     const vsh_run run = vsh_run_default();
-    vshi_put_begin(&put, sent, 0);
-    assert_int_equal(serve(path.c_str(), &take, &run, &put, &failure), VSH_OK);
-    assert_true(vshi_put_flush(&put));
-    const std::vector<unsigned char> bytes = bytes_of(sent, put.size);
+    vshi_encoder_begin(&encoder, sent, 0);
+    assert_int_equal(serve(path.c_str(), &decoder, &run, &encoder, &failure), VSH_OK);
+    assert_true(vshi_encoder_flush(&encoder));
+    const std::vector<unsigned char> bytes = bytes_of(sent, encoder.size);
     close(asked);
     close(sent);
     return bytes;
@@ -142,8 +142,8 @@ template <typename Use> void damage(const std::vector<unsigned char> &whole, int
             bytes.resize(next() % bytes.size() / 8 * 8);
             bytes.shrink_to_fit();
         }
-        vshi_take take = {bytes.data(), bytes.data() + bytes.size(), false};
-        use(&take);
+        vshi_decoder decoder = {bytes.data(), bytes.data() + bytes.size(), false};
+        use(&decoder);
     }
 }
 

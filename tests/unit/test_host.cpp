@@ -18,7 +18,7 @@ extern "C" {
 
 #include "base/floats.h"
 #include "base/hash.h"
-#include "extern/handover.h"
+#include "extern/tsan.h"
 
 #include <cfenv>
 #include <sys/stat.h>

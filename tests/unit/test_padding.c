@@ -8,8 +8,8 @@
 
 #include <cmocka.h>
 
+#include "bake/nearest_valid.h"
 #include "bake/padding.h"
-#include "bake/spread.h"
 #include <stdbool.h>
 
 static const float HOLE = -7.0f; /* what an unfilled texel holds; no valid texel does */

@@ -20,14 +20,14 @@ template <typename Body> void counted(int &refused, Body &&body) {
 
 void damaged_level_sets_are_refused_or_are_trees(void **) {
     const std::string path = save("ball.vdb", {sphere()});
-    const std::vector<unsigned char> whole = payload_of(vshi_serve_grid, path, [](vshi_put *put) {
-        vshi_put_text(put, nullptr);
-        vshi_put_count(put, 0);
+    const std::vector<unsigned char> whole = payload_of(vshi_serve_grid, path, [](vshi_encoder *encoder) {
+        vshi_encode_text(encoder, nullptr);
+        vshi_encode_count(encoder, 0);
     });
     int refused = 0;
-    damage(whole, DAMAGES, [&](vshi_take *take) {
+    damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
         counted(refused, [&]() -> vsh_result {
-            const vshi::LevelSet set = vshi::take_level_set(take, "a.vdb", &failure);
+            const vshi::LevelSet set = vshi::take_level_set(decoder, "a.vdb", &failure);
             const vsh_run run = vsh_run_default();
             vshi::Stage stage(run, "load", &failure);
             const vshi::Finding kind = vshi::examine_kind(*set.grid);
@@ -42,14 +42,14 @@ void damaged_level_sets_are_refused_or_are_trees(void **) {
 
 void damaged_voxels_are_refused_or_sorted(void **) {
     const std::string path = save("ball.vdb", {sphere()});
-    const std::vector<unsigned char> whole =
-        payload_of(vshi_serve_voxels, path, [](vshi_put *put) { vshi_put_text(put, nullptr); });
+    const std::vector<unsigned char> whole = payload_of(
+        vshi_serve_voxels, path, [](vshi_encoder *encoder) { vshi_encode_text(encoder, nullptr); });
     int refused = 0;
-    damage(whole, DAMAGES, [&](vshi_take *take) {
+    damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
         counted(refused, [&]() -> vsh_result {
             std::string grid;
             openvdb::math::Transform::Ptr transform;
-            const auto blocks = vshi::take_blocks(take, "a.vdb", grid, transform, &failure);
+            const auto blocks = vshi::take_blocks(decoder, "a.vdb", grid, transform, &failure);
             for (size_t i = 1; i < blocks.size(); ++i) {
                 assert_true(std::lexicographical_compare(blocks[i - 1].origin, blocks[i - 1].origin + 3,
                                                          blocks[i].origin, blocks[i].origin + 3));
@@ -62,11 +62,11 @@ void damaged_voxels_are_refused_or_sorted(void **) {
 
 void damaged_models_are_refused_or_sound(void **) {
     const std::vector<unsigned char> whole =
-        payload_of(vshi_serve_model, std::string(VSH_ASSETS) + "/thin.glb", [](vshi_put *) {});
+        payload_of(vshi_serve_model, std::string(VSH_ASSETS) + "/thin.glb", [](vshi_encoder *) {});
     int refused = 0;
-    damage(whole, DAMAGES, [&](vshi_take *take) {
+    damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
         vsh_model *model = nullptr;
-        if (vshi_model_take(take, "a.glb", &model, &failure) != VSH_OK) {
+        if (vshi_model_decode(decoder, "a.glb", &model, &failure) != VSH_OK) {
             ++refused;
             return;
         }
@@ -84,11 +84,11 @@ void damaged_models_are_refused_or_sound(void **) {
 void damaged_images_and_contours_are_refused_or_sound(void **) {
     const char *font = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
     std::vector<unsigned char> whole =
-        payload_of(vshi_serve_image, std::string(VSH_ASSETS) + "/emblem.png", [](vshi_put *) {});
+        payload_of(vshi_serve_image, std::string(VSH_ASSETS) + "/emblem.png", [](vshi_encoder *) {});
     int refused = 0;
-    damage(whole, DAMAGES / 8, [&](vshi_take *take) {
+    damage(whole, DAMAGES / 8, [&](vshi_decoder *decoder) {
         vsh_image_file *file = nullptr;
-        refused += vshi_image_take(take, "a.png", &file, &failure) != VSH_OK;
+        refused += vshi_image_decode(decoder, "a.png", &file, &failure) != VSH_OK;
         const vsh_image image = vsh_image_view(file);
         for (int32_t c = 0; c < image.channel_count; ++c) {
             assert_in_range(std::strlen(image.names[c]), 0, 255);
@@ -96,20 +96,20 @@ void damaged_images_and_contours_are_refused_or_sound(void **) {
         vsh_image_free(file);
     });
     assert_in_range(refused, DAMAGES / 64, DAMAGES / 8 - 1);
-    whole = payload_of(vshi_serve_text, font, [](vshi_put *put) {
-        vshi_put_text(put, "A8");
-        vshi_put_number(put, 1.0);
-        vshi_put_number(put, 1.0);
-        vshi_put_count(put, 0);
+    whole = payload_of(vshi_serve_text, font, [](vshi_encoder *encoder) {
+        vshi_encode_text(encoder, "A8");
+        vshi_encode_number(encoder, 1.0);
+        vshi_encode_number(encoder, 1.0);
+        vshi_encode_count(encoder, 0);
     });
     refused = 0;
-    damage(whole, DAMAGES, [&](vshi_take *take) {
+    damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
         const vsh_run run = vsh_run_default();
         vshi_contours contours = {};
         contours.run = &run;
         contours.error = &failure;
         vsh_outline *outline = nullptr;
-        if (vshi_contours_take(take, &contours, "a.ttf", &failure) != VSH_OK) {
+        if (vshi_contours_decode(decoder, &contours, "a.ttf", &failure) != VSH_OK) {
             vshi_contours_free(&contours);
             ++refused;
         } else if (vshi_contours_finish(&contours, false, "text", &outline) != VSH_OK) {
@@ -123,23 +123,23 @@ void damaged_images_and_contours_are_refused_or_sound(void **) {
 void a_message_is_not_read_past_its_end(void **) {
     alignas(8) const uint64_t words[] = {16, 0x4242424242424242, 0x0042424242424242, UINT64_MAX, 5, 0};
     const auto *bytes = reinterpret_cast<const unsigned char *>(words);
-    vshi_take take = {bytes, bytes + 24, false};
-    assert_string_equal(vshi_take_text(&take, true), "BBBBBBBBBBBBBBB");
-    assert_true(vshi_take_ends(&take));
-    take = {bytes, bytes + 16, false}; // the text ends behind it
-    assert_null(vshi_take_text(&take, true));
-    assert_true(take.bad);
-    take = {bytes + 8, bytes + 24, false}; // a size out of the world
-    assert_null(vshi_take_text(&take, true));
-    assert_true(take.bad);
-    take = {bytes + 24, bytes + 40, false};
-    assert_null(vshi_take_text(&take, true)); // NULL that was put
-    assert_false(take.bad);
-    assert_null(vshi_take_array(&take, uint64_t(1) << 62, 8)); // a product out of range
-    assert_true(take.bad);
-    take = {bytes + 32, bytes + 48, false};
-    assert_int_equal(vshi_take_count(&take, 4), 0);
-    assert_true(take.bad);
+    vshi_decoder decoder = {bytes, bytes + 24, false};
+    assert_string_equal(vshi_decode_text(&decoder, true), "BBBBBBBBBBBBBBB");
+    assert_true(vshi_decoder_ends(&decoder));
+    decoder = {bytes, bytes + 16, false}; // the text ends behind it
+    assert_null(vshi_decode_text(&decoder, true));
+    assert_true(decoder.bad);
+    decoder = {bytes + 8, bytes + 24, false}; // a size out of the world
+    assert_null(vshi_decode_text(&decoder, true));
+    assert_true(decoder.bad);
+    decoder = {bytes + 24, bytes + 40, false};
+    assert_null(vshi_decode_text(&decoder, true)); // NULL that was put
+    assert_false(decoder.bad);
+    assert_null(vshi_decode_array(&decoder, uint64_t(1) << 62, 8)); // a product out of range
+    assert_true(decoder.bad);
+    decoder = {bytes + 32, bytes + 48, false};
+    assert_int_equal(vshi_decode_count(&decoder, 4), 0);
+    assert_true(decoder.bad);
 }
 
 // An answer is memory, too: it ends where the heap leaves it no room, whatever each may come to alone.
@@ -147,18 +147,18 @@ void an_answer_and_the_heap_share_their_room(void **) {
     if (VSHI_SANITIZED) {
         skip(); // its heap is not libc's, which tells what it holds
     }
-    static vshi_put put;
+    static vshi_encoder encoder;
     const size_t bytes = size_t(8) << 20;
     const std::vector<char> answer(bytes);
     for (const bool heap : {false, true}) {
         const struct mallinfo2 now = mallinfo2();
         const std::vector<char> held(heap ? bytes : 0);
         const int file = memfd_create("answer", 0);
-        vshi_put_begin(&put, file, 0);
-        put.room = now.uordblks + now.hblkhd + bytes + bytes / 2;
-        vshi_put_array(&put, answer.data(), bytes, 1);
-        assert_true(vshi_put_flush(&put) == !heap);
-        assert_int_equal(put.error, heap ? ENOMEM : 0);
+        vshi_encoder_begin(&encoder, file, 0);
+        encoder.room = now.uordblks + now.hblkhd + bytes + bytes / 2;
+        vshi_encode_array(&encoder, answer.data(), bytes, 1);
+        assert_true(vshi_encoder_flush(&encoder) == !heap);
+        assert_int_equal(encoder.error, heap ? ENOMEM : 0);
         close(file);
     }
 }

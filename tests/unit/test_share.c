@@ -1,5 +1,5 @@
 /* Rays that texels share: what is interpolated, what is not, and what that costs of the error. */
-#include "shade/share.h"
+#include "shade/interpolation.h"
 #include "shading.h"
 
 #include "previews.h"
@@ -14,9 +14,9 @@ static float normals[3 * POINTS];
 static uint32_t texels[POINTS];
 
 /* A level square of texels at (8, 16), all open. */
-static void lay_square(vshi_share *share) {
+static void lay_square(vshi_interpolation *share) {
     static const vsh_points points = {POINTS, positions, normals, texels};
-    *share = (vshi_share){
+    *share = (vshi_interpolation){
         .points = &points, .count = POINTS, .max_error = 0.02, .sampler = VSH_SAMPLER_SOBOL, .rays = 8};
     for (uint32_t k = 0; k < POINTS; ++k) {
         const uint32_t column = k % SQUARE, row = k / SQUARE;
@@ -26,7 +26,7 @@ static void lay_square(vshi_share *share) {
         normals[3 * k] = normals[3 * k + 2] = 0.0f;
         normals[3 * k + 1] = 1.0f;
         texels[k] = (column + 8) + 65536 * (row + 16);
-        share->state[k] = VSHI_SHARE_OPEN;
+        share->state[k] = VSHI_INTERPOLATION_OPEN;
     }
 }
 
@@ -35,11 +35,11 @@ static float known_within = 0.01f;
 typedef double light_fn(double column, double row);
 
 /* Finds what is wanted by `light`; how many. */
-static int answer(vshi_share *share, light_fn *light) {
+static int answer(vshi_interpolation *share, light_fn *light) {
     int wanted = 0;
     for (size_t k = 0; k < POINTS; ++k) {
-        if (share->state[k] == VSHI_SHARE_WANTED) {
-            share->state[k] = VSHI_SHARE_KNOWN;
+        if (share->state[k] == VSHI_INTERPOLATION_WANTED) {
+            share->state[k] = VSHI_INTERPOLATION_KNOWN;
             share->value[k] = (float)light((double)(k % SQUARE), (double)(k / SQUARE));
             share->deviation[k] = known_within;
             ++wanted;
@@ -48,25 +48,25 @@ static int answer(vshi_share *share, light_fn *light) {
     return wanted;
 }
 
-static int still_open(const vshi_share *share) {
+static int still_open(const vshi_interpolation *share) {
     int open = 0;
     for (size_t k = 0; k < POINTS; ++k) {
-        open += share->state[k] == VSHI_SHARE_OPEN;
+        open += share->state[k] == VSHI_INTERPOLATION_OPEN;
     }
     return open;
 }
 
 /* Shares by a light at both levels; how many are left. */
-static int run(vshi_share *share, light_fn *light, int wanted[VSHI_SHARE_LEVELS]) {
+static int run(vshi_interpolation *share, light_fn *light, int wanted[VSHI_INTERPOLATION_LEVELS]) {
     for (size_t k = 0; k < POINTS; ++k) {
         const double seen = light((double)(k % SQUARE), (double)(k / SQUARE));
         share->lit[k] = (uint16_t)lround(share->rays * seen);
     }
-    vshi_share_begin(share);
-    for (int level = 0; level < VSHI_SHARE_LEVELS; ++level) {
-        vshi_share_want(share, level);
+    vshi_interpolation_begin(share);
+    for (int level = 0; level < VSHI_INTERPOLATION_LEVELS; ++level) {
+        vshi_interpolation_pick(share, level);
         wanted[level] = answer(share, light);
-        vshi_share_interpolate(share, level);
+        vshi_interpolation_fill(share, level);
     }
     return still_open(share);
 }
@@ -92,8 +92,8 @@ static double spot(double column, double row) {
 
 static void a_ramp_takes_nine_of_64(void **state) {
     (void)state;
-    static vshi_share share;
-    int wanted[VSHI_SHARE_LEVELS];
+    static vshi_interpolation share;
+    int wanted[VSHI_INTERPOLATION_LEVELS];
     lay_square(&share);
     assert_int_equal(run(&share, ramp, wanted), 0);
     assert_int_equal(wanted[0], 9);
@@ -107,8 +107,8 @@ static void a_ramp_takes_nine_of_64(void **state) {
 
 static void a_bend_takes_small_squares(void **state) {
     (void)state;
-    static vshi_share share;
-    int wanted[VSHI_SHARE_LEVELS];
+    static vshi_interpolation share;
+    int wanted[VSHI_INTERPOLATION_LEVELS];
     lay_square(&share);
     assert_int_equal(run(&share, bend, wanted), 0);
     assert_int_equal(wanted[0], 9);
@@ -127,8 +127,8 @@ static double slight_bend(double column, double row) {
 /* Where the anchors are exact, what is left between them is said too. */
 static void the_error_between_counts(void **state) {
     (void)state;
-    static vshi_share share;
-    int wanted[VSHI_SHARE_LEVELS];
+    static vshi_interpolation share;
+    int wanted[VSHI_INTERPOLATION_LEVELS];
     lay_square(&share);
     known_within = 0.0f;
     assert_int_equal(run(&share, slight_bend, wanted), 0);
@@ -148,12 +148,12 @@ static double straight(double column, double row) {
 
 static void a_wide_range_is_not_bridged(void **state) {
     (void)state;
-    static vshi_share share;
-    int wanted[VSHI_SHARE_LEVELS];
+    static vshi_interpolation share;
+    int wanted[VSHI_INTERPOLATION_LEVELS];
     lay_square(&share);
     assert_true(run(&share, straight, wanted) > 0);
     for (size_t k = 0; k < POINTS; ++k) {
-        if (share.state[k] == VSHI_SHARE_KNOWN) {
+        if (share.state[k] == VSHI_INTERPOLATION_KNOWN) {
             const double off = (double)share.value[k] - straight((double)(k % SQUARE), (double)(k / SQUARE));
             assert_true(fabs(off) < 0.01);
         }
@@ -168,26 +168,26 @@ static double line(double column, double row) {
 
 static void what_lies_between_anchors_shows_in_the_rays(void **state) {
     (void)state;
-    static vshi_share share;
-    int wanted[VSHI_SHARE_LEVELS];
+    static vshi_interpolation share;
+    int wanted[VSHI_INTERPOLATION_LEVELS];
     lay_square(&share);
     assert_int_equal(run(&share, line, wanted), 2 * (16 - 5));
     for (size_t k = 0; k < POINTS; ++k) {
-        assert_true(share.state[k] == VSHI_SHARE_OPEN || share.value[k] == 1.0f);
+        assert_true(share.state[k] == VSHI_INTERPOLATION_OPEN || share.value[k] == 1.0f);
     }
 }
 
 static void edges_and_spots_stay_open(void **state) {
     (void)state;
-    static vshi_share share;
-    int wanted[VSHI_SHARE_LEVELS];
+    static vshi_interpolation share;
+    int wanted[VSHI_INTERPOLATION_LEVELS];
     lay_square(&share);
     /* of its four quarters two are not crossed by the edge */
     assert_int_equal(run(&share, edge, wanted), 2 * (16 - 5));
     lay_square(&share);
     assert_true(run(&share, spot, wanted) > 0);
     for (size_t k = 0; k < POINTS; ++k) {
-        if (share.state[k] == VSHI_SHARE_KNOWN) {
+        if (share.state[k] == VSHI_INTERPOLATION_KNOWN) {
             const double off = (double)share.value[k] - spot((double)(k % SQUARE), (double)(k / SQUARE));
             assert_true(fabs(off) < 0.07);
         }
@@ -196,8 +196,8 @@ static void edges_and_spots_stay_open(void **state) {
 
 static void what_is_bent_or_missing_is_not_shared(void **state) {
     (void)state;
-    static vshi_share share;
-    int wanted[VSHI_SHARE_LEVELS];
+    static vshi_interpolation share;
+    int wanted[VSHI_INTERPOLATION_LEVELS];
     lay_square(&share);
     for (size_t k = 0; k < POINTS; ++k) { /* a step in the middle of the lower right quarter */
         positions[3 * k + 1] = k % SQUARE > 5 && k / SQUARE > 5 ? 0.2 : 0.0;
@@ -205,7 +205,7 @@ static void what_is_bent_or_missing_is_not_shared(void **state) {
     assert_int_equal(run(&share, ramp, wanted), 16);
     assert_int_equal(wanted[0], 0);
     lay_square(&share);
-    share.state[0] = VSHI_SHARE_GONE;
+    share.state[0] = VSHI_INTERPOLATION_GONE;
     assert_int_equal(run(&share, ramp, wanted), 15);
     lay_square(&share);
     texels[5] = texels[4];

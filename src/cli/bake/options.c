@@ -90,21 +90,21 @@ static int take_pattern(cli_patterns *patterns, const char *name, const char *va
     return CLI_OK;
 }
 
-int cli_shared_take(cli_bake_settings *s, int key, const char *name, const char *value) {
+int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char *value) {
     bool taken;
     int code;
     switch (key) {
     case CLI_KEY_SUN:
         s->has_sun = true;
-        return cli_take_vector(name, value, s->sun);
+        return cli_parse_vector(name, value, s->sun);
     case CLI_KEY_SUN_ANGLE:
         s->has_sun_angle = true;
-        return cli_take_number(name, value, 0.0, 179.0, &s->sun_angle_deg);
+        return cli_parse_number(name, value, 0.0, 179.0, &s->sun_angle_deg);
     case CLI_KEY_CASTER:
         return take_caster(s, name, value);
     default:
         code = cli_patch_take(&s->patch, key, name, value, &taken);
-        return taken ? code : cli_common_take(&s->common, key, name, value, &taken);
+        return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);
     }
 }
 
@@ -139,11 +139,11 @@ static int take(void *settings, int key, const char *name, const char *value) {
         s->resume = true;
         return CLI_OK;
     case KEY_BAND_ROWS:
-        return cli_take_integer(name, value, 1, VSH_MAX_LIGHTMAP_SIZE, &s->band_rows);
+        return cli_parse_integer(name, value, 1, VSH_MAX_LIGHTMAP_SIZE, &s->band_rows);
     default:
         break;
     }
-    return cli_shared_take(s, key, name, value);
+    return cli_shared_parse(s, key, name, value);
 }
 
 int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help) {

@@ -46,7 +46,7 @@ typedef struct cli_bake_settings {
 } cli_bake_settings;
 
 /* Takes an option of the tables above, a setting or one of the common ones. */
-int cli_shared_take(cli_bake_settings *settings, int key, const char *name, const char *value);
+int cli_shared_parse(cli_bake_settings *settings, int key, const char *name, const char *value);
 
 /* Takes the command line. */
 int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help);

@@ -33,7 +33,7 @@ const cli_command cli_compare = {
     compare_main};
 
 static int take(void *settings, int key, const char *name, const char *value) {
-    return cli_compare_take(settings, key, name, value);
+    return cli_compare_parse(settings, key, name, value);
 }
 
 static int print(const cli_compare_settings *s, const cli_comparison *c) {
@@ -85,12 +85,12 @@ cli_compare_settings cli_compare_settings_default(void) {
     return s;
 }
 
-int cli_compare_take(cli_compare_settings *s, int key, const char *name, const char *value) {
+int cli_compare_parse(cli_compare_settings *s, int key, const char *name, const char *value) {
     if (key >= CLI_KEY_LIMIT && key < CLI_KEY_LIMIT + VSH_MEASURE_COUNT) {
         const int32_t measure = key - CLI_KEY_LIMIT;
         const bool least = vsh_measure_at_least(measure) != 0;
-        return cli_take_number(name, value, least ? -1.0 : 0.0, least ? 1.0 : 1e15,
-                               &s->options.limits[measure]);
+        return cli_parse_number(name, value, least ? -1.0 : 0.0, least ? 1.0 : 1e15,
+                                &s->options.limits[measure]);
     }
     switch (key) {
     case CLI_KEY_TOLERANCES:
@@ -100,15 +100,15 @@ int cli_compare_take(cli_compare_settings *s, int key, const char *name, const c
         s->options.coverage = value;
         return CLI_OK;
     case CLI_KEY_MAX_COVERAGE:
-        return cli_take_number(name, value, 0.0, 1.0, &s->options.coverage_limit);
+        return cli_parse_number(name, value, 0.0, 1.0, &s->options.coverage_limit);
     case CLI_KEY_THRESHOLD:
-        return cli_take_number(name, value, 0.0, 1.0, &s->options.threshold);
+        return cli_parse_number(name, value, 0.0, 1.0, &s->options.threshold);
     case CLI_KEY_STEP:
-        return cli_take_number(name, value, 1e-6, 1.0, &s->options.step);
+        return cli_parse_number(name, value, 1e-6, 1.0, &s->options.step);
     case CLI_KEY_REACH:
-        return cli_take_integer(name, value, 0, 16, &s->options.reach);
+        return cli_parse_integer(name, value, 0, 16, &s->options.reach);
     case CLI_KEY_NOISE:
-        return cli_take_number(name, value, 0.0, 1.0, &s->options.noise);
+        return cli_parse_number(name, value, 0.0, 1.0, &s->options.noise);
     case CLI_KEY_COMPARE_PADDING:
         s->options.padding = 1;
         return CLI_OK;
@@ -125,7 +125,7 @@ int cli_compare_take(cli_compare_settings *s, int key, const char *name, const c
         break;
     }
     bool taken;
-    return cli_common_take(&s->common, key, name, value, &taken);
+    return cli_common_parse(&s->common, key, name, value, &taken);
 }
 
 int cli_compare_check_reports(const cli_compare_settings *s, const char *const *inputs, size_t count) {

@@ -75,7 +75,7 @@ enum {
     }
 
 /* Takes an option of these, or a common one. */
-int cli_compare_take(cli_compare_settings *settings, int key, const char *name, const char *value);
+int cli_compare_parse(cli_compare_settings *settings, int key, const char *name, const char *value);
 
 /* Refuses reports that replace one of `inputs`, or each other, or cannot be written. */
 int cli_compare_check_reports(const cli_compare_settings *settings, const char *const *inputs, size_t count);

@@ -4,9 +4,9 @@
 #include "cli/clipping.h"
 #include "cli/commands.h"
 #include "cli/message.h"
-#include "cli/origin.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
+#include "cli/provenance.h"
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/temporary.h"
@@ -73,25 +73,25 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_SIZE:
         s->has_size = true;
-        return cli_take_size(name, value, &s->options.width, &s->options.height);
+        return cli_parse_size(name, value, &s->options.width, &s->options.height);
     case KEY_METHOD:
         s->has_method = true;
-        return cli_take_name(name, value, vsh_flat_method, vsh_flat_method_name, &s->options.method);
+        return cli_parse_name(name, value, vsh_flat_method, vsh_flat_method_name, &s->options.method);
     case KEY_SUPERSAMPLE:
         s->has_supersample = true;
-        return cli_take_integer(name, value, 1, 16, &s->options.supersample);
+        return cli_parse_integer(name, value, 1, 16, &s->options.supersample);
     case KEY_PADDING:
         s->has_padding = true;
-        return cli_take_integer(name, value, 0, 4096, &s->options.padding);
+        return cli_parse_integer(name, value, 0, 4096, &s->options.padding);
     case KEY_BITS:
         s->has_bits = true;
-        return cli_take_bits(name, value, &s->bits);
+        return cli_parse_bits(name, value, &s->bits);
     case KEY_PACK:
         s->pack = value;
         return CLI_OK;
     case KEY_COLOR_SPACE:
         s->has_color_space = true;
-        return cli_take_color_space(name, value, &s->color_space);
+        return cli_parse_color_space(name, value, &s->color_space);
     case KEY_STATS:
         s->stats = value;
         return CLI_OK;
@@ -99,7 +99,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
         break;
     }
     bool taken;
-    return cli_common_take(&s->common, key, name, value, &taken);
+    return cli_common_parse(&s->common, key, name, value, &taken);
 }
 
 /* Puts what was given over the scene's own. */
@@ -222,7 +222,7 @@ static int check_files(const flat_settings *s, const vsh_flat_scene *scene, cons
 
 /* Inputs are the scene's file and those that it names. */
 static int make_origin(const flat_settings *s, const vsh_flat_scene *scene, const vsh_run *run,
-                       cli_origin *origin) {
+                       cli_provenance *origin) {
     const size_t count = 1 + scene->caster_count;
     const char **files = calloc(count, sizeof *files);
     if (files == NULL) {
@@ -232,14 +232,14 @@ static int make_origin(const flat_settings *s, const vsh_flat_scene *scene, cons
     for (size_t i = 0; i < scene->caster_count; ++i) {
         files[1 + i] = scene->casters[i].path;
     }
-    const int code = cli_origin_make(NULL, files, count, NULL, run, origin);
+    const int code = cli_provenance_make(NULL, files, count, NULL, run, origin);
     free(files);
     return code;
 }
 
 static int write_map(const flat_settings *s, const vsh_flat_scene *scene, const flat_planes *planes,
                      const vsh_image_options *image, const vsh_run *run) {
-    cli_origin origin = {NULL, NULL, 0};
+    cli_provenance origin = {NULL, NULL, 0};
     int code = make_origin(s, scene, run, &origin);
     vsh_image_options told = *image;
     told.attributes = origin.attributes;
@@ -256,7 +256,7 @@ static int write_map(const flat_settings *s, const vsh_flat_scene *scene, const 
         code = cli_finish_image(writer, scene->output);
     }
     cli_signals_writing(NULL);
-    cli_origin_free(&origin);
+    cli_provenance_free(&origin);
     return code;
 }
 

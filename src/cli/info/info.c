@@ -44,10 +44,10 @@ static int take(void *settings, int key, const char *name, const char *value) {
     info_settings *s = settings;
     bool taken;
     if (key == KEY_SIZE) {
-        return cli_take_size(name, value, &s->look.width, &s->look.height);
+        return cli_parse_size(name, value, &s->look.width, &s->look.height);
     }
     const int code = cli_patch_take(&s->patch, key, name, value, &taken);
-    return taken ? code : cli_common_take(&s->common, key, name, value, &taken);
+    return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);
 }
 
 static int print_info(const char *path, const cli_info_look *look, const vsh_run *run) {

@@ -82,9 +82,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
         s->points = value;
         return CLI_OK;
     case KEY_POINTS_FORMAT:
-        return cli_take_name(name, value, cli_points_format, cli_points_format_name, &s->points_format);
+        return cli_parse_name(name, value, cli_points_format, cli_points_format_name, &s->points_format);
     case KEY_FORMAT:
-        return cli_take_name(name, value, cli_points_format, cli_points_format_name, &s->format);
+        return cli_parse_name(name, value, cli_points_format, cli_points_format_name, &s->format);
     case KEY_NORMALS:
         s->normals = strcmp(value, "yes") == 0;
         return s->normals == 1 || strcmp(value, "no") == 0
@@ -97,7 +97,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
         s->strict = true;
         return CLI_OK;
     case KEY_BATCH:
-        return cli_take_integer(name, value, 1, VSH_QUERY_BATCH, &s->batch);
+        return cli_parse_integer(name, value, 1, VSH_QUERY_BATCH, &s->batch);
     case KEY_DISTANCE:
         s->distance = true;
         return CLI_OK;
@@ -105,14 +105,14 @@ static int take(void *settings, int key, const char *name, const char *value) {
         s->gradient = true;
         return CLI_OK;
     case KEY_WITHIN:
-        return cli_take_positive(name, value, &s->within);
+        return cli_parse_positive(name, value, &s->within);
     case KEY_STATS:
         s->bake.stats = value;
         return CLI_OK;
     default:
         break;
     }
-    return cli_shared_take(&s->bake, key, name, value);
+    return cli_shared_parse(&s->bake, key, name, value);
 }
 
 static bool is_standard(const char *path) {

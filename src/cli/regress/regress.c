@@ -67,7 +67,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
         s->bakes = value;
         return CLI_OK;
     default:
-        return cli_compare_take(&s->compare, key, name, value);
+        return cli_compare_parse(&s->compare, key, name, value);
     }
 }
 

@@ -77,7 +77,7 @@ static int take_background(render_settings *s, const char *name, const char *val
         memset(s->background, 0, sizeof s->background);
         return CLI_OK;
     }
-    return cli_take_color(name, value, s->background);
+    return cli_parse_color(name, value, s->background);
 }
 
 static int take_lightmap(render_settings *s, const char *value) {
@@ -99,33 +99,33 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_CAMERA:
         s->has_camera = true;
-        return cli_take_point(name, value, s->camera);
+        return cli_parse_point(name, value, s->camera);
     case KEY_LOOK_AT:
         s->has_look_at = true;
-        return cli_take_point(name, value, s->look_at);
+        return cli_parse_point(name, value, s->look_at);
     case KEY_UP:
-        return cli_take_vector(name, value, s->up);
+        return cli_parse_vector(name, value, s->up);
     case KEY_FOV:
-        return cli_take_number(name, value, 0.1, 170.0, &s->fov_deg);
+        return cli_parse_number(name, value, 0.1, 170.0, &s->fov_deg);
     case KEY_ORBIT:
-        return cli_take_number(name, value, -1e6, 1e6, &s->orbit_deg);
+        return cli_parse_number(name, value, -1e6, 1e6, &s->orbit_deg);
     case KEY_TURNTABLE:
-        return cli_take_integer(name, value, 2, RENDER_MOST_FRAMES, &s->frames);
+        return cli_parse_integer(name, value, 2, RENDER_MOST_FRAMES, &s->frames);
     case KEY_SIZE:
-        return cli_take_size(name, value, &s->width, &s->height);
+        return cli_parse_size(name, value, &s->width, &s->height);
     case KEY_SAMPLES:
-        return cli_take_integer(name, value, 1, 16, &s->samples);
+        return cli_parse_integer(name, value, 1, 16, &s->samples);
     case KEY_SKY:
         s->has_sky = true;
-        return cli_take_color(name, value, s->sky);
+        return cli_parse_color(name, value, s->sky);
     case KEY_BACKGROUND:
         return take_background(s, name, value);
     case KEY_EXPOSURE:
-        return cli_take_number(name, value, -20.0, 20.0, &s->exposure);
+        return cli_parse_number(name, value, -20.0, 20.0, &s->exposure);
     case KEY_SHAFTS:
-        return cli_take_number(name, value, 0.0, 100.0, &s->shafts);
+        return cli_parse_number(name, value, 0.0, 100.0, &s->shafts);
     case KEY_SHAFT_STEPS:
-        return cli_take_integer(name, value, 1, 64, &s->shaft_steps);
+        return cli_parse_integer(name, value, 1, 64, &s->shaft_steps);
     case KEY_LIGHTMAP:
         return take_lightmap(s, value);
     case KEY_LIGHTMAP_PACK:
@@ -134,7 +134,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
     default:
         break;
     }
-    return cli_shared_take(&s->bake, key, name, value);
+    return cli_shared_parse(&s->bake, key, name, value);
 }
 
 /* What does not go together. */

@@ -87,7 +87,7 @@ uint64_t render_picture_bytes(const render_settings *s) {
     return pixels * (FLOATS + ENCODED + more) * sizeof(float);
 }
 
-int render_picture_create(const render_settings *s, const cli_origin *origin, render_picture *p) {
+int render_picture_create(const render_settings *s, const cli_provenance *origin, render_picture *p) {
     const size_t pixels = (size_t)s->width * (size_t)s->height;
     *p = (render_picture){.memory = calloc(pixels * (FLOATS + ENCODED), sizeof(float)), .origin = origin};
     if (p->memory == NULL) {
@@ -107,7 +107,7 @@ void render_picture_free(render_picture *p) {
     free(p->memory);
 }
 
-static int write_image(const char *path, const vsh_image *image, int32_t bits, const cli_origin *origin) {
+static int write_image(const char *path, const vsh_image *image, int32_t bits, const cli_provenance *origin) {
     vsh_image_options options = vsh_image_options_default();
     vsh_error error;
     options.bits = bits;

@@ -28,7 +28,7 @@ typedef struct render_work {
     render_lightmaps lightmaps;
     vsh_lit_meshes *lit; /* of lightmaps, and of surfaces */
     vsh_render_options options;
-    cli_origin origin;
+    cli_provenance origin;
     render_picture picture;
     render_page *page;
     cli_stats stats;
@@ -165,8 +165,8 @@ static int find_origin(render_work *work) {
     const render_settings *s = work->settings;
     const char *files[1 + RENDER_MOST_LIGHTMAPS] = {s->bake.input};
     memcpy(files + 1, s->lightmaps, s->lightmap_count * sizeof *files);
-    return cli_origin_make(work->scene, files, 1 + s->lightmap_count, &work->stats.casters, &work->run,
-                           &work->origin);
+    return cli_provenance_make(work->scene, files, 1 + s->lightmap_count, &work->stats.casters, &work->run,
+                               &work->origin);
 }
 
 static void say_results(const render_work *work) {
@@ -198,7 +198,7 @@ static int run_render(const render_settings *s, vsh_scene *scene) {
     }
     render_page_abandon(work.page);
     render_picture_free(&work.picture);
-    cli_origin_free(&work.origin);
+    cli_provenance_free(&work.origin);
     free(work.lit);
     render_lightmaps_free(&work.lightmaps);
     render_surfaces_free(&work.surfaces);

@@ -3,7 +3,7 @@
 #define CLI_RENDER_H
 
 #include "cli/bake/options.h"
-#include "cli/origin.h"
+#include "cli/provenance.h"
 
 enum { RENDER_MOST_LIGHTMAPS = 64, RENDER_MOST_FRAMES = 1000, RENDER_PAGE_FRAMES = 36 };
 
@@ -79,13 +79,14 @@ typedef struct render_picture {
     float *memory;
     vsh_picture picture;
     float *encoded[4];
-    const cli_origin *origin; /* of the file */
+    const cli_provenance *origin; /* of the file */
 } render_picture;
 
 /* What a picture takes while it is made and written. */
 uint64_t render_picture_bytes(const render_settings *settings);
 
-int render_picture_create(const render_settings *settings, const cli_origin *origin, render_picture *picture);
+int render_picture_create(const render_settings *settings, const cli_provenance *origin,
+                          render_picture *picture);
 void render_picture_free(render_picture *picture);
 
 /* Whether pictures can go to the output: CLI_OK or an exit code, having said why. */

@@ -83,7 +83,7 @@ static int take_resolutions(trade_settings *s, const char *name, const char *val
 
 static int take_size(trade_settings *s, const char *name, const char *value) {
     int32_t width, height;
-    const int code = cli_take_size(name, value, &width, &height);
+    const int code = cli_parse_size(name, value, &width, &height);
     if (code == CLI_OK && (width > 4096 || height > 4096)) {
         return cli_usage("%s '%s': expected at most 4096 texels", name, value);
     }
@@ -103,27 +103,27 @@ static int take(void *settings, int key, const char *name, const char *value) {
         s->plot = value;
         return CLI_OK;
     case KEY_RECEIVER:
-        return cli_take_integer(name, value, 0, INT32_MAX, &s->receiver);
+        return cli_parse_integer(name, value, 0, INT32_MAX, &s->receiver);
     case KEY_SIZE:
         return take_size(s, name, value);
     case KEY_RESOLUTIONS:
         return take_resolutions(s, name, value);
     case KEY_TRUTH_RAYS:
-        return cli_take_integer(name, value, 16, 65536, &s->truth_rays);
+        return cli_parse_integer(name, value, 16, 65536, &s->truth_rays);
     case KEY_BUDGET:
-        return cli_take_positive(name, value, &s->budget);
+        return cli_parse_positive(name, value, &s->budget);
     case KEY_SUN:
         s->bake.has_sun = true;
-        return cli_take_vector(name, value, s->bake.sun);
+        return cli_parse_vector(name, value, s->bake.sun);
     case KEY_SUN_ANGLE:
         s->bake.has_sun_angle = true;
-        return cli_take_number(name, value, 0.0, 179.0, &s->bake.sun_angle_deg);
+        return cli_parse_number(name, value, 0.0, 179.0, &s->bake.sun_angle_deg);
     default:
         break;
     }
     bool taken;
     const int code = cli_patch_take(&s->bake.patch, key, name, value, &taken);
-    return taken ? code : cli_common_take(&s->bake.common, key, name, value, &taken);
+    return taken ? code : cli_common_parse(&s->bake.common, key, name, value, &taken);
 }
 
 /* --- what the measurements share */

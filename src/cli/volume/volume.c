@@ -4,9 +4,9 @@
 #include "cli/bake/options.h"
 #include "cli/casters.h"
 #include "cli/message.h"
-#include "cli/origin.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
+#include "cli/provenance.h"
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/temporary.h"
@@ -96,22 +96,22 @@ static int take(void *settings, int key, const char *name, const char *value) {
         s->half = true;
         return CLI_OK;
     case KEY_BAND: {
-        const int code = cli_take_positive(name, value, &s->band);
-        return code == CLI_OK && s->band > 100.0 ? cli_take_number(name, value, 0.0, 100.0, &s->band) : code;
+        const int code = cli_parse_positive(name, value, &s->band);
+        return code == CLI_OK && s->band > 100.0 ? cli_parse_number(name, value, 0.0, 100.0, &s->band) : code;
     }
     case KEY_BOX:
         s->has_box = true;
-        return cli_take_box(name, value, s->box_min, s->box_max);
+        return cli_parse_box(name, value, s->box_min, s->box_max);
     case KEY_BOX_VOXEL_SIZE:
-        return cli_take_positive(name, value, &s->box_voxel_size);
+        return cli_parse_positive(name, value, &s->box_voxel_size);
     case KEY_LIKE:
         return take_like(s, name, value);
     case KEY_INSIDE:
-        return cli_take_name(name, value, vsh_inside, vsh_inside_name, &s->inside);
+        return cli_parse_name(name, value, vsh_inside, vsh_inside_name, &s->inside);
     default:
         break;
     }
-    return cli_shared_take(&s->bake, key, name, value);
+    return cli_shared_parse(&s->bake, key, name, value);
 }
 
 static int check_options(const volume_settings *s) {
@@ -262,8 +262,8 @@ static int write_volume(volume_work *work) {
         return cli_fail(&cancelled);
     }
     const char *const files[] = {work->settings->bake.input, work->settings->like};
-    cli_origin origin;
-    const int code = cli_origin_make(work->scene, files, 2, &work->stats.casters, &work->run, &origin);
+    cli_provenance origin;
+    const int code = cli_provenance_make(work->scene, files, 2, &work->stats.casters, &work->run, &origin);
     if (code != CLI_OK) {
         return code;
     }
@@ -272,7 +272,7 @@ static int write_volume(volume_work *work) {
     const vsh_result result =
         vsh_volume_write(work->volume, output, work->settings->half, origin.attributes, origin.count, &error);
     cli_signals_writing(NULL);
-    cli_origin_free(&origin);
+    cli_provenance_free(&origin);
     cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }

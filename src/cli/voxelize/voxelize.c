@@ -3,10 +3,10 @@
 #include "base/clock.h"
 #include "cli/commands.h"
 #include "cli/message.h"
-#include "cli/origin.h"
 #include "cli/patch.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
+#include "cli/provenance.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
 
@@ -56,7 +56,7 @@ static int take(void *settings, int key, const char *name, const char *value) {
     }
     bool taken;
     const int code = cli_patch_take(&s->patch, key, name, value, &taken);
-    return taken ? code : cli_common_take(&s->common, key, name, value, &taken);
+    return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);
 }
 
 /* What can be refused before anything is read. */
@@ -78,15 +78,15 @@ static int write_grid(const voxelize_settings *s, const vsh_scene *scene, const 
     const vsh_scene casters = {.casters = scene->casters, .caster_count = scene->caster_count};
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
-    cli_origin origin;
+    cli_provenance origin;
     const vsh_occluders_info made = {.voxel_size = info.voxel_size};
-    const int code = cli_origin_make(&casters, &s->input, 1, &made, run, &origin);
+    const int code = cli_provenance_make(&casters, &s->input, 1, &made, run, &origin);
     if (code != CLI_OK) {
         return code;
     }
     if (cli_progress_report(NULL, "write", 0.0) != 0) {
         const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
-        cli_origin_free(&origin);
+        cli_provenance_free(&origin);
         return cli_fail(&cancelled);
     }
     vsh_error error;
@@ -94,7 +94,7 @@ static int write_grid(const voxelize_settings *s, const vsh_scene *scene, const 
     const vsh_result result =
         vsh_grid_write(grid, s->output, s->name, origin.attributes, origin.count, &error);
     cli_signals_writing(NULL);
-    cli_origin_free(&origin);
+    cli_provenance_free(&origin);
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }
 

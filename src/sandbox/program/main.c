@@ -22,7 +22,7 @@ static int serve(char *name, char *argument, const vshi_reader_state *state) {
     memcpy(&function, &symbol, sizeof function);
     char word[sizeof VSHI_READER_HELD + 16];
     snprintf(word, sizeof word, VSHI_READER_HELD "%d",
-             (int)state->confined + (state->cramped ? VSHI_HELD_CRAMPED : 0));
+             (int)state->confined + (state->cramped ? VSHI_HELD_FILE_LIMIT : 0));
     char *words[] = {name, argument, word, NULL};
     return function(3, words);
 }

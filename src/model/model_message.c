@@ -1,0 +1,220 @@
+/* A model between a reader and its caller. */
+#include "base/memory.h"
+#include "mesh/mesh.h"
+#include "model/model.h"
+#include "sandbox/reader.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static void put_shape(vshi_encoder *encoder, const vshi_model_shape *shape) {
+    vshi_encode_count(encoder, shape->triangle_count);
+    vshi_encode_count(encoder, shape->vertex_count);
+    vshi_encode_count(encoder, (uint64_t)shape->uv_sets);
+    vshi_encode_count(encoder, (uint64_t)shape->alpha);
+    if (shape->triangle_count == 0) {
+        return;
+    }
+    vshi_encode_array(encoder, shape->positions, shape->vertex_count, sizeof(float[3]));
+    vshi_encode_array(encoder, shape->indices, shape->triangle_count, sizeof(uint32_t[3]));
+    vshi_encode_count(encoder, shape->normals != NULL);
+    if (shape->normals != NULL) {
+        vshi_encode_array(encoder, shape->normals, shape->vertex_count, sizeof(float[3]));
+    }
+    for (int32_t set = 0; set < shape->uv_sets; ++set) {
+        vshi_encode_count(encoder, shape->uvs[set] != NULL);
+        if (shape->uvs[set] != NULL) {
+            vshi_encode_array(encoder, shape->uvs[set], shape->vertex_count, sizeof(float[2]));
+        }
+    }
+}
+
+vsh_result vshi_serve_model(const char *path, vshi_decoder *request, const vsh_run *run,
+                            vshi_encoder *payload, vsh_error *error) {
+    (void)request;
+    vsh_model *model = NULL;
+    const vsh_result result = vsh_model_read(path, run, &model, error);
+    if (result != VSH_OK) {
+        return result;
+    }
+    vshi_encode_number(payload, model->unit);
+    vshi_encode_count(payload, model->shape_count);
+    for (size_t i = 0; i < model->shape_count; ++i) {
+        put_shape(payload, &model->shapes[i]);
+    }
+    vshi_encode_count(payload, model->entry_count);
+    for (size_t i = 0; i < model->entry_count; ++i) {
+        const vshi_model_entry *entry = &model->entries[i];
+        vshi_encode_text(payload, entry->name);
+        vshi_encode_text(payload, entry->object_name);
+        vshi_encode_count(payload, entry->object);
+        vshi_encode_count(payload, entry->shape);
+        vshi_encode_array(payload, entry->transform, 12, sizeof(double));
+    }
+    vsh_model_free(model);
+    return VSH_OK;
+}
+
+/* --- the caller */
+
+/* A copy of the next count × size bytes; sizes are known to be there before memory is taken. */
+static vsh_result copy_array(vshi_decoder *decoder, uint64_t count, size_t size, void *array,
+                             const char *path, vsh_error *error) {
+    const void *from = vshi_decode_array(decoder, count, size);
+    void *memory = NULL;
+    if (from == NULL) {
+        return count == 0 && !decoder->bad ? VSH_OK : vshi_answer_fail(path, "an array's size", error);
+    }
+    const vsh_result result = vshi_allocate(&memory, (size_t)count, size, path, error);
+    if (result == VSH_OK) {
+        memcpy(memory, from, (size_t)count * size);
+        memcpy(array, &memory, sizeof memory);
+    }
+    return result;
+}
+
+/* An array that is only perhaps there. */
+static vsh_result copy_optional(vshi_decoder *decoder, uint64_t count, size_t size, float **array,
+                                const char *path, vsh_error *error) {
+    return vshi_decode_count(decoder, 1) == 0 ? VSH_OK : copy_array(decoder, count, size, array, path, error);
+}
+
+static vsh_result take_shape(vshi_decoder *decoder, vshi_model_shape *shape, const char *path,
+                             vsh_error *error) {
+    shape->triangle_count = vshi_decode_count(decoder, SIZE_MAX / 64);
+    shape->vertex_count = vshi_decode_count(decoder, UINT32_MAX);
+    shape->uv_sets = (int32_t)vshi_decode_count(decoder, VSH_MAX_UV_SETS);
+    shape->alpha = (int32_t)vshi_decode_count(decoder, VSH_ALPHA_BLENDED);
+    if (decoder->bad || shape->triangle_count == 0) {
+        return VSH_OK;
+    }
+    const size_t count = shape->vertex_count;
+    vsh_result result = copy_array(decoder, count, sizeof(float[3]), &shape->positions, path, error);
+    if (result == VSH_OK) {
+        result =
+            copy_array(decoder, shape->triangle_count, sizeof(uint32_t[3]), &shape->indices, path, error);
+    }
+    if (result == VSH_OK) {
+        result = copy_optional(decoder, count, sizeof(float[3]), &shape->normals, path, error);
+    }
+    for (int32_t set = 0; set < shape->uv_sets && result == VSH_OK; ++set) {
+        result = copy_optional(decoder, count, sizeof(float[2]), &shape->uvs[set], path, error);
+    }
+    return result;
+}
+
+static vsh_result check_shape(const vshi_model_shape *shape, const char *path, vsh_error *error) {
+    const vsh_mesh view = {.positions = shape->positions,
+                           .indices = shape->indices,
+                           .vertex_count = shape->vertex_count,
+                           .triangle_count = shape->triangle_count};
+    vsh_error why;
+    if (vshi_mesh_validate(&view, VSHI_MESH_ALONE, &why) != VSH_OK) {
+        return vshi_answer_fail(path, why.message, error);
+    }
+    for (size_t i = 0; shape->normals != NULL && i < 3 * shape->vertex_count; ++i) {
+        if (!isfinite(shape->normals[i])) {
+            return vshi_answer_fail(path, "a normal that is not finite", error);
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result copy_name(const char *name, char **copy, const char *path, vsh_error *error) {
+    if (name == NULL) {
+        return VSH_OK;
+    }
+    const size_t size = strlen(name) + 1;
+    const vsh_result result = vshi_allocate((void **)copy, size, 1, path, error);
+    if (result == VSH_OK) {
+        memcpy(*copy, name, size);
+    }
+    return result;
+}
+
+static vsh_result take_entry(vshi_decoder *decoder, vsh_model *model, size_t index, const char *path,
+                             vsh_error *error) {
+    vshi_model_entry *entry = &model->entries[index];
+    const char *name = vshi_decode_text(decoder, true);
+    const char *object_name = vshi_decode_text(decoder, true);
+    entry->object = (uint32_t)vshi_decode_count(decoder, UINT32_MAX);
+    entry->shape = vshi_decode_count(decoder, model->shape_count - 1);
+    const void *transform = vshi_decode_array(decoder, 12, sizeof(double));
+    if (decoder->bad || model->shapes[entry->shape].triangle_count == 0) {
+        return vshi_answer_fail(path, "a mesh's place", error);
+    }
+    memcpy(entry->transform, transform, sizeof entry->transform);
+    vsh_result result = copy_name(name, &entry->name, path, error);
+    if (result == VSH_OK) {
+        result = copy_name(object_name, &entry->object_name, path, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    vsh_error why;
+    const vsh_mesh view = vsh_model_mesh(model, index, 0);
+    return vshi_mesh_check_transform(&view, VSHI_MESH_ALONE, &why) == VSH_OK
+               ? VSH_OK
+               : vshi_answer_fail(path, why.message, error);
+}
+
+static vsh_result take_meshes(vshi_decoder *decoder, vsh_model *model, const char *path, vsh_error *error) {
+    enum { LEAST_SHAPE = 32, LEAST_ENTRY = 112 }; /* bytes of the message */
+    model->unit = vshi_decode_number(decoder);
+    if (!(model->unit >= 0.0)) {
+        return vshi_answer_fail(path, "its unit", error);
+    }
+    const size_t shapes = vshi_decode_count(decoder, (uint64_t)(decoder->end - decoder->at) / LEAST_SHAPE);
+    if (shapes == 0) {
+        return vshi_answer_fail(path, "its meshes", error);
+    }
+    vsh_result result = vshi_allocate((void **)&model->shapes, shapes, sizeof *model->shapes, path, error);
+    model->shape_count = result == VSH_OK ? shapes : 0;
+    for (size_t i = 0; i < model->shape_count && result == VSH_OK; ++i) {
+        result = take_shape(decoder, &model->shapes[i], path, error);
+        result = result == VSH_OK && model->shapes[i].triangle_count > 0
+                     ? check_shape(&model->shapes[i], path, error)
+                     : result;
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    const size_t entries = vshi_decode_count(decoder, (uint64_t)(decoder->end - decoder->at) / LEAST_ENTRY);
+    result = vshi_allocate((void **)&model->entries, entries, sizeof *model->entries, path, error);
+    model->entry_capacity = result == VSH_OK ? entries : 0;
+    while (result == VSH_OK && model->entry_count < entries) {
+        result = take_entry(decoder, model, model->entry_count++, path, error);
+    }
+    if (result == VSH_OK && (!vshi_decoder_ends(decoder) || entries == 0)) {
+        result = vshi_answer_fail(path, "its meshes", error);
+    }
+    return result;
+}
+
+vsh_result vshi_model_decode(vshi_decoder *decoder, const char *path, vsh_model **model, vsh_error *error) {
+    vsh_model *made = NULL;
+    vsh_result result = vshi_allocate((void **)&made, 1, sizeof *made, path, error);
+    result = result == VSH_OK ? take_meshes(decoder, made, path, error) : result;
+    if (result == VSH_OK) {
+        *model = made;
+    } else {
+        vsh_model_free(made);
+    }
+    return result;
+}
+
+vsh_result vshi_model_from_reader(const char *path, const vsh_run *run, vshi_job *job, size_t units,
+                                  vsh_model **model, vsh_error *error) {
+    vshi_exchange exchange;
+    vshi_answer answer;
+    vsh_result result = vshi_exchange_begin(&exchange, VSHI_READ_MODEL, path, run, error);
+    if (result == VSH_OK) {
+        result = vshi_exchange_send_job(&exchange, job, units, &answer, error);
+    }
+    if (result != VSH_OK) {
+        return result;
+    }
+    result = vshi_model_decode(&answer.payload, path, model, error);
+    vshi_answer_free(&answer);
+    return result;
+}
