@@ -98,6 +98,11 @@ vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_imag
                                   vsh_error *error);
 
 struct vshi_decoder;
+struct vshi_encoder;
+
+/* Parses in a reader, and puts what is handed over. */
+vsh_result vshi_serve_image(const char *path, struct vshi_decoder *request, const vsh_run *run,
+                            struct vshi_encoder *payload, vsh_error *error);
 
 /* What a reader has handed over; everything in it is checked. Errors: VSH_ERROR_READ where it does not hold,
  * and as for what was made in this process. */

@@ -4,8 +4,8 @@
 #define VSHI_OPENVDB_TABLE_H
 
 #include "levelset/leaves.h"
+#include "levelset/serve.h"
 #include "levelset/volume.h"
-#include "sandbox/reader.h"
 
 #include <vdbshade/grid.h>
 #include <vdbshade/voxels.h>

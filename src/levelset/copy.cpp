@@ -1,5 +1,6 @@
 // A dense copy of a grid of a file: its values, and which of them are active.
 #include "levelset/file.h"
+#include "levelset/serve.h"
 
 #include <cstring>
 #include <memory>

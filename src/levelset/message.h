@@ -2,8 +2,8 @@
 #pragma once
 
 #include "levelset/grid.h"
+#include "levelset/serve.h"
 #include "levelset/volume.h"
-#include "sandbox/reader.h"
 
 #include <string>
 #include <vector>

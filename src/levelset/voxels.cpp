@@ -2,6 +2,7 @@
 #include "levelset/voxels.h"
 
 #include "levelset/file.h"
+#include "levelset/serve.h"
 
 #include <cmath>
 #include <cstdio>

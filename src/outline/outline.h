@@ -90,6 +90,11 @@ vsh_result vshi_contours_from_reader(const char *text, const char *path, const v
 bool vshi_outline_resolve(const vsh_outline *outline, vshi_contours *result);
 
 struct vshi_decoder;
+struct vshi_encoder;
+
+/* Parses in a reader, and puts what is handed over. */
+vsh_result vshi_serve_text(const char *path, struct vshi_decoder *request, const vsh_run *run,
+                           struct vshi_encoder *payload, vsh_error *error);
 
 /* What a reader has handed over; everything in it is checked. Errors: VSH_ERROR_READ where it does not hold,
  * and as for what was made in this process. */

@@ -69,8 +69,8 @@ VSHI_SHARED vsh_result vshi_answer_fail(const char *path, const char *what, vsh_
 typedef vsh_result vshi_serve_fn(const char *path, vshi_decoder *request, const vsh_run *run,
                                  vshi_encoder *payload, vsh_error *error);
 
-vshi_serve_fn vshi_serve_grid, vshi_serve_list, vshi_serve_voxels, vshi_serve_model, vshi_serve_image,
-    vshi_serve_text, vshi_serve_copy;
+/* What vsh_reader_serve() does, by who parses each kind (VSHI_READ_…). */
+int32_t vshi_serve(vshi_serve_fn *const servers[VSHI_READ_KINDS], int argc, char **argv);
 
 /* --- both */
 

@@ -17,13 +17,6 @@ enum { MOST_WARNINGS = 1 << 20 /* bytes of all that are passed on */ };
 /* Between two reports of progress, seconds. */
 static const double report_interval = 0.01;
 
-static vshi_serve_fn *const servers[VSHI_READ_KINDS] = {
-    [VSHI_READ_GRID] = vshi_serve_grid,     [VSHI_READ_LIST] = vshi_serve_list,
-    [VSHI_READ_VOXELS] = vshi_serve_voxels, [VSHI_READ_MODEL] = vshi_serve_model,
-    [VSHI_READ_IMAGE] = vshi_serve_image,   [VSHI_READ_TEXT] = vshi_serve_text,
-    [VSHI_READ_COPY] = vshi_serve_copy,
-};
-
 typedef struct serving {
     char *warnings; /* texts, one behind the other with their ends */
     size_t used, count;
@@ -101,7 +94,7 @@ static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_decod
     return write_head(&head) ? 0 : VSHI_READER_CANNOT;
 }
 
-static int32_t serve_request(serving *s, int argc, char **argv) {
+static int32_t serve_request(serving *s, vshi_serve_fn *const *servers, int argc, char **argv) {
     vshi_request request;
     if (!vshi_request_read(&request) || s->warnings == NULL) {
         return VSHI_READER_CANNOT;
@@ -126,12 +119,12 @@ static int32_t serve_request(serving *s, int argc, char **argv) {
     return answer(s, servers[request.kind], request.path, &request.rest, &run);
 }
 
-int32_t vsh_reader_serve(int argc, char **argv) {
+int32_t vshi_serve(vshi_serve_fn *const servers[VSHI_READ_KINDS], int argc, char **argv) {
     if (argc < 2 || strcmp(argv[1], VSH_READER_ARGUMENT) != 0) {
         return -1;
     }
     serving s = {.warnings = malloc(MOST_WARNINGS)};
-    const int32_t code = serve_request(&s, argc, argv);
+    const int32_t code = serve_request(&s, servers, argc, argv);
     free(s.warnings);
     return code;
 }
