@@ -4,6 +4,7 @@
  */
 #include "base/hash.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/mesh.h"
 
 #include <stdlib.h>
@@ -121,22 +122,13 @@ vsh_result vshi_mesh_count_edges(const vsh_mesh *mesh, vsh_mesh_report *report, 
     uint32_t *weld = NULL;
     size_t *ends = NULL; /* ends[v]: past the last use filed under v, once filled */
     edge_use *uses = NULL;
-    vsh_result result =
-        vshi_allocate((void **)&weld, mesh->vertex_count, sizeof *weld, "welded vertices", error);
-    if (result == VSH_OK) {
-        result =
-            vshi_allocate((void **)&ends, mesh->vertex_count + 1, sizeof *ends, "edges of vertices", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&uses, 3 * mesh->triangle_count, sizeof *uses, "edges of triangles",
-                               error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_mesh_weld(mesh, weld, error);
-    }
-    if (result != VSH_OK) {
-        goto cleanup;
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&weld, mesh->vertex_count, sizeof *weld, "welded vertices", error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&ends, mesh->vertex_count + 1, sizeof *ends, "edges of vertices", error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&uses, 3 * mesh->triangle_count, sizeof *uses, "edges of triangles", error));
+    VSHI_TRY_DONE(vshi_mesh_weld(mesh, weld, error));
 
     uint32_t vertex[3];
     for (size_t i = 0; i < mesh->triangle_count; ++i) {
@@ -171,7 +163,7 @@ vsh_result vshi_mesh_count_edges(const vsh_mesh *mesh, vsh_mesh_report *report, 
     report->open_edges = with_flat ? all.open : solid.open;
     report->flipped_edges = with_flat ? all.flipped : solid.flipped;
 
-cleanup:
+done:
     free(uses);
     free(ends);
     free(weld);

@@ -1,6 +1,7 @@
 #include "mesh/whole.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -21,17 +22,15 @@ static vsh_result put_together(const vsh_mesh *parts, size_t count, vshi_wholes 
         return VSH_OK;
     }
     whole->normals = whole->uvs = NULL;
-    vsh_result result = vshi_allocate((void **)&w->positions[w->count], whole->vertex_count,
-                                      3 * sizeof(float), "parts of an object", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&w->indices[w->count], whole->triangle_count, 3 * sizeof(uint32_t),
-                               "parts of an object", error);
-    }
+    VSHI_TRY(vshi_allocate((void **)&w->positions[w->count], whole->vertex_count, 3 * sizeof(float),
+                           "parts of an object", error));
+    VSHI_TRY(vshi_allocate((void **)&w->indices[w->count], whole->triangle_count, 3 * sizeof(uint32_t),
+                           "parts of an object", error));
     float *position = w->positions[w->count];
     uint32_t *index = w->indices[w->count], before = 0;
     whole->positions = position;
     whole->indices = index;
-    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+    for (size_t i = 0; i < count; ++i) {
         if (parts[i].vertex_count > 0) {
             memcpy(position, parts[i].positions, parts[i].vertex_count * 3 * sizeof *position);
         }
@@ -41,32 +40,27 @@ static vsh_result put_together(const vsh_mesh *parts, size_t count, vshi_wholes 
         }
         before += (uint32_t)parts[i].vertex_count;
     }
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_wholes_make(const vsh_mesh *meshes, size_t mesh_count, vshi_wholes *w, vsh_error *error) {
     *w = (vshi_wholes){0};
-    vsh_result result = vshi_allocate((void **)&w->meshes, mesh_count, sizeof *w->meshes, "objects", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&w->first, mesh_count + 1, sizeof *w->first, "objects", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&w->positions, mesh_count, sizeof *w->positions, "objects", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&w->indices, mesh_count, sizeof *w->indices, "objects", error);
-    }
-    for (size_t m = 0, next; m < mesh_count && result == VSH_OK; m = next) {
+    VSHI_TRY(vshi_allocate((void **)&w->meshes, mesh_count, sizeof *w->meshes, "objects", error));
+    VSHI_TRY(vshi_allocate((void **)&w->first, mesh_count + 1, sizeof *w->first, "objects", error));
+    VSHI_TRY(vshi_allocate((void **)&w->positions, mesh_count, sizeof *w->positions, "objects", error));
+    VSHI_TRY(vshi_allocate((void **)&w->indices, mesh_count, sizeof *w->indices, "objects", error));
+    for (size_t m = 0, next; m < mesh_count; m = next) {
         size_t vertices = meshes[m].vertex_count;
         for (next = m + 1; next < mesh_count && one_object(&meshes[m], &meshes[next]) &&
                            vertices + meshes[next].vertex_count <= UINT32_MAX;
              ++next) {
             vertices += meshes[next].vertex_count;
         }
-        result = put_together(meshes + m, next - m, w, error);
-        w->first[++w->count] = next;
+        const vsh_result result = put_together(meshes + m, next - m, w, error);
+        w->first[++w->count] = next; /* what it has is freed with it */
+        VSHI_TRY(result);
     }
-    return result;
+    return VSH_OK;
 }
 
 void vshi_wholes_free(vshi_wholes *w) {
