@@ -273,8 +273,9 @@ static void settle(ray_batch *batch, size_t point, float value, float deviation)
 }
 
 /* What is said of a point whose rays were cast. Down to VSHI_COARSE rays end by deviation_of(), which knows
- * the ends of penumbrae too well: where that matters, as of points that others are interpolated from or of
- * samplers that leave more, the larger of the two is said, of the latter no more than was asked for. */
+ * the ends of penumbrae too well: where that matters, as where all rays agree, of points that others may be
+ * interpolated from or of samplers that leave more, the larger of the two is said, of the latter no more than
+ * was asked for. */
 static double said_of(const ray_batch *batch, size_t owner) {
     const vsh_shade_options *options = batch->task->options;
     const open_point *p = &batch->open[owner];
@@ -284,21 +285,16 @@ static double said_of(const ray_batch *batch, size_t owner) {
     if (options->max_error < VSHI_COARSE) {
         return error_of(batch, owner);
     }
-    const bool cut = batch->shared && p->lit > 0 && p->lit < p->taken;
-    return cut || options->sampler != VSH_SAMPLER_SOBOL
+    const bool agree = p->lit == 0 || p->lit == p->taken;
+    return agree || batch->shared || options->sampler != VSH_SAMPLER_SOBOL
                ? fmax(p->deviation, fmin(error_of(batch, owner), options->max_error))
                : p->deviation;
 }
 
 static void settle_cast(ray_batch *batch, const size_t *some, size_t count) {
-    const bool keeps = batch->task->options->method != VSH_SHADOW_RAYS && !is_hard(batch->task);
     for (size_t i = 0; i < count; ++i) {
         open_point *p = &batch->open[some[i]];
-        const double said = said_of(batch, some[i]);
-        /* where all rays agree, what they may have missed */
-        const bool agree = keeps && (p->lit == 0 || p->lit == p->taken);
-        const double unseen = agree ? fmin(error_of(batch, some[i]), batch->task->options->max_error) : 0.0;
-        p->deviation = fmax(said, unseen);
+        p->deviation = said_of(batch, some[i]);
         settle(batch, p->point, (float)p->lit / (float)p->taken, (float)p->deviation);
     }
 }
