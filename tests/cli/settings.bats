@@ -21,7 +21,7 @@ help_of() {
             [[ $text == *"($default:"* ]] || fail "$key: $default; $text"
         checked=$((checked + 1))
     done < <(sed -n '/^## The scene/,/^## Casters/p' "$BATS_TEST_DIRNAME/../../docs/scene.md" | grep '^| `')
-    [ "$checked" -ge 8 ] || fail "only $checked"
+    [ "$checked" -ge 10 ] || fail "only $checked"
 }
 
 @test "an option that is refused names itself, its value and what is expected" {
