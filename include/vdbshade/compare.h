@@ -219,7 +219,7 @@ typedef struct vsh_comparison vsh_comparison;
 /* Compares two images channel by channel, or two .vdb files grid by grid, over what both cover. That they
  * are not alike is no error, and neither are other sizes, channels, voxels or formats: those are problems of
  * the comparison. Free it with vsh_comparison_free(). Files from strangers are for run->reader (base.h).
- * Errors: as of vsh_tolerances_read(), vsh_image_read_run(), vsh_vdb_copy() and vsh_compare(), and
+ * Errors: as of vsh_tolerances_read(), vsh_image_read(), vsh_vdb_copy() and vsh_compare(), and
  * - VSH_ERROR_ARGUMENT: golden, fresh or comparison NULL, options, run;
  * - VSH_ERROR_INPUT: more than 4096 grids. */
 VSH_API vsh_result vsh_compare_files(const char *golden, const char *fresh,

@@ -18,7 +18,7 @@ typedef struct vshi_baking {
     vsh_run quiet; /* for steps of milliseconds that come once a plane: no stage of their own */
     const vsh_lightmap *lightmap; /* planes of all rows that the texels hold */
     uint32_t needs;               /* VSHI_NEEDS_… of its planes */
-    vshi_work_planes halo;
+    vshi_work_planes work;
     vshi_origins origins;
     vshi_spread spread;
     uint8_t *state;       /* [rows held][width]: VSHI_TEXEL_… */

@@ -18,7 +18,7 @@
 
 enum {
     MAX_PADDING = 4096,
-    LEAST_HALO = VSHI_SPREAD_REACH /* texels beside a band: invalid ones may be filled from as far */
+    LEAST_BESIDE = VSHI_SPREAD_REACH /* texels beside a band: invalid ones may be filled from as far */
 };
 
 static vsh_result check_range(int32_t value, int32_t low, int32_t high, const char *name, vsh_error *error) {
@@ -349,11 +349,11 @@ vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t ro
                          rows, first_row, VSH_BAND_STEP, height - first_row);
     }
     const size_t tile = VSHI_TILE, all = charts->sorted.rows;
-    const size_t reach = (size_t)(charts->padding > LEAST_HALO ? charts->padding : LEAST_HALO);
-    const size_t halo = (reach + tile - 1) / tile;
+    const size_t reach = (size_t)(charts->padding > LEAST_BESIDE ? charts->padding : LEAST_BESIDE);
+    const size_t beside = (reach + tile - 1) / tile;
     const bool shared = charts->ao_spacing > 1;
-    const size_t above = halo + (shared ? VSHI_AO_ABOVE : 0);
-    const size_t below = halo + (shared ? VSHI_AO_BELOW : 0);
+    const size_t above = beside + (shared ? VSHI_AO_ABOVE : 0);
+    const size_t below = beside + (shared ? VSHI_AO_BELOW : 0);
     band->own_first = first_row;
     band->own_rows = rows;
     band->own_begin = (size_t)first_row / tile;
@@ -410,9 +410,9 @@ uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int3
     for (size_t row = band.held_begin; row < band.held_end; ++row) {
         need.samples += (double)charts->rows[row].samples;
     }
-    const bool halo = band.rows > rows;
+    const bool beside = band.rows > rows;
     const double planes =
-        width * (rows + (halo ? band.rows : 0)) * floats_of(lightmap, light_count) * sizeof(float);
+        width * (rows + (beside ? band.rows : 0)) * floats_of(lightmap, light_count) * sizeof(float);
     return (uint64_t)(need.samples * (double)vshi_sample_bytes(charts->tangents) + vshi_bake_bytes(&need) +
                       planes);
 }

@@ -89,9 +89,9 @@ static vsh_result pad(vshi_baking *bake, size_t invalid, vsh_error *error) {
         [VSHI_TEXEL_EMPTY] = texels->padding,
         [VSHI_TEXEL_INVALID] = invalid > 0 ? invalid_radius(texels) : 0,
     };
-    vshi_spread_copy(&bake->spread, bake->state, bake->halo.planes, bake->halo.padded);
+    vshi_spread_copy(&bake->spread, bake->state, bake->work.planes, bake->work.padded);
     return vshi_padding_fill(&bake->run, texels->info.width, texels->band.rows, bake->state, radius,
-                             bake->halo.planes, bake->halo.padded, error);
+                             bake->work.planes, bake->work.padded, error);
 }
 
 static vsh_result check_limit(const vshi_baking *bake, vsh_error *error) {
@@ -130,8 +130,8 @@ static vsh_result run_bake(vshi_baking *bake, vsh_error *error) {
     bake->lifted = *bake->occluders;
     bake->lifted.layers = bake->layers;
     VSHI_TRY_DONE(check_limit(bake, error));
-    VSHI_TRY_DONE(vshi_work_planes_open(texels, bake->lightmap, bake->light_count, &bake->halo, error));
-    bake->lightmap = &bake->halo.lightmap;
+    VSHI_TRY_DONE(vshi_work_planes_open(texels, bake->lightmap, bake->light_count, &bake->work, error));
+    bake->lightmap = &bake->work.lightmap;
     VSHI_TRY_DONE(vshi_allocate((void **)&bake->state, vshi_texels_held(texels), 1, "lightmap", error));
     const vshi_origins_for what = {needs(bake, VSHI_NEEDS_LIGHTS), needs(bake, NEEDS_ANY_AO)};
     VSHI_TRY_DONE(vshi_origins_create(bake->occluders, texels, &bake->shade, what, find_needed, bake,
@@ -148,7 +148,7 @@ static vsh_result run_bake(vshi_baking *bake, vsh_error *error) {
     vshi_coverage_write(texels, &bake->origins, bake->state, bake->lightmap, &bake->stats);
     VSHI_TRY_DONE(pad(bake, bake->stats.invalid_texels, error));
     VSHI_TRY_DONE(vshi_baking_add_filled(bake, error));
-    vshi_work_planes_copy_back(texels, &bake->halo);
+    vshi_work_planes_copy_back(texels, &bake->work);
 done:
     free(bake->layers);
     free(bake->tinted);
@@ -160,7 +160,7 @@ done:
     vshi_field_error_free(&bake->held);
     vshi_spread_free(&bake->spread);
     vshi_origins_free(&bake->origins);
-    vshi_work_planes_close(&bake->halo);
+    vshi_work_planes_close(&bake->work);
     return result;
 }
 

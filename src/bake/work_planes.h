@@ -22,10 +22,10 @@ double vshi_work_planes_bytes(const vsh_texels *texels, const vsh_lightmap *give
 
 /* Zeroes all planes. Close also after an error. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_work_planes_open(const vsh_texels *texels, const vsh_lightmap *given, size_t light_count,
-                                 vshi_work_planes *halo, vsh_error *error);
+                                 vshi_work_planes *work, vsh_error *error);
 
 /* Copies the band's own rows into the caller's planes. */
-void vshi_work_planes_copy_back(const vsh_texels *texels, const vshi_work_planes *halo);
-void vshi_work_planes_close(vshi_work_planes *halo);
+void vshi_work_planes_copy_back(const vsh_texels *texels, const vshi_work_planes *work);
+void vshi_work_planes_close(vshi_work_planes *work);
 
 #endif

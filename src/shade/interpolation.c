@@ -32,14 +32,14 @@ static const double SIGMAS = 2.5;
 static const double FLAT = 0.1, ALIKE = 0.98;
 
 typedef struct square {
-    const vshi_interpolation *share;
+    const vshi_interpolation *interp;
     const pattern *pattern;
     int column, row;         /* of its corner, in the square of SIDE */
     uint16_t at[SIDE][SIDE]; /* of the square of SIDE: place in the piece + 1, 0: none */
 } square;
 
-static uint32_t square_of(const vshi_interpolation *share, size_t k) {
-    const uint32_t texel = share->points->texels[share->begin + k];
+static uint32_t square_of(const vshi_interpolation *interp, size_t k) {
+    const uint32_t texel = interp->points->texels[interp->begin + k];
     return (texel & 0xfff8fff8u) >> 3;
 }
 
@@ -55,29 +55,29 @@ int32_t vshi_interpolation_rays(double max_error) {
     return rays;
 }
 
-void vshi_interpolation_begin(vshi_interpolation *share) {
-    share->runs = 0;
-    for (size_t k = 0; k < share->count; ++k) {
-        if (k == 0 || square_of(share, k) != square_of(share, k - 1)) {
-            share->run_begin[share->runs++] = (uint16_t)k;
+void vshi_interpolation_begin(vshi_interpolation *interp) {
+    interp->runs = 0;
+    for (size_t k = 0; k < interp->count; ++k) {
+        if (k == 0 || square_of(interp, k) != square_of(interp, k - 1)) {
+            interp->run_begin[interp->runs++] = (uint16_t)k;
         }
     }
-    share->run_begin[share->runs] = (uint16_t)share->count;
+    interp->run_begin[interp->runs] = (uint16_t)interp->count;
 }
 
 /* Lays a run's points out. False where two have the same place, or none is open. */
 static bool lay_out(square *s, size_t run) {
-    const vshi_interpolation *share = s->share;
+    const vshi_interpolation *interp = s->interp;
     bool open = false;
     memset(s->at, 0, sizeof s->at);
-    for (size_t k = share->run_begin[run]; k < share->run_begin[run + 1]; ++k) {
-        const uint32_t texel = share->points->texels[share->begin + k];
+    for (size_t k = interp->run_begin[run]; k < interp->run_begin[run + 1]; ++k) {
+        const uint32_t texel = interp->points->texels[interp->begin + k];
         uint16_t *at = &s->at[texel >> 16 & (SIDE - 1)][texel & (SIDE - 1)];
         if (*at != 0) {
             return false;
         }
-        *at = share->state[k] != VSHI_INTERPOLATION_GONE ? (uint16_t)(k + 1) : 0;
-        open = open || share->state[k] == VSHI_INTERPOLATION_OPEN;
+        *at = interp->state[k] != VSHI_INTERPOLATION_GONE ? (uint16_t)(k + 1) : 0;
+        open = open || interp->state[k] == VSHI_INTERPOLATION_OPEN;
     }
     return open;
 }
@@ -90,12 +90,12 @@ static inline bool is_anchor(const pattern *p, int i, int j) {
     return p->edges || (i != 1) == (j != 1);
 }
 
-static vshi_vec position_of(const vshi_interpolation *share, size_t k) {
-    return vshi_vec_of(share->points->positions + 3 * (share->begin + k));
+static vshi_vec position_of(const vshi_interpolation *interp, size_t k) {
+    return vshi_vec_of(interp->points->positions + 3 * (interp->begin + k));
 }
 
-static vshi_vec normal_of(const vshi_interpolation *share, size_t k) {
-    return vshi_unit(vshi_vec_off(share->points->normals + 3 * (share->begin + k)));
+static vshi_vec normal_of(const vshi_interpolation *interp, size_t k) {
+    return vshi_unit(vshi_vec_off(interp->points->normals + 3 * (interp->begin + k)));
 }
 
 static vshi_vec mix(const vshi_vec p[4], double x, double y) {
@@ -117,22 +117,22 @@ static bool is_even(const square *s) {
         }
     }
     for (int k = 0; k < 4; ++k) {
-        corner[k] = position_of(s->share, point_at(s, last * (k & 1), last * (k >> 1)));
+        corner[k] = position_of(s->interp, point_at(s, last * (k & 1), last * (k >> 1)));
     }
-    const vshi_vec normal = normal_of(s->share, point_at(s, 0, 0));
+    const vshi_vec normal = normal_of(s->interp, point_at(s, 0, 0));
     const vshi_vec across = vshi_sub(corner[3], corner[0]);
     const double most = FLAT * FLAT * vshi_dot(across, across);
     bool open = false;
     for (int row = 0; row <= last; ++row) {
         for (int column = 0; column <= last; ++column) {
             const size_t k = point_at(s, column, row);
-            if (k == SIZE_MAX || s->share->state[k] != VSHI_INTERPOLATION_OPEN) {
+            if (k == SIZE_MAX || s->interp->state[k] != VSHI_INTERPOLATION_OPEN) {
                 continue;
             }
             open = true;
             const vshi_vec off =
-                vshi_sub(position_of(s->share, k), mix(corner, (double)column / last, (double)row / last));
-            if (!(vshi_dot(off, off) <= most) || !(vshi_dot(normal, normal_of(s->share, k)) >= ALIKE)) {
+                vshi_sub(position_of(s->interp, k), mix(corner, (double)column / last, (double)row / last));
+            if (!(vshi_dot(off, off) <= most) || !(vshi_dot(normal, normal_of(s->interp, k)) >= ALIKE)) {
                 return false;
             }
         }
@@ -141,39 +141,39 @@ static bool is_even(const square *s) {
 }
 
 /* Calls `fn` for every square of a level that has open points. */
-static void each_square(vshi_interpolation *share, int level,
-                        void (*fn)(vshi_interpolation *share, const square *s)) {
-    square s = {.share = share, .pattern = &LEVELS[level]};
+static void each_square(vshi_interpolation *interp, int level,
+                        void (*fn)(vshi_interpolation *interp, const square *s)) {
+    square s = {.interp = interp, .pattern = &LEVELS[level]};
     const int size = s.pattern->size;
-    for (size_t run = 0; run < share->runs; ++run) {
+    for (size_t run = 0; run < interp->runs; ++run) {
         if (!lay_out(&s, run)) {
             continue;
         }
         for (s.row = 0; s.row < SIDE; s.row += size) {
             for (s.column = 0; s.column < SIDE; s.column += size) {
                 if (is_even(&s)) {
-                    fn(share, &s);
+                    fn(interp, &s);
                 }
             }
         }
     }
 }
 
-static void want(vshi_interpolation *share, const square *s) {
+static void want(vshi_interpolation *interp, const square *s) {
     const pattern *p = s->pattern;
     for (int j = 0; j < 3; ++j) {
         for (int i = 0; i < 3; ++i) {
             const size_t k = is_anchor(p, i, j) ? point_at(s, p->place[i], p->place[j]) : SIZE_MAX;
-            if (k != SIZE_MAX && share->state[k] == VSHI_INTERPOLATION_OPEN) {
-                share->state[k] = VSHI_INTERPOLATION_WANTED;
+            if (k != SIZE_MAX && interp->state[k] == VSHI_INTERPOLATION_OPEN) {
+                interp->state[k] = VSHI_INTERPOLATION_WANTED;
             }
         }
     }
 }
 
-bool vshi_interpolation_pick(vshi_interpolation *share, int level) {
-    each_square(share, level, want);
-    return memchr(share->state, VSHI_INTERPOLATION_WANTED, share->count) != NULL;
+bool vshi_interpolation_pick(vshi_interpolation *interp, int level) {
+    each_square(interp, level, want);
+    return memchr(interp->state, VSHI_INTERPOLATION_WANTED, interp->count) != NULL;
 }
 
 /* --- values between */
@@ -203,7 +203,7 @@ static void fill_side(anchors *a, bool known, double *value, double *variance, c
 /* Values of a square's anchors; false where one is not known, or they do not agree. */
 static bool read(const square *s, anchors *a) {
     const pattern *p = s->pattern;
-    const vshi_interpolation *share = s->share;
+    const vshi_interpolation *interp = s->interp;
     double low = INFINITY, high = -INFINITY;
     for (int j = 0; j < 3; ++j) {
         for (int i = 0; i < 3; ++i) {
@@ -211,11 +211,11 @@ static bool read(const square *s, anchors *a) {
                 continue;
             }
             const size_t k = point_at(s, p->place[i], p->place[j]);
-            if (share->state[k] != VSHI_INTERPOLATION_KNOWN) {
+            if (interp->state[k] != VSHI_INTERPOLATION_KNOWN) {
                 return false;
             }
-            const double deviation = (double)share->deviation[k];
-            a->value[j][i] = (double)share->value[k];
+            const double deviation = (double)interp->deviation[k];
+            a->value[j][i] = (double)interp->value[k];
             a->variance[j][i] = deviation * deviation;
             low = fmin(low, a->value[j][i]);
             high = fmax(high, a->value[j][i]);
@@ -234,8 +234,8 @@ static bool read(const square *s, anchors *a) {
         fill_side(a, p->edges, &v[1][e], &w[1][e], (double[]){v[0][e], v[2][e]},
                   (double[]){w[0][e], w[2][e]});
     }
-    const double agree = share->max_error < FINE ? FINER * p->agree : p->agree;
-    return high - low <= RANGE && a->surplus <= agree * share->max_error;
+    const double agree = interp->max_error < FINE ? FINER * p->agree : p->agree;
+    return high - low <= RANGE && a->surplus <= agree * interp->max_error;
 }
 
 /* Values and variances of a square's open points, in the order of rows. */
@@ -251,7 +251,7 @@ static void mix_open(const square *s, const anchors *a, between *found) {
     for (int row = 0; row < p->size; ++row) {
         for (int column = 0; column < p->size; ++column) {
             const size_t k = point_at(s, column, row);
-            if (k == SIZE_MAX || s->share->state[k] != VSHI_INTERPOLATION_OPEN) {
+            if (k == SIZE_MAX || s->interp->state[k] != VSHI_INTERPOLATION_OPEN) {
                 continue;
             }
             const int i = column >= p->place[1], j = row >= p->place[1];
@@ -267,45 +267,45 @@ static void mix_open(const square *s, const anchors *a, between *found) {
             found->point[found->count] = k;
             found->value[found->count] = fmin(fmax(value, 0.0), 1.0);
             found->variance[found->count++] =
-                fmin(variance + left * left, fmax(variance, s->share->max_error * s->share->max_error));
+                fmin(variance + left * left, fmax(variance, s->interp->max_error * s->interp->max_error));
         }
     }
 }
 
 /* Whether the open points' own rays say the same, each and on average. */
-static bool rays_agree(const vshi_interpolation *share, const between *found) {
+static bool rays_agree(const vshi_interpolation *interp, const between *found) {
     double sum = 0.0, variance = 0.0;
     for (size_t n = 0; n < found->count; ++n) {
-        const int lit = share->lit[found->point[n]];
-        const double error = vshi_rays_deviation(share->sampler, lit, share->rays, found->value[n]);
-        const double off = (double)lit / (double)share->rays - found->value[n];
-        if (fabs(off) > SIGMAS * error + share->max_error) {
+        const int lit = interp->lit[found->point[n]];
+        const double error = vshi_rays_deviation(interp->sampler, lit, interp->rays, found->value[n]);
+        const double off = (double)lit / (double)interp->rays - found->value[n];
+        if (fabs(off) > SIGMAS * error + interp->max_error) {
             return false;
         }
         sum += off;
         variance += error * error;
     }
-    return fabs(sum) <= SIGMAS * sqrt(variance) + share->max_error * (double)found->count;
+    return fabs(sum) <= SIGMAS * sqrt(variance) + interp->max_error * (double)found->count;
 }
 
-static void interpolate(vshi_interpolation *share, const square *s) {
+static void interpolate(vshi_interpolation *interp, const square *s) {
     anchors a;
     between found;
     if (!read(s, &a)) {
         return;
     }
     mix_open(s, &a, &found);
-    if (!rays_agree(share, &found)) {
+    if (!rays_agree(interp, &found)) {
         return;
     }
     for (size_t n = 0; n < found.count; ++n) {
         const size_t k = found.point[n];
-        share->state[k] = VSHI_INTERPOLATION_KNOWN;
-        share->value[k] = (float)found.value[n];
-        share->deviation[k] = (float)sqrt(found.variance[n]);
+        interp->state[k] = VSHI_INTERPOLATION_KNOWN;
+        interp->value[k] = (float)found.value[n];
+        interp->deviation[k] = (float)sqrt(found.variance[n]);
     }
 }
 
-void vshi_interpolation_fill(vshi_interpolation *share, int level) {
-    each_square(share, level, interpolate);
+void vshi_interpolation_fill(vshi_interpolation *interp, int level) {
+    each_square(interp, level, interpolate);
 }

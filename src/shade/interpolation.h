@@ -38,15 +38,15 @@ int32_t vshi_interpolation_rays(double max_error);
 bool vshi_interpolation_can(const vsh_points *points);
 
 /* Finds the squares, of states that are set. */
-void vshi_interpolation_begin(vshi_interpolation *share);
+void vshi_interpolation_begin(vshi_interpolation *interp);
 
 /* Marks as VSHI_INTERPOLATION_WANTED those open points of the level's squares that the others are to be
  * interpolated from. False where there are none. */
-bool vshi_interpolation_pick(vshi_interpolation *share, int level);
+bool vshi_interpolation_pick(vshi_interpolation *interp, int level);
 
 /* Once all that was wanted is known: gives the open points of a square their values, where those that are
  * known agree with each other to within their errors, and with the open points' own rays; they are then known
  * too. */
-void vshi_interpolation_fill(vshi_interpolation *share, int level);
+void vshi_interpolation_fill(vshi_interpolation *interp, int level);
 
 #endif

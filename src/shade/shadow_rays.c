@@ -303,34 +303,34 @@ static void settle_cast(ray_batch *batch, const size_t *some, size_t count) {
  * leaves the rest in `some`. Returns their number. */
 static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *some) {
     const vshi_shadow_task *task = batch->task;
-    vshi_interpolation share = {.points = task->points,
-                                .begin = begin,
-                                .count = end - begin,
-                                .max_error = task->options->max_error,
-                                .sampler = task->options->sampler,
-                                .rays = vshi_interpolation_rays(task->options->max_error)};
-    for (size_t k = 0; k < share.count; ++k) {
-        share.value[k] = task->visibility[begin + k];
-        share.deviation[k] = 0.0f;
-        share.state[k] =
-            (uint8_t)(isnan(share.value[k]) ? VSHI_INTERPOLATION_GONE : VSHI_INTERPOLATION_KNOWN);
+    vshi_interpolation interp = {.points = task->points,
+                                 .begin = begin,
+                                 .count = end - begin,
+                                 .max_error = task->options->max_error,
+                                 .sampler = task->options->sampler,
+                                 .rays = vshi_interpolation_rays(task->options->max_error)};
+    for (size_t k = 0; k < interp.count; ++k) {
+        interp.value[k] = task->visibility[begin + k];
+        interp.deviation[k] = 0.0f;
+        interp.state[k] =
+            (uint8_t)(isnan(interp.value[k]) ? VSHI_INTERPOLATION_GONE : VSHI_INTERPOLATION_KNOWN);
     }
     for (size_t o = 0; o < batch->open_count; ++o) {
-        cast(batch, o, share.rays);
+        cast(batch, o, interp.rays);
     }
     flush(batch);
     for (size_t o = 0; o < batch->open_count; ++o) {
         const size_t k = batch->open[o].point - begin;
-        share.state[k] = VSHI_INTERPOLATION_OPEN;
-        share.lit[k] = (uint16_t)batch->open[o].lit;
+        interp.state[k] = VSHI_INTERPOLATION_OPEN;
+        interp.lit[k] = (uint16_t)batch->open[o].lit;
     }
     bool anchor[VSHI_PIECE] = {false};
-    vshi_interpolation_begin(&share);
+    vshi_interpolation_begin(&interp);
     for (int level = 0; level < VSHI_INTERPOLATION_LEVELS; ++level) {
         size_t wanted = 0;
-        if (vshi_interpolation_pick(&share, level)) {
+        if (vshi_interpolation_pick(&interp, level)) {
             for (size_t o = 0; o < batch->open_count; ++o) {
-                if (share.state[batch->open[o].point - begin] == VSHI_INTERPOLATION_WANTED) {
+                if (interp.state[batch->open[o].point - begin] == VSHI_INTERPOLATION_WANTED) {
                     some[wanted++] = o;
                 }
             }
@@ -341,19 +341,19 @@ static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *so
             const open_point *p = &batch->open[some[i]];
             const size_t k = p->point - begin;
             anchor[some[i]] = true;
-            share.state[k] = VSHI_INTERPOLATION_KNOWN;
-            share.value[k] = task->visibility[p->point];
-            share.deviation[k] = (float)p->deviation;
+            interp.state[k] = VSHI_INTERPOLATION_KNOWN;
+            interp.value[k] = task->visibility[p->point];
+            interp.deviation[k] = (float)p->deviation;
         }
-        vshi_interpolation_fill(&share, level);
+        vshi_interpolation_fill(&interp, level);
     }
     size_t left = 0;
     for (size_t o = 0; o < batch->open_count; ++o) {
         const size_t point = batch->open[o].point, k = point - begin;
-        if (share.state[k] == VSHI_INTERPOLATION_OPEN) {
+        if (interp.state[k] == VSHI_INTERPOLATION_OPEN) {
             some[left++] = o;
         } else if (!anchor[o]) {
-            settle(batch, point, share.value[k], share.deviation[k]);
+            settle(batch, point, interp.value[k], interp.deviation[k]);
         }
     }
     return left;
