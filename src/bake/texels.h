@@ -110,7 +110,7 @@ static inline size_t vshi_texels_held(const vsh_texels *texels) {
 }
 
 /* Whether rows beside the band's own are held. */
-static inline bool vshi_texels_has_halo(const vsh_texels *texels) {
+static inline bool vshi_texels_hold_more(const vsh_texels *texels) {
     return texels->band.own_begin > texels->band.held_begin || texels->band.own_end < texels->band.held_end;
 }
 

@@ -32,7 +32,7 @@ double vshi_work_planes_bytes(const vsh_texels *texels, const vsh_lightmap *give
             floats += vshi_plane_of(given, kind, i) != NULL ? vshi_plane_components(kind) : 0;
         }
     }
-    return vshi_texels_has_halo(texels) ? (double)(vshi_texels_held(texels) * floats * sizeof(float)) : 0.0;
+    return vshi_texels_hold_more(texels) ? (double)(vshi_texels_held(texels) * floats * sizeof(float)) : 0.0;
 }
 
 /* What stands for one of the caller's planes. */
@@ -91,7 +91,7 @@ vsh_result vshi_work_planes_open(const vsh_texels *texels, const vsh_lightmap *g
     work->padded = work->count;
     list(given, light_count, false, work);
     memcpy(work->planes, work->given, work->count * sizeof *work->planes);
-    if (vshi_texels_has_halo(texels)) {
+    if (vshi_texels_hold_more(texels)) {
         return take_planes(texels, given, light_count, work, error);
     }
     for (size_t p = 0; p < work->count; ++p) {

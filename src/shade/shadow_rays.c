@@ -273,9 +273,8 @@ static void settle(ray_batch *batch, size_t point, float value, float deviation)
 }
 
 /* What is said of a point whose rays were cast. Down to VSHI_COARSE rays end by deviation_of(), which knows
- * the ends of penumbrae too well: where that matters, as where all rays agree, of points that others may be
- * interpolated from or of samplers that leave more, the larger of the two is said, of the latter at most what
- * was asked for. */
+ * the ends of penumbrae too well: where all rays agree, of points that others may be interpolated from and of
+ * samplers that leave more, the larger of the two is said, of the latter at most what was asked for. */
 static double said_of(const ray_batch *batch, size_t owner) {
     const vsh_shade_options *options = batch->task->options;
     const open_point *p = &batch->open[owner];
