@@ -60,7 +60,8 @@ function(vsh_add_program name watch)
   vsh_set_flags(${name})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/src ${given_FOLDERS})
   target_compile_definitions(${name} PRIVATE VSH_ASSETS="${PROJECT_SOURCE_DIR}/assets"
-                             VSH_MODELS="${PROJECT_SOURCE_DIR}/tests/models")
+                             VSH_MODELS="${PROJECT_SOURCE_DIR}/tests/models"
+                             VSH_DOCS="${PROJECT_SOURCE_DIR}/docs")
   foreach(library vdbshade_objects ${given_LIBRARIES})
     if(watch AND TARGET ${watch}.${library})
       set(library ${watch}.${library})
