@@ -242,8 +242,8 @@ static vsh_result make(const vsh_mesh *meshes, size_t mesh_count, const vsh_ligh
     const vshi_raster raster = {options->width, options->height, options->supersample};
     vshi_charts *sorted = &charts->sorted;
     vshi_mesh_set set;
-    VSHI_TRY(vshi_mesh_set_create(meshes, mesh_count, &set, error));
     vsh_result result;
+    VSHI_TRY_DONE(vshi_mesh_set_create(meshes, mesh_count, &set, error));
     VSHI_TRY_DONE(vshi_charts_create(meshes, mesh_count, raster, run, job, reports, sorted, error));
     VSHI_TRY_DONE(find_sheets(charts, &set, job, run, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&charts->rows, sorted->rows, sizeof *charts->rows, "texels", error));
