@@ -100,15 +100,10 @@ static vsh_result allocate(vshi_gltf *gltf, vsh_error *error) {
         {&gltf->node_world, gltf->node_count, sizeof *gltf->node_world},
         {&gltf->model, 1, sizeof *gltf->model},
     };
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0] && result == VSH_OK; ++i) {
-        result = vshi_gltf_hold(gltf, (double)wanted[i].count * (double)wanted[i].size, error);
-        if (result == VSH_OK) {
-            result =
-                vshi_allocate((void **)wanted[i].memory, wanted[i].count, wanted[i].size, gltf->path, error);
-        }
+    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
+        VSHI_TRY(vshi_gltf_allocate(gltf, (void **)wanted[i].memory, wanted[i].count, wanted[i].size, error));
     }
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, const vsh_run *run, vshi_job *job,
@@ -117,25 +112,17 @@ vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, const
     const bool binary = size >= 4 && memcmp(text, "glTF", 4) == 0;
     const size_t length = strlen(path);
     const bool expected = length >= 4 && (path[length - 1] == 'b' || path[length - 1] == 'B');
-    vsh_result result =
-        binary || expected ? open_binary(&gltf, text, size, error) : parse(&gltf, text, size, error);
-    if (result == VSH_OK) {
-        result = check_version(&gltf, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_gltf_check_extensions(&gltf, error);
-    }
-    if (result == VSH_OK) {
-        result = allocate(&gltf, error);
-    }
-    if (result == VSH_OK) {
-        gltf.model->unit = 1.0; /* glTF is in metres */
-        result = vshi_gltf_add_scene(&gltf, error);
-    }
-    if (result == VSH_OK) {
-        *model = gltf.model;
-        gltf.model = NULL;
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(binary || expected ? open_binary(&gltf, text, size, error)
+                                     : parse(&gltf, text, size, error));
+    VSHI_TRY_DONE(check_version(&gltf, error));
+    VSHI_TRY_DONE(vshi_gltf_check_extensions(&gltf, error));
+    VSHI_TRY_DONE(allocate(&gltf, error));
+    gltf.model->unit = 1.0; /* glTF is in metres */
+    VSHI_TRY_DONE(vshi_gltf_add_scene(&gltf, error));
+    *model = gltf.model;
+    gltf.model = NULL;
+done:
     vsh_model_free(gltf.model);
     free(gltf.node_world);
     free(gltf.node_seen);

@@ -4,6 +4,7 @@
 #ifndef VSHI_CASTER_GLTF_H
 #define VSHI_CASTER_GLTF_H
 
+#include "base/try.h"
 #include "model/model.h"
 
 #include <jansson.h>
@@ -65,6 +66,9 @@ vsh_result vshi_gltf_fail(const vshi_gltf *gltf, vsh_error *error, const char *f
 
 /* Adds to what is held, and checks it against the memory limit. */
 vsh_result vshi_gltf_hold(vshi_gltf *gltf, double bytes, vsh_error *error);
+
+/* The same of count × size bytes, which it takes: as vshi_allocate(). */
+vsh_result vshi_gltf_allocate(vshi_gltf *gltf, void **memory, size_t count, size_t size, vsh_error *error);
 
 /* --- extensions that a file cannot be read without (gltf_extensions.c) */
 

@@ -39,10 +39,7 @@ static vsh_result place(vshi_gltf *gltf, const char *where, size_t view, size_t 
                         size_t size, const unsigned char **at, size_t *stride, vsh_error *error) {
     vshi_gltf_bytes bytes;
     size_t given;
-    const vsh_result result = vshi_gltf_view(gltf, view, &bytes, &given, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &given, error));
     *stride = given > 0 ? given : size;
     size_t span, end;
     if (*stride < size || __builtin_mul_overflow(count - 1, *stride, &span) ||
@@ -89,35 +86,27 @@ static vsh_result open_sparse(vshi_gltf *gltf, const json_t *sparse, const char 
     if (count == 0) {
         return VSH_OK;
     }
-    vsh_result result =
-        vshi_gltf_index(gltf, indices, "bufferView", "bufferViews", where, &index_view, error);
-    if (result == VSH_OK) {
-        result = vshi_gltf_index(gltf, values, "bufferView", "bufferViews", where, &value_view, error);
+    VSHI_TRY(vshi_gltf_index(gltf, indices, "bufferView", "bufferViews", where, &index_view, error));
+    VSHI_TRY(vshi_gltf_index(gltf, values, "bufferView", "bufferViews", where, &value_view, error));
+    if (index_view == SIZE_MAX || value_view == SIZE_MAX) {
+        return vshi_gltf_fail(gltf, error, "%s: its sparse part has no buffer view", where);
     }
-    if (result == VSH_OK && (index_view == SIZE_MAX || value_view == SIZE_MAX)) {
-        result = vshi_gltf_fail(gltf, error, "%s: its sparse part has no buffer view", where);
-    }
-    if (result == VSH_OK) {
-        result = place(gltf, where, index_view, index_offset, count, (size_t)component_size((int)type),
-                       &accessor->sparse_at, &stride, error);
-    }
-    if (result == VSH_OK) {
-        const size_t size = (size_t)accessor->components * (size_t)component_size(accessor->type);
-        result = place(gltf, where, value_view, value_offset, count, size, &accessor->sparse_values, &stride,
-                       error);
-    }
-    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
-        const size_t index =
-            integer_at(accessor->sparse_at + i * (size_t)component_size((int)type), (int)type);
+    const size_t index_size = (size_t)component_size((int)type);
+    const size_t value_size = (size_t)accessor->components * (size_t)component_size(accessor->type);
+    VSHI_TRY(place(gltf, where, index_view, index_offset, count, index_size, &accessor->sparse_at, &stride,
+                   error));
+    VSHI_TRY(place(gltf, where, value_view, value_offset, count, value_size, &accessor->sparse_values,
+                   &stride, error));
+    for (size_t i = 0; i < count; ++i) {
+        const size_t index = integer_at(accessor->sparse_at + i * index_size, (int)type);
         if (index >= accessor->count) {
-            result =
-                vshi_gltf_fail(gltf, error, "%s: sparse index %zu of %zu is %zu, but it has %zu elements",
-                               where, i, count, index, accessor->count);
+            return vshi_gltf_fail(gltf, error, "%s: sparse index %zu of %zu is %zu, but it has %zu elements",
+                                  where, i, count, index, accessor->count);
         }
     }
     accessor->sparse_count = count;
     accessor->sparse_type = (int)type;
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_gltf_accessor_open(vshi_gltf *gltf, size_t index, vshi_gltf_accessor *accessor,
@@ -137,14 +126,14 @@ vsh_result vshi_gltf_accessor_open(vshi_gltf *gltf, size_t index, vshi_gltf_acce
         accessor->count > UINT32_MAX || !vshi_gltf_count(given, "byteOffset", 0, &offset)) {
         return vshi_gltf_fail(gltf, error, "%s: its count or byteOffset is wrong", where);
     }
-    vsh_result result = vshi_gltf_index(gltf, given, "bufferView", "bufferViews", where, &view, error);
-    if (result == VSH_OK && view != SIZE_MAX) {
+    VSHI_TRY(vshi_gltf_index(gltf, given, "bufferView", "bufferViews", where, &view, error));
+    if (view != SIZE_MAX) {
         const size_t size = (size_t)accessor->components * (size_t)component_size(accessor->type);
-        result =
-            place(gltf, where, view, offset, accessor->count, size, &accessor->at, &accessor->stride, error);
+        VSHI_TRY(
+            place(gltf, where, view, offset, accessor->count, size, &accessor->at, &accessor->stride, error));
     }
     const json_t *sparse = json_object_get(given, "sparse");
-    return result == VSH_OK && sparse != NULL ? open_sparse(gltf, sparse, where, accessor, error) : result;
+    return sparse != NULL ? open_sparse(gltf, sparse, where, accessor, error) : VSH_OK;
 }
 
 static float signed_unit(int value, float most, bool normalized) {

@@ -12,10 +12,7 @@
 
 static vsh_result load_data(vshi_gltf *gltf, size_t index, const char *uri, vshi_gltf_buffer *buffer,
                             vsh_error *error) {
-    vsh_result result = vshi_gltf_hold(gltf, 0.75 * (double)strlen(uri), error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_gltf_hold(gltf, 0.75 * (double)strlen(uri), error));
     if (!vshi_uri_data(uri, &buffer->owned, &buffer->bytes.size)) {
         return buffer->bytes.size > 0
                    ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path)
@@ -37,21 +34,17 @@ static vsh_result read_file(vshi_gltf *gltf, size_t index, const char *path, vsh
              gltf->path, index, path);
     FILE *file;
     uint64_t bytes;
-    vsh_result result = vshi_input_open(path, name, SIZE_MAX, &file, &bytes, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_input_open(path, name, SIZE_MAX, &file, &bytes, error));
     const size_t size = (size_t)bytes;
-    result = vshi_gltf_hold(gltf, (double)size, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&buffer->owned, size, 1, gltf->path, error);
-    }
-    if (result == VSH_OK && fread(buffer->owned, 1, size, file) != size) {
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_gltf_allocate(gltf, (void **)&buffer->owned, size, 1, error));
+    if (fread(buffer->owned, 1, size, file) != size) {
         result = vshi_fail(error, VSH_ERROR_READ, "%s: '%s': %s", gltf->path, path,
                            ferror(file) ? strerror(errno) : "became shorter while it was read");
     }
-    fclose(file);
     buffer->bytes.size = size;
+done:
+    fclose(file);
     return result;
 }
 
@@ -78,27 +71,24 @@ static vsh_result load(vshi_gltf *gltf, size_t index, vsh_error *error) {
     if (!vshi_gltf_count(given, "byteLength", SIZE_MAX, &length) || length == SIZE_MAX) {
         return vshi_gltf_fail(gltf, error, "buffers[%zu]: has no byteLength", index);
     }
-    vsh_result result = VSH_OK;
     if (uri == NULL && index == 0 && gltf->binary) {
         buffer->bytes = gltf->chunk;
     } else if (!json_is_string(uri)) {
         return vshi_gltf_fail(gltf, error, "buffers[%zu]: has no data: neither a URI nor a binary chunk",
                               index);
     } else if (vshi_uri_is_data(json_string_value(uri))) {
-        result = load_data(gltf, index, json_string_value(uri), buffer, error);
+        VSHI_TRY(load_data(gltf, index, json_string_value(uri), buffer, error));
     } else {
-        result = load_beside(gltf, index, json_string_value(uri), buffer, error);
+        VSHI_TRY(load_beside(gltf, index, json_string_value(uri), buffer, error));
     }
-    if (result == VSH_OK && buffer->bytes.size < length) {
-        result = vshi_fail(error, VSH_ERROR_READ, "%s: buffers[%zu] is cut short: %zu bytes of %zu",
-                           gltf->path, index, buffer->bytes.size, length);
+    if (buffer->bytes.size < length) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: buffers[%zu] is cut short: %zu bytes of %zu", gltf->path,
+                         index, buffer->bytes.size, length);
     }
-    if (result == VSH_OK) {
-        buffer->bytes.at = buffer->owned != NULL ? buffer->owned : buffer->bytes.at;
-        buffer->bytes.size = length;
-        buffer->loaded = true;
-    }
-    return result;
+    buffer->bytes.at = buffer->owned != NULL ? buffer->owned : buffer->bytes.at;
+    buffer->bytes.size = length;
+    buffer->loaded = true;
+    return VSH_OK;
 }
 
 vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes, size_t *stride,
@@ -107,19 +97,15 @@ vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes,
     snprintf(where, sizeof where, "bufferViews[%zu]", index);
     const json_t *view = vshi_gltf_element(gltf, "bufferViews", index);
     size_t buffer, offset, length;
-    vsh_result result = vshi_gltf_index(gltf, view, "buffer", "buffers", where, &buffer, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_gltf_index(gltf, view, "buffer", "buffers", where, &buffer, error));
     if (buffer == SIZE_MAX || !vshi_gltf_count(view, "byteOffset", 0, &offset) ||
         !vshi_gltf_count(view, "byteLength", SIZE_MAX, &length) || length == SIZE_MAX ||
         !vshi_gltf_count(view, "byteStride", 0, stride)) {
         return vshi_gltf_fail(gltf, error, "%s: its buffer, byteOffset, byteLength or byteStride is wrong",
                               where);
     }
-    result = gltf->buffers[buffer].loaded ? VSH_OK : load(gltf, buffer, error);
-    if (result != VSH_OK) {
-        return result;
+    if (!gltf->buffers[buffer].loaded) {
+        VSHI_TRY(load(gltf, buffer, error));
     }
     const vshi_gltf_bytes all = gltf->buffers[buffer].bytes;
     if (offset > all.size || length > all.size - offset) {

@@ -75,3 +75,8 @@ vsh_result vshi_gltf_hold(vshi_gltf *gltf, double bytes, vsh_error *error) {
     gltf->bytes_held += bytes;
     return vshi_check_limit(gltf->run, gltf->bytes_held, gltf->path, error);
 }
+
+vsh_result vshi_gltf_allocate(vshi_gltf *gltf, void **memory, size_t count, size_t size, vsh_error *error) {
+    VSHI_TRY(vshi_gltf_hold(gltf, (double)count * (double)size, error));
+    return vshi_allocate(memory, count, size, gltf->path, error);
+}

@@ -67,13 +67,7 @@ static vsh_result grow_shapes(vshi_gltf *gltf, size_t more, vsh_error *error) {
     }
     const size_t capacity = 2 * gltf->shape_capacity + more;
     vshi_model_shape *shapes = NULL;
-    vsh_result result = vshi_gltf_hold(gltf, (double)capacity * sizeof *shapes, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&shapes, capacity, sizeof *shapes, gltf->path, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&shapes, capacity, sizeof *shapes, error));
     if (model->shape_count > 0) {
         memcpy(shapes, model->shapes, model->shape_count * sizeof *shapes);
     }
@@ -91,19 +85,39 @@ static vsh_result read_mesh(vshi_gltf *gltf, size_t mesh, const vshi_gltf_pose *
     const size_t count = json_array_size(primitives);
     const char *name = json_string_value(json_object_get(given, "name"));
     *first = gltf->model->shape_count;
-    vsh_result result = grow_shapes(gltf, count, error);
-    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+    VSHI_TRY(grow_shapes(gltf, count, error));
+    for (size_t i = 0; i < count; ++i) {
         char where[256];
         snprintf(where, sizeof where, "mesh %zu '%.150s': primitive %zu", mesh, name != NULL ? name : "", i);
         vshi_model_shape *shape = &gltf->model->shapes[gltf->model->shape_count++];
-        result = vshi_job_cancelled(gltf->job) ? vshi_job_fail_cancelled(gltf->job, error)
-                                               : vshi_gltf_read_primitive(gltf, json_array_get(primitives, i),
-                                                                          pose, where, shape, error);
+        if (vshi_job_cancelled(gltf->job)) {
+            return vshi_job_fail_cancelled(gltf->job, error);
+        }
+        VSHI_TRY(vshi_gltf_read_primitive(gltf, json_array_get(primitives, i), pose, where, shape, error));
     }
-    return result;
+    return VSH_OK;
 }
 
 /* --- skins and weights */
+
+/* The inverse bind matrices of a skin's `count` joints; stays NULL where all are the identity. */
+static vsh_result read_inverse(vshi_gltf *gltf, const json_t *skin, const char *where, size_t count,
+                               float **inverse, vsh_error *error) {
+    size_t accessor;
+    vshi_gltf_accessor opened;
+    VSHI_TRY(vshi_gltf_index(gltf, skin, "inverseBindMatrices", "accessors", where, &accessor, error));
+    if (accessor == SIZE_MAX) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_gltf_accessor_open(gltf, accessor, &opened, error));
+    if (opened.count < count || opened.components != 16) {
+        return vshi_gltf_fail(gltf, error, "%s: %zu joints, but %zu matrices of %d components", where, count,
+                              opened.count, opened.components);
+    }
+    VSHI_TRY(vshi_gltf_hold(gltf, (double)opened.count * sizeof(float[16]), error));
+    return vshi_gltf_read_attribute(gltf, skin, "inverseBindMatrices", 16, opened.count, where, inverse,
+                                    error);
+}
 
 static vsh_result read_joints(vshi_gltf *gltf, size_t skin, double (**joints)[12], size_t *count,
                               vsh_error *error) {
@@ -112,33 +126,15 @@ static vsh_result read_joints(vshi_gltf *gltf, size_t skin, double (**joints)[12
     const json_t *given = vshi_gltf_element(gltf, "skins", skin);
     const json_t *list = json_object_get(given, "joints");
     float *inverse = NULL;
-    size_t accessor;
     *count = json_array_size(list);
-    vsh_result result =
-        vshi_gltf_index(gltf, given, "inverseBindMatrices", "accessors", where, &accessor, error);
-    if (result == VSH_OK && accessor != SIZE_MAX) {
-        vshi_gltf_accessor opened;
-        result = vshi_gltf_accessor_open(gltf, accessor, &opened, error);
-        if (result == VSH_OK && (opened.count < *count || opened.components != 16)) {
-            result = vshi_gltf_fail(gltf, error, "%s: %zu joints, but %zu matrices of %d components", where,
-                                    *count, opened.count, opened.components);
-        }
-        if (result == VSH_OK) {
-            result = vshi_gltf_hold(gltf, (double)opened.count * sizeof(float[16]), error);
-        }
-        if (result == VSH_OK) {
-            result = vshi_gltf_read_attribute(gltf, given, "inverseBindMatrices", 16, opened.count, where,
-                                              &inverse, error);
-        }
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)joints, *count, sizeof **joints, gltf->path, error);
-    }
-    for (size_t i = 0; i < *count && result == VSH_OK; ++i) {
+    vsh_result result;
+    VSHI_TRY_DONE(read_inverse(gltf, given, where, *count, &inverse, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)joints, *count, sizeof **joints, gltf->path, error));
+    for (size_t i = 0; i < *count; ++i) {
         const double node = json_number_value(json_array_get(list, i));
         if (!(node >= 0.0 && node < (double)gltf->node_count) || !gltf->node_seen[(size_t)node]) {
             result = vshi_gltf_fail(gltf, error, "%s: joint %zu is no node of the scene", where, i);
-            break;
+            goto done;
         }
         double bind[12];
         for (int k = 0; k < 12; ++k) {
@@ -146,6 +142,7 @@ static vsh_result read_joints(vshi_gltf *gltf, size_t skin, double (**joints)[12
         }
         vshi_model_compose(gltf->node_world[(size_t)node], bind, (*joints)[i]);
     }
+done:
     free(inverse);
     return result;
 }
@@ -154,10 +151,41 @@ static vsh_result read_joints(vshi_gltf *gltf, size_t skin, double (**joints)[12
 static vsh_result read_weights(const vshi_gltf *gltf, const json_t *owner, double **weights, size_t *count,
                                vsh_error *error) {
     *count = json_array_size(json_object_get(owner, "weights"));
-    const vsh_result result = vshi_allocate((void **)weights, *count, sizeof **weights, gltf->path, error);
-    if (result == VSH_OK && !vshi_gltf_numbers(owner, "weights", *count, *weights)) {
-        return vshi_gltf_fail(gltf, error, "the weights of morph targets are no numbers");
+    VSHI_TRY(vshi_allocate((void **)weights, *count, sizeof **weights, gltf->path, error));
+    return vshi_gltf_numbers(owner, "weights", *count, *weights)
+               ? VSH_OK
+               : vshi_gltf_fail(gltf, error, "the weights of morph targets are no numbers");
+}
+
+/* The shapes of a node's mesh, from *first on, as its weights and its skin have them; nodes without either
+ * share theirs. *skinned: they are in the world, and the node's own transform is left out. */
+static vsh_result find_shapes(vshi_gltf *gltf, const json_t *node, size_t mesh, size_t skin, size_t *first,
+                              bool *skinned, vsh_error *error) {
+    const bool own_weights = json_object_get(node, "weights") != NULL;
+    const bool shared = skin == SIZE_MAX && !own_weights;
+    *skinned = false;
+    if (shared && gltf->mesh_shapes[mesh] > 0) {
+        *first = gltf->mesh_shapes[mesh] - 1;
+        return VSH_OK;
     }
+    const json_t *owner = own_weights ? node : vshi_gltf_element(gltf, "meshes", mesh);
+    double *weights = NULL, (*joints)[12] = NULL;
+    vshi_gltf_pose pose = {0};
+    vsh_result result;
+    VSHI_TRY_DONE(read_weights(gltf, owner, &weights, &pose.weight_count, error));
+    if (skin != SIZE_MAX) {
+        VSHI_TRY_DONE(read_joints(gltf, skin, &joints, &pose.joint_count, error));
+    }
+    pose.weights = weights;
+    pose.joints = (const double(*)[12])joints;
+    VSHI_TRY_DONE(read_mesh(gltf, mesh, &pose, first, error));
+    *skinned = pose.joint_count > 0;
+    if (shared) {
+        gltf->mesh_shapes[mesh] = *first + 1;
+    }
+done:
+    free(joints);
+    free(weights);
     return result;
 }
 
@@ -171,8 +199,7 @@ static vsh_result add_entries(vshi_gltf *gltf, size_t node, size_t mesh, size_t 
     const uint32_t object = vshi_model_next_object(gltf->model);
     name_of("nodes", node, vshi_gltf_element(gltf, "nodes", node), node_name, sizeof node_name);
     name_of("meshes", mesh, given, mesh_name, sizeof mesh_name);
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+    for (size_t i = 0; i < count; ++i) {
         if (gltf->model->shapes[first + i].triangle_count == 0) {
             continue;
         }
@@ -183,62 +210,71 @@ static vsh_result add_entries(vshi_gltf *gltf, size_t node, size_t mesh, size_t 
         } else {
             snprintf(part, sizeof part, "%s", mesh_name);
         }
-        result = vshi_gltf_hold(gltf, sizeof(vshi_model_entry) + (double)strlen(one), error);
+        VSHI_TRY(vshi_gltf_hold(gltf, sizeof(vshi_model_entry) + (double)strlen(one), error));
         const vshi_model_place place = {
             .node = one, .mesh = part, .object = object, .shape = first + i, .world = world};
-        if (result == VSH_OK) {
-            result = vshi_model_add(gltf->model, gltf->path, gltf->run, &place, error);
-        }
+        VSHI_TRY(vshi_model_add(gltf->model, gltf->path, gltf->run, &place, error));
     }
-    return result;
+    return VSH_OK;
+}
+
+/* The accessors of EXT_mesh_gpu_instancing. */
+static const struct {
+    const char *name;
+    int components;
+} instance_parts[3] = {{"TRANSLATION", 3}, {"ROTATION", 4}, {"SCALE", 3}};
+
+/* Their values, in new memory each; NULL where a part is not given. */
+static vsh_result read_instances(vshi_gltf *gltf, const json_t *instancing, const char *where,
+                                 float *values[3], size_t *count, vsh_error *error) {
+    const json_t *attributes = json_object_get(instancing, "attributes");
+    *count = SIZE_MAX;
+    for (int k = 0; k < 3; ++k) {
+        const char *name = instance_parts[k].name;
+        size_t index;
+        vshi_gltf_accessor accessor;
+        VSHI_TRY(vshi_gltf_index(gltf, attributes, name, "accessors", where, &index, error));
+        if (index == SIZE_MAX) {
+            continue;
+        }
+        VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
+        *count = *count == SIZE_MAX ? accessor.count : *count;
+        VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, name, instance_parts[k].components, *count, where,
+                                          &values[k], error));
+    }
+    return *count < SIZE_MAX
+               ? VSH_OK
+               : vshi_gltf_fail(gltf, error, "%s has neither TRANSLATION nor ROTATION nor SCALE", where);
 }
 
 /* EXT_mesh_gpu_instancing: the mesh once for every element of its accessors, each with a transform behind the
  * node's. */
 static vsh_result add_instances(vshi_gltf *gltf, size_t node, size_t mesh, size_t first,
                                 const json_t *instancing, vsh_error *error) {
-    static const struct {
-        const char *name;
-        int components;
-    } parts[3] = {{"TRANSLATION", 3}, {"ROTATION", 4}, {"SCALE", 3}};
-    const json_t *attributes = json_object_get(instancing, "attributes");
     float *values[3] = {NULL, NULL, NULL};
-    size_t count = SIZE_MAX;
+    size_t count;
     char where[64];
     snprintf(where, sizeof where, "nodes[%zu]: EXT_mesh_gpu_instancing", node);
-    vsh_result result = VSH_OK;
-    for (int k = 0; k < 3 && result == VSH_OK; ++k) {
-        size_t index;
-        vshi_gltf_accessor accessor;
-        result = vshi_gltf_index(gltf, attributes, parts[k].name, "accessors", where, &index, error);
-        if (result != VSH_OK || index == SIZE_MAX) {
-            continue;
-        }
-        result = vshi_gltf_accessor_open(gltf, index, &accessor, error);
-        count = count == SIZE_MAX ? accessor.count : count;
-        if (result == VSH_OK) {
-            result = vshi_gltf_read_attribute(gltf, attributes, parts[k].name, parts[k].components, count,
-                                              where, &values[k], error);
-        }
-    }
-    if (result == VSH_OK && count == SIZE_MAX) {
-        result = vshi_gltf_fail(gltf, error, "%s has neither TRANSLATION nor ROTATION nor SCALE", where);
-    }
-    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+    vsh_result result;
+    VSHI_TRY_DONE(read_instances(gltf, instancing, where, values, &count, error));
+    for (size_t i = 0; i < count; ++i) {
         double t[3] = {0, 0, 0}, r[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1}, own[12], world[12];
         double *const given[3] = {t, r, s};
         for (int k = 0; k < 3; ++k) {
-            for (int c = 0; c < parts[k].components && values[k] != NULL; ++c) {
-                given[k][c] = (double)values[k][(size_t)parts[k].components * i + (size_t)c];
+            const int components = instance_parts[k].components;
+            for (int c = 0; c < components && values[k] != NULL; ++c) {
+                given[k][c] = (double)values[k][(size_t)components * i + (size_t)c];
             }
         }
         from_parts(t, r, s, own);
         vshi_model_compose(gltf->node_world[node], own, world);
         char suffix[32];
         snprintf(suffix, sizeof suffix, "[%zu]", i);
-        result = vshi_job_cancelled(gltf->job) ? vshi_job_fail_cancelled(gltf->job, error)
-                                               : add_entries(gltf, node, mesh, first, suffix, world, error);
+        VSHI_TRY_DONE(vshi_job_cancelled(gltf->job)
+                          ? vshi_job_fail_cancelled(gltf->job, error)
+                          : add_entries(gltf, node, mesh, first, suffix, world, error));
     }
+done:
     for (int k = 0; k < 3; ++k) {
         free(values[k]);
     }
@@ -249,44 +285,18 @@ static vsh_result add_node(vshi_gltf *gltf, size_t node, vsh_error *error) {
     char where[64];
     snprintf(where, sizeof where, "nodes[%zu]", node);
     const json_t *given = vshi_gltf_element(gltf, "nodes", node);
-    size_t mesh, skin, first = 0;
-    double *weights = NULL, (*joints)[12] = NULL;
-    vshi_gltf_pose pose = {0};
-    vsh_result result = vshi_gltf_index(gltf, given, "mesh", "meshes", where, &mesh, error);
-    if (result == VSH_OK) {
-        result = vshi_gltf_index(gltf, given, "skin", "skins", where, &skin, error);
+    size_t mesh, skin, first;
+    bool skinned;
+    VSHI_TRY(vshi_gltf_index(gltf, given, "mesh", "meshes", where, &mesh, error));
+    VSHI_TRY(vshi_gltf_index(gltf, given, "skin", "skins", where, &skin, error));
+    if (mesh == SIZE_MAX) {
+        return VSH_OK;
     }
-    if (result != VSH_OK || mesh == SIZE_MAX) {
-        return result;
-    }
-    const bool own_weights = json_object_get(given, "weights") != NULL;
-    const json_t *mesh_given = vshi_gltf_element(gltf, "meshes", mesh);
-    const bool shared = skin == SIZE_MAX && !own_weights;
-    if (shared && gltf->mesh_shapes[mesh] > 0) {
-        first = gltf->mesh_shapes[mesh] - 1;
-    } else {
-        result = read_weights(gltf, own_weights ? given : mesh_given, &weights, &pose.weight_count, error);
-        if (result == VSH_OK && skin != SIZE_MAX) {
-            result = read_joints(gltf, skin, &joints, &pose.joint_count, error);
-        }
-        pose.weights = weights;
-        pose.joints = (const double(*)[12])joints;
-        if (result == VSH_OK) {
-            result = read_mesh(gltf, mesh, &pose, &first, error);
-        }
-        free(joints);
-        free(weights);
-        if (result == VSH_OK && shared) {
-            gltf->mesh_shapes[mesh] = first + 1;
-        }
-    }
-    const json_t *instancing = vshi_gltf_extension(given, "EXT_mesh_gpu_instancing");
-    if (result != VSH_OK) {
-        return result;
-    }
-    if (pose.joint_count > 0) {
+    VSHI_TRY(find_shapes(gltf, given, mesh, skin, &first, &skinned, error));
+    if (skinned) {
         return add_entries(gltf, node, mesh, first, "", identity, error);
     }
+    const json_t *instancing = vshi_gltf_extension(given, "EXT_mesh_gpu_instancing");
     return instancing != NULL ? add_instances(gltf, node, mesh, first, instancing, error)
                               : add_entries(gltf, node, mesh, first, "", gltf->node_world[node], error);
 }
@@ -325,11 +335,8 @@ static vsh_result visit(vshi_gltf *gltf, const json_t *nodes, const double paren
             return vshi_gltf_fail(gltf, error, "nodes[%zu]: its transform holds what is no number", node);
         }
         vshi_model_compose(parent, own, gltf->node_world[node]);
-        const vsh_result result =
-            visit(gltf, json_object_get(given, "children"), gltf->node_world[node], depth + 1, walked, error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(visit(gltf, json_object_get(given, "children"), gltf->node_world[node], depth + 1, walked,
+                       error));
     }
     return VSH_OK;
 }
@@ -360,33 +367,30 @@ static json_t *find_roots(const vshi_gltf *gltf) {
 static vsh_result visit_scene(vshi_gltf *gltf, walk *walked, vsh_error *error) {
     size_t index;
     const json_t *scenes = json_object_get(gltf->root, "scenes");
-    vsh_result result = vshi_gltf_index(gltf, gltf->root, "scene", "scenes", "glTF", &index, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_gltf_index(gltf, gltf->root, "scene", "scenes", "glTF", &index, error));
     if (json_array_size(scenes) > 0) { /* the first where none is named */
         const json_t *scene = json_array_get(scenes, index == SIZE_MAX ? 0 : index);
         return visit(gltf, json_object_get(scene, "nodes"), identity, 0, walked, error);
     }
     json_t *roots = find_roots(gltf);
-    result = visit(gltf, roots, identity, 0, walked, error);
+    const vsh_result result = visit(gltf, roots, identity, 0, walked, error);
     json_decref(roots);
     return result;
 }
 
 vsh_result vshi_gltf_add_scene(vshi_gltf *gltf, vsh_error *error) {
     walk walked = {NULL, 0};
-    vsh_result result =
-        vshi_allocate((void **)&walked.order, gltf->node_count, sizeof *walked.order, gltf->path, error);
-    if (result == VSH_OK) {
-        result = visit_scene(gltf, &walked, error);
+    vsh_result result;
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&walked.order, gltf->node_count, sizeof *walked.order, gltf->path, error));
+    VSHI_TRY_DONE(visit_scene(gltf, &walked, error));
+    for (size_t i = 0; i < walked.count; ++i) {
+        VSHI_TRY_DONE(add_node(gltf, walked.order[i], error));
     }
-    for (size_t i = 0; i < walked.count && result == VSH_OK; ++i) {
-        result = add_node(gltf, walked.order[i], error);
-    }
-    free(walked.order);
-    if (result == VSH_OK && gltf->model->entry_count == 0) {
+    if (gltf->model->entry_count == 0) {
         result = vshi_gltf_fail(gltf, error, "holds no triangles");
     }
+done:
+    free(walked.order);
     return result;
 }

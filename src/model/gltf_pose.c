@@ -12,33 +12,30 @@
 static vsh_result add_target(vshi_gltf *gltf, const json_t *target, const char *name, double weight,
                              const char *where, size_t vertex_count, float *values, vsh_error *error) {
     float *moves = NULL;
-    const vsh_result result =
-        vshi_gltf_read_attribute(gltf, target, name, 3, vertex_count, where, &moves, error);
-    for (size_t i = 0; result == VSH_OK && moves != NULL && i < 3 * vertex_count; ++i) {
+    VSHI_TRY(vshi_gltf_read_attribute(gltf, target, name, 3, vertex_count, where, &moves, error));
+    for (size_t i = 0; moves != NULL && i < 3 * vertex_count; ++i) {
         values[i] = (float)((double)values[i] + weight * (double)moves[i]);
     }
     free(moves);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result morph(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
                         const char *where, vshi_model_shape *shape, vsh_error *error) {
     const json_t *targets = json_object_get(primitive, "targets");
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; i < json_array_size(targets) && i < pose->weight_count && result == VSH_OK; ++i) {
+    const size_t count = shape->vertex_count;
+    for (size_t i = 0; i < json_array_size(targets) && i < pose->weight_count; ++i) {
         const json_t *target = json_array_get(targets, i);
         const double weight = pose->weights[i];
         if (weight == 0.0) {
             continue;
         }
-        result =
-            add_target(gltf, target, "POSITION", weight, where, shape->vertex_count, shape->positions, error);
-        if (result == VSH_OK && shape->normals != NULL) {
-            result =
-                add_target(gltf, target, "NORMAL", weight, where, shape->vertex_count, shape->normals, error);
+        VSHI_TRY(add_target(gltf, target, "POSITION", weight, where, count, shape->positions, error));
+        if (shape->normals != NULL) {
+            VSHI_TRY(add_target(gltf, target, "NORMAL", weight, where, count, shape->normals, error));
         }
     }
-    return result;
+    return VSH_OK;
 }
 
 /* The sums of each vertex's joint matrices, and of its weights. */
@@ -49,10 +46,7 @@ typedef struct blend {
 static vsh_result add_joints(vshi_gltf *gltf, const vshi_gltf_pose *pose, size_t index, const float *weights,
                              const char *where, size_t vertex_count, blend *blends, vsh_error *error) {
     vshi_gltf_accessor accessor;
-    vsh_result result = vshi_gltf_accessor_open(gltf, index, &accessor, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
     if (accessor.components != 4 || (accessor.type != VSHI_GLTF_UBYTE && accessor.type != VSHI_GLTF_USHORT) ||
         accessor.count != vertex_count) {
         return vshi_gltf_fail(gltf, error,
@@ -60,15 +54,10 @@ static vsh_result add_joints(vshi_gltf *gltf, const vshi_gltf_pose *pose, size_t
                               vertex_count);
     }
     uint32_t *joints = NULL;
-    result = vshi_gltf_hold(gltf, (double)vertex_count * sizeof(uint32_t[4]), error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&joints, vertex_count, sizeof(uint32_t[4]), gltf->path, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&joints, vertex_count, sizeof(uint32_t[4]), error));
     vshi_gltf_accessor_integers(&accessor, joints);
-    for (size_t i = 0; i < 4 * vertex_count && result == VSH_OK; ++i) {
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < 4 * vertex_count; ++i) {
         const double weight = (double)weights[i];
         if (weight == 0.0) {
             continue;
@@ -76,13 +65,14 @@ static vsh_result add_joints(vshi_gltf *gltf, const vshi_gltf_pose *pose, size_t
         if (joints[i] >= pose->joint_count) {
             result = vshi_gltf_fail(gltf, error, "%s: vertex %zu uses joint %u, but its skin has only %zu",
                                     where, i / 4, joints[i], pose->joint_count);
-            break;
+            goto done;
         }
         blends[i / 4].sum += weight;
         for (int k = 0; k < 12; ++k) {
             blends[i / 4].matrix[k] += weight * pose->joints[joints[i]][k];
         }
     }
+done:
     free(joints);
     return result;
 }
@@ -90,24 +80,25 @@ static vsh_result add_joints(vshi_gltf *gltf, const vshi_gltf_pose *pose, size_t
 static vsh_result add_sets(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
                            const char *where, size_t vertex_count, blend *blends, vsh_error *error) {
     const json_t *attributes = json_object_get(primitive, "attributes");
-    vsh_result result = VSH_OK;
-    for (int set = 0; set < VSH_MAX_UV_SETS && result == VSH_OK; ++set) {
+    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
         char name[32];
         size_t index;
-        float *weights = NULL;
+        float *weights;
         snprintf(name, sizeof name, "JOINTS_%d", set);
-        result = vshi_gltf_index(gltf, attributes, name, "accessors", where, &index, error);
-        if (result != VSH_OK || index == SIZE_MAX) {
+        VSHI_TRY(vshi_gltf_index(gltf, attributes, name, "accessors", where, &index, error));
+        if (index == SIZE_MAX) {
             break;
         }
         snprintf(name, sizeof name, "WEIGHTS_%d", set);
-        result = vshi_gltf_read_attribute(gltf, attributes, name, 4, vertex_count, where, &weights, error);
-        if (result == VSH_OK && weights != NULL) {
-            result = add_joints(gltf, pose, index, weights, where, vertex_count, blends, error);
+        VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, name, 4, vertex_count, where, &weights, error));
+        if (weights == NULL) {
+            continue;
         }
+        const vsh_result result = add_joints(gltf, pose, index, weights, where, vertex_count, blends, error);
         free(weights);
+        VSHI_TRY(result);
     }
-    return result;
+    return VSH_OK;
 }
 
 /* Weights that do not add up to 1 are scaled; a vertex without any follows the first joint. */
@@ -130,14 +121,10 @@ static void store(vshi_vec v, float *to) {
 static vsh_result skin(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
                        const char *where, vshi_model_shape *shape, vsh_error *error) {
     blend *blends = NULL;
-    vsh_result result = vshi_gltf_hold(gltf, (double)shape->vertex_count * sizeof *blends, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&blends, shape->vertex_count, sizeof *blends, gltf->path, error);
-    }
-    if (result == VSH_OK) {
-        result = add_sets(gltf, primitive, pose, where, shape->vertex_count, blends, error);
-    }
-    for (size_t v = 0; v < shape->vertex_count && result == VSH_OK; ++v) {
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&blends, shape->vertex_count, sizeof *blends, error));
+    vsh_result result;
+    VSHI_TRY_DONE(add_sets(gltf, primitive, pose, where, shape->vertex_count, blends, error));
+    for (size_t v = 0; v < shape->vertex_count; ++v) {
         finish(pose, &blends[v]);
         const double *m = blends[v].matrix;
         store(vshi_transform_point(m, vshi_vec_off(shape->positions + 3 * v)), shape->positions + 3 * v);
@@ -146,14 +133,14 @@ static vsh_result skin(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf
                   shape->normals + 3 * v);
         }
     }
+done:
     free(blends);
     return result;
 }
 
 vsh_result vshi_gltf_apply_pose(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
                                 const char *where, vshi_model_shape *shape, vsh_error *error) {
-    const vsh_result result = morph(gltf, primitive, pose, where, shape, error);
-    return result == VSH_OK && pose->joints != NULL && pose->joint_count > 0
-               ? skin(gltf, primitive, pose, where, shape, error)
-               : result;
+    VSHI_TRY(morph(gltf, primitive, pose, where, shape, error));
+    return pose->joints != NULL && pose->joint_count > 0 ? skin(gltf, primitive, pose, where, shape, error)
+                                                         : VSH_OK;
 }

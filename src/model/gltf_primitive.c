@@ -16,14 +16,11 @@ vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, c
     size_t index;
     vshi_gltf_accessor accessor;
     *values = NULL;
-    vsh_result result = vshi_gltf_index(gltf, attributes, name, "accessors", where, &index, error);
-    if (result != VSH_OK || index == SIZE_MAX) {
-        return result;
+    VSHI_TRY(vshi_gltf_index(gltf, attributes, name, "accessors", where, &index, error));
+    if (index == SIZE_MAX) {
+        return VSH_OK;
     }
-    result = vshi_gltf_accessor_open(gltf, index, &accessor, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
     if (accessor.components != components || accessor.type == VSHI_GLTF_UINT) {
         return vshi_gltf_fail(gltf, error,
                               "%s: %s has %d components of type %d, expected %d of type 5120 to 5123 or 5126",
@@ -34,33 +31,25 @@ vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, c
                               accessor.count, vertex_count);
     }
     const size_t size = (size_t)components * sizeof(float);
-    result = vshi_gltf_hold(gltf, (double)(accessor.count * size), error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)values, accessor.count, size, gltf->path, error);
-    }
-    if (result == VSH_OK) {
-        vshi_gltf_accessor_floats(&accessor, *values);
-    }
-    return result;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)values, accessor.count, size, error));
+    vshi_gltf_accessor_floats(&accessor, *values);
+    return VSH_OK;
 }
 
 static vsh_result read_vertices(vshi_gltf *gltf, const json_t *primitive, const char *where,
                                 vshi_model_shape *shape, vsh_error *error) {
     const json_t *attributes = json_object_get(primitive, "attributes");
     const size_t count = shape->vertex_count;
-    vsh_result result =
-        vshi_gltf_read_attribute(gltf, attributes, "POSITION", 3, count, where, &shape->positions, error);
-    if (result == VSH_OK) {
-        result =
-            vshi_gltf_read_attribute(gltf, attributes, "NORMAL", 3, count, where, &shape->normals, error);
-    }
-    for (int set = 0; set < VSH_MAX_UV_SETS && result == VSH_OK; ++set) {
+    VSHI_TRY(
+        vshi_gltf_read_attribute(gltf, attributes, "POSITION", 3, count, where, &shape->positions, error));
+    VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, "NORMAL", 3, count, where, &shape->normals, error));
+    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
         char name[32];
         snprintf(name, sizeof name, "TEXCOORD_%d", set);
-        result = vshi_gltf_read_attribute(gltf, attributes, name, 2, count, where, &shape->uvs[set], error);
+        VSHI_TRY(vshi_gltf_read_attribute(gltf, attributes, name, 2, count, where, &shape->uvs[set], error));
         shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;
     }
-    return result;
+    return VSH_OK;
 }
 
 /* The vertices in the order that a primitive draws them in: *order, *count of them. */
@@ -68,12 +57,9 @@ static vsh_result read_order(vshi_gltf *gltf, const json_t *primitive, size_t ve
                              uint32_t **order, size_t *count, vsh_error *error) {
     size_t index;
     vshi_gltf_accessor accessor = {.count = vertex_count};
-    vsh_result result = vshi_gltf_index(gltf, primitive, "indices", "accessors", where, &index, error);
-    if (result == VSH_OK && index != SIZE_MAX) {
-        result = vshi_gltf_accessor_open(gltf, index, &accessor, error);
-    }
-    if (result != VSH_OK) {
-        return result;
+    VSHI_TRY(vshi_gltf_index(gltf, primitive, "indices", "accessors", where, &index, error));
+    if (index != SIZE_MAX) {
+        VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
     }
     if (index != SIZE_MAX &&
         (accessor.components != 1 || (accessor.type != VSHI_GLTF_UBYTE && accessor.type != VSHI_GLTF_USHORT &&
@@ -84,13 +70,7 @@ static vsh_result read_order(vshi_gltf *gltf, const json_t *primitive, size_t ve
                               where, accessor.components, accessor.type);
     }
     *count = accessor.count;
-    result = vshi_gltf_hold(gltf, (double)(accessor.count * sizeof **order), error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)order, accessor.count, sizeof **order, gltf->path, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)order, accessor.count, sizeof **order, error));
     if (index != SIZE_MAX) {
         vshi_gltf_accessor_integers(&accessor, *order);
     }
@@ -119,59 +99,49 @@ static void pick(size_t mode, const uint32_t *order, size_t i, uint32_t corner[3
     }
 }
 
-/* Strips and fans; triangles of fewer than three vertices, by which strips are joined, are left out. */
-static vsh_result unroll(vshi_gltf *gltf, size_t mode, const uint32_t *order, size_t count,
-                         vshi_model_shape *shape, vsh_error *error) {
-    vsh_result result = vshi_gltf_hold(gltf, (double)count * sizeof(uint32_t[3]), error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&shape->indices, count - 2, sizeof(uint32_t[3]), gltf->path, error);
-    }
-    for (size_t i = 0; i + 2 < count && result == VSH_OK; ++i) {
+/* Strips and fans, whose `count` indices become those of triangles; triangles of fewer than three vertices,
+ * by which strips are joined, are left out. */
+static vsh_result unroll(vshi_gltf *gltf, size_t mode, size_t count, vshi_model_shape *shape,
+                         vsh_error *error) {
+    uint32_t *triangles;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&triangles, count, sizeof(uint32_t[3]), error));
+    for (size_t i = 0; i + 2 < count; ++i) {
         uint32_t corner[3];
-        pick(mode, order, i, corner);
+        pick(mode, shape->indices, i, corner);
         if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
-            memcpy(shape->indices + 3 * shape->triangle_count++, corner, sizeof corner);
+            memcpy(triangles + 3 * shape->triangle_count++, corner, sizeof corner);
         }
     }
-    return result;
+    free(shape->indices);
+    shape->indices = triangles;
+    return VSH_OK;
 }
 
 static vsh_result read_plain(vshi_gltf *gltf, const json_t *primitive, size_t mode, const char *where,
                              vshi_model_shape *shape, vsh_error *error) {
     size_t index;
     vshi_gltf_accessor accessor;
-    uint32_t *order = NULL;
     size_t count = 0;
-    vsh_result result = vshi_gltf_index(gltf, json_object_get(primitive, "attributes"), "POSITION",
-                                        "accessors", where, &index, error);
-    if (result != VSH_OK || index == SIZE_MAX) {
-        return result; /* without positions there is nothing to see (3.7.2.1) */
+    VSHI_TRY(vshi_gltf_index(gltf, json_object_get(primitive, "attributes"), "POSITION", "accessors", where,
+                             &index, error));
+    if (index == SIZE_MAX) {
+        return VSH_OK; /* without positions there is nothing to see (3.7.2.1) */
     }
-    result = vshi_gltf_accessor_open(gltf, index, &accessor, error);
+    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
     shape->vertex_count = accessor.count;
-    if (result == VSH_OK) {
-        result = read_order(gltf, primitive, accessor.count, where, &order, &count, error);
-    }
-    if (result == VSH_OK && count >= 3 && mode == MODE_TRIANGLES) {
-        shape->indices = order;
+    VSHI_TRY(read_order(gltf, primitive, accessor.count, where, &shape->indices, &count, error));
+    if (mode == MODE_TRIANGLES) {
         shape->triangle_count = count / 3;
-        order = NULL;
-    } else if (result == VSH_OK && count >= 3) {
-        result = unroll(gltf, mode, order, count, shape, error);
+    } else if (count >= 3) {
+        VSHI_TRY(unroll(gltf, mode, count, shape, error));
     }
-    free(order);
-    return result == VSH_OK && shape->triangle_count > 0 ? read_vertices(gltf, primitive, where, shape, error)
-                                                         : result;
+    return shape->triangle_count > 0 ? read_vertices(gltf, primitive, where, shape, error) : VSH_OK;
 }
 
 /* Many primitives may share one large accessor, of which each uses a part: only that is kept. */
 static vsh_result drop_unused(const vshi_gltf *gltf, vshi_model_shape *shape, vsh_error *error) {
     uint32_t *place = NULL;
-    const vsh_result result =
-        vshi_allocate((void **)&place, shape->vertex_count, sizeof *place, gltf->path, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&place, shape->vertex_count, sizeof *place, gltf->path, error));
     for (size_t i = 0; i < 3 * shape->triangle_count; ++i) {
         place[shape->indices[i]] = 1;
     }
@@ -250,18 +220,15 @@ vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, co
         return VSH_OK; /* points or lines */
     }
     const json_t *draco = vshi_gltf_extension(primitive, "KHR_draco_mesh_compression");
-    vsh_result result = draco != NULL ? vshi_gltf_read_draco(gltf, draco, where, shape, error)
-                                      : read_plain(gltf, primitive, mode, where, shape, error);
-    if (result != VSH_OK || shape->triangle_count == 0) {
-        return result;
+    VSHI_TRY(draco != NULL ? vshi_gltf_read_draco(gltf, draco, where, shape, error)
+                           : read_plain(gltf, primitive, mode, where, shape, error));
+    if (shape->triangle_count == 0) {
+        return VSH_OK;
     }
     shape->alpha = alpha_of(gltf, primitive);
-    result = vshi_gltf_apply_pose(gltf, primitive, pose, where, shape, error);
-    result = result == VSH_OK ? drop_unused(gltf, shape, error) : result;
-    result = result == VSH_OK ? check_vertices(gltf, where, shape, error) : result;
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_gltf_apply_pose(gltf, primitive, pose, where, shape, error));
+    VSHI_TRY(drop_unused(gltf, shape, error));
+    VSHI_TRY(check_vertices(gltf, where, shape, error));
     check_normals(gltf, where, shape);
     for (int set = 0; set < shape->uv_sets; ++set) {
         for (size_t v = 0; v < shape->vertex_count && shape->uvs[set] != NULL; ++v) {

@@ -3,6 +3,7 @@
 #include "model/model.h"
 
 #include "base/floats.h"
+#include "base/try.h"
 #include "model/model_file.h"
 
 #include <stdlib.h>
@@ -84,17 +85,18 @@ static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job,
                             vsh_error *error) {
     vshi_import *import = NULL;
     double unit = 0.0;
-    vsh_result result = vshi_model_file_read(path, run, job, &import, model, &unit, error);
-    if (result == VSH_OK && import != NULL) {
-        const vshi_model_source source = {.path = path,
-                                          .run = run,
-                                          .job = job,
-                                          .scene = vshi_import_scene(import),
-                                          .keep_normals = wants_normals(path),
-                                          .unit = unit > 0.0 ? unit : vshi_import_unit(import),
-                                          .in_metres = unit > 0.0};
-        result = vshi_model_build(&source, model, error);
+    VSHI_TRY(vshi_model_file_read(path, run, job, &import, model, &unit, error));
+    if (import == NULL) {
+        return VSH_OK;
     }
+    const vshi_model_source source = {.path = path,
+                                      .run = run,
+                                      .job = job,
+                                      .scene = vshi_import_scene(import),
+                                      .keep_normals = wants_normals(path),
+                                      .unit = unit > 0.0 ? unit : vshi_import_unit(import),
+                                      .in_metres = unit > 0.0};
+    const vsh_result result = vshi_model_build(&source, model, error);
     vshi_import_free(import);
     return result;
 }
@@ -106,22 +108,21 @@ vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **mode
     *model = NULL;
     VSHI_NEEDS(path);
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
     vshi_job *job = vshi_job_begin(&full, "load", VSHI_MODEL_FILE_UNITS + BUILD_UNITS);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
     }
-    result = full.reader != NULL
-                 ? vshi_model_from_reader(path, &full, job, VSHI_MODEL_FILE_UNITS, model, error)
-                 : read_here(path, &full, job, model, error);
-    if (result == VSH_OK && vshi_job_advance(job, BUILD_UNITS)) {
+    vsh_result result;
+    VSHI_TRY_DONE(full.reader != NULL
+                      ? vshi_model_from_reader(path, &full, job, VSHI_MODEL_FILE_UNITS, model, error)
+                      : read_here(path, &full, job, model, error));
+    if (vshi_job_advance(job, BUILD_UNITS)) {
         vsh_model_free(*model);
         *model = NULL;
         result = vshi_job_fail_cancelled(job, error);
     }
+done:
     vshi_job_end(job);
     return result;
 }

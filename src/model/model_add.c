@@ -1,5 +1,6 @@
 /* Entries of a model: what stands where, and under which name. */
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/mesh.h"
 #include "model/model.h"
 
@@ -22,10 +23,7 @@ static vsh_result make_name(const char *first, const char *second, char **name, 
         return VSH_OK;
     }
     const size_t size = strlen(first) + strlen(second) + 2;
-    const vsh_result result = vshi_allocate((void **)name, size, 1, "a mesh's name", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)name, size, 1, "a mesh's name", error));
     snprintf(*name, size, "%s%s%s", first, both ? "/" : "", both || first[0] == '\0' ? second : "");
     make_line(*name);
     return VSH_OK;
@@ -37,11 +35,7 @@ static vsh_result grow_entries(vsh_model *model, vsh_error *error) {
     }
     const size_t capacity = model->entry_capacity > 0 ? 2 * model->entry_capacity : 8;
     vshi_model_entry *entries = NULL;
-    const vsh_result result =
-        vshi_allocate((void **)&entries, capacity, sizeof *entries, "a model's meshes", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&entries, capacity, sizeof *entries, "a model's meshes", error));
     if (model->entry_count > 0) {
         memcpy(entries, model->entries, model->entry_count * sizeof *entries);
     }
@@ -71,13 +65,9 @@ uint32_t vshi_model_next_object(const vsh_model *model) {
 static vsh_result append(vsh_model *model, const vshi_model_place *place, vsh_error *error) {
     vshi_model_entry entry = {.object = place->object, .shape = place->shape};
     memcpy(entry.transform, place->world, sizeof entry.transform);
-    vsh_result result = grow_entries(model, error);
-    if (result == VSH_OK) {
-        result = make_name(place->node, place->mesh, &entry.name, error);
-    }
-    if (result == VSH_OK) {
-        result = make_name(place->node, "", &entry.object_name, error);
-    }
+    VSHI_TRY(grow_entries(model, error));
+    VSHI_TRY(make_name(place->node, place->mesh, &entry.name, error));
+    const vsh_result result = make_name(place->node, "", &entry.object_name, error);
     if (result != VSH_OK) {
         free(entry.name);
         return result;
@@ -88,10 +78,7 @@ static vsh_result append(vsh_model *model, const vshi_model_place *place, vsh_er
 
 vsh_result vshi_model_add(vsh_model *model, const char *path, const vsh_run *run,
                           const vshi_model_place *place, vsh_error *error) {
-    const vsh_result result = append(model, place, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(append(model, place, error));
     const size_t last = model->entry_count - 1;
     const vsh_mesh view = vsh_model_mesh(model, last, 0);
     for (int i = 0; i < 12; ++i) {

@@ -1,5 +1,6 @@
 /* From Assimp's scene to a model: arrays, polygons cut into triangles, skins at rest, places. */
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/mesh.h"
 #include "model/model.h"
 #include "model/model_skin.h"
@@ -78,7 +79,7 @@ static vsh_result copy_faces(const vshi_model_source *source, const struct aiMes
     vsh_result result = VSH_OK;
     const bool polygons = shape->triangle_count > mesh->mNumFaces;
     shape->triangle_count = 0;
-    for (unsigned f = 0; f < mesh->mNumFaces && result == VSH_OK; ++f) {
+    for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
         const struct aiFace *face = &mesh->mFaces[f];
         uint32_t *to = shape->indices + 3 * shape->triangle_count;
         if (face->mNumIndices < 3) {
@@ -86,12 +87,12 @@ static vsh_result copy_faces(const vshi_model_source *source, const struct aiMes
         }
         if (f % FACES_A_POLL == 0 && vshi_job_cancelled(source->job)) {
             result = vshi_job_fail_cancelled(source->job, error);
-            break;
+            goto done;
         }
         size_t made;
         bool simple;
-        result = vshi_polygon_cut(&cutter, shape->positions, face->mIndices, face->mNumIndices, source->job,
-                                  to, &made, &simple, error);
+        VSHI_TRY_DONE(vshi_polygon_cut(&cutter, shape->positions, face->mIndices, face->mNumIndices,
+                                       source->job, to, &made, &simple, error));
         shape->triangle_count += made;
         crossing += !simple;
         if (polygons && face->mNumIndices <= 4 && made > 0) {
@@ -101,13 +102,14 @@ static vsh_result copy_faces(const vshi_model_source *source, const struct aiMes
             turn_fan(to + 3 * i, 1, &last_first);
         }
     }
-    vshi_polygon_free(&cutter);
-    if (result == VSH_OK && crossing > 0) {
+    if (crossing > 0) {
         vshi_warn(source->run,
                   "%s: mesh '%s': edges of %zu polygons cross each other: which triangles they mean cannot "
                   "be told",
                   source->path, mesh->mName.data, crossing);
     }
+done:
+    vshi_polygon_free(&cutter);
     return result;
 }
 
@@ -131,22 +133,17 @@ static vsh_result copy_shape(const vshi_model_source *source, const struct aiMes
         return VSH_OK; /* points or lines */
     }
     shape->alpha = alpha_of(source->scene, mesh);
-    vsh_result result = vshi_allocate((void **)&shape->positions, count, sizeof(float[3]), what, error);
-    if (result == VSH_OK) {
-        result =
-            vshi_allocate((void **)&shape->indices, shape->triangle_count, sizeof(uint32_t[3]), what, error);
+    VSHI_TRY(vshi_allocate((void **)&shape->positions, count, sizeof(float[3]), what, error));
+    VSHI_TRY(
+        vshi_allocate((void **)&shape->indices, shape->triangle_count, sizeof(uint32_t[3]), what, error));
+    if (mesh->mNormals != NULL && source->keep_normals) {
+        VSHI_TRY(vshi_allocate((void **)&shape->normals, count, sizeof(float[3]), what, error));
     }
-    if (result == VSH_OK && mesh->mNormals != NULL && source->keep_normals) {
-        result = vshi_allocate((void **)&shape->normals, count, sizeof(float[3]), what, error);
-    }
-    for (int set = 0; set < VSH_MAX_UV_SETS && result == VSH_OK; ++set) {
+    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
         if (mesh->mTextureCoords[set] != NULL) {
             shape->uv_sets = set + 1;
-            result = vshi_allocate((void **)&shape->uvs[set], count, sizeof(float[2]), what, error);
+            VSHI_TRY(vshi_allocate((void **)&shape->uvs[set], count, sizeof(float[2]), what, error));
         }
-    }
-    if (result != VSH_OK) {
-        return result;
     }
     for (size_t v = 0; v < count; ++v) {
         const struct aiVector3D p = mesh->mVertices[v];
@@ -181,9 +178,8 @@ static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, v
     }
     double world[12];
     vshi_node_world(parent, node, world);
-    vsh_result result = VSH_OK;
     const uint32_t object = vshi_model_next_object(model);
-    for (unsigned i = 0; i < node->mNumMeshes && result == VSH_OK; ++i) {
+    for (unsigned i = 0; i < node->mNumMeshes; ++i) {
         const unsigned shape = node->mMeshes[i];
         if (shape >= model->shape_count || model->shapes[shape].triangle_count == 0) {
             continue;
@@ -191,58 +187,52 @@ static vsh_result add_nodes(const vshi_model_source *source, vsh_model *model, v
         const struct aiMesh *mesh = source->scene->mMeshes[shape];
         const bool skinned = mesh->mNumBones > 0;
         if (skinned) {
-            result = vshi_skins_apply(skins, shape, &model->shapes[shape], world, error);
+            VSHI_TRY(vshi_skins_apply(skins, shape, &model->shapes[shape], world, error));
         }
         const vshi_model_place place = {.node = node->mName.data,
                                         .mesh = mesh->mName.data,
                                         .object = object,
                                         .shape = shape,
                                         .world = skinned ? identity : world};
-        if (result == VSH_OK) {
-            result = vshi_model_add(model, source->path, source->run, &place, error);
-        }
+        VSHI_TRY(vshi_model_add(model, source->path, source->run, &place, error));
     }
-    for (unsigned i = 0; i < node->mNumChildren && result == VSH_OK; ++i) {
-        result = add_nodes(source, model, skins, node->mChildren[i], world, depth + 1, error);
+    for (unsigned i = 0; i < node->mNumChildren; ++i) {
+        VSHI_TRY(add_nodes(source, model, skins, node->mChildren[i], world, depth + 1, error));
     }
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_model_build(const vshi_model_source *source, vsh_model **out, vsh_error *error) {
     vsh_model *model = NULL;
     vshi_skins skins = {.source = source};
-    vsh_result result = check_size(source, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&model, 1, sizeof *model, source->path, error);
+    const struct aiScene *scene = source->scene;
+    vsh_result result;
+    VSHI_TRY(check_size(source, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&model, 1, sizeof *model, source->path, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&model->shapes, scene->mNumMeshes, sizeof *model->shapes,
+                                source->path, error));
+    model->shape_count = scene->mNumMeshes;
+    model->unit = source->unit;
+    for (size_t m = 0; m < model->shape_count; ++m) {
+        VSHI_TRY_DONE(vshi_job_cancelled(source->job)
+                          ? vshi_job_fail_cancelled(source->job, error)
+                          : copy_shape(source, scene->mMeshes[m], &model->shapes[m], error));
     }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&model->shapes, source->scene->mNumMeshes, sizeof *model->shapes,
-                               source->path, error);
-    }
-    if (result == VSH_OK) {
-        model->shape_count = source->scene->mNumMeshes;
-        model->unit = source->unit;
-    }
-    for (size_t m = 0; result == VSH_OK && m < model->shape_count; ++m) {
-        result = vshi_job_cancelled(source->job)
-                     ? vshi_job_fail_cancelled(source->job, error)
-                     : copy_shape(source, source->scene->mMeshes[m], &model->shapes[m], error);
-    }
-    if (result == VSH_OK && source->scene->mRootNode != NULL) {
+    if (scene->mRootNode != NULL) {
         const double metres = model->unit > 0.0 && !source->in_metres ? model->unit : 1.0;
         const double root[12] = {metres, 0, 0, 0, 0, metres, 0, 0, 0, 0, metres, 0};
         memcpy(skins.root, root, sizeof root);
-        result = add_nodes(source, model, &skins, source->scene->mRootNode, root, 0, error);
+        VSHI_TRY_DONE(add_nodes(source, model, &skins, scene->mRootNode, root, 0, error));
     }
-    if (result == VSH_OK && model->entry_count == 0) {
+    if (model->entry_count == 0) {
         result = vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles: no node uses its meshes",
                            source->path);
+        goto done;
     }
+    *out = model;
+    model = NULL;
+done:
     vshi_skins_free(&skins);
-    if (result == VSH_OK) {
-        *out = model;
-    } else {
-        vsh_model_free(model);
-    }
+    vsh_model_free(model);
     return result;
 }

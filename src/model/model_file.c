@@ -2,6 +2,7 @@
 
 #include "base/input.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "model/gltf.h"
 #include "model/scan.h"
 #include "model/unsupported.h"
@@ -52,31 +53,24 @@ static bool is_gltf(const char *ending) {
     return strcasecmp(ending, "gltf") == 0 || strcasecmp(ending, "glb") == 0;
 }
 
-/* The whole file in *text, *size bytes of it. */
+/* The whole file in *text, *size bytes of it; *text is the caller's to free, after an error too. */
 static vsh_result load_file(const char *path, const vsh_run *run, char **text, size_t *size,
                             vsh_error *error) {
     *text = NULL;
     FILE *file;
     uint64_t bytes;
-    vsh_result result = vshi_input_open(path, path, SIZE_MAX, &file, &bytes, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    vsh_result result;
+    VSHI_TRY(vshi_input_open(path, path, SIZE_MAX, &file, &bytes, error));
     *size = (size_t)bytes;
-    result = bytes > 0 ? vshi_check_limit(run, PEAK_BYTES_A_BYTE * (double)*size, path, error)
-                       : vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)text, *size, 1, path, error);
-    }
-    if (result == VSH_OK && fread(*text, 1, *size, file) != *size) {
+    VSHI_TRY_DONE(bytes > 0 ? vshi_check_limit(run, PEAK_BYTES_A_BYTE * (double)*size, path, error)
+                            : vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path));
+    VSHI_TRY_DONE(vshi_allocate((void **)text, *size, 1, path, error));
+    if (fread(*text, 1, *size, file) != *size) {
         result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", path,
                            ferror(file) ? strerror(errno) : "became shorter while it was read");
     }
+done:
     fclose(file);
-    if (result != VSH_OK) {
-        free(*text);
-        *text = NULL;
-    }
     return result;
 }
 
@@ -104,29 +98,25 @@ static vsh_result stand_in_for(const vshi_scan *scan, const vsh_run *run, stand_
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", scan->path);
     }
     const double bytes = vshi_ply_strips_bytes(strips, scan->size);
-    const vsh_result result =
-        vshi_check_limit(run, (double)scan->size + PEAK_BYTES_A_BYTE * bytes, scan->path, error);
-    return result == VSH_OK ? vshi_ply_strips_unroll(strips, scan->path, scan->text, scan->size, &other->text,
-                                                     &other->size, error)
-                            : result;
+    VSHI_TRY(vshi_check_limit(run, (double)scan->size + PEAK_BYTES_A_BYTE * bytes, scan->path, error));
+    return vshi_ply_strips_unroll(strips, scan->path, scan->text, scan->size, &other->text, &other->size,
+                                  error);
 }
 
 static vsh_result scan_file(vshi_scan *scan, const char *ending, const vsh_run *run, vsh_model **model,
                             stand_in *other, vsh_error *error) {
     char *text;
-    vsh_result result = load_file(scan->path, run, &text, &scan->size, error);
-    if (result == VSH_OK) {
-        scan->text = text;
-        result = scan_text(scan, ending, run, model, error);
-    }
-    if (result == VSH_OK) {
-        result = stand_in_for(scan, run, other, error);
-    }
-    free(text);
-    scan->text = NULL;
-    if (result == VSH_OK && vshi_job_advance(scan->job, SCAN_UNITS - scan->units_done)) {
+    vsh_result result;
+    VSHI_TRY_DONE(load_file(scan->path, run, &text, &scan->size, error));
+    scan->text = text;
+    VSHI_TRY_DONE(scan_text(scan, ending, run, model, error));
+    VSHI_TRY_DONE(stand_in_for(scan, run, other, error));
+    if (vshi_job_advance(scan->job, SCAN_UNITS - scan->units_done)) {
         result = vshi_job_fail_cancelled(scan->job, error);
     }
+done:
+    free(text);
+    scan->text = NULL;
     return result;
 }
 
@@ -173,10 +163,7 @@ static vsh_result check_scene(const char *path, const struct aiScene *scene, siz
         if (vshi_job_cancelled(job)) {
             return vshi_job_fail_cancelled(job, error);
         }
-        const vsh_result result = check_mesh(path, scene->mMeshes[m], m, error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(check_mesh(path, scene->mMeshes[m], m, error));
     }
     size_t faces, triangles;
     count_faces(scene, &faces, &triangles);
@@ -203,26 +190,23 @@ vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *
     if (stat(path, &status) != 0) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: %s", path, strerror(errno));
     }
-    vsh_result result = vshi_unsupported_check(path, error);
-    if (result == VSH_OK) {
-        result = check_ending(path, &ending, error);
-    }
-    if (result == VSH_OK) {
-        result = scan_file(&scan, ending, run, model, &other, error);
-    }
-    if (result == VSH_OK && *model == NULL) {
-        result = vshi_import_read(path, other.text, other.size, run->allow_outside != 0, job, IMPORT_UNITS,
-                                  import, error);
-    }
-    free(other.text);
-    if (result == VSH_OK && *import != NULL) {
-        result = check_scene(path, vshi_import_scene(*import), scan.faces, job, error);
-    }
+    VSHI_TRY(vshi_unsupported_check(path, error));
+    VSHI_TRY(check_ending(path, &ending, error));
+    vsh_result result;
+    VSHI_TRY_DONE(scan_file(&scan, ending, run, model, &other, error));
     *unit = scan.unit;
-    const size_t rest = CHECK_UNITS + (*import == NULL ? IMPORT_UNITS : 0);
-    if (result == VSH_OK && vshi_job_advance(job, rest)) {
+    if (*model == NULL) {
+        VSHI_TRY_DONE(vshi_import_read(path, other.text, other.size, run->allow_outside != 0, job,
+                                       IMPORT_UNITS, import, error));
+        free(other.text);
+        other.text = NULL;
+        VSHI_TRY_DONE(check_scene(path, vshi_import_scene(*import), scan.faces, job, error));
+    }
+    if (vshi_job_advance(job, CHECK_UNITS + (*import == NULL ? IMPORT_UNITS : 0))) {
         result = vshi_job_fail_cancelled(job, error);
     }
+done:
+    free(other.text);
     if (result != VSH_OK) {
         vshi_import_free(*import);
         *import = NULL;

@@ -1,5 +1,6 @@
 /* A model between a reader and its caller. */
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/mesh.h"
 #include "model/model.h"
 #include "sandbox/reader.h"
@@ -33,10 +34,7 @@ vsh_result vshi_serve_model(const char *path, vshi_decoder *request, const vsh_r
                             vshi_encoder *payload, vsh_error *error) {
     (void)request;
     vsh_model *model = NULL;
-    const vsh_result result = vsh_model_read(path, run, &model, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vsh_model_read(path, run, &model, error));
     vshi_encode_number(payload, model->unit);
     vshi_encode_count(payload, model->shape_count);
     for (size_t i = 0; i < model->shape_count; ++i) {
@@ -65,12 +63,10 @@ static vsh_result copy_array(vshi_decoder *decoder, uint64_t count, size_t size,
     if (from == NULL) {
         return count == 0 && !decoder->bad ? VSH_OK : vshi_answer_fail(path, "an array's size", error);
     }
-    const vsh_result result = vshi_allocate(&memory, (size_t)count, size, path, error);
-    if (result == VSH_OK) {
-        memcpy(memory, from, (size_t)count * size);
-        memcpy(array, &memory, sizeof memory);
-    }
-    return result;
+    VSHI_TRY(vshi_allocate(&memory, (size_t)count, size, path, error));
+    memcpy(memory, from, (size_t)count * size);
+    memcpy(array, &memory, sizeof memory);
+    return VSH_OK;
 }
 
 /* An array that is only perhaps there. */
@@ -89,18 +85,13 @@ static vsh_result take_shape(vshi_decoder *decoder, vshi_model_shape *shape, con
         return VSH_OK;
     }
     const size_t count = shape->vertex_count;
-    vsh_result result = copy_array(decoder, count, sizeof(float[3]), &shape->positions, path, error);
-    if (result == VSH_OK) {
-        result =
-            copy_array(decoder, shape->triangle_count, sizeof(uint32_t[3]), &shape->indices, path, error);
+    VSHI_TRY(copy_array(decoder, count, sizeof(float[3]), &shape->positions, path, error));
+    VSHI_TRY(copy_array(decoder, shape->triangle_count, sizeof(uint32_t[3]), &shape->indices, path, error));
+    VSHI_TRY(copy_optional(decoder, count, sizeof(float[3]), &shape->normals, path, error));
+    for (int32_t set = 0; set < shape->uv_sets; ++set) {
+        VSHI_TRY(copy_optional(decoder, count, sizeof(float[2]), &shape->uvs[set], path, error));
     }
-    if (result == VSH_OK) {
-        result = copy_optional(decoder, count, sizeof(float[3]), &shape->normals, path, error);
-    }
-    for (int32_t set = 0; set < shape->uv_sets && result == VSH_OK; ++set) {
-        result = copy_optional(decoder, count, sizeof(float[2]), &shape->uvs[set], path, error);
-    }
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result check_shape(const vshi_model_shape *shape, const char *path, vsh_error *error) {
@@ -125,11 +116,9 @@ static vsh_result copy_name(const char *name, char **copy, const char *path, vsh
         return VSH_OK;
     }
     const size_t size = strlen(name) + 1;
-    const vsh_result result = vshi_allocate((void **)copy, size, 1, path, error);
-    if (result == VSH_OK) {
-        memcpy(*copy, name, size);
-    }
-    return result;
+    VSHI_TRY(vshi_allocate((void **)copy, size, 1, path, error));
+    memcpy(*copy, name, size);
+    return VSH_OK;
 }
 
 static vsh_result take_entry(vshi_decoder *decoder, vsh_model *model, size_t index, const char *path,
@@ -144,13 +133,8 @@ static vsh_result take_entry(vshi_decoder *decoder, vsh_model *model, size_t ind
         return vshi_answer_fail(path, "a mesh's place", error);
     }
     memcpy(entry->transform, transform, sizeof entry->transform);
-    vsh_result result = copy_name(name, &entry->name, path, error);
-    if (result == VSH_OK) {
-        result = copy_name(object_name, &entry->object_name, path, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(copy_name(name, &entry->name, path, error));
+    VSHI_TRY(copy_name(object_name, &entry->object_name, path, error));
     vsh_error why;
     const vsh_mesh view = vsh_model_mesh(model, index, 0);
     return vshi_mesh_check_transform(&view, VSHI_MESH_ALONE, &why) == VSH_OK
@@ -168,33 +152,27 @@ static vsh_result take_meshes(vshi_decoder *decoder, vsh_model *model, const cha
     if (shapes == 0) {
         return vshi_answer_fail(path, "its meshes", error);
     }
-    vsh_result result = vshi_allocate((void **)&model->shapes, shapes, sizeof *model->shapes, path, error);
-    model->shape_count = result == VSH_OK ? shapes : 0;
-    for (size_t i = 0; i < model->shape_count && result == VSH_OK; ++i) {
-        result = take_shape(decoder, &model->shapes[i], path, error);
-        result = result == VSH_OK && model->shapes[i].triangle_count > 0
-                     ? check_shape(&model->shapes[i], path, error)
-                     : result;
-    }
-    if (result != VSH_OK) {
-        return result;
+    VSHI_TRY(vshi_allocate((void **)&model->shapes, shapes, sizeof *model->shapes, path, error));
+    model->shape_count = shapes;
+    for (size_t i = 0; i < shapes; ++i) {
+        VSHI_TRY(take_shape(decoder, &model->shapes[i], path, error));
+        if (model->shapes[i].triangle_count > 0) {
+            VSHI_TRY(check_shape(&model->shapes[i], path, error));
+        }
     }
     const size_t entries = vshi_decode_count(decoder, (uint64_t)(decoder->end - decoder->at) / LEAST_ENTRY);
-    result = vshi_allocate((void **)&model->entries, entries, sizeof *model->entries, path, error);
-    model->entry_capacity = result == VSH_OK ? entries : 0;
-    while (result == VSH_OK && model->entry_count < entries) {
-        result = take_entry(decoder, model, model->entry_count++, path, error);
+    VSHI_TRY(vshi_allocate((void **)&model->entries, entries, sizeof *model->entries, path, error));
+    model->entry_capacity = entries;
+    while (model->entry_count < entries) {
+        VSHI_TRY(take_entry(decoder, model, model->entry_count++, path, error));
     }
-    if (result == VSH_OK && (!vshi_decoder_ends(decoder) || entries == 0)) {
-        result = vshi_answer_fail(path, "its meshes", error);
-    }
-    return result;
+    return vshi_decoder_ends(decoder) && entries > 0 ? VSH_OK : vshi_answer_fail(path, "its meshes", error);
 }
 
 vsh_result vshi_model_decode(vshi_decoder *decoder, const char *path, vsh_model **model, vsh_error *error) {
     vsh_model *made = NULL;
-    vsh_result result = vshi_allocate((void **)&made, 1, sizeof *made, path, error);
-    result = result == VSH_OK ? take_meshes(decoder, made, path, error) : result;
+    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, path, error));
+    const vsh_result result = take_meshes(decoder, made, path, error);
     if (result == VSH_OK) {
         *model = made;
     } else {
@@ -207,14 +185,9 @@ vsh_result vshi_model_from_reader(const char *path, const vsh_run *run, vshi_job
                                   vsh_model **model, vsh_error *error) {
     vshi_exchange exchange;
     vshi_answer answer;
-    vsh_result result = vshi_exchange_begin(&exchange, VSHI_READ_MODEL, path, run, error);
-    if (result == VSH_OK) {
-        result = vshi_exchange_send_job(&exchange, job, units, &answer, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
-    result = vshi_model_decode(&answer.payload, path, model, error);
+    VSHI_TRY(vshi_exchange_begin(&exchange, VSHI_READ_MODEL, path, run, error));
+    VSHI_TRY(vshi_exchange_send_job(&exchange, job, units, &answer, error));
+    const vsh_result result = vshi_model_decode(&answer.payload, path, model, error);
     vshi_answer_free(&answer);
     return result;
 }

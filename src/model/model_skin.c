@@ -1,6 +1,7 @@
 #include "model/model_skin.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 #include "base/vec.h"
 
 #include <assimp/scene.h>
@@ -56,16 +57,12 @@ static int by_name(const void *a, const void *b) {
 static vsh_result find_nodes(vshi_skins *skins, vsh_error *error) {
     const vshi_model_source *source = skins->source;
     const size_t count = count_nodes(source->scene->mRootNode, 0);
-    vsh_result result = vshi_allocate((void **)&skins->done, source->scene->mNumMeshes, sizeof *skins->done,
-                                      source->path, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&skins->nodes, count, sizeof *skins->nodes, source->path, error);
-    }
-    if (result == VSH_OK) {
-        gather(skins, count, source->scene->mRootNode, skins->root);
-        qsort(skins->nodes, skins->node_count, sizeof *skins->nodes, by_name);
-    }
-    return result;
+    VSHI_TRY(vshi_allocate((void **)&skins->done, source->scene->mNumMeshes, sizeof *skins->done,
+                           source->path, error));
+    VSHI_TRY(vshi_allocate((void **)&skins->nodes, count, sizeof *skins->nodes, source->path, error));
+    gather(skins, count, source->scene->mRootNode, skins->root);
+    qsort(skins->nodes, skins->node_count, sizeof *skins->nodes, by_name);
+    return VSH_OK;
 }
 
 /* The sums of a vertex's matrices, and of its weights. */
@@ -129,19 +126,22 @@ static vsh_result move(const vshi_skins *skins, vshi_model_shape *shape, const d
 vsh_result vshi_skins_apply(vshi_skins *skins, size_t mesh, vshi_model_shape *shape, const double world[12],
                             vsh_error *error) {
     const struct aiMesh *given = skins->source->scene->mMeshes[mesh];
-    vsh_result result = skins->nodes == NULL ? find_nodes(skins, error) : VSH_OK;
-    if (result != VSH_OK || skins->done[mesh]) {
-        return result;
+    if (skins->nodes == NULL) {
+        VSHI_TRY(find_nodes(skins, error));
     }
-    blend *blends = NULL;
+    if (skins->done[mesh]) {
+        return VSH_OK;
+    }
     skins->done[mesh] = true;
-    result = vshi_allocate((void **)&blends, shape->vertex_count, sizeof *blends, skins->source->path, error);
-    for (unsigned i = 0; i < given->mNumBones && result == VSH_OK; ++i) {
-        result = add_bone(skins, given->mBones[i], shape->vertex_count, blends, error);
+    blend *blends;
+    vsh_result result;
+    VSHI_TRY(
+        vshi_allocate((void **)&blends, shape->vertex_count, sizeof *blends, skins->source->path, error));
+    for (unsigned i = 0; i < given->mNumBones; ++i) {
+        VSHI_TRY_DONE(add_bone(skins, given->mBones[i], shape->vertex_count, blends, error));
     }
-    if (result == VSH_OK) {
-        result = move(skins, shape, world, blends, error);
-    }
+    VSHI_TRY_DONE(move(skins, shape, world, blends, error));
+done:
     free(blends);
     return result;
 }

@@ -1,6 +1,7 @@
 #include "model/ply_strips.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 #include "model/scan.h"
 
 #include <inttypes.h>
@@ -95,30 +96,26 @@ static vsh_result push(unrolling *u, int64_t index, vsh_error *error) {
 static vsh_result read_row(unrolling *u, vsh_error *error) {
     const vshi_ply_strips *s = u->strips;
     int64_t count = 0;
-    vsh_result result =
-        s->ascii ? read_ascii(u, &count, error) : read_binary(u, s->count_size, false, &count, error);
-    if (result == VSH_OK && count < 0) {
-        result = vshi_fail(error, VSH_ERROR_INPUT, "%s: tristrips %" PRIu64 " is a list of %" PRId64, u->path,
-                           u->row, count);
+    VSHI_TRY(s->ascii ? read_ascii(u, &count, error) : read_binary(u, s->count_size, false, &count, error));
+    if (count < 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: tristrips %" PRIu64 " is a list of %" PRId64, u->path,
+                         u->row, count);
     }
     u->length = 0;
-    for (int64_t i = 0; i < count && result == VSH_OK; ++i) {
+    for (int64_t i = 0; i < count; ++i) {
         int64_t index = 0;
-        result = s->ascii ? read_ascii(u, &index, error)
-                          : read_binary(u, s->index_size, s->is_signed, &index, error);
-        result = result == VSH_OK ? push(u, index, error) : result;
+        VSHI_TRY(s->ascii ? read_ascii(u, &index, error)
+                          : read_binary(u, s->index_size, s->is_signed, &index, error));
+        VSHI_TRY(push(u, index, error));
     }
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_ply_strips_scan(vshi_ply_strips *strips, const char *path, const char *end,
                                 vsh_error *error) {
     unrolling u = {.strips = strips, .path = path, .at = strips->body, .end = end};
     for (; u.row < strips->rows; ++u.row) {
-        const vsh_result result = read_row(&u, error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(read_row(&u, error));
     }
     strips->body_end = u.at;
     strips->triangles = u.triangles;
@@ -150,10 +147,7 @@ vsh_result vshi_ply_strips_unroll(const vshi_ply_strips *strips, const char *pat
                                   size_t size, char **made, size_t *made_size, vsh_error *error) {
     const size_t bytes = (size_t)vshi_ply_strips_bytes(strips, size);
     *made = NULL;
-    vsh_result result = vshi_allocate((void **)made, bytes, 1, path, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)made, bytes, 1, path, error));
     char *to = *made;
     copy_up_to(&to, text, strips->header);
     to += snprintf(to, LONGEST_HEADER, "element face %zu\nproperty list uchar int vertex_indices\n",
@@ -163,11 +157,11 @@ vsh_result vshi_ply_strips_unroll(const vshi_ply_strips *strips, const char *pat
         *to++ = '\n'; /* rows may follow each other in one line */
     }
     unrolling u = {.strips = strips, .path = path, .at = strips->body, .end = strips->body_end, .to = to};
-    for (; u.row < strips->rows && result == VSH_OK; ++u.row) {
-        result = read_row(&u, error);
+    for (; u.row < strips->rows; ++u.row) {
+        VSHI_TRY(read_row(&u, error));
     }
     to = u.to;
     copy_up_to(&to, strips->body_end, text + size);
     *made_size = (size_t)(to - *made);
-    return result;
+    return VSH_OK;
 }

@@ -11,6 +11,7 @@
 #include "model/polygon.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -311,13 +312,10 @@ static vsh_result reserve(vshi_polygon_cutter *cutter, size_t count, vsh_error *
     }
     vshi_polygon_free(cutter);
     const size_t capacity = count + count / 2;
-    vsh_result result =
-        vshi_allocate((void **)&cutter->corners, capacity, sizeof *cutter->corners, "polygon", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&cutter->reflex, capacity, sizeof *cutter->reflex, "polygon", error);
-    }
-    cutter->capacity = result == VSH_OK ? capacity : 0;
-    return result;
+    VSHI_TRY(vshi_allocate((void **)&cutter->corners, capacity, sizeof *cutter->corners, "polygon", error));
+    VSHI_TRY(vshi_allocate((void **)&cutter->reflex, capacity, sizeof *cutter->reflex, "polygon", error));
+    cutter->capacity = capacity;
+    return VSH_OK;
 }
 
 vsh_result vshi_polygon_cut(vshi_polygon_cutter *cutter, const float *positions, const uint32_t *vertices,
@@ -330,10 +328,7 @@ vsh_result vshi_polygon_cut(vshi_polygon_cutter *cutter, const float *positions,
         *made = 1;
         return VSH_OK;
     }
-    vsh_result result = reserve(cutter, count, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(reserve(cutter, count, error));
     cut p = {.c = cutter->corners,
              .reflex = cutter->reflex,
              .count = count,
@@ -341,6 +336,7 @@ vsh_result vshi_polygon_cut(vshi_polygon_cutter *cutter, const float *positions,
              .vertices = vertices,
              .triangles = triangles,
              .simple = true};
+    vsh_result result = VSH_OK;
     if (!lay_out(&p, positions)) {
         cut_fan(&p, positions);
     } else if (count != 4 || !cut_quad(&p)) {
