@@ -1,6 +1,7 @@
 #include "heightfield/height_image.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -32,29 +33,23 @@ vsh_result vshi_height_image_read(const char *path, const vsh_run *run, vshi_hei
                                   vsh_error *error) {
     *map = (vshi_height_image){0, 0, NULL};
     vsh_image_file *file = NULL;
-    vsh_result result = vsh_image_read(path, run, &file, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vsh_image_read(path, run, &file, error));
     const vsh_image image = vsh_image_view(file);
     const size_t count = (size_t)image.width * (size_t)image.height;
     void *values = NULL;
+    vsh_result result;
     if (image.width < 2 || image.height < 2 || image.width > VSH_MAX_HEIGHTS_SIDE ||
         image.height > VSH_MAX_HEIGHTS_SIDE) {
         result = vshi_fail(error, VSH_ERROR_INPUT,
                            "%s: %d × %d pixels are no heightfield: expected 2 … %d along each side", path,
                            image.width, image.height, VSH_MAX_HEIGHTS_SIDE);
+        goto done;
     }
-    if (result == VSH_OK) {
-        result = vshi_check_limit(run, (double)count * 4.0 * (1.0 + image.channel_count), path, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate(&values, count, sizeof(float), path, error);
-    }
-    if (result == VSH_OK) {
-        take_values(&image, count, values);
-        *map = (vshi_height_image){image.width, image.height, values};
-    }
+    VSHI_TRY_DONE(vshi_check_limit(run, (double)count * 4.0 * (1.0 + image.channel_count), path, error));
+    VSHI_TRY_DONE(vshi_allocate(&values, count, sizeof(float), path, error));
+    take_values(&image, count, values);
+    *map = (vshi_height_image){image.width, image.height, values};
+done:
     vsh_image_free(file);
     return result;
 }

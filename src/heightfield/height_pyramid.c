@@ -5,6 +5,7 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/similarity.h"
+#include "base/try.h"
 #include "heightfield/heights_check.h"
 
 #include <stdlib.h>
@@ -155,34 +156,21 @@ vsh_result vsh_heights_create(const vsh_heights_source *source, const vsh_run *r
     vsh_run full;
     vshi_checked_heights terrain;
     double scale = 1.0;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result == VSH_OK) {
-        result = vshi_heights_check(source, "vsh_heights_create", &terrain, error);
-    }
-    if (result == VSH_OK) {
-        result = check_transform(&terrain, &scale, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(vshi_heights_check(source, "vsh_heights_create", &terrain, error));
+    VSHI_TRY(check_transform(&terrain, &scale, error));
     vsh_heights made = {.relief = {.columns = source->columns, .rows = source->rows}};
     size_t offset[VSHI_RELIEF_LEVELS];
     const size_t count = plan(&made.relief, offset);
-    const double bytes = (double)count * sizeof(float);
-    result = vshi_check_limit(&full, bytes, terrain.name, error);
-    void *memory = NULL, *floats = NULL;
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory, 1, sizeof made, terrain.name, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate(&floats, count, sizeof(float), terrain.name, error);
-    }
+    void *memory;
+    VSHI_TRY(vshi_check_limit(&full, (double)count * sizeof(float), terrain.name, error));
+    VSHI_TRY(vshi_allocate(&memory, 1, sizeof made, terrain.name, error));
+    const vsh_result result = vshi_allocate((void **)&made.memory, count, sizeof(float), terrain.name, error);
     if (result != VSH_OK) {
         free(memory);
         return result;
     }
     const double cell = source->size[0] / (source->columns - 1);
-    made.memory = floats;
     made.relief.depth = source->size[1] / (source->rows - 1) / cell;
     made.relief.bottom = terrain.bottom / cell;
     made.info.columns = source->columns;

@@ -1,6 +1,7 @@
 /* A heightfield as triangles: the closed solid that is voxelised, and its top as a receiver. */
 #include "base/floats.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "heightfield/heights_check.h"
 #include "model/model.h"
 
@@ -119,42 +120,26 @@ static vsh_result allocate(const vshi_checked_heights *t, int32_t what, vsh_mode
     const size_t edge = edge_length(columns, rows);
     const size_t vertices = t->samples + (solid ? edge + 1 : 0);
     const size_t triangles = 2 * (columns - 1) * (rows - 1) + (solid ? 3 * edge : 0);
-    void *shape = NULL, *entry = NULL, *positions = NULL, *indices = NULL, *normals = NULL, *uvs = NULL,
-         *name = NULL;
-    vsh_result result = vshi_allocate(&shape, 1, sizeof *model->shapes, t->name, error);
-    if (result == VSH_OK) {
-        model->shapes = shape;
-        model->shape_count = 1;
-        result = vshi_allocate(&entry, 1, sizeof *model->entries, t->name, error);
+    const size_t name_size = strlen(t->name) + 1;
+
+    VSHI_TRY(vshi_allocate((void **)&model->shapes, 1, sizeof *model->shapes, t->name, error));
+    model->shape_count = 1;
+    VSHI_TRY(vshi_allocate((void **)&model->entries, 1, sizeof *model->entries, t->name, error));
+    model->entry_count = model->entry_capacity = 1;
+    VSHI_TRY(vshi_allocate((void **)&model->entries->name, name_size, 1, t->name, error));
+    memcpy(model->entries->name, t->name, name_size);
+
+    vshi_model_shape *shape = model->shapes;
+    VSHI_TRY(vshi_allocate((void **)&shape->positions, vertices, sizeof(float[3]), t->name, error));
+    VSHI_TRY(vshi_allocate((void **)&shape->indices, triangles, sizeof(uint32_t[3]), t->name, error));
+    if (!solid) {
+        VSHI_TRY(vshi_allocate((void **)&shape->normals, vertices, sizeof(float[3]), t->name, error));
+        VSHI_TRY(vshi_allocate((void **)&shape->uvs[0], vertices, sizeof(float[2]), t->name, error));
+        shape->uv_sets = 1;
     }
-    if (result == VSH_OK) {
-        model->entries = entry;
-        model->entry_count = model->entry_capacity = 1;
-        result = vshi_allocate(&name, strlen(t->name) + 1, 1, t->name, error);
-    }
-    if (result == VSH_OK) {
-        model->entries->name = strcpy(name, t->name);
-        result = vshi_allocate(&positions, vertices, 3 * sizeof(float), t->name, error);
-    }
-    if (result == VSH_OK) {
-        model->shapes->positions = positions;
-        result = vshi_allocate(&indices, triangles, 3 * sizeof(uint32_t), t->name, error);
-    }
-    if (result == VSH_OK) {
-        model->shapes->indices = indices;
-        result = solid ? VSH_OK : vshi_allocate(&normals, vertices, 3 * sizeof(float), t->name, error);
-    }
-    if (result == VSH_OK) {
-        model->shapes->normals = normals;
-        result = solid ? VSH_OK : vshi_allocate(&uvs, vertices, 2 * sizeof(float), t->name, error);
-    }
-    if (result == VSH_OK) {
-        model->shapes->uvs[0] = uvs;
-        model->shapes->uv_sets = solid ? 0 : 1;
-        model->shapes->vertex_count = vertices;
-        model->shapes->triangle_count = triangles;
-    }
-    return result;
+    shape->vertex_count = vertices;
+    shape->triangle_count = triangles;
+    return VSH_OK;
 }
 
 static vsh_result check(const vshi_checked_heights *t, int32_t what, const vsh_run *run, vsh_error *error) {
@@ -191,22 +176,12 @@ vsh_result vsh_model_from_heights(const vsh_heights_source *source, int32_t what
     *model = NULL;
     vsh_run full;
     vshi_checked_heights terrain;
-    void *memory = NULL;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result == VSH_OK) {
-        result = vshi_heights_check(source, "vsh_model_from_heights", &terrain, error);
-    }
-    if (result == VSH_OK) {
-        result = check(&terrain, what, &full, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory, 1, sizeof **model, terrain.name, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
-    vsh_model *made = memory;
-    result = allocate(&terrain, what, made, error);
+    vsh_model *made;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(vshi_heights_check(source, "vsh_model_from_heights", &terrain, error));
+    VSHI_TRY(check(&terrain, what, &full, error));
+    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, terrain.name, error));
+    const vsh_result result = allocate(&terrain, what, made, error);
     if (result != VSH_OK) {
         vsh_model_free(made);
         return result;
