@@ -2,6 +2,7 @@
 
 #include "base/floats.h"
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -88,13 +89,14 @@ void vshi_contours_close(vshi_contours *c) {
     if (!closed) {
         vshi_contours_add(c, start.x, start.y);
     }
-    if (c->result == VSH_OK &&
-        reserve(c, &c->starts, sizeof *c->starts, c->contour_count + 1, &c->contour_capacity)) {
-        c->starts[0] = 0;
-        c->starts[++c->contour_count] = (uint32_t)c->point_count;
-        if (c->point_count > MAX_POINTS) {
-            fails(c, vshi_fail(c->error, VSH_ERROR_LIMIT, "outline: more than %zu points", MAX_POINTS));
-        }
+    if (c->result != VSH_OK ||
+        !reserve(c, &c->starts, sizeof *c->starts, c->contour_count + 1, &c->contour_capacity)) {
+        return;
+    }
+    c->starts[0] = 0;
+    c->starts[++c->contour_count] = (uint32_t)c->point_count;
+    if (c->point_count > MAX_POINTS) {
+        fails(c, vshi_fail(c->error, VSH_ERROR_LIMIT, "outline: more than %zu points", MAX_POINTS));
     }
 }
 
@@ -134,54 +136,56 @@ static void orient(vsh_outline *o) {
     }
 }
 
-/* Takes the contours over, and plants the tree. */
+/* Takes the contours over, and plants the tree; *outline stays NULL where there are none. */
 static vsh_result make(vshi_contours *c, vsh_outline **outline) {
-    void *memory = NULL;
-    vsh_result result = c->result;
-    if (result == VSH_OK && c->contour_count > 0) {
-        result = vshi_allocate(&memory, 1, sizeof(vsh_outline), "outline", c->error);
+    vsh_outline *made = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(c->result);
+    if (c->contour_count == 0) {
+        goto done;
     }
-    if (result != VSH_OK || memory == NULL) {
-        vshi_contours_free(c);
-        return result;
-    }
-    vsh_outline *made = memory;
+    VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "outline", c->error));
     made->points = c->points;
     made->starts = c->starts;
     made->contour_count = c->contour_count;
     c->points = NULL;
     c->starts = NULL;
-    vshi_contours_free(c);
     orient(made);
-    result = vshi_outline_grow_tree(made, c->error);
-    if (result != VSH_OK) {
-        vsh_outline_free(made);
-        return result;
-    }
+    VSHI_TRY_DONE(vshi_outline_grow_tree(made, c->error));
     *outline = made;
-    return VSH_OK;
+    made = NULL;
+done:
+    vsh_outline_free(made);
+    vshi_contours_free(c);
+    return result;
+}
+
+/* Puts an outline whose contours neither cross nor overlap in the place of one, unless rounding left no such.
+ */
+static vsh_result resolve(vshi_contours *c, vsh_outline **outline) {
+    vshi_contours resolved = {.run = c->run, .error = c->error};
+    const bool fits = vshi_outline_resolve(*outline, &resolved);
+    if (resolved.result == VSH_OK && !fits) {
+        vshi_contours_free(&resolved);
+        return VSH_OK;
+    }
+    vsh_outline_free(*outline);
+    *outline = NULL;
+    return make(&resolved, outline);
 }
 
 vsh_result vshi_contours_finish(vshi_contours *c, bool clean, const char *what, vsh_outline **outline) {
     *outline = NULL;
-    vsh_result result = make(c, outline);
-    if (result == VSH_OK && *outline != NULL && !clean) {
-        vshi_contours resolved = {.run = c->run, .error = c->error};
-        const bool fits = vshi_outline_resolve(*outline, &resolved);
-        if (resolved.result != VSH_OK || fits) {
-            vsh_outline_free(*outline);
-            *outline = NULL;
-            result = make(&resolved, outline);
-        } else {
-            vshi_contours_free(&resolved);
-        }
+    VSHI_TRY(make(c, outline));
+    if (*outline != NULL && !clean) {
+        VSHI_TRY(resolve(c, outline));
     }
-    if (result == VSH_OK && (*outline == NULL || !((*outline)->area > 0.0))) {
+    if (*outline == NULL || !((*outline)->area > 0.0)) {
         vsh_outline_free(*outline);
         *outline = NULL;
-        result = vshi_fail(c->error, VSH_ERROR_INPUT, "%s: has no outline: nothing in it is solid", what);
+        return vshi_fail(c->error, VSH_ERROR_INPUT, "%s: has no outline: nothing in it is solid", what);
     }
-    return result;
+    return VSH_OK;
 }
 
 void vsh_outline_free(vsh_outline *o) {
@@ -202,10 +206,7 @@ vsh_result vsh_outline_from_polygons(const double *points, const size_t *counts,
     VSHI_NEEDS_OF(contour_count, points);
     VSHI_NEEDS_OF(contour_count, counts);
     vsh_run full;
-    const vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
     vshi_contours contours = {.run = &full, .error = error};
     for (size_t c = 0; c < contour_count; ++c) {
         for (size_t i = 0; i < counts[c]; ++i, points += 2) {
@@ -225,10 +226,7 @@ vsh_result vsh_outline_unite(const vsh_outline_instance *instances, size_t insta
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_outline_unite: no instances");
     }
     vsh_run full;
-    const vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
     static const double identity[6] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
     vshi_contours contours = {.run = &full, .error = error};
     for (size_t i = 0; i < instance_count; ++i) {

@@ -6,6 +6,7 @@
 
 #include "base/floats.h"
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <vdbshade/image.h>
 
@@ -58,16 +59,8 @@ static vsh_result take_luminance(const vsh_image *image, const char *path, const
         return VSH_OK;
     }
     const size_t count = (size_t)image->width * (size_t)image->height;
-    vsh_result result =
-        vshi_check_limit(run, 4.0 * (double)count * (image->channel_count + 1.0), path, error);
-    void *memory = NULL;
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory, count, sizeof(float), path, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
-    *owned = memory;
+    VSHI_TRY(vshi_check_limit(run, 4.0 * (double)count * (image->channel_count + 1.0), path, error));
+    VSHI_TRY(vshi_allocate((void **)owned, count, sizeof(float), path, error));
     for (size_t i = 0; i < count; ++i) {
         (*owned)[i] = (float)(RED * (double)rgb[0][i] + GREEN * (double)rgb[1][i] + BLUE * (double)rgb[2][i]);
     }
@@ -259,29 +252,18 @@ static vsh_result trace(border *b, const char *path, double held, const vsh_run 
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
     }
-    vsh_result result = march(b, job) ? VSH_OK : vshi_job_fail_cancelled(job, error);
-    void *memory = NULL;
-    if (result == VSH_OK) {
-        result = vshi_check_limit(run, held + (double)b->step_count * sizeof(step), path, error);
+    vsh_result result;
+    VSHI_TRY_DONE(march(b, job) ? VSH_OK : vshi_job_fail_cancelled(job, error));
+    VSHI_TRY_DONE(vshi_check_limit(run, held + (double)b->step_count * sizeof(step), path, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&b->steps, b->step_count, sizeof(step), path, error));
+    if (b->steps != NULL) {
+        VSHI_TRY_DONE(march(b, job) ? VSH_OK : vshi_job_fail_cancelled(job, error));
+        join_steps(b, &contours);
     }
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory, b->step_count, sizeof(step), path, error);
-    }
-    b->steps = memory;
-    if (result == VSH_OK && b->steps != NULL) {
-        if (march(b, job)) {
-            join_steps(b, &contours);
-        } else {
-            result = vshi_job_fail_cancelled(job, error);
-        }
-    }
+done:
     free(b->steps);
     vshi_job_end(job);
-    if (result != VSH_OK) {
-        vshi_contours_free(&contours);
-        return result;
-    }
-    return vshi_contours_finish(&contours, true, path, outline);
+    return result == VSH_OK ? vshi_contours_finish(&contours, true, path, outline) : result;
 }
 
 static vsh_result trace_image(const vsh_image *image, const char *path, const vsh_mask_options *options,
@@ -290,30 +272,29 @@ static vsh_result trace_image(const vsh_image *image, const char *path, const vs
     const float *plane = NULL;
     float *owned = NULL;
     const double held = 4.0 * (double)count * (image->channel_count + 1.0);
-    vsh_result result = vshi_check_limit(run, held, path, error);
-    if (result == VSH_OK) {
-        result = take_channel(image, path, options->channel, run, &plane, &owned, error);
-    }
-    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+    vsh_result result;
+    VSHI_TRY(vshi_check_limit(run, held, path, error));
+    VSHI_TRY_DONE(take_channel(image, path, options->channel, run, &plane, &owned, error));
+    for (size_t i = 0; i < count; ++i) {
         if (!isfinite(plane[i])) {
             result = vshi_fail(error, VSH_ERROR_INPUT, "%s: pixel (%zu, %zu) is %g: expected finite numbers",
                                path, i % (size_t)image->width, i / (size_t)image->width, (double)plane[i]);
+            goto done;
         }
     }
-    if (result == VSH_OK) {
-        const double width = options->width;
-        const double height =
-            options->height > 0.0 ? options->height : width * (double)image->height / (double)image->width;
-        border b = {.plane = plane,
-                    .width = image->width,
-                    .height = image->height,
-                    .columns = (int64_t)image->width + 4,
-                    .rows = (int64_t)image->height + 4,
-                    .threshold = options->threshold,
-                    .invert = options->invert != 0,
-                    .pixel = {width / (double)image->width, height / (double)image->height}};
-        result = trace(&b, path, held, run, outline, error);
-    }
+    const double width = options->width;
+    const double height =
+        options->height > 0.0 ? options->height : width * (double)image->height / (double)image->width;
+    border b = {.plane = plane,
+                .width = image->width,
+                .height = image->height,
+                .columns = (int64_t)image->width + 4,
+                .rows = (int64_t)image->height + 4,
+                .threshold = options->threshold,
+                .invert = options->invert != 0,
+                .pixel = {width / (double)image->width, height / (double)image->height}};
+    result = trace(&b, path, held, run, outline, error);
+done:
     free(owned);
     return result;
 }
@@ -342,21 +323,13 @@ vsh_result vsh_outline_from_image(const char *path, const vsh_mask_options *opti
     VSHI_NEEDS(path);
     vsh_mask_options full = vsh_mask_options_default();
     vsh_run full_run;
-    vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_mask_options", error);
-    if (result == VSH_OK) {
-        result = check_options(&full, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_run_resolve(run, &full_run, error);
-    }
-    vsh_image_file *file = NULL;
-    if (result == VSH_OK) {
-        result = vsh_image_read(path, &full_run, &file, error);
-    }
-    if (result == VSH_OK) {
-        const vsh_image image = vsh_image_view(file);
-        result = trace_image(&image, path, &full, &full_run, outline, error);
-    }
+    vsh_image_file *file;
+    VSHI_TRY(vshi_options_resolve(options, &full, sizeof full, "vsh_mask_options", error));
+    VSHI_TRY(check_options(&full, error));
+    VSHI_TRY(vshi_run_resolve(run, &full_run, error));
+    VSHI_TRY(vsh_image_read(path, &full_run, &file, error));
+    const vsh_image image = vsh_image_view(file);
+    const vsh_result result = trace_image(&image, path, &full, &full_run, outline, error);
     vsh_image_free(file);
     return result;
 }

@@ -3,6 +3,7 @@
 #include "outline/outline.h"
 
 #include "base/floats.h"
+#include "base/try.h"
 #include "extern/freetype.h"
 
 #include <math.h>
@@ -156,14 +157,9 @@ static vsh_result draw_line(layout *l, const char *at, const char *end, const vs
         }
         l->x += before != 0 ? vshi_font_kerning(l->font, before, glyph) : 0.0;
         double advance = 0.0;
-        const vsh_result result = vshi_font_draw(l->font, glyph, pen, &advance, error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vshi_font_draw(l->font, glyph, pen, &advance, error));
         vshi_contours_close(l->contours);
-        if (l->contours->result != VSH_OK) {
-            return l->contours->result;
-        }
+        VSHI_TRY(l->contours->result);
         l->x += advance;
         before = glyph;
     }
@@ -177,8 +173,7 @@ static vsh_result draw_text(layout *l, const char *text, const vsh_text_options 
     const double share = options->align == VSH_ALIGN_LEFT     ? 0.0
                          : options->align == VSH_ALIGN_CENTER ? 0.5
                                                               : 1.0;
-    vsh_result result = VSH_OK;
-    for (const char *line = text; result == VSH_OK && line != NULL;) {
+    for (const char *line = text; line != NULL;) {
         const char *end = strchr(line, '\n');
         const char *next = end != NULL ? end + 1 : NULL;
         end = end != NULL ? end : line + strlen(line);
@@ -186,17 +181,17 @@ static vsh_result draw_text(layout *l, const char *text, const vsh_text_options 
         end -= end > line && end[-1] == '\r' && next != NULL;
         l->x = 0.0;
         if (share > 0.0) {
-            result = draw_line(l, line, end, &none, error);
+            VSHI_TRY(draw_line(l, line, end, &none, error));
             l->x *= -share;
         }
-        result = result == VSH_OK ? draw_line(l, line, end, &pen, error) : result;
+        VSHI_TRY(draw_line(l, line, end, &pen, error));
         l->y -= options->line_spacing * vshi_font_line_height(l->font);
-        if (result == VSH_OK && vshi_job_advance(job, size)) {
-            result = vshi_job_fail_cancelled(job, error);
+        if (vshi_job_advance(job, size)) {
+            return vshi_job_fail_cancelled(job, error);
         }
         line = next;
     }
-    return result;
+    return VSH_OK;
 }
 
 /* --- from the outside */
@@ -245,13 +240,11 @@ static vsh_result check_options(const vsh_text_options *options, vsh_error *erro
 vsh_result vshi_contours_draw(const char *text, const char *path, const vsh_text_options *options,
                               const vsh_run *run, vshi_contours *contours, vsh_error *error) {
     layout l = {.path = path, .scale = options->height, .contours = contours};
-    vsh_result result = vshi_font_open(path, &l.font, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_font_open(path, &l.font, error));
     vshi_job *job = vshi_job_begin(run, "outline", strlen(text));
-    result = job != NULL ? draw_text(&l, text, options, job, error)
-                         : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    const vsh_result result = job != NULL
+                                  ? draw_text(&l, text, options, job, error)
+                                  : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
     vshi_job_end(job);
     vshi_font_close(l.font);
     return result;
@@ -266,23 +259,14 @@ vsh_result vsh_outline_from_text(const char *text, const char *font, const vsh_t
     VSHI_NEEDS(font);
     vsh_text_options full = vsh_text_options_default();
     vsh_run full_run;
-    vsh_result result = vshi_options_resolve(options, &full, sizeof full, "vsh_text_options", error);
-    if (result == VSH_OK) {
-        result = check_options(&full, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_run_resolve(run, &full_run, error);
-    }
-    if (result == VSH_OK) {
-        result = check_text(text, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_options_resolve(options, &full, sizeof full, "vsh_text_options", error));
+    VSHI_TRY(check_options(&full, error));
+    VSHI_TRY(vshi_run_resolve(run, &full_run, error));
+    VSHI_TRY(check_text(text, error));
     vshi_contours contours = {.run = &full_run, .error = error};
-    result = full_run.reader != NULL
-                 ? vshi_contours_from_reader(text, font, &full, &full_run, &contours, error)
-                 : vshi_contours_draw(text, font, &full, &full_run, &contours, error);
+    const vsh_result result = full_run.reader != NULL
+                                  ? vshi_contours_from_reader(text, font, &full, &full_run, &contours, error)
+                                  : vshi_contours_draw(text, font, &full, &full_run, &contours, error);
     if (result != VSH_OK) {
         vshi_contours_free(&contours);
         return result;

@@ -1,6 +1,7 @@
 #include "outline/outline.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -93,16 +94,9 @@ vsh_result vshi_outline_grow_tree(vsh_outline *o, vsh_error *error) {
     for (size_t c = 0; c < o->contour_count; ++c) {
         leaves += (o->starts[c + 1] - o->starts[c] - 1 + LEAF_SEGMENTS - 1) / LEAF_SEGMENTS;
     }
-    void *nodes = NULL, *memory = NULL;
-    vsh_result result = vshi_allocate(&nodes, 2 * leaves, sizeof *o->nodes, "outline", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory, o->contour_count, sizeof(item), "outline", error);
-    }
-    o->nodes = nodes;
-    if (result != VSH_OK) {
-        return result;
-    }
-    item *items = memory;
+    item *items;
+    VSHI_TRY(vshi_allocate((void **)&o->nodes, 2 * leaves, sizeof *o->nodes, "outline", error));
+    VSHI_TRY(vshi_allocate((void **)&items, o->contour_count, sizeof *items, "outline", error));
     for (size_t c = 0; c < o->contour_count; ++c) {
         double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
         for (uint32_t i = o->starts[c]; i < o->starts[c + 1]; ++i) {
