@@ -6,6 +6,7 @@
 
 #include "base/elementary.h"
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -197,10 +198,8 @@ static vsh_result find_frayed(finding *f, uint8_t *frayed, vsh_error *error) {
     const size_t count = f->mesh->triangle_count;
     uint32_t *queue = NULL;
     size_t waiting = 0;
-    const vsh_result result =
-        vshi_allocate((void **)&queue, count, sizeof *queue, "edges of triangles", error);
-    for (size_t vertex = 0, begin = 0; result == VSH_OK && vertex < f->mesh->vertex_count;
-         begin = f->ends[vertex], ++vertex) {
+    VSHI_TRY(vshi_allocate((void **)&queue, count, sizeof *queue, "edges of triangles", error));
+    for (size_t vertex = 0, begin = 0; vertex < f->mesh->vertex_count; begin = f->ends[vertex], ++vertex) {
         for (size_t i = begin, next; i < f->ends[vertex]; i = next) {
             for (next = i + 1; next < f->ends[vertex] && f->uses[next].upper == f->uses[i].upper; ++next) {
             }
@@ -221,29 +220,27 @@ static vsh_result find_frayed(finding *f, uint8_t *frayed, vsh_error *error) {
         }
     }
     free(queue);
-    return result;
+    return VSH_OK;
 }
 
 /* Joins what goes on at edges of odd numbers of triangles. */
 static vsh_result join_odd(finding *f, vsh_error *error) {
     uint8_t *frayed = NULL;
-    vsh_result result =
-        vshi_allocate((void **)&frayed, f->mesh->triangle_count, 1, "edges of triangles", error);
-    if (result == VSH_OK) {
-        result = find_frayed(f, frayed, error);
-    }
+    vsh_result result;
+    VSHI_TRY(vshi_allocate((void **)&frayed, f->mesh->triangle_count, 1, "edges of triangles", error));
+    VSHI_TRY_DONE(find_frayed(f, frayed, error));
     f->frayed = frayed;
-    for (size_t vertex = 0, begin = 0; result == VSH_OK && vertex < f->mesh->vertex_count;
-         begin = f->ends[vertex], ++vertex) {
-        for (size_t i = begin, next; i < f->ends[vertex] && result == VSH_OK; i = next) {
+    for (size_t vertex = 0, begin = 0; vertex < f->mesh->vertex_count; begin = f->ends[vertex], ++vertex) {
+        for (size_t i = begin, next; i < f->ends[vertex]; i = next) {
             for (next = i + 1; next < f->ends[vertex] && f->uses[next].upper == f->uses[i].upper; ++next) {
             }
             const size_t count = leave_out_repeated(f, f->uses + i, next - i);
             if (count > 2 && count % 2 != 0) {
-                result = join_many(f, (uint32_t)vertex, f->uses + i, count, error);
+                VSHI_TRY_DONE(join_many(f, (uint32_t)vertex, f->uses + i, count, error));
             }
         }
     }
+done:
     f->frayed = NULL;
     free(frayed);
     return result;
@@ -289,22 +286,20 @@ static vsh_result join_edges(finding *f, bool with_flat, vsh_error *error) {
                 (use){a < b ? b : a, v[(k + 2) % 3], (uint32_t)(3 * i) + (uint32_t)k, a > b};
         }
     }
-    vsh_result result = VSH_OK;
-    for (size_t vertex = 0, begin = 0; vertex < mesh->vertex_count && result == VSH_OK;
-         begin = f->ends[vertex], ++vertex) {
+    for (size_t vertex = 0, begin = 0; vertex < mesh->vertex_count; begin = f->ends[vertex], ++vertex) {
         const size_t end = f->ends[vertex];
         sort_uses(f->uses + begin, end - begin);
-        for (size_t i = begin, next; i < end && result == VSH_OK; i = next) {
+        for (size_t i = begin, next; i < end; i = next) {
             for (next = i + 1; next < end && f->uses[next].upper == f->uses[i].upper; ++next) {
             }
-            result = join_edge(f, (uint32_t)vertex, f->uses + i, next - i, error);
+            VSHI_TRY(join_edge(f, (uint32_t)vertex, f->uses + i, next - i, error));
         }
     }
-    if (result == VSH_OK && f->odd > 0) {
-        result = join_odd(f, error);
+    if (f->odd > 0) {
+        VSHI_TRY(join_odd(f, error));
     }
     edges->open = count_open(mesh, edges);
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result take(const vsh_mesh *mesh, vshi_edges *edges, finding *f, uint8_t **flat,
@@ -320,12 +315,11 @@ static vsh_result take(const vsh_mesh *mesh, vshi_edges *edges, finding *f, uint
                   {(void **)flat, mesh->triangle_count, 1},
                   {(void **)&f->ends, mesh->vertex_count + 1, sizeof *f->ends},
                   {(void **)&f->uses, 3 * mesh->triangle_count, sizeof *f->uses}};
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0] && result == VSH_OK; ++i) {
-        result =
-            vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "edges of triangles", error);
+    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
+        VSHI_TRY(
+            vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "edges of triangles", error));
     }
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, vshi_edges *edges, vsh_error *error) {
@@ -340,27 +334,23 @@ vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, vshi_edges *edges
     finding f = {.mesh = mesh, .mirrored = vshi_transform_determinant(mesh->transform) < 0.0, .edges = edges};
     uint8_t *flat = NULL;
     size_t flats = 0;
-    vsh_result result = take(mesh, edges, &f, &flat, error);
-    if (result == VSH_OK) {
-        result = vshi_mesh_weld(mesh, edges->weld, error);
-    }
-    if (result != VSH_OK) {
-        goto cleanup;
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(take(mesh, edges, &f, &flat, error));
+    VSHI_TRY_DONE(vshi_mesh_weld(mesh, edges->weld, error));
     for (size_t i = 0; i < mesh->triangle_count; ++i) {
         flat[i] = vshi_mesh_degenerate(mesh, i);
         flats += flat[i];
     }
     f.flat = flat;
-    result = join_edges(&f, false, error);
+    VSHI_TRY_DONE(join_edges(&f, false, error));
     const size_t open = edges->open;
-    if (result == VSH_OK && flats > 0 && open > 0) { /* closed with them or without them is closed */
-        result = join_edges(&f, true, error);
-        if (result == VSH_OK && edges->open >= open) {
-            result = join_edges(&f, false, error);
+    if (flats > 0 && open > 0) { /* closed with them or without them is closed */
+        VSHI_TRY_DONE(join_edges(&f, true, error));
+        if (edges->open >= open) {
+            VSHI_TRY_DONE(join_edges(&f, false, error));
         }
     }
-cleanup:
+done:
     free(f.uses);
     free(f.ends);
     free(flat);

@@ -3,6 +3,7 @@
 #include "mesh/face_tree.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <stdlib.h>
 
@@ -131,18 +132,12 @@ vsh_result vshi_face_tree_create(vshi_face *faces, size_t count, vshi_face_corne
     building b = {.faces = faces};
     vshi_face_tree *tree = NULL;
     *made = NULL;
-    vsh_result result = vshi_allocate((void **)&tree, 1, sizeof *tree, "faces", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    vsh_result result;
+    VSHI_TRY(vshi_allocate((void **)&tree, 1, sizeof *tree, "faces", error));
     *tree = (vshi_face_tree){.faces = faces, .corners = corners, .user = user};
-    result = vshi_allocate((void **)&b.middle, count, sizeof *b.middle, "faces", error);
-    if (result == VSH_OK) { /* halves hold more than half of LEAF each */
-        result = vshi_allocate((void **)&tree->nodes, count + 1, sizeof *tree->nodes, "faces", error);
-    }
-    if (result != VSH_OK) {
-        goto cleanup;
-    }
+    VSHI_TRY_DONE(vshi_allocate((void **)&b.middle, count, sizeof *b.middle, "faces", error));
+    /* halves hold more than half of LEAF each */
+    VSHI_TRY_DONE(vshi_allocate((void **)&tree->nodes, count + 1, sizeof *tree->nodes, "faces", error));
     b.tree = tree;
     for (size_t i = 0; i < count; ++i) {
         vshi_vec corner[3];
@@ -157,7 +152,7 @@ vsh_result vshi_face_tree_create(vshi_face *faces, size_t count, vshi_face_corne
     }
     *made = tree;
     tree = NULL;
-cleanup:
+done:
     free(b.middle);
     vshi_face_tree_free(tree);
     return result;

@@ -1,5 +1,6 @@
 /* What each component is for itself. */
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/solidity_parts.h"
 
 #include <stdlib.h>
@@ -180,14 +181,11 @@ static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t *caps, vs
     const vshi_components *found = &s->found[whole];
     closing k = {.mesh = &s->wholes.meshes[whole]};
     const size_t vertices = found->rim_count > 0 ? k.mesh->vertex_count : 0;
-    vsh_result result = vshi_allocate((void **)&k.parent, vertices, sizeof *k.parent, "holes", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&k.number, vertices, sizeof *k.number, "holes", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&k.holes, found->rim_count, sizeof *k.holes, "holes", error);
-    }
-    for (size_t i = 0, rim = 0; i < found->count && result == VSH_OK; ++i) {
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&k.parent, vertices, sizeof *k.parent, "holes", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&k.number, vertices, sizeof *k.number, "holes", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&k.holes, found->rim_count, sizeof *k.holes, "holes", error));
+    for (size_t i = 0, rim = 0; i < found->count; ++i) {
         vshi_component *c = &s->components[s->first[whole] + i];
         *c = (vshi_component){.whole = (uint32_t)whole,
                               .triangles = found->begin[i + 1] - found->begin[i],
@@ -202,6 +200,7 @@ static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t *caps, vs
         const measure m = measure_component(s, c);
         decide(s, c, &m);
     }
+done:
     free(k.holes);
     free(k.number);
     free(k.parent);
@@ -210,9 +209,8 @@ static vsh_result find_of_whole(vshi_solidity *s, size_t whole, size_t *caps, vs
 
 vsh_result vshi_kinds_find(vshi_solidity *s, vsh_error *error) {
     size_t caps = 0;
-    vsh_result result = VSH_OK;
-    for (size_t m = 0; m < s->wholes.count && result == VSH_OK; ++m) {
-        result = find_of_whole(s, m, &caps, error);
+    for (size_t m = 0; m < s->wholes.count; ++m) {
+        VSHI_TRY(find_of_whole(s, m, &caps, error));
     }
-    return result;
+    return VSH_OK;
 }

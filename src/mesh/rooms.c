@@ -1,5 +1,6 @@
 /* Which of the components that look inwards are rooms in solids. */
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/solidity_parts.h"
 
 #include <math.h>
@@ -80,13 +81,12 @@ static vsh_result find_room(vshi_solidity *s, size_t room, vsh_error *error) {
     const vshi_surface_part part = vshi_component_part(s, c);
     surrounding around = {.cuts = 0};
     vshi_part_samples(&part, c->area, SAMPLES, around.samples);
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; i < s->count && result == VSH_OK && !around.coincides; ++i) {
+    for (size_t i = 0; i < s->count && !around.coincides; ++i) {
         const vshi_component *solid = &s->components[i];
         if (solid->kind == VSHI_KIND_SOLID && solid->low.x <= c->high.x && solid->high.x >= c->low.x &&
             solid->low.y <= c->high.y && solid->high.y >= c->low.y && solid->low.z <= c->high.z &&
             solid->high.z >= c->low.z) {
-            result = look(s, room, i, &around, error);
+            VSHI_TRY(look(s, room, i, &around, error));
         }
     }
     size_t inside = 0;
@@ -99,7 +99,7 @@ static vsh_result find_room(vshi_solidity *s, size_t room, vsh_error *error) {
         c->kind = around.coincides ? VSHI_KIND_SHEET : VSHI_KIND_WALL;
         s->cut_count -= around.cuts;
     }
-    return result;
+    return VSH_OK;
 }
 
 /* A house whose skin has holes and an open room within: light goes from the one to the other, so neither is
@@ -200,21 +200,18 @@ static int compare_cuts(const void *a, const void *b) {
 }
 
 vsh_result vshi_rooms_find(vshi_solidity *s, vsh_error *error) {
-    vsh_result result = VSH_OK;
     do {
         s->cut_count = 0;
-        for (size_t i = 0; i < s->count && result == VSH_OK; ++i) {
+        for (size_t i = 0; i < s->count; ++i) {
             const vshi_component *c = &s->components[i];
             if (c->inward && c->kind != VSHI_KIND_SHEET) {
-                result = find_room(s, i, error);
+                VSHI_TRY(find_room(s, i, error));
             }
         }
-    } while (result == VSH_OK && hollow(s));
-    if (result == VSH_OK) {
-        find_dome(s);
-    }
+    } while (hollow(s));
+    find_dome(s);
     if (s->cut_count > 1) {
         qsort(s->cuts, s->cut_count, sizeof *s->cuts, compare_cuts);
     }
-    return result;
+    return VSH_OK;
 }

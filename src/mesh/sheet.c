@@ -6,6 +6,7 @@
 
 #include "base/hash.h"
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -18,15 +19,12 @@ vsh_result vshi_sheet_allocate(vshi_sheet *sheet, size_t vertex_count, size_t tr
                                vsh_error *error) {
     const char *what = "triangles' neighbours";
     *sheet = (vshi_sheet){.vertex_count = vertex_count, .triangle_count = triangle_count};
-    vsh_result result =
-        vshi_allocate((void **)&sheet->vertices, vertex_count, 3 * sizeof(float), what, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&sheet->corners, triangle_count, 3 * sizeof(uint32_t), what, error);
-    }
-    if (result == VSH_OK) {
-        result =
-            vshi_allocate((void **)&sheet->neighbours, triangle_count, 3 * sizeof(uint32_t), what, error);
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&sheet->vertices, vertex_count, sizeof(float[3]), what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&sheet->corners, triangle_count, sizeof(uint32_t[3]), what, error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&sheet->neighbours, triangle_count, sizeof(uint32_t[3]), what, error));
+done:
     if (result != VSH_OK) {
         vshi_sheet_free(sheet);
     }
@@ -90,14 +88,13 @@ vsh_result vshi_sheet_join(vshi_sheet *sheet, vsh_error *error) {
     while (capacity < edges + edges / 2) {
         capacity *= 2;
     }
-    void *memory = NULL;
-    const vsh_result result =
-        vshi_allocate(&memory, capacity, sizeof(uint64_t), "triangles' neighbours", error);
-    for (size_t edge = 0; result == VSH_OK && edge < edges; ++edge) {
-        join_edge(sheet, memory, capacity, edge);
+    uint64_t *slots;
+    VSHI_TRY(vshi_allocate((void **)&slots, capacity, sizeof *slots, "triangles' neighbours", error));
+    for (size_t edge = 0; edge < edges; ++edge) {
+        join_edge(sheet, slots, capacity, edge);
     }
-    free(memory);
-    return result;
+    free(slots);
+    return VSH_OK;
 }
 
 /* --- cutting beams */

@@ -3,6 +3,7 @@
 #include "mesh/standing.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <stdlib.h>
 
@@ -153,17 +154,12 @@ vsh_result vshi_standing_find(vshi_solidity *s, vshi_job *job, vsh_error *error)
     looking l = {.s = s};
     vshi_face *faces = NULL;
     vshi_face_tree *tree = NULL;
-    vsh_result result = vshi_faces_near_vessels(s, &faces, &tree, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&l.caps, most, sizeof *l.caps, name, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&l.sorted, s->count, sizeof *l.sorted, name, error);
-    }
-    if (result == VSH_OK) {
-        sort_beginnings(&l);
-    }
-    for (size_t i = 0; i < s->count && result == VSH_OK; ++i) {
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_faces_near_vessels(s, &faces, &tree, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l.caps, most, sizeof *l.caps, name, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&l.sorted, s->count, sizeof *l.sorted, name, error));
+    sort_beginnings(&l);
+    for (size_t i = 0; i < s->count; ++i) {
         vshi_component *c = &s->components[i];
         double enclosed = 0.0;
         if (c->vessel && stands(&l, tree, i, &enclosed)) {
@@ -172,13 +168,15 @@ vsh_result vshi_standing_find(vshi_solidity *s, vshi_job *job, vsh_error *error)
         }
         if (vshi_job_cancelled(job)) {
             result = vshi_job_fail_cancelled(job, error);
+            goto done;
         }
     }
-    for (size_t i = 0; i < s->count && result == VSH_OK; ++i) { /* at once: no order shows */
+    for (size_t i = 0; i < s->count; ++i) { /* at once: no order shows */
         if (s->components[i].stands) {
             s->components[i].kind = VSHI_KIND_SOLID;
         }
     }
+done:
     free(l.sorted);
     free(l.caps);
     vshi_face_tree_free(tree);

@@ -2,6 +2,7 @@
  * vessels, so that a million triangles cost little where few are near. */
 #include "base/elementary.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "mesh/standing.h"
 
 #include <stdlib.h>
@@ -108,15 +109,15 @@ static vsh_result mark(const vshi_solidity *s, cells *c, box *all, vsh_error *er
         }
     }
     divide(c, all);
-    const vsh_result result = vshi_allocate((void **)&c->near, (size_t)c->count[0] * (size_t)c->count[1],
-                                            (size_t)c->count[2], "what stands on something", error);
-    for (size_t i = 0; i < s->count && result == VSH_OK; ++i) {
+    VSHI_TRY(vshi_allocate((void **)&c->near, (size_t)c->count[0] * (size_t)c->count[1], (size_t)c->count[2],
+                           "what stands on something", error));
+    for (size_t i = 0; i < s->count; ++i) {
         if (s->components[i].vessel) {
             const box b = around(&s->components[i]);
             visit(c, &b, true);
         }
     }
-    return result;
+    return VSH_OK;
 }
 
 /* Counts the faces that are near, and lists them where `faces` is given. */
@@ -153,15 +154,13 @@ vsh_result vshi_faces_near_vessels(const vshi_solidity *s, vshi_face **faces, vs
     box all;
     *faces = NULL;
     *tree = NULL;
-    vsh_result result = mark(s, &c, &all, error);
-    const size_t count = result == VSH_OK ? list(s, &c, &all, NULL) : 0;
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)faces, count, sizeof **faces, "what stands on something", error);
-    }
-    if (result == VSH_OK) {
-        list(s, &c, &all, *faces);
-        result = vshi_face_tree_create(*faces, count, corners_of, s, tree, error);
-    }
+    vsh_result result;
+    VSHI_TRY(mark(s, &c, &all, error));
+    const size_t count = list(s, &c, &all, NULL);
+    VSHI_TRY_DONE(vshi_allocate((void **)faces, count, sizeof **faces, "what stands on something", error));
+    list(s, &c, &all, *faces);
+    result = vshi_face_tree_create(*faces, count, corners_of, s, tree, error);
+done:
     free(c.near);
     return result;
 }
