@@ -1,5 +1,7 @@
 #include "heightfield/heights_check.h"
 
+#include "base/try.h"
+
 #include <math.h>
 #include <stdbool.h>
 
@@ -31,10 +33,7 @@ vsh_result vshi_heights_check(const vsh_heights_source *source, const char *call
                          source == NULL ? "source" : "values");
     }
     const char *name = source->name != NULL ? source->name : "heights";
-    const vsh_result result = check_numbers(source, name, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(check_numbers(source, name, error));
     const size_t columns = (size_t)source->columns, samples = columns * (size_t)source->rows;
     double lowest = INFINITY, highest = -INFINITY;
     for (size_t i = 0; i < samples; ++i) {

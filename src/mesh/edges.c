@@ -137,11 +137,7 @@ static void join_spokes(vshi_edges *edges, spoke *s, size_t count) {
 /* More than two triangles at the edge from `lower` to the uses' upper vertex. */
 static vsh_result join_many(finding *f, uint32_t lower, const use *uses, size_t count, vsh_error *error) {
     spoke *spokes = NULL;
-    const vsh_result result =
-        vshi_allocate((void **)&spokes, count, sizeof *spokes, "triangles of an edge", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&spokes, count, sizeof *spokes, "triangles of an edge", error));
     const vshi_vec origin = place_of(f, lower);
     const vshi_vec axis = vshi_unit(vshi_sub(place_of(f, uses[0].upper), origin));
     vshi_vec u, v;

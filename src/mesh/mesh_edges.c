@@ -25,11 +25,7 @@ vsh_result vshi_mesh_weld(const vsh_mesh *mesh, uint32_t *weld, vsh_error *error
         capacity *= 2;
     }
     uint32_t *slots = NULL; /* vertex + 1, or 0 where empty; a power of two, at most half full */
-    const vsh_result result =
-        vshi_allocate((void **)&slots, capacity, sizeof *slots, "welding vertices", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&slots, capacity, sizeof *slots, "welding vertices", error));
     for (size_t v = 0; v < mesh->vertex_count; ++v) {
         const float *p = mesh->positions + 3 * v;
         size_t slot = (size_t)hash_position(p) & (capacity - 1);

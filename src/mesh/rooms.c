@@ -30,10 +30,7 @@ static vsh_result add_cut(vshi_solidity *s, size_t room, size_t solid, vsh_error
     if (s->cut_count == s->cut_room) {
         const size_t more = 2 * s->cut_room + 16;
         void *memory = NULL;
-        const vsh_result result = vshi_allocate(&memory, more, sizeof *s->cuts, "rooms", error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vshi_allocate(&memory, more, sizeof *s->cuts, "rooms", error));
         vshi_cut *cuts = memory;
         for (size_t i = 0; i < s->cut_count; ++i) {
             cuts[i] = s->cuts[i];
