@@ -1,6 +1,7 @@
 #include "json/json.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 #include "json/locate.h"
 
 #include <stdarg.h>
@@ -141,10 +142,7 @@ void vshi_blocks_free(vshi_json_block *blocks) {
 vsh_result vshi_json_copy(vshi_json *reader, size_t prefix, const char *string, const char **copy) {
     const size_t length = strlen(string);
     void *memory;
-    const vsh_result result = vshi_json_allocate(reader, &memory, prefix + length + 1, 1, "scene");
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_json_allocate(reader, &memory, prefix + length + 1, 1, "scene"));
     memcpy(memory, reader->path, prefix);
     memcpy((char *)memory + prefix, string, length + 1);
     *copy = memory;

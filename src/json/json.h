@@ -30,7 +30,7 @@ typedef struct vshi_value {
     json_t *json;
 } vshi_value;
 
-/* The text of a file, to be freed with free() also where it fails, which reading as JSON keeps within
+/* The text of a file, to be freed with free(), which reading as JSON keeps within
  * run->memory_limit. Errors: VSH_ERROR_READ, VSH_ERROR_LIMIT (64 MiB, the limit), VSH_ERROR_MEMORY. */
 vsh_result vshi_json_text(const char *path, const vsh_run *run, char **text, size_t *size, vsh_error *error);
 

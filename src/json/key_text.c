@@ -127,31 +127,37 @@ static json_t *json_of(const vshi_key *key, const char *text) {
     }
 }
 
+/* Whether the text is a value of the key. */
+static bool take_text(const vshi_key *key, const char *name, const char *text, char *member) {
+    if (key->kind == VSHI_STRING || key->kind == VSHI_PATH) {
+        if (text == NULL || text[0] == '\0') {
+            return false;
+        }
+        memcpy(member, &text, sizeof text);
+        return true;
+    }
+    if (text == NULL && key->kind != VSHI_BOOL) {
+        return false;
+    }
+    vsh_error unused; /* it tells of places in a file */
+    vshi_json reader = {name, "", 0, NULL, &unused};
+    const vshi_value value = {NULL, NULL, 0, 0, json_of(key, text)};
+    const bool good = value.json != NULL && vshi_read_value(&reader, &value, key, member) == VSH_OK;
+    json_decref(value.json);
+    vshi_blocks_free(reader.blocks);
+    return good;
+}
+
 vsh_result vshi_read_text(const vshi_key *key, const char *name, const char *text, void *target,
                           vsh_error *error) {
-    char *member = (char *)target + key->offset;
-    vsh_result result = VSH_ERROR_INPUT;
-    if (key->kind == VSHI_STRING || key->kind == VSHI_PATH) {
-        if (text != NULL && text[0] != '\0') {
-            memcpy(member, &text, sizeof text);
-            result = VSH_OK;
-        }
-    } else if (text != NULL || key->kind == VSHI_BOOL) {
-        vsh_error unused; /* it tells of places in a file */
-        vshi_json reader = {name, "", 0, NULL, &unused};
-        const vshi_value value = {NULL, NULL, 0, 0, json_of(key, text)};
-        result = value.json != NULL ? vshi_read_value(&reader, &value, key, member) : VSH_ERROR_INPUT;
-        json_decref(value.json);
-        vshi_blocks_free(reader.blocks);
+    if (!take_text(key, name, text, (char *)target + key->offset)) {
+        char expected[256];
+        vshi_key_expected(key, expected, sizeof expected);
+        return vshi_fail(error, VSH_ERROR_INPUT, "%.64s '%.200s': expected %s", name,
+                         text != NULL ? text : "", expected);
     }
-    if (result == VSH_OK) {
-        if (key->then != NULL) {
-            key->then(target);
-        }
-        return VSH_OK;
+    if (key->then != NULL) {
+        key->then(target);
     }
-    char expected[256];
-    vshi_key_expected(key, expected, sizeof expected);
-    return vshi_fail(error, VSH_ERROR_INPUT, "%.64s '%.200s': expected %s", name, text != NULL ? text : "",
-                     expected);
+    return VSH_OK;
 }

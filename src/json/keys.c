@@ -1,5 +1,6 @@
 #include "json/keys.h"
 
+#include "base/try.h"
 #include "json/suggest.h"
 
 #include <math.h>
@@ -31,10 +32,7 @@ static bool in_range(const vshi_key *key, double number) {
 
 static vsh_result read_number(const vshi_json *reader, const vshi_value *value, const vshi_key *key,
                               double *number) {
-    const vsh_result result = vshi_expect(reader, value, JSON_REAL);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_expect(reader, value, JSON_REAL));
     *number = json_number_value(value->json);
     if (!in_range(key, *number)) {
         return vshi_json_fail(reader, value, "%.9g is out of range %.9g%s … %.9g%s", *number, key->lowest,
@@ -47,10 +45,7 @@ static vsh_result read_number(const vshi_json *reader, const vshi_value *value, 
 static vsh_result read_integer(const vshi_json *reader, const vshi_value *value, const vshi_key *key,
                                int32_t *integer) {
     double number;
-    const vsh_result result = read_number(reader, value, key, &number);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(read_number(reader, value, key, &number));
     if (number != floor(number)) {
         return vshi_json_fail(reader, value, "%.9g is not a whole number", number);
     }
@@ -85,10 +80,7 @@ static vsh_result read_vector(const vshi_json *reader, const vshi_value *value, 
 
 static vsh_result read_name(const vshi_json *reader, const vshi_value *value, vshi_name_fn *name_of,
                             int32_t *index) {
-    const vsh_result result = vshi_expect(reader, value, JSON_STRING);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_expect(reader, value, JSON_STRING));
     const char *given = json_string_value(value->json);
     char known[256] = "";
     const char *name;
@@ -104,10 +96,7 @@ static vsh_result read_name(const vshi_json *reader, const vshi_value *value, vs
 }
 
 static vsh_result read_string(vshi_json *reader, const vshi_value *value, bool path, const char **string) {
-    const vsh_result result = vshi_expect(reader, value, JSON_STRING);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_expect(reader, value, JSON_STRING));
     const char *given = json_string_value(value->json);
     if (given[0] == '\0') {
         return vshi_json_fail(reader, value, "is empty");
@@ -117,22 +106,19 @@ static vsh_result read_string(vshi_json *reader, const vshi_value *value, bool p
 }
 
 vsh_result vshi_read_value(vshi_json *reader, const vshi_value *value, const vshi_key *key, void *member) {
-    vsh_result result = VSH_OK;
     switch (key->kind) {
     case VSHI_NUMBER:
         return read_number(reader, value, key, member);
     case VSHI_DEGREES:
-        result = read_number(reader, value, key, member);
-        if (result == VSH_OK) {
-            *(double *)member = *(double *)member / 180.0 * VSHI_PI; /* 180 becomes exactly pi */
-        }
-        return result;
+        VSHI_TRY(read_number(reader, value, key, member));
+        *(double *)member = *(double *)member / 180.0 * VSHI_PI; /* 180 becomes exactly pi */
+        return VSH_OK;
     case VSHI_INTEGER:
         return read_integer(reader, value, key, member);
     case VSHI_BOOL:
-        result = vshi_expect(reader, value, JSON_TRUE);
+        VSHI_TRY(vshi_expect(reader, value, JSON_TRUE));
         *(int32_t *)member = json_is_true(value->json);
-        return result;
+        return VSH_OK;
     case VSHI_VECTOR:
         return read_vector(reader, value, key, member);
     case VSHI_NAME:
@@ -145,7 +131,7 @@ vsh_result vshi_read_value(vshi_json *reader, const vshi_value *value, const vsh
     case VSHI_LATER:
         break;
     }
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_read_choice(vshi_json *reader, const vshi_value *object, const char *key,
@@ -223,19 +209,16 @@ vsh_result vshi_read_object(vshi_json *reader, const vshi_value *object, const v
 
 vsh_result vshi_read_list(vshi_json *reader, const vshi_value *array, size_t lowest, size_t highest,
                           size_t item_size, vshi_read_fn *read, void **items, size_t *count) {
-    vsh_result result = vshi_expect(reader, array, JSON_ARRAY);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_expect(reader, array, JSON_ARRAY));
     const size_t size = json_array_size(array->json);
     if (size < lowest || size > highest) {
         return vshi_json_fail(reader, array, "has %zu items, out of range %zu … %zu", size, lowest, highest);
     }
-    result = vshi_json_allocate(reader, items, size, item_size, array->key);
-    for (size_t i = 0; i < size && result == VSH_OK; ++i) {
+    VSHI_TRY(vshi_json_allocate(reader, items, size, item_size, array->key));
+    for (size_t i = 0; i < size; ++i) {
         const vshi_value item = vshi_item(array, i);
-        result = read(reader, &item, (char *)*items + i * item_size);
+        VSHI_TRY(read(reader, &item, (char *)*items + i * item_size));
     }
     *count = size;
-    return result;
+    return VSH_OK;
 }

@@ -2,6 +2,7 @@
 #include "base/input.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "json/json.h"
 
 #include <errno.h>
@@ -68,14 +69,15 @@ vsh_result vshi_json_text(const char *path, const vsh_run *run, char **text, siz
     *size = 0;
     FILE *file;
     uint64_t told;
-    vsh_result result = vshi_input_open(path, path, UINT64_MAX, &file, &told, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    result = read_all(path, file, text, size, error);
-    if (result == VSH_OK) {
-        result = vshi_check_limit(run, tree_bytes(*text, *size), path, error);
-    }
+    VSHI_TRY(vshi_input_open(path, path, UINT64_MAX, &file, &told, error));
+    vsh_result result;
+    VSHI_TRY_DONE(read_all(path, file, text, size, error));
+    VSHI_TRY_DONE(vshi_check_limit(run, tree_bytes(*text, *size), path, error));
+done:
     fclose(file);
+    if (result != VSH_OK) {
+        free(*text);
+        *text = NULL;
+    }
     return result;
 }
