@@ -248,12 +248,12 @@ static vsh_result make_grid(assembly *a, size_t i, vsh_run *run, vsh_error *erro
         const placed_sdf *placed = &a->sdfs[i];
         vsh_grid_options options = a->options;
         options.voxel_size /= placed->scale;
-        const vsh_result result = vsh_grid_from_sdf(&placed->sdf, &options, run, made, error);
-        return result == VSH_OK ? add_made(a, placed->transform, run, error) : result;
+        VSHI_TRY(vsh_grid_from_sdf(&placed->sdf, &options, run, made, error));
+        return add_made(a, placed->transform, run, error);
     } else if (vshi_assets_outline(a->assets, i) != NULL) {
-        const vsh_result result = vsh_grid_from_outline(vshi_assets_outline(a->assets, i), caster->thickness,
-                                                        caster->transform, &a->options, run, made, error);
-        return result == VSH_OK ? add_made(a, NULL, run, error) : result;
+        VSHI_TRY(vsh_grid_from_outline(vshi_assets_outline(a->assets, i), caster->thickness,
+                                       caster->transform, &a->options, run, made, error));
+        return add_made(a, NULL, run, error);
     } else if (caster->type == VSH_CASTER_SPHERES) {
         return voxelise_spheres(a, vshi_assets_spheres(a->assets, i), run, error);
     }

@@ -94,20 +94,17 @@ static vsh_result place_spheres(asset_place *place, const vsh_caster *caster, si
     size_t count = caster->sphere_count;
     double *read = NULL;
     vsh_error why;
-    vsh_result result = VSH_OK;
     if (caster->path != NULL) {
-        result = vsh_spheres_read(caster->path, run, &read, &count, error);
+        VSHI_TRY(vsh_spheres_read(caster->path, run, &read, &count, error));
         spheres = read;
     }
-    if (result == VSH_OK) {
-        result = vsh_spheres_create(spheres, count, caster->transform, run, &place->spheres, &why);
-        if (result != VSH_OK) {
-            vshi_fail(error, result, "caster %zu: %s%s%s", index, caster->path != NULL ? caster->path : "",
-                      caster->path != NULL ? ": " : "", why.message);
-        }
-    }
+    const vsh_result result =
+        vsh_spheres_create(spheres, count, caster->transform, run, &place->spheres, &why);
     vsh_spheres_list_free(read);
-    return result;
+    return result == VSH_OK ? VSH_OK
+                            : vshi_fail(error, result, "caster %zu: %s%s%s", index,
+                                        caster->path != NULL ? caster->path : "",
+                                        caster->path != NULL ? ": " : "", why.message);
 }
 
 /* Takes glass and the like out of `chosen`, and tells what masks are taken for. */

@@ -1,3 +1,4 @@
+#include "base/try.h"
 #include "scene/outline_keys.h"
 #include "scene/parts.h"
 #include "scene/transform.h"
@@ -41,25 +42,24 @@ static vsh_result read_spheres(vshi_json *reader, const vshi_value *value, void 
     if (!json_is_array(value->json)) {
         return vshi_json_fail(reader, value, "expected a file's name or an array of [x, y, z, radius]");
     }
-    void *memory = NULL;
+    double *spheres;
     caster->sphere_count = json_array_size(value->json);
     if (caster->sphere_count == 0) {
         return vshi_json_fail(reader, value, "is empty");
     }
-    vsh_result result =
-        vshi_json_allocate(reader, &memory, caster->sphere_count, 4 * sizeof(double), "spheres");
-    double *spheres = memory;
-    for (size_t i = 0; result == VSH_OK && i < caster->sphere_count; ++i) {
+    VSHI_TRY(
+        vshi_json_allocate(reader, (void **)&spheres, caster->sphere_count, sizeof(double[4]), "spheres"));
+    for (size_t i = 0; i < caster->sphere_count; ++i) {
         const vshi_value item = vshi_item(value, i);
-        result = vshi_read_value(reader, &item, &sphere, spheres + 4 * i);
-        if (result == VSH_OK && !(spheres[4 * i + 3] > 0.0)) {
+        VSHI_TRY(vshi_read_value(reader, &item, &sphere, spheres + 4 * i));
+        if (!(spheres[4 * i + 3] > 0.0)) {
             const vshi_value radius = vshi_item(&item, 3);
             return vshi_json_fail(reader, &radius, "%.9g is out of range 0 (excluded) … %.9g",
                                   spheres[4 * i + 3], VSHI_LARGEST);
         }
     }
     caster->spheres = spheres;
-    return result;
+    return VSH_OK;
 }
 
 static const vshi_key caster_keys[] = {

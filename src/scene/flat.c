@@ -54,10 +54,7 @@ static vsh_result read_region(vshi_json *reader, const vshi_value *value, void *
         .kind = VSHI_VECTOR, .count = 4, .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST};
     vsh_flat_scene *scene = member;
     double r[4];
-    const vsh_result result = vshi_read_value(reader, value, &key, r);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_read_value(reader, value, &key, r));
     if (!(r[0] < r[2] && r[1] < r[3])) {
         return vshi_json_fail(reader, value, "is empty: expected [left, bottom, right, top]");
     }
@@ -123,25 +120,21 @@ vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_sc
     char *text = NULL;
     size_t size;
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result == VSH_OK) {
-        result = vshi_scene_text(path, &full, &text, &size, error);
-    }
-    owner *made = result == VSH_OK ? calloc(1, sizeof *made) : NULL;
-    if (result == VSH_OK && made == NULL) {
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
-    }
-    if (result == VSH_OK) {
-        vshi_json reader = {path, text, size, NULL, error};
-        result = parse(&reader, made);
-    }
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(vshi_scene_text(path, &full, &text, &size, error));
+    vshi_json reader = {path, text, size, NULL, error};
+    owner *made = calloc(1, sizeof *made);
+    const vsh_result result =
+        made != NULL
+            ? parse(&reader, made)
+            : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
     free(text);
-    if (result != VSH_OK) {
-        vsh_flat_scene_free(made == NULL ? NULL : &made->scene);
-        return result;
+    if (result == VSH_OK) {
+        *scene = &made->scene;
+    } else if (made != NULL) {
+        vsh_flat_scene_free(&made->scene);
     }
-    *scene = &made->scene;
-    return VSH_OK;
+    return result;
 }
 
 void vsh_flat_scene_free(vsh_flat_scene *scene) {
@@ -188,6 +181,16 @@ static vsh_result make_caster(const vsh_flat_caster *caster, const vsh_run *run,
     }
 }
 
+/* The same, counted into what is held. */
+static vsh_result make_held(const vsh_flat_caster *caster, vsh_run *held, vsh_outline **outline,
+                            vsh_error *error) {
+    VSHI_TRY(make_caster(caster, held, outline, error));
+    vsh_outline_info info;
+    vsh_outline_get_info(*outline, &info);
+    held->memory_held += info.bytes;
+    return vshi_check_limit(held, 0.0, "outlines", error);
+}
+
 /* Of a scene and on the way from it, what is left of its text included: measured with 60,000 circles. */
 enum { BYTES_PER_CASTER = 1536 };
 
@@ -198,35 +201,27 @@ vsh_result vsh_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *ru
     *outline = NULL;
     VSHI_NEEDS(scene);
     const size_t count = scene->caster_count;
-    void *memory[2] = {NULL, NULL};
+    vsh_outline **made = NULL;
+    vsh_outline_instance *instances = NULL;
     vsh_run held; /* by all that are made so far */
-    vsh_result result = vshi_run_resolve(run, &held, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory[0], count, sizeof(vsh_outline *), "casters", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory[1], count, sizeof(vsh_outline_instance), "casters", error);
-    }
+    vsh_result result;
+    VSHI_TRY(vshi_run_resolve(run, &held, error));
     held.memory_held += count * BYTES_PER_CASTER;
-    vsh_outline **made = memory[0];
-    vsh_outline_instance *instances = memory[1];
-    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+    VSHI_TRY_DONE(vshi_allocate((void **)&made, count, sizeof *made, "casters", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&instances, count, sizeof *instances, "casters", error));
+    for (size_t i = 0; i < count; ++i) {
         vsh_error reason;
-        result = make_caster(&scene->casters[i], &held, &made[i], &reason);
-        if (result == VSH_OK) {
-            vsh_outline_info info;
-            vsh_outline_get_info(made[i], &info);
-            held.memory_held += info.bytes;
-            result = vshi_check_limit(&held, 0.0, "outlines", &reason);
-        }
+        result = make_held(&scene->casters[i], &held, &made[i], &reason);
         if (result != VSH_OK) {
             vshi_fail(error, result, "casters[%zu]: %.960s", i, reason.message);
+            goto done;
         }
         instances[i] = (vsh_outline_instance){made[i], scene->casters[i].transform};
     }
-    if (result == VSH_OK && count > 0) {
+    if (count > 0) {
         result = vsh_outline_unite(instances, count, &held, outline, error);
     }
+done:
     for (size_t i = 0; made != NULL && i < count; ++i) {
         vsh_outline_free(made[i]);
     }

@@ -1,4 +1,5 @@
 #include "base/elementary.h"
+#include "base/try.h"
 #include "scene/outline_keys.h"
 #include "scene/parts.h"
 
@@ -25,25 +26,21 @@ static const char *shape_name(int32_t i) {
 
 static vsh_result read_points(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_flat_caster *caster = member;
-    vsh_result result = vshi_expect(reader, value, JSON_ARRAY);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_expect(reader, value, JSON_ARRAY));
     const size_t count = json_array_size(value->json);
     if (count < 3 || count > MAX_POINTS) {
         return vshi_json_fail(reader, value, "has %zu points, out of range 3 … %zu", count, MAX_POINTS);
     }
-    void *memory;
-    result = vshi_json_allocate(reader, &memory, count, 2 * sizeof(double), "points");
+    double *points;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&points, count, sizeof(double[2]), "points"));
     const vshi_key key = {.kind = VSHI_VECTOR, .count = 2, .lowest = -VSHI_LARGEST, .highest = VSHI_LARGEST};
-    double *points = memory;
-    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
+    for (size_t i = 0; i < count; ++i) {
         const vshi_value point = vshi_item(value, i);
-        result = vshi_read_value(reader, &point, &key, points + 2 * i);
+        VSHI_TRY(vshi_read_value(reader, &point, &key, points + 2 * i));
     }
     caster->points = points;
     caster->point_count = count;
-    return result;
+    return VSH_OK;
 }
 
 /* What stands between reading and the transform. */

@@ -71,10 +71,11 @@ static vsh_result add_buffers(vshi_inputs *inputs, const char *model, bool outsi
     json_t *buffer;
     json_array_foreach(json_object_get(root, "buffers"), i, buffer) {
         const char *uri = json_string_value(json_object_get(buffer, "uri"));
-        if (result == VSH_OK && uri != NULL && !vshi_uri_is_data(uri) && !vshi_uri_is_remote(uri)) {
-            result = add_buffer(inputs, model, vshi_uri_path(model, uri), outside, error);
+        if (uri != NULL && !vshi_uri_is_data(uri) && !vshi_uri_is_remote(uri)) {
+            VSHI_TRY_DONE(add_buffer(inputs, model, vshi_uri_path(model, uri), outside, error));
         }
     }
+done:
     json_decref(root);
     return result;
 }

@@ -8,23 +8,19 @@
 /* Names of lights, each a string that is the name of one. */
 static vsh_result read_light_names(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene_layer *layer = member;
-    vsh_result result = vshi_expect(reader, value, JSON_ARRAY);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_expect(reader, value, JSON_ARRAY));
     const vshi_key key = {.kind = VSHI_STRING};
-    void *memory = NULL;
-    layer->shade.light_count = json_array_size(value->json);
+    const size_t count = json_array_size(value->json);
+    const char **names;
     /* one more: no lights at all are not NULL, which is all of them */
-    result = vshi_json_allocate(reader, &memory, layer->shade.light_count + 1, sizeof(const char *),
-                                "lights of a layer");
-    const char **names = memory;
-    for (size_t i = 0; result == VSH_OK && i < layer->shade.light_count; ++i) {
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&names, count + 1, sizeof *names, "lights of a layer"));
+    for (size_t i = 0; i < count; ++i) {
         const vshi_value name = vshi_item(value, i);
-        result = vshi_read_value(reader, &name, &key, &names[i]);
+        VSHI_TRY(vshi_read_value(reader, &name, &key, &names[i]));
     }
     layer->shade.lights = names;
-    return result;
+    layer->shade.light_count = count;
+    return VSH_OK;
 }
 
 static const vshi_key layer_keys[] = {
@@ -124,19 +120,18 @@ static vsh_result check_lights(vshi_json *reader, const vshi_value *layers, cons
 /* Takes a light from those that a layer casts for. */
 static vsh_result take_out(vshi_json *reader, const vsh_scene *scene, const vsh_light *light,
                            vsh_layer *layer) {
-    void *memory = NULL;
+    const char **left;
     size_t count = 0;
-    const vsh_result result = vshi_json_allocate(reader, &memory, scene->light_count + 1,
-                                                 sizeof(const char *), "lights of a layer");
-    const char **left = memory;
-    for (size_t l = 0; result == VSH_OK && l < scene->light_count; ++l) {
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&left, scene->light_count + 1, sizeof *left,
+                                "lights of a layer"));
+    for (size_t l = 0; l < scene->light_count; ++l) {
         if (&scene->lights[l] != light && casts_for(layer, &scene->lights[l])) {
             left[count++] = scene->lights[l].name;
         }
     }
     layer->lights = left;
     layer->light_count = count;
-    return result;
+    return VSH_OK;
 }
 
 /* A light that names layers: the others do not cast for it. */
@@ -168,24 +163,22 @@ static vsh_result choose_layers(vshi_json *reader, const vshi_value *names, cons
 
 static vsh_result choose_all(vshi_json *reader, const vshi_value *root, vsh_scene *scene) {
     vshi_value lights, names;
-    void *memory = NULL;
+    vsh_scene_layer *layers;
     if (!vshi_member(root, "lights", &lights)) {
         return VSH_OK;
     }
-    vsh_result result =
-        vshi_json_allocate(reader, &memory, scene->layer_count + 1, sizeof *scene->layers, "layers");
-    vsh_scene_layer *layers = memory;
-    if (result == VSH_OK && scene->layer_count > 0) {
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&layers, scene->layer_count + 1, sizeof *layers, "layers"));
+    if (scene->layer_count > 0) {
         memcpy(layers, scene->layers, scene->layer_count * sizeof *layers);
     }
-    for (size_t l = 0; result == VSH_OK && l < scene->light_count; ++l) {
+    for (size_t l = 0; l < scene->light_count; ++l) {
         const vshi_value light = vshi_item(&lights, l);
         if (vshi_member(&light, "layers", &names)) {
-            result = choose_layers(reader, &names, &scene->lights[l], scene, layers);
+            VSHI_TRY(choose_layers(reader, &names, &scene->lights[l], scene, layers));
         }
     }
     scene->layers = layers;
-    return result;
+    return VSH_OK;
 }
 
 /* What names what: casters their layers, layers their lights, lights their layers. */

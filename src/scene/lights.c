@@ -1,3 +1,4 @@
+#include "base/try.h"
 #include "light/light.h"
 #include "light/types.h"
 #include "scene/parts.h"
@@ -27,10 +28,7 @@ static const char *falloff_name(int32_t i) {
 }
 
 static vsh_result read_name(vshi_json *reader, const vshi_value *value, void *member) {
-    const vsh_result result = vshi_expect(reader, value, JSON_STRING);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_expect(reader, value, JSON_STRING));
     const char *name = json_string_value(value->json);
     if (!vshi_light_name_valid(name)) {
         return vshi_json_fail(reader, value,
@@ -126,13 +124,8 @@ static void make_keys(bool flat, light_keys *all) {
 static vsh_result read_keys(vshi_json *reader, const vshi_value *value, bool flat, vsh_light *light) {
     vshi_name_fn *types = flat ? flat_type_name : type_name;
     int32_t type = -1;
-    vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
-    if (result == VSH_OK) {
-        result = vshi_read_choice(reader, value, "type", types, &type);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
+    VSHI_TRY(vshi_read_choice(reader, value, "type", types, &type));
     /* A light without a type still has its keys looked over: "type" may be what is misspelt. */
     char what[32] = "a light";
     if (type >= 0) {
@@ -162,10 +155,7 @@ static vsh_result check(vshi_json *reader, const vshi_value *value, const vsh_li
 vsh_result vshi_read_light(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_light *light = member;
     *light = vsh_light_default();
-    const vsh_result result = read_keys(reader, value, false, light);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(read_keys(reader, value, false, light));
     vshi_value reach;
     const bool has_reach = vshi_member(value, "reach", &reach);
     if (light->falloff == VSH_FALLOFF_QUADRATIC && !has_reach) {
@@ -181,10 +171,7 @@ vsh_result vshi_read_flat_light(vshi_json *reader, const vshi_value *value, void
     vsh_light *light = member;
     *light = vsh_light_default();
     light->direction[1] = light->axis[1] = 0.0; /* so that what is read is all there is */
-    const vsh_result result = read_keys(reader, value, true, light);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(read_keys(reader, value, true, light));
     vshi_value reach;
     if (vshi_member(value, "reach", &reach)) {
         light->falloff = VSH_FALLOFF_QUADRATIC;

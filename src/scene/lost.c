@@ -75,10 +75,7 @@ vsh_result vshi_scene_warn_lost(const vsh_scene *scene, const vsh_assets *assets
         if (count == 0 || caster->type != VSH_CASTER_MESH || !vshi_caster_in_layer(caster, layer)) {
             continue;
         }
-        const vsh_result result = look(caster, meshes, count, field, run, error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(look(caster, meshes, count, field, run, error));
     }
     return VSH_OK;
 }

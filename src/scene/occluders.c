@@ -242,20 +242,15 @@ vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,
                 .assets = assets,
                 .options = vsh_scene_occluders_options_default(),
                 .parts = vsh_occluder_parts_default()};
-    vsh_result result =
-        vshi_options_resolve(options, &m.options, sizeof m.options, "vsh_scene_occluders_options", error);
-    if (result == VSH_OK && (m.options.receivers_min == NULL) != (m.options.receivers_max == NULL)) {
-        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "receivers_min and receivers_max: one of them is NULL");
+    VSHI_TRY(
+        vshi_options_resolve(options, &m.options, sizeof m.options, "vsh_scene_occluders_options", error));
+    if ((m.options.receivers_min == NULL) != (m.options.receivers_max == NULL)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "receivers_min and receivers_max: one of them is NULL");
     }
-    if (result == VSH_OK) {
-        result = vshi_run_resolve(run, &m.run, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_run_resolve(run, &m.run, error));
     m.voxel = m.run;
     m.voxel.warning = m.options.silent_voxels != 0 ? NULL : m.run.warning;
-    result = make(&m, error);
+    vsh_result result = make(&m, error);
     m.parts.field = m.own.field;
     m.parts.triangles = m.own.triangles;
     m.parts.layers = m.layers;

@@ -17,8 +17,8 @@ vsh_result vshi_read_size(vshi_json *reader, const vshi_value *value, int32_t *w
         return vshi_json_fail(reader, value, "expected 2 numbers, found %zu", count);
     }
     const vshi_value first = vshi_item(value, 0), second = vshi_item(value, 1);
-    const vsh_result result = vshi_read_value(reader, &first, &key, width);
-    return result == VSH_OK ? vshi_read_value(reader, &second, &key, height) : result;
+    VSHI_TRY(vshi_read_value(reader, &first, &key, width));
+    return vshi_read_value(reader, &second, &key, height);
 }
 
 static vsh_result read_size(vshi_json *reader, const vshi_value *value, void *member) {
@@ -173,13 +173,8 @@ const vshi_table vshi_receiver_table = VSHI_TABLE(receiver_keys);
 vsh_result vshi_read_receiver(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_receiver *receiver = member;
     *receiver = vsh_receiver_default();
-    vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
-    if (result == VSH_OK) {
-        result = vshi_reject_both(reader, value, "mesh", "heightfield");
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
+    VSHI_TRY(vshi_reject_both(reader, value, "mesh", "heightfield"));
     vshi_value given;
     const bool heightfield = vshi_member(value, "heightfield", &given);
     receiver->type = heightfield ? VSH_RECEIVER_HEIGHTFIELD : VSH_RECEIVER_MESH;

@@ -24,30 +24,29 @@ typedef struct owner {
 
 static vsh_result read_casters(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene *scene = member;
-    void *items = NULL;
-    const vsh_result result = vshi_read_list(reader, value, 1, MAX_ITEMS, sizeof *scene->casters,
-                                             vshi_read_caster, &items, &scene->caster_count);
+    void *items;
+    VSHI_TRY(vshi_read_list(reader, value, 1, MAX_ITEMS, sizeof *scene->casters, vshi_read_caster, &items,
+                            &scene->caster_count));
     scene->casters = items;
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result read_layers(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene *scene = member;
-    void *items = NULL;
-    const vsh_result result = vshi_read_list(reader, value, 0, VSH_MAX_LAYERS, sizeof *scene->layers,
-                                             vshi_read_layer, &items, &scene->layer_count);
+    void *items;
+    VSHI_TRY(vshi_read_list(reader, value, 0, VSH_MAX_LAYERS, sizeof *scene->layers, vshi_read_layer, &items,
+                            &scene->layer_count));
     scene->layers = items;
-    return result;
+    return VSH_OK;
 }
 
 static vsh_result read_lights(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene *scene = member;
-    void *items = NULL;
-    const vsh_result result = vshi_read_list(reader, value, 0, MAX_LIGHTS, sizeof *scene->lights,
-                                             vshi_read_light, &items, &scene->light_count);
+    void *items;
+    VSHI_TRY(vshi_read_list(reader, value, 0, MAX_LIGHTS, sizeof *scene->lights, vshi_read_light, &items,
+                            &scene->light_count));
     scene->lights = items;
-    return result == VSH_OK ? vshi_check_light_names(reader, value, scene->lights, scene->light_count)
-                            : result;
+    return vshi_check_light_names(reader, value, scene->lights, scene->light_count);
 }
 
 static int by_output(const void *a, const void *b) {
@@ -58,17 +57,17 @@ static int by_output(const void *a, const void *b) {
 
 /* Two receivers with one output would overwrite each other. */
 static vsh_result check_outputs(vshi_json *reader, const vshi_value *value, const vsh_scene *scene) {
-    void *memory;
-    vsh_result result = vshi_allocate(&memory, scene->receiver_count, sizeof(const vsh_receiver *),
-                                      "receivers", reader->error);
-    if (result != VSH_OK || memory == NULL) {
-        return result;
+    const vsh_receiver **sorted;
+    vsh_result result = VSH_OK;
+    VSHI_TRY(
+        vshi_allocate((void **)&sorted, scene->receiver_count, sizeof *sorted, "receivers", reader->error));
+    if (sorted == NULL) {
+        return VSH_OK;
     }
-    const vsh_receiver **sorted = memory;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         sorted[i] = &scene->receivers[i];
     }
-    qsort(memory, scene->receiver_count, sizeof *sorted, by_output);
+    qsort(sorted, scene->receiver_count, sizeof *sorted, by_output);
     for (size_t i = 1; i < scene->receiver_count; ++i) {
         const vshi_value receiver = vshi_item(value, (size_t)(sorted[i] - scene->receivers));
         vshi_value output;
@@ -80,17 +79,17 @@ static vsh_result check_outputs(vshi_json *reader, const vshi_value *value, cons
             break;
         }
     }
-    free(memory);
+    free(sorted);
     return result;
 }
 
 static vsh_result read_receivers(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene *scene = member;
-    void *items = NULL;
-    const vsh_result result = vshi_read_list(reader, value, 0, MAX_ITEMS, sizeof *scene->receivers,
-                                             vshi_read_receiver, &items, &scene->receiver_count);
+    void *items;
+    VSHI_TRY(vshi_read_list(reader, value, 0, MAX_ITEMS, sizeof *scene->receivers, vshi_read_receiver, &items,
+                            &scene->receiver_count));
     scene->receivers = items;
-    return result == VSH_OK ? check_outputs(reader, value, scene) : result;
+    return check_outputs(reader, value, scene);
 }
 
 static void wants_ao(void *target) {
@@ -165,13 +164,12 @@ static vsh_result read_tint(vshi_json *reader, const vshi_value *value, void *me
         scene->tint.type = VSH_TINT_POWER;
         return vshi_read_value(reader, value, &powers, scene->tint.power);
     }
-    const vsh_result result = vshi_expect(reader, value, JSON_STRING);
-    scene->tint.type = result == VSH_OK ? vsh_tint_type(json_string_value(value->json)) : VSH_TINT_NONE;
-    if (result == VSH_OK && scene->tint.type != VSH_TINT_NONE && scene->tint.type != VSH_TINT_QUADRATIC) {
-        return vshi_json_fail(reader, value, "\"%.64s\" is none of none, quadratic, [r, g, b]",
-                              json_string_value(value->json));
-    }
-    return result;
+    VSHI_TRY(vshi_expect(reader, value, JSON_STRING));
+    scene->tint.type = vsh_tint_type(json_string_value(value->json));
+    return scene->tint.type == VSH_TINT_NONE || scene->tint.type == VSH_TINT_QUADRATIC
+               ? VSH_OK
+               : vshi_json_fail(reader, value, "\"%.64s\" is none of none, quadratic, [r, g, b]",
+                                json_string_value(value->json));
 }
 
 static void has_ambient(void *target) {
@@ -394,39 +392,36 @@ static const vshi_key scene_keys[] = {
 };
 const vshi_table vshi_scene_table = VSHI_TABLE(scene_keys);
 
+static vsh_result read_scene(vshi_json *reader, json_t *json, vsh_scene *scene) {
+    const vshi_value root = {NULL, NULL, 0, 0, json};
+    *scene = vsh_scene_default();
+    VSHI_TRY(vshi_read_object(reader, &root, &vshi_scene_table, 1, "a scene", scene));
+    VSHI_TRY(vshi_reject_both(reader, &root, "voxel_size", "resolution"));
+    return vshi_check_layers(reader, &root, scene);
+}
+
 vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh_scene **scene,
                             vsh_error *error) {
     *scene = NULL;
     vshi_json reader = {path, text, size, NULL, error};
     json_t *json = NULL;
-    owner *made = NULL;
-    vsh_result result = vshi_json_load(&reader, &json);
-    if (result != VSH_OK) {
-        return result;
-    }
-    made = calloc(1, sizeof *made);
+    vsh_result result;
+    VSHI_TRY(vshi_json_load(&reader, &json));
+    owner *made = calloc(1, sizeof *made);
     if (made == NULL) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
         goto done;
     }
-    made->scene = vsh_scene_default();
-    const vshi_value root = {NULL, NULL, 0, 0, json};
-    result = vshi_read_object(&reader, &root, &vshi_scene_table, 1, "a scene", &made->scene);
-    if (result == VSH_OK) {
-        result = vshi_reject_both(&reader, &root, "voxel_size", "resolution");
-    }
-    if (result == VSH_OK) {
-        result = vshi_check_layers(&reader, &root, &made->scene);
-    }
+    result = read_scene(&reader, json, &made->scene);
     made->blocks = reader.blocks;
-done:
-    json_decref(json);
     if (result != VSH_OK) {
-        vsh_scene_free(made == NULL ? NULL : &made->scene);
-        return result;
+        vsh_scene_free(&made->scene);
+        goto done;
     }
     *scene = &made->scene;
-    return VSH_OK;
+done:
+    json_decref(json);
+    return result;
 }
 
 void vsh_scene_free(vsh_scene *scene) {

@@ -22,15 +22,14 @@ static vsh_result read_patterns(vshi_json *reader, const vshi_value *value, cons
     if (*count == 0) {
         return vshi_json_fail(reader, value, "is empty");
     }
-    void *memory = NULL;
-    vsh_result result = vshi_json_allocate(reader, &memory, *count, sizeof **patterns, "patterns");
-    const char **strings = memory;
-    for (size_t i = 0; i < *count && result == VSH_OK; ++i) {
+    const char **strings;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&strings, *count, sizeof *strings, "patterns"));
+    for (size_t i = 0; i < *count; ++i) {
         const vshi_value item = list ? vshi_item(value, i) : *value;
-        result = vshi_read_value(reader, &item, &key, &strings[i]);
+        VSHI_TRY(vshi_read_value(reader, &item, &key, &strings[i]));
     }
     *patterns = strings;
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_read_only(vshi_json *reader, const vshi_value *value, void *member) {
@@ -46,16 +45,10 @@ vsh_result vshi_read_except(vshi_json *reader, const vshi_value *value, void *me
 static vsh_result read_rules(vshi_json *reader, const vshi_value *value, vsh_caster *caster,
                              int32_t solidity) {
     vsh_selection given = {.only = NULL};
-    vsh_result result = vshi_read_only(reader, value, &given);
-    void *memory = NULL;
+    VSHI_TRY(vshi_read_only(reader, value, &given));
     const size_t count = caster->solidity_count + given.only_count;
-    if (result == VSH_OK) {
-        result = vshi_json_allocate(reader, &memory, count, sizeof *caster->solidity, "patterns");
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
-    vsh_solidity_rule *rules = memory;
+    vsh_solidity_rule *rules;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&rules, count, sizeof *rules, "patterns"));
     for (size_t i = 0; i < count; ++i) {
         rules[i] = i < caster->solidity_count
                        ? caster->solidity[i]

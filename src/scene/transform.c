@@ -20,10 +20,7 @@ static const double LARGEST_SCALE = 1e6;
 vsh_result vshi_read_rotation(vshi_json *reader, const vshi_value *value, void *quaternion) {
     const vshi_key key = {.kind = VSHI_VECTOR, .count = 3, .lowest = -1e6, .highest = 1e6};
     double degrees[3];
-    const vsh_result result = vshi_read_value(reader, value, &key, degrees);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_read_value(reader, value, &key, degrees));
     double s[3], c[3];
     for (int i = 0; i < 3; ++i) {
         const double half = remainder(degrees[i], 720.0) / 360.0 * VSHI_PI;
@@ -126,16 +123,11 @@ static vshi_vec axis(const double m[12], int column) {
 
 vsh_result vshi_read_transform(vshi_json *reader, const vshi_value *value, void *matrix) {
     parts p = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0, 1.0}, {1.0, 1.0, 1.0}, {0.0}};
-    vsh_result result = vshi_read_object(reader, value, &transform_table, 1, "a transform", &p);
-    if (result == VSH_OK) {
-        result = vshi_reject_both(reader, value, "rotate_deg", "rotate_quat");
-    }
+    VSHI_TRY(vshi_read_object(reader, value, &transform_table, 1, "a transform", &p));
+    VSHI_TRY(vshi_reject_both(reader, value, "rotate_deg", "rotate_quat"));
     static const char *const other[] = {"translate", "rotate_deg", "rotate_quat", "scale"};
-    for (size_t i = 0; i < sizeof other / sizeof other[0] && result == VSH_OK; ++i) {
-        result = vshi_reject_both(reader, value, "matrix", other[i]);
-    }
-    if (result != VSH_OK) {
-        return result;
+    for (size_t i = 0; i < sizeof other / sizeof other[0]; ++i) {
+        VSHI_TRY(vshi_reject_both(reader, value, "matrix", other[i]));
     }
     double *m = matrix;
     vshi_value given;

@@ -135,11 +135,7 @@ static vsh_result push(vshi_json *reader, const vshi_value *value, tree *t, cons
     if (t->count == t->capacity) {
         const size_t capacity = t->capacity == 0 ? 16 : 2 * t->capacity;
         void *nodes;
-        const vsh_result result =
-            vshi_allocate(&nodes, capacity, sizeof *t->nodes, "sdf nodes", reader->error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vshi_allocate(&nodes, capacity, sizeof *t->nodes, "sdf nodes", reader->error));
         if (t->count > 0) {
             memcpy(nodes, t->nodes, t->count * sizeof *t->nodes);
         }

@@ -48,10 +48,7 @@ static void collect(const vsh_scene *scene, const vsh_assets *assets, views *v) 
 static vsh_result make(const views *v, const vsh_run *run, vsh_triangles **triangles, vsh_solids **solids,
                        vsh_error *error) {
     if (v->solid_count > 0) {
-        const vsh_result result = vsh_solids_create(v->solids, v->places[0], v->solid_count, solids, error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vsh_solids_create(v->solids, v->places[0], v->solid_count, solids, error));
     }
     return v->mesh_count > 0 && vsh_triangles_available()
                ? vsh_triangles_create(v->meshes, v->mesh_count, run, triangles, error)
@@ -67,15 +64,15 @@ vsh_result vsh_scene_truth(const vsh_scene *scene, const vsh_assets *assets, con
     VSHI_NEEDS(scene);
     VSHI_NEEDS(assets);
     views v = {.mesh_count = 0};
-    vsh_result result = allocate(scene, assets, &v, error);
-    if (result == VSH_OK) {
-        collect(scene, assets, &v);
-        result = make(&v, run, triangles, solids, error);
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(allocate(scene, assets, &v, error));
+    collect(scene, assets, &v);
+    result = make(&v, run, triangles, solids, error);
     if (result != VSH_OK) {
         vsh_solids_free(*solids);
         *solids = NULL;
     }
+done:
     free(v.places);
     free(v.solids);
     free(v.meshes);
