@@ -58,12 +58,17 @@ static void count_rows(void *user, size_t begin, size_t end) {
     for (size_t row = begin; row < end; ++row) {
         vshi_tile_row *total = &all->charts->rows[row];
         vshi_row work;
-        const bool over = atomic_load(&all->samples) > all->most_samples;
-        const vsh_result result = over ? VSH_ERROR_LIMIT : vshi_row_open(sorted, row, &work, NULL);
+        if (atomic_load(&all->samples) > all->most_samples) {
+            atomic_store(&all->row_result, VSH_ERROR_LIMIT);
+            continue;
+        }
+        const vsh_result result = vshi_row_open(sorted, row, &work, NULL);
         if (result != VSH_OK) {
             atomic_store(&all->row_result, result);
+            vshi_row_close(&work);
+            continue;
         }
-        for (size_t column = 0; result == VSH_OK && column < work.tiles; ++column) {
+        for (size_t column = 0; column < work.tiles; ++column) {
             if (work.tile_start[column] == work.tile_start[column + 1]) {
                 continue;
             }
@@ -75,9 +80,7 @@ static void count_rows(void *user, size_t begin, size_t end) {
             total->samples += samples;
             total->texels += (size_t)__builtin_popcountll(work.tile.border | work.tile.covered);
         }
-        if (!over) {
-            vshi_row_close(&work);
-        }
+        vshi_row_close(&work);
         atomic_fetch_add(&all->samples, total->samples);
     }
 }
@@ -135,8 +138,10 @@ static void count_owners(void *user, size_t begin, size_t end) {
         const vsh_result result = vshi_row_open(sorted, row, &work, NULL);
         if (result != VSH_OK) {
             atomic_store(&all->row_result, result);
+            vshi_row_close(&work);
+            continue;
         }
-        for (size_t column = 0; result == VSH_OK && column < work.tiles; ++column) {
+        for (size_t column = 0; column < work.tiles; ++column) {
             if (work.tile_start[column] != work.tile_start[column + 1]) {
                 vshi_row_tile(sorted, &work, column, &all->overlaps);
             }

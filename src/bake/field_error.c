@@ -259,8 +259,9 @@ vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
     h.truth.sampler = sampler;
     const vsh_result result = over_samples(share, hold, &h, run, error);
     vshi_sampler_free(sampler);
+    VSHI_TRY(result);
     double held = 0.0, square = 0.0;
-    for (size_t k = 0; result == VSH_OK && k < share->count; ++k) {
+    for (size_t k = 0; k < share->count; ++k) {
         if (!isnan(share->square[k])) {
             const double weight = share->samples[k].weight;
             held += weight;
@@ -269,7 +270,7 @@ vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
     }
     sum->held += held;
     sum->held_square_error += square;
-    return result;
+    return VSH_OK;
 }
 
 double vsh_bake_error_rmse(const vsh_bake_error *e) {

@@ -1,6 +1,7 @@
 #include "bake/fill.h"
 
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -55,13 +56,8 @@ vsh_result vshi_fill_begin(vshi_fill *fill, const vshi_solid *solid, const vsh_v
         fill->first_step[square] = s;
     }
     fill->distance_error = DISTANCE_ERROR * solid->voxel_size;
-    vsh_result result =
-        vshi_allocate((void **)&fill->shaded, fill->block_count, sizeof *fill->shaded, "volume", error);
-    if (result == VSH_OK) {
-        result =
-            vshi_allocate((void **)&fill->filled, fill->block_count, sizeof *fill->filled, "volume", error);
-    }
-    return result;
+    VSHI_TRY(vshi_allocate((void **)&fill->shaded, fill->block_count, sizeof *fill->shaded, "volume", error));
+    return vshi_allocate((void **)&fill->filled, fill->block_count, sizeof *fill->filled, "volume", error);
 }
 
 void vshi_fill_end(vshi_fill *fill) {

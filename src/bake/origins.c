@@ -190,17 +190,19 @@ static vsh_result keep_needed(const lifting *l, vshi_origins_keep *keep, void *u
     uint8_t *needed = NULL;
     VSHI_TRY(vshi_allocate((void **)&needed, rows, 1, "lightmap rows", error));
     memset(needed, 1, rows);
-    const vsh_result result = keep(user, origins, needed, error);
-    for (size_t row = 0; result == VSH_OK && row < rows; ++row) {
+    vsh_result result;
+    VSHI_TRY_DONE(keep(user, origins, needed, error));
+    for (size_t row = 0; row < rows; ++row) {
         if (!needed[row]) {
             const size_t first = texels->row_start[row];
             memset(origins->valid + first, 0, texels->row_start[row + 1] - first);
         }
     }
-    free(needed);
-    for (size_t i = 0; result == VSH_OK && i < texels->count; ++i) {
+    for (size_t i = 0; i < texels->count; ++i) {
         origins->before[i / VSHI_ORIGIN_BLOCK] += origins->valid[i];
     }
+done:
+    free(needed);
     return result;
 }
 

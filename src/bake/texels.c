@@ -124,13 +124,15 @@ static void write_rows(void *user, size_t begin, size_t end) {
         const vsh_result result = vshi_row_open(sorted, all->first + row, &work, NULL);
         if (result != VSH_OK) {
             atomic_store(&all->row_result, result);
+            vshi_row_close(&work);
+            continue;
         }
         writer w = {.all = all,
                     .work = &work,
                     .box = &all->boxes[row],
                     .next = all->texels != NULL ? all->texels->row_start[row] : 0};
         *w.box = (box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-        for (size_t column = 0; result == VSH_OK && column < work.tiles; ++column) {
+        for (size_t column = 0; column < work.tiles; ++column) {
             if (work.tile_start[column] != work.tile_start[column + 1]) {
                 vshi_row_tile(sorted, &work, column, NULL);
                 write_tile(&w);
@@ -178,16 +180,13 @@ vsh_result vsh_charts_bounds(const vsh_charts *charts, const vsh_run *run, doubl
     VSHI_NEEDS(bounds_min);
     VSHI_NEEDS(bounds_max);
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
     creation all = {.charts = charts};
     const size_t rows = charts->sorted.rows;
-    result = rasterise(&all, rows, &full, error);
-    if (result == VSH_OK) {
-        join(all.boxes, 0, rows, bounds_min, bounds_max);
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(rasterise(&all, rows, &full, error));
+    join(all.boxes, 0, rows, bounds_min, bounds_max);
+done:
     free(all.boxes);
     return result;
 }
@@ -226,11 +225,11 @@ static vsh_result make_band(const vsh_charts *charts, const vsh_run *run, vsh_te
     texels->info.bytes = sizeof *texels + texels->count * sample + (rows + 1) * sizeof *texels->row_start;
     creation all = {.charts = charts, .first = band->held_begin, .texels = texels};
     VSHI_TRY(take_samples(texels, charts->tangents, error));
-    const vsh_result result = rasterise(&all, rows, run, error);
-    if (result == VSH_OK) {
-        join(all.boxes, band->own_begin - band->held_begin, band->own_end - band->held_begin,
-             texels->info.bounds_min, texels->info.bounds_max);
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(rasterise(&all, rows, run, error));
+    join(all.boxes, band->own_begin - band->held_begin, band->own_end - band->held_begin,
+         texels->info.bounds_min, texels->info.bounds_max);
+done:
     free(all.boxes);
     return result;
 }

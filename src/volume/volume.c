@@ -3,6 +3,7 @@
 #include "base/memory.h"
 #include "base/names.h"
 #include "base/parallel.h"
+#include "base/try.h"
 #include "shade/layers.h"
 #include "volume/channels.h"
 #include "volume/volume_blocks.h"
@@ -49,18 +50,19 @@ static vsh_result run_passes(vshi_volume_bake *bake, const vsh_run *run, vsh_err
     static vshi_range_fn *const passes[] = {vshi_volume_shade_blocks, fill_blocks, settle_blocks};
     static const size_t units[] = {SHADE_UNITS, FILL_UNITS, 0};
     vshi_job *job = vshi_job_begin(run, "volume", (SHADE_UNITS + FILL_UNITS) * bake->block_count);
-    vsh_result result = VSH_OK;
     if (job == NULL) {
-        atomic_store(&bake->out_of_memory, true);
+        return vshi_fail(error, VSH_ERROR_MEMORY, "volume: the system refused memory");
     }
-    for (size_t i = 0; i < sizeof units / sizeof units[0] && result == VSH_OK && job != NULL; ++i) {
-        result =
-            vshi_parallel_for(job, bake->block_count, VSHI_VOLUME_GRAIN, units[i], passes[i], bake, error);
+    vsh_result result;
+    for (size_t i = 0; i < sizeof units / sizeof units[0]; ++i) {
+        VSHI_TRY_DONE(
+            vshi_parallel_for(job, bake->block_count, VSHI_VOLUME_GRAIN, units[i], passes[i], bake, error));
     }
-    vshi_job_end(job);
-    if (result == VSH_OK && atomic_load(&bake->out_of_memory)) {
+    if (atomic_load(&bake->out_of_memory)) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "volume: the system refused memory");
     }
+done:
+    vshi_job_end(job);
     return result;
 }
 
@@ -81,11 +83,7 @@ static void find_half_axes(vshi_volume_bake *bake) {
 static vsh_result begin_volume(vshi_volume_bake *bake, const vsh_light *lights, const vsh_run *run,
                                vsh_error *error) {
     vshi_channel *channels = NULL;
-    vsh_result result =
-        vshi_allocate((void **)&channels, bake->channel_count, sizeof *channels, "volume", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&channels, bake->channel_count, sizeof *channels, "volume", error));
     const vsh_occluders *casters = bake->occluders;
     vsh_field_info info;
     vsh_field_get_info(casters->field, &info);
@@ -100,7 +98,8 @@ static vsh_result begin_volume(vshi_volume_bake *bake, const vsh_light *lights, 
     const double held = (double)info.bytes + layers +
                         2.0 * (double)bake->block_count * sizeof *bake->fill.shaded +
                         (casters->triangles != NULL ? (double)vsh_triangles_bytes(casters->triangles) : 0.0);
-    result = vshi_volume_begin(bake->voxels, channels, bake->channel_count, run, held, &bake->volume, error);
+    const vsh_result result =
+        vshi_volume_begin(bake->voxels, channels, bake->channel_count, run, held, &bake->volume, error);
     free(channels);
     return result;
 }
@@ -112,22 +111,16 @@ static vsh_result bake_all(vshi_volume_bake *bake, const vsh_light *lights, cons
         shade.ao_method = VSH_AO_CONES; /* not asked for: it may want what is not there */
     }
     const bool around = !bake->normals && bake->options.ao != 0; /* AO over all directions */
-    vsh_result result =
-        vshi_query_create(bake->occluders, lights, bake->light_count, &shade, around, &bake->query, error);
-    if (result == VSH_OK) {
-        result = begin_volume(bake, lights, run, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_fill_begin(&bake->fill, &bake->solid, bake->voxels, bake->volume, bake->channel_count,
-                                 bake->options.inside == VSH_INSIDE_NEAREST, error);
-    }
-    if (result == VSH_OK) {
-        result = run_passes(bake, run, error);
-    }
-    if (result == VSH_OK) {
-        const vsh_volume_info counts = vshi_fill_counts(&bake->fill);
-        result = vshi_volume_close(bake->volume, &counts, error);
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(
+        vshi_query_create(bake->occluders, lights, bake->light_count, &shade, around, &bake->query, error));
+    VSHI_TRY_DONE(begin_volume(bake, lights, run, error));
+    VSHI_TRY_DONE(vshi_fill_begin(&bake->fill, &bake->solid, bake->voxels, bake->volume, bake->channel_count,
+                                  bake->options.inside == VSH_INSIDE_NEAREST, error));
+    VSHI_TRY_DONE(run_passes(bake, run, error));
+    const vsh_volume_info counts = vshi_fill_counts(&bake->fill);
+    result = vshi_volume_close(bake->volume, &counts, error);
+done:
     vshi_fill_end(&bake->fill);
     vsh_query_free(bake->query);
     return result;
@@ -180,34 +173,23 @@ vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *vox
                              .one = vsh_run_default(),
                              .lock = PTHREAD_MUTEX_INITIALIZER,
                              .stats = vsh_shade_stats_zero()};
-    vsh_result result =
-        vshi_options_resolve(options, &bake.options, sizeof bake.options, "vsh_volume_options", error);
-    if (result == VSH_OK) {
-        vsh_shade_options shade;
-        result = vshi_shade_options_resolve(&bake.options.shade, &shade, error);
-        bake.options.shade = shade;
-    }
-    if (result == VSH_OK) {
-        result = vshi_run_resolve(run, &full, error);
-    }
-    if (result == VSH_OK) {
-        result = check(lights, &bake, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    vsh_shade_options shade;
+    VSHI_TRY(vshi_options_resolve(options, &bake.options, sizeof bake.options, "vsh_volume_options", error));
+    VSHI_TRY(vshi_shade_options_resolve(&bake.options.shade, &shade, error));
+    bake.options.shade = shade;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(check(lights, &bake, error));
     vsh_voxels_info info;
     vsh_voxels_get_info(voxels, &info);
-    const vsh_shade_options *shade = &bake.options.shade;
     bake.normals = info.has_normals != 0;
     bake.blocks = vshi_voxels_blocks(voxels, &bake.block_count);
-    bake.shadow_error = bake.options.error != 0 && light_count > 0 && vshi_shadow_has_rays(shade);
-    bake.ao_error = bake.options.error != 0 && bake.options.ao != 0 && vshi_ao_has_rays(shade);
+    bake.shadow_error = bake.options.error != 0 && light_count > 0 && vshi_shadow_has_rays(&shade);
+    bake.ao_error = bake.options.error != 0 && bake.options.ao != 0 && vshi_ao_has_rays(&shade);
     bake.channel_count = light_count * (bake.shadow_error ? 2 : 1) + (bake.options.ao != 0) + bake.ao_error;
     bake.one.threads = 1;
     bake.one.isa = full.isa;
     find_half_axes(&bake);
-    result = bake_all(&bake, lights, &full, error);
+    const vsh_result result = bake_all(&bake, lights, &full, error);
     if (stats != NULL) {
         vshi_shade_stats_add(stats, &bake.stats);
     }
