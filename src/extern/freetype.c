@@ -1,6 +1,7 @@
 #include "extern/freetype.h"
 
 #include "base/input.h"
+#include "base/try.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -33,19 +34,14 @@ static vsh_result fail(vsh_error *error, const char *path, FT_Error code) {
 static vsh_result check_file(const char *path, vsh_error *error) {
     FILE *file;
     uint64_t size;
-    const vsh_result result = vshi_input_open(path, path, UINT64_MAX, &file, &size, error);
-    if (result == VSH_OK) {
-        fclose(file);
-    }
-    return result;
+    VSHI_TRY(vshi_input_open(path, path, UINT64_MAX, &file, &size, error));
+    fclose(file);
+    return VSH_OK;
 }
 
 vsh_result vshi_font_open(const char *path, vshi_font **font, vsh_error *error) {
     *font = NULL;
-    vsh_result result = check_file(path, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(check_file(path, error));
     vshi_font *opened = calloc(1, sizeof *opened);
     if (opened == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
@@ -55,6 +51,7 @@ vsh_result vshi_font_open(const char *path, vshi_font **font, vsh_error *error) 
     if (code == 0) {
         code = FT_New_Face(opened->library, path, 0, &opened->face);
     }
+    vsh_result result = VSH_OK;
     if (code != 0) {
         result = fail(error, path, code);
     } else if (!FT_IS_SCALABLE(opened->face) || opened->face->units_per_EM == 0) {

@@ -16,6 +16,13 @@ struct Failure {
     vsh_result code;
 };
 
+// Throws what a call came to, unless that is VSH_OK.
+inline void require(vsh_result result) {
+    if (result != VSH_OK) {
+        throw Failure{result};
+    }
+}
+
 // Runs body() and returns its vsh_result; exceptions become VSH_ERROR_MEMORY or `code`, prefixed by `what`.
 template <typename Body>
 vsh_result guard(vsh_error *error, vsh_result code, const char *what, Body &&body) noexcept {

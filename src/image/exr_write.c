@@ -2,6 +2,7 @@
 
 #include "base/file.h"
 #include "base/memory.h"
+#include "base/try.h"
 
 #include <Imath/half.h>
 #include <openexr.h>
@@ -171,12 +172,9 @@ vsh_result vshi_exr_begin(const char *temporary, const char *path, const vshi_pl
                          "%s: %d pixels of %d channels in a row are more than OpenEXR's 2 GiB a chunk", path,
                          planes->width, planes->count);
     }
-    void *memory = NULL;
-    vsh_result result = vshi_allocate(&memory, 1, sizeof(vshi_exr_writer), path, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    vshi_exr_writer *writer = memory;
+    vshi_exr_writer *writer;
+    vsh_result result;
+    VSHI_TRY(vshi_allocate((void **)&writer, 1, sizeof *writer, path, error));
     writer->sink = vshi_sink_open(temporary);
     writer->path = path;
     writer->width = planes->width;
@@ -193,18 +191,15 @@ vsh_result vshi_exr_begin(const char *temporary, const char *path, const vshi_pl
     if (writer->status == EXR_ERR_SUCCESS) {
         writer->status = write_header(writer, planes);
     }
-    result = result_of(writer, error);
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory, (size_t)planes->count * (size_t)writer->lines * (size_t)planes->width,
-                               value_size, path, error);
-        writer->chunk = memory;
-    }
-    if (result != VSH_OK) {
-        vshi_exr_end(writer, NULL);
-        return result;
-    }
+    VSHI_TRY_DONE(result_of(writer, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&writer->chunk,
+                                (size_t)planes->count * (size_t)writer->lines * (size_t)planes->width,
+                                value_size, path, error));
     *made = writer;
-    return VSH_OK;
+    writer = NULL;
+done:
+    vshi_exr_end(writer, NULL);
+    return result;
 }
 
 vsh_result vshi_exr_add(vshi_exr_writer *writer, const vshi_planes *planes, int32_t rows, vsh_error *error) {

@@ -10,10 +10,7 @@ vsh_result vshi_serve_image(const char *path, vshi_decoder *request, const vsh_r
                             vshi_encoder *payload, vsh_error *error) {
     (void)request;
     vsh_image_file *file = NULL;
-    const vsh_result result = vsh_image_read(path, run, &file, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vsh_image_read(path, run, &file, error));
     vshi_encode_count(payload, (uint64_t)file->width);
     vshi_encode_count(payload, (uint64_t)file->height);
     vshi_encode_count(payload, (uint64_t)file->channel_count);

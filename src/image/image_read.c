@@ -21,10 +21,7 @@ static vsh_result find_reader(const char *path, read_fn **reader, vsh_error *err
     unsigned char start[4] = {0};
     FILE *file;
     uint64_t size;
-    const vsh_result result = vshi_input_open(path, path, UINT64_MAX, &file, &size, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_input_open(path, path, UINT64_MAX, &file, &size, error));
     const size_t count = fread(start, 1, sizeof start, file);
     const bool failed = ferror(file) != 0;
     fclose(file);

@@ -169,10 +169,10 @@ vsh_result vsh_image_writer_finish(vsh_image_writer *writer, vsh_error *error) {
         vsh_image_writer_abandon(writer);
         return result;
     }
-    vsh_result result = close_file(writer, error);
-    if (result == VSH_OK) {
-        result = vshi_output_commit(&writer->output, error);
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(close_file(writer, error));
+    result = vshi_output_commit(&writer->output, error);
+done:
     free_writer(writer);
     return result;
 }

@@ -56,12 +56,8 @@ static vsh_result read_header(png_reader *reader) {
                          channels, reader->bits);
     }
     const png_uint_32 height = png_get_image_height(reader->png, reader->info);
-    const vsh_result result =
-        vshi_image_file_new(reader->path, reader->run, png_get_image_width(reader->png, reader->info), height,
-                            channels, &reader->image, reader->error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_image_file_new(reader->path, reader->run, png_get_image_width(reader->png, reader->info),
+                                 height, channels, &reader->image, reader->error));
     for (int c = 0; c < channels; ++c) {
         vshi_image_file_name(reader->image, c, names[channels - 1][c]);
     }

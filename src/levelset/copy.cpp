@@ -1,4 +1,5 @@
 // A dense copy of a grid of a file: its values, and which of them are active.
+#include "base/try.h"
 #include "levelset/file.h"
 #include "levelset/serve.h"
 
@@ -86,18 +87,13 @@ void copy_there(const Wanted &wanted, const vsh_run &run, float *values, float *
     }
     const auto request = std::make_unique<vshi_exchange>();
     vshi_answer answer;
-    vsh_result result = vshi_exchange_begin(request.get(), VSHI_READ_COPY, wanted.path, &run, error);
-    if (result == VSH_OK) {
-        vshi_encode_text(&request->encoder, wanted.name);
-        vshi_encode_array(&request->encoder, wanted.low, 3, sizeof wanted.low[0]);
-        vshi_encode_array(&request->encoder, wanted.size, 3, sizeof wanted.size[0]);
-        vshi_encode_count(&request->encoder, values != nullptr);
-        vshi_encode_count(&request->encoder, active != nullptr);
-        result = vshi_exchange_send_job(request.get(), job.get(), 1, &answer, error);
-    }
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
+    require(vshi_exchange_begin(request.get(), VSHI_READ_COPY, wanted.path, &run, error));
+    vshi_encode_text(&request->encoder, wanted.name);
+    vshi_encode_array(&request->encoder, wanted.low, 3, sizeof wanted.low[0]);
+    vshi_encode_array(&request->encoder, wanted.size, 3, sizeof wanted.size[0]);
+    vshi_encode_count(&request->encoder, values != nullptr);
+    vshi_encode_count(&request->encoder, active != nullptr);
+    require(vshi_exchange_send_job(request.get(), job.get(), 1, &answer, error));
     const std::unique_ptr<vshi_answer, void (*)(vshi_answer *)> owner(&answer, vshi_answer_free);
     const size_t count = count_of(wanted);
     for (float *to : {values, active}) {
@@ -127,13 +123,9 @@ vsh_result vshi_serve_copy(const char *path, vshi_decoder *request, const vsh_ru
             }
         }
         const bool has[2] = {vshi_decode_count(request, 1) != 0, vshi_decode_count(request, 1) != 0};
-        const vsh_result result =
-            vshi_decoder_ends(request)
-                ? vshi::check(wanted, error)
-                : vshi_fail(error, VSH_ERROR_INTERNAL, "%s: the request to its reader does not hold", path);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vshi_decoder_ends(request) ? vshi::check(wanted, error)
+                                            : vshi_fail(error, VSH_ERROR_INTERNAL,
+                                                        "%s: the request to its reader does not hold", path));
         std::vector<float> arrays[2];
         for (int i = 0; i < 2; ++i) {
             arrays[i].resize(has[i] ? vshi::count_of(wanted) : 0);
@@ -153,10 +145,7 @@ vsh_result vsh_vdb_copy(const char *path, const char *name, const int32_t index_
     VSHI_NEEDS(index_min);
     VSHI_NEEDS(size);
     vsh_run full;
-    const vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
     return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
         vshi::initialize();
         const vshi::Wanted wanted{

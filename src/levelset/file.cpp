@@ -118,10 +118,7 @@ Reader::Reader(const char *path, const vsh_run &run, vsh_error *error) : size(ch
     setDataCompression(stream);
     streamed = !inputHasGridOffsets();
     if (streamed) { // all of it has to be read: at least as much as the file is long
-        const vsh_result result = check_bytes(&run, double(size), path, error);
-        if (result != VSH_OK) {
-            throw Failure{result};
-        }
+        require(check_bytes(&run, double(size), path, error));
         stream.seekg(0);
         openvdb::io::Stream all(stream, false);
         for (const GridBase::Ptr &one : *all.getGrids()) {
@@ -351,10 +348,7 @@ void refuse_bad(const Named &named, const Finding &finding, vsh_error *error) {
 }
 
 void refuse_large(const Named &named, const vsh_run &run, double bytes, vsh_error *error) {
-    const vsh_result result = check_bytes(&run, bytes, named.text().c_str(), error);
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
+    require(check_bytes(&run, bytes, named.text().c_str(), error));
 }
 
 double shell_of(const GridBase &grid) {

@@ -2,6 +2,7 @@
 #include "levelset/grid.h"
 
 #include "base/parallel.h"
+#include "base/try.h"
 
 #include <cmath>
 #include <cstdio>
@@ -29,11 +30,7 @@ void fail_option(vsh_error *error, const char *name, double value, const char *e
 
 vsh_grid_options resolve(const vsh_grid_options *given, vsh_error *error) {
     vsh_grid_options options = vsh_grid_options_default();
-    const vsh_result result =
-        vshi_options_resolve(given, &options, sizeof options, "vsh_grid_options", error);
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
+    require(vshi_options_resolve(given, &options, sizeof options, "vsh_grid_options", error));
     if (!(options.voxel_size >= 0.0 && std::isfinite(options.voxel_size))) {
         fail_option(error, "voxel_size", options.voxel_size, "more than 0, or 0 for one from the resolution");
     }
@@ -118,23 +115,20 @@ double band_leaves(double area, const Vec3d &sides, double half_width) {
 }
 
 vsh_result check_bytes(const vsh_run *run, double bytes, const char *what, vsh_error *error) {
-    const vsh_result result = vshi_check_limit(run, bytes, what, error);
+    VSHI_TRY(vshi_check_limit(run, bytes, what, error));
     const double machine = double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE));
-    if (result == VSH_OK && machine > 0.0 && bytes > machine) {
+    if (machine > 0.0 && bytes > machine) {
         return vshi_fail(error, VSH_ERROR_LIMIT,
                          "%s: about %.0f MB are needed, over this machine's memory of %.0f MB", what,
                          bytes / 1e6, machine / 1e6);
     }
-    return result;
+    return VSH_OK;
 }
 
 void check_memory(const vsh_run *run, double voxel, double leaves, double bytes, vsh_error *error) {
     char what[128];
     std::snprintf(what, sizeof what, "voxel size %g (about %.3g voxels)", voxel, leaves * double(Leaf::SIZE));
-    const vsh_result result = check_bytes(run, bytes, what, error);
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
+    require(check_bytes(run, bytes, what, error));
 }
 
 // Of an arena. TBB prints a warning where one asks for more threads than the machine has cores.

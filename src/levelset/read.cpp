@@ -1,4 +1,5 @@
 // vsh_grid_read() and vsh_vdb_list(): a file's content, from this process or from a reader, looked over.
+#include "base/try.h"
 #include "levelset/examine.h"
 #include "levelset/file.h"
 #include "levelset/message.h"
@@ -60,15 +61,10 @@ class Answer {
     vshi_decoder *ask(int32_t kind, const char *path, const char *name, uint64_t number, Stage &stage,
                       vsh_error *error) {
         const auto request = std::make_unique<vshi_exchange>();
-        vsh_result result = vshi_exchange_begin(request.get(), kind, path, &stage.options, error);
-        if (result == VSH_OK) {
-            vshi_encode_text(&request->encoder, name);
-            vshi_encode_count(&request->encoder, number);
-            result = vshi_exchange_send(request.get(), poll_stage, &stage, &answer, error);
-        }
-        if (result != VSH_OK) {
-            throw Failure{result};
-        }
+        require(vshi_exchange_begin(request.get(), kind, path, &stage.options, error));
+        vshi_encode_text(&request->encoder, name);
+        vshi_encode_count(&request->encoder, number);
+        require(vshi_exchange_send(request.get(), poll_stage, &stage, &answer, error));
         return &answer.payload;
     }
 
@@ -146,8 +142,8 @@ vsh_result list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, si
 template <typename Body>
 vsh_result call(const vsh_run *run, const char *path, vsh_error *error, Body &&body) {
     vsh_run full;
-    const vsh_result result = vshi_run_resolve(run, &full, error);
-    return result == VSH_OK ? guard(error, VSH_ERROR_READ, path, [&] { return body(full); }) : result;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    return guard(error, VSH_ERROR_READ, path, [&] { return body(full); });
 }
 
 // What follows the path in every request of this file.

@@ -1,5 +1,6 @@
 // The union of grids: those on the new lattice are shifted by whole voxels, others are meshed, moved and
 // measured again; then each voxel takes the least value of all.
+#include "base/try.h"
 #include "levelset/redistance.h"
 #include "levelset/tiles.h"
 
@@ -125,11 +126,7 @@ void grow_bounds(const Placed &placed, Vec3d &low, Vec3d &high) {
 // at least this one is taken as it is.
 Lattice choose_lattice(const std::vector<Placed> &placed, const vsh_grid_options *given, vsh_error *error) {
     vsh_grid_options options = vsh_grid_options_default();
-    const vsh_result result =
-        vshi_options_resolve(given, &options, sizeof options, "vsh_grid_options", error);
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
+    require(vshi_options_resolve(given, &options, sizeof options, "vsh_grid_options", error));
     Vec3d low(std::numeric_limits<double>::max());
     Vec3d high(-low);
     double finest = placed[0].voxel;
@@ -291,10 +288,7 @@ bool stands_as_it_is(const vsh_grid_instance &instance) {
 vsh_result unite(const vsh_grid_instance *instances, size_t count, const vsh_grid_options *options,
                  const vsh_run *given, vsh_grid **grid, vsh_error *error) {
     vsh_run run;
-    const vsh_result result = vshi_run_resolve(given, &run, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_run_resolve(given, &run, error));
     if (instances == nullptr || count == 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "unite: no grids");
     }

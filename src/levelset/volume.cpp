@@ -1,5 +1,6 @@
 // The grids of a volume: leaves that are filled block by block, and the trees made of them.
 #include "base/attributes.h"
+#include "base/try.h"
 #include "levelset/file.h"
 #include "levelset/voxels.h"
 
@@ -94,10 +95,7 @@ vsh_result begin(const vsh_voxels &voxels, const vshi_channel *channels, size_t 
         held + double(voxels.info.bytes) + blocks * double(count) * (BYTES_PER_LEAF + double(sizeof(Slot)));
     const std::string what = std::to_string(count) + (count > 1 ? " grids" : " grid") + " of " +
                              std::to_string(voxels.info.count) + " voxels";
-    const vsh_result result = check_bytes(&run, bytes, what.c_str(), error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(check_bytes(&run, bytes, what.c_str(), error));
     auto made = std::make_unique<vsh_volume>();
     made->set = voxels.set;
     made->channels = std::vector<Channel>(count);
@@ -239,13 +237,8 @@ vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t 
     VSHI_NEEDS(volume);
     return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
         vshi::initialize();
-        vsh_result result = vshi_attributes_check(path, attributes, attribute_count, error);
-        if (result == VSH_OK) {
-            result = vshi::check_writable(path, volume->set->least_axis, error);
-        }
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vshi_attributes_check(path, attributes, attribute_count, error));
+        VSHI_TRY(vshi::check_writable(path, volume->set->least_axis, error));
         openvdb::GridCPtrVec grids;
         for (const vshi::Channel &channel : volume->channels) {
             const vshi::FloatGrid::Ptr grid = vshi::to_grid(channel, *volume->set, as_half != 0);

@@ -1,6 +1,7 @@
 // Which voxels of which lattice are shaded: a level set's band, a box, another grid's active voxels.
 #include "levelset/voxels.h"
 
+#include "base/try.h"
 #include "levelset/file.h"
 #include "levelset/serve.h"
 
@@ -18,10 +19,7 @@ constexpr double ROUNDING = 1e-6; // voxels: a side so much longer takes no voxe
 constexpr double BAND_ROUNDING = 1e-6; // of a band's width: the background is a float
 
 void check_blocks(const vsh_run &run, double count, const char *what, vsh_error *error) {
-    const vsh_result result = check_bytes(&run, count * double(sizeof(vshi_block)), what, error);
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
+    require(check_bytes(&run, count * double(sizeof(vshi_block)), what, error));
 }
 
 Vec3d centre_of(const VoxelSet &set, const int32_t index[3]) {
@@ -203,11 +201,7 @@ vsh_voxels *from_box(const double low[3], const double high[3], double voxel, co
     char what[96];
     std::snprintf(what, sizeof what, "box of %d x %d x %d voxels", size[0], size[1], size[2]);
     // with the values of one grid at least: what follows would be refused for it
-    const vsh_result result =
-        check_bytes(&run, blocks * (double(sizeof(vshi_block)) + BYTES_PER_LEAF), what, error);
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
+    require(check_bytes(&run, blocks * (double(sizeof(vshi_block)) + BYTES_PER_LEAF), what, error));
     VoxelSet set;
     set.transform = openvdb::math::Transform::createLinearTransform(voxel);
     set.transform->postTranslate(Vec3d(low[0], low[1], low[2]) + Vec3d(0.5 * voxel));
@@ -286,14 +280,9 @@ VoxelSet ask_voxels(const char *path, const char *name, vshi_job *job, const vsh
                     vsh_error *error) {
     const auto request = std::make_unique<vshi_exchange>();
     vshi_answer answer;
-    vsh_result result = vshi_exchange_begin(request.get(), VSHI_READ_VOXELS, path, &run, error);
-    if (result == VSH_OK) {
-        vshi_encode_text(&request->encoder, name);
-        result = vshi_exchange_send_job(request.get(), job, 1, &answer, error);
-    }
-    if (result != VSH_OK) {
-        throw Failure{result};
-    }
+    require(vshi_exchange_begin(request.get(), VSHI_READ_VOXELS, path, &run, error));
+    vshi_encode_text(&request->encoder, name);
+    require(vshi_exchange_send_job(request.get(), job, 1, &answer, error));
     const std::unique_ptr<vshi_answer, void (*)(vshi_answer *)> owner(&answer, vshi_answer_free);
     VoxelSet set;
     set.blocks = take_blocks(&answer.payload, path, grid, set.transform, error);
@@ -331,10 +320,7 @@ vsh_result call(const vsh_run *run, vsh_result code, const char *what, vsh_voxel
                 Make &&make) {
     *voxels = nullptr;
     vsh_run full;
-    const vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
     return guard(error, code, what, [&]() -> vsh_result {
         initialize();
         *voxels = make(full);

@@ -1,6 +1,7 @@
 // Writing .vdb files: whole, or not at all, and the same bytes for the same grids.
 #include "base/attributes.h"
 #include "base/file.h"
+#include "base/try.h"
 #include "levelset/file.h"
 
 #include <cstdio>
@@ -149,10 +150,7 @@ vsh_result check_writable(const char *path, double voxel_size, vsh_error *error)
 
 vsh_result write_grids(const openvdb::GridCPtrVec &grids, const char *path, vsh_error *error) {
     Output output;
-    const vsh_result result = vshi_output_begin(&output.file, path, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_output_begin(&output.file, path, error));
     ContentHash hash;
     for (const openvdb::GridBase::ConstPtr &grid : grids) {
         hash.add(openvdb::gridConstPtrCast<FloatGrid>(grid)->tree());
@@ -203,13 +201,8 @@ vsh_result vsh_grid_write(const vsh_grid *grid, const char *path, const char *na
     VSHI_NEEDS(grid);
     return vshi::guard(error, VSH_ERROR_WRITE, path, [&] {
         vshi::initialize();
-        vsh_result result = vshi_attributes_check(path, attributes, attribute_count, error);
-        if (result == VSH_OK) {
-            result = vshi::check_writable(path, grid->info.voxel_size, error);
-        }
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vshi_attributes_check(path, attributes, attribute_count, error));
+        VSHI_TRY(vshi::check_writable(path, grid->info.voxel_size, error));
         const openvdb::FloatGrid::Ptr named = vshi::named_surface(*grid, name != nullptr ? name : "surface");
         vshi::put_attributes(*named, attributes, attribute_count);
         return vshi::write_grids({named}, path, error);

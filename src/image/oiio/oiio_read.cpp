@@ -1,6 +1,7 @@
 // Reading every image format but OpenEXR and PNG.
 #include "image/oiio/oiio_formats.h"
 
+#include "base/try.h"
 #include "extern/guard.h"
 
 #include <OpenImageIO/imageio.h>
@@ -111,25 +112,17 @@ vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file **file
                          spec.x, spec.y, spec.z);
     }
     vsh_image_file *image = nullptr;
-    vsh_result result =
-        vshi_image_file_new(path, run, spec.width, spec.height, spec.nchannels, &image, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_image_file_new(path, run, spec.width, spec.height, spec.nchannels, &image, error));
     std::unique_ptr<vsh_image_file, void (*)(vsh_image_file *)> owner(image, vsh_image_free);
     for (int32_t c = 0; c < image->channel_count; ++c) {
         vshi_image_file_name(image, c, std::string(spec.channel_name(c)).c_str());
     }
     vshi_job *begun = nullptr;
-    result = vshi_image_job(path, run, image->height, &begun, error);
+    VSHI_TRY(vshi_image_job(path, run, image->height, &begun, error));
     const std::unique_ptr<vshi_job, void (*)(vshi_job *)> job(begun, vshi_job_end);
-    if (result == VSH_OK) {
-        result = read_rows(*input, path, *image, job.get(), error);
-    }
-    if (result == VSH_OK) {
-        *file = owner.release();
-    }
-    return result;
+    VSHI_TRY(read_rows(*input, path, *image, job.get(), error));
+    *file = owner.release();
+    return VSH_OK;
 }
 
 } // namespace

@@ -4,6 +4,7 @@
 #include "image/oiio/oiio_verify.h"
 
 #include "base/file.h"
+#include "base/try.h"
 #include "extern/guard.h"
 
 #include <OpenImageIO/filesystem.h>
@@ -241,10 +242,7 @@ template <typename Value> class Writer final : public vshi_oiio_writer {
             y += count;
             filled_ += count;
             if (filled_ == step_ || row_ + filled_ == shape.height) {
-                const vsh_result result = flush(error);
-                if (result != VSH_OK) {
-                    return result;
-                }
+                VSHI_TRY(flush(error));
             }
         }
         return VSH_OK;
@@ -323,11 +321,9 @@ vsh_result vshi_oiio_begin(const char *temporary, const char *path, const vshi_f
                            vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_WRITE, path, [&]() -> vsh_result {
         auto made = vshi::make_writer(temporary, path, *format, *planes, bits);
-        const vsh_result result = made->open(error);
-        if (result == VSH_OK) {
-            *writer = made.release();
-        }
-        return result;
+        VSHI_TRY(made->open(error));
+        *writer = made.release();
+        return VSH_OK;
     });
 }
 
