@@ -9,6 +9,7 @@
  * come askew, and whatever shows of their order. */
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 #include "field/derive.h"
 
 #include <math.h>
@@ -319,13 +320,9 @@ vsh_result vshi_feet_spread(vshi_derivation *d, vshi_job *job, vsh_error *error)
     const size_t count = d->blocks.count;
     place *order = NULL;
     size_t *groups = NULL, first[TURNS + 1] = {0}, group_count = 0;
-    vsh_result result = vshi_allocate((void **)&order, count, sizeof *order, "field blocks", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&groups, count + 1, sizeof *groups, "field blocks", error);
-    }
-    if (result != VSH_OK) {
-        goto done;
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&order, count, sizeof *order, "field blocks", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&groups, count + 1, sizeof *groups, "field blocks", error));
     for (size_t block = 0; block < count; ++block) {
         order[block] = (place){place_key(d, block), block};
     }
@@ -345,12 +342,12 @@ vsh_result vshi_feet_spread(vshi_derivation *d, vshi_job *job, vsh_error *error)
     int32_t number = 1, begun = 0;
     for (int all = 0; all < 2; ++all) {
         bool changed = count > 0;
-        for (int round = 0; round < (all ? POLISHES : SWEEPS) && changed && result == VSH_OK; ++round) {
+        for (int round = 0; round < (all ? POLISHES : SWEEPS) && changed; ++round) {
             const int32_t start = number * GROUP_BLOCKS;
             begun = round > 0 ? begun : start - 1;
-            for (int p = 0; p < TURNS && result == VSH_OK; ++p) {
+            for (int p = 0; p < TURNS; ++p) {
                 turn t = {d, order, groups + first[p], number++, all != 0 ? begun : -1, all != 0};
-                result = vshi_parallel_for(job, first[p + 1] - first[p], 1, 0, take_turn, &t, error);
+                VSHI_TRY_DONE(vshi_parallel_for(job, first[p + 1] - first[p], 1, 0, take_turn, &t, error));
             }
             changed = false;
             for (size_t block = 0; block < count; ++block) {

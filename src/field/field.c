@@ -2,6 +2,7 @@
 
 #include "base/floats.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "field/level.h"
 
 #include <math.h>
@@ -56,6 +57,36 @@ static bool find_bounds(vsh_field *field, const vshi_below *finest) {
     return low[0] <= high[0];
 }
 
+/* The finest level, of the grid's own voxels. */
+static vsh_result read_finest(const vsh_grid *grid, const vsh_grid_info *info, vsh_field *f,
+                              const vsh_run *run, vshi_job *job, vshi_below *below, vsh_error *error) {
+    const float band = (float)fmin(info->half_width, VSHI_COARSE_BAND);
+    vshi_budget budget = {run, (double)info->bytes};
+    vshi_blocks blocks = {.map = NULL};
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_level_blocks_read(grid, band, budget, job, &blocks, error));
+    budget.held += (double)blocks.count * 512.0 * sizeof *blocks.values;
+    result = vshi_level_append(f, &blocks, budget, job, below, error);
+done:
+    vshi_level_blocks_free(&blocks);
+    return result;
+}
+
+/* Coarser levels, up to one that reaches so many finest voxels. `held`: bytes beside the field. */
+static vsh_result derive_levels(vsh_field *f, double reach, double held, const vsh_run *run, vshi_job *job,
+                                vshi_below *below, vsh_error *error) {
+    for (size_t units = 30; f->level_count < VSHI_MAX_LEVELS; units /= 2) {
+        if (f->levels[f->level_count - 1].band >= reach) {
+            break;
+        }
+        VSHI_TRY(vshi_level_derive(f, below, (vshi_budget){run, held + vshi_field_bytes(f)}, job, error));
+        if (vshi_job_advance(job, units)) {
+            return vshi_job_fail_cancelled(job, error);
+        }
+    }
+    return VSH_OK;
+}
+
 vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *options, const vsh_run *run,
                             vsh_field **field, vsh_error *error) {
     VSHI_FLOATS;
@@ -64,17 +95,10 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     VSHI_NEEDS(grid);
     vsh_field_options o = vsh_field_options_default();
     vsh_run r;
-    vshi_blocks blocks = {.map = NULL};
     vshi_below below = {.bricks = NULL};
-    vshi_job *job = NULL;
     vsh_field *f = NULL;
-    vsh_result result = vshi_options_resolve(options, &o, sizeof o, "vsh_field_options", error);
-    if (result == VSH_OK) {
-        result = vshi_run_resolve(run, &r, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_options_resolve(options, &o, sizeof o, "vsh_field_options", error));
+    VSHI_TRY(vshi_run_resolve(run, &r, error));
     if (!(o.reach >= 0.0) || isinf(o.reach)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "reach %g: expected a length, 0 or more", o.reach);
     }
@@ -82,14 +106,12 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
     /* levels are progress: each has a quarter of the work of the one below */
-    job = vshi_job_begin(&r, "field", 100);
-    result = vshi_allocate((void **)&f, 1, sizeof *f, "field", error);
-    if (result == VSH_OK && job == NULL) {
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "field: the system refused memory");
+    vshi_job *job = vshi_job_begin(&r, "field", 100);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "field: the system refused memory");
     }
-    if (result != VSH_OK) {
-        goto done;
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&f, 1, sizeof *f, "field", error));
     f->voxel_size = info.voxel_size;
     f->shell_thickness = info.shell_thickness;
     f->active_voxels = info.active_voxels;
@@ -97,17 +119,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     memcpy(f->world_max, info.bounds_max, sizeof f->world_max);
     invert(vshi_grid_transform(grid), info.voxel_size, f->to_field);
 
-    const float band = (float)fmin(info.half_width, VSHI_COARSE_BAND);
-    vshi_budget budget = {&r, (double)info.bytes};
-    result = vshi_level_blocks_read(grid, band, budget, job, &blocks, error);
-    if (result == VSH_OK) {
-        budget.held += (double)blocks.count * 512.0 * sizeof *blocks.values;
-        result = vshi_level_append(f, &blocks, budget, job, &below, error);
-    }
-    vshi_level_blocks_free(&blocks);
-    if (result != VSH_OK) {
-        goto done;
-    }
+    VSHI_TRY_DONE(read_finest(grid, &info, f, &r, job, &below, error));
     if (!find_bounds(f, &below)) {
         result = vshi_fail(error, VSH_ERROR_INPUT, "field: the level set has no surface");
         goto done;
@@ -119,21 +131,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     }
     const double reach = o.reach > 0.0 ? o.reach / f->voxel_size : DEFAULT_REACH * sqrt(diagonal);
     vshi_job_advance(job, 40);
-    for (size_t units = 30; f->level_count < VSHI_MAX_LEVELS; units /= 2) {
-        const vshi_level *top = &f->levels[f->level_count - 1];
-        if (top->band >= reach) {
-            break;
-        }
-        budget.held = (double)info.bytes + vshi_field_bytes(f);
-        result = vshi_level_derive(f, &below, budget, job, error);
-        if (result != VSH_OK) {
-            goto done;
-        }
-        if (vshi_job_advance(job, units)) {
-            result = vshi_job_fail_cancelled(job, error);
-            goto done;
-        }
-    }
+    VSHI_TRY_DONE(derive_levels(f, reach, (double)info.bytes, &r, job, &below, error));
     *field = f;
     f = NULL;
 done:
@@ -167,16 +165,14 @@ vsh_result vshi_field_create_empty(double voxel_size, vsh_field **field, vsh_err
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "voxel_size %g is out of range 1e-12 … 1e12", voxel_size);
     }
     vsh_field *f = NULL;
-    vsh_result result = vshi_allocate((void **)&f, 1, sizeof *f, "field", error);
-    if (result == VSH_OK) {
-        f->voxel_size = voxel_size;
-        for (int axis = 0; axis < 3; ++axis) {
-            f->to_field[5 * axis] = 1.0 / voxel_size;
-            f->bounds_min[axis] = INFINITY; /* which no cone meets */
-            f->bounds_max[axis] = -INFINITY;
-        }
-        result = append_emptiness(f, error);
+    VSHI_TRY(vshi_allocate((void **)&f, 1, sizeof *f, "field", error));
+    f->voxel_size = voxel_size;
+    for (int axis = 0; axis < 3; ++axis) {
+        f->to_field[5 * axis] = 1.0 / voxel_size;
+        f->bounds_min[axis] = INFINITY; /* which no cone meets */
+        f->bounds_max[axis] = -INFINITY;
     }
+    const vsh_result result = append_emptiness(f, error);
     if (result != VSH_OK) {
         vsh_field_free(f);
         return result;

@@ -4,6 +4,7 @@
  * there, at places all over a mesh, each standing for as much area. A slab that is 1.25 voxels thick has a
  * voxel's centre an eighth of a voxel under its surface, wherever it lies. */
 #include "base/memory.h"
+#include "base/try.h"
 #include "field/field.h"
 #include "field/level.h"
 #include "mesh/mesh.h"
@@ -143,16 +144,12 @@ vsh_result vsh_field_find_lost_sized(const vsh_field *field, const vsh_mesh *mes
     VSHI_NEEDS_OF(mesh_count, lost);
     double sum = 0.0;
     for (size_t m = 0; m < mesh_count; ++m) {
-        const vsh_result result = vshi_mesh_check_data(&meshes[m], m, error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vshi_mesh_check_data(&meshes[m], m, error));
         sum += mesh_area(&meshes[m]);
     }
     void *thickness = NULL;
-    const vsh_result result =
-        vshi_allocate(&thickness, PLACES + LEAST, sizeof(double), "lost casters", error);
-    for (size_t m = 0; m < mesh_count && result == VSH_OK; ++m) {
+    VSHI_TRY(vshi_allocate(&thickness, PLACES + LEAST, sizeof(double), "lost casters", error));
+    for (size_t m = 0; m < mesh_count; ++m) {
         const double area = mesh_area(&meshes[m]);
         const size_t places = LEAST + (size_t)(sum > 0.0 ? PLACES * (area / sum) : 0.0);
         vsh_lost found = {0.0, 0.0, 0};
@@ -162,5 +159,5 @@ vsh_result vsh_field_find_lost_sized(const vsh_field *field, const vsh_mesh *mes
         vshi_give((char *)lost + m * lost_size, lost_size, &found, sizeof found);
     }
     free(thickness);
-    return result;
+    return VSH_OK;
 }

@@ -64,10 +64,7 @@ static vsh_result check_members(const vsh_light *light, vsh_error *error) {
         if ((m->types & (1U << light->type)) == 0 || m->apart) {
             continue;
         }
-        const vsh_result result = check_range(light, m, error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(check_range(light, m, error));
     }
     return check_range(light, &color_member, error);
 }

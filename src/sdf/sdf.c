@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/floats.h"
 #include "base/memory.h"
+#include "base/try.h"
 #include "base/vec.h"
 
 #include <stdlib.h>
@@ -130,6 +131,33 @@ static vsh_result check_operands(const vsh_sdf *sdf, size_t index, int32_t *dept
     return VSH_OK;
 }
 
+/* `depth`: one of 0 for each node. */
+static vsh_result check_tree(const vsh_sdf *sdf, int32_t *depth, vsh_error *error) {
+    for (size_t i = 0; i < sdf->node_count; ++i) {
+        const vsh_sdf_node *node = &sdf->nodes[i];
+        if (node->shape < 0 || node->shape >= SHAPE_COUNT) {
+            return vshi_fail(error, VSH_ERROR_INPUT, "sdf node %zu: shape %d: expected 0 … %d", i,
+                             node->shape, SHAPE_COUNT - 1);
+        }
+        VSHI_TRY(check_lengths(node, i, error));
+        VSHI_TRY(check_placement(node, i, error));
+        VSHI_TRY(check_operands(sdf, i, depth, error));
+    }
+    for (size_t i = 0; i + 1 < sdf->node_count; ++i) {
+        if (depth[i] != 0) {
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "sdf node %zu (%s): no operation uses it, and only the last node (%zu) is the "
+                             "root",
+                             i, shapes[sdf->nodes[i].shape].name, sdf->node_count - 1);
+        }
+    }
+    double low[3], high[3];
+    vsh_sdf_bounds(sdf, low, high);
+    return vshi_finite(vshi_vec_of(low)) && vshi_finite(vshi_vec_of(high))
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_INPUT, "sdf: its box is not finite: sizes too large");
+}
+
 vsh_result vsh_sdf_check(const vsh_sdf *sdf, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(sdf);
@@ -138,33 +166,8 @@ vsh_result vsh_sdf_check(const vsh_sdf *sdf, vsh_error *error) {
                          sdf->nodes == NULL ? (size_t)0 : sdf->node_count, MAX_NODES);
     }
     int32_t *depth;
-    vsh_result result = vshi_allocate((void **)&depth, sdf->node_count, sizeof *depth, "sdf check", error);
-    for (size_t i = 0; i < sdf->node_count && result == VSH_OK; ++i) {
-        const vsh_sdf_node *node = &sdf->nodes[i];
-        if (node->shape < 0 || node->shape >= SHAPE_COUNT) {
-            result = vshi_fail(error, VSH_ERROR_INPUT, "sdf node %zu: shape %d: expected 0 … %d", i,
-                               node->shape, SHAPE_COUNT - 1);
-            break;
-        }
-        result = check_lengths(node, i, error);
-        result = result == VSH_OK ? check_placement(node, i, error) : result;
-        result = result == VSH_OK ? check_operands(sdf, i, depth, error) : result;
-    }
-    for (size_t i = 0; i + 1 < sdf->node_count && result == VSH_OK; ++i) {
-        if (depth[i] != 0) {
-            result = vshi_fail(error, VSH_ERROR_INPUT,
-                               "sdf node %zu (%s): no operation uses it, and only the last node (%zu) is the "
-                               "root",
-                               i, shapes[sdf->nodes[i].shape].name, sdf->node_count - 1);
-        }
-    }
-    if (result == VSH_OK) {
-        double low[3], high[3];
-        vsh_sdf_bounds(sdf, low, high);
-        if (!vshi_finite(vshi_vec_of(low)) || !vshi_finite(vshi_vec_of(high))) {
-            result = vshi_fail(error, VSH_ERROR_INPUT, "sdf: its box is not finite: sizes too large");
-        }
-    }
+    VSHI_TRY(vshi_allocate((void **)&depth, sdf->node_count, sizeof *depth, "sdf check", error));
+    const vsh_result result = check_tree(sdf, depth, error);
     free(depth);
     return result;
 }

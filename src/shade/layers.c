@@ -27,12 +27,9 @@ struct vshi_layers {
     prepared items[];
 };
 
-vsh_result vshi_layer_resolve(const vsh_layer *layers, size_t index, vsh_layer *layer, vsh_error *error) {
+static vsh_result resolve(const void *given, vsh_layer *layer, vsh_error *error) {
     *layer = vsh_layer_default();
-    /* programs that were built with a shorter struct step by its size */
-    const char *at = (const char *)layers + index * layers->struct_size;
-    vsh_error why;
-    vsh_result result = vshi_options_resolve(at, layer, sizeof *layer, "vsh_layer", &why);
+    VSHI_TRY(vshi_options_resolve(given, layer, sizeof *layer, "vsh_layer", error));
     layer->struct_size = sizeof *layer;
     const struct {
         const char *name;
@@ -45,27 +42,39 @@ vsh_result vshi_layer_resolve(const vsh_layer *layers, size_t index, vsh_layer *
         {"remap[1]", layer->remap[1], layer->remap[0], 1},
         {"start_offset", layer->start_offset, -1, 16},
     };
-    for (size_t i = 0; result == VSH_OK && i < sizeof fields / sizeof fields[0]; ++i) {
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; ++i) {
         if (!(fields[i].value >= fields[i].low && fields[i].value <= fields[i].high)) {
-            result = vshi_fail(&why, VSH_ERROR_ARGUMENT, "%s %g is out of range %g … %g", fields[i].name,
-                               fields[i].value, fields[i].low, fields[i].high);
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s %g is out of range %g … %g", fields[i].name,
+                             fields[i].value, fields[i].low, fields[i].high);
         }
     }
-    if (result == VSH_OK && layer->remap[1] > 0.0 && !(layer->remap[0] < layer->remap[1])) {
-        result = vshi_fail(&why, VSH_ERROR_ARGUMENT, "remap from %g to %g: expected a rise", layer->remap[0],
-                           layer->remap[1]);
+    if (layer->remap[1] > 0.0 && !(layer->remap[0] < layer->remap[1])) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "remap from %g to %g: expected a rise", layer->remap[0],
+                         layer->remap[1]);
     }
     const int casters = (layer->field != NULL) + (layer->heights != NULL) + (layer->spheres != NULL);
-    if (result == VSH_OK && casters != 1) {
-        result = vshi_fail(&why, VSH_ERROR_ARGUMENT, "%s of field, heights and spheres: expected one",
-                           casters == 0 ? "none" : "several");
+    if (casters != 1) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s of field, heights and spheres: expected one",
+                         casters == 0 ? "none" : "several");
     }
-    for (size_t i = 0; result == VSH_OK && layer->lights != NULL && i < layer->light_count; ++i) {
+    for (size_t i = 0; layer->lights != NULL && i < layer->light_count; ++i) {
         if (layer->lights[i] == NULL) {
-            result = vshi_fail(&why, VSH_ERROR_ARGUMENT, "lights[%zu] is NULL", i);
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "lights[%zu] is NULL", i);
         }
     }
-    return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "layer %zu: %s", index, why.message);
+    return VSH_OK;
+}
+
+/* An error of a layer, which it names. */
+static vsh_result name_layer(vsh_result result, size_t index, const vsh_error *why, vsh_error *error) {
+    return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "layer %zu: %s", index, why->message);
+}
+
+vsh_result vshi_layer_resolve(const vsh_layer *layers, size_t index, vsh_layer *layer, vsh_error *error) {
+    /* programs that were built with a shorter struct step by its size */
+    const char *at = (const char *)layers + index * layers->struct_size;
+    vsh_error why;
+    return name_layer(resolve(at, layer, &why), index, &why, error);
 }
 
 double vshi_layer_bytes(const vsh_layer *layer) {
@@ -98,27 +107,24 @@ static vsh_result prepare(prepared *item, size_t index, const vsh_light *light, 
     options->start_offset = layer->start_offset < 0.0 ? options->start_offset : layer->start_offset;
     options->method = layer->method < 0 ? options->method : layer->method;
     vshi_shade_options_settle(options, own.triangles);
-    vsh_error why;
-    vsh_result result = VSH_OK;
     if (light != NULL) {
         item->light = vshi_light_resized(light, layer->softness);
     }
     if (layer->field == NULL) { /* needs no preparing */
-        result = light != NULL ? vsh_light_check(&item->light, &why) : VSH_OK;
-        return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "layer %zu: %s", index, why.message);
+        return light != NULL ? vsh_light_check(&item->light, error) : VSH_OK;
     }
     if (light != NULL) {
-        result = vshi_shadow_prepare(&own, &item->light, options, &item->shadow, &why);
+        VSHI_TRY(vshi_shadow_prepare(&own, &item->light, options, &item->shadow, error));
         item->shadow.purpose = 31u * item->shadow.purpose + (uint32_t)index + 1u;
     } else {
-        result = vshi_ao_prepare(&own, options, cones, &item->ao, &why);
+        VSHI_TRY(vshi_ao_prepare(&own, options, cones, &item->ao, error));
     }
-    if (result == VSH_OK && (light != NULL ? vshi_shadow_has_rays(options) : vshi_ao_has_rays(options))) {
+    if (light != NULL ? vshi_shadow_has_rays(options) : vshi_ao_has_rays(options)) {
         const int32_t rays = light != NULL ? vshi_shadow_most_rays(options) : vshi_ao_most_rays(options);
-        result = vshi_shade_sampler(options, rays, "rays", &item->sampler, &why);
+        VSHI_TRY(vshi_shade_sampler(options, rays, "rays", &item->sampler, error));
         item->shadow.sampler = item->ao.sampler = item->sampler;
     }
-    return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "layer %zu: %s", index, why.message);
+    return VSH_OK;
 }
 
 vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_options *options,
@@ -127,24 +133,27 @@ vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_o
     if (occluders->layer_count == 0) {
         return VSH_OK;
     }
-    vshi_layers *made = NULL;
-    vsh_result result = vshi_allocate(
-        (void **)&made, 1, sizeof *made + occluders->layer_count * sizeof made->items[0], "layers", error);
-    for (size_t i = 0; result == VSH_OK && i < occluders->layer_count; ++i) {
+    vshi_layers *made;
+    const size_t size = sizeof *made + occluders->layer_count * sizeof made->items[0];
+    vsh_result result = VSH_OK;
+    VSHI_TRY(vshi_allocate((void **)&made, 1, size, "layers", error));
+    for (size_t i = 0; i < occluders->layer_count; ++i) {
         prepared *item = &made->items[made->count];
         item->layer = occluders->layers[i];
         if ((light != NULL ? casts_for(&item->layer, light) : item->layer.ao != 0)) {
             item->options = *options;
             ++made->count;
-            result = prepare(item, i, light, &made->cones, error);
+            vsh_error why;
+            VSHI_TRY_DONE(name_layer(prepare(item, i, light, &made->cones, &why), i, &why, error));
         }
     }
-    if (result != VSH_OK || made->count == 0) {
-        vshi_layers_free(made);
-        return result;
+    if (made->count > 0) {
+        *layers = made;
+        made = NULL;
     }
-    *layers = made;
-    return VSH_OK;
+done:
+    vshi_layers_free(made);
+    return result;
 }
 
 vsh_result vshi_layers_prepare_sphere(vshi_layers *layers, vsh_error *error) {

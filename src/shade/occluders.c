@@ -79,25 +79,17 @@ static vsh_result make_empty(const vsh_occluder_parts *parts, vshi_occluders_own
 /* Takes what is owned along. */
 static vsh_result make(const vsh_occluder_parts *parts, vshi_occluders_own *own, vsh_occluders **occluders,
                        vsh_error *error) {
-    vsh_result result = copy_layers(parts, own, error);
-    if (result == VSH_OK && parts->field == NULL) {
-        result = make_empty(parts, own, error);
+    VSHI_TRY(copy_layers(parts, own, error));
+    if (parts->field == NULL) {
+        VSHI_TRY(make_empty(parts, own, error));
     }
+    vsh_occluders *made;
+    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "occluders", error));
+    const vsh_result result = vshi_allocate((void **)&made->own, 1, sizeof *own, "occluders", error);
     if (result != VSH_OK) {
+        free(made);
         return result;
     }
-    void *handle, *owned;
-    result = vshi_allocate(&handle, 1, sizeof **occluders, "occluders", error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    result = vshi_allocate(&owned, 1, sizeof *own, "occluders", error);
-    if (result != VSH_OK) {
-        free(handle);
-        return result;
-    }
-    vsh_occluders *made = handle;
-    made->own = owned;
     *made->own = *own;
     made->field = parts->field != NULL ? parts->field : own->field;
     made->triangles = parts->triangles;

@@ -24,10 +24,7 @@ vsh_result vsh_occluders_from_grid(const vsh_grid *grid, const vsh_field_options
     *occluders = NULL;
     VSHI_NEEDS(grid);
     vshi_occluders_own own = {.field = NULL};
-    const vsh_result result = make_field(grid, options, run, &own, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(make_field(grid, options, run, &own, error));
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.field = own.field;
     return vshi_occluders_make(&parts, &own, occluders, error);

@@ -2,6 +2,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 
 #include <math.h>
 #include <stdatomic.h>
@@ -10,10 +11,7 @@
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
                                       vsh_error *error) {
     *full = vsh_shade_options_default();
-    const vsh_result result = vshi_options_resolve(options, full, sizeof *full, "vsh_shade_options", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_options_resolve(options, full, sizeof *full, "vsh_shade_options", error));
     const struct {
         const char *name;
         double value, low, high;

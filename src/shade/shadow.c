@@ -164,10 +164,7 @@ void vshi_shadow_shade(const void *user, size_t begin, size_t end, vsh_shade_sta
 
 vsh_result vshi_shadow_prepare(const vsh_occluders *occluders, const vsh_light *light,
                                const vsh_shade_options *options, vshi_shadow_task *task, vsh_error *error) {
-    const vsh_result result = vsh_light_check(light, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vsh_light_check(light, error));
     const vsh_field *field = occluders->field;
     const vsh_triangles *triangles = occluders->triangles;
     if (vshi_shadow_traces(options, triangles) && triangles == NULL) {

@@ -7,6 +7,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/similarity.h"
+#include "base/try.h"
 #include "base/vec.h"
 
 #include <stdlib.h>
@@ -118,13 +119,11 @@ static void add_members(vsh_solids *solids, const vsh_sdf_node *nodes, int32_t r
 static vsh_result add_tree(vsh_solids *solids, const vsh_sdf *sdf, const double *transform,
                            vsh_error *error) {
     void *nodes;
-    const vsh_result result = vshi_allocate(&nodes, sdf->node_count, sizeof *sdf->nodes, "sdf nodes", error);
-    if (result == VSH_OK) {
-        memcpy(nodes, sdf->nodes, sdf->node_count * sizeof *sdf->nodes);
-        solids->nodes[solids->tree_count++] = nodes;
-        add_members(solids, nodes, (int32_t)sdf->node_count - 1, transform);
-    }
-    return result;
+    VSHI_TRY(vshi_allocate(&nodes, sdf->node_count, sizeof *sdf->nodes, "sdf nodes", error));
+    memcpy(nodes, sdf->nodes, sdf->node_count * sizeof *sdf->nodes);
+    solids->nodes[solids->tree_count++] = nodes;
+    add_members(solids, nodes, (int32_t)sdf->node_count - 1, transform);
+    return VSH_OK;
 }
 
 /* Checks all trees and counts their nodes. */
@@ -132,10 +131,7 @@ static vsh_result check(const vsh_sdf *sdfs, const double *transforms, size_t co
                         vsh_error *error) {
     *nodes = 0;
     for (size_t i = 0; i < count; ++i) {
-        const vsh_result result = vsh_sdf_check(&sdfs[i], error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vsh_sdf_check(&sdfs[i], error));
         if (transforms != NULL && !(vshi_similarity_scale(transforms + 12 * i) > 0.0)) {
             return vshi_fail(error, VSH_ERROR_INPUT,
                              "solid %zu: the transform of an sdf must neither shear nor scale unevenly", i);
@@ -153,35 +149,24 @@ vsh_result vsh_solids_create(const vsh_sdf *sdfs, const double *transforms, size
     VSHI_NEEDS_OF(count, sdfs);
     static const double identity[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
     size_t nodes;
-    vsh_result result = check(sdfs, transforms, count, &nodes, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    void *memory = NULL, *trees = NULL, *members = NULL;
-    result = vshi_allocate(&memory, 1, sizeof **solids, "solids", error);
-    result =
-        result == VSH_OK ? vshi_allocate(&trees, count, sizeof(vsh_sdf_node *), "solids", error) : result;
-    result = result == VSH_OK ? vshi_allocate(&members, nodes, sizeof(member), "solids", error) : result;
-    if (result != VSH_OK) {
-        free(trees);
-        free(memory);
-        return result;
-    }
-    vsh_solids *made = memory;
-    made->nodes = trees;
-    made->members = members;
+    vsh_solids *made;
+    vsh_result result;
+    VSHI_TRY(check(sdfs, transforms, count, &nodes, error));
+    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "solids", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&made->nodes, count, sizeof *made->nodes, "solids", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&made->members, nodes, sizeof *made->members, "solids", error));
     made->low = (vshi_vec){INFINITY, INFINITY, INFINITY};
     made->high = (vshi_vec){-INFINITY, -INFINITY, -INFINITY};
-    for (size_t i = 0; i < count && result == VSH_OK; ++i) {
-        result = add_tree(made, &sdfs[i], transforms != NULL ? transforms + 12 * i : identity, error);
-    }
-    if (result != VSH_OK) {
-        vsh_solids_free(made);
-        return result;
+    for (size_t i = 0; i < count; ++i) {
+        const double *transform = transforms != NULL ? transforms + 12 * i : identity;
+        VSHI_TRY_DONE(add_tree(made, &sdfs[i], transform, error));
     }
     made->size = made->low.x <= made->high.x ? vshi_length(vshi_sub(made->high, made->low)) : 0.0;
     *solids = made;
-    return VSH_OK;
+    made = NULL;
+done:
+    vsh_solids_free(made);
+    return result;
 }
 
 void vsh_solids_free(vsh_solids *solids) {

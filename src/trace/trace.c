@@ -5,6 +5,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 #include "base/vec.h"
 #include "light/view.h"
 #include "trace/embree.h"
@@ -309,13 +310,8 @@ vsh_result vsh_trace_shadow(const vsh_triangles *triangles, const vsh_solids *so
                             vsh_error *error) {
     VSHI_FLOATS;
     tracing task = {triangles, solids, positions, normals, lift, light, 0.0, rays, NULL, visibility, {0}};
-    vsh_result result = check(&task, count, "vsh_trace_shadow", error);
-    if (result == VSH_OK) {
-        result = vsh_light_check(light, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(check(&task, count, "vsh_trace_shadow", error));
+    VSHI_TRY(vsh_light_check(light, error));
     task.place = vshi_light_in_world(light);
     /* all rays to a point are one ray */
     task.rays = vshi_light_is_point(&task.place) ? 1 : rays;
@@ -327,10 +323,7 @@ vsh_result vsh_trace_ao(const vsh_triangles *triangles, const vsh_solids *solids
                         int32_t rays, const vsh_run *run, float *ao, vsh_error *error) {
     VSHI_FLOATS;
     tracing task = {triangles, solids, positions, normals, lift, NULL, distance, rays, NULL, ao, {0}};
-    const vsh_result result = check(&task, count, "vsh_trace_ao", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(check(&task, count, "vsh_trace_ao", error));
     VSHI_NEEDS_OF(count, normals);
     if (!(distance > 0.0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_trace_ao: distance %g: expected more than 0",
