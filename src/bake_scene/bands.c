@@ -87,23 +87,23 @@ vsh_result vshi_bands_plan(const vsh_scene *scene, const vshi_target *target, co
     const vsh_receiver *receiver = &target->receiver;
     const vsh_image_options image = vshi_receiver_image(receiver);
     vshi_channels channels;
-    vsh_result result = vshi_channels_name(scene, receiver->width, receiver->height, &channels, error);
-    if (result == VSH_OK) {
-        cost c = {.charts = charts,
-                  .lightmap = vshi_channels_shape(scene),
-                  .light_count = scene->light_count,
-                  .floats = 3 * (int32_t)channels.triple_count + (need->picture ? 4 : 0) +
-                            (scene->planes.invalid ? 1 : 0),
-                  .held = need->held,
-                  .limit = need->limit};
-        c.writer = need->files ? vsh_image_writer_bytes(receiver->output, &channels.image, &image) : 0;
-        vsh_charts_get_info(charts, &c.info);
-        result = plan(&c, need->rows, receiver->output, bands, error);
-        const int32_t kept = (receiver->height + RESUME_BANDS - 1) / RESUME_BANDS;
-        if (result == VSH_OK && need->resume && need->rows == 0 && bands->rows > kept) {
-            result = plan(&c, kept, receiver->output, bands, error);
-        }
+    const int32_t kept = (receiver->height + RESUME_BANDS - 1) / RESUME_BANDS;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_channels_name(scene, receiver->width, receiver->height, &channels, error));
+    cost c = {.charts = charts,
+              .lightmap = vshi_channels_shape(scene),
+              .light_count = scene->light_count,
+              .floats = 3 * (int32_t)channels.triple_count + (need->picture ? 4 : 0) +
+                        (scene->planes.invalid ? 1 : 0),
+              .held = need->held,
+              .limit = need->limit};
+    c.writer = need->files ? vsh_image_writer_bytes(receiver->output, &channels.image, &image) : 0;
+    vsh_charts_get_info(charts, &c.info);
+    VSHI_TRY_DONE(plan(&c, need->rows, receiver->output, bands, error));
+    if (need->resume && need->rows == 0 && bands->rows > kept) {
+        result = plan(&c, kept, receiver->output, bands, error);
     }
+done:
     vshi_channels_free(&channels);
     return result;
 }

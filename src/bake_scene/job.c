@@ -19,10 +19,10 @@ vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *e
     const vsh_receiver *receiver = &scene->receivers[index];
     const vsh_image_options options = vshi_receiver_image(receiver);
     vshi_channels channels;
-    vsh_result result = vshi_channels_name(scene, receiver->width, receiver->height, &channels, error);
-    if (result == VSH_OK) {
-        result = vsh_image_check(receiver->output, &channels.image, &options, error);
-    }
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_channels_name(scene, receiver->width, receiver->height, &channels, error));
+    result = vsh_image_check(receiver->output, &channels.image, &options, error);
+done:
     vshi_channels_free(&channels);
     return result;
 }

@@ -43,17 +43,20 @@ vsh_result vshi_target_charts(const vsh_scene *scene, const vshi_target *target,
         vsh_charts_create(target->meshes, target->mesh_count, &options, &silent, reports, charts, error);
     if (result != VSH_OK) {
         result = name_file(receiver->path, result, error);
-    } else {
-        vsh_charts_info info;
-        vsh_charts_get_info(*charts, &info);
-        result = vshi_refuse_uvs(target, reports, info.covered, allow_overlap, error);
+        goto done;
     }
-    if (result == VSH_OK && warn) {
-        vshi_warn_uvs(target, reports, run);
-    } else if (result != VSH_OK) {
+    vsh_charts_info info;
+    vsh_charts_get_info(*charts, &info);
+    result = vshi_refuse_uvs(target, reports, info.covered, allow_overlap, error);
+    if (result != VSH_OK) {
         vsh_charts_free(*charts);
         *charts = NULL;
+        goto done;
     }
+    if (warn) {
+        vshi_warn_uvs(target, reports, run);
+    }
+done:
     free(reports);
     return result;
 }
@@ -256,6 +259,11 @@ static void add_to_report(const work *w) {
     }
 }
 
+static vsh_result bake_all(work *w, vsh_error *error) {
+    VSHI_TRY(open_all(w, error));
+    return bake_bands(w, error);
+}
+
 vsh_result vshi_job_bake(vsh_bake_job *job, size_t index, const vshi_lightmap_input *input,
                          const vsh_run *run, vsh_error *error) {
     work w = {.job = job,
@@ -268,11 +276,7 @@ vsh_result vshi_job_bake(vsh_bake_job *job, size_t index, const vshi_lightmap_in
     w.sink = job->options.sink != NULL ? job->sink : vshi_file_sink_of(&w.files);
     w.lightmap->bands = input->bands.count;
     w.lightmap->band_rows = input->bands.rows;
-    vsh_result result = open_all(&w, error);
-    if (result == VSH_OK) {
-        result = bake_bands(&w, error);
-    }
-    result = end_sink(&w, result, error);
+    vsh_result result = end_sink(&w, bake_all(&w, error), error);
     result = vshi_invalid_picture_close(&w.picture, result, error);
     w.lightmap->kept_rows = vshi_resume_close(&w.resume);
     w.lightmap->invalid_texels = w.baked.invalid_texels;

@@ -2,6 +2,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/try.h"
 #include "compare/pair.h"
 
 #include <math.h>
@@ -131,14 +132,15 @@ static vsh_result take_all(work *w, const vsh_run *run, vsh_error *error) {
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "comparison: the system refused memory");
     }
-    vsh_result result = vshi_parallel_for(job, PARTS, 1, 1, take_parts, w, error);
-    for (size_t i = 0; i < PARTS && result == VSH_OK; ++i) {
+    const vsh_result result = vshi_parallel_for(job, PARTS, 1, 1, take_parts, w, error);
+    vshi_job_end(job);
+    VSHI_TRY(result);
+    for (size_t i = 0; i < PARTS; ++i) {
         if (w->results[i] != VSH_OK) {
-            result = vshi_fail(error, w->results[i], "comparison: the system refused memory");
+            return vshi_fail(error, w->results[i], "comparison: the system refused memory");
         }
     }
-    vshi_job_end(job);
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vsh_compare_sized(const vsh_compared *compared, const vsh_compare_options *options,

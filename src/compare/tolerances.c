@@ -1,6 +1,7 @@
 /* Limits from a file of JSON, read as scenes are. */
 #include "base/floats.h"
 #include "base/job.h"
+#include "base/try.h"
 #include "json/keys.h"
 
 #include <math.h>
@@ -63,26 +64,20 @@ static const vshi_table channel_table = VSHI_TABLE(channel_keys);
 
 static vsh_result read_channels(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_tolerances *made = member;
-    vsh_result result = vshi_expect(reader, value, JSON_OBJECT);
-    void *memory = NULL;
-    const size_t count = result == VSH_OK ? json_object_size(value->json) : 0;
-    result =
-        result == VSH_OK ? vshi_json_allocate(reader, &memory, count, sizeof(entry), "channels") : result;
-    made->channels = memory;
-    for (void *i = json_object_iter(value->json); i != NULL && result == VSH_OK;
-         i = json_object_iter_next(value->json, i)) {
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&made->channels, json_object_size(value->json),
+                                sizeof(entry), "channels"));
+    for (void *i = json_object_iter(value->json); i != NULL; i = json_object_iter_next(value->json, i)) {
         const vshi_value item = {value, json_object_iter_key(i), made->channel_count, value->depth + 1,
                                  json_object_iter_value(i)};
         entry *e = &made->channels[made->channel_count];
         const char *name;
-        result = vshi_json_copy(reader, 0, item.key, &name);
-        if (result == VSH_OK) {
-            *e = no_entry(name);
-            result = vshi_read_object(reader, &item, &channel_table, 1, "a channel's tolerances", e);
-            ++made->channel_count;
-        }
+        VSHI_TRY(vshi_json_copy(reader, 0, item.key, &name));
+        *e = no_entry(name);
+        VSHI_TRY(vshi_read_object(reader, &item, &channel_table, 1, "a channel's tolerances", e));
+        ++made->channel_count;
     }
-    return result;
+    return VSH_OK;
 }
 
 static const vshi_key file_keys[] = {
@@ -93,6 +88,17 @@ static const vshi_key file_keys[] = {
 static const vshi_table file_table = VSHI_TABLE(file_keys);
 _Static_assert(offsetof(vsh_tolerances, all) == 0, "the keys' offsets are those of an entry");
 
+static vsh_result parse(vshi_json *reader, vsh_tolerances *made) {
+    json_t *json;
+    VSHI_TRY(vshi_json_load(reader, &json));
+    const vshi_value root = {NULL, NULL, 0, 0, json};
+    made->all = no_entry(NULL);
+    const vsh_result result = vshi_read_object(reader, &root, &file_table, 1, "tolerances", made);
+    made->blocks = reader->blocks;
+    json_decref(json);
+    return result;
+}
+
 vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(tolerances);
@@ -102,25 +108,13 @@ vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vs
     size_t size;
     vsh_run run = vsh_run_default();
     run.memory_limit = MOST_BYTES;
-    vsh_result result = vshi_json_text(path, &run, &text, &size, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_json_text(path, &run, &text, &size, error));
+    vshi_json reader = {path, text, size, NULL, error};
     vsh_tolerances *made = calloc(1, sizeof *made);
-    json_t *json = NULL;
-    if (made == NULL) {
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
-    } else {
-        vshi_json reader = {path, text, size, NULL, error};
-        made->all = no_entry(NULL);
-        result = vshi_json_load(&reader, &json);
-        if (result == VSH_OK) {
-            const vshi_value root = {NULL, NULL, 0, 0, json};
-            result = vshi_read_object(&reader, &root, &file_table, 1, "tolerances", made);
-        }
-        made->blocks = reader.blocks;
-    }
-    json_decref(json);
+    const vsh_result result =
+        made != NULL
+            ? parse(&reader, made)
+            : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, sizeof *made);
     free(text);
     if (result != VSH_OK) {
         vsh_tolerances_free(made);

@@ -154,11 +154,8 @@ vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], cons
     VSHI_NEEDS(bounds_min);
     VSHI_NEEDS(bounds_max);
     vsh_camera full;
-    vsh_result result = resolve(camera, &full, error);
-    result = result == VSH_OK ? check_lens(&full, error) : result;
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(resolve(camera, &full, error));
+    VSHI_TRY(check_lens(&full, error));
     const vshi_vec low = vshi_vec_of(bounds_min), high = vshi_vec_of(bounds_max);
     const vshi_vec size = vshi_sub(high, low);
     if (!vshi_finite(low) || !vshi_finite(high) || !vshi_finite(size) || size.x < 0.0 || size.y < 0.0 ||
@@ -167,10 +164,7 @@ vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], cons
                          "camera: the box from (%g, %g, %g) to (%g, %g, %g) is none", low.x, low.y, low.z,
                          high.x, high.y, high.z);
     }
-    result = check_view(azimuth, elevation, aspect, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(check_view(azimuth, elevation, aspect, error));
     const view_axes axes = axes_of(&full, azimuth, elevation);
     const vshi_vec back = axes.back, across = axes.across, over = axes.over;
     const double tangent = vshi_tan(0.5 * full.fov) / MARGIN;

@@ -106,10 +106,7 @@ static vsh_result check_meshes(const vsh_lit_meshes *of, size_t index, vsh_error
     }
     for (size_t m = 0; m < of->mesh_count; ++m) {
         const vsh_mesh *mesh = &of->meshes[m];
-        const vsh_result result = vshi_mesh_check_data(mesh, m, error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vshi_mesh_check_data(mesh, m, error));
         if (image != NULL && mesh->uvs == NULL) {
             return vshi_fail(error, VSH_ERROR_INPUT, "%s: no UVs", vshi_mesh_label(mesh, m).text);
         }
@@ -187,36 +184,34 @@ vsh_result vshi_lit_create(const vsh_render_options *options, const vsh_light *l
     if (options->lit_count == 0) {
         return VSH_OK;
     }
-    vshi_lit *made = NULL;
-    vsh_result result = vshi_allocate((void **)&made, 1, sizeof *made, "lit meshes", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    vshi_lit *made;
+    vsh_result result;
+    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "lit meshes", error));
     *made = (vshi_lit){.options = options, .lights = lights, .light_count = light_count, .grid = *grid};
     made->triangle_count = count_triangles(options);
-    result = vshi_allocate((void **)&made->maps, options->lit_count, sizeof *made->maps, "lit meshes", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&made->planes, options->lit_count * light_count, sizeof *made->planes,
-                               "lit meshes", error);
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&made->maps, options->lit_count, sizeof *made->maps, "lit meshes", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&made->planes, options->lit_count * light_count,
+                                sizeof *made->planes, "lit meshes", error));
+    if (made->triangle_count >= UINT32_MAX) {
+        result = vshi_fail(error, VSH_ERROR_LIMIT, "lit meshes: more than 2^32 - 2 triangles");
+        goto done;
     }
-    if (result == VSH_OK) {
-        result = made->triangle_count < UINT32_MAX
-                     ? vshi_allocate((void **)&made->triangles, made->triangle_count, sizeof *made->triangles,
-                                     "lit meshes", error)
-                     : vshi_fail(error, VSH_ERROR_LIMIT, "lit meshes: more than 2^32 - 2 triangles");
-    }
-    for (size_t i = 0; result == VSH_OK && i < options->lit_count; ++i) {
+    VSHI_TRY_DONE(vshi_allocate((void **)&made->triangles, made->triangle_count, sizeof *made->triangles,
+                                "lit meshes", error));
+    for (size_t i = 0; i < options->lit_count; ++i) {
         made->maps[i].of = &options->lit[i];
         made->maps[i].shadow = made->planes != NULL ? made->planes + i * light_count : NULL;
-        result = options->lit[i].lightmap != NULL ? find_planes(made, i, &made->maps[i], error) : VSH_OK;
-    }
-    if (result != VSH_OK) {
-        vshi_lit_free(made);
-        return result;
+        if (options->lit[i].lightmap != NULL) {
+            VSHI_TRY_DONE(find_planes(made, i, &made->maps[i], error));
+        }
     }
     place(made);
     *lit = made;
-    return VSH_OK;
+    made = NULL;
+done:
+    vshi_lit_free(made);
+    return result;
 }
 
 /* Volumes of the ray with each edge: all of one sign where it passes within. An edge has the same one, but

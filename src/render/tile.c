@@ -153,9 +153,10 @@ vsh_result vshi_tile_render(const vshi_scenery *scenery, const vshi_rows *rows, 
             all[count++] = seen;
         }
     }
-    vsh_result result = h.count > 0 ? light_hits(scenery, &h, stats, error) : VSH_OK;
-    if (result == VSH_OK && scenery->shafts.extinction > 0.0) {
-        result = vshi_shafts_add(&scenery->shafts, count, shafts, all, stats, error);
+    if (h.count > 0) {
+        VSHI_TRY(light_hits(scenery, &h, stats, error));
     }
-    return result;
+    return scenery->shafts.extinction > 0.0
+               ? vshi_shafts_add(&scenery->shafts, count, shafts, all, stats, error)
+               : VSH_OK;
 }

@@ -2,6 +2,7 @@
 #define _GNU_SOURCE
 
 #include "base/memory.h"
+#include "base/try.h"
 #include "sandbox/reader.h"
 #include "sandbox/request.h"
 #include "sandbox/spawn.h"
@@ -245,11 +246,7 @@ static vsh_result map_answer(const vshi_exchange *exchange, int file, vshi_answe
         return VSH_OK; /* nothing was answered */
     }
     /* what it holds is copied before it goes */
-    const vsh_result result =
-        vshi_check_limit(exchange->run, 2.0 * (double)status.st_size, exchange->path, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_check_limit(exchange->run, 2.0 * (double)status.st_size, exchange->path, error));
     void *map = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_SHARED, file, 0);
     if (map == MAP_FAILED) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %lld bytes", exchange->path,
@@ -316,22 +313,29 @@ static vsh_result take_head(const vshi_exchange *exchange, int status, vshi_answ
     return VSH_OK;
 }
 
+static vsh_result send_request(vshi_exchange *exchange, vshi_poll_fn *poll_user, void *user,
+                               reader_process *process, vsh_error *error) {
+    if (!vshi_encoder_flush(&exchange->encoder)) {
+        return fail_start(exchange, exchange->encoder.error, error);
+    }
+    if (poll_user(user, 0.0)) {
+        return vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", exchange->path);
+    }
+    return start(exchange, process, error);
+}
+
 vsh_result vshi_exchange_send(vshi_exchange *exchange, vshi_poll_fn *poll_user, void *user,
                               vshi_answer *answer, vsh_error *error) {
     *answer = (vshi_answer){NULL, 0, 0, {NULL, NULL, true}};
     reader_process process = {-1, -1, -1, 0.0};
     int status = 0;
-    vsh_result result = VSH_OK;
-    if (!vshi_encoder_flush(&exchange->encoder)) {
-        result = fail_start(exchange, exchange->encoder.error, error);
-    } else if (poll_user(user, 0.0)) {
-        result = vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", exchange->path);
-    }
-    result = result == VSH_OK ? start(exchange, &process, error) : result;
+    vsh_result result = send_request(exchange, poll_user, user, &process, error);
     close(exchange->encoder.file);
-    result = result == VSH_OK ? await(exchange, &process, poll_user, user, &status, error) : result;
-    result = result == VSH_OK ? map_answer(exchange, process.answer, answer, error) : result;
-    result = result == VSH_OK ? take_head(exchange, status, answer, error) : result;
+    VSHI_TRY_DONE(result);
+    VSHI_TRY_DONE(await(exchange, &process, poll_user, user, &status, error));
+    VSHI_TRY_DONE(map_answer(exchange, process.answer, answer, error));
+    VSHI_TRY_DONE(take_head(exchange, status, answer, error));
+done:
     if (process.answer >= 0) {
         close(process.answer);
     }
@@ -360,12 +364,12 @@ static bool poll_job(void *user, double fraction) {
 vsh_result vshi_exchange_send_job(vshi_exchange *exchange, vshi_job *job, size_t units, vshi_answer *answer,
                                   vsh_error *error) {
     job_share share = {job, units, 0};
-    vsh_result result = vshi_exchange_send(exchange, poll_job, &share, answer, error);
-    if (result == VSH_OK && poll_job(&share, 1.0)) {
+    VSHI_TRY(vshi_exchange_send(exchange, poll_job, &share, answer, error));
+    if (poll_job(&share, 1.0)) {
         vshi_answer_free(answer);
-        result = vshi_job_fail_cancelled(job, error);
+        return vshi_job_fail_cancelled(job, error);
     }
-    return result;
+    return VSH_OK;
 }
 
 void vshi_answer_free(vshi_answer *answer) {
@@ -385,25 +389,20 @@ vsh_result vsh_reader_confinement(const vsh_run *run, uint32_t *confined, vsh_er
     VSHI_NEEDS(confined);
     *confined = 0;
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result == VSH_OK && full.reader == NULL) {
-        result = vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_reader_confinement: vsh_run.reader is NULL");
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    if (full.reader == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_reader_confinement: vsh_run.reader is NULL");
     }
-    vshi_exchange *exchange = NULL;
-    if (result == VSH_OK) {
-        result = vshi_allocate((void **)&exchange, 1, sizeof *exchange, "reader", error);
-    }
+    vshi_exchange *exchange;
     vshi_answer answer;
-    if (result == VSH_OK) {
-        full.warning = NULL; /* what is missing is the result */
-        result = vshi_exchange_begin(exchange, VSHI_READ_CONFINEMENT, "reader", &full, error);
-        result =
-            result == VSH_OK ? vshi_exchange_send(exchange, poll_nothing, &full, &answer, error) : result;
-    }
-    if (result == VSH_OK) {
-        *confined = answer.confined;
-        vshi_answer_free(&answer);
-    }
+    vsh_result result;
+    VSHI_TRY(vshi_allocate((void **)&exchange, 1, sizeof *exchange, "reader", error));
+    full.warning = NULL; /* what is missing is the result */
+    VSHI_TRY_DONE(vshi_exchange_begin(exchange, VSHI_READ_CONFINEMENT, "reader", &full, error));
+    VSHI_TRY_DONE(vshi_exchange_send(exchange, poll_nothing, &full, &answer, error));
+    *confined = answer.confined;
+    vshi_answer_free(&answer);
+done:
     free(exchange);
     return result;
 }
