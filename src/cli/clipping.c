@@ -6,9 +6,8 @@
 int cli_finish_image(vsh_image_writer *writer, const char *output) {
     vsh_error error;
     vsh_image_clipping cut;
-    vsh_result result = vsh_image_writer_get_clipping(writer, &cut, &error);
-    result = result == VSH_OK ? vsh_image_writer_finish(writer, &error) : result;
-    if (result != VSH_OK) {
+    if (vsh_image_writer_get_clipping(writer, &cut, &error) != VSH_OK ||
+        vsh_image_writer_finish(writer, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     if (cut.clipped > 0) {

@@ -1,4 +1,5 @@
 /* vdbshade bake: from files to lightmaps. */
+#include "base/try.h"
 #include "cli/message.h"
 #include "cli/object_output.h"
 #include "cli/paths.h"
@@ -144,17 +145,12 @@ static cli_stats stats_of(const vsh_scene *scene, const vsh_bake_report *report,
 
 /* Warnings are told as soon as they are known: what is wrong with the files, before the long work. */
 static vsh_result run_job(vsh_bake_job *job, const vsh_scene *scene, const vsh_run *run, vsh_error *error) {
-    vsh_result result = vsh_bake_job_measure(job, run, error);
-    if (result == VSH_OK) {
-        cli_bake_expect(scene, job, run->threads);
-        cli_warnings_tell();
-        result = vsh_bake_job_prepare(job, run, error);
-    }
-    if (result == VSH_OK) {
-        cli_warnings_tell();
-        result = vsh_bake_job_run(job, run, error);
-    }
-    return result;
+    VSHI_TRY(vsh_bake_job_measure(job, run, error));
+    cli_bake_expect(scene, job, run->threads);
+    cli_warnings_tell();
+    VSHI_TRY(vsh_bake_job_prepare(job, run, error));
+    cli_warnings_tell();
+    return vsh_bake_job_run(job, run, error);
 }
 
 static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, vsh_bake_job *job,

@@ -99,7 +99,7 @@ int render_camera_place(const render_settings *s, const render_surfaces *seen, v
     memcpy(camera->up, s->up, sizeof camera->up);
     camera->fov = s->fov_deg * degree;
     const bool near = s->frames == 0 && s->orbit_deg == 0.0 && !s->has_camera; /* else as a turntable */
-    vsh_result result =
+    const vsh_result result =
         near ? vsh_camera_frame_points(camera, count, points, azimuth_deg * degree, elevation_deg * degree,
                                        (double)s->width / (double)s->height, &error)
              : frame_box(s, count, points, camera, &error);
@@ -110,8 +110,7 @@ int render_camera_place(const render_settings *s, const render_surfaces *seen, v
     if (s->has_look_at) {
         memcpy(camera->target, s->look_at, sizeof camera->target);
     }
-    result = result == VSH_OK ? vsh_camera_check(camera, &error) : result;
-    if (result != VSH_OK) {
+    if (result != VSH_OK || vsh_camera_check(camera, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     if (!near) {
