@@ -7,6 +7,7 @@
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/temporary.h"
+#include "cli/try.h"
 #include "cli/warnings.h"
 #include "expect.h"
 #include "forecast.h"
@@ -48,29 +49,30 @@ static int check_picture(const cli_bake_settings *settings) {
 
 /* What can be refused before anything is read. */
 static int check_files(const cli_bake_settings *settings, const vsh_scene *scene) {
-    int code = settings->stats != NULL ? cli_temporary_check(settings->stats) : CLI_OK;
-    code = code == CLI_OK ? check_picture(settings) : code;
+    if (settings->stats != NULL) {
+        CLI_TRY(cli_temporary_check(settings->stats));
+    }
+    CLI_TRY(check_picture(settings));
     const bool makes = settings->output_folder != NULL || settings->per_object;
-    for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
         const char *output = scene->receivers[i].output;
         if (makes && settings->dry_run) {
             continue; /* its folder need not be there yet */
         }
-        code = makes ? make_folder_of(output) : cli_check_folder(output);
-        code = code == CLI_OK ? check_image(settings, scene, i) : code;
+        CLI_TRY(makes ? make_folder_of(output) : cli_check_folder(output));
+        CLI_TRY(check_image(settings, scene, i));
     }
-    return code;
+    return CLI_OK;
 }
 
 /* Outputs of objects have their names only now. */
 static int check_outputs(const cli_bake_settings *settings, const vsh_scene *scene, const vsh_bake_job *job) {
-    int code = CLI_OK;
-    for (size_t i = 0; i < vsh_bake_job_count(job) && code == CLI_OK; ++i) {
+    for (size_t i = 0; i < vsh_bake_job_count(job); ++i) {
         vsh_job_lightmap lightmap;
         vsh_bake_job_lightmap(job, i, &lightmap);
-        code = cli_bake_check_output(settings, scene, lightmap.output);
+        CLI_TRY(cli_bake_check_output(settings, scene, lightmap.output));
     }
-    return code;
+    return CLI_OK;
 }
 
 /* --- what is told */
@@ -164,15 +166,13 @@ static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, v
     vsh_bake_job_get_report(job, &report);
     const cli_stats stats = stats_of(scene, &report, run->threads);
     cli_stats_warn(&stats, scene, run);
-    const int code = cli_stats_finish(&stats, run, settings->stats);
-    if (code == CLI_OK) {
-        cli_warnings_tell();
-        if (!settings->common.quiet) {
-            say_all(t, job, &report);
-            cli_stats_say(&stats);
-        }
+    CLI_TRY(cli_stats_finish(&stats, run, settings->stats));
+    cli_warnings_tell();
+    if (!settings->common.quiet) {
+        say_all(t, job, &report);
+        cli_stats_say(&stats);
     }
-    return code;
+    return CLI_OK;
 }
 
 static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
@@ -194,11 +194,10 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
     if (vsh_bake_job_create(scene, &options, &run, &job, &error) != VSH_OK) {
         return cli_fail_of(NULL, &error);
     }
-    int code = check_outputs(settings, scene, job);
-    if (code == CLI_OK) {
-        code = settings->dry_run ? cli_bake_forecast(scene, job, &run)
-                                 : bake_job(settings, scene, job, &run, &t);
-    }
+    int code;
+    CLI_TRY_DONE(check_outputs(settings, scene, job));
+    code = settings->dry_run ? cli_bake_forecast(scene, job, &run) : bake_job(settings, scene, job, &run, &t);
+done:
     vsh_bake_job_free(job);
     return code;
 }
@@ -212,12 +211,11 @@ int cli_bake_main(int argc, char **argv) {
     }
     cli_progress_begin(settings.common.progress, settings.common.quiet);
     cli_bake_scene made;
-    code = cli_bake_scene_make(&settings, &made);
-    code = code == CLI_OK ? check_files(&settings, &made.scene) : code;
-    if (code == CLI_OK) {
-        cli_signals_watch();
-        code = bake(&settings, &made.scene);
-    }
+    CLI_TRY_DONE(cli_bake_scene_make(&settings, &made));
+    CLI_TRY_DONE(check_files(&settings, &made.scene));
+    cli_signals_watch();
+    code = bake(&settings, &made.scene);
+done:
     cli_bake_scene_free(&made);
     cli_progress_end();
     return code;

@@ -1,4 +1,5 @@
 #include "cli/message.h"
+#include "cli/try.h"
 #include "info.h"
 
 #include <stdbool.h>
@@ -113,31 +114,31 @@ int cli_info_mesh(const char *path, const cli_info_look *given, const vsh_run *r
     if (with_uvs == NULL || meshes == NULL || solidity == NULL) {
         cli_say("%s: the system refused memory", path);
         code = CLI_LIMIT;
+        goto done;
     }
-    if (code == CLI_OK) {
-        print_unit(model, look.unit);
-    }
-    for (size_t i = 0; i < count && code == CLI_OK; ++i) {
+    print_unit(model, look.unit);
+    for (size_t i = 0; i < count; ++i) {
         meshes[i] = vsh_model_mesh(model, i, -1);
     }
-    if (code == CLI_OK && vsh_mesh_solidity(meshes, count, run, solidity, &error) != VSH_OK) {
+    if (vsh_mesh_solidity(meshes, count, run, solidity, &error) != VSH_OK) {
         code = cli_fail_of(NULL, &error);
+        goto done;
     }
-    for (size_t i = 0; i < count && code == CLI_OK; ++i) {
-        code = look.table ? CLI_OK : print_mesh(model, i, scale_for(model, look.unit), &solidity[i]);
-        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
-        if (mesh.uvs != NULL) {
-            with_uvs[with_uv_count++] = mesh;
+    for (size_t i = 0; i < count; ++i) {
+        if (!look.table) {
+            CLI_TRY_DONE(print_mesh(model, i, scale_for(model, look.unit), &solidity[i]));
+        }
+        if (meshes[i].uvs != NULL) {
+            with_uvs[with_uv_count++] = meshes[i];
         }
     }
-    if (code == CLI_OK) {
-        code = cli_info_uvs(model, with_uvs, with_uv_count, &look, run);
-    }
-    if (code == CLI_OK && with_uv_count < count) {
+    CLI_TRY_DONE(cli_info_uvs(model, with_uvs, with_uv_count, &look, run));
+    if (with_uv_count < count) {
         printf("problem: %zu of %zu meshes have no UVs to bake into: they only cast with --per-object or "
                "--no-receive; or unwrap them\n",
                count - with_uv_count, count);
     }
+done:
     free(solidity);
     free(meshes);
     free(with_uvs);

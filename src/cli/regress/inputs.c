@@ -3,6 +3,7 @@
 #include "cli/commands.h"
 #include "cli/message.h"
 #include "cli/temporary.h"
+#include "cli/try.h"
 #include "regress.h"
 
 #include <math.h>
@@ -92,25 +93,29 @@ static int add_provenance(const regress_work *work, regress_case *one, const cha
         return cli_fail(&error);
     }
     regress_lines files = {NULL, 0};
-    int code = regress_lines_add(&files, "%s", path) ? CLI_OK : no_memory(work);
-    code = code == CLI_OK && flat ? add_flat_files(work, path, &files) : code;
-    code = code == CLI_OK ? add_option_files(work, one, &files) : code;
     vsh_provenance *provenance = NULL;
-    if (code == CLI_OK) {
-        vsh_provenance_source source = vsh_provenance_source_default();
-        source.scene = scene;
-        source.files = (const char *const *)files.line;
-        source.file_count = files.count;
-        code =
-            vsh_provenance_create(&source, &run, &provenance, &error) == VSH_OK ? CLI_OK : cli_fail(&error);
+    int code;
+    CLI_TRY_DONE(regress_lines_add(&files, "%s", path) ? CLI_OK : no_memory(work));
+    if (flat) {
+        CLI_TRY_DONE(add_flat_files(work, path, &files));
     }
-    size_t count = 0;
+    CLI_TRY_DONE(add_option_files(work, one, &files));
+    vsh_provenance_source source = vsh_provenance_source_default();
+    source.scene = scene;
+    source.files = (const char *const *)files.line;
+    source.file_count = files.count;
+    if (vsh_provenance_create(&source, &run, &provenance, &error) != VSH_OK) {
+        code = cli_fail(&error);
+        goto done;
+    }
+    size_t count;
     const vsh_attribute *attributes = vsh_provenance_attributes(provenance, &count);
-    for (size_t i = 0; i < count && code == CLI_OK; ++i) {
-        code = regress_lines_add(&one->inputs, "%s: %s", attributes[i].name, attributes[i].value)
-                   ? CLI_OK
-                   : no_memory(work);
+    for (size_t i = 0; i < count; ++i) {
+        CLI_TRY_DONE(regress_lines_add(&one->inputs, "%s: %s", attributes[i].name, attributes[i].value)
+                         ? CLI_OK
+                         : no_memory(work));
     }
+done:
     vsh_provenance_free(provenance);
     regress_lines_free(&files);
     vsh_scene_free(scene);

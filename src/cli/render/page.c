@@ -3,6 +3,7 @@
 #include "cli/message.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
+#include "cli/try.h"
 #include "render.h"
 
 #include <math.h>
@@ -61,20 +62,23 @@ int render_page_add(render_page *page, const render_picture *picture) {
     if (values == NULL) {
         return cli_out_of_memory("page");
     }
-    int code = render_output_encode(s, picture);
-    for (size_t i = 0; code == CLI_OK && i < count; ++i) {
+    int code;
+    CLI_TRY_DONE(render_output_encode(s, picture));
+    for (size_t i = 0; i < count; ++i) {
         for (size_t c = 0; c < (size_t)channels; ++c) {
             values[i * (size_t)channels + c] = (uint8_t)lroundf(255.0f * picture->encoded[c][i]);
         }
     }
-    if (code == CLI_OK) {
-        const cli_pixels pixels = {s->width, s->height, channels, values};
-        fputc('"', page->out);
-        code = cli_document_png(page->out, s->bake.output, &pixels);
-        fputs("\",\n", page->out);
+    const cli_pixels pixels = {s->width, s->height, channels, values};
+    fputc('"', page->out);
+    CLI_TRY_DONE(cli_document_png(page->out, s->bake.output, &pixels));
+    fputs("\",\n", page->out);
+    if (ferror(page->out)) {
+        code = cli_out_of_memory("page");
     }
+done:
     free(values);
-    return code == CLI_OK && ferror(page->out) ? cli_out_of_memory("page") : code;
+    return code;
 }
 
 void render_page_abandon(render_page *page) {

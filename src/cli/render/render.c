@@ -8,6 +8,7 @@
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/stats.h"
+#include "cli/try.h"
 #include "cli/warnings.h"
 
 #include <inttypes.h>
@@ -37,14 +38,12 @@ typedef struct render_work {
 static int load(render_work *work) {
     const double start = vshi_seconds();
     vsh_error error;
-    int code = vsh_assets_load(work->scene, &work->run, &work->assets, &error) == VSH_OK
-                   ? CLI_OK
-                   : cli_fail_of(NULL, &error);
-    code = code == CLI_OK ? render_lightmaps_read(work->settings, work->scene, work->assets, &work->run,
-                                                  &work->lightmaps)
-                          : code;
+    if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    CLI_TRY(render_lightmaps_read(work->settings, work->scene, work->assets, &work->run, &work->lightmaps));
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return code;
+    return CLI_OK;
 }
 
 static int make_occluders(render_work *work) {
@@ -101,8 +100,8 @@ static int set_options(render_work *work) {
     if (!work->scene->ao) {
         o->shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
     }
-    const int code = join_lit(work);
-    return code == CLI_OK ? render_camera_place(s, &work->surfaces, o) : code;
+    CLI_TRY(join_lit(work));
+    return render_camera_place(s, &work->surfaces, o);
 }
 
 /* The file that a message is of which begins with "lightmap N: ", as vsh_render() counts them; else NULL. */
@@ -139,25 +138,28 @@ static int render_frame(render_work *work, int32_t index, const vsh_run *run) {
 static int render_frames(render_work *work) {
     const render_settings *s = work->settings;
     const int32_t count = s->frames > 0 ? s->frames : 1;
-    int code = render_picture_create(s, &work->origin, &work->picture);
-    if (code == CLI_OK && s->page) {
+    CLI_TRY(render_picture_create(s, &work->origin, &work->picture));
+    if (s->page) {
         work->page = render_page_begin(s);
-        code = work->page != NULL ? CLI_OK : cli_out_of_memory("page");
+        if (work->page == NULL) {
+            return cli_out_of_memory("page");
+        }
     }
     vshi_rounds rounds;
     vshi_rounds_begin(&rounds, &work->run, "render", 1);
-    for (int32_t i = 0; i < count && code == CLI_OK; ++i) {
+    for (int32_t i = 0; i < count; ++i) {
         const vsh_run run = vshi_rounds_run(&rounds, 1.0 / count);
-        code = render_frame(work, i, &run);
+        CLI_TRY(render_frame(work, i, &run));
         vshi_rounds_next(&rounds);
     }
-    if (code == CLI_OK && s->page) {
+    if (s->page) {
         const double start = vshi_seconds();
-        code = render_page_end(work->page);
+        render_page *page = work->page;
         work->page = NULL;
+        CLI_TRY(render_page_end(page));
         cli_stats_stage(&work->stats, CLI_STAGE_WRITE, start);
     }
-    return code;
+    return CLI_OK;
 }
 
 /* Lightmaps that are shown are inputs, too. */
@@ -187,15 +189,15 @@ static int run_render(const render_settings *s, vsh_scene *scene) {
     render_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
     work.run.memory_held += render_picture_bytes(s);
     work.stats = cli_stats_begin(CLI_STATS_POINTS, work.run.threads);
-    int code = load(&work);
-    code = code == CLI_OK ? make_occluders(&work) : code;
-    code = code == CLI_OK ? set_options(&work) : code;
-    code = code == CLI_OK ? find_origin(&work) : code;
-    code = code == CLI_OK ? render_frames(&work) : code;
-    code = code == CLI_OK ? cli_stats_finish(&work.stats, &work.run, s->bake.stats) : code;
-    if (code == CLI_OK) {
-        say_results(&work);
-    }
+    int code;
+    CLI_TRY_DONE(load(&work));
+    CLI_TRY_DONE(make_occluders(&work));
+    CLI_TRY_DONE(set_options(&work));
+    CLI_TRY_DONE(find_origin(&work));
+    CLI_TRY_DONE(render_frames(&work));
+    CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
+    say_results(&work);
+done:
     render_page_abandon(work.page);
     render_picture_free(&work.picture);
     cli_provenance_free(&work.origin);
@@ -210,28 +212,27 @@ static int run_render(const render_settings *s, vsh_scene *scene) {
 /* What can be refused before anything is read but the scene. */
 static int check_files(const render_settings *s, const vsh_scene *scene) {
     const int32_t count = s->frames > 0 && !s->page ? s->frames : 1;
-    int code = CLI_OK;
-    for (int32_t i = 0; i < count && code == CLI_OK; ++i) {
+    for (int32_t i = 0; i < count; ++i) {
         char path[PATH_MAX];
         render_output_path(s, i, path, sizeof path);
-        code = cli_bake_check_output(&s->bake, scene, path);
+        CLI_TRY(cli_bake_check_output(&s->bake, scene, path));
     }
-    if (code == CLI_OK && s->bake.stats != NULL) {
-        code = cli_bake_check_output(&s->bake, scene, s->bake.stats);
+    if (s->bake.stats != NULL) {
+        CLI_TRY(cli_bake_check_output(&s->bake, scene, s->bake.stats));
     }
-    if (code == CLI_OK && scene->light_count == 0 && !scene->ao && s->lightmap_count == 0) {
+    if (scene->light_count == 0 && !scene->ao && s->lightmap_count == 0) {
         return cli_usage("%s: no lights and no ao; give --sun X,Y,Z or --ao DISTANCE, or both",
                          s->bake.input);
     }
     const uint64_t limit = s->bake.common.memory_limit, bytes = render_picture_bytes(s);
-    if (code == CLI_OK && limit > 0 && bytes > limit) {
+    if (limit > 0 && bytes > limit) {
         char all[32], most[32];
         cli_say("%s: a picture of %d × %d needs %s, over the memory limit of %s", s->bake.output, s->width,
                 s->height, vshi_bytes_text(bytes, all, sizeof all),
                 vshi_bytes_text(limit, most, sizeof most));
         return CLI_LIMIT;
     }
-    return code;
+    return CLI_OK;
 }
 
 int cli_render_main(int argc, char **argv) {
@@ -243,15 +244,14 @@ int cli_render_main(int argc, char **argv) {
     }
     cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
     cli_bake_scene made;
-    code = cli_bake_scene_for_points(&s.bake, &made);
-    if (code == CLI_OK && s.lightmap_count > 0) {
-        code = cli_bake_scene_receivers(&s.bake, &made);
+    CLI_TRY_DONE(cli_bake_scene_for_points(&s.bake, &made));
+    if (s.lightmap_count > 0) {
+        CLI_TRY_DONE(cli_bake_scene_receivers(&s.bake, &made));
     }
-    code = code == CLI_OK ? check_files(&s, &made.scene) : code;
-    if (code == CLI_OK) {
-        cli_signals_watch();
-        code = run_render(&s, &made.scene);
-    }
+    CLI_TRY_DONE(check_files(&s, &made.scene));
+    cli_signals_watch();
+    code = run_render(&s, &made.scene);
+done:
     cli_bake_scene_free(&made);
     cli_progress_end();
     return code;

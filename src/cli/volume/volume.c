@@ -10,6 +10,7 @@
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/temporary.h"
+#include "cli/try.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -164,12 +165,15 @@ static int load(volume_work *work) {
     const double start = vshi_seconds();
     const volume_settings *s = work->settings;
     vsh_error error;
-    vsh_result result = vsh_assets_load(work->scene, &work->run, &work->assets, &error);
-    if (result == VSH_OK && s->like != NULL) {
-        result = vsh_voxels_from_vdb(s->like, s->like_grid, &work->run, &work->voxels, &error);
+    if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    if (s->like != NULL &&
+        vsh_voxels_from_vdb(s->like, s->like_grid, &work->run, &work->voxels, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
     }
     cli_stats_stage(&work->stats, CLI_STAGE_LOAD, start);
-    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+    return CLI_OK;
 }
 
 /* Of the casters' band, or of the box, whose voxels may be of the casters' size. */
@@ -215,28 +219,25 @@ static int make_grid(volume_work *work) {
 }
 
 static int make_occluders(volume_work *work) {
-    int code = make_grid(work);
-    code = code == CLI_OK ? choose_voxels(work) : code;
-    if (code == CLI_OK) {
-        vsh_voxels_info info;
-        vsh_voxels_get_info(work->voxels, &info);
-        vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
-        what.receivers_min = info.bounds_min;
-        what.receivers_max = info.bounds_max;
-        what.grid = work->scene->layer_count == 0 ? work->grid : NULL;
-        vsh_error error;
-        const vsh_result result =
-            vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error);
-        code = result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+    CLI_TRY(make_grid(work));
+    CLI_TRY(choose_voxels(work));
+    vsh_voxels_info info;
+    vsh_voxels_get_info(work->voxels, &info);
+    vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
+    what.receivers_min = info.bounds_min;
+    what.receivers_max = info.bounds_max;
+    what.grid = work->scene->layer_count == 0 ? work->grid : NULL;
+    vsh_error error;
+    if (vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error) !=
+        VSH_OK) {
+        return cli_fail_of(NULL, &error);
     }
     vsh_grid_free(work->grid); /* neither what casts nor the voxels need it */
     work->grid = NULL;
-    if (code == CLI_OK) {
-        vsh_occluders_info casters;
-        vsh_occluders_get_info(work->occluders, &casters);
-        cli_stats_casters(&work->stats, work->scene, &casters);
-    }
-    return code;
+    vsh_occluders_info casters;
+    vsh_occluders_get_info(work->occluders, &casters);
+    cli_stats_casters(&work->stats, work->scene, &casters);
+    return CLI_OK;
 }
 
 static int bake_volume(volume_work *work) {
@@ -303,19 +304,18 @@ static int run_volume(const volume_settings *s, vsh_scene *scene) {
     volume_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
     work.stats = cli_stats_begin(CLI_STATS_VOXELS, work.run.threads);
     vsh_volume_info info;
-    int code = load(&work);
-    code = code == CLI_OK ? make_occluders(&work) : code;
-    code = code == CLI_OK ? bake_volume(&work) : code;
-    code = code == CLI_OK ? write_volume(&work) : code;
-    if (code == CLI_OK) {
-        count_voxels(&work, &info);
-    }
-    code = code == CLI_OK ? cli_stats_finish(&work.stats, &work.run, s->bake.stats) : code;
-    if (code == CLI_OK) {
-        say_results(&work, &info);
-    }
+    int code;
+    CLI_TRY_DONE(load(&work));
+    CLI_TRY_DONE(make_occluders(&work));
+    CLI_TRY_DONE(bake_volume(&work));
+    CLI_TRY_DONE(write_volume(&work));
+    count_voxels(&work, &info);
+    CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
+    say_results(&work, &info);
+done:
     vsh_volume_free(work.volume);
     vsh_voxels_free(work.voxels);
+    vsh_grid_free(work.grid);
     vsh_occluders_free(work.occluders);
     vsh_assets_free(work.assets);
     return code;
@@ -336,16 +336,15 @@ static int volume_main(int argc, char **argv) {
     }
     cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
     cli_bake_scene made;
-    code = cli_bake_scene_for_points(&s.bake, &made);
+    CLI_TRY_DONE(cli_bake_scene_for_points(&s.bake, &made));
     if (s.band > made.scene.grid.half_width && !cli_patch_has(&s.bake.patch, "--half-width")) {
         made.scene.grid.half_width = s.band;
     }
-    code = code == CLI_OK ? cli_bake_check_work(&s.bake, &made) : code;
-    code = code == CLI_OK ? check_files(&s, &made.scene) : code;
-    if (code == CLI_OK) {
-        cli_signals_watch();
-        code = run_volume(&s, &made.scene);
-    }
+    CLI_TRY_DONE(cli_bake_check_work(&s.bake, &made));
+    CLI_TRY_DONE(check_files(&s, &made.scene));
+    cli_signals_watch();
+    code = run_volume(&s, &made.scene);
+done:
     cli_bake_scene_free(&made);
     cli_progress_end();
     return code;

@@ -9,6 +9,7 @@
 #include "cli/provenance.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
+#include "cli/try.h"
 
 #include <inttypes.h>
 #include <stdio.h>
@@ -112,18 +113,18 @@ static int voxelize(const voxelize_settings *s, const vsh_scene *scene) {
     vsh_assets *assets = NULL;
     vsh_grid *grid = NULL;
     vsh_error error;
-    vsh_result result = vsh_assets_load(scene, &run, &assets, &error);
-    int code = result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
-    if (code == CLI_OK) {
-        result = vsh_scene_casters(scene, assets, &run, &grid, &error);
-        code = result == VSH_OK ? write_grid(s, scene, &run, grid) : cli_fail_of(NULL, &error);
+    int code;
+    if (vsh_assets_load(scene, &run, &assets, &error) != VSH_OK ||
+        vsh_scene_casters(scene, assets, &run, &grid, &error) != VSH_OK) {
+        code = cli_fail_of(NULL, &error);
+        goto done;
     }
-    if (code == CLI_OK) {
-        cli_signals_end();
-        if (!s->common.quiet) {
-            say_summary(s, grid, vshi_seconds() - start);
-        }
+    CLI_TRY_DONE(write_grid(s, scene, &run, grid));
+    cli_signals_end();
+    if (!s->common.quiet) {
+        say_summary(s, grid, vshi_seconds() - start);
     }
+done:
     vsh_grid_free(grid);
     vsh_assets_free(assets);
     return code;
@@ -164,12 +165,11 @@ static int voxelize_main(int argc, char **argv) {
         scene.unit = read->unit;
         scene.cast_blended = read->cast_blended;
     }
-    code = cli_patch_scene(&s.patch, &scene);
-    code = code == CLI_OK ? check_files(&s, &scene) : code;
-    if (code == CLI_OK) {
-        cli_signals_watch();
-        code = voxelize(&s, &scene);
-    }
+    CLI_TRY_DONE(cli_patch_scene(&s.patch, &scene));
+    CLI_TRY_DONE(check_files(&s, &scene));
+    cli_signals_watch();
+    code = voxelize(&s, &scene);
+done:
     vsh_scene_free(read);
     cli_progress_end();
     return code;
