@@ -60,6 +60,27 @@ static void wider_and_narrower_penumbrae_are_told_by_how_much(void **unused) {
     }
 }
 
+/* A penumbra of 30 texels from 0 to 1: 24 of them between 0.1 and 0.9. */
+static void a_penumbra_that_is_gone_is_off_by_all_of_its_width(void **unused) {
+    (void)unused;
+    const ramp r = {30.0, 0.0, 0.0};
+    const double lit = 1.0, factors[] = {1.0, 0.5, 1.2};
+    const plane truth = make_plane(SIDE, SIDE, 1, ramp_at, &r);
+    vsh_accuracy a;
+    vsh_error error;
+    for (size_t i = 0; i <= sizeof factors / sizeof factors[0]; ++i) {
+        const bool gone = i == sizeof factors / sizeof factors[0];
+        const ramp other = {30.0 * (gone ? 1.0 : factors[i]), 0.0, 0.0};
+        const plane values =
+            gone ? make_plane(SIDE, SIDE, 1, flat, &lit) : make_plane(SIDE, SIDE, 1, ramp_at, &other);
+        const vsh_compared compared = pair_of(&truth, &values, NULL);
+        assert_int_equal(vsh_compare_accuracy(&compared, 1, NULL, &a, &error), VSH_OK);
+        assert_near(a.width_error, gone ? 1.0 : fabs(factors[i] - 1.0), 1e-4);
+        free(values.values);
+    }
+    free(truth.values);
+}
+
 static void noise_does_not_change_a_penumbras_width(void **unused) {
     (void)unused;
     for (size_t i = 0; i < ANGLES; ++i) {
@@ -301,6 +322,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_ramp_is_as_wide_as_it_is_in_every_direction),
         cmocka_unit_test(wider_and_narrower_penumbrae_are_told_by_how_much),
+        cmocka_unit_test(a_penumbra_that_is_gone_is_off_by_all_of_its_width),
         cmocka_unit_test(noise_does_not_change_a_penumbras_width),
         cmocka_unit_test(an_edge_that_is_cut_off_is_no_edge),
         cmocka_unit_test(part_of_the_penumbrae_shows_in_the_widths),

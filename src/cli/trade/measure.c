@@ -138,6 +138,36 @@ int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh
     return code;
 }
 
+/* Every receiver's lightmap of every plane is one of its own: no penumbra goes on in the next. */
+static int compare(const trade_work *work, const trade_subject *subject, const float *values,
+                   const uint8_t *mask, vsh_accuracy *accuracy) {
+    const size_t count = subject->planes * work->receiver_count;
+    vsh_compared *planes = calloc(count, sizeof *planes);
+    if (planes == NULL) {
+        return cli_out_of_memory("planes");
+    }
+    for (size_t i = 0; i < count; ++i) {
+        const trade_receiver *receiver = &work->receivers[i % work->receiver_count];
+        const size_t first = i / work->receiver_count * work->texels + receiver->first;
+        planes[i] = (vsh_compared){{receiver->info.width, receiver->info.height, 1},
+                                   subject->truth + first,
+                                   values + first,
+                                   mask + receiver->first};
+    }
+    vsh_error error;
+    const vsh_result result = vsh_compare_accuracy(planes, count, &work->run, accuracy, &error);
+    free(planes);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+}
+
+int trade_compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask, trade_run *run) {
+    vsh_accuracy valid;
+    const int code = compare(work, subject, run->values, mask, &valid);
+    run->valid_rmse = valid.rmse;
+    run->rate = 1e6 * run->bake_s / (double)(subject->planes * run->valid);
+    return code == CLI_OK ? compare(work, subject, run->values, work->common, &run->metrics) : code;
+}
+
 /* Bakes the run's values, several times where it is quick. */
 static int bake(const trade_work *work, const trade_subject *subject, const vsh_occluders *occluders,
                 const vsh_shade_options *shade, trade_run *run, vsh_shade_stats *stats) {
@@ -188,7 +218,7 @@ static int run_plan(trade_work *work, trade_subject *subject, const plan *p, con
     int code = bake(work, subject, on->traced, &shade, &run, &stats);
     if (code == CLI_OK) {
         run.certified = certified_share(subject, run.valid, &shade, &stats);
-        code = trade_compare(work, subject, on->mask, on->valid, &run);
+        code = trade_compare(work, subject, on->mask, &run);
     }
     if (code == CLI_OK && trade_add(work, subject, &run) != NULL) {
         return CLI_OK;

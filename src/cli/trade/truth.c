@@ -120,7 +120,7 @@ static int measure_rays(trade_work *work, trade_subject *subject, int32_t rays) 
         code = trace(work, subject, rays, run.values, &clock.times[clock.count++]);
     } while (code == CLI_OK && trade_again(&clock));
     run.bake_s = trade_median(&clock);
-    code = code == CLI_OK ? trade_compare(work, subject, work->any, work->points, &run) : code;
+    code = code == CLI_OK ? trade_compare(work, subject, work->any, &run) : code;
     if (code == CLI_OK && trade_add(work, subject, &run) != NULL) {
         return CLI_OK;
     }
