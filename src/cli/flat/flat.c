@@ -4,6 +4,7 @@
 #include "cli/clipping.h"
 #include "cli/commands.h"
 #include "cli/message.h"
+#include "cli/patch.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/provenance.h"
@@ -15,40 +16,21 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    KEY_SIZE = 0x2000,
-    KEY_METHOD,
-    KEY_SUPERSAMPLE,
-    KEY_PADDING,
-    KEY_BITS,
-    KEY_PACK,
-    KEY_COLOR_SPACE,
-    KEY_STATS
-};
+enum { KEY_STATS = 0x2000 };
 
 typedef struct flat_settings {
-    const char *input, *output, *stats, *pack;
+    const char *input, *output, *stats;
     cli_common common;
-    vsh_flat_options options;
-    int32_t bits, color_space;
-    bool has_color_space, has_size, has_method, has_supersample, has_padding, has_bits;
+    cli_patch patch; /* over the scene */
 } flat_settings;
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
     {'o', "output", "OUT", "image to write; formats as of bake (the scene's)"},
-    {KEY_SIZE, "size", "W[xH]", "texels of the map, 1 to 65536 (the scene's, 512)"},
-    {KEY_BITS, "bits", "N",
-     "8, 16 or 32 bits a channel (32 for EXR, else 16\nwhere the format has it, else 8)"},
-    {KEY_PACK, "pack", "R=NAME,…",
-     "what goes where in formats that cannot name channels\n(irradiance.R, .G and .B to R, G, B; A to A)"},
-    {KEY_COLOR_SPACE, "color-space", "SPACE",
-     "of R, G, B in 8 and 16 bits: srgb or linear (auto:\nsrgb for irradiance, linear for shadows)"},
+    CLI_SETTINGS(VSH_SETTINGS_FLAT_IMAGE),
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {0, NULL, NULL, "Texels"},
-    {KEY_METHOD, "method", "NAME", "exact, classic (outer half of the penumbra only) or hard\n(exact)"},
-    {KEY_SUPERSAMPLE, "supersample", "N", "N × N samples a texel, 1 to 16 (1)"},
-    {KEY_PADDING, "padding", "N", "texels that values are grown by into solids, 0 to 4096 (4)"},
+    CLI_SETTINGS(VSH_SETTINGS_FLAT_TEXELS),
     CLI_COMMON_OPTIONS,
 };
 
@@ -59,8 +41,8 @@ const cli_command cli_flat = {
     "SCENE.json -o OUT [options]",
     "Bakes a light map of a plane, for 2D games: for each light the share of it that is seen, soft\n"
     "shadows of areas, images and text included, the irradiance by all, and where solids are. The\n"
-    "scene's file is one of its own kind: docs/flat.md. Numbers in brackets are what holds without the\n"
-    "option.",
+    "scene's file is one of its own kind: docs/flat.md. What is in brackets holds without the option\n"
+    "and without the scene's key.",
     options,
     sizeof options / sizeof options[0],
     flat_main};
@@ -71,27 +53,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case 'o':
         s->output = value;
         return CLI_OK;
-    case KEY_SIZE:
-        s->has_size = true;
-        return cli_parse_size(name, value, &s->options.width, &s->options.height);
-    case KEY_METHOD:
-        s->has_method = true;
-        return cli_parse_name(name, value, vsh_flat_method, vsh_flat_method_name, &s->options.method);
-    case KEY_SUPERSAMPLE:
-        s->has_supersample = true;
-        return cli_parse_integer(name, value, 1, 16, &s->options.supersample);
-    case KEY_PADDING:
-        s->has_padding = true;
-        return cli_parse_integer(name, value, 0, 4096, &s->options.padding);
-    case KEY_BITS:
-        s->has_bits = true;
-        return cli_parse_bits(name, value, &s->bits);
-    case KEY_PACK:
-        s->pack = value;
-        return CLI_OK;
-    case KEY_COLOR_SPACE:
-        s->has_color_space = true;
-        return cli_parse_color_space(name, value, &s->color_space);
     case KEY_STATS:
         s->stats = value;
         return CLI_OK;
@@ -99,23 +60,15 @@ static int take(void *settings, int key, const char *name, const char *value) {
         break;
     }
     bool taken;
-    return cli_common_parse(&s->common, key, name, value, &taken);
+    const int code = cli_patch_take(&s->patch, key, name, value, &taken);
+    return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);
 }
 
 /* Puts what was given over the scene's own. */
 static int apply(const flat_settings *s, vsh_flat_scene *scene) {
-    const vsh_flat_options *given = &s->options;
-    vsh_flat_options *o = &scene->options;
-    o->width = s->has_size ? given->width : o->width;
-    o->height = s->has_size ? given->height : o->height;
-    o->method = s->has_method ? given->method : o->method;
-    o->supersample = s->has_supersample ? given->supersample : o->supersample;
-    o->padding = s->has_padding ? given->padding : o->padding;
     scene->output = s->output != NULL ? s->output : scene->output;
-    scene->bits = s->has_bits ? s->bits : scene->bits;
-    scene->pack = s->pack != NULL ? s->pack : scene->pack;
-    scene->color_space = s->has_color_space ? s->color_space : scene->color_space;
-    return scene->output != NULL ? CLI_OK : cli_usage("%s: no output; give -o OUT", s->input);
+    return scene->output != NULL ? cli_patch_flat(&s->patch, scene)
+                                 : cli_usage("%s: no output; give -o OUT", s->input);
 }
 
 /* --- channels */
