@@ -44,21 +44,30 @@ static void weigh_sky(void *user, size_t begin, size_t end) {
 }
 
 /* AO of what is over the horizon, within a distance that no caster is beyond. */
-static vsh_result fill_sky(vshi_baking *bake, float *plane, vsh_error *error) {
+vsh_shade_options vshi_baking_sky(const vshi_baking *bake) {
     static const double FAR = 0x1p60;
     const int32_t up = bake->lightmap->asked.sky;
-    if (up <= VSH_UP_NONE || up > VSH_UP_MINUS_Z) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap asked.sky %d: expected %d … %d", up, VSH_UP_X,
-                         VSH_UP_MINUS_Z);
-    }
     vsh_shade_options options = bake->shade;
     options.ao_distance = FAR;
     for (int axis = 0; axis < 3; ++axis) {
         options.ao_up[axis] = up == VSH_UP_X + axis ? 1.0 : up == VSH_UP_MINUS_X + axis ? -1.0 : 0.0;
     }
+    return options;
+}
+
+/* Rays tell of their error before the weighing, which makes it less. */
+static vsh_result fill_sky(vshi_baking *bake, float *plane, vsh_error *error) {
+    const int32_t up = bake->lightmap->asked.sky;
+    if (up <= VSH_UP_NONE || up > VSH_UP_MINUS_Z) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap asked.sky %d: expected %d … %d", up, VSH_UP_X,
+                         VSH_UP_MINUS_Z);
+    }
+    const vsh_shade_options options = vshi_baking_sky(bake);
+    const double square = bake->stats.shade.square_error;
     skylight s = {bake, vshi_vec_of(options.ao_up)};
     VSHI_TRY(vshi_baking_open(bake, &options, NULL, NULL, error));
     VSHI_TRY(vshi_baking_step(bake, "sky", weigh_sky, &s, error));
+    VSHI_TRY(vshi_baking_add_error(bake, bake->light_count + 1, square, error));
     return vshi_baking_average(bake, bake->values, 1, plane, error);
 }
 
