@@ -104,7 +104,7 @@ static void files_have_paths_and_places(void **state) {
     float value;
     char digest[VSH_DIGEST_TEXT];
     const char *const name = "ao";
-    const vsh_image unnamed = {1, 1, 1, NULL, NULL}, empty = {1, 1, 1, &name, NULL};
+    const vsh_image unnamed = {1, 1, 1, NULL, NULL, NULL}, empty = {1, 1, 1, &name, NULL, NULL};
     MAKES_NONE(vsh_grid_read(NULL, NULL, NULL, PLACE, &error));
     REFUSED(vsh_grid_read("a.vdb", NULL, NULL, NULL, &error));
     REFUSED(vsh_grid_write(NULL, "a.vdb", NULL, NULL, 0, &error));

@@ -76,6 +76,7 @@ static int apply(const flat_settings *s, vsh_flat_scene *scene) {
 typedef struct flat_planes {
     char (*names)[VSH_CHANNEL_NAME];
     const char **name_list;
+    int32_t *holds;
     float **planes; /* irradiance.R, .G, .B, then the shadows, then A */
     size_t count;
     vsh_image image;
@@ -90,13 +91,15 @@ static int name_planes(const vsh_flat_scene *scene, flat_planes *p) {
     p->count = scene->light_count + 4;
     p->names = calloc(p->count, sizeof *p->names);
     p->name_list = calloc(p->count, sizeof *p->name_list);
+    p->holds = calloc(p->count, sizeof *p->holds);
     p->planes = calloc(p->count, sizeof *p->planes);
-    if (p->names == NULL || p->name_list == NULL || p->planes == NULL) {
+    if (p->names == NULL || p->name_list == NULL || p->holds == NULL || p->planes == NULL) {
         return out_of_memory("channels");
     }
     for (size_t i = 0; i < p->count; ++i) {
         if (i < 3) {
             snprintf(p->names[i], VSH_CHANNEL_NAME, "irradiance.%c", "RGB"[i]);
+            p->holds[i] = VSH_CHANNEL_LIGHT;
         } else if (i + 1 < p->count) {
             snprintf(p->names[i], VSH_CHANNEL_NAME, "shadow.%s", scene->lights[i - 3].name);
         } else {
@@ -104,8 +107,8 @@ static int name_planes(const vsh_flat_scene *scene, flat_planes *p) {
         }
         p->name_list[i] = p->names[i];
     }
-    p->image = (vsh_image){scene->options.width, scene->options.height, (int32_t)p->count, p->name_list,
-                           (const float *const *)p->planes};
+    p->image = (vsh_image){scene->options.width, scene->options.height,           (int32_t)p->count,
+                           p->name_list,         (const float *const *)p->planes, p->holds};
     return CLI_OK;
 }
 
@@ -136,6 +139,7 @@ static void free_planes(flat_planes *p) {
         free(p->planes[i]);
     }
     free(p->planes);
+    free(p->holds);
     free(p->name_list);
     free(p->names);
 }
