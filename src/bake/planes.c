@@ -1,6 +1,5 @@
 #include "bake/planes.h"
 
-#include "bake/ambient.h"
 #include "bake/baking.h"
 #include "base/names.h"
 #include "base/try.h"
@@ -8,9 +7,25 @@
 #include <math.h>
 #include <string.h>
 
+/* Adds what AO lets through of it to the irradiance of lights, where texels are valid; without ambient light
+ * AO dims the lights instead. Planes and state are of the texels that are held. */
+static void add_ambient(const vsh_texels *texels, const uint8_t *state, const vsh_lightmap *lightmap) {
+    for (size_t i = 0; i < vshi_texels_held(texels); ++i) {
+        const float open = lightmap->ao != NULL ? lightmap->ao[i] : 1.0f;
+        for (size_t c = 0; c < 3; ++c) {
+            float *value = &lightmap->irradiance[3 * i + c];
+            if (lightmap->ambient == NULL) {
+                *value *= open;
+            } else if (state[i] == VSHI_TEXEL_VALID) {
+                *value += (float)lightmap->ambient[c] * open;
+            }
+        }
+    }
+}
+
 static vsh_result fill_irradiance(vshi_baking *bake, float *plane, vsh_error *error) {
     VSHI_TRY(vshi_baking_average(bake, bake->irradiance, 3, plane, error));
-    vshi_ambient_add(bake->texels, bake->state, bake->lightmap);
+    add_ambient(bake->texels, bake->state, bake->lightmap);
     return VSH_OK;
 }
 

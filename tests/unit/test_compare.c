@@ -1,6 +1,5 @@
 /* Comparing values: what the formulas say, what is refused, and what never passes. */
 #include "compared.h"
-#include "truth/metrics.h"
 
 enum { WIDTH = 40, HEIGHT = 25, COUNT = WIDTH * HEIGHT };
 
@@ -36,45 +35,6 @@ static void differences_are_summed_as_their_formulas_say(void **unused) {
     assert_near(m.value[VSH_MEASURE_SHARE], 29.0 / COUNT, 1e-12); /* 1/64 is below 0.02 */
     free(golden.values);
     free(values.values);
-}
-
-/* Of three planes together, by the tests' own formulas over all their values in a row. */
-static void accuracy_is_what_the_tests_measure_by(void **unused) {
-    (void)unused;
-    enum { PLANES = 3, ALL = PLANES * COUNT };
-    static float truth[ALL], values[ALL], masked[ALL];
-    static uint8_t mask[ALL];
-    vsh_compared planes[PLANES];
-    for (uint32_t i = 0; i < ALL; ++i) {
-        truth[i] = (float)fmin(1.0, fmax(0.0, 0.5 + 0.7 * noise(i)));
-        values[i] = (float)((double)truth[i] + 0.05 + 0.3 * noise(i + ALL));
-        mask[i] = i % 7 != 0;
-        masked[i] = mask[i];
-    }
-    for (size_t k = 0; k < PLANES; ++k) {
-        planes[k] =
-            (vsh_compared){{WIDTH, HEIGHT, 1}, truth + k * COUNT, values + k * COUNT, mask + k * COUNT};
-    }
-    vsh_accuracy a;
-    vsh_error error;
-    assert_int_equal(vsh_compare_accuracy(planes, PLANES, NULL, &a, &error), VSH_OK);
-    const truth_metrics expected = truth_compare(ALL, values, truth, masked);
-    assert_int_equal(a.count, expected.count);
-    assert_int_equal(a.penumbra, expected.penumbra);
-    assert_true(a.penumbra > 0 && a.penumbra < a.count);
-    assert_near(a.rmse, expected.rmse, 1e-12);
-    assert_near(a.penumbra_rmse, expected.penumbra_rmse, 1e-12);
-    assert_near(a.bias, expected.bias, 1e-12);
-    assert_near(a.p95, expected.p95, 1e-7);
-    assert_near(a.p99, expected.p99, 1e-7);
-    assert_near(a.max, expected.max, 1e-12);
-    const vsh_run tight = {.struct_size = sizeof tight, .memory_limit = 10 * ALL - 1};
-    assert_int_equal(vsh_compare_accuracy(planes, PLANES, &tight, &a, &error), VSH_ERROR_LIMIT);
-    values[1] = NAN;
-    assert_int_equal(vsh_compare_accuracy(planes, 1, NULL, &a, &error), VSH_OK);
-    assert_int_equal(a.count, COUNT - (COUNT + 6) / 7 - 1);
-    assert_int_equal(vsh_compare_accuracy(planes, 0, NULL, &a, &error), VSH_OK);
-    assert_true(a.count == 0 && a.rmse == 0.0 && isnan(a.width_error));
 }
 
 static void masked_values_count_for_nothing(void **unused) {
@@ -457,7 +417,6 @@ static void what_comes_from_outside_is_not_explained(void **unused) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(differences_are_summed_as_their_formulas_say),
-        cmocka_unit_test(accuracy_is_what_the_tests_measure_by),
         cmocka_unit_test(masked_values_count_for_nothing),
         cmocka_unit_test(values_past_one_are_taken_by_the_largest_golden_one),
         cmocka_unit_test(two_flat_pictures_are_as_similar_as_their_means),

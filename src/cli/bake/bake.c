@@ -1,14 +1,12 @@
 /* vdbshade bake: from files to lightmaps. */
+#include "bake.h"
 #include "cli/message.h"
-#include "cli/object_output.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/temporary.h"
 #include "cli/warnings.h"
-#include "expect.h"
-#include "forecast.h"
 #include "options.h"
 
 #include <inttypes.h>

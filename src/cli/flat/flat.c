@@ -1,7 +1,6 @@
 /* vdbshade flat: light maps of a plane, for 2D games. */
 #include "base/bytes.h"
 #include "base/clock.h"
-#include "cli/clipping.h"
 #include "cli/commands.h"
 #include "cli/message.h"
 #include "cli/patch.h"
@@ -11,6 +10,7 @@
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/temporary.h"
+#include "cli/warnings.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -194,6 +194,24 @@ static int make_origin(const flat_settings *s, const vsh_flat_scene *scene, cons
     return code;
 }
 
+/* Puts an image in place, and warns where light over 1 was cut. Frees the writer. */
+static int finish_image(vsh_image_writer *writer, const char *output) {
+    vsh_error error;
+    vsh_image_clipping cut;
+    vsh_result result = vsh_image_writer_get_clipping(writer, &cut, &error);
+    result = result == VSH_OK ? vsh_image_writer_finish(writer, &error) : result;
+    if (result != VSH_OK) {
+        return cli_fail(&error);
+    }
+    if (cut.clipped > 0) {
+        cli_warn(
+            "%s: %.3g %% of the texels are brighter than 1, up to %.3g, and cut to 1: write .exr, or floats "
+            "(--bits 32) where the format has them, or dim the lights",
+            output, 100.0 * (double)cut.clipped / (double)cut.texels, (double)cut.largest);
+    }
+    return CLI_OK;
+}
+
 static int write_map(const flat_settings *s, const vsh_flat_scene *scene, const flat_planes *planes,
                      const vsh_image_options *image, const vsh_run *run) {
     cli_provenance origin = {NULL, NULL, 0};
@@ -210,7 +228,7 @@ static int write_map(const flat_settings *s, const vsh_flat_scene *scene, const 
         vsh_image_writer_abandon(writer);
         code = cli_fail(&error);
     } else if (code == CLI_OK) {
-        code = cli_finish_image(writer, scene->output);
+        code = finish_image(writer, scene->output);
     }
     cli_signals_writing(NULL);
     cli_provenance_free(&origin);

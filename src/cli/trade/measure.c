@@ -1,5 +1,4 @@
 /* Bakes the scene in every way that is worth a look, and takes the time. */
-#include "cli/box.h"
 #include "cli/message.h"
 #include "trade.h"
 
@@ -30,18 +29,29 @@ static const plan ao_plans[] = {
     {VSH_AO_CONES, 64, 0.0},    {VSH_AO_EXACT, 0, 0.005},   {VSH_AO_ADAPTIVE, 0, 0.005},
 };
 
+/* The world box of the receivers' samples; empty, min > max, where there are none. */
+static void find_box(const trade_work *work, double min[3], double max[3]) {
+    for (int axis = 0; axis < 3; ++axis) {
+        min[axis] = INFINITY;
+        max[axis] = -INFINITY;
+        for (size_t r = 0; r < work->receiver_count; ++r) {
+            const vsh_texels_info *info = &work->receivers[r].info;
+            min[axis] = info->samples > 0 ? fmin(min[axis], info->bounds_min[axis]) : min[axis];
+            max[axis] = info->samples > 0 ? fmax(max[axis], info->bounds_max[axis]) : max[axis];
+        }
+    }
+}
+
 int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds) {
     const double start = trade_now(work);
     vsh_scene scene = *work->scene;
     scene.grid.resolution = resolution;
     scene.grid.voxel_size = 0.0;
-    cli_box receivers = cli_box_empty();
-    for (size_t r = 0; r < work->receiver_count; ++r) {
-        cli_box_grow(&receivers, &work->receivers[r].info);
-    }
+    double min[3], max[3];
+    find_box(work, min, max);
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
-    options.receivers_min = receivers.min;
-    options.receivers_max = receivers.max;
+    options.receivers_min = min;
+    options.receivers_max = max;
     options.triangles = 0; /* the same for all resolutions */
     vsh_error error;
     const vsh_result result =
