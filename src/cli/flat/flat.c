@@ -10,6 +10,7 @@
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/temporary.h"
+#include "cli/try.h"
 #include "cli/warnings.h"
 
 #include <stdio.h>
@@ -162,19 +163,20 @@ static int check_output(const flat_settings *s, const vsh_flat_scene *scene, con
 /* What can be refused before anything is read. */
 static int check_files(const flat_settings *s, const vsh_flat_scene *scene, const vsh_image *image,
                        const vsh_image_options *options_of_image) {
-    int code = check_output(s, scene, scene->output);
-    code = code == CLI_OK && s->output == NULL ? cli_check_links(s->input, scene->output) : code;
-    if (code == CLI_OK && s->stats != NULL) {
-        code = cli_same_file(scene->output, s->stats)
-                   ? cli_usage("%s: both the output and the --stats file", s->stats)
-                   : check_output(s, scene, s->stats);
-        code = code == CLI_OK ? cli_temporary_check(s->stats) : code;
+    CLI_TRY(check_output(s, scene, scene->output));
+    if (s->output == NULL) {
+        CLI_TRY(cli_check_links(s->input, scene->output));
+    }
+    if (s->stats != NULL) {
+        if (cli_same_file(scene->output, s->stats)) {
+            return cli_usage("%s: both the output and the --stats file", s->stats);
+        }
+        CLI_TRY(check_output(s, scene, s->stats));
+        CLI_TRY(cli_temporary_check(s->stats));
     }
     vsh_error error;
-    if (code == CLI_OK && vsh_image_check(scene->output, image, options_of_image, &error) != VSH_OK) {
-        code = cli_fail(&error);
-    }
-    return code;
+    return vsh_image_check(scene->output, image, options_of_image, &error) == VSH_OK ? CLI_OK
+                                                                                     : cli_fail(&error);
 }
 
 /* Inputs are the scene's file and those that it names. */
@@ -198,9 +200,11 @@ static int make_origin(const flat_settings *s, const vsh_flat_scene *scene, cons
 static int finish_image(vsh_image_writer *writer, const char *output) {
     vsh_error error;
     vsh_image_clipping cut;
-    vsh_result result = vsh_image_writer_get_clipping(writer, &cut, &error);
-    result = result == VSH_OK ? vsh_image_writer_finish(writer, &error) : result;
-    if (result != VSH_OK) {
+    if (vsh_image_writer_get_clipping(writer, &cut, &error) != VSH_OK) {
+        vsh_image_writer_abandon(writer);
+        return cli_fail(&error);
+    }
+    if (vsh_image_writer_finish(writer, &error) != VSH_OK) {
         return cli_fail(&error);
     }
     if (cut.clipped > 0) {
@@ -215,21 +219,22 @@ static int finish_image(vsh_image_writer *writer, const char *output) {
 static int write_map(const flat_settings *s, const vsh_flat_scene *scene, const flat_planes *planes,
                      const vsh_image_options *image, const vsh_run *run) {
     cli_provenance origin = {NULL, NULL, 0};
-    int code = make_origin(s, scene, run, &origin);
+    int code;
+    CLI_TRY_DONE(make_origin(s, scene, run, &origin));
     vsh_image_options told = *image;
     told.attributes = origin.attributes;
     told.attribute_count = origin.count;
     vsh_error error;
     cli_signals_writing(scene->output);
     vsh_image_writer *writer = NULL;
-    if (code == CLI_OK &&
-        (vsh_image_writer_create(scene->output, &planes->image, &told, &writer, &error) != VSH_OK ||
-         vsh_image_writer_add(writer, planes->image.height, planes->image.planes, &error) != VSH_OK)) {
+    if (vsh_image_writer_create(scene->output, &planes->image, &told, &writer, &error) != VSH_OK ||
+        vsh_image_writer_add(writer, planes->image.height, planes->image.planes, &error) != VSH_OK) {
         vsh_image_writer_abandon(writer);
         code = cli_fail(&error);
-    } else if (code == CLI_OK) {
-        code = finish_image(writer, scene->output);
+        goto done;
     }
+    code = finish_image(writer, scene->output);
+done:
     cli_signals_writing(NULL);
     cli_provenance_free(&origin);
     return code;
@@ -240,23 +245,25 @@ static int bake(const flat_settings *s, const vsh_flat_scene *scene, const flat_
     vsh_outline *casters = NULL;
     vsh_error error;
     double now = vshi_seconds();
-    vsh_result result = vsh_flat_scene_casters(scene, run, &casters, &error);
+    if (vsh_flat_scene_casters(scene, run, &casters, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
     now = cli_stats_stage(stats, CLI_STAGE_LOAD, now);
-    if (result == VSH_OK) {
-        const vsh_flat_map map = {planes->planes + 3, planes->planes, planes->planes[planes->count - 1]};
-        result =
-            vsh_flat_bake(casters, scene->lights, scene->light_count, &scene->options, run, &map, &error);
-        now = cli_stats_stage(stats, CLI_STAGE_BAKE, now);
-    }
+    const vsh_flat_map map = {planes->planes + 3, planes->planes, planes->planes[planes->count - 1]};
+    const vsh_result result =
+        vsh_flat_bake(casters, scene->lights, scene->light_count, &scene->options, run, &map, &error);
+    now = cli_stats_stage(stats, CLI_STAGE_BAKE, now);
     vsh_outline_free(casters);
-    if (result == VSH_OK && cli_progress_report(NULL, "write", 0.0) != 0) {
-        result = VSH_ERROR_CANCELLED;
-        error = (vsh_error){VSH_ERROR_CANCELLED, "write: cancelled"};
+    if (result != VSH_OK) {
+        return cli_fail_of(NULL, &error);
     }
-    int code = result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
-    code = code == CLI_OK ? write_map(s, scene, planes, image, run) : code;
+    if (cli_progress_report(NULL, "write", 0.0) != 0) {
+        error = (vsh_error){VSH_ERROR_CANCELLED, "write: cancelled"};
+        return cli_fail_of(NULL, &error);
+    }
+    CLI_TRY(write_map(s, scene, planes, image, run));
     cli_stats_stage(stats, CLI_STAGE_WRITE, now);
-    return code;
+    return CLI_OK;
 }
 
 static void say_summary(const flat_settings *s, const vsh_flat_scene *scene, const cli_stats *stats) {
@@ -278,17 +285,15 @@ static int run_flat(const flat_settings *s, const vsh_flat_scene *scene) {
     const vsh_run run = cli_common_run(&s->common);
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, s->common.threads);
     stats.texels = (uint64_t)scene->options.width * (uint64_t)scene->options.height;
-    int code = name_planes(scene, &planes);
-    code = code == CLI_OK ? check_files(s, scene, &planes.image, &image) : code;
-    code = code == CLI_OK ? allocate_planes(s, scene, &image, &planes) : code;
-    if (code == CLI_OK) {
-        cli_signals_watch();
-        code = bake(s, scene, &planes, &image, &run, &stats);
-    }
-    code = code == CLI_OK ? cli_stats_finish(&stats, &run, s->stats) : code;
-    if (code == CLI_OK) {
-        say_summary(s, scene, &stats);
-    }
+    int code;
+    CLI_TRY_DONE(name_planes(scene, &planes));
+    CLI_TRY_DONE(check_files(s, scene, &planes.image, &image));
+    CLI_TRY_DONE(allocate_planes(s, scene, &image, &planes));
+    cli_signals_watch();
+    CLI_TRY_DONE(bake(s, scene, &planes, &image, &run, &stats));
+    CLI_TRY_DONE(cli_stats_finish(&stats, &run, s->stats));
+    say_summary(s, scene, &stats);
+done:
     free_planes(&planes);
     return code;
 }
@@ -308,9 +313,11 @@ static int flat_main(int argc, char **argv) {
     vsh_error error;
     if (vsh_flat_scene_read(s.input, &run, &scene, &error) != VSH_OK) {
         code = cli_fail(&error);
+        goto done;
     }
-    code = code == CLI_OK ? apply(&s, scene) : code;
-    code = code == CLI_OK ? run_flat(&s, scene) : code;
+    CLI_TRY_DONE(apply(&s, scene));
+    code = run_flat(&s, scene);
+done:
     vsh_flat_scene_free(scene);
     cli_progress_end();
     return code;

@@ -1,5 +1,6 @@
 /* Bakes the scene in every way that is worth a look, and takes the time. */
 #include "cli/message.h"
+#include "cli/try.h"
 #include "trade.h"
 
 #include <math.h>
@@ -127,7 +128,7 @@ int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh
     }
     vsh_bake_stats baked = vsh_bake_stats_zero();
     int code = CLI_OK;
-    for (size_t r = 0; r < work->receiver_count && code == CLI_OK; ++r) {
+    for (size_t r = 0; r < work->receiver_count; ++r) {
         const size_t first = work->receivers[r].first;
         for (size_t i = 0; i < lights; ++i) {
             planes[i] = shadow + i * work->texels + first;
@@ -139,12 +140,14 @@ int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh
         if (vsh_bake_lightmap(occluders, work->receivers[r].texels, work->scene->lights, lights, shade,
                               &work->run, &lightmap, &baked, &error) != VSH_OK) {
             code = cli_fail_of(NULL, &error);
+            goto done;
         }
     }
-    free(planes);
     if (stats != NULL) {
         *stats = baked.shade;
     }
+done:
+    free(planes);
     return code;
 }
 
@@ -172,10 +175,10 @@ static int compare(const trade_work *work, const trade_subject *subject, const f
 
 int trade_compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask, trade_run *run) {
     vsh_accuracy valid;
-    const int code = compare(work, subject, run->values, mask, &valid);
+    CLI_TRY(compare(work, subject, run->values, mask, &valid));
     run->valid_rmse = valid.rmse;
     run->rate = 1e6 * run->bake_s / (double)(subject->planes * run->valid);
-    return code == CLI_OK ? compare(work, subject, run->values, work->common, &run->metrics) : code;
+    return compare(work, subject, run->values, work->common, &run->metrics);
 }
 
 /* Bakes the run's values, several times where it is quick. */
@@ -225,16 +228,17 @@ static int run_plan(trade_work *work, trade_subject *subject, const plan *p, con
     run.bytes = info.field_bytes + (exact ? vsh_triangles_bytes(work->triangles) : 0);
     run.build_s += exact ? work->triangles_s : 0.0;
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    int code = bake(work, subject, on->traced, &shade, &run, &stats);
-    if (code == CLI_OK) {
-        run.certified = certified_share(subject, run.valid, &shade, &stats);
-        code = trade_compare(work, subject, on->mask, &run);
-    }
-    if (code == CLI_OK && trade_add(work, subject, &run) != NULL) {
+    int code;
+    CLI_TRY_DONE(bake(work, subject, on->traced, &shade, &run, &stats));
+    run.certified = certified_share(subject, run.valid, &shade, &stats);
+    CLI_TRY_DONE(trade_compare(work, subject, on->mask, &run));
+    if (trade_add(work, subject, &run) != NULL) {
         return CLI_OK;
     }
+    code = cli_out_of_memory("runs");
+done:
     free(run.values);
-    return code != CLI_OK ? code : cli_out_of_memory("runs");
+    return code;
 }
 
 /* The first plans of all come first, on every field: where the budget ends, it is the dear ones that are
@@ -247,10 +251,7 @@ int trade_measure(trade_work *work) {
             trade_subject *subject = &work->subjects[s];
             for (size_t f = 0; f < work->field_count && i < (subject->ao ? ao_count : shadow_count); ++f) {
                 const plan *p = subject->ao ? &ao_plans[i] : &shadow_plans[i];
-                const int code = run_plan(work, subject, p, &work->fields[f]);
-                if (code != CLI_OK) {
-                    return code;
-                }
+                CLI_TRY(run_plan(work, subject, p, &work->fields[f]));
             }
         }
     }
