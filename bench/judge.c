@@ -70,7 +70,7 @@ static int truth(char **arguments) {
     judge_truth t = judge_make(arguments[0], &q);
     static const char *const names[] = {"verdict", "shadow", "ao", "apart", "triangle"};
     const float *const planes[] = {t.verdict, t.shadow, t.ao, t.apart, t.triangle};
-    const vsh_image image = {q.size, q.size, 5, names, planes};
+    const vsh_image image = {q.size, q.size, 5, names, planes, NULL};
     if (fabs(t.units - 1.0) > 1e-3) {
         printf("%s: lengths are %.6g times what was meant\n", arguments[0], t.units);
     }

@@ -88,7 +88,7 @@ static int make_truth(char **arguments) {
     }
     const char *const names[] = {"shadow.sun", "ao", "A"};
     const float *const view[] = {plane[0], plane[1], plane[2]};
-    const vsh_image image = {size.width, size.height, 3, names, view};
+    const vsh_image image = {size.width, size.height, 3, names, view, NULL};
     bench_check(vsh_image_write(arguments[7], &image, NULL, &error), &error);
     for (int p = 0; p < 3; ++p) {
         free(plane[p]);

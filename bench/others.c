@@ -1,10 +1,10 @@
 /* The same level set and the same rays in OpenVDB's LevelSetRayIntersector and in NanoVDB's ZeroCrossing: µs
  * a ray, on one core and on all. And the cone march's samples against NanoVDB's, at the same places. */
+#include "analytic.h"
 #include "bench.h"
 #include "casts.h"
 #include "directions.h"
 #include "scenes.h"
-#include "seeds.h"
 #include "vdb.h"
 
 #include <math.h>

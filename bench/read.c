@@ -124,7 +124,7 @@ static void write_picture(const char *path) {
     }
     const char *const names[] = {"ao", "A"};
     const float *const planes[] = {values, values};
-    const vsh_image image = {SIDE, SIDE, 2, names, planes};
+    const vsh_image image = {SIDE, SIDE, 2, names, planes, NULL};
     bench_check(vsh_image_write(path, &image, NULL, &error), &error);
     free(values);
 }

@@ -1,4 +1,5 @@
-/* The meshes that shadows are measured on, of assets/, and receivers all over them. */
+/* What shadows are measured on, of assets/: meshes and receivers all over them, and the seeds over their
+ * floor. */
 #ifndef BENCH_SCENES_H
 #define BENCH_SCENES_H
 
@@ -32,5 +33,19 @@ vsh_field *bench_scene_field(const bench_scene *scene, int32_t resolution);
  * other geometry, as a bake judges. */
 void bench_scene_points(const bench_scene *scene, const vsh_field *field, uint64_t seed, size_t count,
                         double *positions, float *normals, float *valid);
+
+/* The seeds' scene: its field, its sun, and 512² texels of the floor. */
+typedef struct bench_seeds_scene {
+    vsh_grid *grid;
+    vsh_field *field;
+    vsh_light sun;
+    size_t count;
+    double *positions; /* [count][3], a thousandth above the floor, in the order of a lightmap's samples */
+    float *normals;    /* [count][3] */
+} bench_seeds_scene;
+
+/* Ends the program where the asset or memory is missing. */
+void bench_seeds_make(bench_seeds_scene *seeds);
+void bench_seeds_free(bench_seeds_scene *seeds);
 
 #endif

@@ -1,7 +1,7 @@
 /* The seeds' scene: 512² floor texels against 256 analytic rays each. */
-#include "seeds.h"
-
+#include "analytic.h"
 #include "bench.h"
+#include "scenes.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -55,7 +55,7 @@ int main(void) {
     static float shadow[SIZE * SIZE];
     const char *const name = "shadow.sun";
     const float *const plane = shadow;
-    const vsh_image image = {SIZE, SIZE, 1, &name, &plane};
+    const vsh_image image = {SIZE, SIZE, 1, &name, &plane, NULL};
     vsh_error error;
     if (bake(&box, 1, &ground, shadow, &error) != VSH_OK ||
         vsh_image_write("floor.exr", &image, NULL, &error) != VSH_OK) {

@@ -225,7 +225,7 @@ int main(int argc, char **argv) {
     draw_fog(field, volume);
     static const char *const names[3] = {"R", "G", "B"};
     const float *const rows[3] = {planes[0], planes[1], planes[2]};
-    const vsh_image image = {WIDTH, HIGH, 3, names, rows};
+    const vsh_image image = {WIDTH, HIGH, 3, names, rows, NULL};
     vsh_image_options bits = vsh_image_options_default();
     bits.bits = 8;
     check(vsh_image_write(argv[2], &image, &bits, &error));

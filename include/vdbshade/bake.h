@@ -250,7 +250,8 @@ VSH_API uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_r
  * zeros. */
 typedef struct vsh_bake_error {
     double values;       /* valid samples, where the channel's method keeps an error; else 0 */
-    double square_error; /* over them: the squared error that rays leave, as the method estimates it */
+    double square_error; /* over them: the squared error that rays leave, as the method estimates it; of the
+                            sky before it is weighed by (1 + n · up) / 2, which makes it less */
     double held;         /* values that stand for the samples that were held against the casters themselves */
     double held_square_error; /* over them: the squared error, of whatever cause: rays, voxels, samples that
                                  are invalid by mistake and were filled */
@@ -275,7 +276,8 @@ typedef struct vsh_bake_stats {
     vsh_shade_stats shade;     /* added to */
     uint64_t seen_texels;      /* of the invalid ones: in plain sight, rays from them escape. Of exact methods
                                   only: a field does not tell, and leaves it 0 */
-    vsh_bake_error *errors;    /* [light_count + 1]: of each light, then of AO; added to; NULL: not wanted.
+    vsh_bake_error *errors;    /* [light_count + 1], and with a plane of the sky [light_count + 2]: of each
+                                  light, of AO, of the sky; added to; NULL: not wanted.
                                   Where a method keeps an error and the occluders have what stands for the
                                   truth (vsh_occluder_parts), a part of its samples (one in 16, 4096 to 16384
                                   of a lightmap; of exact methods one in 64, 1024 to 4096; the same ones for

@@ -139,8 +139,8 @@ typedef struct vsh_bake_report {
     uint64_t bands;
     vsh_shade_stats shade;
     vsh_occluders_info occluders;
-    const vsh_bake_error *errors; /* [error_count]: of each light, then of AO; belong to the job */
-    size_t error_count;           /* 1 + lights of the scene; 0 before vsh_bake_job_prepare() */
+    const vsh_bake_error *errors; /* [error_count]: of each light, of AO, of the sky; belong to the job */
+    size_t error_count;           /* 2 + lights of the scene; 0 before vsh_bake_job_prepare() */
 } vsh_bake_report;
 
 /* Cannot fail. */

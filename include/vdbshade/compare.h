@@ -128,6 +128,36 @@ static inline vsh_result vsh_compare(const vsh_compared *compared, const vsh_com
     return vsh_compare_sized(compared, options, run, measures, sizeof *measures, error);
 }
 
+/* --- against a truth */
+
+/* How far values are from the truth, over several planes together. Zeros where nothing is compared. */
+typedef struct vsh_accuracy {
+    uint64_t count;       /* values compared: masked in, finite in both */
+    uint64_t penumbra;    /* of them with a truth in 0.02 … 0.98 */
+    double rmse;          /* over all */
+    double penumbra_rmse; /* over the penumbra; 0 where there is none */
+    double bias;          /* mean of value - truth */
+    double p95, p99;      /* of |value - truth|, nearest rank */
+    double max;           /* the same, the largest */
+    /* Σ |w - v| / Σ v over the penumbrae that lines of the truth along each axis cross from 0.1 to 0.9, v and
+     * w the lengths that truth and values spend between the two around that place; NaN where there are none.
+     * Unlike VSH_MEASURE_WIDTHS it asks for no edge in the values: a penumbra that is gone counts as 1. */
+    double width_error;
+} vsh_accuracy;
+
+/* Measures how far planes of values, which lie in 0 … 1, are from their truth, which is `golden`. Takes 10
+ * bytes a value with the caller's. Errors:
+ * - VSH_ERROR_ARGUMENT: planes or accuracy NULL, a plane's values NULL, its size, run;
+ * - VSH_ERROR_LIMIT: run->memory_limit;
+ * - VSH_ERROR_MEMORY. */
+VSH_API vsh_result vsh_compare_accuracy_sized(const vsh_compared *planes, size_t plane_count,
+                                              const vsh_run *run, vsh_accuracy *accuracy,
+                                              size_t accuracy_size, vsh_error *error);
+static inline vsh_result vsh_compare_accuracy(const vsh_compared *planes, size_t plane_count,
+                                              const vsh_run *run, vsh_accuracy *accuracy, vsh_error *error) {
+    return vsh_compare_accuracy_sized(planes, plane_count, run, accuracy, sizeof *accuracy, error);
+}
+
 /* --- limits */
 
 /* What a channel is allowed. */

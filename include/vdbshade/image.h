@@ -14,6 +14,13 @@ enum { VSH_MAX_CHANNELS = 256, VSH_CHANNEL_NAME = 128 };
  * value says of which: "irradiance", "shadow.sun * ao", "mean of 3 shadows". */
 #define VSH_IMAGE_RGB "vdbshade_rgb"
 
+/* What a channel holds, which says how integers hold it. */
+enum {
+    VSH_CHANNEL_DATA = 0,  /* 0 … 1, as it is */
+    VSH_CHANNEL_LIGHT = 1, /* linear light: VSH_COLOR_AUTO is for it */
+    VSH_CHANNEL_VECTOR = 2 /* a component from -1 to 1: integers hold (1 + x) / 2 */
+};
+
 /* Planes with names: a view. width × height × channel_count is at most 2^31; in
  * an EXR file that is written row by row there is no such limit. */
 typedef struct vsh_image {
@@ -23,12 +30,13 @@ typedef struct vsh_image {
     const char *const *names;   /* [channel_count]: "shadow.sun", "ao", "A"; 1 … VSH_CHANNEL_NAME - 1 bytes,
                                    no two alike */
     const float *const *planes; /* [channel_count][height × width], row 0 on top */
+    const int32_t *holds;       /* [channel_count]: VSH_CHANNEL_…; NULL: all of them data */
 } vsh_image;
 
 /* What R, G and B of integers stand for. Programs take R, G and B of 8 and of 16 bits for sRGB, unless they
  * are told that they are data. */
 enum {
-    VSH_COLOR_AUTO = 0, /* sRGB where all of R, G and B are light (irradiance.… and tint.…), else linear */
+    VSH_COLOR_AUTO = 0,   /* sRGB where all of R, G and B are VSH_CHANNEL_LIGHT, else linear */
     VSH_COLOR_LINEAR = 1, /* as they are */
     VSH_COLOR_SRGB = 2,   /* through the curve of IEC 61966-2-1 */
     VSH_COLOR_ENCODED = 3 /* the caller's values have gone through it: the file only says so */
@@ -66,8 +74,8 @@ static inline vsh_image_options vsh_image_options_default(void) {
 /* Writes an image; the ending of `path`, in any case, chooses the format (docs/formats.md lists them).
  * Integer formats clamp to 0 … 1 and round to nearest, NaN to 0, with the curve that options->color_space
  * says; PNG files tell it in their text "vdbshade_color_space" ("sRGB" or "linear"), and sRGB in PNG's,
- * TIFF's and JPEG's own way too. Channels whose name begins with "bent." hold -1 … 1, and go into integers as
- * (1 + x) / 2. Atomic: written beside `path` and renamed, so a failure leaves an old file alone. Errors:
+ * TIFF's and JPEG's own way too. Atomic: written beside `path` and renamed, so a failure leaves an old file
+ * alone. Errors:
  * - VSH_ERROR_ARGUMENT: path NULL or empty, no image, sizes or channels out of range, a plane NULL,
  *   options; attributes other than vsh_attribute says; an unknown ending; bits, a pack or a size that the
  * format does not have;

@@ -22,10 +22,11 @@ typedef struct vsh_provenance_source {
                                         one line */
     size_t attribute_count;
     int32_t has_triangles; /* of vsh_occluders_info: tells what auto came to */
+    int32_t lightmap;      /* nonzero: of a lightmap, which has what scene->planes asks for */
 } vsh_provenance_source;
 
 static inline vsh_provenance_source vsh_provenance_source_default(void) {
-    vsh_provenance_source source = {sizeof(vsh_provenance_source), NULL, NULL, 0, NULL, 0.0, NULL, 0, 0};
+    vsh_provenance_source source = {sizeof(vsh_provenance_source), NULL, NULL, 0, NULL, 0.0, NULL, 0, 0, 0};
     return source;
 }
 
@@ -34,6 +35,7 @@ static inline vsh_provenance_source vsh_provenance_source_default(void) {
  * - vdbshade_version: "0.2.0";
  * - vdbshade_command;
  * - vdbshade_shadow: "exact, max error 0.02, 64 rays, sobol"; vdbshade_ao: "cones, 16 within 2";
+ *   vdbshade_sky: "exact over y, max error 0.02, sobol";
  * - vdbshade_light_NAME: type, place and size of each light;
  * - vdbshade_voxel_size;
  * - those of the source;
@@ -52,9 +54,9 @@ VSH_API vsh_result vsh_provenance_create(const vsh_provenance_source *source, co
 /* The attributes, which belong to the provenance; none of NULL. Cannot fail. */
 VSH_API const vsh_attribute *vsh_provenance_attributes(const vsh_provenance *provenance, size_t *count);
 
-/* The standard error that the values of a channel ("ao", "shadow.NAME") were made to, as attributes say that
- * a file carries; NaN where they don't, or where a limit of rays was given, by which it may be missed. Cannot
- * fail. */
+/* The standard error that the values of a channel ("ao", "sky", "shadow.NAME") were made to, as attributes
+ * say that a file carries; NaN where they don't, or where a limit of rays was given, by which it may be
+ * missed. Cannot fail. */
 VSH_API double vsh_provenance_max_error(const vsh_attribute *attributes, size_t count, const char *channel);
 
 VSH_API void vsh_provenance_free(vsh_provenance *provenance); /* NULL does nothing */

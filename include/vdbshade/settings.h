@@ -1,8 +1,10 @@
-/* Settings of a scene, and of what receives in it, one by one: listed, and given as texts. They are what a
- * scene's file says by numbers and names (docs/scene.md), and what `vdbshade bake` takes as options. */
+/* Settings of a scene, of what receives in it, and of a flat scene, one by one: listed, and given as texts.
+ * They are what a scene's file says by numbers and names (docs/scene.md, docs/flat.md), and what `vdbshade
+ * bake` and `vdbshade flat` take as options. */
 #ifndef VDBSHADE_SETTINGS_H
 #define VDBSHADE_SETTINGS_H
 
+#include "flat.h"
 #include "scene.h"
 
 #include <string.h>
@@ -18,7 +20,16 @@ enum {
     VSH_SETTINGS_ACCURACY = 2,
     VSH_SETTINGS_CASTERS = 3, /* and their voxels */
     VSH_SETTINGS_IMAGE = 4,   /* these two of a receiver: its image, and the image's texels */
-    VSH_SETTINGS_TEXELS = 5
+    VSH_SETTINGS_TEXELS = 5,
+    VSH_SETTINGS_FLAT_IMAGE = 6, /* the same of a flat scene */
+    VSH_SETTINGS_FLAT_TEXELS = 7
+};
+
+/* What has a setting. */
+enum {
+    VSH_SETTING_OF_SCENE = 0,    /* vsh_scene_set() */
+    VSH_SETTING_OF_RECEIVER = 1, /* each receiver of a scene, vsh_receiver_set() */
+    VSH_SETTING_OF_FLAT = 2      /* a flat scene, vsh_flat_scene_set() */
 };
 
 typedef struct vsh_setting {
@@ -29,7 +40,7 @@ typedef struct vsh_setting {
     char range[160]; /* "1 to 4096", "more than 0", names; "": none */
     char otherwise[160]; /* what holds without it: "64"; "": nothing */
     int32_t group;       /* VSH_SETTINGS_… */
-    int32_t of_receiver; /* nonzero: of each receiver, vsh_receiver_set(); 0: of the scene, vsh_scene_set() */
+    int32_t owner;       /* VSH_SETTING_OF_… */
 } vsh_setting;
 
 /* Setting `index`, from 0; 0 beyond the last one, and *setting is left alone. */
@@ -42,19 +53,27 @@ static inline int32_t vsh_setting_get(size_t index, vsh_setting *setting) {
  * "64", "exact", "0.1,0.2,0.3"; what is on or off is "true", "false", or NULL for true. Nothing else changes
  * but what follows: a distance of AO bakes it, a voxel size stands in place of a resolution. Texts that are
  * kept ("receivers.pack") are kept as pointers. Errors, and then nothing has changed:
- * - VSH_ERROR_ARGUMENT: scene, receiver or name NULL, no such setting of a scene (of a receiver);
+ * - VSH_ERROR_ARGUMENT: scene, receiver or name NULL, no such setting of a scene (a receiver, a flat scene);
  * - VSH_ERROR_INPUT: a text that is none of its values, or out of range, with what is expected;
  * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_scene_set(vsh_scene *scene, const char *name, const char *text, vsh_error *error);
 VSH_API vsh_result vsh_receiver_set(vsh_receiver *receiver, const char *name, const char *text,
                                     vsh_error *error);
+VSH_API vsh_result vsh_flat_scene_set(vsh_flat_scene *scene, const char *name, const char *text,
+                                      vsh_error *error);
 
-/* An empty scene, and a receiver that is no file yet, as keys that are not given leave them. */
+/* Empty scenes, and a receiver that is no file yet, as keys that are not given leave them. */
 static inline vsh_scene vsh_scene_default(void) {
     vsh_scene scene;
     memset(&scene, 0, sizeof scene);
     scene.grid = vsh_grid_options_default();
     scene.shade = vsh_shade_options_default();
+    return scene;
+}
+static inline vsh_flat_scene vsh_flat_scene_default(void) {
+    vsh_flat_scene scene;
+    memset(&scene, 0, sizeof scene);
+    scene.options = vsh_flat_options_default();
     return scene;
 }
 static inline vsh_receiver vsh_receiver_default(void) {

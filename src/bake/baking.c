@@ -109,7 +109,7 @@ vsh_result vshi_bake_light(vshi_baking *bake, size_t index, vsh_error *error) {
     if (shadow != NULL) {
         VSHI_TRY(vshi_baking_average(bake, bake->values, 1, shadow, error));
     }
-    VSHI_TRY(vshi_baking_add_error(bake, light, square, error));
+    VSHI_TRY(vshi_baking_add_error(bake, index, square, error));
     lighting l = {bake, light};
     if (tinted != NULL) {
         VSHI_TRY(vshi_baking_step(bake, "tint", tint, &l, error));
@@ -147,7 +147,7 @@ vsh_result vshi_bake_ao(vshi_baking *bake, vsh_error *error) {
     if (lightmap->ao != NULL) {
         VSHI_TRY(vshi_baking_average(bake, bake->values, 1, lightmap->ao, error));
     }
-    VSHI_TRY(vshi_baking_add_error(bake, NULL, square, error));
+    VSHI_TRY(vshi_baking_add_error(bake, bake->light_count, square, error));
     if (lightmap->bent != NULL) {
         VSHI_TRY(vshi_bent_normals(bake->texels, &bake->origins, lightmap->bent_space, &bake->quiet,
                                    bake->bent, error));
@@ -159,16 +159,17 @@ vsh_result vshi_bake_ao(vshi_baking *bake, vsh_error *error) {
 
 /* --- what is known of their errors */
 
-static bool keeps_error(const vshi_baking *bake, const vsh_light *light) {
-    const uint32_t traits = light != NULL ? vsh_shadow_method_traits(bake->shade.method)
-                                          : vsh_ao_method_traits(bake->shade.ao_method);
+static bool keeps_error(const vshi_baking *bake, bool of_light) {
+    const uint32_t traits =
+        of_light ? vsh_shadow_method_traits(bake->shade.method) : vsh_ao_method_traits(bake->shade.ao_method);
     return (traits & VSH_METHOD_KEEPS_ERROR) != 0;
 }
 
 bool vshi_baking_holds(const vshi_baking *bake) {
     const vsh_occluders *casters = bake->occluders;
-    const bool estimates = ((bake->needs & VSHI_NEEDS_LIGHTS) != 0 && keeps_error(bake, bake->lights)) ||
-                           ((bake->needs & VSHI_NEEDS_AO) != 0 && keeps_error(bake, NULL));
+    const bool estimates =
+        ((bake->needs & VSHI_NEEDS_LIGHTS) != 0 && keeps_error(bake, true)) ||
+        ((bake->needs & (VSHI_NEEDS_AO | VSHI_NEEDS_OPEN)) != 0 && keeps_error(bake, false));
     return bake->stats.errors != NULL && (casters->true_triangles != NULL || casters->true_solids != NULL) &&
            casters->layer_count == 0 && estimates;
 }
@@ -182,33 +183,40 @@ vsh_result vshi_baking_choose_held(vshi_baking *bake, vsh_error *error) {
                                    &bake->held, error);
 }
 
-static vsh_bake_error *error_of(const vshi_baking *bake, const vsh_light *light) {
-    return &bake->stats.errors[light != NULL ? (size_t)(light - bake->lights) : bake->light_count];
+/* Channels in the order of their errors: lights, AO, the sky. */
+static const float *plane_of(const vshi_baking *bake, size_t channel) {
+    const vsh_lightmap *lightmap = bake->lightmap;
+    if (channel < bake->light_count) {
+        return lightmap->shadow != NULL ? lightmap->shadow[channel] : NULL;
+    }
+    return channel == bake->light_count ? lightmap->ao : lightmap->sky;
 }
 
-vsh_result vshi_baking_add_error(vshi_baking *bake, const vsh_light *light, double square, vsh_error *error) {
-    if (bake->stats.errors == NULL || !keeps_error(bake, light)) {
+/* Holds the samples chosen against the casters; `values` and `filled` as of vshi_field_error_add(). */
+static vsh_result hold_channel(vshi_baking *bake, size_t channel, const float *values, const float *filled,
+                               vsh_error *error) {
+    const vsh_light *light = channel < bake->light_count ? &bake->lights[channel] : NULL;
+    const vsh_shade_options options = channel > bake->light_count ? vshi_baking_sky(bake) : bake->shade;
+    return vshi_field_error_add(&bake->held, light, &options, values, filled, &bake->quiet,
+                                &bake->stats.errors[channel], error);
+}
+
+vsh_result vshi_baking_add_error(vshi_baking *bake, size_t channel, double square, vsh_error *error) {
+    if (bake->stats.errors == NULL || !keeps_error(bake, channel < bake->light_count)) {
         return VSH_OK;
     }
     const vshi_point_rows *rows = &bake->origins.rows;
-    vsh_bake_error *sum = error_of(bake, light);
+    vsh_bake_error *sum = &bake->stats.errors[channel];
     sum->values += (double)(rows->start[rows->last] - rows->start[rows->first]);
     sum->square_error += bake->stats.shade.square_error - square;
-    return bake->held.count > 0 ? vshi_field_error_add(&bake->held, light, &bake->shade, bake->values, NULL,
-                                                       &bake->quiet, sum, error)
-                                : VSH_OK;
+    return bake->held.count > 0 ? hold_channel(bake, channel, bake->values, NULL, error) : VSH_OK;
 }
 
 vsh_result vshi_baking_add_filled(vshi_baking *bake, vsh_error *error) {
-    const vsh_lightmap *lightmap = bake->lightmap;
-    for (size_t i = 0; i <= bake->light_count && bake->held.count > 0; ++i) {
-        const vsh_light *light = i < bake->light_count ? &bake->lights[i] : NULL;
-        const float *plane = light == NULL              ? lightmap->ao
-                             : lightmap->shadow != NULL ? lightmap->shadow[i]
-                                                        : NULL;
-        if (plane != NULL && keeps_error(bake, light)) {
-            VSHI_TRY(vshi_field_error_add(&bake->held, light, &bake->shade, NULL, plane, &bake->quiet,
-                                          error_of(bake, light), error));
+    for (size_t i = 0; i < bake->light_count + 2 && bake->held.count > 0; ++i) {
+        const float *plane = plane_of(bake, i);
+        if (plane != NULL && keeps_error(bake, i < bake->light_count)) {
+            VSHI_TRY(hold_channel(bake, i, NULL, plane, error));
         }
     }
     return VSH_OK;

@@ -57,8 +57,13 @@ vsh_result vshi_bake_ao(vshi_baking *bake, vsh_error *error);
 bool vshi_baking_holds(const vshi_baking *bake);
 vsh_result vshi_baking_choose_held(vshi_baking *bake, vsh_error *error);
 
-/* Adds a channel's error, of a light or (NULL) of AO; `square` is what the stats held before it. */
-vsh_result vshi_baking_add_error(vshi_baking *bake, const vsh_light *light, double square, vsh_error *error);
+/* Adds what rays left of a channel, by what the stats hold more than `square`, which was before it; and what
+ * `values` are off the casters, where they are held against them. `channel` is its place in the errors of
+ * vsh_bake_stats. */
+vsh_result vshi_baking_add_error(vshi_baking *bake, size_t channel, double square, vsh_error *error);
+
+/* Options that the sky is shaded by. */
+vsh_shade_options vshi_baking_sky(const vshi_baking *bake);
 
 /* Adds what is filled, once it is: of the planes that there are. */
 vsh_result vshi_baking_add_filled(vshi_baking *bake, vsh_error *error);

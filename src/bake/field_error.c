@@ -214,6 +214,7 @@ typedef struct holding {
     const vshi_field_error *share;
     vshi_truth truth;
     vshi_lift_light light;
+    vshi_vec up;
     const float *values, *filled; /* one of them is NULL */
 } holding;
 
@@ -245,12 +246,14 @@ vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
     holding h = {.share = share,
                  .truth = share->truth,
                  .light = vshi_lift_light_of(light),
+                 .up = vshi_vec_of(options->ao_up),
                  .values = values,
                  .filled = filled};
     const bool one_ray = light != NULL && vshi_light_is_point(&h.light.place);
     h.truth.light = light;
     h.truth.place = h.light.place;
     h.truth.distance = options->ao_distance;
+    h.truth.up = vshi_dot(h.up, h.up) > 0.0 ? &h.up : NULL;
     h.truth.rays = one_ray ? 1 : options->max_error < FINE ? FINE_RAYS : RAYS;
     vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, h.truth.rays, 0);
     if (sampler == NULL) {

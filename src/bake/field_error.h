@@ -36,7 +36,8 @@ vsh_result vshi_field_error_choose(const vsh_texels *texels, vshi_origins *origi
 void vshi_field_error_free(vshi_field_error *share);
 
 /* Adds what is found of a channel to *sum: of valid samples by their `values`, or (NULL) of those that are
- * filled by the plane of the texels held, once it is. Where `light` is NULL it is AO's. Errors: the same. */
+ * filled by the plane of the texels held, once it is. Where `light` is NULL it is AO's, or with
+ * options->ao_up the sky's: all that goes up, of the whole hemisphere. Errors: the same. */
 vsh_result vshi_field_error_add(vshi_field_error *share, const vsh_light *light,
                                 const vsh_shade_options *options, const float *values, const float *filled,
                                 const vsh_run *run, vsh_bake_error *sum, vsh_error *error);

@@ -1,10 +1,10 @@
 #include "bake/baking.h"
-#include "bake/coverage.h"
-#include "bake/layers_lifted.h"
 #include "bake/planes.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/try.h"
+#include "field/field.h"
+#include "shade/layers.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -123,10 +123,75 @@ static vsh_result hold(const vshi_baking *bake, uint32_t any, size_t floats, flo
                          "lightmap", error);
 }
 
+/* The options' layers for points that start_offset and surface_offset have lifted off `field`: what their own
+ * voxels need beyond that is left. *layers [occluders->layer_count], which the caller frees also after an
+ * error; *ao: whether any takes part in AO. Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
+static vsh_result lift_layers(const vsh_occluders *occluders, const vsh_shade_options *shade,
+                              vsh_layer **layers, bool *ao, vsh_error *error) {
+    const double lifted = shade->start_offset * occluders->field->voxel_size + shade->surface_offset;
+    *ao = false;
+    VSHI_TRY(vshi_allocate((void **)layers, occluders->layer_count, sizeof **layers, "layers", error));
+    for (size_t i = 0; i < occluders->layer_count; ++i) {
+        vsh_layer *layer = &(*layers)[i];
+        *layer = occluders->layers[i];
+        *ao = *ao || layer->ao != 0;
+        if (layer->field != NULL) {
+            const vsh_field *own = layer->field;
+            const double offset = layer->start_offset < 0.0 ? shade->start_offset : layer->start_offset;
+            const double height =
+                offset * own->voxel_size + 0.5 * own->shell_thickness + shade->surface_offset;
+            layer->start_offset = fmin(16.0, fmax(0.0, (height - lifted) / own->voxel_size));
+        }
+    }
+    return VSH_OK;
+}
+
+/* --- which texels have values */
+
+/* Whether the texel that sample i is the first of is in plain sight, none of whose samples is valid. */
+static bool is_seen(const vsh_texels *texels, const vshi_origins *origins, size_t i) {
+    bool seen = false;
+    for (size_t k = i; k < texels->count && texels->texel[k] == texels->texel[i]; ++k) {
+        seen = seen || origins->seen[k] != 0;
+    }
+    return seen;
+}
+
+/* Writes the planes `coverage` and `invalid` of a lightmap whose rows are those held, where it has them, and
+ * counts the band's texels, those without a value by the mesh of their first sample. */
+static void write_coverage(const vsh_texels *texels, const vshi_origins *origins, const uint8_t *state,
+                           const vsh_lightmap *lightmap, vsh_bake_stats *stats) {
+    const vshi_band *band = &texels->band;
+    const size_t first = texels->row_start[band->own_begin - band->held_begin];
+    const size_t last = texels->row_start[band->own_end - band->held_begin];
+    size_t invalid = 0;
+    for (size_t i = first; i < last; ++i) {
+        if (i > first && texels->texel[i] == texels->texel[i - 1]) {
+            continue;
+        }
+        const size_t texel = vshi_sample_held(texels, i);
+        if (state[texel] == VSHI_TEXEL_INVALID) {
+            const bool seen = is_seen(texels, origins, i);
+            ++invalid;
+            stats->seen_texels += seen;
+            if (lightmap->invalid != NULL) {
+                lightmap->invalid[texel] = seen ? 2.0f : 1.0f;
+            }
+            if (stats->invalid_by_mesh != NULL) {
+                ++stats->invalid_by_mesh[vshi_sample_mesh(texels, i)];
+            }
+        } else if (lightmap->coverage != NULL) {
+            lightmap->coverage[texel] = 1.0f;
+        }
+    }
+    stats->texels = texels->info.covered;
+    stats->invalid_texels = invalid;
+}
+
 static vsh_result run_bake(vshi_baking *bake, vsh_error *error) {
     const vsh_texels *texels = bake->texels;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_lift_layers(bake->occluders, &bake->shade, &bake->layers, &bake->layered_ao, error));
+    VSHI_TRY_DONE(lift_layers(bake->occluders, &bake->shade, &bake->layers, &bake->layered_ao, error));
     bake->lifted = *bake->occluders;
     bake->lifted.layers = bake->layers;
     VSHI_TRY_DONE(check_limit(bake, error));
@@ -145,7 +210,7 @@ static vsh_result run_bake(vshi_baking *bake, vsh_error *error) {
         VSHI_TRY_DONE(vshi_baking_choose_held(bake, error));
     }
     VSHI_TRY_DONE(bake_planes(bake, error));
-    vshi_coverage_write(texels, &bake->origins, bake->state, bake->lightmap, &bake->stats);
+    write_coverage(texels, &bake->origins, bake->state, bake->lightmap, &bake->stats);
     VSHI_TRY_DONE(pad(bake, bake->stats.invalid_texels, error));
     VSHI_TRY_DONE(vshi_baking_add_filled(bake, error));
     vshi_work_planes_copy_back(texels, &bake->work);

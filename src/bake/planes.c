@@ -1,6 +1,5 @@
 #include "bake/planes.h"
 
-#include "bake/ambient.h"
 #include "bake/baking.h"
 #include "base/names.h"
 #include "base/try.h"
@@ -8,9 +7,25 @@
 #include <math.h>
 #include <string.h>
 
+/* Adds what AO lets through of it to the irradiance of lights, where texels are valid; without ambient light
+ * AO dims the lights instead. Planes and state are of the texels that are held. */
+static void add_ambient(const vsh_texels *texels, const uint8_t *state, const vsh_lightmap *lightmap) {
+    for (size_t i = 0; i < vshi_texels_held(texels); ++i) {
+        const float open = lightmap->ao != NULL ? lightmap->ao[i] : 1.0f;
+        for (size_t c = 0; c < 3; ++c) {
+            float *value = &lightmap->irradiance[3 * i + c];
+            if (lightmap->ambient == NULL) {
+                *value *= open;
+            } else if (state[i] == VSHI_TEXEL_VALID) {
+                *value += (float)lightmap->ambient[c] * open;
+            }
+        }
+    }
+}
+
 static vsh_result fill_irradiance(vshi_baking *bake, float *plane, vsh_error *error) {
     VSHI_TRY(vshi_baking_average(bake, bake->irradiance, 3, plane, error));
-    vshi_ambient_add(bake->texels, bake->state, bake->lightmap);
+    add_ambient(bake->texels, bake->state, bake->lightmap);
     return VSH_OK;
 }
 
@@ -44,21 +59,30 @@ static void weigh_sky(void *user, size_t begin, size_t end) {
 }
 
 /* AO of what is over the horizon, within a distance that no caster is beyond. */
-static vsh_result fill_sky(vshi_baking *bake, float *plane, vsh_error *error) {
+vsh_shade_options vshi_baking_sky(const vshi_baking *bake) {
     static const double FAR = 0x1p60;
     const int32_t up = bake->lightmap->asked.sky;
-    if (up <= VSH_UP_NONE || up > VSH_UP_MINUS_Z) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap asked.sky %d: expected %d … %d", up, VSH_UP_X,
-                         VSH_UP_MINUS_Z);
-    }
     vsh_shade_options options = bake->shade;
     options.ao_distance = FAR;
     for (int axis = 0; axis < 3; ++axis) {
         options.ao_up[axis] = up == VSH_UP_X + axis ? 1.0 : up == VSH_UP_MINUS_X + axis ? -1.0 : 0.0;
     }
+    return options;
+}
+
+/* Rays tell of their error before the weighing, which makes it less. */
+static vsh_result fill_sky(vshi_baking *bake, float *plane, vsh_error *error) {
+    const int32_t up = bake->lightmap->asked.sky;
+    if (up <= VSH_UP_NONE || up > VSH_UP_MINUS_Z) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap asked.sky %d: expected %d … %d", up, VSH_UP_X,
+                         VSH_UP_MINUS_Z);
+    }
+    const vsh_shade_options options = vshi_baking_sky(bake);
+    const double square = bake->stats.shade.square_error;
     skylight s = {bake, vshi_vec_of(options.ao_up)};
     VSHI_TRY(vshi_baking_open(bake, &options, NULL, NULL, error));
     VSHI_TRY(vshi_baking_step(bake, "sky", weigh_sky, &s, error));
+    VSHI_TRY(vshi_baking_add_error(bake, bake->light_count + 1, square, error));
     return vshi_baking_average(bake, bake->values, 1, plane, error);
 }
 
@@ -70,11 +94,11 @@ static const vshi_plane_kind kinds[] = {
     {"ao", .padded = true, .needs = VSHI_NEEDS_AO, PLANE(ao)},
     {"error", .per_light = true, .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_DEVIATION, PLANE(shadow_error)},
     {"error.ao", .needs = VSHI_NEEDS_AO | VSHI_NEEDS_DEVIATION, PLANE(ao_error)},
-    {"irradiance", "RGB", .padded = true, .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_IRRADIANCE,
-     PLANE(irradiance), .fill = fill_irradiance},
-    {"bent", "XYZ", .padded = true, .needs = VSHI_NEEDS_AO | VSHI_NEEDS_BENT, PLANE(bent)},
-    {"tint", "RGB", .per_light = true, .padded = true, .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_TINT,
-     PLANE(tint)},
+    {"irradiance", "RGB", VSHI_HOLDS_LIGHT, .padded = true,
+     .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_IRRADIANCE, PLANE(irradiance), .fill = fill_irradiance},
+    {"bent", "XYZ", VSHI_HOLDS_VECTOR, .padded = true, .needs = VSHI_NEEDS_AO | VSHI_NEEDS_BENT, PLANE(bent)},
+    {"tint", "RGB", VSHI_HOLDS_LIGHT, .per_light = true, .padded = true,
+     .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_TINT, PLANE(tint)},
     {"sky", .padded = true, .needs = VSHI_NEEDS_OPEN, WISHED(sky), .fill = fill_sky},
     {"invalid", WISHED(invalid)},
     {"A", PLANE(coverage)},

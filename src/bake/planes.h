@@ -23,11 +23,15 @@ struct vshi_baking;
 
 enum { VSHI_NO_WISH = -1 };
 
+/* What its values are, for who writes them as integers. */
+enum { VSHI_HOLDS_DATA, VSHI_HOLDS_LIGHT, VSHI_HOLDS_VECTOR };
+
 /* A kind of plane. To add one: its member of vsh_lightmap, the wish for it in vsh_planes, a row and `fill`.
  */
 typedef struct vshi_plane_kind {
     const char *name; /* of its channel in files: "ao"; "shadow.NAME" where there is one for each light */
     const char *axes; /* of three components, interleaved: channels "irradiance.R"; NULL: one component */
+    int holds;        /* VSHI_HOLDS_… */
     bool per_light;
     bool padded; /* beyond its chart: values are, errors and what tells of the texel itself are not */
     uint32_t needs;

@@ -72,6 +72,9 @@ static size_t name_value(const vshi_plane_kind *kind, const vsh_light *light,
 
 vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t height, vshi_channels *channels,
                               vsh_error *error) {
+    static const int32_t holds[] = {[VSHI_HOLDS_DATA] = VSH_CHANNEL_DATA,
+                                    [VSHI_HOLDS_LIGHT] = VSH_CHANNEL_LIGHT,
+                                    [VSHI_HOLDS_VECTOR] = VSH_CHANNEL_VECTOR};
     memset(channels, 0, sizeof *channels);
     size_t kind_count, count = 0;
     const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
@@ -86,23 +89,29 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
     }
     channels->names = calloc(count, sizeof *channels->names);
     channels->name_list = calloc(count, sizeof *channels->name_list);
+    channels->holds = calloc(count, sizeof *channels->holds);
     channels->planes = calloc(count, sizeof *channels->planes);
     channels->triples = calloc(channels->triple_count + 1, sizeof *channels->triples);
-    if (channels->names == NULL || channels->name_list == NULL || channels->planes == NULL ||
-        channels->triples == NULL) {
+    if (channels->names == NULL || channels->name_list == NULL || channels->holds == NULL ||
+        channels->planes == NULL || channels->triples == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "channels: the system refused memory");
     }
     size_t at = 0;
     for (size_t k = 0; k < kind_count; ++k) {
         for (size_t i = 0; i < count_of(&kinds[k], scene); ++i) {
-            at += name_value(&kinds[k], kinds[k].per_light ? &scene->lights[i] : NULL, channels->names + at);
+            const size_t next = at + name_value(&kinds[k], kinds[k].per_light ? &scene->lights[i] : NULL,
+                                                channels->names + at);
+            for (; at < next; ++at) {
+                channels->holds[at] = holds[kinds[k].holds];
+            }
         }
     }
     for (size_t i = 0; i < count; ++i) {
         channels->name_list[i] = channels->names[i];
     }
-    channels->image = (vsh_image){width, height, (int32_t)count, channels->name_list,
-                                  (const float *const *)channels->planes};
+    channels->image = (vsh_image){
+        width,          height, (int32_t)count, channels->name_list, (const float *const *)channels->planes,
+        channels->holds};
     return VSH_OK;
 }
 
@@ -210,6 +219,7 @@ void vshi_channels_free(vshi_channels *channels) {
     free(channels->invalid);
     free(channels->triples);
     free(channels->planes);
+    free(channels->holds);
     free(channels->name_list);
     free(channels->names);
     memset(channels, 0, sizeof *channels);

@@ -13,6 +13,7 @@ typedef struct vshi_channels {
     vsh_lightmap lightmap; /* the same memory, as the bake takes it */
     char (*names)[VSH_CHANNEL_NAME];
     const char **name_list;
+    int32_t *holds;
     float **planes;  /* [image.channel_count][rows][width] */
     float **triples; /* [triple_count][rows][width][3]: what is baked interleaved, and then split */
     float *invalid;  /* [rows][width] as the bake tells it (vsh_lightmap); NULL: not asked for */

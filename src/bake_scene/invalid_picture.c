@@ -39,8 +39,8 @@ vsh_result vshi_invalid_picture_open(vshi_invalid_picture *picture, const char *
             return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
         }
     }
-    picture->image =
-        (vsh_image){width, height, 3, (const char *const *)NAMES, (const float *const *)picture->planes};
+    picture->image = (vsh_image){
+        width, height, 3, (const char *const *)NAMES, (const float *const *)picture->planes, NULL};
     vsh_image_options options = vsh_image_options_default();
     options.bits = 8;
     return vsh_image_writer_create(picture->path, &picture->image, &options, &picture->writer, error);

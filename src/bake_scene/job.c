@@ -229,6 +229,7 @@ static vsh_result find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_err
     const double start = vshi_seconds();
     vsh_provenance_source source = vsh_provenance_source_default();
     source.scene = &job->scene;
+    source.lightmap = 1;
     source.command = job->options.command;
     source.files = job->options.files;
     source.file_count = job->options.file_count;
@@ -253,7 +254,7 @@ vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error
     options.truth = 1;
     VSHI_TRY(vsh_scene_occluders(&job->scene, job->assets, &options, run, &job->occluders, error));
     vsh_occluders_get_info(job->occluders, &job->report.occluders);
-    const size_t count = job->scene.light_count + 1;
+    const size_t count = job->scene.light_count + 2;
     job->errors = calloc(count, sizeof *job->errors);
     if (job->errors == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "bake job: the system refused memory");

@@ -198,7 +198,7 @@ static vsh_result open_all(work *w, vsh_error *error) {
     const char *picture = job->options.invalid_picture;
     w->invalid = calloc(w->target->mesh_count + 1, sizeof *w->invalid);
     w->baked.invalid_by_mesh = calloc(w->target->mesh_count + 1, sizeof *w->baked.invalid_by_mesh);
-    w->baked.errors = calloc(scene->light_count + 1, sizeof *w->baked.errors);
+    w->baked.errors = calloc(job->report.error_count, sizeof *w->baked.errors);
     if (w->invalid == NULL || w->baked.invalid_by_mesh == NULL || w->baked.errors == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", receiver->path);
     }
@@ -210,7 +210,8 @@ static vsh_result open_all(work *w, vsh_error *error) {
     if (job->options.resume) {
         vshi_resume_key key = {.image = &w->channels.image, .band_rows = rows};
         key.attributes = vsh_provenance_attributes(job->provenance, &key.attribute_count);
-        VSHI_TRY(vshi_resume_open(receiver->output, &key, scene->light_count + 1, w->run, &w->resume, error));
+        VSHI_TRY(
+            vshi_resume_open(receiver->output, &key, job->report.error_count, w->run, &w->resume, error));
     }
     return VSH_OK;
 }

@@ -65,9 +65,10 @@ static void list_options(const cli_command *command, option_list *list) {
             continue;
         }
         const vsh_setting *setting;
-        for (size_t k = 0; (setting = cli_setting(k)) != NULL; ++k) {
-            if (option->name != NULL ? strcmp(setting->option, option->name) == 0
-                                     : setting->group == option->key - CLI_KEY_SETTINGS) {
+        bool found = false; /* by a name that is another's too: the first */
+        for (size_t k = 0; (setting = cli_setting(k)) != NULL && !found; ++k) {
+            found = option->name != NULL && strcmp(setting->option, option->name) == 0;
+            if (found || (option->name == NULL && setting->group == option->key - CLI_KEY_SETTINGS)) {
                 add_option(list,
                            &(cli_option){CLI_KEY_SETTING + (int)k, setting->option,
                                          setting->value[0] != '\0' ? setting->value : NULL, listed[k].help});

@@ -28,7 +28,7 @@ typedef struct cli_command {
 #define CLI_SETTINGS(group)                                                                                  \
     { CLI_KEY_SETTINGS + (group), NULL, NULL, NULL }
 
-/* A row that stands for one of them, by its option's name. */
+/* A row that stands for one of them, by its option's name: of a scene's, where a flat scene has one too. */
 #define CLI_SETTING(option)                                                                                  \
     { CLI_KEY_SETTINGS, option, NULL, NULL }
 
@@ -71,9 +71,6 @@ int cli_parse_color(const char *name, const char *text, double value[3]);       
 int cli_parse_box(const char *name, const char *text, double min[3], double max[3]); /* X0,Y0,Z0,X1,Y1,Z1 */
 int cli_parse_size(const char *name, const char *text, int32_t *w, int32_t *h);      /* W[xH] */
 int cli_parse_bytes(const char *name, const char *text, uint64_t *value);            /* 500M, 2GiB */
-
-int cli_parse_bits(const char *name, const char *text, int32_t *bits);         /* 8, 16, 32 */
-int cli_parse_color_space(const char *name, const char *text, int32_t *space); /* VSH_COLOR_… */
 
 /* A name out of the library's list, or an error that shows the list. */
 int cli_parse_name(const char *name, const char *text, int32_t (*value_of)(const char *),

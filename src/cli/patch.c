@@ -5,12 +5,23 @@
 #include <stdio.h>
 #include <string.h>
 
-static int set(const vsh_setting *setting, const char *text, vsh_scene *scene, vsh_receiver *receiver) {
+/* `owner` is what the setting is of: a vsh_scene, a vsh_receiver, a vsh_flat_scene. */
+static int set(const vsh_setting *setting, const char *text, void *owner) {
     char name[sizeof setting->option + 2];
     snprintf(name, sizeof name, "--%s", setting->option);
     vsh_error error;
-    const vsh_result result = setting->of_receiver ? vsh_receiver_set(receiver, name, text, &error)
-                                                   : vsh_scene_set(scene, name, text, &error);
+    vsh_result result = VSH_OK;
+    switch (setting->owner) {
+    case VSH_SETTING_OF_SCENE:
+        result = vsh_scene_set(owner, name, text, &error);
+        break;
+    case VSH_SETTING_OF_RECEIVER:
+        result = vsh_receiver_set(owner, name, text, &error);
+        break;
+    default:
+        result = vsh_flat_scene_set(owner, name, text, &error);
+        break;
+    }
     return result == VSH_OK ? CLI_OK : cli_fail(&error);
 }
 
@@ -18,8 +29,13 @@ static int set(const vsh_setting *setting, const char *text, vsh_scene *scene, v
 static int give(cli_patch *patch, size_t index, const char *value) {
     vsh_scene scene = vsh_scene_default();
     vsh_receiver receiver = vsh_receiver_default();
+    vsh_flat_scene flat = vsh_flat_scene_default();
+    void *const owners[] = {[VSH_SETTING_OF_SCENE] = &scene,
+                            [VSH_SETTING_OF_RECEIVER] = &receiver,
+                            [VSH_SETTING_OF_FLAT] = &flat};
+    const vsh_setting *setting = cli_setting(index);
     patch->text[index] = value != NULL ? value : "true";
-    return set(cli_setting(index), patch->text[index], &scene, &receiver);
+    return set(setting, patch->text[index], owners[setting->owner]);
 }
 
 static int take_rule(cli_patch *patch, const char *name, const char *pattern, int32_t solidity) {
@@ -71,12 +87,11 @@ int cli_patch_check(const cli_patch *patch) {
     return CLI_OK;
 }
 
-static int apply(const cli_patch *patch, vsh_scene *scene, vsh_receiver *receiver) {
+static int apply(const cli_patch *patch, int32_t owner, void *target) {
     int code = CLI_OK;
     for (size_t i = 0; cli_setting(i) != NULL && code == CLI_OK; ++i) {
-        const vsh_setting *setting = cli_setting(i);
-        if (patch->text[i] != NULL && (setting->of_receiver ? receiver != NULL : scene != NULL)) {
-            code = set(setting, patch->text[i], scene, receiver);
+        if (patch->text[i] != NULL && cli_setting(i)->owner == owner) {
+            code = set(cli_setting(i), patch->text[i], target);
         }
     }
     return code;
@@ -87,9 +102,13 @@ int cli_patch_scene(const cli_patch *patch, vsh_scene *scene) {
         scene->solidity = patch->rules;
         scene->solidity_count = patch->rule_count;
     }
-    return apply(patch, scene, NULL);
+    return apply(patch, VSH_SETTING_OF_SCENE, scene);
 }
 
 int cli_patch_receiver(const cli_patch *patch, vsh_receiver *receiver) {
-    return apply(patch, NULL, receiver);
+    return apply(patch, VSH_SETTING_OF_RECEIVER, receiver);
+}
+
+int cli_patch_flat(const cli_patch *patch, vsh_flat_scene *scene) {
+    return apply(patch, VSH_SETTING_OF_FLAT, scene);
 }

@@ -25,8 +25,9 @@ bool cli_patch_has(const cli_patch *patch, const char *name);
 /* --resolution and --voxel-size exclude each other. */
 int cli_patch_check(const cli_patch *patch);
 
-/* Puts what was given over a scene, which then refers to the patch, and over a receiver. */
+/* Puts what was given over a scene, which then refers to the patch, over a receiver and over a flat scene. */
 int cli_patch_scene(const cli_patch *patch, vsh_scene *scene);
 int cli_patch_receiver(const cli_patch *patch, vsh_receiver *receiver);
+int cli_patch_flat(const cli_patch *patch, vsh_flat_scene *scene);
 
 #endif

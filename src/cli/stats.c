@@ -33,8 +33,15 @@ static double bytes_per_voxel(const cli_stats *stats) {
     return (double)stats->casters.field_bytes / fmax(1.0, (double)stats->casters.active_voxels);
 }
 
-static const char *const kind_names[] = {"shadow", "ao"};
-enum { KINDS = sizeof kind_names / sizeof kind_names[0] };
+static const struct {
+    const char *name;   /* in the file */
+    const char *said;   /* in words */
+    const char *option; /* that its method is given by */
+} kinds[CLI_STATS_KINDS] = {
+    [CLI_STATS_SHADOW] = {"shadow", "shadow", "--method"},
+    [CLI_STATS_AO] = {"ao", "AO", "--ao-method"},
+    [CLI_STATS_SKY] = {"sky", "sky", "--ao-method"},
+};
 
 static json_t *number_or_null(double value) {
     return isnan(value) ? json_null() : json_real(value);
@@ -60,17 +67,27 @@ void cli_stats_methods(cli_stats *stats, const vsh_scene *scene, int32_t has_tri
         stats->methods[CLI_STATS_SHADOW] =
             method_of(vsh_shadow_method_name(method), vsh_shadow_method_traits(method));
     }
+    const cli_method open = method_of(vsh_ao_method_name(ao_method), vsh_ao_method_traits(ao_method));
     if (scene->ao) {
-        stats->methods[CLI_STATS_AO] =
-            method_of(vsh_ao_method_name(ao_method), vsh_ao_method_traits(ao_method));
+        stats->methods[CLI_STATS_AO] = open;
     }
+    if (stats->of == CLI_STATS_TEXELS && scene->planes.sky != VSH_UP_NONE) {
+        stats->methods[CLI_STATS_SKY] = open;
+    }
+}
+
+/* Of a channel, by its place among the errors. */
+static int kind_of(const cli_stats *stats, size_t channel) {
+    return channel < stats->light_count ? CLI_STATS_SHADOW
+                                        : CLI_STATS_AO + (int)(channel - stats->light_count);
 }
 
 vsh_bake_error cli_stats_error(const cli_stats *stats, int kind) {
     vsh_bake_error sum = {0.0, 0.0, 0.0, 0.0};
-    const size_t first = kind == CLI_STATS_AO ? stats->light_count : 0;
-    const size_t last = kind == CLI_STATS_AO ? stats->light_count + 1 : stats->light_count;
-    for (size_t i = first; stats->errors != NULL && i < last; ++i) {
+    for (size_t i = 0; stats->errors != NULL && i < stats->light_count + 2; ++i) {
+        if (kind_of(stats, i) != kind) {
+            continue;
+        }
         sum.values += stats->errors[i].values;
         sum.square_error += stats->errors[i].square_error;
         sum.held += stats->errors[i].held;
@@ -80,16 +97,18 @@ vsh_bake_error cli_stats_error(const cli_stats *stats, int kind) {
 }
 
 const char *cli_stats_methods_text(const cli_stats *stats, char *text, size_t size) {
-    const cli_method *shadow = &stats->methods[CLI_STATS_SHADOW], *ao = &stats->methods[CLI_STATS_AO];
     size_t used = 0;
+    bool keeps_error = false;
     text[0] = '\0';
-    if (shadow->name != NULL) {
-        used += (size_t)snprintf(text, size, "shadow %s", shadow->name);
+    for (int kind = 0; kind < CLI_STATS_KINDS && used < size; ++kind) {
+        const cli_method *method = &stats->methods[kind];
+        if (method->name != NULL) {
+            used += (size_t)snprintf(text + used, size - used, "%s%s %s", used > 0 ? ", " : "",
+                                     kinds[kind].said, method->name);
+        }
+        keeps_error = keeps_error || method->keeps_error;
     }
-    if (ao->name != NULL && used < size) {
-        used += (size_t)snprintf(text + used, size - used, "%sAO %s", used > 0 ? ", " : "", ao->name);
-    }
-    if ((shadow->keeps_error || ao->keeps_error) && used < size) {
+    if (keeps_error && used < size) {
         snprintf(text + used, size - used, ", max error %g", stats->max_error);
     }
     return text;
@@ -99,7 +118,6 @@ const char *cli_stats_methods_text(const cli_stats *stats, char *text, size_t si
 static void say_help(const cli_stats *stats, const vsh_scene *scene, int kind, char *text, size_t size) {
     const vsh_bake_error known = cli_stats_error(stats, kind);
     const bool by_rays = sqrt(known.square_error / known.values) > stats->max_error;
-    const char *option = kind == CLI_STATS_AO ? "--ao-method" : "--method";
     if (by_rays && scene->shade.rays > 0) {
         snprintf(text, size, "%d rays are too few; leave the limit off", scene->shade.rays);
     } else if (by_rays) {
@@ -111,13 +129,13 @@ static void say_help(const cli_stats *stats, const vsh_scene *scene, int kind, c
     } else {
         const bool can = vsh_scene_traceable(scene, NULL) && vsh_triangles_available();
         snprintf(text, size, "%.3g of it is that of voxels of %.3g: %s%ssmaller ones leave less",
-                 vsh_bake_error_field(&known), stats->casters.voxel_size, can ? option : "",
+                 vsh_bake_error_field(&known), stats->casters.voxel_size, can ? kinds[kind].option : "",
                  can ? " exact has none, " : "");
     }
 }
 
 void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene, const vsh_run *run) {
-    for (int kind = 0; kind < KINDS; ++kind) {
+    for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
         const vsh_bake_error known = cli_stats_error(stats, kind);
         const double error = vsh_bake_error_rmse(&known);
         if (!stats->methods[kind].keeps_error || !(error > stats->max_error) || run->warning == NULL) {
@@ -126,7 +144,7 @@ void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene, const vsh_ru
         char line[512], help[256];
         say_help(stats, scene, kind, help, sizeof help);
         snprintf(line, sizeof line, "%s: an error of %.3g is left, where %g was asked for: %s",
-                 kind == CLI_STATS_AO ? "AO" : "shadow", error, stats->max_error, help);
+                 kinds[kind].said, error, stats->max_error, help);
         run->warning(run->user, line);
     }
 }
@@ -139,12 +157,12 @@ static void set_error(json_t *of, const vsh_bake_error *known) {
 /* Of each channel on its own. */
 static json_t *channels_of(const cli_stats *stats) {
     json_t *channels = json_array();
-    for (size_t i = 0; stats->errors != NULL && i <= stats->light_count; ++i) {
-        char name[96] = "ao";
-        if (i < stats->light_count) {
-            snprintf(name, sizeof name, "shadow.%.64s", stats->lights[i].name);
-        }
-        if (stats->methods[i < stats->light_count ? CLI_STATS_SHADOW : CLI_STATS_AO].name != NULL) {
+    for (size_t i = 0; stats->errors != NULL && i < stats->light_count + 2; ++i) {
+        const int kind = kind_of(stats, i);
+        char name[96];
+        snprintf(name, sizeof name, "%s%s%.64s", kinds[kind].name, kind == CLI_STATS_SHADOW ? "." : "",
+                 kind == CLI_STATS_SHADOW ? stats->lights[i].name : "");
+        if (stats->methods[kind].name != NULL) {
             json_t *of = json_object();
             json_object_set_new(of, "name", json_string(name));
             set_error(of, &stats->errors[i]);
@@ -157,7 +175,7 @@ static json_t *channels_of(const cli_stats *stats) {
 /* What methods that keep an error say of themselves; null where no such method ran. */
 static void add_errors(const cli_stats *stats, json_t *root) {
     double values = 0.0, square = 0.0;
-    for (int kind = 0; kind < KINDS; ++kind) {
+    for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
         const vsh_bake_error known = cli_stats_error(stats, kind);
         const double error = known.values > 0.0 ? vsh_bake_error_rmse(&known) : 0.0;
         values += known.values;
@@ -167,8 +185,8 @@ static void add_errors(const cli_stats *stats, json_t *root) {
         root, "certified_share",
         number_or_null(values > 0.0 ? 1.0 - fmin(1.0, (double)stats->shade.refined / values) : NAN));
     json_object_set_new(root, "estimated_rmse", number_or_null(values > 0.0 ? sqrt(square / values) : NAN));
-    json_t *kinds = json_object();
-    for (int kind = 0; kind < KINDS; ++kind) {
+    json_t *methods = json_object();
+    for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
         const cli_method *method = &stats->methods[kind];
         if (method->name == NULL) {
             continue;
@@ -178,9 +196,9 @@ static void add_errors(const cli_stats *stats, json_t *root) {
         json_object_set_new(of, "max_error", number_or_null(method->keeps_error ? stats->max_error : NAN));
         const vsh_bake_error known = cli_stats_error(stats, kind);
         set_error(of, &known);
-        json_object_set_new(kinds, kind_names[kind], of);
+        json_object_set_new(methods, kinds[kind].name, of);
     }
-    json_object_set_new(root, "methods", kinds);
+    json_object_set_new(root, "methods", methods);
     json_object_set_new(root, "channels", channels_of(stats));
 }
 
@@ -290,14 +308,14 @@ int cli_stats_finish(const cli_stats *stats, const vsh_run *run, const char *pat
 static void say_errors(const cli_stats *stats) {
     char text[256] = "";
     size_t used = 0;
-    for (int kind = 0; kind < KINDS && used < sizeof text; ++kind) {
+    for (int kind = 0; kind < CLI_STATS_KINDS && used < sizeof text; ++kind) {
         const vsh_bake_error known = cli_stats_error(stats, kind);
         const double error = vsh_bake_error_rmse(&known), field = vsh_bake_error_field(&known);
         if (isnan(error)) {
             continue;
         }
         used += (size_t)snprintf(text + used, sizeof text - used, "%s%s %.3g", used > 0 ? ", " : "",
-                                 kind == CLI_STATS_AO ? "AO" : "shadow", error);
+                                 kinds[kind].said, error);
         if (!isnan(field) && !stats->methods[kind].traces && used < sizeof text) {
             used += (size_t)snprintf(text + used, sizeof text - used, " (the voxels' %.3g)", field);
         }

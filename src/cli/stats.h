@@ -16,7 +16,7 @@ enum {
 
 enum { CLI_STATS_TEXELS, CLI_STATS_POINTS, CLI_STATS_VOXELS };
 
-enum { CLI_STATS_SHADOW, CLI_STATS_AO };
+enum { CLI_STATS_SHADOW, CLI_STATS_AO, CLI_STATS_SKY, CLI_STATS_KINDS };
 
 /* What a kind of value is made by. */
 typedef struct cli_method {
@@ -34,11 +34,12 @@ typedef struct cli_stats {
     uint64_t resumed_rows; /* of lightmaps, that an earlier bake had kept */
     uint64_t bands;        /* that lightmaps were baked in: one each where they were baked whole */
     vsh_shade_stats shade;
-    const vsh_bake_error *errors; /* [light_count + 1]: of each light, then of AO; NULL: none are known */
-    const vsh_light *lights;      /* of `errors` */
+    const vsh_bake_error
+        *errors;             /* [light_count + 2]: of each light, of AO, of the sky; NULL: none are known */
+    const vsh_light *lights; /* of `errors` */
     size_t light_count;
-    cli_method methods[2]; /* CLI_STATS_SHADOW and …_AO; NULL names where nothing is baked by one */
-    double max_error;      /* that was asked for */
+    cli_method methods[CLI_STATS_KINDS]; /* NULL names where nothing is baked by one */
+    double max_error;                    /* that was asked for */
     int32_t threads;
     vsh_occluders_info casters;
 } cli_stats;

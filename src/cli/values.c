@@ -153,24 +153,3 @@ int cli_parse_name(const char *option, const char *text, int32_t (*value_of)(con
     }
     return cli_usage("%s '%s': expected one of %s", option, text, list);
 }
-
-int cli_parse_color_space(const char *name, const char *value, int32_t *space) {
-    for (int32_t i = VSH_COLOR_AUTO; i <= VSH_COLOR_SRGB; ++i) {
-        if (strcmp(value, vsh_color_space_name(i)) == 0) {
-            *space = i;
-            return CLI_OK;
-        }
-    }
-    return cli_usage("%s '%s': expected auto, linear or srgb", name, value);
-}
-
-int cli_parse_bits(const char *name, const char *value, int32_t *bits) {
-    static const char *const widths[] = {"8", "16", "32"};
-    for (int i = 0; i < 3; ++i) {
-        if (strcmp(value, widths[i]) == 0) {
-            *bits = 8 << i;
-            return CLI_OK;
-        }
-    }
-    return cli_usage("%s '%s': expected 8, 16 or 32", name, value);
-}

@@ -32,8 +32,7 @@ void vsh_compare_coverage_sized(uint64_t count, const float *golden, const float
 
 /* --- beforehand */
 
-static vsh_result check(const vsh_compared *compared, const vsh_compare_options *given, const vsh_run *run,
-                        vsh_compare_options *options, vsh_error *error) {
+vsh_result vshi_pair_check(const vsh_compared *compared, double *values, vsh_error *error) {
     if (compared->golden == NULL || compared->values == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "comparison: the %s values are NULL",
                          compared->golden == NULL ? "golden" : "new");
@@ -47,11 +46,17 @@ static vsh_result check(const vsh_compared *compared, const vsh_compare_options 
                          "comparison of %d × %d × %d values: expected 1 … 2^31 - 1", compared->size[0],
                          compared->size[1], compared->size[2]);
     }
+    *values = count;
+    return VSH_OK;
+}
+
+static vsh_result check(const vsh_compared *compared, const vsh_compare_options *given, const vsh_run *run,
+                        vsh_compare_options *options, vsh_error *error) {
+    double count;
+    VSHI_TRY(vshi_pair_check(compared, &count, error));
     *options = vsh_compare_options_default();
-    const vsh_result result =
-        given == NULL ? VSH_OK : vshi_options_resolve(given, options, sizeof *options, "options", error);
-    if (result != VSH_OK) {
-        return result;
+    if (given != NULL) {
+        VSHI_TRY(vshi_options_resolve(given, options, sizeof *options, "options", error));
     }
     if (!(options->threshold >= 0.0 && options->threshold <= 1.0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "threshold of %g: expected 0 … 1", options->threshold);
@@ -72,7 +77,17 @@ static vsh_result check(const vsh_compared *compared, const vsh_compare_options 
 }
 
 /* Leaves out of the mask what is not finite, counts it, and finds the range. */
-static void make_mask(const vsh_compared *compared, vshi_pair *pair, uint8_t *mask, vsh_measures *m) {
+void vshi_pair_make(const vsh_compared *compared, uint8_t *mask, vshi_pair *pair, vsh_measures *m) {
+    *m = (vsh_measures){.width = {NAN, NAN}};
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        m->value[i] = NAN;
+    }
+    *pair = (vshi_pair){.count = 1, .plane = {compared->golden, compared->values}, .mask = mask};
+    for (int axis = 0; axis < 3; ++axis) {
+        pair->size[axis] = (size_t)compared->size[axis];
+        pair->stride[axis] = pair->count;
+        pair->count *= pair->size[axis];
+    }
     double range = 1.0;
     for (size_t i = 0; i < pair->count; ++i) {
         bool finite = true;
@@ -89,7 +104,6 @@ static void make_mask(const vsh_compared *compared, vshi_pair *pair, uint8_t *ma
             range = fmax(range, fabs((double)pair->plane[VSHI_GOLDEN][i]));
         }
     }
-    pair->mask = mask;
     pair->scale = 1.0 / range;
     m->range = range;
     m->value[VSH_MEASURE_NONFINITE] = (double)(m->nonfinite[0] + m->nonfinite[1]);
@@ -151,36 +165,23 @@ vsh_result vsh_compare_sized(const vsh_compared *compared, const vsh_compare_opt
     VSHI_NEEDS(measures);
     vsh_run full;
     vsh_compare_options chosen;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    result = result == VSH_OK ? check(compared, options, &full, &chosen, error) : result;
-    if (result != VSH_OK) {
-        return result;
-    }
-    vshi_pair pair = {.plane = {compared->golden, compared->values}};
-    pair.count = 1;
-    for (int axis = 0; axis < 3; ++axis) {
-        pair.size[axis] = (size_t)compared->size[axis];
-        pair.stride[axis] = pair.count;
-        pair.count *= pair.size[axis];
-    }
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(check(compared, options, &full, &chosen, error));
+    const size_t count = (size_t)compared->size[0] * (size_t)compared->size[1] * (size_t)compared->size[2];
     void *mask = NULL, *scratch = NULL;
-    result = vshi_allocate(&mask, pair.count, 1, "comparison", error);
-    if (result == VSH_OK) {
-        result = vshi_allocate(&scratch, pair.count, VSHI_SHIFT_SCRATCH + VSHI_REGIONS_SCRATCH, "comparison",
-                               error);
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate(&mask, count, 1, "comparison", error));
+    VSHI_TRY_DONE(
+        vshi_allocate(&scratch, count, VSHI_SHIFT_SCRATCH + VSHI_REGIONS_SCRATCH, "comparison", error));
+    vshi_pair pair;
+    vsh_measures m;
+    vshi_pair_make(compared, mask, &pair, &m);
+    work w = {&pair, &chosen, &m, scratch, {VSH_OK}};
+    if (m.count > 0) {
+        VSHI_TRY_DONE(take_all(&w, &full, error));
     }
-    if (result == VSH_OK) {
-        vsh_measures m = {.width = {NAN, NAN}};
-        for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-            m.value[i] = NAN;
-        }
-        make_mask(compared, &pair, mask, &m);
-        work w = {&pair, &chosen, &m, scratch, {VSH_OK}};
-        result = m.count > 0 ? take_all(&w, &full, error) : VSH_OK;
-        if (result == VSH_OK) {
-            vshi_give(measures, measures_size, &m, sizeof m);
-        }
-    }
+    vshi_give(measures, measures_size, &m, sizeof m);
+done:
     free(scratch);
     free(mask);
     return result;

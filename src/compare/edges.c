@@ -262,6 +262,18 @@ static void conclude(const tally *t, vsh_measures *m) {
     }
 }
 
+/* Whether value `i` is the first of a line along the axis, which `l` then is. */
+static bool begins_line(line *l, size_t i) {
+    l->first = i;
+    return i / l->stride % l->count == 0;
+}
+
+static void set_axis(line *l, int axis) {
+    l->axis = axis;
+    l->stride = l->pair->stride[axis];
+    l->count = l->pair->size[axis];
+}
+
 bool vshi_measure_edges(const vshi_pair *pair, const vsh_compare_options *options, void *scratch,
                         vsh_measures *m) {
     (void)scratch;
@@ -277,12 +289,10 @@ bool vshi_measure_edges(const vshi_pair *pair, const vsh_compare_options *option
     tally t = {.pairs = 0};
     line l = {.pair = pair};
     const bool shadow = find_sides(pair, options, &l);
-    for (l.axis = 0; shadow && l.axis < 3; ++l.axis) {
-        l.stride = pair->stride[l.axis];
-        l.count = pair->size[l.axis];
+    for (int axis = 0; shadow && axis < 3; ++axis) {
+        set_axis(&l, axis);
         for (size_t i = 0; i < pair->count; ++i) {
-            if (i / l.stride % l.count == 0) { /* the first of a line */
-                l.first = i;
+            if (begins_line(&l, i)) {
                 count_line(&l, lists, &t);
             }
         }
@@ -290,4 +300,57 @@ bool vshi_measure_edges(const vshi_pair *pair, const vsh_compare_options *option
     conclude(&t, m);
     free(edges);
     return true;
+}
+
+/* --- widths where golden has penumbrae, whatever the new values are there */
+
+/* Length that a line of values spends between its sides, from `begin` to `end`. */
+static double length_of(const line *l, int which, size_t begin, size_t end) {
+    double length = 0.0;
+    for (size_t i = begin; i < end; ++i) {
+        length += length_between(l->sides, value(l, which, i), value(l, which, i + 1));
+    }
+    return length;
+}
+
+/* Adds the penumbra between two texels of golden's that are on two sides. The other may be wider, and is
+ * looked at as far again to both ends. */
+static void add_width(const line *l, size_t begin, size_t end, double *golden, double *off) {
+    for (size_t reach = end - begin + 1, k = 0; k < reach; ++k) {
+        begin -= begin > 0 && valid(l, begin - 1);
+        end += end + 1 < l->count && valid(l, end + 1);
+    }
+    const double width = length_of(l, VSHI_GOLDEN, begin, end);
+    *golden += width;
+    *off += fabs(length_of(l, VSHI_NEW, begin, end) - width);
+}
+
+static void add_widths_of_line(const line *l, double *golden, double *off) {
+    size_t last = 0;
+    int side = 0; /* of texel `last`: -1 dark, 1 light, 0 none yet */
+    for (size_t i = 0; i < l->count; ++i) {
+        const double v = valid(l, i) ? value(l, VSHI_GOLDEN, i) : NAN;
+        const int now = v <= l->sides.low ? -1 : v >= l->sides.high ? 1 : 0;
+        if (now == 0) {
+            side = isnan(v) ? 0 : side;
+            continue;
+        }
+        if (side != 0 && now != side) {
+            add_width(l, last, i, golden, off);
+        }
+        side = now;
+        last = i;
+    }
+}
+
+void vshi_add_widths(const vshi_pair *pair, double *golden, double *off) {
+    line l = {.pair = pair, .sides = {LOW, HIGH}};
+    for (int axis = 0; axis < 3; ++axis) {
+        set_axis(&l, axis);
+        for (size_t i = 0; i < pair->count; ++i) {
+            if (begins_line(&l, i)) {
+                add_widths_of_line(&l, golden, off);
+            }
+        }
+    }
 }

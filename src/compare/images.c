@@ -46,7 +46,7 @@ static void view(images *both, int which) {
     const vsh_image all = vsh_image_view(both->file[which]);
     const bool picture = has_picture(both->file[which]);
     vsh_image *image = &both->image[which];
-    *image = (vsh_image){all.width, all.height, 0, both->names[which], both->planes[which]};
+    *image = (vsh_image){all.width, all.height, 0, both->names[which], both->planes[which], NULL};
     for (int32_t c = 0; c < all.channel_count; ++c) {
         const char *name = all.names[c];
         if (!picture || (strcmp(name, "R") != 0 && strcmp(name, "G") != 0 && strcmp(name, "B") != 0)) {

@@ -21,6 +21,13 @@ static inline double vshi_value_at(const vshi_pair *pair, int which, size_t i) {
     return (double)pair->plane[which][i] * pair->scale;
 }
 
+/* Refuses what cannot be compared; *count: how many values there are. */
+vsh_result vshi_pair_check(const vsh_compared *compared, double *count, vsh_error *error);
+
+/* Makes the pair, with `mask` [count] as its mask, and fills the measures' count, range and what is told of
+ * values that are not finite; the others are NaN or 0. */
+void vshi_pair_make(const vsh_compared *compared, uint8_t *mask, vshi_pair *pair, vsh_measures *m);
+
 /* x, y, z of a value. */
 static inline void vshi_place_of(const vshi_pair *pair, size_t i, size_t place[3]) {
     place[0] = i % pair->size[0];
@@ -44,6 +51,10 @@ vshi_measure_fn vshi_measure_ssim;    /* structural similarity */
 vshi_measure_fn vshi_measure_edges;   /* penumbra, widths, edges */
 vshi_measure_fn vshi_measure_shift;   /* displacement */
 vshi_measure_fn vshi_measure_regions; /* lost, gained */
+
+/* Of edges.c, for vsh_accuracy.width_error: adds the widths of the golden penumbrae, and by how much the new
+ * values are off, each texels along a line. */
+void vshi_add_widths(const vshi_pair *pair, double *golden, double *off);
 
 /* Of ssim.c: what two planes come to where one is flat and the other is it with noise of a standard error. */
 double vshi_ssim_of_noise(double noise);

@@ -76,9 +76,9 @@ void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *nam
 
 vsh_image vsh_image_view(const vsh_image_file *file) {
     if (file == NULL) {
-        return (vsh_image){0, 0, 0, NULL, NULL};
+        return (vsh_image){0, 0, 0, NULL, NULL, NULL};
     }
-    return (vsh_image){file->width, file->height, file->channel_count, file->names, file->planes};
+    return (vsh_image){file->width, file->height, file->channel_count, file->names, file->planes, NULL};
 }
 
 const vsh_attribute *vsh_image_attributes(const vsh_image_file *file, size_t *count) {

@@ -11,8 +11,9 @@
 #include <string.h>
 #include <strings.h>
 
-/* What the names of channels begin with that hold -1 … 1. */
-#define SIGNED "bent."
+static int32_t holds(const vsh_image *image, int32_t channel) {
+    return image->holds != NULL && channel >= 0 ? image->holds[channel] : VSH_CHANNEL_DATA;
+}
 
 static vsh_result check_image(const char *path, const vsh_image *image, vsh_error *error) {
     if (image == NULL || image->names == NULL) {
@@ -35,6 +36,10 @@ static vsh_result check_image(const char *path, const vsh_image *image, vsh_erro
             return vshi_fail(error, VSH_ERROR_ARGUMENT,
                              "%s: channel '%.40s…': the name has more than %d bytes", path, name,
                              VSH_CHANNEL_NAME - 1);
+        }
+        if (holds(image, c) < VSH_CHANNEL_DATA || holds(image, c) > VSH_CHANNEL_VECTOR) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: channel '%s' holds %d, expected %d … %d", path,
+                             name, holds(image, c), VSH_CHANNEL_DATA, VSH_CHANNEL_VECTOR);
         }
         for (int32_t other = 0; other < c; ++other) {
             if (strcmp(image->names[other], name) == 0) {
@@ -209,21 +214,29 @@ static vsh_result plan_planes(const char *path, const vsh_image *image, const ch
         if (entry->given || (!plan->exr && key < (plan->format.grey ? 1 : VSHI_PACK_ALPHA))) {
             const int32_t channel = entry->given ? entry->channel : -1;
             plan->channel[planes->count] = channel;
-            planes->planes[planes->count++] = (vshi_image_plane){
-                .name = vshi_pack_keys[key],
-                .constant = entry->constant,
-                .is_signed = channel >= 0 && strncmp(image->names[channel], SIGNED, strlen(SIGNED)) == 0};
+            planes->planes[planes->count++] =
+                (vshi_image_plane){.name = vshi_pack_keys[key],
+                                   .constant = entry->constant,
+                                   .is_signed = holds(image, channel) == VSH_CHANNEL_VECTOR};
         }
     }
     return VSH_OK;
 }
 
-static float encode_srgb(float value) {
-    return (float)vshi_to_srgb((double)value);
+/* --- what numbers of a file stand for */
+
+const char *vsh_color_space_name(int32_t color_space) {
+    static const char *const names[] = {"auto", "linear", "srgb", "encoded"};
+    const size_t count = sizeof names / sizeof names[0];
+    return color_space >= 0 && (size_t)color_space < count ? names[color_space] : NULL;
 }
 
-static bool begins_with(const char *text, const char *prefix) {
-    return strncmp(text, prefix, strlen(prefix)) == 0;
+double vsh_srgb_to_linear(double encoded) {
+    return vshi_from_srgb(encoded);
+}
+
+static float encode_srgb(float value) {
+    return (float)vshi_to_srgb((double)value);
 }
 
 /* Which planes are light, and which go through a curve. */
@@ -246,8 +259,7 @@ static vsh_result plan_colors(const char *path, const vsh_image *image, int32_t 
     for (int32_t p = 0; p < planes->count; ++p) {
         vshi_image_plane *plane = &planes->planes[p];
         const int32_t channel = plan->channel[p];
-        const char *name = channel >= 0 ? image->names[channel] : NULL;
-        plane->is_color = name != NULL && (begins_with(name, "irradiance.") || begins_with(name, "tint."));
+        plane->is_color = holds(image, channel) == VSH_CHANNEL_LIGHT;
         if (strcmp(plane->name, vshi_pack_keys[VSHI_PACK_ALPHA]) != 0) {
             lights += plane->is_color;
             others += !plane->is_color && (channel >= 0 || plane->is_grey); /* 0 and 1 are either */

@@ -3,7 +3,7 @@
  * A. King, "An area-preserving parametrization for spherical rectangles", 2013), and methods of one march
  * take the disc of the same solid angle (A. van Oosterom and J. Strackee, "The solid angle of a plane
  * triangle", 1983). */
-#include "light/rectangle.h"
+#include "light/types.h"
 
 #include "base/error.h"
 #include "light/light.h"

@@ -2,7 +2,6 @@
 
 #include "base/error.h"
 #include "light/light.h"
-#include "light/rectangle.h"
 
 #include <stddef.h>
 #include <stdio.h>

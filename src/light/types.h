@@ -55,4 +55,11 @@ typedef struct vshi_light_member {
 extern const vshi_light_member vshi_light_members[];
 extern const size_t vshi_light_member_count;
 
+/* The columns of rectangles (rectangle.c). */
+void vshi_rectangle_place(const vsh_light *light, vshi_light_place *place);
+double vshi_rectangle_gain(const vsh_light *light, vshi_vec to_light, double distance);
+int vshi_rectangle_describe(const vsh_light *light, char *text, size_t size);
+void vshi_rectangle_resize(vsh_light *light, double factor);
+vsh_result vshi_rectangle_check(const vsh_light *light, vsh_error *error);
+
 #endif

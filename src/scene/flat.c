@@ -7,8 +7,8 @@
 #include "scene/parts.h"
 #include "scene/scene.h"
 
-#include <vdbshade/flat.h>
 #include <vdbshade/image.h>
+#include <vdbshade/settings.h>
 
 #include <math.h>
 #include <stdlib.h>
@@ -69,42 +69,88 @@ static const vshi_key scene_keys[] = {
     {.name = "casters", .kind = VSHI_CUSTOM, .read = read_casters},
     {.name = "lights", .kind = VSHI_CUSTOM, .required = VSHI_ALL, .read = read_lights},
     {.name = "region", .kind = VSHI_CUSTOM, .required = VSHI_ALL, .read = read_region},
-    {.name = "size", .kind = VSHI_CUSTOM, .read = read_size},
+    {.name = "size",
+     .kind = VSHI_CUSTOM,
+     .read = read_size,
+     .option = {.name = "size",
+                .value = "W[xH]",
+                .group = VSH_SETTINGS_FLAT_IMAGE,
+                .help = "texels of the map",
+                .range = "W or WxH, each from 1 to 65536 texels",
+                .otherwise = "512",
+                .by = true}},
     {.name = "method",
      .kind = VSHI_NAME,
      .offset = offsetof(vsh_flat_scene, options.method),
-     .name_of = vsh_flat_method_name},
+     .name_of = vsh_flat_method_name,
+     .option = {.name = "method",
+                .value = "NAME",
+                .group = VSH_SETTINGS_FLAT_TEXELS,
+                .help = "of the shadow; classic has the outer half of the penumbra only, hard none"}},
     {.name = "supersample",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_flat_scene, options.supersample),
      .lowest = 1.0,
-     .highest = 16.0},
+     .highest = 16.0,
+     .option = {.name = "supersample",
+                .value = "N",
+                .group = VSH_SETTINGS_FLAT_TEXELS,
+                .help = "N × N samples a texel"}},
     {.name = "padding",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_flat_scene, options.padding),
-     .highest = 4096.0},
+     .highest = 4096.0,
+     .option = {.name = "padding",
+                .value = "N",
+                .group = VSH_SETTINGS_FLAT_TEXELS,
+                .help = "texels that values are grown by into solids"}},
     {.name = "max_steps",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_flat_scene, options.max_steps),
      .lowest = 16.0,
-     .highest = 65536.0},
+     .highest = 65536.0,
+     .option = {.name = "max-steps",
+                .value = "N",
+                .group = VSH_SETTINGS_FLAT_TEXELS,
+                .help = "with classic: steps after which a ray takes what is known by then"}},
     {.name = "output", .kind = VSHI_PATH, .offset = offsetof(vsh_flat_scene, output)},
-    {.name = "bits", .kind = VSHI_CUSTOM, .offset = offsetof(vsh_flat_scene, bits), .read = vshi_read_bits},
-    {.name = "pack", .kind = VSHI_STRING, .offset = offsetof(vsh_flat_scene, pack)},
+    {.name = "bits",
+     .kind = VSHI_CUSTOM,
+     .offset = offsetof(vsh_flat_scene, bits),
+     .read = vshi_read_bits,
+     .option = {.name = "bits",
+                .value = "N",
+                .group = VSH_SETTINGS_FLAT_IMAGE,
+                .help = "bits a channel",
+                .range = "8, 16 or 32",
+                .otherwise = "32 for EXR, else 16 where the format has it, else 8"}},
+    {.name = "pack",
+     .kind = VSHI_STRING,
+     .offset = offsetof(vsh_flat_scene, pack),
+     .option = {.name = "pack",
+                .value = "R=NAME,…",
+                .group = VSH_SETTINGS_FLAT_IMAGE,
+                .help = "what goes where in formats that cannot name channels",
+                .otherwise = "irradiance.R, .G and .B to R, G, B; A to A"}},
     {.name = "color_space",
      .kind = VSHI_NAME,
      .offset = offsetof(vsh_flat_scene, color_space),
-     .name_of = vshi_color_space_key},
+     .name_of = vshi_color_space_key,
+     .option = {.name = "color-space",
+                .value = "SPACE",
+                .group = VSH_SETTINGS_FLAT_IMAGE,
+                .help = "of R, G, B in 8 and 16 bits",
+                .otherwise = "auto: srgb for irradiance, linear for shadows"}},
 };
-static const vshi_table scene_table = VSHI_TABLE(scene_keys);
+const vshi_table vshi_flat_table = VSHI_TABLE(scene_keys);
 
 static vsh_result parse(vshi_json *reader, owner *made) {
     json_t *json = NULL;
     vsh_result result = VSH_OK;
     VSHI_TRY_DONE(vshi_json_load(reader, &json));
     const vshi_value root = {NULL, NULL, 0, 0, json};
-    made->scene.options = vsh_flat_options_default();
-    VSHI_TRY_DONE(vshi_read_object(reader, &root, &scene_table, 1, "a flat scene", &made->scene));
+    made->scene = vsh_flat_scene_default();
+    VSHI_TRY_DONE(vshi_read_object(reader, &root, &vshi_flat_table, 1, "a flat scene", &made->scene));
 done:
     made->blocks = reader->blocks;
     json_decref(json);

@@ -7,8 +7,8 @@
 
 #include <vdbshade/scene.h>
 
-/* Keys with options are settings: of a vsh_scene the first two, and of a vsh_receiver. */
-extern const vshi_table vshi_scene_table, vshi_ao_table, vshi_receiver_table;
+/* Keys with options are settings: of a vsh_scene the first two, of a vsh_receiver, of a vsh_flat_scene. */
+extern const vshi_table vshi_scene_table, vshi_ao_table, vshi_receiver_table, vshi_flat_table;
 
 vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *caster);
 vsh_result vshi_read_layer(vshi_json *reader, const vshi_value *value, void *layer);

@@ -65,7 +65,9 @@ static vsh_result add_shadow(vsh_provenance *p, const vsh_provenance_source *sou
     return add(p, "vdbshade_shadow", text, error);
 }
 
-static vsh_result add_ao(vsh_provenance *p, const vsh_provenance_source *source, vsh_error *error) {
+/* AO's method: of AO itself `what` is "within 2", of the sky "over y". */
+static vsh_result add_open(vsh_provenance *p, const vsh_provenance_source *source, const char *name,
+                           const char *what, vsh_error *error) {
     char text[LINE_SIZE], more[LINE_SIZE / 2] = "";
     const vsh_shade_options *o = &source->scene->shade;
     const int32_t method = vsh_ao_method_resolve(o->ao_method, source->has_triangles);
@@ -75,8 +77,8 @@ static vsh_result add_ao(vsh_provenance *p, const vsh_provenance_source *source,
     } else if (method == VSH_AO_CONES) {
         snprintf(more, sizeof more, ", %d cones", o->ao_cones);
     }
-    snprintf(text, sizeof text, "%s within %.9g%s", vsh_ao_method_name(method), o->ao_distance, more);
-    return add(p, "vdbshade_ao", text, error);
+    snprintf(text, sizeof text, "%s %s%s", vsh_ao_method_name(method), what, more);
+    return add(p, name, text, error);
 }
 
 static vsh_result add_scene(vsh_provenance *p, const vsh_provenance_source *source, vsh_error *error) {
@@ -84,8 +86,14 @@ static vsh_result add_scene(vsh_provenance *p, const vsh_provenance_source *sour
     if (scene->light_count > 0) {
         VSHI_TRY(add_shadow(p, source, error));
     }
+    char what[NAME_SIZE];
     if (scene->ao) {
-        VSHI_TRY(add_ao(p, source, error));
+        snprintf(what, sizeof what, "within %.9g", scene->shade.ao_distance);
+        VSHI_TRY(add_open(p, source, "vdbshade_ao", what, error));
+    }
+    if (source->lightmap != 0 && scene->planes.sky != VSH_UP_NONE) {
+        snprintf(what, sizeof what, "over %s", vsh_up_name(scene->planes.sky));
+        VSHI_TRY(add_open(p, source, "vdbshade_sky", what, error));
     }
     for (size_t i = 0; i < scene->light_count; ++i) {
         char name[NAME_SIZE], text[LINE_SIZE];
@@ -186,6 +194,7 @@ const vsh_attribute *vsh_provenance_attributes(const vsh_provenance *provenance,
 double vsh_provenance_max_error(const vsh_attribute *attributes, size_t count, const char *channel) {
     VSHI_NUMBERS;
     const char *name = strcmp(channel, "ao") == 0            ? "vdbshade_ao"
+                       : strcmp(channel, "sky") == 0         ? "vdbshade_sky"
                        : strncmp(channel, "shadow.", 7) == 0 ? "vdbshade_shadow"
                                                              : NULL;
     for (size_t i = 0; name != NULL && i < count; ++i) {

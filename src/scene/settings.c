@@ -13,11 +13,12 @@
 static const struct {
     const vshi_table *table;
     const char *prefix;
-    bool of_receiver;
+    int32_t owner;
 } places[] = {
-    {&vshi_scene_table, "", false},
-    {&vshi_ao_table, "ao.", false},
-    {&vshi_receiver_table, "receivers.", true},
+    {&vshi_scene_table, "", VSH_SETTING_OF_SCENE},
+    {&vshi_ao_table, "ao.", VSH_SETTING_OF_SCENE},
+    {&vshi_receiver_table, "receivers.", VSH_SETTING_OF_RECEIVER},
+    {&vshi_flat_table, "", VSH_SETTING_OF_FLAT},
 };
 enum { PLACES = sizeof places / sizeof places[0] };
 
@@ -33,16 +34,18 @@ static const vshi_key *key_at(size_t index, size_t *place) {
     return NULL;
 }
 
-static void tell_default(const vshi_key *key, bool of_receiver, char *text, size_t size) {
+static void tell_default(const vshi_key *key, int32_t owner, char *text, size_t size) {
     const vsh_scene scene = vsh_scene_default();
     const vsh_receiver receiver = vsh_receiver_default();
+    const vsh_flat_scene flat = vsh_flat_scene_default();
+    const void *const defaults[] = {[VSH_SETTING_OF_SCENE] = &scene,
+                                    [VSH_SETTING_OF_RECEIVER] = &receiver,
+                                    [VSH_SETTING_OF_FLAT] = &flat};
     if (key->option.otherwise != NULL) {
         snprintf(text, size, "%s", key->option.otherwise);
-    } else if (of_receiver) {
-        vshi_key_value(key, &receiver, text, size);
-    } else {
-        vshi_key_value(key, &scene, text, size);
+        return;
     }
+    vshi_key_value(key, defaults[owner], text, size);
 }
 
 int32_t vsh_setting_get_sized(size_t index, vsh_setting *setting, size_t setting_size) {
@@ -58,9 +61,9 @@ int32_t vsh_setting_get_sized(size_t index, vsh_setting *setting, size_t setting
     snprintf(told.value, sizeof told.value, "%s", key->option.value != NULL ? key->option.value : "");
     snprintf(told.help, sizeof told.help, "%s", key->option.help);
     vshi_key_range(key, told.range, sizeof told.range);
-    tell_default(key, places[place].of_receiver, told.otherwise, sizeof told.otherwise);
+    tell_default(key, places[place].owner, told.otherwise, sizeof told.otherwise);
     told.group = key->option.group;
-    told.of_receiver = places[place].of_receiver;
+    told.owner = places[place].owner;
     vshi_give(setting, setting_size, &told, sizeof told);
     return 1;
 }
@@ -71,23 +74,23 @@ static bool is_called(const vshi_key *key, const char *prefix, const char *name)
            (strncmp(name, prefix, length) == 0 && strcmp(name + length, key->name) == 0);
 }
 
-static vsh_result set(bool of_receiver, const char *name, const char *text, void *target, vsh_error *error) {
+static vsh_result set(int32_t owner, const char *name, const char *text, void *target, vsh_error *error) {
+    static const char *const owners[] = {"scene", "receiver", "flat scene"};
     size_t place;
     const vshi_key *key;
     for (size_t i = 0; (key = key_at(i, &place)) != NULL; ++i) {
-        if (places[place].of_receiver == of_receiver && is_called(key, places[place].prefix, name)) {
+        if (places[place].owner == owner && is_called(key, places[place].prefix, name)) {
             return vshi_read_text(key, name, text, target, error);
         }
     }
-    return vshi_fail(error, VSH_ERROR_ARGUMENT, "%.64s: no such setting of a %s", name,
-                     of_receiver ? "receiver" : "scene");
+    return vshi_fail(error, VSH_ERROR_ARGUMENT, "%.64s: no such setting of a %s", name, owners[owner]);
 }
 
 vsh_result vsh_scene_set(vsh_scene *scene, const char *name, const char *text, vsh_error *error) {
     VSHI_NEEDS(scene);
     VSHI_NEEDS(name);
     vsh_scene changed = *scene;
-    VSHI_TRY(set(false, name, text, &changed, error));
+    VSHI_TRY(set(VSH_SETTING_OF_SCENE, name, text, &changed, error));
     *scene = changed;
     return VSH_OK;
 }
@@ -96,7 +99,16 @@ vsh_result vsh_receiver_set(vsh_receiver *receiver, const char *name, const char
     VSHI_NEEDS(receiver);
     VSHI_NEEDS(name);
     vsh_receiver changed = *receiver;
-    VSHI_TRY(set(true, name, text, &changed, error));
+    VSHI_TRY(set(VSH_SETTING_OF_RECEIVER, name, text, &changed, error));
     *receiver = changed;
+    return VSH_OK;
+}
+
+vsh_result vsh_flat_scene_set(vsh_flat_scene *scene, const char *name, const char *text, vsh_error *error) {
+    VSHI_NEEDS(scene);
+    VSHI_NEEDS(name);
+    vsh_flat_scene changed = *scene;
+    VSHI_TRY(set(VSH_SETTING_OF_FLAT, name, text, &changed, error));
+    *scene = changed;
     return VSH_OK;
 }

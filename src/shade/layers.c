@@ -1,4 +1,5 @@
 #include "shade/layers.h"
+#include "base/names.h"
 
 #include "base/memory.h"
 #include "base/try.h"
@@ -10,6 +11,17 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+static const char *const combines_table[] = {[VSH_COMBINE_MULTIPLY] = "multiply", [VSH_COMBINE_MIN] = "min"};
+static const vshi_names combines = VSHI_NAMES(combines_table);
+
+int32_t vsh_combine(const char *name) {
+    return vshi_name_find(combines, name);
+}
+
+const char *vsh_combine_name(int32_t combine) {
+    return vshi_name_at(combines, combine);
+}
 
 /* A layer as one light or AO sees it. */
 typedef struct prepared {

@@ -24,6 +24,7 @@ typedef struct tracing {
     double lift;
     const vsh_light *light; /* NULL: AO */
     double distance;        /* AO */
+    const vshi_vec *up;     /* AO: over this horizon alone; NULL: over the point's own */
     int32_t rays;
     double (*disc)[2]; /* [rays], the same for all points; NULL: each point has its own */
     float *values;
@@ -144,7 +145,7 @@ static void meet(const tracing *task, const vsh_solids *solids, const vshi_segme
 typedef struct viewpoint {
     vshi_vec origin, normal; /* no normal: zero */
     target target;
-    bool horizon;             /* rays below the normal's plane count as hidden */
+    const vshi_vec *over;     /* rays that are not over this plane count as hidden; NULL: none */
     const vsh_solids *solids; /* that rays may meet */
 } viewpoint;
 
@@ -180,7 +181,7 @@ static bool place_point(const tracing *task, const double position[3], const flo
         return false;
     }
     from->solids = state == VSHI_CONE_FREE ? NULL : task->solids;
-    from->horizon = task->light != NULL && normal != NULL;
+    from->over = task->light == NULL ? task->up : normal != NULL ? &from->normal : NULL;
     return true;
 }
 
@@ -195,7 +196,7 @@ static int32_t count_free(const tracing *task, const viewpoint *from, const doub
     for (int32_t i = 0; i < count; ++i) {
         vshi_segment_ray *ray = &rays[waiting];
         *ray = (vshi_segment_ray){{o.x, o.y, o.z}, {0.0, 0.0, 0.0}, 0.0};
-        waiting += direct(task, &from->target, disc[i], from->horizon ? &from->normal : NULL, ray);
+        waiting += direct(task, &from->target, disc[i], from->over, ray);
         if (waiting == AT_ONCE || (i + 1 == count && waiting > 0)) {
             meet(task, from->solids, rays, waiting, blocked);
             for (size_t r = 0; r < waiting; ++r) {
@@ -228,6 +229,7 @@ bool vshi_truth_twice(const vshi_truth *truth, const double position[3], const f
                           .lift = truth->lift,
                           .light = truth->light,
                           .distance = truth->distance,
+                          .up = truth->up,
                           .place = truth->place};
     viewpoint from;
     if (!place_point(&task, position, normal, &from, &seen[0])) {
@@ -309,7 +311,14 @@ vsh_result vsh_trace_shadow(const vsh_triangles *triangles, const vsh_solids *so
                             const vsh_light *light, int32_t rays, const vsh_run *run, float *visibility,
                             vsh_error *error) {
     VSHI_FLOATS;
-    tracing task = {triangles, solids, positions, normals, lift, light, 0.0, rays, NULL, visibility, {0}};
+    tracing task = {.triangles = triangles,
+                    .solids = solids,
+                    .positions = positions,
+                    .normals = normals,
+                    .lift = lift,
+                    .light = light,
+                    .rays = rays,
+                    .values = visibility};
     VSHI_TRY(check(&task, count, "vsh_trace_shadow", error));
     VSHI_TRY(vsh_light_check(light, error));
     task.place = vshi_light_in_world(light);
@@ -322,7 +331,14 @@ vsh_result vsh_trace_ao(const vsh_triangles *triangles, const vsh_solids *solids
                         const double *positions, const float *normals, double lift, double distance,
                         int32_t rays, const vsh_run *run, float *ao, vsh_error *error) {
     VSHI_FLOATS;
-    tracing task = {triangles, solids, positions, normals, lift, NULL, distance, rays, NULL, ao, {0}};
+    tracing task = {.triangles = triangles,
+                    .solids = solids,
+                    .positions = positions,
+                    .normals = normals,
+                    .lift = lift,
+                    .distance = distance,
+                    .rays = rays,
+                    .values = ao};
     VSHI_TRY(check(&task, count, "vsh_trace_ao", error));
     VSHI_NEEDS_OF(count, normals);
     if (!(distance > 0.0)) {

@@ -17,6 +17,7 @@ typedef struct vshi_truth {
     const vsh_light *light; /* NULL: AO */
     vshi_light_place place; /* of the light, in world space */
     double distance;        /* of AO */
+    const vshi_vec *up;     /* of AO: rays that go no way over this horizon are hidden; NULL: none */
     double lift;            /* of rays' beginnings along the normal, world units */
     const vshi_sampler *sampler;
     int32_t rays; /* that a point takes at most, each time, and the sampler's */

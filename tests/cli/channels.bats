@@ -36,9 +36,14 @@ load helper
 @test "the sky over a box is 1, 1/2 and 0, by option and scene, in bands as whole" {
     write_box box.obj
     options=(--size 64 --resolution 32 --quiet)
-    run -0 "$VDBSHADE" bake box.obj --sky z "${options[@]}" -o whole.exr
+    run -0 "$VDBSHADE" bake box.obj --sky z "${options[@]}" --stats stats.json -o whole.exr
     run -0 "$VDBSHADE" info whole.exr
     [[ $output == *"'sky': min 0, "*", max 1"* ]]
+    # method and error are told, of the channel and of outputs
+    [[ $output =~ "vdbshade_sky: "(exact|adaptive)" over z, max error 0.02, sobol" ]] || fail "$output"
+    grep -q '"name": "sky"' stats.json || fail "$(cat stats.json)"
+    awk '/"sky": {/ { here = 1 } here && /"estimated_rmse"/ { exit !($2 + 0 <= 0.02 && $2 !~ /null/) }' stats.json ||
+        fail "$(cat stats.json)"
     run -0 "$VDBSHADE" bake box.obj --sky z "${options[@]}" --band-rows 16 -o bands.exr
     cmp whole.exr bands.exr
     for sky in z -z; do

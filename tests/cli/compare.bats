@@ -197,7 +197,7 @@ int main(void) {
     float values[16] = {0}, other[16] = {0};
     const char *const names[1] = {"ao"};
     const float *const planes[1] = {values}, *const others[1] = {other};
-    const vsh_image image = {4, 4, 1, names, planes}, clean = {4, 4, 1, names, others};
+    const vsh_image image = {4, 4, 1, names, planes, NULL}, clean = {4, 4, 1, names, others, NULL};
     values[6] = NAN;
     values[9] = INFINITY;
     return vsh_image_write("nan.exr", &image, NULL, NULL) != VSH_OK ||

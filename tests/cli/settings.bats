@@ -7,8 +7,8 @@ help_of() {
     awk -v option="--$1" '$1 ~ /^-/ || /^$/ { here = $1 == option } here { printf "%s ", $0 }' help.txt | tr -s ' '
 }
 
-@test "--help of bake has the range and the default that docs/scene.md has" {
-    "$VDBSHADE" bake --help >help.txt
+# Holds help.txt against the tables of options on standard input, of which at least $1 are in both.
+expect_ranges() {
     local checked=0 key default range option text
     while IFS='|' read -r _ key _ default range _; do
         key=$(tr -d ' `' <<<"$key") range=$(xargs <<<"$range") default=$(tr -d '` "' <<<"$default")
@@ -20,8 +20,23 @@ help_of() {
         [[ ! $default =~ ^[0-9.]+$ ]] || [[ $text == *"($default"* ]] || [[ $text == *"($default)"* ]] ||
             [[ $text == *"($default:"* ]] || fail "$key: $default; $text"
         checked=$((checked + 1))
-    done < <(sed -n '/^## The scene/,/^## Casters/p' "$BATS_TEST_DIRNAME/../../docs/scene.md" | grep '^| `')
-    [ "$checked" -ge 10 ] || fail "only $checked"
+    done
+    [ "$checked" -ge "$1" ] || fail "only $checked"
+}
+
+# tables PAGE: the rows of a page's keys of a scene.
+tables() {
+    sed -n '/^## The scene/,/^## Casters/p' "$BATS_TEST_DIRNAME/../../docs/$1" | grep '^| `'
+}
+
+@test "--help of bake and flat has the ranges and the defaults that the documents have" {
+    "$VDBSHADE" bake --help >help.txt
+    expect_ranges 10 < <(tables scene.md)
+    "$VDBSHADE" flat --help >help.txt
+    expect_ranges 3 < <(tables flat.md)
+    # what the document has as a list, or for each of two numbers
+    [[ $(help_of size) == *"each from 1 to 65536 texels (512)"* ]] || fail "$(help_of size)"
+    [[ $(help_of method) == *": hard, classic, exact (exact)"* ]] || fail "$(help_of method)"
 }
 
 @test "an option that is refused names itself, its value and what is expected" {
@@ -34,4 +49,6 @@ help_of() {
     refused 2 "--method 'soft': expected one of hard,"
     shade query box.obj --points p.csv -o out.csv --resolution 1
     refused 2 "--resolution '1': expected a whole number from 2 to 65536"
+    shade flat flat.json -o out.exr --padding 5000
+    refused 2 "--padding '5000': expected a whole number from 0 to 4096"
 }

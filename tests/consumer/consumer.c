@@ -229,7 +229,7 @@ static void write_picture(const char *folder, vsh_error *error) {
     }
     const char *const name = "shadow";
     const float *const plane = values;
-    const vsh_image image = {SIZE, 1, 1, &name, &plane};
+    const vsh_image image = {SIZE, 1, 1, &name, &plane, NULL};
     check("write an image", vsh_image_write(path, &image, NULL, error), error);
     vsh_image_file *file = NULL;
     check("read an image", vsh_image_read(path, NULL, &file, error), error);

@@ -95,7 +95,7 @@ vsh_result draw(const vsh_run *run, vsh_error *error) {
     parts_fill(light_plane, SIDE * SIDE);
     static const char *const name = "shadow.sun";
     const float *const plane = light_plane;
-    const vsh_image lightmap = {SIDE, SIDE, 1, &name, &plane};
+    const vsh_image lightmap = {SIDE, SIDE, 1, &name, &plane, NULL};
     const vsh_light light = vsh_light_default();
     vsh_render_options options = preview_render_options();
     options.width = options.height = SIDE;
@@ -166,7 +166,7 @@ static vsh_result write_image(const char *name, vsh_error *error) {
     }
     static const char *const names[] = {"shadow.sun", "ao", "x", "A"};
     const float *const planes[] = {pixels[0], pixels[1], pixels[2], pixels[3]};
-    const vsh_image image = {SIDE, SIDE, 4, names, planes};
+    const vsh_image image = {SIDE, SIDE, 4, names, planes, NULL};
     return vsh_image_write(name, &image, NULL, error);
 }
 

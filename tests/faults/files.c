@@ -67,7 +67,7 @@ static void write_images(void) {
     }
     static const char *const name = "Y";
     const float *const plane = pixels;
-    const vsh_image image = {SIDE, SIDE, 1, &name, &plane};
+    const vsh_image image = {SIDE, SIDE, 1, &name, &plane, NULL};
     for (size_t i = 0; i < IMAGES; ++i) {
         if (vsh_image_write(images[i], &image, NULL, NULL) != VSH_OK) {
             abort();

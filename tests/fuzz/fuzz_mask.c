@@ -68,7 +68,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const int height = count / width > 0 ? count / width : 1;
     static const char *const name = "Y";
     const float *plane = pixels;
-    const vsh_image image = {width, height, 1, &name, &plane};
+    const vsh_image image = {width, height, 1, &name, &plane, NULL};
     const char *path = fuzz_file("a.exr", "", 0);
     vsh_error error;
     if (vsh_image_write(path, &image, NULL, fuzz_error(&error)) != VSH_OK) {

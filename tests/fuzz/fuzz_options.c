@@ -135,7 +135,7 @@ static void image(fuzz_input *input) {
         texts[i][0] = (char)('A' + i);
         fuzz_take(input, texts[i], sizeof texts[i] - 1);
     }
-    vsh_image what = {4, 4, 4, channels, planes};
+    vsh_image what = {4, 4, 4, channels, planes, NULL};
     int32_t numbers[3] = {4, 4, 4};
     fuzz_take(input, numbers, sizeof numbers);
     vsh_image_options options = vsh_image_options_default();
@@ -175,7 +175,7 @@ static void mask(fuzz_input *input) {
         const float pixels[16] = {0, 0, 0, 0, 0, 1, 1, 0, 0, 1, 0.6f, 0};
         const float *const plane = pixels;
         static const char *const name = "Y";
-        const vsh_image picture = {4, 4, 1, &name, &plane};
+        const vsh_image picture = {4, 4, 1, &name, &plane, NULL};
         strcpy(path, fuzz_file("mask.exr", "", 0));
         fuzz_must(vsh_image_write(path, &picture, NULL, NULL));
     }

@@ -194,7 +194,7 @@ static void render(fuzz_input *input) {
     const float light_map[4][4] = {{1.0f, 0.5f}, {0.25f}, {0.0f, 1.0f}, {0.75f}};
     const float *const map_planes[] = {light_map[0], light_map[1], light_map[2], light_map[3]};
     static const char *const names[] = {"ao", "irradiance.R", "irradiance.G", "irradiance.B"};
-    const vsh_image image = {2, 2, 4, names, map_planes};
+    const vsh_image image = {2, 2, 4, names, map_planes, NULL};
     vsh_lit_meshes lit = {&fuzz_made()->mesh, 1, &image, {0.5, 0.5, 0.5}, 0};
     if (how & 2) {
         fuzz_take(input, &lit, sizeof lit);

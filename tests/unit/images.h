@@ -57,7 +57,7 @@ static inline void make(sample *s, int32_t width, int32_t height, int32_t count,
             s->values[(size_t)c * texels + i] = (float)(0.5 + 0.5 * sin(7.0 * x + 3.1 * y * (c + 1) + c));
         }
     }
-    s->image = (vsh_image){width, height, count, s->names, s->planes};
+    s->image = (vsh_image){width, height, count, s->names, s->planes, NULL};
 }
 
 static inline void unmake(sample *s) {

@@ -281,7 +281,7 @@ static void steps_come_in_their_order(void **state) {
     assert_ok(vsh_bake_job_prepare(job, NULL, &error), &error);
     vsh_bake_report report;
     vsh_bake_job_get_report(job, &report);
-    assert_int_equal(report.error_count, 2);
+    assert_int_equal(report.error_count, 3);
     assert_int_equal(report.texels, 0);
     vsh_bake_job_free(job);
 }

@@ -139,7 +139,7 @@ static void write_image(const char *image, int32_t width, float spot, int32_t ch
     }
     const char *const names[] = {"ao", "A"};
     const float *const planes[] = {ao, covered};
-    const vsh_image view = {width, COUNT / width, channels, names, planes};
+    const vsh_image view = {width, COUNT / width, channels, names, planes, NULL};
     assert_int_equal(vsh_image_write(image, &view, NULL, NULL), VSH_OK);
 }
 

@@ -1,5 +1,6 @@
 /* Comparing shapes: penumbrae of known width, displacements of known length, shadows that are gone. */
 #include "compared.h"
+#include "truth/metrics.h"
 
 enum { SIDE = 96 };
 
@@ -58,6 +59,66 @@ static void wider_and_narrower_penumbrae_are_told_by_how_much(void **unused) {
             assert_near(m.value[VSH_MEASURE_SHIFT], 0.0, 0.1);
         }
     }
+}
+
+/* Of three planes together, by the tests' own formulas over all their values in a row. */
+static void accuracy_is_what_the_tests_measure_by(void **unused) {
+    (void)unused;
+    enum { PLANES = 3, WIDTH = 40, HEIGHT = 25, COUNT = WIDTH * HEIGHT, ALL = PLANES * COUNT };
+    static float truth[ALL], values[ALL], masked[ALL];
+    static uint8_t mask[ALL];
+    vsh_compared planes[PLANES];
+    for (uint32_t i = 0; i < ALL; ++i) {
+        truth[i] = (float)fmin(1.0, fmax(0.0, 0.5 + 0.7 * noise(i)));
+        values[i] = (float)((double)truth[i] + 0.05 + 0.3 * noise(i + ALL));
+        mask[i] = i % 7 != 0;
+        masked[i] = mask[i];
+    }
+    for (size_t k = 0; k < PLANES; ++k) {
+        planes[k] =
+            (vsh_compared){{WIDTH, HEIGHT, 1}, truth + k * COUNT, values + k * COUNT, mask + k * COUNT};
+    }
+    vsh_accuracy a;
+    vsh_error error;
+    assert_int_equal(vsh_compare_accuracy(planes, PLANES, NULL, &a, &error), VSH_OK);
+    const truth_metrics expected = truth_compare(ALL, values, truth, masked);
+    assert_int_equal(a.count, expected.count);
+    assert_int_equal(a.penumbra, expected.penumbra);
+    assert_true(a.penumbra > 0 && a.penumbra < a.count);
+    assert_near(a.rmse, expected.rmse, 1e-12);
+    assert_near(a.penumbra_rmse, expected.penumbra_rmse, 1e-12);
+    assert_near(a.bias, expected.bias, 1e-12);
+    assert_near(a.p95, expected.p95, 1e-7);
+    assert_near(a.p99, expected.p99, 1e-7);
+    assert_near(a.max, expected.max, 1e-12);
+    const vsh_run tight = {.struct_size = sizeof tight, .memory_limit = 10 * ALL - 1};
+    assert_int_equal(vsh_compare_accuracy(planes, PLANES, &tight, &a, &error), VSH_ERROR_LIMIT);
+    values[1] = NAN;
+    assert_int_equal(vsh_compare_accuracy(planes, 1, NULL, &a, &error), VSH_OK);
+    assert_int_equal(a.count, COUNT - (COUNT + 6) / 7 - 1);
+    assert_int_equal(vsh_compare_accuracy(planes, 0, NULL, &a, &error), VSH_OK);
+    assert_true(a.count == 0 && a.rmse == 0.0 && isnan(a.width_error));
+}
+
+/* A penumbra of 30 texels from 0 to 1: 24 of them between 0.1 and 0.9. */
+static void a_penumbra_that_is_gone_is_off_by_all_of_its_width(void **unused) {
+    (void)unused;
+    const ramp r = {30.0, 0.0, 0.0};
+    const double lit = 1.0, factors[] = {1.0, 0.5, 1.2};
+    const plane truth = make_plane(SIDE, SIDE, 1, ramp_at, &r);
+    vsh_accuracy a;
+    vsh_error error;
+    for (size_t i = 0; i <= sizeof factors / sizeof factors[0]; ++i) {
+        const bool gone = i == sizeof factors / sizeof factors[0];
+        const ramp other = {30.0 * (gone ? 1.0 : factors[i]), 0.0, 0.0};
+        const plane values =
+            gone ? make_plane(SIDE, SIDE, 1, flat, &lit) : make_plane(SIDE, SIDE, 1, ramp_at, &other);
+        const vsh_compared compared = pair_of(&truth, &values, NULL);
+        assert_int_equal(vsh_compare_accuracy(&compared, 1, NULL, &a, &error), VSH_OK);
+        assert_near(a.width_error, gone ? 1.0 : fabs(factors[i] - 1.0), 1e-4);
+        free(values.values);
+    }
+    free(truth.values);
 }
 
 static void noise_does_not_change_a_penumbras_width(void **unused) {
@@ -301,6 +362,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_ramp_is_as_wide_as_it_is_in_every_direction),
         cmocka_unit_test(wider_and_narrower_penumbrae_are_told_by_how_much),
+        cmocka_unit_test(accuracy_is_what_the_tests_measure_by),
+        cmocka_unit_test(a_penumbra_that_is_gone_is_off_by_all_of_its_width),
         cmocka_unit_test(noise_does_not_change_a_penumbras_width),
         cmocka_unit_test(an_edge_that_is_cut_off_is_no_edge),
         cmocka_unit_test(part_of_the_penumbrae_shows_in_the_widths),

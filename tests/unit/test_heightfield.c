@@ -126,7 +126,7 @@ static void check_image(const char *name, int32_t bits, int32_t channels, const 
             planes[c][i] = scale * (float)(i * (c + 1)) / 36.0f;
         }
     }
-    const vsh_image image = {4, 3, channels, channels == 3 ? rgb : grey, views};
+    const vsh_image image = {4, 3, channels, channels == 3 ? rgb : grey, views, NULL};
     vsh_image_options options = vsh_image_options_default();
     options.bits = bits;
     options.pack = channels == 3 ? NULL : strstr(name, ".exr") != NULL ? NULL : "R=Y,G=Y,B=Y";
@@ -165,7 +165,7 @@ static void bad_images_are_refused_with_their_place(void **state) {
     float values[12] = {0};
     const float *views[1] = {values};
     values[7] = NAN;
-    vsh_image image = {4, 3, 1, names, views};
+    vsh_image image = {4, 3, 1, names, views, NULL};
     vsh_error error = {VSH_OK, ""};
     vsh_assets *assets = NULL;
     assert_ok(vsh_image_write(at("nan.exr"), &image, NULL, &error), &error);

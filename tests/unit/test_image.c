@@ -341,7 +341,7 @@ static void integers_clamp_and_turn_nan_to_0(void **state) {
     const float expected[6] = {0.0f, 0.0f, 1.0f, 1.0f, 0.0f, 0.5f};
     const char *const name = "ao";
     const float *const plane = values;
-    const vsh_image image = {3, 2, 1, &name, &plane};
+    const vsh_image image = {3, 2, 1, &name, &plane, NULL};
     vsh_image_file *file = write_and_read(at("clamp.png"), &image, 16, NULL);
     const vsh_image view = vsh_image_view(file);
     assert_int_equal(view.channel_count, 3); /* one channel is grey: the same in R, G and B */
@@ -397,7 +397,7 @@ static void default_pack_takes_the_first_three_and_coverage(void **state) {
          "R=irradiance.R,G=irradiance.G,B=irradiance.B,A=A"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        const vsh_image image = {1, 1, cases[i].count, cases[i].names, NULL};
+        const vsh_image image = {1, 1, cases[i].count, cases[i].names, NULL, NULL};
         char text[64];
         vsh_image_default_pack(&image, text, sizeof text);
         assert_string_equal(text, cases[i].text);

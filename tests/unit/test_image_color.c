@@ -2,6 +2,8 @@
 #include "images.h"
 
 static const char *const IRRADIANCE[] = {"shadow.sun", "irradiance.R", "irradiance.G", "irradiance.B", "A"};
+static const int32_t HOLDS[] = {VSH_CHANNEL_DATA, VSH_CHANNEL_LIGHT, VSH_CHANNEL_LIGHT, VSH_CHANNEL_LIGHT,
+                                VSH_CHANNEL_DATA};
 
 static vsh_image_file *write_as(const char *path, const vsh_image *image, int32_t bits, int32_t space,
                                 const char *pack) {
@@ -50,6 +52,7 @@ static void light_is_srgb_and_its_file_says_so(void **state) {
     for (int32_t bits = 8; bits <= 16; bits += 8) {
         sample s;
         make(&s, 30, 20, 5, IRRADIANCE);
+        s.image.holds = HOLDS;
         const double step = bits == 8 ? 255.0 : 65535.0;
         vsh_image_file *file = write_as(at("light.png"), &s.image, bits, VSH_COLOR_AUTO, NULL);
         const vsh_image view = vsh_image_view(file);
@@ -73,6 +76,7 @@ static void data_is_linear_and_its_file_says_nothing_to_be_undone(void **state) 
     (void)state;
     sample s;
     make(&s, 30, 20, 5, IRRADIANCE);
+    s.image.holds = HOLDS;
     static const char *const packs[] = {"R=shadow.sun,A=A", "R=shadow.sun,G=irradiance.G", "rgb"};
     for (size_t k = 0; k < 3; ++k) {
         const bool light = k == 2; /* the picture is the irradiance */
@@ -91,6 +95,7 @@ static void a_space_that_is_asked_for_is_taken(void **state) {
     (void)state;
     sample s;
     make(&s, 30, 20, 5, IRRADIANCE);
+    s.image.holds = HOLDS;
     const double light = s.planes[1][50], shadow = s.planes[0][50];
     vsh_image_file *file = write_as(at("a.png"), &s.image, 16, VSH_COLOR_LINEAR, NULL);
     assert_true(fabs((double)vsh_image_view(file).planes[0][50] - light) <= 0.501 / 65535);
@@ -107,10 +112,34 @@ static void a_space_that_is_asked_for_is_taken(void **state) {
     unmake(&s);
 }
 
+/* Names say nothing of it. */
+static void what_a_channel_holds_says_how_integers_hold_it(void **state) {
+    (void)state;
+    sample s;
+    make(&s, 30, 20, 5, IRRADIANCE);
+    const double value = s.planes[1][50];
+    vsh_image_file *file = write_as(at("n.png"), &s.image, 16, VSH_COLOR_AUTO, NULL);
+    assert_true(fabs((double)vsh_image_view(file).planes[0][50] - value) <= 0.501 / 65535);
+    assert_string_equal(said(file), "linear");
+    vsh_image_free(file);
+    static const int32_t vectors[] = {2, 2, 2, 2, 0}, none[] = {0, 0, 3, 0, 0};
+    s.image.holds = vectors;
+    file = write_as(at("n.png"), &s.image, 16, VSH_COLOR_AUTO, NULL);
+    assert_true(fabs((double)vsh_image_view(file).planes[0][50] - 0.5 - 0.5 * value) <= 0.501 / 65535);
+    assert_true(fabs((double)(vsh_image_view(file).planes[3][50] - s.planes[4][50])) <= 0.501 / 65535);
+    vsh_image_free(file);
+    s.image.holds = none;
+    vsh_error error;
+    assert_int_equal(vsh_image_check(at("n.png"), &s.image, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "channel 'irradiance.G' holds 3, expected 0 … 2"));
+    unmake(&s);
+}
+
 static void floats_are_linear(void **state) {
     (void)state;
     sample s;
     make(&s, 30, 20, 5, IRRADIANCE);
+    s.image.holds = HOLDS;
     vsh_image_file *file = write_as(at("float.tif"), &s.image, 32, VSH_COLOR_AUTO, NULL);
     assert_memory_equal(vsh_image_view(file).planes[0], s.planes[1], 600 * sizeof(float));
     vsh_image_free(file);
@@ -142,6 +171,7 @@ static void light_over_1_is_counted_where_it_is_cut(void **state) {
     (void)state;
     sample s;
     make(&s, 10, 10, 5, IRRADIANCE);
+    s.image.holds = HOLDS;
     for (size_t i = 0; i < 100; ++i) {
         s.values[400 + i] = i < 50 ? 1.0f : 0.0f; /* A */
     }
@@ -165,6 +195,7 @@ int main(void) {
         cmocka_unit_test(light_is_srgb_and_its_file_says_so),
         cmocka_unit_test(data_is_linear_and_its_file_says_nothing_to_be_undone),
         cmocka_unit_test(a_space_that_is_asked_for_is_taken),
+        cmocka_unit_test(what_a_channel_holds_says_how_integers_hold_it),
         cmocka_unit_test(floats_are_linear),
         cmocka_unit_test(light_over_1_is_counted_where_it_is_cut),
     };

@@ -56,7 +56,8 @@ Seen write_and_see(const std::vector<const char *> &names, const char *pack, int
         }
         views.push_back(planes[c].data());
     }
-    const vsh_image image = {WIDTH, HEIGHT, static_cast<int32_t>(names.size()), names.data(), views.data()};
+    const vsh_image image = {WIDTH,        HEIGHT,       static_cast<int32_t>(names.size()),
+                             names.data(), views.data(), NULL};
     vsh_image_options options = vsh_image_options_default();
     options.pack = pack;
     options.bits = bits;
@@ -162,7 +163,7 @@ void half_floats_are_half_all_over(void **) {
 
 void a_picture_of_nothing_is_refused(void **) {
     const char *const names[] = {"depth"};
-    const vsh_image image = {2, 2, 1, names, nullptr};
+    const vsh_image image = {2, 2, 1, names, nullptr, NULL};
     vsh_image_options options = vsh_image_options_default();
     options.pack = "rgb";
     vsh_error error;

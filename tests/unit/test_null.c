@@ -104,7 +104,7 @@ static void files_have_paths_and_places(void **state) {
     float value;
     char digest[VSH_DIGEST_TEXT];
     const char *const name = "ao";
-    const vsh_image unnamed = {1, 1, 1, NULL, NULL}, empty = {1, 1, 1, &name, NULL};
+    const vsh_image unnamed = {1, 1, 1, NULL, NULL, NULL}, empty = {1, 1, 1, &name, NULL, NULL};
     MAKES_NONE(vsh_grid_read(NULL, NULL, NULL, PLACE, &error));
     REFUSED(vsh_grid_read("a.vdb", NULL, NULL, NULL, &error));
     REFUSED(vsh_grid_write(NULL, "a.vdb", NULL, NULL, 0, &error));
@@ -301,6 +301,10 @@ static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
     REFUSED(vsh_picture_encode(&picture, SIDE, SIDE, 1.0, no_green, NULL, &error));
     REFUSED(vsh_compare(NULL, NULL, NULL, &measures, &error));
     REFUSED(vsh_compare(&compared, NULL, NULL, NULL, &error));
+    vsh_accuracy accuracy;
+    REFUSED(vsh_compare_accuracy(NULL, 1, NULL, &accuracy, &error));
+    REFUSED(vsh_compare_accuracy(&compared, 1, NULL, &accuracy, &error));
+    REFUSED(vsh_compare_accuracy(&compared, 0, NULL, NULL, &error));
     vsh_comparison *comparison;
     REFUSED(vsh_compare_files(NULL, "new.exr", NULL, NULL, &comparison, &error));
     REFUSED(vsh_compare_files("golden.exr", NULL, NULL, NULL, &comparison, &error));

@@ -11,7 +11,7 @@ static char image_path[] = "vsh-outline-XXXXXX.exr";
 
 static void write_image(int32_t width, int32_t height, int32_t channels, const char *const *names,
                         const float *const *planes) {
-    const vsh_image image = {width, height, channels, names, planes};
+    const vsh_image image = {width, height, channels, names, planes, NULL};
     assert_ok(vsh_image_write(image_path, &image, NULL, &failure));
 }
 

@@ -135,9 +135,11 @@ static void the_error_that_a_channel_was_made_to_is_told(void **state) {
     (void)state;
     const vsh_attribute list[] = {{"vdbshade_version", "0.2.0"},
                                   {"vdbshade_shadow", "adaptive, max error 0.005, sobol, frame 3"},
-                                  {"vdbshade_ao", "exact within 2.5, max error 0.02, sobol"}};
+                                  {"vdbshade_ao", "exact within 2.5, max error 0.02, sobol"},
+                                  {"vdbshade_sky", "exact over y, max error 0.01, sobol"}};
     assert_true(vsh_provenance_max_error(list, 3, "shadow.sun") == 0.005);
     assert_true(vsh_provenance_max_error(list, 3, "ao") == 0.02);
+    assert_true(vsh_provenance_max_error(list, 4, "sky") == 0.01);
     assert_true(isnan(vsh_provenance_max_error(list, 3, "irradiance.R")));
     assert_true(isnan(vsh_provenance_max_error(list, 2, "ao")));
     assert_true(isnan(vsh_provenance_max_error(NULL, 0, "ao")));

@@ -53,7 +53,7 @@ static void a_lightmap_is_looked_up_where_it_was_baked(void **state) {
     }
     const char *const names[] = {"ao", "shadow.sun"};
     const float *const planes[] = {ao, shadow};
-    const vsh_image image = {N, N, 2, names, planes};
+    const vsh_image image = {N, N, 2, names, planes, NULL};
     const vsh_mesh mesh = quad();
     const vsh_lit_meshes lit = {&mesh, 1, &image, {0.5, 1.0, 0.25}, 0};
     const double z[3] = {0.0, 0.0, 1.0};
@@ -87,7 +87,7 @@ static void a_lightmap_is_looked_up_where_it_was_baked(void **state) {
     }
     assert_true(inside > 300);
     const char *const others[] = {"ao", "shadow.moon"};
-    const vsh_image missing = {N, N, 2, others, planes};
+    const vsh_image missing = {N, N, 2, others, planes, NULL};
     vsh_lit_meshes wrong = {&mesh, 1, &missing, {0.5, 0.5, 0.5}, 0};
     vsh_error error;
     o.lit = &wrong;
@@ -113,7 +113,7 @@ static void irradiance_comes_before_shadows(void **state) {
     const float red[1] = {0.2f}, green[1] = {0.4f}, blue[1] = {0.6f}, dark[1] = {0.0f};
     const char *const names[] = {"irradiance.B", "irradiance.G", "irradiance.R", "shadow.sun"};
     const float *const planes[] = {blue, green, red, dark};
-    const vsh_image image = {1, 1, 4, names, planes};
+    const vsh_image image = {1, 1, 4, names, planes, NULL};
     const vsh_mesh mesh = quad();
     const vsh_lit_meshes lit = {&mesh, 1, &image, {1.0, 1.0, 0.5}, 0};
     const vsh_light light = vsh_light_default();

@@ -1,4 +1,5 @@
-/* Settings: one table for files, programs and the command line, and docs/scene.md says the same. */
+/* Settings: one table for files, programs and the command line, and docs/scene.md and docs/flat.md say the
+ * same. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -10,6 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <vdbshade/image.h>
 #include <vdbshade/settings.h>
 
 static vsh_error error;
@@ -103,7 +105,34 @@ static void what_is_refused_is_told_and_changes_nothing(void **state) {
     assert_int_equal(vsh_receiver_set(NULL, "--size", "1", &error), VSH_ERROR_ARGUMENT);
 }
 
-/* --- docs/scene.md */
+static void settings_of_a_flat_scene_are_its_own(void **state) {
+    (void)state;
+    vsh_flat_scene flat = vsh_flat_scene_default();
+    static const char *const given[][2] = {
+        {"--size", "64x32"}, {"method", "classic"}, {"supersample", "3"},      {"--padding", "7"},
+        {"max_steps", "99"}, {"--bits", "16"},      {"--color-space", "srgb"}, {"pack", "R=shadow.a"}};
+    for (size_t i = 0; i < sizeof given / sizeof given[0]; ++i) {
+        assert_int_equal(vsh_flat_scene_set(&flat, given[i][0], given[i][1], &error), VSH_OK);
+    }
+    const vsh_flat_options *o = &flat.options;
+    assert_true(o->width == 64 && o->height == 32 && o->method == VSH_FLAT_CLASSIC && o->supersample == 3);
+    assert_true(o->padding == 7 && o->max_steps == 99 && flat.bits == 16);
+    assert_int_equal(flat.color_space, VSH_COLOR_SRGB);
+    assert_string_equal(flat.pack, "R=shadow.a");
+
+    const vsh_flat_scene before = flat;
+    assert_int_equal(vsh_flat_scene_set(&flat, "--method", "adaptive", &error), VSH_ERROR_INPUT);
+    assert_non_null(strstr(error.message, "expected one of hard, classic, exact"));
+    assert_int_equal(vsh_flat_scene_set(&flat, "--rays", "4", &error), VSH_ERROR_ARGUMENT);
+    assert_non_null(strstr(error.message, "no such setting of a flat scene"));
+    assert_memory_equal(&flat, &before, sizeof flat);
+    vsh_scene scene = vsh_scene_default();
+    assert_int_equal(vsh_scene_set(&scene, "supersample", "3", &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_flat_scene_set(NULL, "--size", "1", &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_flat_scene_set(&flat, NULL, "1", &error), VSH_ERROR_ARGUMENT);
+}
+
+/* --- docs/scene.md, docs/flat.md */
 
 /* Part `column` of "| a | b | c |". */
 static void cell(const char *line, int column, char *text, size_t size) {
@@ -118,10 +147,11 @@ static void cell(const char *line, int column, char *text, size_t size) {
 /* The row of the key, of the section that it stands in. */
 static void row_of(const vsh_setting *setting, char *row, size_t size) {
     const char *dot = strchr(setting->key, '.'), *key = dot != NULL ? dot + 1 : setting->key;
-    const char *section = setting->of_receiver ? "## Receivers"
-                          : dot != NULL        ? "## Ambient occlusion"
-                                               : "## The scene";
-    FILE *file = fopen(VSH_DOCS "/scene.md", "r");
+    const char *section = setting->owner == VSH_SETTING_OF_RECEIVER ? "## Receivers"
+                          : dot != NULL                             ? "## Ambient occlusion"
+                                                                    : "## The scene";
+    FILE *file =
+        fopen(setting->owner == VSH_SETTING_OF_FLAT ? VSH_DOCS "/flat.md" : VSH_DOCS "/scene.md", "r");
     assert_non_null(file);
     char begins[80];
     snprintf(begins, sizeof begins, "| `%s` |", key);
@@ -134,7 +164,7 @@ static void row_of(const vsh_setting *setting, char *row, size_t size) {
     }
     fclose(file);
     if (!found) {
-        fail_msg("%s: no row in docs/scene.md", setting->key);
+        fail_msg("%s: no row in docs/scene.md or docs/flat.md", setting->key);
     }
 }
 
@@ -147,7 +177,7 @@ static void expect_numbers(const vsh_setting *setting, const char *words, const 
         snprintf(number, sizeof number, "%.*s", (int)strspn(c, digits), c);
         at = strstr(at, number);
         if (at == NULL) {
-            fail_msg("%s: '%s' in the table, '%s' in docs/scene.md", setting->key, words, text);
+            fail_msg("%s: '%s' in the table, '%s' in the document", setting->key, words, text);
         }
         at += strlen(number);
         c += strlen(number);
@@ -181,7 +211,7 @@ static void the_document_has_every_key_with_its_range_and_default(void **state) 
             }
         }
     }
-    assert_true(count >= 25 && ranges >= 15 && defaults >= 8);
+    assert_true(count >= 33 && ranges >= 19 && defaults >= 12);
 }
 
 static void settings_end(void **state) {
@@ -196,6 +226,7 @@ int main(void) {
         cmocka_unit_test(a_setting_goes_where_the_file_would_put_it),
         cmocka_unit_test(a_resolution_and_a_voxel_size_take_each_others_place),
         cmocka_unit_test(what_is_refused_is_told_and_changes_nothing),
+        cmocka_unit_test(settings_of_a_flat_scene_are_its_own),
         cmocka_unit_test(the_document_has_every_key_with_its_range_and_default),
         cmocka_unit_test(settings_end),
     };

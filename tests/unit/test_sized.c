@@ -115,6 +115,7 @@ static void a_call_fills_the_struct_that_the_caller_has(void **state) {
     HOLDS(vsh_coverage, 1, vsh_compare_coverage_sized(4, values, NULL, NULL, (void *)room, size));
     const vsh_compared compared = {{2, 2, 1}, values, values, NULL};
     HOLDS(vsh_measures, 1, vsh_compare_sized(&compared, NULL, NULL, (void *)room, size, &why));
+    HOLDS(vsh_accuracy, 1, vsh_compare_accuracy_sized(&compared, 1, NULL, (void *)room, size, &why));
     vsh_volume_free(volume);
     vsh_voxels_free(voxels);
     vsh_field_free(field);

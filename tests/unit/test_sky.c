@@ -16,6 +16,7 @@ typedef struct stage {
     float corners[12];
     vsh_texels *texels;
     float sky[COUNT], other[COUNT], coverage[COUNT];
+    vsh_bake_error errors[2]; /* of AO, which is not baked, and of the sky */
 } stage;
 
 static void make_triangles(stage *s, size_t count) {
@@ -70,6 +71,12 @@ static void receive(stage *s, const double origin[3], const double u[3], const d
     assert_int_equal(vsh_texels_create(&mesh, 1, &options, NULL, NULL, &s->texels, NULL), VSH_OK);
 }
 
+static void receive_floor(stage *s, int32_t spacing) {
+    const double x = s->half[0], z = s->half[1];
+    receive(s, (double[]){-x, 0.0, z}, (double[]){2.0 * x, 0.0, 0.0}, (double[]){0.0, 0.0, -2.0 * z},
+            spacing);
+}
+
 /* The floor alone has no walls. */
 static stage *set_up(double half_x, double half_z, double height, size_t boxes) {
     const double x = half_x, z = half_z, h = 0.5 * height;
@@ -83,7 +90,7 @@ static stage *set_up(double half_x, double half_z, double height, size_t boxes) 
                  .height = height};
     s->field = field_of((truth_scene){s->boxes, boxes}, 0.04, 4.0);
     make_triangles(s, boxes);
-    receive(s, (double[]){-x, 0.0, z}, (double[]){2.0 * x, 0.0, 0.0}, (double[]){0.0, 0.0, -2.0 * z}, 4);
+    receive_floor(s, 4);
     return s;
 }
 
@@ -101,8 +108,12 @@ static vsh_result bake_sky(stage *s, const vsh_texels *texels, int32_t method, i
     vsh_run run = vsh_run_default();
     run.threads = threads;
     const vsh_lightmap lightmap = {.sky = sky, .asked = {.sky = up}, .coverage = s->coverage};
-    return vsh_bake_lightmap(occluders_traced(s->field, s->triangles), texels, NULL, 0, &shade, &run,
-                             &lightmap, NULL, error);
+    vsh_occluders casters = *occluders_traced(s->field, s->triangles);
+    casters.true_triangles = s->triangles;
+    vsh_bake_stats stats = vsh_bake_stats_zero();
+    stats.errors = s->errors;
+    memset(s->errors, 0, sizeof s->errors);
+    return vsh_bake_lightmap(&casters, texels, NULL, 0, &shade, &run, &lightmap, &stats, error);
 }
 
 static void bake_well(stage *s, int32_t method, int32_t up) {
@@ -124,9 +135,11 @@ static double opening(const stage *s, double x, double z) {
            corner(b, d, s->height);
 }
 
-static void check_floor(double half_x, double half_z, double height, const char *what) {
+/* `bias`: that of exact, at most, either way. */
+static void check_floor(double half_x, double half_z, int32_t spacing, double bias, const char *what) {
     static const int32_t methods[] = {VSH_AO_EXACT, VSH_AO_ADAPTIVE};
-    stage *s = set_up(half_x, half_z, height, BOXES);
+    stage *s = set_up(half_x, half_z, 1.0, BOXES);
+    receive_floor(s, spacing);
     for (int m = s->triangles != NULL ? 0 : 1; m < 2; ++m) {
         bake_well(s, methods[m], VSH_UP_Y);
         double square = 0.0, mean = 0.0;
@@ -140,18 +153,25 @@ static void check_floor(double half_x, double half_z, double height, const char 
             mean += s->coverage[i] > 0.0f ? off : 0.0;
         }
         const double n = (double)count, rmse = sqrt(square / n);
-        print_message("%s, %s: rmse %.4f, bias %.4f of %zu\n", what, vsh_ao_method_name(methods[m]), rmse,
-                      mean / n, count);
+        const double said = vsh_bake_error_rmse(&s->errors[1]);
+        print_message("%s, %s: rmse %.4f, said %.4f, bias %.4f of %zu\n", what,
+                      vsh_ao_method_name(methods[m]), rmse, said, mean / n, count);
         assert_true(count > COUNT * 8 / 10);
-        assert_true(rmse < 0.02);
+        assert_true(rmse < 0.02 && said < 0.02);
+        assert_true(methods[m] != VSH_AO_EXACT || fabs(mean / n) < bias);
+        assert_true(s->errors[0].values == 0.0 && s->errors[1].values == (double)count);
+        if (s->triangles != NULL) {
+            assert_true(s->errors[1].held == (double)count && said > 0.8 * rmse);
+        }
     }
     tear_down(s);
 }
 
 static void the_bottom_of_wells_and_trenches_sees_their_opening(void **state) {
     (void)state;
-    check_floor(1.0, 1.0, 1.0, "well");
-    check_floor(0.5, 6.0, 1.0, "trench");
+    check_floor(1.0, 1.0, 4, 0.007, "well");
+    check_floor(0.5, 6.0, 4, 0.007, "trench");
+    check_floor(1.0, 1.0, 1, 0.001, "well, no rays shared");
 }
 
 static void open_floors_walls_and_ceilings_see_one_half_and_nothing(void **state) {

@@ -1,7 +1,7 @@
 /* vdbshade bake: from files to lightmaps. */
+#include "bake.h"
 #include "base/try.h"
 #include "cli/message.h"
-#include "cli/object_output.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
@@ -9,8 +9,6 @@
 #include "cli/temporary.h"
 #include "cli/try.h"
 #include "cli/warnings.h"
-#include "expect.h"
-#include "forecast.h"
 #include "options.h"
 
 #include <inttypes.h>

@@ -1,6 +1,6 @@
 /* Rates were measured on two cores of an AMD EPYC (Zen 3), with bench/README.md's assets and those of
  * assets/. Only their ratios matter for long: what the first stages take corrects them (estimate.c). */
-#include "expect.h"
+#include "bake.h"
 
 #include "cli/estimate.h"
 #include "cli/progress.h"

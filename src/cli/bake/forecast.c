@@ -1,4 +1,4 @@
-#include "forecast.h"
+#include "bake.h"
 
 #include "base/bytes.h"
 #include "cli/message.h"

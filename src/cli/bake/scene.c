@@ -1,9 +1,8 @@
 /* From the options of `bake` to the scene it bakes. */
+#include "bake.h"
 #include "cli/message.h"
-#include "cli/object_output.h"
 #include "cli/paths.h"
 #include "options.h"
-#include "shade.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,4 +1,4 @@
-#include "shade.h"
+#include "bake.h"
 #include "cli/message.h"
 
 /* Whether a method that the scene is baked by has all of these traits. */

@@ -1,54 +1,37 @@
 /* vdbshade flat: light maps of a plane, for 2D games. */
 #include "base/bytes.h"
 #include "base/clock.h"
-#include "cli/clipping.h"
 #include "cli/commands.h"
 #include "cli/message.h"
+#include "cli/patch.h"
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/provenance.h"
 #include "cli/signals.h"
 #include "cli/stats.h"
 #include "cli/temporary.h"
+#include "cli/try.h"
+#include "cli/warnings.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    KEY_SIZE = 0x2000,
-    KEY_METHOD,
-    KEY_SUPERSAMPLE,
-    KEY_PADDING,
-    KEY_BITS,
-    KEY_PACK,
-    KEY_COLOR_SPACE,
-    KEY_STATS
-};
+enum { KEY_STATS = 0x2000 };
 
 typedef struct flat_settings {
-    const char *input, *output, *stats, *pack;
+    const char *input, *output, *stats;
     cli_common common;
-    vsh_flat_options options;
-    int32_t bits, color_space;
-    bool has_color_space, has_size, has_method, has_supersample, has_padding, has_bits;
+    cli_patch patch; /* over the scene */
 } flat_settings;
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
     {'o', "output", "OUT", "image to write; formats as of bake (the scene's)"},
-    {KEY_SIZE, "size", "W[xH]", "texels of the map, 1 to 65536 (the scene's, 512)"},
-    {KEY_BITS, "bits", "N",
-     "8, 16 or 32 bits a channel (32 for EXR, else 16\nwhere the format has it, else 8)"},
-    {KEY_PACK, "pack", "R=NAME,…",
-     "what goes where in formats that cannot name channels\n(irradiance.R, .G and .B to R, G, B; A to A)"},
-    {KEY_COLOR_SPACE, "color-space", "SPACE",
-     "of R, G, B in 8 and 16 bits: srgb or linear (auto:\nsrgb for irradiance, linear for shadows)"},
+    CLI_SETTINGS(VSH_SETTINGS_FLAT_IMAGE),
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {0, NULL, NULL, "Texels"},
-    {KEY_METHOD, "method", "NAME", "exact, classic (outer half of the penumbra only) or hard\n(exact)"},
-    {KEY_SUPERSAMPLE, "supersample", "N", "N × N samples a texel, 1 to 16 (1)"},
-    {KEY_PADDING, "padding", "N", "texels that values are grown by into solids, 0 to 4096 (4)"},
+    CLI_SETTINGS(VSH_SETTINGS_FLAT_TEXELS),
     CLI_COMMON_OPTIONS,
 };
 
@@ -59,8 +42,8 @@ const cli_command cli_flat = {
     "SCENE.json -o OUT [options]",
     "Bakes a light map of a plane, for 2D games: for each light the share of it that is seen, soft\n"
     "shadows of areas, images and text included, the irradiance by all, and where solids are. The\n"
-    "scene's file is one of its own kind: docs/flat.md. Numbers in brackets are what holds without the\n"
-    "option.",
+    "scene's file is one of its own kind: docs/flat.md. What is in brackets holds without the option\n"
+    "and without the scene's key.",
     options,
     sizeof options / sizeof options[0],
     flat_main};
@@ -71,27 +54,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case 'o':
         s->output = value;
         return CLI_OK;
-    case KEY_SIZE:
-        s->has_size = true;
-        return cli_parse_size(name, value, &s->options.width, &s->options.height);
-    case KEY_METHOD:
-        s->has_method = true;
-        return cli_parse_name(name, value, vsh_flat_method, vsh_flat_method_name, &s->options.method);
-    case KEY_SUPERSAMPLE:
-        s->has_supersample = true;
-        return cli_parse_integer(name, value, 1, 16, &s->options.supersample);
-    case KEY_PADDING:
-        s->has_padding = true;
-        return cli_parse_integer(name, value, 0, 4096, &s->options.padding);
-    case KEY_BITS:
-        s->has_bits = true;
-        return cli_parse_bits(name, value, &s->bits);
-    case KEY_PACK:
-        s->pack = value;
-        return CLI_OK;
-    case KEY_COLOR_SPACE:
-        s->has_color_space = true;
-        return cli_parse_color_space(name, value, &s->color_space);
     case KEY_STATS:
         s->stats = value;
         return CLI_OK;
@@ -99,23 +61,15 @@ static int take(void *settings, int key, const char *name, const char *value) {
         break;
     }
     bool taken;
-    return cli_common_parse(&s->common, key, name, value, &taken);
+    const int code = cli_patch_take(&s->patch, key, name, value, &taken);
+    return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);
 }
 
 /* Puts what was given over the scene's own. */
 static int apply(const flat_settings *s, vsh_flat_scene *scene) {
-    const vsh_flat_options *given = &s->options;
-    vsh_flat_options *o = &scene->options;
-    o->width = s->has_size ? given->width : o->width;
-    o->height = s->has_size ? given->height : o->height;
-    o->method = s->has_method ? given->method : o->method;
-    o->supersample = s->has_supersample ? given->supersample : o->supersample;
-    o->padding = s->has_padding ? given->padding : o->padding;
     scene->output = s->output != NULL ? s->output : scene->output;
-    scene->bits = s->has_bits ? s->bits : scene->bits;
-    scene->pack = s->pack != NULL ? s->pack : scene->pack;
-    scene->color_space = s->has_color_space ? s->color_space : scene->color_space;
-    return scene->output != NULL ? CLI_OK : cli_usage("%s: no output; give -o OUT", s->input);
+    return scene->output != NULL ? cli_patch_flat(&s->patch, scene)
+                                 : cli_usage("%s: no output; give -o OUT", s->input);
 }
 
 /* --- channels */
@@ -123,6 +77,7 @@ static int apply(const flat_settings *s, vsh_flat_scene *scene) {
 typedef struct flat_planes {
     char (*names)[VSH_CHANNEL_NAME];
     const char **name_list;
+    int32_t *holds;
     float **planes; /* irradiance.R, .G, .B, then the shadows, then A */
     size_t count;
     vsh_image image;
@@ -137,13 +92,15 @@ static int name_planes(const vsh_flat_scene *scene, flat_planes *p) {
     p->count = scene->light_count + 4;
     p->names = calloc(p->count, sizeof *p->names);
     p->name_list = calloc(p->count, sizeof *p->name_list);
+    p->holds = calloc(p->count, sizeof *p->holds);
     p->planes = calloc(p->count, sizeof *p->planes);
-    if (p->names == NULL || p->name_list == NULL || p->planes == NULL) {
+    if (p->names == NULL || p->name_list == NULL || p->holds == NULL || p->planes == NULL) {
         return out_of_memory("channels");
     }
     for (size_t i = 0; i < p->count; ++i) {
         if (i < 3) {
             snprintf(p->names[i], VSH_CHANNEL_NAME, "irradiance.%c", "RGB"[i]);
+            p->holds[i] = VSH_CHANNEL_LIGHT;
         } else if (i + 1 < p->count) {
             snprintf(p->names[i], VSH_CHANNEL_NAME, "shadow.%s", scene->lights[i - 3].name);
         } else {
@@ -151,8 +108,8 @@ static int name_planes(const vsh_flat_scene *scene, flat_planes *p) {
         }
         p->name_list[i] = p->names[i];
     }
-    p->image = (vsh_image){scene->options.width, scene->options.height, (int32_t)p->count, p->name_list,
-                           (const float *const *)p->planes};
+    p->image = (vsh_image){scene->options.width, scene->options.height,           (int32_t)p->count,
+                           p->name_list,         (const float *const *)p->planes, p->holds};
     return CLI_OK;
 }
 
@@ -183,6 +140,7 @@ static void free_planes(flat_planes *p) {
         free(p->planes[i]);
     }
     free(p->planes);
+    free(p->holds);
     free(p->name_list);
     free(p->names);
 }
@@ -205,19 +163,20 @@ static int check_output(const flat_settings *s, const vsh_flat_scene *scene, con
 /* What can be refused before anything is read. */
 static int check_files(const flat_settings *s, const vsh_flat_scene *scene, const vsh_image *image,
                        const vsh_image_options *options_of_image) {
-    int code = check_output(s, scene, scene->output);
-    code = code == CLI_OK && s->output == NULL ? cli_check_links(s->input, scene->output) : code;
-    if (code == CLI_OK && s->stats != NULL) {
-        code = cli_same_file(scene->output, s->stats)
-                   ? cli_usage("%s: both the output and the --stats file", s->stats)
-                   : check_output(s, scene, s->stats);
-        code = code == CLI_OK ? cli_temporary_check(s->stats) : code;
+    CLI_TRY(check_output(s, scene, scene->output));
+    if (s->output == NULL) {
+        CLI_TRY(cli_check_links(s->input, scene->output));
+    }
+    if (s->stats != NULL) {
+        if (cli_same_file(scene->output, s->stats)) {
+            return cli_usage("%s: both the output and the --stats file", s->stats);
+        }
+        CLI_TRY(check_output(s, scene, s->stats));
+        CLI_TRY(cli_temporary_check(s->stats));
     }
     vsh_error error;
-    if (code == CLI_OK && vsh_image_check(scene->output, image, options_of_image, &error) != VSH_OK) {
-        code = cli_fail(&error);
-    }
-    return code;
+    return vsh_image_check(scene->output, image, options_of_image, &error) == VSH_OK ? CLI_OK
+                                                                                     : cli_fail(&error);
 }
 
 /* Inputs are the scene's file and those that it names. */
@@ -237,24 +196,45 @@ static int make_origin(const flat_settings *s, const vsh_flat_scene *scene, cons
     return code;
 }
 
+/* Puts an image in place, and warns where light over 1 was cut. Frees the writer. */
+static int finish_image(vsh_image_writer *writer, const char *output) {
+    vsh_error error;
+    vsh_image_clipping cut;
+    if (vsh_image_writer_get_clipping(writer, &cut, &error) != VSH_OK) {
+        vsh_image_writer_abandon(writer);
+        return cli_fail(&error);
+    }
+    if (vsh_image_writer_finish(writer, &error) != VSH_OK) {
+        return cli_fail(&error);
+    }
+    if (cut.clipped > 0) {
+        cli_warn(
+            "%s: %.3g %% of the texels are brighter than 1, up to %.3g, and cut to 1: write .exr, or floats "
+            "(--bits 32) where the format has them, or dim the lights",
+            output, 100.0 * (double)cut.clipped / (double)cut.texels, (double)cut.largest);
+    }
+    return CLI_OK;
+}
+
 static int write_map(const flat_settings *s, const vsh_flat_scene *scene, const flat_planes *planes,
                      const vsh_image_options *image, const vsh_run *run) {
     cli_provenance origin = {NULL, NULL, 0};
-    int code = make_origin(s, scene, run, &origin);
+    int code;
+    CLI_TRY_DONE(make_origin(s, scene, run, &origin));
     vsh_image_options told = *image;
     told.attributes = origin.attributes;
     told.attribute_count = origin.count;
     vsh_error error;
     cli_signals_writing(scene->output);
     vsh_image_writer *writer = NULL;
-    if (code == CLI_OK &&
-        (vsh_image_writer_create(scene->output, &planes->image, &told, &writer, &error) != VSH_OK ||
-         vsh_image_writer_add(writer, planes->image.height, planes->image.planes, &error) != VSH_OK)) {
+    if (vsh_image_writer_create(scene->output, &planes->image, &told, &writer, &error) != VSH_OK ||
+        vsh_image_writer_add(writer, planes->image.height, planes->image.planes, &error) != VSH_OK) {
         vsh_image_writer_abandon(writer);
         code = cli_fail(&error);
-    } else if (code == CLI_OK) {
-        code = cli_finish_image(writer, scene->output);
+        goto done;
     }
+    code = finish_image(writer, scene->output);
+done:
     cli_signals_writing(NULL);
     cli_provenance_free(&origin);
     return code;
@@ -265,23 +245,25 @@ static int bake(const flat_settings *s, const vsh_flat_scene *scene, const flat_
     vsh_outline *casters = NULL;
     vsh_error error;
     double now = vshi_seconds();
-    vsh_result result = vsh_flat_scene_casters(scene, run, &casters, &error);
+    if (vsh_flat_scene_casters(scene, run, &casters, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
     now = cli_stats_stage(stats, CLI_STAGE_LOAD, now);
-    if (result == VSH_OK) {
-        const vsh_flat_map map = {planes->planes + 3, planes->planes, planes->planes[planes->count - 1]};
-        result =
-            vsh_flat_bake(casters, scene->lights, scene->light_count, &scene->options, run, &map, &error);
-        now = cli_stats_stage(stats, CLI_STAGE_BAKE, now);
-    }
+    const vsh_flat_map map = {planes->planes + 3, planes->planes, planes->planes[planes->count - 1]};
+    const vsh_result result =
+        vsh_flat_bake(casters, scene->lights, scene->light_count, &scene->options, run, &map, &error);
+    now = cli_stats_stage(stats, CLI_STAGE_BAKE, now);
     vsh_outline_free(casters);
-    if (result == VSH_OK && cli_progress_report(NULL, "write", 0.0) != 0) {
-        result = VSH_ERROR_CANCELLED;
-        error = (vsh_error){VSH_ERROR_CANCELLED, "write: cancelled"};
+    if (result != VSH_OK) {
+        return cli_fail_of(NULL, &error);
     }
-    int code = result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
-    code = code == CLI_OK ? write_map(s, scene, planes, image, run) : code;
+    if (cli_progress_report(NULL, "write", 0.0) != 0) {
+        error = (vsh_error){VSH_ERROR_CANCELLED, "write: cancelled"};
+        return cli_fail_of(NULL, &error);
+    }
+    CLI_TRY(write_map(s, scene, planes, image, run));
     cli_stats_stage(stats, CLI_STAGE_WRITE, now);
-    return code;
+    return CLI_OK;
 }
 
 static void say_summary(const flat_settings *s, const vsh_flat_scene *scene, const cli_stats *stats) {
@@ -303,17 +285,15 @@ static int run_flat(const flat_settings *s, const vsh_flat_scene *scene) {
     const vsh_run run = cli_common_run(&s->common);
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, s->common.threads);
     stats.texels = (uint64_t)scene->options.width * (uint64_t)scene->options.height;
-    int code = name_planes(scene, &planes);
-    code = code == CLI_OK ? check_files(s, scene, &planes.image, &image) : code;
-    code = code == CLI_OK ? allocate_planes(s, scene, &image, &planes) : code;
-    if (code == CLI_OK) {
-        cli_signals_watch();
-        code = bake(s, scene, &planes, &image, &run, &stats);
-    }
-    code = code == CLI_OK ? cli_stats_finish(&stats, &run, s->stats) : code;
-    if (code == CLI_OK) {
-        say_summary(s, scene, &stats);
-    }
+    int code;
+    CLI_TRY_DONE(name_planes(scene, &planes));
+    CLI_TRY_DONE(check_files(s, scene, &planes.image, &image));
+    CLI_TRY_DONE(allocate_planes(s, scene, &image, &planes));
+    cli_signals_watch();
+    CLI_TRY_DONE(bake(s, scene, &planes, &image, &run, &stats));
+    CLI_TRY_DONE(cli_stats_finish(&stats, &run, s->stats));
+    say_summary(s, scene, &stats);
+done:
     free_planes(&planes);
     return code;
 }
@@ -333,9 +313,11 @@ static int flat_main(int argc, char **argv) {
     vsh_error error;
     if (vsh_flat_scene_read(s.input, &run, &scene, &error) != VSH_OK) {
         code = cli_fail(&error);
+        goto done;
     }
-    code = code == CLI_OK ? apply(&s, scene) : code;
-    code = code == CLI_OK ? run_flat(&s, scene) : code;
+    CLI_TRY_DONE(apply(&s, scene));
+    code = run_flat(&s, scene);
+done:
     vsh_flat_scene_free(scene);
     cli_progress_end();
     return code;

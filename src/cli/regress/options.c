@@ -6,9 +6,8 @@
 
 #include <string.h>
 
-/* Of all commands of cases, what changes values beside settings, which all do, and that `flat` has by the
- * same names. One that is not here is refused: a new option is to be added when it is known to write nothing.
- */
+/* Of all commands of cases, what changes values beside settings, which all do. One that is not here is
+ * refused: a new option is to be added when it is known to write nothing. */
 static const char *const changes_values[] = {
     "receive", "no-receive", "no-cast", "sun", "sun-angle", "caster", "solid", "shell",
     "inward",  "half",       "band",    "box", "like",      "inside", "name",  "box-voxel-size"};

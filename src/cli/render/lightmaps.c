@@ -19,7 +19,7 @@ static int unpack(const char *pack, const char *path, render_lightmap *map) {
         return cli_usage("--lightmap-pack '%s': is too long", pack);
     }
     strcpy(map->text, pack);
-    map->image = (vsh_image){read.width, read.height, 0, map->names, map->planes};
+    map->image = (vsh_image){read.width, read.height, 0, map->names, map->planes, NULL};
     for (char *save = NULL, *item = strtok_r(map->text, ",", &save); item != NULL;
          item = strtok_r(NULL, ",", &save)) {
         char *name = strchr(item, '=');

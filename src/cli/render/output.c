@@ -70,7 +70,8 @@ int render_output_check(const render_settings *s) {
     }
     if (!s->page) {
         const bool linear = is_linear(path);
-        const vsh_image image = {s->width, s->height, s->transparent || linear ? 4 : 3, linear_names, NULL};
+        const vsh_image image = {s->width,     s->height, s->transparent || linear ? 4 : 3,
+                                 linear_names, NULL,      NULL};
         vsh_image_options options = vsh_image_options_default();
         options.bits = linear ? 0 : 8;
         vsh_error error;
@@ -136,8 +137,8 @@ static int write_linear(const render_settings *s, const render_picture *p, const
             memory[(3 + c) * pixels + i] = p->picture.normal[3 * i + c];
         }
     }
-    const vsh_image image = {s->width, s->height, cli_has_ending(path, "exr") ? FLOATS : 4, linear_names,
-                             planes};
+    const vsh_image image = {s->width,     s->height, cli_has_ending(path, "exr") ? FLOATS : 4,
+                             linear_names, planes,    NULL};
     const int code = write_image(path, &image, 0, p->origin);
     free(memory);
     return code;
@@ -156,7 +157,7 @@ int render_output_write(const render_settings *s, const render_picture *p, const
         return write_linear(s, p, path);
     }
     const int code = render_output_encode(s, p);
-    const vsh_image image = {s->width, s->height, s->transparent ? 4 : 3, linear_names,
-                             (const float *const *)p->encoded};
+    const vsh_image image = {
+        s->width, s->height, s->transparent ? 4 : 3, linear_names, (const float *const *)p->encoded, NULL};
     return code == CLI_OK ? write_image(path, &image, 8, p->origin) : code;
 }

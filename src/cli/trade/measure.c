@@ -1,6 +1,6 @@
 /* Bakes the scene in every way that is worth a look, and takes the time. */
-#include "cli/box.h"
 #include "cli/message.h"
+#include "cli/try.h"
 #include "trade.h"
 
 #include <math.h>
@@ -30,18 +30,29 @@ static const plan ao_plans[] = {
     {VSH_AO_CONES, 64, 0.0},    {VSH_AO_EXACT, 0, 0.005},   {VSH_AO_ADAPTIVE, 0, 0.005},
 };
 
+/* The world box of the receivers' samples; empty, min > max, where there are none. */
+static void find_box(const trade_work *work, double min[3], double max[3]) {
+    for (int axis = 0; axis < 3; ++axis) {
+        min[axis] = INFINITY;
+        max[axis] = -INFINITY;
+        for (size_t r = 0; r < work->receiver_count; ++r) {
+            const vsh_texels_info *info = &work->receivers[r].info;
+            min[axis] = info->samples > 0 ? fmin(min[axis], info->bounds_min[axis]) : min[axis];
+            max[axis] = info->samples > 0 ? fmax(max[axis], info->bounds_max[axis]) : max[axis];
+        }
+    }
+}
+
 int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds) {
     const double start = trade_now(work);
     vsh_scene scene = *work->scene;
     scene.grid.resolution = resolution;
     scene.grid.voxel_size = 0.0;
-    cli_box receivers = cli_box_empty();
-    for (size_t r = 0; r < work->receiver_count; ++r) {
-        cli_box_grow(&receivers, &work->receivers[r].info);
-    }
+    double min[3], max[3];
+    find_box(work, min, max);
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
-    options.receivers_min = receivers.min;
-    options.receivers_max = receivers.max;
+    options.receivers_min = min;
+    options.receivers_max = max;
     options.triangles = 0; /* the same for all resolutions */
     vsh_error error;
     const vsh_result result =
@@ -117,7 +128,7 @@ int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh
     }
     vsh_bake_stats baked = vsh_bake_stats_zero();
     int code = CLI_OK;
-    for (size_t r = 0; r < work->receiver_count && code == CLI_OK; ++r) {
+    for (size_t r = 0; r < work->receiver_count; ++r) {
         const size_t first = work->receivers[r].first;
         for (size_t i = 0; i < lights; ++i) {
             planes[i] = shadow + i * work->texels + first;
@@ -129,13 +140,45 @@ int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh
         if (vsh_bake_lightmap(occluders, work->receivers[r].texels, work->scene->lights, lights, shade,
                               &work->run, &lightmap, &baked, &error) != VSH_OK) {
             code = cli_fail_of(NULL, &error);
+            goto done;
         }
     }
-    free(planes);
     if (stats != NULL) {
         *stats = baked.shade;
     }
+done:
+    free(planes);
     return code;
+}
+
+/* Every receiver's lightmap of every plane is one of its own: no penumbra goes on in the next. */
+static int compare(const trade_work *work, const trade_subject *subject, const float *values,
+                   const uint8_t *mask, vsh_accuracy *accuracy) {
+    const size_t count = subject->planes * work->receiver_count;
+    vsh_compared *planes = calloc(count, sizeof *planes);
+    if (planes == NULL) {
+        return cli_out_of_memory("planes");
+    }
+    for (size_t i = 0; i < count; ++i) {
+        const trade_receiver *receiver = &work->receivers[i % work->receiver_count];
+        const size_t first = i / work->receiver_count * work->texels + receiver->first;
+        planes[i] = (vsh_compared){{receiver->info.width, receiver->info.height, 1},
+                                   subject->truth + first,
+                                   values + first,
+                                   mask + receiver->first};
+    }
+    vsh_error error;
+    const vsh_result result = vsh_compare_accuracy(planes, count, &work->run, accuracy, &error);
+    free(planes);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+}
+
+int trade_compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask, trade_run *run) {
+    vsh_accuracy valid;
+    CLI_TRY(compare(work, subject, run->values, mask, &valid));
+    run->valid_rmse = valid.rmse;
+    run->rate = 1e6 * run->bake_s / (double)(subject->planes * run->valid);
+    return compare(work, subject, run->values, work->common, &run->metrics);
 }
 
 /* Bakes the run's values, several times where it is quick. */
@@ -185,16 +228,17 @@ static int run_plan(trade_work *work, trade_subject *subject, const plan *p, con
     run.bytes = info.field_bytes + (exact ? vsh_triangles_bytes(work->triangles) : 0);
     run.build_s += exact ? work->triangles_s : 0.0;
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    int code = bake(work, subject, on->traced, &shade, &run, &stats);
-    if (code == CLI_OK) {
-        run.certified = certified_share(subject, run.valid, &shade, &stats);
-        code = trade_compare(work, subject, on->mask, on->valid, &run);
-    }
-    if (code == CLI_OK && trade_add(work, subject, &run) != NULL) {
+    int code;
+    CLI_TRY_DONE(bake(work, subject, on->traced, &shade, &run, &stats));
+    run.certified = certified_share(subject, run.valid, &shade, &stats);
+    CLI_TRY_DONE(trade_compare(work, subject, on->mask, &run));
+    if (trade_add(work, subject, &run) != NULL) {
         return CLI_OK;
     }
+    code = cli_out_of_memory("runs");
+done:
     free(run.values);
-    return code != CLI_OK ? code : cli_out_of_memory("runs");
+    return code;
 }
 
 /* The first plans of all come first, on every field: where the budget ends, it is the dear ones that are
@@ -207,10 +251,7 @@ int trade_measure(trade_work *work) {
             trade_subject *subject = &work->subjects[s];
             for (size_t f = 0; f < work->field_count && i < (subject->ao ? ao_count : shadow_count); ++f) {
                 const plan *p = subject->ao ? &ao_plans[i] : &shadow_plans[i];
-                const int code = run_plan(work, subject, p, &work->fields[f]);
-                if (code != CLI_OK) {
-                    return code;
-                }
+                CLI_TRY(run_plan(work, subject, p, &work->fields[f]));
             }
         }
     }

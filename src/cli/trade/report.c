@@ -106,7 +106,7 @@ static void write_table(FILE *out, const trade_subject *subject) {
           out);
     for (size_t i = 0; i < subject->run_count; ++i) {
         const trade_run *run = &subject->runs[i];
-        const trade_metrics *m = &run->metrics;
+        const vsh_accuracy *m = &run->metrics;
         fprintf(out,
                 "<tr%s><td class=\"t\">%s<code>%s</code></td><td>%.2f</td><td>%.3f</td><td>%.3g</td>"
                 "<td>%.1f</td>",
@@ -213,7 +213,7 @@ static void write_rows(FILE *out, const void *user) {
         const trade_subject *subject = &work->subjects[s];
         for (size_t i = 0; i < subject->run_count; ++i) {
             const trade_run *r = &subject->runs[i];
-            const trade_metrics *m = &r->metrics;
+            const vsh_accuracy *m = &r->metrics;
             fprintf(out, "%s,%s,%s,%d,%.6g,%.6g,%.6g,%" PRIu64 ",%zu,%zu,%zu,%zu,", subject->name, r->method,
                     r->options, r->resolution, r->build_s, r->bake_s, r->rate, r->bytes, work->covered,
                     work->covered - r->valid, r->valid - work->common_count, work->common_count);

@@ -3,6 +3,7 @@
  */
 #include "cli/casters.h"
 #include "cli/message.h"
+#include "cli/try.h"
 #include "trade.h"
 
 #include <math.h>
@@ -73,8 +74,8 @@ int trade_load(trade_work *work) {
     if (vsh_assets_load(work->scene, &work->run, &work->assets, &error) != VSH_OK) {
         return cli_fail_of(NULL, &error);
     }
-    const int code = load_receivers(work);
-    return code == CLI_OK ? load_casters(work) : code;
+    CLI_TRY(load_receivers(work));
+    return load_casters(work);
 }
 
 int trade_take_masks(trade_work *work) {
@@ -84,31 +85,32 @@ int trade_take_masks(trade_work *work) {
     int code = CLI_OK;
     if (coverage == NULL || work->common == NULL || work->any == NULL) {
         code = cli_out_of_memory("coverage");
-    } else {
-        memset(work->common, 1, work->texels);
+        goto done;
     }
-    for (size_t f = 0; f < work->field_count && code == CLI_OK; ++f) {
+    memset(work->common, 1, work->texels);
+    for (size_t f = 0; f < work->field_count; ++f) {
         trade_field *field = &work->fields[f];
         field->mask = calloc(work->texels, 1);
-        code = field->mask == NULL
-                   ? cli_out_of_memory("coverage")
-                   : trade_bake(work, field->occluders, &work->scene->shade, NULL, NULL, coverage, NULL);
-        for (size_t i = 0; i < work->texels && code == CLI_OK; ++i) {
+        CLI_TRY_DONE(field->mask == NULL ? cli_out_of_memory("coverage")
+                                         : trade_bake(work, field->occluders, &work->scene->shade, NULL, NULL,
+                                                      coverage, NULL));
+        for (size_t i = 0; i < work->texels; ++i) {
             field->mask[i] = coverage[i] > 0.0f;
             field->valid += field->mask[i];
             work->common[i] &= field->mask[i];
             work->any[i] |= field->mask[i];
         }
     }
-    free(coverage);
-    for (size_t i = 0; i < work->texels && code == CLI_OK; ++i) {
+    for (size_t i = 0; i < work->texels; ++i) {
         work->common_count += work->common[i];
         work->points += work->any[i];
     }
-    if (code == CLI_OK && work->common_count == 0) {
-        return cli_usage("%s: no texel is valid at all voxel sizes: nothing to measure",
+    if (work->common_count == 0) {
+        code = cli_usage("%s: no texel is valid at all voxel sizes: nothing to measure",
                          work->settings->bake.input);
     }
+done:
+    free(coverage);
     return code;
 }
 

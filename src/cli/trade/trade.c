@@ -7,6 +7,7 @@
 #include "cli/progress.h"
 #include "cli/signals.h"
 #include "cli/temporary.h"
+#include "cli/try.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -83,11 +84,11 @@ static int take_resolutions(trade_settings *s, const char *name, const char *val
 
 static int take_size(trade_settings *s, const char *name, const char *value) {
     int32_t width, height;
-    const int code = cli_parse_size(name, value, &width, &height);
-    if (code == CLI_OK && (width > 4096 || height > 4096)) {
+    CLI_TRY(cli_parse_size(name, value, &width, &height));
+    if (width > 4096 || height > 4096) {
         return cli_usage("%s '%s': expected at most 4096 texels", name, value);
     }
-    return code == CLI_OK ? cli_patch_set(&s->bake.patch, name, value) : code;
+    return cli_patch_set(&s->bake.patch, name, value);
 }
 
 static int take(void *settings, int key, const char *name, const char *value) {
@@ -208,22 +209,21 @@ static int measure(trade_work *work) {
     int32_t resolutions[TRADE_MAX_RESOLUTIONS];
     memcpy(resolutions, s->resolutions, sizeof resolutions);
     qsort(resolutions, s->resolution_count, sizeof resolutions[0], by_size);
-    int code = CLI_OK;
-    for (size_t i = 0; i < s->resolution_count && code == CLI_OK; ++i) {
-        trade_field *next = &work->fields[work->field_count];
+    for (size_t i = 0; i < s->resolution_count; ++i) {
+        trade_field *next = &work->fields[i];
         next->resolution = resolutions[s->resolution_count - 1 - i];
-        code = trade_make_occluders(work, next->resolution, &next->occluders, &next->build_s);
-        code = code == CLI_OK ? trade_add_triangles(work, next) : code;
-        work->field_count += next->occluders != NULL;
+        CLI_TRY(trade_make_occluders(work, next->resolution, &next->occluders, &next->build_s));
+        ++work->field_count;
+        CLI_TRY(trade_add_triangles(work, next));
     }
-    code = code == CLI_OK ? trade_take_masks(work) : code;
-    code = code == CLI_OK ? trade_place_points(work) : code;
-    code = code == CLI_OK ? trade_take_truth(work, work->fields[0].resolution) : code;
+    CLI_TRY(trade_take_masks(work));
+    CLI_TRY(trade_place_points(work));
+    CLI_TRY(trade_take_truth(work, work->fields[0].resolution));
     work->measuring = vshi_seconds();
-    code = code == CLI_OK ? trade_measure_embree(work) : code;
-    code = code == CLI_OK ? trade_measure(work) : code;
+    CLI_TRY(trade_measure_embree(work));
+    CLI_TRY(trade_measure(work));
     mark_fronts(work);
-    return code;
+    return CLI_OK;
 }
 
 static void free_work(trade_work *work) {
@@ -265,19 +265,19 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
     if (scene->ao) {
         work.subjects[work.subject_count++] = (trade_subject){.name = "ao", .ao = true, .planes = 1};
     }
-    int code = trade_load(&work);
-    code = code == CLI_OK ? measure(&work) : code;
-    code = code == CLI_OK ? trade_write_csv(&work) : code;
-    code = code == CLI_OK ? trade_write_plot(&work) : code;
-    code = code == CLI_OK ? trade_write_report(&work) : code;
-    if (code == CLI_OK) {
-        cli_signals_end();
-        if (!settings->bake.common.quiet) {
-            cli_say("%s: %zu runs in %.1f s, %zu left out", settings->report,
-                    work.subjects[0].run_count + work.subjects[1].run_count, vshi_seconds() - work.began,
-                    work.skipped);
-        }
+    int code;
+    CLI_TRY_DONE(trade_load(&work));
+    CLI_TRY_DONE(measure(&work));
+    CLI_TRY_DONE(trade_write_csv(&work));
+    CLI_TRY_DONE(trade_write_plot(&work));
+    CLI_TRY_DONE(trade_write_report(&work));
+    cli_signals_end();
+    if (!settings->bake.common.quiet) {
+        cli_say("%s: %zu runs in %.1f s, %zu left out", settings->report,
+                work.subjects[0].run_count + work.subjects[1].run_count, vshi_seconds() - work.began,
+                work.skipped);
     }
+done:
     free_work(&work);
     return code;
 }
@@ -289,30 +289,29 @@ static int check_files(const trade_settings *s, const vsh_scene *scene) {
     const char *const outputs[] = {s->report, s->csv, s->plot};
     static const char *const names[] = {"output", "--csv file", "--plot file"};
     cli_bake_settings named = s->bake; /* by the command line, not by the scene */
-    int code = CLI_OK;
     if (scene->layer_count > 0) {
-        code = cli_usage("%s: trade measures one field, not layers", s->bake.input);
+        return cli_usage("%s: trade measures one field, not layers", s->bake.input);
     }
-    for (size_t i = 0; i < scene->caster_count && code == CLI_OK; ++i) {
+    for (size_t i = 0; i < scene->caster_count; ++i) {
         if (cli_caster_is_direct(&scene->casters[i])) {
-            code =
-                cli_usage("%s: trade measures one field, and caster %zu is not part of it", s->bake.input, i);
+            return cli_usage("%s: trade measures one field, and caster %zu is not part of it", s->bake.input,
+                             i);
         }
     }
-    for (size_t i = 0; i < sizeof outputs / sizeof outputs[0] && code == CLI_OK; ++i) {
+    for (size_t i = 0; i < sizeof outputs / sizeof outputs[0]; ++i) {
         if (outputs[i] == NULL) {
             continue;
         }
-        for (size_t k = 0; k < i && code == CLI_OK; ++k) {
+        for (size_t k = 0; k < i; ++k) {
             if (outputs[k] != NULL && cli_same_file(outputs[i], outputs[k])) {
-                code = cli_usage("%s: both the %s and the %s", outputs[i], names[k], names[i]);
+                return cli_usage("%s: both the %s and the %s", outputs[i], names[k], names[i]);
             }
         }
         named.output = outputs[i];
-        code = code == CLI_OK ? cli_bake_check_output(&named, scene, outputs[i]) : code;
-        code = code == CLI_OK ? cli_temporary_check(outputs[i]) : code;
+        CLI_TRY(cli_bake_check_output(&named, scene, outputs[i]));
+        CLI_TRY(cli_temporary_check(outputs[i]));
     }
-    return code;
+    return CLI_OK;
 }
 
 /* Leaves the scene with the one receiver that was asked for. */
@@ -353,13 +352,12 @@ static int trade_main(int argc, char **argv) {
     s.bake.output = cli_has_ending(s.bake.input, "json") ? NULL : s.report;
     cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
     cli_bake_scene made;
-    code = cli_bake_scene_make(&s.bake, &made);
-    code = code == CLI_OK ? check_files(&s, &made.scene) : code;
-    code = code == CLI_OK ? choose_receiver(&s, &made.scene) : code;
-    if (code == CLI_OK) {
-        cli_signals_watch();
-        code = trade(&s, &made.scene);
-    }
+    CLI_TRY_DONE(cli_bake_scene_make(&s.bake, &made));
+    CLI_TRY_DONE(check_files(&s, &made.scene));
+    CLI_TRY_DONE(choose_receiver(&s, &made.scene));
+    cli_signals_watch();
+    code = trade(&s, &made.scene);
+done:
     cli_bake_scene_free(&made);
     cli_progress_end();
     return code;

@@ -28,16 +28,6 @@ typedef struct trade_receiver {
     size_t first; /* of its texels, in a plane */
 } trade_receiver;
 
-typedef struct trade_metrics {
-    size_t count;         /* texels, over all lights */
-    size_t penumbra;      /* of them with a truth in 0.02 … 0.98 */
-    double rmse;          /* over all */
-    double penumbra_rmse; /* 0 where there is no penumbra */
-    double bias;          /* mean of value - truth */
-    double p95, p99, max; /* of |value - truth| */
-    double width_error;   /* of the 10 % to 90 % distance, relative to it; NaN where no penumbra has one */
-} trade_metrics;
-
 /* One way to bake, and what came of it. */
 typedef struct trade_run {
     const char *method;
@@ -51,9 +41,9 @@ typedef struct trade_run {
     uint64_t bytes;   /* of field and triangles */
     double certified; /* share of the values that a cone proved; NaN for rays alone */
     size_t valid;     /* texels that it gave a value, over one plane */
-    trade_metrics metrics; /* over the texels that all runs have */
-    double valid_rmse;     /* over all texels that it gave a value */
-    float *values;         /* as trade_subject.truth */
+    vsh_accuracy metrics; /* over the texels that all runs have */
+    double valid_rmse;    /* over all texels that it gave a value */
+    float *values;        /* as trade_subject.truth */
 } trade_run;
 
 typedef struct trade_field {
@@ -137,10 +127,8 @@ int trade_write_plot(const trade_work *work);
 int trade_bake(const trade_work *work, const vsh_occluders *occluders, const vsh_shade_options *shade,
                float *shadow, float *ao, float *coverage, vsh_shade_stats *stats);
 
-/* Measures run->values and the rate, on the texels that all runs have and on all of `mask`, `valid` of them.
- */
-int trade_compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask, size_t valid,
-                  trade_run *run);
+/* Measures run->values and the rate, on the texels that all runs have and on all of `mask`. */
+int trade_compare(const trade_work *work, const trade_subject *subject, const uint8_t *mask, trade_run *run);
 
 /* --- parts of the report */
 

@@ -2,6 +2,7 @@
  * rays against a field finer than all that are measured. And Embree's own curve, which every method has to
  * beat. */
 #include "cli/message.h"
+#include "cli/try.h"
 #include "trade.h"
 
 #include <math.h>
@@ -20,7 +21,7 @@ static int trace(const trade_work *work, const trade_subject *subject, int32_t r
     }
     int code = CLI_OK;
     *seconds = 0.0;
-    for (size_t plane = 0; plane < subject->planes && code == CLI_OK; ++plane) {
+    for (size_t plane = 0; plane < subject->planes; ++plane) {
         const double start = trade_now(work);
         vsh_error error;
         const vsh_result result =
@@ -33,11 +34,13 @@ static int trace(const trade_work *work, const trade_subject *subject, int32_t r
         *seconds += trade_now(work) - start;
         if (result != VSH_OK) {
             code = cli_fail_of(NULL, &error);
+            goto done;
         }
-        for (size_t i = 0; i < work->points && code == CLI_OK; ++i) {
+        for (size_t i = 0; i < work->points; ++i) {
             values[plane * work->texels + work->texel[i]] = packed[i];
         }
     }
+done:
     free(packed);
     return code;
 }
@@ -46,7 +49,7 @@ static int trace(const trade_work *work, const trade_subject *subject, int32_t r
 static int march(trade_work *work, int32_t resolution) {
     vsh_occluders *occluders = NULL;
     double seconds;
-    int code = trade_make_occluders(work, resolution, &occluders, &seconds);
+    CLI_TRY(trade_make_occluders(work, resolution, &occluders, &seconds));
     vsh_shade_options shade = work->scene->shade;
     shade.method = VSH_SHADOW_RAYS;
     shade.ao_method = VSH_AO_RAYS;
@@ -57,7 +60,7 @@ static int march(trade_work *work, int32_t resolution) {
         trade_subject *subject = &work->subjects[s];
         *(subject->ao ? &ao : &shadow) = subject->truth;
     }
-    code = code == CLI_OK ? trade_bake(work, occluders, &shade, shadow, ao, NULL, NULL) : code;
+    const int code = trade_bake(work, occluders, &shade, shadow, ao, NULL, NULL);
     vsh_occluders_free(occluders);
     snprintf(work->truth_text, sizeof work->truth_text,
              "%d rays a texel marched against a field of %d voxels along the longest side, as %s", shade.rays,
@@ -87,19 +90,18 @@ int trade_take_truth(trade_work *work, int32_t finest) {
         }
     }
     const double start = trade_now(work);
-    int code = CLI_OK;
-    if (vsh_scene_has_truth(work->scene)) {
-        describe(work);
-        for (size_t s = 0; s < work->subject_count && code == CLI_OK; ++s) {
-            double seconds;
-            code = trace(work, &work->subjects[s], work->settings->truth_rays, work->subjects[s].truth,
-                         &seconds);
-        }
+    if (!vsh_scene_has_truth(work->scene)) {
+        CLI_TRY(march(work, finest <= 32768 ? 2 * finest : finest));
     } else {
-        code = march(work, finest <= 32768 ? 2 * finest : finest);
+        describe(work);
+        for (size_t s = 0; s < work->subject_count; ++s) {
+            double seconds;
+            CLI_TRY(trace(work, &work->subjects[s], work->settings->truth_rays, work->subjects[s].truth,
+                          &seconds));
+        }
     }
     work->truth_s = trade_now(work) - start;
-    return code;
+    return CLI_OK;
 }
 
 static int measure_rays(trade_work *work, trade_subject *subject, int32_t rays) {
@@ -115,25 +117,26 @@ static int measure_rays(trade_work *work, trade_subject *subject, int32_t rays) 
     }
     snprintf(run.options, sizeof run.options, "%d ray%s a texel", rays, rays == 1 ? "" : "s");
     trade_clock clock = {.count = 0};
-    int code = CLI_OK;
+    int code;
     do {
-        code = trace(work, subject, rays, run.values, &clock.times[clock.count++]);
-    } while (code == CLI_OK && trade_again(&clock));
+        CLI_TRY_DONE(trace(work, subject, rays, run.values, &clock.times[clock.count++]));
+    } while (trade_again(&clock));
     run.bake_s = trade_median(&clock);
-    code = code == CLI_OK ? trade_compare(work, subject, work->any, work->points, &run) : code;
-    if (code == CLI_OK && trade_add(work, subject, &run) != NULL) {
+    CLI_TRY_DONE(trade_compare(work, subject, work->any, &run));
+    if (trade_add(work, subject, &run) != NULL) {
         return CLI_OK;
     }
+    code = cli_out_of_memory("runs");
+done:
     free(run.values);
-    return code != CLI_OK ? code : cli_out_of_memory("runs");
+    return code;
 }
 
 int trade_measure_embree(trade_work *work) {
-    int code = CLI_OK;
-    for (size_t s = 0; s < work->subject_count && work->meshes && code == CLI_OK; ++s) {
+    for (size_t s = 0; s < work->subject_count && work->meshes; ++s) {
         for (int32_t rays = 1; rays <= CURVE_RAYS && 2 * rays <= work->settings->truth_rays; rays *= 2) {
-            code = code == CLI_OK ? measure_rays(work, &work->subjects[s], rays) : code;
+            CLI_TRY(measure_rays(work, &work->subjects[s], rays));
         }
     }
-    return code;
+    return CLI_OK;
 }

@@ -1,0 +1,19 @@
+/* Steps of `bake`: what is checked of options, expected of stages, and told by --dry-run. */
+#ifndef CLI_BAKE_H
+#define CLI_BAKE_H
+
+#include "options.h"
+
+/* Whether a scene with its lights, that the options were put over, can be shaded so; sets what follows from
+ * them. CLI_OK or an exit code, having said why. */
+int cli_bake_check_shade(const cli_bake_settings *s, vsh_scene *scene);
+
+/* Expects all that comes behind a job's vsh_bake_job_measure(). */
+void cli_bake_expect(const vsh_scene *scene, const vsh_bake_job *job, int32_t threads);
+
+/* Prints texels, voxels, memory and time of a job to standard output. CLI_OK or an exit code, having said
+ * why.
+ */
+int cli_bake_forecast(const vsh_scene *scene, vsh_bake_job *job, const vsh_run *run);
+
+#endif
