@@ -46,7 +46,7 @@ static vsh_result light_step(const vshi_shafts *shafts, step *s, vsh_shade_stats
         visibility[l] = s->visibility;
         output.visibility = visibility;
         const vsh_result result =
-            vsh_query_points(shafts->query, &points, shafts->run, &output, stats, error);
+            vsh_query_points(shafts->query, &points, NULL, shafts->run, &output, stats, error);
         if (result != VSH_OK) {
             return result;
         }

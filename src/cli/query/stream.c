@@ -120,7 +120,8 @@ static int answer_batch(const vsh_query *query, const query_answers *answers, co
     run.user = progress;
     const vsh_points view = {points->count, points->positions, points->normals, points->texels};
     vsh_error error;
-    const vsh_result result = vsh_query_points(query, &view, &run, &answers->output, &stats->shade, &error);
+    const vsh_result result =
+        vsh_query_points(query, &view, NULL, &run, &answers->output, &stats->shade, &error);
     cli_stats_stage(stats, CLI_STAGE_BAKE, start);
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
