@@ -188,9 +188,9 @@ static int choose_answers(query_work *work) {
     vsh_scene *scene = work->scene;
     if (scene->ao && !work->reader.has_normals) {
         if (cli_patch_has(&s->bake.patch, "--ao")) {
-            return cli_usage("%s: no normals, which --ao needs", work->reader.source.name);
+            return cli_usage("%s: no normals, which --ao needs", work->reader.table.source.name);
         }
-        cli_warn("%s: no normals: no ao", work->reader.source.name);
+        cli_warn("%s: no normals: no ao", work->reader.table.source.name);
         scene->ao = 0;
     }
     *a = (query_answers){.lights = scene->light_count,
@@ -242,7 +242,7 @@ static void say_results(const query_work *work) {
     const cli_stats *stats = &work->stats;
     if (stats->bad_rows > 0) {
         cli_say("%s: %" PRIu64 " of %" PRIu64 " rows are bad; their answers are nan",
-                work->reader.source.name, stats->bad_rows, stats->points);
+                work->reader.table.source.name, stats->bad_rows, stats->points);
     }
     if (work->settings->bake.common.quiet) {
         return;

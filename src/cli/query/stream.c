@@ -12,10 +12,9 @@
 #include <string.h>
 
 enum {
-    ORDER_BYTES = 16,  /* a point of a call, as query.h says */
-    TEXT_BYTES = 256,  /* of a kept row of text: what is more makes batches smaller */
-    LEAST_ROWS = 1024, /* what is not worth a smaller batch */
-    RAW_BYTES = 24
+    ORDER_BYTES = 16, /* a point of a call, as query.h says */
+    TEXT_BYTES = 256, /* of a kept row of text: what is more makes batches smaller */
+    LEAST_ROWS = 1024 /* what is not worth a smaller batch */
 };
 
 size_t query_answers_floats(const query_answers *a) {
@@ -44,8 +43,7 @@ int query_answers_create(query_answers *a, size_t room) {
     a->visibility = calloc(a->lights + 1, sizeof *a->visibility);
     a->deviation = calloc(a->lights + 1, sizeof *a->deviation);
     if (a->memory == NULL || a->columns == NULL || a->visibility == NULL || a->deviation == NULL) {
-        cli_say("points: the system refused memory");
-        return CLI_LIMIT;
+        return cli_out_of_memory("points");
     }
     float *next = a->memory;
     a->output = vsh_query_output_default();
@@ -78,11 +76,8 @@ void query_answers_free(query_answers *a) {
 static int plan(const query_settings *s, const query_answers *answers, uint64_t held,
                 const cli_points_reader *reader, bool keep, size_t *rows, size_t *most_kept) {
     const uint64_t limit = s->bake.common.memory_limit;
-    const bool text = reader->format == CLI_POINTS_CSV || reader->ply.ascii;
-    const size_t own = !keep                              ? 0
-                       : text                             ? TEXT_BYTES
-                       : reader->format == CLI_POINTS_RAW ? RAW_BYTES
-                                                          : reader->row_size;
+    const size_t row_size = reader->table.row_size; /* 0: of text */
+    const size_t own = !keep ? 0 : row_size > 0 ? row_size : TEXT_BYTES;
     const size_t each = cli_points_bytes(reader->has_normals, keep) + ORDER_BYTES + own +
                         query_answers_floats(answers) * sizeof(float);
     const size_t least = s->batch > 0 && s->batch < LEAST_ROWS ? (size_t)s->batch : LEAST_ROWS;
@@ -93,7 +88,8 @@ static int plan(const query_settings *s, const query_answers *answers, uint64_t 
     if (limit > 0 && held + (uint64_t)*rows * each > limit) {
         char all[32], most[32];
         cli_say("%s: the field and %zu points at a time need %s, over the memory limit of %s",
-                reader->source.name, *rows, vshi_bytes_text(held + (uint64_t)*rows * each, all, sizeof all),
+                reader->table.source.name, *rows,
+                vshi_bytes_text(held + (uint64_t)*rows * each, all, sizeof all),
                 vshi_bytes_text(limit, most, sizeof most));
         return CLI_LIMIT;
     }
@@ -147,8 +143,8 @@ int query_stream(const query_settings *s, const vsh_query *query, query_answers 
         if (code != CLI_OK || points.count == 0) {
             break;
         }
-        const uint64_t size = reader->source.size;
-        const double done = size > 0 ? (double)reader->source.taken / (double)size : 1.0;
+        const uint64_t size = reader->table.source.size;
+        const double done = size > 0 ? (double)reader->table.source.taken / (double)size : 1.0;
         progress.begin = size > 0 ? progress.begin + progress.share : 0.0;
         progress.share = (done < 1.0 ? done : 1.0) - progress.begin;
         code = answer_batch(query, answers, &points, &progress, stats);
@@ -167,7 +163,7 @@ int query_stream(const query_settings *s, const vsh_query *query, query_answers 
     cli_points_writer_free(&writer);
     cli_signals_writing(NULL);
     cli_points_free(&points);
-    stats->points = reader->rows;
+    stats->points = reader->table.rows;
     stats->bad_rows = reader->bad;
     return code;
 }
