@@ -34,6 +34,23 @@ void cli_message_input(const char *path);
 /* Says that there is no memory for `what` and returns CLI_LIMIT. */
 int cli_out_of_memory(const char *what);
 
+/* Ends a function with what a call came to, unless that is CLI_OK; or goes to its cleanup, with it in `code`.
+ */
+#define CLI_TRY(call)                                                                                        \
+    do {                                                                                                     \
+        const int tried = (call);                                                                            \
+        if (tried != CLI_OK) {                                                                               \
+            return tried;                                                                                    \
+        }                                                                                                    \
+    } while (0)
+#define CLI_TRY_DONE(call)                                                                                   \
+    do {                                                                                                     \
+        code = (call);                                                                                       \
+        if (code != CLI_OK) {                                                                                \
+            goto done;                                                                                       \
+        }                                                                                                    \
+    } while (0)
+
 /* Text for terminals: names come from files, and terminals obey control characters. Those but newlines become
  * '?': those of ASCII, and those that UTF-8 has of its own. */
 void cli_plain(char *text, size_t size);

@@ -4,6 +4,7 @@
 #include "base/memory.h"
 #include "base/numbers.h"
 #include "base/try.h"
+#include "spheres/sphere_tree.h"
 #include "table/table.h"
 
 #include <math.h>
@@ -12,8 +13,6 @@
 #include <vdbshade/spheres.h>
 
 enum { SHOWN = 47 }; /* bytes of a bad line */
-
-static const double LARGEST = 1e15;
 
 /* Of a file, 16 GiB; what is read of it is held against the memory limit. */
 static const uint64_t MOST_BYTES = (uint64_t)1 << 34;
@@ -53,18 +52,6 @@ static vsh_result add(list *l, const double numbers[4], const char *path, const 
     return VSH_OK;
 }
 
-static vsh_result check_numbers(const char *path, size_t row, const double numbers[4], vsh_error *error) {
-    static const char *const names[] = {"x", "y", "z", "radius"};
-    for (int k = 0; k < 4; ++k) {
-        if (!(fabs(numbers[k]) <= LARGEST) || (k == 3 && !(numbers[k] > 0.0))) {
-            return vshi_fail(error, VSH_ERROR_INPUT, "%s:%zu: %s %g is out of range %g%s … %g", path, row,
-                             names[k], numbers[k], k == 3 ? 0.0 : -LARGEST, k == 3 ? " (excluded)" : "",
-                             LARGEST);
-        }
-    }
-    return VSH_OK;
-}
-
 /* Whether a line that is no sphere may name the columns. */
 static bool is_header(char c) {
     return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || c == '"';
@@ -85,7 +72,7 @@ static vsh_result read_rows(vshi_source *from, const vsh_run *run, list *l, vsh_
             continue;
         }
         if (read_row(line, size, numbers)) {
-            VSHI_TRY(check_numbers(from->name, row, numbers, error));
+            VSHI_TRY(vshi_sphere_check(numbers, from->name, row, error));
             VSHI_TRY(add(l, numbers, from->name, run, error));
         } else if (!first || !is_header(line[strspn(line, " \t")])) {
             return vshi_fail(error, VSH_ERROR_INPUT, "%s:%zu: '%.*s': expected four numbers: x, y, z, radius",

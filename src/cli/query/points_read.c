@@ -96,11 +96,10 @@ static int keep_row(cli_points *points, const char *raw, size_t size) {
 /* Fields that a bad row lacks, so that answers stay in their columns. */
 static int keep_fillers(cli_points *points, char delimiter, int missing) {
     const char filler[] = {delimiter, 'n', 'a', 'n'};
-    int code = CLI_OK;
-    for (; code == CLI_OK && missing > 0; --missing) {
-        code = keep_row(points, filler, delimiter == ' ' ? sizeof filler : 1);
+    for (; missing > 0; --missing) {
+        CLI_TRY(keep_row(points, filler, delimiter == ' ' ? sizeof filler : 1));
     }
-    return code;
+    return CLI_OK;
 }
 
 /* Says what a row that can be read has against it. */
@@ -132,14 +131,13 @@ static int take_row(const cli_points_reader *reader, const vshi_table_row *row, 
         points->normals[3 * i + axis] = (float)row->value[NX + axis];
     }
     points->texels[i] = (uint32_t)(reader->table.rows - 1);
-    int code = CLI_OK;
     if (points->kept_end != NULL) {
-        code = keep_row(points, row->bytes, row->size);
-        code = code == CLI_OK ? keep_fillers(points, reader->table.delimiter, row->missing) : code;
+        CLI_TRY(keep_row(points, row->bytes, row->size));
+        CLI_TRY(keep_fillers(points, reader->table.delimiter, row->missing));
         points->kept_end[i] = points->kept_size;
     }
     ++points->count;
-    return code;
+    return CLI_OK;
 }
 
 static int32_t look_for_interrupt(void *user, const char *stage, double fraction) {
@@ -179,8 +177,7 @@ int cli_points_open(const char *path, int32_t format, int normals, bool strict, 
 int cli_points_read(cli_points_reader *reader, size_t most_kept, cli_points *points) {
     points->count = 0;
     points->kept_size = 0;
-    int code = CLI_OK;
-    while (code == CLI_OK && points->count < points->room && points->kept_size <= most_kept) {
+    while (points->count < points->room && points->kept_size <= most_kept) {
         vshi_table_row row;
         vsh_error error;
         if (vshi_table_next(&reader->table, &row, &error) != VSH_OK) {
@@ -198,9 +195,9 @@ int cli_points_read(cli_points_reader *reader, size_t most_kept, cli_points *poi
         if (row.bad[0] != '\0' && reader->strict) {
             return CLI_USAGE;
         }
-        code = take_row(reader, &row, points);
+        CLI_TRY(take_row(reader, &row, points));
     }
-    return code;
+    return CLI_OK;
 }
 
 bool cli_points_can_keep(const cli_points_reader *reader) {

@@ -123,17 +123,11 @@ int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
     if (w->keep && reader->table.format == VSHI_TABLE_CSV) {
         w->delimiter = reader->table.delimiter;
     }
-    int code = check_names(w, reader);
-    if (code != CLI_OK) {
-        return code;
-    }
+    CLI_TRY(check_names(w, reader));
     const bool counted = format == VSHI_TABLE_PLY && reader->table.format != VSHI_TABLE_PLY;
     if (!standard) {
         cli_signals_writing(path);
-        code = cli_temporary_begin(&w->temporary, path);
-        if (code != CLI_OK) {
-            return code;
-        }
+        CLI_TRY(cli_temporary_begin(&w->temporary, path));
         w->file = w->temporary.file;
     } else if (counted) {
         w->file = w->spool = tmpfile();
@@ -295,20 +289,17 @@ int cli_points_writer_commit(cli_points_writer *w, cli_points_reader *reader) {
     if (vshi_table_rest(&reader->table, w->keep ? w->file : NULL, &error) != VSH_OK) {
         return cli_fail(&error);
     }
-    int code = w->spool != NULL ? write_spool(w) : CLI_OK;
-    if (code == CLI_OK && w->count_at >= 0) {
+    CLI_TRY(w->spool != NULL ? write_spool(w) : CLI_OK);
+    if (w->count_at >= 0) {
         if (fseek(w->file, w->count_at, SEEK_SET) != 0) {
             return fail(w);
         }
         write_ply_head(w, w->rows);
     }
-    if (code == CLI_OK && w->temporary.file == NULL) {
-        code = fflush(stdout) == 0 && !ferror(stdout) ? CLI_OK : fail(w);
-    } else if (code == CLI_OK) {
-        code = cli_temporary_commit(&w->temporary);
+    if (w->temporary.file != NULL) {
+        return cli_temporary_commit(&w->temporary);
     }
-    cli_signals_writing(NULL);
-    return code;
+    return fflush(stdout) == 0 && !ferror(stdout) ? CLI_OK : fail(w);
 }
 
 void cli_points_writer_free(cli_points_writer *w) {

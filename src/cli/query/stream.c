@@ -122,48 +122,50 @@ static int answer_batch(const vsh_query *query, const query_answers *answers, co
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
 }
 
+static int answer_rows(const query_settings *s, const vsh_query *query, const query_answers *answers,
+                       const vsh_run *run, size_t most_kept, cli_points_reader *reader, cli_points *points,
+                       cli_points_writer *writer, cli_stats *stats) {
+    batch_progress progress = {run, 0.0, 0.0};
+    for (;;) {
+        double start = vshi_seconds();
+        CLI_TRY(cli_points_read(reader, most_kept, points));
+        cli_stats_stage(stats, CLI_STAGE_LOAD, start);
+        if (points->count == 0) {
+            return CLI_OK;
+        }
+        const uint64_t size = reader->table.source.size;
+        const double done = size > 0 ? (double)reader->table.source.taken / (double)size : 1.0;
+        progress.begin = size > 0 ? progress.begin + progress.share : 0.0;
+        progress.share = (done < 1.0 ? done : 1.0) - progress.begin;
+        CLI_TRY(answer_batch(query, answers, points, &progress, stats));
+        start = vshi_seconds();
+        CLI_TRY(cli_points_write(writer, points));
+        CLI_TRY(s->batch > 0 || size == 0 ? cli_points_writer_flush(writer) : CLI_OK);
+        cli_stats_stage(stats, CLI_STAGE_WRITE, start);
+    }
+}
+
 int query_stream(const query_settings *s, const vsh_query *query, query_answers *answers, uint64_t held,
                  const vsh_run *run, cli_points_reader *reader, cli_stats *stats) {
     cli_points points = {0};
     cli_points_writer writer = {0};
     size_t rows = 0, most_kept = 0;
     const bool keep = !s->answers_only && s->format == s->points_format && cli_points_can_keep(reader);
-    int code = plan(s, answers, held, reader, keep, &rows, &most_kept);
-    code = code == CLI_OK ? cli_points_create(rows, reader->has_normals, keep, &points) : code;
-    code = code == CLI_OK ? query_answers_create(answers, rows) : code;
-    if (code == CLI_OK) {
-        code = cli_points_writer_open(s->bake.output, s->format, s->answers_only, reader, answers->columns,
-                                      answers->column_count, &writer);
-    }
-    batch_progress progress = {run, 0.0, 0.0};
-    while (code == CLI_OK) {
-        double start = vshi_seconds();
-        code = cli_points_read(reader, most_kept, &points);
-        cli_stats_stage(stats, CLI_STAGE_LOAD, start);
-        if (code != CLI_OK || points.count == 0) {
-            break;
-        }
-        const uint64_t size = reader->table.source.size;
-        const double done = size > 0 ? (double)reader->table.source.taken / (double)size : 1.0;
-        progress.begin = size > 0 ? progress.begin + progress.share : 0.0;
-        progress.share = (done < 1.0 ? done : 1.0) - progress.begin;
-        code = answer_batch(query, answers, &points, &progress, stats);
-        start = vshi_seconds();
-        code = code == CLI_OK ? cli_points_write(&writer, &points) : code;
-        if (code == CLI_OK && (s->batch > 0 || size == 0)) {
-            code = cli_points_writer_flush(&writer);
-        }
-        cli_stats_stage(stats, CLI_STAGE_WRITE, start);
-    }
-    if (code == CLI_OK) {
-        const double start = vshi_seconds();
-        code = cli_points_writer_commit(&writer, reader);
-        cli_stats_stage(stats, CLI_STAGE_WRITE, start);
-    }
+    int code = CLI_OK;
+    CLI_TRY_DONE(plan(s, answers, held, reader, keep, &rows, &most_kept));
+    CLI_TRY_DONE(cli_points_create(rows, reader->has_normals, keep, &points));
+    CLI_TRY_DONE(query_answers_create(answers, rows));
+    CLI_TRY_DONE(cli_points_writer_open(s->bake.output, s->format, s->answers_only, reader, answers->columns,
+                                        answers->column_count, &writer));
+    CLI_TRY_DONE(answer_rows(s, query, answers, run, most_kept, reader, &points, &writer, stats));
+    const double start = vshi_seconds();
+    CLI_TRY_DONE(cli_points_writer_commit(&writer, reader));
+    cli_stats_stage(stats, CLI_STAGE_WRITE, start);
+    stats->points = reader->table.rows;
+    stats->bad_rows = reader->bad;
+done:
     cli_points_writer_free(&writer);
     cli_signals_writing(NULL);
     cli_points_free(&points);
-    stats->points = reader->table.rows;
-    stats->bad_rows = reader->bad;
     return code;
 }
