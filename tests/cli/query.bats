@@ -130,6 +130,16 @@ ANSWERS=(--distance --gradient --answers-only)
     refused 4 "memory limit"
 }
 
+@test "rows that are kept are answered in batches as long as without them" {
+    points 4000 >p.raw
+    QUERY+=(--method adaptive --batch 1000 --points p.raw --normals yes) # whose rays depend on the batch
+    shade "${QUERY[@]}" --answers-only -o alone.raw
+    done_well
+    shade "${QUERY[@]}" -o kept.raw
+    done_well
+    perl -ne 'BEGIN { $/ = \32 } print substr $_, 24' kept.raw | cmp - alone.raw
+}
+
 @test "answers are near the truth" {
     cat >truth.c <<'C'
 #include "truth/analytic.h"

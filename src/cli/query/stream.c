@@ -77,7 +77,9 @@ static int plan(const query_settings *s, const query_answers *answers, uint64_t 
                 const cli_points_reader *reader, bool keep, size_t *rows, size_t *most_kept) {
     const uint64_t limit = s->bake.common.memory_limit;
     const size_t row_size = reader->table.row_size; /* 0: of text */
-    const size_t own = !keep ? 0 : row_size > 0 ? row_size : TEXT_BYTES;
+    const size_t own = !keep          ? 0
+                       : row_size > 0 ? 2 * row_size
+                                      : TEXT_BYTES; /* room is taken twice what is used */
     const size_t each = cli_points_bytes(reader->has_normals, keep) + ORDER_BYTES + own +
                         query_answers_floats(answers) * sizeof(float);
     const size_t least = s->batch > 0 && s->batch < LEAST_ROWS ? (size_t)s->batch : LEAST_ROWS;
@@ -93,7 +95,7 @@ static int plan(const query_settings *s, const query_answers *answers, uint64_t 
                 vshi_bytes_text(limit, most, sizeof most));
         return CLI_LIMIT;
     }
-    *most_kept = *rows * (own > 0 ? own : 1) / 2; /* room is taken twice what is used */
+    *most_kept = *rows * own / 2;
     return CLI_OK;
 }
 
