@@ -45,7 +45,7 @@ static double shade_seconds(int runs, const vsh_occluders *occluders, const vsh_
         bench_check(
             light != NULL
                 ? vsh_shade_shadow(occluders, points, light, shade, &run, values, deviation, stats, &error)
-                : vsh_shade_ao(occluders, points, shade, &run, values, deviation, stats, &error),
+                : vsh_shade_ao(occluders, points, shade, &run, values, deviation, NULL, stats, &error),
             &error);
         seconds[i] = bench_seconds() - start;
     }

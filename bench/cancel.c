@@ -233,7 +233,7 @@ static vsh_result ask(const vsh_run *run) {
     output.visibility = &made.planes[0];
     output.ao = made.planes[1];
     const vsh_points points = {POINTS, made.positions, made.normals, NULL};
-    return vsh_query_points(made.query, &points, run, &output, NULL, NULL);
+    return vsh_query_points(made.query, &points, NULL, run, &output, NULL, NULL);
 }
 
 static vsh_result make_triangles(const vsh_run *run) {

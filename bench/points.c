@@ -112,7 +112,7 @@ static double query_seconds(const points_bench *b, const vsh_query *query, size_
             float *const visibility[1] = {b->values + i};
             vsh_query_output output = vsh_query_output_default();
             output.visibility = visibility;
-            bench_check(vsh_query_points(query, &points, &run, &output, stats, &error), &error);
+            bench_check(vsh_query_points(query, &points, NULL, &run, &output, stats, &error), &error);
         }
         seconds[r] = bench_seconds() - start;
     }

@@ -40,7 +40,7 @@ int main(void) {
     vsh_shade_options options = vsh_shade_options_default();
     options.ao_distance = 4.0;
     float open[3];
-    if (vsh_shade_ao(occluders, &points, &options, NULL, open, NULL, NULL, &error) == VSH_OK) {
+    if (vsh_shade_ao(occluders, &points, &options, NULL, open, NULL, NULL, NULL, &error) == VSH_OK) {
         for (int i = 0; i < 3; ++i) {
             printf("%g below: %.2f open\n", -positions[i][1], (double)open[i]);
         }

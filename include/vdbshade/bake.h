@@ -221,7 +221,7 @@ typedef struct vsh_lightmap {
                                    vsh_shade_shadow(); not padded; may be NULL */
     float *ao_error; /* the same of AO. Of exact AO whose rays texels share it is the rays' part: what bends
                         within a texel or two can be half as much again, and is in vsh_bake_stats.errors */
-    float *bent;     /* [height][width][3]: bent normals, unit, see vsh_shade_bent() */
+    float *bent;     /* [height][width][3]: bent normals, unit, see vsh_shade_ao() */
     float *const *tint; /* [light_count] planes [height][width][3]: visibility as tint_by colours it, linear
                            RGB; may be NULL */
     vsh_tint tint_by;   /* of these planes, and of the visibility in irradiance */

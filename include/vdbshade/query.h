@@ -45,7 +45,25 @@ static inline vsh_query_output vsh_query_output_default(void) {
     return output;
 }
 
-/* Shades points for every light and AO that the output asks for.
+/* How the points of a call stand in the caller's memory, in an array of structs say. Strides are bytes from
+ * one point to the next, multiples of what they step over (4, of doubles 8) and at least a point long; 0:
+ * without gaps. */
+typedef struct vsh_point_layout {
+    size_t struct_size;
+    const float *float_positions; /* [count][3]: in place of points->positions, which is then NULL; the bits
+                                     are those of the same numbers as doubles */
+    size_t position_stride;
+    size_t normal_stride;
+    size_t texel_stride;
+} vsh_point_layout;
+
+static inline vsh_point_layout vsh_point_layout_default(void) {
+    vsh_point_layout layout = {sizeof(vsh_point_layout), NULL, 0, 0, 0};
+    return layout;
+}
+
+/* Shades points for every light and AO that the output asks for. `layout`: how the points stand in memory;
+ * NULL: as vsh_points says. No bit depends on it.
  *
  * Up to 64 points are shaded at once on the calling thread, without allocation, progress or cancelling. More
  * run on run->threads under the stage "query". Where many points do not follow each other in space they are
@@ -59,40 +77,15 @@ static inline vsh_query_output vsh_query_output_default(void) {
  * depends on threads. Calls for VSH_QUERY_BATCH points each, in turn, and their numbers as `texels`, give
  * every bit of one call for all.
  *
- * Errors (the arrays then hold nothing of use): VSH_ERROR_ARGUMENT (run, output's size, a deviation without
- * its values, AO without normals), VSH_ERROR_LIMIT (occluders and order need more than run->memory_limit),
+ * Errors (the arrays then hold nothing of use): VSH_ERROR_ARGUMENT (run, size of output or layout, a stride
+ * that is none, positions of both kinds, or of neither with a count above 0, a deviation without its values,
+ * AO without normals), VSH_ERROR_LIMIT (occluders and order need more than run->memory_limit),
  * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, const vsh_run *run,
+VSH_API vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points,
+                                    const vsh_point_layout *layout, const vsh_run *run,
                                     const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error);
 
 enum { VSH_QUERY_BATCH = 1 << 20 };
-
-/* Points as they stand in the caller's memory, in an array of structs say: what vsh_points holds, with
- * strides, which are bytes from one point to the next, multiples of what they step over (4, of doubles 8) and
- * at least a point long; 0: without gaps. */
-typedef struct vsh_strided_points {
-    size_t struct_size;
-    size_t count;
-    const double *positions;      /* [count][3], world units */
-    const float *float_positions; /* instead of them, where `positions` is NULL; the bits are those of the
-                                     same numbers as doubles */
-    size_t position_stride;
-    const float *normals; /* [count][3]; may be NULL, as in vsh_points */
-    size_t normal_stride;
-    const uint32_t *texels; /* [count]; may be NULL, as in vsh_points */
-    size_t texel_stride;
-} vsh_strided_points;
-
-static inline vsh_strided_points vsh_strided_points_default(void) {
-    vsh_strided_points points = {sizeof(vsh_strided_points), 0, NULL, NULL, 0, NULL, 0, NULL, 0};
-    return points;
-}
-
-/* As vsh_query_points(), with the same bits. Errors: as there; VSH_ERROR_ARGUMENT too for points' size, a
- * stride that is none, both or neither of the positions with a count above 0. */
-VSH_API vsh_result vsh_query_strided(const vsh_query *query, const vsh_strided_points *points,
-                                     const vsh_run *run, const vsh_query_output *output,
-                                     vsh_shade_stats *stats, vsh_error *error);
 
 #ifdef __cplusplus
 }

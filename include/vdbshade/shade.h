@@ -69,20 +69,16 @@ VSH_API vsh_result vsh_shade_shadow(const vsh_occluders *occluders, const vsh_po
                                     vsh_shade_stats *stats, vsh_error *error);
 
 /* Cosine-weighted fraction of the hemisphere around the normal that is free within ao_distance, 0 … 1 open,
- * into ao[count]; invalid points are NaN; `deviation` as above. Errors (ao then holds nothing of use):
- * VSH_ERROR_ARGUMENT (options out of range, run, points->normals NULL where there are points),
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+ * into ao[count]; invalid points are NaN; `deviation` as above. `bent` [count][3], where not NULL, takes bent
+ * normals: the mean of the directions that are open, unit, world space; the normal where none is open, NaN
+ * for invalid points (Landis, "Production-ready global illumination", 2002). Layers' directions are
+ * superposed, which is exact where they hide different parts of the sky. Errors (the arrays then hold nothing
+ * of use): VSH_ERROR_ARGUMENT (options out of range, run, points->normals NULL where there are points; with
+ * `bent` also VSH_AO_TAPS, which knows no directions, and a horizon), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED.
+ */
 VSH_API vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
                                 const vsh_shade_options *options, const vsh_run *run, float *ao,
-                                float *deviation, vsh_shade_stats *stats, vsh_error *error);
-
-/* AO as above, and bent normals: the mean of the directions that are open, unit, world space, into
- * bent[count][3]; the normal where none is open, NaN for invalid points (Landis, "Production-ready global
- * illumination", 2002). Layers' directions are superposed, which is exact where they hide different parts of
- * the sky. Errors: as above; VSH_ERROR_ARGUMENT too for VSH_AO_TAPS, which knows no directions. */
-VSH_API vsh_result vsh_shade_bent(const vsh_occluders *occluders, const vsh_points *points,
-                                  const vsh_shade_options *options, const vsh_run *run, float *ao,
-                                  float *bent, vsh_shade_stats *stats, vsh_error *error);
+                                float *deviation, float *bent, vsh_shade_stats *stats, vsh_error *error);
 
 /* Colour of penumbrae: red bleeds farther into the shadow, as light does through what surrounds it (Quilez,
  * "outdoors lighting", 2013). 1 stays white, 0 black. */

@@ -38,8 +38,8 @@ static inline void vsh_spheres_get_info(const vsh_spheres *spheres, vsh_spheres_
 }
 
 /* Reads spheres from a CSV file: a row each of x, y, z and radius, parted by commas, semicolons, tabs or
- * blanks; numbers with a decimal point. Empty rows and rows that begin with # are passed over, and a first
- * row of names. *spheres is [*count][4]; free it with vsh_spheres_list_free(). Errors:
+ * blanks; numbers with a decimal point, perhaps in quotes. Empty rows and rows that begin with # are passed
+ * over, and a first row of names. *spheres is [*count][4]; free it with vsh_spheres_list_free(). Errors:
  * - VSH_ERROR_ARGUMENT: path, spheres or count NULL, run;
  * - VSH_ERROR_READ: no such file, no permission, no regular file;
  * - VSH_ERROR_INPUT: no spheres; by the row's number in the file: not four numbers, one that is not finite or

@@ -1,7 +1,8 @@
-/* Sizes in memory, as text. */
+/* Bytes: how many as text, and the numbers that they are. */
 #ifndef VSHI_BYTES_H
 #define VSHI_BYTES_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -19,6 +20,21 @@ static inline const char *vshi_bytes_text(uint64_t bytes, char *text, size_t cap
     }
     snprintf(text, capacity, "%.*f %s", unit > 0 && value < 100.0 ? 1 : 0, value, units[unit]);
     return text;
+}
+
+/* An unsigned number of 1, 2, 4 or 8 bytes in a binary file. */
+static inline uint64_t vshi_bytes_number(const char *at, int size, bool big_endian) {
+    uint64_t value = 0;
+    for (int i = 0; i < size; ++i) {
+        value = value << 8 | (unsigned char)at[big_endian ? i : size - 1 - i];
+    }
+    return value;
+}
+
+/* A whole number of them, perhaps signed; of 8 bytes at most INT64_MAX. */
+static inline int64_t vshi_bytes_integer(const char *at, int size, bool is_signed, bool big_endian) {
+    const uint64_t bits = vshi_bytes_number(at, size, big_endian), sign = UINT64_C(1) << (8 * size - 1);
+    return is_signed && (bits & sign) != 0 ? (int64_t)bits - (int64_t)(2 * sign) : (int64_t)bits;
 }
 
 #endif

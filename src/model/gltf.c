@@ -1,6 +1,7 @@
 /* A glTF or GLB, from its bytes to a model. */
 #include "model/gltf.h"
 
+#include "base/bytes.h"
 #include "base/memory.h"
 #include "model/scan.h"
 
@@ -45,15 +46,15 @@ static vsh_result open_binary(vshi_gltf *gltf, const char *text, size_t size, vs
     if (memcmp(text, magic, compared) != 0) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: is no GLB: it does not begin with 'glTF'", gltf->path);
     }
-    if (size >= HEADER && vshi_scan_bytes(text + 4, 4, false) == 1) {
+    if (size >= HEADER && vshi_bytes_number(text + 4, 4, false) == 1) {
         return fail_version(gltf, "1.0", error);
     }
-    const uint64_t length = size < HEADER + CHUNK ? HEADER + CHUNK : vshi_scan_bytes(text + 8, 4, false);
+    const uint64_t length = size < HEADER + CHUNK ? HEADER + CHUNK : vshi_bytes_number(text + 8, 4, false);
     if (length > size) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: cut short: %zu bytes of %llu", gltf->path, size,
                          (unsigned long long)length);
     }
-    const size_t json = (size_t)vshi_scan_bytes(text + HEADER, 4, false);
+    const size_t json = (size_t)vshi_bytes_number(text + HEADER, 4, false);
     if (json > size - HEADER - CHUNK) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: its JSON of %zu bytes passes the file's %zu bytes",
                          gltf->path, json, size);
@@ -63,7 +64,7 @@ static vsh_result open_binary(vshi_gltf *gltf, const char *text, size_t size, vs
     }
     const size_t next = HEADER + CHUNK + json;
     if (size - next >= CHUNK && memcmp(text + next + 4, binary_type, sizeof binary_type) == 0) {
-        const size_t held = (size_t)vshi_scan_bytes(text + next, 4, false), left = size - next - CHUNK;
+        const size_t held = (size_t)vshi_bytes_number(text + next, 4, false), left = size - next - CHUNK;
         if (held > left) {
             return vshi_fail(error, VSH_ERROR_READ, "%s: cut short: %zu bytes of a chunk of %zu", gltf->path,
                              left, held);

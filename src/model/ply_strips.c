@@ -1,5 +1,6 @@
 #include "model/ply_strips.h"
 
+#include "base/bytes.h"
 #include "base/memory.h"
 #include "base/try.h"
 #include "model/scan.h"
@@ -42,9 +43,7 @@ static vsh_result read_binary(unrolling *u, int size, bool is_signed, int64_t *v
     if (u->end - u->at < size) {
         return fail_short(u, error);
     }
-    const uint64_t bits = vshi_scan_bytes(u->at, size, u->strips->big_endian);
-    const uint64_t sign = UINT64_C(1) << (8 * size - 1);
-    *value = is_signed && (bits & sign) != 0 ? (int64_t)bits - (int64_t)(2 * sign) : (int64_t)bits;
+    *value = vshi_bytes_integer(u->at, size, is_signed, u->strips->big_endian);
     u->at += size;
     return VSH_OK;
 }

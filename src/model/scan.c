@@ -114,11 +114,3 @@ bool vshi_token_integer(vshi_token token, int64_t *value) {
     *value = negative ? -*value : *value;
     return true;
 }
-
-uint64_t vshi_scan_bytes(const char *at, int size, bool big_endian) {
-    uint64_t value = 0;
-    for (int i = 0; i < size; ++i) {
-        value = value << 8 | (unsigned char)at[big_endian ? i : size - 1 - i];
-    }
-    return value;
-}

@@ -55,7 +55,4 @@ vshi_number vshi_token_number(vshi_token token);
 /* A whole number of at most 18 digits, perhaps with a sign; false where the token is none. */
 bool vshi_token_integer(vshi_token token, int64_t *value);
 
-/* An unsigned number of 1, 2, 4 or 8 bytes in a binary file. */
-uint64_t vshi_scan_bytes(const char *at, int size, bool big_endian);
-
 #endif

@@ -1,7 +1,9 @@
 /* PLY: the body holds all that the header announces, and positions are finite. Assimp 5.2 repeats the last
  * face where a file ends early, and takes memory for whatever number the header names. */
-#include "base/ply.h"
+#include "base/bytes.h"
+#include "base/try.h"
 #include "model/scan.h"
+#include "table/ply.h"
 
 #include <string.h>
 
@@ -43,41 +45,31 @@ static void describe(ply_header *header, const vshi_ply_element *element) {
     }
 }
 
-/* Returns the body; NULL with the error filled where there is none. */
-static const char *read_header(const vshi_scan *scan, ply_header *header, vsh_result *result,
-                               vsh_error *error) {
+static vsh_result read_header(const vshi_scan *scan, ply_header *header, const char **body,
+                              vsh_error *error) {
     const char *at = scan->text, *end = scan->text + scan->size;
-    for (size_t line = 1; at < end; ++line) {
-        const char *stop = memchr(at, '\n', (size_t)(end - at));
+    vshi_ply_header *head = &header->head;
+    while (!head->ended) {
+        const char *stop = at < end ? memchr(at, '\n', (size_t)(end - at)) : NULL;
         if (stop == NULL) {
-            break;
+            return vshi_ply_fail_header(scan->path, error);
         }
-        vshi_ply_header *head = &header->head;
-        const bool good = vshi_ply_header_line(head, at, (size_t)(stop - at));
-        if (head->ended) {
-            for (int e = 0; e < head->elements; ++e) {
-                describe(header, &head->element[e]);
-            }
-            return stop + 1;
-        }
+        VSHI_TRY(vshi_ply_header_line(head, scan->path, at, (size_t)(stop - at), error));
         const vshi_ply_element *last = head->elements > 0 ? &head->element[head->elements - 1] : NULL;
         if (last != NULL && last->count > 0 && strcmp(last->name, "tristrips") == 0) {
             header->strips = head->elements - 1;
         }
-        if (good && header->strips >= 0 && header->strips == head->elements - 1) {
+        if (!head->ended && header->strips >= 0 && header->strips == head->elements - 1) {
             header->lines = header->lines != NULL ? header->lines : at;
             header->lines_end = stop + 1;
         }
-        if (!good) {
-            *result =
-                vshi_fail(error, VSH_ERROR_INPUT, "%s: line %zu of the header is not understood: '%.*s'",
-                          scan->path, line, stop - at < 60 ? (int)(stop - at) : 60, at);
-            return NULL;
-        }
         at = stop + 1;
     }
-    *result = vshi_fail(error, VSH_ERROR_READ, "%s: cut short: the header has no 'end_header'", scan->path);
-    return NULL;
+    for (int e = 0; e < head->elements; ++e) {
+        describe(header, &head->element[e]);
+    }
+    *body = at;
+    return VSH_OK;
 }
 
 /* Where the body is read, and which of its rows. */
@@ -90,8 +82,7 @@ typedef struct ply_cursor {
 } ply_cursor;
 
 static vsh_result fail_short(const ply_cursor *c, vsh_error *error) {
-    return vshi_fail(error, VSH_ERROR_READ, "%s: cut short: it ends in %s %llu of %llu", c->scan->path,
-                     c->element->name, (unsigned long long)c->row, (unsigned long long)c->element->count);
+    return vshi_ply_fail_short(c->scan->path, c->element, c->row, error);
 }
 
 static vsh_result fail_value(const ply_cursor *c, vshi_token token, const char *expected, vsh_error *error) {
@@ -135,7 +126,7 @@ static vsh_result read_binary(ply_cursor *c, const ply_property *property, vsh_e
         if (c->end - c->at < property->count_size) {
             return fail_short(c, error);
         }
-        values = vshi_scan_bytes(c->at, property->count_size, c->header->head.big_endian);
+        values = vshi_bytes_number(c->at, property->count_size, c->header->head.big_endian);
         c->at += property->count_size;
     }
     if (values > (uint64_t)(c->end - c->at) / (uint64_t)property->size) {
@@ -188,40 +179,31 @@ static vsh_result scan_strips(ply_cursor *c, vsh_error *error) {
     return result;
 }
 
+static vsh_result scan_element(ply_cursor *c, vsh_error *error) {
+    const ply_header *header = c->header;
+    for (c->row = 0; c->row < c->element->count; ++c->row) {
+        for (int p = c->element->first; p < c->element->end; ++p) {
+            VSHI_TRY(header->head.ascii ? read_ascii(c, &header->property[p], error)
+                                        : read_binary(c, &header->property[p], error));
+        }
+        if (c->row % ROWS_A_POLL == 0 && vshi_scan_poll(c->scan, c->at)) {
+            return vshi_job_fail_cancelled(c->scan->job, error);
+        }
+    }
+    return VSH_OK;
+}
+
 vsh_result vshi_scan_ply(vshi_scan *scan, vsh_error *error) {
     ply_header header = {.strips = -1};
-    vsh_result result = VSH_OK;
-    const char *body = read_header(scan, &header, &result, error);
-    if (body == NULL) {
-        return result;
+    ply_cursor c = {.scan = scan, .header = &header, .end = scan->text + scan->size};
+    VSHI_TRY(read_header(scan, &header, &c.at, error));
+    if (header.strips >= 0) {
+        VSHI_TRY(check_strips(scan, &header, error));
     }
-    if (header.strips >= 0 && (result = check_strips(scan, &header, error)) != VSH_OK) {
-        return result;
-    }
-    ply_cursor c = {scan, &header, NULL, 0, body, scan->text + scan->size};
     for (int e = 0; e < header.head.elements; ++e) {
         c.element = &header.head.element[e];
-        if (c.element->first == c.element->end) {
-            continue;
-        }
-        if (e == header.strips) {
-            result = scan_strips(&c, error);
-            if (result != VSH_OK) {
-                return result;
-            }
-            continue;
-        }
-        for (c.row = 0; c.row < c.element->count; ++c.row) {
-            for (int p = c.element->first; p < c.element->end; ++p) {
-                result = header.head.ascii ? read_ascii(&c, &header.property[p], error)
-                                           : read_binary(&c, &header.property[p], error);
-                if (result != VSH_OK) {
-                    return result;
-                }
-            }
-            if (c.row % ROWS_A_POLL == 0 && vshi_scan_poll(scan, c.at)) {
-                return vshi_job_fail_cancelled(scan->job, error);
-            }
+        if (c.element->first < c.element->end) {
+            VSHI_TRY(e == header.strips ? scan_strips(&c, error) : scan_element(&c, error));
         }
     }
     return VSH_OK;

@@ -2,6 +2,8 @@
  * numbers. Assimp 5.2 reads an ASCII file that ends between two facets as a smaller mesh. */
 #include "model/scan.h"
 
+#include "base/bytes.h"
+
 #include <string.h>
 
 enum { HEADER = 84, FACET = 50, FACETS_A_POLL = 4096 };
@@ -44,7 +46,7 @@ static vsh_result scan_ascii(vshi_scan *scan, vsh_error *error) {
 }
 
 vsh_result vshi_scan_stl(vshi_scan *scan, vsh_error *error) {
-    const size_t facets = scan->size >= HEADER ? (size_t)vshi_scan_bytes(scan->text + 80, 4, false) : 0;
+    const size_t facets = scan->size >= HEADER ? (size_t)vshi_bytes_number(scan->text + 80, 4, false) : 0;
     const uint64_t expected = HEADER + FACET * (uint64_t)facets;
     const char *at = scan->text;
     const bool solid = vshi_token_is(vshi_scan_token(&at, scan->text + scan->size), "solid");

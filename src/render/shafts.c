@@ -45,7 +45,7 @@ static vsh_result light_step(const vshi_shafts *shafts, step *s, vsh_shade_stats
         vsh_query_output output = vsh_query_output_default();
         visibility[l] = s->visibility;
         output.visibility = visibility;
-        VSHI_TRY(vsh_query_points(shafts->query, &points, shafts->run, &output, stats, error));
+        VSHI_TRY(vsh_query_points(shafts->query, &points, NULL, shafts->run, &output, stats, error));
         const vshi_light_place place = vshi_light_in_world(light);
         for (size_t i = 0; i < s->count; ++i) {
             vshi_vec to;

@@ -95,14 +95,14 @@ static vsh_result light_hits(const vshi_scenery *scenery, hits *h, vsh_shade_sta
     vsh_query_output output = vsh_query_output_default();
     if (scenery->options->ao) {
         output.ao = h->ao;
-        VSHI_TRY(vsh_query_points(scenery->query, &points, &scenery->run, &output, stats, error));
+        VSHI_TRY(vsh_query_points(scenery->query, &points, NULL, &scenery->run, &output, stats, error));
         output.ao = NULL;
     }
     for (size_t l = 0; l < scenery->light_count; ++l) {
         float *visibility[VSHI_MOST_LIGHTS] = {NULL};
         visibility[l] = h->visibility;
         output.visibility = visibility;
-        VSHI_TRY(vsh_query_points(scenery->query, &points, &scenery->run, &output, stats, error));
+        VSHI_TRY(vsh_query_points(scenery->query, &points, NULL, &scenery->run, &output, stats, error));
         vshi_shade_irradiance(&points, NULL, &scenery->lights[l], h->visibility, &scenery->options->tint,
                               &h->light[0][0]);
     }

@@ -116,16 +116,6 @@ vsh_result vshi_ao_check_points(const vsh_points *points, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
-                        const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
-                        vsh_shade_stats *stats, vsh_error *error) {
-    VSHI_NEEDS(occluders);
-    VSHI_NEEDS(points);
-    VSHI_NEEDS_OF(points->count, points->positions);
-    VSHI_NEEDS_OF(points->count, ao);
-    return vshi_shade_ao(occluders, points, NULL, options, run, ao, deviation, NULL, NULL, stats, error);
-}
-
 void vshi_ao_bent(float *bent, const float *normal) {
     const vshi_vec n = vshi_unit(vshi_vec_off(normal)), d = vshi_vec_off(bent);
     if (isnan(bent[0])) {
@@ -137,17 +127,16 @@ void vshi_ao_bent(float *bent, const float *normal) {
     bent[2] = (float)b.z;
 }
 
-vsh_result vsh_shade_bent(const vsh_occluders *occluders, const vsh_points *points,
-                          const vsh_shade_options *options, const vsh_run *run, float *ao, float *bent,
-                          vsh_shade_stats *stats, vsh_error *error) {
+vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
+                        const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
+                        float *bent, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(occluders);
     VSHI_NEEDS(points);
     VSHI_NEEDS_OF(points->count, points->positions);
     VSHI_NEEDS_OF(points->count, ao);
-    VSHI_NEEDS_OF(points->count, bent);
-    VSHI_TRY(vshi_shade_ao(occluders, points, NULL, options, run, ao, NULL, bent, NULL, stats, error));
-    for (size_t i = 0; i < points->count; ++i) {
+    VSHI_TRY(vshi_shade_ao(occluders, points, NULL, options, run, ao, deviation, bent, NULL, stats, error));
+    for (size_t i = 0; bent != NULL && i < points->count; ++i) {
         vshi_ao_bent(bent + 3 * i, points->normals + 3 * i);
     }
     return VSH_OK;

@@ -230,54 +230,6 @@ static vsh_result check_output(const vsh_query *query, const vshi_view *view, co
                : VSH_OK;
 }
 
-/* `packed`: the points, where they are without gaps; else NULL. */
-static vsh_result answer(const vsh_query *query, const vshi_view *view, const vsh_points *packed,
-                         const vsh_run *run, const vsh_query_output *output, vsh_shade_stats *stats,
-                         vsh_error *error) {
-    vsh_run full_run;
-    vsh_query_output full = vsh_query_output_default();
-    bool any = false;
-    vsh_result result = vshi_run_resolve(run, &full_run, error);
-    if (result == VSH_OK) {
-        result = vshi_options_resolve(output, &full, sizeof full, "vsh_query_output", error);
-    }
-    if (result == VSH_OK) {
-        result = check_output(query, view, &full, &any, error);
-    }
-    if (result != VSH_OK || !any || view->count == 0) {
-        return result;
-    }
-    query_call call = {.query = query,
-                       .points = full.stride == 0 ? packed : NULL,
-                       .view = *view,
-                       .output = &full,
-                       .kernel = vshi_kernel_of(full_run.isa)};
-    if (view->count <= FEW) {
-        vsh_shade_stats own = vsh_shade_stats_zero();
-        vshi_shade_fn *shade = call.points != NULL ? shade_in_place : shade_gathered;
-        shade(&call, 0, view->count, stats != NULL ? stats : &own);
-        return VSH_OK;
-    }
-    vshi_job *job = vshi_job_begin(&full_run, "query", view->count);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "query: the system refused memory");
-    }
-    result = shade_many(&call, &full_run, job, stats, error);
-    vshi_job_end(job);
-    return result;
-}
-
-vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, const vsh_run *run,
-                            const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(query);
-    VSHI_NEEDS(points);
-    VSHI_NEEDS_OF(points->count, points->positions);
-    VSHI_NEEDS(output);
-    const vshi_view view = vshi_view_of(points);
-    return answer(query, &view, points, run, output, stats, error);
-}
-
 /* 0 becomes `packed`. Errors: VSH_ERROR_ARGUMENT. */
 static vsh_result resolve_stride(const char *name, size_t unit, size_t packed, size_t *stride,
                                  vsh_error *error) {
@@ -289,43 +241,68 @@ static vsh_result resolve_stride(const char *name, size_t unit, size_t packed, s
     return VSH_OK;
 }
 
-vsh_result vsh_query_strided(const vsh_query *query, const vsh_strided_points *points, const vsh_run *run,
-                             const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error) {
+/* Points as they stand in memory; *packed tells whether that is as vsh_points says. Errors:
+ * VSH_ERROR_ARGUMENT. */
+static vsh_result view_points(const vsh_points *points, const vsh_point_layout *layout, vshi_view *view,
+                              bool *packed, vsh_error *error) {
+    vsh_point_layout l = vsh_point_layout_default();
+    VSHI_TRY(vshi_options_resolve(layout, &l, sizeof l, "vsh_point_layout", error));
+    const bool floats = l.float_positions != NULL;
+    if (points->count > 0 && floats == (points->positions != NULL)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "points: expected one of positions and float_positions");
+    }
+    const size_t unit = floats ? sizeof(float) : sizeof(double);
+    VSHI_TRY(resolve_stride("position_stride", unit, 3 * unit, &l.position_stride, error));
+    VSHI_TRY(resolve_stride("normal_stride", sizeof(float), 3 * sizeof(float), &l.normal_stride, error));
+    VSHI_TRY(resolve_stride("texel_stride", sizeof(uint32_t), sizeof(uint32_t), &l.texel_stride, error));
+    *view = (vshi_view){points->count,
+                        floats ? (const char *)l.float_positions : (const char *)points->positions,
+                        (const char *)points->normals,
+                        (const char *)points->texels,
+                        l.position_stride,
+                        l.normal_stride,
+                        l.texel_stride,
+                        floats};
+    *packed = !floats && l.position_stride == 3 * sizeof(double) &&
+              (points->normals == NULL || l.normal_stride == 3 * sizeof(float)) &&
+              (points->texels == NULL || l.texel_stride == sizeof(uint32_t));
+    return VSH_OK;
+}
+
+vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, const vsh_point_layout *layout,
+                            const vsh_run *run, const vsh_query_output *output, vsh_shade_stats *stats,
+                            vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(query);
     VSHI_NEEDS(points);
     VSHI_NEEDS(output);
-    vsh_strided_points p = vsh_strided_points_default();
-    vsh_result result = vshi_options_resolve(points, &p, sizeof p, "vsh_strided_points", error);
-    if (result != VSH_OK) {
-        return result;
+    vsh_run full_run;
+    vsh_query_output full = vsh_query_output_default();
+    vshi_view view;
+    bool packed = false, any = false;
+    VSHI_TRY(view_points(points, layout, &view, &packed, error));
+    VSHI_TRY(vshi_run_resolve(run, &full_run, error));
+    VSHI_TRY(vshi_options_resolve(output, &full, sizeof full, "vsh_query_output", error));
+    VSHI_TRY(check_output(query, &view, &full, &any, error));
+    if (!any || view.count == 0) {
+        return VSH_OK;
     }
-    const bool floats = p.positions == NULL;
-    if (p.count > 0 && floats == (p.float_positions == NULL)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "points: expected one of positions and float_positions");
+    query_call call = {.query = query,
+                       .points = packed && full.stride == 0 ? points : NULL,
+                       .view = view,
+                       .output = &full,
+                       .kernel = vshi_kernel_of(full_run.isa)};
+    if (view.count <= FEW) {
+        vsh_shade_stats own = vsh_shade_stats_zero();
+        vshi_shade_fn *shade = call.points != NULL ? shade_in_place : shade_gathered;
+        shade(&call, 0, view.count, stats != NULL ? stats : &own);
+        return VSH_OK;
     }
-    const size_t unit = floats ? sizeof(float) : sizeof(double);
-    result = resolve_stride("position_stride", unit, 3 * unit, &p.position_stride, error);
-    if (result == VSH_OK) {
-        result = resolve_stride("normal_stride", sizeof(float), 3 * sizeof(float), &p.normal_stride, error);
+    vshi_job *job = vshi_job_begin(&full_run, "query", view.count);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "query: the system refused memory");
     }
-    if (result == VSH_OK) {
-        result = resolve_stride("texel_stride", sizeof(uint32_t), sizeof(uint32_t), &p.texel_stride, error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
-    const vshi_view view = {p.count,
-                            floats ? (const char *)p.float_positions : (const char *)p.positions,
-                            (const char *)p.normals,
-                            (const char *)p.texels,
-                            p.position_stride,
-                            p.normal_stride,
-                            p.texel_stride,
-                            floats};
-    const vsh_points packed = {p.count, p.positions, p.normals, p.texels};
-    const bool gaps = floats || p.position_stride != 3 * sizeof(double) ||
-                      (p.normals != NULL && p.normal_stride != 3 * sizeof(float)) ||
-                      (p.texels != NULL && p.texel_stride != sizeof(uint32_t));
-    return answer(query, &view, gaps ? NULL : &packed, run, output, stats, error);
+    const vsh_result result = shade_many(&call, &full_run, job, stats, error);
+    vshi_job_end(job);
+    return result;
 }

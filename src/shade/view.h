@@ -27,15 +27,4 @@ static inline void vshi_view_position(const vshi_view *view, size_t i, double po
     }
 }
 
-static inline vshi_view vshi_view_of(const vsh_points *points) {
-    return (vshi_view){points->count,
-                       (const char *)points->positions,
-                       (const char *)points->normals,
-                       (const char *)points->texels,
-                       3 * sizeof(double),
-                       3 * sizeof(float),
-                       sizeof(uint32_t),
-                       false};
-}
-
 #endif

@@ -8,6 +8,7 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/similarity.h"
+#include "base/try.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -141,10 +142,7 @@ static vsh_result add_block(builder *b, size_t *index) {
     if (made->block_count == b->capacity) {
         const size_t capacity = 2 * b->capacity;
         void *grown = NULL;
-        const vsh_result result = vshi_allocate(&grown, capacity, sizeof *made->block, "spheres", b->error);
-        if (result != VSH_OK) {
-            return result;
-        }
+        VSHI_TRY(vshi_allocate(&grown, capacity, sizeof *made->block, "spheres", b->error));
         memcpy(grown, made->block, made->block_count * sizeof *made->block);
         free(made->block);
         made->block = grown;
@@ -158,8 +156,8 @@ static vsh_result add_block(builder *b, size_t *index) {
 static vsh_result build(builder *b, part p, size_t *index) {
     part parts[VSHI_BALLS];
     const size_t count = cut(b->made->sphere, p, parts);
-    vsh_result result = add_block(b, index);
-    for (size_t lane = 0; result == VSH_OK && lane < VSHI_BALLS; ++lane) {
+    VSHI_TRY(add_block(b, index));
+    for (size_t lane = 0; lane < VSHI_BALLS; ++lane) {
         if (lane >= count) {
             b->made->block[*index].radius[lane] = -INFINITY;
             continue;
@@ -168,12 +166,24 @@ static vsh_result build(builder *b, part p, size_t *index) {
         int32_t below = ~(int32_t)parts[lane].begin;
         if (parts[lane].end - parts[lane].begin > 1) {
             size_t child = 0;
-            result = build(b, parts[lane], &child);
+            VSHI_TRY(build(b, parts[lane], &child));
             below = (int32_t)child;
         }
         b->made->block[*index].below[lane] = below;
     }
-    return result;
+    return VSH_OK;
+}
+
+vsh_result vshi_sphere_check(const double sphere[4], const char *path, size_t number, vsh_error *error) {
+    static const char *const names[] = {"x", "y", "z", "radius"};
+    for (int k = 0; k < 4; ++k) {
+        if (!(fabs(sphere[k]) <= LARGEST) || (k == 3 && !(sphere[k] > 0.0))) {
+            return vshi_fail(error, VSH_ERROR_INPUT, "%s%s%zu: %s %g is out of range %g%s … %g",
+                             path != NULL ? path : "sphere", path != NULL ? ":" : " ", number, names[k],
+                             sphere[k], k == 3 ? 0.0 : -LARGEST, k == 3 ? " (excluded)" : "", LARGEST);
+        }
+    }
+    return VSH_OK;
 }
 
 static vsh_result check(const double *spheres, size_t count, const double *transform, double *scale,
@@ -195,15 +205,7 @@ static vsh_result check(const double *spheres, size_t count, const double *trans
             "spheres: the transform must be finite and neither shear, scale unevenly nor flatten");
     }
     for (size_t i = 0; i < count; ++i) {
-        static const char *const names[] = {"x", "y", "z", "radius"};
-        for (int k = 0; k < 4; ++k) {
-            const double value = spheres[4 * i + (size_t)k];
-            if (!(fabs(value) <= LARGEST) || (k == 3 && !(value > 0.0))) {
-                return vshi_fail(error, VSH_ERROR_INPUT, "sphere %zu: %s %g is out of range %g%s … %g", i,
-                                 names[k], value, k == 3 ? 0.0 : -LARGEST, k == 3 ? " (excluded)" : "",
-                                 LARGEST);
-            }
-        }
+        VSHI_TRY(vshi_sphere_check(spheres + 4 * i, NULL, i, error));
     }
     return VSH_OK;
 }
@@ -233,17 +235,9 @@ static void place(vsh_spheres *made, const double *spheres, const double *transf
 
 static vsh_result make(vsh_spheres *made, const double *spheres, const double *transform, double scale,
                        vsh_error *error) {
-    void *copy = NULL, *blocks = NULL;
     const size_t capacity = made->info.count / 5 + 4;
-    vsh_result result = vshi_allocate(&copy, made->info.count, sizeof *made->sphere, "spheres", error);
-    made->sphere = copy;
-    if (result == VSH_OK) {
-        result = vshi_allocate(&blocks, capacity, sizeof *made->block, "spheres", error);
-        made->block = blocks;
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_allocate((void **)&made->sphere, made->info.count, sizeof *made->sphere, "spheres", error));
+    VSHI_TRY(vshi_allocate((void **)&made->block, capacity, sizeof *made->block, "spheres", error));
     place(made, spheres, transform, scale);
     double extent = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
@@ -251,10 +245,10 @@ static vsh_result make(vsh_spheres *made, const double *spheres, const double *t
     }
     builder b = {made, capacity, ROUNDING * extent, error};
     size_t top = 0;
-    result = build(&b, (part){0, made->info.count}, &top);
+    VSHI_TRY(build(&b, (part){0, made->info.count}, &top));
     made->info.bytes =
         sizeof *made + made->info.count * sizeof *made->sphere + b.capacity * sizeof *made->block;
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vsh_spheres_create(const double *spheres, size_t count, const double *transform,
@@ -265,23 +259,13 @@ vsh_result vsh_spheres_create(const double *spheres, size_t count, const double 
     VSHI_NEEDS_OF(count, spheres);
     vsh_run full;
     double scale = 1.0;
-    void *memory = NULL;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result == VSH_OK) {
-        result = check(spheres, count, transform, &scale, error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_check_limit(&full, 100.0 * (double)count, "spheres", error);
-    }
-    if (result == VSH_OK) {
-        result = vshi_allocate(&memory, 1, sizeof **made, "spheres", error);
-    }
-    if (result != VSH_OK) {
-        return result;
-    }
-    vsh_spheres *own = memory;
+    vsh_spheres *own = NULL;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(check(spheres, count, transform, &scale, error));
+    VSHI_TRY(vshi_check_limit(&full, 100.0 * (double)count, "spheres", error));
+    VSHI_TRY(vshi_allocate((void **)&own, 1, sizeof *own, "spheres", error));
     own->info.count = count;
-    result = make(own, spheres, transform, scale, error);
+    const vsh_result result = make(own, spheres, transform, scale, error);
     if (result != VSH_OK) {
         vsh_spheres_free(own);
         return result;

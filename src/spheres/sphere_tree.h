@@ -40,6 +40,10 @@ typedef bool vshi_ball_fn(void *user, const double sphere[4]);
 uint64_t vshi_sphere_tree_search(const vsh_spheres *spheres, const vshi_ball_cone *cone, vshi_ball_fn *fn,
                                  void *user);
 
+/* Whether a sphere's numbers are within their ranges. Errors: VSH_ERROR_INPUT, of row `number` of the file
+ * `path`, or (NULL) of sphere `number`. */
+vsh_result vshi_sphere_check(const double sphere[4], const char *path, size_t number, vsh_error *error);
+
 /* Signed distance to the nearest sphere, world units, negative within one: true outside of all. */
 double vshi_sphere_tree_distance(const vsh_spheres *spheres, const double position[3]);
 

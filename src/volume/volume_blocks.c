@@ -196,7 +196,7 @@ static bool shade_piece(vshi_volume_bake *bake, size_t block, piece *p, const fa
     number_voxels(&bake->blocks[block], p);
     const vsh_points points = {p->count, &p->centre[0][0], bake->normals ? &p->normal[0][0] : NULL, p->texel};
     /* nothing of it is the caller's, so that memory is all it can fail for */
-    good = vsh_query_points(bake->query, &points, &bake->one, &a->output, stats, NULL) == VSH_OK;
+    good = vsh_query_points(bake->query, &points, NULL, &bake->one, &a->output, stats, NULL) == VSH_OK;
     for (size_t l = 0; l < lights; ++l) {
         good = good && take_answers(bake, block, p, l, a->to[l]) &&
                take_answers(bake, block, p, errors + l, a->to[lights + l]);

@@ -65,11 +65,10 @@ int main(int argc, char **argv) {
     CHECK(vsh_query_create(occluders, scene->lights, scene->light_count, &shade, &query, &error));
     enum { MOST = 100000 };
     static float rows[MOST][6], answers[MOST][6];
-    vsh_strided_points points = vsh_strided_points_default();
-    points.count = fread(rows, sizeof rows[0], MOST, stdin);
-    points.float_positions = rows[0];
-    points.normals = rows[0] + 3;
-    points.position_stride = points.normal_stride = sizeof rows[0];
+    const vsh_points points = {fread(rows, sizeof rows[0], MOST, stdin), NULL, rows[0] + 3, NULL};
+    vsh_point_layout layout = vsh_point_layout_default();
+    layout.float_positions = rows[0];
+    layout.position_stride = layout.normal_stride = sizeof rows[0];
     float *const visibility[1] = {answers[0]};
     vsh_query_output output = vsh_query_output_default();
     output.visibility = visibility;
@@ -77,7 +76,7 @@ int main(int argc, char **argv) {
     output.distance = answers[0] + 2;
     output.gradient = answers[0] + 3;
     output.stride = sizeof answers[0];
-    CHECK(vsh_query_strided(query, &points, NULL, &output, NULL, &error));
+    CHECK(vsh_query_points(query, &points, &layout, NULL, &output, NULL, &error));
     fwrite(answers, sizeof answers[0], points.count, stdout);
     vsh_query_free(query);
     vsh_occluders_free(occluders);
@@ -129,6 +128,16 @@ ANSWERS=(--distance --gradient --answers-only)
     done
     shade "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes --memory-limit 4M -o part.raw
     refused 4 "memory limit"
+}
+
+@test "rows that are kept are answered in batches as long as without them" {
+    points 4000 >p.raw
+    QUERY+=(--method adaptive --batch 1000 --points p.raw --normals yes) # whose rays depend on the batch
+    shade "${QUERY[@]}" --answers-only -o alone.raw
+    done_well
+    shade "${QUERY[@]}" -o kept.raw
+    done_well
+    perl -ne 'BEGIN { $/ = \32 } print substr $_, 24' kept.raw | cmp - alone.raw
 }
 
 @test "answers are near the truth" {

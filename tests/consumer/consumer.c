@@ -142,7 +142,7 @@ static void ask_points(const vsh_occluders *occluders, double least_open, double
     float open[2] = {-1.0F, -1.0F};
     check("shadow",
           vsh_shade_shadow(occluders, &points, &light, &options, NULL, visible, NULL, &stats, error), error);
-    check("ao", vsh_shade_ao(occluders, &points, &options, NULL, open, NULL, &stats, error), error);
+    check("ao", vsh_shade_ao(occluders, &points, &options, NULL, open, NULL, NULL, &stats, error), error);
     expect("shadow under the caster", visible[0], 0.0, 0.0);
     expect("shadow far aside", visible[1], 1.0, 1.0);
     expect("AO under the caster", open[0], least_open, most_open);

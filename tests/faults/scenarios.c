@@ -162,10 +162,10 @@ static vsh_result shade_points(const vsh_run *run, vsh_error *error) {
     }
     options.method = VSH_SHADOW_CONE;
     for (options.ao_method = VSH_AO_TAPS; options.ao_method < VSH_AO_EXACT; ++options.ao_method) {
-        TRY(vsh_shade_ao(occluders, &points, &options, run, values, deviation, NULL, error));
+        TRY(vsh_shade_ao(occluders, &points, &options, run, values, deviation, NULL, NULL, error));
     }
     options.ao_method = VSH_AO_CONES;
-    TRY(vsh_shade_bent(occluders, &points, &options, run, values, bent, NULL, error));
+    TRY(vsh_shade_ao(occluders, &points, &options, run, values, NULL, bent, NULL, error));
 end:
     vsh_occluders_free(occluders);
     vsh_grid_free(grid);
@@ -216,11 +216,8 @@ static vsh_result ask(const vsh_run *run, vsh_error *error) {
     output.visibility = planes;
     output.ao = values[1];
     output.gradient = gradient;
-    vsh_strided_points points = vsh_strided_points_default();
-    points.count = POINTS;
-    points.positions = positions;
-    points.normals = normals;
-    TRY(vsh_query_strided(query, &points, run, &output, NULL, error));
+    const vsh_points points = {POINTS, positions, normals, NULL};
+    TRY(vsh_query_points(query, &points, NULL, run, &output, NULL, error));
 end:
     vsh_query_free(query);
     vsh_spheres_free(spheres);

@@ -13,7 +13,7 @@
 enum { ROWS = 7, MOST_KEPT = 256 };
 
 static int copy(cli_points_reader *reader, int32_t format, bool answers_only, const char *to) {
-    const bool keep = !answers_only && format == reader->format && cli_points_can_keep(reader);
+    const bool keep = !answers_only && format == reader->table.format && cli_points_can_keep(reader);
     float values[2 * ROWS] = {1.0f, 0.5f, 1e-30f};
     const cli_points_column columns[] = {{"shadow.fuzz", values, 2}, {"fuzz", values + 1, 2}};
     cli_points points = {0};
@@ -47,9 +47,9 @@ static void read_back(const char *path, int32_t format, const cli_points_reader 
         }
     }
     if (code != CLI_INTERRUPTED &&
-        (code != CLI_OK || reader.rows != written->rows || reader.bad > written->bad)) {
-        fprintf(stderr, "fuzz: written %d rows, %d bad; read %d, %d bad; code %d\n", (int)written->rows,
-                (int)written->bad, (int)reader.rows, (int)reader.bad, code);
+        (code != CLI_OK || reader.table.rows != written->table.rows || reader.bad > written->bad)) {
+        fprintf(stderr, "fuzz: written %d rows, %d bad; read %d, %d bad; code %d\n", (int)written->table.rows,
+                (int)written->bad, (int)reader.table.rows, (int)reader.bad, code);
         abort();
     }
     cli_points_free(&points);
@@ -73,7 +73,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         code != CLI_INTERRUPTED) {
         abort();
     }
-    if (code == CLI_OK && !answers_only && from != to && to != CLI_POINTS_RAW) {
+    if (code == CLI_OK && !answers_only && from != to && to != VSHI_TABLE_RAW) {
         read_back(output, to, &reader);
     }
     cli_points_close(&reader);

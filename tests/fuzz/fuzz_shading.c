@@ -36,10 +36,11 @@ static void shade(fuzz_input *input) {
                                       how & 4 ? deviation : NULL, &stats, fuzz_error(&error)),
                      &error);
     fuzz_ended_plain(vsh_shade_ao(occluders, &points, &options, &run, values, how & 4 ? deviation : NULL,
+                                  NULL, &stats, fuzz_error(&error)),
+                     &error);
+    fuzz_ended_plain(vsh_shade_ao(occluders, &points, &options, &run, ao, how & 4 ? deviation : NULL, values,
                                   &stats, fuzz_error(&error)),
                      &error);
-    fuzz_ended_plain(
-        vsh_shade_bent(occluders, &points, &options, &run, ao, values, &stats, fuzz_error(&error)), &error);
     fuzz_free_occluders(occluders);
 }
 
@@ -60,23 +61,20 @@ static void query(fuzz_input *input) {
     enum { ROOM = 1 << 12, MOST_STRIDE = 256 };
     static double positions[ROOM];
     static float normals[ROOM], visibility[ROOM], ao[ROOM], distance[ROOM], gradient[ROOM];
-    vsh_strided_points points = vsh_strided_points_default();
-    points.count = POINTS;
-    fuzz_take(input, &points, sizeof points);
+    vsh_point_layout layout = vsh_point_layout_default();
+    fuzz_take(input, &layout, sizeof layout);
     vsh_query_output output = vsh_query_output_default();
     fuzz_take(input, &output, sizeof output);
-    points.count %= POINTS + 1;
-    if (points.position_stride > MOST_STRIDE || points.normal_stride > MOST_STRIDE ||
-        points.texel_stride > MOST_STRIDE || output.stride > MOST_STRIDE) {
+    if (layout.position_stride > MOST_STRIDE || layout.normal_stride > MOST_STRIDE ||
+        layout.texel_stride > MOST_STRIDE || output.stride > MOST_STRIDE) {
         vsh_query_free(made_query);
         return;
     }
     const uint8_t how = fuzz_byte(input);
-    points.positions = how & 1 ? positions : NULL;
-    points.float_positions = how & 2 ? normals : NULL;
-    points.normals = how & 4 ? normals : NULL;
-    points.texels = how & 8 ? (const uint32_t *)fuzz_indices : NULL;
-    points.texel_stride = 4;
+    const vsh_points points = {POINTS - fuzz_byte(input) % (POINTS + 1), how & 1 ? positions : NULL,
+                               how & 4 ? normals : NULL, how & 8 ? (const uint32_t *)fuzz_indices : NULL};
+    layout.float_positions = how & 2 ? normals : NULL;
+    layout.texel_stride = 4;
     float *const planes[] = {visibility};
     output.visibility = how & 16 ? planes : NULL;
     output.deviation = NULL;
@@ -86,7 +84,8 @@ static void query(fuzz_input *input) {
     output.gradient = how & 128 ? gradient : NULL;
     fuzz_fill(input, positions, 3 * POINTS * sizeof *positions);
     fuzz_fill(input, normals, 3 * POINTS * sizeof *normals);
-    fuzz_ended_plain(vsh_query_strided(made_query, &points, &run, &output, NULL, fuzz_error(&error)), &error);
+    fuzz_ended_plain(vsh_query_points(made_query, &points, &layout, &run, &output, NULL, fuzz_error(&error)),
+                     &error);
     vsh_query_free(made_query);
     fuzz_free_occluders(occluders);
 }

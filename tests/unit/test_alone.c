@@ -61,7 +61,7 @@ static void ask(const vsh_query *query, bool ao, size_t count, size_t batch, flo
         output.visibility = ao ? NULL : visibility;
         output.ao = ao ? values + i : NULL;
         vsh_error error = {VSH_OK, ""};
-        if (vsh_query_points(query, &points, NULL, &output, NULL, &error) != VSH_OK) {
+        if (vsh_query_points(query, &points, NULL, NULL, &output, NULL, &error) != VSH_OK) {
             fail_msg("%s", error.message);
         }
     }

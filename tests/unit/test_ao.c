@@ -16,7 +16,8 @@ static vsh_shade_stats ao_of(const vsh_field *field, int32_t method, int32_t con
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_ao(occluders_of(field), &points, &options, NULL, ao, NULL, &stats, &error) != VSH_OK) {
+    if (vsh_shade_ao(occluders_of(field), &points, &options, NULL, ao, NULL, NULL, &stats, &error) !=
+        VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;
@@ -256,7 +257,7 @@ static void threads_and_the_order_of_points_do_not_show(void **state) {
             run.threads = threads[i];
             stats[i] = vsh_shade_stats_zero();
             assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &options, &run,
-                                          i == 0 ? first : other, NULL, &stats[i], NULL),
+                                          i == 0 ? first : other, NULL, NULL, &stats[i], NULL),
                              VSH_OK);
             if (i > 0) {
                 assert_memory_equal(first, other, sizeof first);
@@ -266,8 +267,8 @@ static void threads_and_the_order_of_points_do_not_show(void **state) {
         for (size_t i = 0; i < COUNT; i += 97) { /* one at a time */
             const vsh_points one = {1, positions + 3 * i, normals + 3 * i, NULL};
             float ao = -1.0f;
-            assert_int_equal(vsh_shade_ao(occluders_of(field), &one, &options, NULL, &ao, NULL, NULL, NULL),
-                             VSH_OK);
+            assert_int_equal(
+                vsh_shade_ao(occluders_of(field), &one, &options, NULL, &ao, NULL, NULL, NULL, NULL), VSH_OK);
             assert_int_equal(bits_of(ao), bits_of(first[i]));
         }
     }
@@ -281,29 +282,32 @@ static void options_out_of_range_are_named(void **state) {
     const vsh_points points = {1, p, UP, NULL}, bare = {1, p, NULL, NULL};
     float ao = -1.0f;
     vsh_error error = {VSH_OK, ""};
-    assert_int_equal(vsh_shade_ao(occluders_of(field), &bare, NULL, NULL, &ao, NULL, NULL, &error),
+    assert_int_equal(vsh_shade_ao(occluders_of(field), &bare, NULL, NULL, &ao, NULL, NULL, NULL, &error),
                      VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "normals"));
     const int32_t counts[] = {0, -1, 257};
     for (int i = 0; i < 3; ++i) {
         vsh_shade_options options = preview_options();
         options.ao_cones = counts[i];
-        assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, &error),
-                         VSH_ERROR_ARGUMENT);
+        assert_int_equal(
+            vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, NULL, &error),
+            VSH_ERROR_ARGUMENT);
         assert_non_null(strstr(error.message, "ao_cones"));
     }
     const double distances[] = {0.0, -1.0, (double)NAN, (double)INFINITY};
     for (int i = 0; i < 4; ++i) {
         vsh_shade_options options = preview_options();
         options.ao_distance = distances[i];
-        assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, &error),
-                         VSH_ERROR_ARGUMENT);
+        assert_int_equal(
+            vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, NULL, &error),
+            VSH_ERROR_ARGUMENT);
         assert_non_null(strstr(error.message, "ao_distance"));
     }
     vsh_shade_options options = preview_options();
     options.ao_method = VSH_AO_AUTO + 1;
-    assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, &error),
-                     VSH_ERROR_ARGUMENT);
+    assert_int_equal(
+        vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, NULL, &error),
+        VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "ao_method"));
     assert_true(ao == -1.0f);
     vsh_field_free(field);
@@ -318,9 +322,9 @@ static void no_points_need_no_normals(void **state) {
         const vsh_points points = {count, count > 0 ? position : NULL, NULL, NULL};
         float ao[1], bent[3];
         const vsh_result expected = count > 0 ? VSH_ERROR_ARGUMENT : VSH_OK;
-        assert_int_equal(vsh_shade_ao(occluders_of(field), &points, NULL, NULL, ao, NULL, NULL, NULL),
+        assert_int_equal(vsh_shade_ao(occluders_of(field), &points, NULL, NULL, ao, NULL, NULL, NULL, NULL),
                          expected);
-        assert_int_equal(vsh_shade_bent(occluders_of(field), &points, NULL, NULL, ao, bent, NULL, NULL),
+        assert_int_equal(vsh_shade_ao(occluders_of(field), &points, NULL, NULL, ao, NULL, bent, NULL, NULL),
                          expected);
     }
     vsh_field_free(field);

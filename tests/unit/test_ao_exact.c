@@ -97,7 +97,7 @@ static void an_open_plate_is_exactly_1(void **state) {
     const vsh_points points = {TEXELS, positions, normals, NULL};
     const vsh_shade_options options = options_of(0.05);
     assert_int_equal(vsh_shade_ao(occluders_traced(scene.field, scene.triangles), &points, &options, NULL, ao,
-                                  NULL, NULL, NULL),
+                                  NULL, NULL, NULL, NULL),
                      VSH_OK);
     for (size_t i = 0; i < TEXELS; ++i) {
         assert_true(ao[i] == 1.0f);
@@ -122,7 +122,7 @@ static void the_error_left_is_what_was_asked_for_and_said(void **state) {
         const vsh_shade_options options = options_of(errors[e]);
         vsh_shade_stats stats = vsh_shade_stats_zero();
         assert_int_equal(vsh_shade_ao(occluders_traced(scene.field, scene.triangles), &points, &options, NULL,
-                                      ao, deviation, &stats, NULL),
+                                      ao, deviation, NULL, &stats, NULL),
                          VSH_OK);
         double squares = 0.0, bias = 0.0, said = 0.0;
         for (size_t i = 0; i < TEXELS; ++i) {
@@ -142,7 +142,7 @@ static void the_error_left_is_what_was_asked_for_and_said(void **state) {
             vsh_run run = vsh_run_default();
             run.threads = threads[t];
             assert_int_equal(vsh_shade_ao(occluders_traced(scene.field, scene.triangles), &points, &options,
-                                          &run, other, NULL, NULL, NULL),
+                                          &run, other, NULL, NULL, NULL, NULL),
                              VSH_OK);
             assert_memory_equal(ao, other, sizeof ao);
         }
@@ -159,7 +159,7 @@ static void it_needs_triangles(void **state) {
     float ao = -1.0f;
     vsh_error error = {VSH_OK, ""};
     assert_int_equal(
-        vsh_shade_ao(occluders_of(scene.field), &points, &options, NULL, &ao, NULL, NULL, &error),
+        vsh_shade_ao(occluders_of(scene.field), &points, &options, NULL, &ao, NULL, NULL, NULL, &error),
         VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "triangles"));
     free_scene(&scene);

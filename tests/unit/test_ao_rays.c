@@ -23,7 +23,8 @@ static vsh_shade_stats shade(const vsh_field *field, const vsh_shade_options *op
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_ao(occluders_of(field), &points, options, NULL, ao, deviation, &stats, &error) != VSH_OK) {
+    if (vsh_shade_ao(occluders_of(field), &points, options, NULL, ao, deviation, NULL, &stats, &error) !=
+        VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;
@@ -258,7 +259,7 @@ static void threads_and_the_order_of_points_do_not_show(void **state) {
                 run.threads = threads[i];
                 stats[i] = vsh_shade_stats_zero();
                 assert_int_equal(vsh_shade_ao(occluders_of(p->field), &points, &options, &run,
-                                              i == 0 ? first : other, NULL, &stats[i], NULL),
+                                              i == 0 ? first : other, NULL, NULL, &stats[i], NULL),
                                  VSH_OK);
                 if (i > 0) {
                     assert_memory_equal(first, other, sizeof first);
@@ -269,7 +270,7 @@ static void threads_and_the_order_of_points_do_not_show(void **state) {
                 const vsh_points one = {1, p->positions + 3 * i, p->normals + 3 * i, &texels[i]};
                 float ao = -1.0f;
                 assert_int_equal(
-                    vsh_shade_ao(occluders_of(p->field), &one, &options, NULL, &ao, NULL, NULL, NULL),
+                    vsh_shade_ao(occluders_of(p->field), &one, &options, NULL, &ao, NULL, NULL, NULL, NULL),
                     VSH_OK);
                 assert_int_equal(bits_of(ao), bits_of(first[i]));
             }
@@ -319,7 +320,7 @@ static void edges_hide_as_much_as_their_casters(void **state) {
     options.rays = 1024;
     options.ao_distance = 1.0;
     const vsh_points points = {COUNT, places, ups, NULL};
-    assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &options, NULL, open, NULL, NULL, NULL),
+    assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &options, NULL, open, NULL, NULL, NULL, NULL),
                      VSH_OK);
     const truth_metrics m = truth_compare(COUNT, open, expected, NULL);
     print_message("slats of 3.3 voxels: rmse %.4f, bias %+.4f\n", m.rmse, m.bias);

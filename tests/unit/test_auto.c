@@ -118,11 +118,11 @@ static void the_default_is_exact_with_triangles_and_adaptive_without(void **stat
         shade(&given, &points, &options, values);
         shade(&given, &points, &named, other);
         assert_memory_equal(values, other, sizeof values);
+        assert_int_equal(vsh_shade_ao(occluders_of_caster(&given), &points, &options, NULL, values, NULL,
+                                      NULL, NULL, NULL),
+                         VSH_OK);
         assert_int_equal(
-            vsh_shade_ao(occluders_of_caster(&given), &points, &options, NULL, values, NULL, NULL, NULL),
-            VSH_OK);
-        assert_int_equal(
-            vsh_shade_ao(occluders_of_caster(&given), &points, &named, NULL, other, NULL, NULL, NULL),
+            vsh_shade_ao(occluders_of_caster(&given), &points, &named, NULL, other, NULL, NULL, NULL, NULL),
             VSH_OK);
         assert_memory_equal(values, other, sizeof values);
         assert_int_equal(vsh_shadow_method_resolve(VSH_SHADOW_AUTO, traced), named.method);
@@ -147,7 +147,7 @@ static void a_layer_takes_the_method_that_its_own_triangles_allow(void **state) 
     layer.method = VSH_SHADOW_ADAPTIVE;
     shade_by(&casters, &points, &options, other);
     assert_memory_equal(values, other, sizeof values);
-    assert_int_equal(vsh_shade_ao(&casters, &points, &options, NULL, values, NULL, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_shade_ao(&casters, &points, &options, NULL, values, NULL, NULL, NULL, NULL), VSH_OK);
     caster_free(&c);
 }
 

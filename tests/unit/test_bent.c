@@ -127,15 +127,18 @@ static void test_wall(void **state) {
         shade.ao_cones = 64;
         shade.rays = 1024;
         shade.ao_distance = 2.0;
-        float ao, bent[3];
-        assert_int_equal(vsh_shade_bent(occluders_of(field), &points, &shade, NULL, &ao, bent, NULL, NULL),
-                         VSH_OK);
+        float ao, deviation, bent[3];
+        assert_int_equal(
+            vsh_shade_ao(occluders_of(field), &points, &shade, NULL, &ao, &deviation, bent, NULL, NULL),
+            VSH_OK);
         assert_float_equal(ao, 0.5, 0.05);
         assert_true(degrees_between(bent, truth) < 3.0);
-        float alone;
-        assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &shade, NULL, &alone, NULL, NULL, NULL),
+        float alone, its_deviation;
+        assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &shade, NULL, &alone, &its_deviation,
+                                      NULL, NULL, NULL),
                          VSH_OK);
         assert_int_equal(bits_of(alone), bits_of(ao));
+        assert_int_equal(bits_of(its_deviation), bits_of(deviation));
     }
     vsh_field_free(field);
 }

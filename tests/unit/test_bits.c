@@ -44,7 +44,7 @@ static uint64_t shade_by(const context *c, const vsh_light *light, const vsh_sha
     vsh_error error;
     check(light != NULL
               ? vsh_shade_shadow(&casters, &points, light, options, &c->run, value, deviation, &stats, &error)
-              : vsh_shade_ao(&casters, &points, options, &c->run, value, deviation, &stats, &error),
+              : vsh_shade_ao(&casters, &points, options, &c->run, value, deviation, NULL, &stats, &error),
           &error);
     add_floats(b, value, POINTS);
     for (size_t i = 0; i < POINTS; ++i) { /* NaN has many bits */
@@ -115,7 +115,7 @@ static void bent_normals(const context *c, int32_t method, bits *b) {
     options.ao_method = method;
     options.rays = 16;
     vsh_error error;
-    check(vsh_shade_bent(occluders_of(c->field), &points, &options, &c->run, value, bent, NULL, &error),
+    check(vsh_shade_ao(occluders_of(c->field), &points, &options, &c->run, value, NULL, bent, NULL, &error),
           &error);
     add_floats(b, value, POINTS);
     add_floats(b, bent, sizeof bent / sizeof bent[0]);

@@ -68,9 +68,9 @@ static void a_layer_of_heights_is_shaded_as_its_triangles_with_the_receivers_hor
         assert_true(m.rmse < 0.006);
         assert_true(m.penumbra > POINTS / 4);
     }
-    assert_int_equal(
-        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &options, NULL, values, NULL, NULL, &error),
-        VSH_OK);
+    assert_int_equal(vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &options, NULL, values, NULL,
+                                  NULL, NULL, &error),
+                     VSH_OK);
     if (rays != NULL) {
         truth_mesh_ao(rays, POINTS, positions, normals, 1.0, 1024, 0, truth);
         const truth_metrics m = truth_compare(POINTS, values, truth, NULL);
@@ -212,7 +212,7 @@ static void bent_normals_lean_away_from_spheres_and_terrain(void **state) {
     const vsh_points points = {COUNT, positions, normals, NULL};
     const truth_scene scene = {solids, 2};
     assert_int_equal(
-        vsh_shade_bent(occluders_with(empty, &layer, 1), &points, &options, NULL, ao, bent, NULL, NULL),
+        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &options, NULL, ao, NULL, bent, NULL, NULL),
         VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         double mean[3];
@@ -240,7 +240,7 @@ static void bent_normals_lean_away_from_spheres_and_terrain(void **state) {
         positions[3 * i + 2] = between(&counter, -3.0, 3.0);
     }
     assert_int_equal(
-        vsh_shade_bent(occluders_with(empty, &layer, 1), &points, &options, NULL, ao, bent, NULL, NULL),
+        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &options, NULL, ao, NULL, bent, NULL, NULL),
         VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         double mean[3];

@@ -290,7 +290,7 @@ static outcome try(const stage *s, const trial *t) {
         }
         const vsh_points points = {all.count, places, normals, NULL};
         result = s->ao ? vsh_shade_ao(occluders_traced(s->field, s->triangles), &points, &options.shade, NULL,
-                                      values, deviations, &stats, &error)
+                                      values, deviations, NULL, &stats, &error)
                        : vsh_shade_shadow(occluders_traced(s->field, s->triangles), &points, &light,
                                           &options.shade, NULL, values, deviations, &stats, &error);
         for (size_t i = 0; i < all.count; ++i) {

@@ -111,7 +111,7 @@ static void run_all(int s, int32_t threads, outcome *o) {
             vsh_shade_options how = preview_options();
             how.ao_method = i;
             results[calls++] = vsh_shade_ao(occluders_traced(f, triangles), &points, &how, &run, o->open[i],
-                                            NULL, &o->stats, &error);
+                                            NULL, NULL, &o->stats, &error);
         }
         if (triangles != NULL) {
             vshi_floats_set(setting);

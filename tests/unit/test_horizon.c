@@ -87,7 +87,7 @@ static vsh_result shade(const stage *s, int32_t method, const double up[3], floa
     }
     const vsh_points points = {POINTS, s->positions, s->normals, NULL};
     return vsh_shade_ao(occluders_traced(s->field, s->triangles), &points, &options, NULL, values, NULL, NULL,
-                        error);
+                        NULL, error);
 }
 
 static void find_truth(stage *s, const double up[3]) {
@@ -197,12 +197,12 @@ static void what_knows_no_horizon_says_so(void **state) {
     options.ao_up[2] = NAN;
     const vsh_points points = {POINTS, s->positions, s->normals, NULL};
     assert_int_equal(
-        vsh_shade_ao(occluders_of(s->field), &points, &options, NULL, s->values, NULL, NULL, NULL),
+        vsh_shade_ao(occluders_of(s->field), &points, &options, NULL, s->values, NULL, NULL, NULL, NULL),
         VSH_ERROR_ARGUMENT);
     options.ao_up[2] = 1.0;
     static float bent[3 * POINTS];
     assert_int_equal(
-        vsh_shade_bent(occluders_of(s->field), &points, &options, NULL, s->values, bent, NULL, NULL),
+        vsh_shade_ao(occluders_of(s->field), &points, &options, NULL, s->values, NULL, bent, NULL, NULL),
         VSH_ERROR_ARGUMENT);
     tear_down(s);
 }

@@ -98,7 +98,9 @@ Outcome work(int32_t threads = 0) {
                     error);
             o.add(visible.data(), COUNT);
         }
-        o.check(vsh_shade_ao(occluders, &points, &options, &run, ao.data(), nullptr, nullptr, &error), error);
+        o.check(
+            vsh_shade_ao(occluders, &points, &options, &run, ao.data(), nullptr, nullptr, nullptr, &error),
+            error);
         o.add(ao.data(), COUNT);
         vsh_provenance_source source = vsh_provenance_source_default();
         source.scene = scene;

@@ -157,7 +157,7 @@ static void shade_with(const caster *c, const vsh_light *light, int32_t method, 
                                   ? vsh_shade_shadow(occluders_of_caster(c), &points, light, &options, &run,
                                                      o->value, o->deviation, &o->stats, &error)
                                   : vsh_shade_ao(occluders_of_caster(c), &points, &options, &run, o->value,
-                                                 o->deviation, &o->stats, &error);
+                                                 o->deviation, NULL, &o->stats, &error);
     if (result != VSH_OK) {
         fail_msg("%s", error.message);
     }

@@ -70,8 +70,8 @@ static void test_nothing_hides(void **state) {
     }
     const vsh_points points = {COUNT, positions, normals, NULL};
     vsh_shade_options options = preview_options();
-    assert_int_equal(vsh_shade_ao(occluders_of(empty), &points, &options, NULL, values, NULL, NULL, NULL),
-                     VSH_OK);
+    assert_int_equal(
+        vsh_shade_ao(occluders_of(empty), &points, &options, NULL, values, NULL, NULL, NULL, NULL), VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(values[i], 1.0f, 1e-6f);
     }
@@ -212,8 +212,9 @@ static void test_where_it_counts(void **state) {
 
     const vsh_points points = {COUNT, positions, normals, NULL};
     assert_int_equal(
-        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &plain, NULL, ao, NULL, NULL, NULL), VSH_OK);
-    assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &plain, NULL, alone, NULL, NULL, NULL),
+        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &plain, NULL, ao, NULL, NULL, NULL, NULL),
+        VSH_OK);
+    assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &plain, NULL, alone, NULL, NULL, NULL, NULL),
                      VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(ao[i], alone[i], 1e-6);
@@ -222,13 +223,15 @@ static void test_where_it_counts(void **state) {
     layer.remap[0] = 0.4;
     layer.remap[1] = 0.6;
     assert_int_equal(
-        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &plain, NULL, ao, NULL, NULL, NULL), VSH_OK);
+        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &plain, NULL, ao, NULL, NULL, NULL, NULL),
+        VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(ao[i], alone[i], 1e-6);
     }
     layer.ao = 0;
     assert_int_equal(
-        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &plain, NULL, ao, NULL, NULL, NULL), VSH_OK);
+        vsh_shade_ao(occluders_with(empty, &layer, 1), &points, &plain, NULL, ao, NULL, NULL, NULL, NULL),
+        VSH_OK);
     for (size_t i = 0; i < COUNT; ++i) {
         assert_float_equal(ao[i], 1.0f, 1e-6f);
     }

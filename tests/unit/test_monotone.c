@@ -152,7 +152,7 @@ static void more_rays_are_never_farther_from_the_truth(void **state) {
                 options.rays = method == first ? 4 << (2 * step) : 1024;
                 options.max_error = 0.08 / (1 << step);
                 assert_int_equal(ao ? vsh_shade_ao(occluders_of_caster(&c), &points, &options, NULL, values,
-                                                   NULL, NULL, NULL)
+                                                   NULL, NULL, NULL, NULL)
                                     : vsh_shade_shadow(occluders_of_caster(&c), &points, &light, &options,
                                                        NULL, values, NULL, NULL, NULL),
                                  VSH_OK);

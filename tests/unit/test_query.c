@@ -68,7 +68,7 @@ static vsh_shade_stats ask(const vsh_query *query, const vsh_points *points, int
     run.threads = threads;
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_query_points(query, points, &run, &output, &stats, &error) != VSH_OK) {
+    if (vsh_query_points(query, points, NULL, &run, &output, &stats, &error) != VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;
@@ -82,7 +82,7 @@ static void expect(const caster *c, const vsh_points *points, const vsh_light *l
                                   ? vsh_shade_shadow(occluders_of_caster(c), points, &lights[l], options,
                                                      NULL, expected, expected_deviation, NULL, &error)
                                   : vsh_shade_ao(occluders_of_caster(c), points, options, NULL, expected,
-                                                 expected_deviation, NULL, &error);
+                                                 expected_deviation, NULL, NULL, &error);
     if (result != VSH_OK) {
         fail_msg("%s", error.message);
     }
@@ -256,11 +256,11 @@ static void what_is_not_asked_for_is_not_marched(void **state) {
     const vsh_points points = {FEW, positions, normals, NULL};
     vsh_query_output output = vsh_query_output_default();
     vsh_shade_stats none = vsh_shade_stats_zero(), one = none, alone = none;
-    assert_int_equal(vsh_query_points(query, &points, NULL, &output, &none, NULL), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, &none, NULL), VSH_OK);
     assert_true(none.marches == 0 && none.samples == 0 && none.skipped == 0);
     float *const second[LIGHTS] = {NULL, values[1]};
     output.visibility = second;
-    assert_int_equal(vsh_query_points(query, &points, NULL, &output, &one, NULL), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, &one, NULL), VSH_OK);
     assert_int_equal(
         vsh_shade_shadow(occluders_of(field), &points, &lights[1], NULL, NULL, expected, NULL, &alone, NULL),
         VSH_OK);
@@ -268,7 +268,7 @@ static void what_is_not_asked_for_is_not_marched(void **state) {
     assert_memory_equal(expected, values[1], FEW * sizeof expected[0]);
     /* nor is anything of no points, which need no arrays */
     const vsh_points nothing = {0, NULL, NULL, NULL};
-    assert_int_equal(vsh_query_points(query, &nothing, NULL, &output, &none, NULL), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &nothing, NULL, NULL, &output, &none, NULL), VSH_OK);
     assert_int_equal(none.marches, 0);
     vsh_query_free(query);
     vsh_query_free(NULL);
@@ -287,7 +287,7 @@ static void *ask_alone(void *user) {
         float *const visibility[1] = {&a->value[i]};
         vsh_query_output output = vsh_query_output_default();
         output.visibility = visibility;
-        if (vsh_query_points(a->query, &one, NULL, &output, NULL, NULL) != VSH_OK) {
+        if (vsh_query_points(a->query, &one, NULL, NULL, &output, NULL, NULL) != VSH_OK) {
             a->value[i] = -1.0f;
         }
     }
@@ -341,17 +341,17 @@ static void limits_and_cancelling_have_their_codes(void **state) {
     vsh_run run = vsh_run_default();
     vsh_error error = {VSH_OK, ""};
     run.memory_limit = info.bytes + 16 * MANY - 4096;
-    assert_int_equal(vsh_query_points(query, &shuffled, &run, &output, NULL, &error), VSH_ERROR_LIMIT);
+    assert_int_equal(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &error), VSH_ERROR_LIMIT);
     assert_non_null(strstr(error.message, "query"));
     run.memory_limit = info.bytes + 16 * MANY + 4096;
-    assert_int_equal(vsh_query_points(query, &shuffled, &run, &output, NULL, &error), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &error), VSH_OK);
     run.memory_limit = 0;
     const double stops[] = {0.0, 0.1, 0.5};
     for (int i = 0; i < 3; ++i) {
         double stop = stops[i];
         run.progress = stop_at;
         run.user = &stop;
-        assert_int_equal(vsh_query_points(query, &shuffled, &run, &output, NULL, &error),
+        assert_int_equal(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &error),
                          VSH_ERROR_CANCELLED);
     }
     vsh_query_free(query);
@@ -391,20 +391,20 @@ static void bad_arguments_are_refused_by_name(void **state) {
     const vsh_points bare = {FEW, positions, NULL, NULL};
     vsh_query_output output = vsh_query_output_default();
     output.ao = values[0];
-    assert_int_equal(vsh_query_points(query, &bare, NULL, &output, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &error), VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "normals"));
     output.ao = NULL;
     output.ao_deviation = values[0];
-    assert_int_equal(vsh_query_points(query, &bare, NULL, &output, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &error), VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "ao_deviation"));
     float *const deviation[LIGHTS] = {NULL, values[0]};
     output = vsh_query_output_default();
     output.deviation = deviation;
-    assert_int_equal(vsh_query_points(query, &bare, NULL, &output, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &error), VSH_ERROR_ARGUMENT);
     assert_non_null(strstr(error.message, "light 1"));
     output = vsh_query_output_default();
     output.struct_size = 0;
-    assert_int_equal(vsh_query_points(query, &bare, NULL, &output, NULL, &error), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &error), VSH_ERROR_ARGUMENT);
     vsh_query_free(query);
     vsh_field_free(field);
 }

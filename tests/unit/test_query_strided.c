@@ -65,7 +65,7 @@ static void ask_packed(const vsh_query *query, size_t count) {
     output.distance = distance;
     output.gradient = gradient;
     const vsh_points points = {count, positions, normals, texels};
-    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, NULL), VSH_OK);
 }
 
 static void strides_floats_and_gaps_give_the_bits_of_packed_arrays(void **state) {
@@ -84,13 +84,11 @@ static void strides_floats_and_gaps_give_the_bits_of_packed_arrays(void **state)
                     -7.0f;
                 vertices[i].gradient[0] = vertices[i].gradient[1] = vertices[i].gradient[2] = -7.0f;
             }
-            vsh_strided_points points = vsh_strided_points_default();
-            points.count = count;
-            points.positions = floats ? NULL : vertices[0].place;
-            points.float_positions = floats ? vertices[0].position : NULL;
-            points.normals = vertices[0].normal;
-            points.texels = &vertices[0].texel;
-            points.position_stride = points.normal_stride = points.texel_stride = sizeof vertices[0];
+            const vsh_points points = {count, floats ? NULL : vertices[0].place, vertices[0].normal,
+                                       &vertices[0].texel};
+            vsh_point_layout layout = vsh_point_layout_default();
+            layout.float_positions = floats ? vertices[0].position : NULL;
+            layout.position_stride = layout.normal_stride = layout.texel_stride = sizeof vertices[0];
             float *const shadow[1] = {&vertices[0].visibility}, *const error[1] = {&vertices[0].deviation};
             vsh_query_output output = vsh_query_output_default();
             output.visibility = shadow;
@@ -100,7 +98,7 @@ static void strides_floats_and_gaps_give_the_bits_of_packed_arrays(void **state)
             output.gradient = vertices[0].gradient;
             output.stride = sizeof vertices[0];
             vsh_error why = {VSH_OK, ""};
-            if (vsh_query_strided(query, &points, NULL, &output, NULL, &why) != VSH_OK) {
+            if (vsh_query_points(query, &points, &layout, NULL, &output, NULL, &why) != VSH_OK) {
                 fail_msg("%s", why.message);
             }
             for (size_t i = 0; i < count; ++i) {
@@ -115,17 +113,14 @@ static void strides_floats_and_gaps_give_the_bits_of_packed_arrays(void **state)
         }
     }
     /* and without gaps, by strides of 0, at positions that are packed */
-    vsh_strided_points points = vsh_strided_points_default();
-    points.count = 1000;
-    points.positions = positions;
-    points.normals = normals;
-    points.texels = texels;
+    const vsh_points points = {1000, positions, normals, texels};
+    const vsh_point_layout layout = vsh_point_layout_default();
     static float again[1000];
     float *const shadow[1] = {again};
     vsh_query_output output = vsh_query_output_default();
     output.visibility = shadow;
     ask_packed(query, 1000);
-    assert_int_equal(vsh_query_strided(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &points, &layout, NULL, &output, NULL, NULL), VSH_OK);
     assert_memory_equal(again, visibility, sizeof again);
     vsh_query_free(query);
     vsh_field_free(field);
@@ -140,7 +135,7 @@ static void distance_is_the_fields_and_near_the_truth(void **state) {
     vsh_query_output output = vsh_query_output_default();
     output.distance = distance;
     const vsh_points points = {MANY, positions, NULL, NULL};
-    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, NULL), VSH_OK);
     vsh_field_sample(field, MANY, positions, ao);
     assert_memory_equal(distance, ao, sizeof distance);
     for (size_t i = 0; i < MANY; ++i) {
@@ -177,7 +172,7 @@ static void gradients_are_unit_and_point_away_from_the_sphere(void **state) {
     vsh_query_output output = vsh_query_output_default();
     output.gradient = gradient;
     const vsh_points points = {COUNT, positions, NULL, NULL};
-    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, NULL), VSH_OK);
     double worst_near = 1.0, worst = 1.0;
     for (size_t i = 0; i < COUNT; ++i) {
         double length = 0.0, along = 0.0, radius = 0.0;
@@ -216,7 +211,7 @@ static void there_is_no_gradient_beyond_the_reach_nor_where_nothing_is(void **st
     output.gradient = gradient;
     output.distance = distance;
     const vsh_points points = {4, places[0], NULL, NULL};
-    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, NULL), VSH_OK);
     assert_true(gradient[0] == 0.0f && gradient[1] == 0.0f && gradient[2] == 0.0f);
     assert_true(distance[0] > 0.0f);
     for (size_t i = 3; i < 9; ++i) {
@@ -251,14 +246,14 @@ static void calls_for_a_batch_each_give_the_bits_of_one_call(void **state) {
     vsh_query_output output = vsh_query_output_default();
     output.visibility = all;
     const vsh_points points = {ALL, at, NULL, NULL};
-    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, NULL), VSH_OK);
     for (size_t first = 0; first < ALL; first += VSH_QUERY_BATCH) {
         float *const part[1] = {parts + first};
         output.visibility = part;
         const size_t left = ALL - first;
         const vsh_points some = {left < VSH_QUERY_BATCH ? left : VSH_QUERY_BATCH, at + 3 * first, NULL,
                                  numbers + first};
-        assert_int_equal(vsh_query_points(query, &some, NULL, &output, NULL, NULL), VSH_OK);
+        assert_int_equal(vsh_query_points(query, &some, NULL, NULL, &output, NULL, NULL), VSH_OK);
     }
     size_t between_them = 0; /* whose rays depend on the points around them */
     for (size_t i = VSH_QUERY_BATCH; i < ALL; ++i) {
@@ -279,50 +274,49 @@ static void strides_that_are_none_are_refused_by_name(void **state) {
     const truth_solid ball = {.shape = TRUTH_SPHERE, .radius = 1.0};
     vsh_field *field = field_of((truth_scene){&ball, 1}, 0.1, 1.0);
     vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);
-    vsh_strided_points good = vsh_strided_points_default();
-    good.count = 2;
-    good.positions = positions;
-    good.normals = normals;
-    good.texels = texels;
+    const vsh_points good = {2, positions, normals, texels};
     vsh_query_output output = vsh_query_output_default();
     output.distance = distance;
     struct {
-        vsh_strided_points points;
+        vsh_points points;
+        vsh_point_layout layout;
         size_t stride;
         const char *word;
     } cases[8];
     for (int i = 0; i < 8; ++i) {
         cases[i].points = good;
+        cases[i].layout = vsh_point_layout_default();
         cases[i].stride = 0;
     }
-    cases[0].points.position_stride = 3;
+    cases[0].layout.position_stride = 3;
     cases[0].word = "position_stride 3";
-    cases[1].points.position_stride = 28;
+    cases[1].layout.position_stride = 28;
     cases[1].word = "position_stride 28";
-    cases[2].points.normal_stride = 8;
+    cases[2].layout.normal_stride = 8;
     cases[2].word = "normal_stride";
-    cases[3].points.texel_stride = 6;
+    cases[3].layout.texel_stride = 6;
     cases[3].word = "texel_stride";
-    cases[4].points.float_positions = normals;
+    cases[4].layout.float_positions = normals;
     cases[4].word = "float_positions";
     cases[5].points.positions = NULL;
     cases[5].word = "float_positions";
     cases[6].stride = 2;
     cases[6].word = "stride 2";
-    cases[7].points.struct_size = 0;
-    cases[7].word = "vsh_strided_points";
+    cases[7].layout.struct_size = 0;
+    cases[7].word = "vsh_point_layout";
     for (int i = 0; i < 8; ++i) {
         vsh_error error = {VSH_OK, ""};
         output.stride = cases[i].stride;
-        assert_int_equal(vsh_query_strided(query, &cases[i].points, NULL, &output, NULL, &error),
-                         VSH_ERROR_ARGUMENT);
+        assert_int_equal(
+            vsh_query_points(query, &cases[i].points, &cases[i].layout, NULL, &output, NULL, &error),
+            VSH_ERROR_ARGUMENT);
         if (strstr(error.message, cases[i].word) == NULL) {
             fail_msg("'%s' names no %s", error.message, cases[i].word);
         }
     }
     output.stride = 8; /* too near for a gradient */
     output.gradient = gradient;
-    assert_int_equal(vsh_query_strided(query, &good, NULL, &output, NULL, NULL), VSH_ERROR_ARGUMENT);
+    assert_int_equal(vsh_query_points(query, &good, NULL, NULL, &output, NULL, NULL), VSH_ERROR_ARGUMENT);
     vsh_query_free(query);
     vsh_field_free(field);
 }

@@ -117,11 +117,11 @@ static void receivers_on_voxel_planes_see_what_their_neighbours_see(void **state
             vsh_shade_options options = preview_options();
             *(ao ? &options.ao_method : &options.method) = method;
             options.ao_distance = 0.5;
-            assert_int_equal(
-                ao ? vsh_shade_ao(occluders_of_caster(&c), &points, &options, NULL, values, NULL, NULL, NULL)
-                   : vsh_shade_shadow(occluders_of_caster(&c), &points, &light, &options, NULL, values, NULL,
-                                      NULL, NULL),
-                VSH_OK);
+            assert_int_equal(ao ? vsh_shade_ao(occluders_of_caster(&c), &points, &options, NULL, values, NULL,
+                                               NULL, NULL, NULL)
+                                : vsh_shade_shadow(occluders_of_caster(&c), &points, &light, &options, NULL,
+                                                   values, NULL, NULL, NULL),
+                             VSH_OK);
             double worst = 0.0;
             size_t changed = 0;
             for (size_t i = 0; i < PLACES; ++i) {

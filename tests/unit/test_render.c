@@ -122,7 +122,7 @@ static float floor_light(const vsh_field *field, const vsh_light *light, const d
     const vsh_points points = {1, at, up, NULL};
     float open = -1.0f;
     const vsh_shade_options shade = preview_options();
-    assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &shade, NULL, &open, NULL, NULL, NULL),
+    assert_int_equal(vsh_shade_ao(occluders_of(field), &points, &shade, NULL, &open, NULL, NULL, NULL, NULL),
                      VSH_OK);
     return open;
 }

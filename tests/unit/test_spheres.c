@@ -372,11 +372,12 @@ static void rows_of_a_file_are_read_or_refused_by_number(void **state) {
     double *spheres = NULL;
     size_t count = 0;
     vsh_error error = {VSH_OK, ""};
-    static const double expected[12] = {1, -2.5, 3e2, 0.5, 4, 5, 6, 7, 0.25, 0, 1, 2};
-    assert_int_equal(read_text("x,y,z,radius\r\n1,-2.5,3e2,0.5\r\n\n# none\n4; 5; 6; 7\n.25 0\t1 2", &spheres,
-                               &count, &error),
-                     VSH_OK);
-    assert_int_equal(count, 3);
+    static const double expected[16] = {1, -2.5, 3e2, 0.5, 4, 5, 6, 7, 8, 9, 10, 11, 0.25, 0, 1, 2};
+    assert_int_equal(
+        read_text("x,y,z,radius\r\n1,-2.5,3e2,0.5\r\n\n# none\n4; 5; 6; 7\n\"8\",9,\"10\" 11\n.25 0\t1 2",
+                  &spheres, &count, &error),
+        VSH_OK);
+    assert_int_equal(count, 4);
     assert_memory_equal(spheres, expected, sizeof expected);
     vsh_spheres_list_free(spheres);
     static const struct {

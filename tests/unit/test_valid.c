@@ -233,7 +233,8 @@ static void points_deep_in_a_box_see_no_sky_though_its_triangles_are_far(void **
     options.ao_method = VSH_AO_EXACT;
     options.ao_distance = 0.5;
     float ao[3];
-    check(vsh_shade_ao(occluders_traced(field, triangles), &points, &options, NULL, ao, NULL, NULL, &error),
+    check(vsh_shade_ao(occluders_traced(field, triangles), &points, &options, NULL, ao, NULL, NULL, NULL,
+                       &error),
           &error);
     assert_true(ao[0] == 0.0f);
     assert_true(ao[1] > 0.95f);

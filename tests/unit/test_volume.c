@@ -150,7 +150,7 @@ static size_t compare(const vsh_field *field, const vsh_voxels *voxels, const vs
     output.visibility = values;
     output.ao = ao ? values[LIGHTS] : NULL;
     const vsh_points points = {count, centre, normals ? normal : NULL, NULL};
-    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, NULL), VSH_OK);
     /* some normals differ by a bit, as the lattice's own axes are multiplied in another order */
     size_t different = 0, far = 0;
     for (size_t g = 0; g < LIGHTS + (ao ? 1 : 0); ++g) {
@@ -265,7 +265,7 @@ static void layers_hide_light_and_are_solid(void **state) {
     float *const visibility[1] = {values};
     output.visibility = visibility;
     const vsh_points points = {d.count, centre, NULL, NULL};
-    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, NULL), VSH_OK);
     size_t different = 0, behind = 0, inside = 0, near = 0;
     for (size_t i = 0; i < d.count; ++i) {
         if (one[i] >= 0.0f && two[i] >= 0.0f) {
@@ -402,7 +402,7 @@ static void casters_without_voxels_hide_light_and_are_solid(void **state) {
     vsh_query_output output = vsh_query_output_default();
     output.visibility = visibility;
     const vsh_points points = {d.count, centre, NULL, NULL};
-    assert_int_equal(vsh_query_points(query, &points, NULL, &output, NULL, NULL), VSH_OK);
+    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, NULL), VSH_OK);
     size_t outside = 0, in_ball = 0, in_sphere = 0, in_heights = 0, shaded_by_sphere = 0;
     for (size_t i = 0; i < d.count; ++i) {
         const double *p = centre + 3 * i;

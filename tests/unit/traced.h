@@ -176,7 +176,8 @@ static inline vsh_shade_stats cast_ao(const caster *c, int32_t method, double di
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_ao(occluders_of_caster(c), &points, &options, NULL, open, NULL, &stats, &error) != VSH_OK) {
+    if (vsh_shade_ao(occluders_of_caster(c), &points, &options, NULL, open, NULL, NULL, &stats, &error) !=
+        VSH_OK) {
         fail_msg("%s", error.message);
     }
     return stats;

@@ -3,6 +3,7 @@
 #include "base/decimal.h"
 #include "cli/message.h"
 #include "cli/signals.h"
+#include "cli/try.h"
 #include "points.h"
 
 #include <errno.h>
@@ -29,10 +30,10 @@ static void write_csv_head(cli_points_writer *w, const cli_points_reader *reader
     const char *between = "";
     const char delimiter[2] = {w->delimiter, '\0'};
     if (w->keep) {
-        if (reader->header == NULL) {
+        if (reader->table.header == NULL) {
             return; /* none came, none goes */
         }
-        fwrite(reader->header, 1, reader->header_size, w->file);
+        fwrite(reader->table.header, 1, reader->table.header_size, w->file);
         between = delimiter;
     }
     for (int i = 0; own_name(w, i) != NULL; ++i) {
@@ -48,8 +49,7 @@ static void write_csv_head(cli_points_writer *w, const cli_points_reader *reader
 
 static void write_ply_properties(const cli_points_writer *w) {
     for (int i = 0; own_name(w, i) != NULL; ++i) {
-        fprintf(w->file, "property %s %s\n", i < CLI_POINTS_NX && !w->floats ? "double" : "float",
-                own_name(w, i));
+        fprintf(w->file, "property %s %s\n", i < 3 && !w->floats ? "double" : "float", own_name(w, i));
     }
     for (size_t c = 0; c < w->column_count; ++c) {
         fprintf(w->file, "property float %s\n", w->columns[c].name);
@@ -70,9 +70,10 @@ static void write_ply_head(const cli_points_writer *w, uint64_t rows) {
 }
 
 static void write_kept_ply_head(const cli_points_writer *w, const cli_points_reader *reader) {
-    fwrite(reader->header, 1, reader->header_insert, w->file);
+    fwrite(reader->table.header, 1, reader->table.header_insert, w->file);
     write_ply_properties(w);
-    fwrite(reader->header + reader->header_insert, 1, reader->header_size - reader->header_insert, w->file);
+    fwrite(reader->table.header + reader->table.header_insert, 1,
+           reader->table.header_size - reader->table.header_insert, w->file);
 }
 
 /* Names that are there already would stand for two things. */
@@ -81,22 +82,22 @@ static int check_names(const cli_points_writer *w, const cli_points_reader *read
         const char *name = w->columns[c].name;
         const size_t size = strlen(name);
         bool there = false;
-        if (reader->format == CLI_POINTS_PLY) {
-            const vshi_ply_element *e = &reader->ply.element[reader->vertex];
+        if (reader->table.format == VSHI_TABLE_PLY) {
+            const vshi_ply_element *e = &reader->table.ply.element[reader->table.vertex];
             for (int p = e->first; p < e->end; ++p) {
-                there = there || strcmp(reader->ply.property[p].name, name) == 0;
+                there = there || strcmp(reader->table.ply.property[p].name, name) == 0;
             }
-        } else if (reader->header != NULL) {
-            const char *end = reader->header + reader->header_size;
-            for (const char *at = reader->header; at + size <= end; ++at) {
-                const bool begins = at == reader->header || strchr(",;\t \"", at[-1]) != NULL;
+        } else if (reader->table.header != NULL) {
+            const char *end = reader->table.header + reader->table.header_size;
+            for (const char *at = reader->table.header; at + size <= end; ++at) {
+                const bool begins = at == reader->table.header || strchr(",;\t \"", at[-1]) != NULL;
                 const bool ends = at + size == end || strchr(",;\t \"", at[size]) != NULL;
                 there = there || (begins && ends && memcmp(at, name, size) == 0);
             }
         }
         if (there) {
             return cli_usage("%s: it has a column '%s' already; --answers-only leaves its columns out",
-                             reader->source.name, name);
+                             reader->table.source.name, name);
         }
     }
     return CLI_OK;
@@ -105,34 +106,29 @@ static int check_names(const cli_points_writer *w, const cli_points_reader *read
 int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
                            const cli_points_reader *reader, const cli_points_column *columns,
                            size_t column_count, cli_points_writer *w) {
-    const bool standard = strcmp(path, "-") == 0, same = format == reader->format;
+    const bool standard = strcmp(path, "-") == 0, same = format == reader->table.format;
     *w = (cli_points_writer){.name = standard ? "standard output" : path,
                              .format = format,
                              .answers_only = answers_only,
                              .keep = !answers_only && same && cli_points_can_keep(reader),
-                             .ascii = same && reader->ply.ascii,
-                             .big_endian = same && reader->ply.big_endian,
+                             .ascii = same && reader->table.ply.ascii,
+                             .big_endian = same && reader->table.ply.big_endian,
                              .floats = reader->floats,
                              .normals = reader->has_normals,
-                             .delimiter = same && reader->delimiter != ' ' ? reader->delimiter : ',',
+                             .delimiter =
+                                 same && reader->table.delimiter != ' ' ? reader->table.delimiter : ',',
                              .columns = columns,
                              .column_count = column_count,
                              .file = stdout,
                              .count_at = -1};
-    if (w->keep && reader->format == CLI_POINTS_CSV) {
-        w->delimiter = reader->delimiter;
+    if (w->keep && reader->table.format == VSHI_TABLE_CSV) {
+        w->delimiter = reader->table.delimiter;
     }
-    int code = check_names(w, reader);
-    if (code != CLI_OK) {
-        return code;
-    }
-    const bool counted = format == CLI_POINTS_PLY && reader->format != CLI_POINTS_PLY;
+    CLI_TRY(check_names(w, reader));
+    const bool counted = format == VSHI_TABLE_PLY && reader->table.format != VSHI_TABLE_PLY;
     if (!standard) {
         cli_signals_writing(path);
-        code = cli_temporary_begin(&w->temporary, path);
-        if (code != CLI_OK) {
-            return code;
-        }
+        CLI_TRY(cli_temporary_begin(&w->temporary, path));
         w->file = w->temporary.file;
     } else if (counted) {
         w->file = w->spool = tmpfile();
@@ -142,17 +138,16 @@ int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
     }
     w->buffer = malloc(BUFFER);
     if (w->buffer == NULL) {
-        cli_say("%s: the system refused memory", w->name);
-        return CLI_LIMIT;
+        return cli_out_of_memory(w->name);
     }
-    if (format == CLI_POINTS_CSV) {
+    if (format == VSHI_TABLE_CSV) {
         write_csv_head(w, reader);
-    } else if (format == CLI_POINTS_PLY && w->keep) {
+    } else if (format == VSHI_TABLE_PLY && w->keep) {
         write_kept_ply_head(w, reader);
-    } else if (format == CLI_POINTS_PLY) {
+    } else if (format == VSHI_TABLE_PLY) {
         w->count_at = counted && w->spool == NULL ? 0 : -1;
         if (w->spool == NULL) {
-            write_ply_head(w, counted ? 0 : reader->ply.element[reader->vertex].count);
+            write_ply_head(w, counted ? 0 : reader->table.ply.element[reader->table.vertex].count);
         }
     }
     return ferror(w->file) ? fail(w) : CLI_OK;
@@ -203,7 +198,7 @@ static char *put_binary(const cli_points_writer *w, char *at, const void *value,
 
 static char *put_position(const cli_points_writer *w, char *at, double value) {
     const float single = (float)value;
-    const bool floats = w->floats || w->format == CLI_POINTS_RAW;
+    const bool floats = w->floats || w->format == VSHI_TABLE_RAW;
     return floats ? put_binary(w, at, &single, sizeof single) : put_binary(w, at, &value, sizeof value);
 }
 
@@ -232,7 +227,7 @@ static bool put_text_row(cli_points_writer *w, const cli_points *points, size_t 
     if (at == NULL) {
         return false;
     }
-    const char delimiter = w->format == CLI_POINTS_PLY ? ' ' : w->delimiter;
+    const char delimiter = w->format == VSHI_TABLE_PLY ? ' ' : w->delimiter;
     if (!w->keep && !w->answers_only) {
         for (size_t k = 0; k < 3; ++k) {
             /* of a float too all digits that its double has: who reads it gets the same point */
@@ -256,7 +251,7 @@ static bool put_text_row(cli_points_writer *w, const cli_points *points, size_t 
 }
 
 int cli_points_write(cli_points_writer *w, const cli_points *points) {
-    const bool text = w->format == CLI_POINTS_CSV || (w->format == CLI_POINTS_PLY && w->ascii);
+    const bool text = w->format == VSHI_TABLE_CSV || (w->format == VSHI_TABLE_PLY && w->ascii);
     bool good = true;
     for (size_t i = 0; good && i < points->count; ++i) {
         if (w->keep) {
@@ -291,26 +286,21 @@ static int write_spool(cli_points_writer *w) {
 }
 
 int cli_points_writer_commit(cli_points_writer *w, cli_points_reader *reader) {
-    int code = CLI_OK;
-    if (reader->format == CLI_POINTS_PLY) {
-        code = points_ply_rest(reader, w->keep ? w->file : NULL);
+    vsh_error error;
+    if (vshi_table_rest(&reader->table, w->keep ? w->file : NULL, &error) != VSH_OK) {
+        return cli_fail(&error);
     }
-    if (code == CLI_OK && w->spool != NULL) {
-        code = write_spool(w);
-    }
-    if (code == CLI_OK && w->count_at >= 0) {
+    CLI_TRY(w->spool != NULL ? write_spool(w) : CLI_OK);
+    if (w->count_at >= 0) {
         if (fseek(w->file, w->count_at, SEEK_SET) != 0) {
             return fail(w);
         }
         write_ply_head(w, w->rows);
     }
-    if (code == CLI_OK && w->temporary.file == NULL) {
-        code = fflush(stdout) == 0 && !ferror(stdout) ? CLI_OK : fail(w);
-    } else if (code == CLI_OK) {
-        code = cli_temporary_commit(&w->temporary);
+    if (w->temporary.file != NULL) {
+        return cli_temporary_commit(&w->temporary);
     }
-    cli_signals_writing(NULL);
-    return code;
+    return fflush(stdout) == 0 && !ferror(stdout) ? CLI_OK : fail(w);
 }
 
 void cli_points_writer_free(cli_points_writer *w) {

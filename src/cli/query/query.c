@@ -5,6 +5,7 @@
 #include "cli/paths.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
+#include "cli/try.h"
 #include "cli/warnings.h"
 
 #include <inttypes.h>
@@ -152,8 +153,8 @@ static int check_output(const query_settings *s, const vsh_scene *scene, const c
     if (!is_standard(s->points) && cli_same_file(output, s->points)) {
         return cli_usage("%s: the output is also the points' file", output);
     }
-    const int code = cli_bake_check_output(&s->bake, scene, output);
-    return code == CLI_OK ? cli_temporary_check(output) : code;
+    CLI_TRY(cli_bake_check_output(&s->bake, scene, output));
+    return cli_temporary_check(output);
 }
 
 /* What can be refused before anything is read. */
@@ -162,9 +163,8 @@ static int check_files(const query_settings *s, const vsh_scene *scene) {
     if (stats != NULL && cli_same_file(output, stats)) {
         return cli_usage("%s: both the output and the --stats file", output);
     }
-    int code = is_standard(output) ? CLI_OK : check_output(s, scene, output);
-    code = code == CLI_OK && stats != NULL ? check_output(s, scene, stats) : code;
-    return code;
+    CLI_TRY(is_standard(output) ? CLI_OK : check_output(s, scene, output));
+    return stats != NULL ? check_output(s, scene, stats) : CLI_OK;
 }
 
 /* --- the work */
@@ -188,9 +188,9 @@ static int choose_answers(query_work *work) {
     vsh_scene *scene = work->scene;
     if (scene->ao && !work->reader.has_normals) {
         if (cli_patch_has(&s->bake.patch, "--ao")) {
-            return cli_usage("%s: no normals, which --ao needs", work->reader.source.name);
+            return cli_usage("%s: no normals, which --ao needs", work->reader.table.source.name);
         }
-        cli_warn("%s: no normals: no ao", work->reader.source.name);
+        cli_warn("%s: no normals: no ao", work->reader.table.source.name);
         scene->ao = 0;
     }
     *a = (query_answers){.lights = scene->light_count,
@@ -242,7 +242,7 @@ static void say_results(const query_work *work) {
     const cli_stats *stats = &work->stats;
     if (stats->bad_rows > 0) {
         cli_say("%s: %" PRIu64 " of %" PRIu64 " rows are bad; their answers are nan",
-                work->reader.source.name, stats->bad_rows, stats->points);
+                work->reader.table.source.name, stats->bad_rows, stats->points);
     }
     if (work->settings->bake.common.quiet) {
         return;
@@ -259,18 +259,16 @@ static void say_results(const query_work *work) {
 static int run_query(const query_settings *s, vsh_scene *scene) {
     query_work work = {.settings = s, .scene = scene, .run = cli_common_run(&s->bake.common)};
     work.stats = cli_stats_begin(CLI_STATS_POINTS, work.run.threads);
-    int code = cli_points_open(s->points, s->points_format, s->normals, s->strict, &work.reader);
-    code = code == CLI_OK ? choose_answers(&work) : code;
-    code = code == CLI_OK ? load(&work) : code;
-    code = code == CLI_OK ? make_query(&work) : code;
-    if (code == CLI_OK) {
-        const uint64_t held = work.stats.casters.field_bytes + work.stats.casters.triangles_bytes;
-        code = query_stream(s, work.query, &work.answers, held, &work.run, &work.reader, &work.stats);
-    }
-    code = code == CLI_OK ? cli_stats_finish(&work.stats, &work.run, s->bake.stats) : code;
-    if (code == CLI_OK) {
-        say_results(&work);
-    }
+    int code = CLI_OK;
+    CLI_TRY_DONE(cli_points_open(s->points, s->points_format, s->normals, s->strict, &work.reader));
+    CLI_TRY_DONE(choose_answers(&work));
+    CLI_TRY_DONE(load(&work));
+    CLI_TRY_DONE(make_query(&work));
+    const uint64_t held = work.stats.casters.field_bytes + work.stats.casters.triangles_bytes;
+    CLI_TRY_DONE(query_stream(s, work.query, &work.answers, held, &work.run, &work.reader, &work.stats));
+    CLI_TRY_DONE(cli_stats_finish(&work.stats, &work.run, s->bake.stats));
+    say_results(&work);
+done:
     query_answers_free(&work.answers);
     vsh_query_free(work.query);
     vsh_occluders_free(work.occluders);
@@ -289,19 +287,15 @@ static int query_main(int argc, char **argv) {
     if (code != CLI_OK || help) {
         return code;
     }
-    code = cli_patch_check(&s.bake.patch);
-    code = code == CLI_OK ? find_formats(&s) : code;
-    if (code != CLI_OK) {
-        return code;
-    }
+    CLI_TRY(cli_patch_check(&s.bake.patch));
+    CLI_TRY(find_formats(&s));
     cli_progress_begin(s.bake.common.progress, s.bake.common.quiet);
     cli_bake_scene made;
-    code = cli_bake_scene_for_points(&s.bake, &made);
-    code = code == CLI_OK ? check_files(&s, &made.scene) : code;
-    if (code == CLI_OK) {
-        cli_signals_watch();
-        code = run_query(&s, &made.scene);
-    }
+    CLI_TRY_DONE(cli_bake_scene_for_points(&s.bake, &made));
+    CLI_TRY_DONE(check_files(&s, &made.scene));
+    cli_signals_watch();
+    code = run_query(&s, &made.scene);
+done:
     cli_bake_scene_free(&made);
     cli_progress_end();
     return code;

@@ -9,7 +9,7 @@
 typedef struct query_settings {
     cli_bake_settings bake; /* the scene, as `bake` takes it; its output and stats are ours */
     const char *points;
-    int32_t format, points_format; /* CLI_POINTS_…; -1: not given */
+    int32_t format, points_format; /* VSHI_TABLE_…; -1: not given */
     int normals;                   /* as cli_points_open() takes it */
     bool distance, gradient, answers_only, strict;
     int32_t batch; /* rows; 0: as many as go */

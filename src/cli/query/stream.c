@@ -5,6 +5,7 @@
 #include "cli/message.h"
 #include "cli/progress.h"
 #include "cli/signals.h"
+#include "cli/try.h"
 #include "query.h"
 
 #include <inttypes.h>
@@ -12,10 +13,9 @@
 #include <string.h>
 
 enum {
-    ORDER_BYTES = 16,  /* a point of a call, as query.h says */
-    TEXT_BYTES = 256,  /* of a kept row of text: what is more makes batches smaller */
-    LEAST_ROWS = 1024, /* what is not worth a smaller batch */
-    RAW_BYTES = 24
+    ORDER_BYTES = 16, /* a point of a call, as query.h says */
+    TEXT_BYTES = 256, /* of a kept row of text: what is more makes batches smaller */
+    LEAST_ROWS = 1024 /* what is not worth a smaller batch */
 };
 
 size_t query_answers_floats(const query_answers *a) {
@@ -44,8 +44,7 @@ int query_answers_create(query_answers *a, size_t room) {
     a->visibility = calloc(a->lights + 1, sizeof *a->visibility);
     a->deviation = calloc(a->lights + 1, sizeof *a->deviation);
     if (a->memory == NULL || a->columns == NULL || a->visibility == NULL || a->deviation == NULL) {
-        cli_say("points: the system refused memory");
-        return CLI_LIMIT;
+        return cli_out_of_memory("points");
     }
     float *next = a->memory;
     a->output = vsh_query_output_default();
@@ -78,11 +77,10 @@ void query_answers_free(query_answers *a) {
 static int plan(const query_settings *s, const query_answers *answers, uint64_t held,
                 const cli_points_reader *reader, bool keep, size_t *rows, size_t *most_kept) {
     const uint64_t limit = s->bake.common.memory_limit;
-    const bool text = reader->format == CLI_POINTS_CSV || reader->ply.ascii;
-    const size_t own = !keep                              ? 0
-                       : text                             ? TEXT_BYTES
-                       : reader->format == CLI_POINTS_RAW ? RAW_BYTES
-                                                          : reader->row_size;
+    const size_t row_size = reader->table.row_size; /* 0: of text */
+    const size_t own = !keep          ? 0
+                       : row_size > 0 ? 2 * row_size
+                                      : TEXT_BYTES; /* room is taken twice what is used */
     const size_t each = cli_points_bytes(reader->has_normals, keep) + ORDER_BYTES + own +
                         query_answers_floats(answers) * sizeof(float);
     const size_t least = s->batch > 0 && s->batch < LEAST_ROWS ? (size_t)s->batch : LEAST_ROWS;
@@ -93,11 +91,12 @@ static int plan(const query_settings *s, const query_answers *answers, uint64_t 
     if (limit > 0 && held + (uint64_t)*rows * each > limit) {
         char all[32], most[32];
         cli_say("%s: the field and %zu points at a time need %s, over the memory limit of %s",
-                reader->source.name, *rows, vshi_bytes_text(held + (uint64_t)*rows * each, all, sizeof all),
+                reader->table.source.name, *rows,
+                vshi_bytes_text(held + (uint64_t)*rows * each, all, sizeof all),
                 vshi_bytes_text(limit, most, sizeof most));
         return CLI_LIMIT;
     }
-    *most_kept = *rows * (own > 0 ? own : 1) / 2; /* room is taken twice what is used */
+    *most_kept = *rows * own / 2;
     return CLI_OK;
 }
 
@@ -120,9 +119,33 @@ static int answer_batch(const vsh_query *query, const query_answers *answers, co
     run.user = progress;
     const vsh_points view = {points->count, points->positions, points->normals, points->texels};
     vsh_error error;
-    const vsh_result result = vsh_query_points(query, &view, &run, &answers->output, &stats->shade, &error);
+    const vsh_result result =
+        vsh_query_points(query, &view, NULL, &run, &answers->output, &stats->shade, &error);
     cli_stats_stage(stats, CLI_STAGE_BAKE, start);
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+}
+
+static int answer_rows(const query_settings *s, const vsh_query *query, const query_answers *answers,
+                       const vsh_run *run, size_t most_kept, cli_points_reader *reader, cli_points *points,
+                       cli_points_writer *writer, cli_stats *stats) {
+    batch_progress progress = {run, 0.0, 0.0};
+    for (;;) {
+        double start = vshi_seconds();
+        CLI_TRY(cli_points_read(reader, most_kept, points));
+        cli_stats_stage(stats, CLI_STAGE_LOAD, start);
+        if (points->count == 0) {
+            return CLI_OK;
+        }
+        const uint64_t size = reader->table.source.size;
+        const double done = size > 0 ? (double)reader->table.source.taken / (double)size : 1.0;
+        progress.begin = size > 0 ? progress.begin + progress.share : 0.0;
+        progress.share = (done < 1.0 ? done : 1.0) - progress.begin;
+        CLI_TRY(answer_batch(query, answers, points, &progress, stats));
+        start = vshi_seconds();
+        CLI_TRY(cli_points_write(writer, points));
+        CLI_TRY(s->batch > 0 || size == 0 ? cli_points_writer_flush(writer) : CLI_OK);
+        cli_stats_stage(stats, CLI_STAGE_WRITE, start);
+    }
 }
 
 int query_stream(const query_settings *s, const vsh_query *query, query_answers *answers, uint64_t held,
@@ -131,42 +154,21 @@ int query_stream(const query_settings *s, const vsh_query *query, query_answers 
     cli_points_writer writer = {0};
     size_t rows = 0, most_kept = 0;
     const bool keep = !s->answers_only && s->format == s->points_format && cli_points_can_keep(reader);
-    int code = plan(s, answers, held, reader, keep, &rows, &most_kept);
-    code = code == CLI_OK ? cli_points_create(rows, reader->has_normals, keep, &points) : code;
-    code = code == CLI_OK ? query_answers_create(answers, rows) : code;
-    if (code == CLI_OK) {
-        code = cli_points_writer_open(s->bake.output, s->format, s->answers_only, reader, answers->columns,
-                                      answers->column_count, &writer);
-    }
-    batch_progress progress = {run, 0.0, 0.0};
-    while (code == CLI_OK) {
-        double start = vshi_seconds();
-        code = cli_points_read(reader, most_kept, &points);
-        cli_stats_stage(stats, CLI_STAGE_LOAD, start);
-        if (code != CLI_OK || points.count == 0) {
-            break;
-        }
-        const uint64_t size = reader->source.size;
-        const double done = size > 0 ? (double)reader->source.taken / (double)size : 1.0;
-        progress.begin = size > 0 ? progress.begin + progress.share : 0.0;
-        progress.share = (done < 1.0 ? done : 1.0) - progress.begin;
-        code = answer_batch(query, answers, &points, &progress, stats);
-        start = vshi_seconds();
-        code = code == CLI_OK ? cli_points_write(&writer, &points) : code;
-        if (code == CLI_OK && (s->batch > 0 || size == 0)) {
-            code = cli_points_writer_flush(&writer);
-        }
-        cli_stats_stage(stats, CLI_STAGE_WRITE, start);
-    }
-    if (code == CLI_OK) {
-        const double start = vshi_seconds();
-        code = cli_points_writer_commit(&writer, reader);
-        cli_stats_stage(stats, CLI_STAGE_WRITE, start);
-    }
+    int code = CLI_OK;
+    CLI_TRY_DONE(plan(s, answers, held, reader, keep, &rows, &most_kept));
+    CLI_TRY_DONE(cli_points_create(rows, reader->has_normals, keep, &points));
+    CLI_TRY_DONE(query_answers_create(answers, rows));
+    CLI_TRY_DONE(cli_points_writer_open(s->bake.output, s->format, s->answers_only, reader, answers->columns,
+                                        answers->column_count, &writer));
+    CLI_TRY_DONE(answer_rows(s, query, answers, run, most_kept, reader, &points, &writer, stats));
+    const double start = vshi_seconds();
+    CLI_TRY_DONE(cli_points_writer_commit(&writer, reader));
+    cli_stats_stage(stats, CLI_STAGE_WRITE, start);
+    stats->points = reader->table.rows;
+    stats->bad_rows = reader->bad;
+done:
     cli_points_writer_free(&writer);
     cli_signals_writing(NULL);
     cli_points_free(&points);
-    stats->points = reader->rows;
-    stats->bad_rows = reader->bad;
     return code;
 }

@@ -2,15 +2,11 @@
 #ifndef VSHI_PLY_H
 #define VSHI_PLY_H
 
-#include "base/shared.h"
+#include "base/error.h"
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 /* Types of numbers: those below are whole, every second one of them unsigned. */
 enum { VSHI_PLY_FLOAT = 6, VSHI_PLY_DOUBLE = 7 };
@@ -37,16 +33,19 @@ typedef struct vshi_ply_header {
     vshi_ply_property property[VSHI_PLY_PROPERTIES];
 } vshi_ply_header;
 
-/* Takes the next line, without its end; `ended` tells that it was the last. False where it is not understood.
- * Names are cut to VSHI_PLY_NAME - 1 bytes. */
-VSHI_SHARED bool vshi_ply_header_line(vshi_ply_header *header, const char *line, size_t size);
+/* Takes the next line of file `name`, without its end; `ended` tells that it was the last. Names are cut to
+ * VSHI_PLY_NAME - 1 bytes. Errors: VSH_ERROR_INPUT (not understood). */
+vsh_result vshi_ply_header_line(vshi_ply_header *header, const char *name, const char *line, size_t size,
+                                vsh_error *error);
+
+/* VSH_ERROR_READ: file `name` ends in its header; in that row of an element. */
+vsh_result vshi_ply_fail_header(const char *name, vsh_error *error);
+vsh_result vshi_ply_fail_short(const char *name, const vshi_ply_element *element, uint64_t row,
+                               vsh_error *error);
 
 /* Bytes of a binary number. */
 static inline int vshi_ply_size(int type) {
     return type < VSHI_PLY_FLOAT ? 1 << type / 2 : type == VSHI_PLY_FLOAT ? 4 : 8;
 }
 
-#ifdef __cplusplus
-}
-#endif
 #endif

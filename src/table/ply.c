@@ -1,5 +1,6 @@
-#include "base/ply.h"
+#include "table/ply.h"
 
+#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -77,7 +78,7 @@ static int split(const char *line, size_t size, word w[WORDS]) {
     return words;
 }
 
-bool vshi_ply_header_line(vshi_ply_header *h, const char *line, size_t size) {
+static bool take_line(vshi_ply_header *h, const char *line, size_t size) {
     word w[WORDS] = {""};
     const int words = split(line, size, w);
     if (h->lines++ == 0) {
@@ -94,4 +95,21 @@ bool vshi_ply_header_line(vshi_ply_header *h, const char *line, size_t size) {
     }
     h->ended = strcmp(w[0], "end_header") == 0;
     return true; /* comments, and what is not known */
+}
+
+vsh_result vshi_ply_header_line(vshi_ply_header *h, const char *name, const char *line, size_t size,
+                                vsh_error *error) {
+    return take_line(h, line, size)
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_INPUT, "%s: line %d of the header is not understood: '%.*s'",
+                           name, h->lines, size < 60 ? (int)size : 60, line);
+}
+
+vsh_result vshi_ply_fail_header(const char *name, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_READ, "%s: cut short: the header has no 'end_header'", name);
+}
+
+vsh_result vshi_ply_fail_short(const char *name, const vshi_ply_element *e, uint64_t row, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_READ, "%s: cut short: it ends in %s %" PRIu64 " of %" PRIu64, name,
+                     e->name, row, e->count);
 }

@@ -1,0 +1,91 @@
+/* Tables of numbers in files and pipes: CSV, the vertices of a PLY, and raw floats; some of their columns,
+ * read a row at a time. */
+#ifndef VSHI_TABLE_H
+#define VSHI_TABLE_H
+
+#include "table/ply.h"
+#include "table/source.h"
+
+enum { VSHI_TABLE_CSV, VSHI_TABLE_PLY, VSHI_TABLE_RAW };
+
+enum { VSHI_TABLE_COLUMNS = 6 };
+
+/* Columns that are wanted. Files without names have them first, in this order. */
+typedef struct vshi_table_columns {
+    const char *names[VSHI_TABLE_COLUMNS]; /* of any case in CSV */
+    int count;
+    int needed; /* the first so many; others are taken where all of them are there, and not of raw floats */
+} vshi_table_columns;
+
+typedef struct vshi_table {
+    vshi_source source;
+    int32_t format;
+    vshi_table_columns wanted;
+    int columns;   /* of them that are taken: `needed` or `count` */
+    uint64_t rows; /* so far */
+    char *header;  /* lines of the header as they came, with their ends (CSV: one, without); NULL: none */
+    size_t header_size, header_insert; /* where a PLY's new properties go */
+    vshi_ply_header ply;               /* zeros where it is none */
+    int vertex;                        /* number of that element */
+    int8_t *column_of;                 /* [fields of a row]: which column it is, or -1 */
+    /* rows of text */
+    char delimiter;    /* between fields: a character, or VSHI_BETWEEN_BLANKS */
+    int fields, width; /* that a row has at least; that the first line has */
+    /* rows of bytes */
+    size_t row_size;                                          /* 0: of text */
+    int offset[VSHI_TABLE_COLUMNS], type[VSHI_TABLE_COLUMNS]; /* of the columns: bytes, types as of PLY */
+} vshi_table;
+
+typedef struct vshi_table_row {
+    const char *bytes; /* as they came, without a line's end, until the next call; NULL: no more rows */
+    size_t size;
+    double value[VSHI_TABLE_COLUMNS]; /* [columns]; NaN where the row is bad */
+    char bad[96];                     /* why it could not be read; "": it could */
+    int missing;                      /* fields that it has fewer than the first line, where it has too few */
+} vshi_table_row;
+
+/* Opens a file, or (NULL) standard input, and reads its header. `job` (may be NULL) takes all bytes that are
+ * read as units, and outlives the table. Close it in any case. Errors: VSH_ERROR_READ, VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED, VSH_ERROR_INPUT (a header that is none, columns that are not there). */
+VSHI_SHARED vsh_result vshi_table_open(const char *path, int32_t format, const vshi_table_columns *wanted,
+                                       vshi_job *job, vshi_table *table, vsh_error *error);
+VSHI_SHARED void vshi_table_close(vshi_table *table);
+
+/* The next row. Errors: VSH_ERROR_READ (also where the file ends within it), VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED, VSH_ERROR_INPUT (of more than 64 MiB). */
+VSHI_SHARED vsh_result vshi_table_next(vshi_table *table, vshi_table_row *row, vsh_error *error);
+
+/* Reads what follows the rows, a PLY's other elements, and writes it to `to`, where that is not NULL, as it
+ * came. Errors: as above. */
+VSHI_SHARED vsh_result vshi_table_rest(vshi_table *table, FILE *to, vsh_error *error);
+
+/* --- fields of lines */
+
+typedef struct vshi_field {
+    const char *text, *end;
+} vshi_field;
+
+/* What stands between fields, if it is no character: any blanks; or a comma, a semicolon or blanks, between
+ * any two of them. */
+enum { VSHI_BETWEEN_BLANKS = ' ', VSHI_BETWEEN_ANY = '\0' };
+
+/* The field at *at, without blanks and quotes around it; *at moves behind its delimiter, and past `end`
+ * behind the last. */
+vshi_field vshi_field_next(const char **at, const char *end, char delimiter);
+
+/* Whether a line is to be left out: blanks, or a comment behind '#'. */
+bool vshi_line_is_empty(const char *line, size_t size);
+
+/* --- the formats' own parts */
+
+vsh_result vshi_table_open_csv(vshi_table *table, vsh_error *error);
+vsh_result vshi_table_open_ply(vshi_table *table, vsh_error *error);
+
+/* Sets `columns`, and makes fields -1 whose column is not taken. Returns the name of a column that is needed
+ * and not found, or NULL. */
+const char *vshi_table_choose(vshi_table *table, const bool found[VSHI_TABLE_COLUMNS], int fields);
+
+/* A line as a row. */
+void vshi_table_parse(const vshi_table *table, vshi_table_row *row);
+
+#endif
