@@ -12,11 +12,11 @@ namespace vshi {
 
 namespace {
 
-// Distances, nearest polygons, their next values, and one more set of distances while they are collected; and
-// what a triangle takes as polygon, corners and part of a shell. Measured over spheres of 16000 leaves: 11 to
-// 13 kB a leaf; the whole estimate comes to 1.3 to 1.8 times the peak.
-constexpr double MESH_BYTES_PER_LEAF = 5.0 * BYTES_PER_LEAF;
-constexpr double BYTES_PER_TRIANGLE = 96.0;
+// Distances, sides, the leaf that is made of them, and one more set of distances where solids overlap; and
+// what a triangle takes as polygon, corners and in the lists of what it is near to. Measured over the assets
+// at 512 and 1024 voxels: the whole estimate comes to 1.6 to 2.4 times the peak.
+constexpr double MESH_BYTES_PER_LEAF = 3.0 * BYTES_PER_LEAF;
+constexpr double BYTES_PER_TRIANGLE = 160.0;
 
 struct Meshes {
     vshi_mesh_set set{};
@@ -64,7 +64,7 @@ double band_of(const vshi_component &component, const Lattice &lattice) {
     const double shell = component.kind == VSHI_KIND_WALL    ? lattice.shell
                          : component.kind == VSHI_KIND_SHEET ? 0.5 * lattice.shell
                                                              : 0.0;
-    return lattice.half_width + RIM + shell;
+    return lattice.half_width + shell;
 }
 
 void foretell(const Meshes &meshes, const Lattice &lattice, const vsh_run &run, vsh_error *error) {
@@ -74,7 +74,7 @@ void foretell(const Meshes &meshes, const Lattice &lattice, const vsh_run &run, 
     for (size_t w = 0; w < wholes.count; ++w) {
         size_t count = 0;
         const vshi_component *components = vshi_solidity_of_whole(solidity, w, &count);
-        double band = lattice.half_width + RIM, twice = 0.0;
+        double band = lattice.half_width, twice = 0.0;
         for (size_t i = 0; i < count; ++i) {
             band = std::max(band, band_of(components[i], lattice));
             twice += components[i].kind == VSHI_KIND_WALL ? components[i].area : 0.0;
@@ -271,7 +271,7 @@ vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_option
     Stage stage(run, "voxelize", error);
     warn(meshes.set, lattice, run);
 
-    const double reach = 2.0 * (lattice.half_width + lattice.shell + RIM) + 2.0;
+    const double reach = 2.0 * (lattice.half_width + lattice.shell) + 2.0;
     const Parts parts = sort_parts(meshes.set.solidity, lattice, reach);
     Progress progress{0.0, 1.0 / double(meshes.triangles)};
     FloatGrid::Ptr united;

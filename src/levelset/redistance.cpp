@@ -12,7 +12,7 @@ namespace vshi {
 
 void check_redistance(const vsh_run &run, const Lattice &lattice, double area, const Vec3d &sides,
                       double source_leaves, double held, vsh_error *error) {
-    const double leaves = band_leaves(area, sides, lattice.half_width + RIM);
+    const double leaves = band_leaves(area, sides, lattice.half_width);
     check_memory(&run, lattice.voxel, leaves,
                  held + source_leaves * SOURCE_BYTES_PER_LEAF + leaves * REDISTANCE_BYTES_PER_LEAF, error);
 }

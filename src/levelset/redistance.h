@@ -6,10 +6,10 @@
 namespace vshi {
 
 // What re-distancing takes at its peak: a leaf of the source with its part of the mesh, and a leaf of what
-// becomes of it with its nearest polygons. Measured over spheres and boxes at half widths of 3 to 30: the
+// becomes of it with its distances. Measured over spheres and boxes at half widths of 3 to 30: the
 // whole estimate comes to 1.3 to 1.6 times the peak, without the 25 MB that the first threads take.
 constexpr double SOURCE_BYTES_PER_LEAF = 1.5 * BYTES_PER_LEAF;
-constexpr double REDISTANCE_BYTES_PER_LEAF = 4.0 * BYTES_PER_LEAF;
+constexpr double REDISTANCE_BYTES_PER_LEAF = 3.0 * BYTES_PER_LEAF;
 
 // Bytes of a grid's inner nodes beside those of a compact one (eight around the origin, 2.1 MB, and those
 // below them), which the estimates' margins hold: leaves far from each other have nodes of their own, 130

@@ -1,118 +1,141 @@
-// Distances to surfaces of triangles and quads, by OpenVDB's mesh conversion.
+// Grids of the distances to surfaces of triangles and quads.
 #include "levelset/surface.h"
 
-#include "levelset/closest.h"
+#include "levelset/boundary.h"
 
-#include <chrono>
-#include <cmath>
-#include <openvdb/tools/ChangeBackground.h>
-#include <openvdb/tools/MeshToVolume.h>
+#include <memory>
+#include <openvdb/tools/SignedFloodFill.h>
+#include <set>
 
 namespace vshi {
 
 namespace {
 
-// OpenVDB asks at every polygon, on threads of its own choice; the callback is asked at most every 20 ms.
-class Interrupter : public openvdb::util::NullInterrupter {
+// A conversion under way; shares of it as measured at 512 voxels.
+class Conversion {
   public:
-    Interrupter(Stage &stage_, double begin_, double end_) : stage(stage_), begin(begin_), end(end_) {
-        give(this);
+    Conversion(const Surface &surface_, const Lattice &lattice_, double half_width, double begin_,
+               double end_, Stage &stage_)
+        : surface(surface_), lattice(lattice_), begin(begin_), end(end_), stage(stage_),
+          kernel(*vshi_leaf_kernel_of(stage.options.isa)), band(surface, half_width) {
+        stage.check();
     }
-    ~Interrupter() override { take(this); }
 
-    bool wasInterrupted(int percent) override {
-        take(this);
-        if (percent >= 0) {
-            stage.reach(begin + (end - begin) * 0.01 * percent);
-        }
-        if (!stop.load(std::memory_order_relaxed)) {
-            const auto now = std::chrono::steady_clock::now().time_since_epoch().count();
-            auto due = next.load(std::memory_order_relaxed);
-            if (now >= due && next.compare_exchange_strong(due, now + period)) {
-                stop = stage.cancelled();
-            }
-        }
-        const bool stopped = stop;
-        give(this);
-        return stopped;
+    FloatGrid::Ptr without_sides() {
+        measure(false, 0.8);
+        return make_grid();
+    }
+
+    FloatGrid::Ptr with_sides() {
+        measure(true, 0.5);
+        const LeafTable table(leaves);
+        tell_sides(table);
+        measure_boundary(table);
+        const FloatGrid::Ptr grid = make_grid();
+        constexpr openvdb::Index above_leaves = 1;
+        stage.run([&] { openvdb::tools::signedFloodFill(grid->tree(), true, 1, above_leaves); });
+        return grid;
     }
 
   private:
-    static constexpr std::chrono::steady_clock::rep period =
-        std::chrono::steady_clock::duration(std::chrono::milliseconds(20)).count();
-    Stage &stage;
-    const double begin;
-    const double end;
-    std::atomic<bool> stop{false};
-    std::atomic<std::chrono::steady_clock::rep> next{0};
-};
+    double at(double share) const { return begin + share * (end - begin); }
 
-using openvdb::Int32;
-using Adapter = openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec4I>;
-
-// The conversion constructs maps of its own, which takes voxels of some size (Lattice::transform()).
-constexpr double SMALLEST_CONVERTED = 1e-4;
-
-// The lattice scaled by a power of two to what can be converted: its distances are then as exact as its own.
-Lattice scaled_up(const Lattice &lattice, double &scale) {
-    for (scale = 1.0; lattice.voxel * scale < SMALLEST_CONVERTED;) {
-        scale *= 2.0;
+    void measure(bool sides, double until) {
+        stage.loop(band.region_count(), 1, begin, at(until),
+                   [&](size_t i) { band.measure(i, sides, kernel); });
+        leaves = band.leaves();
     }
-    Lattice larger = lattice;
-    larger.voxel *= scale;
-    larger.translation *= scale;
-    return larger;
-}
 
-void scale_values(FloatGrid &grid, float factor, Stage &stage) {
-    std::vector<Leaf *> leaves;
-    grid.tree().getNodes(leaves);
-    stage.loop(leaves.size(), 64, 0.0, 0.0, [&](size_t i) {
-        float *values = leaves[i]->buffer().data();
-        for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
-            values[n] *= factor;
+    void tell_sides(const LeafTable &table) {
+        Sides sides(surface, table);
+        for (int round = 0; round < Sides::ROUNDS; ++round) {
+            stage.loop(leaves.size(), 16, at(0.5), at(0.7), [&](size_t i) { sides.settle(i); });
+            sides.end_round();
         }
-    });
-}
-
-FloatGrid::Ptr convert(const Surface &surface, const Lattice &given, double half_width, int flags,
-                       double begin, double end, Stage &stage) {
-    namespace tools = openvdb::tools;
-    const double middle = begin + 0.6 * (end - begin);
-    double scale;
-    const Lattice lattice = scaled_up(given, scale);
-    Interrupter interrupter(stage, begin, middle);
-    const openvdb::Int32Grid::Ptr nearest = openvdb::Int32Grid::create(Int32(openvdb::util::INVALID_IDX));
-    FloatGrid::Ptr grid;
-    stage.run([&] {
-        const Adapter adapter(surface.points, surface.polygons);
-        const float band = float(half_width + RIM);
-        // Renormalising is for bumps of the distances that are measured again below.
-        grid = tools::meshToVolume<FloatGrid>(
-            static_cast<openvdb::util::NullInterrupter &>(interrupter), adapter, *lattice.transform(), band,
-            band, flags | tools::DISABLE_RENORMALIZATION | tools::DISABLE_NARROW_BAND_TRIMMING,
-            nearest.get());
-    });
-    stage.check();
-    measure_again(*grid, *nearest, surface, lattice.voxel, middle, end, stage);
-    if (scale != 1.0) {
-        scale_values(*grid, float(1.0 / scale), stage);
-        grid->setTransform(given.transform());
+        told.resize(leaves.size());
+        stage.loop(leaves.size(), 16, at(0.7), at(0.8), [&](size_t i) { told[i] = sides.tell(i); });
     }
-    stage.run([&] { tools::changeLevelSetBackground(grid->tree(), float(half_width * given.voxel)); });
-    return grid;
-}
+
+    // Takes the distances of the inside to what bounds it, where something else is within it.
+    void measure_boundary(const LeafTable &table) {
+        const std::vector<size_t> regions = regions_near_buried(band, leaves, told);
+        if (regions.empty()) {
+            return;
+        }
+        const Surface boundary = boundary_of(surface, table, told);
+        stage.check();
+        Band bounded(boundary, band.half_width);
+        const std::vector<size_t> again = regions_near_buried(bounded, leaves, told);
+        stage.loop(again.size(), 1, at(0.8), at(0.9),
+                   [&](size_t i) { bounded.measure(again[i], false, kernel); });
+        const std::vector<BandLeaf> others = bounded.leaves();
+        const LeafTable other_table(others);
+        std::set<Cell> near;
+        for (const size_t region : regions) {
+            near.insert(band.region_origin(region));
+        }
+        stage.loop(leaves.size(), 64, at(0.9), at(0.9), [&](size_t i) {
+            const Cell &origin = leaves[i].origin;
+            constexpr int32_t mask = ~(Band::REGION - 1);
+            if (near.count({origin[0] & mask, origin[1] & mask, origin[2] & mask}) == 0) {
+                return;
+            }
+            const uint32_t other = other_table.find(origin);
+            for (int n = 0; n < VSHI_LEAF_VOXELS; ++n) {
+                if ((told[i].outside[size_t(n >> 6)] >> (n & 63) & 1) == 0) {
+                    leaves[i].distances[n] =
+                        other == LeafTable::NONE ? float(band.half_width) : others[other].distances[n];
+                }
+            }
+        });
+    }
+
+    // In world units; without sides all is outside.
+    std::unique_ptr<Leaf> make_leaf(size_t i, float background) const {
+        const BandLeaf &leaf = leaves[i];
+        auto made = std::make_unique<Leaf>(Coord(leaf.origin[0], leaf.origin[1], leaf.origin[2]), background);
+        float *const values = made->buffer().data();
+        for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
+            const auto value = float(double(leaf.distances[n]) * lattice.voxel);
+            const bool outside = told.empty() || (told[i].outside[n >> 6] >> (n & 63) & 1) != 0;
+            values[n] = outside ? value : -value;
+            made->setActiveState(n, value < background);
+        }
+        return made;
+    }
+
+    FloatGrid::Ptr make_grid() {
+        const auto background = float(band.half_width * lattice.voxel);
+        std::vector<std::unique_ptr<Leaf>> made(leaves.size());
+        stage.loop(leaves.size(), 64, at(0.9), end, [&](size_t i) { made[i] = make_leaf(i, background); });
+        const FloatGrid::Ptr grid = FloatGrid::create(background);
+        grid->setTransform(lattice.transform());
+        for (std::unique_ptr<Leaf> &leaf : made) {
+            grid->tree().addLeaf(leaf.release());
+        }
+        return grid;
+    }
+
+    const Surface &surface;
+    const Lattice &lattice;
+    const double begin, end;
+    Stage &stage;
+    const vshi_leaf_kernel &kernel;
+    Band band;
+    std::vector<BandLeaf> leaves;
+    std::vector<Sides::Told> told;
+};
 
 } // namespace
 
 FloatGrid::Ptr fill_surface(const Surface &surface, const Lattice &lattice, double half_width, double begin,
                             double end, Stage &stage) {
-    return convert(surface, lattice, half_width, 0, begin, end, stage);
+    return Conversion(surface, lattice, half_width, begin, end, stage).with_sides();
 }
 
 FloatGrid::Ptr measure_surface(const Surface &surface, const Lattice &lattice, double half_width,
                                double begin, double end, Stage &stage) {
-    return convert(surface, lattice, half_width, openvdb::tools::UNSIGNED_DISTANCE_FIELD, begin, end, stage);
+    return Conversion(surface, lattice, half_width, begin, end, stage).without_sides();
 }
 
 } // namespace vshi

@@ -2,23 +2,13 @@
 #pragma once
 
 #include "levelset/grid.h"
-
-#include <vector>
+#include "levelset/polygons.h"
 
 namespace vshi {
 
-// Polygons in index space; a triangle's fourth corner is openvdb::util::INVALID_IDX.
-struct Surface {
-    std::vector<openvdb::Vec3s> points;
-    std::vector<openvdb::Vec4I> polygons;
-};
-
-// Bands are converted a little wider than asked for, voxels, because the conversion's errors leave holes at
-// their rims.
-constexpr double RIM = 1.0;
-
-// Signed distances on the lattice, active within half_width (voxels) of the surface: inside is what cannot be
-// reached from outside, whatever way the polygons face.
+// Signed distances on the lattice, active within half_width (voxels, at least 3) of the surface: inside is
+// what cannot be reached from outside, whatever way the polygons face. Distances are exact to 1e-4 of a voxel
+// where the surface's points are.
 FloatGrid::Ptr fill_surface(const Surface &surface, const Lattice &lattice, double half_width, double begin,
                             double end, Stage &stage);
 

@@ -166,7 +166,7 @@ void foretell(const std::vector<Placed> &placed, const Lattice &lattice, const v
         // what band_leaves() makes of a thin band, turned around
         const double area = count * double(Leaf::SIZE) / (2.0 * instance.grid->info.half_width + 12.0);
         const Vec3d sides = instance.grid->level_set->evalActiveVoxelDim().asVec3d();
-        leaves += band_leaves(area * finer * finer, sides * finer, lattice.half_width + RIM);
+        leaves += band_leaves(area * finer * finer, sides * finer, lattice.half_width);
         const double held = double(instance.grid->info.bytes);
         bytes += held + count * SOURCE_BYTES_PER_LEAF + COPIES * far_node_bytes(held, count);
     }

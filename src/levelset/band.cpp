@@ -1,0 +1,367 @@
+#include "levelset/band.h"
+
+#include "levelset/flood.h"
+
+#include <algorithm>
+#include <cfloat>
+#include <cmath>
+#include <unordered_map>
+
+namespace vshi {
+
+namespace {
+
+using openvdb::Vec3d;
+
+constexpr int LEAF = 8;
+constexpr int REGION = Band::REGION;
+constexpr int LEAVES = REGION / LEAF;
+// A triangle that is less high over its longest edge, voxels, is that edge: in floats nothing could be said
+// of its inside.
+constexpr double FLAT = 2e-4;
+// Half widths, voxels, from which on most triangles that are within reach of a leaf are nowhere the nearest.
+constexpr double WIDE = 6.0;
+// From a leaf's middle to its farthest voxels, and a rounding; the same by axis.
+constexpr float LEAF_RADIUS = 6.07f;
+const Vec3d LEAF_HALF(3.5);
+// What may part a voxel from a neighbour is within that neighbour's distance, √3.
+constexpr double PARTING = 1.74;
+// What triangles may be farther off than they are found to be, voxels: they are placed in floats.
+constexpr double SLACK = 0.01;
+
+Vec3d any_normal_to(const Vec3d &a) {
+    const int least = int(openvdb::math::MinIndex(Vec3d(std::fabs(a[0]), std::fabs(a[1]), std::fabs(a[2]))));
+    Vec3d axis(0.0);
+    axis[least] = 1.0;
+    const Vec3d normal = a.cross(axis);
+    return normal.lengthSqr() > 0.0 ? normal / normal.length() : axis;
+}
+
+void set_row(float row[4], const Vec3d &direction, double constant) {
+    for (int i = 0; i < 3; ++i) {
+        row[i] = float(direction[i]);
+    }
+    row[3] = float(constant);
+}
+
+void set_edge(vshi_frame &frame, int e, const Vec3d &from, const Vec3d &along, double length,
+              const Vec3d &normal) {
+    const Vec3d beside = along.cross(normal);
+    const double low = along.dot(from);
+    set_row(frame.row[VSHI_FRAME_BESIDE + e], beside, -beside.dot(from));
+    set_row(frame.row[VSHI_FRAME_ALONG + e], along, 0.0);
+    frame.low[e] = float(low);
+    frame.high[e] = float(low + length);
+}
+
+// Of corners that are counted from the region's middle.
+vshi_frame frame_of(const Corners &corner) {
+    vshi_frame frame{};
+    Corners edge;
+    double square[3];
+    for (int i = 0; i < 3; ++i) {
+        edge[i] = corner[(i + 1) % 3] - corner[i];
+        square[i] = edge[i].lengthSqr();
+    }
+    const int longest = int(std::max_element(square, square + 3) - square);
+    const double length = std::sqrt(square[longest]);
+    const Vec3d area = edge[0].cross(edge[1]);
+    const double twice = area.length();
+    const bool flat = !(twice > FLAT * length);
+    const Vec3d normal = flat ? any_normal_to(edge[longest]) : area / twice;
+    set_row(frame.row[VSHI_FRAME_HEIGHT], normal, -normal.dot(corner[longest]));
+    for (int i = 0; i < 3; ++i) {
+        const int e = (longest + i) % 3; // the longest first: nothing of the inside is beyond its ends
+        if (flat && i > 0) {             // nowhere near, and everything outside of it
+            frame.row[VSHI_FRAME_BESIDE + i][3] = 1.0f;
+            frame.low[i] = frame.high[i] = 1e6f;
+            continue;
+        }
+        const double size = std::sqrt(square[e]);
+        const Vec3d along = size > 0.0 ? edge[e] / size : any_normal_to(normal);
+        set_edge(frame, i, corner[e], along, size, normal);
+    }
+    return frame;
+}
+
+double at(const float row[4], const Vec3d &q) {
+    return double(row[0]) * q[0] + double(row[1]) * q[1] + double(row[2]) * q[2] + double(row[3]);
+}
+
+// Whether a point of the box around q may be within `reach` of the triangle; false only where none is.
+bool may_reach(const vshi_frame &frame, const Vec3d &q, const Vec3d &half, double reach) {
+    const auto extent = [&](const float row[4]) {
+        return reach + SLACK + std::fabs(double(row[0])) * half[0] + std::fabs(double(row[1])) * half[1] +
+               std::fabs(double(row[2])) * half[2];
+    };
+    if (std::fabs(at(frame.row[VSHI_FRAME_HEIGHT], q)) > extent(frame.row[VSHI_FRAME_HEIGHT])) {
+        return false;
+    }
+    for (int e = VSHI_FRAME_BESIDE; e < VSHI_FRAME_ALONG; ++e) {
+        if (at(frame.row[e], q) > extent(frame.row[e])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+struct Box {
+    Cell first, last; // cells
+};
+
+// Cells of `edge` voxels that have a voxel's centre within `reach` of the corners' box; empty where last <
+// first. `shift` voxels after the cells' own.
+Box cells_of(const Corners &corner, double reach, int edge, double shift = 0.0) {
+    Box box{};
+    for (int axis = 0; axis < 3; ++axis) {
+        const double low = shift + std::min({corner[0][axis], corner[1][axis], corner[2][axis]});
+        const double high = shift + std::max({corner[0][axis], corner[1][axis], corner[2][axis]});
+        box.first[axis] = int32_t(std::floor(std::ceil(low - reach) / edge));
+        box.last[axis] = int32_t(std::floor(std::floor(high + reach) / edge));
+    }
+    return box;
+}
+
+// Calls use(cell) for the cells of the box that the triangle may reach, halving the box where it is large.
+template <typename Use>
+void visit(const vshi_frame &frame, const Vec3d &origin, double reach, int edge, const Box &box,
+           const Use &use) {
+    Vec3d middle, half;
+    int widest = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double low = double(box.first[axis]) * edge, high = double(box.last[axis]) * edge + (edge - 1);
+        middle[axis] = 0.5 * (low + high) - origin[axis];
+        half[axis] = 0.5 * (high - low);
+        widest = half[axis] > half[widest] ? axis : widest;
+    }
+    if (!may_reach(frame, middle, half, reach)) {
+        return;
+    }
+    if (box.first[widest] >= box.last[widest]) {
+        use(box.first);
+        return;
+    }
+    Box lower = box, upper = box;
+    lower.last[widest] = box.first[widest] + (box.last[widest] - box.first[widest]) / 2;
+    upper.first[widest] = lower.last[widest] + 1;
+    visit(frame, origin, reach, edge, lower, use);
+    visit(frame, origin, reach, edge, upper, use);
+}
+
+Corners moved(const Corners &corner, const Vec3d &origin) {
+    return {corner[0] - origin, corner[1] - origin, corner[2] - origin};
+}
+
+struct CellHash {
+    size_t operator()(const Cell &c) const {
+        const uint64_t h = uint64_t(uint32_t(c[0])) * 0x9e3779b97f4a7c15u ^
+                           uint64_t(uint32_t(c[1])) * 0xc2b2ae3d27d4eb4fu ^
+                           uint64_t(uint32_t(c[2])) * 0x165667b19e3779f9u;
+        return size_t(h ^ h >> 29);
+    }
+};
+
+// Cells that a triangle reaches; few are taken as they are.
+template <typename Use> void visit_regions(const Corners &corner, double reach, const Use &use) {
+    const Box box = cells_of(corner, reach, REGION);
+    size_t count = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+        count *= size_t(box.last[axis] - box.first[axis] + 1);
+    }
+    if (count > 8) {
+        visit(frame_of(moved(corner, corner[0])), corner[0], reach, REGION, box, use);
+        return;
+    }
+    for (int32_t x = box.first[0]; x <= box.last[0]; ++x) {
+        for (int32_t y = box.first[1]; y <= box.last[1]; ++y) {
+            for (int32_t z = box.first[2]; z <= box.last[2]; ++z) {
+                use(Cell{x, y, z});
+            }
+        }
+    }
+}
+
+} // namespace
+
+Band::Band(const Surface &surface_, double half_width_) : half_width(half_width_), surface(surface_) {
+    sort_triangles();
+}
+
+void Band::sort_triangles() {
+    std::unordered_map<Cell, size_t, CellHash> numbers;
+    Cell last{};
+    size_t current = 0;
+    for (size_t i = 0; i < surface.polygons.size(); ++i) {
+        for (uint32_t half = 0; half < triangles_of(surface.polygons[i]); ++half) {
+            const auto triangle = uint32_t(2 * i + half);
+            visit_regions(corners_of(surface, triangle), half_width, [&](const Cell &cell) {
+                if (regions.empty() || !same(cell, last)) { // else as for the triangle before
+                    const auto found = numbers.emplace(cell, regions.size());
+                    if (found.second) {
+                        regions.emplace_back();
+                        regions.back().origin = {cell[0] * REGION, cell[1] * REGION, cell[2] * REGION};
+                    }
+                    current = found.first->second;
+                    last = cell;
+                }
+                regions[current].triangles.push_back(triangle);
+            });
+        }
+    }
+}
+
+// A region's leaves while they are measured. Places are counted from the region's middle.
+class Band::Measuring {
+  public:
+    Measuring(const Band &band_, Region &region_, const vshi_leaf_kernel &kernel_)
+        : band(band_), region(region_), kernel(kernel_), frames(region.triangles.size()) {
+        limits.fill(FLT_MAX);
+    }
+
+    void measure(bool sides) {
+        frame_triangles();
+        if (band.half_width > WIDE) {
+            limit_leaves();
+        }
+        list_triangles();
+        size_t count = 0;
+        for (int leaf = 0; leaf < VSHI_REGION_LEAVES; ++leaf) {
+            count += first[leaf + 1] > first[leaf];
+        }
+        region.distances.reserve(count * VSHI_LEAF_VOXELS);
+        for (int leaf = 0; leaf < VSHI_REGION_LEAVES; ++leaf) {
+            measure_leaf(leaf, sides);
+        }
+    }
+
+  private:
+    struct Pair {
+        uint32_t leaf, triangle;
+    };
+
+    static Cell cell_of(int leaf) {
+        return {leaf / (LEAVES * LEAVES), leaf / LEAVES % LEAVES, leaf % LEAVES};
+    }
+    static Vec3d middle_of(int leaf) {
+        const Cell cell = cell_of(leaf);
+        return {LEAF * (cell[0] + 0.5) - 0.5 * REGION, LEAF * (cell[1] + 0.5) - 0.5 * REGION,
+                LEAF * (cell[2] + 0.5) - 0.5 * REGION};
+    }
+
+    void frame_triangles() {
+        Vec3d middle;
+        for (int axis = 0; axis < 3; ++axis) {
+            middle[axis] = double(region.origin[axis]) + 0.5 * (REGION - 1);
+        }
+        for (size_t i = 0; i < frames.size(); ++i) {
+            const Corners corner = moved(corners_of(band.surface, region.triangles[i]), middle);
+            frames[i] = frame_of(corner);
+            boxes.push_back(cells_of(corner, band.half_width, LEAF, 0.5 * (REGION - 1)));
+        }
+    }
+
+    // How far a leaf's middle may be from a triangle that is the nearest of one of its voxels.
+    void limit_leaves() {
+        for (const vshi_frame &frame : frames) {
+            float distances[VSHI_REGION_LEAVES];
+            kernel.middles(&frame, distances);
+            for (int leaf = 0; leaf < VSHI_REGION_LEAVES; ++leaf) {
+                limits[leaf] = std::min(limits[leaf], distances[leaf] + 2.0f * LEAF_RADIUS);
+            }
+        }
+    }
+
+    // Sorts the triangles by leaves.
+    void list_triangles() {
+        std::vector<Pair> pairs;
+        for (uint32_t i = 0; i < frames.size(); ++i) {
+            float distances[VSHI_REGION_LEAVES] = {};
+            if (band.half_width > WIDE) {
+                kernel.middles(&frames[i], distances);
+            }
+            for_each_leaf(boxes[i], [&](int leaf) {
+                if (distances[leaf] <= limits[leaf] &&
+                    may_reach(frames[i], middle_of(leaf), LEAF_HALF, band.half_width)) {
+                    pairs.push_back({uint32_t(leaf), i});
+                    ++first[leaf + 1];
+                }
+            });
+        }
+        for (size_t i = 1; i < first.size(); ++i) {
+            first[i] += first[i - 1];
+        }
+        list.resize(pairs.size());
+        auto next = first;
+        for (const Pair &pair : pairs) {
+            list[next[pair.leaf]++] = pair.triangle;
+        }
+    }
+
+    template <typename Use> static void for_each_leaf(const Box &box, const Use &use) {
+        for (int32_t x = std::max(box.first[0], 0); x <= std::min(box.last[0], LEAVES - 1); ++x) {
+            for (int32_t y = std::max(box.first[1], 0); y <= std::min(box.last[1], LEAVES - 1); ++y) {
+                for (int32_t z = std::max(box.first[2], 0); z <= std::min(box.last[2], LEAVES - 1); ++z) {
+                    use((x * LEAVES + y) * LEAVES + z);
+                }
+            }
+        }
+    }
+
+    void measure_leaf(int leaf, bool sides) {
+        const uint32_t *const triangles = list.data() + first[leaf];
+        const size_t count = first[leaf + 1] - first[leaf];
+        const Vec3d middle = middle_of(leaf);
+        const float place[3] = {float(middle[0]), float(middle[1]), float(middle[2])};
+        float distances[VSHI_LEAF_VOXELS];
+        if (count == 0 ||
+            !kernel.measure(frames.data(), triangles, count, place, float(band.half_width), distances)) {
+            return;
+        }
+        const Cell cell = cell_of(leaf);
+        region.leaves.push_back({region.origin[0] + LEAF * cell[0], region.origin[1] + LEAF * cell[1],
+                                 region.origin[2] + LEAF * cell[2]});
+        region.distances.insert(region.distances.end(), distances, distances + VSHI_LEAF_VOXELS);
+        if (sides && add_parts(distances, region.parts)) {
+            for (size_t i = 0; i < count; ++i) {
+                if (may_reach(frames[triangles[i]], middle, LEAF_HALF, PARTING)) {
+                    region.near_triangles.push_back(region.triangles[triangles[i]]);
+                }
+            }
+        }
+        region.part_ends.push_back(region.parts.size());
+        region.triangle_ends.push_back(region.near_triangles.size());
+    }
+
+    const Band &band;
+    Region &region;
+    const vshi_leaf_kernel &kernel;
+    std::vector<vshi_frame> frames;
+    std::vector<Box> boxes;                               // of the leaves that each may reach
+    std::array<float, VSHI_REGION_LEAVES> limits;         // in wide bands
+    std::array<uint32_t, VSHI_REGION_LEAVES + 1> first{}; // of each leaf in the list
+    std::vector<uint32_t> list;                           // frames
+};
+
+void Band::measure(size_t number, bool sides, const vshi_leaf_kernel &kernel) {
+    Measuring(*this, regions[number], kernel).measure(sides);
+    regions[number].triangles = {};
+}
+
+std::vector<BandLeaf> Band::leaves() {
+    std::vector<BandLeaf> all;
+    for (Region &region : regions) {
+        size_t part = 0, triangle = 0;
+        for (size_t i = 0; i < region.leaves.size(); ++i) {
+            all.push_back({region.leaves[i], region.distances.data() + i * VSHI_LEAF_VOXELS,
+                           region.near_triangles.data() + triangle, region.triangle_ends[i] - triangle,
+                           region.parts.data() + part, region.part_ends[i] - part});
+            part = region.part_ends[i];
+            triangle = region.triangle_ends[i];
+        }
+    }
+    std::sort(all.begin(), all.end(),
+              [](const BandLeaf &a, const BandLeaf &b) { return a.origin < b.origin; });
+    return all;
+}
+
+} // namespace vshi

@@ -1,0 +1,16 @@
+#include "levelset/kernel/leaf.h"
+
+#include "base/isa.h"
+
+const vshi_leaf_kernel *vshi_leaf_kernel_of(int32_t isa) {
+    switch (vshi_isa_resolve(isa)) {
+#if defined(__x86_64__)
+    case VSH_ISA_AVX512:
+        return &vshi_leaf_avx512;
+    case VSH_ISA_AVX2:
+        return &vshi_leaf_avx2;
+#endif
+    default:
+        return &vshi_leaf_base;
+    }
+}

@@ -1,0 +1,56 @@
+/* Distances of a leaf's voxels to triangles. */
+#ifndef VSHI_LEAF_KERNEL_H
+#define VSHI_LEAF_KERNEL_H
+
+#include "base/shared.h"
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A triangle as seven functions that are linear in the place q, which is counted from the middle of a region:
+ * the height over its plane, then of each edge the distance from the edge's line within the plane (positive
+ * outside the triangle), then of each edge the place along it. Each is row[0] x + row[1] y + row[2] z +
+ * row[3]; the edge itself reaches from `low` to `high` of its last function, whose row[3] is 0. */
+enum {
+    VSHI_FRAME_HEIGHT = 0,
+    VSHI_FRAME_BESIDE = 1,
+    VSHI_FRAME_ALONG = 4,
+    VSHI_FRAME_ROWS = 7,
+    VSHI_LEAF_VOXELS = 512,
+    VSHI_REGION_LEAVES = 64
+};
+
+typedef struct vshi_frame {
+    float row[VSHI_FRAME_ROWS][4];
+    float low[3];
+    float high[3];
+} vshi_frame;
+
+typedef struct vshi_leaf_kernel {
+    /* The least distance, voxels, of each of a leaf's 8³ voxels (stored x · 64 + y · 8 + z) to `count`
+     * triangles frames[list[i]], `reach` where none is nearer; `middle` is the leaf's, from the region's.
+     * Returns whether one is nearer than `reach`. Exact to 1e-4 of a voxel. */
+    int (*measure)(const vshi_frame *frames, const uint32_t *list, size_t count, const float middle[3],
+                   float reach, float distances[VSHI_LEAF_VOXELS]);
+    /* The distances of the middles of a region's 4³ leaves (stored x · 16 + y · 4 + z) to one triangle. */
+    void (*middles)(const vshi_frame *frame, float distances[VSHI_REGION_LEAVES]);
+} vshi_leaf_kernel;
+
+/* One source (leaf.inc), built for each instruction set; all give the same bits. Thread safe. */
+extern const vshi_leaf_kernel vshi_leaf_base;
+#if defined(__x86_64__)
+extern const vshi_leaf_kernel vshi_leaf_avx2;
+extern const vshi_leaf_kernel vshi_leaf_avx512;
+#endif
+
+/* That of a VSH_ISA_…. */
+VSHI_SHARED const vshi_leaf_kernel *vshi_leaf_kernel_of(int32_t isa);
+
+#ifdef __cplusplus
+}
+#endif
+#endif
