@@ -14,8 +14,6 @@ constexpr int LEAF = 8;
 constexpr int EDGE = 10; // of a leaf with the voxels around it
 // Voxels nearer than this lie on the surface: neither side is wrong.
 constexpr float ON = 1e-4f;
-// How many neighbours a voxel is tested against, whether the surface lies between.
-constexpr int TRIED = 4;
 // What goes by a triangle's edge within this, voxels, goes through it.
 constexpr double AT_EDGE = 1e-6;
 // By how much boxes of triangles are too large, voxels: more than their rounding.
@@ -234,14 +232,12 @@ int Sides::side_of(const Halo &halo, const Cell &local, Nearby &nearby) {
             }
         }
     }
-    for (int tried = 0; tried < std::min(count, TRIED); ++tried) {
-        const auto farthest =
-            std::max_element(known + tried, known + count,
-                             [](const Known26 &a, const Known26 &b) { return a.distance < b.distance; });
-        std::swap(known[tried], *farthest);
-        const int8_t *const step = known[tried].step;
+    std::stable_sort(known, known + count,
+              [](const Known26 &a, const Known26 &b) { return a.distance > b.distance; });
+    for (int k = 0; k < count; ++k) {
+        const int8_t *const step = known[k].step;
         if (!nearby.parts(local, {local[0] + step[0], local[1] + step[1], local[2] + step[2]})) {
-            return known[tried].side;
+            return known[k].side;
         }
     }
     return 0;

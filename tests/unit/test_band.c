@@ -1,0 +1,269 @@
+/* The band of a mesh, voxel by voxel: distances against every triangle, sides against counted crossings. */
+#include "grids.h"
+
+#include "shapes.h"
+
+#define ERROR_MOST 1e-3 /* voxels */
+
+static double dot3(const double a[3], const double b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static void sub3(const double a[3], const double b[3], double to[3]) {
+    for (int i = 0; i < 3; ++i) {
+        to[i] = a[i] - b[i];
+    }
+}
+
+static double to_segment(const double p[3], const double a[3], const double b[3]) {
+    double ab[3], ap[3], off[3];
+    sub3(b, a, ab);
+    sub3(p, a, ap);
+    const double length = dot3(ab, ab);
+    const double t = length > 0.0 ? fmin(fmax(dot3(ap, ab) / length, 0.0), 1.0) : 0.0;
+    for (int i = 0; i < 3; ++i) {
+        off[i] = ap[i] - t * ab[i];
+    }
+    return sqrt(dot3(off, off));
+}
+
+static void corners_of(const shape *s, size_t triangle, double corner[3][3]) {
+    for (int k = 0; k < 3; ++k) {
+        for (int i = 0; i < 3; ++i) {
+            corner[k][i] = (double)s->positions[s->indices[triangle][k]][i];
+        }
+    }
+}
+
+static void cross3(const double a[3], const double b[3], double to[3]) {
+    to[0] = a[1] * b[2] - a[2] * b[1];
+    to[1] = a[2] * b[0] - a[0] * b[2];
+    to[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+/* By solving for the plane's foot; where it is not inside, an edge is the nearest. */
+static double to_triangle(const double p[3], double corner[3][3]) {
+    double u[3], v[3], w[3], normal[3], uw[3], wv[3];
+    sub3(corner[1], corner[0], u);
+    sub3(corner[2], corner[0], v);
+    sub3(p, corner[0], w);
+    cross3(u, v, normal);
+    cross3(u, w, uw);
+    cross3(w, v, wv);
+    const double area = dot3(normal, normal);
+    const double b = dot3(uw, normal), c = dot3(wv, normal);
+    if (area > 0.0 && b >= 0.0 && c >= 0.0 && b + c <= area) {
+        return fabs(dot3(w, normal)) / sqrt(area);
+    }
+    return fmin(to_segment(p, corner[0], corner[1]),
+                fmin(to_segment(p, corner[1], corner[2]), to_segment(p, corner[2], corner[0])));
+}
+
+static double to_shape(const double p[3], const shape *s) {
+    double least = DBL_MAX;
+    for (size_t i = 0; i < s->triangles; ++i) {
+        double corner[3][3];
+        corners_of(s, i, corner);
+        least = fmin(least, to_triangle(p, corner));
+    }
+    return least;
+}
+
+/* Whether a ray from p crosses an odd number of triangles. */
+static int is_inside(const double p[3], const shape *s) {
+    const double direction[3] = {0.331662, 0.712317, 0.618583};
+    int odd = 0;
+    for (size_t i = 0; i < s->triangles; ++i) {
+        double corner[3][3], u[3], v[3], w[3], dv[3], wu[3];
+        corners_of(s, i, corner);
+        sub3(corner[1], corner[0], u);
+        sub3(corner[2], corner[0], v);
+        sub3(p, corner[0], w);
+        cross3(direction, v, dv);
+        cross3(w, u, wu);
+        const double scale = 1.0 / dot3(u, dv);
+        const double a = scale * dot3(w, dv), b = scale * dot3(direction, wu);
+        odd ^= a >= 0.0 && b >= 0.0 && a + b <= 1.0 && scale * dot3(v, wu) > 0.0;
+    }
+    return odd;
+}
+
+/* A closed surface with bumps and hollows. Folds narrower than a voxel have no voxel within and are taken for
+ * closed: there are none. */
+static shape *bumpy(int rows, double amplitude) {
+    shape *s = shape_new();
+    const int columns = 2 * rows;
+    for (int row = 0; row <= rows; ++row) {
+        for (int column = 0; column < (row == 0 || row == rows ? 1 : columns); ++column) {
+            const double polar = 3.14159265358979 * row / rows, around = 3.14159265358979 * column / rows;
+            const double x = sin(polar) * cos(around), y = cos(polar), z = sin(polar) * sin(around);
+            const double r = 1.0 + amplitude * (sin(7.0 * x + 3.0 * y) + sin(9.0 * y + 2.0 * z) +
+                                                sin(11.0 * z + 5.0 * x) + 0.5 * sin(31.0 * x * y + 23.0 * z));
+            shape_vertex(s, r * x, r * y, r * z);
+        }
+    }
+    const uint32_t last = (uint32_t)s->vertices - 1;
+    for (int row = 0; row < rows; ++row) {
+        for (int column = 0; column < columns; ++column) {
+            const int next = (column + 1) % columns;
+            const uint32_t up = (uint32_t)(1 + (row - 1) * columns), down = (uint32_t)(1 + row * columns);
+            if (row > 0) {
+                shape_triangle(s, up + (uint32_t)column, up + (uint32_t)next,
+                               row == rows - 1 ? last : down + (uint32_t)column);
+            }
+            if (row < rows - 1) {
+                shape_triangle(s, row == 0 ? 0 : up + (uint32_t)next, down + (uint32_t)next,
+                               down + (uint32_t)column);
+            }
+        }
+    }
+    return s;
+}
+
+static vsh_grid *grid_of(const shape *s, const vsh_grid_options *options, const vsh_run *run) {
+    vsh_mesh mesh = shape_mesh(s, "mesh");
+    mesh.solidity = VSH_SOLIDITY_SOLID;
+    vsh_grid *grid = NULL;
+    if (vsh_grid_from_meshes(&mesh, 1, options, run, &grid, &failure) != VSH_OK) {
+        fail_msg("%s", failure.message);
+    }
+    return grid;
+}
+
+/* Some `count` voxels of all leaves, against the triangles. Voxels farther than the half width have it. */
+static void compare(const shape *s, const vsh_grid *grid, size_t count) {
+    leaves all = leaves_of(grid);
+    const double voxel = all.info.voxel_size;
+    const size_t step = all.count * 512 / count | 1;
+    double worst = 0.0;
+    size_t wrong = 0, near = 0;
+    for (size_t i = 0; i < all.count * 512; i += step) {
+        double p[3];
+        voxel_position(&all, i / 512, (int)(i % 512), p);
+        const double value = (double)all.leaf[i / 512].values[i % 512] / voxel;
+        const double truth = fmin(to_shape(p, s) / voxel, all.info.half_width);
+        worst = fmax(worst, fabs(fabs(value) - truth));
+        wrong += truth > ERROR_MOST && (value < 0.0) != is_inside(p, s);
+        near += truth < all.info.half_width;
+    }
+    print_message("%zu triangles, %zu leaves: worst of %zu %.2g voxels, %zu sides wrong\n", s->triangles,
+                  all.count, near, worst, wrong);
+    assert_true(near > count / 4);
+    assert_true(worst < ERROR_MOST);
+    assert_int_equal(wrong, 0);
+    free(all.leaf);
+}
+
+static void distances_are_to_the_nearest_triangle_and_sides_by_crossings(void **state) {
+    (void)state;
+    const struct {
+        int rows;
+        double amplitude, voxel, half_width;
+    } cases[] = {
+        {6, 0.02, 0.02, 3.0},  /* triangles of many voxels */
+        {24, 0.05, 0.03, 3.0}, /* of some */
+        {70, 0.06, 0.06, 3.0}, /* of less than one */
+        {24, 0.05, 0.05, 20.0} /* a wide band */
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        shape *s = bumpy(cases[i].rows, cases[i].amplitude);
+        vsh_grid_options options = with_voxel(cases[i].voxel);
+        options.half_width = cases[i].half_width;
+        vsh_grid *grid = grid_of(s, &options, NULL);
+        compare(s, grid, 4000);
+        vsh_grid_free(grid);
+        free(s);
+    }
+}
+
+/* A box whose faces are fans of needles around a point near one of their edges. */
+static shape *needles(void) {
+    enum { ACROSS = 400 };
+    shape *s = shape_new();
+    for (int face = 0; face < 6; ++face) {
+        const int axis = face / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
+        const uint32_t first = (uint32_t)s->vertices;
+        for (int i = 0; i <= 4 * ACROSS; ++i) {
+            const int side = i / ACROSS % 4;
+            const double t = -1.0 + 2.0 * (i % ACROSS) / ACROSS;
+            const double along[4][2] = {{t, -1.0}, {1.0, t}, {-t, 1.0}, {-1.0, -t}};
+            double p[3];
+            p[axis] = face % 2 == 0 ? -1.0 : 1.0;
+            p[u] = i == 4 * ACROSS ? 0.3 : along[side][0];
+            p[v] = i == 4 * ACROSS ? -0.9999 : along[side][1];
+            shape_vertex(s, p[0], p[1], p[2]);
+        }
+        for (uint32_t i = 0; i < 4 * ACROSS; ++i) {
+            shape_triangle(s, first + i, first + (i + 1) % (4 * ACROSS), first + 4 * ACROSS);
+        }
+    }
+    return s;
+}
+
+static double unit_box(const double p[3]) {
+    const double x = fabs(p[0]) - 1.0, y = fabs(p[1]) - 1.0, z = fabs(p[2]) - 1.0;
+    const double a = fmax(x, 0.0), b = fmax(y, 0.0), c = fmax(z, 0.0);
+    return sqrt(a * a + b * b + c * c) + fmin(fmax(x, fmax(y, z)), 0.0);
+}
+
+static void needles_are_as_exact_as_others(void **state) {
+    (void)state;
+    shape *s = needles();
+    const double voxels[] = {0.031, 0.11, 0.007};
+    for (size_t i = 0; i < sizeof voxels / sizeof voxels[0]; ++i) {
+        const vsh_grid_options options = with_voxel(voxels[i]);
+        vsh_grid *grid = grid_of(s, &options, NULL);
+        const double worst = worst_error(grid, unit_box, 2.99, 2.99);
+        print_message("box of needles, voxel %g: worst %.2g voxels\n", voxels[i], worst);
+        assert_true(worst < ERROR_MOST);
+        vsh_grid_free(grid);
+    }
+    free(s);
+}
+
+static void threads_and_instruction_sets_change_no_bit(void **state) {
+    (void)state;
+    shape *s = bumpy(40, 0.08);
+    const vsh_grid_options options = with_voxel(0.04);
+    float *first = NULL;
+    size_t bytes = 0;
+    for (int32_t isa = VSH_ISA_BEST; isa <= VSH_ISA_AVX512; ++isa) {
+        for (int threads = 1; vsh_isa_available(isa) && threads <= 4; threads += 3) {
+            vsh_run run = vsh_run_default();
+            run.isa = isa;
+            run.threads = threads;
+            vsh_grid *grid = grid_of(s, &options, &run);
+            vsh_grid_info info;
+            vsh_grid_get_info(grid, &info);
+            int32_t size[3];
+            size_t count = 1;
+            for (int axis = 0; axis < 3; ++axis) {
+                size[axis] = info.index_max[axis] - info.index_min[axis] + 1;
+                count *= (size_t)size[axis];
+            }
+            float *values = malloc(count * sizeof *values);
+            assert_non_null(values);
+            assert_int_equal(vsh_grid_copy(grid, info.index_min, size, values, &failure), VSH_OK);
+            vsh_grid_free(grid);
+            if (first == NULL) {
+                first = values;
+                bytes = count * sizeof *values;
+                continue;
+            }
+            assert_int_equal(count * sizeof *values, bytes);
+            assert_memory_equal(values, first, bytes);
+            free(values);
+        }
+    }
+    free(first);
+    free(s);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(distances_are_to_the_nearest_triangle_and_sides_by_crossings),
+        cmocka_unit_test(needles_are_as_exact_as_others),
+        cmocka_unit_test(threads_and_instruction_sets_change_no_bit),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
