@@ -233,7 +233,7 @@ int Sides::side_of(const Halo &halo, const Cell &local, Nearby &nearby) {
         }
     }
     std::stable_sort(known, known + count,
-              [](const Known26 &a, const Known26 &b) { return a.distance > b.distance; });
+                     [](const Known26 &a, const Known26 &b) { return a.distance > b.distance; });
     for (int k = 0; k < count; ++k) {
         const int8_t *const step = known[k].step;
         if (!nearby.parts(local, {local[0] + step[0], local[1] + step[1], local[2] + step[2]})) {
