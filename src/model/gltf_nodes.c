@@ -285,8 +285,8 @@ static vsh_result add_node(vshi_gltf *gltf, size_t node, vsh_error *error) {
     char where[64];
     snprintf(where, sizeof where, "nodes[%zu]", node);
     const json_t *given = vshi_gltf_element(gltf, "nodes", node);
-    size_t mesh, skin, first;
-    bool skinned;
+    size_t mesh, skin, first = 0;
+    bool skinned = false;
     VSHI_TRY(vshi_gltf_index(gltf, given, "mesh", "meshes", where, &mesh, error));
     VSHI_TRY(vshi_gltf_index(gltf, given, "skin", "skins", where, &skin, error));
     if (mesh == SIZE_MAX) {
