@@ -67,8 +67,7 @@ static void query(fuzz_input *input) {
     fuzz_take(input, &output, sizeof output);
     if (layout.position_stride > MOST_STRIDE || layout.normal_stride > MOST_STRIDE ||
         layout.texel_stride > MOST_STRIDE || output.stride > MOST_STRIDE) {
-        vsh_query_free(made_query);
-        return;
+        goto done;
     }
     const uint8_t how = fuzz_byte(input);
     const vsh_points points = {POINTS - fuzz_byte(input) % (POINTS + 1), how & 1 ? positions : NULL,
@@ -86,6 +85,7 @@ static void query(fuzz_input *input) {
     fuzz_fill(input, normals, 3 * POINTS * sizeof *normals);
     fuzz_ended_plain(vsh_query_points(made_query, &points, &layout, &run, &output, NULL, fuzz_error(&error)),
                      &error);
+done:
     vsh_query_free(made_query);
     fuzz_free_occluders(occluders);
 }

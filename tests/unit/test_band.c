@@ -163,6 +163,7 @@ static void distances_are_to_the_nearest_triangle_and_sides_by_crossings(void **
         {6, 0.02, 0.02, 3.0},  /* triangles of many voxels */
         {24, 0.05, 0.03, 3.0}, /* of some */
         {70, 0.06, 0.06, 3.0}, /* of less than one */
+        {40, 0.08, 0.06, 3.0}, /* with folds */
         {24, 0.05, 0.05, 20.0} /* a wide band */
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
@@ -221,6 +222,123 @@ static void needles_are_as_exact_as_others(void **state) {
     free(s);
 }
 
+/* Needles alone in space, as sheets, along the voxels' middles: beyond their ends is nothing. */
+static void a_lone_needle_ends_where_it_ends(void **state) {
+    (void)state;
+    const double heights[] = {1e-1, 1e-3, 1e-5, 1e-6}; /* voxels */
+    const double voxel = 1.0 / 128.0;
+    for (size_t k = 0; k < sizeof heights / sizeof heights[0]; ++k) {
+        shape *s = shape_new();
+        const double height = heights[k] * voxel;
+        shape_triangle(s, shape_vertex(s, -0.3125, -0.3125, 0.0), shape_vertex(s, 0.3125, 0.3125, 0.0),
+                       shape_vertex(s, 0.01 - height, 0.01 + height, 0.0));
+        vsh_grid_options options = with_voxel(voxel);
+        vsh_mesh mesh = shape_mesh(s, "needle");
+        mesh.solidity = VSH_SOLIDITY_SHELL;
+        vsh_grid *grid = NULL;
+        assert_int_equal(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure), VSH_OK);
+        leaves all = leaves_of(grid);
+        const double background = all.info.half_width * voxel, half = 0.5 * all.info.shell_thickness;
+        double worst = 0.0;
+        for (size_t i = 0; i < all.count * 512; ++i) {
+            double p[3];
+            voxel_position(&all, i / 512, (int)(i % 512), p);
+            const double truth = fmin(fmax(to_shape(p, s) - half, -background), background);
+            worst = fmax(worst, fabs((double)all.leaf[i / 512].values[i % 512] - truth) / voxel);
+        }
+        print_message("needle of %g voxels: worst %.2g voxels\n", heights[k], worst);
+        assert_true(worst < ERROR_MOST);
+        free(all.leaf);
+        vsh_grid_free(grid);
+        free(s);
+    }
+}
+
+typedef struct box {
+    double low[3], high[3];
+} box;
+
+static void add_box(shape *s, const box *b) {
+    uint32_t v[8];
+    for (int i = 0; i < 8; ++i) {
+        v[i] = shape_vertex(s, i & 1 ? b->high[0] : b->low[0], i & 2 ? b->high[1] : b->low[1],
+                            i & 4 ? b->high[2] : b->low[2]);
+    }
+    shape_quad(s, v[0], v[2], v[3], v[1]);
+    shape_quad(s, v[4], v[5], v[7], v[6]);
+    shape_quad(s, v[0], v[1], v[5], v[4]);
+    shape_quad(s, v[2], v[6], v[7], v[3]);
+    shape_quad(s, v[0], v[4], v[6], v[2]);
+    shape_quad(s, v[1], v[3], v[7], v[5]);
+}
+
+static int is_in_box(const double p[3], const box *b, double by) {
+    int in = 1;
+    for (int i = 0; i < 3; ++i) {
+        in &= p[i] > b->low[i] + by && p[i] < b->high[i] - by;
+    }
+    return in;
+}
+
+/* The distance to what of a box's faces is not in the other, by points `step` apart. */
+static double to_faces(const double p[3], const box *b, const box *other, double step) {
+    double least = DBL_MAX;
+    for (int face = 0; face < 6; ++face) {
+        const int axis = face / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
+        double q[3];
+        q[axis] = face % 2 == 0 ? b->low[axis] : b->high[axis];
+        for (q[u] = b->low[u]; q[u] <= b->high[u] + 1e-9; q[u] += step) {
+            for (q[v] = b->low[v]; q[v] <= b->high[v] + 1e-9; q[v] += step) {
+                double off[3];
+                sub3(p, q, off);
+                const double length = dot3(off, off);
+                least = length < least && !is_in_box(q, other, -1e-9) ? length : least;
+            }
+        }
+    }
+    return sqrt(least);
+}
+
+/* Depth in a union is to its own surface, wherever its parts have theirs; within two voxels of where those
+ * cross, it may be less. */
+static void depth_is_to_the_surface_of_the_union(void **state) {
+    (void)state;
+    const box boxes[2] = {{{-1.03, -0.5, -0.5}, {1.01, 0.52, 0.5}},
+                          {{-0.4, -0.31, -0.33}, {0.42, 1.23, 0.3}}};
+    const double voxel = 0.05, step = 0.01;
+    shape *s = shape_new();
+    add_box(s, &boxes[0]);
+    add_box(s, &boxes[1]);
+    vsh_grid_options options = with_voxel(voxel);
+    options.half_width = 6.0;
+    vsh_grid *grid = grid_of(s, &options, NULL);
+    leaves all = leaves_of(grid);
+    double deeper = 0.0, shallower = 0.0;
+    size_t compared = 0;
+    for (size_t i = 0; i < all.count * 512; i += 7) {
+        double p[3];
+        voxel_position(&all, i / 512, (int)(i % 512), p);
+        if (!is_in_box(p, &boxes[0], voxel) && !is_in_box(p, &boxes[1], voxel)) {
+            continue;
+        }
+        const double truth = fmin(
+            fmin(to_faces(p, &boxes[0], &boxes[1], step), to_faces(p, &boxes[1], &boxes[0], step)) / voxel,
+            all.info.half_width);
+        const double depth = -(double)all.leaf[i / 512].values[i % 512] / voxel;
+        deeper = fmax(deeper, depth - truth);
+        shallower = fmax(shallower, truth - depth);
+        ++compared;
+    }
+    print_message("union: %zu voxels inside, up to %.2g voxels too deep, %.2g too shallow\n", compared,
+                  deeper, shallower);
+    assert_true(compared > 500);
+    assert_true(deeper < 0.05);
+    assert_true(shallower < 2.0);
+    free(all.leaf);
+    vsh_grid_free(grid);
+    free(s);
+}
+
 static void threads_and_instruction_sets_change_no_bit(void **state) {
     (void)state;
     shape *s = bumpy(40, 0.08);
@@ -263,6 +381,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(distances_are_to_the_nearest_triangle_and_sides_by_crossings),
         cmocka_unit_test(needles_are_as_exact_as_others),
+        cmocka_unit_test(a_lone_needle_ends_where_it_ends),
+        cmocka_unit_test(depth_is_to_the_surface_of_the_union),
         cmocka_unit_test(threads_and_instruction_sets_change_no_bit),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
