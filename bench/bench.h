@@ -62,6 +62,8 @@ void bench_nanovdb(FILE *csv);
 void bench_all_cores(FILE *csv);
 void bench_read(FILE *csv);
 void bench_read_header(FILE *csv);
+void bench_levelset(FILE *csv);
+void bench_levelset_header(FILE *csv);
 void bench_scaling(FILE *csv);
 void bench_scaling_header(FILE *csv);
 void bench_features(FILE *csv);

@@ -1,8 +1,10 @@
-// What OpenVDB and NanoVDB do with the same level set. An exception ends the program: this is no library.
+// What OpenVDB and NanoVDB do with the same meshes and level sets. An exception ends the program: this is no
+// library.
 #include "vdb.h"
 
 #include "levelset/grid.h"
 
+#include <openvdb/tools/MeshToVolume.h>
 #include <openvdb/tools/RayIntersector.h>
 
 #ifdef BENCH_NANOVDB
@@ -30,6 +32,25 @@ template <typename Make, typename Body> void run(size_t count, int threads, Make
 }
 
 } // namespace
+
+void vdb_mesh_to_volume(const vdb_triangles *triangles, double voxel, double half_width) {
+    std::vector<openvdb::Vec3s> points(triangles->vertex_count);
+    for (size_t i = 0; i < points.size(); ++i) {
+        points[i] = openvdb::Vec3s(triangles->positions + 3 * i) / float(voxel);
+    }
+    std::vector<openvdb::Vec4I> polygons(triangles->count);
+    for (size_t i = 0; i < polygons.size(); ++i) {
+        const uint32_t *corner = triangles->indices + 3 * i;
+        polygons[i] = {corner[0], corner[1], corner[2], openvdb::util::INVALID_IDX};
+    }
+    tbb::task_arena arena(1);
+    arena.execute([&] {
+        const openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec4I> mesh(points,
+                                                                                              polygons);
+        const auto unit = openvdb::math::Transform::createLinearTransform(1.0);
+        openvdb::tools::meshToVolume<openvdb::FloatGrid>(mesh, *unit, float(half_width), float(half_width));
+    });
+}
 
 struct vdb_intersector {
     openvdb::FloatGrid::Ptr grid;

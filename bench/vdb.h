@@ -1,4 +1,4 @@
-/* Rays against the level set behind a grid, by OpenVDB's and NanoVDB's own code. */
+/* Level sets of meshes, and rays against the one behind a grid, by OpenVDB's and NanoVDB's own code. */
 #ifndef BENCH_VDB_H
 #define BENCH_VDB_H
 
@@ -18,6 +18,15 @@ typedef struct vdb_rays {
     const uint8_t *mask;
     double direction[3];
 } vdb_rays;
+
+typedef struct vdb_triangles {
+    const float *positions;  /* [vertex_count][3] */
+    const uint32_t *indices; /* [count][3] */
+    size_t vertex_count, count;
+} vdb_triangles;
+
+/* openvdb::tools::meshToVolume on one thread, `half_width` voxels to either side; what it makes is freed. */
+void vdb_mesh_to_volume(const vdb_triangles *triangles, double voxel, double half_width);
 
 /* openvdb::tools::LevelSetRayIntersector, one a thread. */
 typedef struct vdb_intersector vdb_intersector;
