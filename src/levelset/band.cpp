@@ -164,11 +164,11 @@ struct CellHash {
 // Cells that a triangle reaches; few are taken as they are.
 template <typename Use> void visit_regions(const Corners &corner, double reach, const Use &use) {
     const Box box = cells_of(corner, reach, REGION);
-    size_t count = 1;
+    double count = 1.0; // which passes all integers where a thin triangle lies across a large lattice
     for (int axis = 0; axis < 3; ++axis) {
-        count *= size_t(box.last[axis] - box.first[axis] + 1);
+        count *= double(box.last[axis] - box.first[axis] + 1);
     }
-    if (count > 8) {
+    if (count > 8.0) {
         visit(frame_of(moved(corner, corner[0])), corner[0], reach, REGION, box, use);
         return;
     }
