@@ -68,8 +68,8 @@ static void measure(FILE *csv, const char *name, const vsh_mesh *meshes, size_t 
         vdb_mesh_to_volume(&all, voxel, options.half_width);
         seconds[2][i] = bench_seconds() - begin;
     }
-    free((void *)all.positions);
-    free((void *)all.indices);
+    free((void *)(uintptr_t)all.positions);
+    free((void *)(uintptr_t)all.indices);
     double ms[3];
     for (int k = 0; k < 3; ++k) {
         ms[k] = 1e3 * bench_median(seconds[k], BENCH_RUNS);
