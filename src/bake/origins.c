@@ -131,19 +131,42 @@ static bool is_open(const void *user, size_t i) {
     return t->in->field->voxel_size * (double)vshi_field_distance(t->in->field, at) >= CREASE * t->in->probe;
 }
 
+/* Samples that are looked at together follow each other in a tile, at most so many: whatever the band, they
+ * are the same. */
+enum { TOGETHER = 64 };
+
+static bool same_tile(const vsh_texels *texels, size_t i, size_t k) {
+    return ((texels->texel[i] ^ texels->texel[k]) & ~0x00070007u) == 0;
+}
+
+/* Where those begin that sample i is of. */
+static size_t together(const vsh_texels *texels, size_t i) {
+    size_t first = i;
+    while (first > 0 && same_tile(texels, first - 1, i)) {
+        --first;
+    }
+    return i - (i - first) % TOGETHER;
+}
+
 /* Looks at samples first … last - 1 by rays against a field's triangles. */
 static void trace(const lifting *l, const looked_at *in, size_t first, size_t last) {
-    double at[3 * VSHI_ORIGIN_BLOCK] = {0.0};
-    uint8_t where[VSHI_ORIGIN_BLOCK];
-    for (size_t i = first; i < last; ++i) {
-        put(place(l, i), at + 3 * (i - first));
+    double at[3 * (TOGETHER + VSHI_ORIGIN_BLOCK)] = {0.0};
+    uint8_t where[TOGETHER + VSHI_ORIGIN_BLOCK];
+    bool follows[TOGETHER + VSHI_ORIGIN_BLOCK];
+    const size_t begin = together(l->texels, first);
+    size_t start = begin;
+    for (size_t i = begin; i < last; ++i) {
+        put(place(l, i), at + 3 * (i - begin));
+        start = i - start == TOGETHER || !same_tile(l->texels, i, start) ? i : start;
+        follows[i - begin] = i != start;
     }
-    const tracing task = {l, in, first};
-    vshi_inside(in->triangles, last - first, at, l->texels->geometric + 3 * first, is_open, &task, where);
+    const tracing task = {l, in, begin};
+    vshi_inside(in->triangles, last - begin, at, l->texels->geometric + 3 * begin, follows, is_open, &task,
+                where);
     for (size_t i = first; i < last; ++i) {
-        if (where[i - first] != VSHI_OUTSIDE) {
+        if (where[i - begin] != VSHI_OUTSIDE) {
             l->origins->valid[i] = 0;
-            l->origins->seen[i] = where[i - first] == VSHI_INSIDE_SEEN;
+            l->origins->seen[i] = where[i - begin] == VSHI_INSIDE_SEEN;
         }
     }
 }

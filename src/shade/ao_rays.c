@@ -277,7 +277,7 @@ static void find_buried(const vshi_ao_task *task, size_t begin, size_t end, vshi
             l.of[count++] = (uint32_t)(i - begin);
         }
     }
-    vshi_inside(task->triangles, count, positions, normals, is_open, &l, where);
+    vshi_inside(task->triangles, count, positions, normals, NULL, is_open, &l, where);
     for (size_t k = 0; k < count; ++k) {
         const size_t i = begin + l.of[k];
         if (where[k] == VSHI_OUTSIDE) {

@@ -25,6 +25,9 @@ static const double MAJORITY = 0.72;
 /* Between these shares of MORE, as many more are asked. */
 static const double UNCLEAR[2] = {0.5, 0.95};
 
+/* Points that are linked by a ray face the same way to within this (cosine). */
+static const double ALIKE = 0.9;
+
 /* And of all of them, where the COUNTED agree on inside and one of the first does not: under the mouth of a
  * pipe whose faces look inwards three rays go into it, and more than half escape. */
 static const double AGREED = 2.0 / 3.0;
@@ -60,9 +63,15 @@ typedef struct looking {
     const void *user;
 } looking;
 
+/* A place where a point's rays begin. */
+static vshi_vec lifted(const looking *l, size_t point) {
+    const vshi_vec normal = vshi_unit(vshi_vec_off(l->normals + 3 * point));
+    return vshi_add(vshi_vec_of(l->positions + 3 * point), vshi_scale(normal, l->lift));
+}
+
 static void aim(const looking *l, size_t point, size_t direction, vshi_segment_ray *ray) {
     vshi_vec normal = vshi_unit(vshi_vec_off(l->normals + 3 * point)), u, v;
-    const vshi_vec p = vshi_add(vshi_vec_of(l->positions + 3 * point), vshi_scale(normal, l->lift));
+    const vshi_vec p = lifted(l, point);
     if (!(vshi_dot(normal, normal) > 0.5)) {
         normal = (vshi_vec){0.0, 0.0, 1.0};
     }
@@ -133,21 +142,25 @@ static uint8_t confirm(const looking *l, size_t point) {
     return VSHI_INSIDE;
 }
 
-static void look(const looking *l, size_t first, size_t count, uint8_t *where) {
+/* Looks at `count` points, which are listed. */
+static void look(const looking *l, const size_t *points, size_t count, uint8_t *where) {
     vshi_segment_ray rays[FIRST * AT_ONCE];
     uint8_t meets[FIRST * AT_ONCE];
+    size_t asked = 0;
     for (size_t k = 0; k < FIRST; ++k) { /* those of neighbours together: they go the same way */
         for (size_t i = 0; i < count; ++i) {
-            aim(l, first + i, k, &rays[k * count + i]);
+            aim(l, points[i], k, &rays[asked++]);
         }
     }
-    vshi_triangles_meet(l->triangles, rays, FIRST * count, meets);
+    if (asked > 0) {
+        vshi_triangles_meet(l->triangles, rays, asked, meets);
+    }
     for (size_t i = 0; i < count; ++i) {
         int met[VSHI_MEETS_COUNT] = {0};
         for (size_t k = 0; k < FIRST; ++k) {
             ++met[meets[k * count + i]];
         }
-        const size_t point = first + i;
+        const size_t point = points[i];
         const bool escapes = met[VSHI_MEETS_NOTHING] > 0;
         const int inside = met[VSHI_MEETS_SOLID] + met[VSHI_MEETS_HOLED];
         if (inside == FIRST) {
@@ -160,14 +173,15 @@ static void look(const looking *l, size_t first, size_t count, uint8_t *where) {
     }
 }
 
-/* Looks again at points inside that have a triangle closer than the rays' lift. */
-static void look_nearer(const looking *l, size_t first, size_t count, uint8_t *where) {
+/* Looks again at those of the points that are inside and have a triangle closer than the rays' lift. */
+static void look_nearer(const looking *l, const size_t *points, size_t count, uint8_t *where) {
     looking nearer = *l;
     nearer.lift *= NEARER;
     vshi_segment_ray rays[AT_ONCE];
     size_t of[AT_ONCE], some = 0;
     bool blocked[AT_ONCE];
-    for (size_t i = first; i < first + count; ++i) {
+    for (size_t k = 0; k < count; ++k) {
+        const size_t i = points[k];
         if (where[i] != VSHI_OUTSIDE) {
             const vshi_vec normal = vshi_vec_off(l->normals + 3 * i);
             const vshi_vec p = vshi_add(vshi_vec_of(l->positions + 3 * i), vshi_scale(normal, nearer.lift));
@@ -180,13 +194,60 @@ static void look_nearer(const looking *l, size_t first, size_t count, uint8_t *w
     }
     for (size_t k = 0; k < some; ++k) {
         if (blocked[k]) {
-            look(&nearer, of[k], 1, where);
+            look(&nearer, &of[k], 1, where);
         }
     }
 }
 
+/* Which of the points first … first + count - 1 are linked to the one before, by a ray that no triangle cuts:
+ * what is said of that one holds for them, too. */
+static void link_points(const looking *l, const bool *follows, size_t first, size_t count, bool *linked) {
+    vshi_segment_ray rays[AT_ONCE];
+    size_t of[AT_ONCE], some = 0;
+    bool blocked[AT_ONCE];
+    for (size_t k = 0; k < count; ++k) {
+        const size_t i = first + k;
+        linked[k] = false;
+        if (follows == NULL || !follows[i]) {
+            continue;
+        }
+        const vshi_vec from = lifted(l, i - 1), way = vshi_sub(lifted(l, i), from);
+        const double length = vshi_length(way);
+        const double alike =
+            vshi_dot(vshi_vec_off(l->normals + 3 * i), vshi_vec_off(l->normals + 3 * (i - 1)));
+        if (alike > ALIKE && length > 0.0 && isfinite(length)) {
+            const vshi_vec d = vshi_scale(way, 1.0 / length);
+            rays[some] = (vshi_segment_ray){{from.x, from.y, from.z}, {d.x, d.y, d.z}, length};
+            of[some++] = k;
+        }
+    }
+    if (some > 0) {
+        vshi_triangles_blocked(l->triangles, rays, some, blocked);
+    }
+    for (size_t k = 0; k < some; ++k) {
+        linked[of[k]] = !blocked[k];
+    }
+}
+
+/* Looks at the points first … first + count - 1. */
+static void look_linked(const looking *l, const bool *follows, size_t first, size_t count, uint8_t *where) {
+    bool linked[AT_ONCE];
+    size_t points[AT_ONCE], some = 0;
+    link_points(l, follows, first, count, linked);
+    for (size_t k = 0; k < count; ++k) {
+        if (!linked[k]) {
+            points[some++] = first + k;
+        }
+    }
+    look(l, points, some, where);
+    look_nearer(l, points, some, where);
+    for (size_t k = 0; k < count; ++k) {
+        where[first + k] = where[first + k - (linked[k] ? 1 : 0)];
+    }
+}
+
 void vshi_inside(const vsh_triangles *triangles, size_t count, const double *positions, const float *normals,
-                 vshi_open_fn *open, const void *user, uint8_t *where) {
+                 const bool *follows, vshi_open_fn *open, const void *user, uint8_t *where) {
     memset(where, VSHI_OUTSIDE, count);
     if (!vshi_triangles_have_solids(triangles)) {
         return;
@@ -196,7 +257,6 @@ void vshi_inside(const vsh_triangles *triangles, size_t count, const double *pos
         open,      user};
     for (size_t first = 0; first < count; first += AT_ONCE) {
         const size_t some = count - first < AT_ONCE ? count - first : AT_ONCE;
-        look(&l, first, some, where);
-        look_nearer(&l, first, some, where);
+        look_linked(&l, follows, first, some, where);
     }
 }
