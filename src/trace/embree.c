@@ -226,6 +226,8 @@ static vsh_result build(vsh_triangles *triangles, const vshi_mesh_set *set, vshi
                    : vshi_fail(error, VSH_ERROR_UNSUPPORTED,
                                "triangles: Embree refuses this machine, error %d", (int)code);
     }
+    triangles->wide =
+        rtcGetDeviceProperty(triangles->device, RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED) != 0;
     rtcSetDeviceMemoryMonitorFunction(triangles->device, watch_memory, triangles);
     triangles->scene = rtcNewScene(triangles->device);
     if (triangles->scene == NULL) {

@@ -113,8 +113,8 @@ void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray 
     looking look;
     begin_look(&look, triangles, NULL);
     for (size_t begin = 0; begin < count; begin += VSHI_PACKET) {
-        struct RTCRayHit8 packet = {0};
-        _Alignas(32) int valid[VSHI_PACKET] = {0};
+        struct RTCRayHit16 packet = {0};
+        _Alignas(64) int valid[VSHI_PACKET] = {0};
         const int lanes = count - begin < VSHI_PACKET ? (int)(count - begin) : VSHI_PACKET;
         for (int lane = 0; lane < lanes; ++lane) {
             valid[lane] =
@@ -123,7 +123,7 @@ void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray 
         }
         look.context.flags = vshi_rays_together(rays + begin, lanes) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
                                                                      : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-        rtcIntersect8(valid, triangles->scene, &look.context, &packet);
+        rtcIntersect16(valid, triangles->scene, &look.context, &packet);
         for (int lane = 0; lane < lanes; ++lane) {
             meets[begin + (size_t)lane] =
                 met(triangles, packet.hit.geomID[lane], packet.hit.primID[lane], &rays[begin + (size_t)lane]);
@@ -153,7 +153,7 @@ int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray 
     crossing crossings[MOST_CROSSINGS];
     looking look;
     begin_look(&look, triangles, crossings);
-    struct RTCRay8 aimed;
+    struct RTCRay16 aimed;
     *meets_nothing = true;
     if (!vshi_triangles_aim(triangles, ray, &aimed, 0)) {
         return 0;

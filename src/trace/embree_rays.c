@@ -16,6 +16,7 @@ void vshi_triangles_cut(const vsh_triangles *triangles, const vshi_sheet_beam *b
 #else
 
 #include <float.h>
+#include <string.h>
 
 static const double COHERENT = 0.9; /* cosine between a packet's rays, at least */
 
@@ -60,7 +61,7 @@ static bool approach(double origin[3], const double direction[3], double *far) {
     return false;
 }
 
-bool vshi_triangles_aim(const vsh_triangles *triangles, const vshi_segment_ray *ray, struct RTCRay8 *packet,
+bool vshi_triangles_aim(const vsh_triangles *triangles, const vshi_segment_ray *ray, struct RTCRay16 *packet,
                         int lane) {
     double origin[3], far = ray->far * triangles->scale;
     for (int axis = 0; axis < 3; ++axis) {
@@ -83,20 +84,43 @@ bool vshi_triangles_aim(const vsh_triangles *triangles, const vshi_segment_ray *
     return true;
 }
 
+/* Half of a packet, a row of VSHI_PACKET values after the other. */
+static void copy_half(int half, const struct RTCRay16 *whole, struct RTCRay8 *part) {
+    const float *from = whole->org_x;
+    float *to = part->org_x;
+    for (size_t row = 0; row < sizeof *part / (8 * sizeof *to); ++row) {
+        memcpy(to + 8 * row, from + 16 * row + 8 * half, 8 * sizeof *to);
+    }
+}
+
+static void occlude(const vsh_triangles *triangles, const int *valid, struct RTCIntersectContext *context,
+                    struct RTCRay16 *packet) {
+    if (triangles->wide) {
+        rtcOccluded16(valid, triangles->scene, context, packet);
+        return;
+    }
+    for (int half = 0; half < 2; ++half) {
+        struct RTCRay8 part;
+        copy_half(half, packet, &part);
+        rtcOccluded8(valid + 8 * half, triangles->scene, context, &part);
+        memcpy(packet->tfar + 8 * half, part.tfar, sizeof part.tfar);
+    }
+}
+
 void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                             bool *blocked) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     for (size_t begin = 0; begin < count; begin += VSHI_PACKET) {
-        struct RTCRay8 packet = {0};
-        _Alignas(32) int valid[VSHI_PACKET] = {0};
+        struct RTCRay16 packet = {0};
+        _Alignas(64) int valid[VSHI_PACKET] = {0};
         const int lanes = count - begin < VSHI_PACKET ? (int)(count - begin) : VSHI_PACKET;
         for (int lane = 0; lane < lanes; ++lane) {
             valid[lane] = vshi_triangles_aim(triangles, &rays[begin + (size_t)lane], &packet, lane) ? -1 : 0;
         }
         context.flags = vshi_rays_together(rays + begin, lanes) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
                                                                 : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-        rtcOccluded8(valid, triangles->scene, &context, &packet);
+        occlude(triangles, valid, &context, &packet);
         for (int lane = 0; lane < lanes; ++lane) {
             blocked[begin + (size_t)lane] = valid[lane] != 0 && packet.tfar[lane] < 0.0f;
         }
