@@ -281,9 +281,20 @@ void vshi_sampler_free(vshi_sampler *sampler) {
     }
 }
 
+const uint32_t (*vshi_sampler_net(const vshi_sampler *sampler))[2] {
+    return (const uint32_t(*)[2])sampler->net;
+}
+
+void vshi_sampler_shift(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, uint32_t shift[2]) {
+    shift[0] = hash2(hash2(texel, purpose), (uint32_t)sampler->frame);
+    shift[1] = hash(shift[0]);
+}
+
 void vshi_sampler_disc(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t first,
                        int32_t count, double (*points)[2]) {
-    const uint32_t seed = hash2(hash2(texel, purpose), (uint32_t)sampler->frame), second = hash(seed);
+    uint32_t shift[2];
+    vshi_sampler_shift(sampler, texel, purpose, shift);
+    const uint32_t seed = shift[0];
     for (int32_t i = 0; i < count; ++i) {
         const uint32_t index = (uint32_t)(first + i);
         double square[2];
@@ -296,8 +307,8 @@ void vshi_sampler_disc(const vshi_sampler *sampler, uint32_t texel, uint32_t pur
             square[1] = unit(hash2(seed, 2 * index + 1));
             break;
         default:
-            square[0] = unit(sampler->net[index][0] ^ seed);
-            square[1] = unit(sampler->net[index][1] ^ second);
+            square[0] = unit(sampler->net[index][0] ^ shift[0]);
+            square[1] = unit(sampler->net[index][1] ^ shift[1]);
             break;
         }
         to_disc(square, points[i]);

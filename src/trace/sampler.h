@@ -19,6 +19,12 @@ void vshi_sampler_free(vshi_sampler *sampler); /* NULL does nothing */
 void vshi_sampler_disc(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t first,
                        int32_t count, double (*points)[2]);
 
+/* What those of VSH_SAMPLER_SOBOL are made of: the digits of points 0 … rays - 1 in the unit square, the same
+ * for all texels (NULL for other kinds), and by what a texel shifts them. net ^ shift, times 2^-32, is turned
+ * to the disc (Shirley and Chiu). */
+const uint32_t (*vshi_sampler_net(const vshi_sampler *sampler))[2];
+void vshi_sampler_shift(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, uint32_t shift[2]);
+
 /* The same of a texel whose values are averaged with those of the others of its tile (VSHI_TILED texels of a
  * square of 8 × 8, `texel` as vsh_points.texels): not only the points of each, but those of all texels of a
  * square of 2^k of them are well spread together. For VSH_SAMPLER_SOBOL; others are as above. */

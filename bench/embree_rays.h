@@ -1,0 +1,28 @@
+/* What plain rays make of texels: as many for each, in Embree's packets, and nothing else. */
+#ifndef BENCH_EMBREE_RAYS_H
+#define BENCH_EMBREE_RAYS_H
+
+#include "light/view.h"
+#include "trace/embree.h"
+#include "trace/sampler.h"
+
+/* Of texels that follow each other: a light's visible fraction, or what is open around them. */
+typedef struct bench_rays_task {
+    const vsh_triangles *triangles;
+    const vshi_sampler *sampler; /* of VSH_SAMPLER_SOBOL, and `rays` rays */
+    int32_t rays;
+    const vshi_light_place *light; /* parallel; NULL: AO, within */
+    double distance;
+} bench_rays_task;
+
+/* Digits of the sampler's net for `rays` rays, put in order: where these are a power of two, by cells of the
+ * square that hold one each, so that the rays of neighbours in a packet go the same way. [rays][2]; NULL
+ * where memory is short. */
+uint32_t (*bench_rays_net(const vshi_sampler *sampler, int32_t rays))[2];
+
+/* Values of `count` texels whose rays begin at origins [count][3], world units, over their normals
+ * [count][3], unit. `net` is that of bench_rays_net(). Thread safe. */
+void bench_rays_trace(const bench_rays_task *task, const uint32_t (*net)[2], size_t count,
+                      const double *origins, const float *normals, const uint32_t *texels, float *values);
+
+#endif
