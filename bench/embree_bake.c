@@ -101,20 +101,19 @@ static size_t end_of(const baking *b, size_t block) {
 }
 
 /* src/bake/origins.c without a field. */
+static void drop(void *user, size_t begin, size_t end) {
+    const baking *b = user;
+    for (size_t block = begin; block < end; ++block) {
+        vshi_lift_drop(b->texels, b->triangles, block * VSHI_ORIGIN_BLOCK, end_of(b, block), b->dropped);
+    }
+}
+
 static void validate(void *user, size_t begin, size_t end) {
     const baking *b = user;
     for (size_t block = begin; block < end; ++block) {
         const size_t first = block * VSHI_ORIGIN_BLOCK, last = end_of(b, block);
-        double at[3 * VSHI_ORIGIN_BLOCK];
         uint8_t where[VSHI_ORIGIN_BLOCK];
-        vshi_lift_drop(b->texels, b->triangles, first, last, b->dropped);
-        for (size_t i = first; i < last; ++i) {
-            const vshi_vec p =
-                b->dropped[i] ? vshi_lift_foot(b->texels, i) : vshi_vec_of(b->texels->position + 3 * i);
-            double *to = at + 3 * (i - first);
-            to[0] = p.x, to[1] = p.y, to[2] = p.z;
-        }
-        vshi_inside(b->triangles, last - first, at, b->texels->geometric + 3 * first, NULL, NULL, where);
+        vshi_origins_inside(b->texels, b->dropped, b->triangles, first, last, NULL, NULL, where);
         for (size_t i = first; i < last; ++i) {
             b->valid[i] = where[i - first] == VSHI_OUTSIDE;
             b->state[vshi_sample_held(b->texels, i)] = b->valid[i] ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
@@ -266,6 +265,7 @@ int main(int argc, char **argv) {
     memset(b.state, VSHI_TEXEL_EMPTY, texels);
     bench_check(vshi_channels_name(&scene, o.size, o.size, &b.channels, &error), &error);
     bench_check(vshi_channels_allocate(&b.channels, &scene, o.size, false, 0, o.output, &error), &error);
+    in_blocks(&b, &run, drop);
     in_blocks(&b, &run, validate);
     if (o.lit) {
         bake_plane(&b, &o, &sun, &run, b.channels.lightmap.shadow[0]);

@@ -116,19 +116,30 @@ static void look(const lifting *l, size_t field, size_t first, size_t last) {
     }
 }
 
-/* A block that is traced. */
+/* Samples that are traced. */
 typedef struct tracing {
     const lifting *lifting;
     const looked_at *in;
-    size_t first;
 } tracing;
 
 /* A vshi_open_fn: no surface is near but the sample's own, and what is within a solid the field knows. */
 static bool is_open(const void *user, size_t i) {
     const tracing *t = user;
     float at[3];
-    probe(t->lifting, t->in, t->first + i, at);
+    probe(t->lifting, t->in, i, at);
     return t->in->field->voxel_size * (double)vshi_field_distance(t->in->field, at) >= CREASE * t->in->probe;
+}
+
+/* A vshi_open_fn of samples that are counted from another one on. */
+typedef struct shifted {
+    vshi_open_fn *open;
+    const void *user;
+    size_t begin;
+} shifted;
+
+static bool open_at(const void *user, size_t i) {
+    const shifted *s = user;
+    return s->open(s->user, s->begin + i);
 }
 
 /* Samples that are looked at together follow each other in a tile, at most so many: whatever the band, they
@@ -148,25 +159,34 @@ static size_t together(const vsh_texels *texels, size_t i) {
     return i - (i - first) % TOGETHER;
 }
 
-/* Looks at samples first … last - 1 by rays against a field's triangles. */
-static void trace(const lifting *l, const looked_at *in, size_t first, size_t last) {
-    double at[3 * (TOGETHER + VSHI_ORIGIN_BLOCK)] = {0.0};
-    uint8_t where[TOGETHER + VSHI_ORIGIN_BLOCK];
+void vshi_origins_inside(const vsh_texels *texels, const uint8_t *dropped, const vsh_triangles *triangles,
+                         size_t first, size_t last, vshi_open_fn *open, const void *user, uint8_t *where) {
+    double at[3 * (TOGETHER + VSHI_ORIGIN_BLOCK)];
+    uint8_t found[TOGETHER + VSHI_ORIGIN_BLOCK];
     bool follows[TOGETHER + VSHI_ORIGIN_BLOCK];
-    const size_t begin = together(l->texels, first);
+    const size_t begin = together(texels, first);
     size_t start = begin;
     for (size_t i = begin; i < last; ++i) {
-        put(place(l, i), at + 3 * (i - begin));
-        start = i - start == TOGETHER || !same_tile(l->texels, i, start) ? i : start;
+        put(dropped[i] ? vshi_lift_foot(texels, i) : vshi_vec_of(texels->position + 3 * i),
+            at + 3 * (i - begin));
+        start = i - start == TOGETHER || !same_tile(texels, i, start) ? i : start;
         follows[i - begin] = i != start;
     }
-    const tracing task = {l, in, begin};
-    vshi_inside(in->triangles, last - begin, at, l->texels->geometric + 3 * begin, follows, is_open, &task,
-                where);
+    const shifted moved = {open, user, begin};
+    vshi_inside(triangles, last - begin, at, texels->geometric + 3 * begin, follows,
+                open != NULL ? open_at : NULL, &moved, found);
+    memcpy(where, found + (first - begin), last - first);
+}
+
+/* Looks at samples first … last - 1 by rays against a field's triangles. */
+static void trace(const lifting *l, const looked_at *in, size_t first, size_t last) {
+    uint8_t where[VSHI_ORIGIN_BLOCK];
+    const tracing task = {l, in};
+    vshi_origins_inside(l->texels, l->origins->dropped, in->triangles, first, last, is_open, &task, where);
     for (size_t i = first; i < last; ++i) {
-        if (where[i - begin] != VSHI_OUTSIDE) {
+        if (where[i - first] != VSHI_OUTSIDE) {
             l->origins->valid[i] = 0;
-            l->origins->seen[i] = where[i - begin] == VSHI_INSIDE_SEEN;
+            l->origins->seen[i] = where[i - first] == VSHI_INSIDE_SEEN;
         }
     }
 }
@@ -181,16 +201,23 @@ static void look_at_solid(const lifting *l, size_t solid, size_t first, size_t l
     }
 }
 
+static void drop(void *user, size_t begin, size_t end) {
+    const lifting *l = user;
+    for (size_t block = begin; block < end; ++block) {
+        for (size_t field = 0; field < l->field_count; ++field) {
+            if (l->fields[field].triangles != NULL) {
+                vshi_lift_drop(l->texels, l->fields[field].triangles, block * VSHI_ORIGIN_BLOCK,
+                               block_end(l, block), l->origins->dropped);
+            }
+        }
+    }
+}
+
 static void validate(void *user, size_t begin, size_t end) {
     const lifting *l = user;
     for (size_t block = begin; block < end; ++block) {
         const size_t first = block * VSHI_ORIGIN_BLOCK, last = block_end(l, block);
         memset(l->origins->valid + first, 1, last - first);
-        for (size_t field = 0; field < l->field_count; ++field) {
-            if (l->fields[field].triangles != NULL) {
-                vshi_lift_drop(l->texels, l->fields[field].triangles, first, last, l->origins->dropped);
-            }
-        }
         for (size_t field = 0; field < l->field_count; ++field) {
             if (l->fields[field].triangles != NULL) {
                 trace(l, &l->fields[field], first, last);
@@ -316,7 +343,7 @@ vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels 
         }
     }
     vsh_result result;
-    vshi_job *job = vshi_job_begin(run, "validate", 2 * origins->blocks);
+    vshi_job *job = vshi_job_begin(run, "validate", 3 * origins->blocks);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
     }
@@ -325,6 +352,7 @@ vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels 
     VSHI_TRY_DONE(vshi_allocate((void **)&l.crease, texels->count, 1, name, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&origins->dropped, texels->count, 1, name, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&origins->before, origins->blocks + 1, sizeof(size_t), name, error));
+    VSHI_TRY_DONE(vshi_parallel_for(job, origins->blocks, 1, 1, drop, &l, error));
     VSHI_TRY_DONE(vshi_parallel_for(job, origins->blocks, 1, 1, validate, &l, error));
     VSHI_TRY_DONE(keep_needed(&l, keep, user, error));
     for (size_t block = 0; block <= origins->blocks; ++block) {

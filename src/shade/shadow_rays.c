@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-enum { FIRST_ROUND = 8 };
+enum { FIRST_ROUND = 8, PACKET_POINTS = 64 };
 
 /* The points whose rays tell what to expect of a point's: so many before and after it, no farther than this,
  * voxels. */
@@ -34,6 +34,7 @@ typedef struct open_point {
     vshi_vec off;            /* from which rays begin so far off, in the rays' space */
     double end;
     int32_t lit, taken;
+    bool near; /* exact: `start` is, to the triangles */
     double deviation;
 } open_point;
 
@@ -90,6 +91,7 @@ static void turn_to_world(const vshi_shadow_task *task, open_point *p) {
     p->start = vshi_add(vshi_vec_of(at), vshi_scale(p->normal, lift));
     vshi_light_view view;
     p->end = vshi_light_look(&task->world, p->start, false, &view) == VSHI_LIGHT_SEEN ? view.end : 0.0;
+    p->near = vshi_triangles_sees(task->triangles, (double[]){p->start.x, p->start.y, p->start.z});
 }
 
 /* Looks at a light that is no disc, in the space of the rays. */
@@ -121,11 +123,15 @@ static bool direct(const vshi_shadow_task *task, const open_point *p, const doub
     return !(horizon && vshi_dot(way, p->normal) <= 0.0);
 }
 
+static uint32_t texel_of(const vshi_shadow_task *task, const open_point *p) {
+    return task->points->texels != NULL ? task->points->texels[p->point] : (uint32_t)p->point;
+}
+
 /* Rays taken … target - 1 of an open point. */
 static void cast(ray_batch *batch, size_t owner, int32_t target) {
     const vshi_shadow_task *task = batch->task;
     open_point *p = &batch->open[owner];
-    const uint32_t texel = task->points->texels != NULL ? task->points->texels[p->point] : (uint32_t)p->point;
+    const uint32_t texel = texel_of(task, p);
     double disc[64][2];
     while (p->taken < target) {
         const int32_t count = target - p->taken < 64 ? target - p->taken : 64;
@@ -151,6 +157,41 @@ static void cast(ray_batch *batch, size_t owner, int32_t target) {
                 .origin = p->origin, .direction = d, .end = end, .sine = 0.0, .close = 1.0};
             p->lit += !vshi_chunk_add(&batch->chunk, task->field, &ray, (uint32_t)owner, batch->stats);
         }
+    }
+}
+
+/* Whether the rays of open points are traced in packets of several points each: discs, and the sampler's
+ * blocks. */
+static bool in_packets(const vshi_shadow_task *task) {
+    return task->options->method == VSH_SHADOW_EXACT && task->place.shape == NULL &&
+           task->options->sampler == VSH_SAMPLER_SOBOL && !is_hard(task);
+}
+
+/* Rays first … last - 1 of open points that have `first`. */
+static void cast_packets(ray_batch *batch, const size_t *some, size_t count, int32_t first, int32_t last) {
+    const vshi_shadow_task *task = batch->task;
+    vshi_disc discs[PACKET_POINTS];
+    int32_t lit[PACKET_POINTS];
+    for (size_t begin = 0; begin < count; begin += PACKET_POINTS) {
+        const size_t points = count - begin < PACKET_POINTS ? count - begin : PACKET_POINTS;
+        for (size_t i = 0; i < points; ++i) {
+            const open_point *p = &batch->open[some[begin + i]];
+            discs[i] = (vshi_disc){.origin = {p->start.x, p->start.y, p->start.z},
+                                   .axis = p->axis,
+                                   .u = p->u,
+                                   .v = p->v,
+                                   .normal = p->normal,
+                                   .far = p->end};
+            vshi_sampler_shift(task->sampler, texel_of(task, p), task->purpose, discs[i].shift);
+            lit[i] = 0;
+        }
+        vshi_triangles_discs(task->triangles, task->sampler, discs, points, first, last, lit);
+        for (size_t i = 0; i < points; ++i) {
+            open_point *p = &batch->open[some[begin + i]];
+            p->lit += lit[i];
+            p->taken = last;
+        }
+        batch->stats->rays += points * (uint64_t)(last - first);
     }
 }
 
@@ -205,9 +246,44 @@ static double error_of(const ray_batch *batch, size_t owner) {
     return vshi_rays_error(batch->task->options->sampler, p->lit, p->taken, a.lit, a.taken);
 }
 
-static void cast_all(ray_batch *batch, const size_t *some, size_t count, int32_t target) {
+/* Of some open points the most rays that one has below `limit`; -1: none has. */
+static int32_t most_below(const ray_batch *batch, const size_t *some, size_t count, int32_t limit) {
+    int32_t most = -1;
     for (size_t i = 0; i < count; ++i) {
-        cast(batch, some[i], target);
+        const int32_t taken = batch->open[some[i]].taken;
+        most = taken < limit && taken > most ? taken : most;
+    }
+    return most;
+}
+
+/* Rays up to `target` of those of some open points that have `taken`. */
+static void cast_alike(ray_batch *batch, const size_t *some, size_t count, int32_t taken, int32_t target) {
+    const bool packets = in_packets(batch->task) && vshi_sampler_is_blocks(taken, target);
+    size_t alike[VSHI_PIECE], same = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const open_point *p = &batch->open[some[i]];
+        if (p->taken == taken && packets && p->near) {
+            alike[same++] = some[i];
+        } else if (p->taken == taken) {
+            cast(batch, some[i], target);
+        }
+    }
+    cast_packets(batch, alike, same, taken, target);
+}
+
+static void cast_all(ray_batch *batch, const size_t *some, size_t count, int32_t target) {
+    int32_t taken = target;
+    while ((taken = most_below(batch, some, count, taken)) >= 0) {
+        cast_alike(batch, some, count, taken, target);
+    }
+    flush(batch);
+}
+
+/* Twice as many rays as they have for some open points, up to `most`. */
+static void cast_double(ray_batch *batch, const size_t *some, size_t count, int32_t most) {
+    int32_t taken = most;
+    while ((taken = most_below(batch, some, count, taken)) >= 0) {
+        cast_alike(batch, some, count, taken, 2 * taken < most ? 2 * taken : most);
     }
     flush(batch);
 }
@@ -226,11 +302,7 @@ static void cast_fine(ray_batch *batch, const size_t *some, size_t count, int32_
                 unsettled[left++] = some[i];
             }
         }
-        for (size_t i = 0; i < left; ++i) {
-            const int32_t taken = batch->open[unsettled[i]].taken;
-            cast(batch, unsettled[i], 2 * taken < most ? 2 * taken : most);
-        }
-        flush(batch);
+        cast_double(batch, unsettled, left, most);
     }
 }
 
@@ -298,8 +370,8 @@ static void settle_cast(ray_batch *batch, const size_t *some, size_t count) {
     }
 }
 
-/* Casts rays for those of the open points that the others can be interpolated from, interpolates these, and
- * leaves the rest in `some`. Returns their number. */
+/* Casts rays for those of the open points, which `some` lists, that the others can be interpolated from,
+ * interpolates these, and leaves the rest in `some`. Returns their number. */
 static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *some) {
     const vshi_shadow_task *task = batch->task;
     vshi_interpolation interp = {.points = task->points,
@@ -314,10 +386,7 @@ static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *so
         interp.state[k] =
             (uint8_t)(isnan(interp.value[k]) ? VSHI_INTERPOLATION_GONE : VSHI_INTERPOLATION_KNOWN);
     }
-    for (size_t o = 0; o < batch->open_count; ++o) {
-        cast(batch, o, interp.rays);
-    }
-    flush(batch);
+    cast_all(batch, some, batch->open_count, interp.rays);
     for (size_t o = 0; o < batch->open_count; ++o) {
         const size_t k = batch->open[o].point - begin;
         interp.state[k] = VSHI_INTERPOLATION_OPEN;

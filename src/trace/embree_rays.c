@@ -93,8 +93,8 @@ static void copy_half(int half, const struct RTCRay16 *whole, struct RTCRay8 *pa
     }
 }
 
-static void occlude(const vsh_triangles *triangles, const int *valid, struct RTCIntersectContext *context,
-                    struct RTCRay16 *packet) {
+void vshi_triangles_occlude(const vsh_triangles *triangles, const int *valid,
+                            struct RTCIntersectContext *context, struct RTCRay16 *packet) {
     if (triangles->wide) {
         rtcOccluded16(valid, triangles->scene, context, packet);
         return;
@@ -120,7 +120,7 @@ void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_r
         }
         context.flags = vshi_rays_together(rays + begin, lanes) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
                                                                 : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-        occlude(triangles, valid, &context, &packet);
+        vshi_triangles_occlude(triangles, valid, &context, &packet);
         for (int lane = 0; lane < lanes; ++lane) {
             blocked[begin + (size_t)lane] = valid[lane] != 0 && packet.tfar[lane] < 0.0f;
         }

@@ -47,6 +47,10 @@ enum { VSHI_PACKET = 16 };
 bool vshi_triangles_aim(const vsh_triangles *triangles, const vshi_segment_ray *ray, struct RTCRay16 *packet,
                         int lane);
 
+/* Occludes a packet: tfar of a valid ray that meets something is -∞ then. */
+void vshi_triangles_occlude(const vsh_triangles *triangles, const int *valid,
+                            struct RTCIntersectContext *context, struct RTCRay16 *packet);
+
 /* Whether rays go much the same way. */
 bool vshi_rays_together(const vshi_segment_ray *rays, int count);
 

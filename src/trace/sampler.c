@@ -10,7 +10,8 @@ struct vshi_sampler {
     int32_t kind;
     int32_t frame;
     int32_t count;                    /* of points */
-    uint32_t (*net)[2];               /* sobol */
+    uint32_t (*net)[2];               /* sobol, */
+    uint32_t *in_cell;                /* and of each block of it the point in each cell */
     double (*points)[2];              /* blue: progressive, in the unit disc */
     float mask[MASK_EDGE][MASK_EDGE]; /* blue: ranks in [0, 1) */
 };
@@ -102,6 +103,23 @@ static void to_disc(const double square[2], double disc[2]) {
     small_angle(0.25 * PI * (wide ? y / x : x / y), &sine, &cosine);
     disc[0] = radius * (wide ? cosine : sine);
     disc[1] = radius * (wide ? sine : cosine);
+}
+
+static void sort_cells(vshi_sampler *sampler) {
+    const uint32_t count = (uint32_t)sampler->count;
+    for (uint32_t i = 0; i < count; ++i) {
+        uint32_t size = VSHI_SAMPLER_BLOCK;
+        while (size <= i / 2) {
+            size *= 2;
+        }
+        const uint32_t begin = i < VSHI_SAMPLER_BLOCK ? 0 : size, end = begin + size;
+        const uint32_t at = begin + vshi_sampler_cell(size, sampler->net[i][0], sampler->net[i][1]);
+        sampler->in_cell[end <= count ? at : i] = i; /* a block that is cut has no cells */
+    }
+}
+
+uint32_t vshi_sampler_in_cell(const vshi_sampler *sampler, uint32_t first, uint32_t cell) {
+    return sampler->in_cell[first + cell];
 }
 
 /* --- blue noise */
@@ -255,11 +273,13 @@ vshi_sampler *vshi_sampler_create(int32_t kind, int32_t rays, int32_t frame) {
     sampler->count = rays;
     if (kind == VSH_SAMPLER_SOBOL) {
         sampler->net = calloc((size_t)rays, sizeof *sampler->net);
-        if (sampler->net == NULL) {
+        sampler->in_cell = calloc((size_t)rays, sizeof *sampler->in_cell);
+        if (sampler->net == NULL || sampler->in_cell == NULL) {
             vshi_sampler_free(sampler);
             return NULL;
         }
         place_net(sampler);
+        sort_cells(sampler);
     }
     if (kind != VSH_SAMPLER_BLUE) {
         return sampler;
@@ -275,6 +295,7 @@ vshi_sampler *vshi_sampler_create(int32_t kind, int32_t rays, int32_t frame) {
 
 void vshi_sampler_free(vshi_sampler *sampler) {
     if (sampler != NULL) {
+        free(sampler->in_cell);
         free(sampler->net);
         free(sampler->points);
         free(sampler);

@@ -25,6 +25,26 @@ void vshi_sampler_disc(const vshi_sampler *sampler, uint32_t texel, uint32_t pur
 const uint32_t (*vshi_sampler_net(const vshi_sampler *sampler))[2];
 void vshi_sampler_shift(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, uint32_t shift[2]);
 
+/* Points of a net in blocks: the first VSHI_SAMPLER_BLOCK, then as many again as there were. A block of 2^k
+ * has one point in each of 2^k cells of the square, and a shift by a texel's digits moves all points of a
+ * cell to one other: whose number is the old one's, exclusive or that of the shift's own cell. */
+enum { VSHI_SAMPLER_BLOCK = 4 };
+
+/* Cell, of `size`, of a point of these digits. */
+static inline uint32_t vshi_sampler_cell(uint32_t size, uint32_t x, uint32_t y) {
+    const uint32_t bits = (uint32_t)__builtin_ctz(size), rows = bits / 2, columns = bits - rows;
+    return x >> (32 - columns) << rows | (uint32_t)((uint64_t)y >> (32 - rows));
+}
+
+/* The point in a cell of the block that begins with point `first`. */
+uint32_t vshi_sampler_in_cell(const vshi_sampler *sampler, uint32_t first, uint32_t cell);
+
+/* Whether points first … last - 1 are whole blocks. */
+static inline bool vshi_sampler_is_blocks(int32_t first, int32_t last) {
+    return (first & (first - 1)) == 0 && (last & (last - 1)) == 0 && first < last &&
+           last >= VSHI_SAMPLER_BLOCK && (first == 0 || first >= VSHI_SAMPLER_BLOCK);
+}
+
 /* The same of a texel whose values are averaged with those of the others of its tile (VSHI_TILED texels of a
  * square of 8 × 8, `texel` as vsh_points.texels): not only the points of each, but those of all texels of a
  * square of 2^k of them are well spread together. For VSH_SAMPLER_SOBOL; others are as above. */

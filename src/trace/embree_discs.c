@@ -1,0 +1,166 @@
+/* Packets of rays of points that lie near each other, over a disc that each of them sees.
+ *
+ * The points on the disc are those of one net, whose digits each texel shifts by its own (sampler.h). In a
+ * block of 2^k points of it there is one in each of 2^k cells of the square; a shift permutes the cells. So
+ * each texel has one ray in any cell, and a packet is made of those of one cell: they go the same way. On
+ * lobes of 50,000 triangles, under a sun of 30°, a ray takes 24 ns so, and 52 where packets follow the index.
+ */
+#include "trace/embree_scene.h"
+
+#ifndef VSH_EMBREE
+
+bool vshi_triangles_sees(const vsh_triangles *triangles, const double origin[3]) {
+    (void)triangles, (void)origin;
+    return false;
+}
+
+void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sampler, const vshi_disc *discs,
+                          size_t count, int32_t first, int32_t last, int32_t *lit) {
+    (void)triangles, (void)sampler, (void)discs, (void)count, (void)first, (void)last, (void)lit;
+}
+
+#else
+
+#include <float.h>
+
+enum { LANES = VSHI_PACKET };
+
+static const float QUARTER = 0.78539816339744831f; /* π / 4 */
+
+/* A packet's discs: all that is the same for all of their rays. */
+typedef struct group {
+    struct RTCRay16 ray;
+    float axis[3][LANES], u[3][LANES], v[3][LANES], normal[3][LANES], far[LANES];
+    uint32_t shift[2][LANES];
+    bool horizon[LANES];
+    int used; /* lanes that have a disc */
+} group;
+
+static void set_lane(const vsh_triangles *t, const vshi_disc *disc, int lane, group *g) {
+    float *const from[3] = {g->ray.org_x, g->ray.org_y, g->ray.org_z};
+    const double axis[3] = {disc->axis.x, disc->axis.y, disc->axis.z};
+    const double u[3] = {disc->u.x, disc->u.y, disc->u.z}, v[3] = {disc->v.x, disc->v.y, disc->v.z};
+    const double normal[3] = {disc->normal.x, disc->normal.y, disc->normal.z};
+    for (size_t k = 0; k < 3; ++k) {
+        from[k][lane] = (float)((disc->origin[k] - t->centre[k]) * t->scale);
+        g->axis[k][lane] = (float)axis[k];
+        g->u[k][lane] = (float)u[k];
+        g->v[k][lane] = (float)v[k];
+        g->normal[k][lane] = (float)normal[k];
+    }
+    const double far = disc->far * t->scale;
+    g->far[lane] = far < (double)FLT_MAX ? (float)far : INFINITY;
+    g->horizon[lane] = normal[0] != 0.0 || normal[1] != 0.0 || normal[2] != 0.0;
+    g->shift[0][lane] = disc->shift[0];
+    g->shift[1][lane] = disc->shift[1];
+    g->ray.mask[lane] = 0xffffffffu;
+}
+
+/* The places of a packet on the unit disc (Shirley and Chiu, "A low distortion map between disk and square",
+ * 1997); angles by series that are exact to 4e-7. */
+static inline void to_disc(uint32_t digits[2][LANES], float x[LANES], float y[LANES]) {
+    for (int l = 0; l < LANES; ++l) {
+        const float a = (float)(int32_t)(digits[0][l] ^ 0x80000000u) * 0x1p-31f;
+        const float b = (float)(int32_t)(digits[1][l] ^ 0x80000000u) * 0x1p-31f;
+        const bool wide = fabsf(a) > fabsf(b);
+        const float radius = wide ? a : b, across = wide ? b : a;
+        const float angle = QUARTER * (across / (radius != 0.0f ? radius : 1.0f)), q = angle * angle;
+        const float sine = angle * (1.0f + q * (-1.0f / 6.0f + q * (1.0f / 120.0f - q * (1.0f / 5040.0f))));
+        const float cosine =
+            1.0f + q * (-0.5f + q * (1.0f / 24.0f + q * (-1.0f / 720.0f + q * (1.0f / 40320.0f))));
+        x[l] = radius * (wide ? cosine : sine);
+        y[l] = radius * (wide ? sine : cosine);
+    }
+}
+
+/* Aims the lanes at places of their discs; a ray below its disc's horizon is not valid. */
+static inline void aim(group *g, const float x[LANES], const float y[LANES], int valid[LANES]) {
+    struct RTCRay16 *r = &g->ray;
+    for (int l = 0; l < LANES; ++l) {
+        const float dx = g->axis[0][l] + (g->u[0][l] * x[l] + g->v[0][l] * y[l]);
+        const float dy = g->axis[1][l] + (g->u[1][l] * x[l] + g->v[1][l] * y[l]);
+        const float dz = g->axis[2][l] + (g->u[2][l] * x[l] + g->v[2][l] * y[l]);
+        const float unit = 1.0f / sqrtf(dx * dx + dy * dy + dz * dz);
+        r->dir_x[l] = dx * unit;
+        r->dir_y[l] = dy * unit;
+        r->dir_z[l] = dz * unit;
+        const float up = dx * g->normal[0][l] + dy * g->normal[1][l] + dz * g->normal[2][l];
+        valid[l] = up > 0.0f || !g->horizon[l] ? -1 : 0;
+        r->tfar[l] = g->far[l];
+    }
+}
+
+/* Traces the points first … last - 1, a block of the net, of a group: `each` lanes have a disc each, and so
+ * on in the next cell. */
+static void trace(const vsh_triangles *t, const vshi_sampler *sampler, group *g, int each, uint32_t first,
+                  uint32_t size, int32_t *lit) {
+    const uint32_t(*net)[2] = vshi_sampler_net(sampler);
+    const uint32_t cells = (uint32_t)(LANES / each);
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    uint32_t cell[LANES];
+    for (int l = 0; l < LANES; ++l) {
+        cell[l] = vshi_sampler_cell(size, g->shift[0][l], g->shift[1][l]);
+    }
+    int32_t seen[LANES] = {0};
+    for (uint32_t c = 0; c < size; c += cells) {
+        uint32_t digits[2][LANES];
+        float x[LANES], y[LANES];
+        _Alignas(64) int valid[LANES];
+        bool has[LANES];
+        for (int l = 0; l < LANES; ++l) {
+            const uint32_t own = c + (uint32_t)(l / each);
+            has[l] = l % each < g->used && own < size;
+            const uint32_t *point = net[vshi_sampler_in_cell(sampler, first, own < size ? own ^ cell[l] : 0)];
+            digits[0][l] = point[0] ^ g->shift[0][l];
+            digits[1][l] = point[1] ^ g->shift[1][l];
+        }
+        to_disc(digits, x, y);
+        aim(g, x, y, valid);
+        for (int l = 0; l < LANES; ++l) {
+            valid[l] = has[l] ? valid[l] : 0;
+        }
+        vshi_triangles_occlude(t, valid, &context, &g->ray);
+        for (int l = 0; l < LANES; ++l) {
+            seen[l] += valid[l] & (g->ray.tfar[l] >= 0.0f); /* of those that meet something it is -∞ */
+        }
+    }
+    for (int l = 0; l < LANES; ++l) {
+        if (l % each < g->used) {
+            lit[l % each] += seen[l];
+        }
+    }
+}
+
+bool vshi_triangles_sees(const vsh_triangles *triangles, const double origin[3]) {
+    double distance = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double at = (origin[axis] - triangles->centre[axis]) * triangles->scale;
+        distance += at * at;
+    }
+    return distance <= VSHI_FAR_ORIGIN * VSHI_FAR_ORIGIN;
+}
+
+void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sampler, const vshi_disc *discs,
+                          size_t count, int32_t first, int32_t last, int32_t *lit) {
+    for (size_t begin = 0; begin < count; begin += LANES) {
+        group g = {.used = count - begin < LANES ? (int)(count - begin) : LANES};
+        int each = 1;
+        while (each < g.used) {
+            each *= 2;
+        }
+        for (int l = 0; l < LANES; ++l) {
+            const int k = l % each;
+            set_lane(triangles, &discs[begin + (size_t)(k < g.used ? k : 0)], l, &g);
+        }
+        /* blocks of the net: the first of VSHI_SAMPLER_BLOCK, each further one as many as all before it */
+        for (int32_t at = first; at < last;) {
+            const int32_t size = at == 0 ? VSHI_SAMPLER_BLOCK : at;
+            trace(triangles, sampler, &g, each, (uint32_t)at, (uint32_t)size, lit + begin);
+            at += size;
+        }
+    }
+}
+
+#endif
