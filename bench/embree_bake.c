@@ -5,7 +5,8 @@
  *
  * It loads, rasterises, judges validity, pads and writes as `vdbshade bake` does, by the same code; between
  * that it traces N rays a texel (16) of the same sampler in Embree's packets. No level set, no field, no
- * proofs, nothing that texels share. */
+ * proofs, nothing that texels share. Truth is that of many rays of another frame. */
+#include "bake/average.h"
 #include "bake/lift.h"
 #include "bake/nearest_valid.h"
 #include "bake_scene/channels.h"
@@ -14,7 +15,8 @@
 #include "base/parallel.h"
 #include "bench.h"
 #include "embree_rays.h"
-#include "shade/inside.h"
+#include "field/field.h"
+#include "trace/embree_scene.h"
 
 #include <getopt.h>
 #include <math.h>
@@ -32,15 +34,11 @@ typedef struct options {
 /* A lightmap under way. */
 typedef struct baking {
     const vsh_texels *texels;
-    const vsh_triangles *triangles;
+    vshi_origins origins;
     vshi_channels channels;
-    uint8_t *state;        /* [texels]: VSHI_TEXEL_… */
-    uint8_t *valid;        /* [samples] */
-    uint8_t *dropped;      /* [samples] */
-    vshi_lift_light light; /* of one channel: these four */
     bench_rays_task task;
     uint32_t (*net)[2];
-    float *plane;
+    float *plane; /* of the channel that is baked */
 } baking;
 
 static void usage(void) {
@@ -95,110 +93,94 @@ static options parse(int argc, char **argv) {
     return o;
 }
 
-static size_t end_of(const baking *b, size_t block) {
-    const size_t end = (block + 1) * VSHI_ORIGIN_BLOCK;
-    return end < b->texels->count ? end : b->texels->count;
-}
-
-/* src/bake/origins.c without a field. */
-static void drop(void *user, size_t begin, size_t end) {
-    const baking *b = user;
-    for (size_t block = begin; block < end; ++block) {
-        vshi_lift_drop(b->texels, b->triangles, block * VSHI_ORIGIN_BLOCK, end_of(b, block), b->dropped);
+/* What stands for a field in the rules of where rays begin: one whose distances are 0 everywhere, which
+ * proves nothing. */
+static const vsh_field *field_of_nothing_known(const vsh_triangles *triangles) {
+    static int32_t index[8];
+    static int16_t values[VSHI_BRICK_VALUES];
+    static vsh_field field = {.index = index, .values = values, .level_count = 1};
+    field.voxel_size = triangles->size / 96.0; /* of the program's, where all is traced */
+    field.levels[0] = (vshi_level){.brick_count = 1, .scale = 0x1p60f, .band = 0x1p60f, .quantum = 0x1p46f};
+    for (int axis = 0; axis < 3; ++axis) {
+        field.levels[0].origin[axis] = -VSHI_BRICK_CELLS;
+        field.levels[0].size[axis] = 2;
+        field.to_field[5 * axis] = 1.0 / field.voxel_size;
+        field.to_field[4 * axis + 3] = -triangles->centre[axis] / field.voxel_size;
     }
+    return &field;
 }
 
-static void validate(void *user, size_t begin, size_t end) {
-    const baking *b = user;
-    for (size_t block = begin; block < end; ++block) {
-        const size_t first = block * VSHI_ORIGIN_BLOCK, last = end_of(b, block);
-        uint8_t where[VSHI_ORIGIN_BLOCK];
-        vshi_origins_inside(b->texels, b->dropped, b->triangles, first, last, NULL, NULL, where);
-        for (size_t i = first; i < last; ++i) {
-            b->valid[i] = where[i - first] == VSHI_OUTSIDE;
-            b->state[vshi_sample_held(b->texels, i)] = b->valid[i] ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
-        }
-    }
+/* A vshi_origins_keep: all samples are needed. */
+static vsh_result keep_all(void *user, const vshi_origins *origins, uint8_t *rows, vsh_error *error) {
+    (void)user, (void)origins, (void)rows, (void)error;
+    return VSH_OK;
 }
 
+/* Valid samples begin … end - 1. */
 static void shade(void *user, size_t begin, size_t end) {
     const baking *b = user;
-    const vsh_texels *texels = b->texels;
-    const double lift = vshi_triangles_lift(b->triangles);
-    for (size_t block = begin; block < end; ++block) {
-        double origins[3 * VSHI_ORIGIN_BLOCK];
-        float normals[3 * VSHI_ORIGIN_BLOCK], values[VSHI_ORIGIN_BLOCK];
-        uint32_t of[VSHI_ORIGIN_BLOCK];
-        size_t count = 0;
-        for (size_t i = block * VSHI_ORIGIN_BLOCK; i < end_of(b, block); ++i) {
-            if (b->valid[i]) {
-                const float *normal = texels->normal + 3 * i;
-                const vshi_vec p = vshi_add(vshi_lift_place(texels, &b->light, i, b->dropped[i] != 0),
-                                            vshi_scale(vshi_vec_off(normal), lift));
-                double *to = origins + 3 * count;
-                to[0] = p.x, to[1] = p.y, to[2] = p.z;
-                memcpy(normals + 3 * count, normal, 3 * sizeof *normal);
-                of[count++] = texels->texel[i];
-            }
-        }
-        bench_rays_trace(&b->task, (const uint32_t(*)[2])b->net, count, origins, normals, of, values);
-        for (size_t k = 0; k < count; ++k) {
-            b->plane[vsh_texel_place(of[k], texels->info.width)] = values[k];
-        }
+    const vshi_origins *o = &b->origins;
+    const double lift = vshi_triangles_lift(b->task.triangles);
+    double from[3 * VSHI_ORIGIN_BLOCK];
+    float values[VSHI_ORIGIN_BLOCK];
+    for (size_t k = 0; k < 3 * (end - begin); ++k) {
+        from[k] = o->surface[3 * begin + k] + lift * (double)o->normal[3 * begin + k];
     }
-}
-
-static void in_blocks(baking *b, const vsh_run *run, vshi_range_fn *step) {
-    vsh_error error;
-    const size_t blocks = (b->texels->count + VSHI_ORIGIN_BLOCK - 1) / VSHI_ORIGIN_BLOCK;
-    vshi_job *job = vshi_job_begin(run, "bake", blocks);
-    bench_check(vshi_parallel_for(job, blocks, 1, 1, step, b, &error), &error);
-    vshi_job_end(job);
+    bench_rays_trace(&b->task, (const uint32_t(*)[2])b->net, end - begin, from, o->normal + 3 * begin,
+                     o->texel + begin, values);
+    for (size_t i = begin; i < end; ++i) {
+        b->plane[vsh_texel_place(o->texel[i], b->texels->info.width)] = values[i - begin];
+    }
 }
 
 /* A light's visibility, or (NULL) AO, of all valid texels. */
-static void bake_plane(baking *b, const options *o, const vsh_light *light, const vsh_run *run,
-                       float *plane) {
-    b->light = vshi_lift_light_of(light);
+static void bake_plane(baking *b, const vsh_light *light, const vsh_run *run, float *plane) {
+    vsh_error error;
+    const vshi_lift_light place = vshi_lift_light_of(light);
+    b->task.light = light != NULL ? &place.place : NULL;
     b->plane = plane;
-    b->task.light = light != NULL ? &b->light.place : NULL;
-    b->task.distance = o->ao;
-    in_blocks(b, run, shade);
+    bench_check(vshi_lift_for(b->texels, light, run, &b->origins, &error), &error);
+    vshi_job *job = vshi_job_begin(run, "bake", b->origins.count);
+    bench_check(vshi_parallel_for(job, b->origins.count, VSHI_ORIGIN_BLOCK, 1, shade, b, &error), &error);
+    vshi_job_end(job);
 }
 
 /* As vsh_bake_lightmap() leaves it: coverage, and values for texels without. */
 static void fill(baking *b, const vsh_run *run) {
     vsh_error error;
-    vshi_spread spread = {0};
-    vshi_plane planes[2];
-    size_t count = 0;
+    const vsh_texels *texels = b->texels;
     const vsh_lightmap *map = &b->channels.lightmap;
+    const size_t count = vshi_texels_held(texels);
+    uint8_t *state = bench_take(count);
+    memset(state, VSHI_TEXEL_EMPTY, count);
+    const vshi_average find = {.texels = texels, .origins = &b->origins, .state = state};
+    bench_check(vshi_average_run(&find, run, &error), &error);
+    for (size_t i = 0; i < count; ++i) {
+        map->coverage[i] = state[i] == VSHI_TEXEL_VALID ? 1.0f : 0.0f;
+    }
+    vshi_plane planes[2];
+    size_t plane_count = 0;
     if (map->shadow != NULL) {
-        planes[count++] = (vshi_plane){map->shadow[0], 1};
+        planes[plane_count++] = (vshi_plane){map->shadow[0], 1};
     }
     if (map->ao != NULL) {
-        planes[count++] = (vshi_plane){map->ao, 1};
+        planes[plane_count++] = (vshi_plane){map->ao, 1};
     }
-    for (size_t i = 0; i < vshi_texels_held(b->texels); ++i) {
-        map->coverage[i] = b->state[i] == VSHI_TEXEL_VALID ? 1.0f : 0.0f;
-    }
-    bench_check(vshi_spread_find(b->texels, b->state, &spread, &error), &error);
-    vshi_spread_copy(&spread, b->state, planes, count);
-    const int32_t padding = b->texels->padding, least = VSHI_LEAST_INVALID_RADIUS;
+    vshi_spread spread = {0};
+    bench_check(vshi_spread_find(texels, state, &spread, &error), &error);
+    vshi_spread_copy(&spread, state, planes, plane_count);
+    const int32_t padding = texels->padding, least = VSHI_LEAST_INVALID_RADIUS;
     const int32_t radius[VSHI_TEXEL_KINDS] = {
         [VSHI_TEXEL_EMPTY] = padding, [VSHI_TEXEL_INVALID] = padding > least ? padding : least};
-    bench_check(vshi_padding_fill(run, b->texels->info.width, b->texels->info.height, b->state, radius,
-                                  planes, count, &error),
+    bench_check(vshi_padding_fill(run, texels->info.width, texels->info.height, state, radius, planes,
+                                  plane_count, &error),
                 &error);
     vshi_spread_free(&spread);
+    free(state);
 }
 
 static void write_stats(const options *o, const baking *b, const double at[5]) {
     FILE *file = fopen(o->stats, "w");
-    size_t valid = 0;
-    for (size_t i = 0; i < b->texels->count; ++i) {
-        valid += b->valid[i];
-    }
     if (file == NULL) {
         perror(o->stats);
         exit(3);
@@ -207,7 +189,7 @@ static void write_stats(const options *o, const baking *b, const double at[5]) {
             "{\"stages_s\": {\"load\": %.4f, \"texels\": %.4f, \"tree\": %.4f, \"bake\": %.4f, "
             "\"write\": %.4f}, \"texels\": %zu, \"invalid_texels\": %zu}\n",
             at[0], at[1] - at[0], at[2] - at[1], at[3] - at[2], at[4] - at[3], b->texels->count,
-            b->texels->count - valid);
+            b->texels->count - b->origins.count);
     fclose(file);
 }
 
@@ -250,28 +232,33 @@ int main(int argc, char **argv) {
                 &error);
     at[2] = vshi_seconds() - start;
     vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, o.rays, o.frame);
-    baking b = {.texels = job->texels, .triangles = triangles};
-    b.task = (bench_rays_task){.triangles = triangles, .sampler = sampler, .rays = o.rays};
+    baking b = {.texels = job->texels};
+    b.task = (bench_rays_task){.triangles = triangles, .sampler = sampler, .rays = o.rays, .distance = o.ao};
     b.net = sampler != NULL ? bench_rays_net(sampler, o.rays) : NULL;
     if (b.net == NULL) {
         fputs("embree_bake: the system refused memory\n", stderr);
         return 4;
     }
-    const size_t samples = b.texels->count, texels = vshi_texels_held(b.texels);
-    b.valid = bench_take(samples);
-    b.dropped = bench_take(samples);
-    memset(b.dropped, 0, samples);
-    b.state = bench_take(texels);
-    memset(b.state, VSHI_TEXEL_EMPTY, texels);
+    /* samples begin, and are valid, as of casters that are traced only */
+    vsh_occluders *occluders = NULL;
+    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    parts.triangles = triangles;
+    parts.field = field_of_nothing_known(triangles);
+    bench_check(vsh_occluders_from_parts(&parts, &occluders, &error), &error);
+    vsh_shade_options exact = vsh_shade_options_default();
+    exact.method = VSH_SHADOW_EXACT;
+    exact.ao_method = VSH_AO_EXACT;
+    const vshi_origins_for what = {.lights = o.lit, .ao = scene.ao != 0};
+    bench_check(
+        vshi_origins_create(occluders, b.texels, &exact, what, keep_all, NULL, &run, &b.origins, &error),
+        &error);
     bench_check(vshi_channels_name(&scene, o.size, o.size, &b.channels, &error), &error);
     bench_check(vshi_channels_allocate(&b.channels, &scene, o.size, false, 0, o.output, &error), &error);
-    in_blocks(&b, &run, drop);
-    in_blocks(&b, &run, validate);
     if (o.lit) {
-        bake_plane(&b, &o, &sun, &run, b.channels.lightmap.shadow[0]);
+        bake_plane(&b, &sun, &run, b.channels.lightmap.shadow[0]);
     }
-    if (o.ao > 0.0) {
-        bake_plane(&b, &o, NULL, &run, b.channels.lightmap.ao);
+    if (scene.ao) {
+        bake_plane(&b, NULL, &run, b.channels.lightmap.ao);
     }
     fill(&b, &run);
     at[3] = vshi_seconds() - start;
@@ -283,9 +270,8 @@ int main(int argc, char **argv) {
         write_stats(&o, &b, at);
     }
     vshi_channels_free(&b.channels);
-    free(b.state);
-    free(b.dropped);
-    free(b.valid);
+    vshi_origins_free(&b.origins);
+    vsh_occluders_free(occluders);
     free(b.net);
     vshi_sampler_free(sampler);
     vsh_triangles_free(triangles);
