@@ -2,53 +2,25 @@
  *
  * A lattice point of the new level is every second one of the level below, so where that one's band reaches,
  * values and signs are taken over as they are: signs of thin parts always come from the finest level. Farther
- * out the distance is that to the nearest point of the surface (its foot). The way there leads through the
- * rim of what was taken over, whose voxels know their feet: the nearest of those (kernel/feet.inc) slides
- * along the finest level's surface to where it faces the voxel, which takes away what the lattice's spacing
- * adds. Feet that spread from voxel to voxel (Danielsson, "Euclidean distance mapping", 1980) take several
- * times as long and are no nearer. Fast sweeping (Zhao 2005) was worse here: its first-order upwind
- * differences leave distances 0.1 voxel too long, and too long is what makes a marcher step through a wall.
+ * out the distance is that to the nearest point of the surface (its foot, reach_out.c). Feet that spread from
+ * voxel to voxel (Danielsson, "Euclidean distance mapping", 1980) take several times as long and are no
+ * nearer. Fast sweeping (Zhao 2005) was worse here: its first-order upwind differences leave distances 0.1
+ * voxel too long, and too long is what makes a marcher step through a wall.
  */
+#include "field/derive.h"
+
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
-#include "field/kernel/feet.h"
-#include "field/level.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { EDGE = 8, BLOCK = 512 };
-
-/* Slides by a voxel each bring a foot that is a band away nearer by no more than this with what is left of
- * VSHI_MAX_RESIDUE, voxels of its level: 2² / (2 · 6), and half a finest voxel. */
-static const float SLIDE_GAIN = 0.6f;
-
-/* One bit a voxel of a block: word x, bit y · 8 + z. */
-typedef uint64_t bits[8];
-
-/* A coarser level while it is derived. */
-typedef struct derivation {
-    const vsh_field *field;
-    const vshi_level *fine; /* the level below */
-    vshi_below below;       /* and what is kept of it */
-    vshi_blocks blocks;     /* of the new level */
-    int32_t *corners;       /* [count][3], lattice coordinates of each block's first voxel */
-    bits *core;             /* [count]: value taken from the level below */
-    bits *inside;           /* [count]: negative */
-    bits *rim;              /* [count]: core voxels that know their feet and touch others */
-    int16_t *feet;          /* [count][3][512], as vshi_below.feet */
-    const vshi_feet_kernel *kernel;
-} derivation;
+enum { BLOCK = 512 };
 
 static int32_t floor_div(int32_t a, int32_t b) {
     return a / b - (a % b < 0);
-}
-
-static float distance_to(const float p[3], const float foot[3]) {
-    const float x = p[0] - foot[0], y = p[1] - foot[1], z = p[2] - foot[2];
-    return sqrtf(x * x + y * y + z * z);
 }
 
 /* A block of the level below: its brick, and its feet [3][512] where any are kept. */
@@ -58,7 +30,7 @@ typedef struct fine_block {
 } fine_block;
 
 /* By the lattice coordinates of one of its voxels. */
-static fine_block fine_block_at(const derivation *d, const int32_t at[3]) {
+static fine_block fine_block_at(const vshi_derivation *d, const int32_t at[3]) {
     const vshi_level *fine = d->fine;
     fine_block found = {NULL, NULL};
     int32_t v[3];
@@ -78,7 +50,7 @@ static fine_block fine_block_at(const derivation *d, const int32_t at[3]) {
     return found;
 }
 
-static float fine_value(const derivation *d, const int32_t at[3]) {
+static float fine_value(const vshi_derivation *d, const int32_t at[3]) {
     const int16_t *brick = fine_block_at(d, at).brick;
     return brick == NULL
                ? d->fine->band
@@ -86,14 +58,20 @@ static float fine_value(const derivation *d, const int32_t at[3]) {
                      (float)brick[(at[0] & 7) * VSHI_STRIDE_X + (at[1] & 7) * VSHI_STRIDE_Y + (at[2] & 7)];
 }
 
-/* Foot of a finest lattice point of value h by one step down the gradient, from central differences. */
-static void first_foot(const derivation *d, const int32_t at[3], float h, float foot[3]) {
+/* Foot of a finest lattice point in a brick, of value h, by one step down the gradient, from central
+ * differences. Coordinates are even, so that the next point lies in the brick. */
+static void first_foot(const vshi_derivation *d, const int32_t at[3], const int16_t *brick, float h,
+                       float foot[3]) {
+    static const int stride[3] = {VSHI_STRIDE_X, VSHI_STRIDE_Y, 1};
+    const int16_t *const here =
+        brick + (at[0] & 7) * VSHI_STRIDE_X + (at[1] & 7) * VSHI_STRIDE_Y + (at[2] & 7);
     float g[3], length = 0.0f;
     for (int axis = 0; axis < 3; ++axis) {
-        int32_t a[3] = {at[0], at[1], at[2]}, b[3] = {at[0], at[1], at[2]};
-        --a[axis];
-        ++b[axis];
-        g[axis] = 0.5f * (fine_value(d, b) - fine_value(d, a));
+        int32_t before[3] = {at[0], at[1], at[2]};
+        --before[axis];
+        const float low =
+            (at[axis] & 7) != 0 ? d->fine->quantum * (float)here[-stride[axis]] : fine_value(d, before);
+        g[axis] = 0.5f * (d->fine->quantum * (float)here[stride[axis]] - low);
         length += g[axis] * g[axis];
     }
     length = sqrtf(length);
@@ -102,59 +80,55 @@ static void first_foot(const derivation *d, const int32_t at[3], float h, float 
     }
 }
 
-/* Keeps a foot that has slid. Feet of core voxels, too, are within a band and a step of theirs. */
-static void keep_foot(const derivation *d, size_t block, const vshi_slides *slides, size_t i) {
-    const float steps = VSHI_FOOT_STEPS / d->blocks.scale;
-    for (size_t axis = 0; axis < 3; ++axis) {
-        d->feet[(block * 3 + axis) * BLOCK + slides->voxel[i]] =
-            vshi_round((slides->foot[axis][i] - slides->place[axis][i]) * steps);
-    }
-}
-
-/* A voxel whose foot is to slide. */
-static void add_slide(vshi_slides *slides, const float p[3], const float foot[3], int voxel) {
-    const size_t i = slides->count++;
-    for (int axis = 0; axis < 3; ++axis) {
-        slides->place[axis][i] = p[axis];
-        slides->foot[axis][i] = foot[axis];
-    }
-    slides->voxel[i] = (uint16_t)voxel;
-}
-
-/* One octant of a block: a block of the level below, every second voxel of it. */
-static void take_octant(derivation *d, size_t block, int octant, vshi_slides *slides) {
+/* One octant of a block: a block of the level below, every second voxel of it. Of a block all of whose feet
+ * are unknown and whose bits are 0. */
+static void take_octant(vshi_derivation *d, size_t block, int octant, vshi_slides *slides) {
     const int first[3] = {octant & 4, octant << 1 & 4, octant << 2 & 4};
     const int32_t *c = d->corners + 3 * block;
     const int32_t corner[3] = {2 * (c[0] + first[0]), 2 * (c[1] + first[1]), 2 * (c[2] + first[2])};
     const fine_block fine = fine_block_at(d, corner);
+    const int16_t *const outside = d->field->values + d->fine->first_value;
+    const int16_t *const brick = fine.brick == NULL ? outside : fine.brick;
+    if (brick == outside || brick == outside + VSHI_BRICK_VALUES) { /* far away on one side */
+        const bool inside = brick != outside;
+        for (int row = 0; row < 16; ++row) {
+            const int word = first[0] + row / 4, bit = (first[1] + row % 4) * 8 + first[2];
+            int16_t *const values = d->blocks.values + block * BLOCK + (size_t)(word * 64 + bit);
+            for (int z = 0; z < 4; ++z) {
+                values[z] = (int16_t)(inside ? -d->blocks.most : d->blocks.most);
+            }
+            d->inside[block][word] |= (uint64_t)(inside ? 0xf : 0) << bit;
+        }
+        return;
+    }
+    const int32_t fine_most = (int32_t)(d->fine->band / d->fine->quantum);
     for (int n = 0; n < 64; ++n) {
         const int x = n >> 4, y = n >> 2 & 3, z = n & 3;
         const int word = first[0] + x, bit = (first[1] + y) * 8 + first[2] + z;
         const size_t v = (size_t)(word * 64 + bit);
-        const float value =
-            fine.brick == NULL
-                ? d->fine->band
-                : d->fine->quantum * (float)fine.brick[2 * (x * VSHI_STRIDE_X + y * VSHI_STRIDE_Y + z)];
-        const bool core = fabsf(value) < d->fine->band;
-        int16_t *const feet = d->feet + block * BLOCK * 3 + v;
-        feet[0] = feet[BLOCK] = feet[2 * BLOCK] = VSHI_FOOT_UNKNOWN;
-        d->core[block][word] |= (uint64_t)core << bit;
-        d->inside[block][word] |= (uint64_t)(value < 0.0f) << bit;
-        d->blocks.values[block * BLOCK + v] =
-            core ? vshi_blocks_value(&d->blocks, value)
-                 : (int16_t)(value < 0.0f ? -d->blocks.most : d->blocks.most);
-        if (core && fine.feet != NULL) {
+        const int16_t given = brick[2 * (x * VSHI_STRIDE_X + y * VSHI_STRIDE_Y + z)];
+        int16_t *const to = d->blocks.values + block * BLOCK + v;
+        d->inside[block][word] |= (uint64_t)(given < 0) << bit;
+        if (abs(given) >= fine_most) {
+            *to = (int16_t)(given < 0 ? -d->blocks.most : d->blocks.most);
+            continue;
+        }
+        const float value = d->fine->quantum * (float)given;
+        d->core[block][word] |= (uint64_t)1 << bit;
+        *to = vshi_blocks_value(&d->blocks, value);
+        if (fine.feet != NULL) {
+            int16_t *const feet = d->feet + block * BLOCK * 3 + v;
             const int16_t *const known = fine.feet + 2 * (x * 64 + y * 8 + z);
             for (int axis = 0; axis < 3 && known[0] != VSHI_FOOT_UNKNOWN; ++axis) {
                 feet[axis * BLOCK] = (int16_t)(known[axis * BLOCK] / 2);
             }
-        } else if (core && d->below.feet == NULL) {
+        } else if (d->below.feet == NULL) {
             const int32_t at[3] = {corner[0] + 2 * x, corner[1] + 2 * y, corner[2] + 2 * z};
             const float p[3] = {(float)at[0], (float)at[1], (float)at[2]};
             float foot[3];
-            first_foot(d, at, value, foot);
+            first_foot(d, at, brick, value, foot);
             if (!isnan(foot[0])) {
-                add_slide(slides, p, foot, (int)v);
+                vshi_slide_add(slides, p, foot, (int)v);
             }
         }
     }
@@ -162,183 +136,28 @@ static void take_octant(derivation *d, size_t block, int octant, vshi_slides *sl
 
 /* Takes over what the level below knows. */
 static void take_core(void *user, size_t begin, size_t end) {
-    derivation *d = user;
+    vshi_derivation *d = user;
     vshi_slides slides;
     for (size_t block = begin; block < end; ++block) {
         slides.count = 0;
+        for (size_t i = 0; i < 3 * BLOCK; ++i) {
+            d->feet[block * 3 * BLOCK + i] = VSHI_FOOT_UNKNOWN;
+        }
         for (int octant = 0; octant < 8; ++octant) {
             take_octant(d, block, octant, &slides);
         }
         d->kernel->slide(d->field, 1.0f, &slides);
         for (size_t i = 0; i < slides.count; ++i) {
             if (fabsf(slides.residue[i]) <= VSHI_MAX_RESIDUE) {
-                keep_foot(d, block, &slides, i);
+                vshi_foot_keep(d, block, &slides, i);
             }
         }
-    }
-}
-
-/* Numbers of a block and of the 26 around it; -1: none. */
-static void find_around(const derivation *d, size_t block, int32_t around[27]) {
-    const vshi_blocks *b = &d->blocks;
-    int32_t at[3];
-    for (int axis = 0; axis < 3; ++axis) {
-        at[axis] = (d->corners[3 * block + (size_t)axis] - b->origin[axis]) / EDGE;
-    }
-    for (int n = 0; n < 27; ++n) {
-        const int32_t x = at[0] + n / 9 - 1, y = at[1] + n / 3 % 3 - 1, z = at[2] + n % 3 - 1;
-        const bool there = x >= 0 && y >= 0 && z >= 0 && x < b->size[0] && y < b->size[1] && z < b->size[2];
-        around[n] =
-            there ? b->map[((size_t)x * (size_t)b->size[1] + (size_t)y) * (size_t)b->size[2] + (size_t)z]
-                  : -1;
-    }
-}
-
-/* A plane of voxels that are not of the core, with what touches them along z; `n` the first of three blocks
- * along z. */
-static uint64_t open_row(const derivation *d, const int32_t around[27], int n, int x) {
-    uint64_t open[3];
-    for (int i = 0; i < 3; ++i) {
-        open[i] = around[n + i] < 0 ? 0 : ~d->core[around[n + i]][x];
-    }
-    static const uint64_t first_z = 0x0101010101010101u;
-    return open[1] | (open[1] << 1 & ~first_z) | (open[1] >> 1 & ~(first_z << 7)) | (open[0] >> 7 & first_z) |
-           (open[2] & first_z) << 7;
-}
-
-static void find_rim(void *user, size_t begin, size_t end) {
-    derivation *d = user;
-    for (size_t block = begin; block < end; ++block) {
-        int32_t around[27];
-        find_around(d, block, around);
-        uint64_t planes[EDGE + 2];
-        for (int i = 0; i < EDGE + 2; ++i) {
-            const int n = i == 0 ? 0 : i == EDGE + 1 ? 18 : 9, x = (i + 7) & 7;
-            const uint64_t own = open_row(d, around, n + 3, x);
-            planes[i] = own | own << 8 | own >> 8 | open_row(d, around, n, x) >> 56 |
-                        open_row(d, around, n + 6, x) << 56;
-        }
-        for (int x = 0; x < EDGE; ++x) {
-            uint64_t rim = d->core[block][x] & (planes[x] | planes[x + 1] | planes[x + 2]);
-            for (uint64_t left = rim; left != 0; left &= left - 1) {
-                const int n = __builtin_ctzll(left);
-                const bool unknown = d->feet[block * BLOCK * 3 + (size_t)(64 * x + n)] == VSHI_FOOT_UNKNOWN;
-                rim ^= (uint64_t)unknown << n;
-            }
-            d->rim[block][x] = rim;
-        }
-    }
-}
-
-/* The feet of the rim within reach of a block's voxels, on their side of the surface. */
-static void gather(const derivation *d, const int32_t around[27], bool outside, bool inside,
-                   vshi_feet *points) {
-    /* a voxel's way to its foot enters the core where that ends: there the rim is a cell's diagonal away */
-    const float way = VSHI_COARSE_BAND + SLIDE_GAIN - d->fine->band / d->blocks.scale + 1.7321f;
-    const int32_t margin = way < (float)EDGE ? (int32_t)ceilf(way) : EDGE;
-    points->count = 0;
-    for (int n = 0; n < 27; ++n) {
-        if (around[n] < 0) {
-            continue;
-        }
-        const int step[3] = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
-        int low[3], high[3];
-        for (int axis = 0; axis < 3; ++axis) {
-            low[axis] = step[axis] < 0 ? EDGE - margin : 0;
-            high[axis] = step[axis] > 0 ? margin - 1 : EDGE - 1;
-        }
-        const uint64_t along_z = (uint64_t)(0xff << low[2] & 0xff >> (7 - high[2])) * 0x0101010101010101u;
-        const uint64_t box = along_z & ~(uint64_t)0 << 8 * low[1] & ~(uint64_t)0 >> (56 - 8 * high[1]);
-        const int16_t *feet = d->feet + (size_t)around[n] * BLOCK * 3;
-        for (int x = low[0]; x <= high[0]; ++x) {
-            const uint64_t in = d->inside[around[n]][x];
-            uint64_t left = d->rim[around[n]][x] & box & ((outside ? ~in : 0) | (inside ? in : 0));
-            for (; left != 0; left &= left - 1) {
-                const int bit = __builtin_ctzll(left), v = 64 * x + bit;
-                const size_t i = points->count++;
-                points->x[i] = (float)(EDGE * step[0] + x) * VSHI_FOOT_STEPS + feet[v];
-                points->y[i] = (float)(EDGE * step[1] + (bit >> 3)) * VSHI_FOOT_STEPS + feet[BLOCK + v];
-                points->z[i] = (float)(EDGE * step[2] + (bit & 7)) * VSHI_FOOT_STEPS + feet[2 * BLOCK + v];
-            }
-        }
-    }
-    for (size_t i = points->count; i % VSHI_FEET_LANES != 0; ++i) {
-        points->x[i] = points->y[i] = points->z[i] = 1e9f;
-    }
-}
-
-/* Lists the voxels of a block that know a foot within the band, and some more. */
-static void list_slides(const derivation *d, size_t block, const bits open, vshi_slides *slides) {
-    const float scale = d->blocks.scale, step = scale / VSHI_FOOT_STEPS;
-    const int16_t *feet = d->feet + block * BLOCK * 3;
-    const int32_t *c = d->corners + 3 * block;
-    slides->count = 0;
-    for (int x = 0; x < EDGE; ++x) {
-        for (uint64_t left = open[x]; left != 0; left &= left - 1) {
-            const int n = __builtin_ctzll(left), v = 64 * x + n;
-            if (feet[v] == VSHI_FOOT_UNKNOWN) {
-                continue;
-            }
-            const float p[3] = {(float)(c[0] + x) * scale, (float)(c[1] + (n >> 3)) * scale,
-                                (float)(c[2] + (n & 7)) * scale};
-            const float foot[3] = {p[0] + (float)feet[v] * step, p[1] + (float)feet[BLOCK + v] * step,
-                                   p[2] + (float)feet[2 * BLOCK + v] * step};
-            if (distance_to(p, foot) <= d->blocks.band + SLIDE_GAIN * scale) {
-                add_slide(slides, p, foot, v);
-            }
-        }
-    }
-}
-
-/* Distances of voxels from their feet. */
-static void settle(derivation *d, size_t block, vshi_slides *slides) {
-    d->kernel->slide(d->field, d->blocks.scale, slides);
-    for (size_t i = 0; i < slides->count; ++i) {
-        int16_t *const value = d->blocks.values + block * BLOCK + slides->voxel[i];
-        const float p[3] = {slides->place[0][i], slides->place[1][i], slides->place[2][i]};
-        const float foot[3] = {slides->foot[0][i], slides->foot[1][i], slides->foot[2][i]};
-        const float sign = *value < 0 ? -1.0f : 1.0f, residue = slides->residue[i];
-        /* a foot just outside the surface is nearer to p than the surface by that, for p outside */
-        const float distance =
-            distance_to(p, foot) + sign * (fabsf(residue) < VSHI_MAX_RESIDUE ? residue : 0.0f);
-        if (distance < d->blocks.band) {
-            /* the level below has said that it is at least its band away */
-            *value = vshi_blocks_value(&d->blocks, sign * fmaxf(distance, d->fine->band));
-        }
-        keep_foot(d, block, slides, i);
-    }
-}
-
-/* Distances of what is not of the core. */
-static void reach_out(void *user, size_t begin, size_t end) {
-    derivation *d = user;
-    vshi_feet points;
-    vshi_slides slides;
-    for (size_t block = begin; block < end; ++block) {
-        bits open;
-        uint64_t outside = 0, inside = 0;
-        for (int x = 0; x < EDGE; ++x) {
-            open[x] = ~d->core[block][x];
-            outside |= open[x] & ~d->inside[block][x];
-            inside |= open[x] & d->inside[block][x];
-        }
-        int32_t around[27];
-        find_around(d, block, around);
-        gather(d, around, outside != 0, inside != 0, &points);
-        if (points.count == 0) {
-            continue;
-        }
-        /* one voxel beyond the band, so that what lies just inside it has its foot */
-        d->kernel->nearest(&points, open, (VSHI_COARSE_BAND + 1.0f) * VSHI_FOOT_STEPS,
-                           d->feet + block * BLOCK * 3);
-        list_slides(d, block, open, &slides);
-        settle(d, block, &slides);
     }
 }
 
 /* Blocks of the new level that the band can reach: it grows by no more than its width from bricks below that
  * hold the surface itself. */
-static vsh_result place_blocks(derivation *d, vsh_error *error) {
+static vsh_result place_blocks(vshi_derivation *d, vsh_error *error) {
     const vshi_level *fine = d->fine;
     vshi_blocks *b = &d->blocks;
     b->scale = 2.0f * fine->scale;
@@ -395,7 +214,7 @@ static vsh_result place_blocks(derivation *d, vsh_error *error) {
 }
 
 /* Adds what it takes to the budget. */
-static vsh_result allocate_voxels(derivation *d, vshi_budget *budget, vsh_error *error) {
+static vsh_result allocate_voxels(vshi_derivation *d, vshi_budget *budget, vsh_error *error) {
     const size_t count = d->blocks.count;
     const struct {
         void **memory;
@@ -420,10 +239,10 @@ static vsh_result allocate_voxels(derivation *d, vshi_budget *budget, vsh_error 
 
 vsh_result vshi_level_derive(vsh_field *field, vshi_below *below, vshi_budget budget, vshi_job *job,
                              vsh_error *error) {
-    derivation d = {.field = field,
-                    .fine = &field->levels[field->level_count - 1],
-                    .below = *below,
-                    .kernel = vshi_feet_kernel_of(budget.run->isa)};
+    vshi_derivation d = {.field = field,
+                         .fine = &field->levels[field->level_count - 1],
+                         .below = *below,
+                         .kernel = vshi_feet_kernel_of(budget.run->isa)};
     budget.held += (double)below->count * BLOCK * 3 * sizeof *below->feet +
                    (double)below->brick_count * (sizeof *below->bricks + 6);
     vshi_below next = {.bricks = NULL};
@@ -431,8 +250,7 @@ vsh_result vshi_level_derive(vsh_field *field, vshi_below *below, vshi_budget bu
     VSHI_TRY_DONE(place_blocks(&d, error));
     VSHI_TRY_DONE(allocate_voxels(&d, &budget, error));
     VSHI_TRY_DONE(vshi_parallel_for(job, d.blocks.count, 16, 0, take_core, &d, error));
-    VSHI_TRY_DONE(vshi_parallel_for(job, d.blocks.count, 64, 0, find_rim, &d, error));
-    VSHI_TRY_DONE(vshi_parallel_for(job, d.blocks.count, 16, 0, reach_out, &d, error));
+    VSHI_TRY_DONE(vshi_reach_out(&d, job, error));
     VSHI_TRY_DONE(vshi_level_append(field, &d.blocks, budget, job, &next, error));
     vshi_below_free(below);
     *below = next;
