@@ -162,17 +162,22 @@ static bool gather_brick(const vshi_blocks *blocks, size_t block, int planes, in
 
 /* A block needs a brick where one of its 9³ values lies within the band, or where signs change without that
  * (a .vdb whose band is torn). */
+static bool varies(const vshi_blocks *blocks, const int16_t *values, int count) {
+    int others = abs(values[0]) != blocks->most;
+    for (int v = 0; v < count; ++v) {
+        others |= values[v] ^ values[0];
+    }
+    return others != 0;
+}
+
 static void mark_bricks(void *user, size_t begin, size_t end) {
     const assembly *a = user;
     for (size_t block = begin; block < end; ++block) {
+        const int32_t number = a->blocks->map[block];
         int16_t brick[VSHI_BRICK_VALUES];
-        if (gather_brick(a->blocks, block, 9, brick)) {
-            int others = abs(brick[0]) != a->blocks->most;
-            for (int v = 0; v < VSHI_BRICK_VALUES; ++v) {
-                others |= brick[v] ^ brick[0];
-            }
-            a->keep[block] = others != 0;
-        }
+        a->keep[block] =
+            (number >= 0 && varies(a->blocks, a->blocks->values + (size_t)number * 512, 512)) ||
+            (gather_brick(a->blocks, block, 9, brick) && varies(a->blocks, brick, VSHI_BRICK_VALUES));
     }
 }
 

@@ -13,17 +13,58 @@ using openvdb::Vec3d;
 constexpr int LEAF = 8;
 // Pieces of triangles are not cut below this, voxels.
 constexpr double PIECE = 1.0;
+// Below this the cells that a triangle passes through are looked at before it is cut, voxels.
+constexpr double GLANCE = 16.0;
+// How far a piece's middle may be from its triangle by rounding, voxels, and more.
+constexpr double MARGIN = 1e-5;
+// Of triangles with less area than this part of their longest edge's square the plane is not known so well.
+constexpr double SLIVER = 1e-8;
+
+using Piece = std::array<openvdb::Vec3s, 3>;
 
 bool any(const Bits &bits) {
     return std::any_of(bits.begin(), bits.end(), [](uint64_t word) { return word != 0; });
+}
+
+// For each lattice cell of a leaf, named by its first voxel, whether one of the eight voxels at its corners
+// is outside: of a surface that bounds the outside there is one on either side.
+Bits cells_near_outside(const LeafTable &table, const std::vector<Sides::Told> &told, size_t leaf) {
+    const Bits *around[8];
+    static const Bits none{};
+    const Cell &origin = table.leaves[leaf].origin;
+    for (int n = 0; n < 8; ++n) {
+        const uint32_t found =
+            n == 0 ? uint32_t(leaf)
+                   : table.find({origin[0] + (n & 4 ? LEAF : 0), origin[1] + (n & 2 ? LEAF : 0),
+                                 origin[2] + (n & 1 ? LEAF : 0)});
+        around[n] = found == LeafTable::NONE ? &none : &told[found].outside;
+    }
+    constexpr uint64_t last_z = 0x8080808080808080u;
+    // The voxels of a plane, with the next along z, then with the next along y.
+    const auto plane = [&](int n, int x) {
+        uint64_t rows[2];
+        for (int y = 0; y < 2; ++y) {
+            const uint64_t own = (*around[n + 2 * y])[x], next = (*around[n + 2 * y + 1])[x];
+            rows[y] = own | (own >> 1 & ~last_z) | (next << 7 & last_z);
+        }
+        return rows[0] | rows[0] >> 8 | rows[1] << 56;
+    };
+    Bits near;
+    uint64_t next = plane(4, 0);
+    for (int x = LEAF - 1; x >= 0; --x) {
+        const uint64_t own = plane(0, x);
+        near[x] = own | next;
+        next = own;
+    }
+    return near;
 }
 
 enum class Bounds { NOTHING, ALL, SOME };
 
 class Cutting {
   public:
-    Cutting(const LeafTable &table_, const std::vector<Sides::Told> &told_, Surface &kept_)
-        : table(table_), told(told_), kept(kept_) {}
+    Cutting(const LeafTable &table_, const std::vector<Bits> &near_, Stage &stage_, std::vector<Piece> &kept_)
+        : table(table_), near(near_), stage(stage_), kept(kept_) {}
 
     // Adds what bounds the outside of a triangle.
     void cut(const Corners &corner) {
@@ -33,13 +74,26 @@ class Cutting {
     }
 
   private:
+    void add(const Corners &corner) {
+        kept.push_back({openvdb::Vec3s(corner[0]), openvdb::Vec3s(corner[1]), openvdb::Vec3s(corner[2])});
+    }
+
     // What of the triangle bounds the outside; that is added where it is some.
     Bounds sort(const Corners &corner) {
         const double square[3] = {(corner[1] - corner[0]).lengthSqr(), (corner[2] - corner[1]).lengthSqr(),
                                   (corner[0] - corner[2]).lengthSqr()};
         const size_t longest = size_t(std::max_element(square, square + 3) - square);
         if (!(square[longest] > PIECE * PIECE)) {
-            return near_outside((corner[0] + corner[1] + corner[2]) / 3.0) ? Bounds::ALL : Bounds::NOTHING;
+            const Vec3d middle = (corner[0] + corner[1] + corner[2]) / 3.0;
+            return is_near_outside(cell_of(middle)) ? Bounds::ALL : Bounds::NOTHING;
+        }
+        if (square[longest] < GLANCE * GLANCE) {
+            const Bounds bounds = glance(corner, square[longest]);
+            if (bounds != Bounds::SOME) {
+                return bounds;
+            }
+        } else if (stage.cancelled()) {
+            return Bounds::NOTHING; // of what is thrown away
         }
         const Vec3d middle = 0.5 * (corner[longest] + corner[(longest + 1) % 3]);
         const Vec3d &from = corner[longest], &to = corner[(longest + 1) % 3],
@@ -57,68 +111,135 @@ class Cutting {
         return Bounds::SOME;
     }
 
-    // Whether one of the eight voxels around a point is outside: of a surface that bounds it, there is one on
-    // either side.
-    bool near_outside(const Vec3d &p) {
-        Cell first;
-        for (int axis = 0; axis < 3; ++axis) {
-            first[axis] = int32_t(std::floor(p[axis]));
+    // What all pieces of a triangle are, if the cells that it passes through are all alike.
+    Bounds glance(const Corners &corner, double longest_square) {
+        const Vec3d normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]);
+        const Vec3d size = openvdb::math::Abs(normal);
+        const auto axis = openvdb::math::MaxIndex(size);
+        if (!(size[axis] > SLIVER * longest_square)) {
+            return Bounds::SOME;
         }
-        for (int i = 0; i < 8; ++i) {
-            if (is_outside({first[0] + (i & 1), first[1] + (i >> 1 & 1), first[2] + (i >> 2)})) {
-                return true;
-            }
-        }
-        return false;
+        return axis == 0   ? glance_along<0>(corner, normal)
+               : axis == 1 ? glance_along<1>(corner, normal)
+                           : glance_along<2>(corner, normal);
     }
 
-    bool is_outside(const Cell &voxel) {
+    // By rows and columns of cells along w, the axis that the triangle faces most.
+    template <int w> Bounds glance_along(const Corners &corner, const Vec3d &normal) {
+        constexpr int u = (w + 1) % 3, v = (w + 2) % 3;
+        const double along_u = -normal[u] / normal[w], along_v = -normal[v] / normal[w];
+        const double rise = 0.5 * (std::fabs(along_u) + std::fabs(along_v)) + MARGIN;
+        const auto ends = std::minmax({corner[0][u], corner[1][u], corner[2][u]});
+        const auto heights = std::minmax({corner[0][w], corner[1][w], corner[2][w]});
+        size_t cells = 0, outer = 0;
+        Cell cell{};
+        for (cell[u] = floor_of(ends.first - MARGIN); cell[u] <= floor_of(ends.second + MARGIN); ++cell[u]) {
+            double low = HUGE_VAL, high = -HUGE_VAL; // along v, within one row of cells
+            for (int i = 0; i < 3; ++i) {
+                widen<u, v>(corner[i], corner[(i + 1) % 3], cell[u], low, high);
+            }
+            for (cell[v] = floor_of(low - MARGIN); cell[v] <= floor_of(high + MARGIN); ++cell[v]) {
+                const double middle = corner[0][w] + along_u * (cell[u] + 0.5 - corner[0][u]) +
+                                      along_v * (cell[v] + 0.5 - corner[0][v]);
+                const int32_t lowest = floor_of(std::max(middle - rise, heights.first - MARGIN));
+                const int32_t highest = floor_of(std::min(middle + rise, heights.second + MARGIN));
+                for (cell[w] = lowest; cell[w] <= highest; ++cell[w]) {
+                    ++cells;
+                    outer += is_near_outside(cell);
+                    if (outer != 0 && outer != cells) {
+                        return Bounds::SOME;
+                    }
+                }
+            }
+        }
+        return outer == cells ? Bounds::ALL : Bounds::NOTHING;
+    }
+
+    // Widens low … high, along v, by what of the edge lies in the row of cells that begins at `row` along u.
+    template <int u, int v>
+    static void widen(const Vec3d &a, const Vec3d &b, int32_t row, double &low, double &high) {
+        const double length = b[u] - a[u];
+        double begin = 0.0, end = 1.0;
+        if (std::fabs(length) > MARGIN) {
+            const double s = (row - MARGIN - a[u]) / length, t = (row + 1.0 + MARGIN - a[u]) / length;
+            begin = std::max(begin, std::min(s, t));
+            end = std::min(end, std::max(s, t));
+        }
+        if (begin <= end) { // else the edge is not in the row
+            const double from = a[v] + begin * (b[v] - a[v]), to = a[v] + end * (b[v] - a[v]);
+            low = std::min({low, from, to});
+            high = std::max({high, from, to});
+        }
+    }
+
+    static int32_t floor_of(double x) {
+        const auto whole = int32_t(x);
+        return whole - (x < whole);
+    }
+
+    static Cell cell_of(const Vec3d &p) { return {floor_of(p[0]), floor_of(p[1]), floor_of(p[2])}; }
+
+    bool is_near_outside(const Cell &cell) {
         constexpr int32_t mask = ~(LEAF - 1);
-        const Cell origin{voxel[0] & mask, voxel[1] & mask, voxel[2] & mask};
-        if (!same(origin, last_origin)) { // else as for the voxel before
+        const Cell origin{cell[0] & mask, cell[1] & mask, cell[2] & mask};
+        if (!same(origin, last_origin)) { // else as for the cell before
             last_origin = origin;
             last = table.find(origin);
         }
         return last != LeafTable::NONE &&
-               (told[last].outside[size_t(voxel[0] & 7)] >> (8 * (voxel[1] & 7) + (voxel[2] & 7)) & 1) != 0;
-    }
-
-    void add(const Corners &corner) {
-        const auto first = uint32_t(kept.points.size());
-        for (const Vec3d &point : corner) {
-            kept.points.emplace_back(point);
-        }
-        kept.polygons.emplace_back(first, first + 1, first + 2, UINT32_MAX);
+               (near[last][size_t(cell[0] & 7)] >> (8 * (cell[1] & 7) + (cell[2] & 7)) & 1) != 0;
     }
 
     const LeafTable &table;
-    const std::vector<Sides::Told> &told;
-    Surface &kept;
+    const std::vector<Bits> &near;
+    Stage &stage;
+    std::vector<Piece> &kept;
     Cell last_origin{1, 1, 1}; // none's
     uint32_t last = LeafTable::NONE;
 };
 
 } // namespace
 
-Surface boundary_of(const Surface &surface, const LeafTable &table, const std::vector<Sides::Told> &told) {
-    std::vector<bool> in_doubt(2 * surface.polygons.size());
+Surface boundary_of(const Surface &surface, const LeafTable &table, const std::vector<Sides::Told> &told,
+                    double begin, double end, Stage &stage) {
+    std::vector<uint8_t> in_doubt(surface.polygons.size());
     for (size_t i = 0; i < told.size(); ++i) {
         const BandLeaf &leaf = table.leaves[i];
         for (size_t t = 0; any(told[i].buried) && t < leaf.triangle_count; ++t) {
-            in_doubt[leaf.triangles[t]] = true;
+            in_doubt[leaf.triangles[t] / 2] = 1;
         }
     }
+    std::vector<uint32_t> doubtful;
+    for (size_t i = 0; i < in_doubt.size(); ++i) {
+        if (in_doubt[i] != 0) {
+            doubtful.push_back(uint32_t(i));
+        }
+    }
+    const double middle = 0.5 * (begin + end);
+    std::vector<Bits> near(told.size());
+    stage.loop(near.size(), 256, begin, middle,
+               [&](size_t i) { near[i] = cells_near_outside(table, told, i); });
+    std::vector<std::vector<Piece>> pieces(doubtful.size());
+    stage.loop(doubtful.size(), 4, middle, end, [&](size_t i) {
+        Cutting cutting(table, near, stage, pieces[i]);
+        for (uint32_t half = 0; half < triangles_of(surface.polygons[doubtful[i]]); ++half) {
+            cutting.cut(corners_of(surface, 2 * doubtful[i] + half));
+        }
+    });
     Surface kept;
     kept.points = surface.points;
-    Cutting cutting(table, told, kept);
+    size_t next = 0;
     for (size_t i = 0; i < surface.polygons.size(); ++i) {
-        const bool whole = !in_doubt[2 * i] && !in_doubt[2 * i + 1];
-        if (whole) {
+        if (in_doubt[i] == 0) {
             kept.polygons.push_back(surface.polygons[i]);
+            continue;
         }
-        for (uint32_t half = 0; !whole && half < triangles_of(surface.polygons[i]); ++half) {
-            cutting.cut(corners_of(surface, uint32_t(2 * i + half)));
+        for (const Piece &piece : pieces[next]) {
+            const auto first = uint32_t(kept.points.size());
+            kept.points.insert(kept.points.end(), piece.begin(), piece.end());
+            kept.polygons.emplace_back(first, first + 1, first + 2, UINT32_MAX);
         }
+        std::vector<Piece>().swap(pieces[next++]);
     }
     return kept;
 }

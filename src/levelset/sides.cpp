@@ -34,24 +34,17 @@ int in_halo(int x, int y, int z) {
 
 struct Sides::Halo {
     float distance[EDGE * EDGE * EDGE];
-    int8_t side[EDGE * EDGE * EDGE]; // 1: outside, -1: inside, 0: not known
+    int8_t side[EDGE * EDGE * EDGE]; // 1: outside, -1: inside, 0: not known, or tried before
 };
 
-// Whether one of the 26 neighbours is outside.
-bool Sides::touches_outside(const Halo &halo, int at) {
-    for (int x = -1; x <= 1; ++x) {
-        for (int y = -1; y <= 1; ++y) {
-            const int8_t *const side = halo.side + at + in_halo(x, y, 0);
-            if (side[-1] > 0 || side[0] > 0 || side[1] > 0) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
 Sides::Sides(const Surface &surface_, const LeafTable &table_)
-    : surface(surface_), table(table_), leaves(table_.leaves), now(find_outside(table)), next(now) {}
+    : surface(surface_), table(table_), leaves(table_.leaves), now(find_outside(table)), next(now),
+      tried(now.size()) {
+    well_off.reserve(now.size());
+    for (const KnownSides &sides : now) {
+        well_off.push_back(sides.known);
+    }
+}
 
 // Byte z is 1 where bit z is set.
 static uint64_t spread(uint64_t byte) {
@@ -59,68 +52,107 @@ static uint64_t spread(uint64_t byte) {
     return ((copies + 0x7f7f7f7f7f7f7f7fu) | copies) >> 7 & ROW_ENDS;
 }
 
-// One row of a leaf: its distances, and the sides that are known (1: outside, -1: inside, 0: not known).
-struct Sides::Row {
-    const float *distance;
-    int8_t side[LEAF];
-};
-
-Sides::Row Sides::row(uint32_t leaf, int x, int y) const {
-    const uint64_t known = now[leaf].known[x] >> 8 * y & 0xff, outside = now[leaf].outside[x] >> 8 * y & 0xff;
-    const uint64_t sides = spread(outside) | spread(known & ~outside) * 0xff;
-    Row row{leaves[leaf].distances + 64 * x + 8 * y, {}};
-    std::memcpy(row.side, &sides, sizeof sides);
-    return row;
-}
-
-// What is near the surface has leaves all around it; where there is none, nothing is known.
-void Sides::gather(size_t i, Halo &halo) const {
-    uint32_t around[27];
+void Sides::find_around(size_t i, uint32_t around[27]) const {
+    const Cell &origin = leaves[i].origin;
     for (int k = 0; k < 27; ++k) {
-        const Cell &origin = leaves[i].origin;
         around[k] = k == 13 ? uint32_t(i)
                             : table.find({origin[0] + LEAF * (k / 9 - 1), origin[1] + LEAF * (k / 3 % 3 - 1),
                                           origin[2] + LEAF * (k % 3 - 1)});
     }
-    std::fill_n(halo.side, EDGE * EDGE * EDGE, int8_t(0));
-    std::fill_n(halo.distance, EDGE * EDGE * EDGE, 0.0f);
+}
+
+// Known, and not tried in the rounds before.
+uint64_t Sides::fresh(uint32_t leaf, size_t x) const {
+    return now[leaf].known[x] & ~tried[leaf][x];
+}
+
+bool Sides::has_fresh(const uint32_t around[27]) const {
+    return std::any_of(around, around + 27, [&](uint32_t leaf) {
+        uint64_t all = 0;
+        for (size_t x = 0; leaf != LeafTable::NONE && x < LEAF; ++x) {
+            all |= fresh(leaf, x);
+        }
+        return all != 0;
+    });
+}
+
+// What is near the surface has leaves all around it; where there is none, nothing is known.
+void Sides::gather(const uint32_t around[27], Halo &halo) const {
+    const auto take_one = [&](uint32_t leaf, int x, int n, int to) {
+        const bool is_there = leaf != LeafTable::NONE;
+        halo.distance[to] = is_there ? leaves[leaf].distances[64 * x + n] : 0.0f;
+        const bool known = is_there && (fresh(leaf, size_t(x)) >> n & 1) != 0;
+        halo.side[to] = int8_t(!known ? 0 : (now[leaf].outside[x] >> n & 1) != 0 ? 1 : -1);
+    };
     for (int x = 0; x < EDGE; ++x) {
         for (int y = 0; y < EDGE; ++y) {
             const uint32_t *const from = around + 9 * part_of(x) + 3 * part_of(y);
-            const int to = in_halo(x, y, 0), inner_x = (x + 7) & 7, inner_y = (y + 7) & 7;
-            if (from[0] != LeafTable::NONE) {
-                const Row last = row(from[0], inner_x, inner_y);
-                halo.distance[to] = last.distance[LEAF - 1];
-                halo.side[to] = last.side[LEAF - 1];
-            }
+            const int to = in_halo(x, y, 0), inner_x = (x + 7) & 7, row = 8 * ((y + 7) & 7);
+            take_one(from[0], inner_x, row + LEAF - 1, to);
+            take_one(from[2], inner_x, row, to + EDGE - 1);
+            uint64_t sides = 0;
             if (from[1] != LeafTable::NONE) {
-                const Row all = row(from[1], inner_x, inner_y);
-                std::copy_n(all.distance, LEAF, halo.distance + to + 1);
-                std::copy_n(all.side, LEAF, halo.side + to + 1);
+                const uint64_t known = fresh(from[1], size_t(inner_x)) >> row & 0xff;
+                const uint64_t outside = known & now[from[1]].outside[inner_x] >> row;
+                sides = spread(outside) | spread(known & ~outside) * 0xff;
+                std::memcpy(halo.distance + to + 1, leaves[from[1]].distances + 64 * inner_x + row,
+                            LEAF * sizeof *halo.distance);
+            } else {
+                std::fill_n(halo.distance + to + 1, LEAF, 0.0f);
             }
-            if (from[2] != LeafTable::NONE) {
-                const Row first = row(from[2], inner_x, inner_y);
-                halo.distance[to + EDGE - 1] = first.distance[0];
-                halo.side[to + EDGE - 1] = first.side[0];
-            }
+            std::memcpy(halo.side + to + 1, &sides, sizeof sides);
         }
     }
 }
 
+// The leaf's voxels that are outside or one of whose 26 neighbours is.
+Bits Sides::touching_outside(size_t i) const {
+    uint32_t around[27];
+    find_around(i, around);
+    const auto word = [&](int k, int x) {
+        return around[k] == LeafTable::NONE ? uint64_t(0) : now[around[k]].outside[x];
+    };
+    // A plane of three leaves along z, with what touches it along z.
+    const auto row = [&](int k, int x) {
+        const uint64_t own = word(k + 1, x);
+        return own | (own << 1 & ~ROW_ENDS) | (own >> 1 & ~(ROW_ENDS << 7)) | (word(k, x) >> 7 & ROW_ENDS) |
+               (word(k + 2, x) & ROW_ENDS) << 7;
+    };
+    uint64_t planes[EDGE];
+    for (int x = 0; x < EDGE; ++x) {
+        const int k = 9 * part_of(x), inner_x = (x + 7) & 7;
+        const uint64_t own = row(k + 3, inner_x);
+        planes[x] = own | own << 8 | own >> 8 | row(k, inner_x) >> 56 | row(k + 6, inner_x) << 56;
+    }
+    Bits touching;
+    for (size_t x = 0; x < LEAF; ++x) {
+        touching[x] = planes[x] | planes[x + 1] | planes[x + 2];
+    }
+    return touching;
+}
+
 namespace {
 
-// Whether the piece from a to b goes through the triangle; in doubt at its edges, it does.
-bool goes_through(const Corners &corner, const Vec3d &a, const Vec3d &b) {
-    const Vec3d normal = (corner[1] - corner[0]).cross(corner[2] - corner[0]);
-    const double from = normal.dot(a - corner[0]), to = normal.dot(b - corner[0]);
+// A triangle near a voxel.
+struct Near {
+    Corners corner;
+    Vec3d normal;
+    float low[3], high[3]; // a box around it, from the leaf's origin
+    double height;         // of the voxel over its plane, times the normal's length
+};
+
+// Whether the piece from the voxel at a to b goes through the triangle; in doubt at its edges, it does.
+bool goes_through(const Near &near, const Vec3d &a, const Vec3d &b) {
+    const double from = near.height, to = near.normal.dot(b - near.corner[0]);
     if (!((from < 0.0 && to > 0.0) || (from > 0.0 && to < 0.0))) {
         return false;
     }
     const Vec3d place = a + (b - a) * (from / (from - to));
     for (int i = 0; i < 3; ++i) {
-        const Vec3d edge = corner[(i + 1) % 3] - corner[i];
-        const double beside = edge.cross(place - corner[i]).dot(normal);
-        if (beside < 0.0 && beside * beside > AT_EDGE * AT_EDGE * edge.lengthSqr() * normal.lengthSqr()) {
+        const Vec3d edge = near.corner[(i + 1) % 3] - near.corner[i];
+        const double beside = edge.cross(place - near.corner[i]).dot(near.normal);
+        if (beside < 0.0 &&
+            beside * beside > AT_EDGE * AT_EDGE * edge.lengthSqr() * near.normal.lengthSqr()) {
             return false;
         }
     }
@@ -141,28 +173,30 @@ class Sides::Nearby {
   public:
     Nearby(const Surface &surface_, const BandLeaf &leaf_) : surface(surface_), leaf(leaf_) {}
 
-    // Whether one of them is between two neighbours.
-    bool parts(const Cell &from, const Cell &to) {
-        if (boxes.empty()) {
-            fill();
+    // The voxel that parts() is asked of.
+    void go_to(const Cell &local_) {
+        local = local_;
+        taken = false;
+    }
+
+    // Whether a triangle is between the voxel and a neighbour.
+    bool parts(const int8_t step[3]) {
+        if (!taken) {
+            take();
         }
-        const size_t count = leaf.triangle_count;
         float low[3], high[3];
-        Vec3d a, b;
+        Vec3d to;
         for (int axis = 0; axis < 3; ++axis) {
-            low[axis] = float(std::min(from[axis], to[axis]));
-            high[axis] = float(std::max(from[axis], to[axis]));
-            a[axis] = leaf.origin[axis] + from[axis];
-            b[axis] = leaf.origin[axis] + to[axis];
+            const int32_t end = local[axis] + step[axis];
+            low[axis] = float(std::min(local[axis], end));
+            high[axis] = float(std::max(local[axis], end));
+            to[axis] = leaf.origin[axis] + end;
         }
-        const float *const box = boxes.data();
-        for (size_t i = 0; i < count; ++i) {
-            hit[i] = (box[i] <= high[0]) & (box[count + i] <= high[1]) & (box[2 * count + i] <= high[2]) &
-                     (box[3 * count + i] >= low[0]) & (box[4 * count + i] >= low[1]) &
-                     (box[5 * count + i] >= low[2]);
-        }
-        for (size_t i = 0; i < count; ++i) {
-            if (hit[i] != 0 && goes_through(corners_of(surface, leaf.triangles[i]), a, b)) {
+        for (Near &one : near) {
+            if ((one.low[0] <= high[0]) & (one.low[1] <= high[1]) & (one.low[2] <= high[2]) &
+                    (one.high[0] >= low[0]) & (one.high[1] >= low[1]) & (one.high[2] >= low[2]) &&
+                goes_through(one, place, to)) {
+                std::swap(one, near.front()); // it is likely to part the next one, too
                 return true;
             }
         }
@@ -170,6 +204,36 @@ class Sides::Nearby {
     }
 
   private:
+    void take() {
+        if (boxes.empty()) {
+            fill();
+        }
+        const size_t count = leaf.triangle_count;
+        const float *const box = boxes.data();
+        const float x = float(local[0]), y = float(local[1]), z = float(local[2]);
+        for (size_t i = 0; i < count; ++i) {
+            hit[i] = (box[i] <= x + 1.0f) & (box[count + i] <= y + 1.0f) & (box[2 * count + i] <= z + 1.0f) &
+                     (box[3 * count + i] >= x - 1.0f) & (box[4 * count + i] >= y - 1.0f) &
+                     (box[5 * count + i] >= z - 1.0f);
+        }
+        place = Vec3d(leaf.origin[0] + local[0], leaf.origin[1] + local[1], leaf.origin[2] + local[2]);
+        near.clear();
+        for (size_t i = 0; i < count; ++i) {
+            if (hit[i] == 0) {
+                continue;
+            }
+            Near one{corners_of(surface, leaf.triangles[i]), {}, {}, {}, 0.0};
+            one.normal = (one.corner[1] - one.corner[0]).cross(one.corner[2] - one.corner[0]);
+            one.height = one.normal.dot(place - one.corner[0]);
+            for (size_t axis = 0; axis < 3; ++axis) {
+                one.low[axis] = box[axis * count + i];
+                one.high[axis] = box[(3 + axis) * count + i];
+            }
+            near.push_back(one);
+        }
+        taken = true;
+    }
+
     void fill() {
         const size_t count = leaf.triangle_count;
         boxes.resize(6 * count + 1);
@@ -188,6 +252,10 @@ class Sides::Nearby {
     const BandLeaf &leaf;
     std::vector<float> boxes; // lows along x, y and z, then highs
     std::vector<uint8_t> hit;
+    Cell local{};
+    Vec3d place;
+    bool taken = false;
+    std::vector<Near> near; // what may be between the voxel and its neighbours
 };
 
 // The side of a voxel that is not known: that of a neighbour that it shares a free ball with, or of one that
@@ -195,9 +263,6 @@ class Sides::Nearby {
 int Sides::side_of(const Halo &halo, const Cell &local, Nearby &nearby) {
     const int at = in_halo(local[0] + 1, local[1] + 1, local[2] + 1);
     const float own = halo.distance[at];
-    if (own < ON) {
-        return 0;
-    }
     // First the neighbour that lies away from the surface.
     constexpr int stride[3] = {EDGE * EDGE, EDGE, 1};
     float slope[3], steepest = 0.0f;
@@ -232,36 +297,44 @@ int Sides::side_of(const Halo &halo, const Cell &local, Nearby &nearby) {
             }
         }
     }
-    std::stable_sort(known, known + count,
-                     [](const Known26 &a, const Known26 &b) { return a.distance > b.distance; });
-    for (int k = 0; k < count; ++k) {
-        const int8_t *const step = known[k].step;
-        if (!nearby.parts(local, {local[0] + step[0], local[1] + step[1], local[2] + step[2]})) {
-            return known[k].side;
+    nearby.go_to(local);
+    for (int tried = 0; tried < count; ++tried) { // the farthest from the surface first
+        Known26 *const farthest = std::max_element(
+            known, known + count, [](const Known26 &a, const Known26 &b) { return a.distance < b.distance; });
+        if (!nearby.parts(farthest->step)) {
+            return farthest->side;
         }
+        farthest->distance = -1.0f;
     }
     return 0;
 }
 
-bool Sides::is_settled(size_t i) const {
-    uint64_t all = ~uint64_t(0);
-    for (const uint64_t word : now[i].known) {
-        all &= word;
-    }
-    return ~all == 0;
-}
-
 void Sides::settle(size_t i) {
     next[i] = now[i];
-    if (is_settled(i)) {
+    Bits left; // those on the surface stay unknown
+    bool any = false;
+    for (size_t x = 0; x < LEAF; ++x) {
+        left[x] = ~now[i].known[x];
+        for (uint64_t unknown = left[x]; unknown != 0; unknown &= unknown - 1) {
+            const int n = __builtin_ctzll(unknown);
+            left[x] ^= uint64_t(leaves[i].distances[64 * x + size_t(n)] < ON) << n;
+        }
+        any |= left[x] != 0;
+    }
+    if (!any) {
+        return;
+    }
+    uint32_t around[27];
+    find_around(i, around);
+    if (!has_fresh(around)) {
         return;
     }
     Halo halo;
-    gather(i, halo);
+    gather(around, halo);
     Nearby nearby(surface, leaves[i]);
     for (int x = 0; x < LEAF; ++x) {
-        for (uint64_t left = ~now[i].known[x]; left != 0; left &= left - 1) {
-            const int n = __builtin_ctzll(left);
+        for (; left[x] != 0; left[x] &= left[x] - 1) {
+            const int n = __builtin_ctzll(left[x]);
             const int side = side_of(halo, {x, n >> 3, n & 7}, nearby);
             if (side != 0) {
                 next[i].known[x] |= uint64_t(1) << n;
@@ -272,29 +345,28 @@ void Sides::settle(size_t i) {
 }
 
 void Sides::end_round() {
+    for (size_t i = 0; i < now.size(); ++i) {
+        tried[i] = now[i].known;
+    }
     now.swap(next);
 }
 
 Sides::Told Sides::tell(size_t i) const {
     Told told{now[i].outside, {}};
-    Halo halo;
-    bool gathered = false;
-    for (int x = 0; x < LEAF; ++x) {
-        for (uint64_t left = ~told.outside[x]; left != 0; left &= left - 1) {
+    bool any = false;
+    for (size_t x = 0; x < LEAF; ++x) {
+        any |= (~told.outside[x] & ~well_off[i][x]) != 0;
+    }
+    if (!any) {
+        return told;
+    }
+    const Bits touching = touching_outside(i);
+    for (size_t x = 0; x < LEAF; ++x) {
+        const uint64_t near = ~told.outside[x] & ~well_off[i][x];
+        told.buried[x] = near & ~touching[x];
+        for (uint64_t left = near & touching[x]; left != 0; left &= left - 1) {
             const int n = __builtin_ctzll(left);
-            const float distance = leaves[i].distances[64 * x + n];
-            if (distance > WELL_OFF) {
-                continue;
-            }
-            if (!gathered) {
-                gather(i, halo);
-                gathered = true;
-            }
-            if (!touches_outside(halo, in_halo(x + 1, (n >> 3) + 1, (n & 7) + 1))) {
-                told.buried[x] |= uint64_t(1) << n;
-            } else if (distance < ON) {
-                told.outside[x] |= uint64_t(1) << n;
-            }
+            told.outside[x] |= uint64_t(leaves[i].distances[64 * x + size_t(n)] < ON) << n;
         }
     }
     return told;

@@ -27,20 +27,22 @@ class Sides {
     Told tell(size_t leaf) const;
 
   private:
-    struct Row;
     struct Halo;
     class Nearby;
 
-    Row row(uint32_t leaf, int x, int y) const;
-    void gather(size_t leaf, Halo &halo) const;
-    static bool touches_outside(const Halo &halo, int at);
-    bool is_settled(size_t leaf) const;
+    void find_around(size_t leaf, uint32_t around[27]) const;
+    uint64_t fresh(uint32_t leaf, size_t x) const;
+    bool has_fresh(const uint32_t around[27]) const;
+    void gather(const uint32_t around[27], Halo &halo) const;
+    Bits touching_outside(size_t leaf) const;
     static int side_of(const Halo &halo, const Cell &local, Nearby &nearby);
 
     const Surface &surface;
     const LeafTable &table;
     const std::vector<BandLeaf> &leaves;
     std::vector<KnownSides> now, next;
+    std::vector<Bits> tried;    // what was known a round before: what it does not tell it never does
+    std::vector<Bits> well_off; // whose sides are known from the start
 };
 
 } // namespace vshi

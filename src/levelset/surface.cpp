@@ -62,11 +62,10 @@ class Conversion {
         if (regions.empty()) {
             return;
         }
-        const Surface boundary = boundary_of(surface, table, told);
-        stage.check();
+        const Surface boundary = boundary_of(surface, table, told, at(0.8), at(0.85), stage);
         Band bounded(boundary, band.half_width);
         const std::vector<size_t> again = regions_near_buried(bounded, leaves, told);
-        stage.loop(again.size(), 1, at(0.8), at(0.9),
+        stage.loop(again.size(), 1, at(0.85), at(0.9),
                    [&](size_t i) { bounded.measure(again[i], false, kernel); });
         const std::vector<BandLeaf> others = bounded.leaves();
         const LeafTable other_table(others);
