@@ -3,6 +3,7 @@
 #include "model/model.h"
 
 #include "base/floats.h"
+#include "base/memory.h"
 #include "base/try.h"
 #include "model/model_file.h"
 
@@ -18,7 +19,8 @@ void vsh_model_free(vsh_model *model) {
         free(model->entries[i].name);
     }
     free(model->entries);
-    for (size_t i = 0; i < model->shape_count; ++i) {
+    const bool owned = model->blocks[0] == NULL && model->answer.map == NULL;
+    for (size_t i = 0; owned && i < model->shape_count; ++i) {
         vshi_model_shape *shape = &model->shapes[i];
         free(shape->indices);
         for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
@@ -28,7 +30,15 @@ void vsh_model_free(vsh_model *model) {
         free(shape->positions);
     }
     free(model->shapes);
+    for (int i = 0; i < VSHI_MODEL_BLOCKS; ++i) {
+        free(model->blocks[i]);
+    }
+    vshi_answer_free(&model->answer);
     free(model);
+}
+
+vsh_result vshi_model_create(const char *path, vsh_model **model, vsh_error *error) {
+    return vshi_allocate((void **)model, 1, sizeof **model, path, error);
 }
 
 size_t vsh_model_mesh_count(const vsh_model *model) {

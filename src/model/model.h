@@ -3,6 +3,7 @@
 #define VSHI_CASTER_MODEL_H
 
 #include "base/job.h"
+#include "sandbox/reader.h"
 
 #include <vdbshade/mesh.h>
 
@@ -32,9 +33,14 @@ typedef struct vshi_model_entry {
     double transform[12];
 } vshi_model_entry;
 
+enum { VSHI_MODEL_BLOCKS = 4 };
+
 struct vsh_model {
     vshi_model_shape *shapes;
     size_t shape_count;
+    void *blocks[VSHI_MODEL_BLOCKS]; /* memory that the shapes' arrays lie in; shapes own theirs where there
+                                        is none */
+    vshi_answer answer;              /* the same: what a reader handed over */
     vshi_model_entry *entries;
     size_t entry_count, entry_capacity;
     double unit; /* metres in one of the file's; 0: not known */
@@ -58,6 +64,9 @@ typedef struct vshi_model_place {
     size_t shape;
     const double *world; /* [12] */
 } vshi_model_place;
+
+/* An empty one. Free with vsh_model_free(). Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_model_create(const char *path, vsh_model **model, vsh_error *error);
 
 /* Adds an entry; a transform that flattens it is left out, with a warning. Errors: VSH_ERROR_INPUT (a
  * transform that is not finite in 32 bits), VSH_ERROR_MEMORY. */

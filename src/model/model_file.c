@@ -4,6 +4,8 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "model/gltf.h"
+#include "model/obj.h"
+#include "model/ply.h"
 #include "model/scan.h"
 #include "model/unsupported.h"
 
@@ -25,7 +27,8 @@ static const double PEAK_BYTES_A_BYTE = 6.0;
 enum {
     SCAN_UNITS = 150,
     IMPORT_UNITS = 600,
-    CHECK_UNITS = VSHI_MODEL_FILE_UNITS - SCAN_UNITS - IMPORT_UNITS
+    READ_UNITS = SCAN_UNITS + IMPORT_UNITS,
+    CHECK_UNITS = VSHI_MODEL_FILE_UNITS - READ_UNITS
 };
 
 /* Formats that are read, each tested with what Blender writes (tests/models). Assimp reads more, and some of
@@ -82,35 +85,13 @@ static vsh_result scan_text(vshi_scan *scan, const char *ending, const vsh_run *
     return vshi_scan_file(scan, ending, error);
 }
 
-/* What Assimp is to read in the file's place. */
-typedef struct stand_in {
-    char *text; /* NULL: the file itself */
-    size_t size;
-} stand_in;
-
-/* Strips become faces. */
-static vsh_result stand_in_for(const vshi_scan *scan, const vsh_run *run, stand_in *other, vsh_error *error) {
-    const vshi_ply_strips *strips = &scan->strips;
-    if (strips->header == NULL) {
-        return VSH_OK;
-    }
-    if (strips->triangles == 0) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", scan->path);
-    }
-    const double bytes = vshi_ply_strips_bytes(strips, scan->size);
-    VSHI_TRY(vshi_check_limit(run, (double)scan->size + PEAK_BYTES_A_BYTE * bytes, scan->path, error));
-    return vshi_ply_strips_unroll(strips, scan->path, scan->text, scan->size, &other->text, &other->size,
-                                  error);
-}
-
 static vsh_result scan_file(vshi_scan *scan, const char *ending, const vsh_run *run, vsh_model **model,
-                            stand_in *other, vsh_error *error) {
+                            vsh_error *error) {
     char *text;
     vsh_result result;
     VSHI_TRY_DONE(load_file(scan->path, run, &text, &scan->size, error));
     scan->text = text;
     VSHI_TRY_DONE(scan_text(scan, ending, run, model, error));
-    VSHI_TRY_DONE(stand_in_for(scan, run, other, error));
     if (vshi_job_advance(scan->job, SCAN_UNITS - scan->units_done)) {
         result = vshi_job_fail_cancelled(scan->job, error);
     }
@@ -184,7 +165,6 @@ vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *
     *model = NULL;
     const char *ending = NULL;
     vshi_scan scan = {.path = path, .job = job, .units = SCAN_UNITS};
-    stand_in other = {NULL, 0};
     struct stat status;
     /* A missing file is that first, whatever its ending. */
     if (stat(path, &status) != 0) {
@@ -193,20 +173,18 @@ vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *
     VSHI_TRY(vshi_unsupported_check(path, error));
     VSHI_TRY(check_ending(path, &ending, error));
     vsh_result result;
-    VSHI_TRY_DONE(scan_file(&scan, ending, run, model, &other, error));
+    VSHI_TRY_DONE(strcasecmp(ending, "obj") == 0   ? vshi_obj_read(path, run, job, READ_UNITS, model, error)
+                  : strcasecmp(ending, "ply") == 0 ? vshi_ply_read(path, run, job, READ_UNITS, model, error)
+                                                   : scan_file(&scan, ending, run, model, error));
     *unit = scan.unit;
     if (*model == NULL) {
-        VSHI_TRY_DONE(vshi_import_read(path, other.text, other.size, run->allow_outside != 0, job,
-                                       IMPORT_UNITS, import, error));
-        free(other.text);
-        other.text = NULL;
+        VSHI_TRY_DONE(vshi_import_read(path, run->allow_outside != 0, job, IMPORT_UNITS, import, error));
         VSHI_TRY_DONE(check_scene(path, vshi_import_scene(*import), scan.faces, job, error));
     }
     if (vshi_job_advance(job, CHECK_UNITS + (*import == NULL ? IMPORT_UNITS : 0))) {
         result = vshi_job_fail_cancelled(job, error);
     }
 done:
-    free(other.text);
     if (result != VSH_OK) {
         vshi_import_free(*import);
         *import = NULL;
