@@ -19,8 +19,7 @@ void vsh_model_free(vsh_model *model) {
         free(model->entries[i].name);
     }
     free(model->entries);
-    const bool owned = model->blocks[0] == NULL && model->answer.map == NULL;
-    for (size_t i = 0; owned && i < model->shape_count; ++i) {
+    for (size_t i = 0; !model->borrowed && i < model->shape_count; ++i) {
         vshi_model_shape *shape = &model->shapes[i];
         free(shape->indices);
         for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
@@ -91,11 +90,11 @@ static bool wants_normals(const char *path) {
     return dot == NULL || (strcmp(dot, ".stl") != 0 && strcmp(dot, ".STL") != 0);
 }
 
-static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job, vsh_model **model,
-                            vsh_error *error) {
+static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job, bool alone,
+                            vsh_model **model, vsh_error *error) {
     vshi_import *import = NULL;
     double unit = 0.0;
-    VSHI_TRY(vshi_model_file_read(path, run, job, &import, model, &unit, error));
+    VSHI_TRY(vshi_model_file_read(path, run, job, alone, &import, model, &unit, error));
     if (import == NULL) {
         return VSH_OK;
     }
@@ -111,7 +110,8 @@ static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job,
     return result;
 }
 
-vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error) {
+vsh_result vshi_model_read(const char *path, const vsh_run *run, bool alone, vsh_model **model,
+                           vsh_error *error) {
     VSHI_FLOATS;
     enum { BUILD_UNITS = 100 };
     VSHI_NEEDS(model);
@@ -126,7 +126,7 @@ vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **mode
     vsh_result result;
     VSHI_TRY_DONE(full.reader != NULL
                       ? vshi_model_from_reader(path, &full, job, VSHI_MODEL_FILE_UNITS, model, error)
-                      : read_here(path, &full, job, model, error));
+                      : read_here(path, &full, job, alone, model, error));
     if (vshi_job_advance(job, BUILD_UNITS)) {
         vsh_model_free(*model);
         *model = NULL;
@@ -135,4 +135,8 @@ vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **mode
 done:
     vshi_job_end(job);
     return result;
+}
+
+vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error) {
+    return vshi_model_read(path, run, false, model, error);
 }

@@ -148,12 +148,12 @@ static inline const char *read_index(const char *c, int64_t *index) {
     const bool negative = *c == '-';
     c += *c == '-' || *c == '+';
     const char *first = c;
-    int64_t number = 0;
-    for (; (unsigned char)(*c - '0') < 10 && c - first < DIGITS; ++c) {
-        number = 10 * number + (*c - '0');
+    uint64_t number = 0;
+    for (; (unsigned char)(*c - '0') < 10; ++c) {
+        number = 10 * number + (unsigned char)(*c - '0');
     }
-    *index = negative ? -number : number;
-    return c > first && (unsigned char)(*c - '0') >= 10 ? c : NULL;
+    *index = negative ? -(int64_t)number : (int64_t)number;
+    return c > first && c - first <= DIGITS ? c : NULL;
 }
 
 /* From 1, or from -1 backwards from the latest. */

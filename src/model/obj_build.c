@@ -69,6 +69,7 @@ static vsh_result make_indices(vshi_obj *obj, vsh_model *model, bool *triangles,
 static vsh_result make_shapes(vshi_obj *obj, vsh_model *model, vsh_error *error) {
     bool triangles;
     size_t capacity = 0, made = 0;
+    model->borrowed = true;
     VSHI_TRY(make_indices(obj, model, &triangles, error));
     VSHI_TRY(gather(obj, VSHI_OBJ_POSITION, 3, &model->blocks[POSITIONS], error));
     if (obj->kinds[VSHI_OBJ_TEXTURE].highest > 0) {

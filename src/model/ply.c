@@ -104,7 +104,7 @@ static vsh_result read_header(vshi_ply_reader *r, vsh_error *error) {
 
 /* --- rows */
 
-static vsh_result keep_vertex(vshi_ply_reader *r, vsh_error *error) {
+vsh_result vshi_ply_keep_vertex(vshi_ply_reader *r, vsh_error *error) {
     const size_t v = r->vertex_count, next = v + 1;
     VSHI_TRY(vshi_grow(&r->budget, &r->positions, &r->position_capacity, next, sizeof(float[3]), error));
     memcpy(r->positions + 3 * v, r->number + VSHI_PLY_X, sizeof(float[3]));
@@ -141,7 +141,7 @@ static vsh_result keep_row(vshi_ply_reader *r, int role, vsh_error *error) {
     vshi_faces *faces = &r->faces;
     const uint32_t *corners = faces->corners + faces->count;
     if (role < VSHI_PLY_NUMBERS) {
-        return keep_vertex(r, error);
+        return vshi_ply_keep_vertex(r, error);
     }
     if (role == VSHI_PLY_STRIP) {
         for (size_t i = 0; i < r->corners; i += 3) {
@@ -171,6 +171,10 @@ static vsh_result read_element(vshi_ply_reader *r, vsh_error *error) {
     const int role = role_of_rows(r);
     memset(r->number, 0, sizeof r->number);
     for (r->row = 0; r->row < r->element->count;) {
+        VSHI_TRY(vshi_ply_read_plain_rows(r, role, error));
+        if (r->row == r->element->count) {
+            break;
+        }
         const char *next = vshi_ply_read_row(r, r->stream.at, error);
         if (next != NULL) {
             VSHI_TRY(keep_row(r, role, error));

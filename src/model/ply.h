@@ -59,6 +59,14 @@ vsh_result vshi_ply_read(const char *path, const vsh_run *run, vshi_job *job, si
  * it; NULL: it failed, or (reader->failed is VSH_OK) the window ends within it. */
 const char *vshi_ply_read_row(vshi_ply_reader *reader, const char *at, vsh_error *error);
 
+/* Reads rows from the window on while they are as nearly all files have them, as many as are there whole, and
+ * moves stream.at and row: whatever else follows, and every error, is vshi_ply_read_row()'s. Errors:
+ * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+vsh_result vshi_ply_read_plain_rows(vshi_ply_reader *reader, int role, vsh_error *error);
+
+/* Keeps the vertex that was read. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+vsh_result vshi_ply_keep_vertex(vshi_ply_reader *reader, vsh_error *error);
+
 /* A number of a binary file. */
 float vshi_ply_float(const char *at, int type, bool big_endian);
 
