@@ -91,8 +91,8 @@ struct vshi_import {
     const aiScene *scene = nullptr;
 };
 
-vsh_result vshi_import_read(const char *path, const char *text, size_t size, bool outside, vshi_job *job,
-                            size_t units, vshi_import **import, vsh_error *error) {
+vsh_result vshi_import_read(const char *path, bool outside, vshi_job *job, size_t units, vshi_import **import,
+                            vsh_error *error) {
     *import = nullptr;
     return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
         auto reader = std::make_unique<vshi_import>();
@@ -101,10 +101,7 @@ vsh_result vshi_import_read(const char *path, const char *text, size_t size, boo
         reader->importer.SetProgressHandler(new Progress(job, units)); // the importer deletes it
         auto *const files = new Beside(path, outside);
         reader->importer.SetIOHandler(files); // as it does this
-        const char *dot = std::strrchr(path, '.');
-        reader->scene = text == nullptr ? reader->importer.ReadFile(path, 0)
-                                        : reader->importer.ReadFileFromMemory(text, size, 0,
-                                                                              dot != nullptr ? dot + 1 : "");
+        reader->scene = reader->importer.ReadFile(path, 0);
         if (vshi_job_cancelled(job)) {
             return vshi_job_fail_cancelled(job, error);
         }

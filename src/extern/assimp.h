@@ -12,13 +12,12 @@ extern "C" {
 struct aiScene;
 typedef struct vshi_import vshi_import;
 
-/* Reads the file as it is: polygons stay polygons, nothing is joined, generated or transformed. Where `text`
- * is not NULL, reads its `size` bytes in the file's place. What the file names is opened where it is a
- * regular file, and in the file's folder or `outside`: else VSH_ERROR_INPUT. Advances the job by up to
- * `units`. Errors: VSH_ERROR_READ with Assimp's reason, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (the readers of
- * OBJ and a few others listen). Free with vshi_import_free(). */
-vsh_result vshi_import_read(const char *path, const char *text, size_t size, bool outside, vshi_job *job,
-                            size_t units, vshi_import **import, vsh_error *error);
+/* Reads the file as it is: polygons stay polygons, nothing is joined, generated or transformed. What the file
+ * names is opened where it is a regular file, and in the file's folder or `outside`: else VSH_ERROR_INPUT.
+ * Advances the job by up to `units`. Errors: VSH_ERROR_READ with Assimp's reason, VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED (the readers of OBJ and a few others listen). Free with vshi_import_free(). */
+vsh_result vshi_import_read(const char *path, bool outside, vshi_job *job, size_t units, vshi_import **import,
+                            vsh_error *error);
 
 /* Metres in one unit of an FBX, by which Assimp does not multiply; 0: of another format. */
 double vshi_import_unit(const vshi_import *import);

@@ -58,6 +58,32 @@ vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_err
     return VSH_OK;
 }
 
+/* Whether all positions are finite, and stay so in the world: by the largest, without a branch. */
+static bool positions_hold(const vsh_mesh *mesh) {
+    uint32_t most = 0;
+    for (size_t i = 0; i < 3 * mesh->vertex_count; ++i) {
+        uint32_t bits;
+        memcpy(&bits, &mesh->positions[i], sizeof bits);
+        bits &= 0x7fffffff; /* without the sign: they are in order of what they stand for */
+        most = bits > most ? bits : most;
+    }
+    float farthest;
+    memcpy(&farthest, &most, sizeof farthest);
+    double sum = (double)farthest;
+    for (int i = 0; mesh->transform != NULL && i < 12; ++i) {
+        sum += fabs(mesh->transform[i]) * (i % 4 == 3 ? 1.0 : (double)farthest);
+    }
+    return isfinite(sum);
+}
+
+static bool indices_hold(const vsh_mesh *mesh) {
+    uint32_t most = 0;
+    for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
+        most = mesh->indices[i] > most ? mesh->indices[i] : most;
+    }
+    return mesh->triangle_count == 0 || most < mesh->vertex_count;
+}
+
 vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *error) {
     if ((mesh->positions == NULL && mesh->vertex_count > 0) ||
         (mesh->indices == NULL && mesh->triangle_count > 0)) {
@@ -71,7 +97,8 @@ vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *err
                          UINT32_MAX, SIZE_MAX / 64);
     }
     VSHI_TRY(vshi_mesh_check_transform(mesh, index, error));
-    for (size_t v = 0; v < mesh->vertex_count; ++v) {
+    const bool positions_held = positions_hold(mesh), indices_held = indices_hold(mesh);
+    for (size_t v = 0; !positions_held && v < mesh->vertex_count; ++v) {
         const float *p = mesh->positions + 3 * v;
         const vshi_vec local = vshi_vec_off(p);
         if (!vshi_finite(local) || !vshi_finite(vshi_transform_point(mesh->transform, local))) {
@@ -82,7 +109,7 @@ vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *err
                                                 : ", expected finite numbers");
         }
     }
-    for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
+    for (size_t i = 0; !indices_held && i < 3 * mesh->triangle_count; ++i) {
         if (mesh->indices[i] >= mesh->vertex_count) {
             return vshi_fail(error, VSH_ERROR_INPUT,
                              "%s: triangle %zu uses vertex %u, but there are only %zu",

@@ -70,6 +70,9 @@ vsh_result vshi_gltf_hold(vshi_gltf *gltf, double bytes, vsh_error *error);
 /* The same of count × size bytes, which it takes: as vshi_allocate(). */
 vsh_result vshi_gltf_allocate(vshi_gltf *gltf, void **memory, size_t count, size_t size, vsh_error *error);
 
+/* The same without zeroing, of at least one element. */
+vsh_result vshi_gltf_take(vshi_gltf *gltf, void **memory, size_t count, size_t size, vsh_error *error);
+
 /* --- extensions that a file cannot be read without (gltf_extensions.c) */
 
 /* Errors: VSH_ERROR_UNSUPPORTED, naming the extension and what could be done. */

@@ -179,7 +179,11 @@ static void element(const vshi_gltf_accessor *a, const unsigned char *at, float 
 
 void vshi_gltf_accessor_floats(const vshi_gltf_accessor *a, float *values) {
     const size_t n = (size_t)a->components;
-    for (size_t i = 0; i < a->count && a->at != NULL; ++i) {
+    const bool plain = a->at != NULL && a->type == VSHI_GLTF_FLOAT && a->stride == n * sizeof *values;
+    if (plain) {
+        memcpy(values, a->at, a->count * a->stride);
+    }
+    for (size_t i = 0; !plain && i < a->count && a->at != NULL; ++i) {
         element(a, a->at + i * a->stride, values + n * i);
     }
     if (a->at == NULL) {
@@ -195,7 +199,11 @@ void vshi_gltf_accessor_floats(const vshi_gltf_accessor *a, float *values) {
 
 void vshi_gltf_accessor_integers(const vshi_gltf_accessor *a, uint32_t *values) {
     const size_t n = (size_t)a->components, size = (size_t)component_size(a->type);
-    for (size_t i = 0; i < a->count; ++i) {
+    const bool plain = a->at != NULL && a->type == VSHI_GLTF_UINT && a->stride == n * size;
+    if (plain) {
+        memcpy(values, a->at, a->count * a->stride);
+    }
+    for (size_t i = 0; !plain && i < a->count; ++i) {
         for (size_t k = 0; k < n; ++k) {
             values[n * i + k] =
                 a->at != NULL ? (uint32_t)integer_at(a->at + i * a->stride + k * size, a->type) : 0;

@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 vsh_result vshi_gltf_fail(const vshi_gltf *gltf, vsh_error *error, const char *format, ...) {
     char text[768];
@@ -79,4 +80,13 @@ vsh_result vshi_gltf_hold(vshi_gltf *gltf, double bytes, vsh_error *error) {
 vsh_result vshi_gltf_allocate(vshi_gltf *gltf, void **memory, size_t count, size_t size, vsh_error *error) {
     VSHI_TRY(vshi_gltf_hold(gltf, (double)count * (double)size, error));
     return vshi_allocate(memory, count, size, gltf->path, error);
+}
+
+vsh_result vshi_gltf_take(vshi_gltf *gltf, void **memory, size_t count, size_t size, vsh_error *error) {
+    size_t bytes;
+    VSHI_TRY(vshi_gltf_hold(gltf, (double)count * (double)size, error));
+    *memory = __builtin_mul_overflow(count, size, &bytes) ? NULL : malloc(bytes);
+    return *memory != NULL ? VSH_OK
+                           : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu × %zu bytes",
+                                       gltf->path, count, size);
 }

@@ -31,7 +31,7 @@ vsh_result vshi_gltf_read_attribute(vshi_gltf *gltf, const json_t *attributes, c
                               accessor.count, vertex_count);
     }
     const size_t size = (size_t)components * sizeof(float);
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)values, accessor.count, size, error));
+    VSHI_TRY(vshi_gltf_take(gltf, (void **)values, accessor.count, size, error));
     vshi_gltf_accessor_floats(&accessor, *values);
     return VSH_OK;
 }
@@ -70,14 +70,18 @@ static vsh_result read_order(vshi_gltf *gltf, const json_t *primitive, size_t ve
                               where, accessor.components, accessor.type);
     }
     *count = accessor.count;
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)order, accessor.count, sizeof **order, error));
+    VSHI_TRY(vshi_gltf_take(gltf, (void **)order, accessor.count, sizeof **order, error));
     if (index != SIZE_MAX) {
         vshi_gltf_accessor_integers(&accessor, *order);
     }
     for (size_t i = 0; i < accessor.count && index == SIZE_MAX; ++i) {
         (*order)[i] = (uint32_t)i;
     }
+    uint32_t highest = 0;
     for (size_t i = 0; i < accessor.count; ++i) {
+        highest = (*order)[i] > highest ? (*order)[i] : highest;
+    }
+    for (size_t i = 0; highest >= vertex_count && i < accessor.count; ++i) {
         if ((*order)[i] >= vertex_count) {
             return vshi_gltf_fail(gltf, error, "%s: index %zu of %zu is %u, but there are only %zu vertices",
                                   where, i, accessor.count, (*order)[i], vertex_count);
@@ -147,6 +151,11 @@ static vsh_result drop_unused(const vshi_gltf *gltf, vshi_model_shape *shape, vs
     }
     uint32_t used = 0;
     for (size_t v = 0; v < shape->vertex_count; ++v) {
+        used += place[v];
+    }
+    const bool all = used == shape->vertex_count;
+    used = all ? used : 0;
+    for (size_t v = 0; !all && v < shape->vertex_count; ++v) {
         const bool keep = place[v] != 0;
         place[v] = used;
         if (keep && used < v) {
@@ -162,7 +171,7 @@ static vsh_result drop_unused(const vshi_gltf *gltf, vshi_model_shape *shape, vs
         }
         used += keep;
     }
-    for (size_t i = 0; i < 3 * shape->triangle_count && used < shape->vertex_count; ++i) {
+    for (size_t i = 0; !all && i < 3 * shape->triangle_count; ++i) {
         shape->indices[i] = place[shape->indices[i]];
     }
     shape->vertex_count = used;

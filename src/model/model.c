@@ -3,6 +3,7 @@
 #include "model/model.h"
 
 #include "base/floats.h"
+#include "base/memory.h"
 #include "base/try.h"
 #include "model/model_file.h"
 
@@ -18,7 +19,7 @@ void vsh_model_free(vsh_model *model) {
         free(model->entries[i].name);
     }
     free(model->entries);
-    for (size_t i = 0; i < model->shape_count; ++i) {
+    for (size_t i = 0; !model->borrowed && i < model->shape_count; ++i) {
         vshi_model_shape *shape = &model->shapes[i];
         free(shape->indices);
         for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
@@ -28,7 +29,15 @@ void vsh_model_free(vsh_model *model) {
         free(shape->positions);
     }
     free(model->shapes);
+    for (int i = 0; i < VSHI_MODEL_BLOCKS; ++i) {
+        free(model->blocks[i]);
+    }
+    vshi_answer_free(&model->answer);
     free(model);
+}
+
+vsh_result vshi_model_create(const char *path, vsh_model **model, vsh_error *error) {
+    return vshi_allocate((void **)model, 1, sizeof **model, path, error);
 }
 
 size_t vsh_model_mesh_count(const vsh_model *model) {
@@ -81,11 +90,11 @@ static bool wants_normals(const char *path) {
     return dot == NULL || (strcmp(dot, ".stl") != 0 && strcmp(dot, ".STL") != 0);
 }
 
-static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job, vsh_model **model,
-                            vsh_error *error) {
+static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job, bool alone,
+                            vsh_model **model, vsh_error *error) {
     vshi_import *import = NULL;
     double unit = 0.0;
-    VSHI_TRY(vshi_model_file_read(path, run, job, &import, model, &unit, error));
+    VSHI_TRY(vshi_model_file_read(path, run, job, alone, &import, model, &unit, error));
     if (import == NULL) {
         return VSH_OK;
     }
@@ -101,7 +110,8 @@ static vsh_result read_here(const char *path, const vsh_run *run, vshi_job *job,
     return result;
 }
 
-vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error) {
+vsh_result vshi_model_read(const char *path, const vsh_run *run, bool alone, vsh_model **model,
+                           vsh_error *error) {
     VSHI_FLOATS;
     enum { BUILD_UNITS = 100 };
     VSHI_NEEDS(model);
@@ -116,7 +126,7 @@ vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **mode
     vsh_result result;
     VSHI_TRY_DONE(full.reader != NULL
                       ? vshi_model_from_reader(path, &full, job, VSHI_MODEL_FILE_UNITS, model, error)
-                      : read_here(path, &full, job, model, error));
+                      : read_here(path, &full, job, alone, model, error));
     if (vshi_job_advance(job, BUILD_UNITS)) {
         vsh_model_free(*model);
         *model = NULL;
@@ -125,4 +135,8 @@ vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **mode
 done:
     vshi_job_end(job);
     return result;
+}
+
+vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error) {
+    return vshi_model_read(path, run, false, model, error);
 }

@@ -3,6 +3,7 @@
 #define VSHI_CASTER_MODEL_H
 
 #include "base/job.h"
+#include "sandbox/reader.h"
 
 #include <vdbshade/mesh.h>
 
@@ -32,9 +33,14 @@ typedef struct vshi_model_entry {
     double transform[12];
 } vshi_model_entry;
 
+enum { VSHI_MODEL_BLOCKS = 4 };
+
 struct vsh_model {
     vshi_model_shape *shapes;
     size_t shape_count;
+    bool borrowed;                   /* the shapes' arrays lie in what follows, else each is its own */
+    void *blocks[VSHI_MODEL_BLOCKS]; /* from malloc; may be NULL */
+    vshi_answer answer;              /* of a reader; its map may be NULL */
     vshi_model_entry *entries;
     size_t entry_count, entry_capacity;
     double unit; /* metres in one of the file's; 0: not known */
@@ -58,6 +64,13 @@ typedef struct vshi_model_place {
     size_t shape;
     const double *world; /* [12] */
 } vshi_model_place;
+
+/* An empty one. Free with vsh_model_free(). Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_model_create(const char *path, vsh_model **model, vsh_error *error);
+
+/* vsh_model_read(); `alone`: in a process of its own, which may end where the file does not hold still. */
+vsh_result vshi_model_read(const char *path, const vsh_run *run, bool alone, vsh_model **model,
+                           vsh_error *error);
 
 /* Adds an entry; a transform that flattens it is left out, with a warning. Errors: VSH_ERROR_INPUT (a
  * transform that is not finite in 32 bits), VSH_ERROR_MEMORY. */
@@ -84,8 +97,9 @@ struct vshi_encoder;
 vsh_result vshi_serve_model(const char *path, struct vshi_decoder *request, const vsh_run *run,
                             struct vshi_encoder *payload, vsh_error *error);
 
-/* What a reader has handed over; everything in it is checked. Errors: VSH_ERROR_READ where it does not hold,
- * and as for what was made in this process. */
+/* What a reader has handed over; everything in it is checked. The model's arrays are those of the message,
+ * which must outlive it. Errors: VSH_ERROR_READ where it does not hold, and as for what was made in this
+ * process. */
 vsh_result vshi_model_decode(struct vshi_decoder *decoder, const char *path, vsh_model **model,
                              vsh_error *error);
 

@@ -2,9 +2,9 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "mesh/mesh.h"
+#include "model/faces.h"
 #include "model/model.h"
 #include "model/model_skin.h"
-#include "model/polygon.h"
 
 #include <assimp/material.h>
 #include <assimp/scene.h>
@@ -55,61 +55,20 @@ static size_t copy_normals(float *to, const struct aiVector3D *from, size_t coun
     return bad;
 }
 
-/* Polygons that shared their first corner with the face before have always begun at another one (Assimp's
- * encoding of polygons as fans), and so bakes keep their bits. */
-static void turn_fan(uint32_t *triangles, size_t count, uint32_t *last_first) {
-    if (triangles[0] == *last_first) {
-        uint32_t *t = triangles;
-        const uint32_t first[3] = {t[2], t[0], t[1]};
-        memcpy(t, first, sizeof first);
-        if (count == 2) {
-            const uint32_t second[3] = {t[4], t[5], t[3]};
-            memcpy(t + 3, second, sizeof second);
-        }
-    }
-    *last_first = triangles[0];
-}
-
 static vsh_result copy_faces(const vshi_model_source *source, const struct aiMesh *mesh,
                              vshi_model_shape *shape, vsh_error *error) {
-    enum { FACES_A_POLL = 1 << 14 };
-    vshi_polygon_cutter cutter = {0};
-    uint32_t last_first = UINT32_MAX;
-    size_t crossing = 0;
+    vshi_face_cutter cutter = {
+        .positions = shape->positions, .job = source->job, .turns = shape->triangle_count > mesh->mNumFaces};
     vsh_result result = VSH_OK;
-    const bool polygons = shape->triangle_count > mesh->mNumFaces;
     shape->triangle_count = 0;
-    for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
+    for (unsigned f = 0; result == VSH_OK && f < mesh->mNumFaces; ++f) {
         const struct aiFace *face = &mesh->mFaces[f];
-        uint32_t *to = shape->indices + 3 * shape->triangle_count;
-        if (face->mNumIndices < 3) {
-            continue;
-        }
-        if (f % FACES_A_POLL == 0 && vshi_job_cancelled(source->job)) {
-            result = vshi_job_fail_cancelled(source->job, error);
-            goto done;
-        }
         size_t made;
-        bool simple;
-        VSHI_TRY_DONE(vshi_polygon_cut(&cutter, shape->positions, face->mIndices, face->mNumIndices,
-                                       source->job, to, &made, &simple, error));
+        result = vshi_face_cut(&cutter, face->mIndices, face->mNumIndices,
+                               shape->indices + 3 * shape->triangle_count, &made, error);
         shape->triangle_count += made;
-        crossing += !simple;
-        if (polygons && face->mNumIndices <= 4 && made > 0) {
-            turn_fan(to, made, &last_first);
-        }
-        for (size_t i = 0; face->mNumIndices > 4 && i < made; ++i) {
-            turn_fan(to + 3 * i, 1, &last_first);
-        }
     }
-    if (crossing > 0) {
-        vshi_warn(source->run,
-                  "%s: mesh '%s': edges of %zu polygons cross each other: which triangles they mean cannot "
-                  "be told",
-                  source->path, mesh->mName.data, crossing);
-    }
-done:
-    vshi_polygon_free(&cutter);
+    vshi_face_cutter_end(&cutter, source->run, source->path, mesh->mName.data);
     return result;
 }
 

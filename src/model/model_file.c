@@ -4,6 +4,8 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "model/gltf.h"
+#include "model/obj.h"
+#include "model/ply.h"
 #include "model/scan.h"
 #include "model/unsupported.h"
 
@@ -15,6 +17,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 
 /* Bytes that reading takes at its peak for one byte of file: its text, Assimp's structures and our arrays.
@@ -25,7 +28,8 @@ static const double PEAK_BYTES_A_BYTE = 6.0;
 enum {
     SCAN_UNITS = 150,
     IMPORT_UNITS = 600,
-    CHECK_UNITS = VSHI_MODEL_FILE_UNITS - SCAN_UNITS - IMPORT_UNITS
+    READ_UNITS = SCAN_UNITS + IMPORT_UNITS,
+    CHECK_UNITS = VSHI_MODEL_FILE_UNITS - READ_UNITS
 };
 
 /* Formats that are read, each tested with what Blender writes (tests/models). Assimp reads more, and some of
@@ -53,69 +57,72 @@ static bool is_gltf(const char *ending) {
     return strcasecmp(ending, "gltf") == 0 || strcasecmp(ending, "glb") == 0;
 }
 
-/* The whole file in *text, *size bytes of it; *text is the caller's to free, after an error too. */
-static vsh_result load_file(const char *path, const vsh_run *run, char **text, size_t *size,
+/* A file in memory. */
+typedef struct file_text {
+    char *text;
+    size_t size;
+    bool mapped; /* it is the file's own pages, else a copy */
+} file_text;
+
+static void free_text(file_text *text) {
+    if (text->mapped) {
+        munmap(text->text, text->size);
+    } else {
+        free(text->text);
+    }
+    *text = (file_text){NULL, 0, false};
+}
+
+/* A file that becomes shorter while its pages are looked at ends the process, which may be the reader's. */
+static bool map_text(FILE *file, file_text *text) {
+    void *map = mmap(NULL, text->size, PROT_READ, MAP_PRIVATE | MAP_POPULATE, fileno(file), 0);
+    text->mapped = map != MAP_FAILED;
+    text->text = text->mapped ? map : NULL;
+    return text->mapped;
+}
+
+static vsh_result copy_text(const char *path, FILE *file, file_text *text, vsh_error *error) {
+    text->text = malloc(text->size);
+    if (text->text == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, text->size);
+    }
+    return fread(text->text, 1, text->size, file) == text->size
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_READ, "%s: %s", path,
+                           ferror(file) ? strerror(errno) : "became shorter while it was read");
+}
+
+/* The whole file, for free_text(), after an error too. */
+static vsh_result load_file(const char *path, const vsh_run *run, bool alone, file_text *text,
                             vsh_error *error) {
-    *text = NULL;
     FILE *file;
     uint64_t bytes;
     vsh_result result;
-    VSHI_TRY(vshi_input_open(path, path, SIZE_MAX, &file, &bytes, error));
-    *size = (size_t)bytes;
-    VSHI_TRY_DONE(bytes > 0 ? vshi_check_limit(run, PEAK_BYTES_A_BYTE * (double)*size, path, error)
+    VSHI_TRY(vshi_input_open(path, path, SIZE_MAX / 2, &file, &bytes, error));
+    text->size = (size_t)bytes;
+    VSHI_TRY_DONE(bytes > 0 ? vshi_check_limit(run, PEAK_BYTES_A_BYTE * (double)bytes, path, error)
                             : vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path));
-    VSHI_TRY_DONE(vshi_allocate((void **)text, *size, 1, path, error));
-    if (fread(*text, 1, *size, file) != *size) {
-        result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", path,
-                           ferror(file) ? strerror(errno) : "became shorter while it was read");
-    }
+    VSHI_TRY_DONE(alone && map_text(file, text) ? VSH_OK : copy_text(path, file, text, error));
 done:
     fclose(file);
     return result;
 }
 
-static vsh_result scan_text(vshi_scan *scan, const char *ending, const vsh_run *run, vsh_model **model,
-                            vsh_error *error) {
-    if (is_gltf(ending)) {
-        return vshi_gltf_read(scan->path, scan->text, scan->size, run, scan->job, model, error);
-    }
-    return vshi_scan_file(scan, ending, error);
-}
-
-/* What Assimp is to read in the file's place. */
-typedef struct stand_in {
-    char *text; /* NULL: the file itself */
-    size_t size;
-} stand_in;
-
-/* Strips become faces. */
-static vsh_result stand_in_for(const vshi_scan *scan, const vsh_run *run, stand_in *other, vsh_error *error) {
-    const vshi_ply_strips *strips = &scan->strips;
-    if (strips->header == NULL) {
-        return VSH_OK;
-    }
-    if (strips->triangles == 0) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", scan->path);
-    }
-    const double bytes = vshi_ply_strips_bytes(strips, scan->size);
-    VSHI_TRY(vshi_check_limit(run, (double)scan->size + PEAK_BYTES_A_BYTE * bytes, scan->path, error));
-    return vshi_ply_strips_unroll(strips, scan->path, scan->text, scan->size, &other->text, &other->size,
-                                  error);
-}
-
-static vsh_result scan_file(vshi_scan *scan, const char *ending, const vsh_run *run, vsh_model **model,
-                            stand_in *other, vsh_error *error) {
-    char *text;
+static vsh_result scan_file(vshi_scan *scan, const char *ending, const vsh_run *run, bool alone,
+                            vsh_model **model, vsh_error *error) {
+    file_text text = {NULL, 0, false};
     vsh_result result;
-    VSHI_TRY_DONE(load_file(scan->path, run, &text, &scan->size, error));
-    scan->text = text;
-    VSHI_TRY_DONE(scan_text(scan, ending, run, model, error));
-    VSHI_TRY_DONE(stand_in_for(scan, run, other, error));
+    VSHI_TRY_DONE(load_file(scan->path, run, alone, &text, error));
+    scan->text = text.text;
+    scan->size = text.size;
+    VSHI_TRY_DONE(is_gltf(ending)
+                      ? vshi_gltf_read(scan->path, scan->text, scan->size, run, scan->job, model, error)
+                      : vshi_scan_file(scan, ending, error));
     if (vshi_job_advance(scan->job, SCAN_UNITS - scan->units_done)) {
         result = vshi_job_fail_cancelled(scan->job, error);
     }
 done:
-    free(text);
+    free_text(&text);
     scan->text = NULL;
     return result;
 }
@@ -178,13 +185,12 @@ static vsh_result check_scene(const char *path, const struct aiScene *scene, siz
     return VSH_OK;
 }
 
-vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *job, vshi_import **import,
-                                vsh_model **model, double *unit, vsh_error *error) {
+vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *job, bool alone,
+                                vshi_import **import, vsh_model **model, double *unit, vsh_error *error) {
     *import = NULL;
     *model = NULL;
     const char *ending = NULL;
     vshi_scan scan = {.path = path, .job = job, .units = SCAN_UNITS};
-    stand_in other = {NULL, 0};
     struct stat status;
     /* A missing file is that first, whatever its ending. */
     if (stat(path, &status) != 0) {
@@ -193,20 +199,18 @@ vsh_result vshi_model_file_read(const char *path, const vsh_run *run, vshi_job *
     VSHI_TRY(vshi_unsupported_check(path, error));
     VSHI_TRY(check_ending(path, &ending, error));
     vsh_result result;
-    VSHI_TRY_DONE(scan_file(&scan, ending, run, model, &other, error));
+    VSHI_TRY_DONE(strcasecmp(ending, "obj") == 0   ? vshi_obj_read(path, run, job, READ_UNITS, model, error)
+                  : strcasecmp(ending, "ply") == 0 ? vshi_ply_read(path, run, job, READ_UNITS, model, error)
+                                                   : scan_file(&scan, ending, run, alone, model, error));
     *unit = scan.unit;
     if (*model == NULL) {
-        VSHI_TRY_DONE(vshi_import_read(path, other.text, other.size, run->allow_outside != 0, job,
-                                       IMPORT_UNITS, import, error));
-        free(other.text);
-        other.text = NULL;
+        VSHI_TRY_DONE(vshi_import_read(path, run->allow_outside != 0, job, IMPORT_UNITS, import, error));
         VSHI_TRY_DONE(check_scene(path, vshi_import_scene(*import), scan.faces, job, error));
     }
     if (vshi_job_advance(job, CHECK_UNITS + (*import == NULL ? IMPORT_UNITS : 0))) {
         result = vshi_job_fail_cancelled(job, error);
     }
 done:
-    free(other.text);
     if (result != VSH_OK) {
         vshi_import_free(*import);
         *import = NULL;

@@ -5,6 +5,8 @@
 #include "model/model.h"
 #include "sandbox/reader.h"
 
+#include <float.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -34,7 +36,7 @@ vsh_result vshi_serve_model(const char *path, vshi_decoder *request, const vsh_r
                             vshi_encoder *payload, vsh_error *error) {
     (void)request;
     vsh_model *model = NULL;
-    VSHI_TRY(vsh_model_read(path, run, &model, error));
+    VSHI_TRY(vshi_model_read(path, run, true, &model, error));
     vshi_encode_number(payload, model->unit);
     vshi_encode_count(payload, model->shape_count);
     for (size_t i = 0; i < model->shape_count; ++i) {
@@ -55,24 +57,19 @@ vsh_result vshi_serve_model(const char *path, vshi_decoder *request, const vsh_r
 
 /* --- the caller */
 
-/* A copy of the next count × size bytes; sizes are known to be there before memory is taken. */
-static vsh_result copy_array(vshi_decoder *decoder, uint64_t count, size_t size, void *array,
+/* The next count × size bytes, where they lie. */
+static vsh_result take_array(vshi_decoder *decoder, uint64_t count, size_t size, void *array,
                              const char *path, vsh_error *error) {
     const void *from = vshi_decode_array(decoder, count, size);
-    void *memory = NULL;
-    if (from == NULL) {
-        return count == 0 && !decoder->bad ? VSH_OK : vshi_answer_fail(path, "an array's size", error);
-    }
-    VSHI_TRY(vshi_allocate(&memory, (size_t)count, size, path, error));
-    memcpy(memory, from, (size_t)count * size);
-    memcpy(array, &memory, sizeof memory);
-    return VSH_OK;
+    memcpy(array, &from, sizeof from);
+    return from != NULL || (count == 0 && !decoder->bad) ? VSH_OK
+                                                         : vshi_answer_fail(path, "an array's size", error);
 }
 
 /* An array that is only perhaps there. */
-static vsh_result copy_optional(vshi_decoder *decoder, uint64_t count, size_t size, float **array,
+static vsh_result take_optional(vshi_decoder *decoder, uint64_t count, size_t size, float **array,
                                 const char *path, vsh_error *error) {
-    return vshi_decode_count(decoder, 1) == 0 ? VSH_OK : copy_array(decoder, count, size, array, path, error);
+    return vshi_decode_count(decoder, 1) == 0 ? VSH_OK : take_array(decoder, count, size, array, path, error);
 }
 
 static vsh_result take_shape(vshi_decoder *decoder, vshi_model_shape *shape, const char *path,
@@ -85,11 +82,11 @@ static vsh_result take_shape(vshi_decoder *decoder, vshi_model_shape *shape, con
         return VSH_OK;
     }
     const size_t count = shape->vertex_count;
-    VSHI_TRY(copy_array(decoder, count, sizeof(float[3]), &shape->positions, path, error));
-    VSHI_TRY(copy_array(decoder, shape->triangle_count, sizeof(uint32_t[3]), &shape->indices, path, error));
-    VSHI_TRY(copy_optional(decoder, count, sizeof(float[3]), &shape->normals, path, error));
+    VSHI_TRY(take_array(decoder, count, sizeof(float[3]), &shape->positions, path, error));
+    VSHI_TRY(take_array(decoder, shape->triangle_count, sizeof(uint32_t[3]), &shape->indices, path, error));
+    VSHI_TRY(take_optional(decoder, count, sizeof(float[3]), &shape->normals, path, error));
     for (int32_t set = 0; set < shape->uv_sets; ++set) {
-        VSHI_TRY(copy_optional(decoder, count, sizeof(float[2]), &shape->uvs[set], path, error));
+        VSHI_TRY(take_optional(decoder, count, sizeof(float[2]), &shape->uvs[set], path, error));
     }
     return VSH_OK;
 }
@@ -103,12 +100,11 @@ static vsh_result check_shape(const vshi_model_shape *shape, const char *path, v
     if (vshi_mesh_validate(&view, VSHI_MESH_ALONE, &why) != VSH_OK) {
         return vshi_answer_fail(path, why.message, error);
     }
+    bool finite = true;
     for (size_t i = 0; shape->normals != NULL && i < 3 * shape->vertex_count; ++i) {
-        if (!isfinite(shape->normals[i])) {
-            return vshi_answer_fail(path, "a normal that is not finite", error);
-        }
+        finite = finite & (fabsf(shape->normals[i]) <= FLT_MAX);
     }
-    return VSH_OK;
+    return finite ? VSH_OK : vshi_answer_fail(path, "a normal that is not finite", error);
 }
 
 static vsh_result copy_name(const char *name, char **copy, const char *path, vsh_error *error) {
@@ -171,7 +167,8 @@ static vsh_result take_meshes(vshi_decoder *decoder, vsh_model *model, const cha
 
 vsh_result vshi_model_decode(vshi_decoder *decoder, const char *path, vsh_model **model, vsh_error *error) {
     vsh_model *made = NULL;
-    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, path, error));
+    VSHI_TRY(vshi_model_create(path, &made, error));
+    made->borrowed = true;
     const vsh_result result = take_meshes(decoder, made, path, error);
     if (result == VSH_OK) {
         *model = made;
@@ -188,6 +185,10 @@ vsh_result vshi_model_from_reader(const char *path, const vsh_run *run, vshi_job
     VSHI_TRY(vshi_exchange_begin(&exchange, VSHI_READ_MODEL, path, run, error));
     VSHI_TRY(vshi_exchange_send_job(&exchange, job, units, &answer, error));
     const vsh_result result = vshi_model_decode(&answer.payload, path, model, error);
-    vshi_answer_free(&answer);
+    if (result == VSH_OK) {
+        (*model)->answer = answer;
+    } else {
+        vshi_answer_free(&answer);
+    }
     return result;
 }

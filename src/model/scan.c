@@ -7,8 +7,6 @@ static const struct {
     const char *ending;
     vsh_result (*scan)(vshi_scan *, vsh_error *);
 } scanners[] = {
-    {"obj", vshi_scan_obj},
-    {"ply", vshi_scan_ply},
     {"stl", vshi_scan_stl},
     {"dae", vshi_scan_dae},
 };
@@ -51,6 +49,16 @@ vshi_token vshi_scan_token(const char **at, const char *end) {
     token.size = token.text != NULL ? (size_t)(c - token.text) : 0;
     *at = c;
     return token;
+}
+
+vshi_token vshi_scan_rest(const char *at, const char *end) {
+    while (at < end && is_space(*at)) {
+        ++at;
+    }
+    while (end > at && is_space(end[-1])) {
+        --end;
+    }
+    return (vshi_token){at, (size_t)(end - at)};
 }
 
 bool vshi_token_is(vshi_token token, const char *text) {

@@ -6,7 +6,6 @@
 #define VSHI_CASTER_SCAN_H
 
 #include "base/job.h"
-#include "model/ply_strips.h"
 
 typedef struct vshi_scan {
     const char *path; /* for messages */
@@ -17,15 +16,12 @@ typedef struct vshi_scan {
     size_t units_done; /* told to the job so far */
     size_t faces; /* out: polygons of three corners or more that a reader must find at least; 0: not known */
     double unit;  /* out: metres in a unit of a Collada file; 0: of another */
-    vshi_ply_strips strips; /* out: of a PLY file, in `text` */
 } vshi_scan;
 
 /* Looks the file over, by its ending (without the dot, any case); endings without a scanner pass. Errors:
  * VSH_ERROR_READ where it ends early, VSH_ERROR_INPUT where its content is bad, VSH_ERROR_CANCELLED. */
 vsh_result vshi_scan_file(vshi_scan *scan, const char *ending, vsh_error *error);
 
-vsh_result vshi_scan_obj(vshi_scan *scan, vsh_error *error);
-vsh_result vshi_scan_ply(vshi_scan *scan, vsh_error *error);
 vsh_result vshi_scan_stl(vshi_scan *scan, vsh_error *error);
 vsh_result vshi_scan_dae(vshi_scan *scan, vsh_error *error);
 
@@ -40,6 +36,9 @@ typedef struct vshi_token {
 
 /* The next token at *at, which moves behind it; stops at `end`. */
 vshi_token vshi_scan_token(const char **at, const char *end);
+
+/* All that is left of a line, without white space around it. */
+vshi_token vshi_scan_rest(const char *at, const char *end);
 
 bool vshi_token_is(vshi_token token, const char *text);
 

@@ -245,9 +245,11 @@ static vsh_result map_answer(const vshi_exchange *exchange, int file, vshi_answe
     if (status.st_size < (off_t)sizeof(vshi_answer_head)) {
         return VSH_OK; /* nothing was answered */
     }
-    /* what it holds is copied before it goes */
+    /* what it holds is copied before it goes, but for a model's arrays */
     VSHI_TRY(vshi_check_limit(exchange->run, 2.0 * (double)status.st_size, exchange->path, error));
-    void *map = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_SHARED, file, 0);
+    /* all of it is looked at; pages that a reader left out would be made */
+    const int whole = status.st_blocks >= status.st_size / 512 ? MAP_POPULATE : 0;
+    void *map = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_SHARED | whole, file, 0);
     if (map == MAP_FAILED) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %lld bytes", exchange->path,
                          (long long)status.st_size);

@@ -7,7 +7,7 @@
 #include <string.h>
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    static const char *const endings[] = {"obj", "ply", "stl"};
+    static const char *const endings[] = {"stl", "dae"};
     if (size == 0) {
         return 0; /* files that are empty never get here */
     }

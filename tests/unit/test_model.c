@@ -214,7 +214,7 @@ static void bad_obj_is_refused_with_line_and_value(void **state) {
 #define CORNERS "v 0 0 0\nv 1 0 0\nv 1 1 0\n"
     refused("a.obj", "v nan 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n", VSH_ERROR_INPUT, "line 1", "'nan'");
     refused("a.obj", "v 0 0 0\nv 1 -inf 0\nv 1 1 0\nf 1 2 3\n", VSH_ERROR_INPUT, "line 2", "'-inf'");
-    refused("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 1e39\nf 1 2 3\n", VSH_ERROR_INPUT, "vertex 2", "inf");
+    refused("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 1e39\nf 1 2 3\n", VSH_ERROR_INPUT, "line 3", "'1e39'");
     refused("a.obj", "v 0 0 0\nv 1 0,5 0\nv 1 1 0\nf 1 2 3\n", VSH_ERROR_INPUT, "line 2", "'0,5'");
     refused("a.obj", "v 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n", VSH_ERROR_INPUT, "line 1", "at least 3");
     refused("a.obj", CORNERS "f 1 2 3\nf 1 2 99\n", VSH_ERROR_INPUT, "line 5", "99");
@@ -225,7 +225,6 @@ static void bad_obj_is_refused_with_line_and_value(void **state) {
             "texture coordinate index 2");
     refused("a.obj", CORNERS "vt 0 nan\nf 1/1 2/1 3/1\n", VSH_ERROR_INPUT, "line 4", "'nan'");
     refused("a.obj", CORNERS "f 1 2 \\\n77\n", VSH_ERROR_INPUT, "line 4", "77");
-    refused("a.obj", CORNERS "f 1 2 3\n f 1 3 2\n", VSH_ERROR_INPUT, "line 5", "indented");
     refused("a.obj", CORNERS "l 1 2\n", VSH_ERROR_INPUT, "holds no triangles", "");
     refused("a.obj", CORNERS, VSH_ERROR_INPUT, "holds no triangles", "");
 #undef CORNERS

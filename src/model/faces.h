@@ -1,0 +1,69 @@
+/* A mesh's faces: corners as a file lists them, and the triangles they become. */
+#ifndef VSHI_FACES_H
+#define VSHI_FACES_H
+
+#include "model/growing.h"
+#include "model/polygon.h"
+
+/* Cuts one face after the other. Begin with positions and job, and all else 0. */
+typedef struct vshi_face_cutter {
+    const float *positions;
+    vshi_job *job;
+    bool apart; /* corners at one vertex count as two, as if each had its own */
+    bool turns; /* whether polygons of four corners are turned as larger ones */
+    bool begun;
+    uint32_t last_first;
+    size_t looked;
+    size_t crossing; /* out: polygons whose edges cross */
+    vshi_polygon_cutter polygon;
+    float *own_positions; /* of one polygon's corners, and their numbers */
+    uint32_t *own_corners;
+    size_t own_capacity;
+} vshi_face_cutter;
+
+/* Puts *made triangles of a face of any number of corners. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_face_cut(vshi_face_cutter *cutter, const uint32_t *corners, size_t count, uint32_t *triangles,
+                         size_t *made, vsh_error *error);
+
+/* Frees what it holds, and warns of polygons that cross in mesh `name`. */
+void vshi_face_cutter_end(vshi_face_cutter *cutter, const vsh_run *run, const char *path, const char *name);
+
+/* Faces one behind the other that have as many corners. */
+typedef struct vshi_face_run {
+    size_t faces, size;
+} vshi_face_run;
+
+/* Faces that are being read. */
+typedef struct vshi_faces {
+    uint32_t *corners;
+    size_t count, capacity;
+    vshi_face_run *runs;
+    size_t run_count, run_capacity;
+} vshi_faces;
+
+/* Of some of the runs: the triangles they make at most, and whether they are triangles already. */
+size_t vshi_faces_most(const vshi_face_run *runs, size_t count, bool *triangles);
+
+/* The last `size` corners are a face of a mesh that begins at run `first_run`. */
+static inline vsh_result vshi_faces_end_face(vshi_faces *faces, vshi_budget *budget, size_t first_run,
+                                             size_t size, vsh_error *error) {
+    const size_t last = faces->run_count - 1;
+    if (faces->run_count > first_run && faces->runs[last].size == size) {
+        ++faces->runs[last].faces;
+        return VSH_OK;
+    }
+    const vsh_result result = vshi_grow(budget, &faces->runs, &faces->run_capacity, faces->run_count + 1,
+                                        sizeof *faces->runs, error);
+    if (result == VSH_OK) {
+        faces->runs[faces->run_count++] = (vshi_face_run){1, size};
+    }
+    return result;
+}
+
+/* Cuts all faces of some runs, whose corners these are. */
+vsh_result vshi_faces_cut(vshi_face_cutter *cutter, const vshi_face_run *runs, size_t count,
+                          const uint32_t *corners, uint32_t *triangles, size_t *made, vsh_error *error);
+
+void vshi_faces_free(vshi_faces *faces);
+
+#endif

@@ -1,0 +1,392 @@
+/* The statements of an OBJ. Vertices are numbered as faces use them: corners of a mesh that have the same
+ * place, texture coordinate and normal are one. */
+#include "model/obj.h"
+
+#include "base/decimal.h"
+#include "base/try.h"
+#include "model/scan.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A place where more vertices than this differ in the rest (the pole of a sphere) gets some of them twice. */
+enum { LONGEST_CHAIN = 32 };
+
+static const struct {
+    const char *name;
+    int least, kept; /* numbers that there must be; that are kept */
+} kinds[VSHI_OBJ_KINDS] = {
+    {"vertex", 3, 3},
+    {"texture coordinate", 1, 2},
+    {"normal", 3, 3},
+};
+
+static bool is_blank(char c) {
+    return c == ' ' || c == '\t' || c == '\v' || c == '\f';
+}
+
+static bool is_line_end(char c) {
+    return c == '\n' || c == '\r';
+}
+
+/* Whether a token may end before c. */
+static bool ends_token(char c) {
+    return is_blank(c) || is_line_end(c);
+}
+
+/* The next thing of the statement: "\" and a line's end are a blank. */
+static inline const char *skip_blanks(vshi_obj *obj, const char *c) {
+    for (;;) {
+        if (is_blank(*c)) {
+            ++c;
+        } else if (*c == '\\' && is_line_end(c[1])) {
+            c += c[1] == '\r' && c[2] == '\n' ? 3 : 2;
+            ++obj->line;
+        } else {
+            return c;
+        }
+    }
+}
+
+static bool is_over(char c) {
+    return is_line_end(c) || c == '#';
+}
+
+/* Behind the end of the line that c is in. */
+static const char *skip_line(vshi_obj *obj, const char *c) {
+    for (;; ++c) {
+        if (*c == '\\') {
+            c = skip_blanks(obj, c);
+        }
+        if (is_line_end(*c)) {
+            ++obj->line;
+            return c + (*c == '\r' && c[1] == '\n' ? 2 : 1);
+        }
+    }
+}
+
+static vshi_token token_at(const char *c) {
+    vshi_token token = {c, 0};
+    while (!ends_token(c[token.size])) {
+        ++token.size;
+    }
+    return token;
+}
+
+/* --- v, vt, vn */
+
+static vsh_result fail_number(const vshi_obj *obj, int kind, const char *at, vsh_error *error) {
+    const vshi_token token = token_at(at);
+    return vshi_fail(error, VSH_ERROR_INPUT, "%s: line %zu: %s holds '%.*s', expected a finite number",
+                     obj->path, obj->statement, kinds[kind].name, VSHI_TOKEN_ARGS(token));
+}
+
+/* x y z w is a place in homogeneous coordinates; what is behind x y z otherwise is a colour. */
+static vsh_result keep_place(vshi_obj *obj, int count, const float *number, float *place, vsh_error *error) {
+    memcpy(place, number, sizeof(float[3]));
+    if (count != 4) {
+        return VSH_OK;
+    }
+    for (int k = 0; k < 3; ++k) {
+        place[k] = number[k] / number[3];
+        if (!isfinite(place[k])) {
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "%s: line %zu: vertex's weight is %g, which puts it beyond what is finite",
+                             obj->path, obj->statement, (double)number[3]);
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result read_numbers(vshi_obj *obj, int kind, const char **at, vsh_error *error) {
+    enum { MOST = 4 };
+    vshi_obj_values *values = &obj->kinds[kind];
+    const size_t size = (size_t)kinds[kind].kept;
+    float number[MOST] = {0};
+    int count = 0;
+    const char *c = *at;
+    if (values->count == UINT32_MAX) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: line %zu: more than %u of %s", obj->path,
+                         obj->statement, UINT32_MAX, kinds[kind].name);
+    }
+    VSHI_TRY(vshi_grow(&obj->budget, &values->values, &values->capacity, values->count + 1,
+                       size * sizeof(float), error));
+    for (c = skip_blanks(obj, c); !is_over(*c); c = skip_blanks(obj, c), ++count) {
+        float given;
+        const char *end = vshi_decimal_float(c, &given);
+        if (end == NULL || !(ends_token(*end) || *end == '\\') || !isfinite(given)) {
+            return fail_number(obj, kind, c, error);
+        }
+        number[count < MOST ? count : MOST - 1] = given;
+        c = end;
+    }
+    *at = c;
+    if (count < kinds[kind].least) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: line %zu: %s of %d numbers, expected at least %d",
+                         obj->path, obj->statement, kinds[kind].name, count, kinds[kind].least);
+    }
+    float *to = values->values + size * values->count++;
+    if (kind == VSHI_OBJ_POSITION) {
+        return keep_place(obj, count, number, to, error);
+    }
+    memcpy(to, number, size * sizeof(float));
+    return VSH_OK;
+}
+
+/* --- f */
+
+static vsh_result fail_corner(const vshi_obj *obj, const char *corner, vsh_error *error) {
+    const vshi_token token = token_at(corner);
+    return vshi_fail(error, VSH_ERROR_INPUT, "%s: line %zu: '%.*s' is no corner of a face", obj->path,
+                     obj->statement, VSHI_TOKEN_ARGS(token));
+}
+
+/* A whole number of at most 18 digits; NULL: there is none. */
+static inline const char *read_index(const char *c, int64_t *index) {
+    enum { DIGITS = 18 };
+    const bool negative = *c == '-';
+    c += *c == '-' || *c == '+';
+    const char *first = c;
+    uint64_t number = 0;
+    for (; (unsigned char)(*c - '0') < 10; ++c) {
+        number = 10 * number + (unsigned char)(*c - '0');
+    }
+    *index = negative ? -(int64_t)number : (int64_t)number;
+    return c > first && c - first <= DIGITS ? c : NULL;
+}
+
+/* From 1, or from -1 backwards from the latest. */
+static inline vsh_result resolve(vshi_obj *obj, int kind, int64_t index, uint32_t *part, vsh_error *error) {
+    vshi_obj_values *values = &obj->kinds[kind];
+    const int64_t count = (int64_t)values->count;
+    if (index == 0 || index < -count) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: line %zu: %s index %lld out of range, there are %lld so far", obj->path,
+                         obj->statement, kinds[kind].name, (long long)index, (long long)count);
+    }
+    index = index > 0 ? index : count + 1 + index;
+    if (index > values->highest) {
+        values->highest = index;
+        values->highest_line = obj->statement;
+    }
+    *part = index <= UINT32_MAX ? (uint32_t)index : UINT32_MAX;
+    return VSH_OK;
+}
+
+/* Room for the heads of all places up to one; none for places that the file is too short to have, which is
+ * found at its end. */
+static vsh_result reach_head(vshi_obj *obj, size_t place, bool *there, vsh_error *error) {
+    enum { LEAST_BYTES = 7 }; /* of a vertex: "v 0 0 0" */
+    *there = place <= obj->stream.size / LEAST_BYTES && place < UINT32_MAX;
+    if (!*there || place <= obj->head_count) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_grow(&obj->budget, &obj->heads, &obj->head_capacity, place, sizeof *obj->heads, error));
+    memset(obj->heads + obj->head_count, 0, (obj->head_capacity - obj->head_count) * sizeof *obj->heads);
+    obj->head_count = obj->head_capacity;
+    return VSH_OK;
+}
+
+/* The vertex of the current mesh with these parts. */
+static vsh_result vertex_of(vshi_obj *obj, const uint32_t part[VSHI_OBJ_KINDS], uint32_t *vertex,
+                            vsh_error *error) {
+    bool there = true;
+    const size_t first = obj->meshes[obj->mesh].first_vertex;
+    if (part[0] > obj->head_count) {
+        VSHI_TRY(reach_head(obj, part[0], &there, error));
+    }
+    if (!there) {
+        *vertex = 0;
+        return VSH_OK;
+    }
+    uint32_t *head = &obj->heads[part[0] - 1];
+    int looked = 0;
+    for (uint32_t v = *head; v > first && looked < LONGEST_CHAIN; v = obj->vertices[v - 1].next, ++looked) {
+        const uint32_t *other = obj->vertices[v - 1].part;
+        if (other[1] == part[1] && other[2] == part[2]) {
+            *vertex = (uint32_t)(v - 1 - first);
+            return VSH_OK;
+        }
+    }
+    if (obj->vertex_count == UINT32_MAX) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: line %zu: more than %u vertices", obj->path,
+                         obj->statement, UINT32_MAX);
+    }
+    VSHI_TRY(vshi_grow(&obj->budget, &obj->vertices, &obj->vertex_capacity, obj->vertex_count + 1,
+                       sizeof *obj->vertices, error));
+    *vertex = (uint32_t)(obj->vertex_count - first);
+    obj->vertices[obj->vertex_count++] = (vshi_obj_vertex){{part[0], part[1], part[2]}, *head};
+    *head = (uint32_t)obj->vertex_count;
+    return VSH_OK;
+}
+
+/* One corner: p, p/t, p//n or p/t/n. */
+static vsh_result read_corner(vshi_obj *obj, const char **at, uint32_t part[VSHI_OBJ_KINDS],
+                              vsh_error *error) {
+    const char *const corner = *at, *c = corner;
+    bool *has = obj->meshes[obj->mesh].has;
+    for (int kind = VSHI_OBJ_POSITION; kind < VSHI_OBJ_KINDS; ++kind) {
+        int64_t index;
+        part[kind] = 0;
+        if (kind > VSHI_OBJ_POSITION) {
+            if (*c != '/') {
+                continue;
+            }
+            ++c;
+            if (*c == '/' || ends_token(*c)) {
+                continue;
+            }
+        }
+        c = read_index(c, &index);
+        if (c == NULL) {
+            return fail_corner(obj, corner, error);
+        }
+        VSHI_TRY(resolve(obj, kind, index, &part[kind], error));
+        has[kind] = true;
+    }
+    *at = c;
+    return ends_token(*c) || *c == '\\' ? VSH_OK : fail_corner(obj, corner, error);
+}
+
+static vsh_result read_face(vshi_obj *obj, const char **at, vsh_error *error) {
+    size_t size = 0;
+    const char *c = *at;
+    VSHI_TRY(vshi_obj_need_mesh(obj, error));
+    vshi_faces *faces = &obj->faces;
+    for (c = skip_blanks(obj, c); !is_over(*c); c = skip_blanks(obj, c), ++size) {
+        uint32_t part[VSHI_OBJ_KINDS], vertex = 0;
+        VSHI_TRY(read_corner(obj, &c, part, error));
+        VSHI_TRY(vertex_of(obj, part, &vertex, error));
+        if (faces->count == faces->capacity) {
+            VSHI_TRY(vshi_grow(&obj->budget, &faces->corners, &faces->capacity, faces->count + 1,
+                               sizeof *faces->corners, error));
+        }
+        faces->corners[faces->count++] = vertex;
+    }
+    *at = c;
+    return vshi_faces_end_face(faces, &obj->budget, obj->meshes[obj->mesh].first_run, size, error);
+}
+
+/* --- statements */
+
+typedef vsh_result name_fn(vshi_obj *obj, const char *text, size_t size, vsh_error *error);
+
+static vsh_result read_name(vshi_obj *obj, const char **at, name_fn *take, vsh_error *error) {
+    const char *c = skip_blanks(obj, *at), *end = c;
+    while (!is_line_end(*end)) {
+        ++end;
+    }
+    *at = end;
+    const vshi_token name = vshi_scan_rest(c, end);
+    return take(obj, name.text, name.size, error);
+}
+
+static vsh_result read_statement(vshi_obj *obj, const char **at, vsh_error *error) {
+    static const struct {
+        const char *keyword;
+        name_fn *take;
+    } named[] = {
+        {"o", vshi_obj_set_object},
+        {"g", vshi_obj_set_group},
+        {"usemtl", vshi_obj_set_material},
+        {"mtllib", vshi_obj_read_materials},
+    };
+    const char *c = *at;
+    if (c[0] == 'v' && ends_token(c[1])) {
+        *at = c + 1;
+        return read_numbers(obj, VSHI_OBJ_POSITION, at, error);
+    }
+    if (c[0] == 'v' && (c[1] == 't' || c[1] == 'n') && ends_token(c[2])) {
+        *at = c + 2;
+        return read_numbers(obj, c[1] == 't' ? VSHI_OBJ_TEXTURE : VSHI_OBJ_NORMAL, at, error);
+    }
+    if (c[0] == 'f' && ends_token(c[1])) {
+        *at = c + 1;
+        return read_face(obj, at, error);
+    }
+    if ((c[0] == 'l' || c[0] == 'p') && ends_token(c[1])) {
+        return vshi_obj_need_mesh(obj, error); /* they cast no shadow, but part meshes as faces do */
+    }
+    const vshi_token keyword = token_at(c);
+    for (size_t i = 0; i < sizeof named / sizeof named[0]; ++i) {
+        if (vshi_token_is(keyword, named[i].keyword)) {
+            *at = c + keyword.size;
+            return read_name(obj, at, named[i].take, error);
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result read_statements(vshi_obj *obj, vsh_error *error) {
+    static const char mark[3] = {'\xef', '\xbb', '\xbf'};
+    for (;;) {
+        const char *stop;
+        VSHI_TRY(vshi_stream_lines(&obj->stream, &stop, error));
+        const char *c = obj->stream.at;
+        if (c == stop) {
+            return VSH_OK;
+        }
+        if (obj->line == 1 && stop - c >= (ptrdiff_t)sizeof mark && memcmp(c, mark, sizeof mark) == 0) {
+            c += sizeof mark;
+        }
+        while (c < stop) {
+            obj->statement = obj->line;
+            c = skip_blanks(obj, c);
+            VSHI_TRY(read_statement(obj, &c, error));
+            c = skip_line(obj, c);
+        }
+        obj->stream.at = stop;
+    }
+}
+
+static vsh_result check_indices(const vshi_obj *obj, vsh_error *error) {
+    for (int kind = VSHI_OBJ_POSITION; kind < VSHI_OBJ_KINDS; ++kind) {
+        const vshi_obj_values *values = &obj->kinds[kind];
+        if (values->highest > (int64_t)values->count) {
+            return vshi_fail(
+                error, VSH_ERROR_INPUT, "%s: line %zu: %s index %lld out of range, the file has %zu",
+                obj->path, values->highest_line, kinds[kind].name, (long long)values->highest, values->count);
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_obj_read(const char *path, const vsh_run *run, vshi_job *job, size_t units, vsh_model **model,
+                         vsh_error *error) {
+    vshi_obj obj = {.path = path,
+                    .run = run,
+                    .job = job,
+                    .budget = {path, run, 0.0},
+                    .line = 1,
+                    .object = SIZE_MAX,
+                    .mesh = SIZE_MAX,
+                    .material = SIZE_MAX,
+                    .group = SIZE_MAX};
+    vsh_model *made = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_stream_open(&obj.stream, path, &obj.budget, job, units, error));
+    VSHI_TRY_DONE(read_statements(&obj, error));
+    VSHI_TRY_DONE(check_indices(&obj, error));
+    vshi_stream_close(&obj.stream);
+    VSHI_TRY_DONE(vshi_model_create(path, &made, error));
+    VSHI_TRY_DONE(vshi_obj_build(&obj, made, error));
+    *model = made;
+    made = NULL;
+done:
+    vsh_model_free(made);
+    vshi_stream_close(&obj.stream);
+    vshi_words_free(&obj.materials);
+    vshi_words_free(&obj.names);
+    vshi_faces_free(&obj.faces);
+    free(obj.meshes);
+    free(obj.objects);
+    free(obj.blended);
+    free(obj.object_of);
+    free(obj.vertices);
+    free(obj.heads);
+    for (int kind = 0; kind < VSHI_OBJ_KINDS; ++kind) {
+        free(obj.kinds[kind].values);
+    }
+    return result;
+}

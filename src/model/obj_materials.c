@@ -1,0 +1,125 @@
+/* MTL, the materials of an OBJ: which of them are blended. */
+#include "base/decimal.h"
+#include "base/input.h"
+#include "base/memory.h"
+#include "base/try.h"
+#include "model/obj.h"
+#include "model/scan.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+/* `d` is the opacity, Tr what is missing of it. "d -halo 0.5" is less where it is seen from the side. */
+static vsh_result take_opacity(const vshi_stream *stream, size_t line, vshi_token keyword, const char *at,
+                               const char *end, bool *blended, vsh_error *error) {
+    vshi_token value = vshi_scan_token(&at, end);
+    if (vshi_token_is(value, "-halo")) {
+        value = vshi_scan_token(&at, end);
+    }
+    if (value.text == NULL) {
+        return VSH_OK;
+    }
+    float number;
+    if (vshi_decimal_float(value.text, &number) != value.text + value.size || !isfinite(number)) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: line %zu: '%.*s' is '%.*s', expected a finite number",
+                         stream->path, line, VSHI_TOKEN_ARGS(keyword), VSHI_TOKEN_ARGS(value));
+    }
+    *blended = keyword.text[0] == 'd' ? number < 1.0F : 1.0F - number < 1.0F;
+    return VSH_OK;
+}
+
+static vsh_result take_line(vshi_obj *obj, const vshi_stream *stream, size_t line, const char *at,
+                            const char *end, vsh_error *error) {
+    static const char unnamed[] = "DefaultMaterial";
+    const vshi_token keyword = vshi_scan_token(&at, end);
+    if (vshi_token_is(keyword, "newmtl")) {
+        bool is_new;
+        const vshi_token name = vshi_scan_rest(at, end);
+        VSHI_TRY(vshi_obj_material(obj, name.size > 0 ? name.text : unnamed,
+                                   name.size > 0 ? name.size : sizeof unnamed - 1, &obj->material, &is_new,
+                                   error));
+        if (is_new && obj->mesh != SIZE_MAX) {
+            obj->meshes[obj->mesh].material = obj->material;
+        }
+        return VSH_OK;
+    }
+    return obj->material != SIZE_MAX && (vshi_token_is(keyword, "d") || vshi_token_is(keyword, "Tr"))
+               ? take_opacity(stream, line, keyword, at, end, &obj->blended[obj->material], error)
+               : VSH_OK;
+}
+
+static vsh_result take_lines(vshi_obj *obj, vshi_stream *stream, vsh_error *error) {
+    const char *stop;
+    size_t line = 0;
+    for (;;) {
+        VSHI_TRY(vshi_stream_lines(stream, &stop, error));
+        if (stream->at == stop) {
+            return VSH_OK;
+        }
+        while (stream->at < stop) {
+            const char *end = memchr(stream->at, '\n', (size_t)(stop - stream->at));
+            end = end != NULL ? end : stop;
+            VSHI_TRY(take_line(obj, stream, ++line, stream->at, end, error));
+            stream->at = end < stop ? end + 1 : stop;
+        }
+    }
+}
+
+/* A file beside the OBJ, `name` behind its folder; NULL: memory is short. */
+static char *beside(const char *path, const char *name, size_t size) {
+    const char *slash = strrchr(path, '/');
+    const size_t folder = slash != NULL ? (size_t)(slash - path) + 1 : 0;
+    char *text = malloc(folder + size + 1);
+    if (text != NULL) {
+        memcpy(text, path, folder);
+        memcpy(text + folder, name, size);
+        text[folder + size] = '\0';
+    }
+    return text;
+}
+
+/* Reads one where it is a regular file, which *found tells. */
+static vsh_result read_file(vshi_obj *obj, const char *path, bool *found, vsh_error *error) {
+    struct stat status;
+    *found = stat(path, &status) == 0 && S_ISREG(status.st_mode);
+    if (*found && obj->run->allow_outside == 0 && !vshi_input_is_beside(obj->path, path)) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: names the file '%s' outside of its folder, where nothing is read of a model; "
+                         "--allow-outside (vsh_run.allow_outside) reads it",
+                         obj->path, path);
+    }
+    if (!*found || status.st_size == 0) {
+        return VSH_OK;
+    }
+    vshi_stream stream;
+    vsh_result result = vshi_stream_open(&stream, path, &obj->budget, obj->job, 0, error);
+    if (result == VSH_OK) {
+        result = take_lines(obj, &stream, error);
+    } else if (result == VSH_ERROR_READ) {
+        *found = false; /* as if it were not there */
+        result = VSH_OK;
+    }
+    vshi_stream_close(&stream);
+    return result;
+}
+
+vsh_result vshi_obj_read_materials(vshi_obj *obj, const char *text, size_t size, vsh_error *error) {
+    bool found = false;
+    const char *dot = strrchr(obj->path, '.'), *slash = strrchr(obj->path, '/');
+    const char *own = slash != NULL ? slash + 1 : obj->path;
+    for (int i = 0; i < 2 && size > 0 && !found; ++i) { /* that named, or else the OBJ's own */
+        char *path = i == 0 ? beside(obj->path, text, size) : beside(obj->path, own, (size_t)(dot - own) + 4);
+        if (path == NULL) {
+            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", obj->path);
+        }
+        if (i > 0) {
+            memcpy(strrchr(path, '.') + 1, "mtl", 3);
+        }
+        const vsh_result result = read_file(obj, path, &found, error);
+        free(path);
+        VSHI_TRY(result);
+    }
+    return VSH_OK;
+}
