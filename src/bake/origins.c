@@ -116,30 +116,19 @@ static void look(const lifting *l, size_t field, size_t first, size_t last) {
     }
 }
 
-/* Samples that are traced. */
+/* Samples that are traced, from `first` on. */
 typedef struct tracing {
     const lifting *lifting;
     const looked_at *in;
+    size_t first;
 } tracing;
 
 /* A vshi_open_fn: no surface is near but the sample's own, and what is within a solid the field knows. */
 static bool is_open(const void *user, size_t i) {
     const tracing *t = user;
     float at[3];
-    probe(t->lifting, t->in, i, at);
+    probe(t->lifting, t->in, t->first + i, at);
     return t->in->field->voxel_size * (double)vshi_field_distance(t->in->field, at) >= CREASE * t->in->probe;
-}
-
-/* A vshi_open_fn of samples that are counted from another one on. */
-typedef struct shifted {
-    vshi_open_fn *open;
-    const void *user;
-    size_t begin;
-} shifted;
-
-static bool open_at(const void *user, size_t i) {
-    const shifted *s = user;
-    return s->open(s->user, s->begin + i);
 }
 
 /* Samples that are looked at together follow each other in a tile, at most so many: whatever the band, they
@@ -159,34 +148,25 @@ static size_t together(const vsh_texels *texels, size_t i) {
     return i - (i - first) % TOGETHER;
 }
 
-void vshi_origins_inside(const vsh_texels *texels, const uint8_t *dropped, const vsh_triangles *triangles,
-                         size_t first, size_t last, vshi_open_fn *open, const void *user, uint8_t *where) {
-    double at[3 * (TOGETHER + VSHI_ORIGIN_BLOCK)];
-    uint8_t found[TOGETHER + VSHI_ORIGIN_BLOCK];
-    bool follows[TOGETHER + VSHI_ORIGIN_BLOCK];
-    const size_t begin = together(texels, first);
-    size_t start = begin;
-    for (size_t i = begin; i < last; ++i) {
-        put(dropped[i] ? vshi_lift_foot(texels, i) : vshi_vec_of(texels->position + 3 * i),
-            at + 3 * (i - begin));
-        start = i - start == TOGETHER || !same_tile(texels, i, start) ? i : start;
-        follows[i - begin] = i != start;
-    }
-    const shifted moved = {open, user, begin};
-    vshi_inside(triangles, last - begin, at, texels->geometric + 3 * begin, follows,
-                open != NULL ? open_at : NULL, &moved, found);
-    memcpy(where, found + (first - begin), last - first);
-}
-
 /* Looks at samples first … last - 1 by rays against a field's triangles. */
 static void trace(const lifting *l, const looked_at *in, size_t first, size_t last) {
-    uint8_t where[VSHI_ORIGIN_BLOCK];
-    const tracing task = {l, in};
-    vshi_origins_inside(l->texels, l->origins->dropped, in->triangles, first, last, is_open, &task, where);
+    double at[3 * (TOGETHER + VSHI_ORIGIN_BLOCK)];
+    uint8_t where[TOGETHER + VSHI_ORIGIN_BLOCK];
+    bool follows[TOGETHER + VSHI_ORIGIN_BLOCK];
+    const size_t begin = together(l->texels, first);
+    size_t start = begin;
+    for (size_t i = begin; i < last; ++i) {
+        put(place(l, i), at + 3 * (i - begin));
+        start = i - start == TOGETHER || !same_tile(l->texels, i, start) ? i : start;
+        follows[i - begin] = i != start;
+    }
+    const tracing task = {l, in, begin};
+    vshi_inside(in->triangles, last - begin, at, l->texels->geometric + 3 * begin, follows, is_open, &task,
+                where);
     for (size_t i = first; i < last; ++i) {
-        if (where[i - first] != VSHI_OUTSIDE) {
+        if (where[i - begin] != VSHI_OUTSIDE) {
             l->origins->valid[i] = 0;
-            l->origins->seen[i] = where[i - first] == VSHI_INSIDE_SEEN;
+            l->origins->seen[i] = where[i - begin] == VSHI_INSIDE_SEEN;
         }
     }
 }

@@ -3,7 +3,6 @@
 #define VSHI_BAKE_ORIGINS_H
 
 #include "bake/texels.h"
-#include "shade/inside.h"
 
 enum { VSHI_ORIGIN_BLOCK = 1024 }; /* samples that are worked on together */
 
@@ -48,11 +47,5 @@ vsh_result vshi_origins_create(const vsh_occluders *occluders, const vsh_texels 
                                vshi_origins_keep *keep, void *user, const vsh_run *run, vshi_origins *origins,
                                vsh_error *error);
 void vshi_origins_free(vshi_origins *origins);
-
-/* Where samples first … last - 1 are, at most VSHI_ORIGIN_BLOCK, into where[last - first] (VSHI_OUTSIDE …):
- * see vshi_inside(). dropped[all samples]: vshi_lift_drop(). `open` is asked by the sample's number; may be
- * NULL. */
-void vshi_origins_inside(const vsh_texels *texels, const uint8_t *dropped, const vsh_triangles *triangles,
-                         size_t first, size_t last, vshi_open_fn *open, const void *user, uint8_t *where);
 
 #endif
