@@ -183,15 +183,19 @@ template <typename Use> void visit_regions(const Corners &corner, double reach, 
 
 } // namespace
 
-Band::Band(const Surface &surface_, double half_width_) : half_width(half_width_), surface(surface_) {
-    sort_triangles();
+Band::Band(const Surface &surface_, double half_width_, Stage &stage)
+    : half_width(half_width_), surface(surface_) {
+    sort_triangles(stage);
 }
 
-void Band::sort_triangles() {
+void Band::sort_triangles(Stage &stage) {
     std::unordered_map<Cell, size_t, CellHash> numbers;
     Cell last{};
     size_t current = 0;
     for (size_t i = 0; i < surface.polygons.size(); ++i) {
+        if (i % 4096 == 0) {
+            stage.check();
+        }
         for (uint32_t half = 0; half < triangles_of(surface.polygons[i]); ++half) {
             const auto triangle = uint32_t(2 * i + half);
             visit_regions(corners_of(surface, triangle), half_width, [&](const Cell &cell) {

@@ -1,6 +1,7 @@
 // The voxels around a surface: which leaves they are in, their distances, which side of it they are on.
 #pragma once
 
+#include "levelset/grid.h"
 #include "levelset/kernel/leaf.h"
 #include "levelset/polygons.h"
 
@@ -31,8 +32,9 @@ class Band {
   public:
     const double half_width;
 
-    // Sorts the triangles by regions of voxels. `surface` outlives this; `half_width` in voxels, 3 or more.
-    Band(const Surface &surface, double half_width);
+    // Sorts the triangles by regions of voxels; throws where the stage is cancelled. `surface` outlives this;
+    // `half_width` in voxels, 3 or more.
+    Band(const Surface &surface, double half_width, Stage &stage);
 
     static constexpr int REGION = 32; // voxels along an edge of a region
     size_t region_count() const { return regions.size(); }
@@ -58,7 +60,7 @@ class Band {
         std::vector<size_t> part_ends, triangle_ends;
     };
     class Measuring;
-    void sort_triangles();
+    void sort_triangles(Stage &stage);
 
     const Surface &surface;
     std::vector<Region> regions;

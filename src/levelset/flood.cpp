@@ -110,7 +110,7 @@ namespace {
 // Sets of parts of leaves, of runs of empty leaves and of the exterior that hang together.
 class Joining {
   public:
-    explicit Joining(const LeafTable &table);
+    Joining(const LeafTable &table, Stage &stage);
     bool is_outside(size_t leaf, size_t part) { return root(first_part[leaf] + part) == EXTERIOR; }
 
   private:
@@ -128,7 +128,7 @@ class Joining {
     std::vector<uint32_t> parent;
 };
 
-Joining::Joining(const LeafTable &table_) : table(table_), leaves(table.leaves) {
+Joining::Joining(const LeafTable &table_, Stage &stage) : table(table_), leaves(table.leaves) {
     size_t node = 1 + leaves.size();
     for (const BandLeaf &leaf : leaves) {
         first_part.push_back(node);
@@ -139,6 +139,9 @@ Joining::Joining(const LeafTable &table_) : table(table_), leaves(table.leaves) 
         parent[i] = uint32_t(i);
     }
     for (size_t i = 0; i < leaves.size(); ++i) {
+        if (i % 1024 == 0) {
+            stage.check();
+        }
         if (run_below(i) != EXTERIOR && leaves[i - 1].origin[2] + LEAF < leaves[i].origin[2]) {
             join_run(i);
         }
@@ -230,8 +233,8 @@ void Joining::join_face(size_t i, int axis, bool last) {
 
 } // namespace
 
-std::vector<KnownSides> find_outside(const LeafTable &table) {
-    Joining joining(table);
+std::vector<KnownSides> find_outside(const LeafTable &table, Stage &stage) {
+    Joining joining(table, stage);
     std::vector<KnownSides> all(table.leaves.size());
     for (size_t i = 0; i < all.size(); ++i) {
         const BandLeaf &leaf = table.leaves[i];

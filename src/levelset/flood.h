@@ -35,6 +35,7 @@ struct KnownSides {
 
 // Tells the sides of all parts: they are joined across the faces of voxels, through leaves that are not there
 // as well. Holes in the surface that are narrower than some 1.7 voxels let nothing through.
-std::vector<KnownSides> find_outside(const LeafTable &table);
+// Throws where the stage is cancelled.
+std::vector<KnownSides> find_outside(const LeafTable &table, Stage &stage);
 
 } // namespace vshi

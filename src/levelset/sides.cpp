@@ -37,8 +37,8 @@ struct Sides::Halo {
     int8_t side[EDGE * EDGE * EDGE]; // 1: outside, -1: inside, 0: not known, or tried before
 };
 
-Sides::Sides(const Surface &surface_, const LeafTable &table_)
-    : surface(surface_), table(table_), leaves(table_.leaves), now(find_outside(table)), next(now),
+Sides::Sides(const Surface &surface_, const LeafTable &table_, Stage &stage)
+    : surface(surface_), table(table_), leaves(table_.leaves), now(find_outside(table, stage)), next(now),
       tried(now.size()) {
     well_off.reserve(now.size());
     for (const KnownSides &sides : now) {

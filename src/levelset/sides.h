@@ -10,8 +10,8 @@ namespace vshi {
 // one that no surface parts them from. What nobody reaches is inside.
 class Sides {
   public:
-    // Both outlive this.
-    Sides(const Surface &surface, const LeafTable &table);
+    // Surface and table outlive this.
+    Sides(const Surface &surface, const LeafTable &table, Stage &stage);
 
     // Tells the sides of voxels near the surface from those of their neighbours: for each of ROUNDS in turn,
     // settle() of every leaf (several at once if wanted), then end_round().

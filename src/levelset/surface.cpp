@@ -17,9 +17,7 @@ class Conversion {
     Conversion(const Surface &surface_, const Lattice &lattice_, double half_width, double begin_,
                double end_, Stage &stage_)
         : surface(surface_), lattice(lattice_), begin(begin_), end(end_), stage(stage_),
-          kernel(*vshi_leaf_kernel_of(stage.options.isa)), band(surface, half_width) {
-        stage.check();
-    }
+          kernel(*vshi_leaf_kernel_of(stage.options.isa)), band(surface, half_width, stage) {}
 
     FloatGrid::Ptr without_sides() {
         measure(false, 0.8);
@@ -47,7 +45,7 @@ class Conversion {
     }
 
     void tell_sides(const LeafTable &table) {
-        Sides sides(surface, table);
+        Sides sides(surface, table, stage);
         for (int round = 0; round < Sides::ROUNDS; ++round) {
             stage.loop(leaves.size(), 16, at(0.5), at(0.7), [&](size_t i) { sides.settle(i); });
             sides.end_round();
@@ -63,7 +61,7 @@ class Conversion {
             return;
         }
         const Surface boundary = boundary_of(surface, table, told, at(0.8), at(0.85), stage);
-        Band bounded(boundary, band.half_width);
+        Band bounded(boundary, band.half_width, stage);
         const std::vector<size_t> again = regions_near_buried(bounded, leaves, told);
         stage.loop(again.size(), 1, at(0.85), at(0.9),
                    [&](size_t i) { bounded.measure(again[i], false, kernel); });

@@ -335,6 +335,42 @@ static void meshes_can_be_cancelled(void **state) {
     free_model(&ball);
 }
 
+static int32_t count_down(void *left, const char *stage, double fraction) {
+    (void)stage;
+    (void)fraction;
+    return --*(int32_t *)left < 0;
+}
+
+/* Sorting triangles, filling from outside and cutting where solids overlap all ask. */
+static void solids_that_overlap_can_be_cancelled_whenever_progress_is_told(void **state) {
+    (void)state;
+    model ball = make_sphere(100, 1.0, 0);
+    const vsh_mesh meshes[] = {ball.mesh, cube};
+    const vsh_grid_options options = with_voxel(0.2);
+    enum { LAST = 60 }; /* calls, which are those of this stage */
+    int32_t all = INT32_MAX;
+    for (int i = 0; i <= LAST; ++i) {
+        int32_t left = i == 0 ? INT32_MAX : all - i;
+        vsh_run run = vsh_run_default();
+        run.threads = 1;
+        run.progress = count_down;
+        run.user = &left;
+        vsh_grid *grid = NULL;
+        const vsh_result result = vsh_grid_from_meshes(meshes, 2, &options, &run, &grid, &failure);
+        if (i == 0) {
+            all -= left;
+            assert_true(all > LAST);
+        }
+        if (i > 1) { /* the last call says that all is done */
+            assert_int_equal(result, VSH_ERROR_CANCELLED);
+            assert_int_equal(left, -1); /* and nobody asks again */
+        }
+        assert_true((grid == NULL) == (result == VSH_ERROR_CANCELLED));
+        vsh_grid_free(grid);
+    }
+    free_model(&ball);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_fine_mesh_of_a_sphere_is_the_sphere),
@@ -347,6 +383,7 @@ int main(void) {
         cmocka_unit_test(threads_do_not_show_in_meshes),
         cmocka_unit_test(bad_meshes_are_refused_with_the_reason),
         cmocka_unit_test(meshes_can_be_cancelled),
+        cmocka_unit_test(solids_that_overlap_can_be_cancelled_whenever_progress_is_told),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
