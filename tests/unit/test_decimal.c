@@ -174,6 +174,68 @@ static void doubles_come_back_with_the_same_bits(void **state) {
     }
 }
 
+static void expect_as_strtof(const char *number) {
+    char text[128];
+    float value = -1.0F;
+    snprintf(text, sizeof text, "%s /        ", number);
+    const char *end = vshi_decimal_float(text, &value);
+    const float expected = strtof(text, NULL);
+    if (end != text + strlen(number) || memcmp(&value, &expected, sizeof value) != 0) {
+        fail_msg("'%s' is %.9g, expected %.9g", number, (double)value, (double)expected);
+    }
+}
+
+/* Short and long, also in the middle between two floats and next to it, subnormal and too large. */
+static void floats_are_read_as_strtof_reads_them(void **state) {
+    (void)state;
+    static const char *const texts[] = {"0",
+                                        "-0",
+                                        "1.",
+                                        "-.5",
+                                        "+1e5",
+                                        "1e-46",
+                                        "1e-45",
+                                        "7.006492321624085e-46",
+                                        "3.4028235e38",
+                                        "3.4028235677973366e38",
+                                        "3.5e38",
+                                        "1e999999999999",
+                                        "16777217",
+                                        "16777217.000000000000000000001",
+                                        "16777219",
+                                        "1.1754943e-38",
+                                        "0.1e22",
+                                        "123456789012345678901234567890"};
+    for (size_t i = 0; i < sizeof texts / sizeof texts[0]; ++i) {
+        expect_as_strtof(texts[i]);
+    }
+    counter = 2;
+    for (int i = 0; i < 300000; ++i) {
+        char text[64];
+        const uint64_t bits = draw();
+        const uint32_t word = (uint32_t)bits & 0x7f7fffff, above = word + 1;
+        float low, high;
+        memcpy(&low, &word, sizeof low);
+        memcpy(&high, &above, sizeof high);
+        if (i % 3 == 0) {
+            snprintf(text, sizeof text, "%.*g", 6 + (int)(bits >> 40 & 3), (double)low);
+        } else if (i % 3 == 1 && isfinite(high)) {
+            snprintf(text, sizeof text, "%.*g", 16 + (int)(bits >> 40 & 15),
+                     ((double)low + (double)high) / 2.0);
+        } else {
+            snprintf(text, sizeof text, "%.*f", (int)(bits & 15), (double)(int32_t)(bits >> 32) / 1e6);
+        }
+        expect_as_strtof(text);
+    }
+    float value;
+    static const char *const none[] = {"", "-", ".", "e5", "1e", "1e+", "-.e1", "nan", "x"};
+    for (size_t i = 0; i < sizeof none / sizeof none[0]; ++i) {
+        char text[32];
+        snprintf(text, sizeof text, "%s /        ", none[i]);
+        assert_null(vshi_decimal_float(text, &value));
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(numbers_are_read_as_strtod_reads_them),
@@ -181,6 +243,7 @@ int main(void) {
         cmocka_unit_test(only_the_given_characters_are_read),
         cmocka_unit_test(floats_come_back_with_the_same_bits),
         cmocka_unit_test(doubles_come_back_with_the_same_bits),
+        cmocka_unit_test(floats_are_read_as_strtof_reads_them),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
