@@ -32,6 +32,14 @@ static const double NEAR_HEIGHT = 1.95, NEAR_LACK = 0.05;
 
 static void march_beams(const vshi_shadow_task *task, vshi_chunk *chunk, vsh_shade_stats *stats) {
     vshi_march_stats work = {0, 0};
+    if (task->field->unknown) { /* what passes by the casters' box is all that is proved */
+        stats->marches -= chunk->rays.count;
+        for (size_t r = 0; r < chunk->rays.count; ++r) {
+            chunk->rays.clear[r] = chunk->rays.end[r];
+            chunk->proof[r] = VSHI_UNPROVED;
+        }
+        return;
+    }
     task->kernel->march(task->field, &chunk->rays, VSHI_MARCH_BEAM, task->options->max_steps, &work);
     stats->samples += work.samples;
 }
@@ -56,7 +64,7 @@ static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_sh
     bool is_free[VSHI_PIECE];
     uint32_t owner[VSHI_PIECE];
     size_t count = 0;
-    if (task->options->method == VSH_SHADOW_IMPROVED) {
+    if (task->options->method == VSH_SHADOW_IMPROVED || task->field->unknown) {
         return;
     }
     for (size_t i = 0; i < facing->count; ++i) {

@@ -53,6 +53,7 @@ int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **o
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
     options.receivers_min = min;
     options.receivers_max = max;
+    options.voxels = 1;
     options.triangles = 0; /* the same for all resolutions */
     vsh_error error;
     const vsh_result result =
