@@ -32,14 +32,6 @@ static const double NEAR_HEIGHT = 1.95, NEAR_LACK = 0.05;
 
 static void march_beams(const vshi_shadow_task *task, vshi_chunk *chunk, vsh_shade_stats *stats) {
     vshi_march_stats work = {0, 0};
-    if (task->field->unknown) { /* what passes by the casters' box is all that is proved */
-        stats->marches -= chunk->rays.count;
-        for (size_t r = 0; r < chunk->rays.count; ++r) {
-            chunk->rays.clear[r] = chunk->rays.end[r];
-            chunk->proof[r] = VSHI_UNPROVED;
-        }
-        return;
-    }
     task->kernel->march(task->field, &chunk->rays, VSHI_MARCH_BEAM, task->options->max_steps, &work);
     stats->samples += work.samples;
 }

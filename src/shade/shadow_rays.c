@@ -270,6 +270,7 @@ static void cast_rounds(ray_batch *batch, const size_t *some, size_t count) {
 static void settle(ray_batch *batch, size_t point, float value, float deviation) {
     vshi_shadow_settle(batch->task, point, value, deviation);
     batch->stats->square_error += (double)deviation * (double)deviation;
+    batch->stats->worst_error = fmax(batch->stats->worst_error, (double)deviation);
 }
 
 /* What is said of a point whose rays were cast. Down to VSHI_COARSE rays end by deviation_of(), which knows
@@ -381,10 +382,6 @@ static void prove(ray_batch *batch, vshi_facing *facing) {
             facing->settled[i] = true;
             ++batch->stats->certified;
         }
-    }
-    if (task->field->unknown) { /* what passes by the casters' box is all that is proved */
-        batch->stats->marches -= batch->chunk.rays.count;
-        vshi_chunk_clear(&batch->chunk);
     }
     vshi_march_stats work = {0, 0};
     task->kernel->march(task->field, &batch->chunk.rays, VSHI_MARCH_PROOF, task->options->max_steps, &work);
