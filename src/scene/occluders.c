@@ -78,8 +78,9 @@ static vsh_result make_field(making *m, const vsh_scene_layer *layer, const vsh_
         resolution = vsh_scene_resolution(m->scene, m->assets, layer, m->options.points);
     }
     if (resolution == 0 && triangles != NULL) {
-        VSHI_TRY(vshi_scene_warn_solidity(m->scene, m->assets, layer, &m->voxel, error));
-        return vshi_occluders_unknown(triangles, 0.0, field, error);
+        VSHI_TRY(vshi_occluders_unknown(triangles, 0.0, field, error));
+        return *field == NULL ? VSH_OK
+                              : vshi_scene_warn_solidity(m->scene, m->assets, layer, &m->voxel, error);
     }
     vsh_result result = find_grid(m, layer, resolution, &grid, &made, error);
     if (result != VSH_OK || grid == NULL) {

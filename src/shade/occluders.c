@@ -73,11 +73,11 @@ vsh_result vshi_occluders_unknown(const vsh_triangles *triangles, double voxel_s
     double low[3], high[3], longest = 0.0;
     *field = NULL;
     vshi_triangles_bounds(triangles, low, high);
+    if (low[0] > high[0]) {
+        return VSH_OK;
+    }
     for (int axis = 0; axis < 3; ++axis) {
         longest = fmax(longest, high[axis] - low[axis]);
-    }
-    if (!(longest > 0.0)) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "triangles: none of any area");
     }
     return vshi_field_create_unknown(voxel_size > 0.0 ? voxel_size : longest / VSHI_TRACED_RESOLUTION, low,
                                      high, field, error);
@@ -85,12 +85,11 @@ vsh_result vshi_occluders_unknown(const vsh_triangles *triangles, double voxel_s
 
 /* What stands in place of a field: casters that are traced only, or none beside the layers. */
 static vsh_result make_fieldless(const vsh_occluder_parts *parts, vshi_occluders_own *own, vsh_error *error) {
-    double low[3] = {1.0, 0.0, 0.0}, high[3] = {0.0, 0.0, 0.0};
     if (parts->triangles != NULL) {
-        vshi_triangles_bounds(parts->triangles, low, high);
+        VSHI_TRY(vshi_occluders_unknown(parts->triangles, parts->voxel_size, &own->field, error));
     }
-    if (low[0] <= high[0]) {
-        return vshi_occluders_unknown(parts->triangles, parts->voxel_size, &own->field, error);
+    if (own->field != NULL) {
+        return VSH_OK;
     }
     if (parts->layer_count == 0 && parts->voxel_size == 0.0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "occluders: neither a field nor triangles nor layers");

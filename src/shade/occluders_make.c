@@ -72,6 +72,13 @@ vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_count,
         VSHI_TRY_DONE(
             vshi_fail(error, VSH_ERROR_ARGUMENT, "reach %g: expected a length, 0 or more", full.reach));
     }
+    size_t triangles = 0;
+    for (size_t m = 0; m < mesh_count; ++m) {
+        triangles += set.meshes[m].triangle_count - set.checked[m].report.degenerate_triangles;
+    }
+    if (triangles == 0) {
+        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_INPUT, "occluders: no triangle of any area"));
+    }
     const bool voxels = full.grid.resolution != 0 || full.grid.voxel_size != 0.0;
     const bool traced = full.triangles != 0 && vsh_triangles_available();
     if (!voxels) {
