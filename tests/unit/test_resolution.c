@@ -159,6 +159,59 @@ static void parts_of_triangles_alone_cast(void **state) {
     vsh_triangles_free(triangles);
 }
 
+/* Shadows of a scene of the thin asset, in a layer of its own or in none, and the truth; returns what fields
+ * take. */
+static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]) {
+    char text[1024];
+    snprintf(text, sizeof text,
+             "{\"casters\": [{\"mesh\": \"" VSH_ASSETS "/thin.glb\"%s}], \"layers\": [{\"name\": \"thin\"}], "
+             "\"lights\": [{\"name\": \"sun\", \"type\": \"directional\", \"direction\": [0.6, 0.75, 0.5], "
+             "\"angle_deg\": 5}], \"receivers\": []}",
+             layered ? ", \"layer\": \"thin\"" : "");
+    vsh_scene *scene = parse("/scene.json", text);
+    vsh_assets *assets = NULL;
+    vsh_occluders *made = NULL;
+    assert_int_equal(vsh_assets_load(scene, NULL, &assets, &why), VSH_OK);
+    assert_int_equal(vsh_scene_occluders(scene, assets, NULL, NULL, &made, &why), VSH_OK);
+    vsh_occluders_info info;
+    vsh_occluders_get_info(made, &info);
+    assert_int_equal(info.layer_count, layered ? 1 : 0);
+    double positions[POINTS][3];
+    float normals[POINTS][3];
+    scatter(positions, normals);
+    const vsh_points points = {POINTS, positions[0], normals[0], NULL};
+    assert_int_equal(vsh_shade_shadow(made, &points, &scene->lights[0], NULL, NULL, lit, NULL, NULL, &why),
+                     VSH_OK);
+    vsh_triangles *triangles = NULL;
+    vsh_solids *solids = NULL;
+    assert_int_equal(vsh_scene_truth(scene, assets, NULL, &triangles, &solids, &why), VSH_OK);
+    assert_int_equal(vsh_trace_shadow(triangles, solids, POINTS, positions[0], normals[0], 1e-6,
+                                      &scene->lights[0], 1024, NULL, truth, &why),
+                     VSH_OK);
+    vsh_triangles_free(triangles);
+    vsh_occluders_free(made);
+    vsh_assets_free(assets);
+    vsh_scene_free(scene);
+    return info.field_bytes;
+}
+
+static void scenes_and_layers_without_voxels_cast_as_the_truth_says(void **state) {
+    (void)state;
+    skip_without_embree();
+    for (int layered = 0; layered < 2; ++layered) {
+        float lit[POINTS], truth[POINTS];
+        assert_true(shade_scene(layered != 0, lit, truth) == 0);
+        double square = 0.0;
+        int dark = 0;
+        for (int i = 0; i < POINTS; ++i) {
+            square += pow((double)lit[i] - (double)truth[i], 2.0);
+            dark += truth[i] < 0.5f;
+        }
+        assert_true(dark > 20 && dark < POINTS - 20);
+        assert_true(sqrt(square / POINTS) < 0.02);
+    }
+}
+
 /* --- what is chosen */
 
 static int32_t chosen(const char *more, const char *casters, double points) {
@@ -221,6 +274,7 @@ int main(void) {
         cmocka_unit_test(ao_by_rays_has_the_bits_that_it_has_with_voxels),
         cmocka_unit_test(what_needs_voxels_is_refused_without_them),
         cmocka_unit_test(parts_of_triangles_alone_cast),
+        cmocka_unit_test(scenes_and_layers_without_voxels_cast_as_the_truth_says),
         cmocka_unit_test(traced_casters_get_voxels_only_where_shadows_pay_for_them),
         cmocka_unit_test(shapes_get_as_many_as_their_error_asks_for),
         cmocka_unit_test(what_is_named_stays_as_it_is),
