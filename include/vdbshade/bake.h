@@ -255,6 +255,7 @@ typedef struct vsh_bake_error {
     double held;         /* values that stand for the samples that were held against the casters themselves */
     double held_square_error; /* over them: the squared error, of whatever cause: rays, voxels, samples that
                                  are invalid by mistake and were filled */
+    double worst;             /* the largest error that rays leave in a value, as the method estimates it */
 } vsh_bake_error;
 
 /* The root mean square error that is estimated: what rays leave, or what was found against the casters where

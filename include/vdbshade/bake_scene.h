@@ -167,7 +167,7 @@ static inline vsh_result vsh_bake_scene(const vsh_scene *scene, const vsh_bake_j
 typedef struct vsh_bake_forecast {
     uint64_t texels;
     uint64_t samples;
-    double voxels; /* active, of all level sets */
+    double voxels; /* active, of all level sets; these three 0 where none are made */
     double voxel_size;
     double resolution;  /* voxels along the longest side */
     double peak_bytes;  /* at most */

@@ -21,16 +21,19 @@ typedef struct vsh_occluders_options {
     int32_t triangles;     /* nonzero: keep the triangles where the library has Embree: exact methods can then
                               be asked for, auto is exact, and errors are measured against them. 0: voxels
                               alone, some 100 bytes less a triangle */
-    vsh_grid_options grid; /* of the voxels */
+    vsh_grid_options grid; /* of the voxels. A resolution and a voxel size of 0: none where triangles are
+                              kept, so that only auto and exact can be asked for, and no distances; else a
+                              resolution of 256 */
 } vsh_occluders_options;
 
 static inline vsh_occluders_options vsh_occluders_options_default(void) {
     vsh_occluders_options options = {sizeof(vsh_occluders_options), 0.0, 1, vsh_grid_options_default()};
+    options.grid.resolution = 0;
     return options;
 }
 
-/* Meshes as what casts: voxelised, a field made of them, their triangles kept. The meshes need not outlive
- * the call. Errors:
+/* Meshes as what casts: their triangles kept, and where voxels are asked for, voxelised and a field made of
+ * them. The meshes need not outlive the call. Errors:
  * - VSH_ERROR_ARGUMENT: no meshes, options out of range, run, and as vsh_mesh_check();
  * - VSH_ERROR_INPUT, VSH_ERROR_LIMIT: as vsh_grid_from_meshes(), vsh_field_create() and
  *   vsh_triangles_create();
@@ -49,7 +52,8 @@ VSH_API vsh_result vsh_occluders_from_grid(const vsh_grid *grid, const vsh_field
  * each in its own way, a field with triangles of another shape. A view; nothing is owned. */
 typedef struct vsh_occluder_parts {
     size_t struct_size;
-    const vsh_field *field;         /* casters in no layer; NULL: all of them are in layers */
+    const vsh_field *field; /* casters in no layer; NULL: they are known by their triangles alone, which auto
+                               and exact trace, or all casters are in layers */
     const vsh_triangles *triangles; /* of the same casters, for exact methods; NULL: none */
     const vsh_layer
         *layers;        /* [layer_count]: casters beside those; may be NULL. Each has the same struct_size */
@@ -58,9 +62,9 @@ typedef struct vsh_occluder_parts {
                                             a bake is asked for its errors (vsh_bake_stats). Together they are
                                             all casters; not with layers. Both NULL: nothing is measured */
     const vsh_solids *true_solids;
-    double
-        voxel_size; /* what start offsets are measured in where there is no field, world units, 1e-12 … 1e12;
-                     * 0: that of the finest layer's field, or of 1e-5 of the first layer's longest side */
+    double voxel_size; /* what start offsets are measured in where there is no field, world units, 1e-12 …
+                        * 1e12; 0: 1/96 of the triangles' longest side, else that of the finest layer's field,
+                        * or 1e-5 of the first layer's longest side */
 } vsh_occluder_parts;
 
 static inline vsh_occluder_parts vsh_occluder_parts_default(void) {
@@ -69,14 +73,14 @@ static inline vsh_occluder_parts vsh_occluder_parts_default(void) {
 }
 
 /* Parts as what casts. The layers are copied; what they and the parts refer to must outlive the handle.
- * Errors: VSH_ERROR_ARGUMENT (neither field nor layers nor a voxel size; more layers than VSH_MAX_LAYERS; a
- * layer that is out of range, its number and member in the message), VSH_ERROR_MEMORY. */
+ * Errors: VSH_ERROR_ARGUMENT (neither field nor triangles nor layers nor a voxel size; more layers than
+ * VSH_MAX_LAYERS; a layer that is out of range, its number and member in the message), VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_occluders_from_parts(const vsh_occluder_parts *parts, vsh_occluders **occluders,
                                             vsh_error *error);
 VSH_API void vsh_occluders_free(vsh_occluders *occluders); /* NULL does nothing */
 
-/* What a handle is made of: views into it. `field` is never NULL, and holds nothing where all casters are in
- * layers. Cannot fail. */
+/* What a handle is made of: views into it. `field` is never NULL; it holds nothing where all casters are in
+ * layers, and knows no distances (NaN) of casters without voxels. Cannot fail. */
 VSH_API void vsh_occluders_get_parts_sized(const vsh_occluders *occluders, vsh_occluder_parts *parts,
                                            size_t parts_size);
 static inline void vsh_occluders_get_parts(const vsh_occluders *occluders, vsh_occluder_parts *parts) {

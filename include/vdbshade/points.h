@@ -40,7 +40,8 @@ typedef struct vsh_points {
                              * in it; NULL: the points' numbers, and no lightmap */
 } vsh_points;
 
-/* Work that was done; calls add to it, cancelled ones too. Begin with vsh_shade_stats_zero(). */
+/* Work that was done; calls add to it (to worst_error what is larger), cancelled ones too. Begin with
+ * vsh_shade_stats_zero(). */
 typedef struct vsh_shade_stats {
     size_t struct_size;
     uint64_t marches;    /* cones and rays that were marched */
@@ -56,10 +57,11 @@ typedef struct vsh_shade_stats {
     uint64_t refined;      /* values that took rays */
     double square_error;   /* adaptive, exact: sum over values of the estimated squared error */
     double ao_square_error; /* what of it is AO's */
+    double worst_error;     /* adaptive, exact: the largest error that is estimated of a value */
 } vsh_shade_stats;
 
 static inline vsh_shade_stats vsh_shade_stats_zero(void) {
-    vsh_shade_stats stats = {sizeof(vsh_shade_stats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.0, 0.0};
+    vsh_shade_stats stats = {sizeof(vsh_shade_stats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0};
     return stats;
 }
 

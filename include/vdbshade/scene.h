@@ -122,8 +122,8 @@ typedef struct vsh_scene {
     size_t solidity_count;
     double unit;          /* of the numbers in mesh files, metres, > 0: instead of what the files say
                              (vsh_model_unit());   0: as they say, and those that say nothing as they are */
-    int32_t voxels_named; /* nonzero: `grid` holds a voxel size or a resolution that was asked for; 0: the
-                             default, where `vdbshade bake` takes fewer for what is only traced */
+    int32_t voxels_named; /* nonzero: `grid` holds a voxel size or a resolution that was asked for; 0: where
+                             it is the default, what is baked chooses them (vsh_scene_resolution()) */
     int32_t cast_blended; /* nonzero: meshes of blended materials (VSH_ALPHA_BLENDED) cast, whole; 0: they
                              only receive */
 } vsh_scene;
@@ -207,6 +207,14 @@ VSH_API int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_laye
  * by their voxels alone; 0 where rays against triangles decide, and voxels only save rays. */
 VSH_API int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer);
 
+/* Voxels along the longest side of the casters in `layer`, or (NULL) in none, where `points` of receivers are
+ * to be shaded by the scene's methods (docs/auto.md tells how they are chosen). VSH_RESOLUTION_NAMED: those
+ * that the scene or the layer names; 0: none, rays against triangles are faster alone. It depends on what
+ * the scene holds, and on nothing else. `assets` are those loaded for this scene. Cannot fail. */
+enum { VSH_RESOLUTION_NAMED = -1 };
+VSH_API int32_t vsh_scene_resolution(const vsh_scene *scene, const vsh_assets *assets,
+                                     const vsh_scene_layer *layer, double points);
+
 /* Which of a scene's casters' parts are to be made, and for what. */
 typedef struct vsh_scene_occluders_options {
     size_t struct_size;
@@ -224,18 +232,23 @@ typedef struct vsh_scene_occluders_options {
                              keeps an error, nothing is in layers and rays can meet all casters */
     int32_t silent_voxels; /* nonzero: nothing is warned of what voxels make of the casters, or lose of them:
                               a trial at voxels other than those that are meant */
+    int32_t voxels; /* nonzero: voxels in any case, as many as scene->grid or a layer says: for distances, and
+                       for other methods than the scene's. 0: those of vsh_scene_resolution() */
+    double points;  /* that are to be shaded; 0: not known, or few */
 } vsh_scene_occluders_options;
 
 static inline vsh_scene_occluders_options vsh_scene_occluders_options_default(void) {
     vsh_scene_occluders_options options = {
-        sizeof(vsh_scene_occluders_options), NULL, NULL, 0.0, NULL, 1, 0, 0};
+        sizeof(vsh_scene_occluders_options), NULL, NULL, 0.0, NULL, 1, 0, 0, 0, 0.0};
     return options;
 }
 
-/* What casts in a scene: a field of the casters in no layer and one of each layer's, triangles where methods
- * trace them, heightfields and spheres that cast as they are. Warns (run->warning) of casters that voxels
- * lose where they decide, and where exact would be meant but the library has no Embree. Scene and assets must
- * outlive the handle. Free it with vsh_occluders_free(). Errors, those of a layer's casters with its name:
+/* What casts in a scene: a field of the casters in no layer and one of each layer's, or none where what is
+ * only traced needs none (then distances are not known, and other methods are refused), triangles where
+ * methods trace them, heightfields and spheres that cast as they are. Warns (run->warning) of casters that
+ * voxels lose where they decide, and where exact would be meant but the library has no Embree. Scene and
+ * assets must outlive the handle. Free it with vsh_occluders_free(). Errors, those of a layer's casters with
+ * its name:
  * - VSH_ERROR_ARGUMENT: scene, assets or occluders NULL, a box of which a half is NULL, options, run;
  * - VSH_ERROR_INPUT: no casters, more layers and casters that are not voxelised than VSH_MAX_LAYERS; as
  *   vsh_scene_casters(), vsh_field_create() and vsh_triangles_create();

@@ -31,6 +31,7 @@ typedef struct sharing {
     size_t block_columns;
     _Atomic size_t refused;  /* blocks whose memory was */
     _Atomic uint64_t square; /* of the estimates' errors, of the band's own, in VSHI_SQUARE_UNIT */
+    _Atomic double worst;    /* of the same, the largest */
     int64_t *curved;         /* [block_columns][rows of tiles]: vshi_window_estimate's, likewise */
 } sharing;
 
@@ -164,6 +165,7 @@ static vshi_window_estimate estimate(const sharing *s, const block *b, int32_t x
 /* Returns the sum of what is curved, in VSHI_SQUARE_UNIT. */
 static int64_t estimate_row(sharing *s, const block *b, const size_t range[2], bool own) {
     uint64_t square = 0;
+    double worst = 0.0;
     int64_t curved = 0;
     for (size_t i = range[0]; i < range[1]; ++i) {
         if (s->rays[i] == 0) {
@@ -187,8 +189,10 @@ static int64_t estimate_row(sharing *s, const block *b, const size_t range[2], b
         }
         square += own ? (uint64_t)(e.deviation * e.deviation / VSHI_SQUARE_UNIT) : 0;
         curved += own ? (int64_t)(e.curved / VSHI_SQUARE_UNIT) : 0;
+        worst = own ? fmax(worst, e.deviation) : worst;
     }
     atomic_fetch_add(&s->square, square);
+    vshi_raise(&s->worst, worst);
     return curved;
 }
 
@@ -298,6 +302,7 @@ vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texe
         const double square = (double)s.square * VSHI_SQUARE_UNIT + sum_curved(&s);
         stats->square_error += square;
         stats->ao_square_error += square;
+        stats->worst_error = fmax(stats->worst_error, s.worst);
     }
 done:
     free(s.curved);

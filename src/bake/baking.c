@@ -10,6 +10,8 @@
 #include "shade/ao.h"
 #include "shade/shadow.h"
 
+#include <math.h>
+
 /* Whether AO need not be shaded at every texel. `rays` are for those who want just them, taps cost no more;
  * what is near in a layer is not looked at. */
 bool vshi_baking_interpolates(const vshi_baking *bake) {
@@ -209,6 +211,9 @@ vsh_result vshi_baking_add_error(vshi_baking *bake, size_t channel, double squar
     vsh_bake_error *sum = &bake->stats.errors[channel];
     sum->values += (double)(rows->start[rows->last] - rows->start[rows->first]);
     sum->square_error += bake->stats.shade.square_error - square;
+    sum->worst = fmax(sum->worst, bake->stats.shade.worst_error);
+    bake->worst = fmax(bake->worst, bake->stats.shade.worst_error);
+    bake->stats.shade.worst_error = 0.0; /* of the next channel */
     return bake->held.count > 0 ? hold_channel(bake, channel, bake->values, NULL, error) : VSH_OK;
 }
 

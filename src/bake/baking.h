@@ -32,6 +32,7 @@ typedef struct vshi_baking {
     bool layered_ao;
     vshi_field_error held; /* samples that are held against the casters; none where that is not wanted */
     vsh_bake_stats stats;
+    double worst; /* error of the channels that are done */
 } vshi_baking;
 
 /* Averages samples over texels: of deviations not into the state. */

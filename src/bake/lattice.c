@@ -234,6 +234,7 @@ static void add_errors(const vshi_lattice *l, vsh_shade_stats *stats) {
     uint64_t sum = 0;
     for (size_t i = rows->start[rows->first]; i < rows->start[rows->last]; ++i) {
         const double deviation = l->state[i] == LATTICE_BETWEEN ? (double)l->deviation[i] : 0.0;
+        stats->worst_error = fmax(stats->worst_error, deviation);
         sum += deviation > 0.0 ? (uint64_t)(deviation * deviation / VSHI_SQUARE_UNIT) : 0;
     }
     stats->square_error += (double)sum * VSHI_SQUARE_UNIT;

@@ -276,7 +276,10 @@ vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_texels *t
     for (size_t m = 0; bake.stats.invalid_by_mesh != NULL && m < texels->mesh_count; ++m) {
         bake.stats.invalid_by_mesh[m] = 0;
     }
+    bake.worst = bake.stats.shade.worst_error;
+    bake.stats.shade.worst_error = 0.0;
     VSHI_TRY(run_bake(&bake, error));
+    bake.stats.shade.worst_error = fmax(bake.stats.shade.worst_error, bake.worst);
     if (stats != NULL) {
         memcpy(stats, &bake.stats, stats->struct_size);
     }

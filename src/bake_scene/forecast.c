@@ -58,24 +58,32 @@ done:
     return result;
 }
 
-/* Voxels of the scene over those of the trial, on a side. */
-static double finer(const vsh_scene *scene, double trial_voxel) {
+/* Voxels of the scene over those of the trial, on a side; `resolution`: as vsh_scene_resolution(). */
+static double finer(const vsh_scene *scene, int32_t resolution, double trial_voxel) {
+    if (resolution != VSH_RESOLUTION_NAMED) {
+        return (double)resolution / TRIAL_RESOLUTION;
+    }
     return scene->grid.voxel_size > 0.0 ? trial_voxel / scene->grid.voxel_size
                                         : (double)scene->grid.resolution / TRIAL_RESOLUTION;
 }
 
 static vsh_result try_small(const vsh_bake_job *job, const vsh_run *run, trial *t, vsh_error *error) {
+    const double points = vshi_job_points(job);
+    const int32_t resolution = vsh_scene_resolution(&job->scene, job->assets, NULL, points);
     vsh_scene small = job->scene;
-    small.grid.voxel_size = 0.0;
-    small.grid.resolution = TRIAL_RESOLUTION;
+    if (resolution != 0) { /* where there are none, nor are there in the trial */
+        small.grid.voxel_size = 0.0;
+        small.grid.resolution = TRIAL_RESOLUTION;
+    }
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
     options.receivers_min = job->receivers[0];
     options.receivers_max = job->receivers[1];
+    options.points = points;
     options.silent_voxels = 1; /* what coarse voxels lose is not lost by the scene's */
     vsh_occluders *occluders = NULL;
     VSHI_TRY(vsh_scene_occluders(&small, job->assets, &options, run, &occluders, error));
     vsh_occluders_get_info(occluders, &t->made);
-    t->finer = finer(&job->scene, t->made.voxel_size);
+    t->finer = resolution != 0 ? finer(&job->scene, resolution, t->made.voxel_size) : 1.0;
     const vsh_result result = bake_part(job, occluders, run, t, error);
     vsh_occluders_free(occluders);
     return result;
@@ -122,7 +130,7 @@ vsh_result vsh_bake_job_forecast_sized(vsh_bake_job *job, const vsh_run *run, vs
     const double more = t.finer * t.finer; /* surfaces: voxels grow with the square */
     vsh_bake_forecast f = {.voxels = (double)t.made.active_voxels * more,
                            .voxel_size = t.made.voxel_size / t.finer,
-                           .resolution = TRIAL_RESOLUTION * t.finer,
+                           .resolution = t.made.voxel_size > 0.0 ? TRIAL_RESOLUTION * t.finer : 0.0,
                            .grid_bytes = (double)t.made.grid_bytes * more,
                            .field_bytes = (double)t.made.field_bytes * more,
                            .voxelize_s = t.made.voxelize_s * more,

@@ -225,6 +225,14 @@ vsh_result vsh_bake_job_measure(vsh_bake_job *job, const vsh_run *run, vsh_error
 
 /* --- prepared */
 
+double vshi_job_points(const vsh_bake_job *job) {
+    double points = 0.0;
+    for (size_t i = 0; i < job->targets.count; ++i) {
+        points += (double)job->lightmaps[i].samples;
+    }
+    return points;
+}
+
 static vsh_result find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
     const double start = vshi_seconds();
     vsh_provenance_source source = vsh_provenance_source_default();
@@ -252,6 +260,7 @@ vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error
     options.receivers_min = job->receivers[0];
     options.receivers_max = job->receivers[1];
     options.truth = 1;
+    options.points = vshi_job_points(job);
     VSHI_TRY(vsh_scene_occluders(&job->scene, job->assets, &options, run, &job->occluders, error));
     vsh_occluders_get_info(job->occluders, &job->report.occluders);
     const size_t count = job->scene.light_count + 2;

@@ -34,6 +34,9 @@ typedef struct vshi_lightmap_input {
     vshi_bands bands;
 } vshi_lightmap_input;
 
+/* Points that the lightmaps of a measured job have. */
+double vshi_job_points(const vsh_bake_job *job);
+
 /* Sorts and counts a target's charts; warns of its UVs where asked to, and refuses those that cannot be
  * baked.
  */

@@ -9,6 +9,7 @@
 #include "base/rounds.h"
 #include "base/try.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -242,6 +243,7 @@ static void add_shade(vsh_shade_stats *sum, const vsh_shade_stats *baked) {
     sum->refined += baked->refined;
     sum->square_error += baked->square_error;
     sum->ao_square_error += baked->ao_square_error;
+    sum->worst_error = fmax(sum->worst_error, baked->worst_error);
 }
 
 static void add_to_report(const work *w) {
@@ -257,6 +259,7 @@ static void add_to_report(const work *w) {
         sum->square_error += w->baked.errors[i].square_error;
         sum->held += w->baked.errors[i].held;
         sum->held_square_error += w->baked.errors[i].held_square_error;
+        sum->worst = fmax(sum->worst, w->baked.errors[i].worst);
     }
 }
 

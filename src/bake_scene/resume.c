@@ -48,7 +48,7 @@ static char *text_of(const vshi_resume_key *key) {
     if (out == NULL) {
         return NULL;
     }
-    fprintf(out, "%s2: %d x %d by %d\n", magic, key->image->width, key->image->height, key->band_rows);
+    fprintf(out, "%s3: %d x %d by %d\n", magic, key->image->width, key->image->height, key->band_rows);
     for (int32_t c = 0; c < key->image->channel_count; ++c) {
         fprintf(out, "%s\n", key->image->names[c]);
     }

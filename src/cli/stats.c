@@ -83,7 +83,7 @@ static int kind_of(const cli_stats *stats, size_t channel) {
 }
 
 vsh_bake_error cli_stats_error(const cli_stats *stats, int kind) {
-    vsh_bake_error sum = {0.0, 0.0, 0.0, 0.0};
+    vsh_bake_error sum = {0.0, 0.0, 0.0, 0.0, 0.0};
     for (size_t i = 0; stats->errors != NULL && i < stats->light_count + 2; ++i) {
         if (kind_of(stats, i) != kind) {
             continue;
@@ -92,6 +92,7 @@ vsh_bake_error cli_stats_error(const cli_stats *stats, int kind) {
         sum.square_error += stats->errors[i].square_error;
         sum.held += stats->errors[i].held;
         sum.held_square_error += stats->errors[i].held_square_error;
+        sum.worst = fmax(sum.worst, stats->errors[i].worst);
     }
     return sum;
 }
@@ -152,6 +153,7 @@ void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene, const vsh_ru
 static void set_error(json_t *of, const vsh_bake_error *known) {
     json_object_set_new(of, "estimated_rmse", number_or_null(vsh_bake_error_rmse(known)));
     json_object_set_new(of, "field_rmse", number_or_null(vsh_bake_error_field(known)));
+    json_object_set_new(of, "worst_error", number_or_null(known->values > 0.0 ? known->worst : NAN));
 }
 
 /* Of each channel on its own. */
@@ -184,6 +186,8 @@ static void add_errors(const cli_stats *stats, json_t *root) {
     json_object_set_new(
         root, "certified_share",
         number_or_null(values > 0.0 ? 1.0 - fmin(1.0, (double)stats->shade.refined / values) : NAN));
+    json_object_set_new(root, "rays_per_value",
+                        number_or_null(values > 0.0 ? (double)stats->shade.rays / values : NAN));
     json_object_set_new(root, "estimated_rmse", number_or_null(values > 0.0 ? sqrt(square / values) : NAN));
     json_t *methods = json_object();
     for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
@@ -269,6 +273,8 @@ static int write_file(const cli_stats *stats, const vsh_run *run, const char *pa
     }
     if (stats->of == CLI_STATS_TEXELS) {
         json_object_set_new(root, "resumed_rows", json_integer((json_int_t)stats->resumed_rows));
+        json_object_set_new(root, "ao_spacing",
+                            stats->ao_spacing > 0 ? json_integer(stats->ao_spacing) : json_null());
     }
     add_errors(stats, root);
     json_object_set_new(root, "confined", confinement(run));
@@ -304,7 +310,7 @@ int cli_stats_finish(const cli_stats *stats, const vsh_run *run, const char *pat
     return code;
 }
 
-/* "estimated error: shadow 0.0123 (the voxels' 0.012), AO 0.0071". */
+/* "estimated error: shadow 0.0123 (the voxels' 0.012; worst 0.05), AO 0.0071 (worst 0.02)". */
 static void say_errors(const cli_stats *stats) {
     char text[256] = "";
     size_t used = 0;
@@ -314,15 +320,42 @@ static void say_errors(const cli_stats *stats) {
         if (isnan(error)) {
             continue;
         }
-        used += (size_t)snprintf(text + used, sizeof text - used, "%s%s %.3g", used > 0 ? ", " : "",
+        used += (size_t)snprintf(text + used, sizeof text - used, "%s%s %.3g (", used > 0 ? ", " : "",
                                  kinds[kind].said, error);
         if (!isnan(field) && !stats->methods[kind].traces && used < sizeof text) {
-            used += (size_t)snprintf(text + used, sizeof text - used, " (the voxels' %.3g)", field);
+            used += (size_t)snprintf(text + used, sizeof text - used, "the voxels' %.3g; ", field);
+        }
+        if (used < sizeof text) {
+            used += (size_t)snprintf(text + used, sizeof text - used, "worst %.3g)", known.worst);
         }
     }
     if (used > 0) {
         cli_say("estimated error: %s", text);
     }
+}
+
+/* "shadow exact, AO exact, max error 0.02; no voxels, 11.3 rays a value, those of AO shared by texels". */
+static void say_choice(const cli_stats *stats) {
+    char methods[128], voxels[64] = "no voxels", rays[48] = "", spacing[48] = "";
+    if (*cli_stats_methods_text(stats, methods, sizeof methods) == '\0') {
+        return;
+    }
+    if (stats->casters.field_bytes > 0) {
+        snprintf(voxels, sizeof voxels, "voxels of %.4g", stats->casters.voxel_size);
+    }
+    double values = 0.0;
+    for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
+        values += cli_stats_error(stats, kind).values;
+    }
+    if (values > 0.0) {
+        snprintf(rays, sizeof rays, ", %.3g rays a value", (double)stats->shade.rays / values);
+    }
+    const cli_method *ao = &stats->methods[CLI_STATS_AO];
+    if (ao->name != NULL && stats->ao_spacing > 1) {
+        snprintf(spacing, sizeof spacing, ao->traces ? ", those of AO shared by texels" : ", AO every %d texels",
+                 stats->ao_spacing);
+    }
+    cli_say("%s; %s%s%s", methods, voxels, rays, spacing);
 }
 
 void cli_stats_say(const cli_stats *stats) {
@@ -340,10 +373,7 @@ void cli_stats_say(const cli_stats *stats) {
                 stats->threads, stats->threads == 1 ? "" : "s",
                 vshi_bytes_text(peak_bytes(), peak, sizeof peak));
     }
-    char methods[128];
-    if (*cli_stats_methods_text(stats, methods, sizeof methods) != '\0') {
-        cli_say("%s", methods);
-    }
+    say_choice(stats);
     say_errors(stats);
     const double *s = stats->seconds;
     cli_say("load %.2f s, voxelize %.2f s, field %.2f s, %s %.2f s, write %.2f s", s[CLI_STAGE_LOAD],

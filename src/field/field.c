@@ -187,7 +187,7 @@ void vsh_field_sample(const vsh_field *field, size_t count, const double *positi
         const vshi_vec p = vshi_to_field(field, positions + 3 * i);
         const float at[3] = {(float)p.x, (float)p.y, (float)p.z};
         const float h = vshi_field_distance(field, at);
-        distances[i] = vshi_finite(p) ? (float)((double)h * field->voxel_size) : NAN;
+        distances[i] = vshi_finite(p) && !field->unknown ? (float)((double)h * field->voxel_size) : NAN;
     }
 }
 

@@ -53,6 +53,7 @@ struct vsh_field {
     int16_t *values; /* bricks; all levels; multiples of the level's quantum, negative inside */
     uint64_t value_count;
     uint64_t active_voxels; /* of the grid */
+    bool unknown;           /* see vshi_field_create_unknown() */
     int32_t level_count;
     vshi_level levels[VSHI_MAX_LEVELS];
 };
@@ -150,5 +151,12 @@ vsh_result vshi_field_create_empty(double voxel_size, vsh_field **field, vsh_err
 static inline bool vshi_field_is_empty(const vsh_field *field) {
     return field->bounds_min[0] > field->bounds_max[0];
 }
+
+/* What stands for casters that are traced only: their box, and distances of 0 everywhere, which prove neither
+ * that anything is free nor that it is solid. Lengths are told in voxels of this size, world units, 1e-12 …
+ * 1e12, though there are none. Free it with vsh_field_free(). Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY.
+ */
+vsh_result vshi_field_create_unknown(double voxel_size, const double low[3], const double high[3],
+                                     vsh_field **field, vsh_error *error);
 
 #endif

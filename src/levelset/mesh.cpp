@@ -108,91 +108,6 @@ void move_out(FloatGrid &grid, float offset, float background, Stage &stage) {
     stage.run([&] { openvdb::tools::changeLevelSetBackground(grid.tree(), background); });
 }
 
-// What is said of the components of one object.
-struct Tally {
-    size_t sheets = 0, sheet_edges = 0;
-    size_t closed = 0, closed_edges = 0, holes = 0; // solids closed over their holes
-    size_t standing = 0, standing_edges = 0;        // closed by what they stand on
-    size_t turned = 0;
-    bool around_all = false;
-};
-
-Tally tally_of(const vshi_component *components, size_t count) {
-    Tally tally;
-    for (size_t i = 0; i < count; ++i) {
-        const vshi_component &c = components[i];
-        tally.turned += c.turned;
-        tally.around_all |= c.around_all;
-        if (c.kind == VSHI_KIND_SHEET) {
-            ++tally.sheets;
-            tally.sheet_edges += c.open_edges;
-        } else if (c.stands) {
-            ++tally.standing;
-            tally.standing_edges += c.open_edges;
-        } else if (c.kind != VSHI_KIND_WALL && c.open_edges > 0) {
-            ++tally.closed;
-            tally.closed_edges += c.open_edges;
-            tally.holes += c.holes;
-        }
-    }
-    return tally;
-}
-
-const char *plural(size_t count) {
-    return count == 1 ? "" : "s";
-}
-
-void warn(const vshi_mesh_set &meshes, const Lattice &lattice, const vsh_run &run) {
-    const vshi_solidity *solidity = meshes.solidity;
-    const vshi_wholes &wholes = *vshi_solidity_wholes(solidity);
-    for (size_t w = 0; w < wholes.count; ++w) {
-        size_t count = 0;
-        const vshi_component *components = vshi_solidity_of_whole(solidity, w, &count);
-        const Tally tally = tally_of(components, count);
-        const size_t first = wholes.first[w];
-        const vshi_mesh_name name = vshi_mesh_label(&meshes.meshes[first], first);
-        if (tally.around_all) {
-            vshi_warn(&run,
-                      "%s (%zu of %zu): everything else lies within it: baked as a shell with air on both "
-                      "sides; leave it out of what casts if light is to come in",
-                      name.text, first + 1, meshes.count);
-        }
-        if (tally.sheets > 0 && tally.sheet_edges == 0 && !tally.around_all) {
-            vshi_warn(
-                &run,
-                "%s (%zu of %zu): no volume between its faces: baked as a shell %g voxels (%g units) thick",
-                name.text, first + 1, meshes.count, lattice.shell, lattice.shell * lattice.voxel);
-        }
-        if (tally.sheet_edges > 0) {
-            vshi_warn(&run, "%s (%zu of %zu): %zu open edge%s: baked as a shell %g voxels (%g units) thick",
-                      name.text, first + 1, meshes.count, tally.sheet_edges, plural(tally.sheet_edges),
-                      lattice.shell, lattice.shell * lattice.voxel);
-        }
-        if (tally.closed > 0) {
-            vshi_warn(&run,
-                      "%s (%zu of %zu): %zu open edge%s around %zu hole%s in %zu of %zu component%s that "
-                      "enclose nearly all behind them: taken for solid, closed over the holes",
-                      name.text, first + 1, meshes.count, tally.closed_edges, plural(tally.closed_edges),
-                      tally.holes, plural(tally.holes), tally.closed, count, plural(count));
-        }
-        if (tally.standing > 0) {
-            vshi_warn(
-                &run,
-                "%s (%zu of %zu): %zu open edge%s of %zu of %zu component%s that stand on others or run "
-                "into them: taken for solid, closed by those",
-                name.text, first + 1, meshes.count, tally.standing_edges, plural(tally.standing_edges),
-                tally.standing, count, plural(count));
-        }
-        if (tally.turned > 0) {
-            vshi_warn(
-                &run,
-                "%s (%zu of %zu): %zu triangle%s that face the other way than those around: taken as if "
-                "they were turned over",
-                name.text, first + 1, meshes.count, tally.turned, plural(tally.turned));
-        }
-    }
-}
-
 struct Progress {
     double done;
     double per_triangle;
@@ -269,7 +184,7 @@ vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_option
     check(vshi_mesh_set_solve(&meshes.set, &run, error));
     foretell(meshes, lattice, run, error);
     Stage stage(run, "voxelize", error);
-    warn(meshes.set, lattice, run);
+    vshi_mesh_set_warn(&meshes.set, lattice.shell, lattice.voxel, &run);
 
     const double reach = 2.0 * (lattice.half_width + lattice.shell) + 2.0;
     const Parts parts = sort_parts(meshes.set.solidity, lattice, reach);

@@ -7,6 +7,7 @@
 #include "render/tile.h"
 #include "shade/layers.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 /* Samples that are in memory at once. */
@@ -116,6 +117,7 @@ static void add_stats(vsh_shade_stats *to, const vsh_shade_stats *from) {
     to->refined += from->refined;
     to->square_error += from->square_error;
     to->ao_square_error += from->ao_square_error;
+    to->worst_error = fmax(to->worst_error, from->worst_error);
 }
 
 static int32_t rows_at_once(const vshi_sample_grid *grid) {

@@ -69,6 +69,9 @@ static void add_hit(const vshi_scenery *scenery, hits *h, const vsh_surface *sur
  * which for an open mesh is a shell around it; voxels. */
 static double clear_of(const vsh_field *field, vshi_vec at, vshi_vec normal) {
     double lift = CLEAR;
+    if (field->unknown) {
+        return 0.0; /* rays begin off the triangles by themselves */
+    }
     while (lift < MOST_LIFT) {
         const vshi_vec point = vshi_add(at, vshi_scale(normal, lift * field->voxel_size));
         const double world[3] = {point.x, point.y, point.z};

@@ -51,26 +51,38 @@ static double reach_of(const making *m, const vsh_grid *grid) {
     return reach > WITHIN * diagonal ? reach : vsh_field_options_default().reach;
 }
 
-/* The level set of a layer's casters, or (NULL) of those in none; NULL where there are none. *made is what
- * is to be freed of it. */
-static vsh_result find_grid(making *m, const vsh_scene_layer *layer, const vsh_grid **grid, vsh_grid **made,
-                            vsh_error *error) {
+/* The level set of a layer's casters, or (NULL) of those in none, of so many voxels; NULL where there are
+ * none. *made is what is to be freed of it. */
+static vsh_result find_grid(making *m, const vsh_scene_layer *layer, int32_t resolution,
+                            const vsh_grid **grid, vsh_grid **made, vsh_error *error) {
     *made = NULL;
     *grid = layer == NULL ? m->options.grid : NULL;
     if (*grid != NULL) {
         return VSH_OK;
     }
-    const vsh_result result = vsh_scene_layer_casters(m->scene, m->assets, layer, &m->voxel, made, error);
+    vsh_scene scene = *m->scene;
+    scene.grid.resolution = resolution != VSH_RESOLUTION_NAMED ? resolution : scene.grid.resolution;
+    const vsh_result result = vsh_scene_layer_casters(&scene, m->assets, layer, &m->voxel, made, error);
     *grid = *made;
     return result;
 }
 
 /* *field is NULL where there are no casters. */
-static vsh_result make_field(making *m, const vsh_scene_layer *layer, vsh_field **field, vsh_error *error) {
+static vsh_result make_field(making *m, const vsh_scene_layer *layer, const vsh_triangles *triangles,
+                             vsh_field **field, vsh_error *error) {
     const double start = vshi_seconds();
     const vsh_grid *grid;
     vsh_grid *made;
-    vsh_result result = find_grid(m, layer, &grid, &made, error);
+    int32_t resolution = VSH_RESOLUTION_NAMED;
+    if (m->options.voxels == 0 && (layer != NULL || m->options.grid == NULL)) {
+        resolution = vsh_scene_resolution(m->scene, m->assets, layer, m->options.points);
+    }
+    if (resolution == 0 && triangles != NULL) {
+        VSHI_TRY(vshi_occluders_unknown(triangles, 0.0, field, error));
+        return *field == NULL ? VSH_OK
+                              : vshi_scene_warn_solidity(m->scene, m->assets, layer, &m->voxel, error);
+    }
+    vsh_result result = find_grid(m, layer, resolution, &grid, &made, error);
     if (result != VSH_OK || grid == NULL) {
         return result;
     }
@@ -98,10 +110,10 @@ static vsh_result make_field(making *m, const vsh_scene_layer *layer, vsh_field 
     return vshi_scene_warn_lost(m->scene, m->assets, layer, *field, &run, error);
 }
 
-static vsh_result make_field_of(making *m, const vsh_scene_layer *layer, vsh_field **field,
-                                vsh_error *error) {
+static vsh_result make_field_of(making *m, const vsh_scene_layer *layer, const vsh_triangles *triangles,
+                                vsh_field **field, vsh_error *error) {
     vsh_error why;
-    const vsh_result result = make_field(m, layer, field, &why);
+    const vsh_result result = make_field(m, layer, triangles, field, &why);
     if (result == VSH_OK || error == NULL) {
         return result;
     }
@@ -199,9 +211,9 @@ static vsh_result make_layers(making *m, vsh_error *error) {
         const vsh_scene_layer *of_scene = &scene->layers[i];
         vsh_field **field = &m->own.layer_fields[i];
         vsh_triangles **triangles = &m->own.layer_triangles[i];
-        VSHI_TRY(make_field_of(m, of_scene, field, error));
+        VSHI_TRY(make_triangles(m, of_scene, triangles, error));
+        VSHI_TRY(make_field_of(m, of_scene, *triangles, field, error));
         if (*field != NULL) {
-            VSHI_TRY(make_triangles(m, of_scene, triangles, error));
             vsh_layer *layer = &m->layers[m->parts.layer_count++];
             *layer = of_scene->shade;
             layer->name = of_scene->name;
@@ -222,7 +234,7 @@ static vsh_result make(making *m, vsh_error *error) {
     }
     VSHI_TRY(make_truth(m, error));
     m->own.triangles_s = vshi_seconds() - start;
-    VSHI_TRY(make_field_of(m, NULL, &m->own.field, error));
+    VSHI_TRY(make_field_of(m, NULL, m->own.triangles, &m->own.field, error));
     VSHI_TRY(make_layers(m, error));
     if (m->own.field == NULL && m->parts.layer_count == 0) {
         return vshi_fail(error, VSH_ERROR_INPUT, "the scene has no casters");

@@ -1,6 +1,7 @@
 /* The triangles of a scene's casters. */
 #include "base/memory.h"
-
+#include "base/try.h"
+#include "mesh/mesh_set.h"
 #include "scene/assets.h"
 #include "scene/occluders.h"
 
@@ -41,47 +42,66 @@ int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer) 
     return scene != NULL && vshi_scene_method_is(scene, layer, VSH_METHOD_TRIANGLES, false);
 }
 
+/* The meshes of a layer's casters, which stay those of the assets; the list is the caller's to free. */
+static vsh_result list_meshes(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
+                              vsh_mesh **meshes, size_t *count, vsh_error *error) {
+    size_t most = 0;
+    *count = 0;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        size_t own;
+        vsh_assets_caster(assets, i, &own);
+        most += own;
+    }
+    VSHI_TRY(vshi_allocate((void **)meshes, most, sizeof **meshes, "triangles", error));
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        size_t own;
+        const vsh_mesh *of_caster = vsh_assets_caster(assets, i, &own);
+        for (size_t m = 0; is_voxelised_in(&scene->casters[i], layer) && m < own; ++m) {
+            (*meshes)[(*count)++] = of_caster[m];
+        }
+    }
+    return VSH_OK;
+}
+
 vsh_result vsh_scene_triangles(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
                                const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
     VSHI_NEEDS(triangles);
     *triangles = NULL;
     VSHI_NEEDS(scene);
     VSHI_NEEDS(assets);
-    size_t count = 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        if (!is_voxelised_in(caster, layer)) {
-            continue;
-        }
-        if (!has_triangles(caster)) {
+        if (is_voxelised_in(caster, layer) && !has_triangles(caster)) {
             const bool known = caster->type > VSH_CASTER_MESH && caster->type <= VSH_CASTER_TEXT;
             return vshi_fail(error, VSH_ERROR_INPUT,
                              "casters[%zu] is %s: exact methods trace triangles, and need casters that are "
                              "all meshes or heightfields",
                              i, known ? type_names[caster->type] : "of no type");
         }
-        size_t own;
-        vsh_assets_caster(assets, i, &own);
-        count += own;
     }
-    if (count == 0) {
+    vsh_mesh *meshes;
+    size_t count;
+    VSHI_TRY(list_meshes(scene, assets, layer, &meshes, &count, error));
+    const vsh_result result = count > 0 ? vsh_triangles_create(meshes, count, run, triangles, error) : VSH_OK;
+    free(meshes);
+    return result;
+}
+
+vsh_result vshi_scene_warn_solidity(const vsh_scene *scene, const vsh_assets *assets,
+                                    const vsh_scene_layer *layer, const vsh_run *run, vsh_error *error) {
+    if (run->warning == NULL) {
         return VSH_OK;
     }
-    void *memory;
-    vsh_result result = vshi_allocate(&memory, count, sizeof(vsh_mesh), "triangles", error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    vsh_mesh *meshes = memory;
-    size_t at = 0;
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        size_t own;
-        const vsh_mesh *of_caster = vsh_assets_caster(assets, i, &own);
-        for (size_t m = 0; vshi_caster_in_layer(&scene->casters[i], layer) && m < own; ++m) {
-            meshes[at++] = of_caster[m];
-        }
-    }
-    result = vsh_triangles_create(meshes, count, run, triangles, error);
-    free(memory);
+    vshi_mesh_set set = {.count = 0};
+    vsh_mesh *meshes;
+    size_t count;
+    vsh_result result;
+    VSHI_TRY_DONE(list_meshes(scene, assets, layer, &meshes, &count, error));
+    VSHI_TRY_DONE(vshi_mesh_set_create(meshes, count, &set, error));
+    VSHI_TRY_DONE(vshi_mesh_set_solve(&set, run, error));
+    vshi_mesh_set_warn(&set, 0.0, 0.0, run);
+done:
+    vshi_mesh_set_free(&set);
+    free(meshes);
     return result;
 }

@@ -405,6 +405,7 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
         }
         stats->square_error += fixed ? 0.0 : error * error;
         stats->ao_square_error += fixed ? 0.0 : error * error;
+        stats->worst_error = fmax(stats->worst_error, fixed ? 0.0 : error);
         ++stats->refined;
     }
 }

@@ -56,7 +56,7 @@ static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_sh
     bool is_free[VSHI_PIECE];
     uint32_t owner[VSHI_PIECE];
     size_t count = 0;
-    if (task->options->method == VSH_SHADOW_IMPROVED) {
+    if (task->options->method == VSH_SHADOW_IMPROVED || task->field->unknown) {
         return;
     }
     for (size_t i = 0; i < facing->count; ++i) {

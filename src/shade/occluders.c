@@ -6,6 +6,7 @@
 #include "base/try.h"
 #include "field/field.h"
 #include "shade/layers.h"
+#include "trace/embree.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -67,9 +68,31 @@ static vsh_result copy_layers(const vsh_occluder_parts *parts, vshi_occluders_ow
     return VSH_OK;
 }
 
-static vsh_result make_empty(const vsh_occluder_parts *parts, vshi_occluders_own *own, vsh_error *error) {
+vsh_result vshi_occluders_unknown(const vsh_triangles *triangles, double voxel_size, vsh_field **field,
+                                  vsh_error *error) {
+    double low[3], high[3], longest = 0.0;
+    *field = NULL;
+    vshi_triangles_bounds(triangles, low, high);
+    if (low[0] > high[0]) {
+        return VSH_OK;
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        longest = fmax(longest, high[axis] - low[axis]);
+    }
+    return vshi_field_create_unknown(voxel_size > 0.0 ? voxel_size : longest / VSHI_TRACED_RESOLUTION, low,
+                                     high, field, error);
+}
+
+/* What stands in place of a field: casters that are traced only, or none beside the layers. */
+static vsh_result make_fieldless(const vsh_occluder_parts *parts, vshi_occluders_own *own, vsh_error *error) {
+    if (parts->triangles != NULL) {
+        VSHI_TRY(vshi_occluders_unknown(parts->triangles, parts->voxel_size, &own->field, error));
+    }
+    if (own->field != NULL) {
+        return VSH_OK;
+    }
     if (parts->layer_count == 0 && parts->voxel_size == 0.0) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "occluders: neither a field nor layers");
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "occluders: neither a field nor triangles nor layers");
     }
     const double voxel_size =
         parts->voxel_size != 0.0 ? parts->voxel_size : finest_voxel(own->layers, parts->layer_count);
@@ -81,7 +104,7 @@ static vsh_result make(const vsh_occluder_parts *parts, vshi_occluders_own *own,
                        vsh_error *error) {
     VSHI_TRY(copy_layers(parts, own, error));
     if (parts->field == NULL) {
-        VSHI_TRY(make_empty(parts, own, error));
+        VSHI_TRY(make_fieldless(parts, own, error));
     }
     vsh_occluders *made;
     VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "occluders", error));
@@ -144,6 +167,9 @@ void vsh_occluders_get_parts_sized(const vsh_occluders *occluders, vsh_occluder_
 
 /* Adds up what fields take; sizes are those of the first. */
 static void count(const vsh_field *field, vsh_occluders_info *info) {
+    if (field->unknown || vshi_field_is_empty(field)) {
+        return;
+    }
     vsh_field_info own;
     vsh_field_get_info(field, &own);
     if (info->field_bytes == 0) {
@@ -164,9 +190,7 @@ void vsh_occluders_get_info_sized(const vsh_occluders *occluders, vsh_occluders_
                                .voxelize_s = own->voxelize_s,
                                .field_s = own->field_s,
                                .triangles_s = own->triangles_s};
-    if (!vshi_field_is_empty(occluders->field)) {
-        count(occluders->field, &made);
-    }
+    count(occluders->field, &made);
     for (size_t i = 0; i < occluders->layer_count; ++i) {
         if (occluders->layers[i].field != NULL) {
             count(occluders->layers[i].field, &made);

@@ -30,6 +30,15 @@ typedef struct vshi_occluders_own {
     double voxelize_s, field_s, triangles_s;
 } vshi_occluders_own;
 
+/* Voxels along the longest side, of casters that are traced only, that lengths are told in. */
+enum { VSHI_TRACED_RESOLUTION = 96 };
+
+/* What stands for the field of casters that are traced only; *field is NULL where there are no triangles.
+ * voxel_size 0: the box's longest side over VSHI_TRACED_RESOLUTION. Errors: as vshi_field_create_unknown().
+ */
+vsh_result vshi_occluders_unknown(const vsh_triangles *triangles, double voxel_size, vsh_field **field,
+                                  vsh_error *error);
+
 /* As vsh_occluders_from_parts(), and takes over what `own` holds, which is freed also after an error. */
 vsh_result vshi_occluders_make(const vsh_occluder_parts *parts, vshi_occluders_own *own,
                                vsh_occluders **occluders, vsh_error *error);

@@ -6,6 +6,8 @@
 #include "mesh/mesh_set.h"
 #include "shade/occluders.h"
 
+#include <math.h>
+
 static vsh_result make_field(const vsh_grid *grid, const vsh_field_options *options, const vsh_run *run,
                              vshi_occluders_own *own, vsh_error *error) {
     const double start = vshi_seconds();
@@ -63,11 +65,36 @@ vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_count,
     vsh_result result;
     VSHI_TRY_DONE(vshi_mesh_set_create(meshes, mesh_count, &set, error));
     VSHI_TRY_DONE(vshi_mesh_set_solve(&set, &resolved, error));
-    VSHI_TRY_DONE(make_field_of_meshes(set.meshes, mesh_count, &full, run, &own, error));
-    if (full.triangles != 0 && vsh_triangles_available()) {
+    if (mesh_count == 0) {
+        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_ARGUMENT, "occluders: no meshes"));
+    }
+    if (!(full.reach >= 0.0) || isinf(full.reach)) {
+        VSHI_TRY_DONE(
+            vshi_fail(error, VSH_ERROR_ARGUMENT, "reach %g: expected a length, 0 or more", full.reach));
+    }
+    size_t triangles = 0;
+    for (size_t m = 0; m < mesh_count; ++m) {
+        triangles += set.meshes[m].triangle_count - set.checked[m].report.degenerate_triangles;
+    }
+    if (triangles == 0) {
+        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_INPUT, "occluders: no triangle of any area"));
+    }
+    const bool voxels = full.grid.resolution != 0 || full.grid.voxel_size != 0.0;
+    const bool traced = full.triangles != 0 && vsh_triangles_available();
+    if (!voxels) {
+        full.grid.resolution = vsh_grid_options_default().resolution;
+    }
+    if (voxels || !traced) {
+        VSHI_TRY_DONE(make_field_of_meshes(set.meshes, mesh_count, &full, run, &own, error));
+    }
+    if (traced) {
         const double start = vshi_seconds();
         VSHI_TRY_DONE(vsh_triangles_create(set.meshes, mesh_count, run, &own.triangles, error));
         own.triangles_s = vshi_seconds() - start;
+    }
+    if (own.field == NULL) {
+        VSHI_TRY_DONE(vshi_occluders_unknown(own.triangles, 0.0, &own.field, error));
+        vshi_mesh_set_warn(&set, 0.0, 0.0, &resolved);
     }
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.field = own.field;

@@ -220,6 +220,10 @@ static vsh_result check_output(const vsh_query *query, const vshi_view *view, co
     if (output->ao == NULL && output->ao_deviation != NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: ao_deviation without ao");
     }
+    if ((output->distance != NULL || output->gradient != NULL) && query->ao.field->unknown) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "output: distance or gradient, of occluders without voxels, which have them");
+    }
     const size_t least = (output->gradient != NULL ? 3 : 1) * sizeof(float);
     if (output->stride != 0 && (output->stride < least || output->stride % sizeof(float) != 0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: stride %zu: expected 0 or bytes, %zu, %zu …",

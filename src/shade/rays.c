@@ -112,6 +112,9 @@ bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *
             return false;
         }
     }
+    if (field->unknown) {
+        return true; /* that it passes by the casters' box is all that a march would prove */
+    }
     vshi_chunk_push(chunk, cone, owner);
     chunk->rays.begin[chunk->rays.count - 1] = (float)begin;
     chunk->rays.end[chunk->rays.count - 1] = (float)end;

@@ -41,7 +41,8 @@ void vshi_chunk_clear(vshi_chunk *chunk);
 /* Adds a cone as it is. */
 void vshi_chunk_push(vshi_chunk *chunk, const vshi_cone *cone, uint32_t owner);
 
-/* Adds a cone where it can meet the casters' bounds, or returns false: its closeness then stays as it is. */
+/* Adds a cone where it can meet the casters' bounds, or returns false: its closeness then stays as it is. Of
+ * an unknown field none is added. */
 bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *cone, uint32_t owner,
                     vsh_shade_stats *stats);
 

@@ -88,6 +88,7 @@ void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more) {
     stats->refined += more->refined;
     stats->square_error += more->square_error;
     stats->ao_square_error += more->ao_square_error;
+    stats->worst_error = fmax(stats->worst_error, more->worst_error);
 }
 
 typedef struct shade_run {
@@ -100,6 +101,7 @@ typedef struct shade_run {
     _Atomic uint64_t marches, samples, skipped, certified, unfinished, invalid, beyond_reach, rays, refined;
     _Atomic uint64_t square_error,
         ao_square_error; /* in units of VSHI_SQUARE_UNIT, so that the order of threads changes no bit */
+    _Atomic double worst_error;
 } shade_run;
 
 static void run_piece(void *user, size_t piece, size_t next) {
@@ -134,6 +136,7 @@ static void run_piece(void *user, size_t piece, size_t next) {
     atomic_fetch_add(&run->refined, stats.refined);
     atomic_fetch_add(&run->square_error, (uint64_t)(stats.square_error / VSHI_SQUARE_UNIT));
     atomic_fetch_add(&run->ao_square_error, (uint64_t)(stats.ao_square_error / VSHI_SQUARE_UNIT));
+    vshi_raise(&run->worst_error, stats.worst_error);
 }
 
 vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows *rows, size_t grain,
@@ -168,7 +171,8 @@ vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows 
                                       .rays = pieces.rays,
                                       .refined = pieces.refined,
                                       .square_error = (double)pieces.square_error * VSHI_SQUARE_UNIT,
-                                      .ao_square_error = (double)pieces.ao_square_error * VSHI_SQUARE_UNIT};
+                                      .ao_square_error = (double)pieces.ao_square_error * VSHI_SQUARE_UNIT,
+                                      .worst_error = pieces.worst_error};
         vshi_shade_stats_add(stats, &done);
     }
     return result;

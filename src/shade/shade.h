@@ -7,6 +7,8 @@
 #include "shade/rays.h"
 #include "trace/sampler.h"
 
+#include <stdatomic.h>
+
 /* Resolves and checks options. Errors: VSH_ERROR_ARGUMENT, naming field, value and limit. */
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
                                       vsh_error *error);
@@ -52,6 +54,13 @@ typedef struct vshi_point_rows {
  * NULL: the points are one row. */
 vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows *rows, size_t grain,
                              vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error);
+
+/* *most becomes `value` where that is larger. */
+static inline void vshi_raise(_Atomic double *most, double value) {
+    double now = *most;
+    while (value > now && !atomic_compare_exchange_weak(most, &now, value)) {
+    }
+}
 
 /* The same as a job of its own, under progress stage `stage`. `run` is a resolved one. */
 vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, const vshi_point_rows *rows,

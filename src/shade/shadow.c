@@ -171,6 +171,11 @@ vsh_result vshi_shadow_prepare(const vsh_occluders *occluders, const vsh_light *
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "method exact: the occluders have no triangles, which it traces");
     }
+    if (field->unknown && !vshi_shadow_traces(options, triangles)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "method %s: the occluders have no voxels, which it marches; exact needs none",
+                         vsh_shadow_method_name(options->method));
+    }
     const bool inner = (vsh_shadow_method_traits(options->method) & VSH_METHOD_INNER) != 0;
     *task = (vshi_shadow_task){.field = field,
                                .triangles = triangles,

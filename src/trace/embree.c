@@ -85,6 +85,8 @@ static void measure(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mes
             }
         }
     }
+    memcpy(triangles->low, low, sizeof low);
+    memcpy(triangles->high, high, sizeof high);
     double half = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         const double side = 0.5 * high[axis] - 0.5 * low[axis];

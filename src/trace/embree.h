@@ -58,6 +58,9 @@ bool vshi_triangles_have_solids(const vsh_triangles *triangles);
 /* Whether any solid or wall has holes, by which rays go in and out. */
 bool vshi_triangles_have_holes(const vsh_triangles *triangles);
 
+/* The box around all triangles, world space; min > max where there are none. */
+void vshi_triangles_bounds(const vsh_triangles *triangles, double low[3], double high[3]);
+
 /* How far off a surface rays begin, world units: above the rounding of floats, below what shows. */
 double vshi_triangles_lift(const vsh_triangles *triangles);
 

@@ -1,6 +1,8 @@
 /* Rays that tell where solids are: which side of a triangle they meet, and how often they cross one. */
 #include "trace/embree_scene.h"
 
+#include <string.h>
+
 #ifndef VSH_EMBREE
 
 void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
@@ -21,6 +23,12 @@ bool vshi_triangles_have_solids(const vsh_triangles *triangles) {
 bool vshi_triangles_have_holes(const vsh_triangles *triangles) {
     (void)triangles;
     return false;
+}
+
+void vshi_triangles_bounds(const vsh_triangles *triangles, double low[3], double high[3]) {
+    (void)triangles;
+    low[0] = low[1] = low[2] = 1.0;
+    high[0] = high[1] = high[2] = 0.0;
 }
 
 double vshi_triangles_lift(const vsh_triangles *triangles) {
@@ -184,6 +192,11 @@ bool vshi_triangles_have_solids(const vsh_triangles *triangles) {
 
 bool vshi_triangles_have_holes(const vsh_triangles *triangles) {
     return triangles->has_holes;
+}
+
+void vshi_triangles_bounds(const vsh_triangles *triangles, double low[3], double high[3]) {
+    memcpy(low, triangles->low, sizeof triangles->low);
+    memcpy(high, triangles->high, sizeof triangles->high);
 }
 
 double vshi_triangles_lift(const vsh_triangles *triangles) {

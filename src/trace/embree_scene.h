@@ -21,12 +21,13 @@ enum { VSHI_SOLID_HOLED = 4 };
 struct vsh_triangles {
     RTCDevice device;
     RTCScene scene;
-    vshi_sheet sheet; /* of all geometries one after the other, in the scene's units */
-    uint32_t *first;  /* triangle of the sheet that each geometry begins with */
-    uint8_t *solid;   /* [of the sheet]: where each one's solid lies */
-    bool has_solids;  /* any */
-    bool has_holes;   /* in any of them */
-    bool wide;        /* VSHI_PACKET rays are traced at once, not in two halves */
+    vshi_sheet sheet;       /* of all geometries one after the other, in the scene's units */
+    uint32_t *first;        /* triangle of the sheet that each geometry begins with */
+    uint8_t *solid;         /* [of the sheet]: where each one's solid lies */
+    bool has_solids;        /* any */
+    bool has_holes;         /* in any of them */
+    bool wide;              /* VSHI_PACKET rays are traced at once, not in two halves */
+    double low[3], high[3]; /* the triangles' box, world space; min > max where there are none */
     double centre[3];
     double scale;
     double size;    /* of the longest side of the triangles' box, world units */

@@ -179,6 +179,10 @@ vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *vox
     bake.options.shade = shade;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(check(lights, &bake, error));
+    if (occluders->field->unknown) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "volume: the occluders have no voxels, which tell what is inside");
+    }
     vsh_voxels_info info;
     vsh_voxels_get_info(voxels, &info);
     bake.normals = info.has_normals != 0;

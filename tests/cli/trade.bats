@@ -27,7 +27,7 @@ column() {
     done
     [ "$(head -1 trade.csv | tr ',' '\n' | wc -l)" -eq 22 ] || fail "not 22 columns"
     [ "$(awk -F, '{ print NF }' trade.csv | sort -u)" = 22 ] || fail "rows of other lengths"
-    for method in hard classic improved smooth cone rays adaptive taps cones; do
+    for method in auto hard classic improved smooth cone rays adaptive taps cones; do
         column method | grep -qx "$method" || fail "no $method"
     done
     column resolution | grep -qx 12

@@ -93,7 +93,7 @@ static void parts_that_are_none_are_refused_by_name(void **state) {
     vsh_spheres *spheres = NULL;
     assert_int_equal(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &why), VSH_OK);
     vsh_occluder_parts parts = vsh_occluder_parts_default();
-    expect_refused(&parts, "neither a field nor layers");
+    expect_refused(&parts, "neither a field nor triangles nor layers");
     parts.voxel_size = -1.0;
     expect_refused(&parts, "voxel_size");
     parts = vsh_occluder_parts_default();

@@ -130,6 +130,10 @@ static cli_stats stats_of(const vsh_scene *scene, const vsh_bake_report *report,
     stats.invalid_texels = report->invalid_texels;
     stats.resumed_rows = report->resumed_rows;
     stats.bands = report->bands;
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        const int32_t spacing = scene->receivers[i].supersample == 1 ? scene->receivers[i].ao_spacing : 1;
+        stats.ao_spacing = i == 0 || spacing < stats.ao_spacing ? spacing : stats.ao_spacing;
+    }
     stats.shade = report->shade;
     stats.errors = report->errors;
     stats.lights = scene->lights;

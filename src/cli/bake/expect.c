@@ -56,7 +56,7 @@ static bool is_traced(const vsh_scene *scene) {
            (scene->ao && scene->shade.ao_method == VSH_AO_EXACT);
 }
 
-static void expect_shape(const vsh_scene *scene, const vsh_assets *assets) {
+static void expect_shape(const vsh_scene *scene, const vsh_assets *assets, double points) {
     shape s = {.low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}};
     size_t others = 0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
@@ -71,15 +71,20 @@ static void expect_shape(const vsh_scene *scene, const vsh_assets *assets) {
     for (int axis = 0; axis < 3; ++axis) {
         longest = fmax(longest, s.high[axis] - s.low[axis]);
     }
+    const int32_t chosen = vsh_scene_resolution(scene, assets, NULL, points);
+    const int32_t resolution = chosen != VSH_RESOLUTION_NAMED ? chosen : scene->grid.resolution;
     const double voxel = scene->grid.voxel_size > 0.0 ? scene->grid.voxel_size
-                         : scene->grid.resolution > 0 ? longest / scene->grid.resolution
+                         : resolution > 0             ? longest / resolution
                                                       : longest / 256.0;
     double voxels = voxel > 0.0 ? s.area / (voxel * voxel) * band : 0.0;
-    if (others > 0 && scene->grid.resolution > 0) {
-        voxels += plain_area * band * pow(scene->grid.resolution, 2.0);
+    if (others > 0 && resolution > 0) {
+        voxels += plain_area * band * pow(resolution, 2.0);
     }
     if (is_traced(scene)) {
         cli_progress_expect("triangles", CLI_ESTIMATE_SHAPE, s.triangles * traced_s);
+    }
+    if (chosen == 0) {
+        return;
     }
     cli_progress_expect("voxelize", CLI_ESTIMATE_SHAPE, voxels * voxel_s + s.triangles * triangle_s);
     cli_progress_expect("field", CLI_ESTIMATE_SHAPE, voxels * field_voxel_s);
@@ -172,7 +177,13 @@ void cli_bake_expect(const vsh_scene *given, const vsh_bake_job *job, int32_t th
     const double used = threads > 0 ? (double)threads : cores > 0 ? (double)cores : 1.0;
     vsh_scene scene = *given;
     resolve(&scene.shade, vsh_scene_traceable(given, NULL) && vsh_triangles_available());
-    expect_shape(&scene, vsh_bake_job_assets(job));
+    double points = 0.0;
+    for (size_t i = 0; i < vsh_bake_job_count(job); ++i) {
+        vsh_job_lightmap lightmap;
+        vsh_bake_job_lightmap(job, i, &lightmap);
+        points += (double)lightmap.samples;
+    }
+    expect_shape(&scene, vsh_bake_job_assets(job), points);
     for (size_t i = 0; i < vsh_bake_job_count(job); ++i) {
         vsh_job_lightmap lightmap;
         vsh_bake_job_lightmap(job, i, &lightmap);

@@ -40,8 +40,12 @@ int cli_bake_forecast(const vsh_scene *scene, vsh_bake_job *job, const vsh_run *
     printf("texels        %" PRIu64 " in %zu lightmap%s, %" PRIu64 " samples\n", f.texels, count,
            count == 1 ? "" : "s", f.samples);
     print_bands(job);
-    printf("voxels        about %.3g of %.4g, %.4g along the longest side\n", f.voxels, f.voxel_size,
-           f.resolution);
+    if (f.voxels == 0.0) {
+        printf("voxels        none\n");
+    } else {
+        printf("voxels        about %.3g of %.4g, %.4g along the longest side\n", f.voxels, f.voxel_size,
+               f.resolution);
+    }
     printf("memory        about %s at most: level set %s, field %s\n",
            vshi_bytes_text((uint64_t)f.peak_bytes, peak, sizeof peak),
            vshi_bytes_text((uint64_t)f.grid_bytes, grid, sizeof grid),

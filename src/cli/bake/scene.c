@@ -261,21 +261,6 @@ static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
     return s->stats != NULL ? cli_bake_check_output(s, scene, s->stats) : CLI_OK;
 }
 
-/* Voxels along the longest side where rays against triangles decide every value: finer ones save fewer rays
- * than they take time, coarser ones the other way round. The assets of tools/judge-assets took 53.6 s of
- * processor with 128, 50.0 with 96 and 48.1 with 64; six larger ones 18.6, 18.6 and 19.1. */
-enum { TRACED_RESOLUTION = 96 };
-
-static void choose_voxels(vsh_scene *scene) {
-    bool marches = vsh_scene_marches(scene, NULL) != 0;
-    for (size_t i = 0; i < scene->layer_count; ++i) {
-        marches = marches || vsh_scene_marches(scene, &scene->layers[i]) != 0;
-    }
-    if (!scene->voxels_named && !marches && scene->grid.resolution > TRACED_RESOLUTION) {
-        scene->grid.resolution = TRACED_RESOLUTION;
-    }
-}
-
 /* The input, or defaults for a mesh, with what the options put over it. */
 static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scene *made) {
     memset(made, 0, sizeof *made);
@@ -299,11 +284,7 @@ static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scen
     code = code == CLI_OK ? add_lights(settings, made) : code;
     code = code == CLI_OK ? cli_bake_check_shade(settings, &made->scene) : code;
     code = code == CLI_OK && receivers ? cli_bake_check_work(settings, made) : code;
-    code = code == CLI_OK ? add_casters(settings, made) : code;
-    if (code == CLI_OK && receivers) {
-        choose_voxels(&made->scene);
-    }
-    return code;
+    return code == CLI_OK ? add_casters(settings, made) : code;
 }
 
 int cli_bake_scene_for_points(const cli_bake_settings *settings, cli_bake_scene *made) {

@@ -221,6 +221,7 @@ static int load(query_work *work) {
 static int make_query(query_work *work) {
     vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
     what.within = work->settings->within;
+    what.voxels = work->settings->distance || work->settings->gradient;
     vsh_error error;
     if (vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error) !=
         VSH_OK) {
@@ -231,7 +232,7 @@ static int make_query(query_work *work) {
     cli_stats_casters(&work->stats, work->scene, &casters);
     vsh_shade_options shade = work->scene->shade;
     if (!work->scene->ao) {
-        shade.ao_method = VSH_AO_CONES; /* not asked for: it may want triangles that are not there */
+        shade.ao_method = VSH_AO_AUTO; /* not asked for: it may want triangles that are not there */
     }
     const vsh_result result = vsh_query_create(work->occluders, work->scene->lights, work->scene->light_count,
                                                &shade, &work->query, &error);

@@ -47,8 +47,10 @@ static int load(render_work *work) {
 }
 
 static int make_occluders(render_work *work) {
+    vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
+    what.voxels = 1; /* which are seen */
     vsh_error error;
-    if (vsh_scene_occluders(work->scene, work->assets, NULL, &work->run, &work->occluders, &error) !=
+    if (vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error) !=
         VSH_OK) {
         return cli_fail_of(NULL, &error);
     }

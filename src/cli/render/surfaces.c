@@ -107,8 +107,10 @@ typedef struct split {
 /* Makes the fields of the groups, each of which is a layer. */
 static int make_own(const vsh_scene *colored, const vsh_assets *assets, const vsh_run *run, const split *p,
                     render_surfaces *s) {
+    vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
+    what.voxels = 1; /* which are seen */
     vsh_error error;
-    if (vsh_scene_occluders(colored, assets, NULL, run, &s->own, &error) != VSH_OK) {
+    if (vsh_scene_occluders(colored, assets, &what, run, &s->own, &error) != VSH_OK) {
         return cli_fail_of(NULL, &error);
     }
     vsh_occluder_parts own;

@@ -43,22 +43,33 @@ static void find_box(const trade_work *work, double min[3], double max[3]) {
     }
 }
 
-int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds) {
+/* A scene's, with its triangles and as many voxels as pay for its receivers, or (`voxels`) its voxels alone.
+ */
+static int make_occluders(const trade_work *work, const vsh_scene *scene, int32_t voxels,
+                          vsh_occluders **occluders, double *seconds) {
     const double start = trade_now(work);
-    vsh_scene scene = *work->scene;
-    scene.grid.resolution = resolution;
-    scene.grid.voxel_size = 0.0;
     double min[3], max[3];
     find_box(work, min, max);
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
     options.receivers_min = min;
     options.receivers_max = max;
-    options.triangles = 0; /* the same for all resolutions */
+    options.voxels = voxels;
+    options.triangles = voxels == 0; /* else the same for all resolutions */
+    for (size_t r = 0; r < work->receiver_count; ++r) {
+        options.points += (double)work->receivers[r].info.samples;
+    }
     vsh_error error;
     const vsh_result result =
-        vsh_scene_occluders(&scene, work->assets, &options, &work->run, occluders, &error);
+        vsh_scene_occluders(scene, work->assets, &options, &work->run, occluders, &error);
     *seconds = trade_now(work) - start;
     return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+}
+
+int trade_make_occluders(trade_work *work, int32_t resolution, vsh_occluders **occluders, double *seconds) {
+    vsh_scene scene = *work->scene;
+    scene.grid.resolution = resolution;
+    scene.grid.voxel_size = 0.0;
+    return make_occluders(work, &scene, 1, occluders, seconds);
 }
 
 int trade_add_triangles(const trade_work *work, trade_field *field) {
@@ -241,11 +252,67 @@ done:
     return code;
 }
 
-/* The first plans of all come first, on every field: where the budget ends, it is the dear ones that are
- * missing. */
+/* What `bake` makes of an error with nothing else said: what casts is made for each, as it depends on it. */
+static int run_auto(trade_work *work, trade_subject *subject, double max_error) {
+    trade_run run = {.method = "auto"};
+    vsh_scene scene = *work->scene;
+    scene.ao = subject->ao ? scene.ao : 0;
+    scene.light_count = subject->ao ? 0 : scene.light_count;
+    scene.shade.method = VSH_SHADOW_AUTO;
+    scene.shade.ao_method = VSH_AO_AUTO;
+    scene.shade.max_error = max_error;
+    scene.shade.rays = 0;
+    if (trade_left(work) < expected(subject, &run, false)) {
+        ++work->skipped;
+        return CLI_OK;
+    }
+    snprintf(run.options, sizeof run.options, "--max-error %g", max_error);
+    vsh_occluders *occluders = NULL;
+    uint8_t *mask = calloc(work->texels, 1);
+    float *coverage = calloc(work->texels, sizeof *coverage);
+    run.values = calloc(subject->planes * work->texels, sizeof *run.values);
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    int code = CLI_OK;
+    if (mask == NULL || coverage == NULL || run.values == NULL) {
+        code = cli_out_of_memory("values");
+        goto done;
+    }
+    CLI_TRY_DONE(make_occluders(work, &scene, 0, &occluders, &run.build_s));
+    CLI_TRY_DONE(trade_bake(work, occluders, &scene.shade, NULL, NULL, coverage, NULL));
+    for (size_t i = 0; i < work->texels; ++i) {
+        run.valid += coverage[i] > 0.0f;
+        mask[i] = coverage[i] > 0.0f && work->any[i]; /* where the truth was looked for */
+    }
+    vsh_occluders_info info;
+    vsh_occluders_get_info(occluders, &info);
+    run.bytes = info.field_bytes + info.triangles_bytes;
+    CLI_TRY_DONE(bake(work, subject, occluders, &scene.shade, &run, &stats));
+    run.certified = NAN;
+    CLI_TRY_DONE(trade_compare(work, subject, mask, &run));
+    if (trade_add(work, subject, &run) == NULL) {
+        code = cli_out_of_memory("runs");
+        goto done;
+    }
+    run.values = NULL;
+done:
+    vsh_occluders_free(occluders);
+    free(run.values);
+    free(coverage);
+    free(mask);
+    return code;
+}
+
+/* auto first, then the first plans of all, on every field: where the budget ends, it is the dear ones that
+ * are missing. */
 int trade_measure(trade_work *work) {
     static const size_t shadow_count = sizeof shadow_plans / sizeof shadow_plans[0];
     static const size_t ao_count = sizeof ao_plans / sizeof ao_plans[0];
+    static const double errors[] = {0.05, 0.02, 0.01, 0.005};
+    for (size_t i = 0; i < sizeof errors / sizeof errors[0]; ++i) {
+        for (size_t s = 0; s < work->subject_count; ++s) {
+            CLI_TRY(run_auto(work, &work->subjects[s], errors[i]));
+        }
+    }
     for (size_t i = 0; i < shadow_count || i < ao_count; ++i) {
         for (size_t s = 0; s < work->subject_count; ++s) {
             trade_subject *subject = &work->subjects[s];

@@ -19,7 +19,7 @@ static const struct {
 } colors[] = {
     {"hard", "#999999"},     {"taps", "#999999"},  {"classic", "#cc79a7"}, {"improved", "#aa4499"},
     {"smooth", "#e69f00"},   {"cone", "#d55e00"},  {"cones", "#d55e00"},   {"rays", "#56b4e9"},
-    {"adaptive", "#009e73"}, {"exact", "#0072b2"}, {"embree", "#000000"},
+    {"adaptive", "#009e73"}, {"exact", "#0072b2"}, {"auto", "#f0e442"},    {"embree", "#000000"},
 };
 enum { COLOR_COUNT = sizeof colors / sizeof colors[0] };
 

@@ -32,7 +32,7 @@ typedef struct trade_receiver {
 typedef struct trade_run {
     const char *method;
     char options[128];  /* as `bake` takes them */
-    int32_t resolution; /* 0: no voxels */
+    int32_t resolution; /* 0: no voxels, or those that auto takes */
     bool embree;        /* rays alone, no cone before them */
     bool front;         /* nothing is both faster and nearer to the truth */
     double build_s;

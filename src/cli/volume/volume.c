@@ -226,6 +226,7 @@ static int make_occluders(volume_work *work) {
     vsh_scene_occluders_options what = vsh_scene_occluders_options_default();
     what.receivers_min = info.bounds_min;
     what.receivers_max = info.bounds_max;
+    what.voxels = 1; /* whose slopes are normals, and whose insides are filled */
     what.grid = work->scene->layer_count == 0 ? work->grid : NULL;
     vsh_error error;
     if (vsh_scene_occluders(work->scene, work->assets, &what, &work->run, &work->occluders, &error) !=

@@ -1,0 +1,283 @@
+/* Voxels that nobody named: how many are made of what, and what casts without any. */
+#include "fields.h"
+#include "scenes.h"
+
+#include <vdbshade/vdbshade.h>
+
+enum { POINTS = 400 };
+
+static vsh_error why;
+
+/* A plate of 2 × 2, 0.2 thick, whose top is at y = 1. */
+static vsh_mesh plate(void) {
+    static const float positions[] = {-1, 1,    -1, 1, 1,    -1, 1, 1,    1, -1, 1,    1,
+                                      -1, 0.8f, -1, 1, 0.8f, -1, 1, 0.8f, 1, -1, 0.8f, 1};
+    static const uint32_t indices[] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
+                                       1, 2, 6, 1, 6, 5, 2, 3, 7, 2, 7, 6, 3, 0, 4, 3, 4, 7};
+    return (vsh_mesh){.positions = positions, .vertex_count = 8, .indices = indices, .triangle_count = 12};
+}
+
+static vsh_occluders *plate_of(int32_t resolution) {
+    const vsh_mesh mesh = plate();
+    vsh_occluders_options options = vsh_occluders_options_default();
+    options.grid.resolution = resolution;
+    vsh_occluders *made = NULL;
+    assert_int_equal(vsh_occluders_create(&mesh, 1, resolution > 0 ? &options : NULL, NULL, &made, &why),
+                     VSH_OK);
+    return made;
+}
+
+/* Below and beside the plate, looking up. */
+static void scatter(double positions[POINTS][3], float normals[POINTS][3]) {
+    uint64_t counter = 3;
+    for (int i = 0; i < POINTS; ++i) {
+        positions[i][0] = between(&counter, -2, 2);
+        positions[i][1] = between(&counter, -1, 0.7);
+        positions[i][2] = between(&counter, -2, 2);
+        normals[i][0] = normals[i][2] = 0.0f;
+        normals[i][1] = 1.0f;
+    }
+}
+
+static void skip_without_embree(void) {
+    if (!vsh_triangles_available()) {
+        skip();
+    }
+}
+
+/* --- casters without voxels */
+
+static void triangles_alone_give_shadows_within_the_error_of_the_truth(void **state) {
+    (void)state;
+    skip_without_embree();
+    vsh_occluders *made = plate_of(0);
+    vsh_occluders_info info;
+    vsh_occluders_get_info(made, &info);
+    assert_true(info.voxel_size == 0.0 && info.field_bytes == 0 && info.levels == 0 && info.has_triangles);
+    double positions[POINTS][3];
+    float normals[POINTS][3], lit[POINTS], truth[POINTS];
+    scatter(positions, normals);
+    const vsh_points points = {POINTS, positions[0], normals[0], NULL};
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(made, &parts);
+    for (int lamp = 0; lamp < 2; ++lamp) {
+        vsh_light light = vsh_light_default();
+        light.angle = 0.3;
+        if (lamp) {
+            light.type = VSH_LIGHT_SPHERE;
+            light.position[1] = 3.0;
+            light.radius = 0.4;
+        }
+        vsh_shade_options options = vsh_shade_options_default();
+        vsh_shade_stats stats = vsh_shade_stats_zero();
+        assert_int_equal(vsh_shade_shadow(made, &points, &light, &options, NULL, lit, NULL, &stats, &why),
+                         VSH_OK);
+        assert_true(stats.samples == 0 && stats.marches == 0 && stats.rays > 0);
+        assert_int_equal(vsh_trace_shadow(parts.triangles, NULL, POINTS, positions[0], normals[0], 1e-6,
+                                          &light, 4096, NULL, truth, &why),
+                         VSH_OK);
+        double square = 0.0;
+        int between_both = 0;
+        for (int i = 0; i < POINTS; ++i) {
+            square += pow((double)lit[i] - (double)truth[i], 2.0);
+            between_both += truth[i] > 0.05f && truth[i] < 0.95f;
+        }
+        assert_true(between_both > 20);
+        assert_true(sqrt(square / POINTS) < options.max_error);
+    }
+    vsh_occluders_free(made);
+}
+
+static void ao_by_rays_has_the_bits_that_it_has_with_voxels(void **state) {
+    (void)state;
+    skip_without_embree();
+    double positions[POINTS][3];
+    float normals[POINTS][3], ao[2][POINTS];
+    scatter(positions, normals);
+    const vsh_points points = {POINTS, positions[0], normals[0], NULL};
+    for (int voxels = 0; voxels < 2; ++voxels) {
+        vsh_occluders *made = plate_of(voxels ? 64 : 0);
+        assert_int_equal(vsh_shade_ao(made, &points, NULL, NULL, ao[voxels], NULL, NULL, NULL, &why), VSH_OK);
+        vsh_occluders_free(made);
+    }
+    assert_memory_equal(ao[0], ao[1], sizeof ao[0]);
+}
+
+static void what_needs_voxels_is_refused_without_them(void **state) {
+    (void)state;
+    skip_without_embree();
+    vsh_occluders *made = plate_of(0);
+    const double at[3] = {0.0, 0.0, 0.0};
+    const float up[3] = {0.0f, 1.0f, 0.0f};
+    const vsh_points points = {1, at, up, NULL};
+    const vsh_light light = vsh_light_default();
+    float value;
+    for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_AUTO; ++method) {
+        vsh_shade_options options = vsh_shade_options_default();
+        options.method = method;
+        const bool traced = method >= VSH_SHADOW_EXACT;
+        assert_int_equal(vsh_shade_shadow(made, &points, &light, &options, NULL, &value, NULL, NULL, &why),
+                         traced ? VSH_OK : VSH_ERROR_ARGUMENT);
+        assert_true(traced || strstr(why.message, "have no voxels") != NULL);
+    }
+    for (int32_t method = VSH_AO_TAPS; method <= VSH_AO_AUTO; ++method) {
+        vsh_shade_options options = vsh_shade_options_default();
+        options.ao_method = method;
+        assert_int_equal(vsh_shade_ao(made, &points, &options, NULL, &value, NULL, NULL, NULL, &why),
+                         method >= VSH_AO_EXACT ? VSH_OK : VSH_ERROR_ARGUMENT);
+    }
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(made, &parts);
+    vsh_field_sample(parts.field, 1, at, &value);
+    assert_true(isnan(value));
+    vsh_query *query = NULL;
+    assert_int_equal(vsh_query_create(made, &light, 1, NULL, &query, &why), VSH_OK);
+    vsh_query_output output = vsh_query_output_default();
+    output.distance = &value;
+    assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, &why), VSH_ERROR_ARGUMENT);
+    vsh_query_free(query);
+    vsh_occluders_free(made);
+}
+
+static void parts_of_triangles_alone_cast(void **state) {
+    (void)state;
+    skip_without_embree();
+    const vsh_mesh mesh = plate();
+    vsh_triangles *triangles = NULL;
+    assert_int_equal(vsh_triangles_create(&mesh, 1, NULL, &triangles, &why), VSH_OK);
+    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    parts.triangles = triangles;
+    vsh_occluders *made = NULL;
+    assert_int_equal(vsh_occluders_from_parts(&parts, &made, &why), VSH_OK);
+    const double at[2][3] = {{0.0, 0.0, 0.0}, {3.0, 0.0, 0.0}};
+    const vsh_points points = {2, at[0], NULL, NULL};
+    const vsh_light light = vsh_light_default();
+    float lit[2];
+    assert_int_equal(vsh_shade_shadow(made, &points, &light, NULL, NULL, lit, NULL, NULL, &why), VSH_OK);
+    assert_true(lit[0] == 0.0f && lit[1] == 1.0f);
+    vsh_occluders_free(made);
+    vsh_triangles_free(triangles);
+}
+
+/* Shadows of a scene of the thin asset, in a layer of its own or in none, and the truth; returns what fields
+ * take. */
+static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]) {
+    char text[1024];
+    snprintf(text, sizeof text,
+             "{\"casters\": [{\"mesh\": \"" VSH_ASSETS "/thin.glb\"%s}], \"layers\": [{\"name\": \"thin\"}], "
+             "\"lights\": [{\"name\": \"sun\", \"type\": \"directional\", \"direction\": [0.6, 0.75, 0.5], "
+             "\"angle_deg\": 5}], \"receivers\": []}",
+             layered ? ", \"layer\": \"thin\"" : "");
+    vsh_scene *scene = parse("/scene.json", text);
+    vsh_assets *assets = NULL;
+    vsh_occluders *made = NULL;
+    assert_int_equal(vsh_assets_load(scene, NULL, &assets, &why), VSH_OK);
+    assert_int_equal(vsh_scene_occluders(scene, assets, NULL, NULL, &made, &why), VSH_OK);
+    vsh_occluders_info info;
+    vsh_occluders_get_info(made, &info);
+    assert_int_equal(info.layer_count, layered ? 1 : 0);
+    double positions[POINTS][3];
+    float normals[POINTS][3];
+    scatter(positions, normals);
+    const vsh_points points = {POINTS, positions[0], normals[0], NULL};
+    assert_int_equal(vsh_shade_shadow(made, &points, &scene->lights[0], NULL, NULL, lit, NULL, NULL, &why),
+                     VSH_OK);
+    vsh_triangles *triangles = NULL;
+    vsh_solids *solids = NULL;
+    assert_int_equal(vsh_scene_truth(scene, assets, NULL, &triangles, &solids, &why), VSH_OK);
+    assert_int_equal(vsh_trace_shadow(triangles, solids, POINTS, positions[0], normals[0], 1e-6,
+                                      &scene->lights[0], 1024, NULL, truth, &why),
+                     VSH_OK);
+    vsh_triangles_free(triangles);
+    vsh_occluders_free(made);
+    vsh_assets_free(assets);
+    vsh_scene_free(scene);
+    return info.field_bytes;
+}
+
+static void scenes_and_layers_without_voxels_cast_as_the_truth_says(void **state) {
+    (void)state;
+    skip_without_embree();
+    for (int layered = 0; layered < 2; ++layered) {
+        float lit[POINTS], truth[POINTS];
+        assert_true(shade_scene(layered != 0, lit, truth) == 0);
+        double square = 0.0;
+        int dark = 0;
+        for (int i = 0; i < POINTS; ++i) {
+            square += pow((double)lit[i] - (double)truth[i], 2.0);
+            dark += truth[i] < 0.5f;
+        }
+        assert_true(dark > 20 && dark < POINTS - 20);
+        assert_true(sqrt(square / POINTS) < 0.02);
+    }
+}
+
+/* --- what is chosen */
+
+static int32_t chosen(const char *more, const char *casters, double points) {
+    char text[2048];
+    snprintf(text, sizeof text, "{\"casters\": [%s], \"receivers\": []%s}", casters, more);
+    vsh_scene *scene = parse("/scene.json", text);
+    vsh_assets *assets = NULL;
+    assert_int_equal(vsh_assets_load(scene, NULL, &assets, &why), VSH_OK);
+    const int32_t resolution = vsh_scene_resolution(scene, assets, NULL, points);
+    vsh_assets_free(assets);
+    vsh_scene_free(scene);
+    return resolution;
+}
+
+#define MESH "{\"mesh\": \"" VSH_ASSETS "/thin.glb\"}"
+#define BALL "{\"sdf\": {\"shape\": \"sphere\", \"radius\": 1}}"
+#define SUN                                                                                                  \
+    ", \"lights\": [{\"name\": \"sun\", \"type\": \"directional\", \"direction\": [0, 1, 0], "               \
+    "\"angle_deg\": 5}]"
+#define AO ", \"ao\": {\"distance\": 0.6}"
+
+static void traced_casters_get_voxels_only_where_shadows_pay_for_them(void **state) {
+    (void)state;
+    skip_without_embree();
+    assert_int_equal(chosen(AO, MESH, 1e9), 0);
+    assert_int_equal(chosen(SUN AO, MESH, 0.0), 0);
+    assert_int_equal(chosen(SUN AO, MESH, 64.0 * 64.0), 0);
+    int32_t last = 0;
+    for (double points = 1e4; points < 1e10; points *= 10.0) {
+        const int32_t now = chosen(SUN, MESH, points);
+        assert_true(now >= last);
+        assert_true(chosen(SUN ", \"max_error\": 0.002", MESH, points) >= now);
+        last = now;
+    }
+    assert_true(last >= 96);
+}
+
+static void shapes_get_as_many_as_their_error_asks_for(void **state) {
+    (void)state;
+    assert_int_equal(chosen(SUN, BALL, 1e6), 200);
+    assert_int_equal(chosen(SUN ", \"max_error\": 0.01", BALL, 1e6), 400);
+    assert_int_equal(chosen(SUN ", \"max_error\": 0.05", BALL, 1e6), 128);
+    assert_int_equal(chosen(SUN ", \"max_error\": 0.0001", BALL, 1e6), 1024);
+    assert_int_equal(chosen(AO ", \"max_error\": 0.005", BALL, 1e6), 240);
+    assert_int_equal(chosen(SUN ", \"method\": \"cone\"", BALL, 1e6), 256);
+}
+
+static void what_is_named_stays_as_it_is(void **state) {
+    (void)state;
+    assert_int_equal(chosen(SUN ", \"resolution\": 64", MESH, 1.0), VSH_RESOLUTION_NAMED);
+    assert_int_equal(chosen(SUN ", \"resolution\": 256", MESH, 1.0), VSH_RESOLUTION_NAMED);
+    assert_int_equal(chosen(SUN ", \"voxel_size\": 0.5", BALL, 1.0), VSH_RESOLUTION_NAMED);
+    assert_int_equal(chosen(SUN ", \"method\": \"cone\"", MESH, 1.0), 256);
+    assert_int_equal(chosen(SUN ", \"method\": \"adaptive\"", MESH, 1.0), 256);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(triangles_alone_give_shadows_within_the_error_of_the_truth),
+        cmocka_unit_test(ao_by_rays_has_the_bits_that_it_has_with_voxels),
+        cmocka_unit_test(what_needs_voxels_is_refused_without_them),
+        cmocka_unit_test(parts_of_triangles_alone_cast),
+        cmocka_unit_test(scenes_and_layers_without_voxels_cast_as_the_truth_says),
+        cmocka_unit_test(traced_casters_get_voxels_only_where_shadows_pay_for_them),
+        cmocka_unit_test(shapes_get_as_many_as_their_error_asks_for),
+        cmocka_unit_test(what_is_named_stays_as_it_is),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
