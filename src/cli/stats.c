@@ -352,8 +352,8 @@ static void say_choice(const cli_stats *stats) {
     }
     const cli_method *ao = &stats->methods[CLI_STATS_AO];
     if (ao->name != NULL && stats->ao_spacing > 1) {
-        snprintf(spacing, sizeof spacing, ao->traces ? ", those of AO shared by texels" : ", AO every %d texels",
-                 stats->ao_spacing);
+        snprintf(spacing, sizeof spacing,
+                 ao->traces ? ", those of AO shared by texels" : ", AO every %d texels", stats->ao_spacing);
     }
     cli_say("%s; %s%s%s", methods, voxels, rays, spacing);
 }

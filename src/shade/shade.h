@@ -55,6 +55,12 @@ typedef struct vshi_point_rows {
 vsh_result vshi_shade_pieces(vshi_job *job, size_t count, const vshi_point_rows *rows, size_t grain,
                              vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error);
 
+/* A value's estimated error. */
+static inline void vshi_stats_add_error(vsh_shade_stats *stats, double error) {
+    stats->square_error += error * error;
+    stats->worst_error = error > stats->worst_error ? error : stats->worst_error;
+}
+
 /* *most becomes `value` where that is larger. */
 static inline void vshi_raise(_Atomic double *most, double value) {
     double now = *most;

@@ -341,8 +341,7 @@ static void cast_rounds(ray_batch *batch, const size_t *some, size_t count) {
 
 static void settle(ray_batch *batch, size_t point, float value, float deviation) {
     vshi_shadow_settle(batch->task, point, value, deviation);
-    batch->stats->square_error += (double)deviation * (double)deviation;
-    batch->stats->worst_error = fmax(batch->stats->worst_error, (double)deviation);
+    vshi_stats_add_error(batch->stats, (double)deviation);
 }
 
 /* What is said of a point whose rays were cast. Down to VSHI_COARSE rays end by deviation_of(), which knows
