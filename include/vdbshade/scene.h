@@ -224,11 +224,13 @@ typedef struct vsh_scene_occluders_options {
                              keeps an error, nothing is in layers and rays can meet all casters */
     int32_t silent_voxels; /* nonzero: nothing is warned of what voxels make of the casters, or lose of them:
                               a trial at voxels other than those that are meant */
+    double samples; /* points that will be shaded: where adaptive casts rays enough on a field for it, its
+                       surface is extracted for them (vsh_field_options.surface). 0: not known, none is */
 } vsh_scene_occluders_options;
 
 static inline vsh_scene_occluders_options vsh_scene_occluders_options_default(void) {
     vsh_scene_occluders_options options = {
-        sizeof(vsh_scene_occluders_options), NULL, NULL, 0.0, NULL, 1, 0, 0};
+        sizeof(vsh_scene_occluders_options), NULL, NULL, 0.0, NULL, 1, 0, 0, 0.0};
     return options;
 }
 

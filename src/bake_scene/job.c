@@ -252,6 +252,9 @@ vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error
     options.receivers_min = job->receivers[0];
     options.receivers_max = job->receivers[1];
     options.truth = 1;
+    for (size_t i = 0; i < job->targets.count; ++i) {
+        options.samples += (double)job->lightmaps[i].samples;
+    }
     VSHI_TRY(vsh_scene_occluders(&job->scene, job->assets, &options, run, &job->occluders, error));
     vsh_occluders_get_info(job->occluders, &job->report.occluders);
     const size_t count = job->scene.light_count + 2;

@@ -33,6 +33,7 @@ typedef struct open_point {
     vshi_light_view view;    /* of a shape: from the point itself, */
     vshi_vec off;            /* from which rays begin so far off, in the rays' space */
     double end;
+    bool traced; /* its rays, against triangles or the field's surface; else they are marched */
     int32_t lit, taken;
     double deviation;
 } open_point;
@@ -44,6 +45,7 @@ typedef struct ray_batch {
     vshi_chunk chunk;
     vshi_segment_ray traced[VSHI_CHUNK];
     bool blocked[VSHI_CHUNK];
+    uint16_t traced_owner[VSHI_CHUNK];
     size_t traced_count;
     bool shared; /* points share their rays */
     vsh_shade_stats *stats;
@@ -65,9 +67,11 @@ static void flush(ray_batch *batch) {
     }
     vshi_chunk_clear(&batch->chunk);
     if (batch->traced_count > 0) {
-        vshi_triangles_blocked(task->triangles, batch->traced, batch->traced_count, batch->blocked);
+        const bool exact = task->options->method == VSH_SHADOW_EXACT;
+        vshi_triangles_blocked(exact ? task->triangles : task->field->surface, batch->traced,
+                               batch->traced_count, batch->blocked);
         for (size_t r = 0; r < batch->traced_count; ++r) {
-            batch->open[batch->chunk.owner[r]].lit += !batch->blocked[r];
+            batch->open[batch->traced_owner[r]].lit += !batch->blocked[r];
         }
         batch->traced_count = 0;
     }
@@ -141,10 +145,11 @@ static void cast(ray_batch *batch, size_t owner, int32_t target) {
             if (batch->chunk.rays.count == VSHI_CHUNK || batch->traced_count == VSHI_CHUNK) {
                 flush(batch);
             }
-            if (task->options->method == VSH_SHADOW_EXACT) {
+            if (p->traced) {
+                const vshi_vec from = task->options->method == VSH_SHADOW_EXACT ? p->start : p->origin;
                 batch->traced[batch->traced_count] = (vshi_segment_ray){
-                    .origin = {p->start.x, p->start.y, p->start.z}, .direction = {d.x, d.y, d.z}, .far = end};
-                batch->chunk.owner[batch->traced_count++] = (uint32_t)owner;
+                    .origin = {from.x, from.y, from.z}, .direction = {d.x, d.y, d.z}, .far = end};
+                batch->traced_owner[batch->traced_count++] = (uint16_t)owner;
                 continue;
             }
             const vshi_cone ray = {
@@ -152,19 +157,6 @@ static void cast(ray_batch *batch, size_t owner, int32_t target) {
             p->lit += !vshi_chunk_add(&batch->chunk, task->field, &ray, (uint32_t)owner, batch->stats);
         }
     }
-}
-
-/* Where the neighbours' share is taken for a point's, errors come out larger by so much: measured on the
- * seeds' floor, where the estimate is right by it to a tenth. */
-static const double BORROWED = 1.2;
-
-static double spread_of(int32_t sampler, int32_t rays) {
-    return BORROWED * vshi_rays_deviation(sampler, rays / 2, rays, 0.5);
-}
-
-int32_t vshi_shadow_most_rays(const vsh_shade_options *options) {
-    const bool keeps_error = (vsh_shadow_method_traits(options->method) & VSH_METHOD_KEEPS_ERROR) != 0;
-    return vshi_shade_most_rays(options, spread_of, keeps_error);
 }
 
 /* What the rays of the points around an open point say of it: how many are lit, of how many. */
@@ -194,7 +186,7 @@ static double deviation_of(const ray_batch *batch, size_t owner) {
     const around a = look_around(batch, owner);
     const double deviation =
         vshi_rays_deviation(batch->task->options->sampler, p->lit, p->taken, (a.lit + 1.0) / (a.taken + 2.0));
-    return a.taken > 0.0 ? BORROWED * deviation : deviation;
+    return a.taken > 0.0 ? VSHI_BORROWED * deviation : deviation;
 }
 
 /* The same, as it is said, and as errors below VSHI_COARSE are kept: the other leaves more unseen at the ends
@@ -427,6 +419,9 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
         vshi_frame(cone->direction, &p->u, &p->v);
         p->u = vshi_scale(p->u, tangent);
         p->v = vshi_scale(p->v, tangent);
+        p->traced =
+            task->options->method == VSH_SHADOW_EXACT ||
+            (task->options->method == VSH_SHADOW_ADAPTIVE && vshi_shade_traces(task->field, p->origin));
         if (task->options->method == VSH_SHADOW_EXACT) {
             turn_to_world(task, p);
         }

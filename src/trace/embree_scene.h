@@ -26,6 +26,8 @@ struct vsh_triangles {
     uint8_t *solid;   /* [of the sheet]: where each one's solid lies */
     bool has_solids;  /* any */
     bool has_holes;   /* in any of them */
+    bool fine; /* a surface's quads, smaller than what lies between rays that go together: traced one by
+                * one these are a quarter faster */
     double centre[3];
     double scale;
     double size;    /* of the longest side of the triangles' box, world units */
