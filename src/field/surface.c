@@ -296,7 +296,10 @@ static vsh_result write(void *user, const double centre[3], double scale, float 
 vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job *job, vsh_error *error) {
     vshi_surface surface;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_surface_find(field, VSHI_GROWN, budget, job, &surface, error));
+    result = vshi_surface_find(field, VSHI_GROWN, budget, job, &surface, error);
+    if (result != VSH_OK || surface.quads[surface.brick_count] == 0) { /* of parts too thin for it: none */
+        goto done;
+    }
     writing w = {&surface, job};
     vshi_quads quads = {.corner_count = surface.corners[surface.brick_count],
                         .quad_count = surface.quads[surface.brick_count],

@@ -29,8 +29,8 @@ void vshi_surface_free(vshi_surface *surface);
 vsh_result vshi_surface_write(vshi_surface *surface, const double centre[3], double scale, vshi_job *job,
                               float *corners, uint32_t *quads, vsh_error *error);
 
-/* Finds the surface and makes it field->surface, for rays. `budget` counts all that is held but it. Errors:
- * also VSH_ERROR_UNSUPPORTED without Embree. */
+/* Finds the surface and makes it field->surface, for rays; NULL where the field reads nothing so low.
+ * `budget` counts all that is held but it. Errors: also VSH_ERROR_UNSUPPORTED without Embree. */
 vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job *job, vsh_error *error);
 
 /* Whether a place of field space is outside of field->surface for certain: farther from it than a quad may be

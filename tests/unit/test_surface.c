@@ -290,6 +290,20 @@ static void traced_values_are_near_those_of_marched_rays(void **state) {
     vsh_field_free(traced);
 }
 
+/* Between two lattice planes, which read half a voxel. */
+static void plate_that_voxels_lose_has_no_surface(void **state) {
+    (void)state;
+    const truth_solid plate = {.shape = TRUTH_BOX,
+                               .center = {0.0, 0.5 * VOXEL, 0.0},
+                               .half = {10.0 * VOXEL, 0.05 * VOXEL, 10.0 * VOXEL}};
+    vsh_grid *grid = grid_of((truth_scene){&plate, 1}, VOXEL);
+    vsh_field *field = NULL;
+    assert_int_equal(make(grid, NULL, &field, NULL), VSH_OK);
+    assert_null(field->surface);
+    vsh_field_free(field);
+    vsh_grid_free(grid);
+}
+
 static int32_t cancel_surface(void *user, const char *stage, double fraction) {
     (void)stage;
     return fraction > *(const double *)user;
@@ -329,6 +343,7 @@ int main(void) {
         cmocka_unit_test(corners_lie_on_the_sphere),
         cmocka_unit_test(rays_meet_what_the_cells_read),
         cmocka_unit_test(traced_values_are_near_those_of_marched_rays),
+        cmocka_unit_test(plate_that_voxels_lose_has_no_surface),
         cmocka_unit_test(surface_keeps_the_limit_and_ends_when_asked),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
