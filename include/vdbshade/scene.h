@@ -234,7 +234,8 @@ typedef struct vsh_scene_occluders_options {
                               a trial at voxels other than those that are meant */
     int32_t voxels; /* nonzero: voxels in any case, as many as scene->grid or a layer says: for distances, and
                        for other methods than the scene's. 0: those of vsh_scene_resolution() */
-    double points;  /* that are to be shaded; 0: not known, or few */
+    double points; /* that are to be shaded; 0: not known, or few. Where adaptive casts rays enough on a field
+                      for it, its surface is extracted for them (vsh_field_options.surface) */
 } vsh_scene_occluders_options;
 
 static inline vsh_scene_occluders_options vsh_scene_occluders_options_default(void) {

@@ -29,7 +29,10 @@ bool vshi_baking_traces_ao(const vshi_baking *bake) {
 }
 
 bool vshi_baking_shares(const vshi_baking *bake) {
-    return vshi_baking_interpolates(bake) && vshi_baking_traces_ao(bake);
+    const vsh_occluders *occluders = bake->occluders;
+    const int32_t method = vsh_ao_method_resolve(bake->shade.ao_method, occluders->triangles != NULL);
+    return vshi_baking_interpolates(bake) &&
+           (method == VSH_AO_EXACT || (method == VSH_AO_ADAPTIVE && occluders->field->surface != NULL));
 }
 
 /* Where rays begin: lifted already, but for methods that trace triangles. Those know the surface better than

@@ -13,6 +13,7 @@
 #include "mesh/mesh_set.h"
 #include "shade/layers.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -377,8 +378,8 @@ double vshi_bake_bytes(const vshi_bake_need *need) {
     sample += (double)floats * sizeof(float);
     return need->samples * sample +
            need->texels * (1.0 + VSHI_PADDING_TEXEL_BYTES + VSHI_SPREAD_TEXEL_BYTES) +
-           (need->lattice ? vshi_lattice_bytes(need->samples, need->texels, need->bent) : 0.0) +
-           (need->windows ? vshi_ao_texels_bytes(need->samples, need->threads, need->bent) : 0.0);
+           fmax(need->lattice ? vshi_lattice_bytes(need->samples, need->texels, need->bent) : 0.0,
+                need->windows ? vshi_ao_texels_bytes(need->samples, need->threads, need->bent) : 0.0);
 }
 
 /* Floats a texel of all planes that are there. */
@@ -403,6 +404,7 @@ uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int3
     vsh_shade_options shade = charts->shade;
     shade.method = vsh_shadow_method_resolve(shade.method, 1); /* the triangles may not be there yet */
     shade.ao_method = vsh_ao_method_resolve(shade.ao_method, 1);
+    const bool keeps_error = (vsh_ao_method_traits(shade.ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
     vshi_bake_need need = {.texels = width * band.rows,
                            .traced = vshi_shadow_traces(&shade, NULL) || vshi_ao_traces(&shade, NULL),
                            .values = true,
@@ -411,7 +413,7 @@ uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int3
                            .bent = lightmap->bent != NULL,
                            .tint = lightmap->tint != NULL,
                            .lattice = charts->ao_spacing > 1 && !vshi_ao_traces(&shade, NULL),
-                           .windows = charts->ao_spacing > 1 && vshi_ao_traces(&shade, NULL)};
+                           .windows = charts->ao_spacing > 1 && keeps_error};
     for (size_t row = band.held_begin; row < band.held_end; ++row) {
         need.samples += (double)charts->rows[row].samples;
     }

@@ -3,7 +3,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/try.h"
-#include "field/level.h"
+#include "field/surface.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -19,6 +19,7 @@ void vsh_field_free(vsh_field *field) {
     if (field == NULL) {
         return;
     }
+    vsh_triangles_free(field->surface);
     free(field->values);
     free(field->index);
     free(field);
@@ -132,6 +133,10 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     const double reach = o.reach > 0.0 ? o.reach / f->voxel_size : DEFAULT_REACH * sqrt(diagonal);
     vshi_job_advance(job, 40);
     VSHI_TRY_DONE(derive_levels(f, reach, (double)info.bytes, &r, job, &below, error));
+    if (o.surface != 0 && vsh_triangles_available()) {
+        const vshi_budget budget = {&r, (double)info.bytes + vshi_field_bytes(f)};
+        VSHI_TRY_DONE(vshi_field_add_surface(f, budget, job, error));
+    }
     *field = f;
     f = NULL;
 done:
@@ -204,7 +209,8 @@ void vsh_field_get_info_sized(const vsh_field *field, vsh_field_info *info, size
         .shell_thickness = field->shell_thickness,
         .levels = field->level_count,
         .bricks = bricks,
-        .bytes = (uint64_t)vshi_field_bytes(field),
+        .bytes = (uint64_t)vshi_field_bytes(field) +
+                 (field->surface != NULL ? vsh_triangles_bytes(field->surface) : 0),
         .active_voxels = field->active_voxels,
     };
     memcpy(found.bounds_min, field->world_min, sizeof found.bounds_min);

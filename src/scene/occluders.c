@@ -51,6 +51,14 @@ static double reach_of(const making *m, const vsh_grid *grid) {
     return reach > WITHIN * diagonal ? reach : vsh_field_options_default().reach;
 }
 
+/* Whether enough rays are cast on a field for its surface: to make it takes as long as two rays an active
+ * voxel are faster by it. */
+static bool pays(const making *m, const vsh_scene_layer *layer, const vsh_grid_info *voxels) {
+    static const double RAYS = 2.0;
+    const double rays = m->options.points * vshi_scene_field_rays(m->scene, layer);
+    return rays >= RAYS * (double)voxels->active_voxels;
+}
+
 /* The level set of a layer's casters, or (NULL) of those in none, of so many voxels; NULL where there are
  * none. *made is what is to be freed of it. */
 static vsh_result find_grid(making *m, const vsh_scene_layer *layer, int32_t resolution,
@@ -92,6 +100,7 @@ static vsh_result make_field(making *m, const vsh_scene_layer *layer, const vsh_
     m->own.grid_bytes += voxels.bytes;
     vsh_field_options options = vsh_field_options_default();
     options.reach = reach_of(m, grid);
+    options.surface = pays(m, layer, &voxels);
     if (layer != NULL) {
         options.reach *= fmax(1.0, layer->shade.softness); /* lights are as much wider */
     }

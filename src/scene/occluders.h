@@ -25,4 +25,8 @@ bool vshi_scene_wants_truth(const vsh_scene *scene);
  * VSH_METHOD_…, or (`has` false) lacks one: of shadows where there are lights, of AO where it is baked. */
 bool vshi_scene_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, uint32_t traits, bool has);
 
+/* About how many rays adaptive casts on the field of a layer's casters, or (NULL) of those in none, from each
+ * point that is shaded. */
+double vshi_scene_field_rays(const vsh_scene *scene, const vsh_scene_layer *layer);
+
 #endif

@@ -5,6 +5,7 @@
 #include "scene/assets.h"
 #include "scene/occluders.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 static const char *const type_names[] = {"a mesh",  "an sdf", "a vdb", "a heightfield",
@@ -27,15 +28,33 @@ int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer
     return scene != NULL;
 }
 
+static int32_t method_of(const vsh_scene *scene, const vsh_scene_layer *layer) {
+    return layer != NULL && layer->shade.method >= 0 ? layer->shade.method : scene->shade.method;
+}
+
+static bool casts_ao(const vsh_scene *scene, const vsh_scene_layer *layer) {
+    return (scene->ao || vsh_planes_shaded(&scene->planes) > 0) && (layer == NULL || layer->shade.ao);
+}
+
 bool vshi_scene_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, uint32_t traits, bool has) {
     const int32_t can = vsh_scene_traceable(scene, layer) && vsh_triangles_available();
-    const int32_t given =
-        layer != NULL && layer->shade.method >= 0 ? layer->shade.method : scene->shade.method;
-    const uint32_t shadow = vsh_shadow_method_traits(vsh_shadow_method_resolve(given, can));
+    const uint32_t shadow = vsh_shadow_method_traits(vsh_shadow_method_resolve(method_of(scene, layer), can));
     const uint32_t ao = vsh_ao_method_traits(vsh_ao_method_resolve(scene->shade.ao_method, can));
     return (scene->light_count > 0 && ((shadow & traits) == traits) == has) ||
-           ((scene->ao || vsh_planes_shaded(&scene->planes) > 0) && (layer == NULL || layer->shade.ao) &&
-            ((ao & traits) == traits) == has);
+           (casts_ao(scene, layer) && ((ao & traits) == traits) == has);
+}
+
+double vshi_scene_field_rays(const vsh_scene *scene, const vsh_scene_layer *layer) {
+    /* over max_error, of all points; measured on the cloister, 0.6 units of AO and a sun of 5° */
+    static const double OF_LIGHT = 0.14, OF_AO = 0.6;
+    const int32_t can = vsh_scene_traceable(scene, layer) && vsh_triangles_available();
+    const int32_t method = vsh_shadow_method_resolve(method_of(scene, layer), can);
+    double rays = method == VSH_SHADOW_ADAPTIVE ? OF_LIGHT * (double)scene->light_count : 0.0;
+    if (casts_ao(scene, layer) && vsh_ao_method_resolve(scene->shade.ao_method, can) == VSH_AO_ADAPTIVE) {
+        rays += OF_AO;
+    }
+    rays /= scene->shade.max_error;
+    return scene->shade.rays > 0 ? fmin(rays, scene->shade.rays) : rays;
 }
 
 int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer) {

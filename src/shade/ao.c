@@ -11,21 +11,6 @@ void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]) {
     axes[2] = normal;
 }
 
-/* A trilinear sample over a convex edge is too large, by up to 0.44 voxels: what stands out in the field is
- * smaller than its caster, and edges are what hides the sky. Through a roof of slats of 3.3 voxels rays see
- * 0.047 too much without it, 0.0004 with it (test_ao_rays); on the cloister 256 rays see 0.0068 and 0.0021
- * too much. Round casters lose less: with it sixteen cones are 0.0046 too dark on the seeds' floor. */
-static const double GROWN = 0.15;
-/* Of the height of the start at most, so that a receiver never hides itself: what is left of a start offset
- * is 0.1 voxels. */
-static const double GROWN_SHARE = 0.75;
-
-double vshi_ao_grown(const vsh_field *field, vshi_vec origin) {
-    const float at[3] = {(float)origin.x, (float)origin.y, (float)origin.z};
-    const double most = GROWN_SHARE * (double)vshi_field_distance(field, at);
-    return most > GROWN ? GROWN : most > 0.0 ? most : 0.0;
-}
-
 bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, vsh_shade_stats *stats) {
     if (task->sphere) {
         frame->origin = vshi_to_field(task->field, task->points->positions + 3 * i);

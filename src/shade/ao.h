@@ -106,9 +106,6 @@ bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, 
  * NaN stays. */
 void vshi_ao_bent(float *bent, const float *normal);
 
-/* What the field's edges are short of, voxels, at a point where rays begin. */
-double vshi_ao_grown(const vsh_field *field, vshi_vec origin);
-
 /* vshi_frame() of a unit vector, and the vector. */
 void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]);
 

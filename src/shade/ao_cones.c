@@ -154,7 +154,7 @@ void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stat
         if (!valid[i - begin]) {
             continue;
         }
-        frame.grown = vshi_ao_grown(task->field, frame.origin);
+        frame.grown = vshi_shade_grown(task->field, frame.origin);
         memcpy(axes[i - begin], frame.axes, sizeof frame.axes);
         ++stats->samples;
         if (chunk.rays.count + count > VSHI_CHUNK) {

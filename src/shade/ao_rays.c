@@ -54,20 +54,23 @@ static void trace(vshi_ao_piece *b) {
     for (size_t r = 0; r < b->traced; ++r) {
         sorted[r] = b->segments[of[r]];
     }
-    vshi_triangles_blocked(b->task->triangles, sorted, b->traced, blocked);
+    vshi_triangles_blocked(b->exact ? b->task->triangles : b->task->field->surface, sorted, b->traced,
+                           blocked);
     for (size_t r = 0; r < b->traced; ++r) {
         if (!blocked[r]) {
-            add_free(&b->points[b->chunk.owner[of[r]]], vshi_vec_of(sorted[r].direction));
+            add_free(&b->points[b->owner[of[r]]], vshi_vec_of(sorted[r].direction));
         }
     }
 }
 
 static void flush(vshi_ao_piece *b, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
-    if (b->exact) {
+    if (b->traced > 0) {
         trace(b);
         stats->rays += b->traced;
         b->traced = 0;
+    }
+    if (b->chunk.rays.count == 0) {
         return;
     }
     vshi_march_stats work = {0, 0};
@@ -121,13 +124,45 @@ static double free_up_to(const vshi_ao_point *point, double z) {
     return end;
 }
 
-static void march_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shade_stats *stats) {
+/* The cell of a direction, row by row there and back. */
+static uint8_t key_of(vshi_vec local) {
+    const int x = (int)(0.5 * EDGE * (local.x + 1.0)), y = (int)(0.5 * EDGE * (local.y + 1.0));
+    return (uint8_t)(y * EDGE + (y & 1 ? EDGE - 1 - x : x));
+}
+
+static void add_segment(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vshi_vec origin, vshi_vec direction,
+                        double far, vsh_shade_stats *stats) {
+    if (b->traced == VSHI_CHUNK) {
+        flush(b, stats);
+    }
+    b->segments[b->traced] = (vshi_segment_ray){.origin = {origin.x, origin.y, origin.z},
+                                                .direction = {direction.x, direction.y, direction.z},
+                                                .far = far};
+    b->key[b->traced] = b->tiled ? key_of(local) : 0;
+    b->owner[b->traced++] = (uint16_t)owner;
+}
+
+/* A ray against the casters' triangles. */
+static void trace_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shade_stats *stats) {
+    const vshi_ao_point *point = &b->points[owner];
+    add_segment(b, owner, local, point->world_origin, vshi_ao_direction(point->world_axes, local),
+                b->task->options->ao_distance, stats);
+}
+
+/* A ray on the field: traced against its surface where that is there, and as much grown as the point's rays
+ * are to meet it. */
+static void field_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
     vshi_ao_point *point = &b->points[owner];
     const double begin = free_up_to(point, local.z);
     const vshi_vec direction = vshi_ao_direction(point->frame.axes, local);
     if (begin >= task->distance) {
         add_free(point, direction);
+        return;
+    }
+    if (point->traced) {
+        const vshi_vec from = vshi_add(point->frame.origin, vshi_scale(direction, begin));
+        add_segment(b, owner, local, from, direction, task->distance - begin, stats);
         return;
     }
     if (b->chunk.rays.count == VSHI_CHUNK) {
@@ -146,25 +181,6 @@ static void march_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shad
     }
     float *start = &b->chunk.rays.begin[b->chunk.rays.count - 1];
     *start = (float)begin > *start ? (float)begin : *start;
-}
-
-/* The cell of a direction, row by row there and back. */
-static uint8_t key_of(vshi_vec local) {
-    const int x = (int)(0.5 * EDGE * (local.x + 1.0)), y = (int)(0.5 * EDGE * (local.y + 1.0));
-    return (uint8_t)(y * EDGE + (y & 1 ? EDGE - 1 - x : x));
-}
-
-static void trace_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shade_stats *stats) {
-    const vshi_ao_task *task = b->task;
-    const vshi_ao_point *point = &b->points[owner];
-    if (b->traced == VSHI_CHUNK) {
-        flush(b, stats);
-    }
-    const vshi_vec o = point->world_origin, d = vshi_ao_direction(point->world_axes, local);
-    b->segments[b->traced] = (vshi_segment_ray){
-        .origin = {o.x, o.y, o.z}, .direction = {d.x, d.y, d.z}, .far = task->options->ao_distance};
-    b->key[b->traced] = b->tiled ? key_of(local) : 0;
-    b->chunk.owner[b->traced++] = owner;
 }
 
 /* Turns axes about the normal so that `up` lies over the first; the cosine of up and the normal. */
@@ -212,7 +228,7 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
             if (b->exact) {
                 trace_ray(b, owner, local, stats);
             } else {
-                march_ray(b, owner, local, stats);
+                field_ray(b, owner, local, stats);
             }
         }
         point->taken += count;
@@ -237,7 +253,9 @@ static bool prepare(vshi_ao_piece *b, size_t i, vshi_ao_point *point, vsh_shade_
         point->world_origin =
             vshi_add(vshi_vec_of(points->positions + 3 * i), vshi_scale(normal, task->sphere ? 0.0 : offset));
     } else {
-        point->frame.grown = vshi_ao_grown(task->field, point->frame.origin);
+        point->frame.grown = vshi_shade_grown(task->field, point->frame.origin);
+        point->traced = task->options->ao_method == VSH_AO_ADAPTIVE &&
+                        vshi_shade_traces(task->field, point->frame.origin);
         ++stats->samples;
         if (horizon) {
             point->rise = turn_to(vshi_direction_to_field(task->field, task->up), point->frame.axes);

@@ -14,6 +14,7 @@ typedef struct vshi_ao_ball {
 
 typedef struct vshi_ao_point {
     vshi_ao_frame frame;
+    bool traced; /* not exact: its rays meet the field's surface; else they are marched */
     double rise; /* cosine of `up` and the normal; 1: AO is of the whole hemisphere */
     uint32_t texel;
     int32_t taken, free; /* rays */
@@ -35,6 +36,7 @@ typedef struct vshi_ao_piece {
     vshi_chunk chunk;
     size_t traced;
     vshi_segment_ray segments[VSHI_CHUNK];
+    uint16_t owner[VSHI_CHUNK]; /* the point of each */
     uint8_t
         key[VSHI_CHUNK]; /* of a tile: where each goes to, so that those that go alike are traced together;
                           * of others 0: the order of a point's rays depends on no other point */

@@ -68,6 +68,10 @@ double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken, double e
  * they may have missed. */
 double vshi_rays_error(int32_t sampler, int32_t lit, int32_t taken, double lit_around, double taken_around);
 
+/* Where the neighbours' share is taken for a point's, errors come out larger by so much: measured on the
+ * seeds' floor, where the estimate is right by it to a tenth. */
+#define VSHI_BORROWED 1.2
+
 /* Unit normal and direction in field space. */
 static inline vshi_vec vshi_direction_to_field(const vsh_field *field, vshi_vec direction) {
     return vshi_unit(vshi_transform_vector(field->to_field, direction));

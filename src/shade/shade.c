@@ -3,6 +3,7 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/try.h"
+#include "field/surface.h"
 
 #include <math.h>
 #include <stdatomic.h>
@@ -202,4 +203,19 @@ bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t 
         *origin = vshi_add(*origin, vshi_scale(*normal, lift));
     }
     return vshi_finite(*origin);
+}
+
+/* Of the height of the start at most, so that a receiver never hides itself: what is left of a start offset
+ * is 0.1 voxels. */
+static const double GROWN_SHARE = 0.75;
+
+double vshi_shade_grown(const vsh_field *field, vshi_vec origin) {
+    const float at[3] = {(float)origin.x, (float)origin.y, (float)origin.z};
+    const double most = GROWN_SHARE * (double)vshi_field_distance(field, at);
+    return most > VSHI_GROWN ? VSHI_GROWN : most > 0.0 ? most : 0.0;
+}
+
+bool vshi_shade_traces(const vsh_field *field, vshi_vec origin) {
+    return field->surface != NULL && vshi_shade_grown(field, origin) >= VSHI_GROWN &&
+           vshi_surface_clears(field, origin);
 }

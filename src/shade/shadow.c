@@ -238,3 +238,12 @@ done:
     vshi_layers_free(layers);
     return result;
 }
+
+static double spread_of(int32_t sampler, int32_t rays) {
+    return VSHI_BORROWED * vshi_rays_deviation(sampler, rays / 2, rays, 0.5);
+}
+
+int32_t vshi_shadow_most_rays(const vsh_shade_options *options) {
+    const bool keeps_error = (vsh_shadow_method_traits(options->method) & VSH_METHOD_KEEPS_ERROR) != 0;
+    return vshi_shade_most_rays(options, spread_of, keeps_error);
+}

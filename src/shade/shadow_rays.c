@@ -33,8 +33,9 @@ typedef struct open_point {
     vshi_light_view view;    /* of a shape: from the point itself, */
     vshi_vec off;            /* from which rays begin so far off, in the rays' space */
     double end;
+    bool traced; /* its rays, against triangles or the field's surface; else they are marched */
     int32_t lit, taken;
-    bool near; /* exact: `start` is, to the triangles */
+    bool near; /* traced: to what they are traced against */
     double deviation;
 } open_point;
 
@@ -45,6 +46,7 @@ typedef struct ray_batch {
     vshi_chunk chunk;
     vshi_segment_ray traced[VSHI_CHUNK];
     bool blocked[VSHI_CHUNK];
+    uint16_t traced_owner[VSHI_CHUNK];
     size_t traced_count;
     bool shared; /* points share their rays */
     vsh_shade_stats *stats;
@@ -53,6 +55,16 @@ typedef struct ray_batch {
 /* Whether all rays of a point are the same. */
 static bool is_hard(const vshi_shadow_task *task) {
     return vshi_light_is_point(&task->place);
+}
+
+/* What rays are traced against: in world space, or a field's surface in its own. */
+static const vsh_triangles *traced_of(const vshi_shadow_task *task) {
+    return task->options->method == VSH_SHADOW_EXACT ? task->triangles : task->field->surface;
+}
+
+/* Where a point's traced rays begin, in the space of these. */
+static vshi_vec begin_of(const vshi_shadow_task *task, const open_point *p) {
+    return task->options->method == VSH_SHADOW_EXACT ? p->start : p->origin;
 }
 
 static void flush(ray_batch *batch) {
@@ -66,9 +78,9 @@ static void flush(ray_batch *batch) {
     }
     vshi_chunk_clear(&batch->chunk);
     if (batch->traced_count > 0) {
-        vshi_triangles_blocked(task->triangles, batch->traced, batch->traced_count, batch->blocked);
+        vshi_triangles_blocked(traced_of(task), batch->traced, batch->traced_count, batch->blocked);
         for (size_t r = 0; r < batch->traced_count; ++r) {
-            batch->open[batch->chunk.owner[r]].lit += !batch->blocked[r];
+            batch->open[batch->traced_owner[r]].lit += !batch->blocked[r];
         }
         batch->traced_count = 0;
     }
@@ -91,7 +103,6 @@ static void turn_to_world(const vshi_shadow_task *task, open_point *p) {
     p->start = vshi_add(vshi_vec_of(at), vshi_scale(p->normal, lift));
     vshi_light_view view;
     p->end = vshi_light_look(&task->world, p->start, false, &view) == VSHI_LIGHT_SEEN ? view.end : 0.0;
-    p->near = vshi_triangles_sees(task->triangles, (double[]){p->start.x, p->start.y, p->start.z});
 }
 
 /* Looks at a light that is no disc, in the space of the rays. */
@@ -147,10 +158,11 @@ static void cast(ray_batch *batch, size_t owner, int32_t target) {
             if (batch->chunk.rays.count == VSHI_CHUNK || batch->traced_count == VSHI_CHUNK) {
                 flush(batch);
             }
-            if (task->options->method == VSH_SHADOW_EXACT) {
+            if (p->traced) {
+                const vshi_vec from = begin_of(task, p);
                 batch->traced[batch->traced_count] = (vshi_segment_ray){
-                    .origin = {p->start.x, p->start.y, p->start.z}, .direction = {d.x, d.y, d.z}, .far = end};
-                batch->chunk.owner[batch->traced_count++] = (uint32_t)owner;
+                    .origin = {from.x, from.y, from.z}, .direction = {d.x, d.y, d.z}, .far = end};
+                batch->traced_owner[batch->traced_count++] = (uint16_t)owner;
                 continue;
             }
             const vshi_cone ray = {
@@ -163,8 +175,7 @@ static void cast(ray_batch *batch, size_t owner, int32_t target) {
 /* Whether the rays of open points are traced in packets of several points each: discs, and the sampler's
  * blocks. */
 static bool in_packets(const vshi_shadow_task *task) {
-    return task->options->method == VSH_SHADOW_EXACT && task->place.shape == NULL &&
-           task->options->sampler == VSH_SAMPLER_SOBOL && !is_hard(task);
+    return task->place.shape == NULL && task->options->sampler == VSH_SAMPLER_SOBOL && !is_hard(task);
 }
 
 /* Rays first … last - 1 of open points that have `first`. */
@@ -176,7 +187,8 @@ static void cast_packets(ray_batch *batch, const size_t *some, size_t count, int
         const size_t points = count - begin < PACKET_POINTS ? count - begin : PACKET_POINTS;
         for (size_t i = 0; i < points; ++i) {
             const open_point *p = &batch->open[some[begin + i]];
-            discs[i] = (vshi_disc){.origin = {p->start.x, p->start.y, p->start.z},
+            const vshi_vec from = begin_of(task, p);
+            discs[i] = (vshi_disc){.origin = {from.x, from.y, from.z},
                                    .axis = p->axis,
                                    .u = p->u,
                                    .v = p->v,
@@ -185,7 +197,7 @@ static void cast_packets(ray_batch *batch, const size_t *some, size_t count, int
             vshi_sampler_shift(task->sampler, texel_of(task, p), task->purpose, discs[i].shift);
             lit[i] = 0;
         }
-        vshi_triangles_discs(task->triangles, task->sampler, discs, points, first, last, lit);
+        vshi_triangles_discs(traced_of(task), task->sampler, discs, points, first, last, lit);
         for (size_t i = 0; i < points; ++i) {
             open_point *p = &batch->open[some[begin + i]];
             p->lit += lit[i];
@@ -193,19 +205,6 @@ static void cast_packets(ray_batch *batch, const size_t *some, size_t count, int
         }
         batch->stats->rays += points * (uint64_t)(last - first);
     }
-}
-
-/* Where the neighbours' share is taken for a point's, errors come out larger by so much: measured on the
- * seeds' floor, where the estimate is right by it to a tenth. */
-static const double BORROWED = 1.2;
-
-static double spread_of(int32_t sampler, int32_t rays) {
-    return BORROWED * vshi_rays_deviation(sampler, rays / 2, rays, 0.5);
-}
-
-int32_t vshi_shadow_most_rays(const vsh_shade_options *options) {
-    const bool keeps_error = (vsh_shadow_method_traits(options->method) & VSH_METHOD_KEEPS_ERROR) != 0;
-    return vshi_shade_most_rays(options, spread_of, keeps_error);
 }
 
 /* What the rays of the points around an open point say of it: how many are lit, of how many. */
@@ -235,7 +234,7 @@ static double deviation_of(const ray_batch *batch, size_t owner) {
     const around a = look_around(batch, owner);
     const double deviation =
         vshi_rays_deviation(batch->task->options->sampler, p->lit, p->taken, (a.lit + 1.0) / (a.taken + 2.0));
-    return a.taken > 0.0 ? BORROWED * deviation : deviation;
+    return a.taken > 0.0 ? VSHI_BORROWED * deviation : deviation;
 }
 
 /* The same, as it is said, and as errors below VSHI_COARSE are kept: the other leaves more unseen at the ends
@@ -262,7 +261,7 @@ static void cast_alike(ray_batch *batch, const size_t *some, size_t count, int32
     size_t alike[VSHI_PIECE], same = 0;
     for (size_t i = 0; i < count; ++i) {
         const open_point *p = &batch->open[some[i]];
-        if (p->taken == taken && packets && p->near) {
+        if (p->taken == taken && packets && p->traced && p->near) {
             alike[same++] = some[i];
         } else if (p->taken == taken) {
             cast(batch, some[i], target);
@@ -496,8 +495,15 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
         vshi_frame(cone->direction, &p->u, &p->v);
         p->u = vshi_scale(p->u, tangent);
         p->v = vshi_scale(p->v, tangent);
+        p->traced =
+            task->options->method == VSH_SHADOW_EXACT ||
+            (task->options->method == VSH_SHADOW_ADAPTIVE && vshi_shade_traces(task->field, p->origin));
         if (task->options->method == VSH_SHADOW_EXACT) {
             turn_to_world(task, p);
+        }
+        if (p->traced) {
+            const vshi_vec from = begin_of(task, p);
+            p->near = vshi_triangles_sees(traced_of(task), (double[]){from.x, from.y, from.z});
         }
         if (task->place.shape != NULL) {
             look_at_shape(task, p);

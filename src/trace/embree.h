@@ -2,6 +2,7 @@
 #ifndef VSHI_EMBREE_H
 #define VSHI_EMBREE_H
 
+#include "base/job.h"
 #include "base/segment.h"
 #include "base/vec.h"
 #include "mesh/sheet.h"
@@ -9,6 +10,22 @@
 
 #include <stdbool.h>
 #include <vdbshade/trace.h>
+
+/* Quads in a space of their own, within a box. A triangle's last two corners are one. */
+typedef struct vshi_quads {
+    size_t corner_count, quad_count;
+    double low[3], high[3];
+    /* Writes corners[corner_count][3], moved by -centre and then scaled, and quads[quad_count][4]. Called
+     * once. */
+    vsh_result (*write)(void *user, const double centre[3], double scale, float *corners, uint32_t *quads,
+                        vsh_error *error);
+    void *user;
+} vshi_quads;
+
+/* Makes what vshi_triangles_blocked() is asked of, and nothing else. `held`: bytes that are taken beside.
+ * Errors: as vsh_triangles_create(), and those of `write`. */
+vsh_result vshi_triangles_of_quads(const vshi_quads *quads, const vsh_run *run, double held, vshi_job *job,
+                                   vsh_triangles **triangles, vsh_error *error);
 
 /* Whether each of `count` rays meets a triangle. Thread safe. */
 void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,

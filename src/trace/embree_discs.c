@@ -98,7 +98,7 @@ static void trace(const vsh_triangles *t, const vshi_sampler *sampler, group *g,
     const uint32_t cells = (uint32_t)(LANES / each);
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    context.flags = t->fine ? RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT : RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     uint32_t cell[LANES];
     for (int l = 0; l < LANES; ++l) {
         cell[l] = vshi_sampler_cell(size, g->shift[0][l], g->shift[1][l]);

@@ -118,8 +118,9 @@ void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_r
         for (int lane = 0; lane < lanes; ++lane) {
             valid[lane] = vshi_triangles_aim(triangles, &rays[begin + (size_t)lane], &packet, lane) ? -1 : 0;
         }
-        context.flags = vshi_rays_together(rays + begin, lanes) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
-                                                                : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+        context.flags = !triangles->fine && vshi_rays_together(rays + begin, lanes)
+                            ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                            : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
         vshi_triangles_occlude(triangles, valid, &context, &packet);
         for (int lane = 0; lane < lanes; ++lane) {
             blocked[begin + (size_t)lane] = valid[lane] != 0 && packet.tfar[lane] < 0.0f;

@@ -28,6 +28,8 @@ struct vsh_triangles {
     bool has_holes;         /* in any of them */
     bool wide;              /* VSHI_PACKET rays are traced at once, not in two halves */
     double low[3], high[3]; /* the triangles' box, world space; min > max where there are none */
+    bool fine; /* a surface's quads, smaller than what lies between rays that go together: traced one by
+                  one these are a quarter faster */
     double centre[3];
     double scale;
     double size;    /* of the longest side of the triangles' box, world units */

@@ -1,0 +1,347 @@
+#include "field/surface.h"
+
+#include "base/memory.h"
+#include "base/parallel.h"
+#include "base/try.h"
+#include "trace/embree.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    MOST_QUADS = 6, /* in a cell: all twelve edges on one loop make ten triangles, two a quad */
+    CELL_EDGES = 12,
+    BRICK_EDGES = 3 * VSHI_BRICK_VALUES,
+    GRAIN = 16 /* bricks */
+};
+
+/* Corner x, y, z of a cell is bit 4, 2, 1: where its value lies in the brick. */
+static const uint16_t corner_at[8] = {0, 1, 9, 10, 81, 82, 90, 91};
+
+/* The corners of an edge, the lower first; edges along z, y and x. */
+static const uint8_t edge_corners[CELL_EDGES][2] = {{0, 1}, {2, 3}, {4, 5}, {6, 7}, {0, 2}, {1, 3},
+                                                    {4, 6}, {5, 7}, {0, 4}, {1, 5}, {2, 6}, {3, 7}};
+
+/* Corners around a face, the same way on both sides of a cell, and the edges from each to the next. */
+static const uint8_t face_corners[6][4] = {{0, 1, 3, 2}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                                           {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}};
+static const uint8_t face_edges[6][4] = {{0, 5, 1, 4},   {2, 7, 3, 6},  {0, 9, 2, 8},
+                                         {1, 11, 3, 10}, {4, 10, 6, 8}, {5, 11, 7, 9}};
+
+/* What a cell holds: quads by its edges. */
+typedef struct cell_quads {
+    uint8_t count;
+    bool ambiguous; /* by signs alone: a face is crossed twice */
+    uint8_t edges[MOST_QUADS][4];
+} cell_quads;
+
+/* Of each edge: the edges that it is joined with in its two faces. */
+typedef struct joined {
+    uint8_t count[CELL_EDGES];
+    uint8_t edges[CELL_EDGES][2];
+} joined;
+
+static void join(joined *j, uint8_t a, uint8_t b) {
+    j->edges[a][j->count[a]++] = b;
+    j->edges[b][j->count[b]++] = a;
+}
+
+/* Joins the edges that are crossed in a face; true where it is crossed twice. */
+static bool join_face(joined *j, int face, const int32_t value[8]) {
+    const uint8_t *corner = face_corners[face], *edge = face_edges[face];
+    uint8_t crossed[4];
+    int count = 0;
+    for (int k = 0; k < 4; ++k) {
+        if ((value[corner[k]] < 0) != (value[corner[(k + 1) & 3]] < 0)) {
+            crossed[count++] = edge[k];
+        }
+    }
+    if (count == 2) {
+        join(j, crossed[0], crossed[1]);
+    }
+    if (count == 4) { /* corners of one sign are cut off: those whose product is the less */
+        const bool odd =
+            (int64_t)value[corner[0]] * value[corner[2]] > (int64_t)value[corner[1]] * value[corner[3]];
+        join(j, edge[odd ? 0 : 3], edge[odd ? 1 : 0]);
+        join(j, edge[odd ? 2 : 1], edge[odd ? 3 : 2]);
+    }
+    return count == 4;
+}
+
+/* Follows the edges that are joined around, and cuts each loop into quads. */
+static void find_quads(const int32_t value[8], cell_quads *quads) {
+    joined j = {.count = {0}};
+    *quads = (cell_quads){.count = 0};
+    for (int face = 0; face < 6; ++face) {
+        quads->ambiguous |= join_face(&j, face, value);
+    }
+    for (uint8_t first = 0; first < CELL_EDGES; ++first) {
+        uint8_t loop[CELL_EDGES];
+        int length = 0;
+        uint8_t at = first;
+        while (j.count[at] > 0) { /* taken edges have none left */
+            j.count[at] = 0;
+            loop[length++] = at;
+            at = j.edges[at][j.count[j.edges[at][0]] > 0 ? 0 : 1];
+        }
+        for (int k = 1; k + 1 < length; k += 2) {
+            uint8_t *quad = quads->edges[quads->count++];
+            quad[0] = loop[0];
+            quad[1] = loop[k];
+            quad[2] = loop[k + 1];
+            quad[3] = loop[k + 2 < length ? k + 2 : k + 1];
+        }
+    }
+}
+
+typedef struct extraction {
+    vshi_surface *surface;
+    cell_quads cells[256]; /* by the signs of the corners, 1 below the height */
+    const double *centre;
+    double scale;
+    float *corners;
+    uint32_t *quads; /* NULL: only to be counted */
+} extraction;
+
+static void make_cells(extraction *e) {
+    for (int signs = 0; signs < 256; ++signs) {
+        int32_t value[8];
+        for (int c = 0; c < 8; ++c) {
+            value[c] = (signs >> c & 1) != 0 ? -1 : 1;
+        }
+        find_quads(value, &e->cells[signs]);
+    }
+}
+
+/* A brick on its way. */
+typedef struct brick {
+    const extraction *extraction;
+    const int16_t *values;
+    float origin[3]; /* of the first value, field space */
+    uint32_t corner_count, quad_count;
+    uint32_t first_corner;
+    float *corners; /* NULL: only to be counted */
+    uint32_t *quads;
+    uint16_t rows[VSHI_STRIDE_X]; /* bits along z of values below the height */
+    uint16_t number[BRICK_EDGES]; /* 1 + that of the corner on it; 0: none yet */
+} brick;
+
+/* Where the surface crosses the edge between two values. */
+static void write_corner(const brick *b, uint32_t corner, int at, int axis, int32_t low, int32_t high) {
+    const extraction *e = b->extraction;
+    double p[3] = {(double)(at / VSHI_STRIDE_X), (double)(at / VSHI_STRIDE_Y % VSHI_BRICK_EDGE),
+                   (double)(at % VSHI_STRIDE_Y)};
+    p[axis] += (double)low / (double)(low - high);
+    for (int k = 0; k < 3; ++k) {
+        b->corners[3 * (size_t)corner + (size_t)k] =
+            (float)(((double)b->origin[k] + p[k] - e->centre[k]) * e->scale);
+    }
+}
+
+static uint32_t corner_of(brick *b, int at, int edge, const int32_t value[8]) {
+    const uint8_t *ends = edge_corners[edge];
+    const int low = at + corner_at[ends[0]], axis = 2 - edge / 4;
+    uint16_t *number = &b->number[3 * low + axis];
+    if (*number == 0) {
+        *number = (uint16_t)++b->corner_count;
+        if (b->corners != NULL) {
+            write_corner(b, *number - 1u, low, axis, value[ends[0]], value[ends[1]]);
+        }
+    }
+    return b->first_corner + *number - 1u;
+}
+
+static void add_cell(brick *b, int at) {
+    const int32_t height = b->extraction->surface->height;
+    int32_t value[8];
+    int signs = 0;
+    for (int c = 0; c < 8; ++c) {
+        value[c] = 2 * b->values[at + corner_at[c]] - height;
+        signs |= (value[c] < 0) << c;
+    }
+    cell_quads by_value;
+    const cell_quads *cell = &b->extraction->cells[signs];
+    if (cell->ambiguous) {
+        find_quads(value, &by_value);
+        cell = &by_value;
+    }
+    for (int q = 0; q < cell->count; ++q, ++b->quad_count) {
+        for (int k = 0; k < 4; ++k) {
+            const uint32_t corner = corner_of(b, at, cell->edges[q][k], value);
+            if (b->quads != NULL) {
+                b->quads[4 * (size_t)b->quad_count + (size_t)k] = corner;
+            }
+        }
+    }
+}
+
+static void extract_brick(brick *b) {
+    const int32_t height = b->extraction->surface->height;
+    for (int row = 0; row < VSHI_STRIDE_X; ++row) {
+        const int16_t *v = b->values + VSHI_BRICK_EDGE * row;
+        int bits = 0;
+        for (int z = 0; z < VSHI_BRICK_EDGE; ++z) {
+            bits |= (2 * v[z] < height) << z;
+        }
+        b->rows[row] = (uint16_t)bits;
+    }
+    for (int x = 0; x < VSHI_BRICK_CELLS; ++x) {
+        for (int y = 0; y < VSHI_BRICK_CELLS; ++y) {
+            const uint16_t *r = b->rows + VSHI_BRICK_EDGE * x + y;
+            const int some = r[0] | r[1] | r[VSHI_BRICK_EDGE] | r[VSHI_BRICK_EDGE + 1];
+            const int all = r[0] & r[1] & r[VSHI_BRICK_EDGE] & r[VSHI_BRICK_EDGE + 1];
+            int mixed = (some | some >> 1) & ~(all & all >> 1) & 0xff;
+            for (; mixed != 0; mixed &= mixed - 1) {
+                add_cell(b, VSHI_STRIDE_X * x + VSHI_STRIDE_Y * y + __builtin_ctz((unsigned)mixed));
+            }
+        }
+    }
+}
+
+static void extract(void *user, size_t begin, size_t end) {
+    const extraction *e = user;
+    vshi_surface *s = e->surface;
+    const vshi_level *level = &s->field->levels[0];
+    brick b = {.extraction = e};
+    for (size_t i = begin; i < end; ++i) {
+        int32_t corner[3];
+        vshi_block_corner(level->origin, level->size, s->bricks[i], corner);
+        b.values = s->field->values + s->field->index[level->first_index + s->bricks[i]];
+        b.corner_count = b.quad_count = 0;
+        memset(b.number, 0, sizeof b.number);
+        if (e->quads != NULL) {
+            b.first_corner = s->corners[i];
+            b.corners = e->corners + 3 * (size_t)s->corners[i];
+            b.quads = e->quads + 4 * (size_t)s->quads[i];
+            for (int axis = 0; axis < 3; ++axis) {
+                b.origin[axis] = (float)corner[axis];
+            }
+        }
+        extract_brick(&b);
+        if (e->quads == NULL) {
+            s->corners[i + 1] = b.corner_count;
+            s->quads[i + 1] = b.quad_count;
+        }
+    }
+}
+
+/* Blocks of the finest level that have bricks of their own. */
+static size_t list_bricks(const vsh_field *field, uint32_t *bricks) {
+    const vshi_level *level = &field->levels[0];
+    const size_t blocks = (size_t)level->size[0] * (size_t)level->size[1] * (size_t)level->size[2];
+    const int32_t constant = (int32_t)level->first_value + VSHI_BRICK_VALUES;
+    size_t count = 0;
+    for (size_t block = 0; block < blocks; ++block) {
+        if (field->index[level->first_index + block] > constant) {
+            if (bricks != NULL) {
+                bricks[count] = (uint32_t)block;
+            }
+            ++count;
+        }
+    }
+    return count;
+}
+
+vsh_result vshi_surface_find(const vsh_field *field, double height, vshi_budget budget, vshi_job *job,
+                             vshi_surface *surface, vsh_error *error) {
+    *surface = (vshi_surface){.field = field, .brick_count = list_bricks(field, NULL)};
+    surface->height = 2 * (int32_t)floor(height / (double)field->levels[0].quantum) + 1;
+    const size_t count = surface->brick_count;
+    VSHI_TRY(vshi_check_limit(budget.run, budget.held + 3.0 * sizeof(uint32_t) * (double)(count + 1),
+                              "surface", error));
+    VSHI_TRY(vshi_allocate((void **)&surface->bricks, count, sizeof(uint32_t), "surface", error));
+    VSHI_TRY(vshi_allocate((void **)&surface->corners, count + 1, sizeof(uint32_t), "surface", error));
+    VSHI_TRY(vshi_allocate((void **)&surface->quads, count + 1, sizeof(uint32_t), "surface", error));
+    list_bricks(field, surface->bricks);
+    extraction e = {.surface = surface};
+    make_cells(&e);
+    VSHI_TRY(vshi_parallel_for(job, count, GRAIN, 0, extract, &e, error));
+    for (size_t i = 0; i < count; ++i) {
+        if (__builtin_add_overflow(surface->corners[i + 1], surface->corners[i], &surface->corners[i + 1]) ||
+            __builtin_add_overflow(surface->quads[i + 1], surface->quads[i], &surface->quads[i + 1])) {
+            return vshi_fail(error, VSH_ERROR_LIMIT,
+                             "surface: its quads pass the limit of 2^32; use larger voxels");
+        }
+    }
+    return VSH_OK;
+}
+
+void vshi_surface_free(vshi_surface *surface) {
+    free(surface->quads);
+    free(surface->corners);
+    free(surface->bricks);
+    *surface = (vshi_surface){.bricks = NULL};
+}
+
+vsh_result vshi_surface_write(vshi_surface *surface, const double centre[3], double scale, vshi_job *job,
+                              float *corners, uint32_t *quads, vsh_error *error) {
+    extraction e = {.surface = surface, .centre = centre, .scale = scale, .corners = corners, .quads = quads};
+    make_cells(&e);
+    return vshi_parallel_for(job, surface->brick_count, GRAIN, 0, extract, &e, error);
+}
+
+typedef struct writing {
+    vshi_surface *surface;
+    vshi_job *job;
+} writing;
+
+/* A vshi_quads_fn. */
+static vsh_result write(void *user, const double centre[3], double scale, float *corners, uint32_t *quads,
+                        vsh_error *error) {
+    const writing *w = user;
+    return vshi_surface_write(w->surface, centre, scale, w->job, corners, quads, error);
+}
+
+vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job *job, vsh_error *error) {
+    vshi_surface surface;
+    vsh_result result;
+    result = vshi_surface_find(field, VSHI_GROWN, budget, job, &surface, error);
+    if (result != VSH_OK || surface.quads[surface.brick_count] == 0) { /* of parts too thin for it: none */
+        goto done;
+    }
+    writing w = {&surface, job};
+    vshi_quads quads = {.corner_count = surface.corners[surface.brick_count],
+                        .quad_count = surface.quads[surface.brick_count],
+                        .write = write,
+                        .user = &w};
+    for (int axis = 0; axis < 3; ++axis) { /* a voxel around what is next to it, for any height */
+        quads.low[axis] = (double)field->bounds_min[axis] - 1.0;
+        quads.high[axis] = (double)field->bounds_max[axis] + 1.0;
+    }
+    budget.held += 3.0 * sizeof(uint32_t) * (double)(surface.brick_count + 1);
+    result = vshi_triangles_of_quads(&quads, budget.run, budget.held, job, &field->surface, error);
+done:
+    vshi_surface_free(&surface);
+    return result;
+}
+
+/* A quad over a cell whose values have a mixed difference of m is off by up to m / 4, that of xy at its
+ * middle; all four add up at most. */
+static double bend(const int16_t *v) {
+    const int xy = v[90] - v[81] - v[9] + v[0], xz = v[82] - v[81] - v[1] + v[0],
+              yz = v[10] - v[9] - v[1] + v[0];
+    const int xyz = v[91] - v[90] - v[82] - v[10] + v[81] + v[9] + v[1] - v[0];
+    return 0.25 * (abs(xy) + abs(xz) + abs(yz) + abs(xyz));
+}
+
+bool vshi_surface_clears(const vsh_field *field, vshi_vec place) {
+    const vshi_level *level = &field->levels[0];
+    const double at[3] = {place.x, place.y, place.z};
+    const float p[3] = {(float)place.x, (float)place.y, (float)place.z};
+    int32_t cell[3];
+    for (int axis = 0; axis < 3; ++axis) {
+        const double x = floor(at[axis]) - level->origin[axis];
+        if (!(x >= 0.0 && x < (double)(VSHI_BRICK_CELLS * level->size[axis]))) {
+            return true;
+        }
+        cell[axis] = (int32_t)x;
+    }
+    const size_t block =
+        ((size_t)(cell[0] >> 3) * (size_t)level->size[1] + (size_t)(cell[1] >> 3)) * (size_t)level->size[2] +
+        (size_t)(cell[2] >> 3);
+    const int16_t *v = field->values + field->index[level->first_index + block] +
+                       (cell[0] & 7) * VSHI_STRIDE_X + (cell[1] & 7) * VSHI_STRIDE_Y + (cell[2] & 7);
+    const double height = (double)vshi_level_sample(field, 0, p, NULL);
+    return height - VSHI_GROWN > bend(v) * (double)level->quantum;
+}

@@ -1,0 +1,40 @@
+/* The surface of a field's finest level as quads: what rays on the field are traced against. */
+#ifndef VSHI_FIELD_SURFACE_H
+#define VSHI_FIELD_SURFACE_H
+
+#include "field/level.h"
+
+/* Where the level's trilinear cells read a height, finest voxels. Corners lie on the cells' edges, exactly
+ * where these read it; each quad lies in one cell. A triangle is a quad whose last two corners are one. In a
+ * face of a cell that the surface crosses twice corners are joined as the face's own hyperbola joins them, so
+ * that neighbours agree and the surface is closed (Nielson and Hamann, "The asymptotic decider", 1991).
+ * Bricks share no corner, but theirs that meet are the same to the bit. */
+typedef struct vshi_surface {
+    const vsh_field *field;
+    int32_t height; /* half quanta, odd: no value is on it */
+    size_t brick_count;
+    uint32_t *bricks;  /* [brick_count]: their blocks */
+    uint32_t *corners; /* these two: [brick_count + 1]: how many all bricks before one have */
+    uint32_t *quads;
+} vshi_surface;
+
+/* Counts corners and quads; free it with vshi_surface_free(), after an error too. `height` is within the
+ * level's band. Errors: VSH_ERROR_LIMIT (the budget's; more than 2^32 corners), VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED. */
+vsh_result vshi_surface_find(const vsh_field *field, double height, vshi_budget budget, vshi_job *job,
+                             vshi_surface *surface, vsh_error *error);
+void vshi_surface_free(vshi_surface *surface);
+
+/* Writes them, moved and scaled, field space. Errors: VSH_ERROR_CANCELLED. */
+vsh_result vshi_surface_write(vshi_surface *surface, const double centre[3], double scale, vshi_job *job,
+                              float *corners, uint32_t *quads, vsh_error *error);
+
+/* Finds the surface and makes it field->surface, for rays; NULL where the field reads nothing so low.
+ * `budget` counts all that is held but it. Errors: also VSH_ERROR_UNSUPPORTED without Embree. */
+vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job *job, vsh_error *error);
+
+/* Whether a place of field space is outside of field->surface for certain: farther from it than a quad may be
+ * off what the cell reads. */
+bool vshi_surface_clears(const vsh_field *field, vshi_vec place);
+
+#endif
