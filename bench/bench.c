@@ -99,14 +99,15 @@ static table tables[] = {{"", bench_header, NULL},
                          {"-features", bench_features_header, NULL},
                          {"-terrain", bench_header, NULL},
                          {"-read", bench_read_header, NULL},
-                         {"-levelset", bench_levelset_header, NULL}};
+                         {"-levelset", bench_levelset_header, NULL},
+                         {"-penumbra", bench_penumbra_header, NULL}};
 
 static table *table_of(const char *part) {
     static const struct {
         const char *part, *suffix;
     } others[] = {{"intersector", "-ratios"}, {"nanovdb", "-ratios"},    {"cores", "-ratios"},
                   {"scaling", "-scaling"},    {"features", "-features"}, {"terrain", "-terrain"},
-                  {"read", "-read"},          {"levelset", "-levelset"}};
+                  {"read", "-read"},          {"levelset", "-levelset"}, {"penumbra", "-penumbra"}};
     const char *suffix = "";
     for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i) {
         suffix = strcmp(part, others[i].part) == 0 ? others[i].suffix : suffix;
@@ -166,7 +167,8 @@ int main(int argc, char **argv) {
                  {"features", bench_features},
                  {"terrain", bench_terrain},
                  {"read", bench_read},
-                 {"levelset", bench_levelset}};
+                 {"levelset", bench_levelset},
+                 {"penumbra", bench_penumbra}};
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
         if (only == NULL || strcmp(only, parts[i].name) == 0) {
             parts[i].run(begin_table(table_of(parts[i].name), path));

@@ -51,8 +51,10 @@ function(vsh_add_kernels target)
   foreach(kind ${kinds})
     set(flags ${VSH_KERNEL_${kind}})
     list(POP_FRONT flags lanes width)
-    vsh_add_kernel(${target} march_${kind} shade/kernel/lanes.inc "${flags}"
-                   "#define KERNEL_NAME vshi_kernel_${kind}\n#define MARCH_LANES ${lanes}\n#define MARCH_WIDTH ${width}\n")
+    foreach(source lanes silhouette)
+      vsh_add_kernel(${target} ${source}_${kind} shade/kernel/${source}.inc "${flags}"
+                     "#define KERNEL_NAME vshi_kernel_${kind}\n#define SILHOUETTES_NAME vshi_silhouettes_${kind}\n#define MARCH_LANES ${lanes}\n#define MARCH_WIDTH ${width}\n")
+    endforeach()
     if(NOT kind STREQUAL few)
       vsh_add_kernel(${target} walk_${kind} heightfield/kernel/walk.inc "${flags}" "#define WALK_NAME vshi_walk_${kind}\n")
       vsh_add_kernel(${target} leaf_${kind} levelset/kernel/leaf.inc "${flags}" "#define LEAF_NAME vshi_leaf_${kind}\n")
