@@ -77,7 +77,7 @@ static void gather(const vshi_derivation *d, const int32_t around[27], bool outs
                    vshi_feet *points) {
     /* a voxel's way to its foot enters the core where that ends: there the rim is a cell's diagonal away */
     const float way = VSHI_COARSE_BAND + SLIDE_GAIN - d->fine->band / d->blocks.scale + 1.7321f;
-    const int32_t margin = way < (float)EDGE ? (int32_t)ceilf(way) : EDGE;
+    const int32_t margin = way < VSHI_FEET_MARGIN ? (int32_t)ceilf(way) : VSHI_FEET_MARGIN;
     points->count = 0;
     for (int n = 0; n < 27; ++n) {
         if (around[n] < 0) {
