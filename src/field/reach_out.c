@@ -73,11 +73,10 @@ static void find_rim(void *user, size_t begin, size_t end) {
 }
 
 /* The feet of the rim within reach of a block's voxels, on their side of the surface. */
-static void gather(const vshi_derivation *d, const int32_t around[27], bool outside, bool inside,
-                   vshi_feet *points) {
+static void gather(const vshi_derivation *d, const int32_t around[27], bool inside, vshi_feet *points) {
     /* a voxel's way to its foot enters the core where that ends: there the rim is a cell's diagonal away */
     const float way = VSHI_COARSE_BAND + SLIDE_GAIN - d->fine->band / d->blocks.scale + 1.7321f;
-    const int32_t margin = way < (float)EDGE ? (int32_t)ceilf(way) : EDGE;
+    const int32_t margin = way < VSHI_FEET_MARGIN ? (int32_t)ceilf(way) : VSHI_FEET_MARGIN;
     points->count = 0;
     for (int n = 0; n < 27; ++n) {
         if (around[n] < 0) {
@@ -94,7 +93,7 @@ static void gather(const vshi_derivation *d, const int32_t around[27], bool outs
         const int16_t *feet = d->feet + (size_t)around[n] * BLOCK * 3;
         for (int x = low[0]; x <= high[0]; ++x) {
             const uint64_t in = d->inside[around[n]][x];
-            uint64_t left = d->rim[around[n]][x] & box & ((outside ? ~in : 0) | (inside ? in : 0));
+            uint64_t left = d->rim[around[n]][x] & box & (inside ? in : ~in);
             for (; left != 0; left &= left - 1) {
                 const int bit = __builtin_ctzll(left), v = 64 * x + bit;
                 const size_t i = points->count++;
@@ -158,21 +157,25 @@ static void reach_out(void *user, size_t begin, size_t end) {
     vshi_slides slides;
     for (size_t block = begin; block < end; ++block) {
         vshi_bits open;
-        uint64_t outside = 0, inside = 0;
-        for (int x = 0; x < EDGE; ++x) {
-            open[x] = ~d->core[block][x];
-            outside |= open[x] & ~d->inside[block][x];
-            inside |= open[x] & d->inside[block][x];
-        }
         int32_t around[27];
         find_around(d, block, around);
-        gather(d, around, outside != 0, inside != 0, &points);
-        if (points.count == 0) {
-            continue;
+        for (int side = 0; side < 2; ++side) {
+            uint64_t any = 0;
+            for (int x = 0; x < EDGE; ++x) {
+                const uint64_t inside = d->inside[block][x];
+                open[x] = ~d->core[block][x] & (side != 0 ? inside : ~inside);
+                any |= open[x];
+            }
+            if (any != 0) {
+                gather(d, around, side != 0, &points);
+                /* what may slide into the band, and a step */
+                const float most = (VSHI_COARSE_BAND + SLIDE_GAIN) * VSHI_FOOT_STEPS + 1.0f;
+                d->kernel->nearest(&points, open, most, d->feet + block * BLOCK * 3);
+            }
         }
-        /* what may slide into the band, and a step */
-        const float most = (VSHI_COARSE_BAND + SLIDE_GAIN) * VSHI_FOOT_STEPS + 1.0f;
-        d->kernel->nearest(&points, open, most, d->feet + block * BLOCK * 3);
+        for (int x = 0; x < EDGE; ++x) {
+            open[x] = ~d->core[block][x];
+        }
         list_slides(d, block, open, &slides);
         settle(d, block, &slides);
     }

@@ -9,8 +9,10 @@
 #include <stdint.h>
 
 enum {
-    VSHI_FEET_LANES = 16,  /* voxels that are looked at together */
-    VSHI_FEET_MOST = 10656 /* points, at most; a multiple of the lanes */
+    VSHI_FEET_LANES = 16, /* points that are looked at together */
+    /* voxels around a block among which points are looked for, at most: what a finest band of 3 takes */
+    VSHI_FEET_MARGIN = 7,
+    VSHI_FEET_MOST = 10656 /* points, at most: (8 + 2 · 7)³, to a multiple of the lanes */
 };
 
 /* Points in steps (field/level.h) from the block's first voxel: whole numbers, which floats hold. */
