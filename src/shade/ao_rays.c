@@ -220,10 +220,11 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
 }
 
 /* False where there is nothing to shoot: the value is then known. */
-static bool prepare(vshi_ao_piece *b, size_t i, vshi_ao_point *point, vsh_shade_stats *stats) {
+static bool prepare(const vshi_ao_piece *b, size_t i, vshi_ao_point *point, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
     const vsh_points *points = task->points;
-    *point = (vshi_ao_point){.rise = 1.0, .texel = points->texels != NULL ? points->texels[i] : (uint32_t)i};
+    *point = (vshi_ao_point){
+        .rise = 1.0, .index = i, .texel = points->texels != NULL ? points->texels[i] : (uint32_t)i};
     const bool horizon = vshi_ao_has_horizon(task);
     if (!vshi_ao_frame_at(task, i, &point->frame, stats)) {
         return false;
@@ -262,24 +263,25 @@ static bool is_open(const void *user, size_t i) {
 }
 
 /* Points in solids see nothing, also where all triangles around are farther than the AO distance. */
-static void find_buried(const vshi_ao_task *task, size_t begin, size_t end, vshi_ao_point *points) {
+static void find_buried(const vshi_ao_task *task, size_t all, vshi_ao_point *points) {
     looking l = {.task = task, .points = points};
     double positions[3 * VSHI_AO_GRAIN] = {0.0};
     float normals[3 * VSHI_AO_GRAIN] = {0.0f};
     uint8_t where[VSHI_AO_GRAIN];
     size_t count = 0;
-    for (size_t i = begin; i < end; ++i) {
-        if (points[i - begin].next > 0) {
+    for (size_t k = 0; k < all; ++k) {
+        const size_t i = points[k].index;
+        if (points[k].next > 0) {
             memcpy(positions + 3 * count, task->points->positions + 3 * i, 3 * sizeof(double));
             if (!task->sphere) {
                 memcpy(normals + 3 * count, task->points->normals + 3 * i, 3 * sizeof(float));
             }
-            l.of[count++] = (uint32_t)(i - begin);
+            l.of[count++] = (uint32_t)k;
         }
     }
     vshi_inside(task->triangles, count, positions, normals, is_open, &l, where);
     for (size_t k = 0; k < count; ++k) {
-        const size_t i = begin + l.of[k];
+        const size_t i = points[l.of[k]].index;
         if (where[k] == VSHI_OUTSIDE) {
             continue;
         }
@@ -338,21 +340,20 @@ static void decide(const vshi_ao_task *task, int32_t most, vshi_ao_point *point)
     point->next = more ? doubled : 0;
 }
 
-void vshi_ao_piece_open(vshi_ao_piece *piece, const vshi_ao_task *task, size_t begin, size_t end, bool tiled,
-                        int32_t first, vsh_shade_stats *stats) {
+void vshi_ao_piece_open(vshi_ao_piece *piece, const vshi_ao_task *task, const size_t *points, size_t count,
+                        bool tiled, int32_t first, vsh_shade_stats *stats) {
     piece->task = task;
     piece->exact = task->options->ao_method == VSH_AO_EXACT;
     piece->tiled = tiled;
-    piece->begin = begin;
-    piece->count = end - begin;
+    piece->count = count;
     piece->traced = 0;
     vshi_chunk_clear(&piece->chunk);
-    for (size_t i = begin; i < end; ++i) {
-        vshi_ao_point *point = &piece->points[i - begin];
-        point->next = prepare(piece, i, point, stats) ? first : 0;
+    for (size_t k = 0; k < count; ++k) {
+        vshi_ao_point *point = &piece->points[k];
+        point->next = prepare(piece, points[k], point, stats) ? first : 0;
     }
     if (piece->exact && !task->outside) {
-        find_buried(task, begin, end, piece->points);
+        find_buried(task, count, piece->points);
     }
 }
 
@@ -379,7 +380,11 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
     int32_t first = fixed ? options->early_rays : FIRST_ROUND;
     first = first == 0 || first > most ? most : first;
     vshi_ao_piece piece;
-    vshi_ao_piece_open(&piece, task, begin, end, false, first, stats);
+    size_t of[VSHI_AO_GRAIN];
+    for (size_t i = begin; i < end; ++i) {
+        of[i - begin] = i;
+    }
+    vshi_ao_piece_open(&piece, task, of, end - begin, false, first, stats);
     for (bool more = true; more;) {
         more = false;
         vshi_ao_piece_shoot(&piece, stats);
