@@ -52,12 +52,16 @@ static void trace(vshi_ao_piece *b) {
     bool blocked[VSHI_CHUNK];
     order(b, of);
     for (size_t r = 0; r < b->traced; ++r) {
-        sorted[r] = b->segments[of[r]];
+        const vshi_vec o = b->points[b->chunk.owner[of[r]]].world_origin, d = b->directions[of[r]];
+        sorted[r] = (vshi_segment_ray){
+            .origin = {o.x, o.y, o.z}, .direction = {d.x, d.y, d.z}, .far = b->task->options->ao_distance};
     }
     vshi_triangles_blocked(b->task->triangles, sorted, b->traced, blocked);
     for (size_t r = 0; r < b->traced; ++r) {
-        if (!blocked[r]) {
-            add_free(&b->points[b->chunk.owner[of[r]]], vshi_vec_of(sorted[r].direction));
+        vshi_ao_point *point = &b->points[b->chunk.owner[of[r]]];
+        point->free += !blocked[r];
+        if (!blocked[r] && b->task->bent != NULL) {
+            point->open = vshi_add(point->open, vshi_vec_of(sorted[r].direction));
         }
     }
 }
@@ -155,14 +159,10 @@ static uint8_t key_of(vshi_vec local) {
 }
 
 static void trace_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shade_stats *stats) {
-    const vshi_ao_task *task = b->task;
-    const vshi_ao_point *point = &b->points[owner];
     if (b->traced == VSHI_CHUNK) {
         flush(b, stats);
     }
-    const vshi_vec o = point->world_origin, d = vshi_ao_direction(point->world_axes, local);
-    b->segments[b->traced] = (vshi_segment_ray){
-        .origin = {o.x, o.y, o.z}, .direction = {d.x, d.y, d.z}, .far = task->options->ao_distance};
+    b->directions[b->traced] = vshi_ao_direction(b->points[owner].world_axes, local);
     b->key[b->traced] = b->tiled ? key_of(local) : 0;
     b->chunk.owner[b->traced++] = owner;
 }
@@ -208,7 +208,9 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
         }
         for (int32_t i = 0; i < count; ++i) {
             const vshi_vec local = direction_of(b->task, point->rise, disc[i]);
-            point->all = vshi_add(point->all, local);
+            if (b->task->bent != NULL) {
+                point->all = vshi_add(point->all, local);
+            }
             if (b->exact) {
                 trace_ray(b, owner, local, stats);
             } else {

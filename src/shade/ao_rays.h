@@ -35,7 +35,7 @@ typedef struct vshi_ao_piece {
     vshi_ao_point points[VSHI_AO_GRAIN];
     vshi_chunk chunk;
     size_t traced;
-    vshi_segment_ray segments[VSHI_CHUNK];
+    vshi_vec directions[VSHI_CHUNK]; /* exact: world space */
     uint8_t
         key[VSHI_CHUNK]; /* of a tile: where each goes to, so that those that go alike are traced together;
                           * of others 0: the order of a point's rays depends on no other point */
