@@ -24,6 +24,8 @@ static const int32_t SPAN = 3;
 /* Where it spans fewer, the second difference of its texel's value and of those beside it, of max_error: what
  * lies between is then off the straight line by an eighth of it at most. */
 static const double BEND = 4.0;
+/* Beside standard deviations of its noise: a texel that is refined by chance is a speck in the picture. */
+static const double SIGMAS = 2.0;
 
 /* A tile of a lattice. */
 typedef struct tile {
@@ -180,8 +182,11 @@ static bool is_straight(const tile *t, const vshi_window_estimate *e, int32_t at
         const int32_t next = run[0] > 0 ? at - along : run[1] > 0 ? at + along : at;
         return fabs(e[next].value - e[at].value) <= 0.25 * most;
     }
-    const int32_t middle = at + (run[0] == 0 ? along : run[1] == 0 ? -along : 0);
-    return fabs(e[middle - along].value - 2.0 * e[middle].value + e[middle + along].value) <= most;
+    const vshi_window_estimate *middle = e + at + (run[0] == 0 ? along : run[1] == 0 ? -along : 0);
+    const double before = middle[-along].deviation, own = 2.0 * middle->deviation,
+                 after = middle[along].deviation;
+    const double off = middle[-along].value - 2.0 * middle->value + middle[along].value;
+    return fabs(off) <= most + SIGMAS * sqrt(before * before + own * own + after * after);
 }
 
 /* Texels whose windows tell nothing of what lies between them and the next are of the finer lattice. */
