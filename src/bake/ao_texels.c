@@ -5,124 +5,106 @@
 #include "base/parallel.h"
 #include "base/try.h"
 #include "shade/ao.h"
-#include "shade/links.h"
 
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Tiles that are estimated together, and with those around them that their windows reach. */
-enum { ROWS = 8, COLUMNS = 8, HELD_ROWS = ROWS + 2, HELD_COLUMNS = COLUMNS + 2 };
-enum { WIDTH = HELD_COLUMNS * VSHI_TILE, HEIGHT = HELD_ROWS * VSHI_TILE, TEXELS = WIDTH * HEIGHT };
+/* Tiles of a lattice that are estimated together, and with those around them that their windows reach. */
+enum { TILES = 8, INNER = TILES * VSHI_TILE, WIDTH = INNER + 2 * VSHI_TILE, TEXELS = WIDTH * WIDTH };
 _Static_assert((int)VSHI_WINDOW_REACH <= (int)VSHI_TILE, "windows reach the next tile, no farther");
+
+/* What a window says of its texel: the plane, a texel of the map on, and how well it is known. */
+typedef struct plane {
+    float slope[2], deviation, curved;
+} plane;
 
 typedef struct sharing {
     const vsh_texels *texels;
     const vshi_origins *origins;
     const vsh_points *points;
     const vsh_shade_options *options;
-    size_t *tile;     /* [tiles + 1]: first origin of each */
-    size_t *row_tile; /* [rows of tiles + 1]: first tile of each */
-    float *shot;      /* [origins.count]: shares of each texel's own rays */
-    int32_t *rays;    /* [origins.count]: how many */
-    float *open;      /* [origins.count][3]: bent normals by them; NULL: not asked for */
+    vshi_ao_share share;
+    uint32_t *at;  /* [held texels]: the share's map */
+    float *shot;   /* [origins.count]: shares of each texel's own rays */
+    float *open;   /* [origins.count][3]: bent normals by them; NULL: not asked for */
+    plane *planes; /* [origins.count]: of texels that shot */
     float *values, *deviation, *bent;
-    size_t block_columns;
-    _Atomic size_t refused;  /* blocks whose memory was */
-    _Atomic uint64_t square; /* of the estimates' errors, of the band's own, in VSHI_SQUARE_UNIT */
-    _Atomic double worst;    /* of the same, the largest */
-    int64_t *curved;         /* [block_columns][rows of tiles]: vshi_window_estimate's, likewise */
+    int32_t spacing;        /* of the lattice at work */
+    _Atomic size_t refused; /* blocks whose memory was */
+    /* of the errors of rows of tiles, in VSHI_SQUARE_UNIT: their squares, and vshi_window_estimate's curved
+     */
+    uint64_t *square;
+    int64_t *curved;
+    _Atomic double worst; /* of the band's own, the largest */
+    _Atomic uint64_t rays, refined, invalid;
 } sharing;
 
-/* Some tiles and those around them, as one rectangle of texels. */
+/* Some tiles of a lattice and those around them, as one rectangle of its texels. */
 typedef struct block {
-    int32_t left, top;   /* of its first texel */
+    vshi_texel_lattice lattice;
     uint32_t at[TEXELS]; /* origin + 1 */
     vshi_window_texel texels[TEXELS];
-    vshi_window_sums sums[(WIDTH + 1) * (HEIGHT + 1)];
+    vshi_window_sums sums[(WIDTH + 1) * (WIDTH + 1)];
     vshi_windows windows;
 } block;
 
-static int32_t column_of(const sharing *s, size_t i) {
-    return (int32_t)(s->origins->texel[i] & 0xffffu);
-}
-
-static int32_t row_of(const sharing *s, size_t i) {
-    return (int32_t)(s->origins->texel[i] >> 16);
-}
-
-/* Where tiles begin; sets tile[] and row_tile[] where they are there. Returns how many there are. */
-static size_t list_tiles(const vshi_origins *origins, size_t *tile, size_t *row_tile) {
-    size_t tiles = 0;
-    for (size_t row = 0; row < origins->rows.count; ++row) {
-        const size_t begin = origins->rows.start[row], end = origins->rows.start[row + 1];
-        uint32_t last = 0;
-        if (row_tile != NULL) {
-            row_tile[row] = tiles;
-        }
-        for (size_t i = begin; i < end; ++i) {
-            const uint32_t of = origins->texel[i] / VSHI_TILE % (0x10000 / VSHI_TILE);
-            if (i > begin && of == last) {
-                continue;
-            }
-            if (tile != NULL) {
-                tile[tiles] = i;
-            }
-            ++tiles;
-            last = of;
-        }
+/* A vshi_range_fn: where each origin is in the map. */
+static void map_origins(void *user, size_t begin, size_t end) {
+    const sharing *s = user;
+    for (size_t i = begin; i < end; ++i) {
+        const uint32_t texel = s->origins->texel[i];
+        const size_t row = vsh_texel_row(texel) - (size_t)s->texels->band.first;
+        s->at[row * (size_t)s->texels->info.width + vsh_texel_column(texel)] = (uint32_t)i + 1;
     }
-    if (tile != NULL) {
-        tile[tiles] = origins->count;
-        row_tile[origins->rows.count] = tiles;
+}
+
+/* --- estimates of texels that shot */
+
+static bool is_own(const sharing *s, uint32_t at) {
+    return at > 0 && s->share.rays[at - 1] > 0 && s->share.level[at - 1] == s->spacing;
+}
+
+/* False where no texel within is to be estimated. */
+static bool find_texels(const sharing *s, block *b) {
+    bool any = false;
+    for (int32_t k = 0; k < TEXELS; ++k) {
+        const int32_t x = k % WIDTH, y = k / WIDTH;
+        b->at[k] =
+            vshi_texel_at(&s->share.map, b->lattice.left + x * s->spacing, b->lattice.top + y * s->spacing);
+        any = any || (x >= VSHI_TILE && x < VSHI_TILE + INNER && y >= VSHI_TILE && y < VSHI_TILE + INNER &&
+                      is_own(s, b->at[k]));
     }
-    return tiles;
+    return any;
 }
 
-/* The first tile of a row that is at `column` of tiles or behind it. */
-static size_t find_tile(const sharing *s, size_t row, int32_t column) {
-    size_t low = s->row_tile[row], high = s->row_tile[row + 1];
-    while (low < high) {
-        const size_t middle = low + (high - low) / 2;
-        if (column_of(s, s->tile[middle]) / VSHI_TILE < column) {
-            low = middle + 1;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
-}
-
-/* The origins of a row of tiles from column `from` of tiles on, before column `to`. */
-static void find_origins(const sharing *s, size_t row, int32_t from, int32_t to, size_t range[2]) {
-    range[0] = s->tile[find_tile(s, row, from)];
-    range[1] = s->tile[find_tile(s, row, to)];
-}
-
-/* Lays out rows `begin` … `end` - 1 of tiles and columns `from` … `to` - 1. */
-static void lay_out(const sharing *s, size_t begin, size_t end, int32_t from, int32_t to, block *b) {
-    memset(b->at, 0, sizeof b->at);
+static void lay_out(const sharing *s, block *b) {
+    const int32_t sampler = vshi_ao_tile_sampler(s->options->sampler);
     memset(b->texels, 0, sizeof b->texels);
-    b->left = from * VSHI_TILE;
-    b->top = (int32_t)(s->texels->band.held_begin + begin) * VSHI_TILE;
-    b->windows = (vshi_windows){WIDTH, (int32_t)(end - begin) * VSHI_TILE, b->texels, b->sums};
-    for (size_t row = begin; row < end; ++row) {
-        size_t range[2];
-        find_origins(s, row, from, to, range);
-        for (size_t i = range[0]; i < range[1]; ++i) {
-            if (s->rays[i] == 0) {
-                continue;
-            }
-            const int32_t place = (row_of(s, i) - b->top) * WIDTH + column_of(s, i) - b->left;
-            b->at[place] = (uint32_t)i + 1;
-            b->texels[place].value = s->shot[i];
-            b->texels[place].rays = s->rays[i];
-            b->texels[place].spread =
-                (float)vshi_ao_spread(vshi_ao_tile_sampler(s->options->sampler), s->rays[i]);
+    b->windows = (vshi_windows){WIDTH, WIDTH, b->texels, b->sums};
+    int32_t rays = 0;
+    float spread = 0.0f;
+    for (size_t k = 0; k < TEXELS; ++k) {
+        const size_t i = (size_t)b->at[k] - 1;
+        if (b->at[k] == 0 || s->share.rays[i] == 0) {
+            b->at[k] = 0;
+            continue;
         }
+        if (s->share.rays[i] != rays) {
+            rays = s->share.rays[i];
+            spread = (float)vshi_ao_spread(sampler, rays);
+        }
+        b->texels[k].value = s->shot[i];
+        b->texels[k].rays = rays;
+        b->texels[k].spread = spread;
     }
-    vshi_links_find(s->points, b->at, b->windows.width, b->windows.height, b->texels);
+    vshi_links_find(s->points, &s->share.map, &b->lattice, b->texels);
+    for (size_t k = 0; k < TEXELS; ++k) { /* what shot nothing parts those beside it */
+        const bool none = b->at[k] == 0;
+        b->texels[k].left = b->texels[k].left && !none && b->at[k - 1] > 0;
+        b->texels[k].above = b->texels[k].above && !none && b->at[k - WIDTH] > 0;
+    }
     vshi_windows_sum(&b->windows);
 }
 
@@ -162,99 +144,217 @@ static vshi_window_estimate estimate(const sharing *s, const block *b, int32_t x
     return own.centred < e.centred ? own : e;
 }
 
-/* Returns the sum of what is curved, in VSHI_SQUARE_UNIT. */
-static int64_t estimate_row(sharing *s, const block *b, const size_t range[2], bool own) {
-    uint64_t square = 0;
-    double worst = 0.0;
-    int64_t curved = 0;
-    for (size_t i = range[0]; i < range[1]; ++i) {
-        if (s->rays[i] == 0) {
-            s->values[i] = s->shot[i];
-            if (s->deviation != NULL) {
-                s->deviation[i] = isnan(s->shot[i]) ? NAN : 0.0f;
+static void estimate_own(const sharing *s, const block *b) {
+    const float part = 1.0f / (float)s->spacing;
+    for (int32_t y = VSHI_TILE; y < VSHI_TILE + INNER; ++y) {
+        for (int32_t x = VSHI_TILE; x < VSHI_TILE + INNER; ++x) {
+            const uint32_t at = b->at[y * WIDTH + x];
+            if (!is_own(s, at)) {
+                continue;
             }
-            for (size_t axis = 0; axis < 3 && s->bent != NULL; ++axis) {
-                s->bent[3 * i + axis] = s->open[3 * i + axis];
+            const size_t i = (size_t)at - 1;
+            const vshi_window_estimate e = estimate(s, b, x, y);
+            s->values[i] = (float)e.value;
+            s->planes[i] = (plane){
+                {part * (float)e.slope[0], part * (float)e.slope[1]}, (float)e.deviation, (float)e.curved};
+            if (s->bent != NULL) {
+                bend(s, b, &e, x, y, s->bent + 3 * i);
             }
-            continue;
         }
-        const int32_t x = column_of(s, i) - b->left, y = row_of(s, i) - b->top;
-        const vshi_window_estimate e = estimate(s, b, x, y);
-        s->values[i] = (float)e.value;
-        if (s->deviation != NULL) {
-            s->deviation[i] = (float)e.deviation;
-        }
-        if (s->bent != NULL) {
-            bend(s, b, &e, x, y, s->bent + 3 * i);
-        }
-        square += own ? (uint64_t)(e.deviation * e.deviation / VSHI_SQUARE_UNIT) : 0;
-        curved += own ? (int64_t)(e.curved / VSHI_SQUARE_UNIT) : 0;
-        worst = own ? fmax(worst, e.deviation) : worst;
     }
-    atomic_fetch_add(&s->square, square);
-    vshi_raise(&s->worst, worst);
-    return curved;
+}
+
+static size_t blocks_across(const sharing *s, int32_t texels) {
+    const int32_t side = INNER * s->spacing;
+    return (size_t)((texels + side - 1) / side);
 }
 
 /* A vshi_range_fn over blocks, row by row. */
-static void estimate_block(void *user, size_t begin, size_t end) {
+static void estimate_blocks(void *user, size_t begin, size_t end) {
     sharing *s = user;
-    const vshi_point_rows *rows = &s->origins->rows;
+    const size_t columns = blocks_across(s, s->share.map.width);
+    block *b = malloc(sizeof *b);
+    if (b == NULL) {
+        atomic_fetch_add(&s->refused, 1);
+        return;
+    }
     for (size_t n = begin; n < end; ++n) {
-        const size_t first = n / s->block_columns * ROWS;
-        const size_t last = first + ROWS < rows->count ? first + ROWS : rows->count;
-        const int32_t left = (int32_t)(n % s->block_columns) * COLUMNS, right = left + COLUMNS;
-        size_t range[2], count = 0;
-        for (size_t row = first; row < last; ++row) {
-            find_origins(s, row, left, right, range);
-            count += range[1] - range[0];
+        const int32_t side = INNER * s->spacing, beside = VSHI_TILE * s->spacing;
+        b->lattice = (vshi_texel_lattice){(int32_t)(n % columns) * side - beside,
+                                          (int32_t)(n / columns) * side - beside, s->spacing, WIDTH, WIDTH};
+        if (find_texels(s, b)) {
+            lay_out(s, b);
+            estimate_own(s, b);
         }
-        if (count == 0) {
+    }
+    free(b);
+}
+
+/* --- of those between */
+
+/* A cell whose texels are estimated by the windows of its corners. */
+typedef struct cell {
+    int32_t at[2];
+    uint32_t good;    /* corners that are of the lattice, as bits */
+    size_t corner[4]; /* origins */
+    bool whole;
+} cell;
+
+static void look_at(const sharing *s, cell *c) {
+    c->good = 0;
+    for (int32_t k = 0; k < 4; ++k) {
+        const uint32_t at =
+            vshi_texel_at(&s->share.map, c->at[0] + (k & 1) * s->spacing, c->at[1] + (k >> 1) * s->spacing);
+        c->corner[k] = (size_t)at - 1;
+        if (at > 0 && s->share.rays[at - 1] > 0 && s->share.level[at - 1] >= s->spacing) {
+            c->good |= 1u << k;
+        }
+    }
+    c->whole = vshi_links_whole(s->points, &s->share.map, c->at[0], c->at[1], s->spacing);
+}
+
+/* Where a texel lies between its cell's corners, 0 … 1, but never on one's line. */
+static double part_of(int32_t place, int32_t spacing) {
+    return (place + 0.25) / (spacing + 0.5);
+}
+
+/* The planes of the corners, blended. */
+static void fill_texel(const sharing *s, const cell *c, int32_t dx, int32_t dy, size_t i) {
+    const uint32_t corners = c->good & vshi_ao_corners(s->points, &s->share.map, c->at, s->spacing, c->whole,
+                                                       c->at[0] + dx, c->at[1] + dy);
+    const double u = part_of(dx, s->spacing), v = part_of(dy, s->spacing);
+    double sum = 0.0, value = 0.0, deviation = 0.0, curved = 0.0, bent[3] = {0.0, 0.0, 0.0};
+    for (int32_t k = 0; k < 4; ++k) {
+        if ((corners >> k & 1) == 0) {
             continue;
         }
-        block *b = malloc(sizeof *b);
-        if (b == NULL) {
-            atomic_fetch_add(&s->refused, 1);
-            return;
+        const size_t corner = c->corner[k];
+        const plane *p = &s->planes[corner];
+        const double weight = (k & 1 ? u : 1.0 - u) * (k >> 1 ? v : 1.0 - v);
+        const int32_t x = dx - (k & 1) * s->spacing, y = dy - (k >> 1) * s->spacing;
+        const double at = (double)s->values[corner] + (double)p->slope[0] * x + (double)p->slope[1] * y;
+        sum += weight;
+        value += weight * (at < 0.0 ? 0.0 : at > 1.0 ? 1.0 : at);
+        deviation += weight * (double)p->deviation;
+        curved += weight * (double)p->curved;
+        for (size_t axis = 0; axis < 3 && s->bent != NULL; ++axis) {
+            bent[axis] += weight * ((double)s->bent[3 * corner + axis] -
+                                    VSHI_AO_OPEN * (double)s->values[corner] *
+                                        (double)s->points->normals[3 * corner + axis]);
         }
-        const size_t below = last < rows->count ? last + 1 : last;
-        lay_out(s, first > 0 ? first - 1 : 0, below, left > 0 ? left - 1 : 0, right + 1, b);
-        for (size_t row = first; row < last; ++row) {
-            find_origins(s, row, left, right, range);
-            s->curved[n % s->block_columns * rows->count + row] =
-                estimate_row(s, b, range, row >= rows->first && row < rows->last);
-        }
-        free(b);
+    }
+    s->values[i] = (float)(value / sum);
+    s->planes[i] = (plane){{0.0f, 0.0f}, (float)(deviation / sum), (float)(curved / sum)};
+    for (size_t axis = 0; axis < 3 && s->bent != NULL; ++axis) {
+        s->bent[3 * i + axis] =
+            (float)(VSHI_AO_OPEN * (double)s->values[i] * (double)s->points->normals[3 * i + axis] +
+                    bent[axis] / sum);
     }
 }
 
-/* What is curved in all texels, by rows of tiles, whose sums are known well enough to tell what is above zero
- * and depend on no band. */
-static double sum_curved(const sharing *s) {
+/* A vshi_range_fn over rows of cells. */
+static void fill_cells(void *user, size_t begin, size_t end) {
+    const sharing *s = user;
+    const vshi_texel_map *map = &s->share.map;
+    for (size_t row = begin; row < end; ++row) {
+        for (int32_t column = 0; column < map->width; column += s->spacing) {
+            cell c = {.at = {column, (int32_t)row * s->spacing}};
+            bool looked = false;
+            for (int32_t k = 0; k < s->spacing * s->spacing; ++k) {
+                const int32_t dx = k % s->spacing, dy = k / s->spacing;
+                const uint32_t at = vshi_texel_at(map, c.at[0] + dx, c.at[1] + dy);
+                if (at == 0 || s->share.rays[at - 1] > 0 || s->share.level[at - 1] != s->spacing) {
+                    continue;
+                }
+                if (!looked) {
+                    look_at(s, &c);
+                    looked = true;
+                }
+                fill_texel(s, &c, dx, dy, (size_t)at - 1);
+            }
+        }
+    }
+}
+
+/* --- all */
+
+/* A vshi_range_fn over rows of tiles. */
+static void sum_rows(void *user, size_t begin, size_t end) {
+    sharing *s = user;
     const vshi_point_rows *rows = &s->origins->rows;
-    double all = 0.0;
-    for (size_t row = rows->first; row < rows->last; ++row) {
-        int64_t sum = 0;
-        for (size_t column = 0; column < s->block_columns; ++column) {
-            sum += s->curved[column * rows->count + row];
+    for (size_t row = begin; row < end; ++row) {
+        uint64_t square = 0, rays = 0, refined = 0, invalid = 0;
+        int64_t curved = 0;
+        double worst = 0.0;
+        for (size_t i = rows->start[row]; i < rows->start[row + 1]; ++i) {
+            if (s->share.level[i] == VSHI_AO_KNOWN_LEVEL) {
+                s->values[i] = s->shot[i];
+                s->planes[i] = (plane){.deviation = isnan(s->shot[i]) ? NAN : 0.0f};
+                for (size_t axis = 0; axis < 3 && s->bent != NULL; ++axis) {
+                    s->bent[3 * i + axis] = s->open[3 * i + axis];
+                }
+                invalid += isnan(s->shot[i]);
+            } else {
+                const double deviation = (double)s->planes[i].deviation;
+                square += (uint64_t)(deviation * deviation / VSHI_SQUARE_UNIT);
+                curved += (int64_t)((double)s->planes[i].curved / VSHI_SQUARE_UNIT);
+                worst = fmax(worst, deviation);
+                rays += (uint64_t)s->share.rays[i];
+                ++refined;
+            }
+            if (s->deviation != NULL) {
+                s->deviation[i] = s->planes[i].deviation;
+            }
         }
-        all += sum > 0 ? (double)sum * VSHI_SQUARE_UNIT : 0.0;
+        s->square[row] = square;
+        s->curved[row] = curved;
+        if (row >= rows->first && row < rows->last) {
+            vshi_raise(&s->worst, worst);
+            atomic_fetch_add(&s->rays, rays);
+            atomic_fetch_add(&s->refined, refined);
+            atomic_fetch_add(&s->invalid, invalid);
+        }
     }
-    return all;
 }
 
-double vshi_ao_texels_bytes(double samples, int32_t threads, bool bent) {
+/* What is curved is summed by rows of tiles, whose sums are known well enough to tell what is above zero and
+ * depend on no band. */
+static void add_stats(const sharing *s, vsh_shade_stats *stats) {
+    const vshi_point_rows *rows = &s->origins->rows;
+    double square = 0.0;
+    for (size_t row = rows->first; row < rows->last; ++row) {
+        square += (double)s->square[row] * VSHI_SQUARE_UNIT;
+        square += s->curved[row] > 0 ? (double)s->curved[row] * VSHI_SQUARE_UNIT : 0.0;
+    }
+    stats->square_error += square;
+    stats->ao_square_error += square;
+    stats->worst_error = fmax(stats->worst_error, s->worst);
+    stats->rays += s->rays;
+    stats->refined += s->refined;
+    stats->invalid += s->invalid;
+}
+
+double vshi_ao_texels_bytes(double samples, double texels, int32_t threads, bool bent) {
     const double all_cores = 64.0; /* threads == 0: how many there are is the pool's business */
-    return samples * ((bent ? 4.0 : 1.0) * sizeof(float) + sizeof(int32_t) + sizeof(size_t)) +
-           (threads > 0 ? threads : all_cores) * (double)sizeof(block);
+    return samples * ((bent ? 4.0 : 1.0) * sizeof(float) + sizeof(int32_t) + sizeof(plane) + 1.0) +
+           texels * sizeof(uint32_t) + (threads > 0 ? threads : all_cores) * (double)sizeof(block);
 }
 
 /* Estimates all, once each texel's own rays are shot. */
 static vsh_result estimate_all(sharing *s, vshi_job *job, vsh_error *error) {
-    const size_t blocks = (s->origins->rows.count + ROWS - 1) / ROWS * s->block_columns;
-    VSHI_TRY(vshi_parallel_for(job, blocks, 1, 0, estimate_block, s, error));
-    return s->refused > 0 ? vshi_fail(error, VSH_ERROR_MEMORY, "AO texels: the system refused memory")
-                          : VSH_OK;
+    const int32_t rows = s->share.map.height;
+    for (s->spacing = s->share.spacing; s->spacing > 0; s->spacing /= 2) {
+        const size_t blocks = blocks_across(s, s->share.map.width) * blocks_across(s, rows);
+        VSHI_TRY(vshi_parallel_for(job, blocks, 1, 0, estimate_blocks, s, error));
+    }
+    if (s->refused > 0) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "AO texels: the system refused memory");
+    }
+    for (s->spacing = s->share.spacing; s->spacing > 1; s->spacing /= 2) {
+        const size_t cells = (size_t)((rows + s->spacing - 1) / s->spacing);
+        VSHI_TRY(vshi_parallel_for(job, cells, 1, 0, fill_cells, s, error));
+    }
+    return vshi_parallel_for(job, s->origins->rows.count, 1, 0, sum_rows, s, error);
 }
 
 vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texels,
@@ -269,48 +369,42 @@ vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texe
                  .deviation = deviation,
                  .bent = bent};
     const char *what = "AO texels";
-    const size_t columns = ((size_t)texels->info.width + VSHI_TILE - 1) / VSHI_TILE;
-    s.block_columns = (columns + COLUMNS - 1) / COLUMNS;
+    const size_t count = origins->count;
     vsh_run quiet = *run;
     quiet.progress = NULL;
-    vshi_job *job = vshi_job_begin(&quiet, "ao", origins->count);
+    vshi_job *job = vshi_job_begin(&quiet, "ao", count);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "ao: the system refused memory");
     }
     vsh_result result;
-    const size_t tiles = list_tiles(origins, NULL, NULL);
-    VSHI_TRY_DONE(vshi_allocate((void **)&s.tile, tiles + 1, sizeof *s.tile, what, error));
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&s.row_tile, origins->rows.count + 1, sizeof *s.row_tile, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&s.shot, origins->count, sizeof *s.shot, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&s.rays, origins->count, sizeof *s.rays, what, error));
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&s.open, bent != NULL ? origins->count : 0, 3 * sizeof *s.open, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&s.curved, s.block_columns * origins->rows.count, sizeof *s.curved,
-                                what, error));
-    if (tiles > 0) {
-        list_tiles(origins, s.tile, s.row_tile);
-        const vshi_point_rows rows = {.count = tiles,
-                                      .first = s.row_tile[origins->rows.first],
-                                      .last = s.row_tile[origins->rows.last],
-                                      .start = s.tile};
-        VSHI_TRY_DONE(vshi_shade_ao(occluders, points, &rows, options, run, s.shot, NULL, s.open, s.rays,
-                                    stats, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.at, vshi_texels_held(texels), sizeof *s.at, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.shot, count, sizeof *s.shot, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.share.rays, count, sizeof *s.share.rays, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.share.level, count, 1, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.open, bent != NULL ? count : 0, 3 * sizeof *s.open, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.planes, count, sizeof *s.planes, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.square, origins->rows.count, sizeof *s.square, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.curved, origins->rows.count, sizeof *s.curved, what, error));
+    s.share.map = (vshi_texel_map){s.at, texels->info.width, texels->band.rows};
+    s.share.spacing = texels->ao_spacing;
+    if (count > 0) {
+        VSHI_TRY_DONE(vshi_parallel_for(job, count, 4096, 0, map_origins, &s, error));
+        VSHI_TRY_DONE(vshi_shade_ao(occluders, points, NULL, options, run, s.shot, NULL, s.open, &s.share,
+                                    NULL, error));
         VSHI_TRY_DONE(estimate_all(&s, job, error));
     }
     if (stats != NULL) {
-        const double square = (double)s.square * VSHI_SQUARE_UNIT + sum_curved(&s);
-        stats->square_error += square;
-        stats->ao_square_error += square;
-        stats->worst_error = fmax(stats->worst_error, s.worst);
+        add_stats(&s, stats);
     }
 done:
     free(s.curved);
+    free(s.square);
+    free(s.planes);
     free(s.open);
-    free(s.rays);
+    free(s.share.level);
+    free(s.share.rays);
     free(s.shot);
-    free(s.row_tile);
-    free(s.tile);
+    free(s.at);
     vshi_job_end(job);
     return result;
 }

@@ -357,15 +357,15 @@ vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t ro
     const size_t tile = VSHI_TILE, all = charts->sorted.rows;
     const size_t reach = (size_t)(charts->padding > LEAST_BESIDE ? charts->padding : LEAST_BESIDE);
     const size_t beside = (reach + tile - 1) / tile;
-    const bool shared = charts->ao_spacing > 1;
-    const size_t above = beside + (shared ? VSHI_AO_ABOVE : 0);
-    const size_t below = beside + (shared ? VSHI_AO_BELOW : 0);
     band->own_first = first_row;
     band->own_rows = rows;
     band->own_begin = (size_t)first_row / tile;
     band->own_end = ((size_t)first_row + (size_t)rows + tile - 1) / tile;
-    band->held_begin = band->own_begin > above ? band->own_begin - above : 0;
-    band->held_end = all - band->own_end > below ? band->own_end + below : all;
+    band->held_begin = band->own_begin > beside ? band->own_begin - beside : 0;
+    band->held_end = all - band->own_end > beside ? band->own_end + beside : all;
+    if (charts->ao_spacing > 1) {
+        vshi_ao_rows(charts->ao_spacing, all, &band->held_begin, &band->held_end);
+    }
     band->first = (int32_t)(band->held_begin * tile);
     band->rows = (band->held_end == all ? height : (int32_t)(band->held_end * tile)) - band->first;
     return VSH_OK;
@@ -379,7 +379,8 @@ double vshi_bake_bytes(const vshi_bake_need *need) {
     return need->samples * sample +
            need->texels * (1.0 + VSHI_PADDING_TEXEL_BYTES + VSHI_SPREAD_TEXEL_BYTES) +
            fmax(need->lattice ? vshi_lattice_bytes(need->samples, need->texels, need->bent) : 0.0,
-                need->windows ? vshi_ao_texels_bytes(need->samples, need->threads, need->bent) : 0.0);
+                need->windows ? vshi_ao_texels_bytes(need->samples, need->texels, need->threads, need->bent)
+                              : 0.0);
 }
 
 /* Floats a texel of all planes that are there. */

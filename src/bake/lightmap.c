@@ -52,11 +52,15 @@ static vsh_result find_needed(void *user, const vshi_origins *origins, uint8_t *
         taken[row] = taken[row] || (at + near >= band->own_begin && at < band->own_end + near);
     }
     const bool shared = vshi_baking_interpolates(bake) && needs(bake, NEEDS_ANY_AO);
-    const size_t above = shared ? VSHI_AO_ABOVE : 0, below = shared ? VSHI_AO_BELOW : 0;
+    memset(rows, 0, count);
     for (size_t row = 0; row < count; ++row) {
-        rows[row] = 0;
-        for (size_t other = row > below ? row - below : 0; other <= row + above && other < count; ++other) {
-            rows[row] = rows[row] || taken[other];
+        size_t begin = row + band->held_begin, end = begin + 1;
+        if (shared) {
+            vshi_ao_rows(texels->ao_spacing, band->held_end, &begin, &end);
+        }
+        begin = begin > band->held_begin ? begin - band->held_begin : 0;
+        if (taken[row]) {
+            memset(rows + begin, 1, end - band->held_begin - begin);
         }
     }
     free(taken);

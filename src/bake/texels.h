@@ -49,9 +49,13 @@ typedef struct vshi_band {
 vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t rows, vshi_band *band,
                          vsh_error *error);
 
-/* Rows of tiles beside a texel's own that its AO depends on, where texels share it: of a lattice those of the
- * cells that end at it, its own and theirs; of windows one. */
-enum { VSHI_AO_ABOVE = 1, VSHI_AO_BELOW = 2 };
+/* Rows of tiles that the AO of rows begin … end - 1 depends on, where texels share it, of `all`: those of its
+ * lattice's squares (8 × 8 spacings) and of the squares beside these, and whether these end there. */
+static inline void vshi_ao_rows(int32_t spacing, size_t all, size_t *begin, size_t *end) {
+    const size_t square = (size_t)spacing, first = *begin / square, last = (*end + square - 1) / square + 1;
+    *begin = first > 0 ? (first - 1) * square : 0;
+    *end = last * square < all ? last * square + 1 : all;
+}
 
 /* What vsh_bake_lightmap() takes beside field, texels and planes, bytes: the most it holds at a time. */
 typedef struct vshi_bake_need {

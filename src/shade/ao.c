@@ -40,7 +40,7 @@ void vshi_ao_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *
     const int32_t method = task->options->ao_method;
     vshi_shade_fn *shade = method == VSH_AO_TAPS    ? vshi_ao_taps
                            : method == VSH_AO_CONES ? vshi_ao_by_cones
-                           : task->rays != NULL     ? vshi_ao_by_tile
+                           : task->share != NULL    ? vshi_ao_by_square
                                                     : vshi_ao_by_rays;
     for (size_t i = begin; task->deviation != NULL && i < end; ++i) {
         task->deviation[i] = NAN;
@@ -134,8 +134,8 @@ vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points
 
 vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
                          const vshi_point_rows *rows, const vsh_shade_options *options, const vsh_run *run,
-                         float *ao, float *deviation, float *bent, int32_t *rays, vsh_shade_stats *stats,
-                         vsh_error *error) {
+                         float *ao, float *deviation, float *bent, const vshi_ao_share *share,
+                         vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     vsh_shade_options full;
     vsh_run full_run;
@@ -156,25 +156,26 @@ vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *point
     }
     VSHI_TRY_DONE(vshi_layers_prepare(occluders, &full, NULL, &layers, error));
     vshi_shade_options_settle(&full, occluders->triangles);
-    if (rays != NULL) {
+    if (share != NULL) {
         full.sampler = vshi_ao_tile_sampler(full.sampler);
     }
     VSHI_TRY_DONE(vshi_ao_prepare(occluders, &full, &cones, &task, error));
     if (vshi_ao_has_rays(&full)) {
         VSHI_TRY_DONE(vshi_shade_sampler(&full, vshi_ao_most_rays(&full), "ao", &sampler, error));
     }
-    task.layers = layers;
+    task.layers = share == NULL ? layers : NULL; /* those that hold AO share nothing */
     task.sampler = sampler;
     task.kernel = vshi_kernel_of(full_run.isa);
-    task.outside = rows != NULL;
+    task.outside = rows != NULL || share != NULL;
     task.points = points;
     task.ao = ao;
     task.deviation = deviation;
     task.bent = bent;
-    task.rays = rays;
+    task.share = share;
     const size_t grain = full.ao_method == VSH_AO_TAPS ? VSHI_CHUNK : VSHI_AO_GRAIN;
-    VSHI_TRY_DONE(
-        vshi_shade_run(&full_run, "ao", points->count, rows, grain, vshi_ao_shade, &task, stats, error));
+    const size_t units = share != NULL ? vshi_ao_squares(share) : points->count;
+    VSHI_TRY_DONE(vshi_shade_run(&full_run, "ao", units, rows, share != NULL ? 1 : grain, vshi_ao_shade,
+                                 &task, stats, error));
 done:
     vshi_sampler_free(sampler);
     vshi_layers_free(layers);

@@ -2,6 +2,7 @@
 #ifndef VSHI_AO_H
 #define VSHI_AO_H
 
+#include "shade/links.h"
 #include "shade/shade.h"
 
 enum { VSHI_AO_GRAIN = 64 }; /* points a piece, with cones and rays */
@@ -15,6 +16,36 @@ typedef struct vshi_ao_cones {
     double sines[VSHI_AO_MAX_CONES];        /* of the cones' half angles */
     uint8_t nearest[VSHI_AO_MAX_CONES][VSHI_AO_NEIGHBOURS];
 } vshi_ao_cones;
+
+/* How texels share rays: points of a lattice of texels shoot them where what they see bends so little that
+ * the texels between need none; where it bends more, those of a lattice of half the spacing, down to all
+ * texels. */
+typedef struct vshi_ao_share {
+    vshi_texel_map map; /* the texels' points */
+    int32_t spacing;    /* texels, the largest: 1, 2, 4 or 8 */
+    int32_t *rays;      /* [points]: those that each shot */
+    /* [points]: spacing of the lattice that the texel's value is to come from, by a window over it where the
+     * texel shot rays, else by those of its cell's corners */
+    uint8_t *level;
+} vshi_ao_share;
+
+/* Levels of no lattice: not chosen yet; the value is known without rays. */
+enum { VSHI_AO_OPEN_LEVEL = 0, VSHI_AO_KNOWN_LEVEL = 0xff };
+
+/* Texels of a square that shoot independently of all others. */
+static inline int32_t vshi_ao_square(const vshi_ao_share *share) {
+    return 8 * share->spacing;
+}
+
+static inline size_t vshi_ao_squares(const vshi_ao_share *share) {
+    const int32_t side = vshi_ao_square(share);
+    return (size_t)((share->map.width + side - 1) / side) * (size_t)((share->map.height + side - 1) / side);
+}
+
+/* The corners of a lattice's cell that a texel in it is estimated from, as bits, of those that hang together
+ * with it; `whole`: vshi_links_whole()'s. Corner k is k & 1 spacings to the right and k >> 1 down. */
+uint32_t vshi_ao_corners(const vsh_points *points, const vshi_texel_map *map, const int32_t cell[2],
+                         int32_t spacing, bool whole, int32_t column, int32_t row);
 
 typedef struct vshi_ao_task {
     const vsh_field *field;
@@ -30,11 +61,10 @@ typedef struct vshi_ao_task {
     bool outside;                /* the points are known to lie in no solid: samples of a lightmap */
     const vsh_points *points;
     float *ao;
-    float *deviation; /* may be NULL */
-    int32_t *rays; /* [count]: how many each value is of, where texels of a tile share theirs (see ao_tile.c),
-                    * 0 where the value is no share of rays; NULL: each point has its own */
-    float *bent;   /* [count][3]: the directions that are open, averaged over the whole cosine-weighted
-                    * hemisphere (2/3 of the normal where all is open), world space; may be NULL */
+    float *deviation;           /* may be NULL */
+    const vshi_ao_share *share; /* of texels that share their rays; NULL: each point has its own */
+    float *bent; /* [count][3]: the directions that are open, averaged over the whole cosine-weighted
+                  * hemisphere (2/3 of the normal where all is open), world space; may be NULL */
 } vshi_ao_task;
 
 /* Length of what `bent` is under an open sky: the mean cosine. */
@@ -118,7 +148,7 @@ static inline vshi_vec vshi_ao_direction(const vshi_vec axes[3], vshi_vec d) {
 vshi_shade_fn vshi_ao_taps;
 vshi_shade_fn vshi_ao_by_cones;
 vshi_shade_fn vshi_ao_by_rays;
-vshi_shade_fn vshi_ao_by_tile; /* the points of a call are texels of one tile */
+vshi_shade_fn vshi_ao_by_square; /* squares of a share, row by row */
 
 /* The sampler of texels that share their rays: blue noise is the same few rays in each, turned, and what
  * those miss no average finds. */

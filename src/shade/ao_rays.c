@@ -52,13 +52,22 @@ static void trace(vshi_ao_piece *b) {
     bool blocked[VSHI_CHUNK];
     order(b, of);
     for (size_t r = 0; r < b->traced; ++r) {
-        sorted[r] = b->segments[of[r]];
+        const vshi_ao_point *point = &b->points[b->owner[of[r]]];
+        const vshi_vec d = b->directions[of[r]];
+        const double begin = b->begin[of[r]];
+        const vshi_vec o =
+            vshi_add(b->exact ? point->world_origin : point->frame.origin, vshi_scale(d, begin));
+        const double far = b->exact ? b->task->options->ao_distance : b->task->distance;
+        sorted[r] =
+            (vshi_segment_ray){.origin = {o.x, o.y, o.z}, .direction = {d.x, d.y, d.z}, .far = far - begin};
     }
     vshi_triangles_blocked(b->exact ? b->task->triangles : b->task->field->surface, sorted, b->traced,
                            blocked);
     for (size_t r = 0; r < b->traced; ++r) {
-        if (!blocked[r]) {
-            add_free(&b->points[b->owner[of[r]]], vshi_vec_of(sorted[r].direction));
+        vshi_ao_point *point = &b->points[b->owner[of[r]]];
+        point->free += !blocked[r];
+        if (!blocked[r] && b->task->bent != NULL) {
+            point->open = vshi_add(point->open, vshi_vec_of(sorted[r].direction));
         }
     }
 }
@@ -130,23 +139,16 @@ static uint8_t key_of(vshi_vec local) {
     return (uint8_t)(y * EDGE + (y & 1 ? EDGE - 1 - x : x));
 }
 
-static void add_segment(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vshi_vec origin, vshi_vec direction,
-                        double far, vsh_shade_stats *stats) {
+/* A ray that is traced from `begin` on. */
+static void trace_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vshi_vec direction, double begin,
+                      vsh_shade_stats *stats) {
     if (b->traced == VSHI_CHUNK) {
         flush(b, stats);
     }
-    b->segments[b->traced] = (vshi_segment_ray){.origin = {origin.x, origin.y, origin.z},
-                                                .direction = {direction.x, direction.y, direction.z},
-                                                .far = far};
+    b->directions[b->traced] = direction;
+    b->begin[b->traced] = begin;
     b->key[b->traced] = b->tiled ? key_of(local) : 0;
     b->owner[b->traced++] = (uint16_t)owner;
-}
-
-/* A ray against the casters' triangles. */
-static void trace_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shade_stats *stats) {
-    const vshi_ao_point *point = &b->points[owner];
-    add_segment(b, owner, local, point->world_origin, vshi_ao_direction(point->world_axes, local),
-                b->task->options->ao_distance, stats);
 }
 
 /* A ray on the field: traced against its surface where that is there, and as much grown as the point's rays
@@ -161,8 +163,7 @@ static void field_ray(vshi_ao_piece *b, uint32_t owner, vshi_vec local, vsh_shad
         return;
     }
     if (point->traced) {
-        const vshi_vec from = vshi_add(point->frame.origin, vshi_scale(direction, begin));
-        add_segment(b, owner, local, from, direction, task->distance - begin, stats);
+        trace_ray(b, owner, local, direction, begin, stats);
         return;
     }
     if (b->chunk.rays.count == VSHI_CHUNK) {
@@ -224,9 +225,11 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
         }
         for (int32_t i = 0; i < count; ++i) {
             const vshi_vec local = direction_of(b->task, point->rise, disc[i]);
-            point->all = vshi_add(point->all, local);
+            if (b->task->bent != NULL) {
+                point->all = vshi_add(point->all, local);
+            }
             if (b->exact) {
-                trace_ray(b, owner, local, stats);
+                trace_ray(b, owner, local, vshi_ao_direction(point->world_axes, local), 0.0, stats);
             } else {
                 field_ray(b, owner, local, stats);
             }
@@ -236,10 +239,11 @@ static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
 }
 
 /* False where there is nothing to shoot: the value is then known. */
-static bool prepare(vshi_ao_piece *b, size_t i, vshi_ao_point *point, vsh_shade_stats *stats) {
+static bool prepare(const vshi_ao_piece *b, size_t i, vshi_ao_point *point, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
     const vsh_points *points = task->points;
-    *point = (vshi_ao_point){.rise = 1.0, .texel = points->texels != NULL ? points->texels[i] : (uint32_t)i};
+    *point = (vshi_ao_point){
+        .rise = 1.0, .index = i, .texel = points->texels != NULL ? points->texels[i] : (uint32_t)i};
     const bool horizon = vshi_ao_has_horizon(task);
     if (!vshi_ao_frame_at(task, i, &point->frame, stats)) {
         return false;
@@ -280,24 +284,25 @@ static bool is_open(const void *user, size_t i) {
 }
 
 /* Points in solids see nothing, also where all triangles around are farther than the AO distance. */
-static void find_buried(const vshi_ao_task *task, size_t begin, size_t end, vshi_ao_point *points) {
+static void find_buried(const vshi_ao_task *task, size_t all, vshi_ao_point *points) {
     looking l = {.task = task, .points = points};
     double positions[3 * VSHI_AO_GRAIN] = {0.0};
     float normals[3 * VSHI_AO_GRAIN] = {0.0f};
     uint8_t where[VSHI_AO_GRAIN];
     size_t count = 0;
-    for (size_t i = begin; i < end; ++i) {
-        if (points[i - begin].next > 0) {
+    for (size_t k = 0; k < all; ++k) {
+        const size_t i = points[k].index;
+        if (points[k].next > 0) {
             memcpy(positions + 3 * count, task->points->positions + 3 * i, 3 * sizeof(double));
             if (!task->sphere) {
                 memcpy(normals + 3 * count, task->points->normals + 3 * i, 3 * sizeof(float));
             }
-            l.of[count++] = (uint32_t)(i - begin);
+            l.of[count++] = (uint32_t)k;
         }
     }
     vshi_inside(task->triangles, count, positions, normals, NULL, is_open, &l, where);
     for (size_t k = 0; k < count; ++k) {
-        const size_t i = begin + l.of[k];
+        const size_t i = points[l.of[k]].index;
         if (where[k] == VSHI_OUTSIDE) {
             continue;
         }
@@ -356,21 +361,20 @@ static void decide(const vshi_ao_task *task, int32_t most, vshi_ao_point *point)
     point->next = more ? doubled : 0;
 }
 
-void vshi_ao_piece_open(vshi_ao_piece *piece, const vshi_ao_task *task, size_t begin, size_t end, bool tiled,
-                        int32_t first, vsh_shade_stats *stats) {
+void vshi_ao_piece_open(vshi_ao_piece *piece, const vshi_ao_task *task, const size_t *points, size_t count,
+                        bool tiled, int32_t first, vsh_shade_stats *stats) {
     piece->task = task;
     piece->exact = task->options->ao_method == VSH_AO_EXACT;
     piece->tiled = tiled;
-    piece->begin = begin;
-    piece->count = end - begin;
+    piece->count = count;
     piece->traced = 0;
     vshi_chunk_clear(&piece->chunk);
-    for (size_t i = begin; i < end; ++i) {
-        vshi_ao_point *point = &piece->points[i - begin];
-        point->next = prepare(piece, i, point, stats) ? first : 0;
+    for (size_t k = 0; k < count; ++k) {
+        vshi_ao_point *point = &piece->points[k];
+        point->next = prepare(piece, points[k], point, stats) ? first : 0;
     }
     if (piece->exact && !task->outside) {
-        find_buried(task, begin, end, piece->points);
+        find_buried(task, count, piece->points);
     }
 }
 
@@ -397,7 +401,11 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
     int32_t first = fixed ? options->early_rays : FIRST_ROUND;
     first = first == 0 || first > most ? most : first;
     vshi_ao_piece piece;
-    vshi_ao_piece_open(&piece, task, begin, end, false, first, stats);
+    size_t of[VSHI_AO_GRAIN];
+    for (size_t i = begin; i < end; ++i) {
+        of[i - begin] = i;
+    }
+    vshi_ao_piece_open(&piece, task, of, end - begin, false, first, stats);
     for (bool more = true; more;) {
         more = false;
         vshi_ao_piece_shoot(&piece, stats);

@@ -14,8 +14,9 @@ typedef struct vshi_ao_ball {
 
 typedef struct vshi_ao_point {
     vshi_ao_frame frame;
-    bool traced; /* not exact: its rays meet the field's surface; else they are marched */
-    double rise; /* cosine of `up` and the normal; 1: AO is of the whole hemisphere */
+    bool traced;  /* not exact: its rays meet the field's surface; else they are marched */
+    double rise;  /* cosine of `up` and the normal; 1: AO is of the whole hemisphere */
+    size_t index; /* of the task's points */
     uint32_t texel;
     int32_t taken, free; /* rays */
     int32_t next;        /* rays after this round; 0: done */
@@ -31,21 +32,22 @@ typedef struct vshi_ao_piece {
     const vshi_ao_task *task;
     bool exact;
     bool tiled; /* the points are texels of one tile, and their rays are spread together */
-    size_t begin, count;
+    size_t count;
     vshi_ao_point points[VSHI_AO_GRAIN];
     vshi_chunk chunk;
     size_t traced;
-    vshi_segment_ray segments[VSHI_CHUNK];
-    uint16_t owner[VSHI_CHUNK]; /* the point of each */
+    vshi_vec directions[VSHI_CHUNK]; /* exact: world space, else the field's */
+    double begin[VSHI_CHUNK];        /* up to where a ray is known to be free */
+    uint16_t owner[VSHI_CHUNK];      /* the point of each */
     uint8_t
         key[VSHI_CHUNK]; /* of a tile: where each goes to, so that those that go alike are traced together;
                           * of others 0: the order of a point's rays depends on no other point */
 } vshi_ao_piece;
 
-/* Points begin … end - 1 of the task, `next` being `first` for those that have something to shoot. The values
- * of the others are known, and set. */
-void vshi_ao_piece_open(vshi_ao_piece *piece, const vshi_ao_task *task, size_t begin, size_t end, bool tiled,
-                        int32_t first, vsh_shade_stats *stats);
+/* Points of the task, VSHI_AO_GRAIN at most, `next` being `first` for those that have something to shoot. The
+ * values of the others are known, and set. */
+void vshi_ao_piece_open(vshi_ao_piece *piece, const vshi_ao_task *task, const size_t *points, size_t count,
+                        bool tiled, int32_t first, vsh_shade_stats *stats);
 
 /* Shoots rays for each point until it has `next`. */
 void vshi_ao_piece_shoot(vshi_ao_piece *piece, vsh_shade_stats *stats);

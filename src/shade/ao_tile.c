@@ -1,22 +1,43 @@
-/* Ambient occlusion of the texels of a tile together: rays are shot for all of them until each is known well
- * enough with the help of those around it (see window.h). */
+/* Ambient occlusion of texels together: rays are shot for all texels of a lattice, tile by tile, until each
+ * is known well enough with the help of those around it (see window.h). Where what they see bends little from
+ * one to the next, the texels between shoot none; else the lattice is halved there. */
 #include "shade/ao_rays.h"
 #include "shade/links.h"
 #include "shade/window.h"
 
 #include <math.h>
+#include <string.h>
 
 enum { TILE = 8, FIRST = 8 };
 
+/* Steps between texels of a lattice, of the AO distance, at most: what a plane is off from what bends grows
+ * with their square, so that they go with the square root of the error asked for, 0.05 of the distance for
+ * 0.02. Where there are none along x or y, what is beside them is not known. */
+static const double WIDEST = 0.35, WIDEST_ALONE = 0.2;
+/* No lattice for errors below this: noise is then so small that what bends is most of the error, which
+ * windows over fewer texels tell less of (test_claims: a disc that fills 32² texels). Nor for random rays, in
+ * whose noise it hides. */
+static const double FINE = 0.005;
+/* Texels of a lattice that a window spans at least, both ways, where what lies between may follow its plane.
+ */
+static const int32_t SPAN = 3;
+/* Where it spans fewer, the second difference of its texel's value and of those beside it, of max_error: what
+ * lies between is then off the straight line by an eighth of it at most. */
+static const double BEND = 4.0;
+/* Beside standard deviations of its noise: a texel that is refined by chance is a speck in the picture. */
+static const double SIGMAS = 2.0;
+
+/* A tile of a lattice. */
 typedef struct tile {
+    vshi_texel_lattice lattice;
     vshi_windows windows;
     vshi_window_texel texels[TILE * TILE];
     vshi_window_sums sums[(TILE + 1) * (TILE + 1)];
+    uint32_t at[TILE * TILE]; /* points + 1 */
+    size_t wanted[TILE * TILE];
+    size_t count;
+    uint8_t place[TILE * TILE]; /* of the wanted */
 } tile;
-
-static size_t place_of(const vshi_ao_point *point) {
-    return (point->texel >> 16) % TILE * TILE + point->texel % TILE;
-}
 
 /* Whether any texel is to have more rays, up to `most`. */
 static bool decide(vshi_ao_piece *piece, tile *t, int32_t most) {
@@ -24,7 +45,7 @@ static bool decide(vshi_ao_piece *piece, tile *t, int32_t most) {
     for (size_t i = 0; i < piece->count; ++i) {
         const vshi_ao_point *point = &piece->points[i];
         if (point->taken > 0) {
-            vshi_window_texel *e = &t->texels[place_of(point)];
+            vshi_window_texel *e = &t->texels[t->place[i]];
             e->rays = point->taken;
             e->value = (float)((double)point->free / point->taken);
             e->spread = (float)vshi_ao_spread(options->sampler, point->taken);
@@ -39,9 +60,9 @@ static bool decide(vshi_ao_piece *piece, tile *t, int32_t most) {
         }
         point->next = 0;
         if (point->taken < most) {
-            const size_t at = place_of(point);
-            const vshi_window_estimate e = vshi_windows_estimate(&t->windows, (int32_t)(at % TILE),
-                                                                 (int32_t)(at / TILE), options->max_error, 0);
+            const int32_t at = t->place[i];
+            const vshi_window_estimate e =
+                vshi_windows_estimate(&t->windows, at % TILE, at / TILE, options->max_error, 0);
             if (e.centred > VSHI_AO_TILE_ENOUGH * options->max_error) {
                 point->next = 2 * point->taken < most ? 2 * point->taken : most;
                 more = true;
@@ -51,33 +72,225 @@ static bool decide(vshi_ao_piece *piece, tile *t, int32_t most) {
     return more;
 }
 
-void vshi_ao_by_tile(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
-    const vshi_ao_task *task = user;
-    const int32_t most = vshi_ao_most_rays(task->options);
-    const int32_t first = FIRST < most ? FIRST : most;
-    vshi_ao_piece piece;
-    tile t = {.windows = {TILE, TILE, t.texels, t.sums}};
-    uint32_t at[TILE * TILE] = {0};
-    vshi_ao_piece_open(&piece, task, begin, end, true, first, stats);
-    for (size_t i = 0; i < piece.count; ++i) {
-        if (piece.points[i].next > 0) {
-            at[place_of(&piece.points[i])] = (uint32_t)(begin + i) + 1;
+/* Whether a lattice is fine enough at one of its texels, by the steps to those around it. */
+static bool is_fine(const vsh_shade_options *options, const tile *t, int32_t at) {
+    const vshi_window_texel *e = &t->texels[at];
+    const float steps[2][2] = {{e->step[0], at % TILE + 1 < TILE ? e[1].step[0] : INFINITY},
+                               {e->step[1], at / TILE + 1 < TILE ? e[TILE].step[1] : INFINITY}};
+    float longest = 0.0f;
+    int lone = 0;
+    for (int axis = 0; axis < 2; ++axis) {
+        bool alone = true;
+        for (int k = 0; k < 2; ++k) {
+            if (steps[axis][k] < INFINITY) {
+                longest = steps[axis][k] > longest ? steps[axis][k] : longest;
+                alone = false;
+            }
+        }
+        lone += alone;
+    }
+    const double most = (lone > 0 ? WIDEST_ALONE : WIDEST) * sqrt(options->max_error) * options->ao_distance;
+    return lone < 2 && (double)longest <= most;
+}
+
+/* Lays a tile out, and lists the texels that are to shoot. */
+static void open_tile(const vshi_ao_task *task, const vshi_texel_lattice *lattice, tile *t) {
+    const vshi_ao_share *share = task->share;
+    t->lattice = *lattice;
+    t->windows = (vshi_windows){TILE, TILE, t->texels, t->sums};
+    t->count = 0;
+    bool any = false;
+    for (int32_t k = 0; k < TILE * TILE; ++k) {
+        t->at[k] = vshi_texel_at(&share->map, lattice->left + k % TILE * lattice->spacing,
+                                 lattice->top + k / TILE * lattice->spacing);
+        any = any || (t->at[k] > 0 && share->level[t->at[k] - 1] == VSHI_AO_OPEN_LEVEL);
+    }
+    if (!any) {
+        return;
+    }
+    memset(t->texels, 0, sizeof t->texels);
+    vshi_links_find(task->points, &share->map, lattice, t->texels);
+    uint8_t shoots[TILE * TILE] = {0};
+    for (int32_t k = 0; k < TILE * TILE; ++k) {
+        const size_t i = (size_t)t->at[k] - 1;
+        if (t->at[k] == 0) {
+            continue;
+        }
+        if (share->level[i] == VSHI_AO_OPEN_LEVEL &&
+            (lattice->spacing == 1 || is_fine(task->options, t, k))) {
+            t->place[t->count] = (uint8_t)k;
+            t->wanted[t->count++] = i;
+            shoots[k] = 1;
+        } else if (share->rays[i] > 0) {
+            t->texels[k].rays = share->rays[i];
+            t->texels[k].value = task->ao[i];
+            t->texels[k].spread = (float)vshi_ao_spread(task->options->sampler, share->rays[i]);
+            shoots[k] = 1;
         }
     }
-    vshi_links_find(task->points, at, TILE, TILE, t.texels);
+    for (int32_t k = 0; k < TILE * TILE; ++k) { /* what shoots nothing parts those beside it */
+        t->texels[k].left = t->texels[k].left && shoots[k] && shoots[k - 1];
+        t->texels[k].above = t->texels[k].above && shoots[k] && shoots[k - TILE];
+    }
+}
+
+static void shoot_tile(const vshi_ao_task *task, tile *t, vsh_shade_stats *stats) {
+    const vshi_ao_share *share = task->share;
+    const int32_t most = vshi_ao_most_rays(task->options), first = FIRST < most ? FIRST : most;
+    const int32_t spacing = t->lattice.spacing;
+    vshi_ao_piece piece;
+    vshi_ao_piece_open(&piece, task, t->wanted, t->count, true, first, stats);
+    for (size_t i = 0; i < piece.count; ++i) {
+        const uint32_t texel = piece.points[i].texel;
+        piece.points[i].texel =
+            vsh_texel(vsh_texel_column(texel) / (uint32_t)spacing, vsh_texel_row(texel) / (uint32_t)spacing);
+    }
     do {
         vshi_ao_piece_shoot(&piece, stats);
-    } while (decide(&piece, &t, most));
+    } while (decide(&piece, t, most));
     for (size_t i = 0; i < piece.count; ++i) {
         const vshi_ao_point *point = &piece.points[i];
-        task->rays[begin + i] = point->taken;
+        share->rays[point->index] = point->taken;
+        share->level[point->index] = point->taken > 0 ? (uint8_t)spacing : VSHI_AO_KNOWN_LEVEL;
         if (point->taken == 0) {
             continue;
         }
-        task->ao[begin + i] = (float)((double)point->free / point->taken);
+        task->ao[point->index] = (float)((double)point->free / point->taken);
         if (task->bent != NULL) {
-            vshi_ao_set_bent(task, begin + i, vshi_ao_piece_bent(&piece, point));
+            vshi_ao_set_bent(task, point->index, vshi_ao_piece_bent(&piece, point));
         }
-        ++stats->refined;
+    }
+}
+
+/* Whether a lattice's values are as good as straight around one of its texels, along x (1) or y (TILE), by
+ * those of the tile that hang together with it. */
+static bool is_straight(const tile *t, const vshi_window_estimate *e, int32_t at, int32_t along,
+                        double most) {
+    const int32_t place = along == 1 ? at % TILE : at / TILE;
+    int32_t run[2] = {0, 0}; /* before and after it, two at most */
+    for (int32_t k = at; run[0] < 2 && run[0] < place; k -= along, ++run[0]) {
+        if (!(along == 1 ? t->texels[k].left : t->texels[k].above)) {
+            break;
+        }
+    }
+    for (int32_t k = at + along; run[1] < 2 && place + run[1] + 1 < TILE; k += along, ++run[1]) {
+        if (!(along == 1 ? t->texels[k].left : t->texels[k].above)) {
+            break;
+        }
+    }
+    if (run[0] + run[1] < 2) {
+        const int32_t next = run[0] > 0 ? at - along : run[1] > 0 ? at + along : at;
+        return fabs(e[next].value - e[at].value) <= 0.25 * most;
+    }
+    const vshi_window_estimate *middle = e + at + (run[0] == 0 ? along : run[1] == 0 ? -along : 0);
+    const double before = middle[-along].deviation, own = 2.0 * middle->deviation,
+                 after = middle[along].deviation;
+    const double off = middle[-along].value - 2.0 * middle->value + middle[along].value;
+    return fabs(off) <= most + SIGMAS * sqrt(before * before + own * own + after * after);
+}
+
+/* Texels whose windows tell nothing of what lies between them and the next are of the finer lattice. */
+static void grade(const vshi_ao_task *task, const tile *t) {
+    const vshi_ao_share *share = task->share;
+    const int32_t spacing = t->lattice.spacing;
+    const double max_error = task->options->max_error, most = BEND * max_error;
+    vshi_window_estimate e[TILE * TILE];
+    for (int32_t k = 0; k < TILE * TILE; ++k) {
+        if (t->texels[k].rays > 0) {
+            e[k] = vshi_windows_estimate(&t->windows, k % TILE, k / TILE, max_error, 0);
+        }
+    }
+    for (int32_t k = 0; k < TILE * TILE; ++k) {
+        if (t->texels[k].rays > 0 && share->level[t->at[k] - 1] == spacing &&
+            ((e[k].x[1] - e[k].x[0] + 1 < SPAN && !is_straight(t, e, k, 1, most)) ||
+             (e[k].y[1] - e[k].y[0] + 1 < SPAN && !is_straight(t, e, k, TILE, most)))) {
+            share->level[t->at[k] - 1] = (uint8_t)(spacing / 2);
+        }
+    }
+}
+
+uint32_t vshi_ao_corners(const vsh_points *points, const vshi_texel_map *map, const int32_t cell[2],
+                         int32_t spacing, bool whole, int32_t column, int32_t row) {
+    uint32_t corners = 0;
+    for (int32_t k = 0; k < 4; ++k) {
+        const int32_t corner[2] = {cell[0] + (k & 1) * spacing, cell[1] + (k >> 1) * spacing};
+        if (whole || (vshi_texel_at(map, corner[0], corner[1]) > 0 &&
+                      vshi_links_lead(points, map, (const int32_t[]){column, row}, corner))) {
+            corners |= 1u << k;
+        }
+    }
+    return corners;
+}
+
+/* Whether a texel beside one is none: where charts end, another surface may begin, and hide the sky of those
+ * that touch it. */
+static bool is_edge(const vshi_texel_map *map, int32_t column, int32_t row) {
+    return vshi_texel_at(map, column - 1, row) == 0 || vshi_texel_at(map, column + 1, row) == 0 ||
+           vshi_texel_at(map, column, row - 1) == 0 || vshi_texel_at(map, column, row + 1) == 0;
+}
+
+/* Gives texels of a cell without rays to its lattice, where the corners that they hang together with are all
+ * of it. Corners in other squares are not looked at. */
+static void cover(const vshi_ao_task *task, const int32_t square[2], const int32_t cell[2], int32_t spacing) {
+    const vshi_ao_share *share = task->share;
+    const int32_t side = vshi_ao_square(share);
+    uint32_t looked_at = 0, good = 0;
+    for (int32_t k = 0; k < 4; ++k) {
+        const int32_t x = cell[0] + (k & 1) * spacing, y = cell[1] + (k >> 1) * spacing;
+        const uint32_t at =
+            x < square[0] + side && y < square[1] + side ? vshi_texel_at(&share->map, x, y) : 0;
+        looked_at |= (uint32_t)(at > 0) << k;
+        good |= (uint32_t)(at > 0 && share->rays[at - 1] > 0 && share->level[at - 1] >= spacing) << k;
+    }
+    if (good == 0) {
+        return;
+    }
+    const bool whole = vshi_links_whole(task->points, &share->map, cell[0], cell[1], spacing);
+    for (int32_t k = 0; k < spacing * spacing; ++k) {
+        const int32_t column = cell[0] + k % spacing, row = cell[1] + k / spacing;
+        const uint32_t at = vshi_texel_at(&share->map, column, row);
+        if (at == 0 || share->level[at - 1] != VSHI_AO_OPEN_LEVEL || is_edge(&share->map, column, row)) {
+            continue;
+        }
+        const uint32_t corners =
+            looked_at & vshi_ao_corners(task->points, &share->map, cell, spacing, whole, column, row);
+        if (corners != 0 && (corners & ~good) == 0) {
+            share->level[at - 1] = (uint8_t)spacing;
+        }
+    }
+}
+
+static void shade_square(const vshi_ao_task *task, const int32_t square[2], vsh_shade_stats *stats) {
+    const int32_t side = vshi_ao_square(task->share);
+    tile t;
+    const bool fine = task->options->max_error < FINE || task->options->sampler == VSH_SAMPLER_WHITE;
+    for (int32_t spacing = fine ? 1 : task->share->spacing; spacing > 0; spacing /= 2) {
+        const int32_t step = TILE * spacing;
+        for (int32_t k = 0; k < side / step * (side / step); ++k) {
+            const vshi_texel_lattice lattice = {square[0] + k % (side / step) * step,
+                                                square[1] + k / (side / step) * step, spacing, TILE, TILE};
+            open_tile(task, &lattice, &t);
+            if (t.count > 0) {
+                shoot_tile(task, &t, stats);
+                if (spacing > 1) {
+                    grade(task, &t);
+                }
+            }
+        }
+        for (int32_t k = 0; spacing > 1 && k < side / spacing * (side / spacing); ++k) {
+            const int32_t cell[2] = {square[0] + k % (side / spacing) * spacing,
+                                     square[1] + k / (side / spacing) * spacing};
+            cover(task, square, cell, spacing);
+        }
+    }
+}
+
+void vshi_ao_by_square(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
+    const vshi_ao_task *task = user;
+    const int32_t side = vshi_ao_square(task->share);
+    const size_t columns = (size_t)((task->share->map.width + side - 1) / side);
+    for (size_t n = begin; n < end; ++n) {
+        shade_square(task, (const int32_t[]){(int32_t)(n % columns) * side, (int32_t)(n / columns) * side},
+                     stats);
     }
 }

@@ -73,16 +73,19 @@ vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, c
                           size_t grain, vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats,
                           vsh_error *error);
 
+struct vshi_ao_share;
+
 /* vsh_shade_shadow() and vsh_shade_ao() for points in rows; `rows` may be NULL, and so may `bent` and
- * `rays`, as of vshi_ao_task. With `rays` each row is a tile. */
+ * `share`, as of vshi_ao_task. With `share` no rows are taken, and points are values of their own rays only.
+ */
 vsh_result vshi_shade_shadow(const vsh_occluders *occluders, const vsh_points *points,
                              const vshi_point_rows *rows, const vsh_light *light,
                              const vsh_shade_options *options, const vsh_run *run, float *visibility,
                              float *deviation, vsh_shade_stats *stats, vsh_error *error);
 vsh_result vshi_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
                          const vshi_point_rows *rows, const vsh_shade_options *options, const vsh_run *run,
-                         float *ao, float *deviation, float *bent, int32_t *rays, vsh_shade_stats *stats,
-                         vsh_error *error);
+                         float *ao, float *deviation, float *bent, const struct vshi_ao_share *share,
+                         vsh_shade_stats *stats, vsh_error *error);
 
 /* vsh_shade_irradiance() by a tinted visibility; the tint is one that vsh_tint_check() has passed. */
 void vshi_shade_irradiance(const vsh_points *points, const float *shading_normals, const vsh_light *light,

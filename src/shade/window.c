@@ -49,7 +49,8 @@ typedef struct window {
     const window_size *size;
     int32_t x[2], y[2];
     double mean;
-    double value;    /* the plane's at the texel */
+    double value; /* the plane's at the texel */
+    double slope[2];
     double weight;   /* of the texels' variances in its own: the sum of squared weights */
     double spread;   /* of a texel's value, on average, over p (1 - p) */
     double residual; /* variance of a texel's value, by how far they lie from the plane; 0: too few */
@@ -187,6 +188,8 @@ static bool fit(const vshi_windows *w, const spot *at, const window_size *size, 
     f->size = size;
     f->mean = mean;
     f->value = value < 0.0 ? 0.0 : value > 1.0 ? 1.0 : value;
+    f->slope[0] = along_x * size->part_x;
+    f->slope[1] = along_y * size->part_y;
     f->weight = size->part + dx * dx * size->part_x + dy * dy * size->part_y;
     f->spread = (double)(int64_t)sum[SPREADS] * SPREAD_UNIT * size->part;
     f->residual = size->freedom >= 4.0 && off > 0.0 ? off / size->freedom : 0.0;
@@ -326,6 +329,7 @@ vshi_window_estimate vshi_windows_estimate(const vshi_windows *w, int32_t x, int
                                   .deviation = sqrt(square),
                                   .centred = sqrt(square * best->size->part / best->weight),
                                   .curved = find_curved(fits, best, max_error),
+                                  .slope = {best->slope[0], best->slope[1]},
                                   .x = {best->x[0], best->x[1]},
                                   .y = {best->y[0], best->y[1]}};
 }

@@ -50,6 +50,7 @@ typedef struct vshi_window_estimate {
     /* square of what bends in the window and is no plane, as by a smaller one: with the noise of its own,
      * which is below zero as often as above, and means something only in sums over many texels */
     double curved;
+    double slope[2];    /* of the plane, a column and a row on */
     int32_t x[2], y[2]; /* first and last column and row of the window */
 } vshi_window_estimate;
 

@@ -321,12 +321,35 @@ static void an_open_plate_is_exactly_1_and_has_no_seams(void **state) {
     caster_free(&s.casters);
 }
 
+/* A piece of floor by the post and the ball, 400 texels to the AO distance. */
+static void fine_texels_take_few_rays(void **state) {
+    stage s = *(stage *)*state;
+    for (size_t v = 0; v < 4; ++v) {
+        const double x = v == 1 || v == 2 ? 1.0 : 0.0, y = v >= 2 ? 1.0 : 0.0;
+        set_vertex(&s.floor, v, -0.5 + 0.2 * x, 0.0, 0.7 - 0.42 * y, x, y);
+    }
+    s.receivers[0].positions = s.floor.positions;
+    s.receivers[0].uvs = s.floor.uvs;
+    baked *few = bake(&s, (how){.spacing = 4, .max_error = 0.02, .receivers = 1}),
+          *truth = bake(&s, (how){.spacing = 1, .max_error = 0.005, .receivers = 1});
+    const judged j = judge(few, truth);
+    const double rays = (double)few->stats.rays / (double)j.count;
+    print_message("RMSE %.5f, said %.5f, most %.3f, bias %+.5f, bent %.2f°, %.2f rays a texel\n", j.is,
+                  sqrt(few->stats.ao_square_error / (double)j.count), j.most, j.bias, j.angle, rays);
+    assert_true(rays < 6.0);
+    assert_true(j.is < 0.02 && j.most < 0.15 && fabs(j.bias) < 0.004 && j.angle < 3.0);
+    assert_true(j.is < 1.1 * sqrt(few->stats.ao_square_error / (double)j.count));
+    free(truth);
+    free(few);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(threads_change_no_bit),
         cmocka_unit_test(bands_change_no_bit),
         cmocka_unit_test(errors_are_below_those_asked_for_with_few_rays),
         cmocka_unit_test(charts_take_nothing_from_each_other),
+        cmocka_unit_test(fine_texels_take_few_rays),
         cmocka_unit_test(a_lone_ball_sees_along_its_normals),
         cmocka_unit_test(an_open_plate_is_exactly_1_and_has_no_seams),
     };

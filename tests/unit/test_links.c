@@ -42,7 +42,9 @@ static void find(image *m, double scale) {
     }
     memset(m->texels, 0, sizeof m->texels);
     const vsh_points points = {.count = TEXELS, .positions = scaled, .normals = m->normals};
-    vshi_links_find(&points, m->at, WIDTH, HEIGHT, m->texels);
+    const vshi_texel_map map = {m->at, WIDTH, HEIGHT};
+    const vshi_texel_lattice all = {0, 0, 1, WIDTH, HEIGHT};
+    vshi_links_find(&points, &map, &all, m->texels);
 }
 
 /* Whether two neighbouring texels should hang together. */
@@ -269,6 +271,36 @@ static void texels_without_a_point_hang_together_with_none(void **state) {
     assert_links(&m, without_holes);
 }
 
+/* A column of texels without points, as under the wall of a shed, lies between those of a lattice. */
+static void lattices_do_not_hang_together_over_a_gap_between_their_texels(void **state) {
+    enum { SPACING = 4, GAP = 10, COLUMNS = WIDTH / SPACING, ROWS = HEIGHT / SPACING };
+    (void)state;
+    static image m;
+    lay_plane(&m, 0.03, 0.03);
+    for (int32_t y = 0; y < HEIGHT; ++y) {
+        m.at[y * WIDTH + GAP] = 0;
+    }
+    const vsh_points points = {.count = TEXELS, .positions = m.positions, .normals = m.normals};
+    const vshi_texel_map map = {m.at, WIDTH, HEIGHT};
+    const vshi_texel_lattice lattice = {0, 0, SPACING, COLUMNS, ROWS};
+    vshi_window_texel texels[COLUMNS * ROWS] = {{0}};
+    vshi_links_find(&points, &map, &lattice, texels);
+    for (int32_t y = 0; y < ROWS; ++y) {
+        for (int32_t x = 0; x < COLUMNS; ++x) {
+            const bool over = GAP / SPACING == x - 1;
+            assert_int_equal(texels[y * COLUMNS + x].left, x > 0 && !over);
+            assert_int_equal(texels[y * COLUMNS + x].above, y > 0);
+            if (x + 1 < COLUMNS && y + 1 < ROWS) {
+                const int32_t from[2] = {SPACING * x + 1, SPACING * y + 1},
+                              to[2] = {SPACING * (x + 1), SPACING * (y + 1)};
+                const bool gap = GAP / SPACING == x;
+                assert_int_equal(vshi_links_whole(&points, &map, SPACING * x, SPACING * y, SPACING), !gap);
+                assert_int_equal(vshi_links_lead(&points, &map, from, to), !gap);
+            }
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(texels_of_a_plane_hang_together),
@@ -281,6 +313,7 @@ int main(void) {
         cmocka_unit_test(nothing_hangs_together_over_a_step_in_height),
         cmocka_unit_test(sides_of_a_sheet_do_not_hang_together),
         cmocka_unit_test(texels_without_a_point_hang_together_with_none),
+        cmocka_unit_test(lattices_do_not_hang_together_over_a_gap_between_their_texels),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
