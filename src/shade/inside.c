@@ -239,8 +239,10 @@ static void look_linked(const looking *l, const bool *follows, size_t first, siz
             points[some++] = first + k;
         }
     }
-    look(l, points, some, where);
-    look_nearer(l, points, some, where);
+    if (some > 0) {
+        look(l, points, some, where);
+        look_nearer(l, points, some, where);
+    }
     for (size_t k = 0; k < count; ++k) {
         where[first + k] = where[first + k - (linked[k] ? 1 : 0)];
     }
