@@ -212,13 +212,18 @@ static vshi_vec direction_of(const vshi_ao_task *task, double rise, const double
                         : (vshi_vec){x, y, height};
 }
 
+/* Whether texels' rays are spread together with those of their tile. */
+static bool is_spread(const vshi_ao_piece *b) {
+    return b->tiled && b->task->options->max_error >= TOGETHER;
+}
+
 static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
     vshi_ao_point *point = &b->points[owner];
     double disc[AT_ONCE][2];
     while (point->taken < point->next) {
         const int32_t left = point->next - point->taken;
         const int32_t count = left < AT_ONCE ? left : AT_ONCE;
-        if (b->tiled && b->task->options->max_error >= TOGETHER) {
+        if (is_spread(b)) {
             vshi_sampler_tile(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
         } else {
             vshi_sampler_disc(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
@@ -378,9 +383,55 @@ void vshi_ao_piece_open(vshi_ao_piece *piece, const vshi_ao_task *task, const si
     }
 }
 
+/* Whether the rays of a point are traced in packets of several points: whole blocks of a sequence of its own,
+ * over all of its hemisphere, of which nothing is to be known but how many are free. */
+static bool in_packets(const vshi_ao_piece *b, const vshi_ao_point *point) {
+    const vshi_ao_task *task = b->task;
+    const vshi_vec o = point->world_origin;
+    return b->exact && !task->sphere && task->bent == NULL && task->options->sampler == VSH_SAMPLER_SOBOL &&
+           !is_spread(b) && point->rise >= 1.0 && vshi_sampler_is_blocks(point->taken, point->next) &&
+           vshi_triangles_sees(task->triangles, (double[]){o.x, o.y, o.z});
+}
+
+/* The rays of a point and of all after it that are to have as many as it, and have as many. */
+static void shoot_packets(vshi_ao_piece *b, size_t first, vsh_shade_stats *stats) {
+    const vshi_ao_task *task = b->task;
+    const int32_t taken = b->points[first].taken, next = b->points[first].next;
+    vshi_disc discs[VSHI_AO_GRAIN];
+    int32_t lit[VSHI_AO_GRAIN] = {0};
+    size_t of[VSHI_AO_GRAIN], count = 0;
+    for (size_t i = first; i < b->count; ++i) {
+        const vshi_ao_point *p = &b->points[i];
+        if (p->taken != taken || p->next != next || !in_packets(b, p)) {
+            continue;
+        }
+        vshi_disc *disc = &discs[count];
+        *disc = (vshi_disc){.origin = {p->world_origin.x, p->world_origin.y, p->world_origin.z},
+                            .axis = p->world_axes[2],
+                            .u = p->world_axes[0],
+                            .v = p->world_axes[1],
+                            .far = task->options->ao_distance};
+        vshi_sampler_shift(task->sampler, p->texel, PURPOSE, disc->shift);
+        of[count++] = i;
+    }
+    if (count > 0) { /* as it is: the first point is among them */
+        vshi_triangles_discs(task->triangles, task->sampler, true, discs, count, taken, next, lit);
+    }
+    for (size_t k = 0; k < count; ++k) {
+        b->points[of[k]].free += lit[k];
+        b->points[of[k]].taken = next;
+    }
+    stats->rays += count * (uint64_t)(next - taken);
+}
+
 void vshi_ao_piece_shoot(vshi_ao_piece *piece, vsh_shade_stats *stats) {
     for (size_t i = 0; i < piece->count; ++i) {
-        shoot(piece, (uint32_t)i, stats);
+        const vshi_ao_point *point = &piece->points[i];
+        if (point->taken < point->next && in_packets(piece, point)) {
+            shoot_packets(piece, i, stats);
+        } else {
+            shoot(piece, (uint32_t)i, stats);
+        }
     }
     flush(piece, stats);
 }

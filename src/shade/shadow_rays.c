@@ -197,7 +197,7 @@ static void cast_packets(ray_batch *batch, const size_t *some, size_t count, int
             vshi_sampler_shift(task->sampler, texel_of(task, p), task->purpose, discs[i].shift);
             lit[i] = 0;
         }
-        vshi_triangles_discs(traced_of(task), task->sampler, discs, points, first, last, lit);
+        vshi_triangles_discs(traced_of(task), task->sampler, false, discs, points, first, last, lit);
         for (size_t i = 0; i < points; ++i) {
             open_point *p = &batch->open[some[begin + i]];
             p->lit += lit[i];

@@ -31,10 +31,11 @@ vsh_result vshi_triangles_of_quads(const vshi_quads *quads, const vsh_run *run, 
 void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                             bool *blocked);
 
-/* A disc that a point sees. World space. */
+/* A disc that a point sees, or a dome over one. World space. */
 typedef struct vshi_disc {
     double origin[3];
-    vshi_vec axis, u, v; /* a ray goes along axis + x u + y v, (x, y) on the unit disc */
+    vshi_vec axis, u, v; /* a ray goes along axis + x u + y v, (x, y) on the unit disc; of a dome, where all
+                            three are unit, along √(1 - x² - y²) axis + x u + y v */
     vshi_vec normal;     /* rays below it meet something, whatever there is; zero: none do */
     double far;          /* how long the rays are; may be infinite */
     uint32_t shift[2];   /* of the texel: vshi_sampler_shift() */
@@ -43,11 +44,11 @@ typedef struct vshi_disc {
 /* Whether a point is near enough to the triangles for vshi_triangles_discs(). */
 bool vshi_triangles_sees(const vsh_triangles *triangles, const double origin[3]);
 
-/* Adds to lit[count] how many of the rays first … last - 1 of each disc meet nothing: whole blocks of a
- * VSH_SAMPLER_SOBOL (vshi_sampler_is_blocks()). Discs that follow each other are best near each other. Thread
- * safe. */
-void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sampler, const vshi_disc *discs,
-                          size_t count, int32_t first, int32_t last, int32_t *lit);
+/* Adds to lit[count] how many of the rays first … last - 1 of each disc, or (`domes`) of each dome, meet
+ * nothing: whole blocks of a VSH_SAMPLER_SOBOL (vshi_sampler_is_blocks()). Those that follow each other are
+ * best near each other. Thread safe. */
+void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sampler, bool domes,
+                          const vshi_disc *discs, size_t count, int32_t first, int32_t last, int32_t *lit);
 
 /* Whether every ray of each of `count` beams, in world space, meets a triangle; false also where that cannot
  * be told from `most` triangles that hang together. Thread safe. */

@@ -1,4 +1,4 @@
-/* Packets of rays of points that lie near each other, over a disc that each of them sees.
+/* Packets of rays of points that lie near each other, over a disc, or a dome, that each of them sees.
  *
  * The points on the disc are those of one net, whose digits each texel shifts by its own (sampler.h). In a
  * block of 2^k points of it there is one in each of 2^k cells of the square; a shift permutes the cells. So
@@ -14,9 +14,9 @@ bool vshi_triangles_sees(const vsh_triangles *triangles, const double origin[3])
     return false;
 }
 
-void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sampler, const vshi_disc *discs,
-                          size_t count, int32_t first, int32_t last, int32_t *lit) {
-    (void)triangles, (void)sampler, (void)discs, (void)count, (void)first, (void)last, (void)lit;
+void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sampler, bool domes,
+                          const vshi_disc *discs, size_t count, int32_t first, int32_t last, int32_t *lit) {
+    (void)triangles, (void)sampler, (void)domes, (void)discs, (void)count, (void)first, (void)last, (void)lit;
 }
 
 #else
@@ -73,13 +73,18 @@ static inline void to_disc(uint32_t digits[2][LANES], float x[LANES], float y[LA
     }
 }
 
-/* Aims the lanes at places of their discs; a ray below its disc's horizon is not valid. */
-static inline void aim(group *g, const float x[LANES], const float y[LANES], int valid[LANES]) {
+/* Aims the lanes at places of their discs, or domes; a ray below its disc's horizon is not valid. */
+static inline void aim(group *g, bool domes, const float x[LANES], const float y[LANES], int valid[LANES]) {
     struct RTCRay16 *r = &g->ray;
+    float up_axis[LANES];
     for (int l = 0; l < LANES; ++l) {
-        const float dx = g->axis[0][l] + (g->u[0][l] * x[l] + g->v[0][l] * y[l]);
-        const float dy = g->axis[1][l] + (g->u[1][l] * x[l] + g->v[1][l] * y[l]);
-        const float dz = g->axis[2][l] + (g->u[2][l] * x[l] + g->v[2][l] * y[l]);
+        const float square = 1.0f - (x[l] * x[l] + y[l] * y[l]);
+        up_axis[l] = domes ? sqrtf(square > 0.0f ? square : 0.0f) : 1.0f;
+    }
+    for (int l = 0; l < LANES; ++l) {
+        const float dx = g->axis[0][l] * up_axis[l] + (g->u[0][l] * x[l] + g->v[0][l] * y[l]);
+        const float dy = g->axis[1][l] * up_axis[l] + (g->u[1][l] * x[l] + g->v[1][l] * y[l]);
+        const float dz = g->axis[2][l] * up_axis[l] + (g->u[2][l] * x[l] + g->v[2][l] * y[l]);
         const float unit = 1.0f / sqrtf(dx * dx + dy * dy + dz * dz);
         r->dir_x[l] = dx * unit;
         r->dir_y[l] = dy * unit;
@@ -92,8 +97,8 @@ static inline void aim(group *g, const float x[LANES], const float y[LANES], int
 
 /* Traces the points first … last - 1, a block of the net, of a group: `each` lanes have a disc each, and so
  * on in the next cell. */
-static void trace(const vsh_triangles *t, const vshi_sampler *sampler, group *g, int each, uint32_t first,
-                  uint32_t size, int32_t *lit) {
+static void trace(const vsh_triangles *t, const vshi_sampler *sampler, bool domes, group *g, int each,
+                  uint32_t first, uint32_t size, int32_t *lit) {
     const uint32_t(*net)[2] = vshi_sampler_net(sampler);
     const uint32_t cells = (uint32_t)(LANES / each);
     struct RTCIntersectContext context;
@@ -117,7 +122,7 @@ static void trace(const vsh_triangles *t, const vshi_sampler *sampler, group *g,
             digits[1][l] = point[1] ^ g->shift[1][l];
         }
         to_disc(digits, x, y);
-        aim(g, x, y, valid);
+        aim(g, domes, x, y, valid);
         for (int l = 0; l < LANES; ++l) {
             valid[l] = has[l] ? valid[l] : 0;
         }
@@ -142,8 +147,8 @@ bool vshi_triangles_sees(const vsh_triangles *triangles, const double origin[3])
     return distance <= VSHI_FAR_ORIGIN * VSHI_FAR_ORIGIN;
 }
 
-void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sampler, const vshi_disc *discs,
-                          size_t count, int32_t first, int32_t last, int32_t *lit) {
+void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sampler, bool domes,
+                          const vshi_disc *discs, size_t count, int32_t first, int32_t last, int32_t *lit) {
     for (size_t begin = 0; begin < count; begin += LANES) {
         group g = {.used = count - begin < LANES ? (int)(count - begin) : LANES};
         int each = 1;
@@ -157,7 +162,7 @@ void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sa
         /* blocks of the net: the first of VSHI_SAMPLER_BLOCK, each further one as many as all before it */
         for (int32_t at = first; at < last;) {
             const int32_t size = at == 0 ? VSHI_SAMPLER_BLOCK : at;
-            trace(triangles, sampler, &g, each, (uint32_t)at, (uint32_t)size, lit + begin);
+            trace(triangles, sampler, domes, &g, each, (uint32_t)at, (uint32_t)size, lit + begin);
             at += size;
         }
     }
