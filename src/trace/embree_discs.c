@@ -22,6 +22,7 @@ void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sa
 #else
 
 #include <float.h>
+#include <string.h>
 
 enum { LANES = VSHI_PACKET };
 
@@ -32,8 +33,9 @@ typedef struct group {
     struct RTCRay16 ray;
     float axis[3][LANES], u[3][LANES], v[3][LANES], normal[3][LANES], far[LANES];
     uint32_t shift[2][LANES];
-    bool horizon[LANES];
-    int used; /* lanes that have a disc */
+    float lowest[LANES]; /* of a ray along its normal, below it */
+    int valid[LANES];    /* -1: the lane has a disc */
+    int used;            /* discs */
 } group;
 
 static void set_lane(const vsh_triangles *t, const vshi_disc *disc, int lane, group *g) {
@@ -50,7 +52,7 @@ static void set_lane(const vsh_triangles *t, const vshi_disc *disc, int lane, gr
     }
     const double far = disc->far * t->scale;
     g->far[lane] = far < (double)FLT_MAX ? (float)far : INFINITY;
-    g->horizon[lane] = normal[0] != 0.0 || normal[1] != 0.0 || normal[2] != 0.0;
+    g->lowest[lane] = normal[0] != 0.0 || normal[1] != 0.0 || normal[2] != 0.0 ? 0.0f : -INFINITY;
     g->shift[0][lane] = disc->shift[0];
     g->shift[1][lane] = disc->shift[1];
     g->ray.mask[lane] = 0xffffffffu;
@@ -73,67 +75,72 @@ static inline void to_disc(uint32_t digits[2][LANES], float x[LANES], float y[LA
     }
 }
 
-/* Aims the lanes at places of their discs, or domes; a ray below its disc's horizon is not valid. */
-static inline void aim(group *g, bool domes, const float x[LANES], const float y[LANES], int valid[LANES]) {
+/* Aims the lanes at places of their discs; a ray below its disc's horizon is not valid. */
+static inline void aim_at_discs(group *g, const float x[LANES], const float y[LANES], int valid[LANES]) {
     struct RTCRay16 *r = &g->ray;
-    float up_axis[LANES];
     for (int l = 0; l < LANES; ++l) {
-        const float square = 1.0f - (x[l] * x[l] + y[l] * y[l]);
-        up_axis[l] = domes ? sqrtf(square > 0.0f ? square : 0.0f) : 1.0f;
-    }
-    for (int l = 0; l < LANES; ++l) {
-        const float dx = g->axis[0][l] * up_axis[l] + (g->u[0][l] * x[l] + g->v[0][l] * y[l]);
-        const float dy = g->axis[1][l] * up_axis[l] + (g->u[1][l] * x[l] + g->v[1][l] * y[l]);
-        const float dz = g->axis[2][l] * up_axis[l] + (g->u[2][l] * x[l] + g->v[2][l] * y[l]);
+        const float dx = g->axis[0][l] + (g->u[0][l] * x[l] + g->v[0][l] * y[l]);
+        const float dy = g->axis[1][l] + (g->u[1][l] * x[l] + g->v[1][l] * y[l]);
+        const float dz = g->axis[2][l] + (g->u[2][l] * x[l] + g->v[2][l] * y[l]);
         const float unit = 1.0f / sqrtf(dx * dx + dy * dy + dz * dz);
         r->dir_x[l] = dx * unit;
         r->dir_y[l] = dy * unit;
         r->dir_z[l] = dz * unit;
         const float up = dx * g->normal[0][l] + dy * g->normal[1][l] + dz * g->normal[2][l];
-        valid[l] = up > 0.0f || !g->horizon[l] ? -1 : 0;
-        r->tfar[l] = g->far[l];
+        valid[l] = up > g->lowest[l] ? g->valid[l] : 0;
     }
 }
 
-/* Traces the points first … last - 1, a block of the net, of a group: `each` lanes have a disc each, and so
- * on in the next cell. */
-static void trace(const vsh_triangles *t, const vshi_sampler *sampler, bool domes, group *g, int each,
-                  uint32_t first, uint32_t size, int32_t *lit) {
-    const uint32_t(*net)[2] = vshi_sampler_net(sampler);
-    const uint32_t cells = (uint32_t)(LANES / each);
+static inline void aim_at_domes(group *g, const float x[LANES], const float y[LANES], int valid[LANES]) {
+    struct RTCRay16 *r = &g->ray;
+    for (int l = 0; l < LANES; ++l) {
+        const float square = 1.0f - (x[l] * x[l] + y[l] * y[l]);
+        const float z = sqrtf(square > 0.0f ? square : 0.0f);
+        r->dir_x[l] = g->axis[0][l] * z + (g->u[0][l] * x[l] + g->v[0][l] * y[l]);
+        r->dir_y[l] = g->axis[1][l] * z + (g->u[1][l] * x[l] + g->v[1][l] * y[l]);
+        r->dir_z[l] = g->axis[2][l] * z + (g->u[2][l] * x[l] + g->v[2][l] * y[l]);
+        valid[l] = g->valid[l];
+    }
+}
+
+/* Traces a block of `size` points of the net, in the order of its cells, for a group: 2^each lanes have a
+ * disc each, and as many the same in the next cell, and so on. */
+static void trace(const vsh_triangles *t, const uint32_t (*points)[2], bool domes, group *g, int each,
+                  uint32_t size, int32_t *lit) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     context.flags = t->fine ? RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT : RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     uint32_t cell[LANES];
-    for (int l = 0; l < LANES; ++l) {
-        cell[l] = vshi_sampler_cell(size, g->shift[0][l], g->shift[1][l]);
-    }
     int32_t seen[LANES] = {0};
-    for (uint32_t c = 0; c < size; c += cells) {
+    for (int l = 0; l < LANES; ++l) {
+        const uint32_t beyond = (uint32_t)l >> each;
+        g->valid[l] = (l & ((1 << each) - 1)) < g->used && beyond < size ? -1 : 0;
+        cell[l] = (beyond < size ? beyond : 0) ^ vshi_sampler_cell(size, g->shift[0][l], g->shift[1][l]);
+    }
+    for (uint32_t c = 0; c < size; c += (uint32_t)LANES >> each) {
         uint32_t digits[2][LANES];
         float x[LANES], y[LANES];
         _Alignas(64) int valid[LANES];
-        bool has[LANES];
         for (int l = 0; l < LANES; ++l) {
-            const uint32_t own = c + (uint32_t)(l / each);
-            has[l] = l % each < g->used && own < size;
-            const uint32_t *point = net[vshi_sampler_in_cell(sampler, first, own < size ? own ^ cell[l] : 0)];
+            const uint32_t *point = points[c ^ cell[l]];
             digits[0][l] = point[0] ^ g->shift[0][l];
             digits[1][l] = point[1] ^ g->shift[1][l];
         }
         to_disc(digits, x, y);
-        aim(g, domes, x, y, valid);
-        for (int l = 0; l < LANES; ++l) {
-            valid[l] = has[l] ? valid[l] : 0;
+        if (domes) {
+            aim_at_domes(g, x, y, valid);
+        } else {
+            aim_at_discs(g, x, y, valid);
         }
+        memcpy(g->ray.tfar, g->far, sizeof g->far);
         vshi_triangles_occlude(t, valid, &context, &g->ray);
         for (int l = 0; l < LANES; ++l) {
             seen[l] += valid[l] & (g->ray.tfar[l] >= 0.0f); /* of those that meet something it is -∞ */
         }
     }
     for (int l = 0; l < LANES; ++l) {
-        if (l % each < g->used) {
-            lit[l % each] += seen[l];
+        if (g->valid[l] != 0) {
+            lit[l & ((1 << each) - 1)] += seen[l];
         }
     }
 }
@@ -151,18 +158,19 @@ void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sa
                           const vshi_disc *discs, size_t count, int32_t first, int32_t last, int32_t *lit) {
     for (size_t begin = 0; begin < count; begin += LANES) {
         group g = {.used = count - begin < LANES ? (int)(count - begin) : LANES};
-        int each = 1;
-        while (each < g.used) {
-            each *= 2;
+        int each = 0;
+        while (1 << each < g.used) {
+            ++each;
         }
         for (int l = 0; l < LANES; ++l) {
-            const int k = l % each;
+            const int k = l & ((1 << each) - 1);
             set_lane(triangles, &discs[begin + (size_t)(k < g.used ? k : 0)], l, &g);
         }
         /* blocks of the net: the first of VSHI_SAMPLER_BLOCK, each further one as many as all before it */
         for (int32_t at = first; at < last;) {
             const int32_t size = at == 0 ? VSHI_SAMPLER_BLOCK : at;
-            trace(triangles, sampler, domes, &g, each, (uint32_t)at, (uint32_t)size, lit + begin);
+            trace(triangles, vshi_sampler_cells(sampler, (uint32_t)at), domes, &g, each, (uint32_t)size,
+                  lit + begin);
             at += size;
         }
     }

@@ -11,7 +11,7 @@ struct vshi_sampler {
     int32_t frame;
     int32_t count;                    /* of points */
     uint32_t (*net)[2];               /* sobol, */
-    uint32_t *in_cell;                /* and of each block of it the point in each cell */
+    uint32_t (*cells)[2];             /* and each block of it in the order of its cells */
     double (*points)[2];              /* blue: progressive, in the unit disc */
     float mask[MASK_EDGE][MASK_EDGE]; /* blue: ranks in [0, 1) */
 };
@@ -114,12 +114,13 @@ static void sort_cells(vshi_sampler *sampler) {
         }
         const uint32_t begin = i < VSHI_SAMPLER_BLOCK ? 0 : size, end = begin + size;
         const uint32_t at = begin + vshi_sampler_cell(size, sampler->net[i][0], sampler->net[i][1]);
-        sampler->in_cell[end <= count ? at : i] = i; /* a block that is cut has no cells */
+        memcpy(sampler->cells[end <= count ? at : i], sampler->net[i],
+               sizeof *sampler->net); /* cut: no cells */
     }
 }
 
-uint32_t vshi_sampler_in_cell(const vshi_sampler *sampler, uint32_t first, uint32_t cell) {
-    return sampler->in_cell[first + cell];
+const uint32_t (*vshi_sampler_cells(const vshi_sampler *sampler, uint32_t first))[2] {
+    return (const uint32_t(*)[2])(sampler->cells + first);
 }
 
 /* --- blue noise */
@@ -273,8 +274,8 @@ vshi_sampler *vshi_sampler_create(int32_t kind, int32_t rays, int32_t frame) {
     sampler->count = rays;
     if (kind == VSH_SAMPLER_SOBOL) {
         sampler->net = calloc((size_t)rays, sizeof *sampler->net);
-        sampler->in_cell = calloc((size_t)rays, sizeof *sampler->in_cell);
-        if (sampler->net == NULL || sampler->in_cell == NULL) {
+        sampler->cells = calloc((size_t)rays, sizeof *sampler->cells);
+        if (sampler->net == NULL || sampler->cells == NULL) {
             vshi_sampler_free(sampler);
             return NULL;
         }
@@ -295,7 +296,7 @@ vshi_sampler *vshi_sampler_create(int32_t kind, int32_t rays, int32_t frame) {
 
 void vshi_sampler_free(vshi_sampler *sampler) {
     if (sampler != NULL) {
-        free(sampler->in_cell);
+        free(sampler->cells);
         free(sampler->net);
         free(sampler->points);
         free(sampler);

@@ -36,8 +36,8 @@ static inline uint32_t vshi_sampler_cell(uint32_t size, uint32_t x, uint32_t y) 
     return x >> (32 - columns) << rows | (uint32_t)((uint64_t)y >> (32 - rows));
 }
 
-/* The point in a cell of the block that begins with point `first`. */
-uint32_t vshi_sampler_in_cell(const vshi_sampler *sampler, uint32_t first, uint32_t cell);
+/* Digits of the points of the block that begins with point `first`, in the order of their cells. */
+const uint32_t (*vshi_sampler_cells(const vshi_sampler *sampler, uint32_t first))[2];
 
 /* Whether points first … last - 1 are whole blocks. */
 static inline bool vshi_sampler_is_blocks(int32_t first, int32_t last) {
