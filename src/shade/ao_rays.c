@@ -16,11 +16,6 @@ static const uint32_t PURPOSE = 0xa0;
  * powers of two. */
 static const int32_t FIRST_ROUND = 16;
 
-/* Texels of a tile have their rays spread together down to this error: it takes so few rays that they are not
- * the same ones in another order. From some hundred rays on they are, all texels are wrong by the same, and
- * windows over them average nothing. */
-static const double TOGETHER = 0.01;
-
 /* What no caster is nearer to than this, voxels, and that the field calls outside, is no point to look at
  * closer. */
 static const double OPEN = 1.0;
@@ -212,22 +207,13 @@ static vshi_vec direction_of(const vshi_ao_task *task, double rise, const double
                         : (vshi_vec){x, y, height};
 }
 
-/* Whether texels' rays are spread together with those of their tile. */
-static bool is_spread(const vshi_ao_piece *b) {
-    return b->tiled && b->task->options->max_error >= TOGETHER;
-}
-
 static void shoot(vshi_ao_piece *b, uint32_t owner, vsh_shade_stats *stats) {
     vshi_ao_point *point = &b->points[owner];
     double disc[AT_ONCE][2];
     while (point->taken < point->next) {
         const int32_t left = point->next - point->taken;
         const int32_t count = left < AT_ONCE ? left : AT_ONCE;
-        if (is_spread(b)) {
-            vshi_sampler_tile(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
-        } else {
-            vshi_sampler_disc(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
-        }
+        vshi_sampler_disc(b->task->sampler, point->texel, PURPOSE, point->taken, count, disc);
         for (int32_t i = 0; i < count; ++i) {
             const vshi_vec local = direction_of(b->task, point->rise, disc[i]);
             if (b->task->bent != NULL) {
@@ -389,7 +375,7 @@ static bool in_packets(const vshi_ao_piece *b, const vshi_ao_point *point) {
     const vshi_ao_task *task = b->task;
     const vshi_vec o = point->world_origin;
     return b->exact && !task->sphere && task->bent == NULL && task->options->sampler == VSH_SAMPLER_SOBOL &&
-           !is_spread(b) && point->rise >= 1.0 && vshi_sampler_is_blocks(point->taken, point->next) &&
+           point->rise >= 1.0 && vshi_sampler_is_blocks(point->taken, point->next) &&
            vshi_triangles_sees(task->triangles, (double[]){o.x, o.y, o.z});
 }
 

@@ -31,7 +31,7 @@ typedef struct vshi_ao_point {
 typedef struct vshi_ao_piece {
     const vshi_ao_task *task;
     bool exact;
-    bool tiled; /* the points are texels of one tile, and their rays are spread together */
+    bool tiled; /* the points are texels of one tile */
     size_t count;
     vshi_ao_point points[VSHI_AO_GRAIN];
     vshi_chunk chunk;

@@ -19,8 +19,8 @@ typedef struct window_size {
 #define SIZE(a, b)                                                                                           \
     { a, b, 1.0 / ((a) * (b)), MOMENT(a, b), MOMENT(b, a), (a) * (b)-1.0 - ((a) > 1) - ((b) > 1) }
 
-/* Windows, one after the other: square, wide and tall. 8 × 8 is a tile, whose rays are spread together; no
- * wide or tall one is larger than it. Larger ones than 11 × 11 lose by what bends in them: rooms' floors came
+/* Windows, one after the other: square, wide and tall. 8 × 8 is a tile; no wide or tall one is larger
+ * than it. Larger ones than 11 × 11 lose by what bends in them: rooms' floors came
  * out darker by 0.006 with 13 × 13. */
 enum { CHAINS = 3, LINKS = 7, TILE_LINK = 3 };
 static const window_size SIZES[CHAINS][LINKS] = {

@@ -45,12 +45,6 @@ static inline bool vshi_sampler_is_blocks(int32_t first, int32_t last) {
            last >= VSHI_SAMPLER_BLOCK && (first == 0 || first >= VSHI_SAMPLER_BLOCK);
 }
 
-/* The same of a texel whose values are averaged with those of the others of its tile (VSHI_TILED texels of a
- * square of 8 × 8, `texel` as vsh_points.texels): not only the points of each, but those of all texels of a
- * square of 2^k of them are well spread together. For VSH_SAMPLER_SOBOL; others are as above. */
-void vshi_sampler_tile(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t first,
-                       int32_t count, double (*points)[2]);
-
 /* Blue noise: a number in [0, 1) that neighbouring texels have far apart. Of VSH_SAMPLER_BLUE. */
 double vshi_sampler_mask(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose);
 

@@ -116,16 +116,10 @@ static void the_blue_mask_spreads_the_error_over_neighbours(void **state) {
     assert_true(sqrt(error[2]) < 0.7 * sqrt(error[1]));
 }
 
-/* --- texels of a tile that share their rays */
-
-enum { TILE = 64, EIGHT = 8 };
+/* --- nets and their cells */
 
 /* The map that the sampler uses is good to 4e-7. */
 static const double ROUNDING = 2e-6;
-
-static uint32_t texel_of_tile(uint32_t column, uint32_t row, uint32_t member) {
-    return 8 * column + member % 8 + ((8 * row + member / 8) << 16);
-}
 
 /* From the disc back to the unit square (Shirley and Chiu, 1997). */
 static void to_square(const double disc[2], double square[2]) {
@@ -175,123 +169,61 @@ static bool is_net(const double (*disc)[2], int32_t m) {
     return true;
 }
 
-/* The first eight points of all texels of a tile, and of the squares of 2 × 2 and 4 × 4 in it. */
-static void first_points_of_a_tile_are_one_net(void **state) {
-    (void)state;
-    static double points[TILE * EIGHT][2];
-    for (int32_t frame = 0; frame < 3; ++frame) {
-        vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, MOST, frame);
-        assert_non_null(sampler);
-        for (uint32_t tile = 0; tile < 24; ++tile) {
-            for (uint32_t edge = 1; edge <= 8; edge *= 2) {
-                for (uint32_t first = 0; first < TILE; ++first) {
-                    if (first % 8 % edge != 0 || first / 8 % edge != 0) {
-                        continue;
-                    }
-                    for (uint32_t i = 0; i < edge * edge; ++i) {
-                        const uint32_t member = first + i / edge * 8 + i % edge;
-                        vshi_sampler_tile(sampler, texel_of_tile(tile % 5 * 37, tile / 5 * 211, member),
-                                          0xa0 + tile % 2, 0, EIGHT, points + (size_t)i * EIGHT);
-                    }
-                    assert_true(is_net((const double(*)[2])points, edge == 1   ? 3
-                                                                   : edge == 2 ? 5
-                                                                   : edge == 4 ? 7
-                                                                               : 9));
-                }
-            }
-        }
-        vshi_sampler_free(sampler);
+/* Digits of a net's points, shifted by a texel's, to the unit square. */
+static void to_unit(const uint32_t digits[2], const uint32_t shift[2], double square[2]) {
+    for (size_t k = 0; k < 2; ++k) {
+        square[k] = (double)(digits[k] ^ shift[k]) * 0x1p-32;
     }
 }
 
-/* The first 8 and 16; with further ones, whose eights have shifts of their own, they are not quite one. */
-static void points_of_a_texel_are_nets_too(void **state) {
+/* What packets of rays are made by: see vshi_sampler_cells(). */
+static void a_block_has_one_point_in_each_cell_and_a_shift_moves_cells_whole(void **state) {
+    (void)state;
+    vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, MOST, 2);
+    assert_non_null(sampler);
+    for (uint32_t texel = 0; texel < 64; ++texel) {
+        uint32_t shift[2];
+        double disc[MOST][2];
+        vshi_sampler_shift(sampler, texel * 65539u, 7, shift);
+        vshi_sampler_disc(sampler, texel * 65539u, 7, 0, MOST, disc);
+        for (uint32_t first = 0; first < MOST; first = first == 0 ? VSHI_SAMPLER_BLOCK : 2 * first) {
+            const uint32_t size = first == 0 ? VSHI_SAMPLER_BLOCK : first;
+            const uint32_t(*cells)[2] = vshi_sampler_cells(sampler, first);
+            bool taken[MOST] = {false};
+            for (uint32_t cell = 0; cell < size; ++cell) {
+                const uint32_t *point = cells[cell ^ vshi_sampler_cell(size, shift[0], shift[1])];
+                double square[2], own[2] = {NAN, NAN};
+                assert_int_equal(vshi_sampler_cell(size, point[0] ^ shift[0], point[1] ^ shift[1]), cell);
+                to_unit(point, shift, square);
+                for (uint32_t i = first; i < first + size;
+                     ++i) { /* it is one of the block, which no other cell has */
+                    to_square((const double *)disc[i], own);
+                    if (fabs(own[0] - square[0]) + fabs(own[1] - square[1]) < 1e-6) {
+                        assert_false(taken[i]);
+                        taken[i] = true;
+                        break;
+                    }
+                }
+            }
+            for (uint32_t i = first; i < first + size; ++i) {
+                assert_true(taken[i]);
+            }
+        }
+    }
+    vshi_sampler_free(sampler);
+}
+
+static void points_of_a_texel_are_nets(void **state) {
     (void)state;
     vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, MOST, 0);
     assert_non_null(sampler);
     static double points[MOST][2];
-    for (uint32_t texel = 0; texel < 4 * TILE; ++texel) {
-        vshi_sampler_tile(sampler, texel_of_tile(texel / TILE, 3, texel % TILE), 0xa0, 0, MOST, points);
-        assert_true(is_net((const double(*)[2])points, 3));
-        assert_true(is_net((const double(*)[2])points, 4));
-        for (size_t i = 0; i < MOST; ++i) {
-            assert_true(hypot(points[i][0], points[i][1]) <= 1.0 + ROUNDING);
+    for (uint32_t texel = 0; texel < 64; ++texel) {
+        vshi_sampler_disc(sampler, texel, 0xa0, 0, MOST, points);
+        for (int32_t m = 2; 1 << m <= MOST; ++m) {
+            assert_true(is_net((const double(*)[2])points, m));
         }
     }
-    vshi_sampler_free(sampler);
-}
-
-/* To share its points with a tile costs a texel little: errors of its own share beside those by
- * vshi_sampler_disc(). */
-static void rays_of_a_texel_of_a_tile_err_as_others(void **state) {
-    (void)state;
-    for (int32_t n = EIGHT; n <= MOST; n *= 2) {
-        vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, MOST, 0);
-        assert_non_null(sampler);
-        double square[2] = {0.0, 0.0};
-        for (uint32_t t = 0; t < TEXELS; ++t) {
-            const double x = -0.8 + 1.6 * (double)((t * 7919u) % TEXELS) / TEXELS, angle = 0.37 * t;
-            for (int32_t tiled = 0; tiled < 2; ++tiled) {
-                static double points[MOST][2];
-                (tiled ? vshi_sampler_tile : vshi_sampler_disc)(sampler, t % 64 + ((t / 64) << 16), 3, 0, n,
-                                                                points);
-                int32_t lit = 0;
-                for (int32_t i = 0; i < n; ++i) {
-                    lit += points[i][0] * cos(angle) + points[i][1] * sin(angle) < x;
-                }
-                const double error = (double)lit / n - truth_disc_share(x);
-                square[tiled] += error * error;
-            }
-        }
-        print_message("%d rays: %.3f of the error alone\n", n, sqrt(square[1] / square[0]));
-        assert_true(square[1] < 1.2 * 1.2 * square[0]);
-        vshi_sampler_free(sampler);
-    }
-}
-
-static int by_x(const void *a, const void *b) {
-    const double *p = a, *q = b;
-    return p[0] < q[0] ? -1 : p[0] > q[0];
-}
-
-static void no_texel_of_a_tile_repeats_anothers_points(void **state) {
-    (void)state;
-    enum { RAYS = 64, COUNT = TILE * RAYS };
-    vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, MOST, 0);
-    assert_non_null(sampler);
-    static double points[COUNT][2];
-    for (uint32_t tile = 0; tile < 8; ++tile) {
-        for (uint32_t member = 0; member < TILE; ++member) {
-            vshi_sampler_tile(sampler, texel_of_tile(tile, 2 * tile, member), 0xa0, 0, RAYS,
-                              points + (size_t)member * RAYS);
-        }
-        qsort(points, COUNT, sizeof points[0], by_x);
-        for (size_t i = 0; i < COUNT; ++i) {
-            for (size_t j = i + 1; j < COUNT && points[j][0] - points[i][0] < ROUNDING; ++j) {
-                assert_true(fabs(points[j][1] - points[i][1]) > ROUNDING);
-            }
-        }
-    }
-    vshi_sampler_free(sampler);
-}
-
-static void tiles_purposes_and_frames_have_points_of_their_own(void **state) {
-    (void)state;
-    vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, MOST, 0),
-                 *later = vshi_sampler_create(VSH_SAMPLER_SOBOL, MOST, 1);
-    assert_true(sampler != NULL && later != NULL);
-    double a[EIGHT][2], b[EIGHT][2];
-    const uint32_t texel = texel_of_tile(4, 4, 19);
-    vshi_sampler_tile(sampler, texel, 1, 0, EIGHT, a);
-    vshi_sampler_tile(sampler, texel_of_tile(5, 4, 19), 1, 0, EIGHT, b);
-    assert_memory_not_equal(a, b, sizeof a);
-    vshi_sampler_tile(sampler, texel_of_tile(4, 5, 19), 1, 0, EIGHT, b);
-    assert_memory_not_equal(a, b, sizeof a);
-    vshi_sampler_tile(sampler, texel, 2, 0, EIGHT, b);
-    assert_memory_not_equal(a, b, sizeof a);
-    vshi_sampler_tile(later, texel, 1, 0, EIGHT, b);
-    assert_memory_not_equal(a, b, sizeof a);
-    vshi_sampler_free(later);
     vshi_sampler_free(sampler);
 }
 
@@ -301,57 +233,15 @@ static void points_asked_for_in_parts_are_the_same(void **state) {
     for (size_t k = 0; k < 3; ++k) {
         vshi_sampler *sampler = vshi_sampler_create(KINDS[k], MOST, 0);
         assert_non_null(sampler);
-        static double whole[MOST][2], parts[MOST][2], alone[MOST][2];
-        for (uint32_t member = 0; member < TILE; ++member) {
-            const uint32_t texel = texel_of_tile(9, 2, member);
-            vshi_sampler_tile(sampler, texel, 0xa0, 0, MOST, whole);
+        static double whole[MOST][2], parts[MOST][2];
+        for (uint32_t texel = 0; texel < 64; ++texel) {
+            vshi_sampler_disc(sampler, texel, 0xa0, 0, MOST, whole);
             for (size_t c = 0; c + 1 < sizeof cuts / sizeof cuts[0]; ++c) {
-                vshi_sampler_tile(sampler, texel, 0xa0, cuts[c], cuts[c + 1] - cuts[c], parts + cuts[c]);
+                vshi_sampler_disc(sampler, texel, 0xa0, cuts[c], cuts[c + 1] - cuts[c], parts + cuts[c]);
             }
             assert_memory_equal(whole, parts, sizeof whole);
-            vshi_sampler_disc(sampler, texel, 0xa0, 0, MOST, alone);
-            if (KINDS[k] != VSH_SAMPLER_SOBOL) { /* only that knows tiles */
-                assert_memory_equal(whole, alone, sizeof whole);
-            }
         }
         vshi_sampler_free(sampler);
-    }
-}
-
-/* Root mean square error of the share of a tile's points on one side of straight edges. */
-static double error_of_tiles(bool tiled, int32_t rays) {
-    enum { TILES = 512 };
-    vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, MOST, 0);
-    assert_non_null(sampler);
-    double square = 0.0;
-    for (uint32_t t = 0; t < TILES; ++t) {
-        const double x = -0.8 + 1.6 * (double)((t * 7919u) % TILES) / TILES, angle = 0.37 * t;
-        double points[MOST][2];
-        int32_t lit = 0;
-        for (uint32_t member = 0; member < TILE; ++member) {
-            (tiled ? vshi_sampler_tile : vshi_sampler_disc)(sampler, texel_of_tile(t % 16, t / 16, member), 3,
-                                                            0, rays, points);
-            for (int32_t i = 0; i < rays; ++i) {
-                lit += points[i][0] * cos(angle) + points[i][1] * sin(angle) < x;
-            }
-        }
-        const double error = (double)lit / (TILE * rays) - truth_disc_share(x);
-        square += error * error / TILES;
-    }
-    vshi_sampler_free(sampler);
-    return sqrt(square);
-}
-
-/* With 64 rays a texel nothing is won any more: further eights shift only what digits are left. */
-static void a_tiles_mean_of_few_rays_is_nearer_than_that_of_texels_alone(void **state) {
-    (void)state;
-    static const double most[] = {0.5, 0.6, 0.8, 1.3};
-    for (int32_t k = 0; k < 4; ++k) {
-        const int32_t rays = EIGHT << k;
-        const double tiled = error_of_tiles(true, rays), alone = error_of_tiles(false, rays);
-        print_message("mean of 64 texels of %d rays: %.5f, alone %.5f (%.2f)\n", rays, tiled, alone,
-                      tiled / alone);
-        assert_true(tiled < most[k] * alone);
     }
 }
 
@@ -361,13 +251,9 @@ int main(void) {
         cmocka_unit_test(low_discrepancy_beats_blue_beats_white_noise),
         cmocka_unit_test(texels_purposes_and_frames_have_sequences_of_their_own),
         cmocka_unit_test(the_blue_mask_spreads_the_error_over_neighbours),
-        cmocka_unit_test(first_points_of_a_tile_are_one_net),
-        cmocka_unit_test(points_of_a_texel_are_nets_too),
-        cmocka_unit_test(rays_of_a_texel_of_a_tile_err_as_others),
-        cmocka_unit_test(no_texel_of_a_tile_repeats_anothers_points),
-        cmocka_unit_test(tiles_purposes_and_frames_have_points_of_their_own),
+        cmocka_unit_test(a_block_has_one_point_in_each_cell_and_a_shift_moves_cells_whole),
+        cmocka_unit_test(points_of_a_texel_are_nets),
         cmocka_unit_test(points_asked_for_in_parts_are_the_same),
-        cmocka_unit_test(a_tiles_mean_of_few_rays_is_nearer_than_that_of_texels_alone),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
