@@ -280,9 +280,9 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
     vsh_lightmap_options full = vsh_lightmap_options_default();
     VSHI_TRY(vshi_options_resolve(options, &full, sizeof full, "vsh_lightmap_options", error));
     VSHI_TRY(check_options(&full, error));
-    if (mesh_count == 0 || mesh_count > INT32_MAX) {
+    if (mesh_count == 0 || mesh_count > VSHI_MOST_MESHES) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap of %zu meshes: expected 1 … %d", mesh_count,
-                         INT32_MAX);
+                         VSHI_MOST_MESHES);
     }
     vsh_uv_report *reports = NULL;
     vsh_charts *made = NULL;

@@ -158,7 +158,8 @@ static void trace(const lifting *l, const looked_at *in, size_t first, size_t la
     for (size_t i = begin; i < last; ++i) {
         put(place(l, i), at + 3 * (i - begin));
         start = i - start == TOGETHER || !same_tile(l->texels, i, start) ? i : start;
-        follows[i - begin] = i != start;
+        follows[i - begin] =
+            i != start && !vshi_sample_is_border(l->texels, i) && !vshi_sample_is_border(l->texels, i - 1);
     }
     const tracing task = {l, in, begin};
     vshi_inside(in->triangles, last - begin, at, l->texels->geometric + 3 * begin, follows, is_open, &task,

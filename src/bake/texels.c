@@ -42,7 +42,7 @@ static void set_tangent(writer *w, const vsh_mesh *mesh, size_t triangle) {
     w->tangent[3] = (float)handedness;
 }
 
-static void write_sample(writer *w, uint32_t number, uint32_t texel, const double weight[3]) {
+static void write_sample(writer *w, uint32_t number, uint32_t texel, const double weight[3], bool border) {
     vsh_texels *texels = w->all->texels;
     const uint32_t mesh = w->work->mesh[number - 1];
     if (number != w->number) {
@@ -76,7 +76,7 @@ static void write_sample(writer *w, uint32_t number, uint32_t texel, const doubl
     texels->texel[i] = texel;
     const vsh_charts *charts = w->all->charts;
     const bool sheet = charts->sheet[charts->sorted.first[mesh] + w->work->local[number - 1]] != 0;
-    texels->mesh[i] = mesh | (sheet ? VSHI_SAMPLE_SHEET : 0);
+    texels->mesh[i] = mesh | (sheet ? VSHI_SAMPLE_SHEET : 0) | (border ? VSHI_SAMPLE_BORDER : 0);
     if (texels->tangent != NULL) {
         memcpy(texels->tangent + 4 * i, w->tangent, sizeof w->tangent);
     }
@@ -100,7 +100,7 @@ static void write_tile(writer *w) {
         if ((tile->border >> bit) & 1) {
             const uint32_t number = tile->nearest[bit];
             vshi_uv_nearest(&w->work->triangle[number - 1], (double)column + 0.5, (double)row + 0.5, weight);
-            write_sample(w, number, texel, weight);
+            write_sample(w, number, texel, weight, true);
         } else if ((tile->covered >> bit) & 1) {
             for (size_t s = 0; s < n * n; ++s) {
                 const size_t sx = s % n, sy = s / n;
@@ -109,7 +109,7 @@ static void write_tile(writer *w) {
                     vshi_uv_barycentric(&w->work->triangle[number - 1],
                                         (double)column + ((double)sx + 0.5) / (double)n,
                                         (double)row + ((double)sy + 0.5) / (double)n, weight);
-                    write_sample(w, number, texel, weight);
+                    write_sample(w, number, texel, weight, false);
                 }
             }
         }

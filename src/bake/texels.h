@@ -83,20 +83,28 @@ struct vsh_texels {
     float *geometric;        /* [count][3] */
     float *lift;             /* [count][3]: of the position off its triangle, world units */
     uint32_t *texel;         /* [count]: vsh_texel() in the whole lightmap */
-    uint32_t *mesh;          /* [count]: index of the mesh, and VSHI_SAMPLE_SHEET: vshi_sample_mesh() */
+    uint32_t *mesh;          /* [count]: index of the mesh, and VSHI_SAMPLE_…: vshi_sample_mesh() */
     float *tangent;          /* [count][4]: of the triangle, unit, and its handedness; NULL: not asked for */
     size_t mesh_count;
 };
 
 /* In a sample's mesh: its triangle is a sheet. */
 #define VSHI_SAMPLE_SHEET UINT32_C(0x80000000)
+/* Whose texel's middle is beside its chart: it stands on the chart's border, which may lie in other surfaces.
+ */
+#define VSHI_SAMPLE_BORDER UINT32_C(0x40000000)
+enum { VSHI_MOST_MESHES = 0x3fffffff };
 
 static inline uint32_t vshi_sample_mesh(const vsh_texels *texels, size_t sample) {
-    return texels->mesh[sample] & ~VSHI_SAMPLE_SHEET;
+    return texels->mesh[sample] & ~(VSHI_SAMPLE_SHEET | VSHI_SAMPLE_BORDER);
 }
 
 static inline bool vshi_sample_is_sheet(const vsh_texels *texels, size_t sample) {
     return (texels->mesh[sample] & VSHI_SAMPLE_SHEET) != 0;
+}
+
+static inline bool vshi_sample_is_border(const vsh_texels *texels, size_t sample) {
+    return (texels->mesh[sample] & VSHI_SAMPLE_BORDER) != 0;
 }
 
 /* Place of a sample's texel in the whole lightmap, and among those that are held. */

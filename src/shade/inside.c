@@ -173,15 +173,15 @@ static void look(const looking *l, const size_t *points, size_t count, uint8_t *
     }
 }
 
-/* Looks again at those of the points that are inside and have a triangle closer than the rays' lift. */
-static void look_nearer(const looking *l, const size_t *points, size_t count, uint8_t *where) {
+/* Looks again at the points first … first + count - 1 that are inside and have a triangle closer than the
+ * lift. */
+static void look_nearer(const looking *l, size_t first, size_t count, uint8_t *where) {
     looking nearer = *l;
     nearer.lift *= NEARER;
     vshi_segment_ray rays[AT_ONCE];
     size_t of[AT_ONCE], some = 0;
     bool blocked[AT_ONCE];
-    for (size_t k = 0; k < count; ++k) {
-        const size_t i = points[k];
+    for (size_t i = first; i < first + count; ++i) {
         if (where[i] != VSHI_OUTSIDE) {
             const vshi_vec normal = vshi_vec_off(l->normals + 3 * i);
             const vshi_vec p = vshi_add(vshi_vec_of(l->positions + 3 * i), vshi_scale(normal, nearer.lift));
@@ -241,7 +241,6 @@ static void look_linked(const looking *l, const bool *follows, size_t first, siz
     }
     if (some > 0) {
         look(l, points, some, where);
-        look_nearer(l, points, some, where);
     }
     for (size_t k = 0; k < count; ++k) {
         where[first + k] = where[first + k - (linked[k] ? 1 : 0)];
@@ -260,5 +259,8 @@ void vshi_inside(const vsh_triangles *triangles, size_t count, const double *pos
     for (size_t first = 0; first < count; first += AT_ONCE) {
         const size_t some = count - first < AT_ONCE ? count - first : AT_ONCE;
         look_linked(&l, follows, first, some, where);
+    }
+    for (size_t first = 0; first < count; first += AT_ONCE) {
+        look_nearer(&l, first, count - first < AT_ONCE ? count - first : AT_ONCE, where);
     }
 }
