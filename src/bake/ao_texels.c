@@ -164,15 +164,15 @@ static void estimate_own(const sharing *s, const block *b) {
     }
 }
 
-static size_t blocks_across(const sharing *s, int32_t texels) {
-    const int32_t side = INNER * s->spacing;
+static size_t blocks_across(int32_t texels, int32_t spacing) {
+    const int32_t side = INNER * spacing;
     return (size_t)((texels + side - 1) / side);
 }
 
 /* A vshi_range_fn over blocks, row by row. */
 static void estimate_blocks(void *user, size_t begin, size_t end) {
     sharing *s = user;
-    const size_t columns = blocks_across(s, s->share.map.width);
+    const size_t columns = blocks_across(s->share.map.width, s->spacing);
     block *b = malloc(sizeof *b);
     if (b == NULL) {
         atomic_fetch_add(&s->refused, 1);
@@ -334,17 +334,19 @@ static void add_stats(const sharing *s, vsh_shade_stats *stats) {
     stats->invalid += s->invalid;
 }
 
-double vshi_ao_texels_bytes(double samples, double texels, int32_t threads, bool bent) {
+double vshi_ao_texels_bytes(double samples, int32_t width, int32_t rows, int32_t threads, bool bent) {
     const double all_cores = 64.0; /* threads == 0: how many there are is the pool's business */
+    const double blocks = (double)blocks_across(width, 1) * (double)blocks_across(rows, 1);
     return samples * ((bent ? 4.0 : 1.0) * sizeof(float) + sizeof(int32_t) + sizeof(plane) + 1.0) +
-           texels * sizeof(uint32_t) + (threads > 0 ? threads : all_cores) * (double)sizeof(block);
+           (double)width * rows * sizeof(uint32_t) +
+           fmin(threads > 0 ? threads : all_cores, blocks) * (double)sizeof(block);
 }
 
 /* Estimates all, once each texel's own rays are shot. */
 static vsh_result estimate_all(sharing *s, vshi_job *job, vsh_error *error) {
     const int32_t rows = s->share.map.height;
     for (s->spacing = s->share.spacing; s->spacing > 0; s->spacing /= 2) {
-        const size_t blocks = blocks_across(s, s->share.map.width) * blocks_across(s, rows);
+        const size_t blocks = blocks_across(s->share.map.width, s->spacing) * blocks_across(rows, s->spacing);
         VSHI_TRY(vshi_parallel_for(job, blocks, 1, 0, estimate_blocks, s, error));
     }
     if (s->refused > 0) {

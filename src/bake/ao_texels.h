@@ -11,7 +11,7 @@ vsh_result vshi_ao_texels(const vsh_occluders *occluders, const vsh_texels *texe
                           const vsh_shade_options *options, const vsh_run *run, float *values,
                           float *deviation, float *bent, vsh_shade_stats *stats, vsh_error *error);
 
-/* Bytes that it takes at most for so many samples and texels, beside the origins. */
-double vshi_ao_texels_bytes(double samples, double texels, int32_t threads, bool bent);
+/* Bytes that it takes at most for so many samples in so many texels, beside the origins. */
+double vshi_ao_texels_bytes(double samples, int32_t width, int32_t rows, int32_t threads, bool bent);
 
 #endif

@@ -372,15 +372,16 @@ vsh_result vshi_band_set(const vsh_charts *charts, int32_t first_row, int32_t ro
 }
 
 double vshi_bake_bytes(const vshi_bake_need *need) {
+    const double texels = (double)need->width * need->rows;
     double sample = vshi_origins_sample_bytes(need->traced);
     const int floats = (need->values ? 1 : 0) + (need->errors ? 1 : 0) + (need->irradiance ? 3 : 0) +
                        (need->bent ? 3 : 0) + (need->tint ? 3 : 0);
     sample += (double)floats * sizeof(float);
-    return need->samples * sample +
-           need->texels * (1.0 + VSHI_PADDING_TEXEL_BYTES + VSHI_SPREAD_TEXEL_BYTES) +
-           fmax(need->lattice ? vshi_lattice_bytes(need->samples, need->texels, need->bent) : 0.0,
-                need->windows ? vshi_ao_texels_bytes(need->samples, need->texels, need->threads, need->bent)
-                              : 0.0);
+    return need->samples * sample + texels * (1.0 + VSHI_PADDING_TEXEL_BYTES + VSHI_SPREAD_TEXEL_BYTES) +
+           fmax(need->lattice ? vshi_lattice_bytes(need->samples, texels, need->bent) : 0.0,
+                need->windows
+                    ? vshi_ao_texels_bytes(need->samples, need->width, need->rows, need->threads, need->bent)
+                    : 0.0);
 }
 
 /* Floats a texel of all planes that are there. */
@@ -406,7 +407,8 @@ uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int3
     shade.method = vsh_shadow_method_resolve(shade.method, 1); /* the triangles may not be there yet */
     shade.ao_method = vsh_ao_method_resolve(shade.ao_method, 1);
     const bool keeps_error = (vsh_ao_method_traits(shade.ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
-    vshi_bake_need need = {.texels = width * band.rows,
+    vshi_bake_need need = {.width = charts->info.width,
+                           .rows = band.rows,
                            .traced = vshi_shadow_traces(&shade, NULL) || vshi_ao_traces(&shade, NULL),
                            .values = true,
                            .errors = lightmap->shadow_error != NULL || lightmap->ao_error != NULL,

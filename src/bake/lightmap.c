@@ -103,7 +103,8 @@ static vsh_result check_limit(const vshi_baking *bake, vsh_error *error) {
     const bool open = needs(bake, NEEDS_ANY_AO) && vshi_baking_interpolates(bake);
     const bool shares = vshi_baking_shares(bake);
     const vshi_bake_need need = {.samples = (double)texels->count,
-                                 .texels = (double)vshi_texels_held(texels),
+                                 .width = texels->info.width,
+                                 .rows = texels->band.rows,
                                  .traced = vshi_baking_traces_shadow(bake) || vshi_baking_traces_ao(bake),
                                  .values = needs(bake, VSHI_NEEDS_LIGHTS | NEEDS_ANY_AO),
                                  .errors = needs(bake, VSHI_NEEDS_DEVIATION),

@@ -59,8 +59,9 @@ static inline void vshi_ao_rows(int32_t spacing, size_t all, size_t *begin, size
 
 /* What vsh_bake_lightmap() takes beside field, texels and planes, bytes: the most it holds at a time. */
 typedef struct vshi_bake_need {
-    double samples, texels; /* held */
-    bool traced;            /* rays against triangles */
+    double samples;      /* held */
+    int32_t width, rows; /* the same, texels */
+    bool traced;         /* rays against triangles */
     bool values, errors, irradiance, bent, tint;
     bool lattice, windows; /* AO between texels, or by those around */
     int32_t threads;

@@ -115,7 +115,7 @@ vsh_result vshi_obj_read_materials(vshi_obj *obj, const char *text, size_t size,
             return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", obj->path);
         }
         if (i > 0) {
-            memcpy(strrchr(path, '.') + 1, "mtl", 3);
+            memcpy(strrchr(path, '.') + 1, "mtl", sizeof "mtl");
         }
         const vsh_result result = read_file(obj, path, &found, error);
         free(path);

@@ -14,6 +14,9 @@
 /* Of casters without voxels, whose surface is exact: positions of floats are off by a hundredth of it. */
 static const double FLOAT_STEPS = 1e-5;
 
+/* Of a voxel, world units, and of one from the origin, voxels: a double must tell voxels apart there. */
+static const double LEAST_VOXEL = 1e-12, MOST_VOXEL = 1e12, FARTHEST = 1e12;
+
 void vshi_occluders_own_free(vshi_occluders_own *own) {
     for (size_t i = 0; i < own->layer_capacity; ++i) {
         vsh_field_free(own->layer_fields != NULL ? own->layer_fields[i] : NULL);
@@ -51,7 +54,7 @@ static double finest_voxel(const vsh_layer *layers, size_t count) {
             finest = fmin(finest, layers[i].field->voxel_size);
         }
     }
-    return isinf(finest) ? fmin(fmax(FLOAT_STEPS * extent(&layers[0]), 1e-12), 1e12) : finest;
+    return isinf(finest) ? fmin(fmax(FLOAT_STEPS * extent(&layers[0]), LEAST_VOXEL), MOST_VOXEL) : finest;
 }
 
 static vsh_result copy_layers(const vsh_occluder_parts *parts, vshi_occluders_own *own, vsh_error *error) {
@@ -68,6 +71,27 @@ static vsh_result copy_layers(const vsh_occluder_parts *parts, vshi_occluders_ow
     return VSH_OK;
 }
 
+/* A box as large, and as near the origin, as one that has voxels may be. */
+static vsh_result check_box(const double low[3], const double high[3], double longest, vsh_error *error) {
+    const double least = LEAST_VOXEL * VSHI_TRACED_RESOLUTION, most = MOST_VOXEL * VSHI_TRACED_RESOLUTION;
+    if (!(longest >= least && longest <= most)) {
+        return vshi_fail(error, VSH_ERROR_LIMIT,
+                         "the casters' box is %g across, expected %g … %g; scale the scene", longest, least,
+                         most);
+    }
+    const double farthest = FARTHEST / VSHI_TRACED_RESOLUTION;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double away = fabs(low[axis] + 0.5 * (high[axis] - low[axis]));
+        if (!(away <= farthest * longest)) {
+            return vshi_fail(error, VSH_ERROR_LIMIT,
+                             "the casters' box lies %g from the origin, %g at most where it is %g across; "
+                             "move the scene",
+                             away, farthest * longest, longest);
+        }
+    }
+    return VSH_OK;
+}
+
 vsh_result vshi_occluders_unknown(const vsh_triangles *triangles, double voxel_size, vsh_field **field,
                                   vsh_error *error) {
     double low[3], high[3], longest = 0.0;
@@ -79,8 +103,11 @@ vsh_result vshi_occluders_unknown(const vsh_triangles *triangles, double voxel_s
     for (int axis = 0; axis < 3; ++axis) {
         longest = fmax(longest, high[axis] - low[axis]);
     }
-    return vshi_field_create_unknown(voxel_size > 0.0 ? voxel_size : longest / VSHI_TRACED_RESOLUTION, low,
-                                     high, field, error);
+    if (voxel_size == 0.0) {
+        VSHI_TRY(check_box(low, high, longest, error));
+        voxel_size = longest / VSHI_TRACED_RESOLUTION;
+    }
+    return vshi_field_create_unknown(voxel_size, low, high, field, error);
 }
 
 /* What stands in place of a field: casters that are traced only, or none beside the layers. */

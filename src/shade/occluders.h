@@ -34,8 +34,9 @@ typedef struct vshi_occluders_own {
 enum { VSHI_TRACED_RESOLUTION = 96 };
 
 /* What stands for the field of casters that are traced only; *field is NULL where there are no triangles.
- * voxel_size 0: the box's longest side over VSHI_TRACED_RESOLUTION. Errors: as vshi_field_create_unknown().
- */
+ * voxel_size 0: the box's longest side over VSHI_TRACED_RESOLUTION. Errors: as vshi_field_create_unknown(),
+ * VSH_ERROR_LIMIT (voxel_size 0: the box is larger, smaller or farther from the origin than one with voxels
+ * may be). */
 vsh_result vshi_occluders_unknown(const vsh_triangles *triangles, double voxel_size, vsh_field **field,
                                   vsh_error *error);
 

@@ -42,14 +42,21 @@ by_each() {
     by_each layer.json 4 "layer 'clouds': voxel size 1e-13: "
 }
 
-@test "a mesh whose voxel size is out of range is named" {
-    printf 'v 0 0 0\nv 1e30 0 0\nv 0 1e30 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n' >huge.obj
-    shade bake huge.obj --sun 0,1,0 --size 8 --quiet -o out.exr
-    refused 4 "huge.obj: voxel size "
-    shade voxelize huge.obj --quiet -o out.vdb
-    refused 4 "huge.obj: voxel size "
-    shade query box.obj --caster huge.obj --sun 0,1,0 --points points.csv --quiet -o out.csv
-    refused 4 "box.obj: voxel size "
+@test "a mesh too large, too small or too far for distances is named, whether it gets voxels or not" {
+    local size
+    for size in 1e-30 1e30; do
+        printf "v 0 0 0\nv $size 0 0\nv 0 $size 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n" >huge.obj
+        shade bake huge.obj --sun 0,1,0 --size 8 --quiet -o out.exr
+        refused 4 "huge.obj: " "; scale the scene"
+        shade bake huge.obj --sun 0,1,0 --size 8 --method cone --quiet -o out.exr
+        refused 4 "huge.obj: voxel size "
+        shade voxelize huge.obj --quiet -o out.vdb
+        refused 4 "huge.obj: voxel size "
+    done
+    shade query box.obj --caster huge.obj --sun 0,1,0 --points points.csv --quiet -o out.csv # of 1e30
+    refused 4 "box.obj: " "; scale the scene"
+    write_scene far.json '{"mesh": "box.obj", "transform": {"translate": [1e14, 0, 0]}}'
+    by_each far.json 4 "from the origin"
 }
 
 @test "an UV that is not finite names the file, the mesh and the vertex" {

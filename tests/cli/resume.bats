@@ -119,13 +119,14 @@ end() { # SIGNAL
     "receivers": [{"mesh": "floor.obj", "output": "out.exr", "transform": {$at}}]
 }
 JSON
-            for how in "" --resume "--memory-limit 42M"; do
+            for how in "" --resume "--memory-limit 21.7M --stats stats.json"; do
                 rm -f out.exr out.exr.resume
                 run --separate-stderr "$VDBSHADE" bake scene.json --size 400x256 --max-error 0.2 $how --quiet
                 if [ "$at" = '"scale": 1' ]; then
                     [ "$status" = 0 ] || fail "$kind, $at, $how: $stderr"
                     [ -n "$how" ] || cp out.exr whole.exr
                     cmp whole.exr out.exr
+                    [[ $how != *stats.json ]] || ! grep -q '"bands": 1,' stats.json || fail "$kind: $how is enough for all rows"
                 else
                     [[ $stderr == *"nothing to bake: all"*"are inside solids"* ]] || fail "$kind, $at, $how: $stderr"
                 fi
