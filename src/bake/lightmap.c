@@ -199,6 +199,7 @@ static vsh_result run_bake(vshi_baking *bake, vsh_error *error) {
     VSHI_TRY_DONE(lift_layers(bake->occluders, &bake->shade, &bake->layers, &bake->layered_ao, error));
     bake->lifted = *bake->occluders;
     bake->lifted.layers = bake->layers;
+    bake->lifted.lifted = bake->shade.start_offset * bake->occluders->field->voxel_size;
     VSHI_TRY_DONE(check_limit(bake, error));
     VSHI_TRY_DONE(vshi_work_planes_open(texels, bake->lightmap, bake->light_count, &bake->work, error));
     bake->lightmap = &bake->work.lightmap;

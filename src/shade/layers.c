@@ -111,11 +111,11 @@ static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
     return casts;
 }
 
-static vsh_result prepare(prepared *item, size_t index, const vsh_light *light, vshi_ao_cones *cones,
-                          vsh_error *error) {
+static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh_light *light,
+                          vshi_ao_cones *cones, vsh_error *error) {
     const vsh_layer *layer = &item->layer;
     vsh_shade_options *options = &item->options;
-    const vsh_occluders own = {.field = layer->field, .triangles = layer->triangles};
+    const vsh_occluders own = {.field = layer->field, .triangles = layer->triangles, .lifted = lifted};
     options->start_offset = layer->start_offset < 0.0 ? options->start_offset : layer->start_offset;
     options->method = layer->method < 0 ? options->method : layer->method;
     vshi_shade_options_settle(options, own.triangles);
@@ -156,7 +156,8 @@ vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_o
             item->options = *options;
             ++made->count;
             vsh_error why;
-            VSHI_TRY_DONE(name_layer(prepare(item, i, light, &made->cones, &why), i, &why, error));
+            VSHI_TRY_DONE(
+                name_layer(prepare(item, i, occluders->lifted, light, &made->cones, &why), i, &why, error));
         }
     }
     if (made->count > 0) {

@@ -13,6 +13,8 @@ struct vsh_occluders {
     size_t layer_count;
     const vsh_triangles *true_triangles;
     const vsh_solids *true_solids;
+    double lifted; /* what the points to be shaded are off their surfaces already, of a start offset; world
+                    * units */
     struct vshi_occluders_own *own;
 };
 

@@ -120,7 +120,7 @@ static void keep_part(const vshi_shadow_task *task, const vshi_facing *facing, v
     const uint32_t owner = chunk->owner[r];
     const vshi_cone *cone = &facing->cone[owner];
     /* seen from the point itself, but near it, where its own surface is */
-    const double at = (double)rays->at[r], drop = task->options->start_offset * at / (at + OWN_SURFACE);
+    const double at = (double)rays->at[r], drop = task->offset * at / (at + OWN_SURFACE);
     const vshi_vec origin = vshi_sub(cone->origin, vshi_scale(facing->normal[owner], drop));
     rays->origin[0][i] = (float)origin.x;
     rays->origin[1][i] = (float)origin.y;
@@ -235,7 +235,8 @@ vsh_result vshi_shadow_prepare(const vsh_occluders *occluders, const vsh_light *
                                .triangles = triangles,
                                .light = light,
                                .options = options,
-                               .lowest = inner ? 1.0 : 0.0};
+                               .lowest = inner ? 1.0 : 0.0,
+                               .offset = options->start_offset + occluders->lifted / field->voxel_size};
     task->leaky = vshi_shadow_traces(options, triangles) &&
                   (field->shell_thickness > 0.0 || vshi_triangles_have_holes(triangles));
     task->world = vshi_light_in_world(light);

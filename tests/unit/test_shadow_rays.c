@@ -128,7 +128,8 @@ static void no_proof_is_wrong(void **state) {
     }
 }
 
-/* A sheet above the floor, a quarter as thick as the cone is wide there: one cone takes it for an edge. */
+/* A sheet above the floor, a quarter as thick as the cone is wide there: one cone looks at one of its edges
+ * and is off where it sees two. */
 static void a_sheet_thinner_than_the_cone_is_dark(void **state) {
     (void)state;
     const double height = 2.0, w = 0.1, thickness = 0.25 * 2.0 * w * height;
@@ -153,7 +154,8 @@ static void a_sheet_thinner_than_the_cone_is_dark(void **state) {
     const truth_metrics adaptive = truth_compare(ACROSS, visible, truth, NULL);
     truth_metrics_print("cone", &cone);
     truth_metrics_print("adaptive", &adaptive);
-    assert_true(cone.max > 0.15);
+    assert_true(cone.max > 0.05); /* 0.12: else there is nothing here that rays were better at */
+    assert_true(adaptive.max < 0.25 * cone.max && adaptive.rmse < 0.25 * cone.rmse);
     assert_true(adaptive.rmse < 0.01);
     assert_true(adaptive.p95 < 0.02);
     vsh_field_free(field);
