@@ -193,6 +193,9 @@ static vsh_result read_element(vshi_ply_reader *r, vsh_error *error) {
 
 static vsh_result check_vertices(const vshi_ply_reader *r, vsh_error *error) {
     size_t bad = 0;
+    if (r->vertex_count != r->vertices) { /* faces were held against what the header names */
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: its vertices have no x, y or z", r->path);
+    }
     for (size_t v = 0; v < r->vertex_count; ++v) {
         const float *p = r->positions + 3 * v;
         if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) {

@@ -244,6 +244,15 @@ static void bad_ply_and_stl_are_refused(void **state) {
     refused("a.ply", HEAD("4000000000") "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", VSH_ERROR_READ, "cut short",
             "4000000000");
     refused("a.ply", HEAD("-3") "0 0 0\n", VSH_ERROR_INPUT, "header", "-3");
+    refused(
+        "a.ply",
+        "ply\nformat ascii 1.0\nelement vertex 4\nelement face 1\nproperty list uchar int vertex_indices\n"
+        "end_header\n4 0 1 2 3\n",
+        VSH_ERROR_INPUT, "no x, y or z", "a.ply");
+    refused("a.ply",
+            "ply\nformat ascii 1.0\nelement vertex 4\nproperty uchar red\nelement face 1\n"
+            "property list uchar int vertex_indices\nend_header\n1\n2\n3\n4\n4 0 1 2 3\n",
+            VSH_ERROR_INPUT, "no x, y or z", "a.ply");
 #undef HEAD
     refused("a.stl",
             "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 inf 0\nvertex 0 1 0\nendloop\n"
