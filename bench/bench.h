@@ -63,6 +63,13 @@ void bench_intersector(FILE *csv);
 void bench_nanovdb(FILE *csv);
 void bench_all_cores(FILE *csv);
 void bench_read(FILE *csv);
+/* A sheet of a million triangles; but for the bare one with UVs and normals (sheet.c). */
+void bench_write_obj(const char *path);
+void bench_write_bare_obj(const char *path);
+void bench_write_ascii_ply(const char *path);
+void bench_write_ply(const char *path);
+void bench_write_glb(const char *path);
+
 void bench_read_header(FILE *csv);
 void bench_levelset(FILE *csv);
 void bench_levelset_header(FILE *csv);

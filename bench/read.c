@@ -1,21 +1,27 @@
-/* What it costs to have files parsed by a reader: the same files here and there, small and large. */
+/* What it costs to have files parsed by a reader: the same files here and there, small and large; meshes of a
+ * million triangles beside Assimp in the process itself, in turn. */
 #define _GNU_SOURCE
 
 #include "bench.h"
 
+#include <assimp/cimport.h>
+#include <assimp/scene.h>
+
+#include <dlfcn.h>
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { ROWS = 708 /* of the large mesh: a million triangles */, SIDE = 4096 };
+enum { SIDE = 4096 };
 
 void bench_read_header(FILE *csv) {
-    fputs("file,bytes,here_ms,reader_ms,ratio,here_wall_ms,reader_wall_ms\n", csv);
-    printf("%-22s %10s %10s %10s %7s %10s %10s\n", "file", "bytes", "here ms", "reader ms", "ratio", "wall",
-           "wall");
+    fputs("file,bytes,here_ms,reader_ms,ratio,here_wall_ms,reader_wall_ms,assimp_ms,reader_to_assimp\n", csv);
+    printf("%-22s %10s %10s %10s %7s %10s %10s %10s %7s\n", "file", "bytes", "here ms", "reader ms", "ratio",
+           "wall", "wall", "Assimp ms", "ratio");
 }
 
 /* Of this process and of those that it waited for. */
@@ -52,31 +58,59 @@ static void read_image(const char *path, const vsh_run *run) {
     vsh_image_free(image);
 }
 
+static void read_by_assimp(const char *path) {
+    const struct aiScene *scene = aiImportFile(path, 0);
+    if (scene == NULL) {
+        fprintf(stderr, "%s: %s\n", path, aiGetErrorString());
+        exit(3);
+    }
+    aiReleaseImport(scene);
+}
+
 typedef void read_fn(const char *path, const vsh_run *run);
 
-static void measure(FILE *csv, const char *name, const char *path, read_fn *read) {
-    double processor[2], wall[2];
+/* Here, in a reader, by Assimp. */
+enum { HERE, READER, ASSIMP, WAYS };
+
+static void read_once(int way, const char *path, read_fn *read) {
+    if (way == ASSIMP) {
+        read_by_assimp(path);
+        return;
+    }
+    vsh_run run = vsh_run_default();
+    run.threads = 1;
+    run.reader = way == READER ? BENCH_READER : NULL;
+    read(path, &run);
+}
+
+static void measure(FILE *csv, const char *name, const char *path, read_fn *read, int ways) {
+    double processor[WAYS] = {0}, wall[WAYS] = {0}, each[WAYS][2][BENCH_RUNS];
     struct stat status = {0};
     stat(path, &status);
-    for (int i = 0; i < 2; ++i) {
-        vsh_run run = vsh_run_default();
-        run.threads = 1;
-        run.reader = i == 1 ? VSH_READER : NULL;
-        double each[2][BENCH_RUNS];
-        read(path, &run); /* what is loaded once is not counted */
-        for (int k = 0; k < BENCH_RUNS; ++k) {
+    for (int k = -1; k < BENCH_RUNS; ++k) { /* what is loaded once is not counted */
+        for (int way = 0; way < ways; ++way) {
             const double begin = processor_seconds(), clock = bench_wall();
-            read(path, &run);
-            each[0][k] = processor_seconds() - begin;
-            each[1][k] = bench_wall() - clock;
+            read_once(way, path, read);
+            each[way][0][k < 0 ? 0 : k] = processor_seconds() - begin;
+            each[way][1][k < 0 ? 0 : k] = bench_wall() - clock;
         }
-        processor[i] = 1e3 * bench_median(each[0], BENCH_RUNS);
-        wall[i] = 1e3 * bench_median(each[1], BENCH_RUNS);
     }
-    fprintf(csv, "%s,%lld,%.2f,%.2f,%.2f,%.2f,%.2f\n", name, (long long)status.st_size, processor[0],
-            processor[1], processor[1] / processor[0], wall[0], wall[1]);
-    printf("%-22s %10lld %10.2f %10.2f %7.2f %10.2f %10.2f\n", name, (long long)status.st_size, processor[0],
-           processor[1], processor[1] / processor[0], wall[0], wall[1]);
+    for (int way = 0; way < ways; ++way) {
+        processor[way] = 1e3 * bench_median(each[way][0], BENCH_RUNS);
+        wall[way] = 1e3 * bench_median(each[way][1], BENCH_RUNS);
+    }
+    fprintf(csv, "%s,%lld,%.2f,%.2f,%.2f,%.2f,%.2f,", name, (long long)status.st_size, processor[HERE],
+            processor[READER], processor[READER] / processor[HERE], wall[HERE], wall[READER]);
+    printf("%-22s %10lld %10.2f %10.2f %7.2f %10.2f %10.2f", name, (long long)status.st_size, processor[HERE],
+           processor[READER], processor[READER] / processor[HERE], wall[HERE], wall[READER]);
+    if (ways == WAYS) {
+        fprintf(csv, "%.2f,%.2f", processor[ASSIMP], processor[READER] / processor[ASSIMP]);
+        printf(" %10.2f %7.2f", processor[ASSIMP], processor[READER] / processor[ASSIMP]);
+    } else {
+        fputs(",", csv);
+    }
+    fputs("\n", csv);
+    printf("\n");
     fflush(stdout);
 }
 
@@ -92,27 +126,12 @@ static void write_ball(const char *path, double voxel) {
     vsh_grid_free(grid);
 }
 
-static void write_sheet(const char *path) {
-    FILE *file = fopen(path, "w");
-    if (file == NULL) {
-        perror(path);
-        exit(3);
-    }
-    for (int i = 0; i <= ROWS; ++i) {
-        for (int k = 0; k <= ROWS; ++k) {
-            fprintf(file, "v %.6f %.6f %.6f\n", 1e-2 * i, 0.3 * sin(0.02 * i) * cos(0.03 * k), 1e-2 * k);
-        }
-    }
-    for (int i = 0; i < ROWS; ++i) {
-        for (int k = 0; k < ROWS; ++k) {
-            const int a = i * (ROWS + 1) + k + 1, b = a + 1, c = a + ROWS + 1, d = c + 1;
-            fprintf(file, "f %d %d %d\nf %d %d %d\n", a, b, d, a, d, c);
-        }
-    }
-    if (fclose(file) != 0) {
-        perror(path);
-        exit(3);
-    }
+static void write_small_ball(const char *path) {
+    write_ball(path, 0.1);
+}
+
+static void write_large_ball(const char *path) {
+    write_ball(path, 0.005);
 }
 
 static void write_picture(const char *path) {
@@ -131,27 +150,44 @@ static void write_picture(const char *path) {
 
 void bench_read(FILE *csv) {
     char folder[] = "/tmp/vdbshade-bench-XXXXXX";
+    /* a reader may load from the folders that this process's libraries are in, and its own lies there */
+    if (dlopen(BENCH_LIBRARY, RTLD_LAZY | RTLD_LOCAL) == NULL) {
+        fprintf(stderr, "%s\n", dlerror());
+        exit(3);
+    }
     if (mkdtemp(folder) == NULL) {
         perror(folder);
         exit(3);
     }
-    char path[4][64];
-    static const char *const names[] = {"small.vdb", "large.vdb", "large.obj", "large.exr"};
-    for (size_t i = 0; i < 4; ++i) {
-        snprintf(path[i], sizeof path[i], "%s/%s", folder, names[i]);
-    }
-    write_ball(path[0], 0.1);
-    write_ball(path[1], 0.005);
-    write_sheet(path[2]);
-    write_picture(path[3]);
-    measure(csv, "a ball of 20 voxels", path[0], read_grid);
-    measure(csv, "a ball of 400 voxels", path[1], read_grid);
-    measure(csv, "thin.glb", VSH_ASSETS "/thin.glb", read_model);
-    measure(csv, "a million triangles", path[2], read_model);
-    measure(csv, "terrain.png", VSH_ASSETS "/terrain.png", read_image);
-    measure(csv, "EXR of 4096², 2 planes", path[3], read_image);
-    for (size_t i = 0; i < 4; ++i) {
-        unlink(path[i]);
+    static const struct {
+        const char *name, *file;
+        void (*write)(const char *path);
+        read_fn *read;
+        int ways;
+    } files[] = {
+        {"a ball of 20 voxels", "small.vdb", write_small_ball, read_grid, ASSIMP},
+        {"a ball of 400 voxels", "large.vdb", write_large_ball, read_grid, ASSIMP},
+        {"thin.glb", NULL, NULL, read_model, ASSIMP},
+        {"a million triangles", "large.obj", bench_write_bare_obj, read_model, WAYS},
+        {"with UVs and normals", "full.obj", bench_write_obj, read_model, WAYS},
+        {"the same as ASCII PLY", "ascii.ply", bench_write_ascii_ply, read_model, WAYS},
+        {"the same as PLY", "large.ply", bench_write_ply, read_model, WAYS},
+        {"the same as GLB", "large.glb", bench_write_glb, read_model, WAYS},
+        {"terrain.png", NULL, NULL, read_image, ASSIMP},
+        {"EXR of 4096², 2 planes", "large.exr", write_picture, read_image, ASSIMP},
+    };
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; ++i) {
+        char path[256];
+        const bool made = files[i].write != NULL;
+        snprintf(path, sizeof path, "%s/%s", made ? folder : VSH_ASSETS,
+                 made ? files[i].file : files[i].name);
+        if (made) {
+            files[i].write(path);
+        }
+        measure(csv, files[i].name, path, files[i].read, files[i].ways);
+        if (made) {
+            unlink(path);
+        }
     }
     rmdir(folder);
 }

@@ -1,5 +1,6 @@
-/* A model: the arrays of each mesh of a file once, and an entry for every node that uses them. glTF is read
- * by gltf*.c, other formats by Assimp (model_file.c, model_build.c). v of UVs points up in every format. */
+/* A model: the arrays of each mesh of a file once, and an entry for every node that uses them. OBJ, PLY
+ * and glTF are read by obj*.c, ply*.c and gltf*.c, other formats by Assimp (model_file.c, model_build.c). v
+ * of UVs points up in every format. */
 #include "model/model.h"
 
 #include "base/floats.h"

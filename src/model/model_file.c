@@ -20,9 +20,10 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 
-/* Bytes that reading takes at its peak for one byte of file: its text, Assimp's structures and our arrays.
- * Measured on a million triangles: OBJ 4.6, PLY 4.3, GLB 4.2, STL 3.4. Some files unfold further (compressed
- * FBX, many faces of few vertices): what Assimp found is measured once more before it is copied. */
+/* Bytes that reading takes at its peak for one byte of a file that is read whole: its text, Assimp's
+ * structures and our arrays. Measured on a million triangles: GLB 4.2, STL 3.4. Some files unfold further
+ * (compressed FBX, many faces of few vertices): what Assimp found is measured once more before it is copied.
+ */
 static const double PEAK_BYTES_A_BYTE = 6.0;
 
 enum {

@@ -1,7 +1,6 @@
 /* What Assimp hides is looked for in the file's own bytes before Assimp reads it: files that end early,
  * indices out of range, coordinates that are no finite numbers. Assimp 5.2 drops or repeats faces, or
- * replaces numbers, where it finds such things in OBJ, PLY and STL, and reports a mesh that is not the
- * one in the file. */
+ * replaces numbers, where it finds such things, and reports a mesh that is not the one in the file. */
 #ifndef VSHI_CASTER_SCAN_H
 #define VSHI_CASTER_SCAN_H
 

@@ -29,7 +29,7 @@ enum {
     MAX_WARNINGS = 4096 /* of one file that are passed on */
 };
 
-/* Seconds that a file may take where run->reader_seconds is 0: Assimp's reader of OBJ takes 0.03 s a MB on an
+/* Seconds that a file may take where run->reader_seconds is 0: Assimp's readers take 0.03 s a MB on an
  * idle core, and ten times as long where many share it. */
 static const double seconds_at_least = 60.0, seconds_a_byte = 1e-6;
 
