@@ -93,7 +93,7 @@ static void lay_out(const sharing *s, block *b) {
         }
         if (s->share.rays[i] != rays) {
             rays = s->share.rays[i];
-            spread = (float)vshi_ao_spread(sampler, rays);
+            spread = (float)vshi_ao_shared_spread(sampler, rays);
         }
         b->texels[k].value = s->shot[i];
         b->texels[k].rays = rays;

@@ -116,6 +116,13 @@ static inline bool vshi_ao_traces(const vsh_shade_options *options, const vsh_tr
 /* Variance of the share of `rays` rays of a VSH_SAMPLER_… that are free, over p (1 - p). */
 double vshi_ao_spread(int32_t sampler, int32_t rays);
 
+/* The same of texels that share their rays: means over windows err by a little more than if texels erred each
+ * by itself, where the same edge runs through all of them (test_claims: a slit, 0.88 of its error would be
+ * claimed). */
+static inline double vshi_ao_shared_spread(int32_t sampler, int32_t rays) {
+    return 1.15 * vshi_ao_spread(sampler, rays);
+}
+
 /* The most rays that a point takes, by settled options. */
 int32_t vshi_ao_most_rays(const vsh_shade_options *options);
 

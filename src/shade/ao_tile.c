@@ -52,7 +52,7 @@ static bool decide(vshi_ao_piece *piece, tile *t, int32_t most) {
             vshi_window_texel *e = &t->texels[t->place[i]];
             e->rays = point->taken;
             e->value = (float)((double)point->free / point->taken);
-            e->spread = (float)vshi_ao_spread(options->sampler, point->taken);
+            e->spread = (float)vshi_ao_shared_spread(options->sampler, point->taken);
         }
     }
     vshi_windows_sum(&t->windows);
@@ -144,7 +144,7 @@ static void open_tile(const vshi_ao_task *task, const vshi_texel_lattice *lattic
         } else if (share->rays[i] > 0) {
             t->texels[k].rays = share->rays[i];
             t->texels[k].value = task->ao[i];
-            t->texels[k].spread = (float)vshi_ao_spread(task->options->sampler, share->rays[i]);
+            t->texels[k].spread = (float)vshi_ao_shared_spread(task->options->sampler, share->rays[i]);
             shoots[k] = 1;
         }
     }
