@@ -208,7 +208,7 @@ static void link_points(const looking *l, const bool *follows, size_t first, siz
     for (size_t k = 0; k < count; ++k) {
         const size_t i = first + k;
         linked[k] = false;
-        if (follows == NULL || !follows[i]) {
+        if (follows == NULL || !follows[i] || l->holes) { /* beside a hole rays disagree more and more */
             continue;
         }
         const vshi_vec from = lifted(l, i - 1), way = vshi_sub(lifted(l, i), from);
