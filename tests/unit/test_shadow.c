@@ -264,6 +264,9 @@ static void a_penumbra_has_neither_bands_nor_a_small_umbra(void **state) {
         print_message(
             "tilt %g: worst %.4f, inner half %.4f, falls by %.4f, second differences %.2f of the truth's\n",
             tilts[t], worst, inner, fall, grain);
+        assert_true(worst < 0.03 && inner < 0.02); /* `smooth`, by depth alone: 0.07 and more */
+        assert_true(fall < 1e-4);
+        assert_true(grain < 4.0);
     }
 }
 
