@@ -8,7 +8,8 @@
 #include <math.h>
 #include <string.h>
 
-enum { TILE = 8, FIRST = 8 };
+/* Rays of a texel at first, and of one that is only looked at. */
+enum { TILE = 8, FIRST = 8, BEYOND = 16 };
 
 /* Steps between texels of a lattice, of scale_of(), at most: what a plane is off from what bends grows with
  * their square, so that they go with the square root of the error asked for, 0.05 of the scale for 0.02.
@@ -154,17 +155,24 @@ static void open_tile(const vshi_ao_task *task, const vshi_texel_lattice *lattic
     }
 }
 
-static void shoot_tile(const vshi_ao_task *task, tile *t, vsh_shade_stats *stats) {
-    const vshi_ao_share *share = task->share;
-    const int32_t most = vshi_ao_most_rays(task->options), first = FIRST < most ? FIRST : most;
-    const int32_t spacing = t->lattice.spacing;
-    vshi_ao_piece piece;
-    vshi_ao_piece_open(&piece, task, t->wanted, t->count, true, first, stats);
-    for (size_t i = 0; i < piece.count; ++i) {
-        const uint32_t texel = piece.points[i].texel;
-        piece.points[i].texel =
+/* Texels of a lattice, with their first rays to shoot: of sequences that those of a lattice have. */
+static void open_piece(const vshi_ao_task *task, int32_t spacing, const size_t *points, size_t count,
+                       int32_t first, vshi_ao_piece *piece, vsh_shade_stats *stats) {
+    const int32_t most = vshi_ao_most_rays(task->options);
+    vshi_ao_piece_open(piece, task, points, count, true, first < most ? first : most, stats);
+    for (size_t i = 0; i < piece->count; ++i) {
+        const uint32_t texel = piece->points[i].texel;
+        piece->points[i].texel =
             vsh_texel(vsh_texel_column(texel) / (uint32_t)spacing, vsh_texel_row(texel) / (uint32_t)spacing);
     }
+}
+
+static void shoot_tile(const vshi_ao_task *task, tile *t, vsh_shade_stats *stats) {
+    const vshi_ao_share *share = task->share;
+    const int32_t most = vshi_ao_most_rays(task->options);
+    const int32_t spacing = t->lattice.spacing;
+    vshi_ao_piece piece;
+    open_piece(task, spacing, t->wanted, t->count, FIRST, &piece, stats);
     do {
         vshi_ao_piece_shoot(&piece, stats);
     } while (decide(&piece, t, most));
@@ -209,8 +217,53 @@ static bool is_straight(const tile *t, const vshi_window_estimate *e, int32_t at
     return fabs(off) <= most + SIGMAS * sqrt(before * before + own * own + after * after);
 }
 
+/* Texels at the end of a square whose next texel, in another square, is far from what they say of it by its
+ * first rays: are of the finer lattice, too. */
+static void look_beyond(const vshi_ao_task *task, const int32_t square[2], const tile *t,
+                        const vshi_window_estimate *e, vsh_shade_stats *stats) {
+    const vshi_ao_share *share = task->share;
+    const int32_t spacing = t->lattice.spacing, side = vshi_ao_square(share);
+    const double most = BEND * task->options->max_error;
+    size_t next[2 * TILE], count = 0;
+    int32_t place[2 * TILE], along[2 * TILE];
+    for (int32_t k = 0; k < TILE * TILE; ++k) {
+        const int32_t at[2] = {t->lattice.left + k % TILE * spacing, t->lattice.top + k / TILE * spacing};
+        if (!(t->texels[k].rays > 0) || share->level[t->at[k] - 1] != spacing) {
+            continue;
+        }
+        for (int32_t axis = 0; axis < 2; ++axis) {
+            int32_t to[2] = {at[0], at[1]};
+            to[axis] += spacing;
+            const uint32_t beyond =
+                to[axis] == square[axis] + side ? vshi_texel_at(&share->map, to[0], to[1]) : 0;
+            if (beyond > 0 && vshi_links_lead(task->points, &share->map, at, to)) {
+                place[count] = k;
+                along[count] = axis;
+                next[count++] = (size_t)beyond - 1;
+            }
+        }
+    }
+    if (count == 0) {
+        return;
+    }
+    vshi_ao_piece piece;
+    open_piece(task, spacing, next, count, BEYOND, &piece, stats);
+    vshi_ao_piece_shoot(&piece, stats);
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_ao_point *point = &piece.points[i];
+        const vshi_window_estimate *own = &e[place[i]];
+        const double said = fmin(fmax(own->value + own->slope[along[i]], 0.0), 1.0);
+        const double p = (said * point->taken + 1.0) / (point->taken + 2.0);
+        const double noise = vshi_ao_shared_spread(task->options->sampler, point->taken) * p * (1.0 - p);
+        const double off = (double)point->free / point->taken - said;
+        if (point->taken > 0 && fabs(off) > most + SIGMAS * sqrt(noise)) {
+            share->level[t->at[place[i]] - 1] = (uint8_t)(spacing / 2);
+        }
+    }
+}
+
 /* Texels whose windows tell nothing of what lies between them and the next are of the finer lattice. */
-static void grade(const vshi_ao_task *task, const tile *t) {
+static void grade(const vshi_ao_task *task, const int32_t square[2], const tile *t, vsh_shade_stats *stats) {
     const vshi_ao_share *share = task->share;
     const int32_t spacing = t->lattice.spacing;
     const double max_error = task->options->max_error, most = BEND * max_error;
@@ -227,6 +280,7 @@ static void grade(const vshi_ao_task *task, const tile *t) {
             share->level[t->at[k] - 1] = (uint8_t)(spacing / 2);
         }
     }
+    look_beyond(task, square, t, e, stats);
 }
 
 uint32_t vshi_ao_corners(const vsh_points *points, const vshi_texel_map *map, const int32_t cell[2],
@@ -293,7 +347,7 @@ static void shade_square(const vshi_ao_task *task, const int32_t square[2], vsh_
             if (t.count > 0) {
                 shoot_tile(task, &t, stats);
                 if (spacing > 1) {
-                    grade(task, &t);
+                    grade(task, square, &t, stats);
                 }
             }
         }

@@ -343,6 +343,69 @@ static void fine_texels_take_few_rays(void **state) {
     free(few);
 }
 
+/* AO of a floor of 256² texels, 2 × 3 units, under and beside a board that hovers just over its first `rows`
+ * rows. */
+static void bake_board(int32_t rows, int32_t spacing, double max_error, float *ao) {
+    enum { SIDE = 256 };
+    quad floor;
+    make_quad(&floor, 0.0f, 0.0f, 1.0f, 1.0f);
+    const float y[2] = {3.0f * (1.0f - (float)rows / SIDE), 3.5f}, z[2] = {0.0004f, 0.05f};
+    float corners[8][3];
+    for (size_t k = 0; k < 8; ++k) {
+        corners[k][0] = (k & 1) != 0 ? 2.5f : -0.5f;
+        corners[k][1] = y[k >> 1 & 1];
+        corners[k][2] = z[k >> 2];
+    }
+    static const uint32_t faces[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    const vsh_mesh meshes[2] = {floor.mesh,
+                                {.name = "board",
+                                 .positions = corners[0],
+                                 .indices = faces,
+                                 .vertex_count = 8,
+                                 .triangle_count = 12}};
+    vsh_error error = {0};
+    vsh_triangles *triangles = NULL;
+    vsh_occluders *occluders = NULL;
+    assert_int_equal(vsh_triangles_create(meshes, 2, NULL, &triangles, &error), VSH_OK);
+    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    parts.triangles = triangles;
+    assert_int_equal(vsh_occluders_from_parts(&parts, &occluders, &error), VSH_OK);
+    vsh_lightmap_options options = size_of(SIDE, SIDE, 1);
+    options.ao_spacing = spacing;
+    options.shade.ao_method = VSH_AO_EXACT;
+    options.shade.ao_distance = 1.0;
+    options.shade.max_error = max_error;
+    vsh_texels *texels = create(&floor.mesh, 1, options, NULL);
+    const vsh_lightmap lightmap = {.ao = ao};
+    assert_int_equal(vsh_bake_lightmap(occluders, texels, NULL, 0, NULL, NULL, &lightmap, NULL, &error),
+                     VSH_OK);
+    vsh_texels_free(texels);
+    vsh_occluders_free(occluders);
+    vsh_triangles_free(triangles);
+}
+
+/* Texels between a lattice's last ones in a square and the next square are told by one side alone. */
+static void what_ends_beside_a_square_darkens_no_texel_of_the_next_row(void **state) {
+    (void)state;
+    enum { SIDE = 256 };
+    static float ao[SIDE * SIDE], exact[SIDE * SIDE];
+    for (int32_t rows = 125; rows <= 130; ++rows) {
+        bake_board(rows, 4, 0.02, ao);
+        bake_board(rows, 1, 0.004, exact);
+        float worst = 0.0f;
+        size_t dark = 0;
+        for (size_t i = 0; i < SIDE * SIDE; ++i) {
+            worst = fmaxf(worst, exact[i] - ao[i]);
+            dark += exact[i] < 0.05f;
+        }
+        print_message("board over %d rows: darker by %.3f at worst, %zu texels dark\n", rows, (double)worst,
+                      dark);
+        assert_true(dark > 10 * SIDE && dark < SIDE * SIDE * 2 / 3);
+        assert_true(worst < 0.25f);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(threads_change_no_bit),
@@ -350,6 +413,7 @@ int main(void) {
         cmocka_unit_test(errors_are_below_those_asked_for_with_few_rays),
         cmocka_unit_test(charts_take_nothing_from_each_other),
         cmocka_unit_test(fine_texels_take_few_rays),
+        cmocka_unit_test(what_ends_beside_a_square_darkens_no_texel_of_the_next_row),
         cmocka_unit_test(a_lone_ball_sees_along_its_normals),
         cmocka_unit_test(an_open_plate_is_exactly_1_and_has_no_seams),
     };
