@@ -1,6 +1,6 @@
-/* Charts that lie closer to each other than a texel. Triangles that share an edge, in space and in the UVs,
- * are one chart; the edges that a triangle has to itself are borders. Borders are walked in steps of half a
- * texel and put into the texels they pass, so that near ones are found there. */
+/* Charts that lie closer to each other than a texel. Their borders are walked in steps of half a texel and
+ * put into the texels they pass, so that near ones are found there. */
+#include "bake/chart_borders.h"
 #include "base/floats.h"
 #include "base/hash.h"
 #include "base/job.h"
@@ -15,14 +15,7 @@
 
 static const double STEP = 0.5; /* texels */
 
-enum { NO_EDGE = UINT32_MAX };
-
-/* A place where an edge of triangles is looked up. */
-typedef struct slot {
-    uint64_t key;
-    uint32_t edge;  /* 3 × triangle + corner that it begins with, of the first; NO_EDGE: free */
-    uint32_t count; /* triangles that have it */
-} slot;
+enum { NONE = UINT32_MAX };
 
 typedef struct border {
     double x[2], y[2]; /* texels */
@@ -32,16 +25,13 @@ typedef struct border {
 /* A border in a texel. */
 typedef struct passing {
     uint64_t texel;
-    uint32_t border, next; /* of the same place in the table; NO_EDGE: none */
+    uint32_t border, next; /* of the same place in the table; NONE: none */
 } passing;
 
 typedef struct closeness {
     const vsh_mesh *meshes;
     size_t mesh_count, triangles;
     double width, height;
-    uint32_t *parent; /* [triangles]: union-find of charts */
-    slot *slots;      /* [slot_count], a power of two */
-    size_t slot_count;
     border *borders;
     size_t border_count;
     passing *passings;
@@ -57,94 +47,21 @@ static size_t power_above(size_t count) {
     return power;
 }
 
-static uint32_t chart_of(closeness *c, uint32_t triangle) {
-    while (c->parent[triangle] != triangle) {
-        c->parent[triangle] = c->parent[c->parent[triangle]];
-        triangle = c->parent[triangle];
-    }
-    return triangle;
-}
-
-static uint64_t bits_of(float value, uint64_t with) {
-    uint32_t bits;
-    value += 0.0f; /* -0 is 0 */
-    memcpy(&bits, &value, sizeof bits);
-    return vshi_mix(with ^ bits);
-}
-
-static uint64_t end_key(const vsh_mesh *mesh, uint32_t vertex) {
-    uint64_t key = 1;
-    for (size_t k = 0; k < 2; ++k) {
-        key = bits_of(mesh->uvs[2 * (size_t)vertex + k], key);
-    }
-    for (size_t k = 0; k < 3; ++k) {
-        key = bits_of(mesh->positions[3 * (size_t)vertex + k], key);
-    }
-    return key;
-}
-
-static slot *find_slot(closeness *c, uint64_t key) {
-    size_t at = (size_t)vshi_mix(key) & (c->slot_count - 1);
-    while (c->slots[at].edge != NO_EDGE && c->slots[at].key != key) {
-        at = (at + 1) & (c->slot_count - 1);
-    }
-    return &c->slots[at];
-}
-
-static uint64_t edge_key(const vsh_mesh *mesh, size_t m, size_t local, size_t k) {
-    const uint32_t *index = mesh->indices + 3 * local;
-    return end_key(mesh, index[k]) + end_key(mesh, index[(k + 1) % 3]) +
-           vshi_mix(m + 1); /* either way round */
-}
-
-/* Whether a triangle covers anything in the UVs. */
-static bool is_flat(const vsh_mesh *mesh, size_t local) {
-    const uint32_t *index = mesh->indices + 3 * local;
-    const float *a = mesh->uvs + 2 * (size_t)index[0], *b = mesh->uvs + 2 * (size_t)index[1];
-    const float *d = mesh->uvs + 2 * (size_t)index[2];
-    const double ux = (double)b[0] - (double)a[0], uy = (double)b[1] - (double)a[1];
-    const double vx = (double)d[0] - (double)a[0], vy = (double)d[1] - (double)a[1];
-    return ux * vy - uy * vx == 0.0;
-}
-
-static void join_charts(closeness *c) {
-    uint32_t triangle = 0;
-    for (size_t m = 0; m < c->mesh_count; ++m) {
-        const vsh_mesh *mesh = &c->meshes[m];
-        for (size_t i = 0; i < mesh->triangle_count; ++i, ++triangle) {
-            c->parent[triangle] = triangle;
-            for (size_t k = 0; !is_flat(mesh, i) && k < 3; ++k) {
-                const uint64_t key = edge_key(mesh, m, i, k);
-                slot *s = find_slot(c, key);
-                if (s->edge == NO_EDGE) {
-                    *s = (slot){key, 3 * triangle + (uint32_t)k, 0};
-                } else {
-                    c->parent[chart_of(c, triangle)] = chart_of(c, s->edge / 3);
-                }
-                ++s->count;
-            }
+static void place_borders(closeness *c, const vshi_chart_borders *found) {
+    size_t m = 0, first = 0;
+    for (size_t i = 0; i < found->edge_count; ++i) {
+        const uint32_t triangle = found->edges[i] / 3, corner = found->edges[i] % 3;
+        while (triangle - first >= c->meshes[m].triangle_count) {
+            first += c->meshes[m++].triangle_count;
         }
-    }
-}
-
-static void list_borders(closeness *c) {
-    uint32_t triangle = 0;
-    for (size_t m = 0; m < c->mesh_count; ++m) {
         const vsh_mesh *mesh = &c->meshes[m];
-        for (size_t i = 0; i < mesh->triangle_count; ++i, ++triangle) {
-            for (size_t k = 0; !is_flat(mesh, i) && k < 3; ++k) {
-                const slot *s = find_slot(c, edge_key(mesh, m, i, k));
-                if (s->count != 1) {
-                    continue;
-                }
-                border *b = &c->borders[c->border_count++];
-                *b = (border){.chart = chart_of(c, triangle), .mesh = (uint32_t)m};
-                for (size_t end = 0; end < 2; ++end) {
-                    const float *uv = mesh->uvs + 2 * (size_t)mesh->indices[3 * i + (k + end) % 3];
-                    b->x[end] = (double)uv[0] * c->width;
-                    b->y[end] = (1.0 - (double)uv[1]) * c->height;
-                }
-            }
+        border *b = &c->borders[c->border_count++];
+        *b = (border){.chart = found->charts[triangle], .mesh = (uint32_t)m};
+        for (size_t end = 0; end < 2; ++end) {
+            const float *uv =
+                mesh->uvs + 2 * (size_t)mesh->indices[3 * (triangle - first) + (corner + end) % 3];
+            b->x[end] = (double)uv[0] * c->width;
+            b->y[end] = (1.0 - (double)uv[1]) * c->height;
         }
     }
 }
@@ -208,7 +125,7 @@ static double nearest_other(const closeness *c, uint32_t chart, double x, double
                 continue;
             }
             uint32_t p = c->heads[vshi_mix(texel) & (c->head_count - 1)];
-            for (; p != NO_EDGE; p = c->passings[p].next) {
+            for (; p != NONE; p = c->passings[p].next) {
                 const border *b = &c->borders[c->passings[p].border];
                 if (c->passings[p].texel == texel && b->chart != chart) {
                     nearest = fmin(nearest, distance_to(b, x, y));
@@ -250,28 +167,23 @@ static void measure(const closeness *c, uint64_t *by_mesh, vsh_closeness *found)
 
 static vsh_result find(closeness *c, const vsh_run *run, vsh_closeness *found, vsh_error *error) {
     const char *what = "closeness of charts";
-    c->slot_count = power_above(6 * c->triangles);
-    const double bytes = (double)c->slot_count * sizeof *c->slots +
-                         (double)c->triangles * (sizeof *c->parent + 3.0 * sizeof *c->borders);
-    VSHI_TRY(vshi_check_limit(run, bytes, what, error));
     uint64_t *by_mesh = NULL;
+    vshi_chart_borders charts;
     vsh_result result;
+    VSHI_TRY_DONE(vshi_chart_borders_find(c->meshes, c->mesh_count, run, what, &charts, error));
+    const double bytes = (double)c->triangles * sizeof *charts.charts +
+                         (double)charts.edge_count * (sizeof *charts.edges + sizeof *c->borders);
+    VSHI_TRY_DONE(vshi_check_limit(run, bytes, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&by_mesh, c->mesh_count, sizeof *by_mesh, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&c->parent, c->triangles, sizeof *c->parent, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&c->slots, c->slot_count, sizeof *c->slots, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&c->borders, 3 * c->triangles, sizeof *c->borders, what, error));
-    for (size_t i = 0; i < c->slot_count; ++i) {
-        c->slots[i].edge = NO_EDGE;
-    }
-    join_charts(c);
-    list_borders(c);
+    VSHI_TRY_DONE(vshi_allocate((void **)&c->borders, charts.edge_count, sizeof *c->borders, what, error));
+    place_borders(c, &charts);
     size_t most = 0;
     for (size_t b = 0; b < c->border_count; ++b) {
         most += steps_of(&c->borders[b]) + 1;
     }
     c->head_count = power_above(most);
     const double passings = (double)most * sizeof *c->passings + (double)c->head_count * sizeof *c->heads;
-    if (most < NO_EDGE) {
+    if (most < NONE) {
         VSHI_TRY_DONE(vshi_check_limit(run, bytes + passings, what, error));
         VSHI_TRY_DONE(vshi_allocate((void **)&c->passings, most, sizeof *c->passings, what, error));
         VSHI_TRY_DONE(vshi_allocate((void **)&c->heads, c->head_count, sizeof *c->heads, what, error));
@@ -282,9 +194,8 @@ done:
     free(c->heads);
     free(c->passings);
     free(c->borders);
-    free(c->slots);
-    free(c->parent);
     free(by_mesh);
+    vshi_chart_borders_free(&charts);
     return result;
 }
 

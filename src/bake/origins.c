@@ -85,13 +85,17 @@ static void probe(const lifting *l, const looked_at *in, size_t i, float at[3]) 
     at[2] = (float)p.z;
 }
 
-/* Looks at samples first … last - 1, at most a block, in a field that decides. */
+/* Samples that are looked at together follow each other in a tile, at most so many: whatever the band, they
+ * are the same. */
+enum { TOGETHER = 64 };
+
+/* Looks at samples first … last - 1, which belong together, in a field that decides. */
 static void look(const lifting *l, size_t field, size_t first, size_t last) {
     const looked_at *in = &l->fields[field];
     const float radius = (float)(CREASE * in->probe / in->field->voxel_size);
-    float at[3][VSHI_ORIGIN_BLOCK];
+    float at[3][TOGETHER];
     float *const centres[3] = {at[0], at[1], at[2]};
-    bool is_free[VSHI_ORIGIN_BLOCK];
+    bool is_free[TOGETHER];
     for (size_t i = first; i < last; ++i) {
         float p[3];
         probe(l, in, i, p);
@@ -131,43 +135,47 @@ static bool is_open(const void *user, size_t i) {
     return t->in->field->voxel_size * (double)vshi_field_distance(t->in->field, at) >= CREASE * t->in->probe;
 }
 
-/* Samples that are looked at together follow each other in a tile, at most so many: whatever the band, they
- * are the same. */
-enum { TOGETHER = 64 };
-
 static bool same_tile(const vsh_texels *texels, size_t i, size_t k) {
     return ((texels->texel[i] ^ texels->texel[k]) & ~0x00070007u) == 0;
 }
 
-/* Where those begin that sample i is of. */
-static size_t together(const vsh_texels *texels, size_t i) {
+/* Behind the samples that are looked at together from `first` on. */
+static size_t together_end(const vsh_texels *texels, size_t first) {
+    size_t end = first + 1;
+    while (end < texels->count && end - first < TOGETHER && same_tile(texels, end, first)) {
+        ++end;
+    }
+    return end;
+}
+
+/* The first sample from i on with which others begin to be looked at together. */
+static size_t together_begin(const vsh_texels *texels, size_t i) {
     size_t first = i;
     while (first > 0 && same_tile(texels, first - 1, i)) {
         --first;
     }
-    return i - (i - first) % TOGETHER;
+    const size_t begin = i - (i - first) % TOGETHER;
+    return begin == i ? i : together_end(texels, begin);
 }
 
-/* Looks at samples first … last - 1 by rays against a field's triangles. */
+/* Looks at samples first … last - 1, which belong together, by rays against a field's triangles. */
 static void trace(const lifting *l, const looked_at *in, size_t first, size_t last) {
-    double at[3 * (TOGETHER + VSHI_ORIGIN_BLOCK)];
-    uint8_t where[TOGETHER + VSHI_ORIGIN_BLOCK];
-    bool follows[TOGETHER + VSHI_ORIGIN_BLOCK];
-    const size_t begin = together(l->texels, first);
-    size_t start = begin;
-    for (size_t i = begin; i < last; ++i) {
-        put(place(l, i), at + 3 * (i - begin));
-        start = i - start == TOGETHER || !same_tile(l->texels, i, start) ? i : start;
-        follows[i - begin] =
-            i != start && !vshi_sample_is_border(l->texels, i) && !vshi_sample_is_border(l->texels, i - 1);
-    }
-    const tracing task = {l, in, begin};
-    vshi_inside(in->triangles, last - begin, at, l->texels->geometric + 3 * begin, follows, is_open, &task,
+    double at[3 * TOGETHER];
+    uint8_t where[TOGETHER];
+    bool follows[TOGETHER];
+    size_t i = first;
+    do { /* there is one */
+        put(place(l, i), at + 3 * (i - first));
+        follows[i - first] =
+            i > first && !vshi_sample_is_border(l->texels, i) && !vshi_sample_is_border(l->texels, i - 1);
+    } while (++i < last);
+    const tracing task = {l, in, first};
+    vshi_inside(in->triangles, last - first, at, l->texels->geometric + 3 * first, follows, is_open, &task,
                 where);
-    for (size_t i = first; i < last; ++i) {
-        if (where[i - begin] != VSHI_OUTSIDE) {
+    for (i = first; i < last; ++i) {
+        if (where[i - first] != VSHI_OUTSIDE) {
             l->origins->valid[i] = 0;
-            l->origins->seen[i] = where[i - begin] == VSHI_INSIDE_SEEN;
+            l->origins->seen[i] = where[i - first] == VSHI_INSIDE_SEEN;
         }
     }
 }
@@ -194,22 +202,29 @@ static void drop(void *user, size_t begin, size_t end) {
     }
 }
 
+static void validate_together(const lifting *l, size_t first, size_t last) {
+    memset(l->origins->valid + first, 1, last - first);
+    for (size_t field = 0; field < l->field_count; ++field) {
+        if (l->fields[field].triangles != NULL) {
+            trace(l, &l->fields[field], first, last);
+        }
+        if (l->fields[field].marched) {
+            look(l, field, first, last);
+        }
+    }
+    for (size_t solid = 0; solid < l->solid_count; ++solid) {
+        look_at_solid(l, solid, first, last);
+    }
+}
+
+/* Those that begin in the blocks. */
 static void validate(void *user, size_t begin, size_t end) {
     const lifting *l = user;
-    for (size_t block = begin; block < end; ++block) {
-        const size_t first = block * VSHI_ORIGIN_BLOCK, last = block_end(l, block);
-        memset(l->origins->valid + first, 1, last - first);
-        for (size_t field = 0; field < l->field_count; ++field) {
-            if (l->fields[field].triangles != NULL) {
-                trace(l, &l->fields[field], first, last);
-            }
-            if (l->fields[field].marched) {
-                look(l, field, first, last);
-            }
-        }
-        for (size_t solid = 0; solid < l->solid_count; ++solid) {
-            look_at_solid(l, solid, first, last);
-        }
+    const size_t last = end > begin ? block_end(l, end - 1) : 0;
+    for (size_t i = begin < end ? together_begin(l->texels, begin * VSHI_ORIGIN_BLOCK) : last, next; i < last;
+         i = next) {
+        next = together_end(l->texels, i);
+        validate_together(l, i, next);
     }
 }
 

@@ -116,25 +116,36 @@ static uint8_t met(const vsh_triangles *triangles, unsigned mesh, unsigned local
     return !out ? VSHI_MEETS_AIR : holed ? VSHI_MEETS_HOLED : VSHI_MEETS_SOLID;
 }
 
+/* Aims a lone ray; false where it has no direction. */
+static bool aim_lone(const vsh_triangles *triangles, const vshi_segment_ray *ray, struct RTCRayHit *lone) {
+    struct RTCRay16 aimed;
+    if (!vshi_triangles_aim(triangles, ray, &aimed, 0)) {
+        return false;
+    }
+    *lone = (struct RTCRayHit){.ray = {.org_x = aimed.org_x[0],
+                                       .org_y = aimed.org_y[0],
+                                       .org_z = aimed.org_z[0],
+                                       .dir_x = aimed.dir_x[0],
+                                       .dir_y = aimed.dir_y[0],
+                                       .dir_z = aimed.dir_z[0],
+                                       .tfar = aimed.tfar[0],
+                                       .mask = 0xffffffffu},
+                               .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
+    return true;
+}
+
+/* One ray after the other: where solids touch, faces of two lie in one place, and which of them a packet of
+ * rays finds depends on who else is in it. */
 void vshi_triangles_meet(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                          uint8_t *meets) {
     looking look;
     begin_look(&look, triangles, NULL);
-    for (size_t begin = 0; begin < count; begin += VSHI_PACKET) {
-        struct RTCRayHit16 packet = {0};
-        _Alignas(64) int valid[VSHI_PACKET] = {0};
-        const int lanes = count - begin < VSHI_PACKET ? (int)(count - begin) : VSHI_PACKET;
-        for (int lane = 0; lane < lanes; ++lane) {
-            valid[lane] =
-                vshi_triangles_aim(triangles, &rays[begin + (size_t)lane], &packet.ray, lane) ? -1 : 0;
-            packet.hit.geomID[lane] = RTC_INVALID_GEOMETRY_ID;
-        }
-        look.context.flags = vshi_rays_together(rays + begin, lanes) ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
-                                                                     : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-        rtcIntersect16(valid, triangles->scene, &look.context, &packet);
-        for (int lane = 0; lane < lanes; ++lane) {
-            meets[begin + (size_t)lane] =
-                met(triangles, packet.hit.geomID[lane], packet.hit.primID[lane], &rays[begin + (size_t)lane]);
+    for (size_t i = 0; i < count; ++i) {
+        struct RTCRayHit lone;
+        meets[i] = VSHI_MEETS_NOTHING;
+        if (aim_lone(triangles, &rays[i], &lone)) {
+            rtcIntersect1(triangles->scene, &look.context, &lone);
+            meets[i] = met(triangles, lone.hit.geomID, lone.hit.primID, &rays[i]);
         }
     }
 }
@@ -161,21 +172,12 @@ int vshi_triangles_depth(const vsh_triangles *triangles, const vshi_segment_ray 
     crossing crossings[MOST_CROSSINGS];
     looking look;
     begin_look(&look, triangles, crossings);
-    struct RTCRay16 aimed;
+    struct RTCRayHit lone;
     *meets_nothing = true;
-    if (!vshi_triangles_aim(triangles, ray, &aimed, 0)) {
+    if (!aim_lone(triangles, ray, &lone)) {
         return 0;
     }
-    struct RTCRayHit one = {.ray = {.org_x = aimed.org_x[0],
-                                    .org_y = aimed.org_y[0],
-                                    .org_z = aimed.org_z[0],
-                                    .dir_x = aimed.dir_x[0],
-                                    .dir_y = aimed.dir_y[0],
-                                    .dir_z = aimed.dir_z[0],
-                                    .tfar = aimed.tfar[0],
-                                    .mask = 0xffffffffu},
-                            .hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
-    rtcIntersect1(triangles->scene, &look.context, &one);
+    rtcIntersect1(triangles->scene, &look.context, &lone);
     *meets_nothing = look.count == 0;
     sort(crossings, look.count);
     int left = 0, most = 0;
