@@ -14,10 +14,11 @@ enum { TILE = 8, FIRST = 8, BEYOND = 16 };
 /* Rays of each texel of a tile in which the first ones do not all tell the same: a power of two, of these
  * over max_error at least. What few rays of a texel say of how many more it is to have is chance, and they
  * leave much where they happen to say that it has enough: with no more than the first ones, the cloister at
- * 0.01 had an RMSE of 0.0061 in the time that gives 0.0053. Those of a lattice are of several texels, and
- * what they are off by is what bends between them rather than noise. */
+ * 0.01 had an RMSE of 0.0061 in the time that gives 0.0053. Lattices wider than CLOSE keep to the first rays:
+ * what they are off by is what bends between their texels rather than noise, and what is said of their error
+ * counts on the noise (test_ao_texels: fine texels). */
 static const double SEEN_OVER = 0.4;
-static const int32_t MOST_SEEN = 128;
+static const int32_t MOST_SEEN = 128, CLOSE = 2;
 
 /* Steps between texels of a lattice, of scale_of(), at most: what a plane is off from what bends grows with
  * their square, so that they go with the square root of the error asked for, 0.05 of the scale for 0.02.
@@ -213,7 +214,7 @@ static void shoot_tile(const vshi_ao_task *task, tile *t, vsh_shade_stats *stats
     vshi_ao_piece piece;
     open_piece(task, spacing, t->wanted, t->count, FIRST, &piece, stats);
     vshi_ao_piece_shoot(&piece, stats);
-    if (spacing == 1) {
+    if (spacing <= CLOSE) {
         look_closer(task, most, &piece, stats);
     }
     while (decide(&piece, t, most)) {
