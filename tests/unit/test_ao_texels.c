@@ -214,6 +214,8 @@ static judged judge(const baked *b, const baked *truth) {
  */
 static void errors_are_below_those_asked_for_with_few_rays(void **state) {
     static const double errors[] = {0.05, 0.02, 0.01}, angles[] = {2.6, 1.8, 1.35};
+    /* with 8 rays at first, whatever the error, RMSE is 0.0103 at 0.02 and 0.0068 at 0.01 */
+    static const double most[] = {0.016, 0.0092, 0.0062};
     baked *truth = bake(*state, (how){.spacing = 1, .max_error = 0.002});
     double before = INFINITY;
     for (size_t e = 0; e < 3; ++e) {
@@ -225,7 +227,7 @@ static void errors_are_below_those_asked_for_with_few_rays(void **state) {
                       (double)shared->stats.rays);
         print_message("    alone: RMSE %.5f, said %.5f, most %.3f, bias %+.5f, bent %.2f°, %.0f rays\n", a.is,
                       a.said, a.most, a.bias, a.angle, (double)alone->stats.rays);
-        assert_true(j.is < errors[e] && j.is < 0.8 * before && j.is < a.is);
+        assert_true(j.is < most[e] && j.is < 0.8 * before && j.is < a.is);
         assert_true(j.is > 0.8 * j.said && j.is < 2.3 * j.said && j.said < 0.5 * errors[e]);
         assert_true(fabs(j.bias) < 0.003 && j.most < 0.3);
         assert_true(shared->stats.rays * 2 < alone->stats.rays);
