@@ -19,8 +19,6 @@ constexpr double AT_EDGE = 1e-6;
 // By how much boxes of triangles are too large, voxels: more than their rounding.
 constexpr double BOX_MARGIN = 1e-3;
 
-constexpr uint64_t ROW_ENDS = 0x0101010101010101u;
-
 // Part 0, 1 or 2 of the leaves around that position 0 … 9 of the halo lies in.
 int part_of(int position) {
     return position == 0 ? 0 : position == EDGE - 1 ? 2 : 1;
@@ -41,23 +39,10 @@ Sides::Sides(const Surface &surface_, const LeafTable &table_, Stage &stage)
     : surface(surface_), table(table_), leaves(table_.leaves), now(find_outside(table, stage)), next(now),
       tried(now.size()) {
     well_off.reserve(now.size());
+    any_fresh.reserve(now.size());
     for (const KnownSides &sides : now) {
         well_off.push_back(sides.known);
-    }
-}
-
-// Byte z is 1 where bit z is set.
-static uint64_t spread(uint64_t byte) {
-    const uint64_t copies = byte * ROW_ENDS & 0x8040201008040201u;
-    return ((copies + 0x7f7f7f7f7f7f7f7fu) | copies) >> 7 & ROW_ENDS;
-}
-
-void Sides::find_around(size_t i, uint32_t around[27]) const {
-    const Cell &origin = leaves[i].origin;
-    for (int k = 0; k < 27; ++k) {
-        around[k] = k == 13 ? uint32_t(i)
-                            : table.find({origin[0] + LEAF * (k / 9 - 1), origin[1] + LEAF * (k / 3 % 3 - 1),
-                                          origin[2] + LEAF * (k % 3 - 1)});
+        any_fresh.push_back(sides.known != Bits{});
     }
 }
 
@@ -67,13 +52,8 @@ uint64_t Sides::fresh(uint32_t leaf, size_t x) const {
 }
 
 bool Sides::has_fresh(const uint32_t around[27]) const {
-    return std::any_of(around, around + 27, [&](uint32_t leaf) {
-        uint64_t all = 0;
-        for (size_t x = 0; leaf != LeafTable::NONE && x < LEAF; ++x) {
-            all |= fresh(leaf, x);
-        }
-        return all != 0;
-    });
+    return std::any_of(around, around + 27,
+                       [&](uint32_t leaf) { return leaf != LeafTable::NONE && any_fresh[leaf] != 0; });
 }
 
 // What is near the surface has leaves all around it; where there is none, nothing is known.
@@ -107,8 +87,7 @@ void Sides::gather(const uint32_t around[27], Halo &halo) const {
 
 // The leaf's voxels that are outside or one of whose 26 neighbours is.
 Bits Sides::touching_outside(size_t i) const {
-    uint32_t around[27];
-    find_around(i, around);
+    const uint32_t *const around = table.around(i);
     const auto word = [&](int k, int x) {
         return around[k] == LeafTable::NONE ? uint64_t(0) : now[around[k]].outside[x];
     };
@@ -324,8 +303,7 @@ void Sides::settle(size_t i) {
     if (!any) {
         return;
     }
-    uint32_t around[27];
-    find_around(i, around);
+    const uint32_t *const around = table.around(i);
     if (!has_fresh(around)) {
         return;
     }
@@ -347,6 +325,7 @@ void Sides::settle(size_t i) {
 void Sides::end_round() {
     for (size_t i = 0; i < now.size(); ++i) {
         tried[i] = now[i].known;
+        any_fresh[i] = next[i].known != tried[i];
     }
     now.swap(next);
 }

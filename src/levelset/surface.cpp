@@ -26,7 +26,8 @@ class Conversion {
 
     FloatGrid::Ptr with_sides() {
         measure(true, 0.5);
-        const LeafTable table(leaves);
+        LeafTable table(leaves);
+        table.find_neighbours();
         tell_sides(table);
         measure_boundary(table);
         const FloatGrid::Ptr grid = make_grid();
@@ -90,14 +91,25 @@ class Conversion {
     // In world units; without sides all is outside.
     std::unique_ptr<Leaf> make_leaf(size_t i, float background) const {
         const BandLeaf &leaf = leaves[i];
-        auto made = std::make_unique<Leaf>(Coord(leaf.origin[0], leaf.origin[1], leaf.origin[2]), background);
+        const Coord origin(leaf.origin[0], leaf.origin[1], leaf.origin[2]);
+        auto made = std::make_unique<Leaf>(openvdb::PartialCreate(), origin, background);
+        made->allocate();
         float *const values = made->buffer().data();
-        for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
-            const auto value = float(double(leaf.distances[n]) * lattice.voxel);
-            const bool outside = told.empty() || (told[i].outside[n >> 6] >> (n & 63) & 1) != 0;
-            values[n] = outside ? value : -value;
-            made->setActiveState(n, value < background);
+        Leaf::NodeMaskType active;
+        const double voxel = lattice.voxel;
+        for (openvdb::Index x = 0; x < Leaf::DIM; ++x) {
+            uint8_t inside[64], within[64];
+            spread_plane(told.empty() ? 0 : ~told[i].outside[x], inside);
+            const float *const from = leaf.distances + 64 * x;
+            float *const to = values + 64 * x;
+            for (int n = 0; n < 64; ++n) {
+                const auto value = float(double(from[n]) * voxel);
+                within[n] = value < background;
+                to[n] = inside[n] != 0 ? -value : value;
+            }
+            active.getWord<uint64_t>(x) = pack_plane(within);
         }
+        made->setValueMask(active);
         return made;
     }
 
