@@ -39,8 +39,8 @@ class Band {
     const Cell &region_origin(size_t region) const { return regions[region].origin; }
 
     // Measures the voxels of one region; others may be measured at the same time. With `sides`, leaves have
-    // their parts and triangles.
-    void measure(size_t region, bool sides, const vshi_leaf_kernel &kernel);
+    // their parts and triangles. Of the region's leaves, 16 x + 4 y + z, only those in `wanted` are.
+    void measure(size_t region, bool sides, const vshi_leaf_kernel &kernel, uint64_t wanted = ~uint64_t(0));
 
     // All leaves that hold a voxel within the band, sorted by origin (x, then y, then z), once every region
     // is measured. They point into the band.

@@ -15,7 +15,9 @@ constexpr int LEAF = 8;
 constexpr double PIECE = 1.0;
 // Below this the cells that a triangle passes through are looked at before it is cut, voxels.
 constexpr double GLANCE = 16.0;
-// The same of the cells of its box.
+// Below this cutting is less work than looking.
+constexpr double LEAST_GLANCE = 4.0;
+// Below this the cells of its box are.
 constexpr double BOX_GLANCE = 32.0;
 // How far a piece's middle may be from its triangle by rounding, voxels, and more.
 constexpr double MARGIN = 1e-5;
@@ -89,7 +91,8 @@ class Cutting {
             return Bounds::NOTHING; // of what is thrown away
         }
         Bounds glanced = square[longest] < BOX_GLANCE * BOX_GLANCE ? glance_box(corner) : Bounds::SOME;
-        if (glanced == Bounds::SOME && square[longest] < GLANCE * GLANCE) {
+        if (glanced == Bounds::SOME && square[longest] < GLANCE * GLANCE &&
+            square[longest] > LEAST_GLANCE * LEAST_GLANCE) {
             glanced = glance(corner, square[longest]);
         }
         if (glanced != Bounds::SOME) {

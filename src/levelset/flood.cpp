@@ -49,9 +49,11 @@ uint64_t face(const Bits &bits, int axis, bool last) {
 bool add_parts(const float distances[VSHI_LEAF_VOXELS], std::vector<Bits> &parts) {
     Bits left{};
     for (int x = 0; x < LEAF; ++x) {
+        uint8_t well_off[64];
         for (int i = 0; i < 64; ++i) {
-            left[x] |= uint64_t(distances[64 * x + i] > WELL_OFF) << i;
+            well_off[i] = distances[64 * x + i] > WELL_OFF;
         }
+        left[x] = pack_plane(well_off);
     }
     bool others = false;
     for (const uint64_t word : left) {

@@ -206,14 +206,19 @@ Closed close_leaf(Leaf &leaf, float background, float voxel) {
     Leaf::NodeMaskType active;
     uint64_t across = 0, planes = 0; // of those in the box: seen along x, and which x
     for (openvdb::Index x = 0; x < Leaf::DIM; ++x) {
-        uint8_t within[64], low[64], others[64];
+        uint8_t within[64], low[64], others[64], beyond[64];
         float *const plane = values + 64 * x;
         for (int i = 0; i < 64; ++i) {
-            const float value = plane[i];
-            within[i] = std::fabs(value) < background;
+            const float value = plane[i], size = std::fabs(value);
+            within[i] = size < background;
             low[i] = value < voxel;
             others[i] = std::signbit(value) != first;
-            plane[i] = std::fabs(value) < background ? value : std::copysign(background, value);
+            beyond[i] = !(size <= background);
+        }
+        if (pack_plane(beyond) != 0) { // else nothing is to be written
+            for (int i = 0; i < 64; ++i) {
+                plane[i] = beyond[i] != 0 ? std::copysign(background, plane[i]) : plane[i];
+            }
         }
         const uint64_t word = pack_plane(within), lower = pack_plane(low);
         active.getWord<uint64_t>(x) = word;

@@ -85,11 +85,10 @@ void Sides::gather(const uint32_t around[27], Halo &halo) const {
     }
 }
 
-// The leaf's voxels that are outside or one of whose 26 neighbours is.
-Bits Sides::touching_outside(size_t i) const {
-    const uint32_t *const around = table.around(i);
+// The leaf's voxels that are of a set or one of whose 26 neighbours is; `word_of(leaf, x)` tells the set.
+template <typename Word> static Bits touching(const uint32_t *around, const Word &word_of) {
     const auto word = [&](int k, int x) {
-        return around[k] == LeafTable::NONE ? uint64_t(0) : now[around[k]].outside[x];
+        return around[k] == LeafTable::NONE ? uint64_t(0) : word_of(around[k], size_t(x));
     };
     // A plane of three leaves along z, with what touches it along z.
     const auto row = [&](int k, int x) {
@@ -103,11 +102,11 @@ Bits Sides::touching_outside(size_t i) const {
         const uint64_t own = row(k + 3, inner_x);
         planes[x] = own | own << 8 | own >> 8 | row(k, inner_x) >> 56 | row(k + 6, inner_x) << 56;
     }
-    Bits touching;
+    Bits all;
     for (size_t x = 0; x < LEAF; ++x) {
-        touching[x] = planes[x] | planes[x + 1] | planes[x + 2];
+        all[x] = planes[x] | planes[x + 1] | planes[x + 2];
     }
-    return touching;
+    return all;
 }
 
 namespace {
@@ -251,10 +250,9 @@ int Sides::side_of(const Halo &halo, const Cell &local, Nearby &nearby) {
     }
     int there = at, square = 0;
     for (int axis = 0; axis < 3; ++axis) {
-        if (std::fabs(slope[axis]) > 0.41421f * steepest) {
-            there += slope[axis] > 0.0f ? stride[axis] : -stride[axis];
-            ++square;
-        }
+        const int step = (slope[axis] > 0.41421f * steepest) - (slope[axis] < -0.41421f * steepest);
+        there += step * stride[axis];
+        square += step & 1;
     }
     constexpr float length[4] = {0.0f, 1.00001f, 1.41423f, 1.73207f};
     if (halo.side[there] != 0 && own + halo.distance[there] > length[square]) {
@@ -307,6 +305,16 @@ void Sides::settle(size_t i) {
     if (!has_fresh(around)) {
         return;
     }
+    // those without a neighbour whose side is known learn nothing now
+    const Bits near_fresh = touching(around, [&](uint32_t leaf, size_t x) { return fresh(leaf, x); });
+    uint64_t all = 0;
+    for (size_t x = 0; x < LEAF; ++x) {
+        left[x] &= near_fresh[x];
+        all |= left[x];
+    }
+    if (all == 0) {
+        return;
+    }
     Halo halo;
     gather(around, halo);
     Nearby nearby(surface, leaves[i]);
@@ -339,11 +347,12 @@ Sides::Told Sides::tell(size_t i) const {
     if (!any) {
         return told;
     }
-    const Bits touching = touching_outside(i);
+    const Bits near_outside =
+        touching(table.around(i), [&](uint32_t leaf, size_t x) { return now[leaf].outside[x]; });
     for (size_t x = 0; x < LEAF; ++x) {
         const uint64_t near = ~told.outside[x] & ~well_off[i][x];
-        told.buried[x] = near & ~touching[x];
-        for (uint64_t left = near & touching[x]; left != 0; left &= left - 1) {
+        told.buried[x] = near & ~near_outside[x];
+        for (uint64_t left = near & near_outside[x]; left != 0; left &= left - 1) {
             const int n = __builtin_ctzll(left);
             told.outside[x] |= uint64_t(leaves[i].distances[64 * x + size_t(n)] < ON) << n;
         }

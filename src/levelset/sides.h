@@ -33,7 +33,6 @@ class Sides {
     uint64_t fresh(uint32_t leaf, size_t x) const;
     bool has_fresh(const uint32_t around[27]) const;
     void gather(const uint32_t around[27], Halo &halo) const;
-    Bits touching_outside(size_t leaf) const;
     static int side_of(const Halo &halo, const Cell &local, Nearby &nearby);
 
     const Surface &surface;
