@@ -217,8 +217,8 @@ void Band::sort_triangles(Stage &stage) {
 // A region's leaves while they are measured. Places are counted from the region's middle.
 class Band::Measuring {
   public:
-    Measuring(const Band &band_, Region &region_, const vshi_leaf_kernel &kernel_)
-        : band(band_), region(region_), kernel(kernel_), frames(region.triangles.size()) {
+    Measuring(const Band &band_, Region &region_, const vshi_leaf_kernel &kernel_, uint64_t wanted_)
+        : band(band_), region(region_), kernel(kernel_), wanted(wanted_), frames(region.triangles.size()) {
         limits.fill(FLT_MAX);
     }
 
@@ -284,7 +284,7 @@ class Band::Measuring {
                 kernel.middles(&frames[i], distances);
             }
             for_each_leaf(boxes[i], [&](int leaf) {
-                if (distances[leaf] <= limits[leaf] &&
+                if ((wanted >> leaf & 1) != 0 && distances[leaf] <= limits[leaf] &&
                     may_reach(frames[i], middle_of(leaf), LEAF_HALF, band.half_width)) {
                     pairs.push_back({uint32_t(leaf), i});
                     ++first[leaf + 1];
@@ -339,6 +339,7 @@ class Band::Measuring {
     const Band &band;
     Region &region;
     const vshi_leaf_kernel &kernel;
+    const uint64_t wanted; // leaves
     std::vector<vshi_frame> frames;
     std::vector<Box> boxes;                               // of the leaves that each may reach
     std::array<float, VSHI_REGION_LEAVES> limits;         // in wide bands
@@ -346,8 +347,8 @@ class Band::Measuring {
     std::vector<uint32_t> list;                           // frames
 };
 
-void Band::measure(size_t number, bool sides, const vshi_leaf_kernel &kernel) {
-    Measuring(*this, regions[number], kernel).measure(sides);
+void Band::measure(size_t number, bool sides, const vshi_leaf_kernel &kernel, uint64_t wanted) {
+    Measuring(*this, regions[number], kernel, wanted).measure(sides);
     regions[number].triangles = {};
 }
 

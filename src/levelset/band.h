@@ -1,6 +1,7 @@
 // The voxels around a surface: which leaves they are in, their distances, which side of it they are on.
 #pragma once
 
+#include "levelset/bits.h"
 #include "levelset/grid.h"
 #include "levelset/kernel/leaf.h"
 #include "levelset/polygons.h"
@@ -15,9 +16,6 @@ using Cell = std::array<int32_t, 3>;
 inline bool same(const Cell &a, const Cell &b) {
     return ((a[0] ^ b[0]) | (a[1] ^ b[1]) | (a[2] ^ b[2])) == 0;
 }
-
-// One bit a voxel of a leaf: word x, bit y · 8 + z.
-using Bits = std::array<uint64_t, 8>;
 
 struct BandLeaf {
     Cell origin;
@@ -41,8 +39,8 @@ class Band {
     const Cell &region_origin(size_t region) const { return regions[region].origin; }
 
     // Measures the voxels of one region; others may be measured at the same time. With `sides`, leaves have
-    // their parts and triangles.
-    void measure(size_t region, bool sides, const vshi_leaf_kernel &kernel);
+    // their parts and triangles. Of the region's leaves, 16 x + 4 y + z, only those in `wanted` are.
+    void measure(size_t region, bool sides, const vshi_leaf_kernel &kernel, uint64_t wanted = ~uint64_t(0));
 
     // All leaves that hold a voxel within the band, sorted by origin (x, then y, then z), once every region
     // is measured. They point into the band.

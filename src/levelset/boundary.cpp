@@ -15,6 +15,10 @@ constexpr int LEAF = 8;
 constexpr double PIECE = 1.0;
 // Below this the cells that a triangle passes through are looked at before it is cut, voxels.
 constexpr double GLANCE = 16.0;
+// Below this cutting is less work than looking.
+constexpr double LEAST_GLANCE = 4.0;
+// Below this the cells of its box are.
+constexpr double BOX_GLANCE = 32.0;
 // How far a piece's middle may be from its triangle by rounding, voxels, and more.
 constexpr double MARGIN = 1e-5;
 // Of triangles with less area than this part of their longest edge's square the plane is not known so well.
@@ -31,12 +35,8 @@ bool any(const Bits &bits) {
 Bits cells_near_outside(const LeafTable &table, const std::vector<Sides::Told> &told, size_t leaf) {
     const Bits *around[8];
     static const Bits none{};
-    const Cell &origin = table.leaves[leaf].origin;
     for (int n = 0; n < 8; ++n) {
-        const uint32_t found =
-            n == 0 ? uint32_t(leaf)
-                   : table.find({origin[0] + (n & 4 ? LEAF : 0), origin[1] + (n & 2 ? LEAF : 0),
-                                 origin[2] + (n & 1 ? LEAF : 0)});
+        const uint32_t found = table.around(leaf)[13 + (n & 4 ? 9 : 0) + (n & 2 ? 3 : 0) + (n & 1)];
         around[n] = found == LeafTable::NONE ? &none : &told[found].outside;
     }
     constexpr uint64_t last_z = 0x8080808080808080u;
@@ -87,13 +87,16 @@ class Cutting {
             const Vec3d middle = (corner[0] + corner[1] + corner[2]) / 3.0;
             return is_near_outside(cell_of(middle)) ? Bounds::ALL : Bounds::NOTHING;
         }
-        if (square[longest] < GLANCE * GLANCE) {
-            const Bounds bounds = glance(corner, square[longest]);
-            if (bounds != Bounds::SOME) {
-                return bounds;
-            }
-        } else if (stage.cancelled()) {
+        if (square[longest] >= GLANCE * GLANCE && stage.cancelled()) {
             return Bounds::NOTHING; // of what is thrown away
+        }
+        Bounds glanced = square[longest] < BOX_GLANCE * BOX_GLANCE ? glance_box(corner) : Bounds::SOME;
+        if (glanced == Bounds::SOME && square[longest] < GLANCE * GLANCE &&
+            square[longest] > LEAST_GLANCE * LEAST_GLANCE) {
+            glanced = glance(corner, square[longest]);
+        }
+        if (glanced != Bounds::SOME) {
+            return glanced;
         }
         const Vec3d middle = 0.5 * (corner[longest] + corner[(longest + 1) % 3]);
         const Vec3d &from = corner[longest], &to = corner[(longest + 1) % 3],
@@ -109,6 +112,45 @@ class Cutting {
             }
         }
         return Bounds::SOME;
+    }
+
+    // What all pieces of a triangle are, if the cells of its box are all alike: quickly told, as of planes
+    // along two axes the box is no more than the cells that they pass through.
+    Bounds glance_box(const Corners &corner) {
+        Cell low, high;
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto ends = std::minmax({corner[0][axis], corner[1][axis], corner[2][axis]});
+            low[axis] = floor_of(ends.first - MARGIN);
+            high[axis] = floor_of(ends.second + MARGIN);
+        }
+        uint64_t inner = 0, outer = 0;
+        constexpr int32_t mask = ~(LEAF - 1);
+        for (int32_t x = low[0] & mask; x <= high[0]; x += LEAF) {
+            for (int32_t y = low[1] & mask; y <= high[1]; y += LEAF) {
+                for (int32_t z = low[2] & mask; z <= high[2]; z += LEAF) {
+                    const uint64_t across = ROW_ENDS * range(low[2], high[2], z, 1);
+                    const uint64_t box = across & range(low[1], high[1], y, LEAF);
+                    const Bits *const leaf = near_of({x, y, z});
+                    const int32_t end = std::min(high[0] - x, LEAF - 1);
+                    for (int32_t i = std::max(low[0] - x, 0); i <= end; ++i) {
+                        const uint64_t word = leaf == nullptr ? 0 : (*leaf)[size_t(i)];
+                        inner |= box & ~word;
+                        outer |= box & word;
+                    }
+                    if (inner != 0 && outer != 0) {
+                        return Bounds::SOME;
+                    }
+                }
+            }
+        }
+        return outer != 0 ? Bounds::ALL : Bounds::NOTHING;
+    }
+
+    // The bits of low … high within a leaf that begins at `origin`, each `width` bits wide.
+    static uint64_t range(int32_t low, int32_t high, int32_t origin, int width) {
+        const int first = std::max(low - origin, 0), last = std::min(high - origin, LEAF - 1);
+        const uint64_t all = width == 1 ? 0xff : ~uint64_t(0);
+        return all >> width * (LEAF - 1 - (last - first)) << width * first;
     }
 
     // What all pieces of a triangle are, if the cells that it passes through are all alike.
@@ -179,15 +221,20 @@ class Cutting {
 
     static Cell cell_of(const Vec3d &p) { return {floor_of(p[0]), floor_of(p[1]), floor_of(p[2])}; }
 
-    bool is_near_outside(const Cell &cell) {
-        constexpr int32_t mask = ~(LEAF - 1);
-        const Cell origin{cell[0] & mask, cell[1] & mask, cell[2] & mask};
-        if (!same(origin, last_origin)) { // else as for the cell before
+    // NULL where there is no such leaf.
+    const Bits *near_of(const Cell &origin) {
+        if (!same(origin, last_origin)) { // else as before
             last_origin = origin;
             last = table.find(origin);
         }
-        return last != LeafTable::NONE &&
-               (near[last][size_t(cell[0] & 7)] >> (8 * (cell[1] & 7) + (cell[2] & 7)) & 1) != 0;
+        return last == LeafTable::NONE ? nullptr : &near[last];
+    }
+
+    bool is_near_outside(const Cell &cell) {
+        constexpr int32_t mask = ~(LEAF - 1);
+        const Bits *const leaf = near_of({cell[0] & mask, cell[1] & mask, cell[2] & mask});
+        return leaf != nullptr &&
+               ((*leaf)[size_t(cell[0] & 7)] >> (8 * (cell[1] & 7) + (cell[2] & 7)) & 1) != 0;
     }
 
     const LeafTable &table;

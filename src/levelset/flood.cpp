@@ -8,7 +8,6 @@ namespace {
 
 constexpr int LEAF = 8;
 constexpr uint32_t EXTERIOR = 0;
-constexpr uint64_t ROW_ENDS = 0x0101010101010101u;
 
 // Voxels of `within` that hang together with the seed.
 Bits flood(Bits seed, const Bits &within) {
@@ -50,9 +49,11 @@ uint64_t face(const Bits &bits, int axis, bool last) {
 bool add_parts(const float distances[VSHI_LEAF_VOXELS], std::vector<Bits> &parts) {
     Bits left{};
     for (int x = 0; x < LEAF; ++x) {
+        uint8_t well_off[64];
         for (int i = 0; i < 64; ++i) {
-            left[x] |= uint64_t(distances[64 * x + i] > WELL_OFF) << i;
+            well_off[i] = distances[64 * x + i] > WELL_OFF;
         }
+        left[x] = pack_plane(well_off);
     }
     bool others = false;
     for (const uint64_t word : left) {
@@ -103,6 +104,29 @@ uint32_t LeafTable::find(const Cell &origin) const {
         at = (at + 1) & (table.size() - 1);
     }
     return table[at];
+}
+
+void LeafTable::find_neighbours() {
+    std::array<uint32_t, 27> none;
+    none.fill(NONE);
+    neighbours.assign(leaves.size(), none);
+    size_t next[13] = {}; // of each offset: as leaves follow each other, so do those beside them
+    for (size_t i = 0; i < leaves.size(); ++i) {
+        neighbours[i][13] = uint32_t(i);
+        for (int k = 14; k < 27; ++k) {
+            const Cell &origin = leaves[i].origin;
+            const Cell at{origin[0] + LEAF * (k / 9 - 1), origin[1] + LEAF * (k / 3 % 3 - 1),
+                          origin[2] + LEAF * (k % 3 - 1)};
+            size_t &found = next[k - 14];
+            while (found < leaves.size() && leaves[found].origin < at) {
+                ++found;
+            }
+            if (found < leaves.size() && same(leaves[found].origin, at)) {
+                neighbours[i][size_t(k)] = uint32_t(found);
+                neighbours[found][size_t(26 - k)] = uint32_t(i);
+            }
+        }
+    }
 }
 
 namespace {
@@ -212,7 +236,8 @@ void Joining::join_run(size_t i) {
 void Joining::join_face(size_t i, int axis, bool last) {
     Cell beyond = leaves[i].origin;
     beyond[axis] += last ? LEAF : -LEAF;
-    const uint32_t neighbour = table.find(beyond);
+    constexpr int stride[3] = {9, 3, 1};
+    const uint32_t neighbour = table.around(i)[13 + (last ? stride[axis] : -stride[axis])];
     if (neighbour != LeafTable::NONE && !last) {
         return; // it does that itself
     }

@@ -22,10 +22,15 @@ class LeafTable {
     explicit LeafTable(const std::vector<BandLeaf> &leaves);
     uint32_t find(const Cell &origin) const; // NONE where there is no such leaf
 
+    // Afterwards around() has a leaf and the 26 around it: at 9 x + 3 y + z, of 0 … 2 along each axis.
+    void find_neighbours();
+    const uint32_t *around(size_t leaf) const { return neighbours[leaf].data(); }
+
     const std::vector<BandLeaf> &leaves;
 
   private:
     std::vector<uint32_t> table;
+    std::vector<std::array<uint32_t, 27>> neighbours;
 };
 
 // Voxels of a leaf whose side of the surface is known, and those that are outside.
@@ -35,7 +40,7 @@ struct KnownSides {
 
 // Tells the sides of all parts: they are joined across the faces of voxels, through leaves that are not there
 // as well. Holes in the surface that are narrower than some 1.7 voxels let nothing through.
-// Throws where the stage is cancelled.
+// Throws where the stage is cancelled. The table knows its neighbours.
 std::vector<KnownSides> find_outside(const LeafTable &table, Stage &stage);
 
 } // namespace vshi

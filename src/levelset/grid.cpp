@@ -3,6 +3,7 @@
 
 #include "base/parallel.h"
 #include "base/try.h"
+#include "levelset/bits.h"
 
 #include <cmath>
 #include <cstdio>
@@ -200,20 +201,41 @@ struct Closed {
 
 Closed close_leaf(Leaf &leaf, float background, float voxel) {
     Closed closed;
-    float *values = leaf.buffer().data();
-    for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
-        const float value = values[i];
-        if (std::fabs(value) < background) {
-            leaf.setValueOn(i);
-            ++closed.active;
-        } else {
-            values[i] = std::copysign(background, value);
-            leaf.setValueOff(i);
+    float *const values = leaf.buffer().data();
+    const bool first = std::signbit(values[0]);
+    Leaf::NodeMaskType active;
+    uint64_t across = 0, planes = 0; // of those in the box: seen along x, and which x
+    for (openvdb::Index x = 0; x < Leaf::DIM; ++x) {
+        uint8_t within[64], low[64], others[64], beyond[64];
+        float *const plane = values + 64 * x;
+        for (int i = 0; i < 64; ++i) {
+            const float value = plane[i], size = std::fabs(value);
+            within[i] = size < background;
+            low[i] = value < voxel;
+            others[i] = std::signbit(value) != first;
+            beyond[i] = !(size <= background);
         }
-        closed.uniform &= std::signbit(value) == std::signbit(values[0]);
-        if (value < voxel) {
-            closed.box.expand(leaf.offsetToGlobalCoord(i));
+        if (pack_plane(beyond) != 0) { // else nothing is to be written
+            for (int i = 0; i < 64; ++i) {
+                plane[i] = beyond[i] != 0 ? std::copysign(background, plane[i]) : plane[i];
+            }
         }
+        const uint64_t word = pack_plane(within), lower = pack_plane(low);
+        active.getWord<uint64_t>(x) = word;
+        closed.active += size_t(__builtin_popcountll(word));
+        closed.uniform &= pack_plane(others) == 0;
+        across |= lower;
+        planes |= uint64_t(lower != 0) << x;
+    }
+    leaf.setValueMask(active);
+    if (planes != 0) {
+        uint64_t rows = across | across >> 32; // all of its y together, as z
+        rows |= rows >> 16;
+        rows = (rows | rows >> 8) & 0xff;
+        const int z[2] = {__builtin_ctzll(rows), 63 - __builtin_clzll(rows)};
+        const Coord low(__builtin_ctzll(planes), __builtin_ctzll(across) >> 3, z[0]);
+        const Coord high(63 - __builtin_clzll(planes), (63 - __builtin_clzll(across)) >> 3, z[1]);
+        closed.box = openvdb::CoordBBox(leaf.origin() + low, leaf.origin() + high);
     }
     return closed;
 }

@@ -19,8 +19,6 @@ constexpr double AT_EDGE = 1e-6;
 // By how much boxes of triangles are too large, voxels: more than their rounding.
 constexpr double BOX_MARGIN = 1e-3;
 
-constexpr uint64_t ROW_ENDS = 0x0101010101010101u;
-
 // Part 0, 1 or 2 of the leaves around that position 0 … 9 of the halo lies in.
 int part_of(int position) {
     return position == 0 ? 0 : position == EDGE - 1 ? 2 : 1;
@@ -41,23 +39,10 @@ Sides::Sides(const Surface &surface_, const LeafTable &table_, Stage &stage)
     : surface(surface_), table(table_), leaves(table_.leaves), now(find_outside(table, stage)), next(now),
       tried(now.size()) {
     well_off.reserve(now.size());
+    any_fresh.reserve(now.size());
     for (const KnownSides &sides : now) {
         well_off.push_back(sides.known);
-    }
-}
-
-// Byte z is 1 where bit z is set.
-static uint64_t spread(uint64_t byte) {
-    const uint64_t copies = byte * ROW_ENDS & 0x8040201008040201u;
-    return ((copies + 0x7f7f7f7f7f7f7f7fu) | copies) >> 7 & ROW_ENDS;
-}
-
-void Sides::find_around(size_t i, uint32_t around[27]) const {
-    const Cell &origin = leaves[i].origin;
-    for (int k = 0; k < 27; ++k) {
-        around[k] = k == 13 ? uint32_t(i)
-                            : table.find({origin[0] + LEAF * (k / 9 - 1), origin[1] + LEAF * (k / 3 % 3 - 1),
-                                          origin[2] + LEAF * (k % 3 - 1)});
+        any_fresh.push_back(sides.known != Bits{});
     }
 }
 
@@ -67,13 +52,8 @@ uint64_t Sides::fresh(uint32_t leaf, size_t x) const {
 }
 
 bool Sides::has_fresh(const uint32_t around[27]) const {
-    return std::any_of(around, around + 27, [&](uint32_t leaf) {
-        uint64_t all = 0;
-        for (size_t x = 0; leaf != LeafTable::NONE && x < LEAF; ++x) {
-            all |= fresh(leaf, x);
-        }
-        return all != 0;
-    });
+    return std::any_of(around, around + 27,
+                       [&](uint32_t leaf) { return leaf != LeafTable::NONE && any_fresh[leaf] != 0; });
 }
 
 // What is near the surface has leaves all around it; where there is none, nothing is known.
@@ -105,12 +85,10 @@ void Sides::gather(const uint32_t around[27], Halo &halo) const {
     }
 }
 
-// The leaf's voxels that are outside or one of whose 26 neighbours is.
-Bits Sides::touching_outside(size_t i) const {
-    uint32_t around[27];
-    find_around(i, around);
+// The leaf's voxels that are of a set or one of whose 26 neighbours is; `word_of(leaf, x)` tells the set.
+template <typename Word> static Bits touching(const uint32_t *around, const Word &word_of) {
     const auto word = [&](int k, int x) {
-        return around[k] == LeafTable::NONE ? uint64_t(0) : now[around[k]].outside[x];
+        return around[k] == LeafTable::NONE ? uint64_t(0) : word_of(around[k], size_t(x));
     };
     // A plane of three leaves along z, with what touches it along z.
     const auto row = [&](int k, int x) {
@@ -124,11 +102,11 @@ Bits Sides::touching_outside(size_t i) const {
         const uint64_t own = row(k + 3, inner_x);
         planes[x] = own | own << 8 | own >> 8 | row(k, inner_x) >> 56 | row(k + 6, inner_x) << 56;
     }
-    Bits touching;
+    Bits all;
     for (size_t x = 0; x < LEAF; ++x) {
-        touching[x] = planes[x] | planes[x + 1] | planes[x + 2];
+        all[x] = planes[x] | planes[x + 1] | planes[x + 2];
     }
-    return touching;
+    return all;
 }
 
 namespace {
@@ -272,10 +250,9 @@ int Sides::side_of(const Halo &halo, const Cell &local, Nearby &nearby) {
     }
     int there = at, square = 0;
     for (int axis = 0; axis < 3; ++axis) {
-        if (std::fabs(slope[axis]) > 0.41421f * steepest) {
-            there += slope[axis] > 0.0f ? stride[axis] : -stride[axis];
-            ++square;
-        }
+        const int step = (slope[axis] > 0.41421f * steepest) - (slope[axis] < -0.41421f * steepest);
+        there += step * stride[axis];
+        square += step & 1;
     }
     constexpr float length[4] = {0.0f, 1.00001f, 1.41423f, 1.73207f};
     if (halo.side[there] != 0 && own + halo.distance[there] > length[square]) {
@@ -324,9 +301,18 @@ void Sides::settle(size_t i) {
     if (!any) {
         return;
     }
-    uint32_t around[27];
-    find_around(i, around);
+    const uint32_t *const around = table.around(i);
     if (!has_fresh(around)) {
+        return;
+    }
+    // those without a neighbour whose side is known learn nothing now
+    const Bits near_fresh = touching(around, [&](uint32_t leaf, size_t x) { return fresh(leaf, x); });
+    uint64_t all = 0;
+    for (size_t x = 0; x < LEAF; ++x) {
+        left[x] &= near_fresh[x];
+        all |= left[x];
+    }
+    if (all == 0) {
         return;
     }
     Halo halo;
@@ -347,6 +333,7 @@ void Sides::settle(size_t i) {
 void Sides::end_round() {
     for (size_t i = 0; i < now.size(); ++i) {
         tried[i] = now[i].known;
+        any_fresh[i] = next[i].known != tried[i];
     }
     now.swap(next);
 }
@@ -360,11 +347,12 @@ Sides::Told Sides::tell(size_t i) const {
     if (!any) {
         return told;
     }
-    const Bits touching = touching_outside(i);
+    const Bits near_outside =
+        touching(table.around(i), [&](uint32_t leaf, size_t x) { return now[leaf].outside[x]; });
     for (size_t x = 0; x < LEAF; ++x) {
         const uint64_t near = ~told.outside[x] & ~well_off[i][x];
-        told.buried[x] = near & ~touching[x];
-        for (uint64_t left = near & touching[x]; left != 0; left &= left - 1) {
+        told.buried[x] = near & ~near_outside[x];
+        for (uint64_t left = near & near_outside[x]; left != 0; left &= left - 1) {
             const int n = __builtin_ctzll(left);
             told.outside[x] |= uint64_t(leaves[i].distances[64 * x + size_t(n)] < ON) << n;
         }

@@ -10,7 +10,7 @@ namespace vshi {
 // one that no surface parts them from. What nobody reaches is inside.
 class Sides {
   public:
-    // Surface and table outlive this.
+    // Surface and table, which knows its neighbours, outlive this.
     Sides(const Surface &surface, const LeafTable &table, Stage &stage);
 
     // Tells the sides of voxels near the surface from those of their neighbours: for each of ROUNDS in turn,
@@ -30,19 +30,18 @@ class Sides {
     struct Halo;
     class Nearby;
 
-    void find_around(size_t leaf, uint32_t around[27]) const;
     uint64_t fresh(uint32_t leaf, size_t x) const;
     bool has_fresh(const uint32_t around[27]) const;
     void gather(const uint32_t around[27], Halo &halo) const;
-    Bits touching_outside(size_t leaf) const;
     static int side_of(const Halo &halo, const Cell &local, Nearby &nearby);
 
     const Surface &surface;
     const LeafTable &table;
     const std::vector<BandLeaf> &leaves;
     std::vector<KnownSides> now, next;
-    std::vector<Bits> tried;    // what was known a round before: what it does not tell it never does
-    std::vector<Bits> well_off; // whose sides are known from the start
+    std::vector<Bits> tried;        // what was known a round before: what it does not tell it never does
+    std::vector<uint8_t> any_fresh; // whether something is known that was not
+    std::vector<Bits> well_off;     // whose sides are known from the start
 };
 
 } // namespace vshi

@@ -26,7 +26,8 @@ class Conversion {
 
     FloatGrid::Ptr with_sides() {
         measure(true, 0.5);
-        const LeafTable table(leaves);
+        LeafTable table(leaves);
+        table.find_neighbours();
         tell_sides(table);
         measure_boundary(table);
         const FloatGrid::Ptr grid = make_grid();
@@ -54,6 +55,27 @@ class Conversion {
         stage.loop(leaves.size(), 16, at(0.7), at(0.8), [&](size_t i) { told[i] = sides.tell(i); });
     }
 
+    bool has_inside(size_t leaf) const {
+        uint64_t inside = 0;
+        for (const uint64_t outside : told[leaf].outside) {
+            inside |= ~outside;
+        }
+        return inside != 0;
+    }
+
+    // Those of a region's leaves that hold some of the inside.
+    uint64_t leaves_inside(const LeafTable &table, const Cell &origin) const {
+        constexpr int edge = int(Leaf::DIM), count = Band::REGION / edge;
+        uint64_t all = 0;
+        for (int n = 0; n < VSHI_REGION_LEAVES; ++n) {
+            const uint32_t leaf =
+                table.find({origin[0] + edge * (n / (count * count)), origin[1] + edge * (n / count % count),
+                            origin[2] + edge * (n % count)});
+            all |= uint64_t(leaf != LeafTable::NONE && has_inside(leaf)) << n;
+        }
+        return all;
+    }
+
     // Takes the distances of the inside to what bounds it, where something else is within it.
     void measure_boundary(const LeafTable &table) {
         const std::vector<size_t> regions = regions_near_buried(band, leaves, told);
@@ -63,8 +85,9 @@ class Conversion {
         const Surface boundary = boundary_of(surface, table, told, at(0.8), at(0.85), stage);
         Band bounded(boundary, band.half_width, stage);
         const std::vector<size_t> again = regions_near_buried(bounded, leaves, told);
-        stage.loop(again.size(), 1, at(0.85), at(0.9),
-                   [&](size_t i) { bounded.measure(again[i], false, kernel); });
+        stage.loop(again.size(), 1, at(0.85), at(0.9), [&](size_t i) {
+            bounded.measure(again[i], false, kernel, leaves_inside(table, bounded.region_origin(again[i])));
+        });
         const std::vector<BandLeaf> others = bounded.leaves();
         const LeafTable other_table(others);
         std::set<Cell> near;
@@ -74,14 +97,19 @@ class Conversion {
         stage.loop(leaves.size(), 64, at(0.9), at(0.9), [&](size_t i) {
             const Cell &origin = leaves[i].origin;
             constexpr int32_t mask = ~(Band::REGION - 1);
-            if (near.count({origin[0] & mask, origin[1] & mask, origin[2] & mask}) == 0) {
+            if (!has_inside(i) || near.count({origin[0] & mask, origin[1] & mask, origin[2] & mask}) == 0) {
                 return;
             }
             const uint32_t other = other_table.find(origin);
-            for (int n = 0; n < VSHI_LEAF_VOXELS; ++n) {
-                if ((told[i].outside[size_t(n >> 6)] >> (n & 63) & 1) == 0) {
-                    leaves[i].distances[n] =
-                        other == LeafTable::NONE ? float(band.half_width) : others[other].distances[n];
+            for (size_t x = 0; x < told[i].outside.size(); ++x) {
+                uint8_t inside[64];
+                spread_plane(~told[i].outside[x], inside);
+                float *const to = leaves[i].distances + 64 * x;
+                const float *const from =
+                    other == LeafTable::NONE ? nullptr : others[other].distances + 64 * x;
+                for (int n = 0; n < 64; ++n) {
+                    const float measured = from == nullptr ? float(band.half_width) : from[n];
+                    to[n] = inside[n] != 0 ? measured : to[n];
                 }
             }
         });
@@ -90,14 +118,25 @@ class Conversion {
     // In world units; without sides all is outside.
     std::unique_ptr<Leaf> make_leaf(size_t i, float background) const {
         const BandLeaf &leaf = leaves[i];
-        auto made = std::make_unique<Leaf>(Coord(leaf.origin[0], leaf.origin[1], leaf.origin[2]), background);
+        const Coord origin(leaf.origin[0], leaf.origin[1], leaf.origin[2]);
+        auto made = std::make_unique<Leaf>(openvdb::PartialCreate(), origin, background);
+        made->allocate();
         float *const values = made->buffer().data();
-        for (openvdb::Index n = 0; n < Leaf::SIZE; ++n) {
-            const auto value = float(double(leaf.distances[n]) * lattice.voxel);
-            const bool outside = told.empty() || (told[i].outside[n >> 6] >> (n & 63) & 1) != 0;
-            values[n] = outside ? value : -value;
-            made->setActiveState(n, value < background);
+        Leaf::NodeMaskType active;
+        const double voxel = lattice.voxel;
+        for (openvdb::Index x = 0; x < Leaf::DIM; ++x) {
+            uint8_t inside[64], within[64];
+            spread_plane(told.empty() ? 0 : ~told[i].outside[x], inside);
+            const float *const from = leaf.distances + 64 * x;
+            float *const to = values + 64 * x;
+            for (int n = 0; n < 64; ++n) {
+                const auto value = float(double(from[n]) * voxel);
+                within[n] = value < background;
+                to[n] = inside[n] != 0 ? -value : value;
+            }
+            active.getWord<uint64_t>(x) = pack_plane(within);
         }
+        made->setValueMask(active);
         return made;
     }
 
