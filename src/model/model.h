@@ -25,12 +25,20 @@ typedef struct vshi_model_shape {
     int32_t alpha;   /* VSH_ALPHA_… */
 } vshi_model_shape;
 
+/* What of a glTF an entry is: its node, the node's mesh, the mesh's primitive and, where the node is drawn
+ * many times (EXT_mesh_gpu_instancing), which of them. Each is 1 + its index in the file; 0: none, as in
+ * every other format. */
+typedef struct vshi_model_origin {
+    uint32_t node, mesh, primitive, instance;
+} vshi_model_origin;
+
 typedef struct vshi_model_entry {
     char *name;        /* NULL where neither node nor mesh has one */
     char *object_name; /* the node's; NULL where it has none */
     uint32_t object;   /* number of the node, from 1 */
     size_t shape;
     double transform[12];
+    vshi_model_origin origin;
 } vshi_model_entry;
 
 enum { VSHI_MODEL_BLOCKS = 4 };
@@ -63,6 +71,7 @@ typedef struct vshi_model_place {
     uint32_t object;
     size_t shape;
     const double *world; /* [12] */
+    vshi_model_origin origin;
 } vshi_model_place;
 
 /* An empty one. Free with vsh_model_free(). Errors: VSH_ERROR_MEMORY. */

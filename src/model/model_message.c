@@ -50,6 +50,10 @@ vsh_result vshi_serve_model(const char *path, vshi_decoder *request, const vsh_r
         vshi_encode_count(payload, entry->object);
         vshi_encode_count(payload, entry->shape);
         vshi_encode_array(payload, entry->transform, 12, sizeof(double));
+        vshi_encode_count(payload, entry->origin.node);
+        vshi_encode_count(payload, entry->origin.mesh);
+        vshi_encode_count(payload, entry->origin.primitive);
+        vshi_encode_count(payload, entry->origin.instance);
     }
     vsh_model_free(model);
     return VSH_OK;
@@ -125,6 +129,10 @@ static vsh_result take_entry(vshi_decoder *decoder, vsh_model *model, size_t ind
     entry->object = (uint32_t)vshi_decode_count(decoder, UINT32_MAX);
     entry->shape = vshi_decode_count(decoder, model->shape_count - 1);
     const void *transform = vshi_decode_array(decoder, 12, sizeof(double));
+    entry->origin.node = (uint32_t)vshi_decode_count(decoder, UINT32_MAX);
+    entry->origin.mesh = (uint32_t)vshi_decode_count(decoder, UINT32_MAX);
+    entry->origin.primitive = (uint32_t)vshi_decode_count(decoder, UINT32_MAX);
+    entry->origin.instance = (uint32_t)vshi_decode_count(decoder, UINT32_MAX);
     if (decoder->bad || model->shapes[entry->shape].triangle_count == 0) {
         return vshi_answer_fail(path, "a mesh's place", error);
     }
@@ -139,7 +147,7 @@ static vsh_result take_entry(vshi_decoder *decoder, vsh_model *model, size_t ind
 }
 
 static vsh_result take_meshes(vshi_decoder *decoder, vsh_model *model, const char *path, vsh_error *error) {
-    enum { LEAST_SHAPE = 32, LEAST_ENTRY = 112 }; /* bytes of the message */
+    enum { LEAST_SHAPE = 32, LEAST_ENTRY = 144 }; /* bytes of the message */
     model->unit = vshi_decode_number(decoder);
     if (!(model->unit >= 0.0)) {
         return vshi_answer_fail(path, "its unit", error);
