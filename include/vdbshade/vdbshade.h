@@ -45,6 +45,7 @@
 #include "image.h"
 #include "layer.h"
 #include "light.h"
+#include "lit.h"
 #include "mesh.h"
 #include "method.h"
 #include "occluders.h"

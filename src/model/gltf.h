@@ -85,6 +85,9 @@ vsh_result vshi_gltf_check_extensions(const vshi_gltf *gltf, vsh_error *error);
 vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes, size_t *stride,
                           vsh_error *error);
 
+/* Reads all of buffer `index`, where it has not been. */
+vsh_result vshi_gltf_load(vshi_gltf *gltf, size_t index, vsh_error *error);
+
 void vshi_gltf_free_buffers(vshi_gltf *gltf);
 
 /* --- accessors (gltf_accessor.c) */
@@ -151,6 +154,13 @@ vsh_result vshi_gltf_read_draco(vshi_gltf *gltf, const json_t *extension, const 
 
 /* Adds what the file's scene shows to the model. */
 vsh_result vshi_gltf_add_scene(vshi_gltf *gltf, vsh_error *error);
+
+/* --- the file (gltf.c) */
+
+/* Parses the JSON of a glTF or GLB of `size` bytes that lie at `text`, and finds its binary chunk; of `gltf`,
+ * path, run and bytes_held are given. Free root with json_decref(), after a failure too. Errors: as
+ * vsh_model_read(). */
+vsh_result vshi_gltf_open(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error);
 
 /* Reads a glTF or GLB of `size` bytes that lie at `text`. Errors: as vsh_model_read(). */
 vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, const vsh_run *run, vshi_job *job,

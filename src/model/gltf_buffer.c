@@ -116,6 +116,10 @@ vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes,
     return VSH_OK;
 }
 
+vsh_result vshi_gltf_load(vshi_gltf *gltf, size_t index, vsh_error *error) {
+    return gltf->buffers[index].loaded ? VSH_OK : load(gltf, index, error);
+}
+
 void vshi_gltf_free_buffers(vshi_gltf *gltf) {
     for (size_t i = 0; gltf->buffers != NULL && i < gltf->buffer_count; ++i) {
         free(gltf->buffers[i].owned);

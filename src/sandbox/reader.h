@@ -20,7 +20,8 @@ enum {
     VSHI_READ_TEXT = 5,
     VSHI_READ_COPY = 6,
     VSHI_READ_CONFINEMENT = 7, /* how its reader is confined; the path is of no matter */
-    VSHI_READ_KINDS = 8
+    VSHI_READ_DRACO = 8,       /* a glTF's vertices under Draco, all attributes of them */
+    VSHI_READ_KINDS = 9
 };
 
 /* --- the caller */

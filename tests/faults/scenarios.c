@@ -2,6 +2,7 @@
 #include "../unit/previews.h"
 
 #include <math.h>
+#include <stdbool.h>
 
 /* --- what several of them need */
 
@@ -280,6 +281,45 @@ end:
     return result;
 }
 
+/* Meshes of two triangles, whose vertices are split and on two pages; NULL: by their own UVs. */
+static vsh_result light_asset(const char *name, bool split_them, const vsh_run *run, vsh_error *error) {
+    enum { CORNERS = 6 };
+    static const float white[] = {1.0f, 0.5f, 0.25f, 2.0f};
+    static const float *const planes[] = {white};
+    static const uint32_t sources[CORNERS] = {0, 1, 2, 0, 2, 3}, indices[CORNERS] = {0, 1, 2, 3, 4, 5},
+                          charts[] = {0, 1};
+    static const float uvs[2 * CORNERS] = {0, 0, 1, 0, 1, 1, 0, 0.5f, 1, 0.5f, 0, 1};
+    const vsh_lit_image baked[] = {
+        {.purpose = VSH_LIT_OCCLUSION, .width = 2, .height = 2, .channels = planes, .channel_count = 1},
+        {.purpose = VSH_LIT_LIGHTMAP,
+         .page = 1,
+         .width = 2,
+         .height = 2,
+         .channels = planes,
+         .channel_count = 1}};
+    const vsh_lit_mesh split = {uvs, sources, indices, charts, CORNERS, 2, 0, -1}, meshes[] = {split, split};
+    vsh_lit_options options = vsh_lit_options_default();
+    options.images = baked;
+    options.image_count = 2;
+    options.chart_pages = charts;
+    options.chart_count = 2;
+    vsh_model *model = NULL;
+    vsh_result result;
+    MAKE(model, vsh_model_read(name, run, &model, error));
+    TRY(vsh_lit_write(name, model, split_them ? meshes : NULL, &options, "out.glb", run, error));
+end:
+    vsh_model_free(model);
+    return result;
+}
+
+static vsh_result light_document(const vsh_run *run, vsh_error *error) {
+    return light_asset("quad.gltf", true, run, error);
+}
+
+static vsh_result light_model(const vsh_run *run, vsh_error *error) {
+    return light_asset("box.obj", false, run, error);
+}
+
 static vsh_result compare(const vsh_run *run, vsh_error *error) {
     float golden[SIDE * SIDE], values[SIDE * SIDE];
     parts_fill(golden, SIDE * SIDE);
@@ -309,6 +349,8 @@ const scenario scenarios[] = {
     {"a TIFF file written", write_tif},
     {"images read", read_images},
     {"an output's origin", tell_origin},
+    {"a lit document written", light_document},
+    {"a lit model written", light_model},
     {"a comparison", compare},
 };
 const size_t scenario_count = sizeof scenarios / sizeof scenarios[0];
