@@ -163,6 +163,11 @@ VSH_API void vsh_assets_free(vsh_assets *assets); /* NULL does nothing */
 VSH_API const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count);
 VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count);
 
+/* The model of receiver `index`, and which of its meshes each of the receiver's is: (*numbers)[mesh_count].
+ * They belong to the assets; NULL for an index beyond the scene's. */
+VSH_API const vsh_model *vsh_assets_receiver_model(const vsh_assets *assets, size_t index,
+                                                   const size_t **numbers);
+
 /* What caster `index` casts by where it is not part of a level set: a heightfield that is direct, spheres
  * that are not voxelised. They belong to the assets; NULL for every other caster, and beyond the scene's. */
 VSH_API const vsh_heights *vsh_assets_heights(const vsh_assets *assets, size_t index);

@@ -1,5 +1,6 @@
 #include "bake_scene/job.h"
 
+#include "bake_scene/lit_sink.h"
 #include "bake_scene/resume.h"
 #include "base/clock.h"
 #include "base/job.h"
@@ -21,7 +22,9 @@ vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *e
     vshi_channels channels;
     vsh_result result;
     VSHI_TRY_DONE(vshi_channels_name(scene, receiver->width, receiver->height, &channels, error));
-    result = vsh_image_check(receiver->output, &channels.image, &options, error);
+    result = vsh_lit_is_output(receiver->output)
+                 ? vshi_lit_sink_check(receiver, &channels.image, error)
+                 : vsh_image_check(receiver->output, &channels.image, &options, error);
 done:
     vshi_channels_free(&channels);
     return result;
@@ -55,6 +58,26 @@ static vsh_result check_sink(const vsh_row_sink *given, vsh_row_sink *sink, vsh_
     return VSH_OK;
 }
 
+static vsh_result check_lit(const vsh_scene *scene, const vsh_bake_job_options *options, vsh_error *error) {
+    size_t assets = 0;
+    for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
+        assets += (size_t)vsh_lit_is_output(scene->receivers[i].output);
+    }
+    if (assets > 0 && options->per_object) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "vsh_bake_job_options.per_object: an asset has one lightmap for all its objects");
+    }
+    if (options->lit_exr != NULL && (assets != 1 || scene->receiver_count != 1)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "vsh_bake_job_options.lit_exr: is for one output that is a .glb or .gltf");
+    }
+    if (options->lit_image_place < VSH_LIT_IMAGES_AUTO || options->lit_image_place > VSH_LIT_IMAGES_BESIDE) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.lit_image_place is %d",
+                         options->lit_image_place);
+    }
+    return VSH_OK;
+}
+
 static vsh_result check(const vsh_scene *scene, const vsh_bake_job_options *options, vsh_error *error) {
     if (scene->receiver_count == 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "scene: no receivers");
@@ -66,7 +89,7 @@ static vsh_result check(const vsh_scene *scene, const vsh_bake_job_options *opti
     for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
         VSHI_TRY(vsh_receiver_check(scene, i, error));
     }
-    return VSH_OK;
+    return check_lit(scene, options, error);
 }
 
 static vsh_result list_lightmaps(vsh_bake_job *job, vsh_error *error) {

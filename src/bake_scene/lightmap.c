@@ -3,6 +3,7 @@
 #include "bake_scene/file_sink.h"
 #include "bake_scene/invalid_picture.h"
 #include "bake_scene/job.h"
+#include "bake_scene/lit_sink.h"
 #include "bake_scene/resume.h"
 #include "bake_scene/warn.h"
 #include "base/clock.h"
@@ -64,11 +65,14 @@ done:
 
 vsh_result vshi_job_plan(const vsh_bake_job *job, size_t index, const vsh_charts *charts, uint64_t held,
                          const vsh_run *run, vshi_bands *bands, vsh_error *error) {
+    const vsh_job_lightmap *lightmap = &job->lightmaps[index];
+    const bool lit = job->options.sink == NULL && vsh_lit_is_output(lightmap->output) != 0;
+    const uint64_t kept = lit ? vshi_lit_sink_bytes(lightmap->width, lightmap->height) : 0;
     const vshi_bands_need need = {.picture = job->options.invalid_picture != NULL,
                                   .resume = job->options.resume != 0,
-                                  .files = job->options.sink == NULL,
+                                  .files = job->options.sink == NULL && !lit,
                                   .rows = job->options.band_rows,
-                                  .held = held,
+                                  .held = held + kept,
                                   .limit = run->memory_limit};
     return vshi_bands_plan(&job->scene, &job->targets.list[index], charts, &need, bands, error);
 }
@@ -85,6 +89,7 @@ typedef struct work {
     uint64_t *invalid;    /* [mesh_count]: of one band */
     vshi_rounds rounds;   /* where there are several bands */
     vshi_file_sink files;
+    vshi_lit_sink lit;
     vsh_row_sink sink;
     bool begun; /* the sink has taken rows */
     vshi_invalid_picture picture;
@@ -276,8 +281,11 @@ vsh_result vshi_job_bake(vsh_bake_job *job, size_t index, const vshi_lightmap_in
               .target = &job->targets.list[index],
               .lightmap = &job->lightmaps[index],
               .baked = vsh_bake_stats_zero(),
-              .files = {.job = job, .run = run}};
-    w.sink = job->options.sink != NULL ? job->sink : vshi_file_sink_of(&w.files);
+              .files = {.job = job, .run = run},
+              .lit = {.job = job, .run = run}};
+    w.sink = job->options.sink != NULL               ? job->sink
+             : vsh_lit_is_output(w.lightmap->output) ? vshi_lit_sink_of(&w.lit)
+                                                     : vshi_file_sink_of(&w.files);
     w.lightmap->bands = input->bands.count;
     w.lightmap->band_rows = input->bands.rows;
     vsh_result result = end_sink(&w, bake_all(&w, error), error);

@@ -17,8 +17,9 @@
 typedef struct asset_place {
     vsh_mesh *meshes;
     double *transforms; /* [count][12] */
+    size_t *numbers;    /* [count]: of each in its model */
     size_t count;
-    const vsh_model *model; /* mesh casters; belongs to the assets' models */
+    const vsh_model *model; /* of meshes; belongs to the assets' models */
     const vsh_grid *grid;   /* vdb casters; belongs to the assets' grids */
     vsh_outline *outline;   /* mask and text casters */
     vsh_model *made;        /* of heightfields; its meshes are this place's */
@@ -49,11 +50,13 @@ static vsh_result place_chosen(asset_place *place, const vsh_model *model, const
     }
     VSHI_TRY(vshi_allocate((void **)&place->meshes, count, sizeof *place->meshes, "meshes", error));
     VSHI_TRY(vshi_allocate((void **)&place->transforms, count, 12 * sizeof(double), "transforms", error));
+    VSHI_TRY(vshi_allocate((void **)&place->numbers, count, sizeof *place->numbers, "meshes", error));
     for (size_t i = 0; i < all; ++i) {
         if (chosen != NULL && chosen[i] == 0) {
             continue;
         }
         double *composed = place->transforms + 12 * place->count;
+        place->numbers[place->count] = i;
         vsh_mesh *mesh = &place->meshes[place->count++];
         *mesh = vsh_model_mesh(model, i, uv_set);
         double scaled[12];
@@ -242,6 +245,7 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
     VSHI_TRY_DONE(vshi_asset_model(&assets->files, receiver->path, run, &model, error));
     VSHI_TRY_DONE(vshi_select(model, receiver->path, &receiver->objects, &chosen, error));
     VSHI_TRY_DONE(vshi_select_uvs(model, receiver, run, chosen, error));
+    assets->receivers[index].model = model;
     VSHI_TRY_DONE(place_chosen(&assets->receivers[index], model, chosen, receiver->uv_set, scene->unit,
                                receiver->transform, error));
 done:
@@ -296,6 +300,7 @@ static void free_places(asset_place *places, size_t count) {
         vsh_heights_free(places[i].heights);
         vsh_model_free(places[i].made);
         vshi_mesh_set_free(&places[i].set);
+        free(places[i].numbers);
         free(places[i].transforms);
         free(places[i].meshes);
         vsh_outline_free(places[i].outline);
@@ -322,6 +327,12 @@ static const vsh_mesh *placed_meshes(const asset_place *places, size_t count, si
 
 const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count) {
     return placed_meshes(assets->receivers, assets->receiver_count, index, mesh_count);
+}
+
+const vsh_model *vsh_assets_receiver_model(const vsh_assets *assets, size_t index, const size_t **numbers) {
+    const asset_place *place = index < assets->receiver_count ? &assets->receivers[index] : NULL;
+    *numbers = place != NULL ? place->numbers : NULL;
+    return place == NULL ? NULL : place->made != NULL ? place->made : place->model;
 }
 
 const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count) {

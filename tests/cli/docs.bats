@@ -1,5 +1,5 @@
 # Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/volume.md,
-# docs/render.md and docs/regression.md runs.
+# docs/render.md, docs/lit.md and docs/regression.md runs.
 load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
@@ -78,6 +78,13 @@ run_commands() {
 @test "every command of docs/render.md" {
     run_commands render.md 7
     for made in view.png court.png baked.png turn.html turn_03.png shafts.exr; do
+        [ -s "$made" ] || fail "no $made"
+    done
+}
+
+@test "every command of docs/lit.md" {
+    run_commands lit.md 3
+    for made in lit.glb preview.glb lit.gltf lit.bin lit.occlusion.png lit.exr; do
         [ -s "$made" ] || fail "no $made"
     done
 }

@@ -15,7 +15,11 @@ enum {
     KEY_NO_RECEIVE,
     KEY_NO_CAST,
     KEY_PER_OBJECT,
-    KEY_INVALID
+    KEY_INVALID,
+    KEY_PREVIEW,
+    KEY_EMBED,
+    KEY_IMAGES_BESIDE,
+    KEY_EXR
 };
 
 static const cli_option options[] = {
@@ -24,7 +28,8 @@ static const cli_option options[] = {
      "image to write: .exr with named channels, or\n"
      ".png .tif .dpx .sgi .jp2 .tga .bmp .ico .iff .rla\n"
      ".hdr .ppm .pgm .jpg .webp .heic .avif .gif; what each\n"
-     "can hold, and what is not written: docs/formats.md"},
+     "can hold, and what is not written: docs/formats.md;\n"
+     ".glb .gltf: the input with its light in its materials\n(docs/lit.md)"},
     {KEY_OUTPUT_FOLDER, "output-folder", "FOLDER",
      "write there what a scene's file says is written, under\nthe same names; it is made where it is not "
      "there"},
@@ -32,6 +37,11 @@ static const cli_option options[] = {
     {KEY_INVALID, "invalid", "FILE.png",
      "also a picture of the lightmap: charts grey, texels\ninside solids or behind walls red, those of them "
      "in\nplain sight yellow; FILE.OUT.png where there are\nseveral outputs"},
+    {KEY_PREVIEW, "preview", NULL,
+     "into a .glb or .gltf: the light as unlit base colour,\nwhich every viewer shows, in place of textures"},
+    {KEY_EMBED, "embed", NULL, "put its images into it (.glb)"},
+    {KEY_IMAGES_BESIDE, "images-beside", NULL, "put its images beside it, as OUT.lightmap.png (.gltf)"},
+    {KEY_EXR, "exr", "FILE.exr", "also an EXR of all channels beside a .glb or .gltf"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {KEY_DRY_RUN, "dry-run", NULL,
      "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},
@@ -128,6 +138,18 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_INVALID:
         s->invalid_picture = value;
+        return CLI_OK;
+    case KEY_PREVIEW:
+        s->preview = true;
+        return CLI_OK;
+    case KEY_EMBED:
+        s->embed = true;
+        return CLI_OK;
+    case KEY_IMAGES_BESIDE:
+        s->images_beside = true;
+        return CLI_OK;
+    case KEY_EXR:
+        s->exr = value;
         return CLI_OK;
     case KEY_STATS:
         s->stats = value;

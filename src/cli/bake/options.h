@@ -42,7 +42,9 @@ typedef struct cli_bake_settings {
     int32_t band_rows; /* 0: as many as go */
     const char *casters[CLI_MAX_EXTRA_CASTERS];
     size_t caster_count;
+    const char *exr; /* beside an asset; NULL: none */
     bool has_sun, has_sun_angle, per_object, dry_run, resume;
+    bool preview, embed, images_beside; /* of an asset */
 } cli_bake_settings;
 
 /* Takes an option of the tables above, a setting or one of the common ones. */
