@@ -100,10 +100,16 @@ void vshi_lit_uses_free(vshi_lit_uses *uses) {
 
 /* Those that refer to no accessor and no buffer view but by what is walked through above. */
 static bool is_known(const char *name) {
-    static const char *const names[] = {
-        "KHR_draco_mesh_compression", "EXT_mesh_gpu_instancing", "KHR_mesh_quantization",
-        "EXT_meshopt_compression",    "KHR_lights_punctual",     "KHR_animation_pointer",
-        "KHR_node_visibility",        "KHR_xmp_json_ld",         "MOZ_lightmap"};
+    static const char *const names[] = {"KHR_draco_mesh_compression",
+                                        "EXT_mesh_gpu_instancing",
+                                        "KHR_mesh_quantization",
+                                        "EXT_meshopt_compression",
+                                        "KHR_meshopt_compression",
+                                        "KHR_lights_punctual",
+                                        "KHR_animation_pointer",
+                                        "KHR_node_visibility",
+                                        "KHR_xmp_json_ld",
+                                        "MOZ_lightmap"};
     static const char *const beginnings[] = {"KHR_materials_", "KHR_texture_", "EXT_texture_",
                                              "EXT_materials_"};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
@@ -222,6 +228,7 @@ static void add_range(const vshi_lit_document *document, const json_t *view, vsh
 static void add_ranges(const vshi_lit_document *document, json_t *view, vshi_lit_range *list, size_t *count) {
     add_range(document, view, list, count);
     const json_t *compressed = member(view, "extensions", "EXT_meshopt_compression");
+    compressed = compressed != NULL ? compressed : member(view, "extensions", "KHR_meshopt_compression");
     if (compressed != NULL) {
         add_range(document, compressed, list, count);
     }
