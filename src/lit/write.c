@@ -2,6 +2,7 @@
 
 #include "base/file.h"
 #include "base/uri.h"
+#include "lit/buffers.h"
 #include "lit/json_text.h"
 
 #include <stdio.h>
@@ -9,116 +10,6 @@
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
-
-/* Where the bytes of each buffer lie in the one that is written. */
-typedef struct layout {
-    size_t *offsets; /* [buffer_count]; SIZE_MAX: has no bytes (EXT_meshopt_compression's fallback) */
-    size_t *numbers; /* [buffer_count]: of each in the new list */
-    size_t added;    /* where what was added begins */
-    size_t size;     /* of all */
-} layout;
-
-/* --- buffers become one */
-
-static bool has_bytes(const vshi_lit_document *document, size_t index) {
-    const bool chunk = index == 0 && document->gltf.binary;
-    return chunk || json_object_get(vshi_gltf_element(&document->gltf, "buffers", index), "uri") != NULL;
-}
-
-/* Bytes of a buffer in front of `offset` that are not written. */
-static size_t dropped_before(const vshi_lit_document *document, size_t buffer, size_t offset) {
-    size_t sum = 0;
-    for (size_t i = 0; i < document->dropped_count; ++i) {
-        const vshi_lit_range *range = &document->dropped[i];
-        const size_t end = range->end < offset ? range->end : offset;
-        sum += range->buffer == buffer && end > range->begin ? end - range->begin : 0;
-    }
-    return sum;
-}
-
-static vsh_result lay_out(vshi_lit_document *document, layout *l, vsh_error *error) {
-    enum { ALIGNMENT = 8 };
-    vshi_gltf *gltf = &document->gltf;
-    VSHI_TRY(
-        vshi_gltf_allocate(gltf, (void **)&l->offsets, gltf->buffer_count + 1, sizeof *l->offsets, error));
-    VSHI_TRY(
-        vshi_gltf_allocate(gltf, (void **)&l->numbers, gltf->buffer_count + 1, sizeof *l->numbers, error));
-    for (size_t i = 0; i < gltf->buffer_count; ++i) {
-        l->offsets[i] = SIZE_MAX;
-        if (has_bytes(document, i)) {
-            VSHI_TRY(vshi_gltf_load(gltf, i, error));
-            l->offsets[i] = l->size;
-            const size_t size = gltf->buffers[i].bytes.size;
-            l->size += (size - dropped_before(document, i, size) + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
-        }
-    }
-    l->added = l->size;
-    l->size += document->added.size;
-    return VSH_OK;
-}
-
-/* The new list: one buffer of all bytes, which is the first that had any, and behind it those without. */
-static vsh_result list_buffers(vshi_lit_document *document, layout *l, json_t **one, vsh_error *error) {
-    vshi_gltf *gltf = &document->gltf;
-    json_t *list = json_array(), *old = json_object_get(gltf->root, "buffers");
-    *one = NULL;
-    for (size_t i = 0; i < gltf->buffer_count && *one == NULL; ++i) {
-        *one = l->offsets[i] != SIZE_MAX ? json_incref(json_array_get(old, i)) : NULL;
-    }
-    *one = *one == NULL && l->size > 0 ? json_object() : *one;
-    bool good = list != NULL && (l->size == 0 || *one != NULL);
-    good = good && (*one == NULL || json_array_append_new(list, *one) == 0);
-    for (size_t i = 0; i < gltf->buffer_count; ++i) {
-        l->numbers[i] = l->offsets[i] != SIZE_MAX ? 0 : json_array_size(list);
-        good = good && (l->offsets[i] != SIZE_MAX || json_array_append(list, json_array_get(old, i)) == 0);
-    }
-    if (json_array_size(list) == 0) {
-        json_object_del(gltf->root, "buffers");
-        json_decref(list);
-        return good ? VSH_OK : vshi_lit_no_memory(document, error);
-    }
-    const vsh_result result = vshi_lit_set(document, gltf->root, "buffers", list, error);
-    return good ? result : vshi_lit_no_memory(document, error);
-}
-
-/* Moves what a view (or an extension of it that names a buffer of its own) refers to. */
-static vsh_result move_view(const vshi_lit_document *document, const layout *l, json_t *view,
-                            vsh_error *error) {
-    size_t buffer, offset;
-    if (!vshi_gltf_count(view, "buffer", SIZE_MAX, &buffer) || buffer >= document->gltf.buffer_count ||
-        !vshi_gltf_count(view, "byteOffset", 0, &offset)) {
-        return vshi_gltf_fail(&document->gltf, error, "a buffer view refers to no buffer");
-    }
-    VSHI_TRY(vshi_lit_set(document, view, "buffer", json_integer((json_int_t)l->numbers[buffer]), error));
-    const size_t base = l->offsets[buffer] != SIZE_MAX ? l->offsets[buffer] : 0;
-    const size_t moved = base + offset - dropped_before(document, buffer, offset);
-    return moved != offset
-               ? vshi_lit_set(document, view, "byteOffset", json_integer((json_int_t)moved), error)
-               : VSH_OK;
-}
-
-static vsh_result move_views(vshi_lit_document *document, const layout *l, vsh_error *error) {
-    size_t i;
-    json_t *view;
-    json_array_foreach(json_object_get(document->gltf.root, "bufferViews"), i, view) {
-        if (i >= document->first_view || (document->replaced != NULL && document->replaced[i])) {
-            const size_t at = (size_t)json_integer_value(json_object_get(view, "byteOffset"));
-            VSHI_TRY(vshi_lit_set(document, view, "buffer", json_integer(0), error));
-            VSHI_TRY(
-                vshi_lit_set(document, view, "byteOffset", json_integer((json_int_t)(at + l->added)), error));
-            continue;
-        }
-        VSHI_TRY(move_view(document, l, view, error));
-        const char *name;
-        json_t *extension;
-        json_object_foreach(json_object_get(view, "extensions"), name, extension) {
-            if (json_object_get(extension, "buffer") != NULL) {
-                VSHI_TRY(move_view(document, l, extension, error));
-            }
-        }
-    }
-    return VSH_OK;
-}
 
 /* --- writing */
 
@@ -159,7 +50,7 @@ static void put_buffer(output_file *file, const vshi_lit_document *document, siz
     put(file, bytes.at + at, bytes.size - at);
 }
 
-static void put_buffers(output_file *file, const vshi_lit_document *document, const layout *l) {
+static void put_buffers(output_file *file, const vshi_lit_document *document, const vshi_lit_layout *l) {
     const uint64_t begin = file->at;
     for (size_t i = 0; i < document->gltf.buffer_count; ++i) {
         if (l->offsets[i] != SIZE_MAX) {
@@ -188,7 +79,7 @@ static void find_rest(const vshi_lit_document *document, const unsigned char **r
 }
 
 /* glTF 2.0, 4.4. */
-static vsh_result put_binary(output_file *file, const vshi_lit_document *document, const layout *l,
+static vsh_result put_binary(output_file *file, const vshi_lit_document *document, const vshi_lit_layout *l,
                              const vshi_lit_bytes *json, const char *path, vsh_error *error) {
     enum { HEADER = 12, CHUNK = 8, JSON_CHUNK = 0x4e4f534a, BINARY_CHUNK = 0x004e4942 };
     const uint64_t text = ((uint64_t)json->size + 3) & ~UINT64_C(3),
@@ -316,8 +207,8 @@ static void end_files(files *all) {
     free(all->list);
 }
 
-static vsh_result write_document(const vshi_lit_work *work, output_file *file, const layout *l, bool binary,
-                                 vsh_error *error) {
+static vsh_result write_document(const vshi_lit_work *work, output_file *file, const vshi_lit_layout *l,
+                                 bool binary, vsh_error *error) {
     const vshi_lit_document *document = &work->document;
     vshi_lit_bytes json = {NULL, 0, 0};
     vsh_result result = vshi_lit_json_text(document->gltf.root, !binary, work->output, &json, error);
@@ -331,8 +222,8 @@ static vsh_result write_document(const vshi_lit_work *work, output_file *file, c
     return result;
 }
 
-static vsh_result write_all(const vshi_lit_work *work, const vshi_lit_besides *besides, const layout *l,
-                            files *all, vsh_error *error) {
+static vsh_result write_all(const vshi_lit_work *work, const vshi_lit_besides *besides,
+                            const vshi_lit_layout *l, files *all, vsh_error *error) {
     for (size_t i = 0; i <= all->named; ++i) {
         output_file *file = &all->list[i];
         VSHI_TRY(begin_file(file, all->paths[i], error));
@@ -360,19 +251,18 @@ static vsh_result write_all(const vshi_lit_work *work, const vshi_lit_besides *b
 vsh_result vshi_lit_write_files(vshi_lit_work *work, const vshi_lit_besides *besides, vsh_error *error) {
     vshi_lit_document *document = &work->document;
     const bool binary = strcasecmp(vshi_path_ending(work->output), "glb") == 0;
-    layout l = {.size = 0};
+    vshi_lit_layout l = {.size = 0};
     json_t *one = NULL;
     char *bin = NULL;
     files all = {.count = 0};
     vsh_result result;
-    VSHI_TRY_DONE(lay_out(document, &l, error));
+    VSHI_TRY_DONE(vshi_lit_lay_out(document, &l, error));
     if (!binary && l.size > 0) {
         bin = vshi_lit_beside_name(work->output, "", "bin");
         VSHI_TRY_DONE(bin != NULL ? VSH_OK : vshi_lit_no_memory(document, error));
     }
     VSHI_TRY_DONE(name_files(work, besides, bin, &all, error)); /* by the names that the input has */
-    VSHI_TRY_DONE(list_buffers(document, &l, &one, error));
-    VSHI_TRY_DONE(move_views(document, &l, error));
+    VSHI_TRY_DONE(vshi_lit_join_buffers(document, &l, &one, error));
     if (one != NULL) {
         VSHI_TRY_DONE(vshi_lit_set(document, one, "byteLength", json_integer((json_int_t)l.size), error));
         json_object_del(one, "uri");
@@ -384,7 +274,6 @@ vsh_result vshi_lit_write_files(vshi_lit_work *work, const vshi_lit_besides *bes
 done:
     end_files(&all);
     free(bin);
-    free(l.numbers);
-    free(l.offsets);
+    vshi_lit_layout_free(&l);
     return result;
 }
