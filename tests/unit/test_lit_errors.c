@@ -80,6 +80,7 @@ static void damaged_documents_are_refused(void **state) {
     } damages[] = {
         {"meshes/0/primitives/0/attributes", "COLOR_0", "999", "COLOR_0"},
         {"meshes/0/primitives/0/attributes", "_ID", "\"3\"", "_ID"},
+        {"meshes/0/primitives/0/attributes", "_ID", "7", "96 elements for 25 vertices"},
         {"accessors/4", "count", "24", "24 elements for 25 vertices"},
         {"accessors/4", "count", "4000000000", "pass the"},
         {"accessors/4", "bufferView", "99", "99"},
@@ -144,6 +145,22 @@ static void sparse_indices_out_of_range_are_refused(void **state) {
     vsh_error error = {0};
     assert_refused(write_in(&s, NULL, &error), &error);
     assert_non_null(strstr(error.message, "sparse index 2 of 3 is 25"));
+    free_sound(&s);
+}
+
+/* As many triangles of as many vertices, one of which is turned over. */
+static void other_triangles_than_the_models_are_refused(void **state) {
+    (void)state;
+    sound s = make_sound();
+    const size_t accessor = number_of(primitive_of(&s.in, 1, 0), "indices");
+    unsigned char *indices = s.in.bytes + (element_of(&s.in, accessor, 0, 2) - s.in.bytes);
+    const unsigned char first = indices[2];
+    indices[2] = indices[4];
+    indices[4] = first;
+    write_glb(&s.in, "in.glb");
+    vsh_error error = {0};
+    assert_refused(write_in(&s, NULL, &error), &error);
+    assert_non_null(strstr(error.message, "the file has changed since"));
     free_sound(&s);
 }
 
@@ -351,6 +368,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(damaged_documents_are_refused),
         cmocka_unit_test(sparse_indices_out_of_range_are_refused),
+        cmocka_unit_test(other_triangles_than_the_models_are_refused),
         cmocka_unit_test(cut_files_are_refused_at_every_length),
         cmocka_unit_test(flipped_bytes_end_in_a_file_or_a_reason),
         cmocka_unit_test(missing_buffers_are_refused),
