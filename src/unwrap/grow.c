@@ -23,6 +23,7 @@ static const double NORMAL = 2.0, STRAIGHT = 0.35, SEAM = 2.0, FAR = 0.15;
 
 enum {
     ROUNDS = 3,      /* of growing all charts again */
+    SMOOTHINGS = 8,  /* of borders */
     MOST_SIDES = 48, /* of a unit that are looked at for straightness */
     CHUNK = 4096     /* units between two looks at whether to stop */
 };
@@ -170,6 +171,39 @@ static vsh_result grow_again(growing *w, const uint32_t *order, vsh_error *error
     return grow_rest(w, order, error);
 }
 
+/* Moves teeth of borders to the chart around them: units that hang on their own chart by one other unit, and share
+ * more of their border with another. No chart falls apart by that. */
+static uint32_t move_teeth(growing *w) {
+    const vshi_units *g = w->g;
+    uint32_t moved = 0;
+    for (uint32_t u = 0; u < g->count; ++u) {
+        const uint32_t own = w->owner[u], begin = g->begin[u], end = g->begin[u + 1];
+        uint32_t mate = VSHI_NONE, other = VSHI_NONE;
+        bool loose = end - begin <= MOST_SIDES;
+        double inside = 0.0, outside = 0.0;
+        for (uint32_t i = begin; i < end && loose; ++i) {
+            const uint32_t beyond = vshi_units_beyond(g, g->sides[i]);
+            const double length = vshi_side_length(g->surface, g->sides[i]);
+            if (w->owner[beyond] == own) {
+                loose = mate == VSHI_NONE || mate == beyond;
+                mate = beyond;
+                inside += length;
+            } else if (other == VSHI_NONE || w->owner[beyond] == other) {
+                other = w->owner[beyond];
+                outside += g->surface->soft[g->sides[i]] ? length : 0.0;
+            } else {
+                loose = false; /* three charts meet here */
+            }
+        }
+        if (loose && mate != VSHI_NONE && other != VSHI_NONE && outside > inside &&
+            vshi_dot(g->units[u].normal, w->charts[other].axis) > WIDEST) {
+            w->owner[u] = other;
+            ++moved;
+        }
+    }
+    return moved;
+}
+
 typedef struct by_area {
     double area;
     uint32_t unit;
@@ -217,6 +251,8 @@ vsh_result vshi_grow_charts(const vshi_units *g, vshi_job *job, uint32_t *owner,
     VSHI_TRY_DONE(grow_rest(&w, order, error));
     for (int round = 0; round < ROUNDS && w.chart_count < g->count; ++round) {
         VSHI_TRY_DONE(grow_again(&w, order, error));
+    }
+    for (int round = 0; round < SMOOTHINGS && move_teeth(&w) > 0; ++round) {
     }
     *chart_count = w.chart_count;
 done:

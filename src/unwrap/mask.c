@@ -46,11 +46,6 @@ vshi_fit vshi_mask_fit(const vshi_patch *p, const double size[2], double density
     return fit;
 }
 
-static int compare_runs(const void *a, const void *b) {
-    const vshi_run *x = a, *y = b;
-    return x->begin != y->begin ? (x->begin < y->begin ? -1 : 1) : (x->end > y->end) - (x->end < y->end);
-}
-
 static int32_t clamp(double x, int32_t most) {
     return x < 0.0 ? 0 : x > most ? most : (int32_t)x;
 }
@@ -98,71 +93,69 @@ static void place_corners(const vshi_patch *p, const vshi_fit *fit, uint32_t i, 
     }
 }
 
-static vsh_result gather_runs(const vshi_patch *p, const vshi_fit *fit, vshi_mask *mask, vsh_error *error) {
-    double at[3][2];
-    int32_t first, last;
-    uint64_t runs = 0;
-    for (uint32_t i = 0; i < p->count; ++i) {
-        place_corners(p, fit, i, at);
-        rows_of(at, mask->height, &first, &last);
-        for (int32_t y = first; y <= last; ++y) {
-            ++mask->row[y + 1];
-        }
-        runs += (uint64_t)(last - first) + 1;
+/* Sets bits begin … end - 1. */
+static void set_bits(uint64_t *row, int32_t begin, int32_t end) {
+    for (int32_t x = begin; x < end;) {
+        const int32_t until = (x / 64 + 1) * 64 < end ? (x / 64 + 1) * 64 : end;
+        row[x / 64] |= until - x == 64 ? ~(uint64_t)0 : (((uint64_t)1 << (until - x)) - 1) << (x % 64);
+        x = until;
     }
-    if (runs > UINT32_MAX) {
-        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: more than 2^32 rows of triangles", what);
-    }
-    VSHI_TRY(vshi_allocate((void **)&mask->runs, runs, sizeof *mask->runs, what, error));
-    for (int32_t y = 0; y < mask->height; ++y) {
-        mask->row[y + 1] += mask->row[y];
-    }
-    for (uint32_t i = p->count; i-- > 0;) {
-        place_corners(p, fit, i, at);
-        rows_of(at, mask->height, &first, &last);
-        for (int32_t y = first; y <= last; ++y) {
-            mask->runs[--mask->row[y + 1]] = touched_in(at, y, mask->width);
-        }
-    }
-    for (int32_t y = 0; y < mask->height; ++y) { /* ends have become begins */
-        mask->row[y] = mask->row[y + 1];
-    }
-    mask->row[mask->height] = (uint32_t)runs;
-    return VSH_OK;
 }
 
-/* Sorts the runs of each row and joins those that touch. */
-static void join_runs(vshi_mask *mask) {
-    uint32_t kept = 0, begin = 0;
-    for (int32_t y = 0; y < mask->height; ++y) {
-        const uint32_t end = mask->row[y + 1], first = kept;
-        if (end > begin) {
-            qsort(mask->runs + begin, end - begin, sizeof *mask->runs, compare_runs);
+/* The first bit from x on that is `value`; `width` where there is none. */
+static int32_t next_bit(const uint64_t *row, int32_t x, int32_t width, bool value) {
+    while (x < width) {
+        const uint64_t word = (value ? row[x / 64] : ~row[x / 64]) >> (x % 64);
+        if (word != 0) {
+            x += __builtin_ctzll(word);
+            return x < width ? x : width;
         }
-        for (uint32_t i = begin; i < end; ++i) {
-            const vshi_run run = mask->runs[i];
-            if (kept > first && run.begin <= mask->runs[kept - 1].end) {
-                mask->runs[kept - 1].end =
-                    run.end > mask->runs[kept - 1].end ? run.end : mask->runs[kept - 1].end;
-            } else {
-                mask->runs[kept++] = run;
+        x = (x / 64 + 1) * 64;
+    }
+    return width;
+}
+
+/* Counts the runs of each row of bits, or lists them. */
+static void read_runs(const uint64_t *bits, size_t words, vshi_mask *mask, bool list) {
+    uint32_t at = 0;
+    for (int32_t y = 0; y < mask->height; ++y) {
+        const uint64_t *row = bits + words * (size_t)y;
+        mask->row[y] = at;
+        for (int32_t begin = next_bit(row, 0, mask->width, true), end; begin < mask->width;
+             begin = next_bit(row, end, mask->width, true), ++at) {
+            end = next_bit(row, begin, mask->width, false);
+            if (list) {
+                mask->runs[at] = (vshi_run){begin, end};
+                mask->touched += (uint64_t)(end - begin);
             }
         }
-        for (uint32_t i = first; i < kept; ++i) {
-            mask->touched += (uint64_t)(mask->runs[i].end - mask->runs[i].begin);
-        }
-        mask->row[y] = first;
-        begin = end;
     }
-    mask->row[mask->height] = kept;
+    mask->row[mask->height] = at;
 }
 
 vsh_result vshi_mask_make(const vshi_patch *p, const vshi_fit *fit, vshi_mask *mask, vsh_error *error) {
     *mask = (vshi_mask){.width = fit->width, .height = fit->height};
-    VSHI_TRY(vshi_allocate((void **)&mask->row, (size_t)mask->height + 1, sizeof *mask->row, what, error));
-    VSHI_TRY(gather_runs(p, fit, mask, error));
-    join_runs(mask);
-    return VSH_OK;
+    const size_t words = ((size_t)mask->width + 63) / 64;
+    uint64_t *bits = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&mask->row, (size_t)mask->height + 1, sizeof *mask->row, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&bits, words * (size_t)mask->height, sizeof *bits, what, error));
+    for (uint32_t i = 0; i < p->count; ++i) {
+        double at[3][2];
+        int32_t first, last;
+        place_corners(p, fit, i, at);
+        rows_of(at, mask->height, &first, &last);
+        for (int32_t y = first; y <= last; ++y) {
+            const vshi_run run = touched_in(at, y, mask->width);
+            set_bits(bits + words * (size_t)y, run.begin, run.end);
+        }
+    }
+    read_runs(bits, words, mask, false);
+    VSHI_TRY_DONE(vshi_allocate((void **)&mask->runs, mask->row[mask->height], sizeof *mask->runs, what, error));
+    read_runs(bits, words, mask, true);
+done:
+    free(bits);
+    return result;
 }
 
 void vshi_mask_free(vshi_mask *mask) {

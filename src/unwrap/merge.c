@@ -45,10 +45,11 @@ static vsh_result measure(vshi_merging *m, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vshi_merging_begin(const vshi_surface *surface, vshi_patches *patches, double max_stretch,
+vsh_result vshi_merging_begin(const vshi_surface *surface, vshi_patches *patches, double max_stretch, double max_area,
                               vshi_merging *m, vsh_error *error) {
     *m = (vshi_merging){.surface = surface,
                         .patches = patches,
+                        .max_area = max_area,
                         .max_stretch = max_stretch < MOST_STRETCH ? max_stretch : MOST_STRETCH};
     return measure(m, error);
 }
@@ -117,7 +118,7 @@ static bool promising(const vshi_merging *m, const border *pair) {
     const double pa = m->perimeter[pair->a], pb = m->perimeter[pair->b], aa = m->patches->list[pair->a].area,
                  ab = m->patches->list[pair->b].area, joined = pa + pb - 2.0 * pair->length;
     const double roundness = joined * joined / (aa + ab), before = (pa * pa + pb * pb) / (aa + ab);
-    return pair->shared > LEAST_SHARED && (roundness < ROUND || roundness < NO_WORSE * before) &&
+    return aa + ab < m->max_area && pair->shared > LEAST_SHARED && (roundness < ROUND || roundness < NO_WORSE * before) &&
            !has_failed(m, pair->a, pair->b);
 }
 

@@ -9,9 +9,12 @@
 #include <stdlib.h>
 
 static const double EXPECTED = 0.93; /* share of the pages that padded charts are expected to fill */
-static const double STEP = 1.03;     /* of the density between attempts before one fits and one does not */
-static const double CLOSE = 1.002;   /* between the best that fits and the least that does not: near enough */
-enum { MOST_STEPS = 400 };
+static const double CLOSE = 0.998;   /* of the density at which rows would just fit */
+static const double SHRINK = 0.97;   /* of the density where it is not known by how much charts do not fit */
+static const double CLIMB = 1.008, LEAST_CLIMB = 1.001; /* from one that fits to the next that is tried */
+static const double OVER = 100.0;                       /* stands for: it is not known by how much */
+
+enum { MOST_STEPS = 400, FEW = 300, MANY = 500 /* charts */ };
 
 double vshi_pack_bytes(const vshi_packing *packing, size_t count) {
     return vshi_page_bytes(packing->width, packing->height) + (double)count * (sizeof(vshi_mask) + 200.0);
@@ -33,7 +36,6 @@ typedef struct search {
     kept *best;
     double best_density; /* 0: none yet */
     uint32_t best_pages;
-    int attempts;
 } search;
 
 static void keep(search *s, double density, uint32_t pages) {
@@ -59,14 +61,36 @@ static void give(search *s) {
     s->packing->pages = s->best_pages;
 }
 
-static vsh_result attempt(search *s, double density, int by, bool *fits, vsh_error *error) {
-    uint32_t pages = 0;
-    VSHI_TRY(vshi_placing_set(&s->placing, density, by, error));
-    VSHI_TRY(vshi_placing_run(&s->placing, &pages, error));
-    ++s->attempts;
-    *fits = pages <= s->packing->max_pages;
-    if (*fits && density > s->best_density) {
+/* One attempt at the density that was set. *over: what it takes of the room there is; above 1 it does not fit. */
+static vsh_result attempt(search *s, double density, int by, double *over, vsh_error *error) {
+    uint32_t pages = 1;
+    VSHI_TRY(vshi_placing_sort(&s->placing, by, error));
+    if (s->packing->max_pages == 1) {
+        int32_t rows = 0;
+        VSHI_TRY(vshi_placing_one_page(&s->placing, &rows, error));
+        *over = (double)rows / s->packing->height;
+    } else {
+        VSHI_TRY(vshi_placing_pages(&s->placing, &pages, error));
+        *over = pages <= s->packing->max_pages ? 1.0 : OVER;
+    }
+    if (*over <= 1.0 && density > s->best_density) {
         keep(s, density, pages);
+    }
+    return VSH_OK;
+}
+
+/* Attempts in the first `orders` orders, until one fits; *over and *by are the best of them. */
+static vsh_result attempt_orders(search *s, double density, int orders, double *over, int *by, vsh_error *error) {
+    bool possible = false;
+    *over = INFINITY;
+    VSHI_TRY(vshi_placing_set(&s->placing, density, &possible, error));
+    for (int order = 0; order < orders && possible && *over > 1.0; ++order) {
+        double own = 0.0;
+        VSHI_TRY(attempt(s, density, order, &own, error));
+        if (own < *over) {
+            *over = own;
+            *by = order;
+        }
     }
     return VSH_OK;
 }
@@ -109,39 +133,42 @@ static double first_guess(const search *s) {
     return low > 0.0 ? low : high;
 }
 
-/* The greatest density that fits, as far as `most` attempts between find it. */
-static vsh_result find_density(search *s, int most, vsh_error *error) {
-    double low = 0.0, high = 0.0, step = STEP, density = first_guess(s);
-    bool fits = false;
-    for (int i = 0; i < MOST_STEPS && (low == 0.0 || high == 0.0); ++i) {
-        VSHI_TRY(attempt(s, density, VSHI_BY_SIDES, &fits, error));
-        if (fits) {
-            low = density;
-            density *= step;
+static vsh_result fail_at_any(const search *s, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_LIMIT,
+                     "%zu charts do not fit into %u page%s of %d × %d texels at any density, with %d texels of padding",
+                     s->count, s->packing->max_pages, s->packing->max_pages == 1 ? "" : "s", s->packing->width,
+                     s->packing->height, s->packing->padding);
+}
+
+/* The greatest density that fits, as far as some attempts find it. */
+static vsh_result find_density(search *s, int orders, int climbs, vsh_error *error) {
+    double density = first_guess(s), over = INFINITY, shrink = SHRINK;
+    int by = 0;
+    for (int i = 0; i < MOST_STEPS && s->best_density == 0.0; ++i) {
+        VSHI_TRY(attempt_orders(s, density, orders, &over, &by, error));
+        if (s->best_density > 0.0) {
+            break;
+        }
+        if (over > 1.0 && over < OVER) { /* rows grow with the square of the density */
+            density *= sqrt(1.0 / over) * CLOSE;
         } else {
-            high = density;
-            density /= step;
+            density *= shrink;
+            shrink = shrink * shrink > 0.5 ? shrink * shrink : 0.5;
         }
-        step = i < 3 ? STEP : step * 1.2 < 2.0 ? step * 1.2 : 2.0;
     }
-    if (low == 0.0) {
-        return vshi_fail(error, VSH_ERROR_LIMIT,
-                         "%zu charts do not fit into %u page%s of %d × %d texels at any density, with %d "
-                         "texels of padding",
-                         s->count, s->packing->max_pages, s->packing->max_pages == 1 ? "" : "s",
-                         s->packing->width, s->packing->height, s->packing->padding);
+    if (s->best_density == 0.0) {
+        return fail_at_any(s, error);
     }
-    for (int i = 0; i < most && high / low > CLOSE; ++i) {
-        density = sqrt(low * high);
-        fits = false;
-        for (int by = 0; by < VSHI_ORDERS && !fits; ++by) {
-            VSHI_TRY(attempt(s, density, by, &fits, error));
+    double failed = INFINITY;
+    for (int i = 0; i < climbs; ++i) {
+        const double loose = over < 1.0 ? sqrt(1.0 / over) : 1.0;
+        density = s->best_density * (loose > CLIMB ? loose : CLIMB);
+        density = density < failed ? density : sqrt(s->best_density * failed);
+        if (density < s->best_density * LEAST_CLIMB) {
+            break;
         }
-        if (fits) {
-            low = density;
-        } else {
-            high = density;
-        }
+        VSHI_TRY(attempt_orders(s, density, orders, &over, &by, error));
+        failed = over > 1.0 ? density : failed;
     }
     return VSH_OK;
 }
@@ -150,26 +177,25 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi
                      vsh_error *error) {
     search s = {.packing = packing, .items = items, .count = count};
     const double asked = packing->density;
+    const int32_t height = packing->max_pages == 1 ? packing->height + packing->height / 4 : packing->height;
+    const int orders = count < MANY ? VSHI_ORDERS : 1, climbs = count < FEW ? 8 : count < MANY ? 4 : 2;
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&s.best, count, sizeof *s.best, "packing charts", error));
-    VSHI_TRY_DONE(vshi_placing_begin(packing, items, count, job, &s.placing, error));
-    const int refine = count < 300 ? 5 : count < 3000 ? 4 : count < 20000 ? 3 : 2;
+    VSHI_TRY_DONE(vshi_placing_begin(packing, height, items, count, job, &s.placing, error));
     if (asked > 0.0) {
-        bool fits = false;
-        for (int by = 0; by < VSHI_ORDERS && !fits; ++by) {
-            VSHI_TRY_DONE(attempt(&s, asked, by, &fits, error));
-        }
-        if (!fits) {
-            VSHI_TRY_DONE(find_density(&s, 1, error));
-            result = vshi_fail(
-                error, VSH_ERROR_LIMIT,
-                "charts do not fit into %u page%s of %d × %d texels at %g texels a unit: %.4g would fit",
-                packing->max_pages, packing->max_pages == 1 ? "" : "s", packing->width, packing->height,
-                asked, s.best_density);
+        double over = INFINITY;
+        int by = 0;
+        VSHI_TRY_DONE(attempt_orders(&s, asked, VSHI_ORDERS, &over, &by, error));
+        if (over > 1.0) {
+            VSHI_TRY_DONE(find_density(&s, 1, 1, error));
+            result = vshi_fail(error, VSH_ERROR_LIMIT,
+                               "charts do not fit into %u page%s of %d × %d texels at %g texels a unit: %.4g would fit",
+                               packing->max_pages, packing->max_pages == 1 ? "" : "s", packing->width, packing->height,
+                               asked, s.best_density);
             goto done;
         }
     } else {
-        VSHI_TRY_DONE(find_density(&s, refine, error));
+        VSHI_TRY_DONE(find_density(&s, orders, climbs, error));
     }
     give(&s);
     vshi_job_advance(job, units);

@@ -16,13 +16,13 @@ enum { HINT_SIDE = 128 }; /* texels: larger charts are few, and look for a place
 /* Share of a page's texels that padded charts may have for it to be tried. */
 static const double HOPE = 0.95;
 
-vsh_result vshi_placing_begin(const vshi_packing *packing, vshi_item *items, size_t count, vshi_job *job,
-                              vshi_placing *p, vsh_error *error) {
+vsh_result vshi_placing_begin(const vshi_packing *packing, int32_t height, vshi_item *items, size_t count,
+                              vshi_job *job, vshi_placing *p, vsh_error *error) {
     *p = (vshi_placing){.packing = packing, .job = job, .items = items, .count = count};
     VSHI_TRY(vshi_allocate((void **)&p->masks, count, sizeof *p->masks, what, error));
     VSHI_TRY(vshi_allocate((void **)&p->order, count, sizeof *p->order, what, error));
     VSHI_TRY(vshi_allocate((void **)&p->hints, HINT_SIDE * HINT_SIDE, sizeof *p->hints, what, error));
-    return vshi_page_make(packing->width, packing->height, packing->padding, &p->page, error);
+    return vshi_page_make(packing->width, height, packing->padding, &p->page, error);
 }
 
 static void drop_masks(vshi_placing *p) {
@@ -73,7 +73,7 @@ static int compare_sort_keys(const void *a, const void *b) {
     return (x->item > y->item) - (x->item < y->item);
 }
 
-static vsh_result sort(vshi_placing *p, int by, vsh_error *error) {
+vsh_result vshi_placing_sort(vshi_placing *p, int by, vsh_error *error) {
     sort_key *keys = NULL;
     VSHI_TRY(vshi_allocate((void **)&keys, p->count, sizeof *keys, what, error));
     for (size_t i = 0; i < p->count; ++i) {
@@ -92,19 +92,22 @@ static vsh_result sort(vshi_placing *p, int by, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vshi_placing_set(vshi_placing *p, double density, int by, vsh_error *error) {
+vsh_result vshi_placing_set(vshi_placing *p, double density, bool *possible, vsh_error *error) {
     masking m = {.placing = p};
     vsh_result result;
     drop_masks(p);
+    *possible = true;
     VSHI_TRY_DONE(vshi_allocate((void **)&m.results, p->count, sizeof *m.results, what, error));
+    const int32_t longest =
+        p->packing->width > p->packing->height ? p->packing->width : p->packing->height;
     for (size_t i = 0; i < p->count; ++i) {
         vshi_item *item = &p->items[i];
         item->fit = vshi_mask_fit(item->patch, item->size, density * item->factor, p->packing->max_stretch);
-        if (item->fit.width > p->packing->width && item->fit.width > p->packing->height) {
-            result = VSH_OK; /* nowhere: no mask is needed to tell */
-            p->order[0] = VSHI_NONE;
-            goto done;
-        }
+        const int32_t longer = item->fit.width > item->fit.height ? item->fit.width : item->fit.height;
+        *possible = *possible && longer <= longest;
+    }
+    if (!*possible) {
+        goto done; /* no mask is needed to tell */
     }
     VSHI_TRY_DONE(vshi_parallel_for(p->job, p->count, 16, 0, make_masks, &m, error));
     for (size_t i = 0; i < p->count; ++i) {
@@ -114,7 +117,6 @@ vsh_result vshi_placing_set(vshi_placing *p, double density, int by, vsh_error *
         }
         p->items[i].touched = p->masks[i].touched;
     }
-    VSHI_TRY_DONE(sort(p, by, error));
 done:
     free(m.results);
     return result;
@@ -241,7 +243,6 @@ static void pool_free(pool *o) {
 
 /* Whether every item has a page, from the meshes' point of view: drops those that have. */
 static void pool_drop_placed(const vshi_placing *p, pool *o) {
-    memset(o->wanted, 0, o->count > 0 ? 1 : 0);
     for (uint32_t m = 0; m < o->count; ++m) {
         o->wanted[o->meshes[m].item] = 0;
     }
@@ -291,22 +292,31 @@ static vsh_result fill_with_meshes(vshi_placing *p, pool *o, uint32_t page, vsh_
     }
 }
 
-vsh_result vshi_placing_run(vshi_placing *p, uint32_t *pages, vsh_error *error) {
-    const uint32_t most = p->packing->max_pages;
-    *pages = most + 1;
-    if (p->order[0] == VSHI_NONE) {
-        return VSH_OK;
-    }
+static void take_all_back(vshi_placing *p) {
     for (size_t i = 0; i < p->count; ++i) {
         p->items[i].page = VSHI_NONE;
     }
+}
+
+vsh_result vshi_placing_one_page(vshi_placing *p, int32_t *rows, vsh_error *error) {
     uint32_t failed = VSHI_NONE;
+    take_all_back(p);
     VSHI_TRY(fill_page(p, NULL, 0, true, &failed, error));
-    if (failed == VSHI_NONE || most == 1) {
-        *pages = failed == VSHI_NONE ? 1 : 2;
+    *rows = failed == VSHI_NONE ? p->page.used : p->page.height + 1;
+    return VSH_OK;
+}
+
+vsh_result vshi_placing_pages(vshi_placing *p, uint32_t *pages, vsh_error *error) {
+    const uint32_t most = p->packing->max_pages;
+    uint32_t failed = VSHI_NONE;
+    *pages = 1;
+    take_all_back(p);
+    VSHI_TRY(fill_page(p, NULL, 0, true, &failed, error));
+    if (failed == VSHI_NONE) {
         return VSH_OK;
     }
-    take_back(p, 0);
+    *pages = most + 1;
+    take_all_back(p);
     pool o = {0};
     vsh_result result;
     VSHI_TRY_DONE(pool_make(p, &o, error));

@@ -19,17 +19,23 @@ typedef struct vshi_placing {
     int32_t *hints; /* row where the last chart of a size was placed */
 } vshi_placing;
 
-/* Errors: VSH_ERROR_MEMORY. Free with vshi_placing_free(), after a failure too. */
-vsh_result vshi_placing_begin(const vshi_packing *packing, vshi_item *items, size_t count, vshi_job *job,
-                              vshi_placing *placing, vsh_error *error);
+/* The page is `height` texels high, the packing's or more. Errors: VSH_ERROR_MEMORY. Free with vshi_placing_free(),
+ * after a failure too. */
+vsh_result vshi_placing_begin(const vshi_packing *packing, int32_t height, vshi_item *items, size_t count,
+                              vshi_job *job, vshi_placing *placing, vsh_error *error);
 void vshi_placing_free(vshi_placing *placing);
 
-/* Fits the items to a density and sorts them. Errors: VSH_ERROR_MEMORY, VSH_ERROR_LIMIT, VSH_ERROR_CANCELLED.
- */
-vsh_result vshi_placing_set(vshi_placing *placing, double density, int by, vsh_error *error);
+/* Fits the items to a density. *possible: none is larger than a page. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_placing_set(vshi_placing *placing, double density, bool *possible, vsh_error *error);
 
-/* Places as many pages as it takes, or max_pages + 1 where they do not fit. Errors: VSH_ERROR_MEMORY,
+/* Sorts them. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_placing_sort(vshi_placing *placing, int by, vsh_error *error);
+
+/* Places all items on one page; *rows is how many rows they take, or more than the page has. Errors: VSH_ERROR_MEMORY,
  * VSH_ERROR_CANCELLED. */
-vsh_result vshi_placing_run(vshi_placing *placing, uint32_t *pages, vsh_error *error);
+vsh_result vshi_placing_one_page(vshi_placing *placing, int32_t *rows, vsh_error *error);
+
+/* Places them on as many pages as it takes, or max_pages + 1 where they do not fit. Errors: as the last. */
+vsh_result vshi_placing_pages(vshi_placing *placing, uint32_t *pages, vsh_error *error);
 
 #endif

@@ -15,6 +15,9 @@ static const char what[] = "charts of meshes";
 
 enum { MOST_ROUNDS = 24 }; /* of joining charts */
 
+/* Share of all charts' area that charts are joined to: larger ones leave gaps between them that nothing fills. */
+static const double LARGEST = 0.06;
+
 static void end_making(vshi_shape *shape) {
     vshi_merging_free(&shape->merging);
     vshi_units_free(&shape->units);
@@ -37,6 +40,7 @@ void vshi_shapes_free(vshi_shapes *shapes) {
 
 typedef struct making {
     vshi_shapes *shapes;
+    size_t mesh_count;
     double max_stretch;
     bool keep_uvs;
     vshi_job *job;
@@ -242,12 +246,29 @@ done:
     return result;
 }
 
+/* World units², of all instances. */
+static double total_area(const making *m) {
+    double sum = 0.0;
+    for (size_t i = 0; i < m->mesh_count; ++i) {
+        const vshi_shape *shape = &m->shapes->list[m->shapes->instances[i].shape];
+        const double scale = shape->surface.scale * m->shapes->instances[i].scale;
+        double area = 0.0;
+        for (size_t c = 0; c < shape->patches.count; ++c) {
+            area += shape->patches.list[c].area;
+        }
+        sum += area * scale * scale;
+    }
+    return sum;
+}
+
 static vsh_result join_all(const making *m, size_t triangles, vsh_error *error) {
+    const double most = LARGEST * total_area(m);
     for (size_t i = 0; i < m->shapes->count; ++i) {
         vshi_shape *shape = &m->shapes->list[i];
         if (!shape->kept && shape->patches.count > 1) {
-            VSHI_TRY(
-                vshi_merging_begin(&shape->surface, &shape->patches, m->max_stretch, &shape->merging, error));
+            const double scale = shape->surface.scale;
+            VSHI_TRY(vshi_merging_begin(&shape->surface, &shape->patches, m->max_stretch, most / (scale * scale),
+                                        &shape->merging, error));
         }
     }
     bool done_all = false;
@@ -273,9 +294,9 @@ static void straighten_shapes(void *user, size_t begin, size_t end) {
     }
 }
 
-vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, double max_stretch, bool keep_uvs, vshi_job *job,
+vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, size_t mesh_count, double max_stretch, bool keep_uvs, vshi_job *job,
                                vsh_error *error) {
-    making m = {shapes, max_stretch, keep_uvs, job};
+    making m = {shapes, mesh_count, max_stretch, keep_uvs, job};
     size_t triangles = 0;
     for (size_t i = 0; i < shapes->count; ++i) {
         triangles += shapes->list[i].mesh->triangle_count;

@@ -44,7 +44,7 @@ void vshi_shapes_free(vshi_shapes *shapes);
 /* Makes their charts, straightened. Advances the job by VSHI_SHAPE_STEPS for each triangle of each shape,
  * about. Errors: VSH_ERROR_LIMIT (2^32 / 3 triangles), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 enum { VSHI_SHAPE_STEPS = 6 };
-vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, double max_stretch, bool keep_uvs, vshi_job *job,
+vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, size_t mesh_count, double max_stretch, bool keep_uvs, vshi_job *job,
                                vsh_error *error);
 
 #endif

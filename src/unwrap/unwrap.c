@@ -100,7 +100,7 @@ static vsh_result make_items(const vshi_shapes *shapes, size_t mesh_count, const
     return VSH_OK;
 }
 
-static vsh_result lay_out(vshi_shapes *shapes, const vsh_unwrap_options *options, const vsh_run *run,
+static vsh_result lay_out(vshi_shapes *shapes, size_t mesh_count, const vsh_unwrap_options *options, const vsh_run *run,
                           vsh_error *error) {
     size_t triangles = 0;
     for (size_t i = 0; i < shapes->count; ++i) {
@@ -111,7 +111,7 @@ static vsh_result lay_out(vshi_shapes *shapes, const vsh_unwrap_options *options
         return vshi_fail(error, VSH_ERROR_MEMORY, "unwrap: the system refused memory");
     }
     const vsh_result result =
-        vshi_shapes_lay_out(shapes, options->max_stretch, options->keep_uvs == VSH_UNWRAP_KEEP, job, error);
+        vshi_shapes_lay_out(shapes, mesh_count, options->max_stretch, options->keep_uvs == VSH_UNWRAP_KEEP, job, error);
     vshi_job_end(job);
     return result;
 }
@@ -152,7 +152,7 @@ vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwra
     vsh_result result;
     VSHI_TRY_DONE(vshi_shapes_find(meshes, mesh_count, &shapes, error));
     VSHI_TRY_DONE(check_memory(meshes, mesh_count, &shapes, &o, &full, error));
-    VSHI_TRY_DONE(lay_out(&shapes, &o, &full, error));
+    VSHI_TRY_DONE(lay_out(&shapes, mesh_count, &o, &full, error));
     VSHI_TRY_DONE(make_items(&shapes, mesh_count, o.density, &items, &count, error));
     VSHI_TRY_DONE(pack(&packing, items, count, &full, error));
     VSHI_TRY_DONE(vshi_atlas_make(mesh_count, &shapes, &packing, items, count, atlas, error));
