@@ -19,7 +19,7 @@ static const double WIDEST = 0.5;
 /* Weights of a unit's cost, which orders growth: the normals' difference, 0 … 0.5; the share of the unit's
  * border that would be added to the chart's less what would vanish, -1 … 1; seams of normals and UVs among
  * what vanishes, 0 … 1; the distance from the chart's middle, in radii of a chart of mean area. */
-static const double NORMAL = 2.0, STRAIGHT = 0.35, SEAM = 2.0, FAR = 0.15;
+static const double NORMAL = 2.0, STRAIGHT = 1.0, SEAM = 2.0, FAR = 0.5;
 
 enum {
     ROUNDS = 3,      /* of growing all charts again */

@@ -10,6 +10,8 @@
 
 static const char what[] = "a page of the atlas";
 
+enum { NEEDS = 16 };
+
 double vshi_page_bytes(int32_t width, int32_t height) {
     return ((double)width / 64.0 + 2.0) * 8.0 * ((double)height + 2.0) + 4.0 * height;
 }
@@ -100,18 +102,47 @@ static int32_t longest_run(const vshi_mask *mask, int32_t row) {
     return longest;
 }
 
+/* Some rows of a mask, spread over it, and the free runs that they need. */
+typedef struct needs {
+    int32_t row[NEEDS], length[NEEDS];
+    int32_t count;
+    int32_t least; /* that every row needs */
+} needs;
+
+static needs needs_of(const vshi_mask *mask) {
+    needs n = {.least = mask->width};
+    for (int32_t r = 0; r < mask->height; ++r) {
+        const int32_t longest = longest_run(mask, r);
+        n.least = longest < n.least ? longest : n.least;
+    }
+    const int32_t step = mask->height > NEEDS ? mask->height / NEEDS : 1;
+    for (int32_t r = step / 2; r < mask->height && n.count < NEEDS; r += step) {
+        n.row[n.count] = r;
+        n.length[n.count++] = longest_run(mask, r);
+    }
+    return n;
+}
+
+static bool may_fit(const vshi_page *page, const needs *n, int32_t y) {
+    for (int32_t i = 0; i < n->count; ++i) {
+        if (page->free_run[y + n->row[i]] < n->length[i]) {
+            return false;
+        }
+    }
+    return true;
+}
+
 /* The first row, y or above, at which each row of the mask may find a free run that is long enough. */
-static int32_t next_row(const vshi_page *page, const vshi_mask *mask, int32_t least, int32_t y,
-                        int32_t limit) {
+static int32_t next_row(const vshi_page *page, const vshi_mask *mask, const needs *n, int32_t y, int32_t limit) {
     while (y + mask->height <= limit) {
         int32_t r = mask->height - 1;
-        while (r >= 0 && page->free_run[y + r] >= least) {
+        while (r >= 0 && page->free_run[y + r] >= n->least) {
             --r;
         }
-        if (r < 0) {
+        if (r < 0 && may_fit(page, n, y)) {
             return y;
         }
-        y += r + 1;
+        y += r < 0 ? 1 : r + 1;
     }
     return limit;
 }
@@ -160,12 +191,8 @@ bool vshi_page_find(vshi_page *page, const vshi_mask *mask, int32_t row, int32_t
         return false;
     }
     limit = limit < page->height ? limit : page->height;
-    int32_t least = mask->width;
-    for (int32_t r = 0; r < mask->height; ++r) {
-        const int32_t longest = longest_run(mask, r);
-        least = longest < least ? longest : least;
-    }
-    for (int32_t at = row; (at = next_row(page, mask, least, at, limit)) + mask->height <= limit; ++at) {
+    const needs n = needs_of(mask);
+    for (int32_t at = row; (at = next_row(page, mask, &n, at, limit)) + mask->height <= limit; ++at) {
         if (fits_row(page, mask, at, x)) {
             *y = at;
             return true;
