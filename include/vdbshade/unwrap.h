@@ -58,9 +58,9 @@ typedef struct vsh_atlas_chart {
     float stretch;  /* root of the mean of the squared stretch of all directions from texture to surface, over
                        the chart's area, for UVs of the surface's area: 1 is isometric (Sander and others,
                        "Texture mapping progressive meshes", 2001, L2) */
-    float area;     /* of its triangles, world units² */
     int32_t min[2]; /* texels that it touches: first column and row, row 0 at v = 0 */
     int32_t max[2]; /* and those after the last */
+    double area;    /* of its triangles, world units² */
 } vsh_atlas_chart;
 
 typedef struct vsh_atlas_info {

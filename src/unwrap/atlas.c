@@ -125,7 +125,7 @@ static vsh_result mesh_make(struct vsh_atlas *a, size_t m, const vshi_shape *sha
 
 /* Stretch of a chart as it was fitted to texels: L2 of the patch, times that of its sides' factors. */
 static double fitted_stretch(const vshi_item *item) {
-    const double uneven = item->fit.scale[0] / item->fit.scale[1];
+    const double uneven = item->fit.uneven;
     return item->patch->stretch * sqrt(0.5 * (uneven + 1.0 / uneven));
 }
 
@@ -137,7 +137,7 @@ static void chart_make(struct vsh_atlas *a, const vshi_item *item, double scale,
         .page = item->page,
         .mesh = item->mesh,
         .stretch = (float)stretch,
-        .area = (float)(item->patch->area * scale * scale),
+        .area = item->patch->area * scale * scale,
         .min = {item->x, item->y},
         .max = {item->x + (sideways ? item->fit.height : item->fit.width),
                 item->y + (sideways ? item->fit.width : item->fit.height)},
@@ -176,8 +176,8 @@ vsh_result vshi_atlas_make(size_t mesh_count, const vshi_shapes *shapes, const v
             mesh_make(a, m, shape, &a->shapes[instance->shape], packing, items + chart, chart, error));
         for (size_t c = 0; c < shape->patches.count; ++c, ++chart) {
             chart_make(a, &items[chart], shape->surface.scale * instance->scale, chart, &touched);
-            area += (double)a->charts[chart].area;
-            stretch += (double)a->charts[chart].area * (double)a->charts[chart].stretch;
+            area += a->charts[chart].area;
+            stretch += a->charts[chart].area * (double)a->charts[chart].stretch;
             a->info.worst_stretch = fmax(a->info.worst_stretch, (double)a->charts[chart].stretch);
         }
     }

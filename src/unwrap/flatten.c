@@ -30,7 +30,7 @@ typedef struct laying {
 /* --- planes */
 
 static bool project(vshi_patch *p) {
-    const vshi_surface *s = p->surface;
+    const vshi_cut_mesh *s = p->surface;
     vshi_vec sum = {0, 0, 0}, u, v;
     for (uint32_t i = 0; i < p->count; ++i) {
         sum = vshi_add(sum, vshi_scale(s->normal[p->triangles[i]], s->area[p->triangles[i]]));

@@ -171,8 +171,8 @@ static vsh_result grow_again(growing *w, const uint32_t *order, vsh_error *error
     return grow_rest(w, order, error);
 }
 
-/* Moves teeth of borders to the chart around them: units that hang on their own chart by one other unit, and share
- * more of their border with another. No chart falls apart by that. */
+/* Moves teeth of borders to the chart around them: units that hang on their own chart by one other unit, and
+ * share more of their border with another. No chart falls apart by that. */
 static uint32_t move_teeth(growing *w) {
     const vshi_units *g = w->g;
     uint32_t moved = 0;

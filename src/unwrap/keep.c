@@ -116,7 +116,7 @@ done:
     return result;
 }
 
-vsh_result vshi_keep_charts(const vshi_surface *s, vshi_patches *patches, bool *usable, vsh_error *error) {
+vsh_result vshi_keep_charts(const vshi_cut_mesh *s, vshi_patches *patches, bool *usable, vsh_error *error) {
     const vsh_mesh *mesh = s->mesh;
     int senses = 0;
     uint32_t count = 0;

@@ -7,44 +7,8 @@
 
 static const char what[] = "texels of a chart";
 
-static const double BOX = 0.9;      /* share of its box that a chart fills at least to be fitted to texels */
-static const double MOST_FIT = 1.3; /* factor by which that may change a side */
-static const double ROOM = 1e-9;    /* texels: a border that is so near to a texel's is on it */
-
-enum { FARTHEST = 1 << 24 }; /* texels: no page is so large */
-
-static int32_t whole(double x) {
-    return x < 1.0 ? 1 : x > FARTHEST ? FARTHEST : (int32_t)x;
-}
-
-vshi_fit vshi_mask_fit(const vshi_patch *p, const double size[2], double density, double max_stretch) {
-    vshi_fit fit;
-    double factor[2];
-    int32_t texels[2];
-    bool fits = !p->kept && p->area > BOX * size[0] * size[1];
-    for (int k = 0; k < 2; ++k) {
-        const double length = size[k] * density;
-        texels[k] = whole(floor(length + 0.5));
-        factor[k] = texels[k] / length;
-        fits = fits && factor[k] < MOST_FIT && factor[k] > 1.0 / MOST_FIT;
-    }
-    const double uneven = factor[0] / factor[1]; /* isometric but for this it stretches by the root of … */
-    fits = fits && p->stretch * sqrt(0.5 * (uneven + 1.0 / uneven)) < max_stretch;
-    int32_t *sides[2] = {&fit.width, &fit.height};
-    for (int k = 0; k < 2; ++k) {
-        const double length = size[k] * density;
-        if (fits) {
-            fit.scale[k] = density * factor[k];
-            fit.offset[k] = 0.5;
-            *sides[k] = texels[k] + 1;
-        } else {
-            fit.scale[k] = density;
-            *sides[k] = whole(ceil(length - ROOM));
-            fit.offset[k] = 0.5 * (*sides[k] - length);
-        }
-    }
-    return fit;
-}
+static const double ROOM =
+    1e-4; /* texels: what is so near to a texel's border is on it; 32-bit UVs know no better */
 
 static int32_t clamp(double x, int32_t most) {
     return x < 0.0 ? 0 : x > most ? most : (int32_t)x;
@@ -87,8 +51,9 @@ static void rows_of(const double at[3][2], int32_t height, int32_t *first, int32
 
 static void place_corners(const vshi_patch *p, const vshi_fit *fit, uint32_t i, double at[3][2]) {
     for (int k = 0; k < 3; ++k) {
+        const double *uv = p->uv[p->corner[i][k]];
         for (int d = 0; d < 2; ++d) {
-            at[k][d] = p->uv[p->corner[i][k]][d] * fit->scale[d] + fit->offset[d];
+            at[k][d] = uv[0] * fit->matrix[d][0] + uv[1] * fit->matrix[d][1] + fit->offset[d];
         }
     }
 }
@@ -138,7 +103,8 @@ vsh_result vshi_mask_make(const vshi_patch *p, const vshi_fit *fit, vshi_mask *m
     const size_t words = ((size_t)mask->width + 63) / 64;
     uint64_t *bits = NULL;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&mask->row, (size_t)mask->height + 1, sizeof *mask->row, what, error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&mask->row, (size_t)mask->height + 1, sizeof *mask->row, what, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&bits, words * (size_t)mask->height, sizeof *bits, what, error));
     for (uint32_t i = 0; i < p->count; ++i) {
         double at[3][2];
@@ -151,7 +117,8 @@ vsh_result vshi_mask_make(const vshi_patch *p, const vshi_fit *fit, vshi_mask *m
         }
     }
     read_runs(bits, words, mask, false);
-    VSHI_TRY_DONE(vshi_allocate((void **)&mask->runs, mask->row[mask->height], sizeof *mask->runs, what, error));
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&mask->runs, mask->row[mask->height], sizeof *mask->runs, what, error));
     read_runs(bits, words, mask, true);
 done:
     free(bits);
@@ -187,59 +154,63 @@ static vsh_result half_turn(const vshi_mask *mask, vshi_mask *to, vsh_error *err
     return VSH_OK;
 }
 
-/* Column x of the mask, from below, becomes row x of the other, from the left; a half turn more and it is a
- * quarter turn anticlockwise, or with `up` clockwise. Runs open and close as columns go over the rows. */
+/* Swaps bit y of word x and bit x of word y, block by block (Warren, "Hacker's Delight", 2002). */
+static void transpose(uint64_t words[64]) {
+    uint64_t pick = UINT64_C(0x00000000ffffffff);
+    for (int width = 32; width > 0; width /= 2, pick ^= pick << width) {
+        for (int i = 0; i < 64; i = (i + width + 1) & ~width) {
+            const uint64_t swap = (words[i] >> width ^ words[i + width]) & pick;
+            words[i] ^= swap << width;
+            words[i + width] ^= swap;
+        }
+    }
+}
+
+/* Texel (x, y) goes to (y, x). */
+static void transpose_bits(const uint64_t *from, size_t from_words, int32_t height, uint64_t *to,
+                           size_t to_words, int32_t width) {
+    for (int32_t by = 0; by < height; by += 64) {
+        for (int32_t bx = 0; bx < width; bx += 64) {
+            uint64_t block[64];
+            for (int32_t i = 0; i < 64; ++i) {
+                block[i] = by + i < height ? from[from_words * (size_t)(by + i) + (size_t)bx / 64] : 0;
+            }
+            transpose(block);
+            for (int32_t i = 0; i < 64 && bx + i < width; ++i) {
+                to[to_words * (size_t)(bx + i) + (size_t)by / 64] = block[i];
+            }
+        }
+    }
+}
+
+/* Anticlockwise, (x, y) goes to (height - 1 - y, x); clockwise to (y, width - 1 - x). Both are (y, x) with
+ * its rows or its columns the other way. */
 static vsh_result quarter_turn(const vshi_mask *mask, bool clockwise, vshi_mask *to, vsh_error *error) {
-    *to = (vshi_mask){.width = mask->height, .height = mask->width, .touched = mask->touched};
-    int32_t *open = NULL; /* [mask width]: row where the column's run began; -1: none */
+    *to = (vshi_mask){.width = mask->height, .height = mask->width};
+    const size_t from_words = ((size_t)mask->width + 63) / 64, to_words = ((size_t)mask->height + 63) / 64;
+    uint64_t *from = NULL, *bits = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&to->row, (size_t)to->height + 1, sizeof *to->row, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&open, (size_t)mask->width, sizeof *open, what, error));
-    uint32_t total = 0;
-    for (int pass = 0; pass < 2; ++pass) {
-        for (int32_t x = 0; x < mask->width; ++x) {
-            open[x] = -1;
-        }
-        for (int32_t k = 0; k <= mask->height; ++k) {
-            /* anticlockwise, (x, y) goes to (height - 1 - y, x): from the last row on; clockwise to (y, width
-             * - 1 - x) */
-            const int32_t y = clockwise ? k : mask->height - 1 - k;
-            int32_t x = 0;
-            const uint32_t begin = k < mask->height ? mask->row[y] : 0,
-                           end = k < mask->height ? mask->row[y + 1] : 0;
-            for (uint32_t i = begin; i <= end; ++i) {
-                const int32_t from = i < end ? mask->runs[i].begin : mask->width,
-                              until = i < end ? mask->runs[i].end : mask->width;
-                for (; x < from; ++x) { /* not touched in this row */
-                    if (open[x] >= 0) {
-                        const int32_t row = clockwise ? mask->width - 1 - x : x;
-                        if (pass == 0) {
-                            ++to->row[row + 1];
-                        } else {
-                            to->runs[to->row[row]++] = (vshi_run){open[x], k};
-                        }
-                        open[x] = -1;
-                    }
-                }
-                for (; x < until; ++x) {
-                    open[x] = open[x] >= 0 ? open[x] : k;
-                }
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&from, from_words * (size_t)mask->height, sizeof *from, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&bits, to_words * (size_t)to->height, sizeof *bits, what, error));
+    for (int32_t y = 0; y < mask->height; ++y) {
+        const int32_t row = clockwise ? y : mask->height - 1 - y;
+        for (uint32_t i = mask->row[row]; i < mask->row[row + 1]; ++i) {
+            vshi_run run = mask->runs[i];
+            if (clockwise) {
+                run = (vshi_run){mask->width - run.end, mask->width - run.begin};
             }
-        }
-        if (pass == 0) {
-            for (int32_t r = 0; r < to->height; ++r) {
-                to->row[r + 1] += to->row[r];
-            }
-            total = to->row[to->height];
-            VSHI_TRY_DONE(vshi_allocate((void **)&to->runs, total, sizeof *to->runs, what, error));
+            set_bits(from + from_words * (size_t)y, run.begin, run.end);
         }
     }
-    for (int32_t r = to->height; r > 0; --r) { /* begins have become ends */
-        to->row[r] = to->row[r - 1];
-    }
-    to->row[0] = 0;
+    transpose_bits(from, from_words, mask->height, bits, to_words, mask->width);
+    read_runs(bits, to_words, to, false);
+    VSHI_TRY_DONE(vshi_allocate((void **)&to->runs, to->row[to->height], sizeof *to->runs, what, error));
+    read_runs(bits, to_words, to, true);
 done:
-    free(open);
+    free(bits);
+    free(from);
     return result;
 }
 
@@ -254,7 +225,8 @@ vsh_result vshi_mask_turn(const vshi_mask *mask, int quarters, vshi_mask *turned
 }
 
 void vshi_fit_turn(const vshi_fit *fit, int quarters, const double uv[2], double at[2]) {
-    const double x = uv[0] * fit->scale[0] + fit->offset[0], y = uv[1] * fit->scale[1] + fit->offset[1];
+    const double x = uv[0] * fit->matrix[0][0] + uv[1] * fit->matrix[0][1] + fit->offset[0],
+                 y = uv[0] * fit->matrix[1][0] + uv[1] * fit->matrix[1][1] + fit->offset[1];
     const double turned[4][2] = {
         {x, y}, {fit->height - y, x}, {fit->width - x, fit->height - y}, {y, fit->width - x}};
     at[0] = turned[quarters][0];

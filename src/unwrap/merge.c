@@ -21,7 +21,7 @@ static const double HARD = 0.3;          /* what a length of seam counts as shar
 static const double ROUND = 28.0, NO_WORSE = 1.1;
 
 static vsh_result measure(vshi_merging *m, vsh_error *error) {
-    const vshi_surface *s = m->surface;
+    const vshi_cut_mesh *s = m->surface;
     const size_t count = m->patches->count;
     VSHI_TRY(vshi_allocate((void **)&m->owner, s->count, sizeof *m->owner, what, error));
     VSHI_TRY(vshi_allocate((void **)&m->perimeter, count, sizeof *m->perimeter, what, error));
@@ -45,8 +45,8 @@ static vsh_result measure(vshi_merging *m, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vshi_merging_begin(const vshi_surface *surface, vshi_patches *patches, double max_stretch, double max_area,
-                              vshi_merging *m, vsh_error *error) {
+vsh_result vshi_merging_begin(const vshi_cut_mesh *surface, vshi_patches *patches, double max_stretch,
+                              double max_area, vshi_merging *m, vsh_error *error) {
     *m = (vshi_merging){.surface = surface,
                         .patches = patches,
                         .max_area = max_area,
@@ -118,13 +118,13 @@ static bool promising(const vshi_merging *m, const border *pair) {
     const double pa = m->perimeter[pair->a], pb = m->perimeter[pair->b], aa = m->patches->list[pair->a].area,
                  ab = m->patches->list[pair->b].area, joined = pa + pb - 2.0 * pair->length;
     const double roundness = joined * joined / (aa + ab), before = (pa * pa + pb * pb) / (aa + ab);
-    return aa + ab < m->max_area && pair->shared > LEAST_SHARED && (roundness < ROUND || roundness < NO_WORSE * before) &&
-           !has_failed(m, pair->a, pair->b);
+    return aa + ab < m->max_area && pair->shared > LEAST_SHARED &&
+           (roundness < ROUND || roundness < NO_WORSE * before) && !has_failed(m, pair->a, pair->b);
 }
 
 /* Borders by pairs of charts. */
 static vsh_result find_pairs(const vshi_merging *m, border **pairs, size_t *count, vsh_error *error) {
-    const vshi_surface *s = m->surface;
+    const vshi_cut_mesh *s = m->surface;
     size_t sides = 0;
     for (int pass = 0; pass < 2; ++pass) {
         size_t at = 0;

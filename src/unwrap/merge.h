@@ -14,7 +14,7 @@ typedef struct vshi_trial {
 } vshi_trial;
 
 typedef struct vshi_merging {
-    const vshi_surface *surface;
+    const vshi_cut_mesh *surface;
     vshi_patches *patches;
     double max_stretch, max_area;
     uint32_t *owner;   /* [triangles]: chart; VSHI_NONE: flat */
@@ -27,10 +27,10 @@ typedef struct vshi_merging {
     size_t failed_count, failed_capacity;
 } vshi_merging;
 
-/* Begins with the charts of a surface. They must outlive it. No chart is joined to one of more than max_area, surface
- * units². Errors: VSH_ERROR_MEMORY. Free with vshi_merging_free(), after a failure too. */
-vsh_result vshi_merging_begin(const vshi_surface *surface, vshi_patches *patches, double max_stretch, double max_area,
-                              vshi_merging *merging, vsh_error *error);
+/* Begins with the charts of a surface. They must outlive it. No chart is joined to one of more than max_area,
+ * surface units². Errors: VSH_ERROR_MEMORY. Free with vshi_merging_free(), after a failure too. */
+vsh_result vshi_merging_begin(const vshi_cut_mesh *surface, vshi_patches *patches, double max_stretch,
+                              double max_area, vshi_merging *merging, vsh_error *error);
 void vshi_merging_free(vshi_merging *merging);
 
 /* Chooses the next round's trials: none, and it is done. Errors: VSH_ERROR_MEMORY. */

@@ -23,7 +23,7 @@ double vshi_pack_bytes(const vshi_packing *packing, size_t count) {
 /* Places of the best attempt. */
 typedef struct kept {
     uint32_t page;
-    int32_t x, y, quarters;
+    int32_t x, y, angle, quarters;
     vshi_fit fit;
     uint64_t touched;
 } kept;
@@ -41,7 +41,8 @@ typedef struct search {
 static void keep(search *s, double density, uint32_t pages) {
     for (size_t i = 0; i < s->count; ++i) {
         const vshi_item *item = &s->items[i];
-        s->best[i] = (kept){item->page, item->x, item->y, item->quarters, item->fit, item->touched};
+        s->best[i] =
+            (kept){item->page, item->x, item->y, item->angle, item->quarters, item->fit, item->touched};
     }
     s->best_density = density;
     s->best_pages = pages;
@@ -53,6 +54,7 @@ static void give(search *s) {
         item->page = s->best[i].page;
         item->x = s->best[i].x;
         item->y = s->best[i].y;
+        item->angle = s->best[i].angle;
         item->quarters = s->best[i].quarters;
         item->fit = s->best[i].fit;
         item->touched = s->best[i].touched;
@@ -61,7 +63,8 @@ static void give(search *s) {
     s->packing->pages = s->best_pages;
 }
 
-/* One attempt at the density that was set. *over: what it takes of the room there is; above 1 it does not fit. */
+/* One attempt at the density that was set. *over: what it takes of the room there is; above 1 it does not
+ * fit. */
 static vsh_result attempt(search *s, double density, int by, double *over, vsh_error *error) {
     uint32_t pages = 1;
     VSHI_TRY(vshi_placing_sort(&s->placing, by, error));
@@ -80,7 +83,8 @@ static vsh_result attempt(search *s, double density, int by, double *over, vsh_e
 }
 
 /* Attempts in the first `orders` orders, until one fits; *over and *by are the best of them. */
-static vsh_result attempt_orders(search *s, double density, int orders, double *over, int *by, vsh_error *error) {
+static vsh_result attempt_orders(search *s, double density, int orders, double *over, int *by,
+                                 vsh_error *error) {
     bool possible = false;
     *over = INFINITY;
     VSHI_TRY(vshi_placing_set(&s->placing, density, &possible, error));
@@ -100,9 +104,9 @@ static double expected_area(const search *s, double density) {
     double sum = 0.0;
     for (size_t i = 0; i < s->count; ++i) {
         const vshi_item *item = &s->items[i];
-        const double k = density * item->factor, width = item->size[0] * k, height = item->size[1] * k,
-                     gap = s->packing->padding + 1.0,
-                     share = item->patch->area / (item->size[0] * item->size[1]);
+        const double k = density * item->factor, width = item->boxes->size[0][0] * k,
+                     height = item->boxes->size[0][1] * k, gap = s->packing->padding + 1.0,
+                     share = item->patch->area / (item->boxes->size[0][0] * item->boxes->size[0][1]);
         /* what is left free of a box is of use to others in part */
         sum += (width + gap) * (height + gap) * (share > 0.0 ? sqrt(share < 1.0 ? share : 1.0) : 1.0);
     }
@@ -134,10 +138,11 @@ static double first_guess(const search *s) {
 }
 
 static vsh_result fail_at_any(const search *s, vsh_error *error) {
-    return vshi_fail(error, VSH_ERROR_LIMIT,
-                     "%zu charts do not fit into %u page%s of %d × %d texels at any density, with %d texels of padding",
-                     s->count, s->packing->max_pages, s->packing->max_pages == 1 ? "" : "s", s->packing->width,
-                     s->packing->height, s->packing->padding);
+    return vshi_fail(
+        error, VSH_ERROR_LIMIT,
+        "%zu charts do not fit into %u page%s of %d × %d texels at any density, with %d texels of padding",
+        s->count, s->packing->max_pages, s->packing->max_pages == 1 ? "" : "s", s->packing->width,
+        s->packing->height, s->packing->padding);
 }
 
 /* The greatest density that fits, as far as some attempts find it. */
@@ -188,10 +193,11 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi
         VSHI_TRY_DONE(attempt_orders(&s, asked, VSHI_ORDERS, &over, &by, error));
         if (over > 1.0) {
             VSHI_TRY_DONE(find_density(&s, 1, 1, error));
-            result = vshi_fail(error, VSH_ERROR_LIMIT,
-                               "charts do not fit into %u page%s of %d × %d texels at %g texels a unit: %.4g would fit",
-                               packing->max_pages, packing->max_pages == 1 ? "" : "s", packing->width, packing->height,
-                               asked, s.best_density);
+            result = vshi_fail(
+                error, VSH_ERROR_LIMIT,
+                "charts do not fit into %u page%s of %d × %d texels at %g texels a unit: %.4g would fit",
+                packing->max_pages, packing->max_pages == 1 ? "" : "s", packing->width, packing->height,
+                asked, s.best_density);
             goto done;
         }
     } else {

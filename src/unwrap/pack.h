@@ -8,12 +8,13 @@
 /* A chart that is to have a place, and the place that it gets. */
 typedef struct vshi_item {
     const vshi_patch *patch; /* straightened */
-    double size[2];
+    const vshi_boxes *boxes;
     double factor; /* texels to a unit of the patch at a density of 1 */
     uint32_t mesh; /* whose chart it is */
     uint32_t page;
     int32_t x, y;     /* texel of the mask's corner */
-    int32_t quarters; /* that the mask is turned by */
+    int32_t angle;    /* that the patch is turned by, */
+    int32_t quarters; /* and its mask then */
     vshi_fit fit;
     uint64_t touched; /* texels */
 } vshi_item;

@@ -10,7 +10,10 @@
 
 static const char what[] = "a page of the atlas";
 
-enum { NEEDS = 16 };
+enum {
+    NEEDS = 16,
+    STEP = 96 /* rows of a chart for which it may miss a row that it would fit in */
+};
 
 double vshi_page_bytes(int32_t width, int32_t height) {
     return ((double)width / 64.0 + 2.0) * 8.0 * ((double)height + 2.0) + 4.0 * height;
@@ -107,6 +110,7 @@ typedef struct needs {
     int32_t row[NEEDS], length[NEEDS];
     int32_t count;
     int32_t least; /* that every row needs */
+    bool boxy;     /* which is nearly what the longest needs */
 } needs;
 
 static needs needs_of(const vshi_mask *mask) {
@@ -115,6 +119,7 @@ static needs needs_of(const vshi_mask *mask) {
         const int32_t longest = longest_run(mask, r);
         n.least = longest < n.least ? longest : n.least;
     }
+    n.boxy = 2 * n.least > mask->width;
     const int32_t step = mask->height > NEEDS ? mask->height / NEEDS : 1;
     for (int32_t r = step / 2; r < mask->height && n.count < NEEDS; r += step) {
         n.row[n.count] = r;
@@ -133,9 +138,10 @@ static bool may_fit(const vshi_page *page, const needs *n, int32_t y) {
 }
 
 /* The first row, y or above, at which each row of the mask may find a free run that is long enough. */
-static int32_t next_row(const vshi_page *page, const vshi_mask *mask, const needs *n, int32_t y, int32_t limit) {
+static int32_t next_row(const vshi_page *page, const vshi_mask *mask, const needs *n, int32_t y,
+                        int32_t limit) {
     while (y + mask->height <= limit) {
-        int32_t r = mask->height - 1;
+        int32_t r = n->boxy ? mask->height - 1 : -1;
         while (r >= 0 && page->free_run[y + r] >= n->least) {
             --r;
         }
@@ -192,9 +198,14 @@ bool vshi_page_find(vshi_page *page, const vshi_mask *mask, int32_t row, int32_t
     }
     limit = limit < page->height ? limit : page->height;
     const needs n = needs_of(mask);
-    for (int32_t at = row; (at = next_row(page, mask, &n, at, limit)) + mask->height <= limit; ++at) {
+    const int32_t step = 1 + mask->height / STEP;
+    for (int32_t at = row; (at = next_row(page, mask, &n, at, limit)) + mask->height <= limit; at += step) {
         if (fits_row(page, mask, at, x)) {
             *y = at;
+            while (*y > row && at - *y < step && may_fit(page, &n, *y - 1) &&
+                   fits_row(page, mask, *y - 1, x)) {
+                --*y; /* a large chart has stepped over it */
+            }
             return true;
         }
     }

@@ -72,7 +72,7 @@ static vsh_result number_vertices(vshi_patch *p, vsh_error *error) {
     VSHI_TRY_DONE(vshi_allocate((void **)&p->uv, p->vertex_count, sizeof *p->uv, what, error));
     for (uint32_t i = 0; i < p->count; ++i) {
         vshi_vec at[3];
-        vshi_surface_corners(p->surface, p->triangles[i], at);
+        vshi_cut_mesh_corners(p->surface, p->triangles[i], at);
         for (int k = 0; k < 3; ++k) {
             p->place[p->corner[i][k]] = at[k];
         }
@@ -84,7 +84,7 @@ done:
     return result;
 }
 
-vsh_result vshi_patch_make(const vshi_surface *surface, uint32_t *triangles, uint32_t count, vshi_patch *p,
+vsh_result vshi_patch_make(const vshi_cut_mesh *surface, uint32_t *triangles, uint32_t count, vshi_patch *p,
                            vsh_error *error) {
     *p = (vshi_patch){.surface = surface, .triangles = triangles, .count = count, .stretch = 1.0};
     VSHI_TRY(vshi_allocate((void **)&p->corner, count, sizeof *p->corner, what, error));

@@ -2,10 +2,10 @@
 #ifndef VSHI_UNWRAP_PATCH_H
 #define VSHI_UNWRAP_PATCH_H
 
-#include "unwrap/surface.h"
+#include "unwrap/cut_mesh.h"
 
 typedef struct vshi_patch {
-    const vshi_surface *surface;
+    const vshi_cut_mesh *surface;
     uint32_t *triangles; /* [count] of the surface, ascending */
     uint32_t count;
     uint32_t vertex_count; /* corners that hang together by the patch's edges are one; where parts of it touch
@@ -21,7 +21,7 @@ typedef struct vshi_patch {
 
 /* Takes over `triangles`, also where it fails; uv is 0. Errors: VSH_ERROR_MEMORY. Free with
  * vshi_patch_free(), after a failure too. */
-vsh_result vshi_patch_make(const vshi_surface *surface, uint32_t *triangles, uint32_t count,
+vsh_result vshi_patch_make(const vshi_cut_mesh *surface, uint32_t *triangles, uint32_t count,
                            vshi_patch *patch, vsh_error *error);
 void vshi_patch_free(vshi_patch *patch);
 

@@ -11,7 +11,8 @@
 
 static const char what[] = "packing charts";
 
-enum { HINT_SIDE = 128 }; /* texels: larger charts are few, and look for a place from the first row on */
+enum { LEAST_TURNED = 40 }; /* texels: shorter charts are turned by quarters alone */
+enum { HINT_SIDE = 128 };   /* texels: larger charts are few, and look for a place from the first row on */
 
 /* Share of a page's texels that padded charts may have for it to be tried. */
 static const double HOPE = 0.95;
@@ -20,6 +21,7 @@ vsh_result vshi_placing_begin(const vshi_packing *packing, int32_t height, vshi_
                               vshi_job *job, vshi_placing *p, vsh_error *error) {
     *p = (vshi_placing){.packing = packing, .job = job, .items = items, .count = count};
     VSHI_TRY(vshi_allocate((void **)&p->masks, count, sizeof *p->masks, what, error));
+    VSHI_TRY(vshi_allocate((void **)&p->fits, count, sizeof *p->fits, what, error));
     VSHI_TRY(vshi_allocate((void **)&p->order, count, sizeof *p->order, what, error));
     VSHI_TRY(vshi_allocate((void **)&p->hints, HINT_SIDE * HINT_SIDE, sizeof *p->hints, what, error));
     return vshi_page_make(packing->width, height, packing->padding, &p->page, error);
@@ -27,7 +29,9 @@ vsh_result vshi_placing_begin(const vshi_packing *packing, int32_t height, vshi_
 
 static void drop_masks(vshi_placing *p) {
     for (size_t i = 0; p->masks != NULL && i < p->count; ++i) {
-        vshi_mask_free(&p->masks[i]);
+        for (int a = 0; a < VSHI_ANGLES; ++a) {
+            vshi_mask_free(&p->masks[i][a]);
+        }
     }
 }
 
@@ -36,6 +40,7 @@ void vshi_placing_free(vshi_placing *p) {
     vshi_page_free(&p->page);
     free(p->hints);
     free(p->order);
+    free(p->fits);
     free(p->masks);
     *p = (vshi_placing){0};
 }
@@ -49,10 +54,17 @@ typedef struct masking {
 
 static void make_masks(void *user, size_t begin, size_t end) {
     const masking *m = user;
+    vshi_placing *p = m->placing;
     for (size_t i = begin; i < end; ++i) {
-        const vshi_item *item = &m->placing->items[i];
+        const vshi_item *item = &p->items[i];
+        const bool plain = vshi_patch_is_box(item->patch, item->boxes) || p->fits[i][0].width < LEAST_TURNED;
         vsh_error ignored;
-        m->results[i] = vshi_mask_make(item->patch, &item->fit, &m->placing->masks[i], &ignored);
+        m->results[i] = VSH_OK;
+        for (int a = 0; a < (plain ? 1 : VSHI_ANGLES) && m->results[i] == VSH_OK; ++a) {
+            p->fits[i][a] = vshi_mask_fit(item->patch, item->boxes, a, p->density * item->factor,
+                                          p->packing->max_stretch);
+            m->results[i] = vshi_mask_make(item->patch, &p->fits[i][a], &p->masks[i][a], &ignored);
+        }
     }
 }
 
@@ -77,12 +89,12 @@ vsh_result vshi_placing_sort(vshi_placing *p, int by, vsh_error *error) {
     sort_key *keys = NULL;
     VSHI_TRY(vshi_allocate((void **)&keys, p->count, sizeof *keys, what, error));
     for (size_t i = 0; i < p->count; ++i) {
-        const vshi_fit *fit = &p->items[i].fit;
+        const vshi_fit *fit = &p->fits[i][0];
         const double width = fit->width, height = fit->height, padding = p->packing->padding;
         const double key = by == VSHI_BY_SIDES  ? width + height
                            : by == VSHI_BY_AREA ? (width + padding) * (height + padding)
                                                 : (width > height ? width : height);
-        keys[i] = (sort_key){key, p->masks[i].touched, (uint32_t)i};
+        keys[i] = (sort_key){key, p->masks[i][0].touched, (uint32_t)i};
     }
     qsort(keys, p->count, sizeof *keys, compare_sort_keys);
     for (size_t i = 0; i < p->count; ++i) {
@@ -96,14 +108,16 @@ vsh_result vshi_placing_set(vshi_placing *p, double density, bool *possible, vsh
     masking m = {.placing = p};
     vsh_result result;
     drop_masks(p);
+    p->density = density;
     *possible = true;
     VSHI_TRY_DONE(vshi_allocate((void **)&m.results, p->count, sizeof *m.results, what, error));
-    const int32_t longest =
-        p->packing->width > p->packing->height ? p->packing->width : p->packing->height;
+    const int32_t longest = p->packing->width > p->packing->height ? p->packing->width : p->packing->height;
     for (size_t i = 0; i < p->count; ++i) {
-        vshi_item *item = &p->items[i];
-        item->fit = vshi_mask_fit(item->patch, item->size, density * item->factor, p->packing->max_stretch);
-        const int32_t longer = item->fit.width > item->fit.height ? item->fit.width : item->fit.height;
+        const vshi_item *item = &p->items[i];
+        p->fits[i][0] =
+            vshi_mask_fit(item->patch, item->boxes, 0, density * item->factor, p->packing->max_stretch);
+        const vshi_fit *fit = &p->fits[i][0];
+        const int32_t longer = fit->width > fit->height ? fit->width : fit->height;
         *possible = *possible && longer <= longest;
     }
     if (!*possible) {
@@ -115,7 +129,6 @@ vsh_result vshi_placing_set(vshi_placing *p, double density, bool *possible, vsh
             result = vshi_fail(error, m.results[i], "%s: the system refused memory", what);
             goto done;
         }
-        p->items[i].touched = p->masks[i].touched;
     }
 done:
     free(m.results);
@@ -139,39 +152,47 @@ static int32_t *hint_of(vshi_placing *p, const vshi_mask *mask) {
 /* Finds the item's place in the page and takes it; *placed tells whether there was one. */
 static vsh_result place(vshi_placing *p, uint32_t index, bool *placed, vsh_error *error) {
     vshi_item *item = &p->items[index];
-    const vshi_mask *mask = &p->masks[index];
-    const int turns = turns_of(mask);
-    vshi_mask turned[4] = {{0}};
     int32_t best_end = p->page.height;
-    int best = -1;
+    vshi_mask best = {0};
     vsh_result result = VSH_OK;
-    for (int t = 0; t < turns; ++t) {
-        int32_t x, y;
-        VSHI_TRY_DONE(vshi_mask_turn(mask, t, &turned[t], error));
-        int32_t *hint = hint_of(p, &turned[t]);
-        if (!vshi_page_find(&p->page, &turned[t], hint != NULL ? *hint : 0, best_end, &x, &y)) {
-            continue;
-        }
-        if (hint != NULL) {
-            *hint = y;
-        }
-        const int32_t end = y + turned[t].height;
-        if (best < 0 || end < best_end || (end == best_end && y < item->y)) {
-            best = t;
+    *placed = false;
+    for (int a = 0; a < VSHI_ANGLES && p->masks[index][a].runs != NULL; ++a) {
+        const vshi_mask *mask = &p->masks[index][a];
+        for (int t = 0; t < turns_of(mask); ++t) {
+            vshi_mask turned = {0};
+            int32_t x, y;
+            result = vshi_mask_turn(mask, t, &turned, error);
+            if (result != VSH_OK) {
+                vshi_mask_free(&turned);
+                goto done;
+            }
+            int32_t *hint = hint_of(p, &turned);
+            bool found = vshi_page_find(&p->page, &turned, hint != NULL ? *hint : 0, best_end, &x, &y);
+            if (found && hint != NULL) {
+                *hint = y;
+            }
+            const int32_t end = found ? y + turned.height : 0;
+            if (!found || (*placed && end == best_end && y >= item->y)) {
+                vshi_mask_free(&turned);
+                continue;
+            }
+            vshi_mask_free(&best);
+            best = turned;
             best_end = end;
             item->x = x;
             item->y = y;
+            item->angle = a;
             item->quarters = t;
+            *placed = true;
         }
     }
-    *placed = best >= 0;
-    if (best >= 0) {
-        vshi_page_put(&p->page, &turned[best], item->x, item->y);
+    if (*placed) {
+        item->fit = p->fits[index][item->angle];
+        item->touched = best.touched;
+        vshi_page_put(&p->page, &best, item->x, item->y);
     }
 done:
-    for (int t = 0; t < 4; ++t) {
-        vshi_mask_free(&turned[t]);
-    }
+    vshi_mask_free(&best);
     return result;
 }
 
@@ -213,8 +234,8 @@ typedef struct pool {
 
 static double padded_area(const vshi_placing *p, size_t i) {
     /* half of the padding around it is its own */
-    const vshi_fit *fit = &p->items[i].fit;
-    return (double)p->masks[i].touched + 0.5 * p->packing->padding * 2.0 * (fit->width + fit->height);
+    const vshi_fit *fit = &p->fits[i][0];
+    return (double)p->masks[i][0].touched + 0.5 * p->packing->padding * 2.0 * (fit->width + fit->height);
 }
 
 static vsh_result pool_make(const vshi_placing *p, pool *o, vsh_error *error) {

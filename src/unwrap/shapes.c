@@ -7,7 +7,6 @@
 #include "base/try.h"
 #include "unwrap/grow.h"
 #include "unwrap/keep.h"
-#include "unwrap/mask.h"
 
 #include <stdlib.h>
 
@@ -15,7 +14,8 @@ static const char what[] = "charts of meshes";
 
 enum { MOST_ROUNDS = 24 }; /* of joining charts */
 
-/* Share of all charts' area that charts are joined to: larger ones leave gaps between them that nothing fills. */
+/* Share of all charts' area that charts are joined to: larger ones leave gaps between them that nothing
+ * fills. */
 static const double LARGEST = 0.3;
 
 static void end_making(vshi_shape *shape) {
@@ -29,9 +29,9 @@ void vshi_shapes_free(vshi_shapes *shapes) {
     for (size_t i = 0; i < shapes->count; ++i) {
         vshi_shape *shape = &shapes->list[i];
         end_making(shape);
-        free(shape->sizes);
+        free(shape->boxes);
         vshi_patches_free(&shape->patches);
-        vshi_surface_free(&shape->surface);
+        vshi_cut_mesh_free(&shape->surface);
     }
     free(shapes->instances);
     free(shapes->list);
@@ -65,10 +65,10 @@ static vsh_result keep_own(vshi_shape *shape) {
     if (shape->mesh->uvs == NULL) {
         return VSH_OK;
     }
-    VSHI_TRY(vshi_surface_make(shape->mesh, shape->index, VSHI_CUT_UVS, &shape->surface, &shape->error));
+    VSHI_TRY(vshi_cut_mesh_make(shape->mesh, shape->index, VSHI_CUT_UVS, &shape->surface, &shape->error));
     VSHI_TRY(vshi_keep_charts(&shape->surface, &shape->patches, &shape->kept, &shape->error));
     if (!shape->kept) {
-        vshi_surface_free(&shape->surface);
+        vshi_cut_mesh_free(&shape->surface);
     }
     return VSH_OK;
 }
@@ -80,7 +80,7 @@ static vsh_result grow(const making *m, vshi_shape *shape) {
             return VSH_OK;
         }
     }
-    VSHI_TRY(vshi_surface_make(shape->mesh, shape->index, VSHI_CUT_CREASES, &shape->surface, &shape->error));
+    VSHI_TRY(vshi_cut_mesh_make(shape->mesh, shape->index, VSHI_CUT_CREASES, &shape->surface, &shape->error));
     VSHI_TRY(vshi_units_make(&shape->surface, &shape->units, &shape->error));
     VSHI_TRY(
         vshi_allocate((void **)&shape->owner, shape->units.count, sizeof *shape->owner, what, &shape->error));
@@ -129,11 +129,11 @@ static void lay_out_charts(void *user, size_t begin, size_t end) {
 
 /* The triangles of a shape's charts, ascending in each. */
 static vsh_result list_charts(vshi_shape *shape, grown *charts, vsh_error *error) {
-    const vshi_surface *s = &shape->surface;
+    const vshi_cut_mesh *s = &shape->surface;
     for (uint32_t c = 0; c < shape->chart_count; ++c) {
         charts[c].shape = shape;
     }
-    for (int pass = 0; pass < 2; ++pass) {
+    for (int pass = 0; pass < 2 && shape->chart_count > 0; ++pass) {
         for (uint32_t i = 0; i < s->count; ++i) {
             if (s->unit[i] != VSHI_NONE) {
                 grown *chart = &charts[shape->owner[s->unit[i]]];
@@ -267,15 +267,18 @@ static vsh_result join_all(const making *m, size_t triangles, vsh_error *error) 
         vshi_shape *shape = &m->shapes->list[i];
         if (!shape->kept && shape->patches.count > 1) {
             const double scale = shape->surface.scale;
-            VSHI_TRY(vshi_merging_begin(&shape->surface, &shape->patches, m->max_stretch, most / (scale * scale),
-                                        &shape->merging, error));
+            VSHI_TRY(vshi_merging_begin(&shape->surface, &shape->patches, m->max_stretch,
+                                        most / (scale * scale), &shape->merging, error));
         }
     }
     bool done_all = false;
+    size_t told = 0;
     for (int round = 0; round < MOST_ROUNDS && !done_all; ++round) {
         VSHI_TRY(join_round(m, &done_all, error));
         vshi_job_advance(m->job, 2 * triangles / MOST_ROUNDS);
+        told += 2 * triangles / MOST_ROUNDS;
     }
+    vshi_job_advance(m->job, 2 * triangles - told);
     return VSH_OK;
 }
 
@@ -285,17 +288,17 @@ static void straighten_shapes(void *user, size_t begin, size_t end) {
     const making *m = user;
     for (size_t i = begin; i < end; ++i) {
         vshi_shape *shape = &m->shapes->list[i];
-        shape->result = vshi_allocate((void **)&shape->sizes, shape->patches.count, sizeof *shape->sizes,
+        shape->result = vshi_allocate((void **)&shape->boxes, shape->patches.count, sizeof *shape->boxes,
                                       what, &shape->error);
         for (size_t c = 0; c < shape->patches.count && shape->result == VSH_OK; ++c) {
-            shape->result = vshi_patch_straighten(&shape->patches.list[c], shape->sizes[c], &shape->error);
+            shape->result = vshi_patch_straighten(&shape->patches.list[c], &shape->boxes[c], &shape->error);
         }
         vshi_job_advance(m->job, shape->mesh->triangle_count);
     }
 }
 
-vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, size_t mesh_count, double max_stretch, bool keep_uvs, vshi_job *job,
-                               vsh_error *error) {
+vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, size_t mesh_count, double max_stretch, bool keep_uvs,
+                               vshi_job *job, vsh_error *error) {
     making m = {shapes, mesh_count, max_stretch, keep_uvs, job};
     size_t triangles = 0;
     for (size_t i = 0; i < shapes->count; ++i) {
@@ -309,5 +312,6 @@ vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, size_t mesh_count, double ma
         end_making(&shapes->list[i]);
     }
     VSHI_TRY(vshi_parallel_for(job, shapes->count, 1, 0, straighten_shapes, &m, error));
-    return first_failure(shapes, error);
+    VSHI_TRY(first_failure(shapes, error));
+    return vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
 }

@@ -3,6 +3,7 @@
 #define VSHI_UNWRAP_SHAPES_H
 
 #include "base/job.h"
+#include "unwrap/mask.h"
 #include "unwrap/merge.h"
 #include "unwrap/units.h"
 
@@ -11,10 +12,10 @@
 typedef struct vshi_shape {
     const vsh_mesh *mesh; /* the first of its instances */
     size_t index;         /* of that */
-    vshi_surface surface;
+    vshi_cut_mesh surface;
     vshi_patches patches;
-    double (*sizes)[2]; /* [patches.count]: of their boxes, surface units */
-    bool kept;          /* patches are those of the mesh's UVs */
+    vshi_boxes *boxes; /* [patches.count] */
+    bool kept;         /* patches are those of the mesh's UVs */
     /* while charts are made */
     vshi_units units;
     vshi_merging merging;
@@ -44,7 +45,7 @@ void vshi_shapes_free(vshi_shapes *shapes);
 /* Makes their charts, straightened. Advances the job by VSHI_SHAPE_STEPS for each triangle of each shape,
  * about. Errors: VSH_ERROR_LIMIT (2^32 / 3 triangles), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 enum { VSHI_SHAPE_STEPS = 6 };
-vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, size_t mesh_count, double max_stretch, bool keep_uvs, vshi_job *job,
-                               vsh_error *error);
+vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, size_t mesh_count, double max_stretch, bool keep_uvs,
+                               vshi_job *job, vsh_error *error);
 
 #endif

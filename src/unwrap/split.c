@@ -72,7 +72,7 @@ static bool one_unit(const splitting *s, uint32_t a, uint32_t b) {
 
 static double way(const splitting *s, uint32_t a, uint32_t b) {
     const vshi_patch *p = s->patch;
-    const vshi_surface *surface = p->surface;
+    const vshi_cut_mesh *surface = p->surface;
     const uint32_t ta = p->triangles[a], tb = p->triangles[b];
     if (one_unit(s, a, b)) {
         return 0.0;
@@ -222,7 +222,7 @@ done:
     return result;
 }
 
-static vsh_result lay_out_next(const vshi_surface *surface, waiting_list *w, double max_stretch,
+static vsh_result lay_out_next(const vshi_cut_mesh *surface, waiting_list *w, double max_stretch,
                                vshi_patches *patches, vsh_error *error) {
     uint32_t *triangles = w->items[--w->count].triangles;
     const uint32_t count = w->items[w->count].count, depth = w->items[w->count].depth;
@@ -240,7 +240,7 @@ done:
     return result;
 }
 
-vsh_result vshi_lay_out(const vshi_surface *surface, uint32_t *triangles, uint32_t count, double max_stretch,
+vsh_result vshi_lay_out(const vshi_cut_mesh *surface, uint32_t *triangles, uint32_t count, double max_stretch,
                         vshi_patches *patches, vsh_error *error) {
     waiting_list w = {0};
     vsh_result result = wait(&w, triangles, count, 0, error);

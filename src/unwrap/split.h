@@ -16,7 +16,7 @@ void vshi_patches_free(vshi_patches *patches);
 
 /* Lays triangles (ascending, taken over) out as one chart, or as many as it takes so that none folds or
  * stretches beyond the limit; adds them to `patches`. Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_lay_out(const vshi_surface *surface, uint32_t *triangles, uint32_t count, double max_stretch,
+vsh_result vshi_lay_out(const vshi_cut_mesh *surface, uint32_t *triangles, uint32_t count, double max_stretch,
                         vshi_patches *patches, vsh_error *error);
 
 #endif

@@ -6,6 +6,16 @@
 
 #include <stdlib.h>
 
+static const double BOX = 0.9;      /* share of its box that a chart fills at least to be fitted to texels */
+static const double MOST_FIT = 1.3; /* factor by which that may change a side */
+static const double ROOM = 1e-9;    /* texels: a border that is so near to a texel's is on it */
+
+enum { FARTHEST = 1 << 24 }; /* texels: no page is so large */
+
+static int32_t whole(double x) {
+    return x < 1.0 ? 1 : x > FARTHEST ? FARTHEST : (int32_t)x;
+}
+
 typedef struct point {
     double x, y;
 } point;
@@ -100,8 +110,34 @@ static void turn(vshi_patch *p, point along, double size[2]) {
     size[1] = high[1] - low[1];
 }
 
-vsh_result vshi_patch_straighten(vshi_patch *p, double size[2], vsh_error *error) {
+/* Cosines and sines of the angles. */
+static const double TURNS[VSHI_ANGLES][2] = {{1.0, 0.0},
+                                             {0.92387953251128676, 0.38268343236508977},
+                                             {0.70710678118654752, 0.70710678118654752},
+                                             {0.38268343236508977, 0.92387953251128676}};
+
+static void measure_boxes(const vshi_patch *p, vshi_boxes *boxes) {
+    for (int a = 0; a < VSHI_ANGLES; ++a) {
+        double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+        for (uint32_t v = 0; v < p->vertex_count; ++v) {
+            const double *uv = p->uv[v];
+            const double at[2] = {TURNS[a][0] * uv[0] - TURNS[a][1] * uv[1],
+                                  TURNS[a][1] * uv[0] + TURNS[a][0] * uv[1]};
+            for (int k = 0; k < 2; ++k) {
+                low[k] = at[k] < low[k] ? at[k] : low[k];
+                high[k] = at[k] > high[k] ? at[k] : high[k];
+            }
+        }
+        for (int k = 0; k < 2; ++k) {
+            boxes->low[a][k] = low[k];
+            boxes->size[a][k] = high[k] - low[k];
+        }
+    }
+}
+
+vsh_result vshi_patch_straighten(vshi_patch *p, vshi_boxes *boxes, vsh_error *error) {
     point *points = NULL, *hull = NULL;
+    double size[2];
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&points, p->vertex_count, sizeof *points, "a chart's box", error));
     VSHI_TRY_DONE(
@@ -114,8 +150,39 @@ vsh_result vshi_patch_straighten(vshi_patch *p, double size[2], vsh_error *error
     if (size[1] > size[0]) {
         turn(p, (point){0.0, 1.0}, size);
     }
+    measure_boxes(p, boxes);
 done:
     free(hull);
     free(points);
     return result;
+}
+
+bool vshi_patch_is_box(const vshi_patch *p, const vshi_boxes *boxes) {
+    return p->area > BOX * boxes->size[0][0] * boxes->size[0][1];
+}
+
+vshi_fit vshi_mask_fit(const vshi_patch *p, const vshi_boxes *boxes, int angle, double density,
+                       double max_stretch) {
+    vshi_fit fit = {.uneven = 1.0};
+    double factor[2];
+    int32_t texels[2];
+    bool fits = angle == 0 && !p->kept && vshi_patch_is_box(p, boxes);
+    for (int k = 0; k < 2; ++k) {
+        const double length = boxes->size[angle][k] * density;
+        texels[k] = whole(floor(length + 0.5));
+        factor[k] = texels[k] / length;
+        fits = fits && factor[k] < MOST_FIT && factor[k] > 1.0 / MOST_FIT;
+    }
+    const double uneven = factor[0] / factor[1]; /* isometric but for this it stretches by the root of … */
+    fits = fits && p->stretch * sqrt(0.5 * (uneven + 1.0 / uneven)) < max_stretch;
+    fit.uneven = fits ? uneven : 1.0;
+    int32_t *sides[2] = {&fit.width, &fit.height};
+    for (int k = 0; k < 2; ++k) {
+        const double length = boxes->size[angle][k] * density, scale = fits ? density * factor[k] : density;
+        *sides[k] = fits ? texels[k] + 1 : whole(ceil(length - ROOM));
+        fit.offset[k] = (fits ? 0.5 : 0.5 * (*sides[k] - length)) - scale * boxes->low[angle][k];
+        fit.matrix[k][0] = scale * TURNS[angle][k];
+        fit.matrix[k][1] = scale * (k == 0 ? -TURNS[angle][1] : TURNS[angle][0]);
+    }
+    return fit;
 }

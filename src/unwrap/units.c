@@ -8,14 +8,14 @@
 enum { SMOOTHINGS = 2 }; /* of normals, by what is beside them */
 
 static void measure(vshi_units *g) {
-    const vshi_surface *s = g->surface;
+    const vshi_cut_mesh *s = g->surface;
     for (uint32_t u = 0; u < g->count; ++u) {
         vshi_unit_shape *unit = &g->units[u];
         vshi_vec normal = {0, 0, 0}, centre = {0, 0, 0};
         for (uint32_t i = s->unit_begin[u]; i < s->unit_begin[u + 1]; ++i) {
             const uint32_t triangle = s->unit_list[i];
             vshi_vec p[3];
-            vshi_surface_corners(s, triangle, p);
+            vshi_cut_mesh_corners(s, triangle, p);
             normal = vshi_add(normal, vshi_scale(s->normal[triangle], s->area[triangle]));
             centre =
                 vshi_add(centre, vshi_scale(vshi_add(p[0], vshi_add(p[1], p[2])), s->area[triangle] / 3.0));
@@ -27,7 +27,7 @@ static void measure(vshi_units *g) {
 }
 
 static uint32_t list_sides(vshi_units *g, bool count_only) {
-    const vshi_surface *s = g->surface;
+    const vshi_cut_mesh *s = g->surface;
     uint32_t count = 0;
     for (uint32_t u = 0; u < g->count; ++u) {
         g->begin[u] = count;
@@ -73,7 +73,7 @@ static vsh_result smooth(vshi_units *g, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vshi_units_make(const vshi_surface *surface, vshi_units *g, vsh_error *error) {
+vsh_result vshi_units_make(const vshi_cut_mesh *surface, vshi_units *g, vsh_error *error) {
     static const char what[] = "units of a surface";
     *g = (vshi_units){.surface = surface, .count = surface->unit_count};
     VSHI_TRY(vshi_allocate((void **)&g->units, g->count, sizeof *g->units, what, error));

@@ -2,7 +2,7 @@
 #ifndef VSHI_UNWRAP_UNITS_H
 #define VSHI_UNWRAP_UNITS_H
 
-#include "unwrap/surface.h"
+#include "unwrap/cut_mesh.h"
 
 typedef struct vshi_unit_shape {
     vshi_vec normal; /* unit, of the unit and what is around it: noise of a scan stays out */
@@ -12,7 +12,7 @@ typedef struct vshi_unit_shape {
 } vshi_unit_shape;
 
 typedef struct vshi_units {
-    const vshi_surface *surface;
+    const vshi_cut_mesh *surface;
     uint32_t count;
     vshi_unit_shape *units;
     uint32_t *begin; /* [count + 1] in `sides` */
@@ -20,7 +20,7 @@ typedef struct vshi_units {
 } vshi_units;
 
 /* Errors: VSH_ERROR_MEMORY. Free with vshi_units_free(), after a failure too. */
-vsh_result vshi_units_make(const vshi_surface *surface, vshi_units *units, vsh_error *error);
+vsh_result vshi_units_make(const vshi_cut_mesh *surface, vshi_units *units, vsh_error *error);
 void vshi_units_free(vshi_units *units);
 
 /* The unit beyond side vshi_units.sides[i]. */
@@ -28,7 +28,7 @@ static inline uint32_t vshi_units_beyond(const vshi_units *units, uint32_t side)
     return units->surface->unit[units->surface->partner[side] / 3];
 }
 
-static inline double vshi_side_length(const vshi_surface *s, uint32_t side) {
+static inline double vshi_side_length(const vshi_cut_mesh *s, uint32_t side) {
     return vshi_length(
         vshi_sub(s->place[s->mesh->indices[side]], s->place[s->mesh->indices[vshi_next_side(side)]]));
 }

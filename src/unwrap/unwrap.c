@@ -61,7 +61,7 @@ static vsh_result check_memory(const vsh_mesh *meshes, size_t mesh_count, const 
     double bytes = (double)mesh_count * 128.0;
     for (size_t i = 0; i < shapes->count; ++i) {
         const vsh_mesh *mesh = shapes->list[i].mesh;
-        bytes += vshi_surface_bytes(mesh) + STEPS_BYTES * (double)mesh->triangle_count +
+        bytes += vshi_cut_mesh_bytes(mesh) + STEPS_BYTES * (double)mesh->triangle_count +
                  vshi_atlas_shape_bytes(mesh->triangle_count);
     }
     for (size_t m = 0; m < mesh_count; ++m) {
@@ -92,7 +92,7 @@ static vsh_result make_items(const vshi_shapes *shapes, size_t mesh_count, const
             shape->surface.scale * shapes->instances[m].scale * (density != NULL ? density[m] : 1.0);
         for (size_t c = 0; c < shape->patches.count; ++c) {
             *item++ = (vshi_item){.patch = &shape->patches.list[c],
-                                  .size = {shape->sizes[c][0], shape->sizes[c][1]},
+                                  .boxes = &shape->boxes[c],
                                   .factor = factor,
                                   .mesh = (uint32_t)m};
         }
@@ -100,8 +100,8 @@ static vsh_result make_items(const vshi_shapes *shapes, size_t mesh_count, const
     return VSH_OK;
 }
 
-static vsh_result lay_out(vshi_shapes *shapes, size_t mesh_count, const vsh_unwrap_options *options, const vsh_run *run,
-                          vsh_error *error) {
+static vsh_result lay_out(vshi_shapes *shapes, size_t mesh_count, const vsh_unwrap_options *options,
+                          const vsh_run *run, vsh_error *error) {
     size_t triangles = 0;
     for (size_t i = 0; i < shapes->count; ++i) {
         triangles += shapes->list[i].mesh->triangle_count;
@@ -110,8 +110,8 @@ static vsh_result lay_out(vshi_shapes *shapes, size_t mesh_count, const vsh_unwr
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "unwrap: the system refused memory");
     }
-    const vsh_result result =
-        vshi_shapes_lay_out(shapes, mesh_count, options->max_stretch, options->keep_uvs == VSH_UNWRAP_KEEP, job, error);
+    const vsh_result result = vshi_shapes_lay_out(shapes, mesh_count, options->max_stretch,
+                                                  options->keep_uvs == VSH_UNWRAP_KEEP, job, error);
     vshi_job_end(job);
     return result;
 }
@@ -169,19 +169,19 @@ vsh_result vsh_uvs_usable(const vsh_mesh *mesh, const vsh_run *run, int32_t *usa
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(vshi_mesh_check_data(mesh, VSHI_MESH_ALONE, error));
-    VSHI_TRY(vshi_check_limit(&full, vshi_surface_bytes(mesh) + STEPS_BYTES * (double)mesh->triangle_count,
+    VSHI_TRY(vshi_check_limit(&full, vshi_cut_mesh_bytes(mesh) + STEPS_BYTES * (double)mesh->triangle_count,
                               "looking at UVs", error));
-    vshi_surface surface;
+    vshi_cut_mesh surface;
     bool found = false;
     vsh_result result = VSH_OK;
     *usable = 0;
     if (mesh->uvs == NULL) {
         return VSH_OK;
     }
-    VSHI_TRY_DONE(vshi_surface_make(mesh, VSHI_MESH_ALONE, VSHI_CUT_UVS, &surface, error));
+    VSHI_TRY_DONE(vshi_cut_mesh_make(mesh, VSHI_MESH_ALONE, VSHI_CUT_UVS, &surface, error));
     VSHI_TRY_DONE(vshi_keep_charts(&surface, NULL, &found, error));
     *usable = found;
 done:
-    vshi_surface_free(&surface);
+    vshi_cut_mesh_free(&surface);
     return result;
 }

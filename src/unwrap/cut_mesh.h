@@ -1,7 +1,7 @@
-/* A mesh as charts are grown over it: which triangles hang together where no chart is cut, and what of them
+/* A mesh as it is cut into charts: which triangles hang together where no chart is cut, and what of them
  * stays together. */
-#ifndef VSHI_UNWRAP_SURFACE_H
-#define VSHI_UNWRAP_SURFACE_H
+#ifndef VSHI_UNWRAP_CUT_MESH_H
+#define VSHI_UNWRAP_CUT_MESH_H
 
 #include "base/vec.h"
 #include "mesh/mesh.h"
@@ -12,7 +12,7 @@
 
 /* Side 3 i + k of triangle i runs from its corner k to corner k + 1, in the mesh's order. Normals are by that
  * order; in a mesh that is mirrored they look inwards, which no chart minds. */
-typedef struct vshi_surface {
+typedef struct vshi_cut_mesh {
     const vsh_mesh *mesh;
     size_t count; /* triangles */
     double
@@ -27,10 +27,10 @@ typedef struct vshi_surface {
     uint32_t *unit_begin; /* [unit_count + 1] in `unit_list` */
     uint32_t *unit_list;  /* triangles by unit, ascending */
     uint32_t unit_count;  /* without those of triangles that have no area */
-} vshi_surface;
+} vshi_cut_mesh;
 
 /* Bytes that a mesh's surface takes, with what making it takes, at most. */
-double vshi_surface_bytes(const vsh_mesh *mesh);
+double vshi_cut_mesh_bytes(const vsh_mesh *mesh);
 
 /* What charts are cut along. */
 enum {
@@ -39,12 +39,12 @@ enum {
 };
 
 /* The mesh has passed vshi_mesh_check_data(), and lives on. Errors: VSH_ERROR_LIMIT (2^32 / 3 triangles),
- * VSH_ERROR_MEMORY. Free with vshi_surface_free(), after a failure too. */
-vsh_result vshi_surface_make(const vsh_mesh *mesh, size_t index, int cut, vshi_surface *surface,
-                             vsh_error *error);
-void vshi_surface_free(vshi_surface *surface);
+ * VSH_ERROR_MEMORY. Free with vshi_cut_mesh_free(), after a failure too. */
+vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, int cut, vshi_cut_mesh *surface,
+                              vsh_error *error);
+void vshi_cut_mesh_free(vshi_cut_mesh *surface);
 
-static inline void vshi_surface_corners(const vshi_surface *surface, size_t i, vshi_vec corner[3]) {
+static inline void vshi_cut_mesh_corners(const vshi_cut_mesh *surface, size_t i, vshi_vec corner[3]) {
     for (int k = 0; k < 3; ++k) {
         corner[k] = surface->place[surface->mesh->indices[3 * i + (size_t)k]];
     }

@@ -1,4 +1,4 @@
-#include "unwrap/surface.h"
+#include "unwrap/cut_mesh.h"
 
 #include "base/memory.h"
 #include "base/try.h"
@@ -14,12 +14,12 @@ static const double PLANE = 0.9999995; /* 0.06°: of one plane; stretch of a pro
 static const double QUAD = 0.9;        /* 26°: halves of a quad that is not flat */
 static const double SEAM = 0.985;      /* 10° between shading normals of a vertex: modelled as an edge */
 
-double vshi_surface_bytes(const vsh_mesh *mesh) {
+double vshi_cut_mesh_bytes(const vsh_mesh *mesh) {
     /* edges.c and sides.c take 130 bytes a triangle while they look, and give them back */
     return 170.0 * (double)mesh->triangle_count + 40.0 * (double)mesh->vertex_count;
 }
 
-static void measure(vshi_surface *s) {
+static void measure(vshi_cut_mesh *s) {
     const vsh_mesh *mesh = s->mesh;
     double m[12];
     if (mesh->transform != NULL) {
@@ -42,7 +42,7 @@ static void measure(vshi_surface *s) {
     }
     for (size_t i = 0; i < s->count; ++i) {
         vshi_vec p[3];
-        vshi_surface_corners(s, i, p);
+        vshi_cut_mesh_corners(s, i, p);
         const vshi_vec cross = vshi_cross(vshi_sub(p[1], p[0]), vshi_sub(p[2], p[0]));
         const double area = 0.5 * vshi_length(cross);
         s->normal[i] = vshi_unit(cross);
@@ -62,7 +62,7 @@ static bool same_normal(const float *normals, uint32_t a, uint32_t b) {
                     vshi_unit(vshi_vec_off(normals + 3 * (size_t)b))) > SEAM;
 }
 
-static void cut_sides(vshi_surface *s, int cut) {
+static void cut_sides(vshi_cut_mesh *s, int cut) {
     const vsh_mesh *mesh = s->mesh;
     for (uint32_t side = 0; side < 3 * (uint32_t)s->count; ++side) {
         const uint32_t other = s->partner[side];
@@ -83,7 +83,7 @@ static void cut_sides(vshi_surface *s, int cut) {
 }
 
 /* Triangles that lie in the plane of the first; `queue` holds `count`. */
-static uint32_t gather_plane(vshi_surface *s, uint32_t first, uint32_t unit, uint32_t *queue) {
+static uint32_t gather_plane(vshi_cut_mesh *s, uint32_t first, uint32_t unit, uint32_t *queue) {
     uint32_t waiting = 1;
     queue[0] = first;
     s->unit[first] = unit;
@@ -100,13 +100,13 @@ static uint32_t gather_plane(vshi_surface *s, uint32_t first, uint32_t unit, uin
     return waiting;
 }
 
-static double side_length(const vshi_surface *s, uint32_t side) {
+static double side_length(const vshi_cut_mesh *s, uint32_t side) {
     return vshi_length(
         vshi_sub(s->place[s->mesh->indices[side]], s->place[s->mesh->indices[vshi_next_side(side)]]));
 }
 
 /* The side of a triangle that is a quad's diagonal if it is half of one: the longest. */
-static uint32_t longest_side(const vshi_surface *s, uint32_t triangle) {
+static uint32_t longest_side(const vshi_cut_mesh *s, uint32_t triangle) {
     uint32_t best = 3 * triangle;
     double most = -1.0;
     for (uint32_t side = 3 * triangle; side < 3 * triangle + 3; ++side) {
@@ -121,7 +121,7 @@ static uint32_t longest_side(const vshi_surface *s, uint32_t triangle) {
 
 /* The other half of a quad that is not flat: where both have their longest side in common, or as files have
  * quads, one after the other. */
-static uint32_t other_half(const vshi_surface *s, uint32_t triangle) {
+static uint32_t other_half(const vshi_cut_mesh *s, uint32_t triangle) {
     const uint32_t diagonal = s->partner[longest_side(s, triangle)];
     if (diagonal != VSHI_NONE && vshi_dot(s->normal[triangle], s->normal[diagonal / 3]) > QUAD &&
         s->partner[longest_side(s, diagonal / 3)] / 3 == triangle) {
@@ -130,7 +130,7 @@ static uint32_t other_half(const vshi_surface *s, uint32_t triangle) {
     return VSHI_NONE;
 }
 
-static vsh_result gather_units(vshi_surface *s, vsh_error *error) {
+static vsh_result gather_units(vshi_cut_mesh *s, vsh_error *error) {
     uint32_t *queue = NULL, *size = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&queue, s->count, sizeof *queue, "parts of planes", error));
@@ -167,7 +167,7 @@ done:
     return result;
 }
 
-static void list_units(vshi_surface *s) {
+static void list_units(vshi_cut_mesh *s) {
     for (size_t i = 0; i < s->count; ++i) {
         if (s->unit[i] != VSHI_NONE) {
             ++s->unit_begin[s->unit[i] + (size_t)1];
@@ -192,8 +192,9 @@ static void list_units(vshi_surface *s) {
     s->unit_begin[s->unit_count] = (uint32_t)placed;
 }
 
-vsh_result vshi_surface_make(const vsh_mesh *mesh, size_t index, int cut, vshi_surface *s, vsh_error *error) {
-    *s = (vshi_surface){.mesh = mesh, .count = mesh->triangle_count};
+vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, int cut, vshi_cut_mesh *s,
+                              vsh_error *error) {
+    *s = (vshi_cut_mesh){.mesh = mesh, .count = mesh->triangle_count};
     if (mesh->triangle_count > UINT32_MAX / 3) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu triangles, %u at most",
                          vshi_mesh_label(mesh, index).text, mesh->triangle_count, UINT32_MAX / 3);
@@ -223,7 +224,7 @@ vsh_result vshi_surface_make(const vsh_mesh *mesh, size_t index, int cut, vshi_s
     return VSH_OK;
 }
 
-void vshi_surface_free(vshi_surface *s) {
+void vshi_cut_mesh_free(vshi_cut_mesh *s) {
     free(s->unit_list);
     free(s->unit_begin);
     free(s->unit);
@@ -232,5 +233,5 @@ void vshi_surface_free(vshi_surface *s) {
     free(s->normal);
     free(s->area);
     free(s->place);
-    *s = (vshi_surface){0};
+    *s = (vshi_cut_mesh){0};
 }
