@@ -95,7 +95,7 @@ options_of() {
 @test "the documents name every option of --help, and no other" {
     local command
     "$VDBSHADE" --help >help.txt
-    for command in bake voxelize info trade query volume flat render compare regress; do
+    for command in bake voxelize info trade query volume flat render compare regress unwrap; do
         "$VDBSHADE" "$command" --help >>help.txt
     done
     options_of help.txt >told.txt

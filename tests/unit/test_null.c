@@ -51,6 +51,10 @@ static void casters_are_not_made_of_nothing(void **state) {
     REFUSED(vsh_grid_from_meshes(&mesh, 1, NULL, NULL, NULL, &error));
     MAKES_NONE(vsh_grid_from_sdf(NULL, NULL, NULL, PLACE, &error));
     REFUSED(vsh_grid_from_sdf(NULL, NULL, NULL, NULL, &error));
+    MAKES_NONE(vsh_unwrap(NULL, 1, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_unwrap(&mesh, 1, NULL, NULL, NULL, &error));
+    REFUSED(vsh_uvs_usable(NULL, NULL, &(int32_t){0}, &error));
+    REFUSED(vsh_uvs_usable(&mesh, NULL, NULL, &error));
     REFUSED(vsh_sdf_check(NULL, &error));
     MAKES_NONE(vsh_grid_from_distance(NULL, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_grid_from_distance(&distance, NULL, NULL, PLACE, &error));
