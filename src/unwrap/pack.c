@@ -2,6 +2,7 @@
  * or down by steps until one fits and the next does not, then between the two. */
 #include "unwrap/pack.h"
 
+#include "base/hash.h"
 #include "base/memory.h"
 #include "base/try.h"
 #include "unwrap/place.h"
@@ -13,6 +14,14 @@ static const double CLOSE = 0.998;   /* of the density at which rows would just 
 static const double SHRINK = 0.97;   /* of the density where it is not known by how much charts do not fit */
 static const double CLIMB = 1.008, LEAST_CLIMB = 1.001; /* from one that fits to the next that is tried */
 static const double OVER = 100.0;                       /* stands for: it is not known by how much */
+
+enum {
+    SMALLER = 4,
+    REHEARSED = -1,
+    PER_REHEARSAL = 200 /* triangles */,
+    LEAST_REHEARSALS = 20,
+    MOST_REHEARSALS = 200
+};
 
 enum { MOST_STEPS = 400, FEW = 300, MANY = 500 /* charts */ };
 
@@ -36,6 +45,9 @@ typedef struct search {
     kept *best;
     double best_density; /* 0: none yet */
     uint32_t best_pages;
+    vshi_job *job;
+    uint32_t *order; /* [count]: of rehearsals */
+    bool has_order;
 } search;
 
 static void keep(search *s, double density, uint32_t pages) {
@@ -63,11 +75,106 @@ static void give(search *s) {
     s->packing->pages = s->best_pages;
 }
 
+/* --- an order found by rehearsals on a small page */
+
+typedef struct rehearsal {
+    vshi_placing placing;
+    uint32_t *order; /* [count]: the best so far */
+    double best;
+} rehearsal;
+
+/* Rows that the order takes, and less than one for how low its charts end: the lower, the better. */
+static vsh_result rehearse(rehearsal *r, double *result_rows, vsh_error *error) {
+    int32_t rows = 0;
+    double ends = 0.0;
+    vshi_placing *p = &r->placing;
+    VSHI_TRY(vshi_placing_one_page(p, &rows, error));
+    for (size_t i = 0; i < p->count; ++i) {
+        ends += p->items[i].y;
+    }
+    *result_rows = rows + ends / ((double)p->count * p->page.height + 1.0);
+    return VSH_OK;
+}
+
+static uint64_t next_random(uint64_t *state) {
+    *state += UINT64_C(0x9e3779b97f4a7c15);
+    return vshi_mix(*state);
+}
+
+/* Moves a chart to another place in the order, mostly a near one. */
+static void move_one(uint32_t *order, size_t count, uint64_t *state) {
+    const size_t from = (size_t)(next_random(state) % count),
+                 reach = 1 + (size_t)(next_random(state) % count);
+    const size_t far = 1 + (size_t)(next_random(state) % reach);
+    const size_t to = (next_random(state) & 1) != 0 ? (from + far < count ? from + far : count - 1)
+                                                    : (from > far ? from - far : 0);
+    const uint32_t moved = order[from];
+    if (to > from) {
+        memmove(order + from, order + from + 1, (to - from) * sizeof *order);
+    } else {
+        memmove(order + to + 1, order + to, (from - to) * sizeof *order);
+    }
+    order[to] = moved;
+}
+
+static vsh_result climb(rehearsal *r, int tries, vsh_error *error) {
+    uint64_t state = r->placing.count;
+    for (int i = 0; i < tries; ++i) {
+        memcpy(r->placing.order, r->order, r->placing.count * sizeof *r->order);
+        for (uint64_t moves = 1 + next_random(&state) % 3; moves > 0; --moves) {
+            move_one(r->placing.order, r->placing.count, &state);
+        }
+        double rows = 0.0;
+        VSHI_TRY(rehearse(r, &rows, error));
+        if (rows <= r->best) {
+            r->best = rows;
+            memcpy(r->order, r->placing.order, r->placing.count * sizeof *r->order);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Fills s->order: charts in the order in which some hundred attempts on a page of a quarter of the size went
+ * best. */
+static vsh_result find_order(search *s, double density, int tries, vsh_error *error) {
+    vshi_packing small = *s->packing;
+    small.width = (small.width + SMALLER - 1) / SMALLER;
+    small.height = (small.height + SMALLER - 1) / SMALLER;
+    small.padding = (small.padding + SMALLER - 1) / SMALLER;
+    rehearsal r = {.order = s->order, .best = INFINITY};
+    bool possible = false;
+    vsh_result result;
+    VSHI_TRY_DONE(
+        vshi_placing_begin(&small, 2 * small.height, s->items, s->count, s->job, &r.placing, error));
+    r.placing.least_turned = (r.placing.least_turned + SMALLER - 1) / SMALLER;
+    VSHI_TRY_DONE(vshi_placing_set(&r.placing, density / SMALLER, &possible, error));
+    for (int by = 0; by < VSHI_ORDERS && possible; ++by) {
+        double rows = 0.0;
+        VSHI_TRY_DONE(vshi_placing_sort(&r.placing, by, error));
+        VSHI_TRY_DONE(rehearse(&r, &rows, error));
+        if (rows < r.best) {
+            r.best = rows;
+            memcpy(s->order, r.placing.order, s->count * sizeof *s->order);
+        }
+    }
+    if (possible) {
+        VSHI_TRY_DONE(climb(&r, tries, error));
+        s->has_order = true;
+    }
+done:
+    vshi_placing_free(&r.placing);
+    return result;
+}
+
 /* One attempt at the density that was set. *over: what it takes of the room there is; above 1 it does not
  * fit. */
 static vsh_result attempt(search *s, double density, int by, double *over, vsh_error *error) {
     uint32_t pages = 1;
-    VSHI_TRY(vshi_placing_sort(&s->placing, by, error));
+    if (by == REHEARSED) {
+        memcpy(s->placing.order, s->order, s->count * sizeof *s->order);
+    } else {
+        VSHI_TRY(vshi_placing_sort(&s->placing, by, error));
+    }
     if (s->packing->max_pages == 1) {
         int32_t rows = 0;
         VSHI_TRY(vshi_placing_one_page(&s->placing, &rows, error));
@@ -88,7 +195,7 @@ static vsh_result attempt_orders(search *s, double density, int orders, double *
     bool possible = false;
     *over = INFINITY;
     VSHI_TRY(vshi_placing_set(&s->placing, density, &possible, error));
-    for (int order = 0; order < orders && possible && *over > 1.0; ++order) {
+    for (int order = s->has_order ? REHEARSED : 0; order < orders && possible && *over > 1.0; ++order) {
         double own = 0.0;
         VSHI_TRY(attempt(s, density, order, &own, error));
         if (own < *over) {
@@ -145,10 +252,28 @@ static vsh_result fail_at_any(const search *s, vsh_error *error) {
         s->packing->height, s->packing->padding);
 }
 
+/* How many rehearsals a packing is worth: in step with what making the charts has taken. */
+static int rehearsals(const search *s) {
+    size_t triangles = 0;
+    for (size_t i = 0; i < s->count; ++i) {
+        triangles += s->items[i].patch->count;
+    }
+    const size_t tries = triangles / PER_REHEARSAL;
+    return s->packing->max_pages > 1 || s->count < 2 || s->count > FEW ? 0
+           : tries < LEAST_REHEARSALS                                  ? LEAST_REHEARSALS
+           : tries > MOST_REHEARSALS                                   ? MOST_REHEARSALS
+                                                                       : (int)tries;
+}
+
 /* The greatest density that fits, as far as some attempts find it. */
 static vsh_result find_density(search *s, int orders, int climbs, vsh_error *error) {
     double density = first_guess(s), over = INFINITY, shrink = SHRINK;
     int by = 0;
+    const int tries = rehearsals(s);
+    if (tries > 0) {
+        VSHI_TRY(find_order(s, density, tries, error));
+        orders = 1;
+    }
     for (int i = 0; i < MOST_STEPS && s->best_density == 0.0; ++i) {
         VSHI_TRY(attempt_orders(s, density, orders, &over, &by, error));
         if (s->best_density > 0.0) {
@@ -180,12 +305,13 @@ static vsh_result find_density(search *s, int orders, int climbs, vsh_error *err
 
 vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi_job *job, size_t units,
                      vsh_error *error) {
-    search s = {.packing = packing, .items = items, .count = count};
+    search s = {.packing = packing, .items = items, .count = count, .job = job};
     const double asked = packing->density;
     const int32_t height = packing->max_pages == 1 ? packing->height + packing->height / 4 : packing->height;
     const int orders = count < MANY ? VSHI_ORDERS : 1, climbs = count < FEW ? 8 : count < MANY ? 4 : 2;
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&s.best, count, sizeof *s.best, "packing charts", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.order, count, sizeof *s.order, "packing charts", error));
     VSHI_TRY_DONE(vshi_placing_begin(packing, height, items, count, job, &s.placing, error));
     if (asked > 0.0) {
         double over = INFINITY;
@@ -207,6 +333,7 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi
     vshi_job_advance(job, units);
 done:
     vshi_placing_free(&s.placing);
+    free(s.order);
     free(s.best);
     return result;
 }

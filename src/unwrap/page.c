@@ -198,15 +198,19 @@ bool vshi_page_find(vshi_page *page, const vshi_mask *mask, int32_t row, int32_t
     }
     limit = limit < page->height ? limit : page->height;
     const needs n = needs_of(mask);
-    const int32_t step = 1 + mask->height / STEP;
+    int32_t step = 1 + mask->height / STEP, patience = page->patience;
     for (int32_t at = row; (at = next_row(page, mask, &n, at, limit)) + mask->height <= limit; at += step) {
         if (fits_row(page, mask, at, x)) {
             *y = at;
             while (*y > row && at - *y < step && may_fit(page, &n, *y - 1) &&
                    fits_row(page, mask, *y - 1, x)) {
-                --*y; /* a large chart has stepped over it */
+                --*y; /* it has stepped over it */
             }
             return true;
+        }
+        if (page->patience > 0 && --patience == 0) {
+            patience = page->patience;
+            step *= 2;
         }
     }
     return false;

@@ -11,20 +11,24 @@
 
 static const char what[] = "packing charts";
 
-enum { LEAST_TURNED = 40 }; /* texels: shorter charts are turned by quarters alone */
-enum { HINT_SIDE = 128 };   /* texels: larger charts are few, and look for a place from the first row on */
+enum { LEAST_TURNED = 40 };          /* texels: shorter charts are turned by quarters alone */
+enum { MANY = 3000, PATIENCE = 24 }; /* charts; rows */
+enum { HINT_SIDE = 128 }; /* texels: larger charts are few, and look for a place from the first row on */
 
 /* Share of a page's texels that padded charts may have for it to be tried. */
 static const double HOPE = 0.95;
 
 vsh_result vshi_placing_begin(const vshi_packing *packing, int32_t height, vshi_item *items, size_t count,
                               vshi_job *job, vshi_placing *p, vsh_error *error) {
-    *p = (vshi_placing){.packing = packing, .job = job, .items = items, .count = count};
+    *p = (vshi_placing){
+        .packing = packing, .job = job, .items = items, .count = count, .least_turned = LEAST_TURNED};
     VSHI_TRY(vshi_allocate((void **)&p->masks, count, sizeof *p->masks, what, error));
     VSHI_TRY(vshi_allocate((void **)&p->fits, count, sizeof *p->fits, what, error));
     VSHI_TRY(vshi_allocate((void **)&p->order, count, sizeof *p->order, what, error));
     VSHI_TRY(vshi_allocate((void **)&p->hints, HINT_SIDE * HINT_SIDE, sizeof *p->hints, what, error));
-    return vshi_page_make(packing->width, height, packing->padding, &p->page, error);
+    VSHI_TRY(vshi_page_make(packing->width, height, packing->padding, &p->page, error));
+    p->page.patience = count > MANY ? PATIENCE : 0;
+    return VSH_OK;
 }
 
 static void drop_masks(vshi_placing *p) {
@@ -57,7 +61,8 @@ static void make_masks(void *user, size_t begin, size_t end) {
     vshi_placing *p = m->placing;
     for (size_t i = begin; i < end; ++i) {
         const vshi_item *item = &p->items[i];
-        const bool plain = vshi_patch_is_box(item->patch, item->boxes) || p->fits[i][0].width < LEAST_TURNED;
+        const bool plain =
+            vshi_patch_is_box(item->patch, item->boxes) || p->fits[i][0].width < p->least_turned;
         vsh_error ignored;
         m->results[i] = VSH_OK;
         for (int a = 0; a < (plain ? 1 : VSHI_ANGLES) && m->results[i] == VSH_OK; ++a) {
