@@ -2,6 +2,7 @@
 
 #include "base/memory.h"
 #include "base/try.h"
+#include "unwrap/settle.h"
 
 #include <stdlib.h>
 
@@ -97,19 +98,42 @@ done:
 
 /* --- meshes */
 
+/* UVs of a mesh's vertices, chart by chart. */
+static vsh_result place_vertices(struct vsh_atlas *a, size_t m, const vshi_shape *shape,
+                                 const vshi_atlas_shape *made, const vshi_packing *packing,
+                                 const vshi_item *items, vsh_error *error) {
+    float(*placed)[2] = NULL; /* of a patch */
+    uint32_t most = 0;
+    vsh_result result;
+    for (size_t c = 0; c < made->chart_count; ++c) {
+        most = shape->patches.list[c].vertex_count > most ? shape->patches.list[c].vertex_count : most;
+    }
+    VSHI_TRY_DONE(vshi_allocate((void **)&placed, most, sizeof *placed, what, error));
+    size_t vertex = 0;
+    for (size_t c = 0; c < made->chart_count; ++c) {
+        const vshi_patch *p = &shape->patches.list[c];
+        for (uint32_t v = 0; v < p->vertex_count; ++v) {
+            double at[2];
+            vshi_fit_turn(&items[c].fit, items[c].quarters, p->uv[v], at);
+            placed[v][0] = (float)((items[c].x + at[0]) / packing->width);
+            placed[v][1] = (float)((items[c].y + at[1]) / packing->height);
+        }
+        VSHI_TRY_DONE(vshi_settle(p, placed, error));
+        for (; vertex < made->chart_vertices && made->vertex_chart[vertex] == c; ++vertex) {
+            memcpy(a->uvs[m] + 2 * vertex, placed[made->patch_vertex[vertex]], sizeof *placed);
+        }
+    }
+done:
+    free(placed);
+    return result;
+}
+
 static vsh_result mesh_make(struct vsh_atlas *a, size_t m, const vshi_shape *shape,
                             const vshi_atlas_shape *made, const vshi_packing *packing, const vshi_item *items,
                             uint32_t first_chart, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&a->uvs[m], made->vertex_count, 2 * sizeof(float), what, error));
     VSHI_TRY(vshi_allocate((void **)&a->mesh_charts[m], made->triangle_count, sizeof(uint32_t), what, error));
-    for (size_t v = 0; v < made->chart_vertices; ++v) {
-        const vshi_item *item = &items[made->vertex_chart[v]];
-        const vshi_patch *p = &shape->patches.list[made->vertex_chart[v]];
-        double at[2];
-        vshi_fit_turn(&item->fit, item->quarters, p->uv[made->patch_vertex[v]], at);
-        a->uvs[m][2 * v] = (float)((item->x + at[0]) / packing->width);
-        a->uvs[m][2 * v + 1] = (float)((item->y + at[1]) / packing->height);
-    }
+    VSHI_TRY(place_vertices(a, m, shape, made, packing, items, error));
     for (size_t i = 0; i < made->triangle_count; ++i) {
         a->mesh_charts[m][i] = made->charts[i] != VSH_NO_CHART ? first_chart + made->charts[i] : VSH_NO_CHART;
         a->info.flat_triangles += made->charts[i] == VSH_NO_CHART;

@@ -23,7 +23,7 @@ enum {
     MOST_REHEARSALS = 200
 };
 
-enum { MOST_STEPS = 400, FEW = 300, MANY = 500 /* charts */ };
+enum { MOST_STEPS = 400, FEW = 300, MANY = 500, LEGION = 20000 /* charts */ };
 
 double vshi_pack_bytes(const vshi_packing *packing, size_t count) {
     return vshi_page_bytes(packing->width, packing->height) + (double)count * (sizeof(vshi_mask) + 200.0);
@@ -308,7 +308,10 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi
     search s = {.packing = packing, .items = items, .count = count, .job = job};
     const double asked = packing->density;
     const int32_t height = packing->max_pages == 1 ? packing->height + packing->height / 4 : packing->height;
-    const int orders = count < MANY ? VSHI_ORDERS : 1, climbs = count < FEW ? 8 : count < MANY ? 4 : 2;
+    const int orders = count < MANY ? VSHI_ORDERS : 1, climbs = count < FEW      ? 8
+                                                                : count < MANY   ? 4
+                                                                : count < LEGION ? 2
+                                                                                 : 1;
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&s.best, count, sizeof *s.best, "packing charts", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&s.order, count, sizeof *s.order, "packing charts", error));

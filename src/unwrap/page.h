@@ -10,7 +10,7 @@ typedef struct vshi_page {
     uint64_t *taken;   /* [height][words]: texels that no other chart may touch; those past the width are */
     int32_t *free_run; /* [height]: longest run of free texels */
     int32_t used;      /* rows up to the last that a chart touches */
-    int32_t patience;            /* rows that a search looks at closely before it begins to leave some out; 0: all */
+    int32_t patience;  /* rows that a search looks at closely before it begins to leave some out; 0: all */
     uint64_t *forbidden, *grown; /* [words + 1]: room of the search */
 } vshi_page;
 

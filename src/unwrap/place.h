@@ -14,7 +14,7 @@ typedef struct vshi_placing {
     vshi_item *items; /* [count] */
     size_t count;
     double density;
-    int32_t least_turned; /* texels: shorter charts are turned by quarters alone */
+    int32_t least_turned;            /* texels: shorter charts are turned by quarters alone */
     vshi_mask (*masks)[VSHI_ANGLES]; /* [count]; runs are NULL at angles that are not tried */
     vshi_fit (*fits)[VSHI_ANGLES];   /* [count] */
     uint32_t *order;                 /* [count]: items, the first first */
