@@ -23,7 +23,7 @@ enum {
     MOST_REHEARSALS = 200
 };
 
-enum { MOST_STEPS = 400, FEW = 300, MANY = 500, LEGION = 20000 /* charts */ };
+enum { MOST_STEPS = 400, FEW = 300, MANY = 500, LEGION = 20000 /* charts */, SMALL = 10000 /* triangles */ };
 
 double vshi_pack_bytes(const vshi_packing *packing, size_t count) {
     return vshi_page_bytes(packing->width, packing->height) + (double)count * (sizeof(vshi_mask) + 200.0);
@@ -252,13 +252,17 @@ static vsh_result fail_at_any(const search *s, vsh_error *error) {
         s->packing->height, s->packing->padding);
 }
 
-/* How many rehearsals a packing is worth: in step with what making the charts has taken. */
-static int rehearsals(const search *s) {
+static size_t count_triangles(const search *s) {
     size_t triangles = 0;
     for (size_t i = 0; i < s->count; ++i) {
         triangles += s->items[i].patch->count;
     }
-    const size_t tries = triangles / PER_REHEARSAL;
+    return triangles;
+}
+
+/* How many rehearsals a packing is worth: in step with what making the charts has taken. */
+static int rehearsals(const search *s) {
+    const size_t tries = count_triangles(s) / PER_REHEARSAL;
     return s->packing->max_pages > 1 || s->count < 2 || s->count > FEW ? 0
            : tries < LEAST_REHEARSALS                                  ? LEAST_REHEARSALS
            : tries > MOST_REHEARSALS                                   ? MOST_REHEARSALS
@@ -308,10 +312,11 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi
     search s = {.packing = packing, .items = items, .count = count, .job = job};
     const double asked = packing->density;
     const int32_t height = packing->max_pages == 1 ? packing->height + packing->height / 4 : packing->height;
-    const int orders = count < MANY ? VSHI_ORDERS : 1, climbs = count < FEW      ? 8
-                                                                : count < MANY   ? 4
-                                                                : count < LEGION ? 2
-                                                                                 : 1;
+    const int orders = count < MANY ? VSHI_ORDERS : 1;
+    const int climbs = count < FEW && count_triangles(&s) > SMALL ? 8
+                       : count < MANY                             ? 4
+                       : count < LEGION                           ? 2
+                                                                  : 1;
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&s.best, count, sizeof *s.best, "packing charts", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&s.order, count, sizeof *s.order, "packing charts", error));

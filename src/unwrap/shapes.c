@@ -16,7 +16,7 @@ enum { MOST_ROUNDS = 24 }; /* of joining charts */
 
 /* Share of all charts' area that charts are joined to: larger ones leave gaps between them that nothing
  * fills. */
-static const double LARGEST = 0.3;
+static const double LARGEST = 0.35;
 
 static void end_making(vshi_shape *shape) {
     vshi_merging_free(&shape->merging);
