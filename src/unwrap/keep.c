@@ -149,6 +149,7 @@ vsh_result vshi_keep_charts(const vshi_cut_mesh *s, vshi_patches *patches, bool 
     vsh_result result;
     VSHI_TRY_DONE(vshi_patch_make(s, triangles, count, &whole, error));
     take_uvs(&whole, senses < 0, 1.0);
+    whole.kept = true; /* of many parts, each with a border of its own */
     VSHI_TRY_DONE(vshi_patch_overlaps(&whole, &overlaps, error));
     *usable = !overlaps;
     if (*usable && patches != NULL) {

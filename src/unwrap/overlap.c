@@ -1,7 +1,7 @@
-/* Two looks, as neither sees everything. Borders that cross are found by a grid of cells over them: where no
- * triangle flips, a chart that lies over itself has such borders, unless they meet only in corners and along
- * each other, as those of regular grids do. A raster, about as fine as the triangles, sees these: each of its
- * points is of one triangle at most. */
+/* Three looks, as none sees everything. Holes that are turned inside out are found by how they run; borders
+ * that cross are found by a grid of cells over them: where no triangle flips, a chart that lies over itself
+ * has such borders, unless they meet only in corners and along each other, as those of regular grids do. A
+ * raster, about as fine as the triangles, sees these: each of its points is of one triangle at most. */
 #include "unwrap/overlap.h"
 
 #include "base/memory.h"
@@ -174,6 +174,31 @@ static size_t file_side(borders *b, uint32_t i, bool list) {
     return passed;
 }
 
+/* Holes run clockwise, as what they bound is outside of them. One that runs the other way has been turned
+ * inside out, and lies over what is around it without a border that crosses another. */
+static vsh_result holes_overlap(const borders *b, bool *overlaps, vsh_error *error) {
+    const vshi_patch *p = b->patch;
+    uint32_t *out = NULL, found = 0; /* [vertex_count]: the side of the border that leaves a vertex, + 1 */
+    VSHI_TRY(vshi_allocate((void **)&out, p->vertex_count, sizeof *out, what, error));
+    for (uint32_t i = 0; i < b->count; ++i) {
+        out[p->corner[b->sides[i] / 3][b->sides[i] % 3]] = b->sides[i] + 1;
+    }
+    for (uint32_t v = 0; v < p->vertex_count; ++v) {
+        double doubled = 0.0;
+        for (uint32_t at = v; out[at] != 0;) {
+            const uint32_t side = out[at] - 1, next = p->corner[side / 3][(side + 1) % 3];
+            const double *from = p->uv[at], *to = p->uv[next], *first = p->uv[v];
+            doubled += (from[0] - first[0]) * (to[1] - first[1]) - (from[1] - first[1]) * (to[0] - first[0]);
+            out[at] = 0;
+            at = next;
+        }
+        found += doubled > TOUCH * b->frame.size * b->frame.size;
+    }
+    free(out);
+    *overlaps = found > 1;
+    return VSH_OK;
+}
+
 static bool any_crosses(const borders *b) {
     const size_t cells = (size_t)b->cells * b->cells;
     for (size_t cell = 0, begin = 0; cell < cells; begin = b->begin[cell++]) {
@@ -196,6 +221,12 @@ static vsh_result borders_overlap(const vshi_patch *p, const frame *f, bool *ove
     for (uint32_t side = 0; side < 3 * p->count; ++side) {
         if (p->beyond[side] == VSHI_NONE) {
             b.sides[b.count++] = side;
+        }
+    }
+    if (!p->kept) {
+        VSHI_TRY_DONE(holes_overlap(&b, overlaps, error));
+        if (*overlaps) {
+            goto done;
         }
     }
     b.cells = (uint32_t)sqrt((double)b.count) + 1;

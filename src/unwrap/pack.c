@@ -18,8 +18,8 @@ static const double OVER = 100.0;                       /* stands for: it is not
 enum {
     SMALLER = 4,
     REHEARSED = -1,
-    PER_REHEARSAL = 200 /* triangles */,
-    LEAST_REHEARSALS = 20,
+    PER_REHEARSAL = 300 /* triangles */,
+    LEAST_REHEARSALS = 12,
     MOST_REHEARSALS = 200
 };
 

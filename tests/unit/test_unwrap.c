@@ -138,6 +138,26 @@ static void a_soup_of_random_triangles_has_places(void **state) {
     free(s);
 }
 
+/* So rough that many an edge is a crease that ends within a chart: a slit that must not open inside out. */
+static void rough_balls_lie_over_themselves_nowhere(void **state) {
+    (void)state;
+    for (uint64_t seed = 1; seed <= 6; ++seed) {
+        uint64_t random = seed;
+        shape *s = shape_new();
+        shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 60);
+        for (size_t v = 0; v < s->vertices; ++v) {
+            const float k = 1.0F + (0.01F + 0.004F * (float)seed) * (float)next_number(&random);
+            for (int i = 0; i < 3; ++i) {
+                s->positions[v][i] *= k;
+            }
+        }
+        const vsh_mesh mesh = shape_mesh(s, "rough");
+        const vsh_unwrap_options o = unwrap_into(512);
+        assert_true(unwrap_well(&mesh, 1, &o, NULL).stretch < 1.05);
+        free(s);
+    }
+}
+
 /* Points, lines, slivers of a millionth of their length, and a triangle among them. */
 static void triangles_without_area_have_no_chart_and_slivers_have_one(void **state) {
     (void)state;
@@ -269,6 +289,7 @@ int main(void) {
         cmocka_unit_test(a_fan_of_triangles_at_one_edge_has_places),
         cmocka_unit_test(copies_of_triangles_have_places_of_their_own),
         cmocka_unit_test(a_soup_of_random_triangles_has_places),
+        cmocka_unit_test(rough_balls_lie_over_themselves_nowhere),
         cmocka_unit_test(triangles_without_area_have_no_chart_and_slivers_have_one),
         cmocka_unit_test(a_triangle_alone_fills_half_of_its_page),
         cmocka_unit_test(units_do_not_matter),
