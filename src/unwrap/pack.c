@@ -23,7 +23,14 @@ enum {
     MOST_REHEARSALS = 200
 };
 
-enum { MOST_STEPS = 400, FEW = 300, MANY = 500, LEGION = 20000 /* charts */, SMALL = 10000 /* triangles */ };
+enum {
+    MOST_STEPS = 400,
+    FEW = 300,
+    MANY = 500,
+    LEGION = 20000 /* charts */,
+    SMALL = 10000 /* triangles */,
+    ATTEMPTS = 16
+};
 
 double vshi_pack_bytes(const vshi_packing *packing, size_t count) {
     return vshi_page_bytes(packing->width, packing->height) + (double)count * (sizeof(vshi_mask) + 200.0);
@@ -48,6 +55,7 @@ typedef struct search {
     vshi_job *job;
     uint32_t *order; /* [count]: of rehearsals */
     bool has_order;
+    size_t units, told; /* of the job: all, and what it was told of */
 } search;
 
 static void keep(search *s, double density, uint32_t pages) {
@@ -166,6 +174,16 @@ done:
     return result;
 }
 
+/* How many attempts there will be is not known: each is some share of a guess, and the end is kept for the
+ * end. */
+static void tell_attempt(search *s) {
+    const size_t share = s->units / ATTEMPTS;
+    if (s->told + share < s->units) {
+        vshi_job_advance(s->job, share);
+        s->told += share;
+    }
+}
+
 /* One attempt at the density that was set. *over: what it takes of the room there is; above 1 it does not
  * fit. */
 static vsh_result attempt(search *s, double density, int by, double *over, vsh_error *error) {
@@ -183,6 +201,7 @@ static vsh_result attempt(search *s, double density, int by, double *over, vsh_e
         VSHI_TRY(vshi_placing_pages(&s->placing, &pages, error));
         *over = pages <= s->packing->max_pages ? 1.0 : OVER;
     }
+    tell_attempt(s);
     if (*over <= 1.0 && density > s->best_density) {
         keep(s, density, pages);
     }
@@ -309,7 +328,7 @@ static vsh_result find_density(search *s, int orders, int climbs, vsh_error *err
 
 vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi_job *job, size_t units,
                      vsh_error *error) {
-    search s = {.packing = packing, .items = items, .count = count, .job = job};
+    search s = {.packing = packing, .items = items, .count = count, .job = job, .units = units};
     const double asked = packing->density;
     const int32_t height = packing->max_pages == 1 ? packing->height + packing->height / 4 : packing->height;
     const int orders = count < MANY ? VSHI_ORDERS : 1;
@@ -338,7 +357,9 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi
         VSHI_TRY_DONE(find_density(&s, orders, climbs, error));
     }
     give(&s);
-    vshi_job_advance(job, units);
+    if (vshi_job_advance(job, units - s.told)) {
+        result = vshi_job_fail_cancelled(job, error);
+    }
 done:
     vshi_placing_free(&s.placing);
     free(s.order);

@@ -10,7 +10,7 @@ static const double LEAST_STRETCH = 1.01; /* of max_stretch: below, rounding and
 static const double STEPS_BYTES =
     420.0; /* a triangle, while charts are made: patches, trials and their equations */
 
-enum { MOST_PADDING = 4096 };
+enum { MOST_PADDING = 4096, PACK_UNITS = 1024 };
 
 static vsh_result check_whole(const char *name, int32_t value, int32_t least, int32_t most,
                               vsh_error *error) {
@@ -119,11 +119,11 @@ static vsh_result lay_out(vshi_shapes *shapes, size_t mesh_count, const vsh_unwr
 static vsh_result pack(vshi_packing *packing, vshi_item *items, size_t count, const vsh_run *run,
                        vsh_error *error) {
     VSHI_TRY(vshi_check_limit(run, vshi_pack_bytes(packing, count), "packing charts", error));
-    vshi_job *job = vshi_job_begin(run, "pack", count);
+    vshi_job *job = vshi_job_begin(run, "pack", PACK_UNITS);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "unwrap: the system refused memory");
     }
-    const vsh_result result = vshi_pack(packing, items, count, job, count, error);
+    const vsh_result result = vshi_pack(packing, items, count, job, PACK_UNITS, error);
     vshi_job_end(job);
     return result;
 }

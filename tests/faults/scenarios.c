@@ -280,6 +280,60 @@ end:
     return result;
 }
 
+/* A bent sheet, a copy of it and an instance, on pages that are searched for; then with the UVs that came of
+ * it. */
+static vsh_result unwrap(const vsh_run *run, vsh_error *error) {
+    enum { N = 3, VERTICES = (N + 1) * (N + 1), TRIANGLES = 4 * N * N };
+    static float positions[VERTICES][3];
+    static uint32_t indices[TRIANGLES][3];
+    static const double twice[12] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0};
+    for (uint32_t v = 0; v < VERTICES; ++v) {
+        const float x = (float)(v % (N + 1)), y = (float)(v / (N + 1));
+        positions[v][0] = x;
+        positions[v][1] = y;
+        positions[v][2] = 0.05F * (x * x + 2 * y * y);
+    }
+    for (uint32_t q = 0; q < 2 * N * N; ++q) {
+        const uint32_t v = q / N % N * (N + 1) + q % N, quad[4] = {v, v + 1, v + N + 2, v + N + 1};
+        for (uint32_t t = 0; t < 2; ++t) {
+            indices[2 * q + t][0] = quad[0];
+            indices[2 * q + t][1] = quad[1 + t];
+            indices[2 * q + t][2] = quad[2 + t];
+        }
+    }
+    vsh_mesh meshes[2] = {{.positions = positions[0],
+                           .indices = indices[0],
+                           .vertex_count = VERTICES,
+                           .triangle_count = TRIANGLES}};
+    meshes[1] = meshes[0];
+    meshes[1].transform = twice;
+    vsh_unwrap_options options = vsh_unwrap_options_default();
+    options.width = options.height = 64;
+    options.max_pages = 2;
+    options.keep_uvs = VSH_UNWRAP_KEEP;
+    vsh_atlas *atlas = NULL, *again = NULL;
+    vsh_result result;
+    MAKE(atlas, vsh_unwrap(meshes, 2, &options, run, &atlas, error));
+    const vsh_atlas_mesh placed = vsh_atlas_mesh_view(atlas, 0);
+    static float corners[3 * TRIANGLES][3];
+    for (size_t v = 0; v < placed.vertex_count; ++v) {
+        for (size_t k = 0; k < 3; ++k) {
+            corners[v][k] = positions[placed.sources[v]][k];
+        }
+    }
+    const vsh_mesh own = {.positions = corners[0],
+                          .uvs = placed.uvs,
+                          .indices = placed.indices,
+                          .vertex_count = placed.vertex_count,
+                          .triangle_count = placed.triangle_count};
+    options.max_pages = 1;
+    MAKE(again, vsh_unwrap(&own, 1, &options, run, &again, error));
+end:
+    vsh_atlas_free(again);
+    vsh_atlas_free(atlas);
+    return result;
+}
+
 static vsh_result compare(const vsh_run *run, vsh_error *error) {
     float golden[SIDE * SIDE], values[SIDE * SIDE];
     parts_fill(golden, SIDE * SIDE);
@@ -310,5 +364,6 @@ const scenario scenarios[] = {
     {"images read", read_images},
     {"an output's origin", tell_origin},
     {"a comparison", compare},
+    {"an atlas", unwrap},
 };
 const size_t scenario_count = sizeof scenarios / sizeof scenarios[0];

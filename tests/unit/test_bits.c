@@ -327,6 +327,30 @@ static void level_set_of_a_mesh(const context *c, int32_t unused, bits *b) {
     vsh_model_free(model);
 }
 
+/* Charts of the asset: of no library, but for the file. */
+static void atlas_of_a_mesh(const context *c, int32_t unused, bits *b) {
+    (void)unused;
+    vsh_model *model = cloister(&c->run);
+    vsh_mesh meshes[64];
+    const size_t count = vsh_model_mesh_count(model);
+    assert_in_range(count, 1, 64);
+    for (size_t i = 0; i < count; ++i) {
+        meshes[i] = vsh_model_mesh(model, i, -1);
+    }
+    vsh_unwrap_options options = vsh_unwrap_options_default();
+    options.width = options.height = 512;
+    options.padding = 2;
+    vsh_atlas *atlas = NULL;
+    vsh_error error;
+    check(vsh_unwrap(meshes, count, &options, &c->run, &atlas, &error), &error);
+    for (size_t i = 0; i < count; ++i) {
+        const vsh_atlas_mesh mesh = vsh_atlas_mesh_view(atlas, i);
+        add_floats(b, mesh.uvs, 2 * mesh.vertex_count);
+    }
+    vsh_atlas_free(atlas);
+    vsh_model_free(model);
+}
+
 /* Rays are Embree's. */
 static void exact(const context *c, int32_t is_ao, bits *b) {
     const vsh_heights_source source = hills();
