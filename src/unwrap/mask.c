@@ -1,3 +1,4 @@
+/* Borders are drawn, and what lies between them is filled, however many triangles that are. */
 #include "unwrap/mask.h"
 
 #include "base/memory.h"
@@ -49,13 +50,16 @@ static void rows_of(const double at[3][2], int32_t height, int32_t *first, int32
     *last = *last > *first ? *last : *first;
 }
 
-static void place_corners(const vshi_patch *p, const vshi_fit *fit, uint32_t i, double at[3][2]) {
-    for (int k = 0; k < 3; ++k) {
-        const double *uv = p->uv[p->corner[i][k]];
+/* The ends of a side, as a triangle without area: what it touches is told as of one. */
+static void place_side(const vshi_patch *p, const vshi_fit *fit, uint32_t side, double at[3][2]) {
+    for (int k = 0; k < 2; ++k) {
+        const double *uv = p->uv[p->corner[side / 3][(side + (uint32_t)k) % 3]];
         for (int d = 0; d < 2; ++d) {
             at[k][d] = uv[0] * fit->matrix[d][0] + uv[1] * fit->matrix[d][1] + fit->offset[d];
         }
     }
+    at[2][0] = at[1][0];
+    at[2][1] = at[1][1];
 }
 
 /* Sets bits begin … end - 1. */
@@ -98,30 +102,95 @@ static void read_runs(const uint64_t *bits, size_t words, vshi_mask *mask, bool 
     mask->row[mask->height] = at;
 }
 
-vsh_result vshi_mask_make(const vshi_patch *p, const vshi_fit *fit, vshi_mask *mask, vsh_error *error) {
-    *mask = (vshi_mask){.width = fit->width, .height = fit->height};
-    const size_t words = ((size_t)mask->width + 63) / 64;
-    uint64_t *bits = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&mask->row, (size_t)mask->height + 1, sizeof *mask->row, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&bits, words * (size_t)mask->height, sizeof *bits, what, error));
-    for (uint32_t i = 0; i < p->count; ++i) {
+/* Where borders cross the middle lines of rows. */
+typedef struct crossings {
+    uint32_t *row; /* [height + 1] in `at` */
+    double *at;
+} crossings;
+
+static int compare_crossings(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Counts, or lists, the rows whose middle a side crosses: from one end's on, to before the other's. */
+static void cross(crossings *c, const double at[3][2], int32_t height, bool list) {
+    const double *low = at[0][1] < at[1][1] ? at[0] : at[1], *high = at[0][1] < at[1][1] ? at[1] : at[0];
+    const int32_t first = clamp(ceil(low[1] - 0.5), height), end = clamp(ceil(high[1] - 0.5), height);
+    for (int32_t y = first; y < end; ++y) {
+        if (list) {
+            c->at[c->row[y]++] = low[0] + (high[0] - low[0]) * ((y + 0.5 - low[1]) / (high[1] - low[1]));
+        } else {
+            ++c->row[y + 1];
+        }
+    }
+}
+
+/* Sets what lies between borders. */
+static void fill_between(crossings *c, uint64_t *bits, size_t words, const vshi_mask *mask) {
+    for (int32_t y = 0; y < mask->height; ++y) {
+        const uint32_t begin = y > 0 ? c->row[y - 1] : 0, end = c->row[y]; /* begins have become ends */
+        if (end > begin) {
+            qsort(c->at + begin, end - begin, sizeof *c->at, compare_crossings);
+        }
+        for (uint32_t i = begin; i + 1 < end; i += 2) {
+            const int32_t from = clamp(floor(c->at[i] + ROOM), mask->width),
+                          until = clamp(ceil(c->at[i + 1] - ROOM), mask->width);
+            set_bits(bits + words * (size_t)y, from, until);
+        }
+    }
+}
+
+/* Sets the texels that borders touch, and counts where they cross the rows. */
+static void draw_borders(const vshi_patch *p, const vshi_fit *fit, const vshi_mask *mask, uint64_t *bits,
+                         size_t words, crossings *c) {
+    for (uint32_t side = 0; side < 3 * p->count; ++side) {
+        if (p->beyond[side] != VSHI_NONE) {
+            continue;
+        }
         double at[3][2];
         int32_t first, last;
-        place_corners(p, fit, i, at);
+        place_side(p, fit, side, at);
         rows_of(at, mask->height, &first, &last);
         for (int32_t y = first; y <= last; ++y) {
             const vshi_run run = touched_in(at, y, mask->width);
             set_bits(bits + words * (size_t)y, run.begin, run.end);
         }
+        cross(c, at, mask->height, false);
     }
+}
+
+vsh_result vshi_mask_make(const vshi_patch *p, const vshi_fit *fit, vshi_mask *mask, vsh_error *error) {
+    *mask = (vshi_mask){.width = fit->width, .height = fit->height};
+    const size_t words = ((size_t)mask->width + 63) / 64;
+    uint64_t *bits = NULL;
+    crossings c = {NULL, NULL};
+    vsh_result result;
+    VSHI_TRY_DONE(
+        vshi_allocate((void **)&mask->row, (size_t)mask->height + 1, sizeof *mask->row, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&c.row, (size_t)mask->height + 1, sizeof *c.row, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&bits, words * (size_t)mask->height, sizeof *bits, what, error));
+    draw_borders(p, fit, mask, bits, words, &c);
+    for (int32_t y = 0; y < mask->height; ++y) {
+        c.row[y + 1] += c.row[y];
+    }
+    VSHI_TRY_DONE(vshi_allocate((void **)&c.at, c.row[mask->height], sizeof *c.at, what, error));
+    for (uint32_t side = 0; side < 3 * p->count; ++side) {
+        if (p->beyond[side] == VSHI_NONE) {
+            double at[3][2];
+            place_side(p, fit, side, at);
+            cross(&c, at, mask->height, true);
+        }
+    }
+    fill_between(&c, bits, words, mask);
     read_runs(bits, words, mask, false);
     VSHI_TRY_DONE(
         vshi_allocate((void **)&mask->runs, mask->row[mask->height], sizeof *mask->runs, what, error));
     read_runs(bits, words, mask, true);
 done:
     free(bits);
+    free(c.at);
+    free(c.row);
     return result;
 }
 
