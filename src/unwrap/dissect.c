@@ -55,14 +55,15 @@ static void number(dissecting *d, const part *p) {
     }
 }
 
-/* Sorts a part's vertices into those before a plane, those beyond it, and those before it that touch them,
+/* `turned`: before is beyond, for where one vertex beyond, the tip of a fan, touches all that is before.
+ * Sorts a part's vertices into those before a plane, those beyond it, and those before it that touch them,
  * which come last. Returns false where that parts nothing. */
-static bool cut(dissecting *d, const part *p, uint32_t tag, part halves[2]) {
+static bool cut(dissecting *d, const part *p, uint32_t tag, bool turned, part halves[2]) {
     double middle;
     const int axis = find_plane(d, p, &middle);
     for (uint32_t i = p->begin; i < p->end; ++i) {
         const uint32_t v = d->list[i];
-        d->side[v] = 2 * tag + (along(d->place[v], axis) > middle);
+        d->side[v] = 2 * tag + ((along(d->place[v], axis) > middle) != turned);
     }
     uint32_t near = p->begin, beyond = 0, between = p->end;
     for (uint32_t i = p->begin; i < p->end; ++i) {
@@ -124,10 +125,13 @@ vsh_result vshi_dissect(const uint32_t *begin, const uint32_t *neighbours, const
     while (waiting > 0) {
         const part p = stack[--waiting];
         part halves[2];
-        if (p.end - p.begin <= FEW || p.depth >= DEEPEST || !cut(&d, &p, tag++, halves)) {
+        if (p.end - p.begin <= FEW || p.depth >= DEEPEST ||
+            (!cut(&d, &p, tag, false, halves) && !cut(&d, &p, tag, true, halves))) {
+            ++tag;
             number(&d, &p);
             continue;
         }
+        ++tag;
         stack[waiting++] = halves[0];
         stack[waiting++] = halves[1];
     }

@@ -94,6 +94,33 @@ static void a_fan_of_triangles_at_one_edge_has_places(void **state) {
     unwrap_shape(s, "fan");
 }
 
+/* One vertex with all of a wavy cone's triangles: eliminated too early, it would fill the equations. */
+static void a_tip_of_thousands_of_triangles_takes_no_time(void **state) {
+    (void)state;
+    enum { AROUND = 30000 };
+    shape *s = shape_new();
+    const uint32_t tip = shape_vertex(s, 0, 0, 1);
+    for (int i = 0; i < AROUND; ++i) {
+        const double angle = 6.283185307179586 * i / AROUND;
+        shape_vertex(s, cos(angle), sin(angle), 0.1 * sin(7 * angle));
+    }
+    for (uint32_t i = 0; i < AROUND; ++i) {
+        shape_triangle(s, tip, 1 + i, 1 + (i + 1) % AROUND);
+    }
+    const vsh_mesh mesh = shape_mesh(s, "tip");
+    const vsh_unwrap_options o = unwrap_into(256);
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 100000000;
+    vsh_atlas *atlas = NULL;
+    vsh_error error = {0};
+    if (vsh_unwrap(&mesh, 1, &o, &run, &atlas, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    assert_in_range(vsh_atlas_chart_count(atlas), 1, 16);
+    vsh_atlas_free(atlas);
+    free(s);
+}
+
 /* Three copies of a bent sheet, one of which looks the other way: each hangs together by itself. */
 static void copies_of_triangles_have_places_of_their_own(void **state) {
     (void)state;
@@ -287,6 +314,7 @@ int main(void) {
         cmocka_unit_test(a_torus_is_cut_open),
         cmocka_unit_test(a_moebius_strip_is_cut_open),
         cmocka_unit_test(a_fan_of_triangles_at_one_edge_has_places),
+        cmocka_unit_test(a_tip_of_thousands_of_triangles_takes_no_time),
         cmocka_unit_test(copies_of_triangles_have_places_of_their_own),
         cmocka_unit_test(a_soup_of_random_triangles_has_places),
         cmocka_unit_test(rough_balls_lie_over_themselves_nowhere),
