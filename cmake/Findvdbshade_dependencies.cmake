@@ -30,6 +30,10 @@ vsh_find(md sha256.h md)
 vsh_find(sleef sleef.h sleef)
 vsh_find(half Imath/half.h Imath-3_1)
 
+# three.js, which is put into the pages that `view` writes.
+find_path(VSH_three_FOLDER three.min.js PATHS /usr/share/javascript/three)
+mark_as_advanced(VSH_three_FOLDER)
+
 # Rays against triangles: optional, and what needs it says where it is missing.
 option(VSH_EMBREE "Trace rays against triangles with Embree, where it is found" ON)
 if(VSH_EMBREE)
@@ -39,7 +43,7 @@ endif()
 find_package_handle_standard_args(vdbshade_dependencies REQUIRED_VARS VSH_openvdb_LIBRARY VSH_openimageio_LIBRARY
                                   VSH_openimageio_util_LIBRARY VSH_png_LIBRARY
                                   VSH_assimp_LIBRARY VSH_draco_LIBRARY VSH_jansson_LIBRARY VSH_seccomp_LIBRARY VSH_half_LIBRARY
-                                  VSH_md_LIBRARY VSH_sleef_LIBRARY)
+                                  VSH_md_LIBRARY VSH_sleef_LIBRARY VSH_three_FOLDER)
 
 if(NOT TARGET vsh::openexr)
   set_property(TARGET vsh::openvdb PROPERTY INTERFACE_LINK_LIBRARIES TBB::tbb vsh::half)

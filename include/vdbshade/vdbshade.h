@@ -61,6 +61,7 @@
 #include "solidity.h"
 #include "spheres.h"
 #include "trace.h"
+#include "view.h"
 #include "volume.h"
 #include "voxels.h"
 

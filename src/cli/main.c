@@ -13,7 +13,7 @@
 
 static const cli_command *const commands[] = {&cli_bake,    &cli_voxelize, &cli_info, &cli_trade,
                                               &cli_query,   &cli_volume,   &cli_flat, &cli_render,
-                                              &cli_compare, &cli_regress};
+                                              &cli_compare, &cli_regress,  &cli_view};
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
 static const char help_text[] =
@@ -28,6 +28,7 @@ static const char help_text[] =
     "  volume INPUT -o OUT.vdb   grids of shadow and AO: a surface's band, a box, a fog's voxels\n"
     "  query INPUT -o OUT        shadow, AO, distance at points of a CSV, a PLY or raw floats\n"
     "  render INPUT -o OUT       picture of a scene, or a turntable, to look at a bake\n"
+    "  view INPUT -o OUT.html    page to look at a lit mesh in a browser, with every channel of its bake\n"
     "  flat SCENE -o OUT         light map of a plane, for 2D games\n"
     "  compare GOLDEN NEW        whether a bake is like its golden one, and in what it is not\n"
     "  regress DIR               bakes of a folder's scenes against their golden ones\n"
