@@ -102,7 +102,7 @@
     /* From 35° to the right of the front and 25° above, as `render` stands. */
     function frame() {
         const center = box.getCenter(new THREE.Vector3()), radius = Math.max(box.getSize(new THREE.Vector3()).length() / 2, 1e-6);
-        const wide = Math.min(1, camera.aspect), distance = 0.86 * radius / Math.sin(camera.fov * Math.PI / 360) / wide;
+        const wide = Math.min(1, camera.aspect), distance = radius / Math.sin(camera.fov * Math.PI / 360) / wide;
         const around = 35 * Math.PI / 180, above = 25 * Math.PI / 180;
         camera.position.set(Math.sin(around) * Math.cos(above), Math.sin(above), Math.cos(around) * Math.cos(above))
             .multiplyScalar(distance).add(center);

@@ -60,9 +60,8 @@
             box.append(line);
         };
         if (state.mode === 'density') {
-            [['rgb(0,0,255)', '≤ ', 1 / 4], ['rgb(0,255,255)', '', 1 / 2], ['rgb(0,255,0)', '', 1],
-                ['rgb(255,255,0)', '', 2], ['rgb(255,0,0)', '≥ ', 4]].forEach(([color, sign, factor]) =>
-                entry(color, sign + +(bake.density * factor).toPrecision(3)));
+            VIEW.DENSITY.forEach((rgb, i) => entry('rgb(' + rgb + ')',
+                (i === 0 ? '≤ ' : i === 4 ? '≥ ' : '') + +(bake.density * 2 ** (i - 2)).toPrecision(3)));
             box.append(VIEW.element('span', 'texels a unit'));
         } else if (state.mode === 'invalid') {
             entry('rgb(237,26,153)', 'invalid: inside a solid or behind a wall');

@@ -9,6 +9,7 @@
 
     /* What of a bake lies at (x, y) of normalized device coordinates; null: nothing. */
     VIEW.pick = function (bake, camera, x, y) {
+        camera.updateMatrixWorld();
         raycaster.setFromCamera({x, y}, camera);
         const hit = raycaster.intersectObjects(bake.meshes, false)[0];
         if (!hit) {

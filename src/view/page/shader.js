@@ -4,6 +4,10 @@
 (function () {
     VIEW.MODE = {lit: 0, ao: 1, light: 2, bent: 3, checker: 4, density: 5, invalid: 6, charts: 7, base: 8};
 
+    /* A quarter of the mean density, half of it, the mean, twice, four times. */
+    VIEW.DENSITY = [[33, 79, 191], [92, 171, 222], [224, 224, 217], [245, 166, 69], [204, 41, 38]];
+    const DENSITY = VIEW.DENSITY.map(rgb => 'vec3(' + rgb.map(value => (value / 255).toFixed(5)).join() + ')');
+
     const vertex = `
 attribute vec2 uvLight, uvBase, uvAo, uvGlow;
 attribute vec3 tint, chart;
@@ -42,8 +46,11 @@ vec3 toSrgb(vec3 c) {
     c = clamp(c, 0.0, 1.0);
     return mix(12.92 * c, 1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, vec3(greaterThan(c, vec3(0.0031308))));
 }
-vec3 ramp(float x) { /* blue, cyan, green, yellow, red over 0 ... 1 */
-    return clamp(vec3(4.0 * x - 2.0, x < 0.5 ? 4.0 * x : 4.0 - 4.0 * x, 2.0 - 4.0 * x), 0.0, 1.0);
+vec3 ramp(float x) { /* 0 ... 1: too few, as in the mean, too many */
+    vec3 few = mix(${DENSITY[0]}, ${DENSITY[1]}, clamp(4.0 * x, 0.0, 1.0));
+    few = mix(few, ${DENSITY[2]}, clamp(4.0 * x - 1.0, 0.0, 1.0));
+    few = mix(few, ${DENSITY[3]}, clamp(4.0 * x - 2.0, 0.0, 1.0));
+    return mix(few, ${DENSITY[4]}, clamp(4.0 * x - 3.0, 0.0, 1.0));
 }
 vec3 grey(float x) { return vec3(x); }
 /* The shape of what has no light of its own. */
