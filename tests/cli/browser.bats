@@ -302,3 +302,47 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     look squares.html ""
     grep -q 'squares.gltf: image 7 is not shown' page.dom || fail "$(grep -o 'id="problems".*' page.dom)"
 }
+
+@test "docs/engines.md: the lines for three.js show a lit glTF as it is meant" {
+    three=/usr/share/javascript/three
+    write_squares
+    sed -i 's/"baseColorFactor"/"metallicFactor": 0, "baseColorFactor"/' squares.gltf
+    # the page cannot ask for files: they stand in it
+    sed -i "s|light%20map.png|data:image/png;base64,$(base64 -w0 'light map.png')|; s|ao.png|data:image/png;base64,$(base64 -w0 ao.png)|;
+        s|squares.bin|data:application/octet-stream;base64,$(base64 -w0 squares.bin)|" squares.gltf
+    awk '/^```js$/ { inside = 1; next } /^```$/ { inside = 0 } inside' "${DOCS:-$BATS_TEST_DIRNAME/../../docs}/engines.md" |
+        sed "s|'lit.glb'|'data:application/json;base64,$(base64 -w0 squares.gltf)'|" >lines.js
+    grep -q 'addLightmaps(THREE, gltf)' lines.js
+    {
+        echo '<!doctype html><html data-state="loading"><style>body { margin: 0 }</style><script>'
+        cat $three/three.min.js
+        echo '</script><script>'
+        cat $three/examples/js/loaders/GLTFLoader.js
+        echo '</script><script>
+            const scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(90, 1, 0.1, 10);
+            const renderer = new THREE.WebGLRenderer({preserveDrawingBuffer: true});
+            renderer.setSize(innerWidth, innerHeight);
+            document.body.append(renderer.domElement);
+            camera.position.z = 1;
+            const add = scene.add;
+            scene.add = function (object) {
+                object.traverse(mesh => { if (mesh.isMesh) for (const map of [mesh.material.lightMap, mesh.material.aoMap])
+                    map.magFilter = map.minFilter = THREE.NearestFilter, map.needsUpdate = true; });
+                add.call(scene, object);
+                renderer.render(scene, camera);
+                document.documentElement.dataset.state = "ready";
+            };
+            addEventListener("unhandledrejection", event => {
+                document.body.append(event.reason.message); document.documentElement.dataset.state = "failed"; });'
+        cat lines.js
+        echo '</script></html>'
+    } | sed 's|<style>|<body><style>|' >engine.html
+    look engine.html ""
+    state_is ready
+    # r111 takes the lightmap as linear, and shows linear values
+    plain() { awk -v v="$*" 'BEGIN { split(v, a); for (i = 1; i <= 3; ++i) printf "%.2f ", a[i] * a[i + 3] * a[7] }'; }
+    pixel_is 50 100 $(plain 10 20 30 0.8 0.4 0.2 0.75)
+    pixel_is 150 100 $(plain 60 70 80 0.8 0.4 0.2 "$(awk 'BEGIN { print 0.75 * (1 + 128 / 255) / 2 }')")
+    pixel_is 350 100 $(plain 160 170 180 1 1 1 "$(awk 'BEGIN { print 200 / 255 }')")
+    pixel_is 50 300 $(plain 200 210 220 0.8 0.4 0.2 "$(awk 'BEGIN { print 0.75 * (1 + 30 / 255) / 2 }')")
+}

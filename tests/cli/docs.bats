@@ -1,5 +1,5 @@
 # Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/volume.md,
-# docs/render.md and docs/regression.md runs.
+# docs/render.md, docs/regression.md and docs/view.md runs.
 load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
@@ -84,6 +84,10 @@ run_commands() {
 
 @test "every command of docs/regression.md" {
     run_commands regression.md 5
+}
+
+@test "every command of docs/view.md" {
+    run_commands view.md 5
 }
 
 # options_of FILE …: each option that is named there, once. Those of other programs are left out.
