@@ -13,59 +13,66 @@ enum { FLOATS = 5126, INTEGERS = 5125, HEAD = 12, CHUNK_HEAD = 8 };
 typedef struct glb {
     json_t *accessors, *views, *meshes, *nodes;
     uint64_t bytes; /* of the binary chunk so far */
+    bool short_of_memory;
 } glb;
+
+/* Adds to a list, and takes it over. */
+static void append(glb *g, json_t *list, json_t *value) {
+    g->short_of_memory |= json_array_append_new(list, value) != 0;
+}
+
+static void put(glb *g, json_t *object, const char *key, json_t *value) {
+    g->short_of_memory |= json_object_set_new(object, key, value) != 0;
+}
 
 /* Adds an array of `count` elements; returns its accessor's number. */
 static json_int_t add_array(glb *g, uint64_t count, uint64_t components, int type, const char *kind) {
     const json_int_t number = (json_int_t)json_array_size(g->accessors);
     const uint64_t bytes = 4 * components * count;
-    json_array_append_new(g->views, json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset",
-                                              (json_int_t)g->bytes, "byteLength", (json_int_t)bytes));
-    json_array_append_new(g->accessors,
-                          json_pack("{s:I, s:i, s:I, s:s}", "bufferView", number, "componentType", type,
-                                    "count", (json_int_t)count, "type", kind));
+    append(g, g->views,
+           json_pack("{s:i, s:I, s:I}", "buffer", 0, "byteOffset", (json_int_t)g->bytes, "byteLength",
+                     (json_int_t)bytes));
+    append(g, g->accessors,
+           json_pack("{s:I, s:i, s:I, s:s}", "bufferView", number, "componentType", type, "count",
+                     (json_int_t)count, "type", kind));
     g->bytes += bytes;
     return number;
 }
 
 static void add_shape(glb *g, const vshi_model_shape *shape) {
     json_t *attributes = json_object();
-    json_object_set_new(attributes, "POSITION",
-                        json_integer(add_array(g, shape->vertex_count, 3, FLOATS, "VEC3")));
+    put(g, attributes, "POSITION", json_integer(add_array(g, shape->vertex_count, 3, FLOATS, "VEC3")));
     if (shape->normals != NULL) {
-        json_object_set_new(attributes, "NORMAL",
-                            json_integer(add_array(g, shape->vertex_count, 3, FLOATS, "VEC3")));
+        put(g, attributes, "NORMAL", json_integer(add_array(g, shape->vertex_count, 3, FLOATS, "VEC3")));
     }
     for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
         if (shape->uvs[set] != NULL) {
             char name[32];
             snprintf(name, sizeof name, "TEXCOORD_%d", set);
-            json_object_set_new(attributes, name,
-                                json_integer(add_array(g, shape->vertex_count, 2, FLOATS, "VEC2")));
+            put(g, attributes, name, json_integer(add_array(g, shape->vertex_count, 2, FLOATS, "VEC2")));
         }
     }
     const json_int_t indices = add_array(g, 3 * (uint64_t)shape->triangle_count, 1, INTEGERS, "SCALAR");
-    json_array_append_new(
-        g->meshes, json_pack("{s:[{s:o, s:I}]}", "primitives", "attributes", attributes, "indices", indices));
+    append(g, g->meshes,
+           json_pack("{s:[{s:o, s:I}]}", "primitives", "attributes", attributes, "indices", indices));
 }
 
 static void add_node(glb *g, const vshi_model_entry *entry) {
     json_t *matrix = json_array(); /* columns, of three rows of four */
     for (size_t i = 0; i < 16; ++i) {
         const size_t row = i % 4, column = i / 4;
-        json_array_append_new(matrix, json_real(row < 3      ? entry->transform[4 * row + column]
-                                                : column < 3 ? 0.0
-                                                             : 1.0));
+        append(g, matrix, json_real(row < 3 ? entry->transform[4 * row + column] : column < 3 ? 0.0 : 1.0));
     }
     const char *name = entry->name != NULL ? entry->name : entry->object_name;
-    json_array_append_new(g->nodes, json_pack("{s:I, s:o, s:o}", "mesh", (json_int_t)entry->shape, "matrix",
-                                              matrix, "name", vshi_view_text(name != NULL ? name : "")));
+    append(g, g->nodes,
+           json_pack("{s:I, s:o, s:o}", "mesh", (json_int_t)entry->shape, "matrix", matrix, "name",
+                     vshi_view_text(name != NULL ? name : "")));
 }
 
-static json_t *numbers_to(size_t count) {
+static json_t *numbers_to(glb *g, size_t count) {
     json_t *list = json_array();
     for (size_t i = 0; i < count; ++i) {
-        json_array_append_new(list, json_integer((json_int_t)i));
+        append(g, list, json_integer((json_int_t)i));
     }
     return list;
 }
@@ -94,7 +101,7 @@ static void put_shape(vshi_page *page, const vshi_model_shape *shape) {
 
 /* The model's JSON as text, to be freed; NULL where memory is short. */
 static char *describe(const vsh_model *model, uint64_t *bytes) {
-    glb g = {json_array(), json_array(), json_array(), json_array(), 0};
+    glb g = {json_array(), json_array(), json_array(), json_array(), 0, false};
     for (size_t i = 0; i < model->shape_count; ++i) {
         add_shape(&g, &model->shapes[i]);
     }
@@ -103,10 +110,10 @@ static char *describe(const vsh_model *model, uint64_t *bytes) {
     }
     *bytes = g.bytes;
     json_t *root = json_pack("{s:{s:s}, s:i, s:[{s:o}], s:o, s:o, s:o, s:o, s:[{s:I}]}", "asset", "version",
-                             "2.0", "scene", 0, "scenes", "nodes", numbers_to(model->entry_count), "nodes",
-                             g.nodes, "meshes", g.meshes, "accessors", g.accessors, "bufferViews", g.views,
-                             "buffers", "byteLength", (json_int_t)g.bytes);
-    char *text = root != NULL ? json_dumps(root, JSON_COMPACT) : NULL;
+                             "2.0", "scene", 0, "scenes", "nodes", numbers_to(&g, model->entry_count),
+                             "nodes", g.nodes, "meshes", g.meshes, "accessors", g.accessors, "bufferViews",
+                             g.views, "buffers", "byteLength", (json_int_t)g.bytes);
+    char *text = root != NULL && !g.short_of_memory ? json_dumps(root, JSON_COMPACT) : NULL;
     json_decref(root);
     return text;
 }
@@ -142,10 +149,16 @@ vsh_result vshi_view_put_arrays(vshi_view *view, const char *path, const vsh_mod
     vshi_page_data(page, "   ", padding);
     const uint32_t chunk[] = {(uint32_t)bytes, BIN};
     put_words(page, chunk, sizeof chunk / sizeof chunk[0]);
+    vshi_job *job = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_view_begin(view, model->shape_count, &job, error));
     for (size_t i = 0; i < model->shape_count; ++i) {
         put_shape(page, &model->shapes[i]);
+        VSHI_TRY_DONE(vshi_view_advance(view, job, 1, error));
     }
     vshi_page_data_end(page);
+done:
+    vshi_job_end(job);
     free(text);
-    return vshi_page_check(page, error);
+    return result;
 }

@@ -35,7 +35,8 @@ static vsh_result fail_to_read(const char *path, FILE *file, vsh_error *error) {
 }
 
 /* The bytes of a file, in a data block. */
-static vsh_result put_file(vshi_view *view, FILE *file, uint64_t size, const char *path, vsh_error *error) {
+static vsh_result put_file(vshi_view *view, vshi_job *job, FILE *file, uint64_t size, const char *path,
+                           vsh_error *error) {
     enum { PIECE = 3 << 14 };
     char piece[PIECE];
     vshi_page_data_begin(view->page, VSHI_VIEW_BLOCK, view->blocks++);
@@ -46,13 +47,14 @@ static vsh_result put_file(vshi_view *view, FILE *file, uint64_t size, const cha
         }
         vshi_page_data(view->page, piece, now);
         left -= now;
+        VSHI_TRY(vshi_view_advance(view, job, now, error));
     }
     vshi_page_data_end(view->page);
-    return vshi_page_check(view->page, error);
+    return VSH_OK;
 }
 
 /* A file that a glTF names, put into the page; one that cannot be had is told of in a warning. */
-static vsh_result put_named(vshi_view *view, const char *model, const char *uri, json_t *files,
+static vsh_result put_named(vshi_view *view, vshi_job *job, const char *model, const char *uri, json_t *files,
                             vsh_error *error) {
     char *path = vshi_uri_path(model, uri);
     if (path == NULL) {
@@ -69,7 +71,7 @@ static vsh_result put_named(vshi_view *view, const char *model, const char *uri,
     } else {
         char block[32];
         snprintf(block, sizeof block, VSHI_VIEW_BLOCK "%zu", view->blocks);
-        VSHI_TRY_DONE(put_file(view, file, size, path, error));
+        VSHI_TRY_DONE(put_file(view, job, file, size, path, error));
         result = vshi_view_tell(files, NULL,
                                 json_pack("{s:o, s:s}", "uri", vshi_view_text(uri), "data", block), error);
     }
@@ -81,8 +83,8 @@ done:
     return result;
 }
 
-static vsh_result put_all_named(vshi_view *view, const char *model, const json_t *root, json_t *about,
-                                vsh_error *error) {
+static vsh_result put_all_named(vshi_view *view, vshi_job *job, const char *model, const json_t *root,
+                                json_t *about, vsh_error *error) {
     static const char *const lists[] = {"buffers", "images"};
     json_t *files = json_array();
     vsh_result result = VSH_OK;
@@ -92,7 +94,7 @@ static vsh_result put_all_named(vshi_view *view, const char *model, const json_t
         json_array_foreach(json_object_get(root, lists[k]), i, item) {
             const char *uri = json_string_value(json_object_get(item, "uri"));
             if (uri != NULL && !vshi_uri_is_data(uri) && !vshi_uri_is_remote(uri)) {
-                VSHI_TRY_DONE(put_named(view, model, uri, files, error));
+                VSHI_TRY_DONE(put_named(view, job, model, uri, files, error));
             }
         }
     }
@@ -138,16 +140,19 @@ static vsh_result put_gltf(vshi_view *view, const char *path, const vsh_model *m
     FILE *file;
     uint64_t size;
     json_t *root = NULL;
+    vshi_job *job = NULL;
     VSHI_TRY(vshi_input_open(path, path, VSH_MAX_VIEW_MODEL, &file, &size, error));
     vsh_result result;
     VSHI_TRY_DONE(read_json(view, path, file, size, &root, error));
     if (is_compressed(root)) {
         VSHI_TRY_DONE(vshi_view_put_arrays(view, path, model, error));
     } else {
-        VSHI_TRY_DONE(put_file(view, file, size, path, error));
-        VSHI_TRY_DONE(put_all_named(view, path, root, about, error));
+        VSHI_TRY_DONE(vshi_view_begin(view, (size_t)size, &job, error));
+        VSHI_TRY_DONE(put_file(view, job, file, size, path, error));
+        VSHI_TRY_DONE(put_all_named(view, job, path, root, about, error));
     }
 done:
+    vshi_job_end(job);
     json_decref(root);
     fclose(file);
     return result;
@@ -165,10 +170,7 @@ vsh_result vshi_view_put_model(vshi_view *view, const char *path, json_t *about,
     } else {
         VSHI_TRY_DONE(vshi_view_put_arrays(view, path, model, error));
     }
-    VSHI_TRY_DONE(vshi_view_tell(about, "model", json_string(block), error));
-    if (vshi_job_advance(view->job, VSHI_VIEW_FILE_UNITS)) {
-        result = vshi_job_fail_cancelled(view->job, error);
-    }
+    result = vshi_view_tell(about, "model", json_string(block), error);
 done:
     vsh_model_free(model);
     return result;

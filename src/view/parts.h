@@ -9,19 +9,21 @@
 #include <vdbshade/mesh.h>
 #include <vdbshade/view.h>
 
-/* A page as it is written: the numbers of its data blocks, and its job. */
+/* A page as it is written, and the numbers of its data blocks. */
 typedef struct vshi_view {
     vshi_page *page;
     const vsh_run *run; /* resolved */
-    vshi_job *job;
-    size_t blocks; /* data blocks so far, whose ids are VSHI_VIEW_BLOCK and their number */
-    json_t *about; /* array of what is known of each bake; borrowed by nobody */
+    size_t blocks;      /* data blocks so far, whose ids are VSHI_VIEW_BLOCK and their number */
+    json_t *about;      /* array of what is known of each bake; borrowed by nobody */
 } vshi_view;
 
 #define VSHI_VIEW_BLOCK "data"
 
-/* Units of the job for each file. */
-enum { VSHI_VIEW_FILE_UNITS = 1 << 12 };
+/* Begins the job of what is put into the page of one file, once that is read. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_view_begin(const vshi_view *view, size_t total, vshi_job **job, vsh_error *error);
+
+/* Says that `units` more are done. Errors: VSH_ERROR_CANCELLED, VSH_ERROR_WRITE of what was put so far. */
+vsh_result vshi_view_advance(const vshi_view *view, vshi_job *job, size_t units, vsh_error *error);
 
 /* Writes a model, after vsh_model_read() has found it sound, and tells of it: "model", "files". */
 vsh_result vshi_view_put_model(vshi_view *view, const char *path, json_t *about, vsh_error *error);

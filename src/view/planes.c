@@ -97,29 +97,32 @@ static vsh_result put_channels(vshi_view *view, const vsh_image_file *file, uint
     const vsh_image image = vsh_image_view(file);
     const bool made_of_others = has_attribute(file, VSH_IMAGE_RGB, NULL);
     const bool srgb = has_attribute(file, "vdbshade_color_space", "sRGB");
-    size_t done = 0;
+    vshi_job *job;
+    VSHI_TRY(vshi_view_begin(view, (size_t)image.channel_count, &job, error));
+    vsh_result result = VSH_OK;
     for (int32_t c = 0; c < image.channel_count; ++c) {
         const bool picture = is_picture(image.names[c]);
         if (!picture || !made_of_others) {
-            VSHI_TRY(put_channel(view, &image, c, picture && srgb, bytes, channels, error));
+            VSHI_TRY_DONE(put_channel(view, &image, c, picture && srgb, bytes, channels, error));
         }
-        const size_t now = (size_t)VSHI_VIEW_FILE_UNITS * (size_t)(c + 1) / (size_t)image.channel_count;
-        if (vshi_job_advance(view->job, now - done)) {
-            return vshi_job_fail_cancelled(view->job, error);
-        }
-        done = now;
+        VSHI_TRY_DONE(vshi_view_advance(view, job, 1, error));
     }
-    return VSH_OK;
+done:
+    vshi_job_end(job);
+    return result;
 }
 
-/* What the file says of itself. */
+/* What the file says of itself; NULL where memory is short. */
 static json_t *attributes_of(const vsh_image_file *file) {
     size_t count;
     const vsh_attribute *list = vsh_image_attributes(file, &count);
     json_t *made = json_array();
     for (size_t i = 0; i < count; ++i) {
-        json_array_append_new(
-            made, json_pack("[o, o]", vshi_view_text(list[i].name), vshi_view_text(list[i].value)));
+        json_t *pair = json_pack("[o, o]", vshi_view_text(list[i].name), vshi_view_text(list[i].value));
+        if (json_array_append_new(made, pair) != 0) {
+            json_decref(made);
+            return NULL;
+        }
     }
     return made;
 }

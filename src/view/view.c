@@ -40,6 +40,18 @@ vsh_result vshi_view_tell(json_t *about, const char *key, json_t *value, vsh_err
     return failed ? vshi_fail(error, VSH_ERROR_MEMORY, "page: the system refused memory") : VSH_OK;
 }
 
+vsh_result vshi_view_begin(const vshi_view *view, size_t total, vshi_job **job, vsh_error *error) {
+    *job = vshi_job_begin(view->run, "page", total);
+    return *job != NULL
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", view->page->path);
+}
+
+vsh_result vshi_view_advance(const vshi_view *view, vshi_job *job, size_t units, vsh_error *error) {
+    VSHI_TRY(vshi_page_check(view->page, error));
+    return vshi_job_advance(job, units) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+}
+
 /* --- the page itself */
 
 /* The source by which Content-Security-Policy (W3C, level 2) knows a script or style: 'sha256-…'. */
@@ -170,10 +182,6 @@ vsh_result vsh_view_write(const char *path, const vsh_view_bake *bake, const vsh
     }
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     const size_t count = other != NULL ? 2 : 1;
-    size_t files = 0;
-    for (size_t i = 0; i < count; ++i) {
-        files += bakes[i].plane_count + (bakes[i].model != NULL ? 1 : 0);
-    }
     void *memory = NULL;
     VSHI_TRY(vshi_allocate(&memory, 1, sizeof(vshi_page), "page", error));
     vshi_page *page = memory;
@@ -182,9 +190,8 @@ vsh_result vsh_view_write(const char *path, const vsh_view_bake *bake, const vsh
         free(page);
         return result;
     }
-    vshi_view view = {page, &full, vshi_job_begin(&full, "page", files * VSHI_VIEW_FILE_UNITS), 0,
-                      json_array()};
-    if (view.job == NULL || view.about == NULL) {
+    vshi_view view = {page, &full, 0, json_array()};
+    if (view.about == NULL) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
         goto done;
     }
@@ -198,7 +205,6 @@ vsh_result vsh_view_write(const char *path, const vsh_view_bake *bake, const vsh
     page = NULL;
 done:
     json_decref(view.about);
-    vshi_job_end(view.job);
     if (page != NULL) {
         vshi_page_abandon(page);
     }

@@ -198,3 +198,21 @@ C
     refused 4 cloister.glb
     untouched page.html
 }
+
+@test "bake --view writes the page of what it baked, and the same image as without it" {
+    shade bake box.obj "${SMALL[@]}" --ao 0.5 -o again.exr --view baked.html --quiet
+    done_well
+    cmp box.exr again.exr || fail "another image"
+    shade view box.obj --planes again.exr -o page.html --quiet
+    cmp baked.html page.html || fail "another page"
+    old_output page.html
+    for wrong in page.exr again.exr; do
+        shade bake box.obj "${SMALL[@]}" -o again.exr --view $wrong
+        refused 2 "--view '$wrong'"
+    done
+    shade bake box.obj "${SMALL[@]}" -o again.exr --view nowhere/page.html
+    refused 3 nowhere
+    shade bake box.obj "${SMALL[@]}" --per-object -o objects/ --view page.html
+    refused 2 'one lightmap of one mesh'
+    untouched page.html
+}

@@ -45,7 +45,7 @@ static const struct {
               {"balls.csv", balls_csv}, {"triangle.ply", triangle_ply}, {"triangle.stl", triangle_stl}};
 enum { INPUTS = sizeof inputs / sizeof inputs[0] };
 
-static const char *const outputs[] = {"out.exr", "out.png", "out.tif", "out.vdb"};
+static const char *const outputs[] = {"out.exr", "out.png", "out.tif", "out.vdb", "out.html"};
 enum { OUTPUTS = sizeof outputs / sizeof outputs[0] };
 
 static void write_text(const char *name, const char *text) {

@@ -290,6 +290,16 @@ static vsh_result compare(const vsh_run *run, vsh_error *error) {
     return vsh_compare(&compared, NULL, run, &measures, error);
 }
 
+static vsh_result write_page(const vsh_run *run, vsh_error *error) {
+    vsh_view_bake bake = vsh_view_bake_default(), other = bake;
+    bake.model = "box.obj";
+    bake.planes = images;
+    bake.plane_count = 1;
+    other.planes = images;
+    other.plane_count = IMAGES;
+    return vsh_view_write("out.html", &bake, &other, run, error);
+}
+
 const scenario scenarios[] = {
     {"scene files", read_scenes},
     {"models", read_models},
@@ -310,5 +320,6 @@ const scenario scenarios[] = {
     {"images read", read_images},
     {"an output's origin", tell_origin},
     {"a comparison", compare},
+    {"a page", write_page},
 };
 const size_t scenario_count = sizeof scenarios / sizeof scenarios[0];

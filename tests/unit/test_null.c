@@ -306,6 +306,15 @@ static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
     REFUSED(vsh_compare_files(NULL, "new.exr", NULL, NULL, &comparison, &error));
     REFUSED(vsh_compare_files("golden.exr", NULL, NULL, NULL, &comparison, &error));
     REFUSED(vsh_compare_files("golden.exr", "new.exr", NULL, NULL, NULL, &error));
+    const vsh_view_bake no_bake = vsh_view_bake_default();
+    vsh_view_bake seen = vsh_view_bake_default();
+    seen.model = "a.obj";
+    REFUSED(vsh_view_write(NULL, &seen, NULL, NULL, &error));
+    REFUSED(vsh_view_write("a.html", NULL, NULL, NULL, &error));
+    REFUSED(vsh_view_write("a.html", &no_bake, NULL, NULL, &error));
+    REFUSED(vsh_view_write("a.html", &seen, &no_bake, NULL, &error));
+    seen.plane_count = 1;
+    REFUSED(vsh_view_write("a.html", &seen, NULL, NULL, &error));
     assert_int_equal(vsh_comparison_alike(NULL), 0);
     assert_null(vsh_comparison_channel(NULL, 0));
     assert_null(vsh_comparison_problem(NULL, 0));

@@ -51,6 +51,7 @@ static int check_files(const cli_bake_settings *settings, const vsh_scene *scene
         CLI_TRY(cli_temporary_check(settings->stats));
     }
     CLI_TRY(check_picture(settings));
+    CLI_TRY(cli_bake_check_view(settings, scene));
     const bool makes = settings->output_folder != NULL || settings->per_object;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         const char *output = scene->receivers[i].output;
@@ -168,6 +169,7 @@ static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, v
     vsh_bake_job_get_report(job, &report);
     const cli_stats stats = stats_of(scene, &report, run->threads);
     cli_stats_warn(&stats, scene, run);
+    CLI_TRY(cli_bake_view(settings, scene, run));
     CLI_TRY(cli_stats_finish(&stats, run, settings->stats));
     cli_warnings_tell();
     if (!settings->common.quiet) {

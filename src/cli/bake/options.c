@@ -15,7 +15,8 @@ enum {
     KEY_NO_RECEIVE,
     KEY_NO_CAST,
     KEY_PER_OBJECT,
-    KEY_INVALID
+    KEY_INVALID,
+    KEY_VIEW
 };
 
 static const cli_option options[] = {
@@ -32,6 +33,7 @@ static const cli_option options[] = {
     {KEY_INVALID, "invalid", "FILE.png",
      "also a picture of the lightmap: charts grey, texels\ninside solids or behind walls red, those of them "
      "in\nplain sight yellow; FILE.OUT.png where there are\nseveral outputs"},
+    {KEY_VIEW, "view", "PAGE.html", "also a page to look at it in a browser: docs/view.md"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {KEY_DRY_RUN, "dry-run", NULL,
      "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},
@@ -128,6 +130,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_INVALID:
         s->invalid_picture = value;
+        return CLI_OK;
+    case KEY_VIEW:
+        s->view = value;
         return CLI_OK;
     case KEY_STATS:
         s->stats = value;

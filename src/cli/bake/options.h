@@ -35,6 +35,7 @@ typedef struct cli_bake_settings {
     cli_patterns receive, no_receive, no_cast;
     const char *stats;
     const char *invalid_picture; /* NULL: none */
+    const char *view;            /* page; NULL: none */
     cli_common common;
     cli_patch patch; /* over the scene and its receivers */
     double sun[3];
