@@ -61,12 +61,16 @@ half() { # where a lightmap's half that begins at $1 ends
     [ "$1" = 0 ] && echo 0.5 || echo 1
 }
 
-# lit R G B BASE_R BASE_G BASE_B FACTOR: base colour times light, as sRGB, 0 … 255.
+# lit R G B BASE_R BASE_G BASE_B FACTOR: base colour times (linear) light, as sRGB, 0 … 255. A lightmap's intensity is over π.
 lit() {
-    awk -v v="$*" 'function least(a, b) { return a < b ? a : b } function linear(c) { c /= 255; return c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ^ 2.4 }
+    awk -v v="$*" 'function least(a, b) { return a < b ? a : b }
         BEGIN { split(v, a)
-            for (i = 1; i <= 3; ++i) { c = least(linear(a[i]) * a[i + 3] * a[7], 1)
+            for (i = 1; i <= 3; ++i) { c = least(a[i] / 255 * a[i + 3] * a[7], 1)
                 printf "%.2f ", 255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * c ^ (1 / 2.4) - 0.055) } }'
+}
+
+over_pi() {
+    awk "BEGIN { print ($1) / 3.14159265 }"
 }
 
 # Looks at x and y from -1 to 1.
@@ -79,11 +83,11 @@ FRONT="fov=90&camera=0,0,1,0,0,0&ui=0"
     rm squares.gltf squares.bin ao.png "light map.png"
     look squares.html "$FRONT&texels=1"
     state_is ready
-    pixel_is 50 100 $(lit 10 20 30 0.8 0.4 0.2 0.75)                                                # its AO is 1
-    pixel_is 150 100 $(lit 60 70 80 0.8 0.4 0.2 "$(awk 'BEGIN { print 0.75 * (1 + 128 / 255) / 2 }')") # half of AO's strength
-    pixel_is 50 300 $(lit 200 210 220 0.8 0.4 0.2 "$(awk 'BEGIN { print 0.75 * (1 + 30 / 255) / 2 }')")
-    pixel_is 350 100 $(lit 160 170 180 1 1 1 "$(awk 'BEGIN { print 200 / 255 }')")
-    pixel_is 250 300 $(lit 5 5 5 1 1 1 "$(awk 'BEGIN { print 150 / 255 }')")
+    pixel_is 50 100 $(lit 10 20 30 0.8 0.4 0.2 "$(over_pi 0.75)")                                                # its AO is 1
+    pixel_is 150 100 $(lit 60 70 80 0.8 0.4 0.2 "$(over_pi '0.75 * (1 + 128 / 255) / 2')") # half of AO's strength
+    pixel_is 50 300 $(lit 200 210 220 0.8 0.4 0.2 "$(over_pi '0.75 * (1 + 30 / 255) / 2')")
+    pixel_is 350 100 $(lit 160 170 180 1 1 1 "$(over_pi '200 / 255')")
+    pixel_is 250 300 $(lit 5 5 5 1 1 1 "$(over_pi '150 / 255')")
 }
 
 @test "AO alone, the lightmap alone, exposure, base colour" {
@@ -95,8 +99,8 @@ FRONT="fov=90&camera=0,0,1,0,0,0&ui=0"
     pixel_is 250 100 64 64 64
     pixel_is 350 300 220 220 220
     look squares.html "$FRONT&texels=1&mode=light&exposure=1"
-    pixel_is 350 300 $(lit 90 0 190 1 1 1 2)
-    pixel_is 50 100 $(lit 10 20 30 1 1 1 1.5)
+    pixel_is 350 300 $(lit 90 0 190 1 1 1 "$(over_pi 2)")
+    pixel_is 50 100 $(lit 10 20 30 1 1 1 "$(over_pi 1.5)")
     look squares.html "$FRONT&mode=base"
     pixel_is 50 100 $(lit 255 255 255 0.8 0.4 0.2 1)
     pixel_is 350 100 255 255 255
@@ -197,11 +201,11 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     look squares.html "$FRONT&texels=1" key:2
     pixel_is 150 100 128 128 128
     look squares.html "$FRONT&texels=1" key:9 key:2 key:1
-    pixel_is 350 100 $(lit 160 170 180 1 1 1 "$(awk 'BEGIN { print 200 / 255 }')")
+    pixel_is 350 100 $(lit 160 170 180 1 1 1 "$(over_pi '200 / 255')")
     look squares.html "$FRONT&texels=1&mode=light" key:+ key:+
-    pixel_is 350 300 $(lit 90 0 190 1 1 1 2)
+    pixel_is 350 300 $(lit 90 0 190 1 1 1 "$(over_pi 2)")
     look squares.html "$FRONT&mode=light" key:t
-    pixel_is 350 100 $(lit 160 170 180 1 1 1 1)
+    pixel_is 350 100 $(lit 160 170 180 1 1 1 "$(over_pi 1)")
     look squares.html "ui=1&$FRONT" click:350,100
     grep -q '<h2>square b</h2>' page.dom || fail "a click picks nothing"
     look squares.html "ui=1&$FRONT" click:350,100 key:Escape
@@ -339,10 +343,10 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     } | sed 's|<style>|<body><style>|' >engine.html
     look engine.html ""
     state_is ready
-    # r111 takes the lightmap as linear, and shows linear values
+    # r111 shows linear values
     plain() { awk -v v="$*" 'BEGIN { split(v, a); for (i = 1; i <= 3; ++i) printf "%.2f ", a[i] * a[i + 3] * a[7] }'; }
-    pixel_is 50 100 $(plain 10 20 30 0.8 0.4 0.2 0.75)
-    pixel_is 150 100 $(plain 60 70 80 0.8 0.4 0.2 "$(awk 'BEGIN { print 0.75 * (1 + 128 / 255) / 2 }')")
-    pixel_is 350 100 $(plain 160 170 180 1 1 1 "$(awk 'BEGIN { print 200 / 255 }')")
-    pixel_is 50 300 $(plain 200 210 220 0.8 0.4 0.2 "$(awk 'BEGIN { print 0.75 * (1 + 30 / 255) / 2 }')")
+    pixel_is 50 100 $(plain 10 20 30 0.8 0.4 0.2 "$(over_pi 0.75)")
+    pixel_is 150 100 $(plain 60 70 80 0.8 0.4 0.2 "$(over_pi '0.75 * (1 + 128 / 255) / 2')")
+    pixel_is 350 100 $(plain 160 170 180 1 1 1 "$(over_pi '200 / 255')")
+    pixel_is 50 300 $(plain 200 210 220 0.8 0.4 0.2 "$(over_pi '0.75 * (1 + 30 / 255) / 2')")
 }

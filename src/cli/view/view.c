@@ -44,8 +44,9 @@ static int view_main(int argc, char **argv);
 const cli_command cli_view = {
     "view",
     "INPUT [OTHER] -o OUT.html [options]",
-    "Writes a page that shows a lit mesh in a browser, in three dimensions: its light, AO, every channel of\n"
-    "its bake, texel density, charts; and a second bake beside it. It needs nothing beside it; docs/view.md",
+    "Writes a page that shows a lit mesh in a browser, in three dimensions: its light, AO, every channel\n"
+    "of its bake, texel density, charts; and a second bake beside it. It needs nothing beside it;\n"
+    "docs/view.md",
     options,
     sizeof options / sizeof options[0],
     view_main};

@@ -53,6 +53,8 @@ vec3 ramp(float x) { /* 0 ... 1: too few, as in the mean, too many */
     return mix(few, ${DENSITY[4]}, clamp(4.0 * x - 3.0, 0.0, 1.0));
 }
 vec3 grey(float x) { return vec3(x); }
+/* What a white surface sends back: the lightmap is linear irradiance, as three.js and Hubs take it. */
+vec3 baked() { return texture2D(lightMap, vLight).rgb * intensity / 3.14159265358979; }
 /* The shape of what has no light of its own. */
 float shape() {
     vec3 n = normalize(dot(vNormalView, vNormalView) > 0.0 ? vNormalView : cross(dFdx(vView), dFdy(vView)));
@@ -74,7 +76,7 @@ void main() {
     vec3 shown = none;
     if (mode == ${VIEW.MODE.lit}) {
         if (hasPlane && hasUv) { shown = base.rgb * value.rgb * gain + emitted; }
-        else if (hasLight) { shown = base.rgb * toLinear(texture2D(lightMap, vLight).rgb) * intensity * ao * gain + emitted; }
+        else if (hasLight) { shown = base.rgb * baked() * ao * gain + emitted; }
         else { shown = plain * ao * gain + emitted; }
         shown = toSrgb(shown);
     } else if (mode == ${VIEW.MODE.base}) {
@@ -84,7 +86,7 @@ void main() {
         else if (hasAo) { shown = grey(texture2D(aoMap, vAo).r); }
     } else if (mode == ${VIEW.MODE.light}) {
         if (hasPlane && hasUv) { shown = encode ? toSrgb(value.rgb * gain) : value.rgb * gain; }
-        else if (hasLight) { shown = toSrgb(toLinear(texture2D(lightMap, vLight).rgb) * intensity * gain); }
+        else if (hasLight) { shown = toSrgb(baked() * gain); }
     } else if (mode == ${VIEW.MODE.bent}) {
         if (hasPlane && hasUv) { shown = 0.5 + 0.5 * value.rgb; }
     } else if (mode == ${VIEW.MODE.invalid}) {
