@@ -8,15 +8,22 @@
     VIEW.DENSITY = [[33, 79, 191], [92, 171, 222], [224, 224, 217], [245, 166, 69], [204, 41, 38]];
     const DENSITY = VIEW.DENSITY.map(rgb => 'vec3(' + rgb.map(value => (value / 255).toFixed(5)).join() + ')');
 
+    /* Lookups stay within triangles where a pixel's middle does not (centroid), else charts' borders show what lies beside
+     * them; what is derived (place) does not bend there. */
+    const VARYINGS = `
+centroid varying vec2 vLight, vBase, vAo, vGlow;
+varying vec2 vPlace;
+varying vec3 vTint, vChart, vNormalView, vView, vWorld;`;
+
     const vertex = `
 attribute vec2 uvLight, uvBase, uvAo, uvGlow;
 attribute vec3 tint, chart;
-varying vec2 vLight, vBase, vAo, vGlow;
-varying vec3 vTint, vChart, vNormalView, vView, vWorld;
+${VARYINGS}
 uniform mat3 baseMatrix, glowMatrix;
 void main() {
     vec4 view = modelViewMatrix * vec4(position, 1.0);
     vLight = uvLight;
+    vPlace = uvLight;
     vAo = uvAo;
     vBase = (baseMatrix * vec3(uvBase, 1.0)).xy;
     vGlow = (glowMatrix * vec3(uvGlow, 1.0)).xy;
@@ -36,8 +43,7 @@ uniform vec4 color;
 uniform vec3 glow;
 uniform float intensity, strength, cutoff, gain, reference;
 uniform vec2 size, picked;
-varying vec2 vLight, vBase, vAo, vGlow;
-varying vec3 vTint, vChart, vNormalView, vView, vWorld;
+${VARYINGS}
 
 vec3 toLinear(vec3 c) {
     return mix(c / 12.92, pow((c + 0.055) / 1.055, vec3(2.4)), vec3(greaterThan(c, vec3(0.04045))));
@@ -103,7 +109,7 @@ void main() {
             shown = mix(hue * 0.45, hue, odd) * mix(0.8, 1.0, coarse) * shape();
         }
     } else if (mode == ${VIEW.MODE.density}) {
-        vec2 a = dFdx(vLight) * size, b = dFdy(vLight) * size;
+        vec2 a = dFdx(vPlace) * size, b = dFdy(vPlace) * size;
         float texels = abs(a.x * b.y - a.y * b.x), area = length(cross(dFdx(vWorld), dFdy(vWorld)));
         if (hasUv && texels > 0.0 && area > 0.0) {
             shown = ramp(clamp(0.5 + 0.25 * log2(sqrt(texels / area) / reference), 0.0, 1.0)) * shape();
