@@ -1,9 +1,14 @@
 # Pages in Chromium, without a window and without a network; loaded after helper.bash.
 
 setup_file() {
-    command -v chromium >/dev/null || skip "there is no chromium"
+    command -v chromium >/dev/null || return 0
     "${CC:-cc}" -std=gnu11 -O1 "$BATS_TEST_DIRNAME/picture.c" -o "$BATS_FILE_TMPDIR/picture" -lpng
     "${CC:-cc}" -std=gnu11 -O1 "$BATS_TEST_DIRNAME/browser.c" -o "$BATS_FILE_TMPDIR/browser" -ljansson
+}
+
+setup() {
+    command -v chromium >/dev/null || skip "there is no chromium"
+    cd "$BATS_TEST_TMPDIR" || return 1
 }
 
 picture() {
