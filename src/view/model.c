@@ -15,15 +15,23 @@
 static const char *const compressed[] = {"KHR_draco_mesh_compression", "EXT_meshopt_compression",
                                          "KHR_meshopt_compression"};
 
-static bool is_compressed(const json_t *root) {
+static bool uses(const json_t *root, const char *extension) {
     size_t i;
     const json_t *used;
     json_array_foreach(json_object_get(root, "extensionsUsed"), i, used) {
         const char *name = json_string_value(used);
-        for (size_t k = 0; name != NULL && k < sizeof compressed / sizeof compressed[0]; ++k) {
-            if (strcmp(name, compressed[k]) == 0) {
-                return true;
-            }
+        if (name != NULL && strcmp(name, extension) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Of what has been lit, the rest may be compressed: the page then leaves that out, and not the light. */
+static bool is_compressed(const json_t *root) {
+    for (size_t k = 0; k < sizeof compressed / sizeof compressed[0]; ++k) {
+        if (uses(root, compressed[k])) {
+            return !uses(root, "MOZ_lightmap");
         }
     }
     return false;

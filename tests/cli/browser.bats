@@ -300,6 +300,13 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     look squares.html "" -- --disable-3d-apis
     state_is failed
     grep -q 'shows no WebGL 2' page.dom || fail "$(grep -o 'id="message".*' page.dom)"
+    sed 's/"POSITION": 0,/"POSITION": 0, "JOINTS_0": 99,/' squares.gltf >joints.gltf
+    shade view joints.gltf -o joints.html --quiet
+    done_well
+    look joints.html "$FRONT&texels=1"
+    state_is ready
+    grep -q 'square a is not shown: accessor 99 is not there' page.dom || fail "$(grep -o 'id="problems".*' page.dom)"
+    pixel_is 350 100 $(lit 160 170 180 1 1 1 "$(over_pi '200 / 255')")
     sed -i 's/"source": 0/"source": 7/' squares.gltf
     shade view squares.gltf -o squares.html --quiet
     done_well

@@ -28,6 +28,9 @@
     /* The arrays of a primitive, with the morph targets at their weights. */
     function arraysOf(file, primitive, weights) {
         const attributes = primitive.attributes || {};
+        if ((primitive.extensions || {}).KHR_draco_mesh_compression) {
+            throw new Error('it is compressed (Draco)');
+        }
         if (attributes.POSITION === undefined) {
             return null;
         }
@@ -151,6 +154,16 @@
         return has(1) ? 1 : has(0) ? 0 : -1;
     }
 
+    /* A primitive that cannot be had is left out, with a word about it. */
+    function tryArrays(file, primitive, weights, name) {
+        try {
+            return arraysOf(file, primitive, weights);
+        } catch (error) {
+            file.problems.add(name + ' is not shown: ' + error.message);
+            return null;
+        }
+    }
+
     VIEW.loadScene = async function (bytes, named, uvSet, tell) {
         const file = VIEW.gltf.open(bytes, named), json = file.json, worlds = placeNodes(file);
         const materials = new Map(), known = new Map(), drawn = [];
@@ -168,7 +181,7 @@
                 }
                 const weights = node.weights || mesh.weights;
                 if (!known.has(primitive) || weights || node.skin !== undefined) {
-                    known.set(primitive, arraysOf(file, primitive, weights));
+                    known.set(primitive, tryArrays(file, primitive, weights, name));
                 }
                 let arrays = known.get(primitive), world = worlds[index];
                 if (arrays === null || arrays.indices.length === 0) {
