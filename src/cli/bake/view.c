@@ -29,10 +29,14 @@ int cli_bake_view(const cli_bake_settings *settings, const vsh_scene *scene, con
         return CLI_OK;
     }
     vsh_view_bake bake = vsh_view_bake_default();
-    bake.model = receiver->path;
-    bake.planes = (const char *const *)&receiver->output;
-    bake.plane_count = 1;
-    bake.uv_set = receiver->uv_set;
+    if (cli_has_ending(receiver->output, "glb") || cli_has_ending(receiver->output, "gltf")) {
+        bake.model = receiver->output; /* its light is in it */
+    } else {
+        bake.model = receiver->path;
+        bake.planes = (const char *const *)&receiver->output;
+        bake.plane_count = 1;
+        bake.uv_set = receiver->uv_set;
+    }
     vsh_error error;
     cli_signals_writing(settings->view);
     const vsh_result result = vsh_view_write(settings->view, &bake, NULL, run, &error);
