@@ -94,6 +94,9 @@ typedef struct vsh_receiver {
     int32_t allow_overlap; /* nonzero: objects whose UVs lie over each other are meant so (vdbshade bake then
                               does not refuse them) */
     int32_t color_space;   /* as in vsh_image_options */
+    int32_t seams; /* mesh: VSH_SEAMS_…; FIX moves values by up to the scene's shade.max_error, and pads
+                      by 2 texels at least. A lightmap that is baked in bands of rows keeps its seams, with
+                      a warning */
 } vsh_receiver;
 
 /* A whole scene, read from a file or filled by the caller. Paths are as the system takes them (the reader has

@@ -5,6 +5,8 @@
 #include <vdbshade/image.h>
 #include <vdbshade/settings.h>
 
+#include <string.h>
+
 vsh_result vshi_read_size(vshi_json *reader, const vshi_value *value, int32_t *width, int32_t *height) {
     const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 1.0, .highest = VSH_MAX_LIGHTMAP_SIZE};
     if (!json_is_array(value->json)) {
@@ -34,6 +36,20 @@ vsh_result vshi_read_bits(vshi_json *reader, const vshi_value *value, void *memb
         return vshi_json_fail(reader, value, "%d is none of 0, 8, 16, 32", *bits);
     }
     return VSH_OK;
+}
+
+/* Texels, or "auto". */
+static vsh_result read_padding(vshi_json *reader, const vshi_value *value, void *member) {
+    const vshi_key key = {.kind = VSHI_INTEGER, .highest = 4096.0};
+    int32_t *padding = member;
+    if (!json_is_string(value->json)) {
+        return vshi_read_value(reader, value, &key, padding);
+    }
+    *padding = VSH_PADDING_AUTO;
+    return strcmp(json_string_value(value->json), "auto") == 0
+               ? VSH_OK
+               : vshi_json_fail(reader, value, "\"%.64s\" is none of auto, a whole number from 0 to 4096",
+                                json_string_value(value->json));
 }
 
 enum { MESH = 1 << VSH_RECEIVER_MESH, HEIGHTFIELD = 1 << VSH_RECEIVER_HEIGHTFIELD };
@@ -119,13 +135,27 @@ static const vshi_key receiver_keys[] = {
                 .group = VSH_SETTINGS_TEXELS,
                 .help = "N × N samples a texel"}},
     {.name = "padding",
-     .kind = VSHI_INTEGER,
+     .kind = VSHI_CUSTOM,
      .offset = offsetof(vsh_receiver, padding),
-     .highest = 4096.0,
+     .read = read_padding,
      .option = {.name = "padding",
                 .value = "N",
                 .group = VSH_SETTINGS_TEXELS,
-                .help = "texels that charts are grown by"}},
+                .help = "texels that charts are grown by; auto: all is filled, so that no mip level reads "
+                        "background",
+                .range = "a whole number from 0 to 4096, or auto",
+                .otherwise = "4"}},
+    {.name = "seams",
+     .kind = VSHI_NAME,
+     .variants = MESH,
+     .offset = offsetof(vsh_receiver, seams),
+     .name_of = vsh_seams_name,
+     .option = {.name = "seams",
+                .value = "WHAT",
+                .group = VSH_SETTINGS_TEXELS,
+                .help =
+                    "fix: values on both sides of a chart's border are made to agree where the surface is "
+                    "smooth, moved by up to --max-error"}},
     {.name = "ao_spacing",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_receiver, ao_spacing),

@@ -247,6 +247,15 @@ static void nothing_is_baked_without_what_it_takes(void **state) {
     MAKES_NONE(vsh_texels_create_band(NULL, 0, 1, NULL, PLACE, &error));
     REFUSED(vsh_bake_lightmap(casters, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));
     REFUSED(vsh_bake_lightmap(NULL, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));
+    REFUSED(vsh_lightmap_stitch(NULL, &lightmap, 1, NULL, NULL, NULL, &error));
+    vsh_charts *charts = NULL;
+    const float corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0}, places[6] = {0, 0, 1, 0, 0, 1};
+    const uint32_t triangle[3] = {0, 1, 2};
+    const vsh_mesh one = {
+        .positions = corners, .uvs = places, .indices = triangle, .vertex_count = 3, .triangle_count = 1};
+    assert_int_equal(vsh_charts_create(&one, 1, NULL, NULL, NULL, &charts, &error), VSH_OK);
+    REFUSED(vsh_lightmap_stitch(charts, NULL, 1, NULL, NULL, NULL, &error));
+    vsh_charts_free(charts);
     REFUSED(vsh_flat_bake(NULL, NULL, 1, &plane, NULL, &flat, &error));
     REFUSED(vsh_flat_bake(NULL, &light, 1, &plane, NULL, NULL, &error));
     MAKES_NONE(vsh_voxels_from_grid(NULL, 1.0, NULL, PLACE, &error));

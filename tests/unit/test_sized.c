@@ -105,6 +105,12 @@ static void a_call_fills_the_struct_that_the_caller_has(void **state) {
     });
     assert_int_equal(vsh_charts_create(meshes, 1, &lightmap, NULL, NULL, &charts, &why), VSH_OK);
     assert_int_equal(vsh_texels_create(meshes, 1, &lightmap, NULL, NULL, &texels, &why), VSH_OK);
+    HOLDS(vsh_stitch_report, 1, {
+        float values[16 * 16] = {0};
+        const vsh_lightmap plane = {.ao = values};
+        assert_int_equal(vsh_lightmap_stitch_sized(charts, &plane, 0, NULL, NULL, (void *)room, size, &why),
+                         VSH_OK);
+    });
     HOLDS(vsh_charts_info, 1, vsh_charts_get_info_sized(charts, (void *)room, size));
     HOLDS(vsh_texels_info, 1, vsh_texels_get_info_sized(texels, (void *)room, size));
     HOLDS(vsh_texel_samples, 1, vsh_texels_samples_sized(texels, (void *)room, size));
