@@ -30,8 +30,8 @@ enum { VSHI_SEAM_READS = 8 }; /* texels: four on each side */
 
 /* A place on a seam: Σ weight × texel is the difference of what bilinear lookups give on both sides. Weights
  * are multiples of 2^-24 and sum up to 0, so that equal texels differ by 0 exactly. The squares of
- * differences count by `share`, 1 where places are half a texel apart, so that a seam of short edges is like
- * one of long ones. */
+ * differences count by `share`, what there is of the border for each in half texels, so that a seam of short
+ * edges is like one of long ones. */
 typedef struct vshi_seam_row {
     uint32_t unknown[VSHI_SEAM_READS];
     float weight[VSHI_SEAM_READS];

@@ -26,9 +26,12 @@ typedef struct slot {
     uint32_t hash;
 } slot;
 
-/* An edge of a triangle, as it is in the world and in the lightmap. */
+/* An end of a triangle's edge, as it is in the world and in the lightmap. */
 typedef struct edge_end {
-    vshi_vec at, normal;
+    const vsh_mesh *mesh;
+    size_t triangle; /* of the mesh */
+    uint32_t vertex;
+    vshi_vec at;
     double x, y; /* texels */
 } edge_end;
 
@@ -111,14 +114,15 @@ static void put(edges *e, uint32_t edge, const vshi_vec at[2]) {
 
 /* --- pairs of edges */
 
-static vshi_vec normal_at(const vsh_mesh *mesh, size_t local, uint32_t vertex) {
+static vshi_vec normal_at(const edge_end *end) {
+    const vsh_mesh *mesh = end->mesh;
     vshi_vec normal = {0.0, 0.0, 0.0}, corner[3];
     if (mesh->normals != NULL) {
-        const vshi_vec given = vshi_vec_off(mesh->normals + 3 * (size_t)vertex);
+        const vshi_vec given = vshi_vec_off(mesh->normals + 3 * (size_t)end->vertex);
         normal = vshi_unit(vshi_transform_normal(mesh->transform, given));
     }
     if (!(vshi_dot(normal, normal) > 0.0)) {
-        vshi_mesh_triangle(mesh, local, corner);
+        vshi_mesh_triangle(mesh, end->triangle, corner);
         normal = vshi_unit(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
     }
     return normal;
@@ -130,7 +134,10 @@ static void look_at(const edges *e, uint32_t edge, edge_end ends[2]) {
     for (uint32_t k = 0; k < 2; ++k) {
         const uint32_t vertex = mesh->indices[3 * local + (edge % 3 + k) % 3];
         const float *uv = mesh->uvs + 2 * (size_t)vertex;
-        ends[k] = (edge_end){place_of(mesh, vertex), normal_at(mesh, local, vertex),
+        ends[k] = (edge_end){mesh,
+                             local,
+                             vertex,
+                             place_of(mesh, vertex),
                              (double)uv[0] * e->charts->raster.width,
                              (1.0 - (double)uv[1]) * e->charts->raster.height};
     }
@@ -156,7 +163,11 @@ static bool same_in_lightmap(const edge_end a[2], const edge_end b[2]) {
 }
 
 static bool is_smooth(const edges *e, const edge_end a[2], const edge_end b[2]) {
-    return vshi_dot(a[0].normal, b[0].normal) >= e->cosine && vshi_dot(a[1].normal, b[1].normal) >= e->cosine;
+    bool all = true;
+    for (int k = 0; k < 2; ++k) {
+        all = all && vshi_dot(normal_at(&a[k]), normal_at(&b[k])) >= e->cosine;
+    }
+    return all;
 }
 
 /* What lies outside of the image is not baked. */

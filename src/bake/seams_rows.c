@@ -263,8 +263,9 @@ static vsh_result make_rows(making *m, vsh_error *error) {
                 ++system->crowded;
                 continue;
             }
-            row->share = share;
-            system->shares += (double)share;
+            /* ends are those of the next edge too */
+            row->share = places > 1 && (p == 0 || p + 1 == places) ? 0.5f * share : share;
+            system->shares += (double)row->share;
             join_row(m, row);
             ++system->row_count;
         }

@@ -88,6 +88,19 @@ static inline vsh_stitch_report stitch(const vsh_mesh *meshes, size_t count, con
     return report;
 }
 
+static inline float *new_plane(float value) {
+    float *plane = malloc(TEXELS * sizeof *plane);
+    for (size_t i = 0; i < TEXELS; ++i) {
+        plane[i] = value;
+    }
+    return plane;
+}
+
+static inline float random_value(uint32_t *state) {
+    *state = *state * 1664525u + 1013904223u;
+    return (float)(*state >> 8) * 0x1p-24f;
+}
+
 /* A bilinear lookup at a place, texels. */
 static inline double look_up(const float *plane, double x, double y) {
     const double left = floor(x - 0.5), top = floor(y - 0.5), tx = x - 0.5 - left, ty = y - 0.5 - top;
@@ -100,17 +113,17 @@ static inline double look_up(const float *plane, double x, double y) {
     return sum;
 }
 
-/* The largest difference between two edges of a mesh's quads: from corner a to b of the first and c to d of
- * the second, numbered through all quads. */
-static inline double across(const charts_mesh *m, const float *plane, uint32_t a, uint32_t b, uint32_t c,
-                            uint32_t d) {
+/* The largest difference between two edges: from corner a to b of the first mesh, c to d of the second. */
+static inline double between(const float *plane, const charts_mesh *first, uint32_t a, uint32_t b,
+                             const charts_mesh *second, uint32_t c, uint32_t d) {
     enum { STEPS = 997 };
     double most = 0.0;
     for (int s = 0; s <= STEPS; ++s) {
         const double t = (double)s / STEPS;
         double value[2];
         for (int side = 0; side < 2; ++side) {
-            const float *from = m->uvs + 2 * (side == 0 ? a : c), *to = m->uvs + 2 * (side == 0 ? b : d);
+            const float *uvs = side == 0 ? first->uvs : second->uvs;
+            const float *from = uvs + 2 * (side == 0 ? a : c), *to = uvs + 2 * (side == 0 ? b : d);
             const double u = (double)from[0] + t * ((double)to[0] - (double)from[0]);
             const double v = (double)from[1] + t * ((double)to[1] - (double)from[1]);
             value[side] = look_up(plane, u * SIDE, (1.0 - v) * SIDE);
@@ -118,6 +131,12 @@ static inline double across(const charts_mesh *m, const float *plane, uint32_t a
         most = fmax(most, fabs(value[0] - value[1]));
     }
     return most;
+}
+
+/* The same of corners of one mesh, numbered through all its quads. */
+static inline double across(const charts_mesh *m, const float *plane, uint32_t a, uint32_t b, uint32_t c,
+                            uint32_t d) {
+    return between(plane, m, a, b, m, c, d);
 }
 
 /* Two squares side by side, their charts apart and one of them turned, or mirrored; corners 1, 2 and 4, 7 are

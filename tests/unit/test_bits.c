@@ -7,6 +7,7 @@
 #include "casts.h"
 #include "field/field.h"
 #include "previews.h"
+#include "stitched.h"
 
 /* --- the parts */
 
@@ -165,6 +166,11 @@ static void lightmap(const context *c, int32_t method, bits *b) {
     add_floats(b, ao_plane, TEXELS);
     add_floats(b, rgb, 3 * TEXELS);
     add_floats(b, coverage, TEXELS);
+}
+
+static void seams(const context *c, int32_t unused, bits *b) {
+    (void)unused;
+    add_stitched(&c->run, b);
 }
 
 static void volume_of_band(const context *c, int32_t unused, bits *b) {
