@@ -17,7 +17,8 @@ static const double SAME_PLACE = 1.0 / 1024.0;
 
 enum {
     NO_EDGE = UINT32_MAX,
-    MOST_PAIRS = 8,       /* of an edge with those before it: what many triangles meet at is no surface */
+    MOST_PAIRS = 8, /* of an edge with those before it: what many triangles meet at is no surface */
+    BATCH = 96,
     POLL_TRIANGLES = 4096 /* between two looks at the cancel flag */
 };
 
@@ -82,34 +83,57 @@ static const vsh_mesh *mesh_of(const edges *e, uint32_t edge, size_t *local) {
     return &e->charts->meshes[vshi_charts_mesh(e->charts, edge / 3, local)];
 }
 
-static void places_of(const edges *e, uint32_t edge, vshi_vec at[2]) {
-    size_t local;
-    const vsh_mesh *mesh = mesh_of(e, edge, &local);
-    at[0] = place_of(mesh, mesh->indices[3 * local + edge % 3]);
-    at[1] = place_of(mesh, mesh->indices[3 * local + (edge + 1 - edge / 3 * 3) % 3]);
+static void places_of(const vsh_mesh *mesh, size_t local, size_t k, vshi_vec at[2]) {
+    at[0] = place_of(mesh, mesh->indices[3 * local + k]);
+    at[1] = place_of(mesh, mesh->indices[3 * local + (k + 1) % 3]);
 }
 
 static bool same_ends(const vshi_vec a[2], const vshi_vec b[2]) {
     return (same(a[0], b[0]) && same(a[1], b[1])) || (same(a[0], b[1]) && same(a[1], b[0]));
 }
 
-/* Puts an edge behind those of equal ends. */
-static void put(edges *e, uint32_t edge, const vshi_vec at[2]) {
+/* Edges that are put into the table together: their slots are fetched from memory meanwhile. */
+typedef struct batch {
+    uint32_t edge[BATCH];
+    uint64_t key[BATCH];
+    vshi_vec at[BATCH][2];
+    size_t count;
+} batch;
+
+static void add(const edges *e, batch *b, uint32_t edge, const vsh_mesh *mesh, size_t local) {
+    vshi_vec *at = b->at[b->count];
+    places_of(mesh, local, edge % 3, at);
     const uint64_t key = vshi_mix(hash_place(at[0]) + hash_place(at[1])); /* either way round */
+    b->edge[b->count] = edge;
+    b->key[b->count++] = key;
+    __builtin_prefetch(&e->slots[(size_t)key & (e->slot_count - 1)], 1);
+}
+
+/* Puts an edge behind those of equal ends. */
+static void put(edges *e, uint32_t edge, uint64_t key, const vshi_vec at[2]) {
     const uint32_t hash = (uint32_t)(key >> 32);
     size_t i = (size_t)key & (e->slot_count - 1);
     for (; e->slots[i].edge != NO_EDGE; i = (i + 1) & (e->slot_count - 1)) {
         vshi_vec other[2];
+        size_t local;
         if (e->slots[i].hash != hash) {
             continue;
         }
-        places_of(e, e->slots[i].edge, other);
+        const vsh_mesh *mesh = mesh_of(e, e->slots[i].edge, &local);
+        places_of(mesh, local, e->slots[i].edge % 3, other);
         if (same_ends(at, other)) {
             break;
         }
     }
     e->previous[edge] = e->slots[i].edge;
     e->slots[i] = (slot){edge, hash};
+}
+
+static void put_all(edges *e, batch *b) {
+    for (size_t i = 0; i < b->count; ++i) {
+        put(e, b->edge[i], b->key[i], b->at[i]);
+    }
+    b->count = 0;
 }
 
 /* --- pairs of edges */
@@ -191,6 +215,8 @@ static vsh_result sort_edges(edges *e, vsh_error *error) {
     const vshi_charts *charts = e->charts;
     memset(e->slots, 0xff, e->slot_count * sizeof *e->slots);
     uint32_t triangle = 0;
+    batch b;
+    b.count = 0;
     for (size_t m = 0; m < charts->mesh_count; ++m) {
         for (size_t i = 0; i < charts->meshes[m].triangle_count; ++i, ++triangle) {
             if (cancelled(e, triangle)) {
@@ -200,15 +226,17 @@ static vsh_result sort_edges(edges *e, vsh_error *error) {
             const bool used = vshi_charts_triangle(charts, m, i, &unused);
             e->chart[triangle] = triangle;
             for (uint32_t k = 0; k < 3; ++k) {
-                vshi_vec at[2];
                 e->previous[3 * triangle + k] = NO_EDGE;
                 if (used) {
-                    places_of(e, 3 * triangle + k, at);
-                    put(e, 3 * triangle + k, at);
+                    add(e, &b, 3 * triangle + k, &charts->meshes[m], i);
                 }
+            }
+            if (b.count > BATCH - 3) {
+                put_all(e, &b);
             }
         }
     }
+    put_all(e, &b);
     return VSH_OK;
 }
 
