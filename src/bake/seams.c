@@ -46,7 +46,7 @@ typedef struct channel {
 } channel;
 
 typedef struct stitching {
-    const vshi_seam_system *system;
+    vshi_seam_system system;
     const vsh_stitch_options *options;
     const float *coverage; /* NULL: as charts cover */
     channel *channels;     /* [channel_count] */
@@ -61,16 +61,16 @@ typedef struct stitching {
 enum { LOW, HIGH, KEEP, GRADIENT, CHANGE, WORK };
 
 static double *vector(const stitching *s, const channel *c, int which, size_t first) {
-    return c->vectors + (size_t)which * s->system->unknown_count + first;
+    return c->vectors + (size_t)which * s->system.unknown_count + first;
 }
 
 static float *value_of(const stitching *s, const channel *c, size_t unknown) {
-    return c->values + s->system->texel[unknown] * c->stride;
+    return c->values + s->system.texel[unknown] * c->stride;
 }
 
 static bool is_guess(const stitching *s, size_t unknown) {
-    return s->coverage != NULL ? s->coverage[s->system->texel[unknown]] == 0.0f
-                               : s->system->chart[unknown] == VSHI_NO_CHART;
+    return s->coverage != NULL ? s->coverage[s->system.texel[unknown]] == 0.0f
+                               : s->system.chart[unknown] == VSHI_NO_CHART;
 }
 
 /* The largest value that is read together with each unknown. */
@@ -125,7 +125,7 @@ static double square_of(const vshi_seam_problem *p, const double *values) {
 
 /* One island in one channel. What is not finite stays, and so does all that is read with it. */
 static void stitch_island(const stitching *s, const channel *c, size_t i) {
-    const vshi_seam_system *system = s->system;
+    const vshi_seam_system *system = &s->system;
     const size_t first = system->first_unknown[i], count = system->first_unknown[i + 1] - first;
     double *low = vector(s, c, LOW, first), *high = vector(s, c, HIGH, first),
            *keep = vector(s, c, KEEP, first);
@@ -178,7 +178,7 @@ static void stitch_islands(void *user, size_t begin, size_t end) {
 /* In the order of the islands; of light in parts of the largest value. */
 static void add_sums(stitching *s, const channel *c) {
     double before = 0.0, after = 0.0, largest = 0.0;
-    for (size_t i = 0; i < s->system->island_count; ++i) {
+    for (size_t i = 0; i < s->system.island_count; ++i) {
         before += c->islands[i].before;
         after += c->islands[i].after;
         largest = fmax(largest, c->islands[i].largest);
@@ -190,7 +190,7 @@ static void add_sums(stitching *s, const channel *c) {
 
 /* A few channels at a time, one a thread: islands are few where charts meet at their corners. */
 static vsh_result stitch_channels(stitching *s, const vsh_run *run, vsh_error *error) {
-    const vshi_seam_system *system = s->system;
+    const vshi_seam_system *system = &s->system;
     const int32_t threads = vshi_job_threads(s->job);
     const size_t most = threads > 0 ? (size_t)threads : s->channel_count;
     const size_t room = s->channel_count < most ? s->channel_count : most;
@@ -243,30 +243,29 @@ static vsh_result stitch(stitching *s, const vsh_charts *charts, const vsh_light
                          vsh_error *error) {
     static const double RADIANS = 3.14159265358979323846 / 180.0;
     vshi_seams seams = {NULL, NULL, 0, 0.0};
-    vshi_seam_system system = {.unknown_count = 0};
+    vshi_seam_system *system = &s->system;
     vsh_result result;
     VSHI_TRY_DONE(
         vshi_allocate((void **)&s->channels, s->channel_count, sizeof *s->channels, "seams", error));
     list_channels(lightmap, light_count, s->channels);
     VSHI_TRY_DONE(vshi_seams_find(&charts->sorted, vshi_cos(s->options->max_angle * RADIANS), run, s->job,
                                   &seams, error));
-    VSHI_TRY_DONE(vshi_seam_system_make(&charts->sorted, &seams, run, s->job, &system, error));
-    s->system = &system;
+    VSHI_TRY_DONE(vshi_seam_system_make(&charts->sorted, &seams, run, s->job, system, error));
     report->seams = seams.count;
-    report->places = system.row_count;
-    report->crowded = system.crowded;
-    report->texels = system.unknown_count;
+    report->places = system->row_count;
+    report->crowded = system->crowded;
+    report->texels = system->unknown_count;
     vshi_seams_free(&seams);
     VSHI_TRY_DONE(vshi_job_advance(s->job, 1) ? vshi_job_fail_cancelled(s->job, error) : VSH_OK);
     VSHI_TRY_DONE(stitch_channels(s, run, error));
-    const double all = (double)s->channel_count * system.shares;
+    const double all = (double)s->channel_count * system->shares;
     report->before = all > 0.0 ? sqrt(s->square_before / all) : 0.0;
     report->after = all > 0.0 ? sqrt(s->square_after / all) : 0.0;
 done:
     free(s->islands);
     free(s->vectors);
     free(s->channels);
-    vshi_seam_system_free(&system);
+    vshi_seam_system_free(system);
     vshi_seams_free(&seams);
     return result;
 }
