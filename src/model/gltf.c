@@ -107,10 +107,13 @@ static vsh_result allocate(vshi_gltf *gltf, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, const vsh_run *run, vshi_job *job,
-                          vsh_model **model, vsh_error *error) {
+vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, bool mapped, const vsh_run *run,
+                          vshi_job *job, vsh_model **model, vsh_error *error) {
     vshi_gltf gltf = {.path = path, .run = run, .job = job, .bytes_held = (double)size};
     const bool binary = size >= 4 && memcmp(text, "glTF", 4) == 0;
+    if (mapped) {
+        gltf.mapped = (vshi_gltf_bytes){(const unsigned char *)text, size};
+    }
     const size_t length = strlen(path);
     const bool expected = length >= 4 && (path[length - 1] == 'b' || path[length - 1] == 'B');
     vsh_result result;

@@ -66,7 +66,7 @@ void damaged_models_are_refused_or_sound(void **) {
     int refused = 0;
     damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
         vsh_model *model = nullptr;
-        if (vshi_model_decode(decoder, "a.glb", &model, &failure) != VSH_OK) {
+        if (vshi_model_decode(decoder, "a.glb", nullptr, &model, &failure) != VSH_OK) {
             ++refused;
             return;
         }
