@@ -24,6 +24,7 @@ vsh_find(openimageio_util OpenImageIO/filesystem.h OpenImageIO_Util)
 vsh_find(png png.h png)
 vsh_find(assimp assimp/cimport.h assimp)
 vsh_find(draco draco/compression/decode.h draco)
+vsh_find(meshoptimizer meshoptimizer.h meshoptimizer)
 vsh_find(jansson jansson.h jansson)
 vsh_find(seccomp seccomp.h seccomp)
 vsh_find(md sha256.h md)
@@ -38,7 +39,7 @@ endif()
 
 find_package_handle_standard_args(vdbshade_dependencies REQUIRED_VARS VSH_openvdb_LIBRARY VSH_openimageio_LIBRARY
                                   VSH_openimageio_util_LIBRARY VSH_png_LIBRARY
-                                  VSH_assimp_LIBRARY VSH_draco_LIBRARY VSH_jansson_LIBRARY VSH_seccomp_LIBRARY VSH_half_LIBRARY
+                                  VSH_assimp_LIBRARY VSH_draco_LIBRARY VSH_meshoptimizer_LIBRARY VSH_jansson_LIBRARY VSH_seccomp_LIBRARY VSH_half_LIBRARY
                                   VSH_md_LIBRARY VSH_sleef_LIBRARY)
 
 if(NOT TARGET vsh::openexr)
@@ -47,7 +48,7 @@ if(NOT TARGET vsh::openexr)
   add_library(vsh::openexr INTERFACE IMPORTED)
   target_link_libraries(vsh::openexr INTERFACE OpenEXR::OpenEXRCore)
   add_library(vsh::dependencies INTERFACE IMPORTED)
-  target_link_libraries(vsh::dependencies INTERFACE TBB::tbb vsh::half vsh::openexr vsh::png vsh::assimp vsh::draco vsh::jansson
+  target_link_libraries(vsh::dependencies INTERFACE TBB::tbb vsh::half vsh::openexr vsh::png vsh::assimp vsh::draco vsh::meshoptimizer vsh::jansson
                                                     vsh::md vsh::sleef vsh::seccomp Freetype::Freetype ZLIB::ZLIB
                                                     ${CMAKE_DL_LIBS} m)
   if(TARGET embree)

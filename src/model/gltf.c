@@ -90,12 +90,14 @@ static vsh_result check_version(const vshi_gltf *gltf, vsh_error *error) {
 static vsh_result allocate(vshi_gltf *gltf, vsh_error *error) {
     const size_t meshes = json_array_size(json_object_get(gltf->root, "meshes"));
     gltf->buffer_count = json_array_size(json_object_get(gltf->root, "buffers"));
+    gltf->view_count = json_array_size(json_object_get(gltf->root, "bufferViews"));
     gltf->node_count = json_array_size(json_object_get(gltf->root, "nodes"));
     const struct {
         void *memory;
         size_t count, size;
     } wanted[] = {
         {&gltf->buffers, gltf->buffer_count, sizeof *gltf->buffers},
+        {&gltf->views, gltf->view_count, sizeof *gltf->views},
         {&gltf->mesh_shapes, meshes, sizeof *gltf->mesh_shapes},
         {&gltf->node_seen, gltf->node_count, sizeof *gltf->node_seen},
         {&gltf->node_world, gltf->node_count, sizeof *gltf->node_world},

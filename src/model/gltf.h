@@ -32,6 +32,8 @@ typedef struct vshi_gltf {
     vshi_gltf_bytes mapped; /* the file, where arrays may be left in it (vshi_model_file); else NULL */
     vshi_gltf_buffer *buffers;
     size_t buffer_count;
+    vshi_gltf_buffer *views; /* what compressed ones unpack to */
+    size_t view_count;
     double bytes_held; /* by buffers and the model, for the memory limit */
 
     vsh_model *model;
@@ -85,6 +87,14 @@ vsh_result vshi_gltf_check_extensions(const vshi_gltf *gltf, vsh_error *error);
  */
 vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes, size_t *stride,
                           vsh_error *error);
+
+/* The bytes that `buffer`, `byteOffset` and `byteLength` of an object name. */
+vsh_result vshi_gltf_part(vshi_gltf *gltf, const json_t *object, const char *where, vshi_gltf_bytes *bytes,
+                          vsh_error *error);
+
+/* Unpacks what EXT_meshopt_compression names, into new memory (gltf_meshopt.c). */
+vsh_result vshi_gltf_read_meshopt(vshi_gltf *gltf, const json_t *extension, const char *where,
+                                  unsigned char **made, size_t *size, vsh_error *error);
 
 void vshi_gltf_free_buffers(vshi_gltf *gltf);
 

@@ -145,7 +145,7 @@ static void required_extensions_that_are_not_known_are_refused_by_name(void **st
     (void)state;
     static const struct {
         const char *name, *advice;
-    } unknown[] = {{"KHR_made_up", "export it without"}, {"EXT_meshopt_compression", "gltfpack"}};
+    } unknown[] = {{"KHR_made_up", "export it without"}, {"KHR_node_visibility", "to be seen"}};
     static const char *const known[] = {"KHR_mesh_quantization", "KHR_texture_transform",
                                         "KHR_materials_unlit", "KHR_lights_punctual"};
     char rest[1024];
