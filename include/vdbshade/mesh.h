@@ -117,6 +117,39 @@ VSH_API double vsh_unit(const char *name);
 /* Number of UV sets of mesh `index` (< mesh count), 0 … VSH_MAX_UV_SETS. */
 VSH_API int32_t vsh_model_uv_sets(const vsh_model *model, size_t index);
 
+/* How a light of a file shines. */
+enum {
+    VSH_MODEL_LIGHT_DIRECTIONAL = 0, /* from far away: direction */
+    VSH_MODEL_LIGHT_POINT = 1,       /* position, range */
+    VSH_MODEL_LIGHT_SPOT = 2         /* position, direction, range, angles */
+};
+
+/* A light that a file's node carries (glTF: KHR_lights_punctual). Lights of files have no size: shadows take
+ * an angle or a radius of the caller's. */
+typedef struct vsh_model_light {
+    const char *name;    /* the node's, else the light's; NULL where neither has one */
+    int32_t type;        /* VSH_MODEL_LIGHT_… */
+    double position[3];  /* world, metres */
+    double direction[3]; /* world, of length 1: the way it shines, away from it; of a point 0, 0, 0 */
+    double color[3];     /* linear RGB, ≥ 0, without the intensity */
+    double intensity;    /* ≥ 0: lux, of a directional one at normal incidence; else candela */
+    double range;        /* metres, where it is said to end; 0: nowhere */
+    double inner_angle;  /* spot: half angle of full light, radians, 0 … outer_angle; else 0 */
+    double outer_angle;  /* spot: half angle where light ends, radians, > 0 … π / 2; else 0 */
+} vsh_model_light;
+
+/* Number of lights of the file's scene: of glTF; of other formats 0. */
+VSH_API size_t vsh_model_light_count(const vsh_model *model);
+
+/* Light `index` (< light count), in the order in which its nodes are met. Its name belongs to the model. */
+VSH_API void vsh_model_get_light_sized(const vsh_model *model, size_t index, vsh_model_light *light,
+                                       size_t light_size);
+static inline vsh_model_light vsh_model_get_light(const vsh_model *model, size_t index) {
+    vsh_model_light light;
+    vsh_model_get_light_sized(model, index, &light, sizeof light);
+    return light;
+}
+
 /* A view of mesh `index` (< mesh count), with the UVs of set `uv_set` (from 0); -1 takes the second set where
  * there is one, else the first. Where the set is missing, `uvs` is NULL. The view's arrays and name belong to
  * the model. */

@@ -140,6 +140,18 @@ typedef struct vsh_scene {
 VSH_API vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error);
 VSH_API void vsh_scene_free(vsh_scene *scene); /* of vsh_scene_read() only; NULL does nothing */
 
+/* The lights of a model's file (vsh_model_get_light()) as those of a scene. Lights of files have no size:
+ * directional ones get `angle` (angular diameter, radians, 0 … π, excluded), points, which become spheres,
+ * and spots `radius` (world units, ≥ 0) and VSH_FALLOFF_INVERSE_SQUARE. Colours are colour × intensity;
+ * ranges are not taken. A name is the model's with _ for what a light's cannot have ("light" where it has
+ * none), and _2, _3 … behind it where one before has it. `unit` as vsh_scene.unit. Free *lights, NULL where
+ * *count is 0, with vsh_lights_free(). Safe for one model in any number of threads. Errors:
+ * VSH_ERROR_ARGUMENT (NULL, an angle, a radius or a unit out of range, a light whose place is then none that
+ * lights can have), VSH_ERROR_MEMORY. */
+VSH_API vsh_result vsh_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
+                                         vsh_light **lights, size_t *count, vsh_error *error);
+VSH_API void vsh_lights_free(vsh_light *lights); /* NULL does nothing */
+
 /* What a scene's files hold, each file read once, however many casters and receivers use it. */
 typedef struct vsh_assets vsh_assets;
 

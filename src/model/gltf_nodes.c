@@ -386,6 +386,7 @@ vsh_result vshi_gltf_add_scene(vshi_gltf *gltf, vsh_error *error) {
     VSHI_TRY_DONE(visit_scene(gltf, &walked, error));
     for (size_t i = 0; i < walked.count; ++i) {
         VSHI_TRY_DONE(add_node(gltf, walked.order[i], error));
+        VSHI_TRY_DONE(vshi_gltf_add_light(gltf, walked.order[i], error));
     }
     if (gltf->model->entry_count == 0) {
         result = vshi_gltf_fail(gltf, error, "holds no triangles");

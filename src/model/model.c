@@ -35,6 +35,7 @@ void vsh_model_free(vsh_model *model) {
         free(shape->positions);
     }
     free(model->shapes);
+    vshi_model_free_lights(model);
     for (int i = 0; i < VSHI_MODEL_BLOCKS; ++i) {
         free(model->blocks[i]);
     }

@@ -59,6 +59,8 @@ struct vsh_model {
     vshi_model_file file;
     vshi_model_entry *entries;
     size_t entry_count, entry_capacity;
+    vsh_model_light *lights; /* whose names are the model's */
+    size_t light_count, light_capacity;
     double unit; /* metres in one of the file's; 0: not known */
 };
 
@@ -92,6 +94,11 @@ vsh_result vshi_model_read(const char *path, const vsh_run *run, bool alone, vsh
  * transform that is not finite in 32 bits), VSH_ERROR_MEMORY. */
 vsh_result vshi_model_add(vsh_model *model, const char *path, const vsh_run *run,
                           const vshi_model_place *place, vsh_error *error);
+
+/* Adds a light, whose name is copied on one line; it may be NULL. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_model_add_light(vsh_model *model, const vsh_model_light *light, const char *name,
+                                vsh_error *error);
+void vshi_model_free_lights(vsh_model *model);
 
 /* The number of an object that is yet to be added. */
 uint32_t vshi_model_next_object(const vsh_model *model);
@@ -128,6 +135,11 @@ vsh_result vshi_serve_model(const char *path, struct vshi_decoder *request, cons
  * VSH_ERROR_READ where it does not hold, and as for what was made in this process. */
 vsh_result vshi_model_decode(struct vshi_decoder *decoder, const char *path, const vsh_run *run,
                              vsh_model **model, vsh_error *error);
+
+/* Its lights; what is taken is checked (model_light.c). */
+void vshi_model_put_lights(struct vshi_encoder *encoder, const vsh_model *model);
+vsh_result vshi_model_take_lights(struct vshi_decoder *decoder, vsh_model *model, const char *path,
+                                  vsh_error *error);
 
 /* --- arrays that are left in the file (model_raw.c) */
 

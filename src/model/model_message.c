@@ -58,6 +58,7 @@ vsh_result vshi_serve_model(const char *path, vshi_decoder *request, const vsh_r
         vshi_encode_count(payload, entry->shape);
         vshi_encode_array(payload, entry->transform, 12, sizeof(double));
     }
+    vshi_model_put_lights(payload, model);
     vsh_model_free(model);
     return VSH_OK;
 }
@@ -166,6 +167,7 @@ static vsh_result take_meshes(vshi_decoder *decoder, vshi_raw *raw, vsh_model *m
     while (model->entry_count < entries) {
         VSHI_TRY(take_entry(decoder, model, model->entry_count++, path, error));
     }
+    VSHI_TRY(vshi_model_take_lights(decoder, model, path, error));
     return vshi_decoder_ends(decoder) && entries > 0 ? VSH_OK : vshi_answer_fail(path, "its meshes", error);
 }
 

@@ -186,8 +186,9 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
     options.resume = settings->resume;
     options.invalid_picture = settings->invalid_picture;
     options.command = cli_parsed_command();
-    options.files = &settings->input;
-    options.file_count = 1;
+    const char *const files[] = {settings->input, settings->lights};
+    options.files = files;
+    options.file_count = settings->lights != NULL ? 2 : 1;
     options.done = say_lightmap;
     options.writing = say_writing;
     options.user = &t;

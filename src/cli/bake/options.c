@@ -15,7 +15,9 @@ enum {
     KEY_NO_RECEIVE,
     KEY_NO_CAST,
     KEY_PER_OBJECT,
-    KEY_INVALID
+    KEY_INVALID,
+    KEY_LIGHTS,
+    KEY_LIGHT_RADIUS
 };
 
 static const cli_option options[] = {
@@ -47,6 +49,11 @@ static const cli_option options[] = {
      "an image for each object: FOLDER/NAME.exr with\n-o FOLDER/, else OUT.NAME.exr, or where OUT has %s"},
     {0, NULL, NULL, "Light and occlusion"},
     CLI_LIGHT_OPTIONS,
+    {KEY_LIGHTS, "lights", "FILE",
+     "also the lights in a glTF or GLB, which may be INPUT;\ntheir channels are shadow.NAME, suns are as "
+     "wide "
+     "as\n--sun-angle says"},
+    {KEY_LIGHT_RADIUS, "light-radius", "R", "radius of its points and spots, scene units (0: hard)"},
     CLI_SETTINGS(VSH_SETTINGS_CHANNELS),
     CLI_ACCURACY_OPTIONS,
     CLI_CASTER_OPTIONS,
@@ -129,6 +136,12 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_INVALID:
         s->invalid_picture = value;
         return CLI_OK;
+    case KEY_LIGHTS:
+        s->lights = value;
+        return CLI_OK;
+    case KEY_LIGHT_RADIUS:
+        s->has_light_radius = true;
+        return cli_parse_number(name, value, 0.0, 1e12, &s->light_radius);
     case KEY_STATS:
         s->stats = value;
         return CLI_OK;
