@@ -117,6 +117,47 @@ VSH_API double vsh_unit(const char *name);
 /* Number of UV sets of mesh `index` (< mesh count), 0 … VSH_MAX_UV_SETS. */
 VSH_API int32_t vsh_model_uv_sets(const vsh_model *model, size_t index);
 
+/* What a texture is where UVs leave 0 … 1. */
+enum {
+    VSH_WRAP_REPEAT = 0,
+    VSH_WRAP_MIRROR = 1, /* repeated, every other time mirrored */
+    VSH_WRAP_CLAMP = 2   /* its edge goes on */
+};
+
+/* A material of a file (glTF), as far as it decides where light comes through. What is of the texture is told
+ * of masked ones only; light comes through these where base_alpha × the texture's alpha < alpha_cutoff. */
+typedef struct vsh_model_material {
+    const char *name;       /* NULL where it has none */
+    int32_t alpha;          /* VSH_ALPHA_… */
+    int32_t double_sided;   /* 1: both sides of its faces are seen */
+    double alpha_cutoff;    /* ≥ 0; 0 where it is not masked */
+    double base_alpha;      /* 0 … 1 */
+    int32_t uv_set;         /* of the texture, 0 … VSH_MAX_UV_SETS - 1; a mesh need not have it */
+    int32_t wrap[2];        /* VSH_WRAP_…, along u and v */
+    double uv_transform[6]; /* rows (a, b, c), (d, e, f): the image is looked up at u' = a u + b v + c,
+                               v' = d u + e v + f, v up in all */
+    const void *image; /* the base colour's image file (PNG, JPEG, …) as it is in the model; NULL where it
+                          is a file of its own, or none */
+    size_t image_size; /* bytes of it */
+    const char *image_path; /* the file, within the model's folder unless run->allow_outside; it need not be
+                               there. NULL: none */
+} vsh_model_material;
+
+/* Number of materials of the file: of glTF; of other formats 0. */
+VSH_API size_t vsh_model_material_count(const vsh_model *model);
+
+/* Material `index` (< material count). What it points to belongs to the model. */
+VSH_API void vsh_model_get_material_sized(const vsh_model *model, size_t index, vsh_model_material *material,
+                                          size_t material_size);
+static inline vsh_model_material vsh_model_get_material(const vsh_model *model, size_t index) {
+    vsh_model_material material;
+    vsh_model_get_material_sized(model, index, &material, sizeof material);
+    return material;
+}
+
+/* The material of mesh `index` (< mesh count); -1: none. */
+VSH_API int32_t vsh_model_mesh_material(const vsh_model *model, size_t index);
+
 /* How a light of a file shines. */
 enum {
     VSH_MODEL_LIGHT_DIRECTIONAL = 0, /* from far away: direction */

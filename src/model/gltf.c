@@ -125,6 +125,7 @@ vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, bool 
     VSHI_TRY_DONE(vshi_gltf_check_extensions(&gltf, error));
     VSHI_TRY_DONE(allocate(&gltf, error));
     gltf.model->unit = 1.0; /* glTF is in metres */
+    VSHI_TRY_DONE(vshi_gltf_read_materials(&gltf, error));
     VSHI_TRY_DONE(vshi_gltf_add_scene(&gltf, error));
     *model = gltf.model;
     gltf.model = NULL;

@@ -166,6 +166,9 @@ vsh_result vshi_gltf_read_draco(vshi_gltf *gltf, const json_t *extension, const 
 /* Adds what the file's scene shows to the model. */
 vsh_result vshi_gltf_add_scene(vshi_gltf *gltf, vsh_error *error);
 
+/* Reads all materials, and the images of masked ones (gltf_material.c). */
+vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error);
+
 /* Adds the light that a node of the scene carries (gltf_lights.c). */
 vsh_result vshi_gltf_add_light(vshi_gltf *gltf, size_t node, vsh_error *error);
 

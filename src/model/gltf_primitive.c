@@ -214,16 +214,14 @@ static vsh_result leave_raw(vshi_gltf *gltf, const json_t *primitive, const vshi
     return VSH_OK;
 }
 
-static int32_t alpha_of(const vshi_gltf *gltf, const json_t *primitive) {
+/* One that is not there is none. */
+static void set_material(const vshi_gltf *gltf, const json_t *primitive, vshi_model_shape *shape) {
     size_t material;
-    if (!vshi_gltf_count(primitive, "material", SIZE_MAX, &material) || material == SIZE_MAX) {
-        return VSH_ALPHA_OPAQUE;
+    if (vshi_gltf_count(primitive, "material", SIZE_MAX, &material) &&
+        material < gltf->model->material_count && material < INT32_MAX) {
+        shape->material = (int32_t)material + 1;
+        shape->alpha = gltf->model->materials[material].told.alpha;
     }
-    const char *mode =
-        json_string_value(json_object_get(vshi_gltf_element(gltf, "materials", material), "alphaMode"));
-    return mode != NULL && strcmp(mode, "BLEND") == 0  ? VSH_ALPHA_BLENDED
-           : mode != NULL && strcmp(mode, "MASK") == 0 ? VSH_ALPHA_MASKED
-                                                       : VSH_ALPHA_OPAQUE;
 }
 
 vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
@@ -246,7 +244,7 @@ vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, co
     if (shape->triangle_count == 0) {
         return VSH_OK;
     }
-    shape->alpha = alpha_of(gltf, primitive);
+    set_material(gltf, primitive, shape);
     if (shape->raw != NULL) {
         return VSH_OK;
     }

@@ -36,6 +36,7 @@ void vsh_model_free(vsh_model *model) {
     }
     free(model->shapes);
     vshi_model_free_lights(model);
+    vshi_model_free_materials(model);
     for (int i = 0; i < VSHI_MODEL_BLOCKS; ++i) {
         free(model->blocks[i]);
     }

@@ -23,11 +23,26 @@ typedef struct vshi_model_shape {
     uint32_t *indices;
     size_t vertex_count;
     size_t triangle_count;
-    int32_t uv_sets; /* highest set + 1 */
-    int32_t alpha;   /* VSH_ALPHA_… */
-    char *raw;       /* its arrays lie in the model's file, as they are there: what to call it where
-                        vshi_model_finish() is still to be done. NULL: they are its own, and done */
+    int32_t uv_sets;  /* highest set + 1 */
+    int32_t alpha;    /* VSH_ALPHA_… */
+    int32_t material; /* number of it + 1; 0: none */
+    char *raw;        /* its arrays lie in the model's file, as they are there: what to call it where
+                         vshi_model_finish() is still to be done. NULL: they are its own, and done */
 } vshi_model_shape;
+
+/* An image file: bytes, or a path. */
+typedef struct vshi_model_image {
+    const unsigned char *bytes; /* what is `owned`, or of the reader's answer */
+    size_t size;
+    unsigned char *owned;
+    char *path;
+} vshi_model_image;
+
+typedef struct vshi_model_material {
+    vsh_model_material told; /* without what lies in memory of the model's: */
+    char *name;
+    size_t image; /* number of it + 1; 0: none */
+} vshi_model_material;
 
 enum { VSHI_FILE_IDENTITY = 5 };
 
@@ -61,6 +76,10 @@ struct vsh_model {
     size_t entry_count, entry_capacity;
     vsh_model_light *lights; /* whose names are the model's */
     size_t light_count, light_capacity;
+    vshi_model_material *materials;
+    size_t material_count;
+    vshi_model_image *images;
+    size_t image_count;
     double unit; /* metres in one of the file's; 0: not known */
 };
 
@@ -99,6 +118,10 @@ vsh_result vshi_model_add(vsh_model *model, const char *path, const vsh_run *run
 vsh_result vshi_model_add_light(vsh_model *model, const vsh_model_light *light, const char *name,
                                 vsh_error *error);
 void vshi_model_free_lights(vsh_model *model);
+
+/* A copy of a text on one line. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_model_copy_line(const char *text, char **copy, vsh_error *error);
+void vshi_model_free_materials(vsh_model *model);
 
 /* The number of an object that is yet to be added. */
 uint32_t vshi_model_next_object(const vsh_model *model);
@@ -140,6 +163,11 @@ vsh_result vshi_model_decode(struct vshi_decoder *decoder, const char *path, con
 void vshi_model_put_lights(struct vshi_encoder *encoder, const vsh_model *model);
 vsh_result vshi_model_take_lights(struct vshi_decoder *decoder, vsh_model *model, const char *path,
                                   vsh_error *error);
+
+/* Its materials and images, which stay where they lie in the answer (model_material.c). */
+void vshi_model_put_materials(struct vshi_encoder *encoder, const vsh_model *model);
+vsh_result vshi_model_take_materials(struct vshi_decoder *decoder, vsh_model *model, const char *path,
+                                     const vsh_run *run, vsh_error *error);
 
 /* --- arrays that are left in the file (model_raw.c) */
 

@@ -38,12 +38,7 @@ vsh_result vshi_model_add_light(vsh_model *model, const vsh_model_light *light, 
     VSHI_TRY(grow(model, error));
     char *copy = NULL;
     if (name != NULL && name[0] != '\0') {
-        const size_t size = strlen(name) + 1;
-        VSHI_TRY(vshi_allocate((void **)&copy, size, 1, "a light's name", error));
-        memcpy(copy, name, size);
-        for (char *c = copy; *c != '\0'; ++c) {
-            *c = (unsigned char)*c < 0x20 || *c == 0x7f ? '?' : *c;
-        }
+        VSHI_TRY(vshi_model_copy_line(name, &copy, error));
     }
     vsh_model_light *added = &model->lights[model->light_count++];
     *added = *light;

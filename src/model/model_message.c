@@ -15,6 +15,7 @@ static void put_shape(vshi_encoder *encoder, const vshi_model_file *file, const 
     vshi_encode_count(encoder, shape->vertex_count);
     vshi_encode_count(encoder, (uint64_t)shape->uv_sets);
     vshi_encode_count(encoder, (uint64_t)shape->alpha);
+    vshi_encode_count(encoder, (uint64_t)shape->material);
     if (shape->triangle_count == 0) {
         return;
     }
@@ -59,6 +60,7 @@ vsh_result vshi_serve_model(const char *path, vshi_decoder *request, const vsh_r
         vshi_encode_array(payload, entry->transform, 12, sizeof(double));
     }
     vshi_model_put_lights(payload, model);
+    vshi_model_put_materials(payload, model);
     vsh_model_free(model);
     return VSH_OK;
 }
@@ -102,6 +104,7 @@ static vsh_result take_shape(vshi_decoder *decoder, vshi_raw *raw, vshi_model_sh
     shape->vertex_count = vshi_decode_count(decoder, UINT32_MAX);
     shape->uv_sets = (int32_t)vshi_decode_count(decoder, VSH_MAX_UV_SETS);
     shape->alpha = (int32_t)vshi_decode_count(decoder, VSH_ALPHA_BLENDED);
+    shape->material = (int32_t)vshi_decode_count(decoder, INT32_MAX);
     if (decoder->bad || shape->triangle_count == 0) {
         return VSH_OK;
     }
@@ -150,8 +153,8 @@ static vsh_result take_entry(vshi_decoder *decoder, vsh_model *model, size_t ind
 }
 
 static vsh_result take_meshes(vshi_decoder *decoder, vshi_raw *raw, vsh_model *model, const char *path,
-                              vsh_error *error) {
-    enum { LEAST_SHAPE = 32, LEAST_ENTRY = 112 }; /* bytes of the message */
+                              const vsh_run *run, vsh_error *error) {
+    enum { LEAST_SHAPE = 40, LEAST_ENTRY = 112 }; /* bytes of the message */
     const size_t shapes = vshi_decode_count(decoder, (uint64_t)(decoder->end - decoder->at) / LEAST_SHAPE);
     if (shapes == 0) {
         return vshi_answer_fail(path, "its meshes", error);
@@ -168,6 +171,7 @@ static vsh_result take_meshes(vshi_decoder *decoder, vshi_raw *raw, vsh_model *m
         VSHI_TRY(take_entry(decoder, model, model->entry_count++, path, error));
     }
     VSHI_TRY(vshi_model_take_lights(decoder, model, path, error));
+    VSHI_TRY(vshi_model_take_materials(decoder, model, path, run, error));
     return vshi_decoder_ends(decoder) && entries > 0 ? VSH_OK : vshi_answer_fail(path, "its meshes", error);
 }
 
@@ -186,7 +190,7 @@ static vsh_result take_model(vshi_decoder *decoder, const char *path, const vsh_
     if (bytes > 0) {
         VSHI_TRY_DONE(vshi_raw_open(&raw, path, run, identity, bytes, &model->blocks[0], error));
     }
-    VSHI_TRY_DONE(take_meshes(decoder, &raw, model, path, error));
+    VSHI_TRY_DONE(take_meshes(decoder, &raw, model, path, run, error));
 done:
     vshi_raw_close(&raw);
     return result;
