@@ -190,12 +190,12 @@ typedef struct vshi_raw {
     size_t used, bytes; /* of the block */
 } vshi_raw;
 
-/* Opens the file, which must be the one that the reader had, and takes `bytes` of memory: *block is the
- * caller's. Close with vshi_raw_close(), after an error too. Errors: VSH_ERROR_READ, VSH_ERROR_LIMIT,
+/* Opens the file, which must be the one that the reader had, and takes `bytes` of memory, no more than the
+ * places that `message` more bytes of its answer may tell: *block is the caller's. Of a `raw` with a path and
+ * a run; close with vshi_raw_close(), after an error too. Errors: VSH_ERROR_READ, VSH_ERROR_LIMIT,
  * VSH_ERROR_MEMORY. */
-vsh_result vshi_raw_open(vshi_raw *raw, const char *path, const vsh_run *run,
-                         const uint64_t identity[VSHI_FILE_IDENTITY], uint64_t bytes, void **block,
-                         vsh_error *error);
+vsh_result vshi_raw_open(vshi_raw *raw, const uint64_t identity[VSHI_FILE_IDENTITY], uint64_t bytes,
+                         size_t message, void **block, vsh_error *error);
 void vshi_raw_close(vshi_raw *raw);
 
 /* Reads and finishes the arrays of a shape whose counts are known. Errors: as vshi_model_finish(), and

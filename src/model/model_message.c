@@ -188,7 +188,8 @@ static vsh_result take_model(vshi_decoder *decoder, const char *path, const vsh_
     memcpy(identity, told, sizeof identity);
     vsh_result result;
     if (bytes > 0) {
-        VSHI_TRY_DONE(vshi_raw_open(&raw, path, run, identity, bytes, &model->blocks[0], error));
+        VSHI_TRY_DONE(vshi_raw_open(&raw, identity, bytes, (size_t)(decoder->end - decoder->at),
+                                    &model->blocks[0], error));
     }
     VSHI_TRY_DONE(take_meshes(decoder, &raw, model, path, run, error));
 done:

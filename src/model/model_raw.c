@@ -74,19 +74,22 @@ static vsh_result fail_changed(const char *path, vsh_error *error) {
     return vshi_fail(error, VSH_ERROR_READ, "%s: changed while it was read", path);
 }
 
-vsh_result vshi_raw_open(vshi_raw *raw, const char *path, const vsh_run *run,
-                         const uint64_t identity[VSHI_FILE_IDENTITY], uint64_t bytes, void **block,
-                         vsh_error *error) {
+vsh_result vshi_raw_open(vshi_raw *raw, const uint64_t identity[VSHI_FILE_IDENTITY], uint64_t bytes,
+                         size_t message, void **block, vsh_error *error) {
+    enum { PLACE = 16 /* bytes of a message that tell where an array lies */ };
     /* of the arrays, what vshi_model_finish() takes for a while is 5/36 and less */
     static const double beside = 1.25;
     uint64_t now[VSHI_FILE_IDENTITY];
-    *raw = (vshi_raw){.path = path, .run = run, .bytes = (size_t)bytes};
-    VSHI_TRY(vshi_input_open(path, path, SIZE_MAX / 2, &raw->file, &raw->size, error));
+    VSHI_TRY(vshi_input_open(raw->path, raw->path, SIZE_MAX / 2, &raw->file, &raw->size, error));
     if (!vshi_file_identity(fileno(raw->file), now) || memcmp(now, identity, sizeof now) != 0) {
-        return fail_changed(path, error);
+        return fail_changed(raw->path, error);
     }
-    VSHI_TRY(vshi_check_limit(run, beside * (double)bytes, path, error));
-    VSHI_TRY(vshi_take_pages(block, raw->bytes, path, error));
+    if (bytes / (raw->size + ALIGNED) > message / PLACE) { /* each array is a part of the file */
+        return vshi_answer_fail(raw->path, "what its arrays take", error);
+    }
+    VSHI_TRY(vshi_check_limit(raw->run, beside * (double)bytes, raw->path, error));
+    VSHI_TRY(vshi_take_pages(block, (size_t)bytes, raw->path, error));
+    raw->bytes = (size_t)bytes;
     raw->block = *block;
     return VSH_OK;
 }

@@ -128,7 +128,7 @@ static const double octahedral_steps = 1.7321 + 0.5 + 0.01;
 static void directions_on_an_octahedron_come_out_again(void **state) {
     (void)state;
     static float given[VERTICES][4];
-    static unsigned char folded[VERTICES][8], kept[VERTICES][8];
+    static unsigned char folded[8 * VERTICES], kept[8 * VERTICES];
     make_sheet();
     for (int bytes = 1; bytes <= 2; ++bytes) {
         const size_t stride = 4 * (size_t)bytes;
@@ -147,9 +147,9 @@ static void directions_on_an_octahedron_come_out_again(void **state) {
         meshopt_decodeFilterOct(kept, VERTICES, stride);
         for (size_t v = 0; v < VERTICES; ++v) {
             for (size_t c = 0; c < 3; ++c) {
-                int16_t two = (int8_t)kept[0][stride * v + c];
+                int16_t two = (int8_t)kept[stride * v + c];
                 if (bytes == 2) {
-                    memcpy(&two, &kept[0][stride * v + 2 * c], 2);
+                    memcpy(&two, &kept[stride * v + 2 * c], 2);
                 }
                 const double value = (double)mesh.normals[3 * v + c];
                 assert_true(fabs(value - (double)given[v][c]) <= octahedral_steps / most);
