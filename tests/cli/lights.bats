@@ -57,6 +57,19 @@ SPOT='{"type": "spot", "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.5}}'
     done
 }
 
+@test "info tells the lights of a file" {
+    write_lit lit.gltf "$(down 0 'Key light' 0,7,0), $(down 1 lamp 1,3,0)" "$SUN,$LAMP"
+    shade info lit.gltf
+    done_well
+    for line in "light 'Key_light': directional towards 0 1 0" "light 'lamp': sphere at 1 3 0, radius 0, color 8 4 0"; do
+        [[ $output == *"$line"* ]] || fail "no '$line'"
+    done
+    shade info lit.gltf --unit cm
+    [[ $output == *"light 'lamp': sphere at 0.01 0.03 0"* ]] || fail 'not in centimetres'
+    shade info "$ASSETS/thin.glb"
+    [[ $output != *"light '"* ]] || fail 'a light'
+}
+
 @test "lights of a file go with a scene's own, and are an input of the output" {
     write_lit lit.gltf "$(down 0 lamp 0,3,0)" "$LAMP"
     cat >scene.json <<'JSON'
