@@ -77,8 +77,8 @@ static vsh_result fail_changed(const char *path, vsh_error *error) {
 vsh_result vshi_raw_open(vshi_raw *raw, const uint64_t identity[VSHI_FILE_IDENTITY], uint64_t bytes,
                          size_t message, void **block, vsh_error *error) {
     enum { PLACE = 16 /* bytes of a message that tell where an array lies */ };
-    /* of the arrays, what vshi_model_finish() takes for a while is 5/36 and less */
-    static const double beside = 1.25;
+    /* vshi_model_finish() takes 5 bytes a vertex for a while, whose position alone is 12 */
+    static const double beside = 1.0 + 5.0 / 12.0;
     uint64_t now[VSHI_FILE_IDENTITY];
     VSHI_TRY(vshi_input_open(raw->path, raw->path, SIZE_MAX / 2, &raw->file, &raw->size, error));
     if (!vshi_file_identity(fileno(raw->file), now) || memcmp(now, identity, sizeof now) != 0) {
