@@ -173,7 +173,7 @@ static void fill(baking *b, const vsh_run *run) {
     const int32_t radius[VSHI_TEXEL_KINDS] = {
         [VSHI_TEXEL_EMPTY] = padding, [VSHI_TEXEL_INVALID] = padding > least ? padding : least};
     bench_check(vshi_padding_fill(run, texels->info.width, texels->info.height, state, radius, planes,
-                                  plane_count, &error),
+                                  plane_count, NULL, &error),
                 &error);
     vshi_spread_free(&spread);
     free(state);

@@ -24,11 +24,16 @@ vsh_find(openimageio_util OpenImageIO/filesystem.h OpenImageIO_Util)
 vsh_find(png png.h png)
 vsh_find(assimp assimp/cimport.h assimp)
 vsh_find(draco draco/compression/decode.h draco)
+vsh_find(meshoptimizer meshoptimizer.h meshoptimizer)
 vsh_find(jansson jansson.h jansson)
 vsh_find(seccomp seccomp.h seccomp)
 vsh_find(md sha256.h md)
 vsh_find(sleef sleef.h sleef)
 vsh_find(half Imath/half.h Imath-3_1)
+
+# three.js, which is put into the pages that `view` writes.
+find_path(VSH_three_FOLDER three.min.js PATHS /usr/share/javascript/three)
+mark_as_advanced(VSH_three_FOLDER)
 
 # Rays against triangles: optional, and what needs it says where it is missing.
 option(VSH_EMBREE "Trace rays against triangles with Embree, where it is found" ON)
@@ -38,8 +43,8 @@ endif()
 
 find_package_handle_standard_args(vdbshade_dependencies REQUIRED_VARS VSH_openvdb_LIBRARY VSH_openimageio_LIBRARY
                                   VSH_openimageio_util_LIBRARY VSH_png_LIBRARY
-                                  VSH_assimp_LIBRARY VSH_draco_LIBRARY VSH_jansson_LIBRARY VSH_seccomp_LIBRARY VSH_half_LIBRARY
-                                  VSH_md_LIBRARY VSH_sleef_LIBRARY)
+                                  VSH_assimp_LIBRARY VSH_draco_LIBRARY VSH_meshoptimizer_LIBRARY VSH_jansson_LIBRARY VSH_seccomp_LIBRARY VSH_half_LIBRARY
+                                  VSH_md_LIBRARY VSH_sleef_LIBRARY VSH_three_FOLDER)
 
 if(NOT TARGET vsh::openexr)
   set_property(TARGET vsh::openvdb PROPERTY INTERFACE_LINK_LIBRARIES TBB::tbb vsh::half)
@@ -47,7 +52,7 @@ if(NOT TARGET vsh::openexr)
   add_library(vsh::openexr INTERFACE IMPORTED)
   target_link_libraries(vsh::openexr INTERFACE OpenEXR::OpenEXRCore)
   add_library(vsh::dependencies INTERFACE IMPORTED)
-  target_link_libraries(vsh::dependencies INTERFACE TBB::tbb vsh::half vsh::openexr vsh::png vsh::assimp vsh::draco vsh::jansson
+  target_link_libraries(vsh::dependencies INTERFACE TBB::tbb vsh::half vsh::openexr vsh::png vsh::assimp vsh::draco vsh::meshoptimizer vsh::jansson
                                                     vsh::md vsh::sleef vsh::seccomp Freetype::Freetype ZLIB::ZLIB
                                                     ${CMAKE_DL_LIBS} m)
   if(TARGET embree)

@@ -22,6 +22,7 @@ set_target_properties(vdbshade_cli_installed PROPERTIES
 install(TARGETS vdbshade_cli_installed RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS vdbshade_reader RUNTIME DESTINATION ${VSH_READER_DIR})
 install(FILES LICENSE docs/licences.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY src/bindings/blender/vdbshade_bake DESTINATION ${CMAKE_INSTALL_DATADIR}/vdbshade/blender FILES_MATCHING PATTERN "*.py")
 install(DIRECTORY include/vdbshade DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
 
 set(VSH_PACKAGE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/vdbshade)

@@ -11,12 +11,17 @@ extern "C" {
 
 enum { VSH_MAX_LIGHTMAP_SIZE = 65536 };
 
+enum { VSH_PADDING_AUTO = -1 };
+
 typedef struct vsh_lightmap_options {
     size_t struct_size;
     int32_t width;           /* texels, 1 … VSH_MAX_LIGHTMAP_SIZE */
     int32_t height;          /* the same */
     int32_t supersample;     /* N: N × N samples a texel, 1 … 16 */
-    int32_t padding;         /* texels that charts are grown by, 0 … 4096; fills values, never coverage */
+    int32_t padding;         /* texels that charts are grown by, 0 … 4096; fills values, never coverage.
+                              * VSH_PADDING_AUTO: by 16, and all that is farther takes the mean of what a mip
+                              * level holds around it, so that no level reads background; bands of rows are
+                              * grown only */
     vsh_shade_options shade; /* of a bake that is given none; checked there */
     int32_t ao_spacing; /* 1, 2, 4 or 8 texels: AO by cones or adaptive is shaded no closer than this where
                          * casters are far enough, and interpolated between. Over 1 texels share the rays
@@ -303,6 +308,69 @@ VSH_API vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_t
                                      const vsh_light *lights, size_t light_count,
                                      const vsh_shade_options *options, const vsh_run *run,
                                      const vsh_lightmap *lightmap, vsh_bake_stats *stats, vsh_error *error);
+
+/* --- seams */
+
+/* What is done about them. */
+enum {
+    VSH_SEAMS_DEFAULT = 0, /* FIX where the output is an asset (vsh_lit_is_output()), else KEEP */
+    VSH_SEAMS_KEEP = 1,    /* values are what was baked */
+    VSH_SEAMS_FIX = 2      /* vsh_lightmap_stitch() */
+};
+
+/* "fix" to VSH_SEAMS_FIX and back; -1 and NULL for what is none. Names are static; NULL is none. */
+VSH_API int32_t vsh_seams(const char *name);
+VSH_API const char *vsh_seams_name(int32_t seams);
+
+typedef struct vsh_stitch_options {
+    size_t struct_size;
+    double max_change; /* how far a value may be moved, 0 … 1 (0.02): the standard error that it was baked to
+                          (vsh_shade_options.max_error). Of irradiance in parts of the largest value that is
+                          read at the same seams near it */
+    double max_angle;  /* degrees, 0 … 180 (5): surfaces whose normals differ by more at an edge are creased
+                          there, and left */
+    double keep; /* what moving a value costs, 1e-6 … 1 (0.01): the square of a change against that of the
+                    difference at a place on a seam, two of which there are for a texel of its length */
+} vsh_stitch_options;
+
+static inline vsh_stitch_options vsh_stitch_options_default(void) {
+    vsh_stitch_options options = {sizeof(vsh_stitch_options), 0.02, 5.0, 0.01};
+    return options;
+}
+
+/* What was stitched. */
+typedef struct vsh_stitch_report {
+    uint64_t seams;   /* edges that two charts share, or a chart with itself, where the surface is smooth */
+    uint64_t places;  /* on them, half a texel apart, where both sides were made to agree */
+    uint64_t crowded; /* that were left out: a lookup there reads a third chart */
+    uint64_t texels;  /* read at these places */
+    double before;    /* root mean square difference across, of all channels; of irradiance in parts of its */
+    double after;     /* largest value */
+} vsh_stitch_report;
+
+/* Makes the values on both sides of charts' borders agree as bilinear lookups give them, by least squares
+ * over the texels that they read (Iwanicki, "Lighting technology of The Last of Us", 2013): of a whole
+ * lightmap that was baked of these charts. Edges count whose ends are equal in the world, whichever meshes
+ * they are of. Texels where coverage is 0 (padding, invalid ones) are guesses and move as far as values go;
+ * all others at most max_change, and none out of its range: 0 … 1, irradiance ≥ 0. Shadow, AO, irradiance,
+ * tint and sky are moved; errors, `invalid` and coverage are not, nor bent normals, which are directions: in
+ * tangent space no chart's are like another's. Planes should have a padding of 2 texels at least. `report`
+ * may be NULL. The planes are not to be changed meanwhile. What is not finite is left, and all that is read
+ * with it. Errors (but for VSH_ERROR_CANCELLED, planes are then as they were):
+ * - VSH_ERROR_ARGUMENT: charts, lightmap NULL, options out of range, run;
+ * - VSH_ERROR_LIMIT: run->memory_limit, beside the charts and the planes; 2^32 / 3 triangles; 2^32 places;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_lightmap_stitch_sized(const vsh_charts *charts, const vsh_lightmap *lightmap,
+                                             size_t light_count, const vsh_stitch_options *options,
+                                             const vsh_run *run, vsh_stitch_report *report,
+                                             size_t report_size, vsh_error *error);
+static inline vsh_result vsh_lightmap_stitch(const vsh_charts *charts, const vsh_lightmap *lightmap,
+                                             size_t light_count, const vsh_stitch_options *options,
+                                             const vsh_run *run, vsh_stitch_report *report,
+                                             vsh_error *error) {
+    return vsh_lightmap_stitch_sized(charts, lightmap, light_count, options, run, report, sizeof *report,
+                                     error);
+}
 
 #ifdef __cplusplus
 }

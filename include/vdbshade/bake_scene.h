@@ -3,14 +3,12 @@
 #define VDBSHADE_BAKE_SCENE_H
 
 #include "image.h"
+#include "lit.h"
 #include "scene.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-/* The share of a lightmap's covered texels that objects may take from each other: charts that touch. */
-#define VSH_LARGEST_OVERLAP 0.01
 
 /* --- where rows go */
 
@@ -31,6 +29,8 @@ typedef struct vsh_job_lightmap {
     uint64_t resumed_rows;   /* that an earlier bake had kept */
     int32_t kept_rows; /* where its bake failed and `resume` was asked for: rows that the next one need not
                           bake */
+    size_t page;       /* of the receiver, where it is unwrapped onto several: an image's name then has its
+                          number before the ending, OUT.0.exr */
 } vsh_job_lightmap;
 
 /* Takes the rows of lightmaps, one lightmap after the other, from the top on, in the thread that called
@@ -68,7 +68,10 @@ typedef struct vsh_bake_job_options {
     const char *invalid_picture; /* PNG of the texels that are not valid, for each lightmap: where there are
                                     several, FILE.OUTPUT.png. NULL: none. Not with `resume` */
     const vsh_row_sink *sink; /* NULL: image files at the receivers' outputs, which say where they come from
-                                 (vsh_provenance) */
+                                 (vsh_provenance); where an output's name ends in .glb or .gltf, the
+                                 receiver's file with its light (vsh_lit_write()): AO as occlusion, irradiance
+                                 or else the mean of the lights' shadows as lightmap, whose intensity is π:
+                                 what is lit fully shows its own colour */
     const char *command;      /* these three as in vsh_provenance_source */
     const char *const *files;
     size_t file_count;
@@ -77,21 +80,27 @@ typedef struct vsh_bake_job_options {
     /* A file is written from here on, beside its place under a temporary name; NULL: no more. For programs
      * that may end in the middle of it, and take it away then. May be NULL. */
     void (*writing)(void *user, const char *path);
-    void *user; /* handed to both */
+    void *user;          /* handed to both */
+    int32_t lit_preview; /* these three of outputs that are assets (vsh_lit_is_output()). Nonzero: what the
+                            image shows is their unlit base colour */
+    int32_t lit_image_place; /* VSH_LIT_IMAGES_… */
+    const char *lit_exr;     /* EXR of all channels beside the one output; NULL: none */
 } vsh_bake_job_options;
 
 static inline vsh_bake_job_options vsh_bake_job_options_default(void) {
     vsh_bake_job_options options = {
-        sizeof(vsh_bake_job_options), 0, 0, 0, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL};
+        sizeof(vsh_bake_job_options), 0,   0, 0, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL, 0,
+        VSH_LIT_IMAGES_AUTO,          NULL};
     return options;
 }
 
 /* The lightmaps of a scene under way. Not for several threads at once. Free it with vsh_bake_job_free(). */
 typedef struct vsh_bake_job vsh_bake_job;
 
-/* Whether the image of receiver `index` can be written as it asks, its channels included, without reading a
- * file. Errors: as vsh_image_check(); VSH_ERROR_ARGUMENT (scene NULL, no such receiver, more channels than
- * VSH_MAX_CHANNELS). */
+/* Whether the image (or the asset) of receiver `index` can be written as it asks, its channels included,
+ * without reading a file. Errors: as vsh_image_check(); VSH_ERROR_ARGUMENT (scene NULL, no such
+ * receiver, more channels than VSH_MAX_CHANNELS; an asset without AO, irradiance and shadows, or of 32 bits,
+ * or with a pack). */
 VSH_API vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *error);
 
 /* Loads the scene's files and finds its lightmaps. Scene, options and what they point to must outlive the

@@ -117,6 +117,80 @@ VSH_API double vsh_unit(const char *name);
 /* Number of UV sets of mesh `index` (< mesh count), 0 … VSH_MAX_UV_SETS. */
 VSH_API int32_t vsh_model_uv_sets(const vsh_model *model, size_t index);
 
+/* What a texture is where UVs leave 0 … 1. */
+enum {
+    VSH_WRAP_REPEAT = 0,
+    VSH_WRAP_MIRROR = 1, /* repeated, every other time mirrored */
+    VSH_WRAP_CLAMP = 2   /* its edge goes on */
+};
+
+/* A material of a file (glTF), as far as it decides where light comes through. What is of the texture is told
+ * of masked ones only; light comes through these where base_alpha × the texture's alpha < alpha_cutoff. */
+typedef struct vsh_model_material {
+    const char *name;       /* NULL where it has none */
+    int32_t alpha;          /* VSH_ALPHA_… */
+    int32_t double_sided;   /* 1: both sides of its faces are seen */
+    double alpha_cutoff;    /* ≥ 0; 0 where it is not masked */
+    double base_alpha;      /* 0 … 1 */
+    int32_t uv_set;         /* of the texture, 0 … VSH_MAX_UV_SETS - 1; a mesh need not have it */
+    int32_t wrap[2];        /* VSH_WRAP_…, along u and v */
+    double uv_transform[6]; /* rows (a, b, c), (d, e, f): the image is looked up at u' = a u + b v + c,
+                               v' = d u + e v + f, v up in all */
+    const void *image; /* the base colour's image file (PNG, JPEG, …) as it is in the model; NULL where it
+                          is a file of its own, or none */
+    size_t image_size; /* bytes of it */
+    const char *image_path; /* the file, within the model's folder unless run->allow_outside; it need not be
+                               there. NULL: none */
+} vsh_model_material;
+
+/* Number of materials of the file: of glTF; of other formats 0. */
+VSH_API size_t vsh_model_material_count(const vsh_model *model);
+
+/* Material `index` (< material count). What it points to belongs to the model. */
+VSH_API void vsh_model_get_material_sized(const vsh_model *model, size_t index, vsh_model_material *material,
+                                          size_t material_size);
+static inline vsh_model_material vsh_model_get_material(const vsh_model *model, size_t index) {
+    vsh_model_material material;
+    vsh_model_get_material_sized(model, index, &material, sizeof material);
+    return material;
+}
+
+/* The material of mesh `index` (< mesh count); -1: none. */
+VSH_API int32_t vsh_model_mesh_material(const vsh_model *model, size_t index);
+
+/* How a light of a file shines. */
+enum {
+    VSH_MODEL_LIGHT_DIRECTIONAL = 0, /* from far away: direction */
+    VSH_MODEL_LIGHT_POINT = 1,       /* position, range */
+    VSH_MODEL_LIGHT_SPOT = 2         /* position, direction, range, angles */
+};
+
+/* A light that a file's node carries (glTF: KHR_lights_punctual). Lights of files have no size: shadows take
+ * an angle or a radius of the caller's. */
+typedef struct vsh_model_light {
+    const char *name;    /* the node's, else the light's; NULL where neither has one */
+    int32_t type;        /* VSH_MODEL_LIGHT_… */
+    double position[3];  /* world, metres */
+    double direction[3]; /* world, of length 1: the way it shines, away from it; of a point 0, 0, 0 */
+    double color[3];     /* linear RGB, ≥ 0, without the intensity */
+    double intensity;    /* ≥ 0: lux, of a directional one at normal incidence; else candela */
+    double range;        /* metres, where it is said to end; 0: nowhere */
+    double inner_angle;  /* spot: half angle of full light, radians, 0 … outer_angle; else 0 */
+    double outer_angle;  /* spot: half angle where light ends, radians, > 0 … π / 2; else 0 */
+} vsh_model_light;
+
+/* Number of lights of the file's scene: of glTF; of other formats 0. */
+VSH_API size_t vsh_model_light_count(const vsh_model *model);
+
+/* Light `index` (< light count), in the order in which its nodes are met. Its name belongs to the model. */
+VSH_API void vsh_model_get_light_sized(const vsh_model *model, size_t index, vsh_model_light *light,
+                                       size_t light_size);
+static inline vsh_model_light vsh_model_get_light(const vsh_model *model, size_t index) {
+    vsh_model_light light;
+    vsh_model_get_light_sized(model, index, &light, sizeof light);
+    return light;
+}
+
 /* A view of mesh `index` (< mesh count), with the UVs of set `uv_set` (from 0); -1 takes the second set where
  * there is one, else the first. Where the set is missing, `uvs` is NULL. The view's arrays and name belong to
  * the model. */

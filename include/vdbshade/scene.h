@@ -8,6 +8,7 @@
 #include "occluders.h"
 #include "outline.h"
 #include "spheres.h"
+#include "unwrap.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -71,7 +72,25 @@ typedef struct vsh_scene_layer {
     vsh_layer shade; /* field and triangles NULL */
 } vsh_scene_layer;
 
+/* The share of a lightmap's covered texels that objects may take from each other: charts that touch. */
+#define VSH_LARGEST_OVERLAP 0.01
+
 enum { VSH_RECEIVER_MESH = 0, VSH_RECEIVER_HEIGHTFIELD = 1 };
+
+/* Whether a receiver's lightmap UVs are made for it (vsh_unwrap()), in place of those of its file. */
+enum {
+    VSH_RECEIVER_UNWRAP_DEFAULT = 0, /* AUTO where its output is an asset (vsh_lit_is_output()), else NEVER */
+    VSH_RECEIVER_UNWRAP_NEVER = 1,
+    VSH_RECEIVER_UNWRAP_AUTO = 2, /* where no lightmap can be baked by its own, because there are none, they
+                                     leave the unit square or lie over each other; what is laid out well in
+                                     each of its meshes stays so, and is packed anew */
+    VSH_RECEIVER_UNWRAP_ALWAYS = 3
+};
+
+/* "default", "never", "auto", "always" to VSH_RECEIVER_UNWRAP_… and back; -1 and NULL for what is none. Names
+ * are static; NULL is none. */
+VSH_API int32_t vsh_receiver_unwrap(const char *name);
+VSH_API const char *vsh_receiver_unwrap_name(int32_t unwrap);
 
 typedef struct vsh_receiver {
     const char *path;     /* mesh file, or a heightfield's image */
@@ -91,9 +110,17 @@ typedef struct vsh_receiver {
     vsh_selection objects; /* mesh: which of its meshes receive */
     int32_t partial; /* mesh: nonzero: those without UVs, or without the set, are left out with a warning,
                         as long as one has them */
-    int32_t allow_overlap; /* nonzero: objects whose UVs lie over each other are meant so (vdbshade bake then
-                              does not refuse them) */
-    int32_t color_space;   /* as in vsh_image_options */
+    int32_t allow_overlap;  /* nonzero: objects whose UVs lie over each other are meant so (vdbshade bake then
+                               does not refuse them) */
+    int32_t color_space;    /* as in vsh_image_options */
+    int32_t unwrap;         /* mesh: VSH_RECEIVER_UNWRAP_… */
+    double texels_per_unit; /* these two where it is unwrapped, as in vsh_unwrap_options: `width` × `height`
+                               is a page's size. 0: the most that fit */
+    int32_t pages; /* that may be filled at most, ≤ VSH_MAX_PAGES; 0: one, or with texels_per_unit as
+                      many as it takes */
+    int32_t seams; /* mesh: VSH_SEAMS_…; FIX moves values by up to the scene's shade.max_error, and pads
+                      by 2 texels at least. A lightmap that is baked in bands of rows keeps its seams, with
+                      a warning */
 } vsh_receiver;
 
 /* A whole scene, read from a file or filled by the caller. Paths are as the system takes them (the reader has
@@ -140,6 +167,18 @@ typedef struct vsh_scene {
 VSH_API vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error);
 VSH_API void vsh_scene_free(vsh_scene *scene); /* of vsh_scene_read() only; NULL does nothing */
 
+/* The lights of a model's file (vsh_model_get_light()) as those of a scene. Lights of files have no size:
+ * directional ones get `angle` (angular diameter, radians, 0 … π, excluded), points, which become spheres,
+ * and spots `radius` (world units, ≥ 0) and VSH_FALLOFF_INVERSE_SQUARE. Colours are colour × intensity;
+ * ranges are not taken. A name is the model's with _ for what a light's cannot have ("light" where it has
+ * none), and _2, _3 … behind it where one before has it. `unit` as vsh_scene.unit. Free *lights, NULL where
+ * *count is 0, with vsh_lights_free(). Safe for one model in any number of threads. Errors:
+ * VSH_ERROR_ARGUMENT (NULL, an angle, a radius or a unit out of range, a light whose place is then none that
+ * lights can have), VSH_ERROR_MEMORY. */
+VSH_API vsh_result vsh_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
+                                         vsh_light **lights, size_t *count, vsh_error *error);
+VSH_API void vsh_lights_free(vsh_light *lights); /* NULL does nothing */
+
 /* What a scene's files hold, each file read once, however many casters and receivers use it. */
 typedef struct vsh_assets vsh_assets;
 
@@ -162,6 +201,24 @@ VSH_API void vsh_assets_free(vsh_assets *assets); /* NULL does nothing */
  * to assets. NULL and a count of 0 for an index beyond the scene's, and for a caster without triangles. */
 VSH_API const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count);
 VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count);
+
+/* The model of receiver `index`, and which of its meshes each of the receiver's is: (*numbers)[mesh_count].
+ * They belong to the assets; NULL for an index beyond the scene's. */
+VSH_API const vsh_model *vsh_assets_receiver_model(const vsh_assets *assets, size_t index,
+                                                   const size_t **numbers);
+
+/* Pages of receiver `index`: 1 but where it is unwrapped and needs more; 0 beyond the scene's. */
+VSH_API size_t vsh_assets_receiver_pages(const vsh_assets *assets, size_t index);
+
+/* The meshes of vsh_assets_receiver() that lie on page `page`, which are some in a row of them: *first is the
+ * place of the first in that list. NULL and a count of 0 beyond what there is. */
+VSH_API const vsh_mesh *vsh_assets_receiver_page(const vsh_assets *assets, size_t index, size_t page,
+                                                 size_t *first, size_t *mesh_count);
+
+/* Where it is unwrapped: its atlas, and which of the atlas's meshes each of vsh_assets_receiver() is, or a
+ * part of: (*numbers)[mesh_count]. They belong to the assets. Else NULL. */
+VSH_API const vsh_atlas *vsh_assets_receiver_atlas(const vsh_assets *assets, size_t index,
+                                                   const size_t **numbers);
 
 /* What caster `index` casts by where it is not part of a level set: a heightfield that is direct, spheres
  * that are not voxelised. They belong to the assets; NULL for every other caster, and beyond the scene's. */

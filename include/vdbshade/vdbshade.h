@@ -45,6 +45,7 @@
 #include "image.h"
 #include "layer.h"
 #include "light.h"
+#include "lit.h"
 #include "mesh.h"
 #include "method.h"
 #include "occluders.h"
@@ -61,6 +62,8 @@
 #include "solidity.h"
 #include "spheres.h"
 #include "trace.h"
+#include "unwrap.h"
+#include "view.h"
 #include "volume.h"
 #include "voxels.h"
 

@@ -5,6 +5,7 @@
 #include "bake/origins.h"
 #include "bake/padding.h"
 #include "bake/planes.h"
+#include "bake/pull_push.h"
 #include "bake/rows.h"
 #include "base/floats.h"
 #include "base/memory.h"
@@ -19,6 +20,7 @@
 
 enum {
     MAX_PADDING = 4096,
+    AUTO_PADDING = 16, /* texels: half of the gap between charts that four mip levels keep apart, and more */
     LEAST_BESIDE = VSHI_SPREAD_REACH /* texels beside a band: invalid ones may be filled from as far */
 };
 
@@ -34,7 +36,7 @@ static vsh_result check_options(const vsh_lightmap_options *options, vsh_error *
     VSHI_TRY(check_range(options->width, 1, VSH_MAX_LIGHTMAP_SIZE, "width", error));
     VSHI_TRY(check_range(options->height, 1, VSH_MAX_LIGHTMAP_SIZE, "height", error));
     VSHI_TRY(check_range(options->supersample, 1, VSHI_MAX_SUPERSAMPLE, "supersample", error));
-    VSHI_TRY(check_range(options->padding, 0, MAX_PADDING, "padding", error));
+    VSHI_TRY(check_range(options->padding, VSH_PADDING_AUTO, MAX_PADDING, "padding", error));
     const int32_t spacing = options->ao_spacing;
     if (spacing != 1 && spacing != 2 && spacing != 4 && spacing != 8) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap ao_spacing %d: expected 1, 2, 4 or 8", spacing);
@@ -295,7 +297,8 @@ vsh_result vshi_charts_make(const vsh_mesh *meshes, size_t mesh_count, const vsh
     VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "texels", error));
     made->info.width = full.width;
     made->info.height = full.height;
-    made->padding = full.padding;
+    made->fills = full.padding == VSH_PADDING_AUTO;
+    made->padding = made->fills ? AUTO_PADDING : full.padding;
     made->ao_spacing = full.supersample == 1 ? full.ao_spacing : 1;
     made->tangents = full.tangents != 0;
     made->shade = full.shade;
@@ -378,6 +381,7 @@ double vshi_bake_bytes(const vshi_bake_need *need) {
                        (need->bent ? 3 : 0) + (need->tint ? 3 : 0);
     sample += (double)floats * sizeof(float);
     return need->samples * sample + texels * (1.0 + VSHI_PADDING_TEXEL_BYTES + VSHI_SPREAD_TEXEL_BYTES) +
+           (need->fills ? vshi_pull_push_bytes(need->width, need->rows) : 0.0) +
            fmax(need->lattice ? vshi_lattice_bytes(need->samples, texels, need->bent) : 0.0,
                 need->windows
                     ? vshi_ao_texels_bytes(need->samples, need->width, need->rows, need->threads, need->bent)
@@ -416,7 +420,8 @@ uint64_t vsh_charts_band_bytes(const vsh_charts *charts, int32_t first_row, int3
                            .bent = lightmap->bent != NULL,
                            .tint = lightmap->tint != NULL,
                            .lattice = charts->ao_spacing > 1 && !vshi_ao_traces(&shade, NULL),
-                           .windows = charts->ao_spacing > 1 && keeps_error};
+                           .windows = charts->ao_spacing > 1 && keeps_error,
+                           .fills = charts->fills && rows == charts->info.height};
     for (size_t row = band.held_begin; row < band.held_end; ++row) {
         need.samples += (double)charts->rows[row].samples;
     }

@@ -1,5 +1,6 @@
 #include "bake/baking.h"
 #include "bake/planes.h"
+#include "bake/pull_push.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/try.h"
@@ -94,8 +95,20 @@ static vsh_result pad(vshi_baking *bake, size_t invalid, vsh_error *error) {
         [VSHI_TEXEL_INVALID] = invalid > 0 ? invalid_radius(texels) : 0,
     };
     vshi_spread_copy(&bake->spread, bake->state, bake->work.planes, bake->work.padded);
-    return vshi_padding_fill(&bake->run, texels->info.width, texels->band.rows, bake->state, radius,
-                             bake->work.planes, bake->work.padded, error);
+    uint8_t *filled = NULL;
+    vsh_result result;
+    if (texels->fills) {
+        VSHI_TRY(vshi_allocate((void **)&filled, vshi_texels_held(texels), 1, "padding", error));
+    }
+    VSHI_TRY_DONE(vshi_padding_fill(&bake->run, texels->info.width, texels->band.rows, bake->state, radius,
+                                    bake->work.planes, bake->work.padded, filled, error));
+    if (texels->fills) {
+        result = vshi_pull_push(&bake->run, texels->info.width, texels->band.rows, filled, bake->work.planes,
+                                bake->work.padded, error);
+    }
+done:
+    free(filled);
+    return result;
 }
 
 static vsh_result check_limit(const vshi_baking *bake, vsh_error *error) {
@@ -113,6 +126,7 @@ static vsh_result check_limit(const vshi_baking *bake, vsh_error *error) {
                                  .tint = needs(bake, VSHI_NEEDS_TINT),
                                  .lattice = open && !shares,
                                  .windows = open && shares,
+                                 .fills = texels->fills,
                                  .threads = bake->run.threads};
     const double bytes =
         fields_bytes(bake) + (double)texels->info.bytes + vshi_bake_bytes(&need) +

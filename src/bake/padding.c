@@ -18,7 +18,8 @@ typedef struct filling {
     int32_t reach; /* the largest radius */
     const vshi_plane *planes;
     size_t plane_count;
-    int16_t *down; /* [height][width]: rows from a texel to the nearest valid one of its column; NONE */
+    uint8_t *filled; /* [height][width]; NULL: not asked for */
+    int16_t *down;   /* [height][width]: rows from a texel to the nearest valid one of its column; NONE */
 } filling;
 
 static void search_columns(void *user, size_t begin, size_t end) {
@@ -84,6 +85,10 @@ static void fill_rows(void *user, size_t begin, size_t end) {
             const uint8_t kind = f->state[at];
             const int32_t radius = kind == VSHI_TEXEL_VALID ? 0 : f->radius[kind];
             const size_t source = radius > 0 ? search_row(f, x, y, radius) : SIZE_MAX;
+            if (f->filled != NULL) {
+                f->filled[at] =
+                    radius == 0 ? kind == VSHI_TEXEL_VALID || kind == VSHI_TEXEL_FILLED : source != SIZE_MAX;
+            }
             if (source == SIZE_MAX) {
                 continue;
             }
@@ -98,13 +103,14 @@ static void fill_rows(void *user, size_t begin, size_t end) {
 
 vsh_result vshi_padding_fill(const vsh_run *run, int32_t width, int32_t height, const uint8_t *state,
                              const int32_t radius[VSHI_TEXEL_KINDS], const vshi_plane *planes,
-                             size_t plane_count, vsh_error *error) {
+                             size_t plane_count, uint8_t *filled, vsh_error *error) {
     filling f = {.width = (size_t)width,
                  .height = (size_t)height,
                  .state = state,
                  .radius = radius,
                  .planes = planes,
-                 .plane_count = plane_count};
+                 .plane_count = plane_count,
+                 .filled = filled};
     for (int kind = 0; kind < VSHI_TEXEL_KINDS; ++kind) {
         f.reach = kind != VSHI_TEXEL_VALID && radius[kind] > f.reach ? radius[kind] : f.reach;
     }

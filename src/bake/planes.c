@@ -90,16 +90,18 @@ static vsh_result fill_sky(vshi_baking *bake, float *plane, vsh_error *error) {
 #define WISHED(member) .plane = offsetof(vsh_lightmap, member), .wish = offsetof(vsh_planes, member)
 
 static const vshi_plane_kind kinds[] = {
-    {"shadow", .per_light = true, .padded = true, .needs = VSHI_NEEDS_LIGHTS, PLANE(shadow)},
-    {"ao", .padded = true, .needs = VSHI_NEEDS_AO, PLANE(ao)},
+    {"shadow", .per_light = true, .range = VSHI_RANGE_SHARE, .padded = true, .needs = VSHI_NEEDS_LIGHTS,
+     PLANE(shadow)},
+    {"ao", .range = VSHI_RANGE_SHARE, .padded = true, .needs = VSHI_NEEDS_AO, PLANE(ao)},
     {"error", .per_light = true, .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_DEVIATION, PLANE(shadow_error)},
     {"error.ao", .needs = VSHI_NEEDS_AO | VSHI_NEEDS_DEVIATION, PLANE(ao_error)},
-    {"irradiance", "RGB", VSHI_HOLDS_LIGHT, .padded = true,
+    {"irradiance", "RGB", VSHI_HOLDS_LIGHT, .range = VSHI_RANGE_LIGHT, .padded = true,
      .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_IRRADIANCE, PLANE(irradiance), .fill = fill_irradiance},
     {"bent", "XYZ", VSHI_HOLDS_VECTOR, .padded = true, .needs = VSHI_NEEDS_AO | VSHI_NEEDS_BENT, PLANE(bent)},
-    {"tint", "RGB", VSHI_HOLDS_LIGHT, .per_light = true, .padded = true,
+    {"tint", "RGB", VSHI_HOLDS_LIGHT, .per_light = true, .range = VSHI_RANGE_SHARE, .padded = true,
      .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_TINT, PLANE(tint)},
-    {"sky", .padded = true, .needs = VSHI_NEEDS_OPEN, WISHED(sky), .fill = fill_sky},
+    {"sky", .range = VSHI_RANGE_SHARE, .padded = true, .needs = VSHI_NEEDS_OPEN, WISHED(sky),
+     .fill = fill_sky},
     {"invalid", WISHED(invalid)},
     {"A", PLANE(coverage)},
 };

@@ -26,6 +26,13 @@ enum { VSHI_NO_WISH = -1 };
 /* What its values are, for who writes them as integers. */
 enum { VSHI_HOLDS_DATA, VSHI_HOLDS_LIGHT, VSHI_HOLDS_VECTOR };
 
+/* What values may be, for who changes them; those of no range are left as they are. */
+enum {
+    VSHI_RANGE_NONE = 0,
+    VSHI_RANGE_SHARE, /* 0 … 1 */
+    VSHI_RANGE_LIGHT  /* ≥ 0; errors of it are told of what is near */
+};
+
 /* A kind of plane. To add one: its member of vsh_lightmap, the wish for it in vsh_planes, a row and `fill`.
  */
 typedef struct vshi_plane_kind {
@@ -33,6 +40,7 @@ typedef struct vshi_plane_kind {
     const char *axes; /* of three components, interleaved: channels "irradiance.R"; NULL: one component */
     int holds;        /* VSHI_HOLDS_… */
     bool per_light;
+    int range;   /* VSHI_RANGE_… */
     bool padded; /* beyond its chart: values are, errors and what tells of the texel itself are not */
     uint32_t needs;
     int wish;     /* offset in vsh_planes; VSHI_NO_WISH: a scene has lights, AO … of its own members */

@@ -244,6 +244,7 @@ static vsh_result create(const vsh_charts *charts, int32_t first_row, int32_t ro
     made->info.width = charts->info.width;
     made->info.height = charts->info.height;
     made->padding = charts->padding;
+    made->fills = charts->fills && rows == charts->info.height;
     made->ao_spacing = charts->ao_spacing;
     made->shade = charts->shade;
     made->whole = charts->info.samples;

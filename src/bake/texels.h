@@ -17,6 +17,7 @@ struct vsh_charts {
     vsh_charts_info info;
     vshi_charts sorted;
     int32_t padding;
+    bool fills;         /* what is beyond the padding too, where a lightmap is whole */
     int32_t ao_spacing; /* 1 where texels have several samples */
     bool tangents;
     vsh_shade_options shade;
@@ -64,6 +65,7 @@ typedef struct vshi_bake_need {
     bool traced;         /* rays against triangles */
     bool values, errors, irradiance, bent, tint;
     bool lattice, windows; /* AO between texels, or by those around */
+    bool fills;            /* what is beyond the padding */
     int32_t threads;
 } vshi_bake_need;
 
@@ -74,6 +76,7 @@ struct vsh_texels {
     vsh_texels_info info; /* of the band's own rows */
     vshi_band band;
     int32_t padding;
+    bool fills;              /* what is beyond it too */
     int32_t ao_spacing;      /* as of the charts */
     vsh_shade_options shade; /* those given with the lightmap's size */
     size_t count;            /* samples */

@@ -1,5 +1,6 @@
 #include "bake_scene/job.h"
 
+#include "bake_scene/lit_sink.h"
 #include "bake_scene/resume.h"
 #include "base/clock.h"
 #include "base/job.h"
@@ -21,7 +22,9 @@ vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *e
     vshi_channels channels;
     vsh_result result;
     VSHI_TRY_DONE(vshi_channels_name(scene, receiver->width, receiver->height, &channels, error));
-    result = vsh_image_check(receiver->output, &channels.image, &options, error);
+    result = vsh_lit_is_output(receiver->output)
+                 ? vshi_lit_sink_check(receiver, &channels.image, error)
+                 : vsh_image_check(receiver->output, &channels.image, &options, error);
 done:
     vshi_channels_free(&channels);
     return result;
@@ -40,7 +43,7 @@ vsh_result vsh_receiver_charts(const vsh_scene *scene, size_t index, const vsh_m
     }
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    const vshi_target target = {scene->receivers[index], index, meshes, mesh_count, NULL, {NULL}};
+    const vshi_target target = {scene->receivers[index], index, meshes, mesh_count, NULL, {NULL}, 0};
     return vshi_target_charts(scene, &target, allow_overlap != 0, true, &full, charts, error);
 }
 
@@ -51,6 +54,26 @@ static vsh_result check_sink(const vsh_row_sink *given, vsh_row_sink *sink, vsh_
     VSHI_TRY(vshi_options_resolve(given, sink, sizeof *sink, "vsh_row_sink", error));
     if (given != NULL && (sink->begin == NULL || sink->add == NULL || sink->end == NULL)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_row_sink: begin, add or end is NULL");
+    }
+    return VSH_OK;
+}
+
+static vsh_result check_lit(const vsh_scene *scene, const vsh_bake_job_options *options, vsh_error *error) {
+    size_t assets = 0;
+    for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
+        assets += (size_t)vsh_lit_is_output(scene->receivers[i].output);
+    }
+    if (assets > 0 && options->per_object) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "vsh_bake_job_options.per_object: an asset has one lightmap for all its objects");
+    }
+    if (options->lit_exr != NULL && (assets != 1 || scene->receiver_count != 1)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "vsh_bake_job_options.lit_exr: is for one output that is a .glb or .gltf");
+    }
+    if (options->lit_image_place < VSH_LIT_IMAGES_AUTO || options->lit_image_place > VSH_LIT_IMAGES_BESIDE) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.lit_image_place is %d",
+                         options->lit_image_place);
     }
     return VSH_OK;
 }
@@ -66,7 +89,7 @@ static vsh_result check(const vsh_scene *scene, const vsh_bake_job_options *opti
     for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
         VSHI_TRY(vsh_receiver_check(scene, i, error));
     }
-    return VSH_OK;
+    return check_lit(scene, options, error);
 }
 
 static vsh_result list_lightmaps(vsh_bake_job *job, vsh_error *error) {
@@ -83,7 +106,8 @@ static vsh_result list_lightmaps(vsh_bake_job *job, vsh_error *error) {
                                                .meshes = target->meshes,
                                                .mesh_count = target->mesh_count,
                                                .width = target->receiver.width,
-                                               .height = target->receiver.height};
+                                               .height = target->receiver.height,
+                                               .page = target->page};
     }
     return VSH_OK;
 }
@@ -106,6 +130,9 @@ vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_option
         return vshi_fail(error, VSH_ERROR_MEMORY, "bake job: the system refused memory");
     }
     made->scene = *scene;
+    if (own.sink == NULL) {
+        vshi_lit_sink_scene(&made->scene);
+    }
     made->options = own;
     made->sink = sink;
     made->report.shade = vsh_shade_stats_zero();
@@ -126,6 +153,7 @@ void vsh_bake_job_free(vsh_bake_job *job) {
         return;
     }
     free(job->errors);
+    vshi_lit_pages_free(job);
     vsh_provenance_free(job->provenance);
     vsh_occluders_free(job->occluders);
     vsh_texels_free(job->texels);

@@ -8,6 +8,11 @@
 #include <vdbshade/bake_scene.h>
 #include <vdbshade/provenance.h>
 
+/* A page of a receiver that goes into an asset, until all of them are there. */
+typedef struct vshi_lit_page {
+    float *planes[4]; /* AO; light: R, G and B, or one; NULL: none */
+} vshi_lit_page;
+
 struct vsh_bake_job {
     vsh_scene scene;
     vsh_bake_job_options options;
@@ -25,6 +30,8 @@ struct vsh_bake_job {
     vsh_bake_error *errors;     /* [error_count], as in the report */
     vsh_bake_report report;
     bool measured;
+    vshi_lit_page *lit_pages; /* [lit_page_count]: of the receiver that is baked */
+    size_t lit_page_count;
 };
 
 /* The texels of some rows, or (`kept`, where they are all of them) those that are there already. */

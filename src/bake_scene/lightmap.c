@@ -3,15 +3,19 @@
 #include "bake_scene/file_sink.h"
 #include "bake_scene/invalid_picture.h"
 #include "bake_scene/job.h"
+#include "bake_scene/lit_sink.h"
 #include "bake_scene/resume.h"
 #include "bake_scene/warn.h"
 #include "base/clock.h"
+#include "base/job.h"
 #include "base/rounds.h"
 #include "base/try.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+enum { STITCHED_PADDING = 2 }; /* texels: what lookups at borders read is guessed from what is near */
 
 /* What the library made of arrays names no file. */
 static vsh_result name_file(const char *path, vsh_result result, vsh_error *error) {
@@ -31,6 +35,9 @@ vsh_result vshi_target_charts(const vsh_scene *scene, const vshi_target *target,
     options.height = receiver->height;
     options.supersample = receiver->supersample;
     options.padding = receiver->padding;
+    if (receiver->seams == VSH_SEAMS_FIX && options.padding >= 0 && options.padding < STITCHED_PADDING) {
+        options.padding = STITCHED_PADDING;
+    }
     options.ao_spacing = scene->ao || vsh_planes_shaded(&scene->planes) > 0 ? receiver->ao_spacing : 1;
     options.shade = scene->shade;
     options.tangents = scene->bent == 1 + VSH_BENT_TANGENT;
@@ -64,11 +71,15 @@ done:
 
 vsh_result vshi_job_plan(const vsh_bake_job *job, size_t index, const vsh_charts *charts, uint64_t held,
                          const vsh_run *run, vshi_bands *bands, vsh_error *error) {
+    const vsh_job_lightmap *lightmap = &job->lightmaps[index];
+    const bool lit = job->options.sink == NULL && vsh_lit_is_output(lightmap->output) != 0;
+    const uint64_t pages = vsh_assets_receiver_pages(job->assets, lightmap->receiver);
+    const uint64_t kept = lit ? pages * vshi_lit_sink_bytes(lightmap->width, lightmap->height) : 0;
     const vshi_bands_need need = {.picture = job->options.invalid_picture != NULL,
                                   .resume = job->options.resume != 0,
-                                  .files = job->options.sink == NULL,
+                                  .files = job->options.sink == NULL && !lit,
                                   .rows = job->options.band_rows,
-                                  .held = held,
+                                  .held = held + kept,
                                   .limit = run->memory_limit};
     return vshi_bands_plan(&job->scene, &job->targets.list[index], charts, &need, bands, error);
 }
@@ -85,6 +96,7 @@ typedef struct work {
     uint64_t *invalid;    /* [mesh_count]: of one band */
     vshi_rounds rounds;   /* where there are several bands */
     vshi_file_sink files;
+    vshi_lit_sink lit;
     vsh_row_sink sink;
     bool begun; /* the sink has taken rows */
     vshi_invalid_picture picture;
@@ -118,6 +130,41 @@ static vsh_result bake_band(work *w, int32_t first, int32_t rows, const vsh_run 
     return VSH_OK;
 }
 
+static bool fixes_seams(const work *w) {
+    return w->target->receiver.seams == VSH_SEAMS_FIX && w->target->receiver.type == VSH_RECEIVER_MESH;
+}
+
+/* Bytes that are there beside the charts: what casts, texels that are kept, planes. */
+static uint64_t held_bytes(const work *w) {
+    const vsh_occluders_info *casters = &w->job->report.occluders;
+    const uint64_t texels = (uint64_t)w->lightmap->width * (uint64_t)w->lightmap->height;
+    const uint64_t floats = (uint64_t)w->channels.image.channel_count +
+                            3 * (uint64_t)w->channels.triple_count + (w->channels.invalid != NULL ? 1 : 0);
+    vsh_texels_info kept = {.bytes = 0};
+    if (w->input->kept != NULL) {
+        vsh_texels_get_info(w->input->kept, &kept);
+    }
+    return casters->field_bytes + casters->triangles_bytes + kept.bytes + texels * floats * sizeof(float);
+}
+
+/* A lightmap that is whole. What is baked stays where there is no memory to make it better. */
+static vsh_result stitch(const work *w, vsh_error *error) {
+    const vsh_bake_job *job = w->job;
+    vsh_stitch_options options = vsh_stitch_options_default();
+    options.max_change = job->scene.shade.max_error;
+    vsh_run run = *w->run;
+    run.memory_held += held_bytes(w);
+    const vsh_result result = vsh_lightmap_stitch(w->input->charts, &w->channels.lightmap,
+                                                  job->scene.light_count, &options, &run, NULL, error);
+    if (result != VSH_ERROR_LIMIT) {
+        return name_file(w->target->receiver.path, result, error);
+    }
+    vshi_warn(w->run,
+              "%s: seams are kept: no memory to fix them beside a whole lightmap; raise --memory-limit",
+              w->target->receiver.path);
+    return VSH_OK;
+}
+
 /* Bakes a band, or takes it from before. */
 static vsh_result make_band(work *w, int32_t first, int32_t rows, const vsh_run *run, vsh_error *error) {
     const size_t meshes = w->target->mesh_count;
@@ -126,6 +173,9 @@ static vsh_result make_band(work *w, int32_t first, int32_t rows, const vsh_run 
         return VSH_OK;
     }
     VSHI_TRY(bake_band(w, first, rows, run, error));
+    if (fixes_seams(w) && w->input->bands.count == 1) {
+        VSHI_TRY(stitch(w, error));
+    }
     vshi_channels_split(&w->channels, &w->job->scene);
     vshi_resume_keep(&w->resume, first, rows, &w->channels, &w->baked, meshes);
     return VSH_OK;
@@ -157,11 +207,32 @@ static vsh_result write_band(work *w, int32_t rows, vsh_error *error) {
     return report_writing(w, 0.5, error);
 }
 
+/* What a lightmap goes without that is never whole. */
+static void warn_bands(const work *w) {
+    const vsh_receiver *receiver = &w->target->receiver;
+    const int32_t bands = w->input->bands.count;
+    if (bands > 1 && fixes_seams(w)) {
+        vshi_warn(
+            w->run,
+            "%s: seams are kept: it is baked in %d bands of rows, and a border's sides may lie in two; raise "
+            "--memory-limit, or bake without --resume",
+            receiver->path, bands);
+    }
+    if (bands > 1 && receiver->padding == VSH_PADDING_AUTO) {
+        vshi_warn(
+            w->run,
+            "%s: padding is of 16 texels, not of all that is empty: it is baked in %d bands of rows; raise "
+            "--memory-limit, or bake without --resume",
+            receiver->path, bands);
+    }
+}
+
 static vsh_result bake_bands(work *w, vsh_error *error) {
     const vsh_scene *scene = &w->job->scene;
     const vshi_bands *bands = &w->input->bands;
     const int32_t height = w->target->receiver.height;
     const bool several = bands->count > 1;
+    warn_bands(w);
     if (several) { /* texels, validate, padding, and what is shaded */
         const int shaded = (int)scene->light_count + (scene->ao ? 1 : 0) + vsh_planes_shaded(&scene->planes);
         vshi_rounds_begin(&w->rounds, w->run, "bake", 3 + shaded);
@@ -276,8 +347,11 @@ vsh_result vshi_job_bake(vsh_bake_job *job, size_t index, const vshi_lightmap_in
               .target = &job->targets.list[index],
               .lightmap = &job->lightmaps[index],
               .baked = vsh_bake_stats_zero(),
-              .files = {.job = job, .run = run}};
-    w.sink = job->options.sink != NULL ? job->sink : vshi_file_sink_of(&w.files);
+              .files = {.job = job, .run = run},
+              .lit = {.job = job, .run = run}};
+    w.sink = job->options.sink != NULL               ? job->sink
+             : vsh_lit_is_output(w.lightmap->output) ? vshi_lit_sink_of(&w.lit)
+                                                     : vshi_file_sink_of(&w.files);
     w.lightmap->bands = input->bands.count;
     w.lightmap->band_rows = input->bands.rows;
     vsh_result result = end_sink(&w, bake_all(&w, error), error);

@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <vdbshade/lit.h>
 
 enum {
     NAME_BYTES = 120 /* of an object's name in a file's, which may have 255 with its number and ending */
@@ -105,9 +106,12 @@ static vsh_result find_solid(vshi_target *target, const vsh_run *run, vsh_error 
 static vsh_result add(vshi_targets *t, const vsh_scene *scene, size_t index, const vsh_mesh *meshes,
                       size_t count, char *output, const vsh_run *run, vsh_error *error) {
     vshi_target *target = &t->list[t->count++];
-    *target = (vshi_target){scene->receivers[index], index, meshes, count, output, {NULL}};
+    *target = (vshi_target){scene->receivers[index], index, meshes, count, output, {NULL}, 0};
     if (output != NULL) {
         target->receiver.output = output;
+    }
+    if (target->receiver.seams == VSH_SEAMS_DEFAULT) {
+        target->receiver.seams = vsh_lit_is_output(target->receiver.output) ? VSH_SEAMS_FIX : VSH_SEAMS_KEEP;
     }
     return find_solid(target, run, error);
 }
@@ -132,6 +136,37 @@ static vsh_result add_objects(vshi_targets *t, const vsh_scene *scene, size_t in
     return VSH_OK;
 }
 
+char *vshi_page_output(const char *output, size_t page) {
+    const char *slash = strrchr(output, '/'), *dot = strrchr(output, '.');
+    const size_t length = strlen(output);
+    const int stem = (int)(dot != NULL && (slash == NULL || dot > slash) ? (size_t)(dot - output) : length);
+    const size_t size = length + 24;
+    char *named = malloc(size);
+    if (named != NULL) {
+        snprintf(named, size, "%.*s.%zu%s", stem, output, page, output + stem);
+    }
+    return named;
+}
+
+/* All pages go into one asset, but images have one each. */
+static vsh_result add_pages(vshi_targets *t, const vsh_scene *scene, size_t index, const vsh_assets *assets,
+                            const vsh_run *run, vsh_error *error) {
+    const vsh_receiver *receiver = &scene->receivers[index];
+    const size_t pages = vsh_assets_receiver_pages(assets, index);
+    const bool named = pages > 1 && receiver->output != NULL && !vsh_lit_is_output(receiver->output);
+    for (size_t page = 0; page < pages; ++page) {
+        size_t first, count;
+        const vsh_mesh *meshes = vsh_assets_receiver_page(assets, index, page, &first, &count);
+        char *output = named ? vshi_page_output(receiver->output, page) : NULL;
+        if (named && output == NULL) {
+            return refuse_memory(error);
+        }
+        VSHI_TRY(add(t, scene, index, meshes, count, output, run, error));
+        t->list[t->count - 1].page = page;
+    }
+    return VSH_OK;
+}
+
 vsh_result vshi_targets_make(const vsh_scene *scene, const vsh_assets *assets, bool per_object,
                              const vsh_run *run, vshi_targets *targets, vsh_error *error) {
     *targets = (vshi_targets){NULL, 0};
@@ -141,17 +176,20 @@ vsh_result vshi_targets_make(const vsh_scene *scene, const vsh_assets *assets, b
         vsh_assets_receiver(assets, i, &count);
         most += count;
     }
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        most += vsh_assets_receiver_pages(assets, i);
+    }
     targets->list = calloc(most + 1, sizeof *targets->list);
     if (targets->list == NULL) {
         return refuse_memory(error);
     }
     for (size_t i = 0; i < scene->receiver_count; ++i) {
-        size_t count;
-        const vsh_mesh *meshes = vsh_assets_receiver(assets, i, &count);
         if (per_object) {
+            size_t count;
+            const vsh_mesh *meshes = vsh_assets_receiver(assets, i, &count);
             VSHI_TRY(add_objects(targets, scene, i, meshes, count, run, error));
         } else {
-            VSHI_TRY(add(targets, scene, i, meshes, count, NULL, run, error));
+            VSHI_TRY(add_pages(targets, scene, i, assets, run, error));
         }
     }
     return VSH_OK;

@@ -1,4 +1,4 @@
-/* The lightmaps of a job: one a receiver, or one for each object of every receiver. */
+/* The lightmaps of a job: one for each page of a receiver, or one for each object of every receiver. */
 #ifndef VSHI_TARGET_H
 #define VSHI_TARGET_H
 
@@ -15,14 +15,18 @@ typedef struct vshi_target {
     size_t index;          /* of the receiver in the scene */
     const vsh_mesh *meshes;
     size_t mesh_count;
-    char *output;      /* of an object; NULL: it is the receiver's own */
+    char *output;      /* of an object or a page; NULL: it is the receiver's own */
     vshi_mesh_set set; /* whose the meshes are */
+    size_t page;       /* of the receiver */
 } vshi_target;
 
 typedef struct vshi_targets {
     vshi_target *list; /* [count] */
     size_t count;
 } vshi_targets;
+
+/* FILE.PAGE.exr for FILE.exr, to be freed; NULL where the system refuses memory. */
+char *vshi_page_output(const char *output, size_t page);
 
 /* Finds what is solid of receivers that do not cast. Errors: VSH_ERROR_ARGUMENT (per_object: an output
  * without

@@ -1,9 +1,11 @@
+#define _DEFAULT_SOURCE
 #include "base/memory.h"
 
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 
-enum { ALIGNMENT = 64 };
+enum { ALIGNMENT = 64, LARGE_PAGE = 2 << 20 /* x86-64 */ };
 
 vsh_result vshi_allocate(void **memory, size_t count, size_t size, const char *what, vsh_error *error) {
     *memory = NULL;
@@ -21,6 +23,19 @@ vsh_result vshi_allocate(void **memory, size_t count, size_t size, const char *w
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", what, bytes);
     }
     memset(*memory, 0, bytes);
+    return VSH_OK;
+}
+
+vsh_result vshi_take_pages(void **memory, size_t bytes, const char *what, vsh_error *error) {
+    const bool large = bytes >= 2 * (size_t)LARGE_PAGE && bytes <= SIZE_MAX / 2;
+    const size_t pages = large ? (bytes + LARGE_PAGE - 1) / LARGE_PAGE * LARGE_PAGE : 0;
+    *memory = large ? aligned_alloc(LARGE_PAGE, pages) : malloc(bytes > 0 ? bytes : 1);
+    if (*memory == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", what, bytes);
+    }
+    if (large) {
+        madvise(*memory, pages, MADV_HUGEPAGE); /* where that is refused, small ones do */
+    }
     return VSH_OK;
 }
 

@@ -16,6 +16,10 @@ extern "C" {
  * Errors: VSH_ERROR_MEMORY, naming `what`. */
 vsh_result vshi_allocate(void **memory, size_t count, size_t size, const char *what, vsh_error *error);
 
+/* As many bytes, not zeroed, in pages as large as the system has them where that pays: for arrays that are
+ * written at once. Free with free(). Errors: VSH_ERROR_MEMORY, naming `what`. */
+vsh_result vshi_take_pages(void **memory, size_t bytes, const char *what, vsh_error *error);
+
 /* Gives a caller what a call tells, into a struct of `size` bytes, which may be of another version of the
  * header: cut to it, or with zeros behind. */
 static inline void vshi_give(void *to, size_t size, const void *from, size_t from_size) {

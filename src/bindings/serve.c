@@ -1,6 +1,7 @@
 /* vsh_reader_serve(): who parses each kind of file. */
 #include "levelset/serve.h"
 #include "image/planes.h"
+#include "lit/draco.h"
 #include "model/model.h"
 #include "outline/outline.h"
 
@@ -11,7 +12,7 @@ int32_t vsh_reader_serve(int argc, char **argv) {
         [VSHI_READ_GRID] = vshi_serve_grid,     [VSHI_READ_LIST] = vshi_serve_list,
         [VSHI_READ_VOXELS] = vshi_serve_voxels, [VSHI_READ_MODEL] = vshi_serve_model,
         [VSHI_READ_IMAGE] = vshi_serve_image,   [VSHI_READ_TEXT] = vshi_serve_text,
-        [VSHI_READ_COPY] = vshi_serve_copy,
+        [VSHI_READ_COPY] = vshi_serve_copy,     [VSHI_READ_DRACO] = vshi_serve_draco,
     };
     return vshi_serve(servers, argc, argv);
 }

@@ -14,6 +14,8 @@ extern const cli_command cli_volume;
 extern const cli_command cli_flat;
 extern const cli_command cli_compare;
 extern const cli_command cli_regress;
+extern const cli_command cli_unwrap;
+extern const cli_command cli_view;
 
 int cli_bake_main(int argc, char **argv);
 int cli_render_main(int argc, char **argv);

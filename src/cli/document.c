@@ -1,5 +1,7 @@
 #include "document.h"
 
+#include "base/base64.h"
+#include "base/utf8.h"
 #include "message.h"
 #include "signals.h"
 #include "temporary.h"
@@ -9,36 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What stands for a byte that is part of no character: U+FFFD. */
-static const char no_character[] = "\xef\xbf\xbd";
-
-/* The well-formed sequences (The Unicode Standard, table 3-7): the first byte's range, the second's, and how
- * many there are. */
-static const struct {
-    unsigned char first, last, second_first, second_last;
-    size_t length;
-} sequences[] = {{0x01, 0x7f, 0x00, 0xff, 1}, {0xc2, 0xdf, 0x80, 0xbf, 2}, {0xe0, 0xe0, 0xa0, 0xbf, 3},
-                 {0xe1, 0xec, 0x80, 0xbf, 3}, {0xed, 0xed, 0x80, 0x9f, 3}, {0xee, 0xef, 0x80, 0xbf, 3},
-                 {0xf0, 0xf0, 0x90, 0xbf, 4}, {0xf1, 0xf3, 0x80, 0xbf, 4}, {0xf4, 0xf4, 0x80, 0x8f, 4}};
-
-/* Bytes of the character that a text begins with; 0 where it is none of UTF-8's, or none that XML takes. */
-static size_t utf8_length(const char *text) {
-    const unsigned char *c = (const unsigned char *)text;
-    for (size_t i = 0; i < sizeof sequences / sizeof sequences[0]; ++i) {
-        if (c[0] < sequences[i].first || c[0] > sequences[i].last || c[1] < sequences[i].second_first ||
-            c[1] > sequences[i].second_last) {
-            continue;
-        }
-        for (size_t k = 2; k < sequences[i].length; ++k) {
-            if (c[k] < 0x80 || c[k] > 0xbf) {
-                return 0;
-            }
-        }
-        return c[0] == 0xef && c[1] == 0xbf && c[2] >= 0xbe ? 0 : sequences[i].length; /* U+FFFE, U+FFFF */
-    }
-    return 0;
-}
-
 json_t *cli_utf8_json(const char *text) {
     char *clean = malloc(3 * strlen(text) + 1);
     size_t used = 0;
@@ -46,8 +18,8 @@ json_t *cli_utf8_json(const char *text) {
         return NULL;
     }
     while (*text != '\0') {
-        const size_t length = utf8_length(text);
-        memcpy(clean + used, length > 0 ? text : no_character, length > 0 ? length : 3);
+        const size_t length = vshi_utf8_length(text);
+        memcpy(clean + used, length > 0 ? text : VSHI_NO_CHARACTER, length > 0 ? length : 3);
         used += length > 0 ? length : 3;
         text += length > 0 ? length : 1;
     }
@@ -78,7 +50,7 @@ int cli_document_write(const char *path, void (*compose)(FILE *out, const void *
 
 void cli_document_escape(FILE *out, const char *text) {
     for (size_t length; *text != '\0'; text += length > 0 ? length : 1) {
-        length = utf8_length(text);
+        length = vshi_utf8_length(text);
         switch (*text) {
         case '<':
             fputs("&lt;", out);
@@ -94,7 +66,7 @@ void cli_document_escape(FILE *out, const char *text) {
             break;
         default: /* control characters are none of XML's */
             if (length == 0) {
-                fputs(no_character, out);
+                fputs(VSHI_NO_CHARACTER, out);
             } else if (length == 1 && ((unsigned char)*text < 0x20 || *text == 0x7f)) {
                 fputc('?', out);
             } else {
@@ -104,18 +76,11 @@ void cli_document_escape(FILE *out, const char *text) {
     }
 }
 
-/* RFC 4648. */
 static void write_base64(FILE *out, const uint8_t *bytes, size_t count) {
-    static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    for (size_t i = 0; i < count; i += 3) {
-        const size_t rest = count - i < 3 ? count - i : 3;
-        uint32_t word = 0;
-        for (size_t k = 0; k < 3; ++k) {
-            word = word << 8 | (k < rest ? bytes[i + k] : 0u);
-        }
-        for (size_t k = 0; k < 4; ++k) {
-            fputc(k <= rest ? letters[word >> (18 - 6 * k) & 63] : '=', out);
-        }
+    for (size_t i = 0; i < count; i += VSHI_BASE64_BYTES) {
+        char letters[VSHI_BASE64_LETTERS];
+        vshi_base64_group(bytes + i, count - i < VSHI_BASE64_BYTES ? count - i : VSHI_BASE64_BYTES, letters);
+        fwrite(letters, 1, sizeof letters, out);
     }
 }
 

@@ -11,9 +11,9 @@
 #include <unistd.h>
 #include <vdbshade/reader.h>
 
-static const cli_command *const commands[] = {&cli_bake,    &cli_voxelize, &cli_info, &cli_trade,
-                                              &cli_query,   &cli_volume,   &cli_flat, &cli_render,
-                                              &cli_compare, &cli_regress};
+static const cli_command *const commands[] = {&cli_bake,    &cli_voxelize, &cli_info,   &cli_trade,
+                                              &cli_query,   &cli_volume,   &cli_flat,   &cli_render,
+                                              &cli_compare, &cli_regress,  &cli_unwrap, &cli_view};
 enum { COMMAND_COUNT = sizeof commands / sizeof commands[0] };
 
 static const char help_text[] =
@@ -23,11 +23,13 @@ static const char help_text[] =
     "\n"
     "Commands:\n"
     "  bake INPUT -o OUT         lightmap of a mesh or a scene (.json)\n"
+    "  unwrap INPUT -o OUT.obj   lightmap UVs for meshes that have none\n"
     "  voxelize INPUT -o OUT.vdb level set of a mesh's or a scene's casters\n"
     "  info FILE                 what a mesh, .vdb, scene or image holds, and what is wrong with it\n"
     "  volume INPUT -o OUT.vdb   grids of shadow and AO: a surface's band, a box, a fog's voxels\n"
     "  query INPUT -o OUT        shadow, AO, distance at points of a CSV, a PLY or raw floats\n"
     "  render INPUT -o OUT       picture of a scene, or a turntable, to look at a bake\n"
+    "  view INPUT -o OUT.html    page to look at a lit mesh in a browser, with every channel of its bake\n"
     "  flat SCENE -o OUT         light map of a plane, for 2D games\n"
     "  compare GOLDEN NEW        whether a bake is like its golden one, and in what it is not\n"
     "  regress DIR               bakes of a folder's scenes against their golden ones\n"

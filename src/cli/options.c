@@ -241,7 +241,7 @@ static void append_option(const cli_option *option, const char *value) {
     static const char *const changes_nothing[] = {
         "output",  "output-folder", "stats",         "threads", "memory-limit", "isa",
         "trusted", "confined",      "allow-outside", "quiet",   "verbose",      "progress",
-        "json",    "band-rows",     "dry-run",       "resume",  "help"};
+        "json",    "band-rows",     "dry-run",       "resume",  "help",         "view"};
     for (size_t i = 0; i < sizeof changes_nothing / sizeof changes_nothing[0]; ++i) {
         if (strcmp(option->name, changes_nothing[i]) == 0) {
             return;
@@ -262,6 +262,11 @@ int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *
 
 int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
                        const char *const *what, const char **operands, int count, bool *help) {
+    return cli_parse_some(command, argc, argv, take, settings, what, operands, count, count, help);
+}
+
+int cli_parse_some(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
+                   const char *const *what, const char **operands, int least, int count, bool *help) {
     struct option longs[MAX_OPTIONS];
     char shorts[2 * MAX_OPTIONS + 2];
     option_list list;
@@ -305,6 +310,10 @@ int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_op
         }
     }
     for (int i = 0; i < count; ++i) {
+        operands[i] = NULL;
+        if (optind + i >= argc && i >= least) {
+            continue;
+        }
         if (optind + i >= argc) {
             return cli_usage("%s: no %s; see 'vdbshade %s --help'", command->name, what[i], command->name);
         }

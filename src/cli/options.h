@@ -52,7 +52,11 @@ int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *
  * limits, output, …), and files by their names alone. Belongs to the parser; "" where memory was short. */
 const char *cli_parsed_command(void);
 
-/* The same with `count` operands, one or more. */
+/* The same with `least` to `count` operands, one or more; NULL stands for those that are not there. */
+int cli_parse_some(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
+                   const char *const *what, const char **operands, int least, int count, bool *help);
+
+/* The same with `count` operands. */
 int cli_parse_operands(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
                        const char *const *what, const char **operands, int count, bool *help);
 

@@ -47,7 +47,9 @@ void vshi_draco_indices(const vshi_draco *mesh, uint32_t *indices) {
     }
 }
 
-bool vshi_draco_attribute(const vshi_draco *mesh, uint32_t id, int components, float *values) {
+namespace {
+
+template <typename T> bool elements(const vshi_draco *mesh, uint32_t id, int components, T *values) {
     const draco::PointAttribute *attribute = mesh->mesh->GetAttributeByUniqueId(id);
     if (attribute == nullptr || attribute->num_components() != components) {
         return false;
@@ -62,6 +64,31 @@ bool vshi_draco_attribute(const vshi_draco *mesh, uint32_t id, int components, f
         }
     }
     return true;
+}
+
+} // namespace
+
+bool vshi_draco_attribute(const vshi_draco *mesh, uint32_t id, int components, float *values) {
+    return elements(mesh, id, components, values);
+}
+
+bool vshi_draco_elements(const vshi_draco *mesh, uint32_t id, int type, int components, void *values) {
+    switch (type) {
+    case VSHI_DRACO_BYTE:
+        return elements(mesh, id, components, static_cast<int8_t *>(values));
+    case VSHI_DRACO_UBYTE:
+        return elements(mesh, id, components, static_cast<uint8_t *>(values));
+    case VSHI_DRACO_SHORT:
+        return elements(mesh, id, components, static_cast<int16_t *>(values));
+    case VSHI_DRACO_USHORT:
+        return elements(mesh, id, components, static_cast<uint16_t *>(values));
+    case VSHI_DRACO_UINT:
+        return elements(mesh, id, components, static_cast<uint32_t *>(values));
+    case VSHI_DRACO_FLOAT:
+        return elements(mesh, id, components, static_cast<float *>(values));
+    default:
+        return false;
+    }
 }
 
 void vshi_draco_free(vshi_draco *mesh) {

@@ -27,6 +27,19 @@ void vshi_draco_indices(const vshi_draco *mesh, uint32_t *indices);
  * number of components. */
 bool vshi_draco_attribute(const vshi_draco *mesh, uint32_t id, int components, float *values);
 
+/* Types of components, by glTF's numbers. */
+enum {
+    VSHI_DRACO_BYTE = 5120,
+    VSHI_DRACO_UBYTE = 5121,
+    VSHI_DRACO_SHORT = 5122,
+    VSHI_DRACO_USHORT = 5123,
+    VSHI_DRACO_UINT = 5125,
+    VSHI_DRACO_FLOAT = 5126
+};
+
+/* The same as numbers of a type, as they are where that is the attribute's own. */
+bool vshi_draco_elements(const vshi_draco *mesh, uint32_t id, int type, int components, void *values);
+
 void vshi_draco_free(vshi_draco *mesh); /* NULL does nothing */
 
 #ifdef __cplusplus

@@ -205,8 +205,8 @@ static vsh_result pad(const bake *b, const vsh_run *run, vsh_error *error) {
             planes[count++] = (vshi_plane){values, 1};
         }
     }
-    result =
-        vshi_padding_fill(run, b->options.width, b->options.height, b->state, radius, planes, count, error);
+    result = vshi_padding_fill(run, b->options.width, b->options.height, b->state, radius, planes, count,
+                               NULL, error);
     free(planes);
     return result;
 }

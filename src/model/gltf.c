@@ -90,12 +90,14 @@ static vsh_result check_version(const vshi_gltf *gltf, vsh_error *error) {
 static vsh_result allocate(vshi_gltf *gltf, vsh_error *error) {
     const size_t meshes = json_array_size(json_object_get(gltf->root, "meshes"));
     gltf->buffer_count = json_array_size(json_object_get(gltf->root, "buffers"));
+    gltf->view_count = json_array_size(json_object_get(gltf->root, "bufferViews"));
     gltf->node_count = json_array_size(json_object_get(gltf->root, "nodes"));
     const struct {
         void *memory;
         size_t count, size;
     } wanted[] = {
         {&gltf->buffers, gltf->buffer_count, sizeof *gltf->buffers},
+        {&gltf->views, gltf->view_count, sizeof *gltf->views},
         {&gltf->mesh_shapes, meshes, sizeof *gltf->mesh_shapes},
         {&gltf->node_seen, gltf->node_count, sizeof *gltf->node_seen},
         {&gltf->node_world, gltf->node_count, sizeof *gltf->node_world},
@@ -107,19 +109,26 @@ static vsh_result allocate(vshi_gltf *gltf, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, const vsh_run *run, vshi_job *job,
-                          vsh_model **model, vsh_error *error) {
-    vshi_gltf gltf = {.path = path, .run = run, .job = job, .bytes_held = (double)size};
+vsh_result vshi_gltf_open(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error) {
     const bool binary = size >= 4 && memcmp(text, "glTF", 4) == 0;
-    const size_t length = strlen(path);
-    const bool expected = length >= 4 && (path[length - 1] == 'b' || path[length - 1] == 'B');
+    const size_t length = strlen(gltf->path);
+    const bool expected = length >= 4 && (gltf->path[length - 1] == 'b' || gltf->path[length - 1] == 'B');
+    VSHI_TRY(binary || expected ? open_binary(gltf, text, size, error) : parse(gltf, text, size, error));
+    VSHI_TRY(check_version(gltf, error));
+    return vshi_gltf_check_extensions(gltf, error);
+}
+
+vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, bool mapped, const vsh_run *run,
+                          vshi_job *job, vsh_model **model, vsh_error *error) {
+    vshi_gltf gltf = {.path = path, .run = run, .job = job, .bytes_held = (double)size};
+    if (mapped) {
+        gltf.mapped = (vshi_gltf_bytes){(const unsigned char *)text, size};
+    }
     vsh_result result;
-    VSHI_TRY_DONE(binary || expected ? open_binary(&gltf, text, size, error)
-                                     : parse(&gltf, text, size, error));
-    VSHI_TRY_DONE(check_version(&gltf, error));
-    VSHI_TRY_DONE(vshi_gltf_check_extensions(&gltf, error));
+    VSHI_TRY_DONE(vshi_gltf_open(&gltf, text, size, error));
     VSHI_TRY_DONE(allocate(&gltf, error));
     gltf.model->unit = 1.0; /* glTF is in metres */
+    VSHI_TRY_DONE(vshi_gltf_read_materials(&gltf, error));
     VSHI_TRY_DONE(vshi_gltf_add_scene(&gltf, error));
     *model = gltf.model;
     gltf.model = NULL;

@@ -29,8 +29,11 @@ typedef struct vshi_gltf {
     json_t *root;
     vshi_gltf_bytes chunk; /* the binary one of a GLB */
     bool binary;
+    vshi_gltf_bytes mapped; /* the file, where arrays may be left in it (vshi_model_file); else NULL */
     vshi_gltf_buffer *buffers;
     size_t buffer_count;
+    vshi_gltf_buffer *views; /* what compressed ones unpack to */
+    size_t view_count;
     double bytes_held; /* by buffers and the model, for the memory limit */
 
     vsh_model *model;
@@ -85,6 +88,16 @@ vsh_result vshi_gltf_check_extensions(const vshi_gltf *gltf, vsh_error *error);
 vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes, size_t *stride,
                           vsh_error *error);
 
+/* Reads all of buffer `index`, where it has not been. */
+vsh_result vshi_gltf_load(vshi_gltf *gltf, size_t index, vsh_error *error);
+/* The bytes that `buffer`, `byteOffset` and `byteLength` of an object name. */
+vsh_result vshi_gltf_part(vshi_gltf *gltf, const json_t *object, const char *where, vshi_gltf_bytes *bytes,
+                          vsh_error *error);
+
+/* Unpacks what EXT_meshopt_compression names, into new memory (gltf_meshopt.c). */
+vsh_result vshi_gltf_read_meshopt(vshi_gltf *gltf, const json_t *extension, const char *where,
+                                  unsigned char **made, size_t *size, vsh_error *error);
+
 void vshi_gltf_free_buffers(vshi_gltf *gltf);
 
 /* --- accessors (gltf_accessor.c) */
@@ -113,6 +126,9 @@ typedef struct vshi_gltf_accessor {
 /* Looks accessor `index` up, and checks that all of it is there. */
 vsh_result vshi_gltf_accessor_open(vshi_gltf *gltf, size_t index, vshi_gltf_accessor *accessor,
                                    vsh_error *error);
+
+/* Whether its elements lie as in an array of `components` of `type`, 4 bytes each. */
+bool vshi_gltf_accessor_plain(const vshi_gltf_accessor *accessor, int components, int type);
 
 /* Its elements as floats, `components` each; what is normalized is 0 … 1 or -1 … 1. */
 void vshi_gltf_accessor_floats(const vshi_gltf_accessor *accessor, float *values);
@@ -152,8 +168,23 @@ vsh_result vshi_gltf_read_draco(vshi_gltf *gltf, const json_t *extension, const 
 /* Adds what the file's scene shows to the model. */
 vsh_result vshi_gltf_add_scene(vshi_gltf *gltf, vsh_error *error);
 
-/* Reads a glTF or GLB of `size` bytes that lie at `text`. Errors: as vsh_model_read(). */
-vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, const vsh_run *run, vshi_job *job,
-                          vsh_model **model, vsh_error *error);
+/* Reads all materials, and the images of masked ones (gltf_material.c). */
+vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error);
+
+/* Adds the light that a node of the scene carries (gltf_lights.c). */
+vsh_result vshi_gltf_add_light(vshi_gltf *gltf, size_t node, vsh_error *error);
+
+/* --- the file (gltf.c) */
+
+/* Parses the JSON of a glTF or GLB of `size` bytes that lie at `text`, and finds its binary chunk; of `gltf`,
+ * path, run and bytes_held are given. Free root with json_decref(), after a failure too. Errors: as
+ * vsh_model_read(). */
+vsh_result vshi_gltf_open(vshi_gltf *gltf, const char *text, size_t size, vsh_error *error);
+
+/* Reads a glTF or GLB of `size` bytes that lie at `text`. `mapped`: they are pages of the file that outlive
+ * the model, and shapes that are there as they should be stay where they are (vshi_model_shape.raw). Errors:
+ * as vsh_model_read(). */
+vsh_result vshi_gltf_read(const char *path, const char *text, size_t size, bool mapped, const vsh_run *run,
+                          vshi_job *job, vsh_model **model, vsh_error *error);
 
 #endif

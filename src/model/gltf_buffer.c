@@ -91,18 +91,13 @@ static vsh_result load(vshi_gltf *gltf, size_t index, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes, size_t *stride,
+vsh_result vshi_gltf_part(vshi_gltf *gltf, const json_t *object, const char *where, vshi_gltf_bytes *bytes,
                           vsh_error *error) {
-    char where[64];
-    snprintf(where, sizeof where, "bufferViews[%zu]", index);
-    const json_t *view = vshi_gltf_element(gltf, "bufferViews", index);
     size_t buffer, offset, length;
-    VSHI_TRY(vshi_gltf_index(gltf, view, "buffer", "buffers", where, &buffer, error));
-    if (buffer == SIZE_MAX || !vshi_gltf_count(view, "byteOffset", 0, &offset) ||
-        !vshi_gltf_count(view, "byteLength", SIZE_MAX, &length) || length == SIZE_MAX ||
-        !vshi_gltf_count(view, "byteStride", 0, stride)) {
-        return vshi_gltf_fail(gltf, error, "%s: its buffer, byteOffset, byteLength or byteStride is wrong",
-                              where);
+    VSHI_TRY(vshi_gltf_index(gltf, object, "buffer", "buffers", where, &buffer, error));
+    if (buffer == SIZE_MAX || !vshi_gltf_count(object, "byteOffset", 0, &offset) ||
+        !vshi_gltf_count(object, "byteLength", SIZE_MAX, &length) || length == SIZE_MAX) {
+        return vshi_gltf_fail(gltf, error, "%s: its buffer, byteOffset or byteLength is wrong", where);
     }
     if (!gltf->buffers[buffer].loaded) {
         VSHI_TRY(load(gltf, buffer, error));
@@ -116,9 +111,50 @@ vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes,
     return VSH_OK;
 }
 
+vsh_result vshi_gltf_load(vshi_gltf *gltf, size_t index, vsh_error *error) {
+    return gltf->buffers[index].loaded ? VSH_OK : load(gltf, index, error);
+}
+
+/* What a compressed view unpacks to, once. Its own buffer may have no data. */
+static vsh_result unpack(vshi_gltf *gltf, size_t index, const json_t *extension, const char *where,
+                         size_t length, vshi_gltf_bytes *bytes, vsh_error *error) {
+    vshi_gltf_buffer *view = &gltf->views[index];
+    if (!view->loaded) {
+        VSHI_TRY(vshi_gltf_read_meshopt(gltf, extension, where, &view->owned, &view->bytes.size, error));
+        view->bytes.at = view->owned;
+        view->loaded = true;
+    }
+    if (length != view->bytes.size) {
+        return vshi_gltf_fail(gltf, error, "%s: its byteLength is %zu, but it unpacks to %zu bytes", where,
+                              length, view->bytes.size);
+    }
+    *bytes = view->bytes;
+    return VSH_OK;
+}
+
+vsh_result vshi_gltf_view(vshi_gltf *gltf, size_t index, vshi_gltf_bytes *bytes, size_t *stride,
+                          vsh_error *error) {
+    char where[64];
+    snprintf(where, sizeof where, "bufferViews[%zu]", index);
+    const json_t *view = vshi_gltf_element(gltf, "bufferViews", index);
+    const json_t *packed = vshi_gltf_extension(view, "EXT_meshopt_compression");
+    packed = packed != NULL ? packed : vshi_gltf_extension(view, "KHR_meshopt_compression");
+    size_t length;
+    if (!vshi_gltf_count(view, "byteStride", 0, stride) ||
+        !vshi_gltf_count(view, "byteLength", SIZE_MAX, &length)) {
+        return vshi_gltf_fail(gltf, error, "%s: its byteLength or byteStride is wrong", where);
+    }
+    return packed != NULL ? unpack(gltf, index, packed, where, length, bytes, error)
+                          : vshi_gltf_part(gltf, view, where, bytes, error);
+}
+
 void vshi_gltf_free_buffers(vshi_gltf *gltf) {
     for (size_t i = 0; gltf->buffers != NULL && i < gltf->buffer_count; ++i) {
         free(gltf->buffers[i].owned);
     }
     free(gltf->buffers);
+    for (size_t i = 0; gltf->views != NULL && i < gltf->view_count; ++i) {
+        free(gltf->views[i].owned);
+    }
+    free(gltf->views);
 }

@@ -6,7 +6,8 @@
 /* Extensions that are read, or that leave the geometry as it is. */
 static const char *const understood[] = {
     "KHR_mesh_quantization",   "KHR_draco_mesh_compression",
-    "EXT_mesh_gpu_instancing", /* */
+    "EXT_mesh_gpu_instancing", "EXT_meshopt_compression",
+    "KHR_meshopt_compression", /* */
     "KHR_texture_transform",   "KHR_texture_basisu",
     "EXT_texture_webp",        "EXT_texture_avif",
     "MSFT_texture_dds",        "KHR_lights_punctual",
@@ -22,10 +23,6 @@ static const char material[] = "KHR_materials_";
 static const struct {
     const char *name, *advice;
 } advices[] = {
-    {"EXT_meshopt_compression",
-     "its vertices are compressed; 'gltfpack -i IN.glb -o OUT.glb' without -c writes them as they are"},
-    {"KHR_meshopt_compression",
-     "its vertices are compressed; 'gltfpack -i IN.glb -o OUT.glb' without -c writes them as they are"},
     {"KHR_node_visibility", "export it with only those nodes that are to be seen"},
     {"KHR_gaussian_splatting", "it holds no triangles"},
 };

@@ -191,14 +191,18 @@ done:
 
 /* --- entries */
 
-static vsh_result add_entries(vshi_gltf *gltf, size_t node, size_t mesh, size_t first, const char *suffix,
+/* `instance`: 1 + which of the node's it is; 0: it has none. */
+static vsh_result add_entries(vshi_gltf *gltf, size_t node, size_t mesh, size_t first, size_t instance,
                               const double world[12], vsh_error *error) {
     const json_t *given = vshi_gltf_element(gltf, "meshes", mesh);
     const size_t count = json_array_size(json_object_get(given, "primitives"));
-    char node_name[256], mesh_name[256];
+    char node_name[256], mesh_name[256], suffix[32] = "";
     const uint32_t object = vshi_model_next_object(gltf->model);
     name_of("nodes", node, vshi_gltf_element(gltf, "nodes", node), node_name, sizeof node_name);
     name_of("meshes", mesh, given, mesh_name, sizeof mesh_name);
+    if (instance > 0) {
+        snprintf(suffix, sizeof suffix, "[%zu]", instance - 1);
+    }
     for (size_t i = 0; i < count; ++i) {
         if (gltf->model->shapes[first + i].triangle_count == 0) {
             continue;
@@ -212,7 +216,12 @@ static vsh_result add_entries(vshi_gltf *gltf, size_t node, size_t mesh, size_t 
         }
         VSHI_TRY(vshi_gltf_hold(gltf, sizeof(vshi_model_entry) + (double)strlen(one), error));
         const vshi_model_place place = {
-            .node = one, .mesh = part, .object = object, .shape = first + i, .world = world};
+            .node = one,
+            .mesh = part,
+            .object = object,
+            .shape = first + i,
+            .world = world,
+            .origin = {(uint32_t)node + 1, (uint32_t)mesh + 1, (uint32_t)i + 1, (uint32_t)instance}};
         VSHI_TRY(vshi_model_add(gltf->model, gltf->path, gltf->run, &place, error));
     }
     return VSH_OK;
@@ -268,11 +277,9 @@ static vsh_result add_instances(vshi_gltf *gltf, size_t node, size_t mesh, size_
         }
         from_parts(t, r, s, own);
         vshi_model_compose(gltf->node_world[node], own, world);
-        char suffix[32];
-        snprintf(suffix, sizeof suffix, "[%zu]", i);
         VSHI_TRY_DONE(vshi_job_cancelled(gltf->job)
                           ? vshi_job_fail_cancelled(gltf->job, error)
-                          : add_entries(gltf, node, mesh, first, suffix, world, error));
+                          : add_entries(gltf, node, mesh, first, i + 1, world, error));
     }
 done:
     for (int k = 0; k < 3; ++k) {
@@ -294,11 +301,11 @@ static vsh_result add_node(vshi_gltf *gltf, size_t node, vsh_error *error) {
     }
     VSHI_TRY(find_shapes(gltf, given, mesh, skin, &first, &skinned, error));
     if (skinned) {
-        return add_entries(gltf, node, mesh, first, "", identity, error);
+        return add_entries(gltf, node, mesh, first, 0, identity, error);
     }
     const json_t *instancing = vshi_gltf_extension(given, "EXT_mesh_gpu_instancing");
     return instancing != NULL ? add_instances(gltf, node, mesh, first, instancing, error)
-                              : add_entries(gltf, node, mesh, first, "", gltf->node_world[node], error);
+                              : add_entries(gltf, node, mesh, first, 0, gltf->node_world[node], error);
 }
 
 /* --- the tree */
@@ -386,6 +393,7 @@ vsh_result vshi_gltf_add_scene(vshi_gltf *gltf, vsh_error *error) {
     VSHI_TRY_DONE(visit_scene(gltf, &walked, error));
     for (size_t i = 0; i < walked.count; ++i) {
         VSHI_TRY_DONE(add_node(gltf, walked.order[i], error));
+        VSHI_TRY_DONE(vshi_gltf_add_light(gltf, walked.order[i], error));
     }
     if (gltf->model->entry_count == 0) {
         result = vshi_gltf_fail(gltf, error, "holds no triangles");

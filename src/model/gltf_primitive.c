@@ -3,7 +3,6 @@
 
 #include "base/memory.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -77,17 +76,7 @@ static vsh_result read_order(vshi_gltf *gltf, const json_t *primitive, size_t ve
     for (size_t i = 0; i < accessor.count && index == SIZE_MAX; ++i) {
         (*order)[i] = (uint32_t)i;
     }
-    uint32_t highest = 0;
-    for (size_t i = 0; i < accessor.count; ++i) {
-        highest = (*order)[i] > highest ? (*order)[i] : highest;
-    }
-    for (size_t i = 0; highest >= vertex_count && i < accessor.count; ++i) {
-        if ((*order)[i] >= vertex_count) {
-            return vshi_gltf_fail(gltf, error, "%s: index %zu of %zu is %u, but there are only %zu vertices",
-                                  where, i, accessor.count, (*order)[i], vertex_count);
-        }
-    }
-    return VSH_OK;
+    return vshi_model_check_indices(gltf->path, where, *order, accessor.count, vertex_count, error);
 }
 
 /* Triangle i of a strip or a fan (glTF 2.0, 3.7.2.1). */
@@ -142,81 +131,97 @@ static vsh_result read_plain(vshi_gltf *gltf, const json_t *primitive, size_t mo
     return shape->triangle_count > 0 ? read_vertices(gltf, primitive, where, shape, error) : VSH_OK;
 }
 
-/* Many primitives may share one large accessor, of which each uses a part: only that is kept. */
-static vsh_result drop_unused(const vshi_gltf *gltf, vshi_model_shape *shape, vsh_error *error) {
-    uint32_t *place = NULL;
-    VSHI_TRY(vshi_allocate((void **)&place, shape->vertex_count, sizeof *place, gltf->path, error));
-    for (size_t i = 0; i < 3 * shape->triangle_count; ++i) {
-        place[shape->indices[i]] = 1;
+/* --- shapes that are left in the file */
+
+/* Whether a pose moves anything of a primitive. */
+static bool is_posed(const json_t *primitive, const vshi_gltf_pose *pose) {
+    bool moved = pose->joints != NULL && pose->joint_count > 0;
+    const size_t targets = json_array_size(json_object_get(primitive, "targets"));
+    for (size_t i = 0; i < targets && i < pose->weight_count; ++i) {
+        moved = moved || pose->weights[i] != 0.0;
     }
-    uint32_t used = 0;
-    for (size_t v = 0; v < shape->vertex_count; ++v) {
-        used += place[v];
+    return moved;
+}
+
+/* Where an accessor's elements lie in the mapped file, plain; NULL where there is no such accessor, or *plain
+ * becomes false where they do not. */
+static vsh_result find_plain(vshi_gltf *gltf, const json_t *object, const char *key, int components, int type,
+                             const char *where, size_t *count, void *array, bool *plain, vsh_error *error) {
+    size_t index;
+    vshi_gltf_accessor accessor;
+    VSHI_TRY(vshi_gltf_index(gltf, object, key, "accessors", where, &index, error));
+    if (index == SIZE_MAX) {
+        return VSH_OK;
     }
-    const bool all = used == shape->vertex_count;
-    used = all ? used : 0;
-    for (size_t v = 0; !all && v < shape->vertex_count; ++v) {
-        const bool keep = place[v] != 0;
-        place[v] = used;
-        if (keep && used < v) {
-            memcpy(shape->positions + 3 * (size_t)used, shape->positions + 3 * v, sizeof(float[3]));
-            if (shape->normals != NULL) {
-                memcpy(shape->normals + 3 * (size_t)used, shape->normals + 3 * v, sizeof(float[3]));
-            }
-            for (int set = 0; set < shape->uv_sets; ++set) {
-                if (shape->uvs[set] != NULL) {
-                    memcpy(shape->uvs[set] + 2 * (size_t)used, shape->uvs[set] + 2 * v, sizeof(float[2]));
-                }
-            }
-        }
-        used += keep;
+    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
+    const uintptr_t at = (uintptr_t)accessor.at, file = (uintptr_t)gltf->mapped.at;
+    if (!vshi_gltf_accessor_plain(&accessor, components, type) || at < file ||
+        at - file >= gltf->mapped.size || at % 4 != 0 || (*count != SIZE_MAX && *count != accessor.count)) {
+        *plain = false;
+        return VSH_OK;
     }
-    for (size_t i = 0; !all && i < 3 * shape->triangle_count; ++i) {
-        shape->indices[i] = place[shape->indices[i]];
+    *count = accessor.count;
+    memcpy(array, &accessor.at, sizeof accessor.at);
+    return vshi_gltf_hold(gltf, (double)accessor.count * 4.0 * components, error);
+}
+
+static vsh_result find_vertices(vshi_gltf *gltf, const json_t *primitive, const char *where,
+                                vshi_model_shape *shape, bool *plain, vsh_error *error) {
+    const json_t *attributes = json_object_get(primitive, "attributes");
+    size_t count = SIZE_MAX;
+    VSHI_TRY(find_plain(gltf, attributes, "POSITION", 3, VSHI_GLTF_FLOAT, where, &count, &shape->positions,
+                        plain, error));
+    VSHI_TRY(find_plain(gltf, attributes, "NORMAL", 3, VSHI_GLTF_FLOAT, where, &count, &shape->normals, plain,
+                        error));
+    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
+        char name[32];
+        snprintf(name, sizeof name, "TEXCOORD_%d", set);
+        VSHI_TRY(find_plain(gltf, attributes, name, 2, VSHI_GLTF_FLOAT, where, &count, &shape->uvs[set],
+                            plain, error));
+        shape->uv_sets = shape->uvs[set] != NULL ? set + 1 : shape->uv_sets;
     }
-    shape->vertex_count = used;
-    free(place);
+    shape->vertex_count = count;
     return VSH_OK;
 }
 
-/* Directions that are not finite become zero, which no direction is: flat there. */
-static void check_normals(const vshi_gltf *gltf, const char *where, const vshi_model_shape *shape) {
-    size_t bad = 0;
-    for (size_t v = 0; v < shape->vertex_count && shape->normals != NULL; ++v) {
-        float *n = shape->normals + 3 * v;
-        if (!isfinite(n[0]) || !isfinite(n[1]) || !isfinite(n[2])) {
-            memset(n, 0, sizeof(float[3]));
-            ++bad;
-        }
+/* Where all of a list of triangles lies in the mapped file as a model has it, and is not moved, it stays
+ * there, and nothing of it is looked at here; else the shape stays all 0. */
+static vsh_result leave_raw(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
+                            const char *where, vshi_model_shape *shape, vsh_error *error) {
+    enum { LEAST = 1 << 14 /* corners; what a shape of fewer takes is not its copy */ };
+    vshi_model_shape found = {.raw = NULL};
+    size_t corners = SIZE_MAX;
+    const double held = gltf->bytes_held;
+    bool plain = gltf->mapped.at != NULL && !is_posed(primitive, pose);
+    if (plain) {
+        VSHI_TRY(find_plain(gltf, primitive, "indices", 1, VSHI_GLTF_UINT, where, &corners, &found.indices,
+                            &plain, error));
     }
-    if (bad > 0) {
-        vshi_warn(gltf->run, "%s: %s: %zu normals are not finite: flat there", gltf->path, where, bad);
+    if (!plain || found.indices == NULL || corners < LEAST || corners % 3 != 0) {
+        gltf->bytes_held = held;
+        return VSH_OK;
     }
-}
-
-static vsh_result check_vertices(const vshi_gltf *gltf, const char *where, const vshi_model_shape *shape,
-                                 vsh_error *error) {
-    for (size_t v = 0; v < shape->vertex_count; ++v) {
-        const float *p = shape->positions + 3 * v;
-        if (!isfinite(p[0]) || !isfinite(p[1]) || !isfinite(p[2])) {
-            return vshi_gltf_fail(gltf, error,
-                                  "%s: vertex %zu of %zu lies at (%g, %g, %g), expected finite numbers",
-                                  where, v, shape->vertex_count, (double)p[0], (double)p[1], (double)p[2]);
-        }
+    VSHI_TRY(find_vertices(gltf, primitive, where, &found, &plain, error));
+    if (!plain || found.positions == NULL) {
+        gltf->bytes_held = held;
+        return VSH_OK;
     }
+    found.triangle_count = corners / 3;
+    const size_t size = strlen(where) + 1;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&found.raw, size, 1, error));
+    memcpy(found.raw, where, size);
+    *shape = found;
     return VSH_OK;
 }
 
-static int32_t alpha_of(const vshi_gltf *gltf, const json_t *primitive) {
+/* One that is not there is none. */
+static void set_material(const vshi_gltf *gltf, const json_t *primitive, vshi_model_shape *shape) {
     size_t material;
-    if (!vshi_gltf_count(primitive, "material", SIZE_MAX, &material) || material == SIZE_MAX) {
-        return VSH_ALPHA_OPAQUE;
+    if (vshi_gltf_count(primitive, "material", SIZE_MAX, &material) &&
+        material < gltf->model->material_count && material < INT32_MAX) {
+        shape->material = (int32_t)material + 1;
+        shape->alpha = gltf->model->materials[material].told.alpha;
     }
-    const char *mode =
-        json_string_value(json_object_get(vshi_gltf_element(gltf, "materials", material), "alphaMode"));
-    return mode != NULL && strcmp(mode, "BLEND") == 0  ? VSH_ALPHA_BLENDED
-           : mode != NULL && strcmp(mode, "MASK") == 0 ? VSH_ALPHA_MASKED
-                                                       : VSH_ALPHA_OPAQUE;
 }
 
 vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, const vshi_gltf_pose *pose,
@@ -229,20 +234,20 @@ vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *primitive, co
         return VSH_OK; /* points or lines */
     }
     const json_t *draco = vshi_gltf_extension(primitive, "KHR_draco_mesh_compression");
-    VSHI_TRY(draco != NULL ? vshi_gltf_read_draco(gltf, draco, where, shape, error)
-                           : read_plain(gltf, primitive, mode, where, shape, error));
+    if (draco == NULL && mode == MODE_TRIANGLES) {
+        VSHI_TRY(leave_raw(gltf, primitive, pose, where, shape, error));
+    }
+    if (shape->raw == NULL) {
+        VSHI_TRY(draco != NULL ? vshi_gltf_read_draco(gltf, draco, where, shape, error)
+                               : read_plain(gltf, primitive, mode, where, shape, error));
+    }
     if (shape->triangle_count == 0) {
         return VSH_OK;
     }
-    shape->alpha = alpha_of(gltf, primitive);
-    VSHI_TRY(vshi_gltf_apply_pose(gltf, primitive, pose, where, shape, error));
-    VSHI_TRY(drop_unused(gltf, shape, error));
-    VSHI_TRY(check_vertices(gltf, where, shape, error));
-    check_normals(gltf, where, shape);
-    for (int set = 0; set < shape->uv_sets; ++set) {
-        for (size_t v = 0; v < shape->vertex_count && shape->uvs[set] != NULL; ++v) {
-            shape->uvs[set][2 * v + 1] = 1.0F - shape->uvs[set][2 * v + 1]; /* v points down in glTF */
-        }
+    set_material(gltf, primitive, shape);
+    if (shape->raw != NULL) {
+        return VSH_OK;
     }
-    return VSH_OK;
+    VSHI_TRY(vshi_gltf_apply_pose(gltf, primitive, pose, where, shape, error));
+    return vshi_model_finish(gltf->path, gltf->run, where, shape, error);
 }

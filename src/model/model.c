@@ -10,6 +10,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 
 void vsh_model_free(vsh_model *model) {
     if (model == NULL) {
@@ -22,6 +23,10 @@ void vsh_model_free(vsh_model *model) {
     free(model->entries);
     for (size_t i = 0; !model->borrowed && i < model->shape_count; ++i) {
         vshi_model_shape *shape = &model->shapes[i];
+        if (shape->raw != NULL) {
+            free(shape->raw);
+            continue;
+        }
         free(shape->indices);
         for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
             free(shape->uvs[set]);
@@ -30,10 +35,15 @@ void vsh_model_free(vsh_model *model) {
         free(shape->positions);
     }
     free(model->shapes);
+    vshi_model_free_lights(model);
+    vshi_model_free_materials(model);
     for (int i = 0; i < VSHI_MODEL_BLOCKS; ++i) {
         free(model->blocks[i]);
     }
     vshi_answer_free(&model->answer);
+    if (model->file.map != NULL) {
+        munmap(model->file.map, model->file.size);
+    }
     free(model);
 }
 

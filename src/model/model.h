@@ -7,6 +7,8 @@
 
 #include <vdbshade/mesh.h>
 
+#include <stdio.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -21,9 +23,43 @@ typedef struct vshi_model_shape {
     uint32_t *indices;
     size_t vertex_count;
     size_t triangle_count;
-    int32_t uv_sets; /* highest set + 1 */
-    int32_t alpha;   /* VSH_ALPHA_… */
+    int32_t uv_sets;  /* highest set + 1 */
+    int32_t alpha;    /* VSH_ALPHA_… */
+    int32_t material; /* number of it + 1; 0: none */
+    char *raw;        /* its arrays lie in the model's file, as they are there: what to call it where
+                         vshi_model_finish() is still to be done. NULL: they are its own, and done */
 } vshi_model_shape;
+
+/* What of a glTF an entry is: its node, the node's mesh, the mesh's primitive and, where the node is drawn
+ * many times (EXT_mesh_gpu_instancing), which of them. Each is 1 + its index in the file; 0: none, as in
+ * every other format. */
+typedef struct vshi_model_origin {
+    uint32_t node, mesh, primitive, instance;
+} vshi_model_origin;
+/* An image file: bytes, or a path. */
+typedef struct vshi_model_image {
+    const unsigned char *bytes; /* what is `owned`, or of the reader's answer */
+    size_t size;
+    unsigned char *owned;
+    char *path;
+} vshi_model_image;
+
+typedef struct vshi_model_material {
+    vsh_model_material told; /* without what lies in memory of the model's: */
+    char *name;
+    size_t image; /* number of it + 1; 0: none */
+} vshi_model_material;
+
+enum { VSHI_FILE_IDENTITY = 5 };
+
+/* A file that a reader has mapped, and that arrays of its model are left in: what takes them up reads them
+ * from there, without a copy in between (model_raw.c). */
+typedef struct vshi_model_file {
+    void *map; /* NULL: none */
+    size_t size;
+    uint64_t identity[VSHI_FILE_IDENTITY]; /* device, number, bytes, seconds and nanoseconds of its last
+                                              change */
+} vshi_model_file;
 
 typedef struct vshi_model_entry {
     char *name;        /* NULL where neither node nor mesh has one */
@@ -31,6 +67,7 @@ typedef struct vshi_model_entry {
     uint32_t object;   /* number of the node, from 1 */
     size_t shape;
     double transform[12];
+    vshi_model_origin origin;
 } vshi_model_entry;
 
 enum { VSHI_MODEL_BLOCKS = 4 };
@@ -41,8 +78,15 @@ struct vsh_model {
     bool borrowed;                   /* the shapes' arrays lie in what follows, else each is its own */
     void *blocks[VSHI_MODEL_BLOCKS]; /* from malloc; may be NULL */
     vshi_answer answer;              /* of a reader; its map may be NULL */
+    vshi_model_file file;
     vshi_model_entry *entries;
     size_t entry_count, entry_capacity;
+    vsh_model_light *lights; /* whose names are the model's */
+    size_t light_count, light_capacity;
+    vshi_model_material *materials;
+    size_t material_count;
+    vshi_model_image *images;
+    size_t image_count;
     double unit; /* metres in one of the file's; 0: not known */
 };
 
@@ -63,6 +107,7 @@ typedef struct vshi_model_place {
     uint32_t object;
     size_t shape;
     const double *world; /* [12] */
+    vshi_model_origin origin;
 } vshi_model_place;
 
 /* An empty one. Free with vsh_model_free(). Errors: VSH_ERROR_MEMORY. */
@@ -77,8 +122,27 @@ vsh_result vshi_model_read(const char *path, const vsh_run *run, bool alone, vsh
 vsh_result vshi_model_add(vsh_model *model, const char *path, const vsh_run *run,
                           const vshi_model_place *place, vsh_error *error);
 
+/* Adds a light, whose name is copied on one line; it may be NULL. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_model_add_light(vsh_model *model, const vsh_model_light *light, const char *name,
+                                vsh_error *error);
+void vshi_model_free_lights(vsh_model *model);
+
+/* A copy of a text on one line. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_model_copy_line(const char *text, char **copy, vsh_error *error);
+void vshi_model_free_materials(vsh_model *model);
+
 /* The number of an object that is yet to be added. */
 uint32_t vshi_model_next_object(const vsh_model *model);
+
+/* The shape's triangles are held against its vertices, vertices that none of them uses are left out,
+ * positions are finite, normals that are not become 0 with a warning, and v of UVs points up. Errors:
+ * VSH_ERROR_INPUT, naming `where`; VSH_ERROR_MEMORY. */
+vsh_result vshi_model_finish(const char *path, const vsh_run *run, const char *where, vshi_model_shape *shape,
+                             vsh_error *error);
+
+/* Whether `count` indices are of `vertex_count` vertices. Errors: VSH_ERROR_INPUT, naming the first. */
+vsh_result vshi_model_check_indices(const char *path, const char *where, const uint32_t *indices,
+                                    size_t count, size_t vertex_count, vsh_error *error);
 
 /* world = parent × own. */
 void vshi_model_compose(const double parent[12], const double own[12], double world[12]);
@@ -98,10 +162,54 @@ vsh_result vshi_serve_model(const char *path, struct vshi_decoder *request, cons
                             struct vshi_encoder *payload, vsh_error *error);
 
 /* What a reader has handed over; everything in it is checked. The model's arrays are those of the message,
- * which must outlive it. Errors: VSH_ERROR_READ where it does not hold, and as for what was made in this
- * process. */
-vsh_result vshi_model_decode(struct vshi_decoder *decoder, const char *path, vsh_model **model,
-                             vsh_error *error);
+ * which must outlive it, or are read from the file at `path` where they were left there. Errors:
+ * VSH_ERROR_READ where it does not hold, and as for what was made in this process. */
+vsh_result vshi_model_decode(struct vshi_decoder *decoder, const char *path, const vsh_run *run,
+                             vsh_model **model, vsh_error *error);
+
+/* Its lights; what is taken is checked (model_light.c). */
+void vshi_model_put_lights(struct vshi_encoder *encoder, const vsh_model *model);
+vsh_result vshi_model_take_lights(struct vshi_decoder *decoder, vsh_model *model, const char *path,
+                                  vsh_error *error);
+
+/* Its materials and images, which stay where they lie in the answer (model_material.c). */
+void vshi_model_put_materials(struct vshi_encoder *encoder, const vsh_model *model);
+vsh_result vshi_model_take_materials(struct vshi_decoder *decoder, vsh_model *model, const char *path,
+                                     const vsh_run *run, vsh_error *error);
+
+/* --- arrays that are left in the file (model_raw.c) */
+
+/* What of it tells whether it is the same one, unchanged. False where the system does not say. */
+bool vshi_file_identity(int file, uint64_t identity[VSHI_FILE_IDENTITY]);
+
+/* What a model's arrays in the file take, each at a multiple of 64 bytes. */
+uint64_t vshi_raw_bytes(const vsh_model *model);
+
+/* Tells where the arrays of a shape with `raw` lie. */
+void vshi_raw_put(struct vshi_encoder *encoder, const vshi_model_file *file, const vshi_model_shape *shape);
+
+/* A file that arrays are read from, into one block of memory. */
+typedef struct vshi_raw {
+    const char *path;
+    const vsh_run *run;
+    FILE *file;
+    uint64_t size; /* of the file */
+    unsigned char *block;
+    size_t used, bytes; /* of the block */
+} vshi_raw;
+
+/* Opens the file, which must be the one that the reader had, and takes `bytes` of memory, no more than the
+ * places that `message` more bytes of its answer may tell: *block is the caller's. Of a `raw` with a path and
+ * a run; close with vshi_raw_close(), after an error too. Errors: VSH_ERROR_READ, VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_raw_open(vshi_raw *raw, const uint64_t identity[VSHI_FILE_IDENTITY], uint64_t bytes,
+                         size_t message, void **block, vsh_error *error);
+void vshi_raw_close(vshi_raw *raw);
+
+/* Reads and finishes the arrays of a shape whose counts are known. Errors: as vshi_model_finish(), and
+ * VSH_ERROR_READ. */
+vsh_result vshi_raw_take(vshi_raw *raw, struct vshi_decoder *decoder, vshi_model_shape *shape,
+                         vsh_error *error);
 
 #ifdef __cplusplus
 }

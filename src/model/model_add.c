@@ -63,7 +63,7 @@ uint32_t vshi_model_next_object(const vsh_model *model) {
 }
 
 static vsh_result append(vsh_model *model, const vshi_model_place *place, vsh_error *error) {
-    vshi_model_entry entry = {.object = place->object, .shape = place->shape};
+    vshi_model_entry entry = {.object = place->object, .shape = place->shape, .origin = place->origin};
     memcpy(entry.transform, place->world, sizeof entry.transform);
     VSHI_TRY(grow_entries(model, error));
     VSHI_TRY(make_name(place->node, place->mesh, &entry.name, error));

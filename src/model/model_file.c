@@ -63,6 +63,7 @@ typedef struct file_text {
     char *text;
     size_t size;
     bool mapped; /* it is the file's own pages, else a copy */
+    uint64_t identity[VSHI_FILE_IDENTITY];
 } file_text;
 
 static void free_text(file_text *text) {
@@ -71,12 +72,15 @@ static void free_text(file_text *text) {
     } else {
         free(text->text);
     }
-    *text = (file_text){NULL, 0, false};
+    *text = (file_text){.text = NULL};
 }
 
 /* A file that becomes shorter while its pages are looked at ends the process, which may be the reader's. */
 static bool map_text(FILE *file, file_text *text) {
-    void *map = mmap(NULL, text->size, PROT_READ, MAP_PRIVATE | MAP_POPULATE, fileno(file), 0);
+    if (!vshi_file_identity(fileno(file), text->identity)) {
+        return false;
+    }
+    void *map = mmap(NULL, text->size, PROT_READ, MAP_PRIVATE, fileno(file), 0);
     text->mapped = map != MAP_FAILED;
     text->text = text->mapped ? map : NULL;
     return text->mapped;
@@ -111,14 +115,19 @@ done:
 
 static vsh_result scan_file(vshi_scan *scan, const char *ending, const vsh_run *run, bool alone,
                             vsh_model **model, vsh_error *error) {
-    file_text text = {NULL, 0, false};
+    file_text text = {.text = NULL};
     vsh_result result;
     VSHI_TRY_DONE(load_file(scan->path, run, alone, &text, error));
     scan->text = text.text;
     scan->size = text.size;
-    VSHI_TRY_DONE(is_gltf(ending)
-                      ? vshi_gltf_read(scan->path, scan->text, scan->size, run, scan->job, model, error)
-                      : vshi_scan_file(scan, ending, error));
+    VSHI_TRY_DONE(is_gltf(ending) ? vshi_gltf_read(scan->path, scan->text, scan->size, text.mapped, run,
+                                                   scan->job, model, error)
+                                  : vshi_scan_file(scan, ending, error));
+    if (*model != NULL && text.mapped) { /* whose arrays may lie there */
+        (*model)->file = (vshi_model_file){.map = text.text, .size = text.size};
+        memcpy((*model)->file.identity, text.identity, sizeof text.identity);
+        text = (file_text){.text = NULL};
+    }
     if (vshi_job_advance(scan->job, SCAN_UNITS - scan->units_done)) {
         result = vshi_job_fail_cancelled(scan->job, error);
     }

@@ -251,7 +251,7 @@ static vsh_result build(vshi_ply_reader *r, vsh_model *model, vsh_error *error) 
     r->positions = r->normals = r->uvs = NULL;
     model->shape_count = 1;
     VSHI_TRY(make_triangles(r, shape, error));
-    const vshi_model_place place = {"", "", 1, 0, world};
+    const vshi_model_place place = {"", "", 1, 0, world, {0, 0, 0, 0}};
     return shape->triangle_count > 0 ? vshi_model_add(model, r->path, r->run, &place, error)
                                      : vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", r->path);
 }

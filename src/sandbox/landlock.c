@@ -97,7 +97,7 @@ static void allow_libraries(int ruleset, const vshi_request *request) {
 static void allow_inputs(int ruleset, const vshi_request *request) {
     char folder[PATH_MAX];
     allow(ruleset, request->path);
-    if (request->kind != VSHI_READ_MODEL) {
+    if (request->kind != VSHI_READ_MODEL && request->kind != VSHI_READ_DRACO) {
         return;
     }
     const char *slash = strrchr(request->path, '/');

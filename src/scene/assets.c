@@ -9,6 +9,7 @@
 #include "scene/asset_files.h"
 #include "scene/select.h"
 #include "scene/solidity.h"
+#include "scene/unwrapped.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -17,15 +18,17 @@
 typedef struct asset_place {
     vsh_mesh *meshes;
     double *transforms; /* [count][12] */
+    size_t *numbers;    /* [count]: of each in its model */
     size_t count;
-    const vsh_model *model; /* mesh casters; belongs to the assets' models */
+    const vsh_model *model; /* of meshes; belongs to the assets' models */
     const vsh_grid *grid;   /* vdb casters; belongs to the assets' grids */
     vsh_outline *outline;   /* mask and text casters */
     vsh_model *made;        /* of heightfields; its meshes are this place's */
     vsh_heights *heights;   /* direct ones */
     vsh_spheres *spheres;
     bool direct;
-    vshi_mesh_set set; /* of a receiver */
+    vshi_mesh_set set; /* these two of a receiver */
+    vshi_unwrapped unwrapped;
 } asset_place;
 
 struct vsh_assets {
@@ -37,38 +40,54 @@ struct vsh_assets {
     vshi_mesh_set set; /* of the casters' meshes */
 };
 
-/* The meshes of the model that are `chosen`; NULL: all. */
+/* Adds mesh `number` of a model, as it is or as `mesh` has it. */
+static void add_mesh(asset_place *place, vsh_mesh mesh, size_t number, double scale,
+                     const double transform[12]) {
+    double *composed = place->transforms + 12 * place->count, scaled[12];
+    for (int k = 0; k < 12; ++k) {
+        scaled[k] = mesh.transform[k] * scale;
+    }
+    vshi_transform_compose(transform, scaled, composed);
+    mesh.transform = composed;
+    place->numbers[place->count] = number;
+    place->meshes[place->count++] = mesh;
+}
+
+/* The meshes of the model that are `chosen`; NULL: all. Those that `parts`, a receiver of the same model, has
+ * unwrapped are taken from there: what casts and receives is one. NULL: none. */
 static vsh_result place_chosen(asset_place *place, const vsh_model *model, const unsigned char *chosen,
-                               int32_t uv_set, double unit, const double transform[12], vsh_error *error) {
-    const size_t all = vsh_model_mesh_count(model);
+                               const asset_place *parts, int32_t uv_set, double unit,
+                               const double transform[12], vsh_error *error) {
+    const size_t all = vsh_model_mesh_count(model), part_count = parts != NULL ? parts->count : 0;
     const double own_unit = vsh_model_unit(model) > 0.0 ? vsh_model_unit(model) : 1.0;
     const double scale = unit > 0.0 ? unit / own_unit : 1.0;
-    size_t count = 0;
-    for (size_t i = 0; i < all; ++i) {
-        count += chosen == NULL || chosen[i] != 0;
-    }
+    const size_t count = all + part_count;
     VSHI_TRY(vshi_allocate((void **)&place->meshes, count, sizeof *place->meshes, "meshes", error));
     VSHI_TRY(vshi_allocate((void **)&place->transforms, count, 12 * sizeof(double), "transforms", error));
-    for (size_t i = 0; i < all; ++i) {
-        if (chosen != NULL && chosen[i] == 0) {
-            continue;
+    VSHI_TRY(vshi_allocate((void **)&place->numbers, count, sizeof *place->numbers, "meshes", error));
+    unsigned char *taken = NULL;
+    VSHI_TRY(vshi_allocate((void **)&taken, all, 1, "meshes", error));
+    for (size_t i = 0; i < part_count; ++i) {
+        const size_t number = parts->numbers[i];
+        if (chosen == NULL || chosen[number] != 0) {
+            vsh_mesh part = parts->meshes[i];
+            part.transform = vsh_model_mesh(model, number, -1).transform;
+            add_mesh(place, part, number, scale, transform);
+            taken[number] = 1;
         }
-        double *composed = place->transforms + 12 * place->count;
-        vsh_mesh *mesh = &place->meshes[place->count++];
-        *mesh = vsh_model_mesh(model, i, uv_set);
-        double scaled[12];
-        for (int k = 0; k < 12; ++k) {
-            scaled[k] = mesh->transform[k] * scale;
-        }
-        vshi_transform_compose(transform, scaled, composed);
-        mesh->transform = composed;
     }
+    for (size_t i = 0; i < all; ++i) {
+        if ((chosen == NULL || chosen[i] != 0) && !taken[i]) {
+            add_mesh(place, vsh_model_mesh(model, i, uv_set), i, scale, transform);
+        }
+    }
+    free(taken);
     return VSH_OK;
 }
 
 static vsh_result place_model(asset_place *place, const vsh_model *model, int32_t uv_set,
                               const double transform[12], vsh_error *error) {
-    return place_chosen(place, model, NULL, uv_set, 0.0, transform, error);
+    return place_chosen(place, model, NULL, NULL, uv_set, 0.0, transform, error);
 }
 
 /* `source` is filled but for what the image holds, and whether it is direct but for its transform. */
@@ -142,6 +161,16 @@ static vsh_result leave_out_blended(const vsh_scene *scene, const vsh_model *mod
     return VSH_OK;
 }
 
+/* The first receiver that unwraps meshes of a model; NULL: none. */
+static const asset_place *find_unwrapped(const vsh_assets *assets, const vsh_model *model) {
+    for (size_t i = 0; i < assets->receiver_count; ++i) {
+        if (assets->receivers[i].model == model && assets->receivers[i].unwrapped.atlas != NULL) {
+            return &assets->receivers[i];
+        }
+    }
+    return NULL;
+}
+
 static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_t index, const vsh_run *run,
                                vsh_error *error) {
     const vsh_caster *caster = &scene->casters[index];
@@ -182,7 +211,8 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
     vsh_result result = VSH_OK;
     VSHI_TRY_DONE(vshi_select(place->model, caster->path, &caster->objects, &chosen, error));
     VSHI_TRY_DONE(leave_out_blended(scene, place->model, caster->path, run, chosen, error));
-    VSHI_TRY_DONE(place_chosen(place, place->model, chosen, -1, scene->unit, caster->transform, error));
+    VSHI_TRY_DONE(place_chosen(place, place->model, chosen, find_unwrapped(assets, place->model), -1,
+                               scene->unit, caster->transform, error));
 done:
     free(chosen);
     return result;
@@ -207,7 +237,8 @@ static vsh_result settle_solidity(vsh_assets *assets, const vsh_scene *scene, co
 }
 
 /* Those that do not cast, too. */
-static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, vsh_error *error) {
+static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
+                                  vsh_error *error) {
     for (size_t i = 0; i < assets->receiver_count; ++i) {
         asset_place *place = &assets->receivers[i];
         vsh_error why;
@@ -218,7 +249,41 @@ static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, vs
         for (size_t m = 0; m < place->count; ++m) {
             place->meshes[m].checked = place->set.meshes[m].checked;
         }
+        if (place->unwrapped.page_count > 1) { /* what hangs together may be on several */
+            VSHI_TRY(vshi_mesh_set_solve(&place->set, run, error));
+        }
     }
+    return VSH_OK;
+}
+
+/* Puts the parts of unwrapped meshes in their places. */
+static vsh_result unwrap(asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
+                         vsh_error *error) {
+    bool needs = false;
+    VSHI_TRY(vshi_receiver_needs_unwrap(receiver, place->meshes, place->count, run, &needs, error));
+    if (!needs) {
+        return VSH_OK;
+    }
+    vshi_unwrapped *made = &place->unwrapped;
+    VSHI_TRY(vshi_unwrap_receiver(receiver, place->meshes, place->count, run, made, error));
+    size_t *numbers = NULL;
+    VSHI_TRY(vshi_allocate((void **)&numbers, made->part_count, sizeof *numbers, "meshes", error));
+    vsh_mesh *meshes = NULL;
+    const vsh_result result =
+        vshi_allocate((void **)&meshes, made->part_count, sizeof *meshes, "meshes", error);
+    if (result != VSH_OK) {
+        free(numbers);
+        return result;
+    }
+    for (size_t i = 0; i < made->part_count; ++i) {
+        numbers[i] = place->numbers[made->numbers[i]];
+        meshes[i] = made->parts[i];
+    }
+    free(place->numbers);
+    free(place->meshes);
+    place->numbers = numbers;
+    place->meshes = meshes;
+    place->count = made->part_count;
     return VSH_OK;
 }
 
@@ -242,8 +307,10 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
     VSHI_TRY_DONE(vshi_asset_model(&assets->files, receiver->path, run, &model, error));
     VSHI_TRY_DONE(vshi_select(model, receiver->path, &receiver->objects, &chosen, error));
     VSHI_TRY_DONE(vshi_select_uvs(model, receiver, run, chosen, error));
-    VSHI_TRY_DONE(place_chosen(&assets->receivers[index], model, chosen, receiver->uv_set, scene->unit,
+    assets->receivers[index].model = model;
+    VSHI_TRY_DONE(place_chosen(&assets->receivers[index], model, chosen, NULL, receiver->uv_set, scene->unit,
                                receiver->transform, error));
+    result = unwrap(&assets->receivers[index], receiver, run, error);
 done:
     free(chosen);
     return result;
@@ -280,7 +347,7 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
         VSHI_TRY_DONE(place_caster(loaded, scene, i, &full, error));
     }
     VSHI_TRY_DONE(settle_solidity(loaded, scene, &full, error));
-    VSHI_TRY_DONE(check_receivers(loaded, scene, error));
+    VSHI_TRY_DONE(check_receivers(loaded, scene, &full, error));
     /* with the places in it, which the check asks for */
     VSHI_TRY_DONE(vshi_assets_check(loaded, scene, &full, error));
     *assets = loaded;
@@ -296,6 +363,8 @@ static void free_places(asset_place *places, size_t count) {
         vsh_heights_free(places[i].heights);
         vsh_model_free(places[i].made);
         vshi_mesh_set_free(&places[i].set);
+        vshi_unwrapped_free(&places[i].unwrapped);
+        free(places[i].numbers);
         free(places[i].transforms);
         free(places[i].meshes);
         vsh_outline_free(places[i].outline);
@@ -322,6 +391,39 @@ static const vsh_mesh *placed_meshes(const asset_place *places, size_t count, si
 
 const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count) {
     return placed_meshes(assets->receivers, assets->receiver_count, index, mesh_count);
+}
+
+const vsh_model *vsh_assets_receiver_model(const vsh_assets *assets, size_t index, const size_t **numbers) {
+    const asset_place *place = index < assets->receiver_count ? &assets->receivers[index] : NULL;
+    *numbers = place != NULL ? place->numbers : NULL;
+    return place == NULL ? NULL : place->made != NULL ? place->made : place->model;
+}
+
+size_t vsh_assets_receiver_pages(const vsh_assets *assets, size_t index) {
+    if (index >= assets->receiver_count) {
+        return 0;
+    }
+    const vshi_unwrapped *made = &assets->receivers[index].unwrapped;
+    return made->atlas != NULL ? made->page_count : 1;
+}
+
+const vsh_mesh *vsh_assets_receiver_page(const vsh_assets *assets, size_t index, size_t page, size_t *first,
+                                         size_t *mesh_count) {
+    *first = *mesh_count = 0;
+    if (page >= vsh_assets_receiver_pages(assets, index)) {
+        return NULL;
+    }
+    const asset_place *place = &assets->receivers[index];
+    const size_t *begins = place->unwrapped.page_begins;
+    *first = begins != NULL ? begins[page] : 0;
+    *mesh_count = (begins != NULL ? begins[page + 1] : place->count) - *first;
+    return place->meshes + *first;
+}
+
+const vsh_atlas *vsh_assets_receiver_atlas(const vsh_assets *assets, size_t index, const size_t **numbers) {
+    const vshi_unwrapped *made = index < assets->receiver_count ? &assets->receivers[index].unwrapped : NULL;
+    *numbers = made != NULL ? made->numbers : NULL;
+    return made != NULL ? made->atlas : NULL;
 }
 
 const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count) {

@@ -1,9 +1,12 @@
+#include "base/names.h"
 #include "base/try.h"
 #include "scene/parts.h"
 #include "scene/transform.h"
 
 #include <vdbshade/image.h>
 #include <vdbshade/settings.h>
+
+#include <string.h>
 
 vsh_result vshi_read_size(vshi_json *reader, const vshi_value *value, int32_t *width, int32_t *height) {
     const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 1.0, .highest = VSH_MAX_LIGHTMAP_SIZE};
@@ -34,6 +37,34 @@ vsh_result vshi_read_bits(vshi_json *reader, const vshi_value *value, void *memb
         return vshi_json_fail(reader, value, "%d is none of 0, 8, 16, 32", *bits);
     }
     return VSH_OK;
+}
+
+static const char *const unwrap_table[] = {[VSH_RECEIVER_UNWRAP_DEFAULT] = "default",
+                                           [VSH_RECEIVER_UNWRAP_NEVER] = "never",
+                                           [VSH_RECEIVER_UNWRAP_AUTO] = "auto",
+                                           [VSH_RECEIVER_UNWRAP_ALWAYS] = "always"};
+static const vshi_names unwrap_names = VSHI_NAMES(unwrap_table);
+
+int32_t vsh_receiver_unwrap(const char *name) {
+    return vshi_name_find(unwrap_names, name);
+}
+
+const char *vsh_receiver_unwrap_name(int32_t unwrap) {
+    return vshi_name_at(unwrap_names, unwrap);
+}
+
+/* Texels, or "auto". */
+static vsh_result read_padding(vshi_json *reader, const vshi_value *value, void *member) {
+    const vshi_key key = {.kind = VSHI_INTEGER, .highest = 4096.0};
+    int32_t *padding = member;
+    if (!json_is_string(value->json)) {
+        return vshi_read_value(reader, value, &key, padding);
+    }
+    *padding = VSH_PADDING_AUTO;
+    return strcmp(json_string_value(value->json), "auto") == 0
+               ? VSH_OK
+               : vshi_json_fail(reader, value, "\"%.64s\" is none of auto, a whole number from 0 to 4096",
+                                json_string_value(value->json));
 }
 
 enum { MESH = 1 << VSH_RECEIVER_MESH, HEIGHTFIELD = 1 << VSH_RECEIVER_HEIGHTFIELD };
@@ -99,6 +130,38 @@ static const vshi_key receiver_keys[] = {
          {.name = "allow-overlap",
           .group = VSH_SETTINGS_TEXELS,
           .help = "bake objects that lie over each other in the lightmap, too: the first keeps the texels"}},
+    {.name = "unwrap",
+     .kind = VSHI_NAME,
+     .variants = MESH,
+     .offset = offsetof(vsh_receiver, unwrap),
+     .name_of = vsh_receiver_unwrap_name,
+     .option = {.name = "unwrap",
+                .value = "MODE",
+                .group = VSH_SETTINGS_TEXELS,
+                .help = "make lightmap UVs: always, or (auto) where the file's own cannot be baked",
+                .otherwise = "auto for .glb and .gltf, never for images"}},
+    {.name = "texels_per_unit",
+     .kind = VSHI_NUMBER,
+     .variants = MESH,
+     .offset = offsetof(vsh_receiver, texels_per_unit),
+     .highest = VSHI_LARGEST,
+     .flags = VSHI_ABOVE,
+     .option = {.name = "texels-per-unit",
+                .value = "N",
+                .group = VSH_SETTINGS_TEXELS,
+                .help = "density of UVs that are made, texels along a scene unit",
+                .otherwise = "the most that fit"}},
+    {.name = "pages",
+     .kind = VSHI_INTEGER,
+     .variants = MESH,
+     .offset = offsetof(vsh_receiver, pages),
+     .lowest = 1.0,
+     .highest = VSH_MAX_PAGES,
+     .option = {.name = "pages",
+                .value = "N",
+                .group = VSH_SETTINGS_TEXELS,
+                .help = "images of --size that may be filled with UVs that are made: OUT.0.exr, OUT.1.exr, …",
+                .otherwise = "1; with --texels-per-unit as many as it takes"}},
     {.name = "size",
      .kind = VSHI_CUSTOM,
      .read = read_size,
@@ -119,13 +182,28 @@ static const vshi_key receiver_keys[] = {
                 .group = VSH_SETTINGS_TEXELS,
                 .help = "N × N samples a texel"}},
     {.name = "padding",
-     .kind = VSHI_INTEGER,
+     .kind = VSHI_CUSTOM,
      .offset = offsetof(vsh_receiver, padding),
-     .highest = 4096.0,
+     .read = read_padding,
      .option = {.name = "padding",
                 .value = "N",
                 .group = VSH_SETTINGS_TEXELS,
-                .help = "texels that charts are grown by"}},
+                .help = "texels that charts are grown by; auto: all is filled, so that no mip level reads "
+                        "background",
+                .range = "a whole number from 0 to 4096, or auto",
+                .otherwise = "4"}},
+    {.name = "seams",
+     .kind = VSHI_NAME,
+     .variants = MESH,
+     .offset = offsetof(vsh_receiver, seams),
+     .name_of = vsh_seams_name,
+     .option = {.name = "seams",
+                .value = "WHAT",
+                .group = VSH_SETTINGS_TEXELS,
+                .help =
+                    "fix: values on both sides of a chart's border are made to agree where the surface is "
+                    "smooth, moved by up to --max-error",
+                .otherwise = "fix for .glb and .gltf, keep for images"}},
     {.name = "ao_spacing",
      .kind = VSHI_INTEGER,
      .offset = offsetof(vsh_receiver, ao_spacing),

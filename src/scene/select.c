@@ -1,4 +1,5 @@
 #include "scene/select.h"
+#include "scene/unwrapped.h"
 
 #include "base/job.h"
 #include "base/memory.h"
@@ -189,9 +190,9 @@ static vsh_result fail_without_uvs(const vsh_receiver *receiver, const char *mes
                                    vsh_error *error) {
     if (sets == 0) {
         return vshi_fail(error, VSH_ERROR_INPUT,
-                         "%s: %s: no UVs to bake into: unwrap it (in Blender: UV > Smart UV Project, into a "
-                         "second UV map), or leave it out of what receives, so that it only casts "
-                         "(--no-receive NAME, --per-object; \"except\" in a scene)",
+                         "%s: %s: no UVs to bake into: have them made (--unwrap auto; \"unwrap\" in a scene), or "
+                         "leave it out of what receives, so that it only casts (--no-receive NAME, "
+                         "--per-object; \"except\" in a scene)",
                          receiver->path, mesh);
     }
     return vshi_fail(error, VSH_ERROR_INPUT, "%s: %s: no UV set %d: it has %s%d", receiver->path, mesh,
@@ -206,6 +207,9 @@ vsh_result vshi_select_uvs(const vsh_model *model, const vsh_receiver *receiver,
     }
     const size_t count = vsh_model_mesh_count(model);
     bool any = false;
+    if (vshi_receiver_unwrap(receiver) != VSH_RECEIVER_UNWRAP_NEVER) {
+        return VSH_OK; /* which makes what is missing */
+    }
     for (size_t i = 0; i < count; ++i) {
         any = any ||
               (chosen[i] != 0 && vsh_model_uv_sets(model, i) > (receiver->uv_set > 0 ? receiver->uv_set : 0));

@@ -14,8 +14,9 @@ vsh_result vshi_select(const vsh_model *model, const char *path, const vsh_selec
 vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const char *pattern,
                                vsh_error *error);
 
-/* Takes those out of `chosen` that cannot receive, where the receiver is partial; else errors:
- * VSH_ERROR_INPUT where a mesh has no UVs or not the set, VSH_ERROR_ARGUMENT where there is no such set. */
+/* Takes those out of `chosen` that cannot receive, where the receiver is partial and not unwrapped; else
+ * errors: VSH_ERROR_INPUT where a mesh has no UVs or not the set, VSH_ERROR_ARGUMENT where there is no such
+ * set. */
 vsh_result vshi_select_uvs(const vsh_model *model, const vsh_receiver *receiver, const vsh_run *run,
                            unsigned char *chosen, vsh_error *error);
 

@@ -1,5 +1,5 @@
 # Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/volume.md,
-# docs/render.md and docs/regression.md runs.
+# docs/render.md, docs/lit.md, docs/regression.md and docs/view.md runs.
 load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
@@ -82,8 +82,19 @@ run_commands() {
     done
 }
 
+@test "every command of docs/lit.md" {
+    run_commands lit.md 3
+    for made in lit.glb preview.glb lit.gltf lit.bin lit.occlusion.png lit.exr; do
+        [ -s "$made" ] || fail "no $made"
+    done
+}
+
 @test "every command of docs/regression.md" {
     run_commands regression.md 5
+}
+
+@test "every command of docs/view.md" {
+    run_commands view.md 5
 }
 
 # options_of FILE …: each option that is named there, once. Those of other programs are left out.
@@ -95,7 +106,7 @@ options_of() {
 @test "the documents name every option of --help, and no other" {
     local command
     "$VDBSHADE" --help >help.txt
-    for command in bake voxelize info trade query volume flat render compare regress; do
+    for command in bake voxelize info trade query volume flat render compare regress unwrap view; do
         "$VDBSHADE" "$command" --help >>help.txt
     done
     options_of help.txt >told.txt

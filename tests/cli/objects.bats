@@ -119,7 +119,7 @@ LEVEL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
     [ "$(grep -c 'no UVs' <<<"$stderr")" -eq 1 ] || fail "not one line"
     [[ $stderr == *"2 objects"*"'bare'"*"casts only"*"'naked'"* ]] || fail "not both"
     shade bake bare.obj "${LEVEL[@]}" -o out.exr
-    refused 2 bare.obj "'bare'" 'no UVs' 'Smart UV Project' --no-receive
+    refused 2 bare.obj "'bare'" 'no UVs' '--unwrap auto' --no-receive
 }
 
 @test "a scene's receivers choose objects too, and may overlap on purpose" {

@@ -48,6 +48,9 @@ vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
     MAKE(charts, vsh_charts_create(&mesh, 1, &options, run, NULL, &charts, error));
     double box[6];
     TRY(vsh_charts_bounds(charts, run, box, box + 3, error));
+    vsh_stitch_options creases = vsh_stitch_options_default();
+    creases.max_angle = 180.0; /* a box has no other seams */
+    TRY(vsh_lightmap_stitch(charts, &all, 2, &creases, run, NULL, error));
     MAKE(band, vsh_texels_create_band(charts, 0, 8, run, &band, error));
     TRY(vsh_bake_lightmap(occluders, band, lights, 2, NULL, run, &some, NULL, error));
 end:

@@ -39,13 +39,26 @@ static const char triangle_stl[] =
     "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
     "endsolid a\n";
 
+/* A quad, shown by two nodes. */
+static const char quad_gltf[] =
+    "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0,1]}],\"nodes\":[{\"mesh\":0,\"name\":"
+    "\"a\"},{\"mesh\":0,\"translation\":[2,0,0]}],\"meshes\":[{\"primitives\":[{\"attributes\":{\""
+    "POSITION\":0},\"indices\":1,\"material\":0}]}],\"materials\":[{\"name\":\"m\"}],\"accessors\""
+    ":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\",\"min\":[0,0,0],\"ma"
+    "x\":[1,0,1]},{\"bufferView\":1,\"componentType\":5123,\"count\":6,\"type\":\"SCALAR\"}],\"bu"
+    "fferViews\":[{\"buffer\":0,\"byteLength\":48},{\"buffer\":0,\"byteOffset\":48,\"byteLength"
+    "\":12}],\"buffers\":[{\"byteLength\":60,\"uri\":\"data:application/octet-stream;base64,A"
+    "AAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAACAPwAAAAAAAIA/AAAAAAAAAAAAAIA/AAABAAIAAAACAAMA\""
+    "}]}";
+
 static const struct {
     const char *name, *text;
 } inputs[] = {{"box.obj", box_obj},     {"scene.json", scene_json},     {"flat.json", flat_json},
-              {"balls.csv", balls_csv}, {"triangle.ply", triangle_ply}, {"triangle.stl", triangle_stl}};
+              {"balls.csv", balls_csv}, {"triangle.ply", triangle_ply}, {"triangle.stl", triangle_stl},
+              {"quad.gltf", quad_gltf}};
 enum { INPUTS = sizeof inputs / sizeof inputs[0] };
 
-static const char *const outputs[] = {"out.exr", "out.png", "out.tif", "out.vdb"};
+static const char *const outputs[] = {"out.exr", "out.png", "out.tif", "out.vdb", "out.glb", "out.html"};
 enum { OUTPUTS = sizeof outputs / sizeof outputs[0] };
 
 static void write_text(const char *name, const char *text) {

@@ -2,6 +2,7 @@
 #include "../unit/previews.h"
 
 #include <math.h>
+#include <stdbool.h>
 
 /* --- what several of them need */
 
@@ -280,6 +281,99 @@ end:
     return result;
 }
 
+/* Meshes of two triangles, whose vertices are split and on two pages; NULL: by their own UVs. */
+static vsh_result light_asset(const char *name, bool split_them, const vsh_run *run, vsh_error *error) {
+    enum { CORNERS = 6 };
+    static const float white[] = {1.0f, 0.5f, 0.25f, 2.0f};
+    static const float *const planes[] = {white};
+    static const uint32_t sources[CORNERS] = {0, 1, 2, 0, 2, 3}, indices[CORNERS] = {0, 1, 2, 3, 4, 5},
+                          charts[] = {0, 1};
+    static const float uvs[2 * CORNERS] = {0, 0, 1, 0, 1, 1, 0, 0.5f, 1, 0.5f, 0, 1};
+    const vsh_lit_image baked[] = {
+        {.purpose = VSH_LIT_OCCLUSION, .width = 2, .height = 2, .channels = planes, .channel_count = 1},
+        {.purpose = VSH_LIT_LIGHTMAP,
+         .page = 1,
+         .width = 2,
+         .height = 2,
+         .channels = planes,
+         .channel_count = 1}};
+    const vsh_lit_mesh split = {uvs, sources, indices, charts, CORNERS, 2, 0, -1}, meshes[] = {split, split};
+    vsh_lit_options options = vsh_lit_options_default();
+    options.images = baked;
+    options.image_count = 2;
+    options.chart_pages = charts;
+    options.chart_count = 2;
+    vsh_model *model = NULL;
+    vsh_result result;
+    MAKE(model, vsh_model_read(name, run, &model, error));
+    TRY(vsh_lit_write(name, model, split_them ? meshes : NULL, &options, "out.glb", run, error));
+end:
+    vsh_model_free(model);
+    return result;
+}
+
+static vsh_result light_document(const vsh_run *run, vsh_error *error) {
+    return light_asset("quad.gltf", true, run, error);
+}
+
+static vsh_result light_model(const vsh_run *run, vsh_error *error) {
+    return light_asset("box.obj", false, run, error);
+}
+
+/* A bent sheet, a copy of it and an instance, on pages that are searched for; then with the UVs that came of
+ * it. */
+static vsh_result unwrap(const vsh_run *run, vsh_error *error) {
+    enum { N = 3, VERTICES = (N + 1) * (N + 1), TRIANGLES = 4 * N * N };
+    static float positions[VERTICES][3];
+    static uint32_t indices[TRIANGLES][3];
+    static const double twice[12] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0};
+    for (uint32_t v = 0; v < VERTICES; ++v) {
+        const float x = (float)(v % (N + 1)), y = (float)(v / (N + 1));
+        positions[v][0] = x;
+        positions[v][1] = y;
+        positions[v][2] = 0.05F * (x * x + 2 * y * y);
+    }
+    for (uint32_t q = 0; q < 2 * N * N; ++q) {
+        const uint32_t v = q / N % N * (N + 1) + q % N, quad[4] = {v, v + 1, v + N + 2, v + N + 1};
+        for (uint32_t t = 0; t < 2; ++t) {
+            indices[2 * q + t][0] = quad[0];
+            indices[2 * q + t][1] = quad[1 + t];
+            indices[2 * q + t][2] = quad[2 + t];
+        }
+    }
+    vsh_mesh meshes[2] = {{.positions = positions[0],
+                           .indices = indices[0],
+                           .vertex_count = VERTICES,
+                           .triangle_count = TRIANGLES}};
+    meshes[1] = meshes[0];
+    meshes[1].transform = twice;
+    vsh_unwrap_options options = vsh_unwrap_options_default();
+    options.width = options.height = 64;
+    options.max_pages = 2;
+    options.keep_uvs = VSH_UNWRAP_KEEP;
+    vsh_atlas *atlas = NULL, *again = NULL;
+    vsh_result result;
+    MAKE(atlas, vsh_unwrap(meshes, 2, &options, run, &atlas, error));
+    const vsh_atlas_mesh placed = vsh_atlas_mesh_view(atlas, 0);
+    static float corners[3 * TRIANGLES][3];
+    for (size_t v = 0; v < placed.vertex_count; ++v) {
+        for (size_t k = 0; k < 3; ++k) {
+            corners[v][k] = positions[placed.sources[v]][k];
+        }
+    }
+    const vsh_mesh own = {.positions = corners[0],
+                          .uvs = placed.uvs,
+                          .indices = placed.indices,
+                          .vertex_count = placed.vertex_count,
+                          .triangle_count = placed.triangle_count};
+    options.max_pages = 1;
+    MAKE(again, vsh_unwrap(&own, 1, &options, run, &again, error));
+end:
+    vsh_atlas_free(again);
+    vsh_atlas_free(atlas);
+    return result;
+}
+
 static vsh_result compare(const vsh_run *run, vsh_error *error) {
     float golden[SIDE * SIDE], values[SIDE * SIDE];
     parts_fill(golden, SIDE * SIDE);
@@ -288,6 +382,16 @@ static vsh_result compare(const vsh_run *run, vsh_error *error) {
     const vsh_compared compared = {{SIDE, SIDE, 1}, golden, values, NULL};
     vsh_measures measures;
     return vsh_compare(&compared, NULL, run, &measures, error);
+}
+
+static vsh_result write_page(const vsh_run *run, vsh_error *error) {
+    vsh_view_bake bake = vsh_view_bake_default(), other = bake;
+    bake.model = "box.obj";
+    bake.planes = images;
+    bake.plane_count = 1;
+    other.planes = images;
+    other.plane_count = IMAGES;
+    return vsh_view_write("out.html", &bake, &other, run, error);
 }
 
 const scenario scenarios[] = {
@@ -309,6 +413,10 @@ const scenario scenarios[] = {
     {"a TIFF file written", write_tif},
     {"images read", read_images},
     {"an output's origin", tell_origin},
+    {"a lit document written", light_document},
+    {"a lit model written", light_model},
     {"a comparison", compare},
+    {"a page", write_page},
+    {"an atlas", unwrap},
 };
 const size_t scenario_count = sizeof scenarios / sizeof scenarios[0];

@@ -1,11 +1,13 @@
 /* Mesh files, the whole way: our scanners, Assimp, our checks. The first byte chooses the format. What is
- * read must be a mesh that vsh_mesh_check() takes. */
+ * read must be a mesh that vsh_mesh_check() takes, and comes back lit where its document holds. */
 #include "fuzz.h"
 
-#include <vdbshade/mesh.h>
+#include <vdbshade/lit.h>
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static void check(const vsh_model *model) {
     for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
@@ -18,6 +20,47 @@ static void check(const vsh_model *model) {
             abort();
         }
     }
+}
+
+/* Every corner is a vertex of its own, and the first triangle of each mesh lies on another page. */
+static void light(const char *path, const vsh_model *model, const vsh_run *run) {
+    static const uint32_t pages[] = {0, 1};
+    const size_t count = vsh_model_mesh_count(model);
+    size_t most = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const size_t triangles = vsh_model_mesh(model, i, 0).triangle_count;
+        most = triangles > most ? triangles : most;
+    }
+    vsh_lit_mesh *meshes = calloc(count, sizeof *meshes);
+    float *uvs = calloc(6 * most, sizeof *uvs);
+    uint32_t *indices = calloc(3 * most, sizeof *indices), *charts = calloc(most, sizeof *charts);
+    for (size_t i = 0; i < 6 * most; ++i) {
+        uvs[i] = (float)(i % 1021) / 1021.0f;
+    }
+    for (size_t i = 0; i < 3 * most; ++i) {
+        indices[i] = (uint32_t)i;
+    }
+    charts[0] = 1;
+    for (size_t i = 0; i < count; ++i) { /* its corners are copies of what they index */
+        const vsh_mesh mesh = vsh_model_mesh(model, i, 0);
+        meshes[i] = (vsh_lit_mesh){
+            uvs, mesh.indices, indices, charts, 3 * mesh.triangle_count, mesh.triangle_count, 0, -1};
+    }
+    char output[1024];
+    snprintf(output, sizeof output, "%s/lit.glb", fuzz_folder());
+    vsh_lit_options options = vsh_lit_options_default();
+    options.chart_pages = pages;
+    options.chart_count = 2;
+    vsh_error error;
+    const vsh_result result = vsh_lit_write(path, model, meshes, &options, output, run, fuzz_error(&error));
+    fuzz_ended(result, &error, result == VSH_OK ? output : NULL);
+    if ((unlink(output) == 0) != (result == VSH_OK)) {
+        abort();
+    }
+    free(charts);
+    free(indices);
+    free(uvs);
+    free(meshes);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
@@ -34,6 +77,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     fuzz_ended(result, &error, model);
     if (result == VSH_OK) {
         check(model);
+        light(path, model, &run);
     }
     vsh_model_free(model);
     return 0;

@@ -7,6 +7,7 @@
 #include "casts.h"
 #include "field/field.h"
 #include "previews.h"
+#include "stitched.h"
 
 /* --- the parts */
 
@@ -167,6 +168,11 @@ static void lightmap(const context *c, int32_t method, bits *b) {
     add_floats(b, coverage, TEXELS);
 }
 
+static void seams(const context *c, int32_t unused, bits *b) {
+    (void)unused;
+    add_stitched(&c->run, b);
+}
+
 static void volume_of_band(const context *c, int32_t unused, bits *b) {
     (void)unused;
     vsh_voxels *voxels = NULL;
@@ -324,6 +330,30 @@ static void level_set_of_a_mesh(const context *c, int32_t unused, bits *b) {
     check(vsh_grid_from_meshes(meshes, count, &options, &c->run, &grid, &error), &error);
     add_leaves(b, grid);
     vsh_grid_free(grid);
+    vsh_model_free(model);
+}
+
+/* Charts of the asset: of no library, but for the file. */
+static void atlas_of_a_mesh(const context *c, int32_t unused, bits *b) {
+    (void)unused;
+    vsh_model *model = cloister(&c->run);
+    vsh_mesh meshes[64];
+    const size_t count = vsh_model_mesh_count(model);
+    assert_in_range(count, 1, 64);
+    for (size_t i = 0; i < count; ++i) {
+        meshes[i] = vsh_model_mesh(model, i, -1);
+    }
+    vsh_unwrap_options options = vsh_unwrap_options_default();
+    options.width = options.height = 512;
+    options.padding = 2;
+    vsh_atlas *atlas = NULL;
+    vsh_error error;
+    check(vsh_unwrap(meshes, count, &options, &c->run, &atlas, &error), &error);
+    for (size_t i = 0; i < count; ++i) {
+        const vsh_atlas_mesh mesh = vsh_atlas_mesh_view(atlas, i);
+        add_floats(b, mesh.uvs, 2 * mesh.vertex_count);
+    }
+    vsh_atlas_free(atlas);
     vsh_model_free(model);
 }
 

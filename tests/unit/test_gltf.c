@@ -124,6 +124,90 @@ static void sparse_accessors_replace_elements(void **state) {
     refused_gltf(rest, buffer, sizeof buffer, VSH_ERROR_INPUT, "sparse index 1 of 2 is 4", "accessors[0]");
 }
 
+/* KHR_mesh_quantization as gltfpack writes it: normals of bytes, UVs of unsigned shorts, indices of every
+ * type. */
+static void quantized_normals_uvs_and_indices_stand_for_their_numbers(void **state) {
+    (void)state;
+    for (int type = 5121; type <= 5125; type += 2) {
+        unsigned char buffer[48 + 16 + 16 + 24] = {0};
+        memcpy(buffer, corners, 48);
+        for (size_t v = 0; v < 4; ++v) {
+            memcpy(buffer + 48 + 4 * v, (int8_t[4]){0, -127, (int8_t)-128, 0}, 4);
+            memcpy(buffer + 64 + 4 * v, (uint16_t[2]){(uint16_t)(13107 * v), 65535}, 4);
+        }
+        const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+        const size_t size = type == 5121 ? 1 : type == 5123 ? 2 : 4;
+        for (size_t i = 0; i < 6; ++i) {
+            buffer[80 + size * i] = (unsigned char)indices[i];
+        }
+        char rest[2048];
+        snprintf(
+            rest, sizeof rest,
+            "\"extensionsRequired\":[\"KHR_mesh_quantization\"],\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{"
+            "\"mesh\":0}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"NORMAL\":1,"
+            "\"TEXCOORD_0\":2},\"indices\":3}]}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,"
+            "\"count\":4,\"type\":\"VEC3\"},{\"bufferView\":1,\"componentType\":5120,\"normalized\":true,"
+            "\"count\":4,\"type\":\"VEC3\"},{\"bufferView\":2,\"componentType\":5123,\"normalized\":true,"
+            "\"count\":4,\"type\":\"VEC2\"},{\"bufferView\":3,\"componentType\":%d,\"count\":6,\"type\":"
+            "\"SCALAR\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":48},{\"buffer\":0,\"byteOffset\":48,"
+            "\"byteLength\":16,\"byteStride\":4},{\"buffer\":0,\"byteOffset\":64,\"byteLength\":16},{"
+            "\"buffer\":0,\"byteOffset\":80,\"byteLength\":24}]",
+            type);
+        vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
+        const vsh_mesh mesh = vsh_model_mesh(model, 0, 0);
+        assert_memory_equal(mesh.indices, indices, sizeof indices);
+        for (size_t v = 0; v < 4; ++v) {
+            assert_true(mesh.normals[3 * v] == 0.0F && mesh.normals[3 * v + 1] == -1.0F);
+            assert_true(mesh.normals[3 * v + 2] == -1.0F); /* -128, too */
+            assert_near((double)mesh.uvs[2 * v], 0.2 * (double)v, 1e-7);
+            assert_true(mesh.uvs[2 * v + 1] == 0.0F); /* v up */
+        }
+        vsh_model_free(model);
+        memcpy(strstr(rest, "\"count\":6"), "\"count\":5", 9); /* a corner alone is no triangle */
+        model = read_gltf(rest, buffer, sizeof buffer);
+        assert_int_equal(vsh_model_mesh(model, 0, 0).triangle_count, 1);
+        vsh_model_free(model);
+    }
+}
+
+/* Indices of every type, in no order; the last of those that agree counts. */
+static void sparse_indices_may_be_of_any_unsigned_type(void **state) {
+    (void)state;
+    static const float moved[3][3] = {{9, 9, 9}, {0, 7, 0}, {5, 0, 0}};
+    static const struct {
+        int type;
+        size_t size;
+        vsh_result result;
+    } types[] = {{5121, 1, VSH_OK},          {5123, 2, VSH_OK},          {5125, 4, VSH_OK},
+                 {5120, 1, VSH_ERROR_INPUT}, {5126, 4, VSH_ERROR_INPUT}, {0, 1, VSH_ERROR_INPUT}};
+    for (size_t t = 0; t < sizeof types / sizeof types[0]; ++t) {
+        unsigned char buffer[48 + 12 + 36] = {0};
+        memcpy(buffer, corners, 48);
+        buffer[48] = 1;
+        buffer[48 + types[t].size] = 2;
+        buffer[48 + 2 * types[t].size] = 1;
+        memcpy(buffer + 60, moved, 36);
+        char rest[2048];
+        snprintf(rest, sizeof rest,
+                 ONE_MESH
+                 ",\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":"
+                 "\"VEC3\",\"sparse\":{\"count\":3,\"indices\":{\"bufferView\":1,\"componentType\":%d},"
+                 "\"values\":{\"bufferView\":2}}}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":48},{"
+                 "\"buffer\":0,\"byteOffset\":48,\"byteLength\":%zu},{\"buffer\":0,\"byteOffset\":60,"
+                 "\"byteLength\":36}]",
+                 "", "", "", types[t].type, 3 * types[t].size);
+        if (types[t].result != VSH_OK) {
+            refused_gltf(rest, buffer, sizeof buffer, types[t].result, "its sparse part is wrong",
+                         "accessors[0]");
+            continue;
+        }
+        vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
+        assert_at(corner_of(model, 0, 1), 5, 0, 0);
+        assert_at(corner_of(model, 0, 2), 0, 7, 0);
+        vsh_model_free(model);
+    }
+}
+
 static void strips_and_fans_become_triangles_of_one_winding(void **state) {
     (void)state;
     static const float zigzag[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
@@ -145,7 +229,7 @@ static void required_extensions_that_are_not_known_are_refused_by_name(void **st
     (void)state;
     static const struct {
         const char *name, *advice;
-    } unknown[] = {{"KHR_made_up", "export it without"}, {"EXT_meshopt_compression", "gltfpack"}};
+    } unknown[] = {{"KHR_made_up", "export it without"}, {"KHR_node_visibility", "to be seen"}};
     static const char *const known[] = {"KHR_mesh_quantization", "KHR_texture_transform",
                                         "KHR_materials_unlit", "KHR_lights_punctual"};
     char rest[1024];
@@ -331,6 +415,8 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(quantized_positions_stand_for_their_numbers),
         cmocka_unit_test(sparse_accessors_replace_elements),
+        cmocka_unit_test(quantized_normals_uvs_and_indices_stand_for_their_numbers),
+        cmocka_unit_test(sparse_indices_may_be_of_any_unsigned_type),
         cmocka_unit_test(strips_and_fans_become_triangles_of_one_winding),
         cmocka_unit_test(required_extensions_that_are_not_known_are_refused_by_name),
         cmocka_unit_test(instances_stand_behind_their_node),

@@ -51,6 +51,10 @@ static void casters_are_not_made_of_nothing(void **state) {
     REFUSED(vsh_grid_from_meshes(&mesh, 1, NULL, NULL, NULL, &error));
     MAKES_NONE(vsh_grid_from_sdf(NULL, NULL, NULL, PLACE, &error));
     REFUSED(vsh_grid_from_sdf(NULL, NULL, NULL, NULL, &error));
+    MAKES_NONE(vsh_unwrap(NULL, 1, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_unwrap(&mesh, 1, NULL, NULL, NULL, &error));
+    REFUSED(vsh_uvs_usable(NULL, NULL, &(int32_t){0}, &error));
+    REFUSED(vsh_uvs_usable(&mesh, NULL, NULL, &error));
     REFUSED(vsh_sdf_check(NULL, &error));
     MAKES_NONE(vsh_grid_from_distance(NULL, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_grid_from_distance(&distance, NULL, NULL, PLACE, &error));
@@ -247,6 +251,15 @@ static void nothing_is_baked_without_what_it_takes(void **state) {
     MAKES_NONE(vsh_texels_create_band(NULL, 0, 1, NULL, PLACE, &error));
     REFUSED(vsh_bake_lightmap(casters, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));
     REFUSED(vsh_bake_lightmap(NULL, NULL, &light, 1, NULL, NULL, &lightmap, NULL, &error));
+    REFUSED(vsh_lightmap_stitch(NULL, &lightmap, 1, NULL, NULL, NULL, &error));
+    vsh_charts *charts = NULL;
+    const float corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0}, places[6] = {0, 0, 1, 0, 0, 1};
+    const uint32_t triangle[3] = {0, 1, 2};
+    const vsh_mesh one = {
+        .positions = corners, .uvs = places, .indices = triangle, .vertex_count = 3, .triangle_count = 1};
+    assert_int_equal(vsh_charts_create(&one, 1, NULL, NULL, NULL, &charts, &error), VSH_OK);
+    REFUSED(vsh_lightmap_stitch(charts, NULL, 1, NULL, NULL, NULL, &error));
+    vsh_charts_free(charts);
     REFUSED(vsh_flat_bake(NULL, NULL, 1, &plane, NULL, &flat, &error));
     REFUSED(vsh_flat_bake(NULL, &light, 1, &plane, NULL, NULL, &error));
     MAKES_NONE(vsh_voxels_from_grid(NULL, 1.0, NULL, PLACE, &error));
@@ -306,6 +319,15 @@ static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
     REFUSED(vsh_compare_files(NULL, "new.exr", NULL, NULL, &comparison, &error));
     REFUSED(vsh_compare_files("golden.exr", NULL, NULL, NULL, &comparison, &error));
     REFUSED(vsh_compare_files("golden.exr", "new.exr", NULL, NULL, NULL, &error));
+    const vsh_view_bake no_bake = vsh_view_bake_default();
+    vsh_view_bake seen = vsh_view_bake_default();
+    seen.model = "a.obj";
+    REFUSED(vsh_view_write(NULL, &seen, NULL, NULL, &error));
+    REFUSED(vsh_view_write("a.html", NULL, NULL, NULL, &error));
+    REFUSED(vsh_view_write("a.html", &no_bake, NULL, NULL, &error));
+    REFUSED(vsh_view_write("a.html", &seen, &no_bake, NULL, &error));
+    seen.plane_count = 1;
+    REFUSED(vsh_view_write("a.html", &seen, NULL, NULL, &error));
     assert_int_equal(vsh_comparison_alike(NULL), 0);
     assert_null(vsh_comparison_channel(NULL, 0));
     assert_null(vsh_comparison_problem(NULL, 0));

@@ -18,7 +18,7 @@ static void fill(const vsh_run *run, int32_t width, int32_t height, const uint8_
                  int32_t invalid, float *values, size_t channels) {
     const int32_t radius[VSHI_TEXEL_KINDS] = {padding, 0, invalid};
     const vshi_plane plane = {values, channels};
-    assert_int_equal(vshi_padding_fill(run, width, height, state, radius, &plane, 1, NULL), VSH_OK);
+    assert_int_equal(vshi_padding_fill(run, width, height, state, radius, &plane, 1, NULL, NULL), VSH_OK);
 }
 
 /* The definition, texel by texel: index of the source, or -1. */

@@ -2,6 +2,10 @@
 // one.
 #include "readers.h"
 
+extern "C" {
+#include "lit/draco.h"
+}
+
 #include <fcntl.h>
 #include <malloc.h>
 #include <sys/ptrace.h>
@@ -66,7 +70,7 @@ void damaged_models_are_refused_or_sound(void **) {
     int refused = 0;
     damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
         vsh_model *model = nullptr;
-        if (vshi_model_decode(decoder, "a.glb", &model, &failure) != VSH_OK) {
+        if (vshi_model_decode(decoder, "a.glb", nullptr, &model, &failure) != VSH_OK) {
             ++refused;
             return;
         }
@@ -79,6 +83,35 @@ void damaged_models_are_refused_or_sound(void **) {
         vsh_model_free(model);
     });
     assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
+}
+
+void damaged_decompressed_vertices_are_refused_or_sound(void **) {
+    constexpr size_t PRIMITIVES = 3;
+    const std::vector<unsigned char> whole =
+        payload_of(vshi_serve_draco, std::string(VSH_MODELS) + "/scene_draco.glb", [](vshi_encoder *) {});
+    int refused = 0;
+    damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
+        vshi_lit_dracos dracos = {};
+        dracos.list = static_cast<vshi_lit_draco *>(std::calloc(PRIMITIVES, sizeof *dracos.list));
+        dracos.count = PRIMITIVES;
+        refused += vshi_lit_dracos_decode(decoder, "a.glb", &dracos, &failure) != VSH_OK;
+        for (size_t i = 0; i < PRIMITIVES; ++i) { // each index is one of a vertex, each value is there
+            const vshi_lit_draco &draco = dracos.list[i];
+            unsigned sum = 0;
+            for (size_t k = 0; draco.attribute_count > 0 && k < 3 * draco.triangle_count; ++k) {
+                assert_true(draco.indices[k] < draco.vertex_count);
+            }
+            for (size_t k = 0; k < draco.attribute_count && draco.vertex_count > 0; ++k) {
+                const vshi_lit_draco_attribute &attribute = draco.attributes[k];
+                const size_t size = draco.vertex_count * size_t(attribute.components) *
+                                    vshi_lit_component_size(attribute.type);
+                sum += attribute.values != nullptr ? attribute.values[size - 1] : 0;
+            }
+            assert_true(sum < 1000000);
+        }
+        vshi_lit_dracos_free(&dracos);
+    });
+    assert_in_range(refused, DAMAGES / 64, DAMAGES - 1);
 }
 
 void damaged_images_and_contours_are_refused_or_sound(void **) {
@@ -220,6 +253,7 @@ int main(int argc, char **argv) {
         cmocka_unit_test(damaged_level_sets_are_refused_or_are_trees),
         cmocka_unit_test(damaged_voxels_are_refused_or_sorted),
         cmocka_unit_test(damaged_models_are_refused_or_sound),
+        cmocka_unit_test(damaged_decompressed_vertices_are_refused_or_sound),
         cmocka_unit_test(damaged_images_and_contours_are_refused_or_sound),
         cmocka_unit_test(an_answer_and_the_heap_share_their_room),
         cmocka_unit_test(a_confined_process_reads_and_nothing_else),

@@ -63,6 +63,16 @@ static void a_call_fills_the_struct_that_the_caller_has(void **state) {
     const vsh_light light = vsh_light_default();
     assert_int_equal(vsh_bake_volume(occluders_of(field), voxels, &light, 1, NULL, NULL, &volume, NULL, &why),
                      VSH_OK);
+    vsh_atlas *atlas = NULL;
+    const float corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+    const uint32_t order[3] = {0, 1, 2};
+    const vsh_mesh triangle = {
+        .positions = corners, .indices = order, .vertex_count = 3, .triangle_count = 1};
+    assert_int_equal(vsh_unwrap(&triangle, 1, NULL, NULL, &atlas, &why), VSH_OK);
+    HOLDS(vsh_atlas_info, 1, vsh_atlas_get_info_sized(atlas, (void *)room, size));
+    HOLDS(vsh_atlas_mesh, 1, vsh_atlas_mesh_view_sized(atlas, 0, (void *)room, size));
+    HOLDS(vsh_atlas_chart, 1, vsh_atlas_chart_view_sized(atlas, 0, (void *)room, size));
+    vsh_atlas_free(atlas);
     HOLDS(vsh_grid_info, 1, vsh_grid_get_info_sized(grid, (void *)room, size));
     HOLDS(vsh_field_info, 1, vsh_field_get_info_sized(field, (void *)room, size));
     vsh_occluders *casters = NULL;
@@ -105,6 +115,12 @@ static void a_call_fills_the_struct_that_the_caller_has(void **state) {
     });
     assert_int_equal(vsh_charts_create(meshes, 1, &lightmap, NULL, NULL, &charts, &why), VSH_OK);
     assert_int_equal(vsh_texels_create(meshes, 1, &lightmap, NULL, NULL, &texels, &why), VSH_OK);
+    HOLDS(vsh_stitch_report, 1, {
+        float values[16 * 16] = {0};
+        const vsh_lightmap plane = {.ao = values};
+        assert_int_equal(vsh_lightmap_stitch_sized(charts, &plane, 0, NULL, NULL, (void *)room, size, &why),
+                         VSH_OK);
+    });
     HOLDS(vsh_charts_info, 1, vsh_charts_get_info_sized(charts, (void *)room, size));
     HOLDS(vsh_texels_info, 1, vsh_texels_get_info_sized(texels, (void *)room, size));
     HOLDS(vsh_texel_samples, 1, vsh_texels_samples_sized(texels, (void *)room, size));

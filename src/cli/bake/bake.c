@@ -45,12 +45,44 @@ static int check_picture(const cli_bake_settings *settings) {
     return CLI_OK;
 }
 
+/* What is only for outputs that are assets. */
+static int check_lit(const cli_bake_settings *settings, const vsh_scene *scene) {
+    const char *given = settings->preview         ? "preview"
+                        : settings->embed         ? "embed"
+                        : settings->images_beside ? "images-beside"
+                        : settings->exr != NULL   ? "exr"
+                                                  : NULL;
+    size_t assets = 0;
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        assets += vsh_lit_is_output(scene->receivers[i].output) != 0;
+    }
+    if (given != NULL && assets == 0) {
+        return cli_usage("--%s: is for outputs that end in .glb or .gltf", given);
+    }
+    if (assets > 0 && settings->per_object) {
+        return cli_usage("--per-object: a .glb or .gltf has one lightmap for all its objects");
+    }
+    if (settings->embed && settings->images_beside) {
+        return cli_usage("--embed: not together with --images-beside");
+    }
+    if (settings->exr == NULL) {
+        return CLI_OK;
+    }
+    if (!cli_has_ending(settings->exr, "exr") || scene->receiver_count != 1) {
+        return cli_usage("--exr '%s': expected a name that ends in .exr, and one output", settings->exr);
+    }
+    CLI_TRY(cli_check_folder(settings->exr));
+    return cli_bake_check_output(settings, scene, settings->exr);
+}
+
 /* What can be refused before anything is read. */
 static int check_files(const cli_bake_settings *settings, const vsh_scene *scene) {
     if (settings->stats != NULL) {
         CLI_TRY(cli_temporary_check(settings->stats));
     }
     CLI_TRY(check_picture(settings));
+    CLI_TRY(check_lit(settings, scene));
+    CLI_TRY(cli_bake_check_view(settings, scene));
     const bool makes = settings->output_folder != NULL || settings->per_object;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         const char *output = scene->receivers[i].output;
@@ -168,6 +200,7 @@ static int bake_job(const cli_bake_settings *settings, const vsh_scene *scene, v
     vsh_bake_job_get_report(job, &report);
     const cli_stats stats = stats_of(scene, &report, run->threads);
     cli_stats_warn(&stats, scene, run);
+    CLI_TRY(cli_bake_view(settings, scene, run));
     CLI_TRY(cli_stats_finish(&stats, run, settings->stats));
     cli_warnings_tell();
     if (!settings->common.quiet) {
@@ -185,9 +218,15 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
     options.band_rows = settings->band_rows;
     options.resume = settings->resume;
     options.invalid_picture = settings->invalid_picture;
+    options.lit_preview = settings->preview;
+    options.lit_image_place = settings->embed           ? VSH_LIT_IMAGES_EMBED
+                              : settings->images_beside ? VSH_LIT_IMAGES_BESIDE
+                                                        : VSH_LIT_IMAGES_AUTO;
+    options.lit_exr = settings->exr;
     options.command = cli_parsed_command();
-    options.files = &settings->input;
-    options.file_count = 1;
+    const char *const files[] = {settings->input, settings->lights};
+    options.files = files;
+    options.file_count = settings->lights != NULL ? 2 : 1;
     options.done = say_lightmap;
     options.writing = say_writing;
     options.user = &t;

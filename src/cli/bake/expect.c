@@ -126,7 +126,7 @@ static double ao_us(const vsh_shade_options *o) {
     }
 }
 
-static const double chart_us = 0.13, texel_us = 0.15, bent_us = 1.0, padding_us = 0.1;
+static const double chart_us = 0.13, texel_us = 0.15, bent_us = 1.0, padding_us = 0.1, seam_us = 0.05;
 /* Whether a sample is valid: by the field, or by rays. */
 static const double valid_us = 0.25, traced_valid_us = 1.0;
 /* Of a channel's texel, one thread. */
@@ -157,6 +157,10 @@ static void expect_lightmap(const vsh_scene *scene, const vsh_job_lightmap *r, d
         cli_progress_expect("bent", CLI_ESTIMATE_SHADE, sample * bent_us);
     }
     cli_progress_expect("padding", CLI_ESTIMATE_SHADE, texel * padding_us);
+    const int32_t seams = scene->receivers[r->receiver].seams;
+    if (seams == VSH_SEAMS_FIX || (seams == VSH_SEAMS_DEFAULT && vsh_lit_is_output(r->output))) {
+        cli_progress_expect("seams", CLI_ESTIMATE_SHADE, texel * seam_us);
+    }
     const double channels = (double)scene->light_count + (scene->ao ? 1.0 : 0.0) +
                             (scene->irradiance ? 3.0 : 0.0) + 4.0; /* A, and R, G, B */
     cli_progress_expect("write", CLI_ESTIMATE_FILE, (double)r->covered * channels * write_us * micro);

@@ -15,7 +15,14 @@ enum {
     KEY_NO_RECEIVE,
     KEY_NO_CAST,
     KEY_PER_OBJECT,
-    KEY_INVALID
+    KEY_INVALID,
+    KEY_PREVIEW,
+    KEY_EMBED,
+    KEY_IMAGES_BESIDE,
+    KEY_EXR,
+    KEY_VIEW,
+    KEY_LIGHTS,
+    KEY_LIGHT_RADIUS
 };
 
 static const cli_option options[] = {
@@ -24,7 +31,8 @@ static const cli_option options[] = {
      "image to write: .exr with named channels, or\n"
      ".png .tif .dpx .sgi .jp2 .tga .bmp .ico .iff .rla\n"
      ".hdr .ppm .pgm .jpg .webp .heic .avif .gif; what each\n"
-     "can hold, and what is not written: docs/formats.md"},
+     "can hold, and what is not written: docs/formats.md;\n"
+     ".glb .gltf: the input with its light in its materials\n(docs/lit.md)"},
     {KEY_OUTPUT_FOLDER, "output-folder", "FOLDER",
      "write there what a scene's file says is written, under\nthe same names; it is made where it is not "
      "there"},
@@ -32,6 +40,12 @@ static const cli_option options[] = {
     {KEY_INVALID, "invalid", "FILE.png",
      "also a picture of the lightmap: charts grey, texels\ninside solids or behind walls red, those of them "
      "in\nplain sight yellow; FILE.OUT.png where there are\nseveral outputs"},
+    {KEY_PREVIEW, "preview", NULL,
+     "into a .glb or .gltf: the light as unlit base colour,\nwhich every viewer shows, in place of textures"},
+    {KEY_EMBED, "embed", NULL, "put its images into it (.glb)"},
+    {KEY_IMAGES_BESIDE, "images-beside", NULL, "put its images beside it, as OUT.lightmap.png (.gltf)"},
+    {KEY_EXR, "exr", "FILE.exr", "also an EXR of all channels beside a .glb or .gltf"},
+    {KEY_VIEW, "view", "PAGE.html", "also a page to look at it in a browser: docs/view.md"},
     {KEY_STATS, "stats", "FILE.json", "write times, counts and peak memory as JSON"},
     {KEY_DRY_RUN, "dry-run", NULL,
      "bake nothing: print texels, voxels, memory and\nexpected time, found by a small bake"},
@@ -47,6 +61,11 @@ static const cli_option options[] = {
      "an image for each object: FOLDER/NAME.exr with\n-o FOLDER/, else OUT.NAME.exr, or where OUT has %s"},
     {0, NULL, NULL, "Light and occlusion"},
     CLI_LIGHT_OPTIONS,
+    {KEY_LIGHTS, "lights", "FILE",
+     "also the lights in a glTF or GLB, which may be INPUT;\ntheir channels are shadow.NAME, suns are as "
+     "wide "
+     "as\n--sun-angle says"},
+    {KEY_LIGHT_RADIUS, "light-radius", "R", "radius of its points and spots, scene units (0: hard)"},
     CLI_SETTINGS(VSH_SETTINGS_CHANNELS),
     CLI_ACCURACY_OPTIONS,
     CLI_CASTER_OPTIONS,
@@ -129,6 +148,27 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_INVALID:
         s->invalid_picture = value;
         return CLI_OK;
+    case KEY_PREVIEW:
+        s->preview = true;
+        return CLI_OK;
+    case KEY_EMBED:
+        s->embed = true;
+        return CLI_OK;
+    case KEY_IMAGES_BESIDE:
+        s->images_beside = true;
+        return CLI_OK;
+    case KEY_EXR:
+        s->exr = value;
+        return CLI_OK;
+    case KEY_VIEW:
+        s->view = value;
+        return CLI_OK;
+    case KEY_LIGHTS:
+        s->lights = value;
+        return CLI_OK;
+    case KEY_LIGHT_RADIUS:
+        s->has_light_radius = true;
+        return cli_parse_number(name, value, 0.0, 1e12, &s->light_radius);
     case KEY_STATS:
         s->stats = value;
         return CLI_OK;

@@ -35,14 +35,19 @@ typedef struct cli_bake_settings {
     cli_patterns receive, no_receive, no_cast;
     const char *stats;
     const char *invalid_picture; /* NULL: none */
+    const char *view;            /* page; NULL: none */
     cli_common common;
     cli_patch patch; /* over the scene and its receivers */
     double sun[3];
     double sun_angle_deg;
+    const char *lights; /* a file whose lights are taken; NULL: none */
+    double light_radius;
     int32_t band_rows; /* 0: as many as go */
     const char *casters[CLI_MAX_EXTRA_CASTERS];
     size_t caster_count;
-    bool has_sun, has_sun_angle, per_object, dry_run, resume;
+    const char *exr; /* beside an asset; NULL: none */
+    bool preview, embed, images_beside; /* of an asset */
+    bool has_sun, has_sun_angle, has_light_radius, per_object, dry_run, resume;
 } cli_bake_settings;
 
 /* Takes an option of the tables above, a setting or one of the common ones. */
@@ -57,8 +62,8 @@ typedef struct cli_bake_scene {
     vsh_scene *read; /* the scene file's; NULL for a mesh */
     vsh_caster *casters;
     vsh_receiver *receivers;
-    char **outputs; /* [receiver_count], where they are not the scene's own; NULL: none is */
-    vsh_light sun;
+    char **outputs;    /* [receiver_count], where they are not the scene's own; NULL: none is */
+    vsh_light *lights; /* [scene.light_count], where they are not all the scene file's */
 } cli_bake_scene;
 
 /* Makes the scene, checks that it can be baked and that its outputs replace no input. */

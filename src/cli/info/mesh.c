@@ -63,6 +63,24 @@ static void print_unit(const vsh_model *model, double unit) {
     }
 }
 
+/* As 'bake --lights' takes them where nothing else is said. */
+static int print_lights(const vsh_model *model, double unit) {
+    static const double angle = 0.53 * 0.017453292519943295; /* radians */
+    vsh_light *lights = NULL;
+    size_t count = 0;
+    vsh_error error;
+    if (vsh_lights_from_model(model, angle, 0.0, unit, &lights, &count, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    for (size_t i = 0; i < count; ++i) {
+        char text[512];
+        vsh_light_text(&lights[i], text, sizeof text);
+        printf("light '%s': %s\n", lights[i].name, text);
+    }
+    vsh_lights_free(lights);
+    return CLI_OK;
+}
+
 static int print_mesh(const vsh_model *model, size_t index, double scale,
                       const vsh_solidity_report *solidity) {
     vsh_mesh mesh = vsh_model_mesh(model, index, -1);
@@ -132,6 +150,7 @@ int cli_info_mesh(const char *path, const cli_info_look *given, const vsh_run *r
             with_uvs[with_uv_count++] = meshes[i];
         }
     }
+    CLI_TRY_DONE(print_lights(model, look.unit));
     CLI_TRY_DONE(cli_info_uvs(model, with_uvs, with_uv_count, &look, run));
     if (with_uv_count < count) {
         printf("problem: %zu of %zu meshes have no UVs to bake into: they only cast with --per-object or "

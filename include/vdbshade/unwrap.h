@@ -1,0 +1,140 @@
+/* Lightmap UVs: charts of triangles laid out flat, and packed into the pages of an atlas. */
+#ifndef VDBSHADE_UNWRAP_H
+#define VDBSHADE_UNWRAP_H
+
+#include "mesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { VSH_MAX_PAGES = 1024, VSH_MAX_PAGE_SIZE = 65536 };
+
+/* Which UVs charts are made of. */
+enum {
+    VSH_UNWRAP_ALWAYS = 0, /* those that are laid out here */
+    VSH_UNWRAP_KEEP = 1    /* a mesh's own, where vsh_uvs_usable() finds nothing wrong with them: what hangs
+                              together in them is a chart, and is packed as it is; else as VSH_UNWRAP_ALWAYS */
+};
+
+typedef struct vsh_unwrap_options {
+    size_t struct_size;
+    int32_t width;     /* texels of each page, 1 … VSH_MAX_PAGE_SIZE */
+    int32_t height;    /* the same */
+    int32_t max_pages; /* 1 … VSH_MAX_PAGES */
+    int32_t padding;   /* free texels between those that two charts touch, along rows and columns, 0 … 4096;
+                          what is before a page's border is no chart, and needs none */
+    double texels_per_unit; /* texels along a world unit, finite, ≥ 0; 0: the greatest at which everything
+                               fits into max_pages, to some hundredths */
+    const double *density;  /* [mesh_count] factors of texels_per_unit, finite, > 0; NULL: all 1 */
+    double max_stretch;     /* L2 stretch (vsh_atlas_chart) that no chart exceeds, ≥ 1.01; charts are split
+                               until none does */
+    int32_t keep_uvs;       /* VSH_UNWRAP_… */
+} vsh_unwrap_options;
+
+static inline vsh_unwrap_options vsh_unwrap_options_default(void) {
+    vsh_unwrap_options options = {sizeof(vsh_unwrap_options), 1024, 1024, 1, 4, 0.0, NULL, 1.3,
+                                  VSH_UNWRAP_ALWAYS};
+    return options;
+}
+
+#define VSH_NO_CHART UINT32_MAX
+
+/* One mesh as it lies in the atlas. The arrays belong to the atlas. Triangles are those of the mesh in its
+ * order, and the corners of each in its order; no vertex is in two charts. */
+typedef struct vsh_atlas_mesh {
+    const float *uvs; /* [vertex_count][2], 0 … 1 of the chart's page, v up; triangles run anticlockwise */
+    const uint32_t *sources; /* [vertex_count]: the vertex of the mesh that each is a copy of */
+    const uint32_t *indices; /* [triangle_count][3], each < vertex_count */
+    const uint32_t *charts;  /* [triangle_count]: number in vsh_atlas_charts(); VSH_NO_CHART: of a triangle
+                                without area, whose corners are at (0, 0) */
+    size_t vertex_count;
+    size_t triangle_count;
+} vsh_atlas_mesh;
+
+typedef struct vsh_atlas_chart {
+    uint32_t page;
+    uint32_t mesh;
+    float stretch;  /* root of the mean of the squared stretch of all directions from texture to surface, over
+                       the chart's area, for UVs of the surface's area: 1 is isometric (Sander and others,
+                       "Texture mapping progressive meshes", 2001, L2) */
+    int32_t min[2]; /* texels that it touches: first column and row, row 0 at v = 0 */
+    int32_t max[2]; /* and those after the last */
+    double area;    /* of its triangles, world units² */
+} vsh_atlas_chart;
+
+typedef struct vsh_atlas_info {
+    uint64_t charts;
+    uint32_t pages; /* that have charts */
+    int32_t width;  /* texels of each page */
+    int32_t height;
+    double texels_per_unit;  /* as given, or as found */
+    double covered;          /* share of the texels of all pages that a chart touches, 0 … 1 */
+    double stretch;          /* mean over charts, by area; 1 where there is none */
+    double worst_stretch;    /* of a chart */
+    uint64_t flat_triangles; /* that have no chart */
+    uint64_t kept;           /* meshes whose own UVs were kept */
+    uint64_t shared;         /* meshes whose charts are laid out as those of an earlier one */
+} vsh_atlas_info;
+
+/* Immutable. Free it with vsh_atlas_free(). It does not need its meshes any more. */
+typedef struct vsh_atlas vsh_atlas;
+
+/* Cuts meshes into charts along creases, lays them out with little stretch, and packs them by their shapes.
+ * Any triangles will do: edges of many triangles, several at one place, mirrored meshes. Triangles of a quad
+ * stay together. Meshes of the same arrays whose transforms differ by a rotation, a mirroring, a translation
+ * and a uniform scale share their charts' layout, and have places of their own. A mesh is spread over pages
+ * only where it does not fit one. The values depend on no number of threads. The stages are "unwrap" and
+ * "pack". Errors:
+ * - VSH_ERROR_ARGUMENT: meshes or atlas NULL, no meshes or more than 2^32 - 1, options out of range, run, and
+ *   as vsh_mesh_check();
+ * - VSH_ERROR_INPUT: as vsh_mesh_check(); no triangle that has area;
+ * - VSH_ERROR_LIMIT: run->memory_limit; charts that do not fit into max_pages at this density (the message
+ *   names one that fits), or more charts than there are places in them; 2^32 / 3 triangles of a mesh;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwrap_options *options,
+                              const vsh_run *run, vsh_atlas **atlas, vsh_error *error);
+VSH_API void vsh_atlas_free(vsh_atlas *atlas); /* NULL does nothing */
+
+/* 1: the mesh's UVs lie in the unit square, all triangles that have area have area in them too and run the
+ * same way, and no two lie over each other (looked at on a grid that is finer than the triangles); 0 else,
+ * and where there are none. Errors: VSH_ERROR_ARGUMENT (mesh or usable NULL, run, and as vsh_mesh_check()),
+ * VSH_ERROR_INPUT (as vsh_mesh_check()), VSH_ERROR_LIMIT (run->memory_limit), VSH_ERROR_MEMORY. */
+VSH_API vsh_result vsh_uvs_usable(const vsh_mesh *mesh, const vsh_run *run, int32_t *usable,
+                                  vsh_error *error);
+
+/* None of these can fail; `atlas` must not be NULL. */
+VSH_API size_t vsh_atlas_mesh_count(const vsh_atlas *atlas); /* as were given */
+VSH_API size_t vsh_atlas_chart_count(const vsh_atlas *atlas);
+VSH_API size_t vsh_atlas_page_count(const vsh_atlas *atlas);
+
+VSH_API void vsh_atlas_get_info_sized(const vsh_atlas *atlas, vsh_atlas_info *info, size_t info_size);
+static inline void vsh_atlas_get_info(const vsh_atlas *atlas, vsh_atlas_info *info) {
+    vsh_atlas_get_info_sized(atlas, info, sizeof *info);
+}
+
+/* A view of mesh `mesh` (< mesh count). */
+VSH_API void vsh_atlas_mesh_view_sized(const vsh_atlas *atlas, size_t mesh, vsh_atlas_mesh *view,
+                                       size_t view_size);
+static inline vsh_atlas_mesh vsh_atlas_mesh_view(const vsh_atlas *atlas, size_t mesh) {
+    vsh_atlas_mesh view;
+    vsh_atlas_mesh_view_sized(atlas, mesh, &view, sizeof view);
+    return view;
+}
+
+/* Chart `chart` (< chart count). */
+VSH_API void vsh_atlas_chart_view_sized(const vsh_atlas *atlas, size_t chart, vsh_atlas_chart *view,
+                                        size_t view_size);
+static inline vsh_atlas_chart vsh_atlas_chart_view(const vsh_atlas *atlas, size_t chart) {
+    vsh_atlas_chart view;
+    vsh_atlas_chart_view_sized(atlas, chart, &view, sizeof view);
+    return view;
+}
+
+/* All charts, [chart count]; they belong to the atlas. */
+VSH_API const vsh_atlas_chart *vsh_atlas_charts(const vsh_atlas *atlas);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

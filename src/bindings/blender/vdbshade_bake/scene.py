@@ -1,0 +1,141 @@
+"""The scene as the program reads it: a GLB of what casts, in the world and with Blender's axes, and a scene file."""
+import json
+import math
+import re
+import struct
+
+import mathutils
+
+
+class BakeError(Exception):
+    """What a user has to be told, in one line."""
+
+
+def numpy_of():
+    try:
+        import numpy
+    except ImportError:
+        raise BakeError("Python's NumPy, which comes with Blender, is not found")
+    return numpy
+
+
+def is_caster(obj):
+    return obj.type == "MESH" and not obj.hide_render and len(obj.data.polygons) > 0
+
+
+def mesh_arrays(numpy, obj, depsgraph, uv_name):
+    """Positions, normals (world), UVs or None, and indices of an object as it is rendered, a vertex a corner."""
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        mesh.calc_loop_triangles()
+        if hasattr(mesh, "calc_normals_split"):  # until Blender 4.1
+            mesh.calc_normals_split()
+        corners = len(mesh.loops)
+        points = numpy.empty(3 * len(mesh.vertices), numpy.float32)
+        mesh.vertices.foreach_get("co", points)
+        vertices = numpy.empty(corners, numpy.int32)
+        mesh.loops.foreach_get("vertex_index", vertices)
+        normals = numpy.empty(3 * corners, numpy.float32)
+        mesh.loops.foreach_get("normal", normals)
+        indices = numpy.empty(3 * len(mesh.loop_triangles), numpy.int32)
+        mesh.loop_triangles.foreach_get("loops", indices)
+        uvs = None
+        if uv_name is not None:
+            if uv_name not in mesh.uv_layers:
+                raise BakeError("'%s': its modifiers leave nothing of the UV map '%s'" % (obj.name, uv_name))
+            uvs = numpy.empty(2 * corners, numpy.float32)
+            mesh.uv_layers[uv_name].data.foreach_get("uv", uvs)
+    finally:
+        evaluated.to_mesh_clear()
+    if len(indices) == 0:
+        return None
+    matrix = numpy.array(obj.matrix_world, numpy.float64)
+    determinant = numpy.linalg.det(matrix[:3, :3])
+    if determinant == 0.0:
+        return None  # flattened: it has no normals, and casts nothing that could be seen
+    points = points.reshape(-1, 3)[vertices] @ matrix[:3, :3].T + matrix[:3, 3]
+    normals = normals.reshape(-1, 3) @ numpy.linalg.inv(matrix[:3, :3])
+    length = numpy.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / numpy.where(length > 0.0, length, 1.0)
+    if determinant < 0.0:  # mirrored: corners the other way round
+        indices = indices.reshape(-1, 3)[:, ::-1]
+    return (points.astype("<f4"), normals.astype("<f4"), None if uvs is None else uvs.reshape(-1, 2),
+            indices.astype("<u4").ravel())
+
+
+def write_glb(path, objects, depsgraph, uv_names):
+    """Writes objects as a GLB, axes as they are in Blender; returns the names of those that have triangles."""
+    numpy = numpy_of()
+    chunks, accessors, views, meshes, nodes = [], [], [], [], []
+
+    def add(array, kind, component, count, **more):
+        views.append({"buffer": 0, "byteOffset": sum(map(len, chunks)), "byteLength": array.nbytes})
+        chunks.append(array.tobytes())
+        accessors.append(dict({"bufferView": len(views) - 1, "componentType": component, "count": count, "type": kind},
+                              **more))
+        return len(accessors) - 1
+
+    for obj in objects:
+        arrays = mesh_arrays(numpy, obj, depsgraph, uv_names.get(obj.name))
+        if arrays is None:
+            continue
+        points, normals, uvs, indices = arrays
+        if not numpy.isfinite(points).all():
+            raise BakeError("'%s': has vertices that are not finite" % obj.name)
+        attributes = {"POSITION": add(points, "VEC3", 5126, len(points), min=points.min(axis=0).tolist(),
+                                      max=points.max(axis=0).tolist()),
+                      "NORMAL": add(normals, "VEC3", 5126, len(points))}
+        if uvs is not None:
+            flipped = numpy.stack((uvs[:, 0], 1.0 - uvs[:, 1]), axis=1).astype("<f4")  # v down
+            attributes["TEXCOORD_0"] = add(flipped, "VEC2", 5126, len(points))
+        meshes.append({"name": obj.data.name, "primitives": [{"attributes": attributes, "indices": add(indices, "SCALAR", 5125, len(indices))}]})
+        nodes.append({"name": obj.name, "mesh": len(meshes) - 1})
+    if not nodes:
+        raise BakeError("no object has a face")
+    body = b"".join(chunks)
+    text = json.dumps({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(len(nodes)))}],
+                       "nodes": nodes, "meshes": meshes, "accessors": accessors, "bufferViews": views,
+                       "buffers": [{"byteLength": len(body)}]}).encode()
+    text += b" " * (-len(text) % 4)
+    with open(path, "wb") as out:
+        out.write(struct.pack("<4sIIII", b"glTF", 2, 28 + len(text) + len(body), len(text), 0x4E4F534A))
+        out.write(text + struct.pack("<II", len(body), 0x004E4942) + body)
+    return [node["name"] for node in nodes]
+
+
+def pattern_of(name):
+    """A name as the pattern that matches it alone."""
+    return re.sub(r"([*?\[\\])", r"\\\1", name)
+
+
+def sun_of(settings, scene):
+    """Direction towards the sun, and its angular diameter in degrees; None where there is none."""
+    lamp = settings.sun
+    if lamp is None:
+        lamp = next((obj for obj in scene.objects if obj.type == "LIGHT" and obj.data.type == "SUN" and
+                     not obj.hide_render), None)
+    if lamp is None:
+        return None
+    towards = lamp.matrix_world.to_3x3() @ mathutils.Vector((0.0, 0.0, 1.0))
+    return list(towards.normalized()), math.degrees(lamp.data.angle)
+
+
+PACKS = {"SHADOW": "R=shadow.sun,G=shadow.sun,B=shadow.sun", "AO": "R=ao,G=ao,B=ao", "BOTH": "rgb", "LIGHT": "rgb"}
+
+
+def scene_of(settings, scene, receivers, output):
+    """The scene file's content."""
+    made = {"casters": [{"mesh": "scene.glb"}], "receivers": [
+        {"mesh": "scene.glb", "objects": [pattern_of(name) for name in receivers], "uv_set": 0, "size": settings.size,
+         "padding": settings.padding, "output": output, "pack": PACKS[settings.what]}]}
+    if settings.what != "AO":
+        sun = sun_of(settings, scene)
+        if sun is None:
+            raise BakeError("the scene has no sun: add one, or bake ambient occlusion alone")
+        made["lights"] = [{"name": "sun", "type": "directional", "direction": sun[0], "angle_deg": max(sun[1], 0.0)}]
+    if settings.what != "SHADOW":
+        made["ao"] = {"distance": settings.ao_distance}
+    if settings.what == "LIGHT":
+        made["irradiance"] = True
+    return made

@@ -1,0 +1,141 @@
+/* vdbshade view: one page that shows baked meshes, to be turned and looked into. */
+#include "base/clock.h"
+#include "cli/commands.h"
+#include "cli/message.h"
+#include "cli/paths.h"
+#include "cli/progress.h"
+#include "cli/signals.h"
+#include "cli/temporary.h"
+#include "cli/try.h"
+
+#include <string.h>
+
+enum { KEY_PLANES = 0x2000, KEY_OTHER_PLANES, KEY_UV_SET };
+
+/* Planes of one bake, a file each. */
+typedef struct view_planes {
+    const char *files[VSH_MAX_VIEW_PLANES];
+    size_t count;
+} view_planes;
+
+typedef struct view_settings {
+    const char *inputs[2]; /* the second may be NULL */
+    const char *output;
+    view_planes planes[2];
+    int32_t uv_set;
+    cli_common common;
+} view_settings;
+
+static const cli_option options[] = {
+    {0, NULL, NULL, "Page"},
+    {'o', "output", "OUT.html", "page to write"},
+    {KEY_PLANES, "planes", "FILE",
+     "image of a bake of INPUT, best an EXR with every\nchannel; again for each further page of its "
+     "lightmap"},
+    {KEY_OTHER_PLANES, "other-planes", "FILE", "the same of OTHER or, without one, of INPUT once more"},
+    {KEY_UV_SET, "uv-set", "N",
+     "UV set of the lightmap, from 0 (that of the lightmap\nor AO in the materials, or else as bake takes "
+     "it)"},
+    CLI_COMMON_OPTIONS,
+};
+
+static int view_main(int argc, char **argv);
+
+const cli_command cli_view = {
+    "view",
+    "INPUT [OTHER] -o OUT.html [options]",
+    "Writes a page that shows a lit mesh in a browser, in three dimensions: its light, AO, every channel\n"
+    "of its bake, texel density, charts; and a second bake beside it. It needs nothing beside it;\n"
+    "docs/view.md",
+    options,
+    sizeof options / sizeof options[0],
+    view_main};
+
+static int take_planes(view_planes *planes, const char *name, const char *value) {
+    if (planes->count == VSH_MAX_VIEW_PLANES) {
+        return cli_usage("%s '%s': at most %d are taken", name, value, VSH_MAX_VIEW_PLANES);
+    }
+    planes->files[planes->count++] = value;
+    return CLI_OK;
+}
+
+static int take(void *settings, int key, const char *name, const char *value) {
+    view_settings *s = settings;
+    switch (key) {
+    case 'o':
+        s->output = value;
+        return CLI_OK;
+    case KEY_PLANES:
+        return take_planes(&s->planes[0], name, value);
+    case KEY_OTHER_PLANES:
+        return take_planes(&s->planes[1], name, value);
+    case KEY_UV_SET:
+        return cli_parse_integer(name, value, 0, VSH_MAX_UV_SETS - 1, &s->uv_set);
+    default:
+        break;
+    }
+    bool taken;
+    return cli_common_parse(&s->common, key, name, value, &taken);
+}
+
+/* What can be refused before anything is read. */
+static int check(const view_settings *s) {
+    if (s->output == NULL || !cli_has_ending(s->output, "html")) {
+        return cli_usage("%s: give -o OUT.html", s->output != NULL ? s->output : s->inputs[0]);
+    }
+    for (size_t i = 0; i < 2; ++i) {
+        if (s->inputs[i] != NULL && cli_same_file(s->output, s->inputs[i])) {
+            return cli_usage("%s: the output is the input", s->output);
+        }
+        for (size_t k = 0; k < s->planes[i].count; ++k) {
+            if (cli_same_file(s->output, s->planes[i].files[k])) {
+                return cli_usage("%s: the output is also a file of planes", s->output);
+            }
+        }
+    }
+    return cli_temporary_check(s->output);
+}
+
+static int write_page(const view_settings *s) {
+    vsh_view_bake bakes[2];
+    for (size_t i = 0; i < 2; ++i) {
+        bakes[i] = vsh_view_bake_default();
+        bakes[i].model = s->inputs[i];
+        bakes[i].planes = s->planes[i].files;
+        bakes[i].plane_count = s->planes[i].count;
+        bakes[i].uv_set = s->uv_set;
+    }
+    const bool two = s->inputs[1] != NULL || s->planes[1].count > 0;
+    const vsh_run run = cli_common_run(&s->common);
+    vsh_error error;
+    cli_signals_writing(s->output);
+    const vsh_result result = vsh_view_write(s->output, &bakes[0], two ? &bakes[1] : NULL, &run, &error);
+    cli_signals_writing(NULL);
+    return result == VSH_OK ? CLI_OK : cli_fail_of(NULL, &error);
+}
+
+static int view_main(int argc, char **argv) {
+    static view_settings s; /* 16 KiB of pointers */
+    memset(&s, 0, sizeof s);
+    s.common = cli_common_default();
+    s.uv_set = -1;
+    bool help;
+    static const char *const what[] = {"INPUT", "OTHER"};
+    CLI_TRY(cli_parse_some(&cli_view, argc, argv, take, &s, what, s.inputs, 1, 2, &help));
+    if (help) {
+        return CLI_OK;
+    }
+    CLI_TRY(check(&s));
+    const double start = vshi_seconds();
+    cli_progress_begin(s.common.progress, s.common.quiet);
+    cli_signals_watch();
+    const int code = write_page(&s);
+    cli_progress_end();
+    if (code == CLI_OK) {
+        cli_signals_end();
+        if (!s.common.quiet) {
+            cli_say("%s: written in %.2f s; open it in a browser", s.output, vshi_seconds() - start);
+        }
+    }
+    return code;
+}

@@ -1,0 +1,315 @@
+#include "lit/document.h"
+
+#include "base/input.h"
+#include "base/memory.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Bytes, at most, of Jansson's tree of a text, and of a copy of its meshes: objects and arrays bring the
+ * first slots of their tables, members and items double them (as src/json/text.c counts them). */
+static double tree_bytes(const char *text, size_t size) {
+    double objects = 0.0, arrays = 0.0, members = 0.0, items = 0.0;
+    bool in_string = false;
+    for (size_t i = 0; i < size; ++i) {
+        const char c = text[i];
+        i += in_string && c == '\\';
+        in_string ^= c == '"';
+        if (!in_string) {
+            objects += c == '{';
+            arrays += c == '[';
+            members += c == ':';
+            items += c == ',';
+        }
+    }
+    return 288.0 * objects + 176.0 * arrays + 144.0 * members + 112.0 * items + 3.0 * (double)size;
+}
+
+/* Where the JSON of a GLB lies, as far as its header can be believed: vshi_gltf_open() checks it. */
+static void find_json(const char *text, size_t size, size_t *begin, size_t *length) {
+    enum { HEADER = 20, LENGTH = 12 };
+    uint32_t told = 0;
+    *begin = 0;
+    *length = size;
+    if (size >= HEADER && memcmp(text, "glTF", 4) == 0) {
+        memcpy(&told, text + LENGTH, sizeof told);
+        *begin = HEADER;
+        *length = told < size - HEADER ? told : size - HEADER;
+    }
+}
+
+/* Bytes of a GLB that was opened, whatever stands behind it. */
+static size_t told_size(const char *text, size_t size) {
+    enum { HEADER = 12, LENGTH = 8 };
+    uint32_t told = 0;
+    if (size >= HEADER && memcmp(text, "glTF", 4) == 0) {
+        memcpy(&told, text + LENGTH, sizeof told);
+        return told < size ? told : size;
+    }
+    return size;
+}
+
+static vsh_result read_text(vshi_lit_document *document, size_t *size, vsh_error *error) {
+    const char *path = document->gltf.path;
+    FILE *file;
+    uint64_t bytes;
+    VSHI_TRY(vshi_input_open(path, path, SIZE_MAX / 2, &file, &bytes, error));
+    *size = (size_t)bytes;
+    vsh_result result;
+    VSHI_TRY_DONE(bytes > 0 ? vshi_gltf_take(&document->gltf, (void **)&document->text, *size, 1, error)
+                            : vshi_fail(error, VSH_ERROR_READ, "%s: is empty", path));
+    if (fread(document->text, 1, *size, file) != *size) {
+        result = vshi_fail(error, VSH_ERROR_READ, "%s: %s", path,
+                           ferror(file) ? strerror(errno) : "became shorter while it was read");
+    }
+done:
+    fclose(file);
+    return result;
+}
+
+/* Lists that are appended to, or looked through, are lists. */
+static vsh_result check_lists(const vshi_gltf *gltf, vsh_error *error) {
+    static const char *const lists[] = {"buffers",  "bufferViews", "accessors",      "images",
+                                        "samplers", "textures",    "materials",      "meshes",
+                                        "nodes",    "scenes",      "extensionsUsed", "extensionsRequired"};
+    for (size_t i = 0; i < sizeof lists / sizeof lists[0]; ++i) {
+        const json_t *list = json_object_get(gltf->root, lists[i]);
+        if (list != NULL && !json_is_array(list)) {
+            return vshi_gltf_fail(gltf, error, "its '%s' is no list", lists[i]);
+        }
+        size_t k;
+        const json_t *item;
+        json_array_foreach(list, k, item) {
+            if (!json_is_object(item) && !json_is_string(item)) {
+                return vshi_gltf_fail(gltf, error, "%s[%zu] is no object", lists[i], k);
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_lit_open(vshi_lit_document *document, const char *path, const vsh_run *run, vshi_job *job,
+                         vsh_error *error) {
+    *document = (vshi_lit_document){.gltf = {.path = path, .run = run, .job = job}};
+    vshi_gltf *gltf = &document->gltf;
+    size_t size, begin, length;
+    VSHI_TRY(read_text(document, &size, error));
+    find_json(document->text, size, &begin, &length);
+    VSHI_TRY(vshi_gltf_hold(gltf, tree_bytes(document->text + begin, length), error));
+    VSHI_TRY(vshi_gltf_open(gltf, document->text, size, error));
+    document->text_size = told_size(document->text, size);
+    VSHI_TRY(check_lists(gltf, error));
+    document->first_view = json_array_size(json_object_get(gltf->root, "bufferViews"));
+    const size_t buffers = json_array_size(json_object_get(gltf->root, "buffers"));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->buffers, buffers, sizeof *gltf->buffers, error));
+    gltf->buffer_count = buffers;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->views, document->first_view, sizeof *gltf->views, error));
+    gltf->view_count = document->first_view;
+    return VSH_OK;
+}
+
+vsh_result vshi_lit_begin(vshi_lit_document *document, const char *path, const vsh_run *run, vshi_job *job,
+                          vsh_error *error) {
+    *document = (vshi_lit_document){.gltf = {.path = path, .run = run, .job = job}};
+    document->gltf.root = json_pack("{s:{s:s}}", "asset", "version", "2.0");
+    return document->gltf.root != NULL ? VSH_OK : vshi_lit_no_memory(document, error);
+}
+
+void vshi_lit_close(vshi_lit_document *document) {
+    vshi_gltf_free_buffers(&document->gltf);
+    json_decref(document->gltf.root);
+    free(document->dropped);
+    free(document->replaced);
+    free(document->added.at);
+    free(document->text);
+}
+
+vsh_result vshi_lit_no_memory(const vshi_lit_document *document, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", document->gltf.path);
+}
+
+/* --- JSON */
+
+vsh_result vshi_lit_set(const vshi_lit_document *document, json_t *object, const char *key, json_t *value,
+                        vsh_error *error) {
+    return json_object_set_new(object, key, value) == 0 ? VSH_OK : vshi_lit_no_memory(document, error);
+}
+
+vsh_result vshi_lit_object(const vshi_lit_document *document, json_t *object, const char *key,
+                           json_t **member, vsh_error *error) {
+    *member = json_object_get(object, key);
+    if (*member == NULL) {
+        VSHI_TRY(vshi_lit_set(document, object, key, json_object(), error));
+        *member = json_object_get(object, key);
+    }
+    return json_is_object(*member) ? VSH_OK
+                                   : vshi_gltf_fail(&document->gltf, error, "a '%s' is no object", key);
+}
+
+vsh_result vshi_lit_append(vshi_lit_document *document, const char *array, json_t *value, size_t *index,
+                           vsh_error *error) {
+    json_t *list = json_object_get(document->gltf.root, array);
+    if (list == NULL) {
+        const vsh_result result = vshi_lit_set(document, document->gltf.root, array, json_array(), error);
+        if (result != VSH_OK) {
+            json_decref(value);
+            return result;
+        }
+        list = json_object_get(document->gltf.root, array);
+    }
+    *index = json_array_size(list);
+    return json_array_append_new(list, value) == 0 ? VSH_OK : vshi_lit_no_memory(document, error);
+}
+
+static size_t find_name(const json_t *list, const char *name) {
+    size_t i;
+    const json_t *item;
+    json_array_foreach(list, i, item) {
+        if (json_is_string(item) && strcmp(json_string_value(item), name) == 0) {
+            return i;
+        }
+    }
+    return SIZE_MAX;
+}
+
+vsh_result vshi_lit_use_extension(vshi_lit_document *document, const char *name, vsh_error *error) {
+    size_t index;
+    return find_name(json_object_get(document->gltf.root, "extensionsUsed"), name) != SIZE_MAX
+               ? VSH_OK
+               : vshi_lit_append(document, "extensionsUsed", json_string(name), &index, error);
+}
+
+void vshi_lit_drop_extension(vshi_lit_document *document, const char *name) {
+    static const char *const lists[] = {"extensionsUsed", "extensionsRequired"};
+    for (size_t i = 0; i < sizeof lists / sizeof lists[0]; ++i) {
+        json_t *list = json_object_get(document->gltf.root, lists[i]);
+        for (size_t at = find_name(list, name); at != SIZE_MAX; at = find_name(list, name)) {
+            json_array_remove(list, at);
+        }
+        if (list != NULL && json_array_size(list) == 0) {
+            json_object_del(document->gltf.root, lists[i]);
+        }
+    }
+}
+
+/* --- bytes */
+
+/* Room for `more` bytes behind the others; those are zeros. */
+static vsh_result grow(vshi_lit_document *document, size_t more, vsh_error *error) {
+    vshi_lit_bytes *bytes = &document->added;
+    size_t size;
+    if (__builtin_add_overflow(bytes->size, more, &size) || size > SIZE_MAX / 4) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: more bytes than there are addresses",
+                         document->gltf.path);
+    }
+    if (size > bytes->capacity) {
+        const size_t capacity = size + size / 2 + 4096;
+        VSHI_TRY(vshi_gltf_hold(&document->gltf, (double)(capacity - bytes->capacity), error));
+        unsigned char *grown = realloc(bytes->at, capacity);
+        if (grown == NULL) {
+            return vshi_lit_no_memory(document, error);
+        }
+        bytes->at = grown;
+        bytes->capacity = capacity;
+    }
+    memset(bytes->at + bytes->size, 0, more);
+    bytes->size = size;
+    return VSH_OK;
+}
+
+vsh_result vshi_lit_add_view(vshi_lit_document *document, const void *bytes, size_t size, int target,
+                             size_t stride, size_t *view, size_t *offset, vsh_error *error) {
+    enum { ALIGNMENT = 8 }; /* 4 would do for glTF; 8 for what is in front of what follows */
+    size_t padded;
+    if (__builtin_add_overflow(size, ALIGNMENT - 1, &padded)) {
+        return vshi_lit_no_memory(document, error);
+    }
+    const size_t at = document->added.size;
+    VSHI_TRY(grow(document, padded / ALIGNMENT * ALIGNMENT, error));
+    if (bytes != NULL) {
+        memcpy(document->added.at + at, bytes, size);
+    }
+    json_t *made =
+        json_pack("{s:i,s:I,s:I}", "buffer", 0, "byteOffset", (json_int_t)at, "byteLength", (json_int_t)size);
+    bool good = made != NULL;
+    good = good &&
+           (stride == 0 || json_object_set_new(made, "byteStride", json_integer((json_int_t)stride)) == 0);
+    good = good && (target == 0 || json_object_set_new(made, "target", json_integer(target)) == 0);
+    if (offset != NULL) {
+        *offset = at;
+    }
+    if (!good) {
+        json_decref(made);
+        return vshi_lit_no_memory(document, error);
+    }
+    return vshi_lit_append(document, "bufferViews", made, view, error);
+}
+
+static const char *type_name(int components) {
+    static const char *const names[] = {"SCALAR", "VEC2", "VEC3", "VEC4"};
+    return components >= 1 && components <= 4 ? names[components - 1] : "MAT4";
+}
+
+static vsh_result add_bounds(const vshi_lit_document *document, json_t *accessor, const float *values,
+                             size_t count, size_t components, vsh_error *error) {
+    json_t *low = json_array(), *high = json_array();
+    bool good = low != NULL && high != NULL;
+    for (size_t c = 0; good && c < components; ++c) {
+        float least = values[c], most = values[c];
+        for (size_t i = 1; i < count; ++i) {
+            const float value = values[components * i + c];
+            least = value < least ? value : least;
+            most = value > most ? value : most;
+        }
+        good = json_array_append_new(low, json_real((double)least)) == 0 &&
+               json_array_append_new(high, json_real((double)most)) == 0;
+    }
+    const bool first = json_object_set_new(accessor, "min", low) == 0;
+    const bool second = json_object_set_new(accessor, "max", high) == 0;
+    return good && first && second ? VSH_OK : vshi_lit_no_memory(document, error);
+}
+
+vsh_result vshi_lit_add_floats(vshi_lit_document *document, const float *values, size_t count, int components,
+                               bool bounds, size_t *accessor, size_t *offset, vsh_error *error) {
+    size_t size, view;
+    if (__builtin_mul_overflow(count, (size_t)components * sizeof *values, &size)) {
+        return vshi_lit_no_memory(document, error);
+    }
+    VSHI_TRY(vshi_lit_add_view(document, values, size, VSHI_LIT_VERTICES, 0, &view, offset, error));
+    json_t *made = json_pack("{s:I,s:i,s:I,s:s}", "bufferView", (json_int_t)view, "componentType",
+                             VSHI_GLTF_FLOAT, "count", (json_int_t)count, "type", type_name(components));
+    if (made == NULL) {
+        return vshi_lit_no_memory(document, error);
+    }
+    if (bounds && count > 0) {
+        const vsh_result result = add_bounds(document, made, values, count, (size_t)components, error);
+        if (result != VSH_OK) {
+            json_decref(made);
+            return result;
+        }
+    }
+    return vshi_lit_append(document, "accessors", made, accessor, error);
+}
+
+vsh_result vshi_lit_add_indices(vshi_lit_document *document, const uint32_t *indices, size_t count,
+                                size_t vertex_count, size_t *accessor, vsh_error *error) {
+    /* 65535 is what some interfaces restart strips by (glTF 2.0, 3.7.2.1) */
+    const bool shorts = vertex_count <= UINT16_MAX;
+    const size_t each = shorts ? sizeof(uint16_t) : sizeof(uint32_t);
+    size_t size, view, offset;
+    if (__builtin_mul_overflow(count, each, &size)) {
+        return vshi_lit_no_memory(document, error);
+    }
+    VSHI_TRY(vshi_lit_add_view(document, shorts ? NULL : indices, size, VSHI_LIT_INDICES, 0, &view, &offset,
+                               error));
+    for (size_t i = 0; shorts && i < count; ++i) {
+        const uint16_t index = (uint16_t)indices[i];
+        memcpy(document->added.at + offset + i * sizeof index, &index, sizeof index);
+    }
+    json_t *made =
+        json_pack("{s:I,s:i,s:I,s:s}", "bufferView", (json_int_t)view, "componentType",
+                  shorts ? VSHI_GLTF_USHORT : VSHI_GLTF_UINT, "count", (json_int_t)count, "type", "SCALAR");
+    return vshi_lit_append(document, "accessors", made, accessor, error);
+}

@@ -1,0 +1,267 @@
+#include "lit/draco.h"
+
+#include "base/memory.h"
+#include "extern/draco.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char extension_name[] = "KHR_draco_mesh_compression";
+
+const vshi_lit_draco *vshi_lit_draco_of(const vshi_lit_dracos *dracos, size_t mesh, size_t primitive) {
+    for (size_t i = 0; i < dracos->count; ++i) {
+        if (dracos->list[i].mesh == mesh && dracos->list[i].primitive == primitive) {
+            return &dracos->list[i];
+        }
+    }
+    return NULL;
+}
+
+const vshi_lit_draco_attribute *vshi_lit_draco_attribute_of(const vshi_lit_draco *draco,
+                                                            const json_t *primitive, const char *name) {
+    const json_t *names = json_object_get(vshi_gltf_extension(primitive, extension_name), "attributes");
+    size_t id;
+    if (!vshi_gltf_count(names, name, SIZE_MAX, &id) || id == SIZE_MAX) {
+        return NULL;
+    }
+    for (size_t i = 0; i < draco->attribute_count; ++i) {
+        if (draco->attributes[i].id == id) {
+            return &draco->attributes[i];
+        }
+    }
+    return NULL;
+}
+
+void vshi_lit_dracos_free(vshi_lit_dracos *dracos) {
+    for (size_t i = 0; i < dracos->count; ++i) {
+        vshi_lit_draco *draco = &dracos->list[i];
+        for (size_t k = 0; k < draco->attribute_count && !dracos->borrowed; ++k) {
+            free(draco->attributes[k].values);
+        }
+        free(draco->attributes);
+        if (!dracos->borrowed) {
+            free(draco->indices);
+        }
+    }
+    free(dracos->list);
+    vshi_answer_free(&dracos->answer);
+    *dracos = (vshi_lit_dracos){.list = NULL};
+}
+
+/* --- decoding */
+
+static vsh_result take_attribute(vshi_lit_document *document, const vshi_draco *mesh, const json_t *primitive,
+                                 const char *name, const char *where, vshi_lit_draco_attribute *attribute,
+                                 vsh_error *error) {
+    vshi_gltf *gltf = &document->gltf;
+    const json_t *names = json_object_get(vshi_gltf_extension(primitive, extension_name), "attributes");
+    vshi_gltf_accessor accessor;
+    size_t id, index;
+    VSHI_TRY(vshi_gltf_index(gltf, json_object_get(primitive, "attributes"), name, "accessors", where, &index,
+                             error));
+    if (index == SIZE_MAX || !vshi_gltf_count(names, name, SIZE_MAX, &id) || id > UINT32_MAX) {
+        return vshi_gltf_fail(gltf, error, "%s: its compressed %s is no attribute of it", where, name);
+    }
+    VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
+    *attribute = (vshi_lit_draco_attribute){id, accessor.type, accessor.components, NULL};
+    const size_t size = (size_t)accessor.components * sizeof(float); /* at most, of a component */
+    VSHI_TRY(
+        vshi_gltf_allocate(gltf, (void **)&attribute->values, vshi_draco_vertex_count(mesh), size, error));
+    return accessor.components <= 4 && vshi_draco_elements(mesh, (uint32_t)id, accessor.type,
+                                                           accessor.components, attribute->values)
+               ? VSH_OK
+               : vshi_gltf_fail(gltf, error, "%s: its Draco data has no attribute %zu of %d components",
+                                where, id, accessor.components);
+}
+
+static vsh_result take_indices(vshi_lit_document *document, const vshi_draco *mesh, const char *where,
+                               vshi_lit_draco *draco, vsh_error *error) {
+    draco->vertex_count = vshi_draco_vertex_count(mesh);
+    draco->triangle_count = vshi_draco_triangle_count(mesh);
+    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&draco->indices, draco->triangle_count,
+                                sizeof(uint32_t[3]), error));
+    if (draco->triangle_count > 0) {
+        vshi_draco_indices(mesh, draco->indices);
+    }
+    for (size_t i = 0; i < 3 * draco->triangle_count; ++i) {
+        if (draco->indices[i] >= draco->vertex_count) {
+            return vshi_gltf_fail(&document->gltf, error, "%s: its Draco data uses vertex %u of %zu", where,
+                                  draco->indices[i], draco->vertex_count);
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result take(vshi_lit_document *document, const vshi_draco *mesh, json_t *primitive,
+                       const char *where, vshi_lit_draco *draco, vsh_error *error) {
+    json_t *names = json_object_get(vshi_gltf_extension(primitive, extension_name), "attributes");
+    VSHI_TRY(take_indices(document, mesh, where, draco, error));
+    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&draco->attributes, json_object_size(names),
+                                sizeof *draco->attributes, error));
+    const char *name;
+    json_t *value;
+    json_object_foreach(names, name, value) {
+        vshi_lit_draco_attribute *attribute = &draco->attributes[draco->attribute_count++];
+        VSHI_TRY(take_attribute(document, mesh, primitive, name, where, attribute, error));
+    }
+    return VSH_OK;
+}
+
+static vsh_result decode(vshi_lit_document *document, json_t *primitive, vshi_lit_draco *draco,
+                         vsh_error *error) {
+    vshi_gltf *gltf = &document->gltf;
+    char where[96];
+    snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", draco->mesh, draco->primitive);
+    vshi_gltf_bytes bytes;
+    size_t view, stride;
+    VSHI_TRY(vshi_gltf_index(gltf, vshi_gltf_extension(primitive, extension_name), "bufferView",
+                             "bufferViews", where, &view, error));
+    if (view == SIZE_MAX) {
+        return vshi_gltf_fail(gltf, error, "%s: its Draco data has no buffer view", where);
+    }
+    VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &stride, error));
+    vshi_draco *mesh = NULL;
+    VSHI_TRY(vshi_draco_decode(bytes.at, bytes.size, gltf->path, &mesh, error));
+    const vsh_result result = take(document, mesh, primitive, where, draco, error);
+    vshi_draco_free(mesh);
+    return result;
+}
+
+/* All primitives under Draco, listed by their places. */
+static vsh_result list(vshi_lit_document *document, vshi_lit_dracos *dracos, vsh_error *error) {
+    size_t m, p, count = 0;
+    const json_t *mesh, *primitive;
+    const json_t *meshes = json_object_get(document->gltf.root, "meshes");
+    json_array_foreach(meshes, m, mesh) {
+        json_array_foreach(json_object_get(mesh, "primitives"), p, primitive) {
+            count += vshi_gltf_extension(primitive, extension_name) != NULL;
+        }
+    }
+    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&dracos->list, count, sizeof *dracos->list, error));
+    json_array_foreach(meshes, m, mesh) {
+        json_array_foreach(json_object_get(mesh, "primitives"), p, primitive) {
+            if (vshi_gltf_extension(primitive, extension_name) != NULL) {
+                dracos->list[dracos->count++] = (vshi_lit_draco){.mesh = m, .primitive = p};
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+static json_t *primitive_of(const vshi_lit_document *document, const vshi_lit_draco *draco) {
+    const json_t *mesh = vshi_gltf_element(&document->gltf, "meshes", draco->mesh);
+    return json_array_get(json_object_get(mesh, "primitives"), draco->primitive);
+}
+
+static vsh_result decode_all(vshi_lit_document *document, vshi_lit_dracos *dracos, vsh_error *error) {
+    for (size_t i = 0; i < dracos->count; ++i) {
+        if (vshi_job_cancelled(document->gltf.job)) {
+            return vshi_job_fail_cancelled(document->gltf.job, error);
+        }
+        VSHI_TRY(decode(document, primitive_of(document, &dracos->list[i]), &dracos->list[i], error));
+    }
+    return VSH_OK;
+}
+
+/* --- the reader */
+
+vsh_result vshi_serve_draco(const char *path, vshi_decoder *request, const vsh_run *run,
+                            vshi_encoder *payload, vsh_error *error) {
+    (void)request;
+    vshi_lit_document document;
+    vshi_lit_dracos dracos = {.list = NULL};
+    vshi_job *job = vshi_job_begin(run, "load", 1);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    }
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_lit_open(&document, path, run, job, error));
+    VSHI_TRY_DONE(list(&document, &dracos, error));
+    VSHI_TRY_DONE(decode_all(&document, &dracos, error));
+    vshi_encode_count(payload, dracos.count);
+    for (size_t i = 0; i < dracos.count; ++i) {
+        const vshi_lit_draco *draco = &dracos.list[i];
+        vshi_encode_count(payload, draco->vertex_count);
+        vshi_encode_count(payload, draco->triangle_count);
+        vshi_encode_array(payload, draco->indices, draco->triangle_count, sizeof(uint32_t[3]));
+        vshi_encode_count(payload, draco->attribute_count);
+        for (size_t k = 0; k < draco->attribute_count; ++k) {
+            const vshi_lit_draco_attribute *attribute = &draco->attributes[k];
+            vshi_encode_count(payload, attribute->id);
+            vshi_encode_count(payload, (uint64_t)attribute->type);
+            vshi_encode_count(payload, (uint64_t)attribute->components);
+            vshi_encode_array(payload, attribute->values, draco->vertex_count,
+                              (size_t)attribute->components * vshi_lit_component_size(attribute->type));
+        }
+    }
+done:
+    vshi_lit_dracos_free(&dracos);
+    vshi_lit_close(&document);
+    vshi_job_end(job);
+    return result;
+}
+
+/* --- the caller */
+
+static vsh_result take_decoded(vshi_decoder *decoder, const char *path, vshi_lit_draco *draco,
+                               vsh_error *error) {
+    enum { MOST_ATTRIBUTES = 4096 };
+    draco->vertex_count = vshi_decode_count(decoder, UINT32_MAX);
+    draco->triangle_count = vshi_decode_count(decoder, SIZE_MAX / 64);
+    const void *indices = vshi_decode_array(decoder, draco->triangle_count, sizeof(uint32_t[3]));
+    const size_t count = vshi_decode_count(decoder, MOST_ATTRIBUTES);
+    if (decoder->bad) {
+        return vshi_answer_fail(path, "its decoded vertices", error);
+    }
+    memcpy(&draco->indices, &indices, sizeof indices);
+    for (size_t i = 0; i < 3 * draco->triangle_count; ++i) {
+        if (draco->indices[i] >= draco->vertex_count) {
+            return vshi_answer_fail(path, "a decoded index", error);
+        }
+    }
+    VSHI_TRY(vshi_allocate((void **)&draco->attributes, count, sizeof *draco->attributes, path, error));
+    for (; draco->attribute_count < count; ++draco->attribute_count) {
+        vshi_lit_draco_attribute *attribute = &draco->attributes[draco->attribute_count];
+        attribute->id = vshi_decode_count(decoder, UINT32_MAX);
+        attribute->type = (int)vshi_decode_count(decoder, VSHI_GLTF_FLOAT);
+        attribute->components = (int)vshi_decode_count(decoder, 4);
+        const size_t size = (size_t)attribute->components * vshi_lit_component_size(attribute->type);
+        const void *values = size > 0 ? vshi_decode_array(decoder, draco->vertex_count, size) : NULL;
+        if (decoder->bad || (values == NULL && draco->vertex_count > 0)) {
+            return vshi_answer_fail(path, "a decoded attribute", error);
+        }
+        memcpy(&attribute->values, &values, sizeof values);
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_lit_dracos_decode(vshi_decoder *decoder, const char *path, vshi_lit_dracos *dracos,
+                                  vsh_error *error) {
+    dracos->borrowed = true;
+    if (vshi_decode_count(decoder, UINT32_MAX) != dracos->count) {
+        return vshi_answer_fail(path, "the number of its compressed meshes", error);
+    }
+    for (size_t i = 0; i < dracos->count; ++i) {
+        VSHI_TRY(take_decoded(decoder, path, &dracos->list[i], error));
+    }
+    return vshi_decoder_ends(decoder) ? VSH_OK : vshi_answer_fail(path, "its end", error);
+}
+
+static vsh_result ask_reader(vshi_lit_document *document, vshi_lit_dracos *dracos, vsh_error *error) {
+    const vshi_gltf *gltf = &document->gltf;
+    vshi_exchange exchange;
+    VSHI_TRY(vshi_exchange_begin(&exchange, VSHI_READ_DRACO, gltf->path, gltf->run, error));
+    VSHI_TRY(vshi_exchange_send_job(&exchange, gltf->job, 0, &dracos->answer, error));
+    return vshi_lit_dracos_decode(&dracos->answer.payload, gltf->path, dracos, error);
+}
+
+vsh_result vshi_lit_dracos_read(vshi_lit_document *document, vshi_lit_dracos *dracos, vsh_error *error) {
+    *dracos = (vshi_lit_dracos){.list = NULL};
+    VSHI_TRY(list(document, dracos, error));
+    if (dracos->count == 0) {
+        return VSH_OK;
+    }
+    return document->gltf.run->reader != NULL ? ask_reader(document, dracos, error)
+                                              : decode_all(document, dracos, error);
+}

@@ -1,0 +1,206 @@
+#include "lit/images.h"
+
+#include "base/file.h"
+#include "base/memory.h"
+#include "base/srgb.h"
+#include "image/png.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const purpose_names[VSH_LIT_PURPOSES] = {
+    [VSH_LIT_OCCLUSION] = "occlusion", [VSH_LIT_LIGHTMAP] = "lightmap", [VSH_LIT_PREVIEW] = "preview"};
+
+void vshi_lit_besides_free(vshi_lit_besides *besides) {
+    for (size_t i = 0; i < besides->count; ++i) {
+        free(besides->list[i].name);
+        free(besides->list[i].owned);
+    }
+    free(besides->list);
+    *besides = (vshi_lit_besides){NULL, 0};
+}
+
+char *vshi_lit_beside_name(const char *output, const char *mark, const char *ending) {
+    const char *slash = strrchr(output, '/');
+    const char *name = slash != NULL ? slash + 1 : output;
+    const char *own = vshi_path_ending(output);
+    const size_t stem = own[0] != '\0' ? (size_t)(own - name) - 1 : strlen(name);
+    const size_t size = stem + strlen(mark) + strlen(ending) + 2;
+    char *made = malloc(size);
+    if (made != NULL) {
+        snprintf(made, size, "%.*s%s.%s", (int)stem, name, mark, ending);
+    }
+    return made;
+}
+
+/* --- encoding */
+
+typedef struct rows {
+    const vsh_lit_image *image;
+    double factor; /* of values, before they are cut */
+    bool srgb;
+    int bits;
+} rows;
+
+static void fill_row(void *user, int32_t y, unsigned char *bytes) {
+    const rows *r = user;
+    const size_t width = (size_t)r->image->width, count = (size_t)r->image->channel_count;
+    const double most = r->bits == 16 ? 65535.0 : 255.0;
+    for (size_t x = 0; x < width; ++x) {
+        for (size_t c = 0; c < count; ++c) {
+            const double given = (double)r->image->channels[c][(size_t)y * width + x] * r->factor;
+            const double cut = given > 0.0 ? (given < 1.0 ? given : 1.0) : 0.0; /* what is none is 0 */
+            const unsigned value = (unsigned)((r->srgb ? vshi_to_srgb(cut) : cut) * most + 0.5);
+            if (r->bits == 16) {
+                *bytes++ = (unsigned char)(value >> 8);
+            }
+            *bytes++ = (unsigned char)value;
+        }
+    }
+}
+
+/* What planes of light are divided by, so that none is cut. */
+static double largest(const vsh_lit_image *image) {
+    double most = 1.0;
+    const size_t count = (size_t)image->width * (size_t)image->height;
+    for (int32_t c = 0; c < image->channel_count; ++c) {
+        for (size_t i = 0; i < count; ++i) {
+            const double value = (double)image->channels[c][i];
+            most = value > most && isfinite(value) ? value : most;
+        }
+    }
+    return most;
+}
+
+static vsh_result encode(vshi_lit_work *work, const vsh_lit_image *image, double scale, unsigned char **bytes,
+                         size_t *size, vsh_error *error) {
+    rows r = {image, 1.0, image->purpose == VSH_LIT_PREVIEW, image->bits == 16 ? 16 : 8};
+    r.factor = image->purpose == VSH_LIT_LIGHTMAP                            ? 1.0 / scale
+               : image->purpose == VSH_LIT_PREVIEW && image->intensity > 0.0 ? image->intensity
+                                                                             : 1.0;
+    const vshi_png_source source = {image->width, image->height, image->channel_count, r.bits, fill_row, &r};
+    /* incompressible ones are a little larger than their values */
+    const double most = 1.01 * image->width * image->height * image->channel_count * r.bits / 8;
+    VSHI_TRY(vshi_gltf_hold(&work->document.gltf, most, error));
+    return vshi_png_encode(&source, work->output, bytes, size, error);
+}
+
+/* --- adding */
+
+static vsh_result add_sampler(vshi_lit_work *work, size_t *sampler, vsh_error *error) {
+    enum { LINEAR = 9729, CLAMP = 33071 };
+    /* without smaller levels: in those, charts of all kinds flow together */
+    return *sampler != SIZE_MAX
+               ? VSH_OK
+               : vshi_lit_append(&work->document, "samplers",
+                                 json_pack("{s:i,s:i,s:i,s:i}", "magFilter", LINEAR, "minFilter", LINEAR,
+                                           "wrapS", CLAMP, "wrapT", CLAMP),
+                                 sampler, error);
+}
+
+static vsh_result embed_bytes(vshi_lit_work *work, const void *bytes, size_t size, json_t *image,
+                              const char *type, vsh_error *error) {
+    size_t view;
+    VSHI_TRY(vshi_lit_add_view(&work->document, bytes, size, 0, 0, &view, NULL, error));
+    VSHI_TRY(vshi_lit_set(&work->document, image, "bufferView", json_integer((json_int_t)view), error));
+    return vshi_lit_set(&work->document, image, "mimeType", json_string(type), error);
+}
+
+/* The characters that a URI has as they are (RFC 3986), the others by their numbers. */
+json_t *vshi_lit_uri(const char *name) {
+    static const char digits[] = "0123456789ABCDEF";
+    char *text = malloc(3 * strlen(name) + 1), *to = text;
+    if (text == NULL) {
+        return NULL;
+    }
+    for (const char *c = name; *c != '\0'; ++c) {
+        const unsigned char byte = (unsigned char)*c;
+        const bool plain = (byte >= 'a' && byte <= 'z') || (byte >= 'A' && byte <= 'Z') ||
+                           (byte >= '0' && byte <= '9') || strchr("-._~", byte) != NULL;
+        if (plain) {
+            *to++ = *c;
+        } else {
+            *to++ = '%';
+            *to++ = digits[byte >> 4];
+            *to++ = digits[byte & 15];
+        }
+    }
+    *to = '\0';
+    json_t *uri = json_string(text);
+    free(text);
+    return uri;
+}
+
+static vsh_result put_beside(vshi_lit_work *work, const vsh_lit_image *image, vshi_lit_beside *beside,
+                             json_t *made, vsh_error *error) {
+    char mark[64];
+    if (work->page_count > 1) {
+        snprintf(mark, sizeof mark, ".%s.%u", purpose_names[image->purpose], image->page);
+    } else {
+        snprintf(mark, sizeof mark, ".%s", purpose_names[image->purpose]);
+    }
+    beside->name = vshi_lit_beside_name(work->output, mark, "png");
+    return beside->name != NULL
+               ? vshi_lit_set(&work->document, made, "uri", vshi_lit_uri(beside->name), error)
+               : vshi_lit_no_memory(&work->document, error);
+}
+
+static vsh_result add_texture(vshi_lit_work *work, const vsh_lit_image *image, json_t *made, size_t *sampler,
+                              vsh_error *error) {
+    vshi_lit_document *document = &work->document;
+    size_t index;
+    VSHI_TRY(vshi_lit_append(document, "images", json_incref(made), &index, error));
+    VSHI_TRY(add_sampler(work, sampler, error));
+    json_t *texture = json_pack("{s:I,s:I}", "sampler", (json_int_t)*sampler, "source", (json_int_t)index);
+    return vshi_lit_append(document, "textures", texture, &work->textures[image->purpose][image->page],
+                           error);
+}
+
+static vsh_result add(vshi_lit_work *work, const vsh_lit_image *image, bool embed, size_t *sampler,
+                      vshi_lit_beside *beside, vsh_error *error) {
+    *beside = (vshi_lit_beside){NULL, image->png, image->png_size, NULL};
+    if (image->purpose == VSH_LIT_LIGHTMAP) {
+        work->intensities[image->page] = image->intensity > 0.0 ? image->intensity : 1.0;
+    }
+    if (image->png == NULL) {
+        const double scale = image->purpose == VSH_LIT_LIGHTMAP ? largest(image) : 1.0;
+        work->intensities[image->page] *= scale;
+        VSHI_TRY(encode(work, image, scale, &beside->owned, &beside->size, error));
+        beside->bytes = beside->owned;
+    }
+    json_t *made = json_pack("{s:s}", "name", purpose_names[image->purpose]);
+    vsh_result result = made != NULL ? VSH_OK : vshi_lit_no_memory(&work->document, error);
+    if (result == VSH_OK) {
+        result = embed ? embed_bytes(work, beside->bytes, beside->size, made, "image/png", error)
+                       : put_beside(work, image, beside, made, error);
+    }
+    if (result == VSH_OK) {
+        result = add_texture(work, image, made, sampler, error);
+    }
+    json_decref(made);
+    return result;
+}
+
+vsh_result vshi_lit_images_add(vshi_lit_work *work, bool embed, vshi_lit_besides *besides, vsh_error *error) {
+    const vsh_lit_options *options = work->options;
+    size_t sampler = SIZE_MAX;
+    VSHI_TRY(vshi_gltf_allocate(&work->document.gltf, (void **)&besides->list, options->image_count,
+                                sizeof *besides->list, error));
+    for (size_t i = 0; i < options->image_count; ++i) {
+        if (vshi_job_cancelled(work->document.gltf.job)) {
+            return vshi_job_fail_cancelled(work->document.gltf.job, error);
+        }
+        vshi_lit_beside beside;
+        const vsh_result result = add(work, &options->images[i], embed, &sampler, &beside, error);
+        if (result == VSH_OK && !embed) {
+            besides->list[besides->count++] = beside;
+        } else {
+            free(beside.name);
+            free(beside.owned);
+        }
+        VSHI_TRY(result);
+    }
+    return VSH_OK;
+}

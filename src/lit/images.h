@@ -1,0 +1,37 @@
+/* Images of a lit document: those that were baked, and those that the file names beside it. */
+#ifndef VSHI_LIT_IMAGES_H
+#define VSHI_LIT_IMAGES_H
+
+#include "lit/work.h"
+
+/* A file that stands beside the document. */
+typedef struct vshi_lit_beside {
+    char *name;        /* without a folder: in the document's */
+    const void *bytes; /* [size] */
+    size_t size;
+    unsigned char *owned; /* NULL: they are the caller's */
+} vshi_lit_beside;
+
+typedef struct vshi_lit_besides {
+    vshi_lit_beside *list; /* [count] */
+    size_t count;
+} vshi_lit_besides;
+
+void vshi_lit_besides_free(vshi_lit_besides *besides);
+
+/* Adds an image and a texture for each image that was baked, into the buffer or (embed false) to `besides`,
+ * which is freed after a failure too. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_lit_images_add(vshi_lit_work *work, bool embed, vshi_lit_besides *besides, vsh_error *error);
+
+/* Takes the images that the file names beside it into the buffer, where the document moves to another folder.
+ * Those that cannot be read stay named, with a warning. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+vsh_result vshi_lit_images_bring(vshi_lit_work *work, vsh_error *error);
+
+/* A file's name as a URI; NULL where memory is short. */
+json_t *vshi_lit_uri(const char *name);
+
+/* Name of a file beside the output: its own without its ending, `mark`, `ending`. NULL where memory is short.
+ */
+char *vshi_lit_beside_name(const char *output, const char *mark, const char *ending);
+
+#endif

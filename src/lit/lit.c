@@ -1,0 +1,212 @@
+#include "lit/images.h"
+#include "lit/prune.h"
+#include "lit/work.h"
+#include "lit/write.h"
+
+#include "base/file.h"
+#include "base/floats.h"
+#include "base/memory.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+static bool is_gltf(const char *path) {
+    const char *ending = vshi_path_ending(path);
+    return strcasecmp(ending, "glb") == 0 || strcasecmp(ending, "gltf") == 0;
+}
+
+int32_t vsh_lit_is_output(const char *path) {
+    return path != NULL && is_gltf(path) ? 1 : 0;
+}
+
+/* --- what is asked for */
+
+/* The set that vsh_model_mesh() takes for -1, of each mesh, on page 0. */
+static vsh_result default_meshes(const vsh_model *model, vsh_lit_mesh **meshes, vsh_error *error) {
+    const size_t count = vsh_model_mesh_count(model);
+    VSHI_TRY(vshi_allocate((void **)meshes, count, sizeof **meshes, "a lit model", error));
+    for (size_t i = 0; i < count; ++i) {
+        const int32_t sets = vsh_model_uv_sets(model, i);
+        const int32_t set = sets > 1 ? 1 : 0;
+        (*meshes)[i].uv_set = vsh_model_mesh(model, i, set).uvs != NULL ? set : -1;
+    }
+    return VSH_OK;
+}
+
+static vsh_result count_pages(vshi_lit_work *work, vsh_error *error) {
+    const vsh_lit_options *options = work->options;
+    size_t most = 0;
+    for (size_t i = 0; i < options->image_count; ++i) {
+        most = options->images[i].page > most ? options->images[i].page : most;
+    }
+    for (size_t i = 0; i < options->chart_count; ++i) {
+        most = options->chart_pages[i] > most ? options->chart_pages[i] : most;
+    }
+    for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
+        const vsh_lit_mesh *mesh = &work->meshes[i];
+        const bool placed = mesh->charts == NULL && (mesh->uvs != NULL || mesh->uv_set >= 0);
+        if (placed && mesh->page >= UINT16_MAX) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_lit_mesh %zu: page is %u, expected below %d", i,
+                             mesh->page, UINT16_MAX);
+        }
+        most = placed && mesh->page > most ? mesh->page : most;
+    }
+    work->page_count = most + 1;
+    return VSH_OK;
+}
+
+static vsh_result check(vshi_lit_work *work, vsh_error *error) {
+    if (!is_gltf(work->output)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: expected a name that ends in .glb or .gltf",
+                         work->output);
+    }
+    VSHI_TRY(vshi_output_check(work->output, error));
+    VSHI_TRY(vshi_lit_check_images(work->options, error));
+    VSHI_TRY(count_pages(work, error));
+    for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
+        VSHI_TRY(vshi_lit_check_mesh(work, i, error));
+    }
+    return VSH_OK;
+}
+
+static bool is_same(const char *a, const char *b) {
+    struct stat one, other;
+    return stat(a, &one) == 0 && stat(b, &other) == 0 && one.st_dev == other.st_dev &&
+           one.st_ino == other.st_ino;
+}
+
+/* --- the document */
+
+static vsh_result allocate_pages(vshi_lit_work *work, vsh_error *error) {
+    vshi_gltf *gltf = &work->document.gltf;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&work->intensities, work->page_count,
+                                sizeof *work->intensities, error));
+    for (int purpose = 0; purpose < VSH_LIT_PURPOSES; ++purpose) {
+        VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&work->textures[purpose], work->page_count,
+                                    sizeof *work->textures[purpose], error));
+        for (size_t page = 0; page < work->page_count; ++page) {
+            work->textures[purpose][page] = SIZE_MAX;
+        }
+    }
+    return VSH_OK;
+}
+
+/* Draco's data is needed where a mesh gets new UVs. */
+static bool has_new_uvs(const vshi_lit_work *work) {
+    for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
+        if (work->meshes[i].uvs != NULL) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* The folder of a file, in new memory. */
+static char *folder_of(const char *path) {
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? strndup(path, (size_t)(slash - path) + 1) : strdup(".");
+}
+
+/* Images that the input names stay named where the output stands beside it. */
+static vsh_result bring_images(vshi_lit_work *work, const char *path, vsh_error *error) {
+    char *one = folder_of(path), *other = folder_of(work->output);
+    const bool known = one != NULL && other != NULL, beside = known && is_same(one, other);
+    free(one);
+    free(other);
+    return !known   ? vshi_lit_no_memory(&work->document, error)
+           : beside ? VSH_OK
+                    : vshi_lit_images_bring(work, error);
+}
+
+static vsh_result make_document(vshi_lit_work *work, const char *path, const vsh_run *run, vshi_job *job,
+                                vshi_lit_uses *uses, vsh_error *error) {
+    if (path == NULL || !is_gltf(path)) {
+        VSHI_TRY(vshi_lit_begin(&work->document, path != NULL ? path : work->output, run, job, error));
+        VSHI_TRY(allocate_pages(work, error));
+        return vshi_lit_from_model(work, error);
+    }
+    if (is_same(path, work->output)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the output is the input", work->output);
+    }
+    VSHI_TRY(vshi_lit_open(&work->document, path, run, job, error));
+    VSHI_TRY(allocate_pages(work, error));
+    if (has_new_uvs(work)) {
+        VSHI_TRY(vshi_lit_dracos_read(&work->document, &work->dracos, error));
+    }
+    VSHI_TRY(vshi_lit_uses_find(&work->document, uses, error));
+    VSHI_TRY(vshi_lit_materials_check(work, error));
+    VSHI_TRY(vshi_lit_nodes_make(work, error));
+    return bring_images(work, path, error);
+}
+
+static vsh_result make(vshi_lit_work *work, const char *path, const vsh_run *run, vshi_job *job,
+                       vsh_error *error) {
+    vshi_lit_besides besides = {NULL, 0};
+    vshi_lit_uses uses = {.accessors = NULL};
+    const int32_t place = work->options->image_place;
+    const bool glb = strcasecmp(vshi_path_ending(work->output), "glb") == 0;
+    const bool embed = place == VSH_LIT_IMAGES_EMBED || (place == VSH_LIT_IMAGES_AUTO && glb);
+    vsh_result result;
+    VSHI_TRY_DONE(make_document(work, path, run, job, &uses, error));
+    VSHI_TRY_DONE(vshi_lit_images_add(work, embed, &besides, error));
+    VSHI_TRY_DONE(vshi_lit_materials_apply(work, error));
+    VSHI_TRY_DONE(vshi_lit_prune(&work->document, &uses, error));
+    VSHI_TRY_DONE(vshi_lit_write_files(work, &besides, error));
+done:
+    vshi_lit_uses_free(&uses);
+    vshi_lit_besides_free(&besides);
+    return result;
+}
+
+static void free_work(vshi_lit_work *work) {
+    for (size_t i = 0; i < work->shape_count; ++i) {
+        for (size_t k = 0; k < work->shapes[i].split_count; ++k) {
+            vshi_lit_gathered_free(&work->shapes[i].splits[k].gathered);
+        }
+        free(work->shapes[i].splits);
+        vshi_lit_topology_free(&work->shapes[i].topology);
+    }
+    free(work->shapes);
+    free(work->looks.list);
+    vshi_lit_uv_pool_free(&work->pool);
+    vshi_lit_dracos_free(&work->dracos);
+    for (int purpose = 0; purpose < VSH_LIT_PURPOSES; ++purpose) {
+        free(work->textures[purpose]);
+    }
+    free(work->intensities);
+    vshi_lit_close(&work->document);
+}
+
+vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
+                         const vsh_lit_options *options, const char *output, const vsh_run *run,
+                         vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(model);
+    VSHI_NEEDS(output);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    vsh_lit_options own = vsh_lit_options_default();
+    VSHI_TRY(vshi_options_resolve(options, &own, sizeof own, "vsh_lit_options", error));
+    vsh_lit_mesh *made = NULL;
+    if (meshes == NULL) {
+        VSHI_TRY(default_meshes(model, &made, error));
+    }
+    vshi_lit_work work = {
+        .model = model, .meshes = meshes != NULL ? meshes : made, .options = &own, .output = output};
+    vshi_job *job = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(check(&work, error));
+    job = vshi_job_begin(&full, "lit", vsh_model_mesh_count(model) + 1);
+    result = job != NULL ? make(&work, path, &full, job, error)
+                         : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", output);
+    if (result == VSH_OK) {
+        vshi_job_advance(job, 1); /* all is written: too late to stop */
+    }
+done:
+    vshi_job_end(job);
+    free_work(&work);
+    free(made);
+    return result;
+}

@@ -1,0 +1,420 @@
+/* Nodes, and the meshes that they show: one of its own for each where their UVs differ, and a node for each
+ * instance of EXT_mesh_gpu_instancing. */
+#include "lit/work.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+static const char instancing_name[] = "EXT_mesh_gpu_instancing";
+
+/* A mesh as one node (or one instance) shows it: entries of the model, which are its primitives. */
+typedef struct use {
+    size_t node, mesh;
+    size_t instance;     /* SIZE_MAX: the node has none */
+    size_t first, count; /* entries */
+    bool lit, keeps;     /* some of it is lit; no primitive gets new UVs */
+    size_t made;         /* the mesh that it shows in the end */
+} use;
+
+typedef struct uses {
+    use *list;
+    size_t count;
+    size_t *unlit;    /* [mesh_count]: how many others show each mesh as it is */
+    json_t **changed; /* [mesh_count]: what each becomes; NULL: stays */
+    size_t mesh_count;
+} uses;
+
+/* --- who shows what */
+
+static vsh_result fail_entry(const vshi_lit_work *work, size_t entry, vsh_error *error) {
+    return vshi_gltf_fail(
+        &work->document.gltf, error,
+        "mesh %zu of the model is none of its nodes': the file has changed since it was read", entry);
+}
+
+static vsh_result check_entry(const vshi_lit_work *work, size_t entry, const use *u, vsh_error *error) {
+    const vshi_gltf *gltf = &work->document.gltf;
+    const vshi_model_origin *origin = &work->model->entries[entry].origin;
+    const json_t *node = vshi_gltf_element(gltf, "nodes", u->node);
+    const json_t *primitives = json_object_get(vshi_gltf_element(gltf, "meshes", u->mesh), "primitives");
+    size_t mesh;
+    const bool good = origin->node > 0 && origin->mesh > 0 && origin->primitive > 0 &&
+                      vshi_gltf_count(node, "mesh", SIZE_MAX, &mesh) && mesh == u->mesh &&
+                      origin->primitive <= json_array_size(primitives) &&
+                      (u->instance == SIZE_MAX || vshi_gltf_extension(node, instancing_name) != NULL);
+    return good ? VSH_OK : fail_entry(work, entry, error);
+}
+
+/* Whether entry e goes on with what u begins: the next primitive of it. */
+static bool continues(const vshi_lit_work *work, const use *u, size_t e) {
+    const vshi_model_origin *before = &work->model->entries[e - 1].origin;
+    const vshi_model_origin *origin = &work->model->entries[e].origin;
+    return u->count > 0 && origin->node == before->node && origin->instance == before->instance &&
+           origin->mesh == before->mesh && origin->primitive > before->primitive;
+}
+
+/* Each node comes once, its instances in their order. */
+static bool comes_once(const uses *all, const use *u, bool *seen) {
+    const use *before = all->count > 0 ? &all->list[all->count - 1] : NULL;
+    if (before != NULL && before->node == u->node) {
+        return before->instance != SIZE_MAX && u->instance != SIZE_MAX && u->instance > before->instance;
+    }
+    const bool first = !seen[u->node];
+    seen[u->node] = true;
+    return first;
+}
+
+static vsh_result list_uses(vshi_lit_work *work, bool *seen, uses *all, vsh_error *error) {
+    const size_t count = vsh_model_mesh_count(work->model);
+    const size_t nodes = json_array_size(json_object_get(work->document.gltf.root, "nodes"));
+    for (size_t e = 0; e < count; ++e) {
+        const vshi_model_origin *origin = &work->model->entries[e].origin;
+        use *last = all->count > 0 ? &all->list[all->count - 1] : NULL;
+        if (last == NULL || !continues(work, last, e)) {
+            const use next = {.node = (size_t)origin->node - 1,
+                              .mesh = (size_t)origin->mesh - 1,
+                              .instance = origin->instance > 0 ? (size_t)origin->instance - 1 : SIZE_MAX,
+                              .first = e,
+                              .keeps = true};
+            if (origin->node == 0 || next.node >= nodes || !comes_once(all, &next, seen)) {
+                return fail_entry(work, e, error);
+            }
+            last = &all->list[all->count++];
+            *last = next;
+        }
+        VSHI_TRY(check_entry(work, e, last, error));
+        ++last->count;
+        last->lit = last->lit || work->meshes[e].uvs != NULL || work->meshes[e].uv_set >= 0;
+        last->keeps = last->keeps && work->meshes[e].uvs == NULL;
+    }
+    return VSH_OK;
+}
+
+/* How many instances a node has: the length of any of its accessors, which the model found alike. */
+static vsh_result count_instances(vshi_lit_work *work, size_t node, size_t *count, vsh_error *error) {
+    static const char *const parts[] = {"TRANSLATION", "ROTATION", "SCALE"};
+    vshi_gltf *gltf = &work->document.gltf;
+    const json_t *attributes = json_object_get(
+        vshi_gltf_extension(vshi_gltf_element(gltf, "nodes", node), instancing_name), "attributes");
+    *count = 0;
+    for (size_t k = 0; k < sizeof parts / sizeof parts[0] && *count == 0; ++k) {
+        size_t index;
+        vshi_gltf_accessor accessor;
+        VSHI_TRY(vshi_gltf_index(gltf, attributes, parts[k], "accessors", instancing_name, &index, error));
+        if (index != SIZE_MAX) {
+            VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
+            *count = accessor.count;
+        }
+    }
+    return VSH_OK;
+}
+
+/* Counts the showings of each mesh as it is: by nodes that the model does not have, or that stay unlit. */
+static vsh_result count_unlit(vshi_lit_work *work, uses *all, vsh_error *error) {
+    vshi_gltf *gltf = &work->document.gltf;
+    size_t n;
+    const json_t *node;
+    json_array_foreach(json_object_get(gltf->root, "nodes"), n, node) {
+        size_t mesh;
+        VSHI_TRY(vshi_gltf_index(gltf, node, "mesh", "meshes", "a node", &mesh, error));
+        if (mesh != SIZE_MAX) {
+            ++all->unlit[mesh];
+        }
+    }
+    for (size_t i = 0; i < all->count;) {
+        const size_t first = i, of = all->list[i].node;
+        size_t lit = 0, wanted = 1;
+        for (; i < all->count && all->list[i].node == of; ++i) {
+            lit += all->list[i].lit;
+        }
+        if (all->list[first].instance != SIZE_MAX) {
+            VSHI_TRY(count_instances(work, of, &wanted, error));
+        }
+        all->unlit[all->list[first].mesh] -= lit == wanted;
+    }
+    return VSH_OK;
+}
+
+/* --- meshes */
+
+/* An earlier use that shows the same: none gets UVs of its own, and the pages and sets are alike. */
+static const use *find_alike(const vshi_lit_work *work, const uses *all, const use *u) {
+    for (const use *other = all->list; other < u && u->keeps; ++other) {
+        bool alike = other->lit && other->keeps && other->mesh == u->mesh && other->count == u->count;
+        for (size_t i = 0; alike && i < u->count; ++i) {
+            const vsh_lit_mesh *a = &work->meshes[other->first + i], *b = &work->meshes[u->first + i];
+            alike = a->uv_set == b->uv_set && (a->uv_set < 0 || a->page == b->page) &&
+                    work->model->entries[other->first + i].origin.primitive ==
+                        work->model->entries[u->first + i].origin.primitive;
+        }
+        if (alike) {
+            return other;
+        }
+    }
+    return NULL;
+}
+
+static vsh_result make_primitives(vshi_lit_work *work, const use *u, json_t *list, vsh_error *error) {
+    const json_t *primitives =
+        json_object_get(vshi_gltf_element(&work->document.gltf, "meshes", u->mesh), "primitives");
+    size_t next = u->first;
+    for (size_t p = 0; p < json_array_size(primitives); ++p) {
+        if (next < u->first + u->count && work->model->entries[next].origin.primitive == p + 1) {
+            VSHI_TRY(vshi_lit_primitive_make(work, u->mesh, p, next, list, error));
+            ++next;
+        } else if (json_array_append_new(list, json_deep_copy(json_array_get(primitives, p))) != 0) {
+            return vshi_lit_no_memory(&work->document, error);
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result make_mesh(vshi_lit_work *work, uses *all, use *u, vsh_error *error) {
+    vshi_lit_document *document = &work->document;
+    const use *alike = find_alike(work, all, u);
+    if (alike != NULL) {
+        u->made = alike->made;
+        return VSH_OK;
+    }
+    json_t *mesh = json_copy(json_array_get(json_object_get(document->gltf.root, "meshes"), u->mesh));
+    json_t *list = json_array();
+    vsh_result result = mesh != NULL && list != NULL ? VSH_OK : vshi_lit_no_memory(document, error);
+    if (result == VSH_OK) {
+        result = make_primitives(work, u, list, error);
+    }
+    if (result == VSH_OK) {
+        result = vshi_lit_set(document, mesh, "primitives", json_incref(list), error);
+    }
+    json_decref(list);
+    if (result != VSH_OK) {
+        json_decref(mesh);
+        return result;
+    }
+    if (all->unlit[u->mesh] == 0 && all->changed[u->mesh] == NULL) {
+        all->changed[u->mesh] = mesh; /* put there when all have been made of what it was */
+        u->made = u->mesh;
+        return VSH_OK;
+    }
+    return vshi_lit_append(document, "meshes", mesh, &u->made, error);
+}
+
+/* --- instances */
+
+static const struct {
+    const char *attribute, *key;
+    int components;
+} parts[3] = {{"TRANSLATION", "translation", 3}, {"ROTATION", "rotation", 4}, {"SCALE", "scale", 3}};
+
+static vsh_result read_part(vshi_lit_work *work, const json_t *attributes, int part, size_t count,
+                            float **values, vsh_error *error) {
+    size_t index;
+    vshi_gltf *gltf = &work->document.gltf;
+    VSHI_TRY(vshi_gltf_index(gltf, attributes, parts[part].attribute, "accessors", instancing_name, &index,
+                             error));
+    return index == SIZE_MAX
+               ? VSH_OK
+               : vshi_gltf_read_attribute(gltf, attributes, parts[part].attribute, parts[part].components,
+                                          count, instancing_name, values, error);
+}
+
+static json_t *numbers(const float *values, int part) {
+    enum { ROTATION = 1 };
+    static const double unit_slack = 1e-5;
+    json_t *list = json_array();
+    double scale = 1.0;
+    if (part == ROTATION) { /* integers are not quite of unit length, and viewers want that */
+        double square = 0.0;
+        for (int c = 0; c < 4; ++c) {
+            square += (double)values[c] * (double)values[c];
+        }
+        if (!(square > 0.0)) {
+            json_decref(list);
+            return json_pack("[i,i,i,i]", 0, 0, 0, 1);
+        }
+        scale = fabs(square - 1.0) < unit_slack ? 1.0 : 1.0 / sqrt(square);
+    }
+    for (int c = 0; c < parts[part].components && list != NULL; ++c) {
+        if (json_array_append_new(list, json_real((double)values[c] * scale)) != 0) {
+            json_decref(list);
+            list = NULL;
+        }
+    }
+    return list;
+}
+
+static vsh_result add_instance(vshi_lit_work *work, const json_t *node, size_t node_index, size_t instance,
+                               size_t mesh, float *const values[3], json_t *children, vsh_error *error) {
+    vshi_lit_document *document = &work->document;
+    const char *given = json_string_value(json_object_get(node, "name"));
+    size_t index;
+    json_t *name = given != NULL && given[0] != '\0' ? json_sprintf("%s[%zu]", given, instance)
+                                                     : json_sprintf("nodes[%zu][%zu]", node_index, instance);
+    json_t *made = json_pack("{s:o,s:I}", "name", name, "mesh", (json_int_t)mesh);
+    vsh_result result = made != NULL ? VSH_OK : vshi_lit_no_memory(document, error);
+    for (int k = 0; result == VSH_OK && k < 3; ++k) {
+        if (values[k] != NULL) {
+            const float *own = values[k] + (size_t)parts[k].components * instance;
+            result = vshi_lit_set(document, made, parts[k].key, numbers(own, k), error);
+        }
+    }
+    const json_t *weights = json_object_get(node, "weights");
+    if (result == VSH_OK && weights != NULL) {
+        result = vshi_lit_set(document, made, "weights", json_deep_copy(weights), error);
+    }
+    if (result != VSH_OK) {
+        json_decref(made);
+        return result;
+    }
+    VSHI_TRY(vshi_lit_append(document, "nodes", made, &index, error));
+    return json_array_append_new(children, json_integer((json_int_t)index)) == 0
+               ? VSH_OK
+               : vshi_lit_no_memory(document, error);
+}
+
+/* Instances become children of their node; `first` … `end` - 1 are those that the model has. */
+static vsh_result add_instances(vshi_lit_work *work, const uses *all, size_t first, size_t end, size_t count,
+                                json_t *children, vsh_error *error) {
+    vshi_gltf *gltf = &work->document.gltf;
+    const use *of = &all->list[first];
+    const json_t *node = vshi_gltf_element(gltf, "nodes", of->node);
+    const json_t *attributes = json_object_get(vshi_gltf_extension(node, instancing_name), "attributes");
+    float *values[3] = {NULL, NULL, NULL};
+    vsh_result result = VSH_OK;
+    for (int k = 0; result == VSH_OK && k < 3; ++k) {
+        result = read_part(work, attributes, k, count, &values[k], error);
+    }
+    for (size_t i = 0, next = first; result == VSH_OK && i < count; ++i) {
+        const bool has = next < end && all->list[next].instance == i;
+        const size_t mesh = has && all->list[next].lit ? all->list[next].made : of->mesh;
+        next += has;
+        result = vshi_job_cancelled(gltf->job)
+                     ? vshi_job_fail_cancelled(gltf->job, error)
+                     : add_instance(work, node, of->node, i, mesh, values, children, error);
+    }
+    for (int k = 0; k < 3; ++k) {
+        free(values[k]);
+    }
+    return result;
+}
+
+static vsh_result expand(vshi_lit_work *work, const uses *all, size_t first, size_t end, vsh_error *error) {
+    vshi_lit_document *document = &work->document;
+    json_t *node = json_array_get(json_object_get(document->gltf.root, "nodes"), all->list[first].node);
+    json_t *children = json_object_get(node, "children");
+    size_t count;
+    VSHI_TRY(count_instances(work, all->list[first].node, &count, error));
+    if (children == NULL) {
+        VSHI_TRY(vshi_lit_set(document, node, "children", json_array(), error));
+        children = json_object_get(node, "children");
+    }
+    VSHI_TRY(add_instances(work, all, first, end, count, children, error));
+    json_t *extensions = json_object_get(node, "extensions");
+    json_object_del(extensions, instancing_name);
+    if (json_object_size(extensions) == 0) {
+        json_object_del(node, "extensions");
+    }
+    json_object_del(node, "mesh");
+    json_object_del(node, "weights");
+    return VSH_OK;
+}
+
+/* A node's uses, `first` … `end` - 1, have their meshes. */
+static vsh_result give(vshi_lit_work *work, const uses *all, size_t first, size_t end, vsh_error *error) {
+    vshi_lit_document *document = &work->document;
+    const use *of = &all->list[first];
+    bool any = false, same = true;
+    size_t wanted = 1;
+    for (size_t i = first; i < end; ++i) {
+        any = any || all->list[i].lit;
+        same = same && all->list[i].lit && all->list[i].made == of->made;
+    }
+    if (!any) {
+        return VSH_OK;
+    }
+    if (of->instance != SIZE_MAX) {
+        VSHI_TRY(count_instances(work, of->node, &wanted, error));
+    }
+    if (!same || end - first != wanted) {
+        return expand(work, all, first, end, error);
+    }
+    json_t *node = json_array_get(json_object_get(document->gltf.root, "nodes"), of->node);
+    return vshi_lit_set(document, node, "mesh", json_integer((json_int_t)of->made), error);
+}
+
+static vsh_result make_all(vshi_lit_work *work, uses *all, vsh_error *error) {
+    vshi_gltf *gltf = &work->document.gltf;
+    for (size_t i = 0; i < all->count; ++i) {
+        if (vshi_job_advance(gltf->job, all->list[i].count)) {
+            return vshi_job_fail_cancelled(gltf->job, error);
+        }
+        if (all->list[i].lit) {
+            VSHI_TRY(make_mesh(work, all, &all->list[i], error));
+        }
+    }
+    for (size_t first = 0, end; first < all->count; first = end) {
+        for (end = first + 1; end < all->count && all->list[end].node == all->list[first].node;) {
+            ++end;
+        }
+        VSHI_TRY(give(work, all, first, end, error));
+    }
+    json_t *meshes = json_object_get(gltf->root, "meshes");
+    for (size_t m = 0; m < all->mesh_count; ++m) {
+        if (all->changed[m] != NULL && json_array_set(meshes, m, all->changed[m]) != 0) {
+            return vshi_lit_no_memory(&work->document, error);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Extensions that only what has changed has needed. */
+static void drop_extensions(vshi_lit_work *work) {
+    size_t i, k;
+    const json_t *item, *primitive;
+    bool instancing = false, draco = false;
+    json_array_foreach(json_object_get(work->document.gltf.root, "nodes"), i, item) {
+        instancing = instancing || vshi_gltf_extension(item, instancing_name) != NULL;
+    }
+    json_array_foreach(json_object_get(work->document.gltf.root, "meshes"), i, item) {
+        json_array_foreach(json_object_get(item, "primitives"), k, primitive) {
+            draco = draco || vshi_gltf_extension(primitive, "KHR_draco_mesh_compression") != NULL;
+        }
+    }
+    if (!instancing) {
+        vshi_lit_drop_extension(&work->document, instancing_name);
+    }
+    if (!draco) {
+        vshi_lit_drop_extension(&work->document, "KHR_draco_mesh_compression");
+    }
+}
+
+vsh_result vshi_lit_nodes_make(vshi_lit_work *work, vsh_error *error) {
+    vshi_gltf *gltf = &work->document.gltf;
+    const size_t nodes = json_array_size(json_object_get(gltf->root, "nodes"));
+    uses all = {.mesh_count = json_array_size(json_object_get(gltf->root, "meshes"))};
+    bool *seen = NULL;
+    vsh_result result;
+    const struct {
+        void *memory;
+        size_t count, size;
+    } wanted[] = {{&all.list, vsh_model_mesh_count(work->model), sizeof *all.list},
+                  {&all.unlit, all.mesh_count, sizeof *all.unlit},
+                  {&all.changed, all.mesh_count, sizeof *all.changed},
+                  {&seen, nodes, sizeof *seen}};
+    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
+        VSHI_TRY_DONE(
+            vshi_gltf_allocate(gltf, (void **)wanted[i].memory, wanted[i].count, wanted[i].size, error));
+    }
+    VSHI_TRY_DONE(list_uses(work, seen, &all, error));
+    VSHI_TRY_DONE(count_unlit(work, &all, error));
+    VSHI_TRY_DONE(make_all(work, &all, error));
+    drop_extensions(work);
+done:
+    for (size_t m = 0; all.changed != NULL && m < all.mesh_count; ++m) {
+        json_decref(all.changed[m]);
+    }
+    free(seen);
+    free(all.changed);
+    free(all.unlit);
+    free(all.list);
+    return result;
+}

@@ -1,0 +1,274 @@
+/* What becomes of a primitive: its new set of UVs, and where the atlas asks for it, vertices of its own. */
+#include "lit/work.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char draco_name[] = "KHR_draco_mesh_compression";
+
+/* --- shapes */
+
+static vsh_result grow(const vshi_lit_document *document, void **list, size_t count, size_t *capacity,
+                       size_t size, vsh_error *error) {
+    if (count < *capacity) {
+        return VSH_OK;
+    }
+    const size_t more = 2 * *capacity + 8;
+    void *grown = realloc(*list, more * size);
+    if (grown == NULL) {
+        return vshi_lit_no_memory(document, error);
+    }
+    *list = grown;
+    *capacity = more;
+    return VSH_OK;
+}
+
+static bool is_before(const vshi_lit_shape *shape, size_t mesh, size_t primitive) {
+    return shape->mesh != mesh ? shape->mesh < mesh : shape->primitive < primitive;
+}
+
+static vsh_result find_shape(vshi_lit_work *work, size_t mesh, size_t primitive, size_t entry,
+                             const json_t *given, const char *where, vshi_lit_shape **shape,
+                             vsh_error *error) {
+    size_t low = 0, high = work->shape_count;
+    while (low < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (is_before(&work->shapes[middle], mesh, primitive)) {
+            low = middle + 1;
+        } else {
+            high = middle;
+        }
+    }
+    if (low == work->shape_count || work->shapes[low].mesh != mesh ||
+        work->shapes[low].primitive != primitive) {
+        VSHI_TRY(grow(&work->document, (void **)&work->shapes, work->shape_count, &work->shape_capacity,
+                      sizeof *work->shapes, error));
+        memmove(work->shapes + low + 1, work->shapes + low, (work->shape_count - low) * sizeof *work->shapes);
+        ++work->shape_count;
+        work->shapes[low] = (vshi_lit_shape){.mesh = mesh, .primitive = primitive};
+        const vsh_mesh view = vsh_model_mesh(work->model, entry, 0);
+        VSHI_TRY(vshi_lit_topology_find(&work->document, given, where,
+                                        vshi_lit_draco_of(&work->dracos, mesh, primitive), &view,
+                                        &work->shapes[low].topology, error));
+    }
+    *shape = &work->shapes[low];
+    return vsh_model_mesh(work->model, entry, 0).vertex_count == (*shape)->topology.vertex_count
+               ? VSH_OK
+               : vshi_gltf_fail(&work->document.gltf, error, "%s: two nodes show it with other vertices",
+                                where);
+}
+
+/* --- vertices */
+
+/* The vertices of one primitive in the atlas. */
+typedef struct vertices {
+    uint32_t *elements; /* [vertex_count] of the accessors */
+    float (*uvs)[2];    /* [vertex_count], v down */
+    uint32_t *corners;  /* [triangle_count][3]: elements; NULL: those of the atlas itself */
+    bool split;         /* an element has two places, or is compressed */
+} vertices;
+
+static void free_vertices(vertices *v) {
+    free(v->corners);
+    free(v->uvs);
+    free(v->elements);
+}
+
+/* Whether some vertex of the model has two places. */
+static vsh_result find_split(vshi_lit_work *work, const vshi_lit_topology *topology, const vsh_lit_mesh *mesh,
+                             vertices *v, vsh_error *error) {
+    uint32_t *first = NULL; /* 1 + the first vertex of the atlas that is this one; 0: none yet */
+    VSHI_TRY(vshi_gltf_allocate(&work->document.gltf, (void **)&first, topology->vertex_count, sizeof *first,
+                                error));
+    v->split = topology->draco != NULL;
+    for (size_t i = 0; i < mesh->vertex_count && !v->split; ++i) {
+        const uint32_t source = mesh->sources[i];
+        if (first[source] == 0) {
+            first[source] = (uint32_t)i + 1;
+        } else {
+            v->split = memcmp(v->uvs[first[source] - 1], v->uvs[i], sizeof v->uvs[i]) != 0;
+        }
+    }
+    free(first);
+    return VSH_OK;
+}
+
+static vsh_result find_vertices(vshi_lit_work *work, const vshi_lit_topology *topology,
+                                const vsh_lit_mesh *mesh, vertices *v, vsh_error *error) {
+    vshi_gltf *gltf = &work->document.gltf;
+    const double held = gltf->bytes_held;
+    VSHI_TRY(vshi_gltf_take(gltf, (void **)&v->elements, mesh->vertex_count, sizeof *v->elements, error));
+    VSHI_TRY(vshi_gltf_take(gltf, (void **)&v->uvs, mesh->vertex_count, sizeof *v->uvs, error));
+    for (size_t i = 0; i < mesh->vertex_count; ++i) {
+        v->elements[i] = topology->elements[mesh->sources[i]];
+        v->uvs[i][0] = mesh->uvs[2 * i];
+        v->uvs[i][1] = 1.0F - mesh->uvs[2 * i + 1]; /* v points down in glTF */
+    }
+    VSHI_TRY(find_split(work, topology, mesh, v, error));
+    if (!v->split && vshi_lit_only_page(work, mesh) == VSH_LIT_NO_CHART) {
+        VSHI_TRY(
+            vshi_gltf_take(gltf, (void **)&v->corners, mesh->triangle_count, 3 * sizeof *v->corners, error));
+        for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
+            v->corners[i] = v->elements[mesh->indices[i]];
+        }
+    }
+    gltf->bytes_held = held; /* they are freed with this primitive */
+    return VSH_OK;
+}
+
+/* --- attributes */
+
+static bool same(const vsh_lit_mesh *a, const vsh_lit_mesh *b) {
+    return a->vertex_count == b->vertex_count && a->triangle_count == b->triangle_count &&
+           memcmp(a->sources, b->sources, a->vertex_count * sizeof *a->sources) == 0 &&
+           memcmp(a->indices, b->indices, a->triangle_count * 3 * sizeof *a->indices) == 0;
+}
+
+/* That of an instance that is split alike, or a new one. */
+static vsh_result take_split(vshi_lit_work *work, vshi_lit_shape *shape, const vsh_lit_mesh *mesh,
+                             vshi_lit_split **split, vsh_error *error) {
+    for (size_t i = 0; i < shape->split_count; ++i) {
+        *split = &shape->splits[i];
+        if (same((*split)->mesh, mesh)) {
+            return VSH_OK;
+        }
+    }
+    VSHI_TRY(grow(&work->document, (void **)&shape->splits, shape->split_count, &shape->split_capacity,
+                  sizeof *shape->splits, error));
+    *split = &shape->splits[shape->split_count++];
+    **split = (vshi_lit_split){.mesh = mesh, .indices = SIZE_MAX};
+    return VSH_OK;
+}
+
+/* Replaces the accessors that `attributes` (of the primitive, or of a morph target) names. */
+static vsh_result gather(vshi_lit_work *work, const vshi_lit_topology *topology, const json_t *primitive,
+                         json_t *attributes, bool target, const vsh_lit_mesh *mesh, const vertices *v,
+                         const char *where, vshi_lit_split *split, vsh_error *error) {
+    const char *name;
+    json_t *value;
+    json_object_foreach(attributes, name, value) {
+        size_t index, accessor;
+        VSHI_TRY(vshi_gltf_index(&work->document.gltf, attributes, name, "accessors", where, &index, error));
+        const vshi_lit_draco_attribute *draco =
+            topology->draco != NULL && !target ? vshi_lit_draco_attribute_of(topology->draco, primitive, name)
+                                               : NULL;
+        VSHI_TRY(vshi_lit_gather(&work->document, index, topology->element_count, draco, v->elements,
+                                 mesh->vertex_count, strcmp(name, "POSITION") == 0, where, &split->gathered,
+                                 &accessor, error));
+        if (json_object_set_new_nocheck(attributes, name, json_integer((json_int_t)accessor)) != 0) {
+            return vshi_lit_no_memory(&work->document, error);
+        }
+    }
+    return VSH_OK;
+}
+
+static void drop_draco(json_t *primitive) {
+    json_t *extensions = json_object_get(primitive, "extensions");
+    json_object_del(extensions, draco_name);
+    if (extensions != NULL && json_object_size(extensions) == 0) {
+        json_object_del(primitive, "extensions");
+    }
+}
+
+/* `made` with vertices of its own. */
+static vsh_result make_split(vshi_lit_work *work, vshi_lit_shape *shape, const json_t *given,
+                             const vsh_lit_mesh *mesh, const vertices *v, const char *where, json_t *made,
+                             size_t *uvs, vshi_lit_split **split, vsh_error *error) {
+    vshi_lit_document *document = &work->document;
+    VSHI_TRY(take_split(work, shape, mesh, split, error));
+    VSHI_TRY(gather(work, &shape->topology, given, json_object_get(made, "attributes"), false, mesh, v, where,
+                    *split, error));
+    size_t i;
+    json_t *target;
+    json_array_foreach(json_object_get(made, "targets"), i, target) {
+        VSHI_TRY(gather(work, &shape->topology, given, target, true, mesh, v, where, *split, error));
+    }
+    drop_draco(made);
+    return vshi_lit_add_floats(document, v->uvs[0], mesh->vertex_count, 2, false, uvs, NULL, error);
+}
+
+static size_t free_set(const json_t *attributes, char *name, size_t size) {
+    size_t set = 0;
+    do {
+        snprintf(name, size, "TEXCOORD_%zu", set);
+    } while (json_object_get(attributes, name) != NULL && ++set > 0);
+    return set;
+}
+
+static vsh_result set_uvs(const vshi_lit_work *work, json_t *primitive, size_t accessor, size_t *set,
+                          vsh_error *error) {
+    char name[40];
+    json_t *attributes = json_object_get(primitive, "attributes");
+    *set = free_set(attributes, name, sizeof name);
+    return vshi_lit_set(&work->document, attributes, name, json_integer((json_int_t)accessor), error);
+}
+
+static vsh_result make(vshi_lit_work *work, vshi_lit_shape *shape, const json_t *given,
+                       const vsh_lit_mesh *mesh, const vertices *v, const char *where, json_t *made,
+                       json_t *list, vsh_error *error) {
+    vshi_lit_document *document = &work->document;
+    vshi_lit_split *split = NULL;
+    size_t uvs, set, positions, whole = SIZE_MAX;
+    if (v->split) {
+        VSHI_TRY(make_split(work, shape, given, mesh, v, where, made, &uvs, &split, error));
+    } else {
+        VSHI_TRY(vshi_gltf_index(&document->gltf, json_object_get(given, "attributes"), "POSITION",
+                                 "accessors", where, &positions, error));
+        VSHI_TRY(vshi_lit_uv_pool_put(document, &work->pool, positions, shape->topology.element_count,
+                                      v->elements, (const float(*)[2])v->uvs, mesh->vertex_count, &uvs,
+                                      error));
+    }
+    VSHI_TRY(set_uvs(work, made, uvs, &set, error));
+    const uint32_t only = vshi_lit_only_page(work, mesh);
+    if (!v->split && only != VSH_LIT_NO_CHART) { /* its indices stay, strips too */
+        VSHI_TRY(vshi_lit_mark_primitive(work, made, only, set, error));
+        return json_array_append(list, made) == 0 ? VSH_OK : vshi_lit_no_memory(document, error);
+    }
+    if (shape->topology.mode != VSHI_LIT_TRIANGLES || shape->topology.draco != NULL) {
+        json_object_del(made, "mode");
+    }
+    return v->split ? vshi_lit_pages_make(work, made, mesh, mesh->indices, mesh->vertex_count, set,
+                                          &split->indices, list, error)
+                    : vshi_lit_pages_make(work, made, mesh, v->corners, shape->topology.element_count, set,
+                                          &whole, list, error);
+}
+
+/* The set is the file's own. */
+static vsh_result make_kept(vshi_lit_work *work, const vsh_lit_mesh *mesh, const char *where, json_t *made,
+                            json_t *list, vsh_error *error) {
+    char name[40];
+    snprintf(name, sizeof name, "TEXCOORD_%d", mesh->uv_set);
+    if (mesh->uv_set >= 0 && json_object_get(json_object_get(made, "attributes"), name) == NULL) {
+        return vshi_gltf_fail(&work->document.gltf, error, "%s: has no %s to be lit by", where, name);
+    }
+    if (mesh->uv_set >= 0) {
+        VSHI_TRY(vshi_lit_mark_primitive(work, made, mesh->page, (size_t)mesh->uv_set, error));
+    }
+    return json_array_append(list, made) == 0 ? VSH_OK : vshi_lit_no_memory(&work->document, error);
+}
+
+vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t primitive, size_t entry,
+                                   json_t *list, vsh_error *error) {
+    char where[96];
+    snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", mesh, primitive);
+    const json_t *given = json_array_get(
+        json_object_get(vshi_gltf_element(&work->document.gltf, "meshes", mesh), "primitives"), primitive);
+    const vsh_lit_mesh *lit = &work->meshes[entry];
+    vertices v = {.elements = NULL};
+    vshi_lit_shape *shape;
+    json_t *made = json_deep_copy(given);
+    vsh_result result = made != NULL ? VSH_OK : vshi_lit_no_memory(&work->document, error);
+    if (result == VSH_OK && lit->uvs == NULL) {
+        result = make_kept(work, lit, where, made, list, error);
+        goto done;
+    }
+    VSHI_TRY_DONE(result);
+    VSHI_TRY_DONE(find_shape(work, mesh, primitive, entry, given, where, &shape, error));
+    VSHI_TRY_DONE(find_vertices(work, &shape->topology, lit, &v, error));
+    VSHI_TRY_DONE(make(work, shape, given, lit, &v, where, made, list, error));
+done:
+    free_vertices(&v);
+    json_decref(made);
+    return result;
+}

@@ -1,0 +1,215 @@
+/* Materials of a glTF, as far as they decide where light comes through: alphaMode and the alpha of the base
+ * colour's texture (glTF 2.0, 3.9.4; KHR_texture_transform). */
+#include "model/gltf.h"
+
+#include "base/elementary.h"
+#include "base/input.h"
+#include "base/memory.h"
+#include "base/uri.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* --- what the texture is */
+
+static int32_t wrap_of(const json_t *sampler, const char *key) {
+    enum { CLAMP = 33071, MIRROR = 33648 };
+    const double code = json_number_value(json_object_get(sampler, key));
+    return code == CLAMP ? VSH_WRAP_CLAMP : code == MIRROR ? VSH_WRAP_MIRROR : VSH_WRAP_REPEAT;
+}
+
+/* From UVs with v up to those of the image with v up: offset × rotation × scale, where the rotation goes the
+ * way that Blender, Babylon and three.js have it and not that of the extension's own listing (glTF issue
+ * 1563). */
+static bool read_transform(const json_t *transform, double to[6]) {
+    double offset[2] = {0.0, 0.0}, scale[2] = {1.0, 1.0}, angle = 0.0;
+    const json_t *rotation = json_object_get(transform, "rotation");
+    bool good = vshi_gltf_numbers(transform, "offset", 2, offset) &&
+                vshi_gltf_numbers(transform, "scale", 2, scale) &&
+                (rotation == NULL || json_is_number(rotation));
+    angle = rotation != NULL ? json_number_value(rotation) : angle;
+    const double c = vshi_cos(angle), s = vshi_sin(angle);
+    const double down[6] = {c * scale[0], s * scale[1], offset[0], -s * scale[0], c * scale[1], offset[1]};
+    const double up[6] = {down[0], -down[1], down[1] + down[2], -down[3], down[4], 1.0 - down[4] - down[5]};
+    for (int i = 0; i < 6; ++i) {
+        good = good && fabs(up[i]) <= FLT_MAX;
+        to[i] = up[i] + 0.0;
+    }
+    return good;
+}
+
+/* --- its image */
+
+static vsh_result take_path(const vshi_gltf *gltf, const char *where, const char *uri,
+                            vshi_model_image *image, vsh_error *error) {
+    if (vshi_uri_is_remote(uri)) {
+        return vshi_gltf_fail(gltf, error, "%s is '%.200s': only files beside it are read", where, uri);
+    }
+    image->path = vshi_uri_path(gltf->path, uri);
+    if (image->path == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
+    }
+    if (gltf->run->allow_outside != 0 || vshi_input_is_beside(gltf->path, image->path)) {
+        return VSH_OK;
+    }
+    const vsh_result result = vshi_gltf_fail(
+        gltf, error, "%s is '%.400s', outside of its folder; --allow-outside reads it", where, image->path);
+    free(image->path);
+    image->path = NULL;
+    return result;
+}
+
+static vsh_result take_data(vshi_gltf *gltf, const char *where, const char *uri, vshi_model_image *image,
+                            vsh_error *error) {
+    VSHI_TRY(vshi_gltf_hold(gltf, 0.75 * (double)strlen(uri), error));
+    if (vshi_uri_data(uri, &image->owned, &image->size)) {
+        return VSH_OK;
+    }
+    const bool damaged = image->size == 0;
+    image->size = 0;
+    return damaged ? vshi_gltf_fail(gltf, error, "%s: its data URI is no base64", where)
+                   : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
+}
+
+static vsh_result take_view(vshi_gltf *gltf, const char *where, size_t view, vshi_model_image *image,
+                            vsh_error *error) {
+    vshi_gltf_bytes bytes;
+    size_t stride;
+    VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &stride, error));
+    if (bytes.size == 0) {
+        return vshi_gltf_fail(gltf, error, "%s is empty", where);
+    }
+    VSHI_TRY(vshi_gltf_take(gltf, (void **)&image->owned, bytes.size, 1, error));
+    memcpy(image->owned, bytes.at, bytes.size);
+    image->size = bytes.size;
+    return VSH_OK;
+}
+
+/* Where it has not been read yet. */
+static vsh_result read_image(vshi_gltf *gltf, size_t index, vsh_error *error) {
+    char where[32];
+    snprintf(where, sizeof where, "images[%zu]", index);
+    const json_t *given = vshi_gltf_element(gltf, "images", index);
+    const char *uri = json_string_value(json_object_get(given, "uri"));
+    vshi_model_image *image = &gltf->model->images[index];
+    size_t view;
+    if (image->path != NULL || image->owned != NULL) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_gltf_index(gltf, given, "bufferView", "bufferViews", where, &view, error));
+    VSHI_TRY(view != SIZE_MAX ? take_view(gltf, where, view, image, error)
+             : uri == NULL    ? vshi_gltf_fail(gltf, error, "%s has neither a URI nor a buffer view", where)
+             : vshi_uri_is_data(uri) ? take_data(gltf, where, uri, image, error)
+                                     : take_path(gltf, where, uri, image, error));
+    image->bytes = image->owned;
+    return VSH_OK;
+}
+
+/* The image of a texture: where it names none, that of an extension for other formats; SIZE_MAX: none. */
+static vsh_result find_image(const vshi_gltf *gltf, const json_t *texture, const char *where, size_t *image,
+                             vsh_error *error) {
+    static const char *const others[] = {"EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds",
+                                         "KHR_texture_basisu"};
+    VSHI_TRY(vshi_gltf_index(gltf, texture, "source", "images", where, image, error));
+    for (size_t i = 0; *image == SIZE_MAX && i < sizeof others / sizeof others[0]; ++i) {
+        VSHI_TRY(vshi_gltf_index(gltf, vshi_gltf_extension(texture, others[i]), "source", "images", where,
+                                 image, error));
+    }
+    return VSH_OK;
+}
+
+static vsh_result read_texture(vshi_gltf *gltf, const json_t *info, const char *where,
+                               vshi_model_material *material, vsh_error *error) {
+    const json_t *transform = vshi_gltf_extension(info, "KHR_texture_transform");
+    vsh_model_material *told = &material->told;
+    size_t texture, image, sampler, set, own_set;
+    VSHI_TRY(vshi_gltf_index(gltf, info, "index", "textures", where, &texture, error));
+    if (texture == SIZE_MAX) {
+        return VSH_OK;
+    }
+    const json_t *given = vshi_gltf_element(gltf, "textures", texture);
+    VSHI_TRY(find_image(gltf, given, where, &image, error));
+    VSHI_TRY(vshi_gltf_index(gltf, given, "sampler", "samplers", where, &sampler, error));
+    if (!vshi_gltf_count(info, "texCoord", 0, &set) ||
+        !vshi_gltf_count(transform, "texCoord", set, &own_set) || own_set >= VSH_MAX_UV_SETS ||
+        !read_transform(transform, told->uv_transform)) {
+        return vshi_gltf_fail(gltf, error, "%s: the texCoord or transform of its texture is wrong", where);
+    }
+    told->uv_set = (int32_t)own_set;
+    if (sampler != SIZE_MAX) {
+        told->wrap[0] = wrap_of(vshi_gltf_element(gltf, "samplers", sampler), "wrapS");
+        told->wrap[1] = wrap_of(vshi_gltf_element(gltf, "samplers", sampler), "wrapT");
+    }
+    if (image != SIZE_MAX) {
+        VSHI_TRY(read_image(gltf, image, error));
+        material->image = image + 1;
+    }
+    return VSH_OK;
+}
+
+/* --- materials */
+
+static int32_t alpha_of(const json_t *given) {
+    const char *mode = json_string_value(json_object_get(given, "alphaMode"));
+    return mode != NULL && strcmp(mode, "BLEND") == 0  ? VSH_ALPHA_BLENDED
+           : mode != NULL && strcmp(mode, "MASK") == 0 ? VSH_ALPHA_MASKED
+                                                       : VSH_ALPHA_OPAQUE;
+}
+
+/* A number between limits; else the fallback. */
+static double number_or(const json_t *given, double lowest, double highest, double fallback) {
+    const double number = json_number_value(given);
+    return json_is_number(given) && number >= lowest && number <= highest ? number : fallback;
+}
+
+/* What casts by its texture needs that; of others only what they are is told. A texture that cannot be had is
+ * left out with a warning: the mesh is there all the same. */
+static vsh_result read_mask(vshi_gltf *gltf, const json_t *given, const char *where,
+                            vshi_model_material *material, vsh_error *error) {
+    const json_t *surface = json_object_get(given, "pbrMetallicRoughness");
+    vsh_error why;
+    material->told.alpha_cutoff = number_or(json_object_get(given, "alphaCutoff"), 0.0, FLT_MAX, 0.5);
+    material->told.base_alpha =
+        number_or(json_array_get(json_object_get(surface, "baseColorFactor"), 3), 0.0, 1.0, 1.0);
+    const vsh_result result =
+        read_texture(gltf, json_object_get(surface, "baseColorTexture"), where, material, &why);
+    if (result == VSH_ERROR_INPUT || result == VSH_ERROR_READ || result == VSH_ERROR_UNSUPPORTED) {
+        vshi_warn(gltf->run, "%s; its mask is not read", why.message);
+        return VSH_OK;
+    }
+    return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "%s", why.message);
+}
+
+vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error) {
+    static const double as_they_are[6] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+    const json_t *materials = json_object_get(gltf->root, "materials");
+    vsh_model *model = gltf->model;
+    const size_t count = json_array_size(materials);
+    const size_t images = json_array_size(json_object_get(gltf->root, "images"));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&model->materials, count, sizeof *model->materials, error));
+    model->material_count = count;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&model->images, images, sizeof *model->images, error));
+    model->image_count = images;
+    for (size_t i = 0; i < count; ++i) {
+        const json_t *given = json_array_get(materials, i);
+        vshi_model_material *material = &model->materials[i];
+        char where[32];
+        snprintf(where, sizeof where, "materials[%zu]", i);
+        memcpy(material->told.uv_transform, as_they_are, sizeof as_they_are);
+        material->told.alpha = alpha_of(given);
+        material->told.double_sided = json_is_true(json_object_get(given, "doubleSided"));
+        material->told.base_alpha = 1.0;
+        const char *name = json_string_value(json_object_get(given, "name"));
+        if (name != NULL && name[0] != '\0') {
+            VSHI_TRY(vshi_gltf_hold(gltf, (double)strlen(name), error));
+            VSHI_TRY(vshi_model_copy_line(name, &material->name, error));
+        }
+        if (material->told.alpha == VSH_ALPHA_MASKED) {
+            VSHI_TRY(read_mask(gltf, given, where, material, error));
+        }
+    }
+    return VSH_OK;
+}

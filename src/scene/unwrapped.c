@@ -1,0 +1,260 @@
+#include "scene/unwrapped.h"
+
+#include "base/memory.h"
+#include "base/try.h"
+
+#include <vdbshade/lit.h>
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Of a mesh's triangles, those without area in the UVs: what an exporter leaves of slivers. */
+static const double LARGEST_DEGENERATE = 0.01;
+
+int32_t vshi_receiver_unwrap(const vsh_receiver *receiver) {
+    if (receiver->type != VSH_RECEIVER_MESH) {
+        return VSH_RECEIVER_UNWRAP_NEVER;
+    }
+    if (receiver->unwrap != VSH_RECEIVER_UNWRAP_DEFAULT) {
+        return receiver->unwrap;
+    }
+    return vsh_lit_is_output(receiver->output) ? VSH_RECEIVER_UNWRAP_AUTO : VSH_RECEIVER_UNWRAP_NEVER;
+}
+
+/* Whether a lightmap of the meshes' own UVs can be baked. */
+static vsh_result are_usable(const vsh_receiver *receiver, const vsh_mesh *meshes, size_t count,
+                             const vsh_run *run, bool *usable, vsh_error *error) {
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = receiver->width;
+    options.height = receiver->height;
+    vsh_run quiet = *run;
+    quiet.warning = NULL;
+    vsh_uv_report *reports = NULL;
+    vsh_charts *charts = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&reports, count, sizeof *reports, "UV reports", error));
+    VSHI_TRY_DONE(vsh_charts_create(meshes, count, &options, &quiet, reports, &charts, error));
+    vsh_charts_info info;
+    vsh_charts_get_info(charts, &info);
+    size_t overlap = 0;
+    *usable = info.covered > 0;
+    for (size_t i = 0; i < count; ++i) {
+        overlap += reports[i].overlap_texels;
+        *usable =
+            *usable && reports[i].outside_triangles == 0 &&
+            (double)reports[i].degenerate_triangles <= LARGEST_DEGENERATE * (double)meshes[i].triangle_count;
+    }
+    *usable = *usable && (double)overlap <= VSH_LARGEST_OVERLAP * (double)info.covered;
+done:
+    vsh_charts_free(charts);
+    free(reports);
+    return result;
+}
+
+vsh_result vshi_receiver_needs_unwrap(const vsh_receiver *receiver, const vsh_mesh *meshes, size_t count,
+                                      const vsh_run *run, bool *needs, vsh_error *error) {
+    const int32_t mode = vshi_receiver_unwrap(receiver);
+    *needs = mode == VSH_RECEIVER_UNWRAP_ALWAYS;
+    if (mode != VSH_RECEIVER_UNWRAP_AUTO) {
+        return VSH_OK;
+    }
+    for (size_t i = 0; i < count; ++i) {
+        *needs = *needs || meshes[i].uvs == NULL;
+    }
+    if (*needs) {
+        return VSH_OK;
+    }
+    bool usable = false;
+    VSHI_TRY(are_usable(receiver, meshes, count, run, &usable, error));
+    *needs = !usable;
+    return VSH_OK;
+}
+
+/* --- parts */
+
+typedef struct cutting {
+    const vsh_mesh *meshes;
+    size_t count;
+    const vsh_atlas_chart *charts;
+    size_t *on_page;  /* [page_count]: triangles of one mesh */
+    uint32_t objects; /* numbers of objects that are taken */
+    vshi_unwrapped *made;
+} cutting;
+
+static vsh_result take(vshi_unwrapped *made, size_t count, size_t size, void **array, vsh_error *error) {
+    VSHI_TRY(vshi_allocate(array, count, size, "unwrapped meshes", error));
+    made->arrays[made->array_count++] = *array;
+    return VSH_OK;
+}
+
+static uint32_t page_of(const cutting *c, const vsh_atlas_mesh *view, size_t triangle) {
+    const uint32_t chart = view->charts[triangle];
+    return chart == VSH_NO_CHART ? UINT32_MAX : c->charts[chart].page;
+}
+
+/* Counts a mesh's triangles by pages; those without a chart go with the first that has any. Returns how many
+ * pages there are. */
+static size_t count_by_page(const cutting *c, const vsh_atlas_mesh *view, size_t *first) {
+    size_t pages = 0, none = 0;
+    memset(c->on_page, 0, c->made->page_count * sizeof *c->on_page);
+    for (size_t t = 0; t < view->triangle_count; ++t) {
+        const uint32_t page = page_of(c, view, t);
+        if (page == UINT32_MAX) {
+            ++none;
+        } else {
+            pages += c->on_page[page]++ == 0;
+        }
+    }
+    for (*first = 0; pages > 0 && c->on_page[*first] == 0;) {
+        ++*first;
+    }
+    c->on_page[*first] += none;
+    return pages > 0 ? pages : 1;
+}
+
+/* Copies `width` floats a vertex to where the atlas wants them; NULL where there are none. */
+static vsh_result gather(vshi_unwrapped *made, const float *from, const vsh_atlas_mesh *view, size_t width,
+                         const float **to, vsh_error *error) {
+    *to = NULL;
+    if (from == NULL || view->vertex_count == 0) {
+        return VSH_OK;
+    }
+    void *memory;
+    VSHI_TRY(take(made, view->vertex_count, width * sizeof(float), &memory, error));
+    float *gathered = memory;
+    for (size_t v = 0; v < view->vertex_count; ++v) {
+        memcpy(gathered + width * v, from + width * (size_t)view->sources[v], width * sizeof *gathered);
+    }
+    *to = gathered;
+    return VSH_OK;
+}
+
+/* The triangles of a mesh that lie on one page. */
+static vsh_result select_page(const cutting *c, const vsh_atlas_mesh *view, uint32_t page, bool first,
+                              vsh_mesh *part, vsh_error *error) {
+    void *memory;
+    VSHI_TRY(take(c->made, c->on_page[page], 3 * sizeof(uint32_t), &memory, error));
+    uint32_t *indices = memory;
+    part->indices = indices;
+    part->triangle_count = 0;
+    for (size_t t = 0; t < view->triangle_count; ++t) {
+        const uint32_t own = page_of(c, view, t);
+        if (own == page || (own == UINT32_MAX && first)) {
+            memcpy(indices + 3 * part->triangle_count++, view->indices + 3 * t, 3 * sizeof *indices);
+        }
+    }
+    return VSH_OK;
+}
+
+/* Adds a mesh's parts to the pages' lists, of which `page_begins` says where each goes on. */
+static vsh_result add_parts(cutting *c, size_t m, vsh_error *error) {
+    vshi_unwrapped *made = c->made;
+    const vsh_atlas_mesh view = vsh_atlas_mesh_view(made->atlas, m);
+    size_t first;
+    const size_t pages = count_by_page(c, &view, &first);
+    vsh_mesh part = c->meshes[m];
+    part.checked = NULL;
+    part.uvs = view.uvs;
+    part.indices = view.indices;
+    part.vertex_count = view.vertex_count;
+    part.object = pages > 1 && part.object == 0 ? ++c->objects : part.object;
+    VSHI_TRY(gather(made, c->meshes[m].positions, &view, 3, &part.positions, error));
+    VSHI_TRY(gather(made, c->meshes[m].normals, &view, 3, &part.normals, error));
+    for (size_t page = 0; page < made->page_count; ++page) {
+        if (c->on_page[page] == 0 && !(page == first && pages == 1)) {
+            continue;
+        }
+        vsh_mesh *placed = &made->parts[made->page_begins[page]];
+        *placed = part;
+        made->numbers[made->page_begins[page]++] = m;
+        if (pages > 1) {
+            VSHI_TRY(select_page(c, &view, (uint32_t)page, page == first, placed, error));
+        }
+    }
+    return VSH_OK;
+}
+
+/* Where each page's parts begin, and how many there are. */
+static void count_parts(cutting *c) {
+    vshi_unwrapped *made = c->made;
+    for (size_t m = 0; m < c->count; ++m) {
+        const vsh_atlas_mesh view = vsh_atlas_mesh_view(made->atlas, m);
+        size_t first;
+        const bool empty = count_by_page(c, &view, &first) == 1 && c->on_page[first] == 0;
+        for (size_t page = 0; page < made->page_count; ++page) {
+            made->page_begins[page + 1] += c->on_page[page] > 0 || (empty && page == first);
+        }
+    }
+    for (size_t page = 0; page < made->page_count; ++page) {
+        made->page_begins[page + 1] += made->page_begins[page];
+    }
+    made->part_count = made->page_begins[made->page_count];
+}
+
+static vsh_result cut(cutting *c, const vsh_run *run, vsh_error *error) {
+    vshi_unwrapped *made = c->made;
+    double bytes = 0.0;
+    for (size_t m = 0; m < c->count; ++m) {
+        const vsh_atlas_mesh view = vsh_atlas_mesh_view(made->atlas, m);
+        const size_t width = c->meshes[m].normals != NULL ? 6 : 3;
+        bytes += (double)view.vertex_count * (double)(width * sizeof(float)) +
+                 (double)view.triangle_count * 3.0 * sizeof(uint32_t);
+        c->objects = c->meshes[m].object > c->objects ? c->meshes[m].object : c->objects;
+    }
+    VSHI_TRY(vshi_check_limit(run, bytes, "unwrapped meshes", error));
+    made->page_count = vsh_atlas_page_count(made->atlas);
+    VSHI_TRY(vshi_allocate((void **)&c->on_page, made->page_count, sizeof *c->on_page, "pages", error));
+    VSHI_TRY(vshi_allocate((void **)&made->page_begins, made->page_count + 2, sizeof *made->page_begins,
+                           "pages", error));
+    count_parts(c);
+    VSHI_TRY(vshi_allocate((void **)&made->parts, made->part_count, sizeof *made->parts, "meshes", error));
+    VSHI_TRY(
+        vshi_allocate((void **)&made->numbers, made->part_count, sizeof *made->numbers, "meshes", error));
+    VSHI_TRY(vshi_allocate((void **)&made->arrays, 2 * c->count + made->part_count, sizeof *made->arrays,
+                           "meshes", error));
+    /* each page's beginning moves to its end, which is where the next one's is */
+    for (size_t m = 0; m < c->count; ++m) {
+        VSHI_TRY(add_parts(c, m, error));
+    }
+    memmove(made->page_begins + 1, made->page_begins, made->page_count * sizeof *made->page_begins);
+    made->page_begins[0] = 0;
+    return VSH_OK;
+}
+
+vsh_result vshi_unwrap_receiver(const vsh_receiver *receiver, const vsh_mesh *meshes, size_t count,
+                                const vsh_run *run, vshi_unwrapped *unwrapped, vsh_error *error) {
+    *unwrapped = (vshi_unwrapped){NULL};
+    vsh_unwrap_options options = vsh_unwrap_options_default();
+    options.width = receiver->width;
+    options.height = receiver->height;
+    options.padding =
+        receiver->padding == VSH_PADDING_AUTO ? vsh_unwrap_options_default().padding : receiver->padding;
+    options.texels_per_unit = receiver->texels_per_unit;
+    options.max_pages = receiver->pages > 0               ? receiver->pages
+                        : receiver->texels_per_unit > 0.0 ? VSH_MAX_PAGES
+                                                          : 1;
+    options.keep_uvs =
+        vshi_receiver_unwrap(receiver) == VSH_RECEIVER_UNWRAP_ALWAYS ? VSH_UNWRAP_ALWAYS : VSH_UNWRAP_KEEP;
+    cutting c = {.meshes = meshes, .count = count, .made = unwrapped};
+    vsh_error why;
+    vsh_result result = vsh_unwrap(meshes, count, &options, run, &unwrapped->atlas, &why);
+    if (result != VSH_OK) {
+        return vshi_fail(error, result, "%s: %s", receiver->path, why.message);
+    }
+    c.charts = vsh_atlas_charts(unwrapped->atlas);
+    result = cut(&c, run, error);
+    free(c.on_page);
+    return result;
+}
+
+void vshi_unwrapped_free(vshi_unwrapped *unwrapped) {
+    for (size_t i = 0; i < unwrapped->array_count; ++i) {
+        free(unwrapped->arrays[i]);
+    }
+    free(unwrapped->arrays);
+    free(unwrapped->page_begins);
+    free(unwrapped->numbers);
+    free(unwrapped->parts);
+    vsh_atlas_free(unwrapped->atlas);
+    *unwrapped = (vshi_unwrapped){NULL};
+}

@@ -1,0 +1,237 @@
+#include "unwrap/cut_mesh.h"
+
+#include "base/memory.h"
+#include "base/try.h"
+#include "unwrap/sides.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Cosines of angles between normals. */
+static const double CREASE =
+    0.64; /* 50°: a chart is cut there; sides of a round column of eight faces are 45° */
+static const double PLANE = 0.9999995; /* 0.06°: of one plane; stretch of a projection is then 1 + 5e-7 */
+static const double QUAD = 0.9;        /* 26°: halves of a quad that is not flat */
+static const double SEAM = 0.985;      /* 10° between shading normals of a vertex: modelled as an edge */
+
+double vshi_cut_mesh_bytes(const vsh_mesh *mesh) {
+    /* edges.c and sides.c take 130 bytes a triangle while they look, and give them back */
+    return 170.0 * (double)mesh->triangle_count + 40.0 * (double)mesh->vertex_count;
+}
+
+static void measure(vshi_cut_mesh *s) {
+    const vsh_mesh *mesh = s->mesh;
+    double m[12];
+    if (mesh->transform != NULL) {
+        memcpy(m, mesh->transform, sizeof m);
+        m[3] = m[7] = m[11] = 0.0;
+    }
+    double most = 0.0;
+    for (size_t v = 0; v < mesh->vertex_count; ++v) {
+        const vshi_vec p =
+            vshi_transform_point(mesh->transform != NULL ? m : NULL, vshi_vec_off(mesh->positions + 3 * v));
+        most = fmax(most, fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z))));
+        s->place[v] = p;
+    }
+    int exponent = 0;
+    frexp(most, &exponent);
+    s->scale = ldexp(1.0, exponent);
+    for (size_t v = 0; v < mesh->vertex_count; ++v) { /* so that no square leaves the range of doubles */
+        s->place[v] = (vshi_vec){ldexp(s->place[v].x, -exponent), ldexp(s->place[v].y, -exponent),
+                                 ldexp(s->place[v].z, -exponent)};
+    }
+    for (size_t i = 0; i < s->count; ++i) {
+        vshi_vec p[3];
+        vshi_cut_mesh_corners(s, i, p);
+        const vshi_vec cross = vshi_cross(vshi_sub(p[1], p[0]), vshi_sub(p[2], p[0]));
+        const double area = 0.5 * vshi_length(cross);
+        s->normal[i] = vshi_unit(cross);
+        /* what a transform or the range of doubles flattens has no place either */
+        s->area[i] = vshi_mesh_degenerate(mesh, i) || !(area > 0.0) || !isfinite(area) ? 0.0 : area;
+    }
+}
+
+static bool same_uv(const float *uvs, uint32_t a, uint32_t b) {
+    return uvs == NULL || a == b ||
+           (uvs[2 * (size_t)a] == uvs[2 * (size_t)b] && uvs[2 * (size_t)a + 1] == uvs[2 * (size_t)b + 1]);
+}
+
+static bool same_normal(const float *normals, uint32_t a, uint32_t b) {
+    return normals == NULL || a == b ||
+           vshi_dot(vshi_unit(vshi_vec_off(normals + 3 * (size_t)a)),
+                    vshi_unit(vshi_vec_off(normals + 3 * (size_t)b))) > SEAM;
+}
+
+static void cut_sides(vshi_cut_mesh *s, int cut) {
+    const vsh_mesh *mesh = s->mesh;
+    for (uint32_t side = 0; side < 3 * (uint32_t)s->count; ++side) {
+        const uint32_t other = s->partner[side];
+        if (other == VSHI_NONE) {
+            continue;
+        }
+        const uint32_t a = mesh->indices[side], b = mesh->indices[vshi_next_side(side)],
+                       c = mesh->indices[vshi_next_side(other)], d = mesh->indices[other];
+        const bool one_uv = same_uv(mesh->uvs, a, c) && same_uv(mesh->uvs, b, d);
+        const bool through =
+            cut == VSHI_CUT_UVS ? one_uv : vshi_dot(s->normal[side / 3], s->normal[other / 3]) >= CREASE;
+        if (!through || s->area[side / 3] == 0.0 || s->area[other / 3] == 0.0) {
+            s->partner[side] = VSHI_NONE;
+            continue;
+        }
+        s->soft[side] = one_uv && same_normal(mesh->normals, a, c) && same_normal(mesh->normals, b, d);
+    }
+}
+
+/* Triangles that lie in the plane of the first; `queue` holds `count`. */
+static uint32_t gather_plane(vshi_cut_mesh *s, uint32_t first, uint32_t unit, uint32_t *queue) {
+    uint32_t waiting = 1;
+    queue[0] = first;
+    s->unit[first] = unit;
+    for (uint32_t at = 0; at < waiting; ++at) {
+        for (uint32_t k = 0; k < 3; ++k) {
+            const uint32_t side = s->partner[3 * queue[at] + k];
+            if (side != VSHI_NONE && s->unit[side / 3] == VSHI_NONE &&
+                vshi_dot(s->normal[first], s->normal[side / 3]) > PLANE) {
+                s->unit[side / 3] = unit;
+                queue[waiting++] = side / 3;
+            }
+        }
+    }
+    return waiting;
+}
+
+static double side_length(const vshi_cut_mesh *s, uint32_t side) {
+    return vshi_length(
+        vshi_sub(s->place[s->mesh->indices[side]], s->place[s->mesh->indices[vshi_next_side(side)]]));
+}
+
+/* The side of a triangle that is a quad's diagonal if it is half of one: the longest. */
+static uint32_t longest_side(const vshi_cut_mesh *s, uint32_t triangle) {
+    uint32_t best = 3 * triangle;
+    double most = -1.0;
+    for (uint32_t side = 3 * triangle; side < 3 * triangle + 3; ++side) {
+        const double length = side_length(s, side);
+        if (length > most) {
+            most = length;
+            best = side;
+        }
+    }
+    return best;
+}
+
+/* The other half of a quad that is not flat: where both have their longest side in common, or as files have
+ * quads, one after the other. */
+static uint32_t other_half(const vshi_cut_mesh *s, uint32_t triangle) {
+    const uint32_t diagonal = s->partner[longest_side(s, triangle)];
+    if (diagonal != VSHI_NONE && vshi_dot(s->normal[triangle], s->normal[diagonal / 3]) > QUAD &&
+        s->partner[longest_side(s, diagonal / 3)] / 3 == triangle) {
+        return diagonal / 3;
+    }
+    return VSHI_NONE;
+}
+
+static vsh_result gather_units(vshi_cut_mesh *s, vsh_error *error) {
+    uint32_t *queue = NULL, *size = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&queue, s->count, sizeof *queue, "parts of planes", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&size, s->count, sizeof *size, "parts of planes", error));
+    memset(s->unit, 0xff, s->count * sizeof *s->unit);
+    uint32_t units = 0;
+    for (uint32_t i = 0; i < s->count; ++i) {
+        if (s->unit[i] == VSHI_NONE && s->area[i] > 0.0) {
+            size[units] = gather_plane(s, i, units, queue);
+            ++units;
+        }
+    }
+    /* lone triangles join into quads; numbers are given anew, without gaps */
+    uint32_t *renamed = queue;
+    s->unit_count = 0;
+    memset(renamed, 0xff, units * sizeof *renamed);
+    for (uint32_t i = 0; i < s->count; ++i) {
+        const uint32_t unit = s->unit[i];
+        if (unit == VSHI_NONE || renamed[unit] != VSHI_NONE) {
+            continue;
+        }
+        const uint32_t half = size[unit] == 1 ? other_half(s, i) : VSHI_NONE;
+        renamed[unit] = s->unit_count++;
+        if (half != VSHI_NONE && size[s->unit[half]] == 1 && renamed[s->unit[half]] == VSHI_NONE) {
+            renamed[s->unit[half]] = renamed[unit];
+        }
+    }
+    for (uint32_t i = 0; i < s->count; ++i) {
+        s->unit[i] = s->unit[i] != VSHI_NONE ? renamed[s->unit[i]] : VSHI_NONE;
+    }
+done:
+    free(size);
+    free(queue);
+    return result;
+}
+
+static void list_units(vshi_cut_mesh *s) {
+    for (size_t i = 0; i < s->count; ++i) {
+        if (s->unit[i] != VSHI_NONE) {
+            ++s->unit_begin[s->unit[i] + (size_t)1];
+        }
+    }
+    for (uint32_t u = 0; u < s->unit_count; ++u) {
+        s->unit_begin[u + 1] += s->unit_begin[u];
+    }
+    for (size_t i = s->count;
+         i-- > 0;) { /* from behind: begins end as begins of the next, and are moved back */
+        if (s->unit[i] != VSHI_NONE) {
+            s->unit_list[--s->unit_begin[s->unit[i] + (size_t)1]] = (uint32_t)i;
+        }
+    }
+    for (uint32_t u = 0; u < s->unit_count; ++u) {
+        s->unit_begin[u] = s->unit_begin[u + 1];
+    }
+    size_t placed = 0;
+    for (size_t i = 0; i < s->count; ++i) {
+        placed += s->unit[i] != VSHI_NONE;
+    }
+    s->unit_begin[s->unit_count] = (uint32_t)placed;
+}
+
+vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, int cut, vshi_cut_mesh *s,
+                              vsh_error *error) {
+    *s = (vshi_cut_mesh){.mesh = mesh, .count = mesh->triangle_count};
+    if (mesh->triangle_count > UINT32_MAX / 3) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu triangles, %u at most",
+                         vshi_mesh_label(mesh, index).text, mesh->triangle_count, UINT32_MAX / 3);
+    }
+    const struct {
+        void **memory;
+        size_t count, size;
+    } wanted[] = {{(void **)&s->place, mesh->vertex_count, sizeof *s->place},
+                  {(void **)&s->area, s->count, sizeof *s->area},
+                  {(void **)&s->normal, s->count, sizeof *s->normal},
+                  {(void **)&s->partner, 3 * s->count, sizeof *s->partner},
+                  {(void **)&s->soft, 3 * s->count, 1},
+                  {(void **)&s->unit, s->count, sizeof *s->unit},
+                  {(void **)&s->unit_begin, s->count + 1, sizeof *s->unit_begin},
+                  {(void **)&s->unit_list, s->count, sizeof *s->unit_list}};
+    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
+        VSHI_TRY(vshi_allocate(wanted[i].memory, wanted[i].count, wanted[i].size, "a mesh's charts", error));
+    }
+    if (s->count == 0) {
+        return VSH_OK;
+    }
+    measure(s);
+    VSHI_TRY(vshi_sides_find(mesh, index, s->partner, error));
+    cut_sides(s, cut);
+    VSHI_TRY(gather_units(s, error));
+    list_units(s);
+    return VSH_OK;
+}
+
+void vshi_cut_mesh_free(vshi_cut_mesh *s) {
+    free(s->unit_list);
+    free(s->unit_begin);
+    free(s->unit);
+    free(s->soft);
+    free(s->partner);
+    free(s->normal);
+    free(s->area);
+    free(s->place);
+    *s = (vshi_cut_mesh){0};
+}

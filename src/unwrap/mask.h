@@ -1,0 +1,59 @@
+/* Which texels a chart touches. */
+#ifndef VSHI_UNWRAP_MASK_H
+#define VSHI_UNWRAP_MASK_H
+
+#include "unwrap/patch.h"
+
+/* Turns that are tried beside quarter turns: 22.5° each. */
+enum { VSHI_ANGLES = 4 };
+
+/* A patch's box, by angle: its lowest corner and size. */
+typedef struct vshi_boxes {
+    double low[VSHI_ANGLES][2], size[VSHI_ANGLES][2];
+} vshi_boxes;
+
+/* How a patch lies on texels, before it has a place: uv times `matrix` plus `offset` is in texels from the
+ * mask's corner. */
+typedef struct vshi_fit {
+    double matrix[2][2], offset[2];
+    double uneven;         /* what one side is scaled more than the other */
+    int32_t width, height; /* texels of its box */
+} vshi_fit;
+
+/* Texels that are touched in one row: begin … end - 1. */
+typedef struct vshi_run {
+    int32_t begin, end;
+} vshi_run;
+
+typedef struct vshi_mask {
+    int32_t width, height;
+    uint32_t *row;  /* [height + 1] in `runs` */
+    vshi_run *runs; /* ascending, apart */
+    uint64_t touched;
+} vshi_mask;
+
+/* Turns a patch's uv so that its box is the least, begins at 0 and is not higher than wide; and tells its
+ * boxes. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_patch_straighten(vshi_patch *patch, vshi_boxes *boxes, vsh_error *error);
+
+/* Whether a patch nearly fills its box at angle 0: other angles are of no use to it. */
+bool vshi_patch_is_box(const vshi_patch *patch, const vshi_boxes *boxes);
+
+/* Fits a patch at an angle and so many texels to its unit. Patches that nearly fill their boxes are made a
+ * whole number of texels wide and high, where stretch stays within the limit, and their borders put on
+ * texels' centres: what is read between texels inside of it is then of its own texels alone. */
+vshi_fit vshi_mask_fit(const vshi_patch *patch, const vshi_boxes *boxes, int angle, double density,
+                       double max_stretch);
+
+/* The texels that triangles of the patch touch with more than their border. Errors: VSH_ERROR_MEMORY. Free
+ * with vshi_mask_free(), after a failure too. */
+vsh_result vshi_mask_make(const vshi_patch *patch, const vshi_fit *fit, vshi_mask *mask, vsh_error *error);
+void vshi_mask_free(vshi_mask *mask);
+
+/* The mask turned by quarter turns anticlockwise. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_mask_turn(const vshi_mask *mask, int quarters, vshi_mask *turned, vsh_error *error);
+
+/* A point of the fit in the mask turned so: texels from its corner. */
+void vshi_fit_turn(const vshi_fit *fit, int quarters, const double uv[2], double at[2]);
+
+#endif

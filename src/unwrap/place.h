@@ -1,0 +1,45 @@
+/* One attempt to pack charts at one density. */
+#ifndef VSHI_UNWRAP_PLACE_H
+#define VSHI_UNWRAP_PLACE_H
+
+#include "unwrap/pack.h"
+#include "unwrap/page.h"
+
+/* Which chart comes first. */
+enum { VSHI_BY_SIDES = 0, VSHI_BY_AREA = 1, VSHI_BY_LONGEST = 2, VSHI_ORDERS = 3 };
+
+typedef struct vshi_placing {
+    const vshi_packing *packing;
+    vshi_job *job;
+    vshi_item *items; /* [count] */
+    size_t count;
+    double density;
+    int32_t least_turned;            /* texels: shorter charts are turned by quarters alone */
+    vshi_mask (*masks)[VSHI_ANGLES]; /* [count]; runs are NULL at angles that are not tried */
+    vshi_fit (*fits)[VSHI_ANGLES];   /* [count] */
+    uint32_t *order;                 /* [count]: items, the first first */
+    vshi_page page;
+    int32_t *hints; /* row where the last chart of a size was placed */
+} vshi_placing;
+
+/* The page is `height` texels high, the packing's or more. Errors: VSH_ERROR_MEMORY. Free with
+ * vshi_placing_free(), after a failure too. */
+vsh_result vshi_placing_begin(const vshi_packing *packing, int32_t height, vshi_item *items, size_t count,
+                              vshi_job *job, vshi_placing *placing, vsh_error *error);
+void vshi_placing_free(vshi_placing *placing);
+
+/* Fits the items to a density. *possible: none is larger than a page. Errors: VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED. */
+vsh_result vshi_placing_set(vshi_placing *placing, double density, bool *possible, vsh_error *error);
+
+/* Sorts them. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_placing_sort(vshi_placing *placing, int by, vsh_error *error);
+
+/* Places all items on one page; *rows is how many rows they take, or more than the page has. Errors:
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_placing_one_page(vshi_placing *placing, int32_t *rows, vsh_error *error);
+
+/* Places them on as many pages as it takes, or max_pages + 1 where they do not fit. Errors: as the last. */
+vsh_result vshi_placing_pages(vshi_placing *placing, uint32_t *pages, vsh_error *error);
+
+#endif

@@ -1,0 +1,187 @@
+#include "base/floats.h"
+#include "base/memory.h"
+#include "base/try.h"
+#include "unwrap/atlas.h"
+#include "unwrap/keep.h"
+
+#include <stdlib.h>
+
+static const double LEAST_STRETCH = 1.01; /* of max_stretch: below, rounding and texels decide */
+static const double STEPS_BYTES =
+    420.0; /* a triangle, while charts are made: patches, trials and their equations */
+
+enum { MOST_PADDING = 4096, PACK_UNITS = 1024 };
+
+static vsh_result check_whole(const char *name, int32_t value, int32_t least, int32_t most,
+                              vsh_error *error) {
+    if (value < least || value > most) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "unwrap: %s is %d, expected %d to %d", name, value, least,
+                         most);
+    }
+    return VSH_OK;
+}
+
+static vsh_result check_options(const vsh_unwrap_options *o, size_t mesh_count, vsh_error *error) {
+    VSHI_TRY(check_whole("width", o->width, 1, VSH_MAX_PAGE_SIZE, error));
+    VSHI_TRY(check_whole("height", o->height, 1, VSH_MAX_PAGE_SIZE, error));
+    VSHI_TRY(check_whole("max_pages", o->max_pages, 1, VSH_MAX_PAGES, error));
+    VSHI_TRY(check_whole("padding", o->padding, 0, MOST_PADDING, error));
+    VSHI_TRY(check_whole("keep_uvs", o->keep_uvs, VSH_UNWRAP_ALWAYS, VSH_UNWRAP_KEEP, error));
+    if (!(o->texels_per_unit >= 0.0) || !isfinite(o->texels_per_unit)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "unwrap: texels_per_unit is %g, expected a finite number from 0 on",
+                         o->texels_per_unit);
+    }
+    if (!(o->max_stretch >= LEAST_STRETCH)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "unwrap: max_stretch is %g, expected at least %g",
+                         o->max_stretch, LEAST_STRETCH);
+    }
+    for (size_t m = 0; o->density != NULL && m < mesh_count; ++m) {
+        if (!(o->density[m] > 0.0) || !isfinite(o->density[m])) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                             "unwrap: density %zu is %g, expected a finite number above 0", m, o->density[m]);
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result check_meshes(const vsh_mesh *meshes, size_t mesh_count, vsh_error *error) {
+    if (mesh_count == 0 || mesh_count > UINT32_MAX) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "unwrap: %zu meshes, expected 1 to %u", mesh_count,
+                         UINT32_MAX);
+    }
+    for (size_t m = 0; m < mesh_count; ++m) {
+        VSHI_TRY(vshi_mesh_check_data(&meshes[m], m, error));
+    }
+    return VSH_OK;
+}
+
+static vsh_result check_memory(const vsh_mesh *meshes, size_t mesh_count, const vshi_shapes *shapes,
+                               const vsh_unwrap_options *options, const vsh_run *run, vsh_error *error) {
+    double bytes = (double)mesh_count * 128.0;
+    for (size_t i = 0; i < shapes->count; ++i) {
+        const vsh_mesh *mesh = shapes->list[i].mesh;
+        bytes += vshi_cut_mesh_bytes(mesh) + STEPS_BYTES * (double)mesh->triangle_count +
+                 vshi_atlas_shape_bytes(mesh->triangle_count);
+    }
+    for (size_t m = 0; m < mesh_count; ++m) {
+        bytes += vshi_atlas_mesh_bytes(meshes[m].triangle_count);
+    }
+    const vshi_packing packing = {.width = options->width, .height = options->height};
+    return vshi_check_limit(run, bytes + vshi_pack_bytes(&packing, 0), "unwrapping", error);
+}
+
+static vsh_result make_items(const vshi_shapes *shapes, size_t mesh_count, const double *density,
+                             vshi_item **items, size_t *count, vsh_error *error) {
+    *count = 0;
+    for (size_t m = 0; m < mesh_count; ++m) {
+        *count += shapes->list[shapes->instances[m].shape].patches.count;
+    }
+    if (*count == 0) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "unwrap: no triangle of %zu mesh%s has area", mesh_count,
+                         mesh_count == 1 ? "" : "es");
+    }
+    if (*count >= VSH_NO_CHART) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "unwrap: %zu charts, at most %u", *count, VSH_NO_CHART - 1);
+    }
+    VSHI_TRY(vshi_allocate((void **)items, *count, sizeof **items, "packing charts", error));
+    vshi_item *item = *items;
+    for (size_t m = 0; m < mesh_count; ++m) {
+        const vshi_shape *shape = &shapes->list[shapes->instances[m].shape];
+        const double factor =
+            shape->surface.scale * shapes->instances[m].scale * (density != NULL ? density[m] : 1.0);
+        for (size_t c = 0; c < shape->patches.count; ++c) {
+            *item++ = (vshi_item){.patch = &shape->patches.list[c],
+                                  .boxes = &shape->boxes[c],
+                                  .factor = factor,
+                                  .mesh = (uint32_t)m};
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result lay_out(vshi_shapes *shapes, size_t mesh_count, const vsh_unwrap_options *options,
+                          const vsh_run *run, vsh_error *error) {
+    size_t triangles = 0;
+    for (size_t i = 0; i < shapes->count; ++i) {
+        triangles += shapes->list[i].mesh->triangle_count;
+    }
+    vshi_job *job = vshi_job_begin(run, "unwrap", VSHI_SHAPE_STEPS * triangles);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "unwrap: the system refused memory");
+    }
+    const vsh_result result = vshi_shapes_lay_out(shapes, mesh_count, options->max_stretch,
+                                                  options->keep_uvs == VSH_UNWRAP_KEEP, job, error);
+    vshi_job_end(job);
+    return result;
+}
+
+static vsh_result pack(vshi_packing *packing, vshi_item *items, size_t count, const vsh_run *run,
+                       vsh_error *error) {
+    VSHI_TRY(vshi_check_limit(run, vshi_pack_bytes(packing, count), "packing charts", error));
+    vshi_job *job = vshi_job_begin(run, "pack", PACK_UNITS);
+    if (job == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "unwrap: the system refused memory");
+    }
+    const vsh_result result = vshi_pack(packing, items, count, job, PACK_UNITS, error);
+    vshi_job_end(job);
+    return result;
+}
+
+vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwrap_options *options,
+                      const vsh_run *run, vsh_atlas **atlas, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(atlas);
+    *atlas = NULL;
+    VSHI_NEEDS_OF(mesh_count, meshes);
+    vsh_run full;
+    vsh_unwrap_options o = vsh_unwrap_options_default();
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(vshi_options_resolve(options, &o, sizeof o, "vsh_unwrap_options", error));
+    VSHI_TRY(check_options(&o, mesh_count, error));
+    VSHI_TRY(check_meshes(meshes, mesh_count, error));
+    vshi_shapes shapes = {0};
+    vshi_item *items = NULL;
+    size_t count = 0;
+    vshi_packing packing = {.width = o.width,
+                            .height = o.height,
+                            .padding = o.padding,
+                            .max_pages = (uint32_t)o.max_pages,
+                            .max_stretch = o.max_stretch,
+                            .density = o.texels_per_unit};
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_shapes_find(meshes, mesh_count, &shapes, error));
+    VSHI_TRY_DONE(check_memory(meshes, mesh_count, &shapes, &o, &full, error));
+    VSHI_TRY_DONE(lay_out(&shapes, mesh_count, &o, &full, error));
+    VSHI_TRY_DONE(make_items(&shapes, mesh_count, o.density, &items, &count, error));
+    VSHI_TRY_DONE(pack(&packing, items, count, &full, error));
+    VSHI_TRY_DONE(vshi_atlas_make(mesh_count, &shapes, &packing, items, count, atlas, error));
+done:
+    free(items);
+    vshi_shapes_free(&shapes);
+    return result;
+}
+
+vsh_result vsh_uvs_usable(const vsh_mesh *mesh, const vsh_run *run, int32_t *usable, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(mesh);
+    VSHI_NEEDS(usable);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(vshi_mesh_check_data(mesh, VSHI_MESH_ALONE, error));
+    VSHI_TRY(vshi_check_limit(&full, vshi_cut_mesh_bytes(mesh) + STEPS_BYTES * (double)mesh->triangle_count,
+                              "looking at UVs", error));
+    vshi_cut_mesh surface;
+    bool found = false;
+    vsh_result result = VSH_OK;
+    *usable = 0;
+    if (mesh->uvs == NULL) {
+        return VSH_OK;
+    }
+    VSHI_TRY_DONE(vshi_cut_mesh_make(mesh, VSHI_MESH_ALONE, VSHI_CUT_UVS, &surface, error));
+    VSHI_TRY_DONE(vshi_keep_charts(&surface, NULL, &found, error));
+    *usable = found;
+done:
+    vshi_cut_mesh_free(&surface);
+    return result;
+}

@@ -1,0 +1,60 @@
+/* Materials and textures of a glTF file, as far as they are shown. */
+'use strict';
+
+(function () {
+    const WRAP = {33071: THREE.ClampToEdgeWrapping, 33648: THREE.MirroredRepeatWrapping, 10497: THREE.RepeatWrapping};
+    const FILTER = {9728: THREE.NearestFilter};
+
+    /* {texture, image, index, set, matrix} of a texture info; null where there is none to be had. */
+    async function texture(file, info, mipmaps) {
+        if (!info || info.index === undefined) {
+            return null;
+        }
+        const definition = VIEW.gltf.at(file.json.textures, info.index, 'texture');
+        const bitmap = await VIEW.gltf.image(file, definition.source);
+        if (bitmap === null) {
+            return null;
+        }
+        const sampler = definition.sampler !== undefined
+            ? VIEW.gltf.at(file.json.samplers, definition.sampler, 'sampler') : {};
+        const made = new THREE.Texture(bitmap);
+        made.flipY = false;
+        made.generateMipmaps = mipmaps;
+        made.magFilter = FILTER[sampler.magFilter] || THREE.LinearFilter;
+        made.minFilter = mipmaps ? THREE.LinearMipmapLinearFilter : THREE.LinearFilter;
+        made.anisotropy = mipmaps ? 4 : 1;
+        made.wrapS = WRAP[sampler.wrapS] || THREE.RepeatWrapping;
+        made.wrapT = WRAP[sampler.wrapT] || THREE.RepeatWrapping;
+        made.needsUpdate = true;
+        const transform = (info.extensions || {}).KHR_texture_transform || {};
+        const matrix = new THREE.Matrix3();
+        const [sx, sy] = transform.scale || [1, 1], [x, y] = transform.offset || [0, 0];
+        const c = Math.cos(transform.rotation || 0), s = Math.sin(transform.rotation || 0);
+        matrix.set(sx * c, sy * s, x, -sx * s, sy * c, y, 0, 0, 1);
+        const set = transform.texCoord !== undefined ? transform.texCoord : info.texCoord || 0;
+        return {texture: made, image: bitmap, source: definition.source, set, matrix};
+    }
+
+    VIEW.material = async function (file, index) {
+        const m = index !== undefined ? VIEW.gltf.at(file.json.materials, index, 'material') : {};
+        const pbr = m.pbrMetallicRoughness || {}, extensions = m.extensions || {};
+        const lightmap = extensions.MOZ_lightmap;
+        const strength = (extensions.KHR_materials_emissive_strength || {}).emissiveStrength;
+        const glossy = extensions.KHR_materials_pbrSpecularGlossiness || {};
+        return {
+            name: m.name || '',
+            color: pbr.baseColorFactor || glossy.diffuseFactor || (index !== undefined ? [1, 1, 1, 1] : [0.8, 0.8, 0.8, 1]),
+            base: await texture(file, pbr.baseColorTexture || glossy.diffuseTexture, true),
+            emissive: (m.emissiveFactor || [0, 0, 0]).map(value => value * (strength === undefined ? 1 : strength)),
+            glow: await texture(file, m.emissiveTexture, true),
+            ao: await texture(file, m.occlusionTexture, false),
+            strength: m.occlusionTexture && m.occlusionTexture.strength !== undefined ? m.occlusionTexture.strength : 1,
+            light: await texture(file, lightmap, false),
+            intensity: lightmap && lightmap.intensity !== undefined ? lightmap.intensity : 1,
+            unlit: extensions.KHR_materials_unlit !== undefined,
+            alphaMode: m.alphaMode || 'OPAQUE',
+            cutoff: m.alphaMode === 'MASK' ? (m.alphaCutoff !== undefined ? m.alphaCutoff : 0.5) : -1,
+            doubleSided: m.doubleSided === true
+        };
+    };
+})();

@@ -1,0 +1,213 @@
+/* A page from its head to its end. What it may do is in its head: run the scripts that are in it, known by
+ * their hashes, and nothing else: no request, no script that a file's name or content brings. */
+#include <vdbshade/view.h>
+
+#include "base/floats.h"
+#include "base/memory.h"
+#include "base/try.h"
+#include "base/utf8.h"
+#include "view/embedded.h"
+#include "view/parts.h"
+
+#include <sha256.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char *vshi_view_file_name(const char *path) {
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+json_t *vshi_view_text(const char *text) {
+    char *clean = malloc(3 * strlen(text) + 1);
+    size_t used = 0;
+    if (clean == NULL) {
+        return NULL;
+    }
+    for (size_t length; *text != '\0'; text += length > 0 ? length : 1) {
+        length = vshi_utf8_length(text);
+        memcpy(clean + used, length > 0 ? text : VSHI_NO_CHARACTER, length > 0 ? length : 3);
+        used += length > 0 ? length : 3;
+    }
+    json_t *made = json_stringn(clean, used);
+    free(clean);
+    return made;
+}
+
+vsh_result vshi_view_tell(json_t *about, const char *key, json_t *value, vsh_error *error) {
+    const int failed =
+        key != NULL ? json_object_set_new(about, key, value) : json_array_append_new(about, value);
+    return failed ? vshi_fail(error, VSH_ERROR_MEMORY, "page: the system refused memory") : VSH_OK;
+}
+
+vsh_result vshi_view_begin(const vshi_view *view, size_t total, vshi_job **job, vsh_error *error) {
+    *job = vshi_job_begin(view->run, "page", total);
+    return *job != NULL
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", view->page->path);
+}
+
+vsh_result vshi_view_advance(const vshi_view *view, vshi_job *job, size_t units, vsh_error *error) {
+    VSHI_TRY(vshi_page_check(view->page, error));
+    return vshi_job_advance(job, units) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+}
+
+/* --- the page itself */
+
+/* The source by which Content-Security-Policy (W3C, level 2) knows a script or style: 'sha256-…'. */
+static void put_source(vshi_page *page, const vshi_embedded *embedded) {
+    uint8_t digest[SHA256_DIGEST_LENGTH];
+    SHA2_CTX context;
+    SHA256Init(&context);
+    SHA256Update(&context, embedded->bytes, embedded->size);
+    SHA256Final(digest, &context);
+    vshi_page_text(page, " 'sha256-");
+    for (size_t i = 0; i < sizeof digest; i += VSHI_BASE64_BYTES) {
+        char letters[VSHI_BASE64_LETTERS];
+        const size_t left = sizeof digest - i;
+        vshi_base64_group(digest + i, left < VSHI_BASE64_BYTES ? left : VSHI_BASE64_BYTES, letters);
+        vshi_page_put(page, letters, sizeof letters);
+    }
+    vshi_page_text(page, "'");
+}
+
+static void put_head(vshi_page *page) {
+    vshi_page_text(
+        page, "<!doctype html>\n<html lang=\"en\" data-state=\"loading\"><head><meta charset=\"utf-8\">\n"
+              "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; base-uri "
+              "'none'; form-action 'none'; script-src");
+    for (const vshi_embedded *script = vshi_view_scripts; script->size > 0; ++script) {
+        put_source(page, script);
+    }
+    vshi_page_text(page, "; style-src");
+    put_source(page, &vshi_view_style);
+    vshi_page_text(page, "\">\n<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n"
+                         "<meta name=\"generator\" content=\"vdbshade " VSHI_VERSION
+                         "\">\n<title>vdbshade</title>\n<style>");
+    vshi_page_put(page, vshi_view_style.bytes, vshi_view_style.size);
+    vshi_page_text(page, "</style></head>\n<body>\n");
+    vshi_page_put(page, vshi_view_body.bytes, vshi_view_body.size);
+}
+
+/* JSON that HTML takes for text: within strings, the only place where they can be, < > & are escaped. */
+static vsh_result put_about(vshi_view *view, vsh_error *error) {
+    char *text = json_dumps(view->about, JSON_COMPACT);
+    if (text == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "page: the system refused memory");
+    }
+    vshi_page_text(view->page, "<script type=\"application/json\" id=\"about\">");
+    for (const char *at = text; *at != '\0'; ++at) {
+        if (*at == '<' || *at == '>' || *at == '&') {
+            char escaped[8];
+            snprintf(escaped, sizeof escaped, "\\u%04x", (unsigned)*at);
+            vshi_page_text(view->page, escaped);
+        } else {
+            vshi_page_put(view->page, at, 1);
+        }
+    }
+    vshi_page_text(view->page, "</script>\n");
+    free(text);
+    return VSH_OK;
+}
+
+static void put_scripts(vshi_page *page) {
+    for (const vshi_embedded *script = vshi_view_scripts; script->size > 0; ++script) {
+        vshi_page_text(page, "<script>");
+        vshi_page_put(page, script->bytes, script->size);
+        vshi_page_text(page, "</script>\n");
+    }
+    vshi_page_text(page, "</body></html>\n");
+}
+
+/* --- the bakes in it */
+
+static const char *name_of(const vsh_view_bake *bake) {
+    if (bake->name != NULL) {
+        return bake->name;
+    }
+    return vshi_view_file_name(bake->model != NULL ? bake->model : bake->planes[0]);
+}
+
+static vsh_result put_bake(vshi_view *view, const vsh_view_bake *bake, vsh_error *error) {
+    json_t *about = json_object(), *pages = json_array();
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_view_tell(about, "name", vshi_view_text(name_of(bake)), error));
+    VSHI_TRY_DONE(vshi_view_tell(about, "uvSet", json_integer(bake->uv_set), error));
+    if (bake->model != NULL) {
+        VSHI_TRY_DONE(vshi_view_put_model(view, bake->model, about, error));
+    }
+    for (size_t i = 0; i < bake->plane_count; ++i) {
+        VSHI_TRY_DONE(vshi_view_put_planes(view, bake->planes[i], pages, error));
+    }
+    VSHI_TRY_DONE(vshi_view_tell(about, "pages", json_incref(pages), error));
+    VSHI_TRY_DONE(vshi_view_tell(view->about, NULL, json_incref(about), error));
+done:
+    json_decref(pages);
+    json_decref(about);
+    return result;
+}
+
+static vsh_result check(const vsh_view_bake *given, const char *what, vsh_view_bake *bake, vsh_error *error) {
+    *bake = vsh_view_bake_default();
+    VSHI_TRY(vshi_options_resolve(given, bake, sizeof *bake, what, error));
+    if (bake->plane_count > VSH_MAX_VIEW_PLANES) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %zu files of planes, at most %d", what,
+                         bake->plane_count, VSH_MAX_VIEW_PLANES);
+    }
+    VSHI_NEEDS_OF(bake->plane_count, bake->planes);
+    for (size_t i = 0; i < bake->plane_count; ++i) {
+        VSHI_NEEDS(bake->planes[i]);
+    }
+    if (bake->uv_set < -1 || bake->uv_set >= VSH_MAX_UV_SETS) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: UV set %d: expected -1 … %d", what, bake->uv_set,
+                         VSH_MAX_UV_SETS - 1);
+    }
+    if (bake->model == NULL && bake->plane_count == 0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: neither a model nor planes", what);
+    }
+    return VSH_OK;
+}
+
+vsh_result vsh_view_write(const char *path, const vsh_view_bake *bake, const vsh_view_bake *other,
+                          const vsh_run *run, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(path);
+    VSHI_NEEDS(bake);
+    vsh_view_bake bakes[2];
+    vsh_run full;
+    VSHI_TRY(check(bake, "bake", &bakes[0], error));
+    VSHI_NEEDS(bakes[0].model);
+    if (other != NULL) {
+        VSHI_TRY(check(other, "other", &bakes[1], error));
+    }
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    const size_t count = other != NULL ? 2 : 1;
+    void *memory = NULL;
+    VSHI_TRY(vshi_allocate(&memory, 1, sizeof(vshi_page), "page", error));
+    vshi_page *page = memory;
+    vsh_result result = vshi_page_begin(page, path, error);
+    if (result != VSH_OK) {
+        free(page);
+        return result;
+    }
+    vshi_view view = {page, &full, 0, json_array()};
+    if (view.about == NULL) {
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+        goto done;
+    }
+    put_head(page);
+    for (size_t i = 0; i < count; ++i) {
+        VSHI_TRY_DONE(put_bake(&view, &bakes[i], error));
+    }
+    VSHI_TRY_DONE(put_about(&view, error));
+    put_scripts(page);
+    result = vshi_page_commit(page, error);
+    page = NULL;
+done:
+    json_decref(view.about);
+    if (page != NULL) {
+        vshi_page_abandon(page);
+    }
+    free(memory);
+    return result;
+}

@@ -1,0 +1,299 @@
+"""The add-on in Blender, without a window: the scene goes out, the image comes back into the materials.
+
+blender -b --factory-startup --python tests/blender/test_bake.py -- ADDON VDBSHADE FOLDER"""
+import importlib.util
+import math
+import os
+import sys
+import traceback
+
+import bpy
+
+ADDON, PROGRAM, FOLDER = sys.argv[sys.argv.index("--") + 1:]
+
+
+def load_addon():
+    """As Blender does it: a module, its preferences, its classes."""
+    name = "vdbshade_bake"
+    spec = importlib.util.spec_from_file_location(name, os.path.join(ADDON, "__init__.py"), submodule_search_locations=[ADDON])
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    bpy.context.preferences.addons.new().module = name
+    module.register()
+    bpy.context.preferences.addons[name].preferences.program = PROGRAM
+    return module
+
+
+def quad(name, corners, uv_maps):
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(corners, [], [range(len(corners))])
+    for uv_name, uvs in uv_maps:
+        layer = mesh.uv_layers.new(name=uv_name)
+        for loop, uv in zip(layer.data, uvs):
+            loop.uv = uv
+    obj = bpy.data.objects.new(name, mesh)
+    bpy.context.collection.objects.link(obj)
+    return obj
+
+
+SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
+FLOOR = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)]
+
+
+def start(sun=(0.0, math.radians(45.0), 0.0), lightmap=True):
+    """A floor of 2 × 2 and a roof 1 over its half x > 0, under a sun that stands towards +x and up."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    load = bpy.context.preferences.addons.get("vdbshade_bake")
+    if load is None:
+        globals()["addon"] = load_addon()
+    else:
+        load.preferences.program = PROGRAM
+    maps = [("UVMap", [(0, 0)] * 4)] + ([("Baked", SQUARE)] if lightmap else [])
+    floor = quad("floor", FLOOR, maps)
+    roof = quad("roof", [(0, -1, 1), (1, -1, 1), (1, 1, 1), (0, 1, 1)], [])
+    lamp = bpy.data.lights.new("sun", "SUN")
+    lamp.angle = math.radians(1.0)
+    light = bpy.data.objects.new("sun", lamp)
+    light.rotation_euler = sun
+    bpy.context.collection.objects.link(light)
+    bpy.context.view_layer.update()
+    select(floor)
+    settings = bpy.context.scene.vdbshade
+    settings.size = 64
+    settings.max_error = 0.05
+    settings.what = "SHADOW"
+    return floor, roof, settings
+
+
+def select(*objects):
+    for obj in bpy.context.scene.objects:
+        obj.select_set(obj in objects)
+    bpy.context.view_layer.objects.active = objects[0]
+
+
+def bake():
+    result = bpy.ops.vdbshade.bake()
+    assert result == {"FINISHED"}, result
+    return bpy.data.images["vdbshade"]
+
+
+def error_of(call):
+    try:
+        call()
+    except RuntimeError as error:
+        return str(error)
+    raise AssertionError("nothing was refused")
+
+
+def value(image, u, v):
+    """R of the texel at (u, v), v up."""
+    width, height = image.size
+    return image.pixels[4 * (int(v * height) * width + int(u * width))]
+
+
+def test_the_sun_shadows_what_the_roof_hides():
+    # towards the sun is (1, 0, 1): the roof over 0 < x < 1 at height 1 hides -1 < x < 0
+    start()
+    image = bake()
+    assert tuple(image.size) == (64, 64), tuple(image.size)
+    assert value(image, 0.25, 0.5) < 0.02, value(image, 0.25, 0.5)
+    assert value(image, 0.75, 0.5) > 0.98, value(image, 0.75, 0.5)
+    assert image.colorspace_settings.name == "Non-Color"
+
+
+def test_a_turned_sun_turns_the_shadow():
+    start(sun=(0.0, 0.0, 0.0))
+    image = bake()
+    assert value(image, 0.25, 0.5) > 0.98 and value(image, 0.75, 0.5) < 0.02
+
+
+def test_the_angle_of_the_sun_softens_the_shadow():
+    widths = []
+    for degrees in (1.0, 40.0):
+        start(sun=(0.0, 0.0, 0.0))
+        bpy.data.lights["sun"].angle = math.radians(degrees)
+        image = bake()
+        widths.append(sum(0.05 < value(image, (i + 0.5) / 64, 0.5) < 0.95 for i in range(64)))
+    assert widths[0] <= 2 and widths[1] > 12, widths  # a penumbra of 2 tan(20 degrees) = 0.73 of 2
+
+
+def test_ao_and_its_distance():
+    _, _, settings = start()
+    settings.what = "AO"
+    settings.ao_distance = 4.0
+    far = value(bake(), 0.75, 0.5)
+    settings.ao_distance = 0.5
+    near = value(bake(), 0.75, 0.5)
+    assert far < 0.8 and near == 1.0, (far, near)
+
+
+def test_irradiance_is_the_shadow_times_the_cosine():
+    _, _, settings = start()
+    settings.what = "LIGHT"
+    settings.ao_distance = 0.1
+    image = bake()
+    lit = value(image, 0.9, 0.5)
+    assert abs(lit - math.cos(math.radians(45.0))) < 0.02, lit
+    assert image.colorspace_settings.name.startswith("Linear")
+
+
+def test_image_and_uv_map_stand_in_the_material():
+    floor, _, settings = start()
+    material = bpy.data.materials.new("stone")
+    material.use_nodes = True
+    material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0.8, 0.4, 0.2, 1.0)
+    floor.data.materials.append(material)
+    image = bake()
+    tree = floor.material_slots[0].material.node_tree
+    assert floor.material_slots[0].material == material, "a copy that nobody needs"
+    assert tree.nodes["vdbshade image"].image == image
+    assert tree.nodes["vdbshade UV"].uv_map == "Baked"
+    assert tree.nodes["vdbshade image"].inputs["Vector"].links[0].from_node == tree.nodes["vdbshade UV"]
+    mix = tree.nodes["Principled BSDF"].inputs["Base Color"].links[0].from_node
+    assert mix.blend_type == "MULTIPLY" and mix.inputs["Color2"].links[0].from_node.image == image
+    assert abs(mix.inputs["Color1"].default_value[1] - 0.4) < 1e-6
+    count = len(tree.nodes)
+    assert bake() == image and len(tree.nodes) == count and len(bpy.data.images) == 1, "a second bake adds something"
+
+
+def test_a_material_that_others_have_is_copied():
+    floor, roof, settings = start()
+    material = bpy.data.materials.new("stone")
+    for obj in (floor, roof):
+        obj.data.materials.append(material)
+    bake()
+    assert floor.material_slots[0].material != material and roof.material_slots[0].material == material
+    assert material.node_tree is None or "vdbshade image" not in material.node_tree.nodes
+
+
+def test_without_links_the_image_node_stands_alone():
+    floor, _, settings = start()
+    settings.link = "NONE"
+    bake()
+    tree = floor.material_slots[0].material.node_tree
+    assert not tree.nodes["vdbshade image"].outputs["Color"].links
+    assert tree.nodes.active == tree.nodes["vdbshade image"]
+
+
+def test_unlit_shows_the_image_as_emission():
+    floor, _, settings = start()
+    settings.link = "EMISSION"
+    image = bake()
+    shader = floor.material_slots[0].material.node_tree.nodes["Principled BSDF"]
+    glow = shader.inputs.get("Emission Color") or shader.inputs["Emission"]
+    assert glow.links[0].from_node.inputs["Color2"].links[0].from_node.image == image
+    assert not shader.inputs["Base Color"].links
+
+
+def test_objects_without_lightmap_uvs_get_a_map_that_does_not_overlap():
+    floor, roof, settings = start(lightmap=False)
+    roof.location.z = 3.0
+    select(floor, roof)
+    bake()
+    squares = []
+    for obj in (floor, roof):
+        assert obj.data.uv_layers["Lightmap"] is not None
+        uvs = [loop.uv for loop in obj.data.uv_layers["Lightmap"].data]
+        squares.append([(min(uv[k] for uv in uvs), max(uv[k] for uv in uvs)) for k in range(2)])
+        assert all(0.0 <= low < high <= 1.0 for low, high in squares[-1]), squares
+    apart = any(squares[0][k][1] < squares[1][k][0] or squares[1][k][1] < squares[0][k][0] for k in range(2))
+    assert apart, squares
+    assert floor.data.uv_layers.active.name == "UVMap", "another UV map is the active one now"
+    assert set(bpy.context.selected_objects) == {floor, roof}
+
+
+def test_transforms_and_modifiers_count():
+    floor, roof, settings = start(sun=(0.0, 0.0, 0.0))
+    roof.scale = (-1.0, 1.0, 1.0)  # mirrored: over x < 0 now
+    floor.modifiers.new("thick", "SOLIDIFY").thickness = 0.1
+    bpy.context.view_layer.update()
+    image = bake()
+    assert value(image, 0.25, 0.5) < 0.02 and value(image, 0.75, 0.5) > 0.98
+
+
+def test_what_is_hidden_from_renders_casts_nothing():
+    floor, roof, settings = start()
+    roof.hide_render = True
+    image = bake()
+    assert value(image, 0.25, 0.5) == 1.0
+
+
+def test_names_are_no_patterns():
+    floor, roof, settings = start()
+    floor.name = "floor [1]*?\\"
+    other = quad("floor 1xx", [(5, 5, 0), (6, 5, 0), (6, 6, 0)], [("a", SQUARE[:3]), ("b", SQUARE[:3])])
+    select(floor)
+    assert value(bake(), 0.25, 0.5) < 0.02
+    assert not other.data.materials
+
+
+def test_a_saved_file_keeps_the_image_beside_it():
+    floor, _, settings = start()
+    path = os.path.join(FOLDER, "scene.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    image = bake()
+    assert os.path.exists(os.path.join(FOLDER, "vdbshade.exr")), os.listdir(FOLDER)
+    assert image.filepath == "//vdbshade.exr" and image.packed_file is None, image.filepath
+    start()
+    assert bake().packed_file is not None, "an image of a file that was never saved is lost"
+
+
+def test_errors_are_told():
+    floor, _, settings = start()
+    bpy.context.preferences.addons["vdbshade_bake"].preferences.program = "/nowhere/vdbshade"
+    assert "no such program" in error_of(bpy.ops.vdbshade.bake)
+    bpy.context.preferences.addons["vdbshade_bake"].preferences.program = PROGRAM
+    for obj in bpy.context.scene.objects:
+        obj.select_set(False)
+    assert "select the mesh objects" in error_of(bpy.ops.vdbshade.bake)
+    select(floor)
+    bpy.data.objects.remove(bpy.data.objects["sun"])
+    assert "no sun" in error_of(bpy.ops.vdbshade.bake)
+    floor.data.uv_layers["Baked"].data[2].uv = (float("nan"), 0.0)
+    settings.what = "AO"
+    told = error_of(bpy.ops.vdbshade.bake)
+    assert "floor" in told, told  # the program's own line
+    assert "vdbshade" not in bpy.data.images
+
+
+def test_a_bake_that_is_stopped_leaves_nothing():
+    floor, _, settings = start()
+    settings.size = 8192
+    settings.max_error = 0.001
+    job = addon.Bake(bpy.context)
+    job.begin(bpy.context)
+    folder, process = job.folder, job.process
+    assert job.poll() is None
+    job.stop()
+    assert process.poll() is not None and not os.path.exists(folder)
+    assert "vdbshade" not in bpy.data.images
+
+
+def test_progress_is_read():
+    start()
+    job = addon.Bake(bpy.context)
+    job.begin(bpy.context)
+    job.process.wait()
+    assert job.poll() == 0
+    assert job.progress[0] > 0.5 and "write" in job.progress[1], job.progress
+    job.stop()
+
+
+def main():
+    failed = 0
+    tests = [(name, test) for name, test in sorted(globals().items()) if name.startswith("test_")]
+    for name, test in tests:
+        try:
+            test()
+            print("ok", name)
+        except Exception:
+            failed += 1
+            print("not ok", name)
+            traceback.print_exc(file=sys.stdout)
+    print("%d passed, %d failed" % (len(tests) - failed, failed))
+    sys.stdout.flush()
+    os._exit(1 if failed else 0)
+
+
+main()

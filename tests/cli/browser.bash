@@ -1,0 +1,45 @@
+# Pages in Chromium, without a window and without a network; loaded after helper.bash.
+
+setup_file() {
+    command -v chromium >/dev/null || return 0
+    "${CC:-cc}" -std=gnu11 -O1 "$BATS_TEST_DIRNAME/picture.c" -o "$BATS_FILE_TMPDIR/picture" -lpng
+    "${CC:-cc}" -std=gnu11 -O1 "$BATS_TEST_DIRNAME/browser.c" -o "$BATS_FILE_TMPDIR/browser" -ljansson
+}
+
+setup() {
+    command -v chromium >/dev/null || skip "there is no chromium"
+    cd "$BATS_TEST_TMPDIR" || return 1
+}
+
+picture() {
+    "$BATS_FILE_TMPDIR/picture" "$@"
+}
+
+# The size of the window: a number that halves well.
+WIDE=400
+
+# look PAGE STATE [ACTION …] [-- OPTION …]: opens PAGE#STATE and does what browser.c can do; its picture is in page.png, its
+# document in page.dom.
+look() {
+    local page=$1 state=$2
+    shift 2
+    local words=("$@")
+    [[ " $* " == *" -- "* ]] || words+=(--)
+    timeout 200 "$BATS_FILE_TMPDIR/browser" "file://$PWD/$page#$state" $WIDE page.png page.dom "${words[@]}" \
+        --user-data-dir="$BATS_FILE_TMPDIR/profile" 2>page.log || fail "$(tail -5 page.log)"
+}
+
+# state_is WORD: what the page says of itself.
+state_is() {
+    grep -q "data-state=\"$1\"" page.dom || fail "no $1: $(grep -o '<div id="message".*' page.dom)"
+}
+
+# pixel_is X Y R G B: a pixel of the last picture, to one of 255.
+pixel_is() {
+    local seen
+    seen=$(picture get page.png "$1" "$2")
+    awk -v seen="$seen" -v wanted="$3 $4 $5" 'BEGIN {
+        split(seen, a); split(wanted, b)
+        for (i = 1; i <= 3; ++i) if (a[i] - b[i] > 1.01 || b[i] - a[i] > 1.01) exit 1 }' ||
+        fail "pixel $1 $2: $seen, not $3 $4 $5"
+}

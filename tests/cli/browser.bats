@@ -1,0 +1,359 @@
+# What `view` writes, as Chromium shows it: by the pixels of its picture.
+load helper
+load browser
+
+# Two squares side by side, facing the camera: a from x = -1 to 0, b from 0 to 1, y from -1 to 1. Their lightmaps are in
+# the third UV set, v down: a has the left half of the picture, b the right one. The other two sets are all zero.
+write_squares() {
+    {
+        for x in -1 0; do
+            f32 $x -1 0 $((x + 1)) -1 0 $((x + 1)) 1 0 $x 1 0
+        done
+        for u in 0 0.5; do
+            f32 $u 1 "$(half $u)" 1 "$(half $u)" 0 $u 0
+        done
+        f32 0 0 0 0 0 0 0 0
+        printf '\0\0\1\0\2\0\0\0\2\0\3\0'
+    } >squares.bin
+    cat >squares.gltf <<JSON
+{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+ "extensionsUsed": ["MOZ_lightmap"],
+ "nodes": [{"name": "${NAME_A-square a}", "mesh": 0}, {"name": "square b", "mesh": 1}],
+ "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 4, "TEXCOORD_1": 4, "TEXCOORD_2": 2}, "indices": 5, "material": 0}]},
+            {"primitives": [{"attributes": {"POSITION": 1, "TEXCOORD_0": 4, "TEXCOORD_1": 4, "TEXCOORD_2": 3}, "indices": 5, "material": 1}]}],
+ "materials": [{"name": "dim", "pbrMetallicRoughness": {"baseColorFactor": [0.8, 0.4, 0.2, 1]},
+                "occlusionTexture": {"index": 1, "texCoord": 2, "strength": 0.5},
+                "extensions": {"MOZ_lightmap": {"index": 0, "texCoord": 2, "intensity": 0.75}}},
+               {"pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 1]},
+                "occlusionTexture": {"index": 1, "texCoord": 2},
+                "extensions": {"MOZ_lightmap": {"index": 0, "texCoord": 2}}}],
+ "textures": [{"source": 0}, {"source": 1}], "images": [{"uri": "${LIGHT-light%20map.png}"}, {"uri": "ao.png"}],
+ "accessors": [{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, 0], "max": [0, 1, 0]},
+               {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC3", "min": [0, -1, 0], "max": [1, 1, 0]},
+               {"bufferView": 2, "componentType": 5126, "count": 4, "type": "VEC2"},
+               {"bufferView": 3, "componentType": 5126, "count": 4, "type": "VEC2"},
+               {"bufferView": 4, "componentType": 5126, "count": 4, "type": "VEC2"},
+               {"bufferView": 5, "componentType": 5123, "count": 6, "type": "SCALAR"}],
+ "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 48},
+                 {"buffer": 0, "byteOffset": 96, "byteLength": 32}, {"buffer": 0, "byteOffset": 128, "byteLength": 32},
+                 {"buffer": 0, "byteOffset": 160, "byteLength": 32}, {"buffer": 0, "byteOffset": 192, "byteLength": 12}],
+ "buffers": [{"byteLength": 204, "uri": "squares.bin"}]}
+JSON
+    picture put "light map.png" 4 2  10 20 30  60 70 80  110 120 130  160 170 180   200 210 220  250 240 230  5 5 5  90 0 190
+    picture put ao.png 4 2  255 0 0  128 0 0  64 0 0  200 0 0   30 0 0  90 0 0  150 0 0  220 0 0
+}
+
+# f32 NUMBER …: as floats of 32 bits; of the few that are used here.
+f32() {
+    local number
+    for number; do
+        case $number in
+        0) printf '\0\0\0\0' ;;
+        0.5) printf '\0\0\0\77' ;;
+        1) printf '\0\0\200\77' ;;
+        -1) printf '\0\0\200\277' ;;
+        *) return 1 ;;
+        esac
+    done
+}
+
+half() { # where a lightmap's half that begins at $1 ends
+    [ "$1" = 0 ] && echo 0.5 || echo 1
+}
+
+# lit R G B BASE_R BASE_G BASE_B FACTOR: base colour times (linear) light, as sRGB, 0 … 255. A lightmap's intensity is over π.
+lit() {
+    awk -v v="$*" 'function least(a, b) { return a < b ? a : b }
+        BEGIN { split(v, a)
+            for (i = 1; i <= 3; ++i) { c = least(a[i] / 255 * a[i + 3] * a[7], 1)
+                printf "%.2f ", 255 * (c <= 0.0031308 ? 12.92 * c : 1.055 * c ^ (1 / 2.4) - 0.055) } }'
+}
+
+over_pi() {
+    awk "BEGIN { print ($1) / 3.14159265 }"
+}
+
+# Looks at x and y from -1 to 1.
+FRONT="fov=90&camera=0,0,1,0,0,0&ui=0"
+
+@test "lit: base colour times the lightmap of the third UV set times its intensity times AO" {
+    write_squares
+    shade view squares.gltf -o squares.html --quiet
+    done_well
+    rm squares.gltf squares.bin ao.png "light map.png"
+    look squares.html "$FRONT&texels=1"
+    state_is ready
+    pixel_is 50 100 $(lit 10 20 30 0.8 0.4 0.2 "$(over_pi 0.75)")                                                # its AO is 1
+    pixel_is 150 100 $(lit 60 70 80 0.8 0.4 0.2 "$(over_pi '0.75 * (1 + 128 / 255) / 2')") # half of AO's strength
+    pixel_is 50 300 $(lit 200 210 220 0.8 0.4 0.2 "$(over_pi '0.75 * (1 + 30 / 255) / 2')")
+    pixel_is 350 100 $(lit 160 170 180 1 1 1 "$(over_pi '200 / 255')")
+    pixel_is 250 300 $(lit 5 5 5 1 1 1 "$(over_pi '150 / 255')")
+}
+
+@test "AO alone, the lightmap alone, exposure, base colour" {
+    write_squares
+    shade view squares.gltf -o squares.html --quiet
+    done_well
+    look squares.html "$FRONT&texels=1&mode=ao"
+    pixel_is 150 100 128 128 128
+    pixel_is 250 100 64 64 64
+    pixel_is 350 300 220 220 220
+    look squares.html "$FRONT&texels=1&mode=light&exposure=1"
+    pixel_is 350 300 $(lit 90 0 190 1 1 1 "$(over_pi 2)")
+    pixel_is 50 100 $(lit 10 20 30 1 1 1 "$(over_pi 1.5)")
+    look squares.html "$FRONT&mode=base"
+    pixel_is 50 100 $(lit 255 255 255 0.8 0.4 0.2 1)
+    pixel_is 350 100 255 255 255
+}
+
+@test "a picked texel tells its place and its values" {
+    write_squares
+    shade view squares.gltf -o squares.html --quiet
+    look squares.html "ui=1&$FRONT&mode=charts&pick=0.875,0.3"
+    state_is ready
+    for told in '<h2>square b</h2>' '<th>UV set</th><td>2</td>' '<th>UV</th><td>0.87500  0.30000</td>' \
+        '<th>texel</th><td>3  0 of 4 × 2</td>' '<th>lightmap / 255</th><td>160  170  180</td>' \
+        '<th>occlusion / 255</th><td>200</td>' '<th>position</th><td>0.75  0.4  0</td>'; do
+        grep -qF "$told" page.dom || fail "no $told: $(grep -o '<section.*section>' page.dom)"
+    done
+    grep -q '>2 charts<' page.dom || fail "not two charts"
+    look squares.html "ui=1&$FRONT&pick=0.125,0.75"
+    grep -qF '<th>material</th><td>dim</td>' page.dom || fail "no material"
+    grep -qF '<th>texel</th><td>0  1 of 4 × 2</td>' page.dom || fail "another texel"
+}
+
+# A floor of 2 × 2 seen from above, its UVs the left half of the lightmap, and a wall at its right border.
+write_corner() {
+    cat >corner.obj <<'OBJ'
+o floor
+v -1 -1 0
+v 1 -1 0
+v 1 1 0
+v -1 1 0
+vt 0 0
+vt 0.5 0
+vt 0.5 1
+vt 0 1
+f 1/1 2/2 3/3
+f 1/1 3/3 4/4
+o wall
+v 1 -1 0
+v 1 -1 1
+v 1 1 1
+v 1 1 0
+vt 0.6 0
+vt 1 0
+vt 1 1
+vt 0.6 1
+f 5/5 6/6 7/7
+f 5/5 7/7 8/8
+OBJ
+}
+
+BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-normals world --quiet)
+
+@test "the planes of a bake: each texel shows what the file has" {
+    write_corner
+    "$VDBSHADE" bake corner.obj "${BAKE[@]}" -o corner.exr
+    "$VDBSHADE" bake corner.obj "${BAKE[@]}" --pack R=ao,G=shadow.sun,B=0 --bits 8 -o corner.png
+    shade view corner.obj --planes corner.exr -o corner.html --quiet
+    done_well
+    # 32 × 64 texels over 400 × 400 pixels: the middle of texel (i, j) is at ((i + 1/2) 12.5, (j + 1/2) 6.25)
+    look corner.html "$FRONT&texels=1&mode=ao"
+    state_is ready
+    for texel in 4,10 16,33 28,20 30,60 31,5; do
+        local i=${texel%,*} j=${texel#*,} ao
+        ao=$(picture get corner.png "$i" "$j" | cut -d' ' -f1)
+        pixel_is $((i * 25 / 2 + 6)) $((j * 25 / 4 + 3)) "$ao" "$ao" "$ao"
+    done
+    [ "$(picture get corner.png 31 5 | cut -d' ' -f1)" -lt 180 ] || fail "the wall hides nothing"
+    look corner.html "$FRONT&texels=1&mode=light&channel=shadow.sun"
+    for texel in 4,10 16,33 24,20 30,60; do
+        local i=${texel%,*} j=${texel#*,} sun
+        sun=$(picture get corner.png "$i" "$j" | cut -d' ' -f2)
+        pixel_is $((i * 25 / 2 + 6)) $((j * 25 / 4 + 3)) "$sun" "$sun" "$sun"
+    done
+    [ "$(picture get corner.png 30 60 | cut -d' ' -f2)" -lt 30 ] || fail "the wall throws no shadow"
+    [ "$(picture get corner.png 4 10 | cut -d' ' -f2)" -gt 200 ] || fail "nothing is lit"
+}
+
+@test "bilinear lookups between texels, and bent normals as (1 + n) / 2" {
+    write_corner
+    "$VDBSHADE" bake corner.obj "${BAKE[@]}" -o corner.exr
+    "$VDBSHADE" bake corner.obj "${BAKE[@]}" --pack R=bent.X,G=bent.Y,B=bent.Z --bits 8 -o bent.png
+    shade view corner.obj --planes corner.exr -o corner.html --quiet
+    done_well
+    look corner.html "$FRONT&texels=1&mode=bent"
+    for texel in 4,10 28,20 30,60; do
+        local i=${texel%,*} j=${texel#*,}
+        pixel_is $((i * 25 / 2 + 6)) $((j * 25 / 4 + 3)) $(picture get bent.png "$i" "$j")
+    done
+    [ "$(picture get bent.png 30 60 | cut -d' ' -f1)" -lt 120 ] || fail "the wall bends nothing"
+    look corner.html "$FRONT&mode=bent"
+    # pixel 375 is where texels 29 and 30 meet, and 206 where rows 32 and 33 do
+    pixel_is 375 206 $(picture get bent.png 29 32 30 32 29 33 30 33 |
+        awk '{ for (i = 1; i <= 3; ++i) s[i] += $i / 4 } END { print s[1], s[2], s[3] }')
+}
+
+@test "keys choose, the mouse turns and picks" {
+    write_squares
+    shade view squares.gltf -o squares.html --quiet
+    look squares.html "$FRONT&texels=1" key:2
+    pixel_is 150 100 128 128 128
+    look squares.html "$FRONT&texels=1" key:9 key:2 key:1
+    pixel_is 350 100 $(lit 160 170 180 1 1 1 "$(over_pi '200 / 255')")
+    look squares.html "$FRONT&texels=1&mode=light" key:+ key:+
+    pixel_is 350 300 $(lit 90 0 190 1 1 1 "$(over_pi 2)")
+    look squares.html "$FRONT&mode=light" key:t
+    pixel_is 350 100 $(lit 160 170 180 1 1 1 "$(over_pi 1)")
+    look squares.html "ui=1&$FRONT" click:350,100
+    grep -q '<h2>square b</h2>' page.dom || fail "a click picks nothing"
+    look squares.html "ui=1&$FRONT" click:350,100 key:Escape
+    grep -q '<section id="picked".*hidden=""' page.dom || fail "Escape leaves it"
+    look squares.html "ui=1&$FRONT" key:ArrowRight key:ArrowRight key:Enter
+    grep -q '<th>position</th><td>0  0  0</td>' page.dom || fail "Enter does not pick what the arrows turn around"
+    look squares.html "$FRONT&mode=base" drag:200,200,300,200
+    picture get page.png 20 200 >seen
+    look squares.html "$FRONT&mode=base" drag:200,200,202,200
+    [ "$(picture get page.png 20 200)" != "$(cat seen)" ] || fail "dragging turns nothing"
+}
+
+@test "a slider between two bakes: the first on the left, the second on the right" {
+    write_corner
+    "$VDBSHADE" bake corner.obj "${BAKE[@]}" -o near.exr
+    "$VDBSHADE" bake corner.obj "${BAKE[@]}" --ao 0.1 -o far.exr
+    for name in near far; do
+        "$VDBSHADE" bake corner.obj "${BAKE[@]}" $([ $name = far ] && echo --ao 0.1) --pack R=ao,G=ao,B=ao --bits 8 -o $name.png
+    done
+    shade view corner.obj --planes near.exr --other-planes far.exr -o two.html --quiet
+    done_well
+    look two.html "$FRONT&texels=1&mode=ao&split=0.9"
+    state_is ready
+    pixel_is 356 203 $(picture get near.png 28 32)
+    pixel_is 369 203 $(picture get far.png 29 32)
+    [ "$(picture get near.png 29 32)" != "$(picture get far.png 29 32)" ] || fail "the bakes are alike"
+    look two.html "$FRONT&texels=1&mode=ao&split=1"
+    pixel_is 369 203 $(picture get near.png 29 32)
+    look two.html "ui=1&$FRONT&mode=ao&split=0.9&pick=0.7,0.5"
+    grep -q '<th>bake</th><td>corner.obj</td>' page.dom || fail "the first bake is not told"
+    grep -q '<th>bake</th><td>far.exr</td>' page.dom || fail "the second bake is not told"
+    # two models
+    write_squares
+    shade view squares.gltf corner.obj -o models.html --quiet
+    done_well
+    look models.html "$FRONT&mode=base&split=0.5"
+    pixel_is 100 100 $(lit 255 255 255 0.8 0.4 0.2 1)
+    pixel_is 300 100 $(lit 255 255 255 0.8 0.8 0.8 1)
+}
+
+@test "texel density, checker and charts of a mesh without a bake" {
+    write_corner
+    shade view corner.obj -o corner.html --quiet
+    done_well
+    # floor: 512 × 1024 texels over 2 × 2; wall: 410 × 1024 over 1 × 2; no lightmap: 1024² is taken
+    look corner.html "ui=1&$FRONT&mode=density"
+    grep -o '[0-9]*</span><span>texels a unit' page.dom >/dev/null || fail "no legend"
+    mean=$(awk 'BEGIN { printf "%.3g", sqrt((0.5 + 0.4) * 1024 * 1024 / 6) }')
+    grep -qF ">$mean</span>" page.dom || fail "no $mean: $(grep -o 'id="legend".*' page.dom)"
+    look corner.html "$FRONT&mode=checker"
+    # squares of 8 texels are 6.25 pixels wide and 3.125 high there
+    [ "$(picture get page.png 100 101)" != "$(picture get page.png 107 101)" ] || fail "no squares"
+    [ "$(picture get page.png 100 101)" != "$(picture get page.png 100 104)" ] || fail "no squares"
+    look corner.html "ui=1&$FRONT&mode=charts"
+    grep -q '>2 charts<' page.dom || fail "not two charts"
+}
+
+@test "every mesh format shows its triangles" {
+    models=$BATS_TEST_DIRNAME/../models
+    for file in scene.obj scene.ply scene.stl scene.fbx scene.dae scene.gltf scene.glb scene_draco.glb figure.glb; do
+        shade view "$models/$file" -o page.html --quiet
+        done_well
+        look page.html "ui=0&mode=base&theme=dark"
+        state_is ready
+        # something else than the back is in the middle third
+        picture get page.png 150 200 200 150 200 200 250 200 200 250 170 230 230 170 | sort -u >seen
+        grep -qv '^23 25 29$' seen || fail "$file: nothing is seen"
+    done
+}
+
+@test "names and texts of strangers stay texts, and nothing that they name is asked for" {
+    NAME_A='</script><script>document.title=\"gone\"</script><img src=x onerror=\"document.title=1\">' LIGHT=http://127.0.0.1:9/light.png write_squares
+    evil='<img src=x onerror=document.title=1>&quot;.gltf'
+    mv squares.gltf "$evil"
+    shade view "$evil" -o squares.html --quiet
+    done_well
+    ! grep -q '<img' squares.html || fail "a tag came through"
+    look squares.html "ui=1&$FRONT&pick=0.25,0.3" -- --log-net-log="$PWD/net.json"
+    state_is ready
+    grep -qF '&lt;/script&gt;&lt;script&gt;document.title="gone"' page.dom || fail "the name is not told"
+    grep -qF "<title>&lt;img src=x onerror=document.title=1&gt;&amp;quot;.gltf</title>" page.dom || fail "another title"
+    grep -qF 'is not shown' page.dom || fail "no word of the missing picture"
+    ! grep -q '127.0.0.1:9' net.json || fail "something was asked for"
+    echo '<html data-state="ready"><img src="http://127.0.0.1:9/light.png">' >asks.html
+    look asks.html "" -- --log-net-log="$PWD/asks.json"
+    grep -q '127.0.0.1:9' asks.json || fail "the log does not show what is asked for"
+}
+
+@test "without WebGL, and with a file that its script cannot take, the page says so" {
+    write_squares
+    shade view squares.gltf -o squares.html --quiet
+    look squares.html "" -- --disable-3d-apis
+    state_is failed
+    grep -q 'shows no WebGL 2' page.dom || fail "$(grep -o 'id="message".*' page.dom)"
+    sed 's/"POSITION": 0,/"POSITION": 0, "JOINTS_0": 99,/' squares.gltf >joints.gltf
+    shade view joints.gltf -o joints.html --quiet
+    done_well
+    look joints.html "$FRONT&texels=1"
+    state_is ready
+    grep -q 'square a is not shown: accessor 99 is not there' page.dom || fail "$(grep -o 'id="problems".*' page.dom)"
+    pixel_is 350 100 $(lit 160 170 180 1 1 1 "$(over_pi '200 / 255')")
+    sed -i 's/"source": 0/"source": 7/' squares.gltf
+    shade view squares.gltf -o squares.html --quiet
+    done_well
+    look squares.html ""
+    grep -q 'squares.gltf: image 7 is not shown' page.dom || fail "$(grep -o 'id="problems".*' page.dom)"
+}
+
+@test "docs/engines.md: the lines for three.js show a lit glTF as it is meant" {
+    three=/usr/share/javascript/three
+    write_squares
+    sed -i 's/"baseColorFactor"/"metallicFactor": 0, "baseColorFactor"/' squares.gltf
+    # the page cannot ask for files: they stand in it
+    sed -i "s|light%20map.png|data:image/png;base64,$(base64 -w0 'light map.png')|; s|ao.png|data:image/png;base64,$(base64 -w0 ao.png)|;
+        s|squares.bin|data:application/octet-stream;base64,$(base64 -w0 squares.bin)|" squares.gltf
+    awk '/^```js$/ { inside = 1; next } /^```$/ { inside = 0 } inside' "${DOCS:-$BATS_TEST_DIRNAME/../../docs}/engines.md" |
+        sed "s|'lit.glb'|'data:application/json;base64,$(base64 -w0 squares.gltf)'|" >lines.js
+    grep -q 'addLightmaps(THREE, gltf)' lines.js
+    {
+        echo '<!doctype html><html data-state="loading"><style>body { margin: 0 }</style><script>'
+        cat $three/three.min.js
+        echo '</script><script>'
+        cat $three/examples/js/loaders/GLTFLoader.js
+        echo '</script><script>
+            const scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(90, 1, 0.1, 10);
+            const renderer = new THREE.WebGLRenderer({preserveDrawingBuffer: true});
+            renderer.setSize(innerWidth, innerHeight);
+            document.body.append(renderer.domElement);
+            camera.position.z = 1;
+            const add = scene.add;
+            scene.add = function (object) {
+                object.traverse(mesh => { if (mesh.isMesh) for (const map of [mesh.material.lightMap, mesh.material.aoMap])
+                    map.magFilter = map.minFilter = THREE.NearestFilter, map.needsUpdate = true; });
+                add.call(scene, object);
+                renderer.render(scene, camera);
+                document.documentElement.dataset.state = "ready";
+            };
+            addEventListener("unhandledrejection", event => {
+                document.body.append(event.reason.message); document.documentElement.dataset.state = "failed"; });'
+        cat lines.js
+        echo '</script></html>'
+    } | sed 's|<style>|<body><style>|' >engine.html
+    look engine.html ""
+    state_is ready
+    # r111 shows linear values
+    plain() { awk -v v="$*" 'BEGIN { split(v, a); for (i = 1; i <= 3; ++i) printf "%.2f ", a[i] * a[i + 3] * a[7] }'; }
+    pixel_is 50 100 $(plain 10 20 30 0.8 0.4 0.2 "$(over_pi 0.75)")
+    pixel_is 150 100 $(plain 60 70 80 0.8 0.4 0.2 "$(over_pi '0.75 * (1 + 128 / 255) / 2')")
+    pixel_is 350 100 $(plain 160 170 180 1 1 1 "$(over_pi '200 / 255')")
+    pixel_is 50 300 $(plain 200 210 220 0.8 0.4 0.2 "$(over_pi '0.75 * (1 + 30 / 255) / 2')")
+}

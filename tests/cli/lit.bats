@@ -1,0 +1,181 @@
+# A .glb or .gltf as output: the mesh file with its light.
+load helper
+
+MODELS=$BATS_TEST_DIRNAME/../models
+
+# What is there, in one line, but for Bats' own.
+files() {
+    local name names=()
+    for name in ${1:-*}; do
+        [[ $name == separate-stderr-* ]] || names+=("$name")
+    done
+    echo "${names[@]}"
+}
+
+# The JSON of a GLB.
+json_of() {
+    local length
+    length=$(od -An -tu4 -j12 -N4 "$1" | tr -d ' ')
+    tail -c +21 "$1" | head -c "$length"
+}
+
+BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
+
+@test "a mesh comes back as GLB with AO as occlusion and its light as lightmap" {
+    shade bake "$MODELS/scene.glb" "${BAKE[@]}" -o lit.glb
+    done_well
+    [[ $stderr == *"lit.glb: 32 × 32, "*" texels"* ]] || fail "$stderr"
+    json_of lit.glb | grep -q '"occlusionTexture":{"index":0,"texCoord":1}' || fail "no occlusion"
+    json_of lit.glb | grep -q '"MOZ_lightmap":{"index":1,"texCoord":1,"intensity":3.' || fail "no lightmap"
+    [ "$(files)" = lit.glb ] || fail "$(files) beside it"
+    shade info lit.glb
+    done_well
+    [[ $output == *"2, in 3 meshes, 16 triangles; UV sets: 2"* ]] || fail "$output"
+}
+
+@test "a glTF has its buffer and its images beside it, and the EXR that is asked for" {
+    shade bake "$MODELS/scene.gltf" "${BAKE[@]}" --irradiance --ambient 0.2,0.2,0.2 --seams keep -o lit.gltf \
+        --exr all.exr
+    done_well
+    [ "$(files '*')" = "all.exr lit.bin lit.gltf lit.lightmap.png lit.occlusion.png" ] || fail "$(files)"
+    shade bake "$MODELS/scene.gltf" "${BAKE[@]}" --irradiance --ambient 0.2,0.2,0.2 -o image.exr
+    same_values all.exr image.exr || fail "the EXR is another"
+    shade bake "$MODELS/scene.gltf" "${BAKE[@]}" -o one.gltf --embed
+    done_well
+    [ "$(files 'one*')" = "one.bin one.gltf" ] || fail "$(files)"
+    shade bake "$MODELS/scene.gltf" "${BAKE[@]}" -o beside.glb --images-beside
+    done_well
+    [ "$(files 'beside*')" = "beside.glb beside.lightmap.png beside.occlusion.png" ] || fail "$(files)"
+}
+
+@test "--preview writes unlit base colour; other formats become GLB" {
+    for model in scene.glb scene.fbx scene.dae figure.fbx scene_draco.glb; do
+        shade bake "$MODELS/$model" "${BAKE[@]}" --allow-overlap -o lit.glb --preview
+        done_well
+        json_of lit.glb | grep -q '"KHR_materials_unlit":{}' || fail "$model: no preview"
+    done
+    write_box box.obj
+    shade bake box.obj "${BAKE[@]}" -o lit.glb
+    done_well
+    json_of lit.glb | grep -q '"TEXCOORD_0"' || fail "no UVs"
+}
+
+@test "objects that do not receive keep their materials" {
+    shade bake "$MODELS/scene.glb" "${BAKE[@]}" --receive ell -o lit.glb
+    done_well
+    [ "$(json_of lit.glb | grep -o '"occlusionTexture"' | wc -l)" -eq 1 ] || fail "$(json_of lit.glb)"
+}
+
+@test "in bands, resumed and by any number of threads it is the same file" {
+    shade bake "$MODELS/scene.glb" "${BAKE[@]}" -o whole.glb
+    done_well
+    shade bake "$MODELS/scene.glb" "${BAKE[@]}" -o bands.glb --band-rows 8 --threads 1
+    done_well
+    cmp whole.glb bands.glb
+    shade bake "$MODELS/scene.glb" "${BAKE[@]}" -o resumed.glb --band-rows 8 --resume
+    done_well
+    cmp whole.glb resumed.glb
+    [ ! -e resumed.glb.resume ] || fail "rows are left"
+}
+
+@test "options that are for assets alone, and that assets do not have, are refused" {
+    cp "$MODELS/scene.glb" in.glb
+    for words in "--preview -o a.png" "--embed -o a.exr" "--exr b.exr -o a.png" "--images-beside -o a.tif"; do
+        # shellcheck disable=SC2086
+        shade bake in.glb "${BAKE[@]}" $words
+        refused 2 "${words%% *}" ".glb or .gltf"
+    done
+    shade bake in.glb "${BAKE[@]}" --embed --images-beside -o a.glb
+    refused 2 --embed --images-beside
+    shade bake in.glb "${BAKE[@]}" --exr b.png -o a.glb
+    refused 2 b.png .exr
+    shade bake in.glb "${BAKE[@]}" --exr in.glb -o a.glb
+    refused 2
+    shade bake in.glb "${BAKE[@]}" --per-object -o a.glb
+    refused 2 --per-object
+    shade bake in.glb "${BAKE[@]}" --bits 32 -o a.glb
+    refused 2 a.glb "32 bits"
+    shade bake in.glb "${BAKE[@]}" --pack R=ao -o a.glb
+    refused 2 a.glb pack
+    shade bake in.glb "${BAKE[@]}" -o in.glb
+    refused 2 in.glb "the output is the input"
+    shade bake in.glb --sky y --size 32 -o a.glb
+    refused 2 a.glb AO
+    [ "$(files)" = in.glb ] || fail "$(files)"
+}
+
+# write_gltf NODES ACCESSOR BUFFER: a triangle, whose parts these are.
+write_gltf() {
+    cat >in.gltf <<EOF
+{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[$1],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1}}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"$2},{"bufferView":1,"componentType":5126,"count":3,"type":"VEC2"}],
+"bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteOffset":36,"byteLength":24}],"buffers":[{"byteLength":60,"uri":"$3"}]}
+EOF
+}
+
+@test "hostile documents are refused in one line, and the old output stays" {
+    # 0 0 0, 1 0 0, 0 0 1; 0 0, 1 0, 0 1
+    awk 'BEGIN { z = "\\000\\000\\000\\000"; o = "\\000\\000\\200\\077"; print z z z o z z z z o z z o z z o }' >bytes
+    printf '%b' "$(sed 's/\\\([0-7]\)/\\0\1/g' bytes)" >good.bin
+    [ "$(wc -c <good.bin)" -eq 60 ]
+    head -c 40 good.bin >short.bin
+    write_gltf '{"mesh":0}' '' good.bin
+    shade bake in.gltf --ao 1 --size 32 -o out.glb
+    done_well
+    old_output out.glb
+    while IFS='|' read -r code nodes accessor buffer part; do
+        write_gltf "$nodes" "$accessor" "$buffer"
+        shade bake in.gltf --ao 1 --size 32 -o out.glb
+        [ "$status" -eq "$code" ] || fail "$part: $status: $stderr"
+        [ "${#stderr_lines[@]}" -eq 1 ] || fail "$part: $stderr"
+        [[ $stderr == *in.gltf*"$part"* ]] || fail "$part: $stderr"
+        [ "$(cat out.glb)" = old ] || fail "$part: the old output is gone"
+    done <<'EOF'
+2|{"mesh":0,"children":[0]}||good.bin|its own descendant
+2|{"children":[1]},{"mesh":0,"children":[0]}||good.bin|its own descendant
+2|{"mesh":0}|,"byteOffset":4|good.bin|pass the 36 bytes
+2|{"mesh":0}|,"componentType":5125|good.bin|POSITION
+3|{"mesh":0}||short.bin|cut short
+3|{"mesh":0}||gone.bin|gone.bin
+2|{"mesh":7}||good.bin|there are only 1
+EOF
+    [ "$(files 'out*')" = out.glb ] || fail "$(files)"
+}
+
+@test "the validator finds no error, and no warning that the input had not" {
+    node -e 'require("gltf-validator")' 2>/dev/null || skip "no gltf-validator"
+    [ -n "${TEST_LIT:-}" ] || skip "no test_lit"
+    mkdir kept
+    for test in "$TEST_LIT" "${TEST_LIT}_images"; do
+        TMPDIR=$PWD VSH_LIT_KEEP=$PWD/kept "$test" >/dev/null 2>&1 || fail "$test"
+    done
+    for model in scene.glb scene.gltf figure.glb scene_draco.glb scene.fbx; do
+        for kind in "" --preview --images-beside; do
+            # shellcheck disable=SC2086
+            shade bake "$MODELS/$model" "${BAKE[@]}" $kind -o "kept/$model$kind.glb"
+            done_well
+        done
+        shade bake "$MODELS/$model" "${BAKE[@]}" -o "kept/$model.gltf"
+        done_well
+    done
+    [ "$(ls kept/*.glb kept/*.gltf | wc -l)" -gt 40 ]
+    cat >validate.js <<'EOF'
+const validator = require('gltf-validator'), fs = require('fs'), path = require('path');
+(async () => {
+    let bad = 0;
+    for (const file of process.argv.slice(2)) {
+        const read = (uri) => Promise.resolve(new Uint8Array(fs.readFileSync(path.join(path.dirname(file), decodeURIComponent(uri)))));
+        const report = await validator.validateBytes(new Uint8Array(fs.readFileSync(file)), {externalResourceFunction: read});
+        for (const m of report.issues.messages) {
+            // the figure's skinned node has a parent, as Blender wrote it
+            if (m.severity < 2 && m.code !== 'NODE_SKINNED_MESH_NON_ROOT') {
+                console.log(file, m.code, m.message, m.pointer);
+                ++bad;
+            }
+        }
+    }
+    process.exit(bad ? 1 : 0);
+})();
+EOF
+    node validate.js kept/*.glb kept/*.gltf || fail "see above"
+}

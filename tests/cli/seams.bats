@@ -1,0 +1,87 @@
+# Seams of lightmaps, and padding for mip levels.
+load helper
+
+# A tube with smooth normals, whose only chart meets itself, in the shadow of nothing but itself.
+write_tube() {
+    awk 'BEGIN {
+        n = 24; print "o tube"
+        for (i = 0; i <= n; ++i) for (k = 0; k < 2; ++k) {
+            a = 6.283185307179586 * (i % n) / n
+            printf "v %.6f %.6f %d\nvn %.6f %.6f 0\nvt %.6f %.6f\n", cos(a), sin(a), 2 * k, cos(a), sin(a), 0.113 + 0.77 * i / n, 0.121 + 0.5 * k
+        }
+        for (i = 0; i < n; ++i) { a = 2 * i + 1; b = a + 2; c = a + 3; d = a + 1
+            printf "f %d/%d/%d %d/%d/%d %d/%d/%d\nf %d/%d/%d %d/%d/%d %d/%d/%d\n", a, a, a, b, b, b, c, c, c, a, a, a, c, c, c, d, d, d }
+    }' >"$1"
+}
+
+# The sun stands where the seam is half lit.
+TUBE=(--sun 0.1,1,0.3 --sun-angle 60 --ao 1 --size 48 --quiet)
+
+@test "seams are fixed where that is asked for, by option and by scene" {
+    write_tube tube.obj
+    run -0 "$VDBSHADE" bake tube.obj "${TUBE[@]}" -o plain.exr
+    run -0 "$VDBSHADE" bake tube.obj "${TUBE[@]}" --seams keep -o kept.exr
+    run -0 "$VDBSHADE" bake tube.obj "${TUBE[@]}" --seams fix -o fixed.exr
+    same_values plain.exr kept.exr
+    run -1 same_values plain.exr fixed.exr
+    # texels that were baked: within the error that was asked for
+    run -0 "$VDBSHADE" compare plain.exr fixed.exr --max-difference 0.020001 --max-coverage 0
+    printf '{"casters": [{"mesh": "tube.obj"}], "ao": {"distance": 1},
+             "lights": [{"name": "sun", "type": "directional", "direction": [0.1, 1, 0.3], "angle_deg": 60}],
+             "receivers": [{"mesh": "tube.obj", "size": 48, "seams": "fix", "output": "scene.exr"}]}' >scene.json
+    run -0 "$VDBSHADE" bake scene.json --quiet
+    same_values fixed.exr scene.exr
+    run -0 "$VDBSHADE" bake scene.json --seams keep --quiet -o kept.exr
+    same_values plain.exr kept.exr
+}
+
+@test "a smaller error moves texels less" {
+    write_tube tube.obj
+    run -0 "$VDBSHADE" bake tube.obj "${TUBE[@]}" --max-error 0.002 -o plain.exr
+    run -0 "$VDBSHADE" bake tube.obj "${TUBE[@]}" --max-error 0.002 --seams fix -o fixed.exr
+    run -1 same_values plain.exr fixed.exr
+    run -0 "$VDBSHADE" compare plain.exr fixed.exr --max-difference 0.0020001 --max-coverage 0
+}
+
+@test "creases have no seams: a box stays as it is" {
+    write_box box.obj
+    run -0 "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o plain.exr
+    run -0 "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet --seams fix -o fixed.exr
+    same_values plain.exr fixed.exr
+}
+
+@test "bands of rows keep their seams and their padding is of 16 texels, with warnings" {
+    write_tube tube.obj
+    run -0 "$VDBSHADE" bake tube.obj "${TUBE[@]}" --padding 16 -o plain.exr
+    run --separate-stderr -0 "$VDBSHADE" bake tube.obj "${TUBE[@]:0:8}" --seams fix --padding auto --band-rows 16 -o bands.exr
+    [[ $stderr == *"tube.obj: seams are kept: it is baked in 3 bands of rows"* ]]
+    [[ $stderr == *"tube.obj: padding is of 16 texels, not of all that is empty: it is baked in 3 bands"* ]]
+    run -0 "$VDBSHADE" compare plain.exr bands.exr --max-difference 0 --max-coverage 0 --padding
+}
+
+@test "padding auto leaves no texel empty" {
+    write_tube tube.obj
+    options=(--ao 1 --size 256 --quiet)
+    run -0 "$VDBSHADE" bake tube.obj "${options[@]}" --padding 16 -o grown.exr
+    run -0 "$VDBSHADE" info grown.exr
+    [[ $output == *"'ao': min 0, "* ]]
+    run -0 "$VDBSHADE" bake tube.obj "${options[@]}" --padding auto -o filled.exr
+    run -0 "$VDBSHADE" info filled.exr
+    [[ $output != *"'ao': min 0, "* ]]
+    run -0 "$VDBSHADE" compare grown.exr filled.exr --max-difference 0 --max-coverage 0
+}
+
+@test "what seams and padding may be is said where they are something else" {
+    write_tube tube.obj
+    run -2 "$VDBSHADE" bake tube.obj "${TUBE[@]}" --seams stitch -o out.exr
+    [[ $output == *"--seams 'stitch': expected one of default, keep, fix"* ]]
+    run -2 "$VDBSHADE" bake tube.obj "${TUBE[@]}" --padding all -o out.exr
+    [[ $output == *"--padding 'all': expected a whole number from 0 to 4096, or auto"* ]]
+    run -2 "$VDBSHADE" bake tube.obj "${TUBE[@]}" --padding -1 -o out.exr
+    [[ $output == *"--padding '-1': expected a whole number from 0 to 4096, or auto"* ]]
+    printf '{"casters": [{"mesh": "tube.obj"}], "ao": {"distance": 1},
+             "receivers": [{"mesh": "tube.obj", "padding": "all", "output": "out.exr"}]}' >scene.json
+    run -2 "$VDBSHADE" bake scene.json
+    [[ $output == *'scene.json:2:'*'padding: "all" is none of auto, a whole number from 0 to 4096'* ]]
+    [ ! -e out.exr ]
+}

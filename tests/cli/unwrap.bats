@@ -1,0 +1,85 @@
+# unwrap: lightmap UVs for meshes that have none.
+load helper
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    write_box box.obj
+    grep -v '^vt' box.obj | sed 's#/[0-9]*##g' >bare.obj
+}
+
+@test "a mesh without UVs gets some that bake without a warning" {
+    shade unwrap bare.obj -o out.obj --size 64 --picture charts.png
+    done_well
+    [[ $stderr == "vdbshade: out.obj: 6 charts on 1 page of 64 × 64, "*"texels a unit, stretch 1.0"* ]] || fail "no summary"
+    shade info out.obj --size 64
+    [[ $output == *"triangles: 12"*"UV sets: 1"* ]] || fail "no UVs"
+    [[ $output != *problem* ]] || fail "a problem"
+    shade bake out.obj -o out.exr --sun 0.3,1,0.2 --size 64 --resolution 24
+    done_well
+    [[ $stderr != *warning* ]] || fail "a warning"
+    shade info charts.png
+    [[ $output == *"64 × 64"* || $output == *"64 x 64"* ]] || fail "no picture of the page"
+}
+
+@test "positions, normals and triangles are the input's" {
+    shade unwrap "$ASSETS/cloister.glb" -o out.obj --quiet
+    done_well
+    [ -z "$stderr" ] || fail "not quiet"
+    shade info "$ASSETS/cloister.glb"
+    before=$(grep -o 'objects: .* triangles' <<<"$output")
+    shade info out.obj
+    [[ $output == *"$before"* ]] || fail "expected $before"
+    [ "$(grep -c '^vn' out.obj)" -gt 100 ] || fail "no normals"
+}
+
+@test "pages are materials, and a density that does not fit names one that does" {
+    shade unwrap bare.obj -o out.obj --size 32 --texels-per-unit 20
+    refused 4 "texels a unit: "
+    [ ! -e out.obj ] || fail "it was written"
+    shade unwrap bare.obj -o out.obj --size 32 --texels-per-unit 20 --pages 6
+    done_well
+    grep -q '^usemtl page_1' out.obj || fail "no second page"
+}
+
+@test "UVs that can serve are kept, and densities go by name" {
+    shade unwrap box.obj -o out.obj --size 128 --keep
+    done_well
+    [[ $stderr == *"1 mesh kept their UVs"* ]] || fail "they were not kept"
+    shade unwrap box.obj -o out.obj --size 128 --density 'b*=0.5'
+    done_well
+    shade unwrap box.obj -o out.obj --density none=2
+    refused 2 none
+    shade unwrap box.obj -o out.obj --density 3
+    refused 2 --density
+}
+
+@test "the same file for any number of threads" {
+    for threads in 1 5; do
+        shade unwrap "$ASSETS/smooth.glb" -o "$threads.obj" --size 256 --threads "$threads" --quiet
+        done_well
+    done
+    cmp 1.obj 5.obj || fail "they differ"
+}
+
+@test "bad options and places are refused" {
+    old_output out.obj
+    shade unwrap box.obj
+    refused 2 -o
+    shade unwrap box.obj -o out.glb
+    refused 2 out.glb
+    shade unwrap box.obj -o none/out.obj
+    refused 3 none/out.obj
+    shade unwrap box.obj -o box.obj
+    refused 2 box.obj
+    shade unwrap box.obj -o out.obj --picture out.obj
+    refused 2 picture
+    shade unwrap box.obj -o out.obj --picture out.none
+    refused 2 out.none
+    shade unwrap box.obj -o out.obj --padding -1
+    refused 2 --padding
+    shade unwrap box.obj -o out.obj --max-stretch 1
+    refused 2 --max-stretch
+    shade unwrap none.obj -o out.obj
+    refused 3 none.obj
+    untouched out.obj
+}

@@ -1,0 +1,86 @@
+#!/usr/bin/env bats
+# Receivers whose lightmap UVs are made for them: --unwrap, --texels-per-unit, --pages.
+load helper
+
+# The box without UVs, and with a second one beside it.
+write_bare() {
+    write_box full.obj
+    sed -e '/^vt /d' -e 's,/[0-9]*,,g' full.obj >"$1"
+    rm full.obj
+}
+
+write_two() {
+    write_box one.obj
+    {
+        cat one.obj
+        echo 'o second'
+        sed -n 's/^v \([0-9]\) /v \1.5 /p' one.obj | sed 's/^v \([0-9]\)\.5/v 3\1/'
+        sed -n 's/^f //p' one.obj | awk '{ out = "f"; for (i = 1; i <= NF; ++i) { split($i, p, "/"); out = out " " p[1] + 8 "/" p[2] } print out }'
+    } >"$1"
+    rm one.obj
+}
+
+@test "a mesh without lightmap UVs gets some where an asset is written" {
+    write_bare box.obj
+    shade bake box.obj "${SMALL[@]}" --ao 1 -o lit.glb
+    [ "$status" -eq 0 ] || fail "$stderr"
+    grep -aq '"TEXCOORD_0"' lit.glb || fail "no UVs"
+    grep -aq '"MOZ_lightmap"' lit.glb || fail "no light"
+}
+
+@test "for an image it gets none unasked, and the error says how" {
+    write_bare box.obj
+    shade bake box.obj "${SMALL[@]}" -o x.exr
+    [ "$status" -eq 2 ] || fail "status $status"
+    [[ $stderr == *"--unwrap auto"* ]] || fail "$stderr"
+    shade bake box.obj "${SMALL[@]}" --unwrap auto -o x.exr
+    [ "$status" -eq 0 ] || fail "$stderr"
+}
+
+@test "UVs that can be baked are kept, and always replaces them" {
+    write_box box.obj
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" -o plain.exr --quiet
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" --unwrap auto -o auto.exr --quiet
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" --unwrap always -o always.exr --quiet
+    same_values plain.exr auto.exr
+    ! same_values plain.exr always.exr || fail "the same UVs"
+}
+
+@test "objects that each fill the square are packed apart" {
+    write_two two.obj
+    shade bake two.obj "${SMALL[@]}" --size 64 -o x.exr
+    [ "$status" -ne 0 ] || fail "baked over each other"
+    shade bake two.obj "${SMALL[@]}" --size 64 --unwrap auto -o x.exr --verbose
+    [ "$status" -eq 0 ] || fail "$stderr"
+    [[ $stderr != *"overlap"* ]] || fail "$stderr"
+}
+
+@test "a density fills as many pages as it takes, each with an image of its own" {
+    write_two two.obj
+    shade bake two.obj "${SMALL[@]}" --size 64 --unwrap always --texels-per-unit 20 --irradiance \
+        --ambient 0.25,0.25,0.25 -o x.exr
+    [ "$status" -eq 0 ] || fail "$stderr"
+    [ -s x.0.exr ] && [ -s x.1.exr ] && [ ! -e x.exr ] || fail "$(ls)"
+    shade bake two.obj "${SMALL[@]}" --size 64 --unwrap always --texels-per-unit 20 --seams keep \
+        --exr y.exr -o y.glb
+    [ "$status" -eq 0 ] || fail "$stderr"
+    [ -s y.glb ] || fail "no asset"
+    same_values x.0.exr y.0.exr
+    same_values x.1.exr y.1.exr
+}
+
+@test "a density that does not fit the pages is refused with one that does" {
+    write_two two.obj
+    old_output x.exr
+    shade bake two.obj "${SMALL[@]}" --size 64 --unwrap always --texels-per-unit 20 --pages 1 -o x.exr
+    [ "$status" -ne 0 ] || fail "fitted"
+    [[ $stderr == *"two.obj"* && $stderr == *"fit"* ]] || fail "$stderr"
+    [ "$(cat x.exr)" = old ] || fail "the old output is gone"
+}
+
+@test "threads and bands change no bit of what is unwrapped" {
+    write_two two.obj
+    "$VDBSHADE" bake two.obj "${SMALL[@]}" --size 64 --ao 1 --unwrap always --threads 1 -o one.exr --quiet
+    "$VDBSHADE" bake two.obj "${SMALL[@]}" --size 64 --ao 1 --unwrap always --threads 4 --band-rows 8 -o four.exr --quiet
+    same_values one.exr four.exr
+}

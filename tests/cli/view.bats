@@ -1,0 +1,218 @@
+# vdbshade view: the page as a file, and what is refused. What is seen of it: browser.bats.
+load helper
+
+setup() {
+    cd "$BATS_TEST_TMPDIR" || return 1
+    write_box box.obj
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" --ao 0.5 --quiet -o box.exr
+}
+
+# block ID PAGE: the bytes of a data block of a page.
+block() {
+    sed -n "s|^<script type=\"application/octet-stream\" id=\"$1\">\(.*\)</script>$|\1|p" "$2" | base64 -d
+}
+
+@test "a page that needs nothing beside it, of what was given" {
+    shade view box.obj --planes box.exr -o box.html
+    done_well
+    [ -z "$output" ] || fail "something on standard output"
+    no_leftovers
+    ! grep -qE '(src|href)="?(https?:|/|\.)' box.html || fail "the page needs something beside it"
+    grep -q "default-src 'none'" box.html || fail "no policy"
+    tail -1 box.html | grep -q '</html>$' || fail "cut short"
+    grep -q '"name":"box.obj"' box.html || fail "no name"
+    grep -o '"name":"[a-zA-Z.]*","data"' box.html | sort >channels
+    printf '"name":"%s","data"\n' A ao shadow.sun | diff - channels || fail "other channels"
+    grep -q '"vdbshade_version"' box.html || fail "nothing of where the bake is from"
+}
+
+@test "every script of the page is one that its policy lets run" {
+    shade view box.obj -o box.html --quiet
+    done_well
+    awk 'BEGIN { RS = "</script>" } match($0, /<script>/) { file = "script" ++n; printf "%s", substr($0, RSTART + 8) > file; close(file) }' box.html
+    [ -s script3 ] || fail "too few scripts"
+    for script in script*; do
+        hash=$(sha256sum "$script" | cut -d' ' -f1 | sed 's/../\\x&/g')
+        grep -qF "'sha256-$(printf "$hash" | base64)'" box.html || fail "$script: its hash is not in the policy"
+    done
+}
+
+@test "a GLB goes in byte by byte; compressed geometry and other formats as triangles" {
+    shade view "$ASSETS/cloister.glb" -o page.html --quiet
+    done_well
+    block data0 page.html | cmp - "$ASSETS/cloister.glb" || fail "another GLB"
+    models=$BATS_TEST_DIRNAME/../models
+    for file in "$models/scene_draco.glb" "$models/scene.fbx" box.obj; do
+        shade view "$file" -o page.html --quiet
+        done_well
+        block data0 page.html >plain.glb
+        "$VDBSHADE" info "$file" | sed -n 's/^objects: .*, \([0-9]* triangles\).*/\1/p' >before
+        "$VDBSHADE" info plain.glb | sed -n 's/^objects: .*, \([0-9]* triangles\).*/\1/p' >after
+        [ -s before ] && diff before after || fail "$file: other triangles"
+    done
+    # the same UVs: the same bake
+    block data0 page.html >plain.glb
+    "$VDBSHADE" bake plain.glb "${SMALL[@]}" --ao 0.5 --quiet -o plain.exr
+    same_values box.exr plain.exr || fail "another bake"
+}
+
+@test "a glTF takes along what it names, and warns of what is not there" {
+    models=$BATS_TEST_DIRNAME/../models
+    cp "$models/scene.gltf" "$models/scene.bin" .
+    shade view scene.gltf -o page.html
+    done_well
+    block data0 page.html | cmp - scene.gltf
+    block data1 page.html | cmp - scene.bin
+    grep -q '"files":\[{"uri":"scene.bin","data":"data1"}\]' page.html || fail "no word of the buffer"
+    sed 's|"buffers"|"images":[{"uri":"gone.png"},{"uri":"../secret.png"}],"buffers"|' scene.gltf >named.gltf
+    echo secret >../secret.png
+    shade view named.gltf -o page.html
+    done_well
+    [[ $stderr == *"gone.png"* ]] || fail "no warning of the missing picture"
+    [[ $stderr == *"'../secret.png' is outside of its folder"* ]] || fail "no warning of the picture outside"
+    ! grep -q "$(base64 <../secret.png)" page.html || fail "a file outside of the folder is in the page"
+    shade view named.gltf -o page.html --allow-outside
+    grep -q "$(base64 <../secret.png)" page.html || fail "it was asked for"
+}
+
+@test "planes are those of the file, to a half float" {
+    shade view box.obj --planes box.exr -o page.html --quiet
+    done_well
+    cat >planes.c <<'C'
+#include <Imath/half.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <vdbshade/vdbshade.h>
+#include <zlib.h>
+/* IMAGE BLOCK …: the blocks of the channels, in their order but for R, G and B. */
+int main(int argc, char **argv) {
+    vsh_image_file *file;
+    if (vsh_image_read(argv[1], NULL, &file, NULL) != VSH_OK) return 2;
+    const vsh_image image = vsh_image_view(file);
+    const size_t count = (size_t)image.width * (size_t)image.height;
+    int at = 2;
+    for (int c = 0; c < image.channel_count; ++c) {
+        if (image.names[c][1] == 0 && image.names[c][0] != 'A') continue;
+        if (at >= argc) return 3;
+        FILE *in = fopen(argv[at++], "rb");
+        unsigned char *packed = malloc(1 << 20), *bytes = malloc(2 * count);
+        const size_t size = fread(packed, 1, 1 << 20, in);
+        uLongf length = 2 * count;
+        if (uncompress(bytes, &length, packed, size) != Z_OK || length != 2 * count) return 4;
+        for (size_t i = 0; i < count; ++i) {
+            if (i % (size_t)image.width) bytes[i] += bytes[i - 1], bytes[count + i] += bytes[count + i - 1];
+            const float value = imath_half_to_float((imath_half_bits_t)(bytes[i] << 8 | bytes[count + i]));
+            if (!(fabsf(value - image.planes[c][i]) <= fabsf(image.planes[c][i]) / 2048)) {
+                printf("%s %zu: %g, not %g\n", image.names[c], i, value, image.planes[c][i]);
+                return 1;
+            }
+        }
+        fclose(in);
+    }
+    return at == argc ? 0 : 5;
+}
+C
+    build=$(dirname "$(realpath "$VDBSHADE")")
+    [ -e "$build/libvdbshade.so" ] || build=$build/..
+    "${CC:-cc}" -std=gnu11 ${CFLAGS-} -I"$BATS_TEST_DIRNAME/../../include" planes.c -L"$build" -lvdbshade -lz -lImath-3_1 -lm \
+        -Wl,-rpath,"$build" -o planes
+    block data1 page.html >one
+    block data2 page.html >two
+    block data3 page.html >three
+    ./planes box.exr one two three
+}
+
+@test "light of a PNG that says sRGB is made linear" {
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" --irradiance --bits 16 --quiet -o light.png
+    "$VDBSHADE" info light.png | grep -q 'vdbshade_color_space: sRGB'
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" --irradiance --bits 16 --color-space linear --quiet -o plain.png
+    for name in light plain; do
+        shade view box.obj --planes $name.png -o $name.html --quiet
+        done_well
+        block data1 $name.html >$name.z
+    done
+    [ -s light.z ] && cmp light.z plain.z
+}
+
+@test "two bakes, of one mesh and of two" {
+    shade view box.obj --planes box.exr --other-planes box.exr -o page.html --quiet
+    done_well
+    [ "$(grep -o '"uvSet"' page.html | wc -l)" -eq 2 ] || fail "not two"
+    [ "$(grep -o '"model":"data[0-9]*"' page.html | wc -l)" -eq 1 ] || fail "not one model"
+    shade view box.obj "$ASSETS/cloister.glb" --planes box.exr -o page.html --quiet
+    done_well
+    grep -q '"model":"data0"' page.html && grep -q '"model":"data4"' page.html || fail "not two models"
+}
+
+@test "the same page for any number of threads" {
+    for threads in 1 3; do
+        "$VDBSHADE" view box.obj --planes box.exr -o $threads.html --threads $threads --quiet
+    done
+    cmp 1.html 3.html
+}
+
+@test "bad usage" {
+    old_output page.html
+    shade view box.obj --planes box.exr
+    refused 2 'give -o OUT.html'
+    shade view box.obj -o page.exr
+    refused 2 'page.exr' 'give -o OUT.html'
+    shade view -o page.html
+    refused 2 'no INPUT'
+    shade view box.obj box.obj box.obj -o page.html
+    refused 2 'box.obj'
+    cp box.obj in.html
+    shade view in.html -o in.html
+    refused 2 'the output is the input'
+    shade view box.obj --planes in.html -o in.html
+    refused 2 'also a file of planes'
+    for set in -1 8 x; do
+        shade view box.obj --uv-set "$set" -o page.html
+        refused 2 uv-set
+    done
+    untouched page.html
+}
+
+@test "files that are not there, damaged, or too large" {
+    old_output page.html
+    shade view gone.glb -o page.html
+    refused 3 gone.glb
+    shade view box.obj --planes gone.exr -o page.html
+    refused 3 gone.exr
+    shade view box.obj gone.obj -o page.html
+    refused 3 gone.obj
+    head -c 3000 "$ASSETS/cloister.glb" >cut.glb
+    shade view cut.glb -o page.html
+    refused 3 cut.glb
+    head -c 300 box.exr >cut.exr
+    shade view box.obj --planes cut.exr -o page.html
+    refused 3 cut.exr
+    printf 'glTF\2\0\0\0\24\0\0\0\377\377\377\377JSON' >lies.glb
+    shade view lies.glb -o page.html
+    refused 3 lies.glb
+    shade view box.obj -o nowhere/page.html
+    refused 3 nowhere
+    unless_sanitized "its shadow memory has no such limit"
+    shade view "$ASSETS/cloister.glb" --memory-limit 100k -o page.html
+    refused 4 cloister.glb
+    untouched page.html
+}
+
+@test "bake --view writes the page of what it baked, and the same image as without it" {
+    shade bake box.obj "${SMALL[@]}" --ao 0.5 -o again.exr --view baked.html --quiet
+    done_well
+    cmp box.exr again.exr || fail "another image"
+    shade view box.obj --planes again.exr -o page.html --quiet
+    cmp baked.html page.html || fail "another page"
+    old_output page.html
+    for wrong in page.exr again.exr; do
+        shade bake box.obj "${SMALL[@]}" -o again.exr --view $wrong
+        refused 2 "--view '$wrong'"
+    done
+    shade bake box.obj "${SMALL[@]}" -o again.exr --view nowhere/page.html
+    refused 3 nowhere
+    shade bake box.obj "${SMALL[@]}" --per-object -o objects/ --view page.html
+    refused 2 'one lightmap of one mesh'
+    untouched page.html
+}

@@ -1,0 +1,262 @@
+/* Materials of a glTF: what decides where light comes through masked ones; in the process itself and by a
+ * reader, which is this test. */
+#define _GNU_SOURCE
+
+#include "models.h"
+
+#include "model/model.h"
+
+#include <math.h>
+#include <sys/mman.h>
+#include <vdbshade/reader.h>
+
+/* Three corners and an "image" of 5 bytes. */
+static const unsigned char image[5] = {'I', 'M', 'A', 'G', 'E'};
+
+static const char *material_json(const char *materials, const char *rest) {
+    static const float corners[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    static char json[8192], text[128];
+    unsigned char body[41];
+    memcpy(body, corners, 36);
+    memcpy(body + 36, image, 5);
+    base64(body, sizeof body, text);
+    const int size = snprintf(
+        json, sizeof json,
+        "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\"meshes\":[{"
+        "\"primitives\":[{\"attributes\":{\"POSITION\":0},\"material\":1},{\"attributes\":{\"POSITION\":0}},"
+        "{\"attributes\":{\"POSITION\":0},\"material\":0}]}],\"accessors\":[{\"bufferView\":0,"
+        "\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],\"bufferViews\":[{\"buffer\":0,"
+        "\"byteLength\":36},"
+        "{\"buffer\":0,\"byteOffset\":36,\"byteLength\":5}],\"materials\":[%s],%s,"
+        "\"buffers\":[{\"byteLength\":41,\"uri\":\"data:;base64,%s\"}]}",
+        materials, rest, text);
+    assert_in_range(size, 1, sizeof json - 1);
+    return json;
+}
+
+static vsh_model *read_by(bool reader, const char *json) {
+    vsh_run run = vsh_run_default();
+    run.warning = keep_warning;
+    run.reader = reader ? "/proc/self/exe" : NULL;
+    run.reader_seconds = reader ? 120.0 : 0.0;
+    warnings[0] = '\0';
+    vsh_model *model = NULL;
+    vsh_error error = {0};
+    write_bytes("a.gltf", json, strlen(json));
+    if (vsh_model_read(path_of("a.gltf").text, &run, &model, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    assert_int_equal(unlink(path_of("a.gltf").text), 0);
+    return model;
+}
+
+#define LEAF(more)                                                                                           \
+    "{\"name\":\"plain\",\"alphaCutoff\":0.9},{\"name\":\"leaf\",\"alphaMode\":\"MASK\",\"alphaCutoff\":0."  \
+    "25,"                                                                                                    \
+    "\"doubleSided\":true,\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.75],\"baseColorTexture\":{" \
+    "\"index\":0" more "}}}"
+
+static const char textures[] = "\"textures\":[{\"source\":0,\"sampler\":0}],\"samplers\":[{\"wrapS\":33071,"
+                               "\"wrapT\":33648}],\"images\":[{\"bufferView\":1,\"mimeType\":\"image/png\"}]";
+
+static void masked_materials_come_with_their_image(void **state) {
+    (void)state;
+    for (int reader = 0; reader < 2; ++reader) {
+        vsh_model *model = read_by(reader != 0, material_json(LEAF(",\"texCoord\":3"), textures));
+        assert_int_equal(vsh_model_material_count(model), 2);
+        assert_int_equal(vsh_model_mesh_material(model, 0), 1);
+        assert_int_equal(vsh_model_mesh_material(model, 1), -1);
+        assert_int_equal(vsh_model_mesh_material(model, 2), 0);
+        assert_int_equal(vsh_model_mesh(model, 0, 0).alpha, VSH_ALPHA_MASKED);
+        const vsh_model_material plain = vsh_model_get_material(model, 0);
+        assert_string_equal(plain.name, "plain");
+        assert_true(plain.alpha == VSH_ALPHA_OPAQUE && plain.double_sided == 0 && plain.alpha_cutoff == 0.0);
+        assert_null(plain.image);
+        const vsh_model_material leaf = vsh_model_get_material(model, 1);
+        assert_string_equal(leaf.name, "leaf");
+        assert_true(leaf.alpha == VSH_ALPHA_MASKED && leaf.double_sided == 1);
+        assert_true(leaf.alpha_cutoff == 0.25 && leaf.base_alpha == 0.75);
+        assert_int_equal(leaf.uv_set, 3);
+        assert_true(leaf.wrap[0] == VSH_WRAP_CLAMP && leaf.wrap[1] == VSH_WRAP_MIRROR);
+        assert_int_equal(leaf.image_size, sizeof image);
+        assert_memory_equal(leaf.image, image, sizeof image);
+        assert_null(leaf.image_path);
+        vsh_model_free(model);
+    }
+    vsh_model *model = read_text("a.obj", quad_obj);
+    assert_int_equal(vsh_model_material_count(model), 0);
+    assert_int_equal(vsh_model_mesh_material(model, 0), -1);
+    vsh_model_free(model);
+}
+
+static void assert_maps(const vsh_model_material *m, double u, double v, double to_u, double to_v) {
+    const double *t = m->uv_transform;
+    const double made[2] = {t[0] * u + t[1] * v + t[2], t[3] * u + t[4] * v + t[5]};
+    if (!(fabs(made[0] - to_u) < 1e-12 && fabs(made[1] - to_v) < 1e-12)) {
+        fail_msg("(%g, %g) becomes (%.17g, %.17g), expected (%g, %g)", u, v, made[0], made[1], to_u, to_v);
+    }
+}
+
+/* By hand: in the file's UVs (v down) scaled, turned so that u goes the way of -v, moved. */
+static void transforms_map_uvs_with_v_up(void **state) {
+    (void)state;
+    vsh_model *model = read_by(true, material_json(LEAF(""), textures));
+    vsh_model_material leaf = vsh_model_get_material(model, 1);
+    assert_int_equal(leaf.uv_set, 0);
+    assert_maps(&leaf, 0.25, 0.75, 0.25, 0.75);
+    vsh_model_free(model);
+    model = read_by(true, material_json(LEAF(",\"texCoord\":1,\"extensions\":{\"KHR_texture_transform\":{"
+                                             "\"offset\":[0.5,0.25],\"scale\":[2,4],\"texCoord\":2}}"),
+                                        textures));
+    leaf = vsh_model_get_material(model, 1);
+    assert_int_equal(leaf.uv_set, 2);
+    assert_maps(&leaf, 0.0, 1.0, 0.5, 1.0 - 0.25); /* the file's (0, 0) is at (0.5, 0.25) of it */
+    assert_maps(&leaf, 0.5, 0.75, 1.5, 1.0 - 1.25);
+    vsh_model_free(model);
+    model = read_by(true, material_json(LEAF(",\"extensions\":{\"KHR_texture_transform\":{\"offset\":[0,1],"
+                                             "\"rotation\":1.5707963267948966,\"scale\":[2,1]}}"),
+                                        textures));
+    leaf = vsh_model_get_material(model, 1);
+    assert_maps(&leaf, 0.25, 1.0, 0.0, 1.0 - (1.0 - 0.5)); /* (0.25, 0) → (0.5, 0) → (0, -0.5) → (0, 0.5) */
+    assert_maps(&leaf, 0.0, 0.75, 0.25, 1.0 - 1.0);        /* (0, 0.25) → (0.25, 0) → (0.25, 1) */
+    vsh_model_free(model);
+}
+
+static void images_may_lie_beside_or_in_the_json(void **state) {
+    (void)state;
+    for (int reader = 0; reader < 2; ++reader) {
+        vsh_model *model = read_by(
+            reader != 0,
+            material_json(LEAF(""), "\"textures\":[{\"extensions\":{\"EXT_texture_webp\":{\"source\":0}}}],"
+                                    "\"images\":[{\"uri\":\"my%20leaf.webp\"}]"));
+        vsh_model_material leaf = vsh_model_get_material(model, 1);
+        assert_null(leaf.image);
+        assert_string_equal(leaf.image_path, path_of("my leaf.webp").text);
+        assert_true(leaf.wrap[0] == VSH_WRAP_REPEAT && leaf.wrap[1] == VSH_WRAP_REPEAT);
+        vsh_model_free(model);
+        model =
+            read_by(reader != 0, material_json(LEAF(""), "\"textures\":[{\"source\":0}],\"images\":[{\"uri\":"
+                                                         "\"data:image/png;base64,SU1BR0U=\"}]"));
+        leaf = vsh_model_get_material(model, 1);
+        assert_int_equal(leaf.image_size, sizeof image);
+        assert_memory_equal(leaf.image, image, sizeof image);
+        vsh_model_free(model);
+    }
+}
+
+static void a_mask_that_cannot_be_had_is_left_out_with_a_warning(void **state) {
+    (void)state;
+    static const struct {
+        const char *rest, *part;
+    } bad[] = {
+        {"\"textures\":[]", "materials[1]: 'index' is 0, but there are only 0 textures"},
+        {"\"textures\":[{\"source\":4}],\"images\":[{}]", "'source' is 4, but there are only 1 images"},
+        {"\"textures\":[{\"source\":0}],\"images\":[{}]", "images[0] has neither a URI nor a buffer view"},
+        {"\"textures\":[{\"source\":0}],\"images\":[{\"bufferView\":9}]", "'bufferView' is 9"},
+        {"\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"https://a/b.png\"}]", "only files beside it"},
+        {"\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"/etc/passwd\"}]", "outside of its folder"},
+        {"\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"data:;base64,*\"}]", "no base64"},
+        {"\"textures\":[{\"source\":0,\"sampler\":0}],\"images\":[{\"bufferView\":1}]", "'sampler' is 0"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+        for (int reader = 0; reader < 2; ++reader) {
+            vsh_model *model = read_by(reader != 0, material_json(LEAF(""), bad[i].rest));
+            const vsh_model_material leaf = vsh_model_get_material(model, 1);
+            assert_null(leaf.image);
+            assert_null(leaf.image_path);
+            if (strstr(warnings, bad[i].part) == NULL || strstr(warnings, "its mask is not read") == NULL) {
+                fail_msg("'%s', expected '%s'", warnings, bad[i].part);
+            }
+            vsh_model_free(model);
+        }
+    }
+}
+
+/* Each word that a reader tells in turn wrong, or perhaps; and a path that leads out of the folder. */
+static void what_a_reader_tells_of_materials_is_refused_or_in_range(void **state) {
+    (void)state;
+    static vshi_encoder encoder;
+    static _Alignas(8) unsigned char whole[4096], bytes[4096];
+    static const uint64_t values[] = {0,
+                                      1,
+                                      2,
+                                      3,
+                                      9,
+                                      UINT64_MAX,
+                                      0x7ff0000000000000,
+                                      0xbff0000000000000,
+                                      0x3ff0000000000000,
+                                      0x7ff8000000000000,
+                                      0x6374652f2e2e2f2e};
+    const vsh_run run = vsh_run_default();
+    vsh_error error = {0};
+    const char *json =
+        material_json(LEAF(""), "\"textures\":[{\"source\":0},{\"source\":1}],\"images\":[{\"uri\":"
+                                "\"x.png\"},{\"bufferView\":1}]");
+    write_bytes("a.gltf", json, strlen(json));
+    const int file = memfd_create("payload", 0);
+    vshi_encoder_begin(&encoder, file, 0);
+    assert_int_equal(vshi_serve_model(path_of("a.gltf").text, NULL, &run, &encoder, &error), VSH_OK);
+    assert_true(vshi_encoder_flush(&encoder));
+    const size_t size = (size_t)encoder.size;
+    assert_in_range(size, 8, sizeof whole);
+    assert_int_equal(pread(file, whole, size, 0), (ssize_t)size);
+    close(file);
+    int refused_count = 0, read = 0;
+    for (size_t word = 0; word < size / 8; ++word) {
+        for (size_t k = 0; k < sizeof values / sizeof values[0]; ++k) {
+            vsh_model *model = NULL;
+            memcpy(bytes, whole, size);
+            memcpy(bytes + 8 * word, &values[k], 8);
+            vshi_decoder decoder = {bytes, bytes + size, false};
+            if (vshi_model_decode(&decoder, path_of("a.gltf").text, &run, &model, &error) != VSH_OK) {
+                ++refused_count;
+                continue;
+            }
+            for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+                assert_true(vsh_model_mesh_material(model, i) < (int32_t)vsh_model_material_count(model));
+            }
+            for (size_t i = 0; i < vsh_model_material_count(model); ++i) {
+                const vsh_model_material m = vsh_model_get_material(model, i);
+                assert_in_range(m.uv_set, 0, VSH_MAX_UV_SETS - 1);
+                assert_in_range(m.wrap[0], 0, VSH_WRAP_CLAMP);
+                assert_in_range(m.alpha, 0, VSH_ALPHA_BLENDED);
+                assert_true(m.base_alpha >= 0.0 && m.base_alpha <= 1.0 && isfinite(m.uv_transform[5]));
+                assert_true(m.image == NULL || m.image_size == sizeof image || m.image_size <= 9);
+            }
+            vsh_model_free(model);
+            ++read;
+        }
+    }
+    assert_in_range(refused_count, 100, 100000);
+    assert_in_range(read, 20, 100000);
+
+    memcpy(bytes, whole, size);
+    const char name[] = "x.png";
+    unsigned char *at = memmem(bytes, size, name, sizeof name);
+    assert_non_null(at);
+    const char out[] = "/etc/passwd";
+    unsigned char *begin = at - strlen(folder) - 1; /* where the path begins: its length stays */
+    memset(begin, '/', (size_t)(at - begin) + sizeof name - 1);
+    memcpy(at + sizeof name - sizeof out, out, sizeof out - 1);
+    vshi_decoder decoder = {bytes, bytes + size, false};
+    vsh_model *model = NULL;
+    assert_int_equal(vshi_model_decode(&decoder, path_of("a.gltf").text, &run, &model, &error),
+                     VSH_ERROR_READ);
+    assert_non_null(strstr(error.message, "its images"));
+    assert_int_equal(unlink(path_of("a.gltf").text), 0);
+}
+
+int main(int argc, char **argv) {
+    if (argc > 1 && strcmp(argv[1], VSH_READER_ARGUMENT) == 0) {
+        return vsh_reader_serve(argc, argv);
+    }
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(masked_materials_come_with_their_image),
+        cmocka_unit_test(transforms_map_uvs_with_v_up),
+        cmocka_unit_test(images_may_lie_beside_or_in_the_json),
+        cmocka_unit_test(a_mask_that_cannot_be_had_is_left_out_with_a_warning),
+        cmocka_unit_test(what_a_reader_tells_of_materials_is_refused_or_in_range),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

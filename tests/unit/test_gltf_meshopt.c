@@ -1,0 +1,344 @@
+/* Buffer views under EXT_meshopt_compression: what meshoptimizer packed comes out again, through filters as
+ * near as their bits, and what is damaged is refused. */
+#include "models.h"
+
+#include <math.h>
+#include <meshoptimizer.h>
+
+enum { SIDE = 24, VERTICES = SIDE * SIDE, CORNERS = 6 * (SIDE - 1) * (SIDE - 1), PACKED = 1 << 16 };
+
+static float positions[VERTICES][3];
+static uint32_t indices[CORNERS];
+
+static void make_sheet(void) {
+    for (uint32_t v = 0; v < VERTICES; ++v) {
+        const float x = (float)(v % SIDE), y = (float)(v / SIDE);
+        memcpy(positions[v], (float[3]){x, y, 0.125F * x * y}, sizeof positions[v]);
+    }
+    for (uint32_t q = 0; q < CORNERS / 6; ++q) {
+        const uint32_t a = q / (SIDE - 1) * SIDE + q % (SIDE - 1), d = a + SIDE + 1;
+        memcpy(indices + 6 * (size_t)q, (uint32_t[6]){a, a + 1, d, a, d, a + SIDE}, sizeof(uint32_t[6]));
+    }
+}
+
+/* A compressed view, as its file has it. */
+typedef struct view {
+    const char *mode, *filter; /* NULL: not said */
+    size_t count, stride, size;
+    long byte_length; /* of the view; 0: count × stride */
+    unsigned char bytes[PACKED];
+} view;
+
+/* Those of the sheet: positions, normals (where their size is not 0), indices. */
+static view views[3];
+static const char *normal_type = "5120,\"normalized\":true";
+static int index_type = 5123;
+
+static void pack_sheet(bool triangles, size_t index_size) {
+    memset(views, 0, sizeof views);
+    views[0] = (view){.mode = "ATTRIBUTES", .count = VERTICES, .stride = sizeof positions[0]};
+    views[0].size =
+        meshopt_encodeVertexBuffer(views[0].bytes, PACKED, positions, VERTICES, sizeof positions[0]);
+    views[2] = (view){.mode = triangles ? "TRIANGLES" : "INDICES", .count = CORNERS, .stride = index_size};
+    views[2].size = triangles ? meshopt_encodeIndexBuffer(views[2].bytes, PACKED, indices, CORNERS)
+                              : meshopt_encodeIndexSequence(views[2].bytes, PACKED, indices, CORNERS);
+    assert_true(views[0].size > 0 && views[2].size > 0);
+    index_type = index_size == 2 ? 5123 : 5125;
+}
+
+/* The file of the three views. The buffer of what they unpack to has no data. */
+static const char *packed_json(void) {
+    static char json[4 * PACKED + 8192], text[2 * PACKED];
+    static unsigned char all[3 * PACKED];
+    size_t used = 0, offsets[3];
+    for (int i = 0; i < 3; ++i) {
+        offsets[i] = used;
+        memcpy(all + used, views[i].bytes, views[i].size);
+        used += (views[i].size + 3) / 4 * 4;
+    }
+    assert_true(used < PACKED);
+    base64(all, used, text);
+    const bool normals = views[1].size > 0;
+    size_t length = (size_t)snprintf(
+        json, sizeof json,
+        "{\"asset\":{\"version\":\"2.0\"},\"extensionsRequired\":[\"EXT_meshopt_compression\"],\"scenes\":[{"
+        "\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":"
+        "0%s},"
+        "\"indices\":2}]}],\"buffers\":[{\"byteLength\":%zu,\"uri\":\"data:;base64,%s\"},{\"byteLength\":"
+        "1000000,\"extensions\":{\"EXT_meshopt_compression\":{\"fallback\":true}}}],\"accessors\":["
+        "{\"bufferView\":0,\"componentType\":5126,\"count\":%d,\"type\":\"VEC3\"},"
+        "{\"bufferView\":1,\"componentType\":%s,\"count\":%d,\"type\":\"VEC3\"},"
+        "{\"bufferView\":2,\"componentType\":%d,\"count\":%d,\"type\":\"SCALAR\"}],\"bufferViews\":[",
+        normals ? ",\"NORMAL\":1" : "", used, text, VERTICES, normal_type, VERTICES, index_type, CORNERS);
+    for (int i = 0; i < 3; ++i) {
+        const view *v = &views[i];
+        const long bytes = v->byte_length != 0 ? v->byte_length : (long)(v->count * v->stride);
+        char filter[64] = "", stride[64] = "";
+        if (v->filter != NULL) {
+            snprintf(filter, sizeof filter, ",\"filter\":\"%s\"", v->filter);
+        }
+        if (i < 2) {
+            snprintf(stride, sizeof stride, ",\"byteStride\":%zu", v->stride);
+        }
+        length += (size_t)snprintf(
+            json + length, sizeof json - length,
+            "%s{\"buffer\":1,\"byteLength\":%ld%s,\"extensions\":{\"EXT_meshopt_compression\":{\"buffer\":0,"
+            "\"byteOffset\":%zu,\"byteLength\":%zu,\"byteStride\":%zu,\"count\":%zu,\"mode\":\"%s\"%s}}}",
+            i > 0 ? "," : "", bytes, stride, offsets[i], v->size, v->stride, v->count,
+            v->mode != NULL ? v->mode : "ATTRIBUTES", filter);
+    }
+    snprintf(json + length, sizeof json - length, "]}");
+    return json;
+}
+
+static void what_was_packed_comes_out_again(void **state) {
+    (void)state;
+    make_sheet();
+    for (int k = 0; k < 4; ++k) {
+        pack_sheet(k % 2 == 0, k < 2 ? 2 : 4);
+        vsh_model *model = read_text("a.gltf", packed_json());
+        const vsh_mesh mesh = vsh_model_mesh(model, 0, 0);
+        assert_int_equal(mesh.vertex_count, VERTICES);
+        assert_int_equal(3 * mesh.triangle_count, CORNERS);
+        assert_memory_equal(mesh.positions, positions, sizeof positions);
+        for (size_t t = 0; t < mesh.triangle_count; ++t) { /* which may begin at another corner */
+            const uint32_t *a = mesh.indices + 3 * t, *b = indices + 3 * t;
+            const size_t turn = a[0] == b[0] ? 0 : a[0] == b[1] ? 1 : 2;
+            for (size_t c = 0; c < 3; ++c) {
+                assert_int_equal(a[c], b[(c + turn) % 3]);
+            }
+        }
+        vsh_model_free(model);
+    }
+}
+
+/* A direction of each vertex: all around. */
+static void direction(size_t v, float d[4]) {
+    const double z = 1.0 - 2.0 * ((double)v + 0.5) / VERTICES, r = sqrt(1.0 - z * z);
+    d[0] = (float)(r * cos(2.4 * (double)v));
+    d[1] = (float)(r * sin(2.4 * (double)v));
+    d[2] = (float)z;
+    d[3] = 0.0F;
+}
+
+/* Steps of 1 / most: on the octahedron x and y are half a step off and z as much as both, which grows by √3
+ * where its middle is stretched to the sphere; and the result is half a step off. */
+static const double octahedral_steps = 1.7321 + 0.5 + 0.01;
+
+static void directions_on_an_octahedron_come_out_again(void **state) {
+    (void)state;
+    static float given[VERTICES][4];
+    static unsigned char folded[8 * VERTICES], kept[8 * VERTICES];
+    make_sheet();
+    for (int bytes = 1; bytes <= 2; ++bytes) {
+        const size_t stride = 4 * (size_t)bytes;
+        const double most = bytes == 1 ? 127.0 : 32767.0;
+        pack_sheet(true, 2);
+        for (size_t v = 0; v < VERTICES; ++v) {
+            direction(v, given[v]);
+        }
+        meshopt_encodeFilterOct(folded, VERTICES, stride, 8 * bytes, given[0]);
+        memcpy(kept, folded, sizeof kept);
+        views[1] = (view){.mode = "ATTRIBUTES", .filter = "OCTAHEDRAL", .count = VERTICES, .stride = stride};
+        views[1].size = meshopt_encodeVertexBuffer(views[1].bytes, PACKED, folded, VERTICES, stride);
+        normal_type = bytes == 1 ? "5120,\"normalized\":true" : "5122,\"normalized\":true";
+        vsh_model *model = read_text("a.gltf", packed_json());
+        const vsh_mesh mesh = vsh_model_mesh(model, 0, 0);
+        meshopt_decodeFilterOct(kept, VERTICES, stride);
+        for (size_t v = 0; v < VERTICES; ++v) {
+            for (size_t c = 0; c < 3; ++c) {
+                int16_t two = (int8_t)kept[stride * v + c];
+                if (bytes == 2) {
+                    memcpy(&two, &kept[stride * v + 2 * c], 2);
+                }
+                const double value = (double)mesh.normals[3 * v + c];
+                assert_true(fabs(value - (double)given[v][c]) <= octahedral_steps / most);
+                assert_true(fabs(value * most - two) <= 1.01); /* the library's own, by rougher roots */
+            }
+        }
+        vsh_model_free(model);
+    }
+}
+
+static void floats_with_an_exponent_come_out_again(void **state) {
+    (void)state;
+    static uint32_t folded[VERTICES][3];
+    make_sheet();
+    pack_sheet(true, 2);
+    meshopt_encodeFilterExp(folded, VERTICES, sizeof folded[0], 24, positions[0]);
+    views[0].filter = "EXPONENTIAL";
+    views[0].size = meshopt_encodeVertexBuffer(views[0].bytes, PACKED, folded, VERTICES, sizeof folded[0]);
+    vsh_model *model = read_text("a.gltf", packed_json());
+    assert_memory_equal(vsh_model_mesh(model, 0, 0).positions, positions, sizeof positions); /* of few bits */
+    vsh_model_free(model);
+
+    /* the same bits as the library's, of every exponent that gives a finite number */
+    for (size_t v = 0; v < VERTICES; ++v) {
+        for (size_t c = 0; c < 3; ++c) {
+            const uint32_t exponent = (uint32_t)((int)(v % 232) - 128) & 0xff;
+            folded[v][c] = exponent << 24 | (uint32_t)(0x9e3779b9u * (v * 3 + c + 1)) >> 8;
+        }
+    }
+    views[0].size = meshopt_encodeVertexBuffer(views[0].bytes, PACKED, folded, VERTICES, sizeof folded[0]);
+    model = read_text("a.gltf", packed_json());
+    const float *made = vsh_model_mesh(model, 0, 0).positions;
+    for (size_t v = 0; v < VERTICES; ++v) {
+        for (size_t c = 0; c < 3; ++c) {
+            const int exponent = (int8_t)(folded[v][c] >> 24), mantissa = (int32_t)(folded[v][c] << 8) >> 8;
+            assert_true(made[3 * v + c] == (float)ldexp(mantissa, exponent));
+        }
+    }
+    vsh_model_free(model);
+}
+
+/* The meshes of instances, each turned. */
+static void quaternions_come_out_again(void **state) {
+    (void)state;
+    static float given[VERTICES][4];
+    static int16_t folded[VERTICES][4];
+    static char json[1 << 15], text[1 << 14];
+    static unsigned char packed[1 << 13];
+    enum { COUNT = 64 };
+    for (size_t v = 0; v < COUNT; ++v) {
+        direction(9 * v, given[v]);
+        const double half = 0.1 * (double)v;
+        for (int c = 0; c < 3; ++c) {
+            given[v][c] *= (float)sin(half);
+        }
+        given[v][3] = (float)cos(half);
+    }
+    meshopt_encodeFilterQuat(folded, COUNT, 8, 16, given[0]);
+    static const float corners[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    const size_t size = meshopt_encodeVertexBuffer(packed + 36, sizeof packed - 36, folded, COUNT, 8);
+    memcpy(packed, corners, 36);
+    base64(packed, 36 + size, text);
+    snprintf(
+        json, sizeof json,
+        "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0,\"extensions\":"
+        "{\"EXT_mesh_gpu_instancing\":{\"attributes\":{\"ROTATION\":1}}}}],\"meshes\":[{\"primitives\":[{"
+        "\"attributes\":{\"POSITION\":0}}]}],\"buffers\":[{\"byteLength\":%zu,\"uri\":\"data:;base64,%s\"}],"
+        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},{"
+        "\"bufferView\":1,\"componentType\":5122,\"normalized\":true,\"count\":%d,\"type\":\"VEC4\"}],"
+        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36},{\"buffer\":0,\"byteLength\":%d,\"extensions\":{"
+        "\"EXT_meshopt_compression\":{\"buffer\":0,\"byteOffset\":36,\"byteLength\":%zu,\"byteStride\":8,"
+        "\"count\":%d,\"mode\":\"ATTRIBUTES\",\"filter\":\"QUATERNION\"}}}]}",
+        36 + size, text, COUNT, 8 * COUNT, size, COUNT);
+    vsh_model *model = read_text("a.gltf", json);
+    assert_int_equal(vsh_model_mesh_count(model), COUNT);
+    for (size_t i = 0; i < COUNT; ++i) {
+        const double x = (double)given[i][0], y = (double)given[i][1], z = (double)given[i][2];
+        const double w = (double)given[i][3];
+        const double *m = vsh_model_mesh(model, i, 0).transform;
+        assert_true(fabs(m[0] - (1.0 - 2.0 * (y * y + z * z))) < 4e-4);
+        assert_true(fabs(m[4] - 2.0 * (x * y + z * w)) < 4e-4);
+        assert_true(fabs(m[8] - 2.0 * (x * z - y * w)) < 4e-4);
+        assert_true(fabs(m[9] - 2.0 * (y * z + x * w)) < 4e-4);
+    }
+    vsh_model_free(model);
+}
+
+static void refused_with(vsh_result code, const char *part) {
+    refused("a.gltf", packed_json(), code, part, "bufferViews[");
+}
+
+static void what_compression_cannot_be_is_refused(void **state) {
+    (void)state;
+    make_sheet();
+    pack_sheet(true, 2);
+    views[0].mode = "MESHLETS";
+    refused_with(VSH_ERROR_UNSUPPORTED, "mode 'MESHLETS'");
+    pack_sheet(true, 2);
+    views[0].filter = "COLOR";
+    refused_with(VSH_ERROR_UNSUPPORTED, "filter 'COLOR'");
+    pack_sheet(true, 2);
+    views[0].filter = "OCTAHEDRAL"; /* of elements of 12 bytes */
+    refused_with(VSH_ERROR_INPUT, "count 576 and byteStride 12, which ATTRIBUTES with filter OCTAHEDRAL");
+    pack_sheet(true, 2);
+    views[2].filter = "EXPONENTIAL";
+    refused_with(VSH_ERROR_INPUT, "TRIANGLES with filter EXPONENTIAL");
+    pack_sheet(true, 2);
+    views[2].count = CORNERS - 1;
+    refused_with(VSH_ERROR_INPUT, "count 3173");
+    pack_sheet(true, 2);
+    views[0].stride = 260;
+    refused_with(VSH_ERROR_INPUT, "byteStride 260");
+    pack_sheet(true, 2);
+    views[0].stride = 0;
+    views[0].byte_length = 12;
+    refused_with(VSH_ERROR_INPUT, "byteStride 0");
+    pack_sheet(true, 2);
+    views[0].byte_length = 12 * VERTICES + 4;
+    refused_with(VSH_ERROR_INPUT, "its byteLength is 6916, but it unpacks to 6912 bytes");
+    pack_sheet(true, 2);
+    views[0].bytes[0] = 0xa1; /* KHR_meshopt_compression's */
+    refused_with(VSH_ERROR_UNSUPPORTED, "of version 1; up to version 0 is read");
+    pack_sheet(true, 2);
+    views[0].size = 0;
+    refused_with(VSH_ERROR_INPUT, "damaged: 0 bytes");
+    pack_sheet(true, 2);
+    views[0].count = 4000000000u; /* 48 GB from some KB */
+    refused_with(VSH_ERROR_INPUT, "cannot hold 4000000000 elements of 12 bytes");
+    pack_sheet(true, 2);
+    views[2].count = 2999999997u;
+    refused_with(VSH_ERROR_INPUT, "cannot hold");
+}
+
+/* Each byte of it turned in one bit or all, and cut there: an error of a line, or a mesh. */
+static void damaged_data_are_refused_or_a_mesh(void **state) {
+    (void)state;
+    int refused_count = 0, read = 0;
+    make_sheet();
+    for (int which = 0; which < 3; which += 2) {
+        pack_sheet(which == 0, 2);
+        const view whole = views[which];
+        for (size_t at = 0; at < whole.size; at += which == 0 ? 7 : 41) {
+            for (int k = 0; k < 3; ++k) {
+                views[which] = whole;
+                views[which].size = k == 2 ? at : whole.size;
+                views[which].bytes[at] ^= k == 0 ? 0x10 : 0xff;
+                vsh_model *model = NULL;
+                vsh_error error = {0};
+                const char *json = packed_json();
+                if (read_bytes("a.gltf", json, strlen(json), &model, &error) != VSH_OK) {
+                    assert_null(strchr(error.message, '\n'));
+                    assert_non_null(strstr(error.message, "a.gltf: "));
+                    ++refused_count;
+                    continue;
+                }
+                assert_int_not_equal(k, 2);
+                vsh_model_free(model);
+                ++read;
+            }
+        }
+    }
+    assert_in_range(refused_count, 100, 100000);
+    assert_in_range(read, 10, 100000);
+}
+
+static void what_is_unpacked_is_held_against_the_limit(void **state) {
+    (void)state;
+    make_sheet();
+    memset(positions, 0, sizeof positions); /* packed 60 times as small */
+    pack_sheet(true, 2);
+    const char *json = packed_json();
+    write_bytes("a.gltf", json, strlen(json));
+    vsh_run run = vsh_run_default();
+    run.memory_limit = 6 * strlen(json) + 1000;
+    vsh_model *model;
+    vsh_error error = {0};
+    assert_int_equal(vsh_model_read(path_of("a.gltf").text, &run, &model, &error), VSH_ERROR_LIMIT);
+    assert_int_equal(unlink(path_of("a.gltf").text), 0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_was_packed_comes_out_again),
+        cmocka_unit_test(directions_on_an_octahedron_come_out_again),
+        cmocka_unit_test(floats_with_an_exponent_come_out_again),
+        cmocka_unit_test(quaternions_come_out_again),
+        cmocka_unit_test(what_compression_cannot_be_is_refused),
+        cmocka_unit_test(damaged_data_are_refused_or_a_mesh),
+        cmocka_unit_test(what_is_unpacked_is_held_against_the_limit),
+    };
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}

@@ -1,0 +1,349 @@
+/* Images and materials of a lit asset: what they hold, where they go, and who shares them. */
+#include "rich_asset.h"
+
+#include "base/srgb.h"
+#include "sandbox/reader.h"
+
+#include <vdbshade/image.h>
+
+enum { WIDTH = 7, HEIGHT = 3, TEXELS = WIDTH * HEIGHT };
+
+static vsh_lit_options options_of(const vsh_lit_image *images, size_t count) {
+    vsh_lit_options options = vsh_lit_options_default();
+    options.images = images;
+    options.image_count = count;
+    return options;
+}
+
+/* --- what they hold */
+
+/* The image of texture `texture`, which lies in the buffer, read again. */
+static vsh_image_file *image_of(const asset *out, size_t texture) {
+    const json_t *image = item_of(out, "images", number_of(item_of(out, "textures", texture), "source"));
+    const size_t view = number_of(image, "bufferView");
+    assert_string_equal(json_string_value(json_object_get(image, "mimeType")), "image/png");
+    write_bytes("image.png", bytes_of_view(out, view),
+                number_of(item_of(out, "bufferViews", view), "byteLength"));
+    vsh_image_file *file = NULL;
+    vsh_error error = {0};
+    if (vsh_image_read(path_of("image.png").text, NULL, &file, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
+    remove_file("image.png");
+    return file;
+}
+
+static void assert_values(const vsh_image_file *file, int32_t channel, const double *expected, double most) {
+    const vsh_image image = vsh_image_view(file);
+    assert_int_equal(image.width, WIDTH);
+    assert_int_equal(image.height, HEIGHT);
+    for (int i = 0; i < TEXELS; ++i) {
+        const double error = fabs((double)image.planes[channel][i] - expected[i]);
+        if (!(error <= 0.5 / most + 1e-6)) {
+            fail_msg("channel %d, texel %d: %.9g, expected %.9g", channel, i,
+                     (double)image.planes[channel][i], expected[i]);
+        }
+    }
+}
+
+/* A scene's file, lit by its own UVs. */
+static asset write_scene(const vsh_lit_image *images, size_t count) {
+    char path[512];
+    snprintf(path, sizeof path, "%s/scene.glb", VSH_MODELS);
+    const vsh_lit_options options = options_of(images, count);
+    vsh_model *model = read_model(path);
+    write_lit(path, model, NULL, &options, path_of("out.glb").text);
+    vsh_model_free(model);
+    asset out = load_asset(path_of("out.glb").text);
+    remove_file("out.glb");
+    return out;
+}
+
+static void planes_become_images_of_their_values(void **state) {
+    (void)state;
+    float grey[TEXELS], light[3][TEXELS];
+    for (int i = 0; i < TEXELS; ++i) {
+        grey[i] = (float)i / (TEXELS - 1);
+        for (int c = 0; c < 3; ++c) {
+            light[c][i] = (float)(i + c) / 4.0F; /* up to 5.5 */
+        }
+    }
+    const float *const one[1] = {grey}, *const three[3] = {light[0], light[1], light[2]};
+    for (int32_t bits = 8; bits <= 16; bits += 8) {
+        const double most = bits == 8 ? 255.0 : 65535.0;
+        const vsh_lit_image images[2] = {{.purpose = VSH_LIT_OCCLUSION,
+                                          .width = WIDTH,
+                                          .height = HEIGHT,
+                                          .channels = one,
+                                          .channel_count = 1,
+                                          .bits = bits},
+                                         {.purpose = VSH_LIT_LIGHTMAP,
+                                          .width = WIDTH,
+                                          .height = HEIGHT,
+                                          .channels = three,
+                                          .channel_count = 3,
+                                          .bits = bits,
+                                          .intensity = 2.0}};
+        asset out = write_scene(images, 2);
+        const json_t *material = item_of(&out, "materials", 0);
+        const json_t *occlusion = json_object_get(material, "occlusionTexture");
+        const json_t *lightmap = json_object_get(json_object_get(material, "extensions"), "MOZ_lightmap");
+        double expected[TEXELS];
+        vsh_image_file *file = image_of(&out, number_of(occlusion, "index"));
+        for (int i = 0; i < TEXELS; ++i) {
+            expected[i] = (double)grey[i];
+        }
+        assert_values(file, 0, expected, most);
+        vsh_image_free(file);
+        /* what is over 1 is in the intensity */
+        assert_true(json_number_value(json_object_get(lightmap, "intensity")) == 2.0 * 5.5);
+        file = image_of(&out, number_of(lightmap, "index"));
+        for (int c = 0; c < 3; ++c) {
+            for (int i = 0; i < TEXELS; ++i) {
+                expected[i] = (double)light[c][i] / 5.5;
+            }
+            assert_values(file, c, expected, most);
+        }
+        vsh_image_free(file);
+        free_asset(&out);
+    }
+}
+
+static void previews_are_unlit_base_colour_of_srgb(void **state) {
+    (void)state;
+    float grey[TEXELS];
+    double expected[TEXELS];
+    for (int i = 0; i < TEXELS; ++i) {
+        grey[i] = i == 3 ? NAN : i == 4 ? -1.0F : 2.0F * (float)i / (TEXELS - 1);
+        expected[i] = i == 3 || i == 4 ? 0.0 : vshi_to_srgb(fmin(0.75 * (double)grey[i], 1.0));
+    }
+    const float *const one[1] = {grey};
+    const vsh_lit_image image = {.purpose = VSH_LIT_PREVIEW,
+                                 .width = WIDTH,
+                                 .height = HEIGHT,
+                                 .channels = one,
+                                 .channel_count = 1,
+                                 .intensity = 0.75};
+    asset out = write_scene(&image, 1);
+    const json_t *material = item_of(&out, "materials", 0);
+    assert_non_null(json_object_get(json_object_get(material, "extensions"), "KHR_materials_unlit"));
+    const json_t *base =
+        json_object_get(json_object_get(material, "pbrMetallicRoughness"), "baseColorTexture");
+    assert_int_equal(number_of(base, "texCoord"), 1);
+    vsh_image_file *file = image_of(&out, number_of(base, "index"));
+    assert_values(file, 0, expected, 255.0);
+    vsh_image_free(file);
+    free_asset(&out);
+}
+
+/* --- materials */
+
+static void materials_are_copied_only_where_they_must(void **state) {
+    (void)state;
+    asset in = make_rich();
+    write_glb(&in, "in.glb");
+    vsh_model *model = read_model(path_of("in.glb").text);
+    vsh_lit_mesh *lit = make_all_lit(model, false);
+    const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
+    const vsh_lit_options options = options_of(&image, 1);
+    write_lit(path_of("in.glb").text, model, lit, &options, path_of("out.glb").text);
+    asset out = load_asset(path_of("out.glb").text);
+    /* tiles: in set 1, and as it was for the mesh in the other scene. leaf: as variant there too, in set 1 as
+     * a variant and by the instances, in set 0 by the skinned mesh. rail: set 0, and points. White: set 1 */
+    assert_int_equal(count_of(&out, "materials"), 3 + 1 + 2 + 1 + 1);
+    static const char *const names[] = {"tiles", "leaf", "rail"};
+    for (size_t m = 0; m < 3; ++m) { /* all are shown unlit as well */
+        assert_json_equal(item_of(&in, "materials", m), item_of(&out, "materials", m), names[m]);
+    }
+    /* left and right share theirs */
+    size_t shared[2];
+    for (size_t node = 1; node < 3; ++node) {
+        const json_t *primitive = primitive_of(&out, number_of(item_of(&out, "nodes", node), "mesh"), 0);
+        shared[node - 1] = number_of(primitive, "material");
+        const json_t *mappings = json_object_get(
+            json_object_get(json_object_get(primitive, "extensions"), "KHR_materials_variants"), "mappings");
+        assert_int_equal(number_of(json_array_get(mappings, 0), "material"), shared[0]);
+        const json_t *night = item_of(&out, "materials", number_of(json_array_get(mappings, 1), "material"));
+        assert_string_equal(json_string_value(json_object_get(night, "name")), "leaf");
+        assert_int_equal(number_of(json_object_get(night, "occlusionTexture"), "texCoord"), 1);
+    }
+    assert_int_equal(shared[0], shared[1]);
+    free_asset(&out);
+    /* without the other scene's node and the points, they change where they are */
+    json_array_remove(json_object_get(in.root, "scenes"), 1);
+    json_array_set_new(json_object_get(in.root, "nodes"), 8, json_pack("{s:s}", "name", "empty"));
+    json_array_remove(json_object_get(json_array_get(json_object_get(in.root, "meshes"), 3), "primitives"),
+                      1);
+    write_glb(&in, "in.glb");
+    write_lit(path_of("in.glb").text, model, lit, &options, path_of("out.glb").text);
+    out = load_asset(path_of("out.glb").text);
+    assert_int_equal(count_of(&out, "materials"), 3 + 1 + 1);
+    for (size_t m = 0; m < 3; ++m) {
+        assert_non_null(json_object_get(item_of(&out, "materials", m), "occlusionTexture"));
+    }
+    free_asset(&out);
+    free_lit(lit, vsh_model_mesh_count(model));
+    vsh_model_free(model);
+    free_asset(&in);
+    remove_file("out.glb");
+    remove_file("in.glb");
+}
+
+static void cut_out_materials_have_no_preview(void **state) {
+    (void)state;
+    asset in = make_rich();
+    json_object_set_new(json_array_get(json_object_get(in.root, "materials"), 0), "alphaMode",
+                        json_string("MASK"));
+    write_glb(&in, "in.glb");
+    vsh_model *model = read_model(path_of("in.glb").text);
+    vsh_lit_mesh *lit = make_all_lit(model, false);
+    const vsh_lit_image image = white_image(VSH_LIT_PREVIEW, 0);
+    const vsh_lit_options options = options_of(&image, 1);
+    write_lit(path_of("in.glb").text, model, lit, &options, path_of("out.glb").text);
+    asset out = load_asset(path_of("out.glb").text);
+    for (size_t m = 0; m < count_of(&out, "materials"); ++m) {
+        const json_t *material = item_of(&out, "materials", m);
+        const char *name = json_string_value(json_object_get(material, "name"));
+        if (name != NULL && strcmp(name, "tiles") == 0) {
+            assert_json_equal(item_of(&in, "materials", 0), material, "tiles");
+        }
+    }
+    free_asset(&out);
+    free_lit(lit, vsh_model_mesh_count(model));
+    vsh_model_free(model);
+    free_asset(&in);
+    remove_file("out.glb");
+    remove_file("in.glb");
+}
+
+/* --- where they go */
+
+static void images_go_beside_a_gltf_with_its_buffer(void **state) {
+    (void)state;
+    static const uint32_t pages[2] = {0, 1};
+    asset in = make_rich();
+    write_glb(&in, "in.glb");
+    write_bytes("tile one.png", white_png, sizeof white_png);
+    vsh_model *model = read_model(path_of("in.glb").text);
+    vsh_lit_mesh *lit = make_all_lit(model, false);
+    lit[0].page = 1;
+    const vsh_lit_image images[2] = {white_image(VSH_LIT_LIGHTMAP, 0), white_image(VSH_LIT_LIGHTMAP, 1)};
+    vsh_lit_options options = options_of(images, 2);
+    options.chart_pages = pages;
+    options.chart_count = 2;
+    write_lit(path_of("in.glb").text, model, lit, &options, path_of("a b.gltf").text);
+    asset out = load_asset(path_of("a b.gltf").text);
+    assert_string_equal(json_string_value(json_object_get(item_of(&out, "buffers", 0), "uri")), "a%20b.bin");
+    assert_string_equal(json_string_value(json_object_get(item_of(&out, "buffers", 0), "name")), "all");
+    assert_string_equal(json_string_value(json_object_get(item_of(&out, "images", 1), "uri")),
+                        "a%20b.lightmap.0.png");
+    assert_string_equal(json_string_value(json_object_get(item_of(&out, "images", 2), "uri")),
+                        "a%20b.lightmap.1.png");
+    for (size_t v = 0; v < count_of(&in, "bufferViews"); ++v) {
+        const size_t size = number_of(item_of(&in, "bufferViews", v), "byteLength");
+        assert_memory_equal(bytes_of_view(&in, v), bytes_of_view(&out, v), size);
+    }
+    static const char *const written[] = {"a b.lightmap.0.png", "a b.lightmap.1.png"};
+    for (size_t i = 0; i < 2; ++i) {
+        size_t size;
+        unsigned char *bytes = load_bytes(path_of(written[i]).text, &size);
+        assert_int_equal(size, sizeof white_png);
+        assert_memory_equal(bytes, white_png, size);
+        free(bytes);
+        remove_file(written[i]);
+    }
+    free_asset(&out);
+    /* and back: from a buffer beside it into a GLB, which is the one that was written from the GLB */
+    vsh_model *again = read_model(path_of("a b.gltf").text);
+    assert_int_equal(vsh_model_mesh_count(again), vsh_model_mesh_count(model));
+    vsh_model_free(again);
+    remove_file("a b.gltf");
+    remove_file("a b.bin");
+    free_lit(lit, vsh_model_mesh_count(model));
+    vsh_model_free(model);
+    free_asset(&in);
+    remove_file("tile one.png");
+    remove_file("in.glb");
+}
+
+static void images_come_along_into_another_folder(void **state) {
+    (void)state;
+    asset in = make_rich();
+    json_array_append_new(json_object_get(in.root, "images"), parsed("{\"uri\":\"gone.png\"}"));
+    json_array_append_new(json_object_get(in.root, "images"), parsed("{\"uri\":\"link.png\"}"));
+    json_array_append_new(json_object_get(in.root, "images"), parsed("{\"uri\":\"https://a.b/c.png\"}"));
+    write_glb(&in, "in.glb");
+    write_bytes("tile one.png", white_png, sizeof white_png);
+    assert_int_equal(symlink("/etc/passwd", path_of("link.png").text), 0);
+    assert_int_equal(mkdir(path_of("other").text, 0777), 0);
+    vsh_model *model = read_model(path_of("in.glb").text);
+    vsh_run run = vsh_run_default();
+    run.warning = keep_warning;
+    warnings[0] = '\0';
+    vsh_error error;
+    assert_int_equal(
+        vsh_lit_write(path_of("in.glb").text, model, NULL, NULL, path_of("other/out.glb").text, &run, &error),
+        VSH_OK);
+    asset out = load_asset(path_of("other/out.glb").text);
+    const json_t *image = item_of(&out, "images", 0);
+    assert_null(json_object_get(image, "uri"));
+    assert_string_equal(json_string_value(json_object_get(image, "name")), "tile");
+    assert_memory_equal(bytes_of_view(&out, number_of(image, "bufferView")), white_png, sizeof white_png);
+    for (size_t i = 1; i < 4; ++i) { /* what cannot be had stays as it was */
+        assert_json_equal(item_of(&in, "images", i), item_of(&out, "images", i), "an image");
+    }
+    assert_non_null(strstr(warnings, "gone.png"));
+    assert_non_null(strstr(warnings, "outside of the model's folder"));
+    free_asset(&out);
+    vsh_model_free(model);
+    free_asset(&in);
+    remove_file("other/out.glb");
+    assert_int_equal(rmdir(path_of("other").text), 0);
+    remove_file("link.png");
+    remove_file("tile one.png");
+    remove_file("in.glb");
+}
+
+/* --- the reader */
+
+static void draco_is_decoded_by_a_reader_to_the_same_bytes(void **state) {
+    (void)state;
+    char path[512];
+    snprintf(path, sizeof path, "%s/scene_draco.glb", VSH_MODELS);
+    vsh_model *model = read_model(path);
+    vsh_lit_mesh *lit = make_all_lit(model, true);
+    asset out[2];
+    for (int i = 0; i < 2; ++i) {
+        vsh_run run = vsh_run_default();
+        run.reader = i == 1 ? "/proc/self/exe" : NULL;
+        vsh_error error = {0};
+        if (vsh_lit_write(path, model, lit, NULL, path_of("out.glb").text, &run, &error) != VSH_OK) {
+            fail_msg("%s", error.message);
+        }
+        out[i] = load_asset(path_of("out.glb").text);
+    }
+    assert_json_equal(out[0].root, out[1].root, "the root");
+    assert_int_equal(out[0].size, out[1].size);
+    assert_memory_equal(out[0].bytes, out[1].bytes, out[0].size);
+    free_asset(&out[0]);
+    free_asset(&out[1]);
+    free_lit(lit, vsh_model_mesh_count(model));
+    vsh_model_free(model);
+    remove_file("out.glb");
+}
+
+int main(int argc, char **argv) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(planes_become_images_of_their_values),
+        cmocka_unit_test(previews_are_unlit_base_colour_of_srgb),
+        cmocka_unit_test(materials_are_copied_only_where_they_must),
+        cmocka_unit_test(cut_out_materials_have_no_preview),
+        cmocka_unit_test(images_go_beside_a_gltf_with_its_buffer),
+        cmocka_unit_test(images_come_along_into_another_folder),
+        cmocka_unit_test(draco_is_decoded_by_a_reader_to_the_same_bytes),
+    };
+    if (argc >= 2 && strcmp(argv[1], VSH_READER_ARGUMENT) == 0) {
+        return vsh_reader_serve(argc, argv);
+    }
+    return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
