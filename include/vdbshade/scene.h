@@ -81,9 +81,11 @@ enum { VSH_RECEIVER_MESH = 0, VSH_RECEIVER_HEIGHTFIELD = 1 };
 enum {
     VSH_RECEIVER_UNWRAP_DEFAULT = 0, /* AUTO where its output is an asset (vsh_lit_is_output()), else NEVER */
     VSH_RECEIVER_UNWRAP_NEVER = 1,
-    VSH_RECEIVER_UNWRAP_AUTO = 2, /* where no lightmap can be baked by its own, because there are none, they
-                                     leave the unit square or lie over each other; what is laid out well in
-                                     each of its meshes stays so, and is packed anew */
+    VSH_RECEIVER_UNWRAP_AUTO =
+        2, /* where no lightmap can be baked by its own, because there are none, they
+              leave the unit square or lie over each other, and where texels_per_unit or
+              pages are given; what is laid out well in
+              each of its meshes stays so, and is packed anew */
     VSH_RECEIVER_UNWRAP_ALWAYS = 3
 };
 
@@ -206,6 +208,13 @@ VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index
  * They belong to the assets; NULL for an index beyond the scene's. */
 VSH_API const vsh_model *vsh_assets_receiver_model(const vsh_assets *assets, size_t index,
                                                    const size_t **numbers);
+
+/* *needs is 1 where a receiver's meshes are unwrapped, as receiver->unwrap says, and 0 where their own UVs
+ * are baked. Of `receiver` what it says of its output, size and unwrapping is read. Errors: as
+ * vsh_charts_create(). */
+VSH_API vsh_result vsh_receiver_needs_unwrap(const vsh_receiver *receiver, const vsh_mesh *meshes,
+                                             size_t count, const vsh_run *run, int32_t *needs,
+                                             vsh_error *error);
 
 /* Pages of receiver `index`: 1 but where it is unwrapped and needs more; 0 beyond the scene's. */
 VSH_API size_t vsh_assets_receiver_pages(const vsh_assets *assets, size_t index);

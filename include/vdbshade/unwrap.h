@@ -103,6 +103,21 @@ VSH_API void vsh_atlas_free(vsh_atlas *atlas); /* NULL does nothing */
 VSH_API vsh_result vsh_uvs_usable(const vsh_mesh *mesh, const vsh_run *run, int32_t *usable,
                                   vsh_error *error);
 
+/* How a mesh's UVs lie on its surface; both 0 where it has none, or none that have area. */
+typedef struct vsh_uvs_measures {
+    double texels_per_unit; /* texels along a world unit, as the root of the ratio of areas */
+    double stretch; /* L2, of all triangles to their mean density: 1 where all have it and are isometric */
+} vsh_uvs_measures;
+
+/* Measures them in a lightmap of this size, texels. Errors: VSH_ERROR_ARGUMENT (mesh or measures NULL, a size
+ * out of 1 … VSH_MAX_PAGE_SIZE, and as vsh_mesh_check()), VSH_ERROR_INPUT (as vsh_mesh_check()). */
+VSH_API vsh_result vsh_uvs_measure_sized(const vsh_mesh *mesh, int32_t width, int32_t height,
+                                         vsh_uvs_measures *measures, size_t measures_size, vsh_error *error);
+static inline vsh_result vsh_uvs_measure(const vsh_mesh *mesh, int32_t width, int32_t height,
+                                         vsh_uvs_measures *measures, vsh_error *error) {
+    return vsh_uvs_measure_sized(mesh, width, height, measures, sizeof *measures, error);
+}
+
 /* None of these can fail; `atlas` must not be NULL. */
 VSH_API size_t vsh_atlas_mesh_count(const vsh_atlas *atlas); /* as were given */
 VSH_API size_t vsh_atlas_chart_count(const vsh_atlas *atlas);

@@ -256,7 +256,7 @@ vsh_result vshi_lit_primitive_make(vshi_lit_work *work, size_t mesh, size_t prim
         json_object_get(vshi_gltf_element(&work->document.gltf, "meshes", mesh), "primitives"), primitive);
     const vsh_lit_mesh *lit = &work->meshes[entry];
     vertices v = {.elements = NULL};
-    vshi_lit_shape *shape;
+    vshi_lit_shape *shape = NULL;
     json_t *made = json_deep_copy(given);
     vsh_result result = made != NULL ? VSH_OK : vshi_lit_no_memory(&work->document, error);
     if (result == VSH_OK && lit->uvs == NULL) {

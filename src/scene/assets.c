@@ -259,29 +259,24 @@ static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, co
 /* Puts the parts of unwrapped meshes in their places. */
 static vsh_result unwrap(asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
                          vsh_error *error) {
-    bool needs = false;
-    VSHI_TRY(vshi_receiver_needs_unwrap(receiver, place->meshes, place->count, run, &needs, error));
-    if (!needs) {
+    int32_t needs = 0;
+    VSHI_TRY(vsh_receiver_needs_unwrap(receiver, place->meshes, place->count, run, &needs, error));
+    if (needs == 0) {
         return VSH_OK;
     }
     vshi_unwrapped *made = &place->unwrapped;
     VSHI_TRY(vshi_unwrap_receiver(receiver, place->meshes, place->count, run, made, error));
     size_t *numbers = NULL;
     VSHI_TRY(vshi_allocate((void **)&numbers, made->part_count, sizeof *numbers, "meshes", error));
-    vsh_mesh *meshes = NULL;
-    const vsh_result result =
-        vshi_allocate((void **)&meshes, made->part_count, sizeof *meshes, "meshes", error);
-    if (result != VSH_OK) {
-        free(numbers);
-        return result;
-    }
     for (size_t i = 0; i < made->part_count; ++i) {
         numbers[i] = place->numbers[made->numbers[i]];
-        meshes[i] = made->parts[i];
     }
     free(place->numbers);
-    free(place->meshes);
     place->numbers = numbers;
+    vsh_mesh *meshes = NULL;
+    VSHI_TRY(vshi_allocate((void **)&meshes, made->part_count, sizeof *meshes, "meshes", error));
+    memcpy(meshes, made->parts, made->part_count * sizeof *meshes);
+    free(place->meshes);
     place->meshes = meshes;
     place->count = made->part_count;
     return VSH_OK;
@@ -296,7 +291,6 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
     if (receiver->type == VSH_RECEIVER_HEIGHTFIELD) {
         vsh_heights_source source = {.name = receiver->path,
                                      .size = {receiver->extent[0], receiver->extent[1]},
-
                                      .height = receiver->relief};
         return place_heights(assets, &assets->receivers[index], &source, VSH_HEIGHTS_SURFACE,
                              receiver->transform, run, error);

@@ -189,11 +189,12 @@ vsh_result vshi_select(const vsh_model *model, const char *path, const vsh_selec
 static vsh_result fail_without_uvs(const vsh_receiver *receiver, const char *mesh, int32_t sets,
                                    vsh_error *error) {
     if (sets == 0) {
-        return vshi_fail(error, VSH_ERROR_INPUT,
-                         "%s: %s: no UVs to bake into: have them made (--unwrap auto; \"unwrap\" in a scene), or "
-                         "leave it out of what receives, so that it only casts (--no-receive NAME, "
-                         "--per-object; \"except\" in a scene)",
-                         receiver->path, mesh);
+        return vshi_fail(
+            error, VSH_ERROR_INPUT,
+            "%s: %s: no UVs to bake into: have them made (--unwrap auto; \"unwrap\" in a scene), or "
+            "leave it out of what receives, so that it only casts (--no-receive NAME, "
+            "--per-object; \"except\" in a scene)",
+            receiver->path, mesh);
     }
     return vshi_fail(error, VSH_ERROR_INPUT, "%s: %s: no UV set %d: it has %s%d", receiver->path, mesh,
                      receiver->uv_set, sets == 1 ? "set " : "sets 0 … ", sets - 1);

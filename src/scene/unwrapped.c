@@ -1,10 +1,12 @@
 #include "scene/unwrapped.h"
 
+#include "base/job.h"
 #include "base/memory.h"
 #include "base/try.h"
 
 #include <vdbshade/lit.h>
 
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -51,13 +53,19 @@ done:
     return result;
 }
 
-vsh_result vshi_receiver_needs_unwrap(const vsh_receiver *receiver, const vsh_mesh *meshes, size_t count,
-                                      const vsh_run *run, bool *needs, vsh_error *error) {
+vsh_result vsh_receiver_needs_unwrap(const vsh_receiver *receiver, const vsh_mesh *meshes, size_t count,
+                                     const vsh_run *run, int32_t *needs, vsh_error *error) {
+    VSHI_NEEDS(receiver);
+    VSHI_NEEDS_OF(count, meshes);
+    VSHI_NEEDS(needs);
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
     const int32_t mode = vshi_receiver_unwrap(receiver);
     *needs = mode == VSH_RECEIVER_UNWRAP_ALWAYS;
     if (mode != VSH_RECEIVER_UNWRAP_AUTO) {
         return VSH_OK;
     }
+    *needs = receiver->texels_per_unit > 0.0 || receiver->pages > 0;
     for (size_t i = 0; i < count; ++i) {
         *needs = *needs || meshes[i].uvs == NULL;
     }
@@ -65,7 +73,7 @@ vsh_result vshi_receiver_needs_unwrap(const vsh_receiver *receiver, const vsh_me
         return VSH_OK;
     }
     bool usable = false;
-    VSHI_TRY(are_usable(receiver, meshes, count, run, &usable, error));
+    VSHI_TRY(are_usable(receiver, meshes, count, &full, &usable, error));
     *needs = !usable;
     return VSH_OK;
 }

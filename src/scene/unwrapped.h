@@ -5,8 +5,6 @@
 #include <vdbshade/scene.h>
 #include <vdbshade/unwrap.h>
 
-#include <stdbool.h>
-
 /* Parts are whole meshes, but for those that lie on several pages, which have a part on each, all of one
  * object. They are sorted by their pages, and stand in the meshes' order on each. */
 typedef struct vshi_unwrapped {
@@ -22,12 +20,6 @@ typedef struct vshi_unwrapped {
 
 /* Whether its meshes are unwrapped: VSH_RECEIVER_UNWRAP_NEVER, …_AUTO or …_ALWAYS. */
 int32_t vshi_receiver_unwrap(const vsh_receiver *receiver);
-
-/* Whether a receiver's meshes need UVs that are made for them: always, never, or where their own cannot be
- * baked (none, outside the unit square, more of the texels shared than VSH_LARGEST_OVERLAP). Errors: as
- * vsh_charts_create(). */
-vsh_result vshi_receiver_needs_unwrap(const vsh_receiver *receiver, const vsh_mesh *meshes, size_t count,
-                                      const vsh_run *run, bool *needs, vsh_error *error);
 
 /* Unwraps a receiver's meshes, which need not outlive the result but for their transforms and names. Errors:
  * as vsh_unwrap(). Free it also after a failure. */

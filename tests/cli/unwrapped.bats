@@ -69,6 +69,31 @@ write_two() {
     same_values x.1.exr y.1.exr
 }
 
+@test "UVs that can be baked are packed anew where a density is asked for" {
+    write_box box.obj
+    shade bake box.obj "${SMALL[@]}" --size 64 --unwrap auto --texels-per-unit 8 -o few.exr
+    [ "$status" -eq 0 ] || fail "$stderr"
+    shade bake box.obj "${SMALL[@]}" --size 64 --unwrap auto --texels-per-unit 16 -o many.exr --stats many.json
+    [ "$status" -eq 0 ] || fail "$stderr"
+    # six unit squares
+    texels=$(grep -o '"texels": [0-9]*' many.json | grep -o '[0-9]*')
+    [ "$texels" -ge 1536 ] && [ "$texels" -le 1850 ] || fail "$texels texels"
+}
+
+@test "info tells density and stretch of UVs, and what auto would do" {
+    write_two two.obj
+    write_bare bare.obj
+    write_box box.obj
+    shade info box.obj --size 100
+    [[ $output == *"lightmap UVs: 36.12 texels a unit at 100 × 100, stretch 1.048"* ]] || fail "$output"
+    [[ $output == *"--unwrap auto: bakes these UVs as they are"* ]] || fail "$output"
+    shade info two.obj
+    [[ $output == *"--unwrap auto: packs the charts of 2 meshes anew, and makes those of 0"* ]] || fail "$output"
+    shade info bare.obj
+    [[ $output != *"lightmap UVs"* ]] || fail "$output"
+    [[ $output == *"--unwrap auto: packs the charts of 0 meshes anew, and makes those of 1"* ]] || fail "$output"
+}
+
 @test "a density that does not fit the pages is refused with one that does" {
     write_two two.obj
     old_output x.exr

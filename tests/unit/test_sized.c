@@ -102,6 +102,7 @@ static void a_call_fills_the_struct_that_the_caller_has(void **state) {
     HOLDS(vsh_mesh_report, 1, vsh_mesh_check_sized(meshes, (void *)room, size, &why));
     HOLDS(vsh_solidity_report, 2, vsh_mesh_solidity_sized(meshes, 2, NULL, (void *)room, size, &why));
     HOLDS(vsh_lost, 2, vsh_field_find_lost_sized(field, meshes, 2, NULL, (void *)room, size, &why));
+    HOLDS(vsh_uvs_measures, 1, vsh_uvs_measure_sized(meshes, 16, 16, (void *)room, size, &why));
     HOLDS(vsh_closeness, 1, vsh_charts_closeness_sized(meshes, 1, 16, 16, NULL, (void *)room, size, &why));
     HOLDS(vsh_uv_report, 2, {
         assert_int_equal(

@@ -428,9 +428,34 @@ static void wild_numbers_do_no_harm(void **state) {
     free(s);
 }
 
+/* A rectangle of 1 × 2 units that fills the square: along v a texel is twice as long as along u. */
+static void density_and_stretch_of_uvs_are_those_of_their_derivatives(void **state) {
+    (void)state;
+    static const float positions[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 2, 0}, {0, 2, 0}};
+    static const float uvs[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    vsh_mesh mesh = {.name = "rectangle",
+                     .positions = positions[0],
+                     .uvs = uvs[0],
+                     .indices = indices,
+                     .vertex_count = 4,
+                     .triangle_count = 2};
+    vsh_uvs_measures measures;
+    assert_int_equal(vsh_uvs_measure(&mesh, 64, 64, &measures, NULL), VSH_OK);
+    assert_true(fabs(measures.texels_per_unit - 64.0 / sqrt(2.0)) < 1e-9);
+    assert_true(fabs(measures.stretch - sqrt(1.25)) < 1e-9);
+    assert_int_equal(vsh_uvs_measure(&mesh, 64, 128, &measures, NULL), VSH_OK);
+    assert_true(fabs(measures.texels_per_unit - 64.0) < 1e-9 && fabs(measures.stretch - 1.0) < 1e-9);
+    mesh.uvs = NULL;
+    assert_int_equal(vsh_uvs_measure(&mesh, 64, 64, &measures, NULL), VSH_OK);
+    assert_true(measures.texels_per_unit == 0.0 && measures.stretch == 0.0);
+    assert_int_equal(vsh_uvs_measure(&mesh, 0, 64, &measures, NULL), VSH_ERROR_ARGUMENT);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_same_bits_for_any_number_of_threads),
+        cmocka_unit_test(density_and_stretch_of_uvs_are_those_of_their_derivatives),
         cmocka_unit_test(each_mesh_is_on_one_page_where_it_fits),
         cmocka_unit_test(a_density_that_does_not_fit_is_refused_and_one_named_that_does),
         cmocka_unit_test(density_is_as_asked_and_by_mesh),

@@ -81,7 +81,20 @@ static int print_lights(const vsh_model *model, double unit) {
     return CLI_OK;
 }
 
-static int print_mesh(const vsh_model *model, size_t index, double scale,
+static int print_uvs(const vsh_mesh *mesh, const cli_info_look *look) {
+    vsh_uvs_measures measures;
+    vsh_error error;
+    if (vsh_uvs_measure(mesh, look->width, look->height, &measures, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    if (measures.texels_per_unit > 0.0) {
+        printf("  lightmap UVs: %.4g texels a unit at %d × %d, stretch %.3f\n", measures.texels_per_unit,
+               look->width, look->height, measures.stretch);
+    }
+    return CLI_OK;
+}
+
+static int print_mesh(const vsh_model *model, size_t index, const cli_info_look *look, double scale,
                       const vsh_solidity_report *solidity) {
     vsh_mesh mesh = vsh_model_mesh(model, index, -1);
     double scaled[12];
@@ -96,8 +109,9 @@ static int print_mesh(const vsh_model *model, size_t index, double scale,
     }
     printf("mesh %zu '%s'\n", index, name_of(&mesh));
     printf("  triangles: %zu\n  vertices: %zu\n", mesh.triangle_count, mesh.vertex_count);
-    printf("  UV sets: %d\n  normals: %s\n", vsh_model_uv_sets(model, index),
-           mesh.normals != NULL ? "yes" : "no, flat");
+    printf("  UV sets: %d\n", vsh_model_uv_sets(model, index));
+    CLI_TRY(print_uvs(&mesh, look));
+    printf("  normals: %s\n", mesh.normals != NULL ? "yes" : "no, flat");
     printf("  bounds: %g %g %g to %g %g %g\n  area: %g\n", report.bounds_min[0], report.bounds_min[1],
            report.bounds_min[2], report.bounds_max[0], report.bounds_max[1], report.bounds_max[2],
            report.area);
@@ -110,6 +124,34 @@ static int print_mesh(const vsh_model *model, size_t index, double scale,
     print_count(report.flipped_edges, "edges whose triangles disagree about the outside");
     print_count(report.degenerate_triangles, "triangles of zero area, which are skipped");
     print_solidity(solidity);
+    return CLI_OK;
+}
+
+/* What `bake --unwrap auto` would do. */
+static int print_unwrap(const vsh_mesh *meshes, size_t count, const cli_info_look *look, const vsh_run *run) {
+    vsh_receiver receiver = vsh_receiver_default();
+    receiver.width = look->width;
+    receiver.height = look->height;
+    receiver.unwrap = VSH_RECEIVER_UNWRAP_AUTO;
+    int32_t needs;
+    vsh_error error;
+    if (vsh_receiver_needs_unwrap(&receiver, meshes, count, run, &needs, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    if (needs == 0) {
+        puts("--unwrap auto: bakes these UVs as they are");
+        return CLI_OK;
+    }
+    size_t kept = 0;
+    for (size_t i = 0; i < count; ++i) {
+        int32_t usable = 0;
+        if (meshes[i].uvs != NULL && vsh_uvs_usable(&meshes[i], run, &usable, &error) != VSH_OK) {
+            return cli_fail_of(NULL, &error);
+        }
+        kept += usable != 0;
+    }
+    printf("--unwrap auto: packs the charts of %zu mesh%s anew, and makes those of %zu\n", kept,
+           kept == 1 ? "" : "es", count - kept);
     return CLI_OK;
 }
 
@@ -144,7 +186,7 @@ int cli_info_mesh(const char *path, const cli_info_look *given, const vsh_run *r
     }
     for (size_t i = 0; i < count; ++i) {
         if (!look.table) {
-            CLI_TRY_DONE(print_mesh(model, i, scale_for(model, look.unit), &solidity[i]));
+            CLI_TRY_DONE(print_mesh(model, i, &look, scale_for(model, look.unit), &solidity[i]));
         }
         if (meshes[i].uvs != NULL) {
             with_uvs[with_uv_count++] = meshes[i];
@@ -152,9 +194,10 @@ int cli_info_mesh(const char *path, const cli_info_look *given, const vsh_run *r
     }
     CLI_TRY_DONE(print_lights(model, look.unit));
     CLI_TRY_DONE(cli_info_uvs(model, with_uvs, with_uv_count, &look, run));
+    CLI_TRY_DONE(print_unwrap(meshes, count, &look, run));
     if (with_uv_count < count) {
         printf("problem: %zu of %zu meshes have no UVs to bake into: they only cast with --per-object or "
-               "--no-receive; or unwrap them\n",
+               "--no-receive; or are unwrapped\n",
                count - with_uv_count, count);
     }
 done:
