@@ -105,7 +105,8 @@ vsh_result vshi_lit_open(vshi_lit_document *document, const char *path, const vs
     const size_t buffers = json_array_size(json_object_get(gltf->root, "buffers"));
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->buffers, buffers, sizeof *gltf->buffers, error));
     gltf->buffer_count = buffers;
-    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&gltf->views, document->first_view, sizeof *gltf->views, error));
+    VSHI_TRY(
+        vshi_gltf_allocate(gltf, (void **)&gltf->views, document->first_view, sizeof *gltf->views, error));
     gltf->view_count = document->first_view;
     return VSH_OK;
 }

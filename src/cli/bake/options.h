@@ -45,7 +45,7 @@ typedef struct cli_bake_settings {
     int32_t band_rows; /* 0: as many as go */
     const char *casters[CLI_MAX_EXTRA_CASTERS];
     size_t caster_count;
-    const char *exr; /* beside an asset; NULL: none */
+    const char *exr;                    /* beside an asset; NULL: none */
     bool preview, embed, images_beside; /* of an asset */
     bool has_sun, has_sun_angle, has_light_radius, per_object, dry_run, resume;
 } cli_bake_settings;
