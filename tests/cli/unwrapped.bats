@@ -69,6 +69,19 @@ write_two() {
     same_values x.1.exr y.1.exr
 }
 
+@test "a mesh that no page can hold lies on several, each triangle on one" {
+    write_box box.obj
+    shade bake box.obj "${SMALL[@]}" --size 32 --unwrap always --texels-per-unit 20 -o x.exr --stats x.json --verbose
+    [ "$status" -eq 0 ] || fail "$stderr"
+    [ -s x.5.exr ] && [ ! -e x.6.exr ] || fail "$(ls)"
+    [[ $stderr != *"lie over"* ]] || fail "$stderr"
+    # six squares of 20 texels and a border
+    texels=$(grep -o '"texels": [0-9]*' x.json | grep -o '[0-9]*')
+    [ "$texels" -ge 2400 ] && [ "$texels" -le 2904 ] || fail "$texels texels"
+    # solid still, though it is cut in six
+    [[ $stderr != *"sheet"* && $stderr != *"open edges"* ]] || fail "$stderr"
+}
+
 @test "UVs that can be baked are packed anew where a density is asked for" {
     write_box box.obj
     shade bake box.obj "${SMALL[@]}" --size 64 --unwrap auto --texels-per-unit 8 -o few.exr
