@@ -1,6 +1,7 @@
 /* The text of a file of JSON, brought into memory within a limit. */
 #include "base/input.h"
 #include "base/job.h"
+#include "base/json_bytes.h"
 #include "base/memory.h"
 #include "base/try.h"
 #include "json/json.h"
@@ -44,26 +45,6 @@ static vsh_result read_all(const char *path, FILE *file, char **text, size_t *si
     return VSH_OK;
 }
 
-/* Bytes, at most, that reading a text takes: its own, Jansson's tree of it, and what is made of that. Objects
- * and arrays bring the first slots of their tables; members and items double them. (The C library's blocks
- * counted, Jansson 2.14 and glibc 2.36 on 64 bits: tests/unit/test_scene.c.) */
-static double tree_bytes(const char *text, size_t size) {
-    double objects = 0.0, arrays = 0.0, members = 0.0, items = 0.0;
-    bool in_string = false;
-    for (size_t i = 0; i < size; ++i) {
-        const char c = text[i];
-        i += in_string && c == '\\';
-        in_string ^= c == '"';
-        if (!in_string) {
-            objects += c == '{';
-            arrays += c == '[';
-            members += c == ':';
-            items += c == ',';
-        }
-    }
-    return 288.0 * objects + 176.0 * arrays + 144.0 * members + 112.0 * items + 3.0 * (double)size;
-}
-
 vsh_result vshi_json_text(const char *path, const vsh_run *run, char **text, size_t *size, vsh_error *error) {
     *text = NULL;
     *size = 0;
@@ -72,7 +53,7 @@ vsh_result vshi_json_text(const char *path, const vsh_run *run, char **text, siz
     VSHI_TRY(vshi_input_open(path, path, UINT64_MAX, &file, &told, error));
     vsh_result result;
     VSHI_TRY_DONE(read_all(path, file, text, size, error));
-    VSHI_TRY_DONE(vshi_check_limit(run, tree_bytes(*text, *size), path, error));
+    VSHI_TRY_DONE(vshi_check_limit(run, vshi_json_bytes(*text, *size), path, error));
 done:
     fclose(file);
     if (result != VSH_OK) {

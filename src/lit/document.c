@@ -1,31 +1,13 @@
 #include "lit/document.h"
 
 #include "base/input.h"
+#include "base/json_bytes.h"
 #include "base/memory.h"
 
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Bytes, at most, of Jansson's tree of a text, and of a copy of its meshes: objects and arrays bring the
- * first slots of their tables, members and items double them (as src/json/text.c counts them). */
-static double tree_bytes(const char *text, size_t size) {
-    double objects = 0.0, arrays = 0.0, members = 0.0, items = 0.0;
-    bool in_string = false;
-    for (size_t i = 0; i < size; ++i) {
-        const char c = text[i];
-        i += in_string && c == '\\';
-        in_string ^= c == '"';
-        if (!in_string) {
-            objects += c == '{';
-            arrays += c == '[';
-            members += c == ':';
-            items += c == ',';
-        }
-    }
-    return 288.0 * objects + 176.0 * arrays + 144.0 * members + 112.0 * items + 3.0 * (double)size;
-}
 
 /* Where the JSON of a GLB lies, as far as its header can be believed: vshi_gltf_open() checks it. */
 static void find_json(const char *text, size_t size, size_t *begin, size_t *length) {
@@ -97,7 +79,7 @@ vsh_result vshi_lit_open(vshi_lit_document *document, const char *path, const vs
     size_t size, begin, length;
     VSHI_TRY(read_text(document, &size, error));
     find_json(document->text, size, &begin, &length);
-    VSHI_TRY(vshi_gltf_hold(gltf, tree_bytes(document->text + begin, length), error));
+    VSHI_TRY(vshi_gltf_hold(gltf, vshi_json_bytes(document->text + begin, length), error));
     VSHI_TRY(vshi_gltf_open(gltf, document->text, size, error));
     document->text_size = told_size(document->text, size);
     VSHI_TRY(check_lists(gltf, error));

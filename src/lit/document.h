@@ -62,9 +62,6 @@ vsh_result vshi_lit_use_extension(vshi_lit_document *document, const char *name,
 /* Takes a name out of extensionsUsed and extensionsRequired, and either away where that was its last. */
 void vshi_lit_drop_extension(vshi_lit_document *document, const char *name);
 
-/* Bytes of a component of this type, VSHI_GLTF_…; 0: it is none. (gather.c) */
-size_t vshi_lit_component_size(int type);
-
 /* --- bytes */
 
 /* Adds a buffer view of `size` bytes, zeros where `bytes` is NULL; *offset (may be NULL) is where they lie in

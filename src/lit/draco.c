@@ -192,7 +192,7 @@ vsh_result vshi_serve_draco(const char *path, vshi_decoder *request, const vsh_r
             vshi_encode_count(payload, (uint64_t)attribute->type);
             vshi_encode_count(payload, (uint64_t)attribute->components);
             vshi_encode_array(payload, attribute->values, draco->vertex_count,
-                              (size_t)attribute->components * vshi_lit_component_size(attribute->type));
+                              (size_t)attribute->components * vshi_gltf_component_size(attribute->type));
         }
     }
 done:
@@ -226,7 +226,7 @@ static vsh_result take_decoded(vshi_decoder *decoder, const char *path, vshi_lit
         attribute->id = vshi_decode_count(decoder, UINT32_MAX);
         attribute->type = (int)vshi_decode_count(decoder, VSHI_GLTF_FLOAT);
         attribute->components = (int)vshi_decode_count(decoder, 4);
-        const size_t size = (size_t)attribute->components * vshi_lit_component_size(attribute->type);
+        const size_t size = (size_t)attribute->components * vshi_gltf_component_size(attribute->type);
         const void *values = size > 0 ? vshi_decode_array(decoder, draco->vertex_count, size) : NULL;
         if (decoder->bad || (values == NULL && draco->vertex_count > 0)) {
             return vshi_answer_fail(path, "a decoded attribute", error);

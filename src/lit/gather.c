@@ -3,22 +3,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-size_t vshi_lit_component_size(int type) {
-    switch (type) {
-    case VSHI_GLTF_BYTE:
-    case VSHI_GLTF_UBYTE:
-        return 1;
-    case VSHI_GLTF_SHORT:
-    case VSHI_GLTF_USHORT:
-        return 2;
-    case VSHI_GLTF_UINT:
-    case VSHI_GLTF_FLOAT:
-        return 4;
-    default:
-        return 0;
-    }
-}
-
 void vshi_lit_gathered_free(vshi_lit_gathered *gathered) {
     free(gathered->from);
     free(gathered->to);
@@ -55,7 +39,7 @@ static vsh_result make_dense(vshi_lit_document *document, const vshi_gltf_access
     for (size_t i = 0; i < accessor->count && accessor->at != NULL; ++i) {
         memcpy(made->owned + i * made->size, accessor->at + i * accessor->stride, made->size);
     }
-    const size_t index_size = vshi_lit_component_size(accessor->sparse_type);
+    const size_t index_size = vshi_gltf_component_size(accessor->sparse_type);
     for (size_t i = 0; i < accessor->sparse_count; ++i) {
         const size_t index = index_at(accessor->sparse_at + i * index_size, accessor->sparse_type);
         memcpy(made->owned + index * made->size, accessor->sparse_values + i * made->size, made->size);
@@ -72,7 +56,7 @@ static vsh_result find_elements(vshi_lit_document *document, size_t index, size_
     *found = (elements){.at = NULL};
     VSHI_TRY(vshi_gltf_accessor_open(&document->gltf, index, &accessor, error));
     if (draco != NULL) {
-        const size_t size = (size_t)draco->components * vshi_lit_component_size(draco->type);
+        const size_t size = (size_t)draco->components * vshi_gltf_component_size(draco->type);
         if (draco->type != accessor.type || draco->components != accessor.components) {
             return vshi_gltf_fail(&document->gltf, error, "%s: accessors[%zu] is not what was decompressed",
                                   where, index);
@@ -84,7 +68,7 @@ static vsh_result find_elements(vshi_lit_document *document, size_t index, size_
         return vshi_gltf_fail(&document->gltf, error, "%s: accessors[%zu] has %zu elements for %zu vertices",
                               where, index, accessor.count, element_count);
     }
-    const size_t size = (size_t)accessor.components * vshi_lit_component_size(accessor.type);
+    const size_t size = (size_t)accessor.components * vshi_gltf_component_size(accessor.type);
     *found = (elements){accessor.at, accessor.stride, size, accessor.components, accessor.type, NULL};
     return accessor.sparse_count > 0 ? make_dense(document, &accessor, found, error) : VSH_OK;
 }
@@ -115,7 +99,7 @@ static json_t *number(double value, int type) {
 static vsh_result set_bounds(const vshi_lit_document *document, json_t *accessor, const unsigned char *at,
                              size_t stride, size_t count, const elements *from, vsh_error *error) {
     json_t *low = json_array(), *high = json_array();
-    const size_t each = vshi_lit_component_size(from->type);
+    const size_t each = vshi_gltf_component_size(from->type);
     bool good = low != NULL && high != NULL;
     for (int c = 0; good && c < from->components; ++c) {
         const size_t offset = (size_t)c * each;

@@ -111,6 +111,9 @@ enum {
     VSHI_GLTF_FLOAT = 5126
 };
 
+/* Bytes of a component of a type VSHI_GLTF_…; 0 of every other. */
+size_t vshi_gltf_component_size(int type);
+
 typedef struct vshi_gltf_accessor {
     size_t count;
     int components; /* 1 … 16 */

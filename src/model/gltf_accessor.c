@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-static int component_size(int type) {
+size_t vshi_gltf_component_size(int type) {
     switch (type) {
     case VSHI_GLTF_BYTE:
     case VSHI_GLTF_UBYTE:
@@ -91,8 +91,8 @@ static vsh_result open_sparse(vshi_gltf *gltf, const json_t *sparse, const char 
     if (index_view == SIZE_MAX || value_view == SIZE_MAX) {
         return vshi_gltf_fail(gltf, error, "%s: its sparse part has no buffer view", where);
     }
-    const size_t index_size = (size_t)component_size((int)type);
-    const size_t value_size = (size_t)accessor->components * (size_t)component_size(accessor->type);
+    const size_t index_size = vshi_gltf_component_size((int)type);
+    const size_t value_size = (size_t)accessor->components * vshi_gltf_component_size(accessor->type);
     VSHI_TRY(place(gltf, where, index_view, index_offset, count, index_size, &accessor->sparse_at, &stride,
                    error));
     VSHI_TRY(place(gltf, where, value_view, value_offset, count, value_size, &accessor->sparse_values,
@@ -118,7 +118,7 @@ vsh_result vshi_gltf_accessor_open(vshi_gltf *gltf, size_t index, vshi_gltf_acce
     *accessor = (vshi_gltf_accessor){.normalized = json_is_true(json_object_get(given, "normalized"))};
     accessor->components = component_count(json_string_value(json_object_get(given, "type")));
     if (!vshi_gltf_count(given, "componentType", 0, &type) || type > VSHI_GLTF_FLOAT ||
-        component_size((int)type) == 0 || accessor->components == 0) {
+        vshi_gltf_component_size((int)type) == 0 || accessor->components == 0) {
         return vshi_gltf_fail(gltf, error, "%s: its type or componentType is wrong", where);
     }
     accessor->type = (int)type;
@@ -128,7 +128,7 @@ vsh_result vshi_gltf_accessor_open(vshi_gltf *gltf, size_t index, vshi_gltf_acce
     }
     VSHI_TRY(vshi_gltf_index(gltf, given, "bufferView", "bufferViews", where, &view, error));
     if (view != SIZE_MAX) {
-        const size_t size = (size_t)accessor->components * (size_t)component_size(accessor->type);
+        const size_t size = (size_t)accessor->components * vshi_gltf_component_size(accessor->type);
         VSHI_TRY(
             place(gltf, where, view, offset, accessor->count, size, &accessor->at, &accessor->stride, error));
     }
@@ -171,9 +171,9 @@ static void element(const vshi_gltf_accessor *a, const unsigned char *at, float 
         memcpy(to, at, (size_t)a->components * sizeof *to);
         return;
     }
-    const int size = component_size(a->type);
+    const size_t size = vshi_gltf_component_size(a->type);
     for (int k = 0; k < a->components; ++k) {
-        to[k] = component(at + k * size, a->type, a->normalized);
+        to[k] = component(at + (size_t)k * size, a->type, a->normalized);
     }
 }
 
@@ -194,8 +194,8 @@ void vshi_gltf_accessor_floats(const vshi_gltf_accessor *a, float *values) {
     if (a->at == NULL) {
         memset(values, 0, a->count * n * sizeof *values);
     }
-    const size_t index_size = (size_t)component_size(a->sparse_type);
-    const size_t value_size = n * (size_t)component_size(a->type);
+    const size_t index_size = vshi_gltf_component_size(a->sparse_type);
+    const size_t value_size = n * vshi_gltf_component_size(a->type);
     for (size_t i = 0; i < a->sparse_count; ++i) {
         const size_t index = integer_at(a->sparse_at + i * index_size, a->sparse_type);
         element(a, a->sparse_values + i * value_size, values + n * index);
@@ -203,7 +203,7 @@ void vshi_gltf_accessor_floats(const vshi_gltf_accessor *a, float *values) {
 }
 
 void vshi_gltf_accessor_integers(const vshi_gltf_accessor *a, uint32_t *values) {
-    const size_t n = (size_t)a->components, size = (size_t)component_size(a->type);
+    const size_t n = (size_t)a->components, size = vshi_gltf_component_size(a->type);
     const bool plain = a->at != NULL && a->type == VSHI_GLTF_UINT && a->stride == n * size;
     if (plain) {
         memcpy(values, a->at, a->count * a->stride);
@@ -214,7 +214,7 @@ void vshi_gltf_accessor_integers(const vshi_gltf_accessor *a, uint32_t *values) 
                 a->at != NULL ? (uint32_t)integer_at(a->at + i * a->stride + k * size, a->type) : 0;
         }
     }
-    const size_t index_size = (size_t)component_size(a->sparse_type);
+    const size_t index_size = vshi_gltf_component_size(a->sparse_type);
     for (size_t i = 0; i < a->sparse_count; ++i) {
         const size_t index = integer_at(a->sparse_at + i * index_size, a->sparse_type);
         for (size_t k = 0; k < n; ++k) {

@@ -179,3 +179,18 @@ const validator = require('gltf-validator'), fs = require('fs'), path = require(
 EOF
     node validate.js kept/*.glb kept/*.gltf || fail "see above"
 }
+
+@test "light from all around is whole beside an occlusion texture, which viewers multiply it by" {
+    cat >dark.json <<JSON
+{"casters": [{"mesh": "$MODELS/scene.glb"}], "irradiance": true, "ambient": [0.5, 0.5, 0.5], "ao": {"distance": 1},
+ "lights": [{"name": "sun", "type": "directional", "direction": [0.4, 0.8, 0.3], "color": [0, 0, 0]}],
+ "receivers": [{"mesh": "$MODELS/scene.glb", "size": 32, "padding": "auto", "output": "dark.glb"}]}
+JSON
+    shade bake dark.json --images-beside
+    done_well
+    shade info dark.occlusion.png
+    [[ $output == *"'Y': min 0.4"* ]] || fail "nothing occludes: $output"
+    shade info dark.lightmap.png
+    # 0.5 of 8 bits, in every texel
+    [[ $output == *"min 0.50196"*"max 0.50196"* ]] || fail "$output"
+}
