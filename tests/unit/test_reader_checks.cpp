@@ -104,7 +104,7 @@ void damaged_decompressed_vertices_are_refused_or_sound(void **) {
             for (size_t k = 0; k < draco.attribute_count && draco.vertex_count > 0; ++k) {
                 const vshi_lit_draco_attribute &attribute = draco.attributes[k];
                 const size_t size = draco.vertex_count * size_t(attribute.components) *
-                                    vshi_lit_component_size(attribute.type);
+                                    vshi_gltf_component_size(attribute.type);
                 sum += attribute.values != nullptr ? attribute.values[size - 1] : 0;
             }
             assert_true(sum < 1000000);
