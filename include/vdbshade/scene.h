@@ -25,7 +25,8 @@ enum {
     VSH_CASTER_TEXT = 6         /* text, likewise */
 };
 
-/* Which of a file's meshes are meant, by patterns as of vsh_mesh_matches(). All zero: all of them. */
+/* Which of a file's meshes are meant, by patterns as of vsh_mesh_matches(); one that matches none of them by
+ * these names means materials of that name. All zero: all of them. */
 typedef struct vsh_selection {
     const char *const *only; /* [only_count]: those that one of these matches, where there are any */
     size_t only_count;
@@ -62,6 +63,9 @@ typedef struct vsh_caster {
     vsh_selection objects;             /* mesh: which of its meshes cast */
     const vsh_solidity_rule *solidity; /* [solidity_count]; mesh: of those that cast; later ones overrule */
     size_t solidity_count;
+    const char *const *one_sided; /* [one_sided_count]; mesh: patterns of those that are (vsh_mesh.one_sided):
+                                     of materials, too, where no object is called so */
+    size_t one_sided_count;
 } vsh_caster;
 
 /* Casters that are shaded in a way of their own. */
@@ -153,8 +157,8 @@ typedef struct vsh_scene {
                              (vsh_model_unit());   0: as they say, and those that say nothing as they are */
     int32_t voxels_named; /* nonzero: `grid` holds a voxel size or a resolution that was asked for; 0: where
                              it is the default, what is baked chooses them (vsh_scene_resolution()) */
-    int32_t cast_blended; /* nonzero: meshes of blended materials (VSH_ALPHA_BLENDED) cast, whole; 0: they
-                             only receive */
+    int32_t cast_blended; /* nonzero: meshes of blended materials (VSH_ALPHA_BLENDED) cast, where the alpha of
+                             their texture is at least half, without one whole; 0: they only receive */
 } vsh_scene;
 
 /* Reads a scene file; what it names is not opened. The scene and all it points to belong to *scene; free it

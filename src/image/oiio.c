@@ -49,8 +49,9 @@ double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *plan
     return at()->writer_bytes(format, planes, bits);
 }
 
-vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
+vsh_result vshi_oiio_read(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
+                          vsh_image_file **file, vsh_error *error) {
     *file = NULL;
     VSHI_TRY(vshi_oiio_have(path, error));
-    return at()->read(path, run, file, error);
+    return at()->read(path, bytes, run, file, error);
 }

@@ -61,9 +61,11 @@ vsh_result vshi_oiio_end(vshi_oiio_writer *writer, vsh_error *error);
 /* Bytes that writing takes at most. */
 double vshi_oiio_writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits);
 
-/* Within run->memory_limit; NULL is none. Errors: VSH_ERROR_INPUT, VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT,
- * VSH_ERROR_MEMORY. Thread safe. */
-vsh_result vshi_oiio_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error);
+/* The file at `path`, of the format that its ending says, or `bytes`, which a format is named of and messages
+ * call `path`. Within run->memory_limit; NULL is none. Errors: VSH_ERROR_READ, VSH_ERROR_INPUT,
+ * VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Thread safe. */
+vsh_result vshi_oiio_read(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
+                          vsh_image_file **file, vsh_error *error);
 
 #ifdef __cplusplus
 }

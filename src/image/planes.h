@@ -93,9 +93,21 @@ VSHI_SHARED vsh_result vshi_image_job(const char *path, const vsh_run *run, int6
 /* Cut to VSHI_FILE_NAME, without control characters. */
 VSHI_SHARED void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *name);
 
-/* Has run->reader read the file. Errors: as vsh_image_read(). */
-vsh_result vshi_image_from_reader(const char *path, const vsh_run *run, vsh_image_file **file,
-                                  vsh_error *error);
+/* An image file that lies in memory. */
+typedef struct vshi_image_bytes {
+    const void *at;
+    size_t size;
+    const char *format; /* OpenImageIO's name of it */
+} vshi_image_bytes;
+
+/* Has run->reader read the file, or `bytes` that stand for it (NULL: none). Errors: as vsh_image_read(). */
+vsh_result vshi_image_from_reader(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
+                                  vsh_image_file **file, vsh_error *error);
+
+/* As vsh_image_read(), of an image file in memory, PNG, JPEG or WebP by its first bytes, which messages call
+ * `name`; `run` is a resolved one. Errors: VSH_ERROR_UNSUPPORTED too, of another kind. */
+vsh_result vshi_image_read_bytes(const char *name, const void *bytes, size_t size, const vsh_run *run,
+                                 vsh_image_file **file, vsh_error *error);
 
 struct vshi_decoder;
 struct vshi_encoder;

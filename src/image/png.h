@@ -10,6 +10,10 @@
  * VSH_ERROR_MEMORY. Thread safe. */
 vsh_result vshi_png_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error);
 
+/* The same of bytes in memory, which messages call `name`. */
+vsh_result vshi_png_read_bytes(const char *name, const vshi_image_bytes *bytes, const vsh_run *run,
+                               vsh_image_file **file, vsh_error *error);
+
 /* An image that is to be written. */
 typedef struct vshi_png_source {
     int32_t width, height;

@@ -30,6 +30,8 @@ vsh_result vshi_read_except(vshi_json *reader, const vshi_value *value, void *se
 vsh_result vshi_read_solid(vshi_json *reader, const vshi_value *value, void *caster);
 vsh_result vshi_read_shell(vshi_json *reader, const vshi_value *value, void *caster);
 vsh_result vshi_read_inward(vshi_json *reader, const vshi_value *value, void *caster);
+/* Patterns of a caster's meshes that are one-sided. */
+vsh_result vshi_read_one_sided(vshi_json *reader, const vshi_value *value, void *caster);
 const char *vshi_color_space_key(int32_t i); /* names of color_space; NULL behind the last */
 vsh_result vshi_read_bits(vshi_json *reader, const vshi_value *value, void *bits); /* int32_t */
 

@@ -72,6 +72,11 @@ vsh_result vshi_read_inward(vshi_json *reader, const vshi_value *value, void *ca
     return read_rules(reader, value, caster, VSH_SOLIDITY_INWARD);
 }
 
+vsh_result vshi_read_one_sided(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_caster *caster = member;
+    return read_patterns(reader, value, &caster->one_sided, &caster->one_sided_count);
+}
+
 /* --- in a model */
 
 /* A name as messages tell it: that of the object. */
@@ -150,22 +155,34 @@ vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const c
                      near != NULL ? "'?" : "", names);
 }
 
-/* Sets those that a pattern matches to `value`. */
+/* Sets those that a pattern matches by the name of their object, or of their `material`, to `value`; whether
+ * there are any. */
+static bool apply_one(const vsh_model *model, const char *pattern, bool material, unsigned char value,
+                      unsigned char *chosen) {
+    bool matched = false;
+    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+        vsh_mesh mesh = vsh_model_mesh(model, i, -1);
+        if (material) {
+            mesh.name = mesh.material_name;
+            mesh.object_name = NULL;
+        }
+        if (vsh_mesh_matches(&mesh, pattern)) {
+            chosen[i] = value;
+            matched = true;
+        }
+    }
+    return matched;
+}
+
+/* Sets those that a pattern matches to `value`: objects, or where none is called so, materials. */
 static vsh_result apply(const vsh_model *model, const char *path, const char *const *patterns, size_t count,
                         unsigned char value, unsigned char *chosen, vsh_error *error) {
     for (size_t p = 0; p < count; ++p) {
         if (patterns[p] == NULL) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: pattern %zu of objects is NULL", path, p);
         }
-        bool matched = false;
-        for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
-            const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
-            if (vsh_mesh_matches(&mesh, patterns[p])) {
-                chosen[i] = value;
-                matched = true;
-            }
-        }
-        if (!matched) {
+        if (!apply_one(model, patterns[p], false, value, chosen) &&
+            !apply_one(model, patterns[p], true, value, chosen)) {
             return vshi_fail_unmatched(model, path, patterns[p], error);
         }
     }
@@ -184,6 +201,12 @@ vsh_result vshi_select(const vsh_model *model, const char *path, const vsh_selec
                          "%s: no object is left: all that are chosen are excepted, too", path);
     }
     return VSH_OK;
+}
+
+vsh_result vshi_select_some(const vsh_model *model, const char *path, const char *const *patterns,
+                            size_t count, unsigned char **chosen, vsh_error *error) {
+    VSHI_TRY(vshi_allocate((void **)chosen, vsh_model_mesh_count(model), 1, "objects", error));
+    return apply(model, path, patterns, count, 1, *chosen, error);
 }
 
 static vsh_result fail_without_uvs(const vsh_receiver *receiver, const char *mesh, int32_t sets,
