@@ -13,6 +13,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#define OF_MATERIAL "material:" /* begins a pattern of materials */
+
 /* --- in scene files */
 
 static vsh_result read_patterns(vshi_json *reader, const vshi_value *value, const char *const **patterns,
@@ -85,15 +87,28 @@ static const char *name_of(const vsh_mesh *mesh) {
     return name != NULL ? name : "";
 }
 
+/* That of the object of mesh `index`; of `materials`, that of material `index`. */
+static const char *name_at(const vsh_model *model, size_t index, bool materials) {
+    if (materials) {
+        const char *name = vsh_model_get_material(model, index).name;
+        return name != NULL ? name : "";
+    }
+    const vsh_mesh mesh = vsh_model_mesh(model, index, -1);
+    return name_of(&mesh);
+}
+
+static size_t count_of(const vsh_model *model, bool materials) {
+    return materials ? vsh_model_material_count(model) : vsh_model_mesh_count(model);
+}
+
 /* "'floor', 'wall' and 12 more", without those that follow one of the same name. */
-static void list_names(const vsh_model *model, char *text, size_t capacity) {
+static void list_names(const vsh_model *model, bool materials, char *text, size_t capacity) {
     enum { LISTED = 8, ROOM = 40 };
-    const size_t count = vsh_model_mesh_count(model);
+    const size_t count = count_of(model, materials);
     size_t used = 0, listed = 0, more = 0;
     const char *last = NULL;
     for (size_t i = 0; i < count; ++i) {
-        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
-        const char *name = name_of(&mesh);
+        const char *name = name_at(model, i, materials);
         if (last != NULL && strcmp(last, name) == 0) {
             continue;
         }
@@ -125,21 +140,20 @@ static void fold(const char *from, bool pattern, char to[64]) {
 }
 
 /* The name that a pattern which matches nothing comes nearest to, or NULL. */
-static const char *nearest_name(const vsh_model *model, const char *pattern) {
+static const char *nearest_name(const vsh_model *model, bool materials, const char *pattern) {
     char wanted[64], have[64];
     fold(pattern, true, wanted);
     const char *nearest = NULL;
     size_t least = SIZE_MAX;
-    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
-        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
-        fold(name_of(&mesh), false, have);
+    for (size_t i = 0; i < count_of(model, materials); ++i) {
+        fold(name_at(model, i, materials), false, have);
         size_t distance = vshi_edit_distance(wanted, have);
         if (wanted[0] != '\0' && strstr(have, wanted) != NULL) {
             distance = 0;
         }
         if (distance < least) {
             least = distance;
-            nearest = name_of(&mesh);
+            nearest = name_at(model, i, materials);
         }
     }
     return nearest != NULL && wanted[0] != '\0' && vshi_is_near(least, wanted) ? nearest : NULL;
@@ -147,12 +161,18 @@ static const char *nearest_name(const vsh_model *model, const char *pattern) {
 
 vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const char *pattern,
                                vsh_error *error) {
-    char names[600] = "";
-    list_names(model, names, sizeof names);
-    const char *near = nearest_name(model, pattern);
-    return vshi_fail(error, VSH_ERROR_INPUT, "%s: no object is named '%.100s'%s%.100s%s there are %s", path,
-                     pattern, near != NULL ? "; did you mean '" : ";", near != NULL ? near : "",
-                     near != NULL ? "'?" : "", names);
+    char names[600] = "", materials[300] = "";
+    list_names(model, false, names, sizeof names);
+    list_names(model, true, materials, sizeof materials);
+    const size_t prefix =
+        strncmp(pattern, OF_MATERIAL, sizeof OF_MATERIAL - 1) == 0 ? sizeof OF_MATERIAL - 1 : 0;
+    const char *near = prefix == 0 ? nearest_name(model, false, pattern) : NULL;
+    near = near != NULL ? near : nearest_name(model, true, pattern + prefix);
+    return vshi_fail(error, VSH_ERROR_INPUT, "%s: no %s is named '%.100s'%s%.100s%s there are %s%s%s", path,
+                     prefix > 0 ? "material" : "object", pattern + prefix,
+                     near != NULL ? "; did you mean '" : ";", near != NULL ? near : "",
+                     near != NULL ? "'?" : "", names, materials[0] != '\0' ? ", and materials " : "",
+                     materials);
 }
 
 /* Sets those that a pattern matches by the name of their object, or of their `material`, to `value`; whether

@@ -14,6 +14,7 @@ enum {
     KEY_RECEIVE,
     KEY_NO_RECEIVE,
     KEY_NO_CAST,
+    KEY_ONE_SIDED,
     KEY_PER_OBJECT,
     KEY_INVALID,
     KEY_PREVIEW,
@@ -55,8 +56,12 @@ static const cli_option options[] = {
     {0, NULL, NULL, "Objects"},
     {KEY_RECEIVE, "receive", "NAME",
      "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
-    {KEY_NO_RECEIVE, "no-receive", "NAME", "objects of this name only cast; may be repeated"},
-    {KEY_NO_CAST, "no-cast", "NAME", "objects of this name only receive; may be repeated"},
+    {KEY_NO_RECEIVE, "no-receive", "NAME",
+     "objects of this name only cast, or where there are\nnone, those of materials of this name; may be "
+     "repeated"},
+    {KEY_NO_CAST, "no-cast", "NAME",
+     "objects of this name only receive, or where there\nare none, those of materials; may be repeated"},
+    {KEY_ONE_SIDED, "one-sided", "NAME", "light passes the backs of their faces, likewise; may\nbe repeated"},
     {KEY_PER_OBJECT, "per-object", NULL,
      "an image for each object: FOLDER/NAME.exr with\n-o FOLDER/, else OUT.NAME.exr, or where OUT has %s"},
     {0, NULL, NULL, "Light and occlusion"},
@@ -100,7 +105,8 @@ static int take_caster(cli_bake_settings *s, const char *name, const char *value
 
 static int take_pattern(cli_patterns *patterns, const char *name, const char *value) {
     if (value[0] == '\0') {
-        return cli_usage("%s: expected an object's name, or a pattern such as 'floor*'", name);
+        return cli_usage("%s: expected the name of an object or a material, or a pattern such as 'floor*'",
+                         name);
     }
     if (patterns->count == CLI_MAX_PATTERNS) {
         return cli_usage("%s '%s': given more than %d times", name, value, CLI_MAX_PATTERNS);
@@ -142,6 +148,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return take_pattern(&s->no_receive, name, value);
     case KEY_NO_CAST:
         return take_pattern(&s->no_cast, name, value);
+    case KEY_ONE_SIDED:
+        return take_pattern(&s->one_sided, name, value);
     case KEY_PER_OBJECT:
         s->per_object = true;
         return CLI_OK;

@@ -32,7 +32,7 @@ typedef struct cli_bake_settings {
     const char *input;
     const char *output;
     const char *output_folder; /* for the outputs of a scene, by their names; NULL: where it says */
-    cli_patterns receive, no_receive, no_cast;
+    cli_patterns receive, no_receive, no_cast, one_sided;
     const char *stats;
     const char *invalid_picture; /* NULL: none */
     const char *view;            /* page; NULL: none */
