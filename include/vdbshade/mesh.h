@@ -145,7 +145,8 @@ VSH_API double vsh_unit(const char *name);
 VSH_API int32_t vsh_model_uv_sets(const vsh_model *model, size_t index);
 
 /* A material of a file (glTF), as far as it decides where light comes through. What is of the texture is told
- * of masked ones only; light comes through these where base_alpha × the texture's alpha < alpha_cutoff. */
+ * of masked and blended ones; light comes through masked ones where base_alpha × the texture's alpha <
+ * alpha_cutoff. */
 typedef struct vsh_model_material {
     const char *name;       /* NULL where it has none */
     int32_t alpha;          /* VSH_ALPHA_… */

@@ -102,6 +102,7 @@ void cut_masks(const vsh_mesh *given, size_t count, double voxel, Meshes &meshes
         mesh.mask = nullptr;
         mesh.checked = nullptr;
         mesh.solidity = VSH_SOLIDITY_SHELL;
+        mesh.alpha = VSH_ALPHA_MASKED;
         run.memory_held += uint64_t(pieces.count) * (9 * sizeof(float) + 3 * sizeof(uint32_t));
     }
     vshi_mesh_set_free(&meshes.set);

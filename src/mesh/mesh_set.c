@@ -47,6 +47,7 @@ vsh_result vshi_mesh_set_create(const vsh_mesh *meshes, size_t count, vshi_mesh_
         if (meshes[m].mask != NULL) {
             VSHI_TRY(vshi_alpha_mask_check(&meshes[m], m, error));
             set->meshes[m].solidity = VSH_SOLIDITY_SHELL;
+            set->meshes[m].alpha = VSH_ALPHA_MASKED;
         }
         own->of = set->meshes[m];
         set->meshes[m].checked = own;

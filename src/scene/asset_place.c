@@ -86,14 +86,20 @@ done:
     return result;
 }
 
-/* Takes glass and the like out of `chosen`. */
-static vsh_result leave_out_blended(const vsh_scene *scene, const vsh_model *model, const char *path,
-                                    const vsh_run *run, unsigned char *chosen, vsh_error *error) {
+/* Takes glass and the like out of `chosen`; what is a cut-out, though its material is blended, stays. */
+static vsh_result leave_out_blended(const vsh_scene *scene, vshi_masks *masks, const vsh_model *model,
+                                    const char *path, const vsh_run *run, unsigned char *chosen,
+                                    vsh_error *error) {
     const size_t count = vsh_model_mesh_count(model);
-    size_t left = 0, blended = 0;
+    size_t left = 0, blended = 0, cut_out = 0;
     for (size_t i = 0; i < count; ++i) {
         const int32_t alpha = vsh_model_mesh(model, i, -1).alpha;
-        const bool out = chosen[i] != 0 && alpha == VSH_ALPHA_BLENDED && scene->cast_blended == 0;
+        bool out = chosen[i] != 0 && alpha == VSH_ALPHA_BLENDED && scene->cast_blended == 0, stays = false;
+        if (out) {
+            VSHI_TRY(vshi_masks_is_cut_out(masks, i, run, &stays, error));
+        }
+        out = out && !stays;
+        cut_out += stays;
         blended += out;
         chosen[i] = out ? 0 : chosen[i];
         left += chosen[i] != 0;
@@ -111,6 +117,13 @@ static vsh_result leave_out_blended(const vsh_scene *scene, const vsh_model *mod
                   "--cast-blended has them cast",
                   path, blended, count);
     }
+    if (cut_out > 0) {
+        vshi_warn(
+            run,
+            "%s: %zu of %zu meshes have blended materials that their textures cut out (leaves, fences): "
+            "they cast where alpha is at least half; --no-cast NAME leaves them out",
+            path, cut_out, count);
+    }
     return VSH_OK;
 }
 
@@ -120,7 +133,7 @@ vsh_result vshi_place_casting(vshi_asset_place *place, const vsh_scene *scene, c
     unsigned char *chosen = NULL, *one_sided = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vshi_select(place->model, caster->path, &caster->objects, &chosen, error));
-    VSHI_TRY_DONE(leave_out_blended(scene, place->model, caster->path, run, chosen, error));
+    VSHI_TRY_DONE(leave_out_blended(scene, masks, place->model, caster->path, run, chosen, error));
     VSHI_TRY_DONE(vshi_select_some(place->model, caster->path, caster->one_sided, caster->one_sided_count,
                                    &one_sided, error));
     VSHI_TRY_DONE(place_casting(place, masks, chosen, parts, scene->unit, caster->transform, run, error));

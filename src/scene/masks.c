@@ -26,6 +26,7 @@ typedef enum material_state {
 
 typedef struct material {
     material_state state;
+    bool binary; /* its texture is, and its factor leaves it so */
     vsh_alpha_mask mask;
     vshi_mask_table table; /* NULL sums: not made yet */
 } material;
@@ -42,6 +43,7 @@ typedef struct texture {
     const void *of; /* vsh_model_material.image or .image_path */
     uint8_t *alpha; /* NULL: it has none, or could not be read */
     int32_t width, height;
+    bool binary; /* nearly all of it is clear or opaque, and there is some of both */
 } texture;
 
 struct vshi_masks {
@@ -89,6 +91,20 @@ void vshi_masks_free(vshi_masks *masks) {
 
 /* --- textures */
 
+/* A cut-out's edges are few texels wide; smoke and glass are between all over. */
+static bool is_binary(const uint8_t *alpha, size_t texels) {
+    static const double BETWEEN = 0.25, SOME = 0.01;
+    enum { CLEAR = 25, OPAQUE = 230 };
+    size_t clear = 0, opaque = 0;
+    for (size_t i = 0; i < texels; ++i) {
+        clear += alpha[i] <= CLEAR;
+        opaque += alpha[i] >= OPAQUE;
+    }
+    const double all = (double)texels;
+    return (double)(texels - clear - opaque) <= BETWEEN * all && (double)clear >= SOME * all &&
+           (double)opaque >= SOME * all;
+}
+
 /* The alpha of an image, 8 bits a texel; none where it has none, or is opaque everywhere. */
 static vsh_result take_alpha(const vsh_image *image, const char *path, const vsh_run *run, texture *to,
                              vsh_error *error) {
@@ -117,6 +133,7 @@ static vsh_result take_alpha(const vsh_image *image, const char *path, const vsh
     }
     to->width = image->width;
     to->height = image->height;
+    to->binary = is_binary(to->alpha, texels);
     return VSH_OK;
 }
 
@@ -184,6 +201,7 @@ static vsh_result read_material(vshi_masks *masks, size_t index, const vsh_run *
         m->state = NOTHING;
     } else if (found != NULL && found->alpha != NULL) {
         m->state = BY_MASK;
+        m->binary = found->binary && told.base_alpha >= HALF;
         m->mask = (vsh_alpha_mask){.alpha = found->alpha,
                                    .width = found->width,
                                    .height = found->height,
@@ -204,6 +222,18 @@ static vshi_mask_cover cover_of(const vshi_mask_table *table, const vsh_mesh *me
         places[k] = vshi_alpha_mask_place(table->mask, mesh->uvs + 2 * vertex);
     }
     return vshi_mask_table_cover(table, places);
+}
+
+vsh_result vshi_masks_is_cut_out(vshi_masks *masks, size_t mesh, const vsh_run *run, bool *is,
+                                 vsh_error *error) {
+    const int32_t number = vsh_model_mesh_material(masks->model, mesh);
+    *is = false;
+    if (number < 0 || vsh_model_get_material(masks->model, (size_t)number).alpha != VSH_ALPHA_BLENDED) {
+        return VSH_OK;
+    }
+    VSHI_TRY(read_material(masks, (size_t)number, run, error));
+    *is = masks->materials[number].state == BY_MASK && masks->materials[number].binary;
+    return VSH_OK;
 }
 
 static vsh_result take_list(size_t count, size_t all, const vsh_run *run, uint32_t **list, vsh_error *error) {
@@ -291,6 +321,7 @@ vsh_result vshi_masks_cast(vshi_masks *masks, size_t index, const vsh_run *run, 
         cut->mask = &m->mask;
         cut->mask_uvs = textured.uvs;
         cut->solidity = VSH_SOLIDITY_SHELL;
+        cut->alpha = VSH_ALPHA_MASKED;
     }
     return VSH_OK;
 }
