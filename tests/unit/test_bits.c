@@ -398,7 +398,7 @@ static void exact(const context *c, int32_t what, bits *b) {
         cut_out(&mesh, &mask, &uvs);
     }
     vsh_grid_options options = vsh_grid_options_default();
-    options.resolution = 64;
+    options.resolution = (what & CUT_OUT) != 0 ? 16 : 64;
     check(vsh_grid_from_meshes(&mesh, 1, &options, &c->run, &grid, &error), &error);
     check(vsh_field_create(grid, NULL, &c->run, &here.field, &error), &error);
     check(vsh_triangles_create(&mesh, 1, &c->run, &triangles, &error), &error);
