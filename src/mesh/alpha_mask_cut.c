@@ -123,7 +123,7 @@ vsh_result vshi_mask_pieces_cut(const vsh_mesh *mesh, double size, const vsh_run
     const uint64_t memory = run->memory_limit > 0 ? vshi_memory_left(run) : 0;
     c.most = memory > 0 ? fmin(c.most, (double)memory / PIECE_BYTES) : c.most;
     vsh_result result;
-    *pieces = (vshi_mask_pieces){NULL};
+    *pieces = (vshi_mask_pieces){.count = 0};
     VSHI_TRY_DONE(vshi_mask_table_create(mesh->mask, run, &c.table, error));
     c.job = vshi_job_begin(run, "masks", 2 * mesh->triangle_count);
     if (c.job == NULL) {
@@ -154,5 +154,5 @@ done:
 void vshi_mask_pieces_free(vshi_mask_pieces *pieces) {
     free(pieces->positions);
     free(pieces->indices);
-    *pieces = (vshi_mask_pieces){NULL};
+    *pieces = (vshi_mask_pieces){.count = 0};
 }

@@ -387,7 +387,7 @@ static const vshi_key scene_keys[] = {
      .offset = offsetof(vsh_scene, cast_blended),
      .option = {.name = "cast-blended",
                 .group = VSH_SETTINGS_CASTERS,
-                .help = "meshes of blended materials (glass) cast too, whole"}},
+                .help = "meshes of blended materials (glass) cast too"}},
     {.name = "receivers", .kind = VSHI_CUSTOM, .read = read_receivers},
 };
 const vshi_table vshi_scene_table = VSHI_TABLE(scene_keys);

@@ -139,21 +139,24 @@ static void fold(const char *from, bool pattern, char to[64]) {
     to[length] = '\0';
 }
 
-/* The name that a pattern which matches nothing comes nearest to, or NULL. */
-static const char *nearest_name(const vsh_model *model, bool materials, const char *pattern) {
+/* The name that a pattern which matches nothing comes nearest to, or NULL: of an object (materials 0), then
+ * of a material. */
+static const char *nearest_name(const vsh_model *model, int materials, const char *pattern) {
     char wanted[64], have[64];
     fold(pattern, true, wanted);
     const char *nearest = NULL;
     size_t least = SIZE_MAX;
-    for (size_t i = 0; i < count_of(model, materials); ++i) {
-        fold(name_at(model, i, materials), false, have);
-        size_t distance = vshi_edit_distance(wanted, have);
-        if (wanted[0] != '\0' && strstr(have, wanted) != NULL) {
-            distance = 0;
-        }
-        if (distance < least) {
-            least = distance;
-            nearest = name_at(model, i, materials);
+    for (; materials < 2; ++materials) {
+        for (size_t i = 0; i < count_of(model, materials != 0); ++i) {
+            fold(name_at(model, i, materials != 0), false, have);
+            size_t distance = vshi_edit_distance(wanted, have);
+            if (wanted[0] != '\0' && strstr(have, wanted) != NULL) {
+                distance = 0;
+            }
+            if (distance < least) {
+                least = distance;
+                nearest = name_at(model, i, materials != 0);
+            }
         }
     }
     return nearest != NULL && wanted[0] != '\0' && vshi_is_near(least, wanted) ? nearest : NULL;
@@ -166,8 +169,7 @@ vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const c
     list_names(model, true, materials, sizeof materials);
     const size_t prefix =
         strncmp(pattern, OF_MATERIAL, sizeof OF_MATERIAL - 1) == 0 ? sizeof OF_MATERIAL - 1 : 0;
-    const char *near = prefix == 0 ? nearest_name(model, false, pattern) : NULL;
-    near = near != NULL ? near : nearest_name(model, true, pattern + prefix);
+    const char *near = nearest_name(model, prefix > 0, pattern + prefix);
     return vshi_fail(error, VSH_ERROR_INPUT, "%s: no %s is named '%.100s'%s%.100s%s there are %s%s%s", path,
                      prefix > 0 ? "material" : "object", pattern + prefix,
                      near != NULL ? "; did you mean '" : ";", near != NULL ? near : "",

@@ -319,16 +319,21 @@ static void an_opaque_triangle_beside_a_masked_one_cuts_no_beam_over_both(void *
     free(c);
 }
 
-static void a_masked_box_holds_nothing(void **state) {
-    (void)state;
+/* A box from -1 to 1. */
+static vsh_mesh box_mesh(void) {
     static const float corners[8][3] = {{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
                                         {-1, -1, 1},  {1, -1, 1},  {-1, 1, 1},  {1, 1, 1}};
     static const uint32_t sides[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
                                        2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    return (vsh_mesh){.positions = corners[0], .indices = sides, .vertex_count = 8, .triangle_count = 12};
+}
+
+static void a_masked_box_holds_nothing(void **state) {
+    (void)state;
     static const float uvs[16];
     const uint8_t half[2] = {255, 0};
     const vsh_alpha_mask mask = mask_of(half, 2, 1);
-    vsh_mesh box = {.positions = corners[0], .indices = sides, .vertex_count = 8, .triangle_count = 12};
+    vsh_mesh box = box_mesh();
     for (int masked = 0; masked < 2; ++masked) {
         box.mask = masked ? &mask : NULL;
         box.mask_uvs = uvs;
@@ -337,6 +342,27 @@ static void a_masked_box_holds_nothing(void **state) {
         assert_int_equal(vshi_triangles_have_solids(triangles), !masked);
         vsh_triangles_free(triangles);
     }
+}
+
+static void a_one_sided_box_is_as_solid_as_any(void **state) {
+    (void)state;
+    vsh_mesh box = box_mesh();
+    box.one_sided = 1;
+    vsh_triangles *triangles = traced_of(&box, 1);
+    assert_true(vshi_triangles_have_solids(triangles));
+    for (int i = 0; i < 3; ++i) {
+        const vshi_segment_ray ray = {{-3.0 + 3.0 * i, 0.1, 0.2}, {1.0, 0.0, 0.0}, INFINITY};
+        bool nothing = false;
+        uint8_t meets = VSHI_MEETS_NOTHING;
+        /* before it, in it, behind it */
+        assert_int_equal(vshi_triangles_depth(triangles, &ray, &nothing), i == 1);
+        assert_int_equal(nothing, i == 2);
+        vshi_triangles_meet(triangles, &ray, 1, &meets);
+        assert_int_equal(meets, i == 0 ? VSHI_MEETS_AIR : i == 1 ? VSHI_MEETS_SOLID : VSHI_MEETS_NOTHING);
+        /* and casts the same */
+        assert_int_equal(blocked(triangles, ray.origin, ray.direction), i < 2);
+    }
+    vsh_triangles_free(triangles);
 }
 
 static void light_on_the_back_of_a_one_sided_face_comes_through(void **state) {
@@ -504,6 +530,7 @@ int main(void) {
         cmocka_unit_test(no_beam_is_cut_by_what_is_masked_or_one_sided),
         cmocka_unit_test(an_opaque_triangle_beside_a_masked_one_cuts_no_beam_over_both),
         cmocka_unit_test(a_masked_box_holds_nothing),
+        cmocka_unit_test(a_one_sided_box_is_as_solid_as_any),
         cmocka_unit_test(light_on_the_back_of_a_one_sided_face_comes_through),
         cmocka_unit_test(masks_that_are_none_are_refused),
     };
