@@ -144,7 +144,7 @@ VSH_API double vsh_unit(const char *name);
 /* Number of UV sets of mesh `index` (< mesh count), 0 … VSH_MAX_UV_SETS. */
 VSH_API int32_t vsh_model_uv_sets(const vsh_model *model, size_t index);
 
-/* A material of a file (glTF), as far as it decides where light comes through. What is of the texture is told
+/* A material of a file, as far as it decides where light comes through. What is of the texture is told
  * of masked and blended ones; light comes through masked ones where base_alpha × the texture's alpha <
  * alpha_cutoff. */
 typedef struct vsh_model_material {
@@ -164,7 +164,8 @@ typedef struct vsh_model_material {
                                there. NULL: none */
 } vsh_model_material;
 
-/* Number of materials of the file: of glTF; of other formats 0. */
+/* Number of materials of the file: of PLY 0. Of formats other than glTF name and
+ * `alpha` are told. */
 VSH_API size_t vsh_model_material_count(const vsh_model *model);
 
 /* Material `index` (< material count). What it points to belongs to the model. */

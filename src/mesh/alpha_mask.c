@@ -54,10 +54,15 @@ static int32_t wrapped(double at, int32_t size, int32_t wrap) {
     return in < size ? in : 2 * size - 1 - in;
 }
 
-static double alpha_of(const vsh_alpha_mask *mask, double column, double row) {
-    const size_t x = (size_t)wrapped(column, mask->width, mask->wrap[0]);
-    const size_t y = (size_t)wrapped(row, mask->height, mask->wrap[1]);
-    return (double)mask->alpha[y * (size_t)mask->width + x];
+/* A column (row) and the next, as texels. */
+static void find_pair(double at, int32_t size, int32_t wrap, size_t pair[2]) {
+    if (at >= 0.0 && at < size - 1.0) { /* within the image */
+        pair[0] = (size_t)at;
+        pair[1] = pair[0] + 1;
+        return;
+    }
+    pair[0] = (size_t)wrapped(at, size, wrap);
+    pair[1] = (size_t)wrapped(at + 1.0, size, wrap);
 }
 
 /* Of 255, as the base's factor makes it. */
@@ -70,9 +75,13 @@ bool vshi_alpha_mask_opaque(const vsh_alpha_mask *mask, vshi_mask_place at) {
         return true;
     }
     const double column = floor(at.x), row = floor(at.y), x = at.x - column, y = at.y - row;
-    const double top = (1.0 - x) * alpha_of(mask, column, row) + x * alpha_of(mask, column + 1.0, row);
-    const double under =
-        (1.0 - x) * alpha_of(mask, column, row + 1.0) + x * alpha_of(mask, column + 1.0, row + 1.0);
+    size_t columns[2], rows[2];
+    find_pair(column, mask->width, mask->wrap[0], columns);
+    find_pair(row, mask->height, mask->wrap[1], rows);
+    const uint8_t *first = mask->alpha + rows[0] * (size_t)mask->width;
+    const uint8_t *second = mask->alpha + rows[1] * (size_t)mask->width;
+    const double top = (1.0 - x) * first[columns[0]] + x * first[columns[1]];
+    const double under = (1.0 - x) * second[columns[0]] + x * second[columns[1]];
     return is_opaque(mask, (1.0 - y) * top + y * under);
 }
 
