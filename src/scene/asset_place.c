@@ -145,6 +145,7 @@ vsh_result vshi_place_casting(vshi_asset_place *place, const vsh_scene *scene, c
                            "%s: the masks of its materials leave nothing of what is to cast", caster->path);
     }
 done:
+    vshi_masks_trim(masks);
     free(one_sided);
     free(chosen);
     return result;

@@ -69,13 +69,17 @@ vsh_result vshi_masks_create(const vsh_model *model, const char *path, vshi_mask
                          error);
 }
 
+void vshi_masks_trim(vshi_masks *masks) {
+    for (size_t i = 0; masks->materials != NULL && i < vsh_model_material_count(masks->model); ++i) {
+        vshi_mask_table_free(&masks->materials[i].table);
+    }
+}
+
 void vshi_masks_free(vshi_masks *masks) {
     if (masks == NULL) {
         return;
     }
-    for (size_t i = 0; masks->materials != NULL && i < vsh_model_material_count(masks->model); ++i) {
-        vshi_mask_table_free(&masks->materials[i].table);
-    }
+    vshi_masks_trim(masks);
     for (size_t i = 0; masks->shapes != NULL && i < masks->model->shape_count; ++i) {
         free(masks->shapes[i].opaque);
         free(masks->shapes[i].mixed);

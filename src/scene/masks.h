@@ -15,6 +15,9 @@ typedef struct vshi_masks vshi_masks;
 vsh_result vshi_masks_create(const vsh_model *model, const char *path, vshi_masks **masks, vsh_error *error);
 void vshi_masks_free(vshi_masks *masks);
 
+/* Frees what can be made anew, four bytes a texel. */
+void vshi_masks_trim(vshi_masks *masks);
+
 /* What a mesh of the model casts as: none, one or two views. Triangles that their mask leaves whole are as
  * those of an opaque material; what it cuts out is a view with the mask; what it leaves nothing of is in
  * none. Blended materials (VSH_ALPHA_BLENDED) are opaque where their texture's alpha is at least half. The

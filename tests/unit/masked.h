@@ -90,4 +90,59 @@ static inline vsh_triangles *traced_of(const vsh_mesh *meshes, size_t count) {
     return triangles;
 }
 
+/* Lookups as the standards have them. */
+static inline int wrap(int at, int size, int32_t how) {
+    if (how == VSH_WRAP_CLAMP) {
+        return at < 0 ? 0 : at >= size ? size - 1 : at;
+    }
+    const int period = how == VSH_WRAP_MIRROR ? 2 * size : size;
+    while (at < 0) {
+        at += period;
+    }
+    while (at >= period) {
+        at -= period;
+    }
+    return at < size ? at : period - 1 - at;
+}
+
+/* As the standards have it, with another sum. */
+static inline double alpha_at(const vsh_alpha_mask *m, double u, double v) {
+    const double *t = m->uv_transform;
+    const double x = (t[0] * u + t[1] * v + t[2]) * m->width - 0.5;
+    const double y = (1.0 - (t[3] * u + t[4] * v + t[5])) * m->height - 0.5;
+    double sum = 0.0;
+    for (int j = 0; j < 2; ++j) {
+        for (int i = 0; i < 2; ++i) {
+            const int column = (int)floor(x) + i, row = (int)floor(y) + j;
+            const int texel =
+                wrap(row, m->height, m->wrap[1]) * m->width + wrap(column, m->width, m->wrap[0]);
+            sum += (1.0 - fabs(x - column)) * (1.0 - fabs(y - row)) * m->alpha[texel] / 255.0;
+        }
+    }
+    return m->base_alpha * sum;
+}
+
+static inline double next_of(uint32_t *seed) {
+    *seed = *seed * 1664525u + 1013904223u;
+    return (double)(*seed >> 8) * 0x1p-24;
+}
+
+enum { WIDE = 5, HIGH = 7 };
+
+static inline vsh_alpha_mask random_mask(uint8_t alpha[WIDE * HIGH], int i, uint32_t *seed) {
+    for (int k = 0; k < WIDE * HIGH; ++k) {
+        alpha[k] = (uint8_t)(next_of(seed) * 255.99);
+    }
+    vsh_alpha_mask mask = mask_of(alpha, WIDE, HIGH);
+    mask.wrap[0] = i % 3;
+    mask.wrap[1] = i / 3 % 3;
+    if (i % 2 == 1) {
+        const double turned[6] = {0.8, -1.7, 0.4, 1.1, 0.6, -2.3};
+        memcpy(mask.uv_transform, turned, sizeof turned);
+        mask.base_alpha = 0.7;
+        mask.alpha_cutoff = 0.3;
+    }
+    return mask;
+}
+
 #endif
