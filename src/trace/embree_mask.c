@@ -168,15 +168,8 @@ void vshi_sieves_part(const vsh_triangles *triangles) {
     for (size_t m = 0; m < triangles->sieve_count; ++m) {
         const size_t begin = triangles->first[m];
         const size_t end = m + 1 < triangles->sieve_count ? triangles->first[m + 1] : sheet->triangle_count;
-        for (size_t i = begin; vshi_sieve_is(triangles, m) && i < end; ++i) {
-            for (size_t k = 0; k < 3; ++k) {
-                const uint32_t other = sheet->neighbours[3 * i + k];
-                sheet->neighbours[3 * i + k] = VSHI_SHEET_BORDER;
-                for (size_t j = 0; other != VSHI_SHEET_BORDER && j < 3; ++j) {
-                    uint32_t *back = &sheet->neighbours[3 * (size_t)other + j];
-                    *back = *back == i ? VSHI_SHEET_BORDER : *back;
-                }
-            }
+        for (size_t k = 3 * begin; vshi_sieve_is(triangles, m) && k < 3 * end; ++k) {
+            sheet->neighbours[k] = VSHI_SHEET_BORDER; /* which those beside it come upon, too */
         }
     }
 }
