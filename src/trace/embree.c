@@ -276,7 +276,6 @@ static vsh_result finish(vsh_triangles *triangles, vshi_job *job, vsh_error *err
 static vsh_result build(vsh_triangles *triangles, const vshi_mesh_set *set, vshi_job *job, vsh_error *error) {
     VSHI_TRY(begin(triangles, job, error));
     VSHI_TRY(make_sheet(triangles, set, error));
-    vshi_sieves_part(triangles);
     size_t vertex = 0;
     for (size_t m = 0; m < set->count; ++m) {
         if (!attach(triangles, set->meshes, set->count, m, vertex)) {

@@ -163,15 +163,4 @@ void vshi_sieve_attach(const vsh_triangles *triangles, size_t mesh, RTCGeometry 
     }
 }
 
-void vshi_sieves_part(const vsh_triangles *triangles) {
-    const vshi_sheet *sheet = &triangles->sheet;
-    for (size_t m = 0; m < triangles->sieve_count; ++m) {
-        const size_t begin = triangles->first[m];
-        const size_t end = m + 1 < triangles->sieve_count ? triangles->first[m + 1] : sheet->triangle_count;
-        for (size_t k = 3 * begin; vshi_sieve_is(triangles, m) && k < 3 * end; ++k) {
-            sheet->neighbours[k] = VSHI_SHEET_BORDER; /* which those beside it come upon, too */
-        }
-    }
-}
-
 #endif

@@ -26,15 +26,12 @@ void vshi_sieves_free(vsh_triangles *triangles);
  * lets nothing through stays as it is. */
 void vshi_sieve_attach(const vsh_triangles *triangles, size_t mesh, RTCGeometry geometry);
 
-/* Whether a geometry lets anything through. */
+/* Whether a geometry lets anything through; no beam is cut by one that does, nor together with another, as
+ * triangles of two meshes are no neighbours in the sheet. */
 static inline bool vshi_sieve_is(const vsh_triangles *triangles, size_t mesh) {
     return triangles->sieves != NULL &&
            (triangles->sieves[mesh].places != NULL || triangles->sieves[mesh].one_sided);
 }
-
-/* Parts the triangles that let something through from their neighbours in the sheet, so that no beam is taken
- * to be cut by them. */
-void vshi_sieves_part(const vsh_triangles *triangles);
 
 #endif
 #endif

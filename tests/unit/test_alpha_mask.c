@@ -180,30 +180,6 @@ static void no_beam_is_cut_by_what_is_masked_or_one_sided(void **state) {
     free(c);
 }
 
-static void an_opaque_triangle_beside_a_masked_one_cuts_no_beam_over_both(void **state) {
-    (void)state;
-    const vshi_sheet_beam beam = {{0.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, 0.05, 0.05, INFINITY};
-    card *c = malloc(sizeof *c);
-    make_card(c, 1.0f);
-    memset(c->alpha, 0, sizeof c->alpha);
-    vsh_mesh halves[2] = {c->mesh, c->mesh};
-    halves[0].triangle_count = halves[1].triangle_count = 1;
-    halves[1].indices += 3;
-    for (size_t i = 0; i < 2; ++i) {
-        halves[i].object = 1;
-    }
-    for (int masked = 0; masked < 2; ++masked) {
-        halves[0].mask = NULL;
-        halves[1].mask = masked ? c->mesh.mask : NULL;
-        vsh_triangles *triangles = traced_of(halves, 2);
-        bool cut = false;
-        vshi_triangles_cut(triangles, &beam, 1, 32, &cut);
-        assert_int_equal(cut && masked, 0);
-        vsh_triangles_free(triangles);
-    }
-    free(c);
-}
-
 /* A box from -1 to 1. */
 static vsh_mesh box_mesh(void) {
     static const float corners[8][3] = {{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
@@ -322,7 +298,6 @@ int main(void) {
         cmocka_unit_test(rays_see_wraps_transforms_cutoff_and_base_factor),
         cmocka_unit_test(a_ray_sees_the_same_alone_and_in_any_packet),
         cmocka_unit_test(no_beam_is_cut_by_what_is_masked_or_one_sided),
-        cmocka_unit_test(an_opaque_triangle_beside_a_masked_one_cuts_no_beam_over_both),
         cmocka_unit_test(a_masked_box_holds_nothing),
         cmocka_unit_test(a_one_sided_box_is_as_solid_as_any),
         cmocka_unit_test(light_on_the_back_of_a_one_sided_face_comes_through),
