@@ -29,8 +29,8 @@ typedef struct vsh_job_lightmap {
     uint64_t resumed_rows;   /* that an earlier bake had kept */
     int32_t kept_rows; /* where its bake failed and `resume` was asked for: rows that the next one need not
                           bake */
-    size_t page;       /* of the receiver, where it is unwrapped onto several: an image's name then has its
-                          number before the ending, OUT.0.exr */
+    size_t page;       /* of the receiver, where it is unwrapped onto several, or has one for each object: an
+                          image's name then has its number before the ending, OUT.0.exr, or the object's name */
 } vsh_job_lightmap;
 
 /* Takes the rows of lightmaps, one lightmap after the other, from the top on, in the thread that called
@@ -57,8 +57,9 @@ static inline vsh_row_sink vsh_row_sink_default(void) {
 
 typedef struct vsh_bake_job_options {
     size_t struct_size;
-    int32_t per_object; /* nonzero: a lightmap for each object of every receiver, whose output holds "%s" in
-                           its file's name for the object's */
+    int32_t per_object;    /* nonzero: every receiver is of VSH_ATLAS_OBJECTS, a lightmap for each object. An
+                              image's name has the object's, in place of "%s", or else before the ending:
+                              OUT.NAME.exr */
     int32_t allow_overlap; /* nonzero: objects may share texels, whatever their receivers say */
     int32_t band_rows;     /* rows that are baked at a time, up to a multiple of VSH_BAND_STEP; 0: all, or as
                               many as run->memory_limit lets */
@@ -105,7 +106,7 @@ VSH_API vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_
 
 /* Loads the scene's files and finds its lightmaps. Scene, options and what they point to must outlive the
  * job. Errors: as vsh_assets_load() and vsh_receiver_check(); VSH_ERROR_ARGUMENT (a pointer NULL, options,
- * run; an output without "%s" where per_object wants one; no receivers). */
+ * run; no receivers). */
 VSH_API vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_options *options,
                                        const vsh_run *run, vsh_bake_job **job, vsh_error *error);
 VSH_API void vsh_bake_job_free(vsh_bake_job *job); /* NULL does nothing */

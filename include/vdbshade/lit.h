@@ -58,7 +58,8 @@ typedef struct vsh_lit_image {
 enum {
     VSH_LIT_IMAGES_AUTO = 0,   /* into a GLB, beside a glTF */
     VSH_LIT_IMAGES_EMBED = 1,  /* into the buffer */
-    VSH_LIT_IMAGES_BESIDE = 2, /* OUT.PURPOSE.png, or OUT.PURPOSE.PAGE.png where there are several pages */
+    VSH_LIT_IMAGES_BESIDE = 2, /* OUT.PURPOSE.png, or OUT.PURPOSE.PAGE.png where there are several pages, or
+                                  where a page has a name */
 };
 
 typedef struct vsh_lit_options {
@@ -68,11 +69,15 @@ typedef struct vsh_lit_options {
     const vsh_lit_image *images; /* [image_count], in any order. A page without any leaves its materials as
                                     they are */
     size_t image_count;
-    int32_t image_place; /* VSH_LIT_IMAGES_… */
+    int32_t image_place;           /* VSH_LIT_IMAGES_… */
+    const char *const *page_names; /* [page_count]: of pages, UTF-8, as file names may be: images have them in
+                                      their names, and beside the file in place of the page's number. NULL,
+                                      and a name that is NULL: none */
+    size_t page_count;
 } vsh_lit_options;
 
 static inline vsh_lit_options vsh_lit_options_default(void) {
-    vsh_lit_options options = {sizeof(vsh_lit_options), NULL, 0, NULL, 0, VSH_LIT_IMAGES_AUTO};
+    vsh_lit_options options = {sizeof(vsh_lit_options), NULL, 0, NULL, 0, VSH_LIT_IMAGES_AUTO, NULL, 0};
     return options;
 }
 

@@ -83,14 +83,20 @@ enum {
     VSH_RECEIVER_UNWRAP_NEVER = 1,
     VSH_RECEIVER_UNWRAP_AUTO =
         2, /* where no lightmap can be baked by its own, because there are none, they
-              leave the unit square or lie over each other, and where texels_per_unit or
-              pages are given; what is laid out well in
-              each of its meshes stays so, and is packed anew */
+              leave the unit square or lie over each other (of VSH_ATLAS_OBJECTS within an object),
+              and where texels_per_unit, pages, max_size or density are given; what is laid out
+              well in each of its meshes stays so, and is packed anew */
     VSH_RECEIVER_UNWRAP_ALWAYS = 3
 };
 
 /* "default", "never", "auto", "always" to VSH_RECEIVER_UNWRAP_… and back; -1 and NULL for what is none. Names
  * are static; NULL is none. */
+/* A factor of a receiver's texels_per_unit for the meshes that a pattern means, as in vsh_selection. */
+typedef struct vsh_density_rule {
+    const char *pattern;
+    double factor; /* finite, > 0 */
+} vsh_density_rule;
+
 VSH_API int32_t vsh_receiver_unwrap(const char *name);
 VSH_API const char *vsh_receiver_unwrap_name(int32_t unwrap);
 
@@ -123,7 +129,21 @@ typedef struct vsh_receiver {
     int32_t seams; /* mesh: VSH_SEAMS_…; FIX moves values by up to the scene's shade.max_error, and pads
                       by 2 texels at least. A lightmap that is baked in bands of rows keeps its seams, with
                       a warning */
+    int32_t
+        atlas; /* mesh: VSH_ATLAS_…; OBJECTS: each object has a lightmap of its own, whose UVs, where it is
+                  unwrapped, are packed alone. An image's name then has the object's (vsh_bake_job_create())
+                */
+    int32_t max_size;                /* where it is unwrapped, with texels_per_unit: a page has the fewest
+                                        texels that it needs (vsh_unwrap_options.fit_pages), at most so many on
+                                        a side, ≤ VSH_MAX_LIGHTMAP_SIZE; 0: it has `width` × `height` */
+    const vsh_density_rule *density; /* [density_count]: where it is unwrapped (vsh_model_densities()) */
+    size_t density_count;
 } vsh_receiver;
+
+/* "shared", "objects" to VSH_ATLAS_… and back; -1 and NULL for what is none. Names are static; NULL is none.
+ */
+VSH_API int32_t vsh_atlas_kind(const char *name);
+VSH_API const char *vsh_atlas_kind_name(int32_t atlas);
 
 /* A whole scene, read from a file or filled by the caller. Paths are as the system takes them (the reader has
  * put the scene file's folder in front of relative ones). */
@@ -209,6 +229,14 @@ VSH_API const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index
 VSH_API const vsh_model *vsh_assets_receiver_model(const vsh_assets *assets, size_t index,
                                                    const size_t **numbers);
 
+/* Fills density[mesh count]: for each of a model's meshes the factor of the last rule that means it, else 1.
+ * `path` is the model's, for messages. Errors: VSH_ERROR_ARGUMENT (a pointer NULL; a rule without a pattern,
+ * or whose factor is out of range), VSH_ERROR_INPUT (a rule that means no mesh, with names that it might have
+ * meant). */
+VSH_API vsh_result vsh_model_densities(const vsh_model *model, const char *path,
+                                       const vsh_density_rule *rules, size_t count, double *density,
+                                       vsh_error *error);
+
 /* *needs is 1 where a receiver's meshes are unwrapped, as receiver->unwrap says, and 0 where their own UVs
  * are baked. Of `receiver` what it says of its output, size and unwrapping is read. Errors: as
  * vsh_charts_create(). */
@@ -216,8 +244,24 @@ VSH_API vsh_result vsh_receiver_needs_unwrap(const vsh_receiver *receiver, const
                                              size_t count, const vsh_run *run, int32_t *needs,
                                              vsh_error *error);
 
-/* Pages of receiver `index`: 1 but where it is unwrapped and needs more; 0 beyond the scene's. */
+/* Pages of receiver `index`: 1 but where it is unwrapped and needs more, or has one for each object; 0 beyond
+ * the scene's. */
 VSH_API size_t vsh_assets_receiver_pages(const vsh_assets *assets, size_t index);
+
+/* A page of a receiver; `object` belongs to the assets. */
+typedef struct vsh_receiver_page {
+    int32_t width; /* texels */
+    int32_t height;
+    const char *object; /* the name of the object whose it is, "" where it has none; NULL: it is shared */
+} vsh_receiver_page;
+
+/* Fills *page; false, and nothing changes, beyond what there is. */
+VSH_API int32_t vsh_assets_receiver_page_info_sized(const vsh_assets *assets, size_t index, size_t page,
+                                                    vsh_receiver_page *info, size_t info_size);
+static inline int32_t vsh_assets_receiver_page_info(const vsh_assets *assets, size_t index, size_t page,
+                                                    vsh_receiver_page *info) {
+    return vsh_assets_receiver_page_info_sized(assets, index, page, info, sizeof *info);
+}
 
 /* The meshes of vsh_assets_receiver() that lie on page `page`, which are some in a row of them: *first is the
  * place of the first in that list. NULL and a count of 0 beyond what there is. */

@@ -43,7 +43,8 @@ vsh_result vsh_receiver_charts(const vsh_scene *scene, size_t index, const vsh_m
     }
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    const vshi_target target = {scene->receivers[index], index, meshes, mesh_count, NULL, {NULL}, 0};
+    const vshi_target target = {
+        .receiver = scene->receivers[index], .index = index, .meshes = meshes, .mesh_count = mesh_count};
     return vshi_target_charts(scene, &target, allow_overlap != 0, true, &full, charts, error);
 }
 
@@ -62,10 +63,6 @@ static vsh_result check_lit(const vsh_scene *scene, const vsh_bake_job_options *
     size_t assets = 0;
     for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
         assets += (size_t)vsh_lit_is_output(scene->receivers[i].output);
-    }
-    if (assets > 0 && options->per_object) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "vsh_bake_job_options.per_object: an asset has one lightmap for all its objects");
     }
     if (options->lit_exr != NULL && (assets != 1 || scene->receiver_count != 1)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
@@ -90,6 +87,24 @@ static vsh_result check(const vsh_scene *scene, const vsh_bake_job_options *opti
         VSHI_TRY(vsh_receiver_check(scene, i, error));
     }
     return check_lit(scene, options, error);
+}
+
+/* The job's own scene: with lightmaps of objects, where all are to have some, and light for assets. */
+static vsh_result take_scene(vsh_bake_job *job, const vsh_scene *scene, vsh_error *error) {
+    job->scene = *scene;
+    if (job->options.per_object != 0) {
+        VSHI_TRY(vshi_allocate((void **)&job->receivers_own, scene->receiver_count,
+                               sizeof *job->receivers_own, "receivers", error));
+        for (size_t i = 0; i < scene->receiver_count; ++i) {
+            job->receivers_own[i] = scene->receivers[i];
+            job->receivers_own[i].atlas = VSH_ATLAS_OBJECTS;
+        }
+        job->scene.receivers = job->receivers_own;
+    }
+    if (job->options.sink == NULL) {
+        vshi_lit_sink_scene(&job->scene);
+    }
+    return VSH_OK;
 }
 
 static vsh_result list_lightmaps(vsh_bake_job *job, vsh_error *error) {
@@ -129,16 +144,13 @@ vsh_result vsh_bake_job_create(const vsh_scene *scene, const vsh_bake_job_option
     if (made == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "bake job: the system refused memory");
     }
-    made->scene = *scene;
-    if (own.sink == NULL) {
-        vshi_lit_sink_scene(&made->scene);
-    }
     made->options = own;
     made->sink = sink;
     made->report.shade = vsh_shade_stats_zero();
     vsh_result result;
-    VSHI_TRY_DONE(vsh_assets_load(scene, &full, &made->assets, error));
-    VSHI_TRY_DONE(vshi_targets_make(scene, made->assets, own.per_object != 0, &full, &made->targets, error));
+    VSHI_TRY_DONE(take_scene(made, scene, error));
+    VSHI_TRY_DONE(vsh_assets_load(&made->scene, &full, &made->assets, error));
+    VSHI_TRY_DONE(vshi_targets_make(&made->scene, made->assets, &full, &made->targets, error));
     VSHI_TRY_DONE(list_lightmaps(made, error));
     made->report.load_s = vshi_seconds() - start;
     *job = made;
@@ -161,6 +173,7 @@ void vsh_bake_job_free(vsh_bake_job *job) {
     free(job->lightmaps);
     vshi_targets_free(&job->targets);
     vsh_assets_free(job->assets);
+    free(job->receivers_own);
     free(job);
 }
 

@@ -10,11 +10,14 @@
 
 /* A page of a receiver that goes into an asset, until all of them are there. */
 typedef struct vshi_lit_page {
-    float *planes[4]; /* AO; light: R, G and B, or one; NULL: none */
+    int32_t width, height;
+    const char *object; /* whose it is; NULL: of several */
+    float *planes[4];   /* AO; light: R, G and B, or one; NULL: none */
 } vshi_lit_page;
 
 struct vsh_bake_job {
     vsh_scene scene;
+    vsh_receiver *receivers_own; /* the scene's, where they are not those that were given; else NULL */
     vsh_bake_job_options options;
     vsh_row_sink sink; /* that of the options, where there is one */
     vsh_assets *assets;

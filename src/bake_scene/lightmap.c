@@ -73,8 +73,11 @@ vsh_result vshi_job_plan(const vsh_bake_job *job, size_t index, const vsh_charts
                          const vsh_run *run, vshi_bands *bands, vsh_error *error) {
     const vsh_job_lightmap *lightmap = &job->lightmaps[index];
     const bool lit = job->options.sink == NULL && vsh_lit_is_output(lightmap->output) != 0;
-    const uint64_t pages = vsh_assets_receiver_pages(job->assets, lightmap->receiver);
-    const uint64_t kept = lit ? pages * vshi_lit_sink_bytes(lightmap->width, lightmap->height) : 0;
+    uint64_t kept = 0;
+    for (size_t i = 0; i < job->targets.count && lit; ++i) {
+        const vsh_job_lightmap *page = &job->lightmaps[i];
+        kept += page->receiver == lightmap->receiver ? vshi_lit_sink_bytes(page->width, page->height) : 0;
+    }
     const vshi_bands_need need = {.picture = job->options.invalid_picture != NULL,
                                   .resume = job->options.resume != 0,
                                   .files = job->options.sink == NULL && !lit,
@@ -348,7 +351,7 @@ vsh_result vshi_job_bake(vsh_bake_job *job, size_t index, const vshi_lightmap_in
               .lightmap = &job->lightmaps[index],
               .baked = vsh_bake_stats_zero(),
               .files = {.job = job, .run = run},
-              .lit = {.job = job, .run = run}};
+              .lit = {.job = job, .run = run, .target = &job->targets.list[index]}};
     w.sink = job->options.sink != NULL               ? job->sink
              : vsh_lit_is_output(w.lightmap->output) ? vshi_lit_sink_of(&w.lit)
                                                      : vshi_file_sink_of(&w.files);

@@ -10,6 +10,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { MARK_BYTES = VSHI_LIT_NAME_BYTES + 64 }; /* of a purpose and a page's name */
+
 static const char *const purpose_names[VSH_LIT_PURPOSES] = {
     [VSH_LIT_OCCLUSION] = "occlusion", [VSH_LIT_LIGHTMAP] = "lightmap", [VSH_LIT_PREVIEW] = "preview"};
 
@@ -133,10 +135,18 @@ json_t *vshi_lit_uri(const char *name) {
     return uri;
 }
 
+/* The name of an image's page, or NULL. */
+static const char *name_of(const vshi_lit_work *work, const vsh_lit_image *image) {
+    return image->page < work->options->page_count ? work->options->page_names[image->page] : NULL;
+}
+
 static vsh_result put_beside(vshi_lit_work *work, const vsh_lit_image *image, vshi_lit_beside *beside,
                              json_t *made, vsh_error *error) {
-    char mark[64];
-    if (work->page_count > 1) {
+    char mark[MARK_BYTES];
+    const char *name = name_of(work, image);
+    if (name != NULL) {
+        snprintf(mark, sizeof mark, ".%s.%s", purpose_names[image->purpose], name);
+    } else if (work->page_count > 1) {
         snprintf(mark, sizeof mark, ".%s.%u", purpose_names[image->purpose], image->page);
     } else {
         snprintf(mark, sizeof mark, ".%s", purpose_names[image->purpose]);
@@ -170,7 +180,11 @@ static vsh_result add(vshi_lit_work *work, const vsh_lit_image *image, bool embe
         VSHI_TRY(encode(work, image, scale, &beside->owned, &beside->size, error));
         beside->bytes = beside->owned;
     }
-    json_t *made = json_pack("{s:s}", "name", purpose_names[image->purpose]);
+    char called[MARK_BYTES];
+    const char *name = name_of(work, image);
+    snprintf(called, sizeof called, "%s%s%s", purpose_names[image->purpose], name != NULL ? " of " : "",
+             name != NULL ? name : "");
+    json_t *made = json_pack("{s:s}", "name", called);
     vsh_result result = made != NULL ? VSH_OK : vshi_lit_no_memory(&work->document, error);
     if (result == VSH_OK) {
         result = embed ? embed_bytes(work, beside->bytes, beside->size, made, "image/png", error)

@@ -62,6 +62,8 @@ static inline uint32_t vshi_lit_page(const vshi_lit_work *work, const vsh_lit_me
                                                  : work->options->chart_pages[mesh->charts[t]];
 }
 
+enum { VSHI_LIT_NAME_BYTES = 200 }; /* of a page, in names of files */
+
 /* Checks what the caller gives for the model's mesh `index`. Errors: VSH_ERROR_ARGUMENT. (check.c) */
 vsh_result vshi_lit_check_mesh(const vshi_lit_work *work, size_t index, vsh_error *error);
 vsh_result vshi_lit_check_images(const vsh_lit_options *options, vsh_error *error);

@@ -249,7 +249,8 @@ static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, co
         for (size_t m = 0; m < place->count; ++m) {
             place->meshes[m].checked = place->set.meshes[m].checked;
         }
-        if (place->unwrapped.page_count > 1) { /* what hangs together may be on several */
+        const bool shared = scene->receivers[i].atlas == VSH_ATLAS_SHARED;
+        if (shared && place->unwrapped.page_count > 1) { /* what hangs together may be on several */
             VSHI_TRY(vshi_mesh_set_solve(&place->set, run, error));
         }
     }
@@ -260,26 +261,14 @@ static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, co
 static vsh_result unwrap(asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
                          vsh_error *error) {
     int32_t needs = 0;
+    vshi_unwrapped *made = &place->unwrapped;
     VSHI_TRY(vsh_receiver_needs_unwrap(receiver, place->meshes, place->count, run, &needs, error));
     if (needs == 0) {
-        return VSH_OK;
+        return vshi_pages_as_they_are(receiver, place->meshes, place->count, made, error);
     }
-    vshi_unwrapped *made = &place->unwrapped;
-    VSHI_TRY(vshi_unwrap_receiver(receiver, place->meshes, place->count, run, made, error));
-    size_t *numbers = NULL;
-    VSHI_TRY(vshi_allocate((void **)&numbers, made->part_count, sizeof *numbers, "meshes", error));
-    for (size_t i = 0; i < made->part_count; ++i) {
-        numbers[i] = place->numbers[made->numbers[i]];
-    }
-    free(place->numbers);
-    place->numbers = numbers;
-    vsh_mesh *meshes = NULL;
-    VSHI_TRY(vshi_allocate((void **)&meshes, made->part_count, sizeof *meshes, "meshes", error));
-    memcpy(meshes, made->parts, made->part_count * sizeof *meshes);
-    free(place->meshes);
-    place->meshes = meshes;
-    place->count = made->part_count;
-    return VSH_OK;
+    VSHI_TRY(vshi_unwrap_receiver(receiver, place->model, place->meshes, place->numbers, place->count, run,
+                                  made, error));
+    return vshi_unwrapped_take(made, &place->meshes, &place->numbers, &place->count, error);
 }
 
 static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, size_t index, const vsh_run *run,
@@ -292,8 +281,9 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
         vsh_heights_source source = {.name = receiver->path,
                                      .size = {receiver->extent[0], receiver->extent[1]},
                                      .height = receiver->relief};
-        return place_heights(assets, &assets->receivers[index], &source, VSH_HEIGHTS_SURFACE,
-                             receiver->transform, run, error);
+        asset_place *place = &assets->receivers[index];
+        VSHI_TRY(place_heights(assets, place, &source, VSH_HEIGHTS_SURFACE, receiver->transform, run, error));
+        return vshi_pages_as_they_are(receiver, place->meshes, place->count, &place->unwrapped, error);
     }
     const vsh_model *model = NULL;
     unsigned char *chosen = NULL;
@@ -398,7 +388,17 @@ size_t vsh_assets_receiver_pages(const vsh_assets *assets, size_t index) {
         return 0;
     }
     const vshi_unwrapped *made = &assets->receivers[index].unwrapped;
-    return made->atlas != NULL ? made->page_count : 1;
+    return made->page_begins != NULL ? made->page_count : 1;
+}
+
+int32_t vsh_assets_receiver_page_info_sized(const vsh_assets *assets, size_t index, size_t page,
+                                            vsh_receiver_page *info, size_t info_size) {
+    if (page >= vsh_assets_receiver_pages(assets, index)) {
+        return 0;
+    }
+    const vshi_unwrapped *made = &assets->receivers[index].unwrapped;
+    vshi_give(info, info_size, made->pages != NULL ? &made->pages[page] : &made->whole, sizeof *made->pages);
+    return 1;
 }
 
 const vsh_mesh *vsh_assets_receiver_page(const vsh_assets *assets, size_t index, size_t page, size_t *first,

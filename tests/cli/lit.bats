@@ -91,8 +91,6 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     refused 2 b.png .exr
     shade bake in.glb "${BAKE[@]}" --exr in.glb -o a.glb
     refused 2
-    shade bake in.glb "${BAKE[@]}" --per-object -o a.glb
-    refused 2 --per-object
     shade bake in.glb "${BAKE[@]}" --bits 32 -o a.glb
     refused 2 a.glb "32 bits"
     shade bake in.glb "${BAKE[@]}" --pack R=ao -o a.glb

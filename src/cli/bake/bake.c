@@ -59,9 +59,6 @@ static int check_lit(const cli_bake_settings *settings, const vsh_scene *scene) 
     if (given != NULL && assets == 0) {
         return cli_usage("--%s: is for outputs that end in .glb or .gltf", given);
     }
-    if (assets > 0 && settings->per_object) {
-        return cli_usage("--per-object: a .glb or .gltf has one lightmap for all its objects");
-    }
     if (settings->embed && settings->images_beside) {
         return cli_usage("--embed: not together with --images-beside");
     }
@@ -146,9 +143,10 @@ static void say_all(const telling *t, const vsh_bake_job *job, const vsh_bake_re
     vsh_job_lightmap first, last;
     vsh_bake_job_lightmap(job, 0, &first);
     vsh_bake_job_lightmap(job, t->count - 1, &last);
-    cli_say("%zu lightmaps, %s to %s: %" PRIu64 " texels, %" PRIu64
-            " of them invalid; --verbose tells of each",
-            t->count, first.output, last.output, report->texels, report->invalid_texels);
+    const bool one = strcmp(first.output, last.output) == 0;
+    cli_say("%zu lightmaps, %s%s%s: %" PRIu64 " texels, %" PRIu64 " of them invalid; --verbose tells of each",
+            t->count, one ? "in " : first.output, one ? "" : " to ", last.output, report->texels,
+            report->invalid_texels);
 }
 
 static void say_writing(void *user, const char *path) {
@@ -248,6 +246,7 @@ int cli_bake_main(int argc, char **argv) {
     bool help;
     int code = cli_bake_parse(argc, argv, &settings, &help);
     if (code != CLI_OK || help) {
+        cli_densities_free(&settings.densities);
         return code;
     }
     cli_progress_begin(settings.common.progress, settings.common.quiet);
@@ -258,6 +257,7 @@ int cli_bake_main(int argc, char **argv) {
     code = bake(&settings, &made.scene);
 done:
     cli_bake_scene_free(&made);
+    cli_densities_free(&settings.densities);
     cli_progress_end();
     return code;
 }

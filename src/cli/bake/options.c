@@ -22,7 +22,8 @@ enum {
     KEY_EXR,
     KEY_VIEW,
     KEY_LIGHTS,
-    KEY_LIGHT_RADIUS
+    KEY_LIGHT_RADIUS,
+    KEY_DENSITY
 };
 
 static const cli_option options[] = {
@@ -72,6 +73,9 @@ static const cli_option options[] = {
     CLI_GRID_OPTIONS,
     {0, NULL, NULL, "Texels"},
     CLI_SETTINGS(VSH_SETTINGS_TEXELS),
+    {KEY_DENSITY, "density", "PATTERN=X",
+     "factor of --texels-per-unit, or of the density that\nfits, for objects of that name; repeatable, the "
+     "last\nthat means one holds (1)"},
     {KEY_BAND_ROWS, "band-rows", "N",
      "rows baked and written at a time, 1 to 65536,\nrounded up to eights; changes no value (all, or as\n"
      "many as --memory-limit allows)"},
@@ -142,6 +146,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return take_pattern(&s->no_receive, name, value);
     case KEY_NO_CAST:
         return take_pattern(&s->no_cast, name, value);
+    case KEY_DENSITY:
+        return cli_density_take(&s->densities, name, value);
     case KEY_PER_OBJECT:
         s->per_object = true;
         return CLI_OK;
@@ -190,5 +196,7 @@ int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *hel
     memset(settings, 0, sizeof *settings);
     settings->common = cli_common_default();
     const int code = cli_parse(&cli_bake, argc, argv, take, settings, "INPUT", &settings->input, help);
+    const char *atlas = cli_patch_text(&settings->patch, "--atlas");
+    settings->per_object = settings->per_object || vsh_atlas_kind(atlas) == VSH_ATLAS_OBJECTS;
     return code != CLI_OK || *help ? code : cli_patch_check(&settings->patch);
 }

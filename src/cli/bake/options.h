@@ -3,6 +3,7 @@
 #define CLI_BAKE_OPTIONS_H
 
 #include "cli/commands.h"
+#include "cli/density.h"
 #include "cli/patch.h"
 
 enum { CLI_MAX_EXTRA_CASTERS = 256, CLI_MAX_PATTERNS = 256 };
@@ -33,6 +34,7 @@ typedef struct cli_bake_settings {
     const char *output;
     const char *output_folder; /* for the outputs of a scene, by their names; NULL: where it says */
     cli_patterns receive, no_receive, no_cast;
+    cli_densities densities;
     const char *stats;
     const char *invalid_picture; /* NULL: none */
     const char *view;            /* page; NULL: none */

@@ -52,6 +52,10 @@ static int override_receiver(const cli_bake_settings *s, vsh_receiver *receiver)
     if (s->receive.count > 0 || s->no_receive.count > 0) {
         receiver->objects = selection(&s->receive, &s->no_receive);
     }
+    if (s->densities.count > 0) {
+        receiver->density = s->densities.list;
+        receiver->density_count = s->densities.count;
+    }
     receiver->partial = s->per_object || receiver->partial;
     receiver->output = s->output != NULL ? s->output : receiver->output;
     return cli_patch_receiver(&s->patch, receiver);
@@ -92,7 +96,8 @@ static int mark_outputs(cli_bake_scene *made) {
         return cli_out_of_memory("outputs");
     }
     for (size_t i = 0; i < made->scene.receiver_count; ++i) {
-        marked[i] = cli_object_output(made->receivers[i].output);
+        const char *output = made->receivers[i].output;
+        marked[i] = vsh_lit_is_output(output) ? strdup(output) : cli_object_output(output);
         made->receivers[i].output = marked[i];
     }
     free_outputs(made);

@@ -14,7 +14,8 @@ int cli_bake_check_view(const cli_bake_settings *settings, const vsh_scene *scen
     if (!cli_has_ending(page, "html")) {
         return cli_usage("--view '%s': expected a name that ends in .html", page);
     }
-    if (settings->per_object || scene->receiver_count != 1 || scene->receivers[0].type != VSH_RECEIVER_MESH) {
+    const bool images = settings->per_object && !vsh_lit_is_output(scene->receivers[0].output);
+    if (images || scene->receiver_count != 1 || scene->receivers[0].type != VSH_RECEIVER_MESH) {
         return cli_usage("--view '%s': shows one lightmap of one mesh; 'vdbshade view' shows others", page);
     }
     if (cli_same_file(page, scene->receivers[0].output) || cli_same_file(page, settings->input)) {

@@ -10,12 +10,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A name as OBJ has them: no blanks at its ends, no control characters. */
-static void put_name(FILE *out, const vsh_mesh *mesh, size_t index) {
-    const char *name = mesh->name != NULL && mesh->name[0] != '\0' ? mesh->name : NULL;
-    fputs("o ", out);
+/* A name as OBJ has them, or WHAT_INDEX: no blanks at its ends, no control characters. */
+static void put_name(FILE *out, const char *name, const char *what, size_t index) {
+    name = name != NULL && name[0] != '\0' ? name : NULL;
     if (name == NULL) {
-        fprintf(out, "mesh_%zu", index);
+        fprintf(out, "%s_%zu", what, index);
     }
     for (; name != NULL && *name != '\0'; ++name) {
         fputc((unsigned char)*name <= ' ' || *name == 0x7f ? '_' : *name, out);
@@ -59,17 +58,26 @@ static void put_face(FILE *out, const vsh_mesh *mesh, const vsh_atlas_mesh *plac
     fputc('\n', out);
 }
 
-static void put_mesh(FILE *out, const vsh_mesh *mesh, size_t index, const vsh_atlas *atlas, counts *before) {
+/* That of a page: of an object with its name. */
+static void put_material(FILE *out, const vsh_mesh *mesh, uint32_t page, bool object) {
+    const char *name = mesh->object_name != NULL ? mesh->object_name : mesh->name;
+    fputs("usemtl ", out);
+    put_name(out, object ? name : NULL, "page", page);
+}
+
+static void put_mesh(FILE *out, const vsh_mesh *mesh, size_t index, const vsh_atlas *atlas, bool objects,
+                     counts *before) {
     const vsh_atlas_mesh placed = vsh_atlas_mesh_view(atlas, index);
     const vsh_atlas_chart *charts = vsh_atlas_charts(atlas);
     const size_t pages = vsh_atlas_page_count(atlas);
-    put_name(out, mesh, index);
+    fputs("o ", out);
+    put_name(out, mesh->name, "mesh", index);
     put_vertices(out, mesh, &placed);
     uint32_t page = UINT32_MAX;
     for (size_t i = 0; i < placed.triangle_count; ++i) {
         const uint32_t chart = placed.charts[i], own = chart != VSH_NO_CHART ? charts[chart].page : 0;
         if (pages > 1 && own != page) {
-            fprintf(out, "usemtl page_%u\n", own);
+            put_material(out, mesh, own, objects);
             page = own;
         }
         put_face(out, mesh, &placed, i, before);
@@ -79,7 +87,7 @@ static void put_mesh(FILE *out, const vsh_mesh *mesh, size_t index, const vsh_at
     before->normals += mesh->normals != NULL ? mesh->vertex_count : 0;
 }
 
-int cli_unwrap_write_obj(const char *path, const vsh_mesh *meshes, const vsh_atlas *atlas) {
+int cli_unwrap_write_obj(const char *path, const vsh_mesh *meshes, const vsh_atlas *atlas, bool objects) {
     VSHI_NUMBERS;
     cli_temporary temporary;
     counts before = {0, 0, 0};
@@ -93,7 +101,7 @@ int cli_unwrap_write_obj(const char *path, const vsh_mesh *meshes, const vsh_atl
             const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
             return cli_fail(&cancelled);
         }
-        put_mesh(temporary.file, &meshes[m], m, atlas, &before);
+        put_mesh(temporary.file, &meshes[m], m, atlas, objects, &before);
     }
     const int code = cli_temporary_commit(&temporary);
     cli_signals_writing(NULL);
