@@ -372,6 +372,18 @@ static inline vsh_result vsh_lightmap_stitch(const vsh_charts *charts, const vsh
                                      error);
 }
 
+/* Gives a whole lightmap's texels that are not valid and that no valid one of their chart filled, as those of
+ * faces that touch each other, the values of the texel that is nearest in the world, of the valid ones beside
+ * such that are not; and what is empty around them, up to 4 texels or the padding. Bent normals in tangent
+ * space are left. `texels` are those that the lightmap was baked of, all rows. *filled (may be NULL) is how
+ * many there are. Errors:
+ * - VSH_ERROR_ARGUMENT: texels, lightmap or its coverage NULL; texels of a band; run;
+ * - VSH_ERROR_LIMIT: run->memory_limit, beside texels and planes; 2^32 texels or samples;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (nothing has changed then). */
+VSH_API vsh_result vsh_lightmap_fill_hidden(const vsh_texels *texels, const vsh_lightmap *lightmap,
+                                            size_t light_count, const vsh_run *run, uint64_t *filled,
+                                            vsh_error *error);
+
 #ifdef __cplusplus
 }
 #endif

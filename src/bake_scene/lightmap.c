@@ -106,6 +106,61 @@ typedef struct work {
     vshi_resume resume;
 } work;
 
+static bool fixes_seams(const work *w) {
+    return w->target->receiver.seams == VSH_SEAMS_FIX && w->target->receiver.type == VSH_RECEIVER_MESH;
+}
+
+static bool is_fixed_whole(const work *w) {
+    return fixes_seams(w) && w->input->bands.count == 1;
+}
+
+/* Bytes of texels that are kept. */
+static uint64_t kept_bytes(const work *w) {
+    vsh_texels_info kept = {.bytes = 0};
+    if (w->input->kept != NULL) {
+        vsh_texels_get_info(w->input->kept, &kept);
+    }
+    return kept.bytes;
+}
+
+/* Bytes that are there beside the charts: what casts, texels that are kept, planes. */
+static uint64_t held_bytes(const work *w) {
+    const vsh_occluders_info *casters = &w->job->report.occluders;
+    const uint64_t texels = (uint64_t)w->lightmap->width * (uint64_t)w->lightmap->height;
+    const uint64_t floats = (uint64_t)w->channels.image.channel_count +
+                            3 * (uint64_t)w->channels.triple_count + (w->channels.invalid != NULL ? 1 : 0);
+    return casters->field_bytes + casters->triangles_bytes + kept_bytes(w) + texels * floats * sizeof(float);
+}
+
+/* Both of a lightmap that is whole: what is baked stays where there is no memory to make it better. */
+static vsh_result keep_without_memory(const work *w, vsh_result result, const char *kept, vsh_error *error) {
+    if (result != VSH_ERROR_LIMIT) {
+        return name_file(w->target->receiver.path, result, error);
+    }
+    vshi_warn(w->run, "%s: %s: no memory to fix them beside a whole lightmap; raise --memory-limit",
+              w->target->receiver.path, kept);
+    return VSH_OK;
+}
+
+static vsh_result fill_hidden(const work *w, const vsh_texels *texels, vsh_error *error) {
+    vsh_run run = *w->run;
+    run.memory_held += held_bytes(w) - kept_bytes(w);
+    const vsh_result result =
+        vsh_lightmap_fill_hidden(texels, &w->channels.lightmap, w->job->scene.light_count, &run, NULL, error);
+    return keep_without_memory(w, result, "hidden charts are kept", error);
+}
+
+static vsh_result stitch(const work *w, vsh_error *error) {
+    const vsh_bake_job *job = w->job;
+    vsh_stitch_options options = vsh_stitch_options_default();
+    options.max_change = job->scene.shade.max_error;
+    vsh_run run = *w->run;
+    run.memory_held += held_bytes(w);
+    const vsh_result result = vsh_lightmap_stitch(w->input->charts, &w->channels.lightmap,
+                                                  job->scene.light_count, &options, &run, NULL, error);
+    return keep_without_memory(w, result, "seams are kept", error);
+}
+
 static vsh_result bake_band(work *w, int32_t first, int32_t rows, const vsh_run *run, vsh_error *error) {
     const vsh_scene *scene = &w->job->scene;
     vsh_texels *own = NULL;
@@ -116,9 +171,13 @@ static vsh_result bake_band(work *w, int32_t first, int32_t rows, const vsh_run 
     band.invalid_by_mesh = w->invalid;
     band.shade = w->baked.shade;
     band.errors = w->baked.errors;
-    const vsh_result result =
+    vsh_result result =
         vsh_bake_lightmap(w->job->occluders, own != NULL ? own : w->input->kept, scene->lights,
                           scene->light_count, &scene->shade, run, &w->channels.lightmap, &band, error);
+    const vsh_texels *texels = own != NULL ? own : w->input->kept;
+    if (result == VSH_OK && is_fixed_whole(w)) {
+        result = fill_hidden(w, texels, error);
+    }
     vsh_texels_free(own);
     if (result != VSH_OK) {
         return name_file(w->target->receiver.path, result, error);
@@ -133,41 +192,6 @@ static vsh_result bake_band(work *w, int32_t first, int32_t rows, const vsh_run 
     return VSH_OK;
 }
 
-static bool fixes_seams(const work *w) {
-    return w->target->receiver.seams == VSH_SEAMS_FIX && w->target->receiver.type == VSH_RECEIVER_MESH;
-}
-
-/* Bytes that are there beside the charts: what casts, texels that are kept, planes. */
-static uint64_t held_bytes(const work *w) {
-    const vsh_occluders_info *casters = &w->job->report.occluders;
-    const uint64_t texels = (uint64_t)w->lightmap->width * (uint64_t)w->lightmap->height;
-    const uint64_t floats = (uint64_t)w->channels.image.channel_count +
-                            3 * (uint64_t)w->channels.triple_count + (w->channels.invalid != NULL ? 1 : 0);
-    vsh_texels_info kept = {.bytes = 0};
-    if (w->input->kept != NULL) {
-        vsh_texels_get_info(w->input->kept, &kept);
-    }
-    return casters->field_bytes + casters->triangles_bytes + kept.bytes + texels * floats * sizeof(float);
-}
-
-/* A lightmap that is whole. What is baked stays where there is no memory to make it better. */
-static vsh_result stitch(const work *w, vsh_error *error) {
-    const vsh_bake_job *job = w->job;
-    vsh_stitch_options options = vsh_stitch_options_default();
-    options.max_change = job->scene.shade.max_error;
-    vsh_run run = *w->run;
-    run.memory_held += held_bytes(w);
-    const vsh_result result = vsh_lightmap_stitch(w->input->charts, &w->channels.lightmap,
-                                                  job->scene.light_count, &options, &run, NULL, error);
-    if (result != VSH_ERROR_LIMIT) {
-        return name_file(w->target->receiver.path, result, error);
-    }
-    vshi_warn(w->run,
-              "%s: seams are kept: no memory to fix them beside a whole lightmap; raise --memory-limit",
-              w->target->receiver.path);
-    return VSH_OK;
-}
-
 /* Bakes a band, or takes it from before. */
 static vsh_result make_band(work *w, int32_t first, int32_t rows, const vsh_run *run, vsh_error *error) {
     const size_t meshes = w->target->mesh_count;
@@ -176,7 +200,7 @@ static vsh_result make_band(work *w, int32_t first, int32_t rows, const vsh_run 
         return VSH_OK;
     }
     VSHI_TRY(bake_band(w, first, rows, run, error));
-    if (fixes_seams(w) && w->input->bands.count == 1) {
+    if (is_fixed_whole(w)) {
         VSHI_TRY(stitch(w, error));
     }
     vshi_channels_split(&w->channels, &w->job->scene);

@@ -85,3 +85,21 @@ TUBE=(--sun 0.1,1,0.3 --sun-angle 60 --ao 1 --size 48 --quiet)
     [[ $output == *'scene.json:2:'*'padding: "all" is none of auto, a whole number from 0 to 4096'* ]]
     [ ! -e out.exr ]
 }
+
+@test "a face that is hidden where boxes touch takes what is nearest beside it" {
+    write_box box.obj
+    # another one on top of it
+    { cat box.obj; echo 'o upper'; sed -n 's/^v //p' box.obj | awk '{print "v", $1, $2 + 1, $3}'
+      sed -n 's/^f //p' box.obj | awk '{ out = "f"; for (i = 1; i <= NF; ++i) { split($i, p, "/"); out = out " " p[1] + 8 "/" p[2] } print out }'
+    } >two.obj
+    for seams in keep fix; do
+        shade bake two.obj --ao 1 --max-error 0.02 --size 128 --unwrap always --seams $seams -o $seams.exr --quiet
+        [ "$status" -eq 0 ] || fail "$stderr"
+        shade info $seams.exr
+        grep -o "'ao': min 0, mean [0-9.]*" <<<"$output" | grep -o '[0-9.]*$' >$seams.mean
+    done
+    # all that is seen is 1; two faces of twelve are hidden, some of whose texels padding reaches
+    paste keep.mean fix.mean | awk '{ exit !($1 > 0.3 && $2 > 1.03 * $1) }' || fail "$(cat keep.mean fix.mean)"
+    # nothing that is seen is another
+    run -0 "$VDBSHADE" compare keep.exr fix.exr --max-difference 0.020001 --max-coverage 0
+}
