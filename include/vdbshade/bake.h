@@ -372,6 +372,26 @@ static inline vsh_result vsh_lightmap_stitch(const vsh_charts *charts, const vsh
                                      error);
 }
 
+/* A lightmap among several that are stitched together. */
+typedef struct vsh_stitch_page {
+    const vsh_charts *charts;
+    const vsh_lightmap *lightmap;
+} vsh_stitch_page;
+
+/* The same of several lightmaps of any sizes that have the same planes, such as pages of one atlas: borders
+ * between them, too. Nothing is done where there are none. Errors: as there. */
+VSH_API vsh_result vsh_lightmaps_stitch_sized(const vsh_stitch_page *pages, size_t page_count,
+                                              size_t light_count, const vsh_stitch_options *options,
+                                              const vsh_run *run, vsh_stitch_report *report,
+                                              size_t report_size, vsh_error *error);
+static inline vsh_result vsh_lightmaps_stitch(const vsh_stitch_page *pages, size_t page_count,
+                                              size_t light_count, const vsh_stitch_options *options,
+                                              const vsh_run *run, vsh_stitch_report *report,
+                                              vsh_error *error) {
+    return vsh_lightmaps_stitch_sized(pages, page_count, light_count, options, run, report, sizeof *report,
+                                      error);
+}
+
 /* Gives a whole lightmap's texels that are not valid and that no valid one of their chart filled, as those of
  * faces that touch each other, the values of the texel that is nearest in the world, of the valid ones beside
  * such that are not; and what is empty around them, up to 4 texels or the padding. Bent normals in tangent

@@ -30,14 +30,16 @@ typedef struct slot {
 /* An end of a triangle's edge, as it is in the world and in the lightmap. */
 typedef struct edge_end {
     const vsh_mesh *mesh;
+    const vshi_raster *raster;
     size_t triangle; /* of the mesh */
+    uint32_t page;
     uint32_t vertex;
     vshi_vec at;
     double x, y; /* texels */
 } edge_end;
 
 typedef struct edges {
-    const vshi_charts *charts;
+    const vshi_seam_pages *pages;
     double cosine;
     vshi_job *job;
     uint32_t *chart;    /* union-find, while charts are joined */
@@ -80,7 +82,9 @@ static uint64_t hash_place(vshi_vec p) {
 }
 
 static const vsh_mesh *mesh_of(const edges *e, uint32_t edge, size_t *local) {
-    return &e->charts->meshes[vshi_charts_mesh(e->charts, edge / 3, local)];
+    const size_t page = vshi_seam_page(e->pages, edge / 3);
+    const vshi_charts *charts = e->pages->charts[page];
+    return &charts->meshes[vshi_charts_mesh(charts, edge / 3 - e->pages->first[page], local)];
 }
 
 static void places_of(const vsh_mesh *mesh, size_t local, size_t k, vshi_vec at[2]) {
@@ -155,15 +159,19 @@ static vshi_vec normal_at(const edge_end *end) {
 static void look_at(const edges *e, uint32_t edge, edge_end ends[2]) {
     size_t local;
     const vsh_mesh *mesh = mesh_of(e, edge, &local);
+    const size_t page = vshi_seam_page(e->pages, edge / 3);
+    const vshi_raster *raster = &e->pages->charts[page]->raster;
     for (uint32_t k = 0; k < 2; ++k) {
         const uint32_t vertex = mesh->indices[3 * local + (edge % 3 + k) % 3];
         const float *uv = mesh->uvs + 2 * (size_t)vertex;
-        ends[k] = (edge_end){mesh,
-                             local,
-                             vertex,
-                             place_of(mesh, vertex),
-                             (double)uv[0] * e->charts->raster.width,
-                             (1.0 - (double)uv[1]) * e->charts->raster.height};
+        ends[k] = (edge_end){.mesh = mesh,
+                             .raster = raster,
+                             .triangle = local,
+                             .page = (uint32_t)page,
+                             .vertex = vertex,
+                             .at = place_of(mesh, vertex),
+                             .x = (double)uv[0] * raster->width,
+                             .y = (1.0 - (double)uv[1]) * raster->height};
     }
 }
 
@@ -179,7 +187,7 @@ static void look_at_pair(const edges *e, uint32_t a, uint32_t b, edge_end first[
 }
 
 static bool same_in_lightmap(const edge_end a[2], const edge_end b[2]) {
-    bool all = true;
+    bool all = a[0].page == b[0].page;
     for (int k = 0; k < 2; ++k) {
         all = all && fabs(a[k].x - b[k].x) <= SAME_PLACE && fabs(a[k].y - b[k].y) <= SAME_PLACE;
     }
@@ -195,8 +203,8 @@ static bool is_smooth(const edges *e, const edge_end a[2], const edge_end b[2]) 
 }
 
 /* What lies outside of the image is not baked. */
-static bool is_inside(const edges *e, const edge_end a[2]) {
-    const vshi_raster *raster = &e->charts->raster;
+static bool is_inside(const edge_end a[2]) {
+    const vshi_raster *raster = a[0].raster;
     bool all = true;
     for (int k = 0; k < 2; ++k) {
         all = all && a[k].x >= -SAME_PLACE && a[k].x <= raster->width + SAME_PLACE && a[k].y >= -SAME_PLACE &&
@@ -211,38 +219,44 @@ static bool cancelled(const edges *e, size_t triangle) {
     return triangle % POLL_TRIANGLES == 0 && vshi_job_advance(e->job, 0);
 }
 
-static vsh_result sort_edges(edges *e, vsh_error *error) {
-    const vshi_charts *charts = e->charts;
-    memset(e->slots, 0xff, e->slot_count * sizeof *e->slots);
-    uint32_t triangle = 0;
-    batch b;
-    b.count = 0;
+static vsh_result sort_page(edges *e, const vshi_charts *charts, batch *b, uint32_t *triangle,
+                            vsh_error *error) {
     for (size_t m = 0; m < charts->mesh_count; ++m) {
-        for (size_t i = 0; i < charts->meshes[m].triangle_count; ++i, ++triangle) {
-            if (cancelled(e, triangle)) {
+        for (size_t i = 0; i < charts->meshes[m].triangle_count; ++i, ++*triangle) {
+            if (cancelled(e, *triangle)) {
                 return vshi_job_fail_cancelled(e->job, error);
             }
             vshi_uv_triangle unused;
             const bool used = vshi_charts_triangle(charts, m, i, &unused);
-            e->chart[triangle] = triangle;
+            e->chart[*triangle] = *triangle;
             for (uint32_t k = 0; k < 3; ++k) {
-                e->previous[3 * triangle + k] = NO_EDGE;
+                e->previous[3 * *triangle + k] = NO_EDGE;
                 if (used) {
-                    add(e, &b, 3 * triangle + k, &charts->meshes[m], i);
+                    add(e, b, 3 * *triangle + k, &charts->meshes[m], i);
                 }
             }
-            if (b.count > BATCH - 3) {
-                put_all(e, &b);
+            if (b->count > BATCH - 3) {
+                put_all(e, b);
             }
         }
+    }
+    return VSH_OK;
+}
+
+static vsh_result sort_edges(edges *e, vsh_error *error) {
+    memset(e->slots, 0xff, e->slot_count * sizeof *e->slots);
+    uint32_t triangle = 0;
+    batch b;
+    b.count = 0;
+    for (size_t page = 0; page < e->pages->count; ++page) {
+        VSHI_TRY(sort_page(e, e->pages->charts[page], &b, &triangle, error));
     }
     put_all(e, &b);
     return VSH_OK;
 }
-
 /* Joins charts and counts seams, or (`list`) fills them in. */
 static vsh_result go_through_pairs(edges *e, vshi_seam *list, size_t *count, vsh_error *error) {
-    const size_t all = 3 * e->charts->first[e->charts->mesh_count];
+    const size_t all = 3 * e->pages->first[e->pages->count];
     *count = 0;
     for (size_t edge = 0; edge < all; ++edge) {
         if (edge % 3 == 0 && cancelled(e, edge / 3)) {
@@ -256,14 +270,15 @@ static vsh_result go_through_pairs(edges *e, vshi_seam *list, size_t *count, vsh
                 join(e->chart, other / 3, (uint32_t)edge / 3);
                 continue;
             }
-            if (!is_smooth(e, a, b) || !is_inside(e, a) || !is_inside(e, b)) {
+            if (!is_smooth(e, a, b) || !is_inside(a) || !is_inside(b)) {
                 continue;
             }
             if (list != NULL) {
                 list[*count] =
                     (vshi_seam){{{a[0].x, a[1].x}, {b[0].x, b[1].x}},
                                 {{a[0].y, a[1].y}, {b[0].y, b[1].y}},
-                                {chart_of(e->chart, other / 3), chart_of(e->chart, (uint32_t)edge / 3)}};
+                                {chart_of(e->chart, other / 3), chart_of(e->chart, (uint32_t)edge / 3)},
+                                {a[0].page, b[0].page}};
             }
             ++*count;
         }
@@ -273,7 +288,7 @@ static vsh_result go_through_pairs(edges *e, vshi_seam *list, size_t *count, vsh
 
 static vsh_result find(edges *e, const vsh_run *run, vshi_seams *seams, vsh_error *error) {
     const char *what = "seams";
-    const size_t triangles = e->charts->first[e->charts->mesh_count];
+    const size_t triangles = e->pages->first[e->pages->count];
     e->slot_count = 16;
     while (e->slot_count < 4 * triangles) {
         e->slot_count *= 2;
@@ -301,15 +316,15 @@ static vsh_result find(edges *e, const vsh_run *run, vshi_seams *seams, vsh_erro
     return VSH_OK;
 }
 
-vsh_result vshi_seams_find(const vshi_charts *charts, double cosine, const vsh_run *run, vshi_job *job,
+vsh_result vshi_seams_find(const vshi_seam_pages *pages, double cosine, const vsh_run *run, vshi_job *job,
                            vshi_seams *seams, vsh_error *error) {
-    const size_t triangles = charts->first[charts->mesh_count];
+    const size_t triangles = pages->first[pages->count];
     *seams = (vshi_seams){NULL, NULL, 0, 0.0};
     if (triangles > UINT32_MAX / 3 - 1) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "seams: %zu triangles, at most %u", triangles,
                          UINT32_MAX / 3 - 1);
     }
-    edges e = {.charts = charts, .cosine = cosine, .job = job};
+    edges e = {.pages = pages, .cosine = cosine, .job = job};
     const vsh_result result = find(&e, run, seams, error);
     free(e.slots);
     free(e.previous);
