@@ -6,7 +6,6 @@
 #include "base/try.h"
 
 #include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
 
 enum { DEEPEST = 64, FEW = 8 /* places that are looked at one by one */ };
@@ -158,4 +157,55 @@ uint32_t vshi_places_nearest(const vshi_places *places, const float at[3], float
         }
     }
     return best.number;
+}
+
+/* A part of the tree, and of the line that is near to it. */
+typedef struct line_part {
+    part part;
+    float begin, end;
+} line_part;
+
+/* Cuts the line where it is farther than `within` beyond the plane, on the side that a sign points away from.
+ */
+static line_part cut(line_part p, part of, float at, float along, float plane, float sign, float within) {
+    const float over = sign * (at - plane) - within, step = sign * along;
+    p.part = of;
+    if (step > 0.0F) {
+        p.end = fminf(p.end, -over / step);
+    } else if (step < 0.0F) {
+        p.begin = fmaxf(p.begin, -over / step);
+    } else if (over > 0.0F) {
+        p.end = -1.0F;
+    }
+    return p;
+}
+
+void vshi_places_along(const vshi_places *places, const float a[3], const float b[3], float within,
+                       bool (*found)(void *user, uint32_t number), void *user) {
+    line_part open[DEEPEST];
+    int count = 0;
+    open[count++] = (line_part){{0, places->count}, 0.0F, 1.0F};
+    while (count > 0) {
+        const line_part next = open[--count];
+        const part p = next.part;
+        if (!(next.begin <= next.end) || p.begin == p.end) {
+            continue;
+        }
+        if (p.end - p.begin <= FEW) {
+            for (size_t i = p.begin; i < p.end; ++i) {
+                if (!found(user, places->list[i].number)) {
+                    return;
+                }
+            }
+            continue;
+        }
+        const size_t middle = p.begin + (p.end - p.begin) / 2;
+        const int axis = places->axis[middle];
+        const float plane = places->list[middle].at[axis], along = b[axis] - a[axis];
+        if (!found(user, places->list[middle].number)) {
+            return;
+        }
+        open[count++] = cut(next, (part){middle + 1, p.end}, a[axis], along, plane, -1.0F, within);
+        open[count++] = cut(next, (part){p.begin, middle}, a[axis], along, plane, 1.0F, within);
+    }
 }

@@ -4,6 +4,7 @@
 
 #include "base/error.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -30,5 +31,10 @@ void vshi_places_free(vshi_places *places);
 /* The number of the nearest place whose distance's square is below `square`, of equally near ones the lowest;
  * UINT32_MAX: there is none. Any thread. */
 uint32_t vshi_places_nearest(const vshi_places *places, const float at[3], float square);
+
+/* Calls found() with each place that is at most so far from the line from a to b, and with others near it,
+ * until it returns false. Any thread. */
+void vshi_places_along(const vshi_places *places, const float a[3], const float b[3], float within,
+                       bool (*found)(void *user, uint32_t number), void *user);
 
 #endif
