@@ -1,7 +1,7 @@
 #include "bake_scene/job.h"
 
 #include "bake_scene/lit_sink.h"
-#include "bake_scene/resume.h"
+#include "bake_scene/seams.h"
 #include "base/clock.h"
 #include "base/job.h"
 #include "base/memory.h"
@@ -354,8 +354,9 @@ vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *er
     if (job->options.sink == NULL && job->provenance == NULL) {
         VSHI_TRY(find_provenance(job, &full, error));
     }
-    for (size_t i = 0; i < job->targets.count; ++i) {
-        VSHI_TRY(bake(job, i, &full, error));
+    for (size_t i = 0, count; i < job->targets.count; i += count) {
+        VSHI_TRY(vshi_count_together(job, i, &full, &count, error));
+        VSHI_TRY(count > 1 ? vshi_bake_together(job, i, count, &full, error) : bake(job, i, &full, error));
     }
     /* not before all are whole: a bake that goes on writes those that were again */
     for (size_t i = 0; i < job->targets.count && job->options.resume; ++i) {

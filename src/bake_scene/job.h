@@ -33,6 +33,7 @@ struct vsh_bake_job {
     vsh_bake_error *errors;     /* [error_count], as in the report */
     vsh_bake_report report;
     bool measured;
+    size_t apart; /* lightmaps before it are not stitched together with others: there is no memory for it */
     vshi_lit_page *lit_pages; /* [lit_page_count]: of the receiver that is baked */
     size_t lit_page_count;
 };

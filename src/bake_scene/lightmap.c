@@ -1,14 +1,8 @@
 /* One lightmap's way: its charts, its bands of texels, its values, its rows. */
-#include "bake_scene/channels.h"
-#include "bake_scene/file_sink.h"
-#include "bake_scene/invalid_picture.h"
-#include "bake_scene/job.h"
-#include "bake_scene/lit_sink.h"
-#include "bake_scene/resume.h"
+#include "bake_scene/seams.h"
 #include "bake_scene/warn.h"
 #include "base/clock.h"
 #include "base/job.h"
-#include "base/rounds.h"
 #include "base/try.h"
 
 #include <math.h>
@@ -17,8 +11,7 @@
 
 enum { STITCHED_PADDING = 2 }; /* texels: what lookups at borders read is guessed from what is near */
 
-/* What the library made of arrays names no file. */
-static vsh_result name_file(const char *path, vsh_result result, vsh_error *error) {
+vsh_result vshi_name_file(const char *path, vsh_result result, vsh_error *error) {
     if (error == NULL ||
         (result != VSH_ERROR_INPUT && result != VSH_ERROR_LIMIT && result != VSH_ERROR_UNSUPPORTED)) {
         return result;
@@ -50,7 +43,7 @@ vsh_result vshi_target_charts(const vsh_scene *scene, const vshi_target *target,
     vsh_result result =
         vsh_charts_create(target->meshes, target->mesh_count, &options, &silent, reports, charts, error);
     if (result != VSH_OK) {
-        result = name_file(receiver->path, result, error);
+        result = vshi_name_file(receiver->path, result, error);
         goto done;
     }
     vsh_charts_info info;
@@ -87,100 +80,27 @@ vsh_result vshi_job_plan(const vsh_bake_job *job, size_t index, const vsh_charts
     return vshi_bands_plan(&job->scene, &job->targets.list[index], charts, &need, bands, error);
 }
 
-/* A lightmap under way. */
-typedef struct work {
-    vsh_bake_job *job;
-    const vsh_run *run;
-    const vshi_lightmap_input *input;
-    const vshi_target *target;
-    vsh_job_lightmap *lightmap;
-    vshi_channels channels;
-    vsh_bake_stats baked; /* of all bands so far */
-    uint64_t *invalid;    /* [mesh_count]: of one band */
-    vshi_rounds rounds;   /* where there are several bands */
-    vshi_file_sink files;
-    vshi_lit_sink lit;
-    vsh_row_sink sink;
-    bool begun; /* the sink has taken rows */
-    vshi_invalid_picture picture;
-    vshi_resume resume;
-} work;
-
-static bool fixes_seams(const work *w) {
-    return w->target->receiver.seams == VSH_SEAMS_FIX && w->target->receiver.type == VSH_RECEIVER_MESH;
-}
-
-static bool is_fixed_whole(const work *w) {
-    return fixes_seams(w) && w->input->bands.count == 1;
-}
-
-/* Bytes of texels that are kept. */
-static uint64_t kept_bytes(const work *w) {
-    vsh_texels_info kept = {.bytes = 0};
-    if (w->input->kept != NULL) {
-        vsh_texels_get_info(w->input->kept, &kept);
-    }
-    return kept.bytes;
-}
-
-/* Bytes that are there beside the charts: what casts, texels that are kept, planes. */
-static uint64_t held_bytes(const work *w) {
-    const vsh_occluders_info *casters = &w->job->report.occluders;
-    const uint64_t texels = (uint64_t)w->lightmap->width * (uint64_t)w->lightmap->height;
-    const uint64_t floats = (uint64_t)w->channels.image.channel_count +
-                            3 * (uint64_t)w->channels.triple_count + (w->channels.invalid != NULL ? 1 : 0);
-    return casters->field_bytes + casters->triangles_bytes + kept_bytes(w) + texels * floats * sizeof(float);
-}
-
-/* Both of a lightmap that is whole: what is baked stays where there is no memory to make it better. */
-static vsh_result keep_without_memory(const work *w, vsh_result result, const char *kept, vsh_error *error) {
-    if (result != VSH_ERROR_LIMIT) {
-        return name_file(w->target->receiver.path, result, error);
-    }
-    vshi_warn(w->run, "%s: %s: no memory to fix them beside a whole lightmap; raise --memory-limit",
-              w->target->receiver.path, kept);
-    return VSH_OK;
-}
-
-static vsh_result fill_hidden(const work *w, const vsh_texels *texels, vsh_error *error) {
-    vsh_run run = *w->run;
-    run.memory_held += held_bytes(w) - kept_bytes(w);
-    const vsh_result result =
-        vsh_lightmap_fill_hidden(texels, &w->channels.lightmap, w->job->scene.light_count, &run, NULL, error);
-    return keep_without_memory(w, result, "hidden charts are kept", error);
-}
-
-static vsh_result stitch(const work *w, vsh_error *error) {
-    const vsh_bake_job *job = w->job;
-    vsh_stitch_options options = vsh_stitch_options_default();
-    options.max_change = job->scene.shade.max_error;
-    vsh_run run = *w->run;
-    run.memory_held += held_bytes(w);
-    const vsh_result result = vsh_lightmap_stitch(w->input->charts, &w->channels.lightmap,
-                                                  job->scene.light_count, &options, &run, NULL, error);
-    return keep_without_memory(w, result, "seams are kept", error);
-}
-
-static vsh_result bake_band(work *w, int32_t first, int32_t rows, const vsh_run *run, vsh_error *error) {
+static vsh_result bake_band(vshi_lightmap_work *w, int32_t first, int32_t rows, const vsh_run *run,
+                            vsh_error *error) {
     const vsh_scene *scene = &w->job->scene;
     vsh_texels *own = NULL;
-    if (w->input->kept == NULL) {
-        VSHI_TRY(vsh_texels_create_band(w->input->charts, first, rows, run, &own, error));
+    if (w->input.kept == NULL) {
+        VSHI_TRY(vsh_texels_create_band(w->input.charts, first, rows, run, &own, error));
     }
     vsh_bake_stats band = vsh_bake_stats_zero();
     band.invalid_by_mesh = w->invalid;
     band.shade = w->baked.shade;
     band.errors = w->baked.errors;
     vsh_result result =
-        vsh_bake_lightmap(w->job->occluders, own != NULL ? own : w->input->kept, scene->lights,
+        vsh_bake_lightmap(w->job->occluders, own != NULL ? own : w->input.kept, scene->lights,
                           scene->light_count, &scene->shade, run, &w->channels.lightmap, &band, error);
-    const vsh_texels *texels = own != NULL ? own : w->input->kept;
-    if (result == VSH_OK && is_fixed_whole(w)) {
-        result = fill_hidden(w, texels, error);
+    const vsh_texels *texels = own != NULL ? own : w->input.kept;
+    if (result == VSH_OK && vshi_is_fixed_whole(w)) {
+        result = vshi_fill_hidden(w, texels, error);
     }
     vsh_texels_free(own);
     if (result != VSH_OK) {
-        return name_file(w->target->receiver.path, result, error);
+        return vshi_name_file(w->target->receiver.path, result, error);
     }
     w->baked.texels += band.texels;
     w->baked.invalid_texels += band.invalid_texels;
@@ -193,15 +113,16 @@ static vsh_result bake_band(work *w, int32_t first, int32_t rows, const vsh_run 
 }
 
 /* Bakes a band, or takes it from before. */
-static vsh_result make_band(work *w, int32_t first, int32_t rows, const vsh_run *run, vsh_error *error) {
+static vsh_result make_band(vshi_lightmap_work *w, int32_t first, int32_t rows, const vsh_run *run,
+                            vsh_error *error) {
     const size_t meshes = w->target->mesh_count;
     if (vshi_resume_take(&w->resume, first, rows, &w->channels, &w->baked, meshes)) {
         w->lightmap->resumed_rows += (uint64_t)rows;
         return VSH_OK;
     }
     VSHI_TRY(bake_band(w, first, rows, run, error));
-    if (is_fixed_whole(w)) {
-        VSHI_TRY(stitch(w, error));
+    if (vshi_is_fixed_whole(w)) {
+        VSHI_TRY(vshi_stitch_alone(w, error));
     }
     vshi_channels_split(&w->channels, &w->job->scene);
     vshi_resume_keep(&w->resume, first, rows, &w->channels, &w->baked, meshes);
@@ -210,8 +131,8 @@ static vsh_result make_band(work *w, int32_t first, int32_t rows, const vsh_run 
 
 /* Rows of several bands are written as part of the stage that bakes them; those of one as a stage of its own,
  * that far. */
-static vsh_result report_writing(const work *w, double fraction, vsh_error *error) {
-    const bool several = w->input->bands.count > 1;
+static vsh_result report_writing(const vshi_lightmap_work *w, double fraction, vsh_error *error) {
+    const bool several = w->input.bands.count > 1;
     const vsh_run *run = w->run;
     if (run->progress != NULL &&
         run->progress(run->user, several ? "bake" : "write", several ? w->rounds.before : fraction) != 0) {
@@ -220,7 +141,7 @@ static vsh_result report_writing(const work *w, double fraction, vsh_error *erro
     return VSH_OK;
 }
 
-static vsh_result write_band(work *w, int32_t rows, vsh_error *error) {
+static vsh_result write_band(vshi_lightmap_work *w, int32_t rows, vsh_error *error) {
     VSHI_TRY(report_writing(w, 0.0, error));
     if (!w->begun) {
         vsh_image image = w->channels.image;
@@ -235,10 +156,10 @@ static vsh_result write_band(work *w, int32_t rows, vsh_error *error) {
 }
 
 /* What a lightmap goes without that is never whole. */
-static void warn_bands(const work *w) {
+static void warn_bands(const vshi_lightmap_work *w) {
     const vsh_receiver *receiver = &w->target->receiver;
-    const int32_t bands = w->input->bands.count;
-    if (bands > 1 && fixes_seams(w)) {
+    const int32_t bands = w->input.bands.count;
+    if (bands > 1 && vshi_fixes_seams(&w->target->receiver)) {
         vshi_warn(
             w->run,
             "%s: seams are kept: it is baked in %d bands of rows, and a border's sides may lie in two; raise "
@@ -254,9 +175,16 @@ static void warn_bands(const work *w) {
     }
 }
 
-static vsh_result bake_bands(work *w, vsh_error *error) {
+/* Warns of what a lightmap is, or refuses it. */
+static vsh_result tell_baked(const vshi_lightmap_work *w, vsh_error *error) {
+    VSHI_TRY(vshi_refuse_invalid(w->target, &w->baked, error));
+    vshi_warn_baked(&w->job->scene, w->target, &w->baked, w->run);
+    return VSH_OK;
+}
+
+static vsh_result bake_bands(vshi_lightmap_work *w, vsh_error *error) {
     const vsh_scene *scene = &w->job->scene;
-    const vshi_bands *bands = &w->input->bands;
+    const vshi_bands *bands = &w->input.bands;
     const int32_t height = w->target->receiver.height;
     const bool several = bands->count > 1;
     warn_bands(w);
@@ -277,8 +205,7 @@ static vsh_result bake_bands(work *w, vsh_error *error) {
         w->job->report.bake_s += baked - start;
         VSHI_TRY(result);
         if (last) {
-            VSHI_TRY(vshi_refuse_invalid(w->target, &w->baked, error));
-            vshi_warn_baked(scene, w->target, &w->baked, w->run);
+            VSHI_TRY(tell_baked(w, error));
         }
         result = write_band(w, rows, error);
         w->job->report.write_s += vshi_seconds() - baked;
@@ -289,11 +216,11 @@ static vsh_result bake_bands(work *w, vsh_error *error) {
 }
 
 /* Memory, files, and what was kept. */
-static vsh_result open_all(work *w, vsh_error *error) {
+static vsh_result open_all(vshi_lightmap_work *w, vsh_error *error) {
     const vsh_bake_job *job = w->job;
     const vsh_scene *scene = &job->scene;
     const vsh_receiver *receiver = &w->target->receiver;
-    const int32_t rows = w->input->bands.rows;
+    const int32_t rows = w->input.bands.rows;
     const char *picture = job->options.invalid_picture;
     w->invalid = calloc(w->target->mesh_count + 1, sizeof *w->invalid);
     w->baked.invalid_by_mesh = calloc(w->target->mesh_count + 1, sizeof *w->baked.invalid_by_mesh);
@@ -315,7 +242,7 @@ static vsh_result open_all(work *w, vsh_error *error) {
     return VSH_OK;
 }
 
-static vsh_result end_sink(work *w, vsh_result result, vsh_error *error) {
+static vsh_result end_sink(vshi_lightmap_work *w, vsh_result result, vsh_error *error) {
     if (!w->begun) {
         return result;
     }
@@ -344,12 +271,12 @@ static void add_shade(vsh_shade_stats *sum, const vsh_shade_stats *baked) {
     sum->worst_error = fmax(sum->worst_error, baked->worst_error);
 }
 
-static void add_to_report(const work *w) {
+static void add_to_report(const vshi_lightmap_work *w) {
     vsh_bake_report *report = &w->job->report;
     report->texels += w->baked.texels;
     report->invalid_texels += w->baked.invalid_texels;
     report->resumed_rows += w->lightmap->resumed_rows;
-    report->bands += (uint64_t)w->input->bands.count;
+    report->bands += (uint64_t)w->input.bands.count;
     add_shade(&report->shade, &w->baked.shade);
     for (size_t i = 0; i < report->error_count; ++i) {
         vsh_bake_error *sum = &w->job->errors[i];
@@ -361,36 +288,63 @@ static void add_to_report(const work *w) {
     }
 }
 
-static vsh_result bake_all(work *w, vsh_error *error) {
+void vshi_lightmap_begin(vsh_bake_job *job, size_t index, const vshi_lightmap_input *input,
+                         const vsh_run *run, vshi_lightmap_work *w) {
+    *w = (vshi_lightmap_work){.job = job,
+                              .run = run,
+                              .input = *input,
+                              .target = &job->targets.list[index],
+                              .lightmap = &job->lightmaps[index],
+                              .baked = vsh_bake_stats_zero(),
+                              .files = {.job = job, .run = run},
+                              .lit = {.job = job, .run = run, .target = &job->targets.list[index]}};
+    w->sink = job->options.sink != NULL                ? job->sink
+              : vsh_lit_is_output(w->lightmap->output) ? vshi_lit_sink_of(&w->lit)
+                                                       : vshi_file_sink_of(&w->files);
+    w->lightmap->bands = input->bands.count;
+    w->lightmap->band_rows = input->bands.rows;
+}
+
+vsh_result vshi_lightmap_bake_whole(vshi_lightmap_work *w, vsh_error *error) {
+    const double start = vshi_seconds();
+    vsh_run run = *w->run;
+    run.memory_held += w->held;
     VSHI_TRY(open_all(w, error));
-    return bake_bands(w, error);
+    const vsh_result result = bake_band(w, 0, w->input.bands.rows, &run, error);
+    w->job->report.bake_s += vshi_seconds() - start;
+    return result == VSH_OK ? tell_baked(w, error) : result;
+}
+
+vsh_result vshi_lightmap_write_whole(vshi_lightmap_work *w, vsh_error *error) {
+    const double start = vshi_seconds();
+    vshi_channels_split(&w->channels, &w->job->scene);
+    const vsh_result result = write_band(w, w->input.bands.rows, error);
+    w->job->report.write_s += vshi_seconds() - start;
+    return result;
+}
+
+vsh_result vshi_lightmap_end(vshi_lightmap_work *w, vsh_result result, vsh_error *error) {
+    result = end_sink(w, result, error);
+    result = vshi_invalid_picture_close(&w->picture, result, error);
+    w->lightmap->kept_rows = vshi_resume_close(&w->resume);
+    w->lightmap->invalid_texels = w->baked.invalid_texels;
+    if (result == VSH_OK) {
+        add_to_report(w);
+    }
+    free(w->baked.errors);
+    free(w->baked.invalid_by_mesh);
+    free(w->invalid);
+    vshi_channels_free(&w->channels);
+    return result;
 }
 
 vsh_result vshi_job_bake(vsh_bake_job *job, size_t index, const vshi_lightmap_input *input,
                          const vsh_run *run, vsh_error *error) {
-    work w = {.job = job,
-              .run = run,
-              .input = input,
-              .target = &job->targets.list[index],
-              .lightmap = &job->lightmaps[index],
-              .baked = vsh_bake_stats_zero(),
-              .files = {.job = job, .run = run},
-              .lit = {.job = job, .run = run, .target = &job->targets.list[index]}};
-    w.sink = job->options.sink != NULL               ? job->sink
-             : vsh_lit_is_output(w.lightmap->output) ? vshi_lit_sink_of(&w.lit)
-                                                     : vshi_file_sink_of(&w.files);
-    w.lightmap->bands = input->bands.count;
-    w.lightmap->band_rows = input->bands.rows;
-    vsh_result result = end_sink(&w, bake_all(&w, error), error);
-    result = vshi_invalid_picture_close(&w.picture, result, error);
-    w.lightmap->kept_rows = vshi_resume_close(&w.resume);
-    w.lightmap->invalid_texels = w.baked.invalid_texels;
+    vshi_lightmap_work w;
+    vshi_lightmap_begin(job, index, input, run, &w);
+    vsh_result result = open_all(&w, error);
     if (result == VSH_OK) {
-        add_to_report(&w);
+        result = bake_bands(&w, error);
     }
-    free(w.baked.errors);
-    free(w.baked.invalid_by_mesh);
-    free(w.invalid);
-    vshi_channels_free(&w.channels);
-    return result;
+    return vshi_lightmap_end(&w, result, error);
 }
