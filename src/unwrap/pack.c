@@ -33,7 +33,8 @@ enum {
 };
 
 double vshi_pack_bytes(const vshi_packing *packing, size_t count) {
-    return vshi_page_bytes(packing->width, packing->height) + (double)count * (sizeof(vshi_mask) + 200.0);
+    return vshi_page_bytes(packing->width, packing->height) +
+           (double)count * (VSHI_QUARTERS * sizeof(vshi_mask) + VSHI_ANGLES * sizeof(vshi_fit) + 400.0);
 }
 
 /* Places of the best attempt. */
