@@ -7,6 +7,10 @@
 
 #include <stdlib.h>
 
+/* Bytes of planes that are held for stitching where there is no limit: a dozen lightmaps of 2048² with AO
+ * and the irradiance of a light. */
+static const uint64_t MOST_HELD = UINT64_C(2) << 30;
+
 bool vshi_fixes_seams(const vsh_receiver *receiver) {
     return receiver->seams == VSH_SEAMS_FIX && receiver->type == VSH_RECEIVER_MESH;
 }
@@ -85,25 +89,31 @@ vsh_result vshi_stitch_alone(const vshi_lightmap_work *w, vsh_error *error) {
 
 /* --- several */
 
-/* Bytes that a lightmap holds until all of them are stitched: its planes, its charts. */
-static vsh_result find_held(vsh_bake_job *job, size_t index, const vsh_run *run, uint64_t *held,
-                            vsh_error *error) {
+static vsh_result find_planes(const vsh_bake_job *job, size_t index, uint64_t *bytes, vsh_error *error) {
     const vshi_target *target = &job->targets.list[index];
     const bool invalid = job->options.invalid_picture != NULL || job->scene.planes.invalid != 0;
-    vsh_charts *charts = NULL;
     vshi_channels channels;
-    vsh_charts_info info;
     vsh_result result;
     VSHI_TRY_DONE(
         vshi_channels_name(&job->scene, target->receiver.width, target->receiver.height, &channels, error));
-    VSHI_TRY_DONE(
-        vshi_target_charts(&job->scene, target, job->options.allow_overlap != 0, false, run, &charts, error));
-    vsh_charts_get_info(charts, &info);
-    *held = planes_bytes(&job->lightmaps[index], &channels, invalid) + info.bytes;
+    *bytes = planes_bytes(&job->lightmaps[index], &channels, invalid);
 done:
-    vsh_charts_free(charts);
     vshi_channels_free(&channels);
     return result;
+}
+
+/* Bytes that a lightmap holds until all of them are stitched: its planes, its charts. */
+static vsh_result find_held(const vsh_bake_job *job, size_t index, const vsh_run *run, uint64_t *held,
+                            vsh_error *error) {
+    vsh_charts *charts = NULL;
+    vsh_charts_info info;
+    VSHI_TRY(find_planes(job, index, held, error));
+    VSHI_TRY(vshi_target_charts(&job->scene, &job->targets.list[index], job->options.allow_overlap != 0,
+                                false, run, &charts, error));
+    vsh_charts_get_info(charts, &info);
+    vsh_charts_free(charts);
+    *held += info.bytes;
+    return VSH_OK;
 }
 
 /* Lightmaps in a row whose seams are fixed, which are whole by themselves. */
@@ -117,9 +127,25 @@ static size_t count_fixed(const vsh_bake_job *job, size_t first, bool one_receiv
     return end > first ? end - first : 1;
 }
 
+/* Whether lightmaps are few and small enough to be held where nobody has set a limit. */
+static vsh_result are_small(const vsh_bake_job *job, size_t first, size_t count, bool *small,
+                            vsh_error *error) {
+    uint64_t all = 0;
+    for (size_t i = first; i < first + count && all <= MOST_HELD; ++i) {
+        uint64_t bytes = 0;
+        VSHI_TRY(find_planes(job, i, &bytes, error));
+        all += bytes;
+    }
+    *small = all <= MOST_HELD;
+    return VSH_OK;
+}
+
 /* Whether each can be baked whole beside what the others hold. */
 static vsh_result fit_together(const vsh_bake_job *job, size_t first, size_t count, const uint64_t *held,
                                const vsh_run *run, bool *fit, vsh_error *error) {
+    if (run->memory_limit == 0) {
+        return are_small(job, first, count, fit, error);
+    }
     uint64_t all = casters_bytes(job);
     for (size_t i = 0; i < count; ++i) {
         all += held[i];
@@ -148,12 +174,8 @@ vsh_result vshi_count_together(vsh_bake_job *job, size_t first, const vsh_run *r
     if (most == 1 || job->options.resume || first < job->apart) {
         return VSH_OK;
     }
-    if (run->memory_limit == 0) {
-        *count = most;
-        return VSH_OK;
-    }
     VSHI_TRY_DONE(vshi_allocate((void **)&held, most, sizeof *held, "seams", error));
-    for (size_t i = 0; i < most; ++i) {
+    for (size_t i = 0; i < most && run->memory_limit > 0; ++i) {
         VSHI_TRY_DONE(find_held(job, first + i, run, &held[i], error));
     }
     VSHI_TRY_DONE(fit_together(job, first, most, held, run, &fit, error));
