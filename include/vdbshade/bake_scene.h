@@ -85,12 +85,19 @@ typedef struct vsh_bake_job_options {
                             image shows is their unlit base colour */
     int32_t lit_image_place; /* VSH_LIT_IMAGES_… */
     const char *lit_exr;     /* EXR of all channels beside the one output; NULL: none */
+    int32_t shard; /* 1 … shard_count: vsh_bake_job_run() bakes only the rows that are its, as much work as
+                      any other's, and writes them into the file PARTS.SHARD-of-COUNT.part, whole or not at
+                      all; 0: all rows. Not with a sink or `invalid_picture` */
+    int32_t shard_count; /* 1 … 10000; for vsh_bake_job_merge() also 0: as many as there are beside PARTS */
+    const char *parts;   /* what the names of parts begin with; NULL: the first lightmap's output */
+    const char *const *words; /* [word_count]: kept in a part as they are, for vsh_part_words() */
+    size_t word_count;
 } vsh_bake_job_options;
 
 static inline vsh_bake_job_options vsh_bake_job_options_default(void) {
     vsh_bake_job_options options = {
-        sizeof(vsh_bake_job_options), 0,   0, 0, 0, NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL, 0,
-        VSH_LIT_IMAGES_AUTO,          NULL};
+        sizeof(vsh_bake_job_options), 0,    0, 0, 0,    NULL, NULL, NULL, NULL, 0, NULL, NULL, NULL, 0,
+        VSH_LIT_IMAGES_AUTO,          NULL, 0, 0, NULL, NULL, 0};
     return options;
 }
 
@@ -125,6 +132,25 @@ VSH_API vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, v
  * the limit); VSH_ERROR_WRITE (`resume`: the file of bands is not ours, or open elsewhere). Lightmaps that
  * are done by then stay. */
 VSH_API vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
+
+/* Puts the parts of all shards together, which vsh_bake_job_run() wrote for the same scene and options on
+ * whatever machines, in place of …_prepare() and …_run(): pads, fills, stitches, and writes the same files,
+ * bit by bit, as one bake that holds its lightmaps whole. What casts is not made. A lightmap that
+ * run->memory_limit does not let hold whole is written in bands of rows, as of a bake. Statistics are those
+ * of the parts, where what filled texels are off is not known. The parts stay. Errors: as …_measure() and the
+ * writing of …_run(); VSH_ERROR_READ (a part is missing), VSH_ERROR_INPUT (there are none; one is damaged, or
+ * of other inputs, options or another version than this job, all of which it names). */
+VSH_API vsh_result vsh_bake_job_merge(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
+
+/* The words that were kept in the first part that is there of those whose names begin with `parts`
+ * (vsh_bake_job_options), of `shard_count` shards, or (0) of however many there are beside it:
+ * (*words)[*count], and NULL behind them, to be freed with vsh_part_words_free(). A part is whatever somebody
+ * has put there: words are text that its writer chose. Errors: VSH_ERROR_ARGUMENT (NULL), VSH_ERROR_READ,
+ * VSH_ERROR_INPUT (there are no parts, of several numbers of shards, or it is none), VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY. */
+VSH_API vsh_result vsh_part_words(const char *parts, int32_t shard_count, const vsh_run *run, char ***words,
+                                  size_t *count, vsh_error *error);
+VSH_API void vsh_part_words_free(char **words); /* NULL does nothing */
 
 /* How many lightmaps there are, and one of them. Cannot fail, but that `index` must be below the count. */
 VSH_API size_t vsh_bake_job_count(const vsh_bake_job *job);

@@ -1,7 +1,9 @@
 #include "bake_scene/job.h"
 
 #include "bake_scene/lit_sink.h"
+#include "bake_scene/part_job.h"
 #include "bake_scene/resume.h"
+#include "bake_scene/shares.h"
 #include "base/clock.h"
 #include "base/job.h"
 #include "base/memory.h"
@@ -78,6 +80,24 @@ static vsh_result check_lit(const vsh_scene *scene, const vsh_bake_job_options *
     return VSH_OK;
 }
 
+static vsh_result check_shard(const vsh_bake_job_options *options, vsh_error *error) {
+    const int32_t count = options->shard_count;
+    if (count < 0 || count > VSHI_MOST_SHARDS || options->shard < 0 || options->shard > count) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "vsh_bake_job_options.shard %d of %d: expected 1 to %d, and no more than there are",
+                         options->shard, count, VSHI_MOST_SHARDS);
+    }
+    if (options->shard > 0 && (options->sink != NULL || options->invalid_picture != NULL)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.shard: not together with %s",
+                         options->sink != NULL ? "a sink" : "invalid_picture");
+    }
+    VSHI_NEEDS_OF(options->word_count, options->words);
+    for (size_t i = 0; i < options->word_count; ++i) {
+        VSHI_NEEDS(options->words[i]);
+    }
+    return VSH_OK;
+}
+
 static vsh_result check(const vsh_scene *scene, const vsh_bake_job_options *options, vsh_error *error) {
     if (scene->receiver_count == 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "scene: no receivers");
@@ -86,6 +106,7 @@ static vsh_result check(const vsh_scene *scene, const vsh_bake_job_options *opti
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_bake_job_options.resume: not together with %s",
                          options->sink != NULL ? "a sink" : "invalid_picture");
     }
+    VSHI_TRY(check_shard(options, error));
     for (size_t i = 0; i < scene->receiver_count && options->sink == NULL; ++i) {
         VSHI_TRY(vsh_receiver_check(scene, i, error));
     }
@@ -152,6 +173,8 @@ void vsh_bake_job_free(vsh_bake_job *job) {
     if (job == NULL) {
         return;
     }
+    free(job->part_path);
+    vshi_shares_free(job);
     free(job->errors);
     vshi_lit_pages_free(job);
     vsh_provenance_free(job->provenance);
@@ -183,6 +206,11 @@ void vsh_bake_job_get_report_sized(const vsh_bake_job *job, vsh_bake_report *rep
 
 /* --- measured */
 
+/* Whether some of its rows are baked, into a part. */
+static bool is_shard(const vsh_bake_job *job) {
+    return job->options.shard > 0;
+}
+
 /* Where its samples are: looked at in passing, or (whole) all of them are made. */
 static vsh_result find_bounds(const vsh_charts *charts, const vshi_bands *bands, bool whole,
                               const vsh_run *run, vsh_texels **texels, double low[3], double high[3],
@@ -207,15 +235,19 @@ static vsh_result measure(vsh_bake_job *job, size_t index, bool bakes, const vsh
     vsh_result result;
     VSHI_TRY_DONE(vshi_target_charts(&job->scene, &job->targets.list[index], job->options.allow_overlap != 0,
                                      bakes, run, &charts, error));
-    VSHI_TRY_DONE(vshi_job_plan(job, index, charts, 0, run, &bands, error));
-    VSHI_TRY_DONE(find_bounds(charts, &bands, bakes && bands.count == 1, run, &texels, low, high, error));
     vsh_charts_info counted;
     vsh_charts_get_info(charts, &counted);
+    VSHI_TRY_DONE(vshi_shares_note(job, index, charts, error));
+    VSHI_TRY_DONE(vshi_job_plan(job, index, charts, 0, run, &bands, error));
+    if (!job->merges) { /* which asks nothing of what casts */
+        const bool all = bakes && bands.count == 1 && !is_shard(job);
+        VSHI_TRY_DONE(find_bounds(charts, &bands, all, run, &texels, low, high, error));
+    }
     lightmap->covered = counted.covered;
     lightmap->samples = counted.samples;
     lightmap->bands = bands.count;
     lightmap->band_rows = bands.rows;
-    for (int axis = 0; axis < 3 && counted.samples > 0; ++axis) {
+    for (int axis = 0; axis < 3 && counted.samples > 0 && !job->merges; ++axis) {
         job->receivers[0][axis] = fmin(job->receivers[0][axis], low[axis]);
         job->receivers[1][axis] = fmax(job->receivers[1][axis], high[axis]);
     }
@@ -261,7 +293,10 @@ double vshi_job_points(const vsh_bake_job *job) {
     return points;
 }
 
-static vsh_result find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
+vsh_result vshi_job_find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
+    if (job->provenance != NULL) {
+        return VSH_OK;
+    }
     const double start = vshi_seconds();
     vsh_provenance_source source = vsh_provenance_source_default();
     source.scene = &job->scene;
@@ -274,6 +309,18 @@ static vsh_result find_provenance(vsh_bake_job *job, const vsh_run *run, vsh_err
     const vsh_result result = vsh_provenance_create(&source, run, &job->provenance, error);
     job->report.load_s += vshi_seconds() - start;
     return result;
+}
+
+vsh_result vshi_job_make_errors(vsh_bake_job *job, vsh_error *error) {
+    const size_t count = job->scene.light_count + 2;
+    free(job->errors);
+    job->errors = calloc(count, sizeof *job->errors);
+    if (job->errors == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "bake job: the system refused memory");
+    }
+    job->report.errors = job->errors;
+    job->report.error_count = count;
+    return VSH_OK;
 }
 
 vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
@@ -291,19 +338,12 @@ vsh_result vsh_bake_job_prepare(vsh_bake_job *job, const vsh_run *run, vsh_error
     options.points = vshi_job_points(job);
     VSHI_TRY(vsh_scene_occluders(&job->scene, job->assets, &options, run, &job->occluders, error));
     vsh_occluders_get_info(job->occluders, &job->report.occluders);
-    const size_t count = job->scene.light_count + 2;
-    job->errors = calloc(count, sizeof *job->errors);
-    if (job->errors == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "bake job: the system refused memory");
-    }
-    job->report.errors = job->errors;
-    job->report.error_count = count;
-    return VSH_OK;
+    return vshi_job_make_errors(job, error);
 }
 
 /* --- run */
 
-static vsh_result bake(vsh_bake_job *job, size_t index, const vsh_run *run, vsh_error *error) {
+vsh_result vshi_job_bake_one(vsh_bake_job *job, size_t index, const vsh_run *run, vsh_error *error) {
     vshi_lightmap_input input = {.charts = job->charts};
     vsh_charts *own = NULL;
     if (job->charts == NULL) {
@@ -314,9 +354,9 @@ static vsh_result bake(vsh_bake_job *job, size_t index, const vsh_run *run, vsh_
         input.charts = own;
     }
     const vsh_occluders_info *casters = &job->report.occluders;
+    const uint64_t held = job->parts != NULL ? 0 : casters->field_bytes + casters->triangles_bytes;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_job_plan(job, index, input.charts, casters->field_bytes + casters->triangles_bytes,
-                                run, &input.bands, error));
+    VSHI_TRY_DONE(vshi_job_plan(job, index, input.charts, held, run, &input.bands, error));
     if (input.bands.count > 1) {
         vsh_texels_free(job->texels);
         job->texels = NULL;
@@ -333,20 +373,23 @@ done:
 
 vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
     VSHI_NEEDS(job);
-    if (job->errors == NULL) {
+    if (job->occluders == NULL || job->errors == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: vsh_bake_job_prepare() comes first", __func__);
     }
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    if (job->options.sink == NULL && job->provenance == NULL) {
-        VSHI_TRY(find_provenance(job, &full, error));
+    if (job->options.sink == NULL) {
+        VSHI_TRY(vshi_job_find_provenance(job, &full, error));
     }
-    for (size_t i = 0; i < job->targets.count; ++i) {
-        VSHI_TRY(bake(job, i, &full, error));
+    if (is_shard(job)) {
+        VSHI_TRY(vshi_job_bake_part(job, &full, error));
+    }
+    for (size_t i = 0; i < job->targets.count && !is_shard(job); ++i) {
+        VSHI_TRY(vshi_job_bake_one(job, i, &full, error));
     }
     /* not before all are whole: a bake that goes on writes those that were again */
     for (size_t i = 0; i < job->targets.count && job->options.resume; ++i) {
-        vshi_resume_remove(job->lightmaps[i].output);
+        VSHI_TRY(vshi_job_forget(job, i, error));
     }
     return VSH_OK;
 }

@@ -1,13 +1,18 @@
 /* One lightmap's way: its charts, its bands of texels, its values, its rows. */
+#include "bake/part.h"
 #include "bake_scene/channels.h"
 #include "bake_scene/file_sink.h"
 #include "bake_scene/invalid_picture.h"
 #include "bake_scene/job.h"
 #include "bake_scene/lit_sink.h"
+#include "bake_scene/merge.h"
+#include "bake_scene/part_job.h"
 #include "bake_scene/resume.h"
+#include "bake_scene/shares.h"
 #include "bake_scene/warn.h"
 #include "base/clock.h"
 #include "base/job.h"
+#include "base/memory.h"
 #include "base/rounds.h"
 #include "base/try.h"
 
@@ -74,11 +79,21 @@ vsh_result vshi_job_plan(const vsh_bake_job *job, size_t index, const vsh_charts
     const vsh_job_lightmap *lightmap = &job->lightmaps[index];
     const bool lit = job->options.sink == NULL && vsh_lit_is_output(lightmap->output) != 0;
     const uint64_t pages = vsh_assets_receiver_pages(job->assets, lightmap->receiver);
-    const uint64_t kept = lit ? pages * vshi_lit_sink_bytes(lightmap->width, lightmap->height) : 0;
-    const vshi_bands_need need = {.picture = job->options.invalid_picture != NULL,
+    const uint64_t kept =
+        lit && job->options.shard == 0 ? pages * vshi_lit_sink_bytes(lightmap->width, lightmap->height) : 0;
+    const bool shard = job->options.shard > 0;
+    int32_t first = 0, end = lightmap->height;
+    if (shard) {
+        vshi_shares_rows(job, job->options.shard, job->options.shard_count, index, &first, &end);
+    }
+    const vshi_bands_need need = {.part = shard,
+                                  .merge = job->merges,
+                                  .first = first,
+                                  .end = end,
+                                  .picture = job->options.invalid_picture != NULL,
                                   .resume = job->options.resume != 0,
-                                  .files = job->options.sink == NULL && !lit,
-                                  .rows = job->options.band_rows,
+                                  .files = job->options.sink == NULL && !lit && !shard,
+                                  .rows = job->merges ? 0 : job->options.band_rows,
                                   .held = held + kept,
                                   .limit = run->memory_limit};
     return vshi_bands_plan(&job->scene, &job->targets.list[index], charts, &need, bands, error);
@@ -90,6 +105,7 @@ typedef struct work {
     const vsh_run *run;
     const vshi_lightmap_input *input;
     const vshi_target *target;
+    size_t index; /* of it */
     vsh_job_lightmap *lightmap;
     vshi_channels channels;
     vsh_bake_stats baked; /* of all bands so far */
@@ -97,6 +113,7 @@ typedef struct work {
     vshi_rounds rounds;   /* where there are several bands */
     vshi_file_sink files;
     vshi_lit_sink lit;
+    vshi_part_sink part;
     vsh_row_sink sink;
     bool begun; /* the sink has taken rows */
     vshi_invalid_picture picture;
@@ -106,16 +123,21 @@ typedef struct work {
 static vsh_result bake_band(work *w, int32_t first, int32_t rows, const vsh_run *run, vsh_error *error) {
     const vsh_scene *scene = &w->job->scene;
     vsh_texels *own = NULL;
+    uint32_t *known = w->channels.known;
     if (w->input->kept == NULL) {
-        VSHI_TRY(vsh_texels_create_band(w->input->charts, first, rows, run, &own, error));
+        VSHI_TRY((known != NULL ? vshi_texels_create_part : vsh_texels_create_band)(w->input->charts, first,
+                                                                                    rows, run, &own, error));
     }
+    const vsh_texels *texels = own != NULL ? own : w->input->kept;
     vsh_bake_stats band = vsh_bake_stats_zero();
     band.invalid_by_mesh = w->invalid;
     band.shade = w->baked.shade;
     band.errors = w->baked.errors;
     const vsh_result result =
-        vsh_bake_lightmap(w->job->occluders, own != NULL ? own : w->input->kept, scene->lights,
-                          scene->light_count, &scene->shade, run, &w->channels.lightmap, &band, error);
+        known != NULL ? vshi_bake_part(w->job->occluders, texels, scene->lights, scene->light_count,
+                                       &scene->shade, run, &w->channels.lightmap, known, &band, error)
+                      : vsh_bake_lightmap(w->job->occluders, texels, scene->lights, scene->light_count,
+                                          &scene->shade, run, &w->channels.lightmap, &band, error);
     vsh_texels_free(own);
     if (result != VSH_OK) {
         return name_file(w->target->receiver.path, result, error);
@@ -134,6 +156,11 @@ static bool fixes_seams(const work *w) {
     return w->target->receiver.seams == VSH_SEAMS_FIX && w->target->receiver.type == VSH_RECEIVER_MESH;
 }
 
+/* Whether it is some rows of it that go into a part. */
+static bool is_part(const work *w) {
+    return w->job->options.shard > 0;
+}
+
 /* Bytes that are there beside the charts: what casts, texels that are kept, planes. */
 static uint64_t held_bytes(const work *w) {
     const vsh_occluders_info *casters = &w->job->report.occluders;
@@ -144,7 +171,8 @@ static uint64_t held_bytes(const work *w) {
     if (w->input->kept != NULL) {
         vsh_texels_get_info(w->input->kept, &kept);
     }
-    return casters->field_bytes + casters->triangles_bytes + kept.bytes + texels * floats * sizeof(float);
+    const uint64_t cast = w->job->parts != NULL ? 0 : casters->field_bytes + casters->triangles_bytes;
+    return cast + kept.bytes + texels * floats * sizeof(float);
 }
 
 /* A lightmap that is whole. What is baked stays where there is no memory to make it better. */
@@ -165,15 +193,21 @@ static vsh_result stitch(const work *w, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Bakes a band, or takes it from before. */
+/* Bakes a band, or takes it from parts, or from before. */
 static vsh_result make_band(work *w, int32_t first, int32_t rows, const vsh_run *run, vsh_error *error) {
     const size_t meshes = w->target->mesh_count;
+    const vshi_parts *parts = w->job->parts;
     if (vshi_resume_take(&w->resume, first, rows, &w->channels, &w->baked, meshes)) {
         w->lightmap->resumed_rows += (uint64_t)rows;
         return VSH_OK;
     }
-    VSHI_TRY(bake_band(w, first, rows, run, error));
-    if (fixes_seams(w) && w->input->bands.count == 1) {
+    if (parts != NULL) {
+        VSHI_TRY(vshi_parts_take(parts, &w->job->scene, w->index, w->input->charts, first, rows, run,
+                                 &w->channels, error));
+    } else {
+        VSHI_TRY(bake_band(w, first, rows, run, error));
+    }
+    if (fixes_seams(w) && w->input->bands.count == 1 && !is_part(w)) {
         VSHI_TRY(stitch(w, error));
     }
     vshi_channels_split(&w->channels, &w->job->scene);
@@ -230,15 +264,20 @@ static void warn_bands(const work *w) {
 static vsh_result bake_bands(work *w, vsh_error *error) {
     const vsh_scene *scene = &w->job->scene;
     const vshi_bands *bands = &w->input->bands;
-    const int32_t height = w->target->receiver.height;
+    const int32_t height = bands->end - bands->first;
     const bool several = bands->count > 1;
-    warn_bands(w);
+    if (!is_part(w)) {
+        warn_bands(w);
+    }
     if (several) { /* texels, validate, padding, and what is shaded */
         const int shaded = (int)scene->light_count + (scene->ao ? 1 : 0) + vsh_planes_shaded(&scene->planes);
         vshi_rounds_begin(&w->rounds, w->run, "bake", 3 + shaded);
     }
-    for (int32_t first = 0;; first += bands->rows) {
-        const int32_t left = height - first, rows = left < bands->rows ? left : bands->rows;
+    if (w->job->parts != NULL) {
+        vshi_parts_add_stats(w->job->parts, w->index, &w->baked);
+    }
+    for (int32_t first = bands->first;; first += bands->rows) {
+        const int32_t left = bands->end - first, rows = left < bands->rows ? left : bands->rows;
         const bool last = left <= bands->rows;
         const double start = vshi_seconds();
         const vsh_run run = several ? vshi_rounds_run(&w->rounds, (double)rows / (double)height) : *w->run;
@@ -249,7 +288,7 @@ static vsh_result bake_bands(work *w, vsh_error *error) {
         const double baked = vshi_seconds();
         w->job->report.bake_s += baked - start;
         VSHI_TRY(result);
-        if (last) {
+        if (last && !is_part(w)) {
             VSHI_TRY(vshi_refuse_invalid(w->target, &w->baked, error));
             vshi_warn_baked(scene, w->target, &w->baked, w->run);
         }
@@ -277,13 +316,28 @@ static vsh_result open_all(work *w, vsh_error *error) {
     VSHI_TRY(vshi_channels_name(scene, receiver->width, receiver->height, &w->channels, error));
     VSHI_TRY(vshi_channels_allocate(&w->channels, scene, rows, picture != NULL || scene->planes.invalid != 0,
                                     w->run->memory_limit, receiver->output, error));
+    if (is_part(w)) {
+        const size_t texels = (size_t)receiver->width * (size_t)rows;
+        VSHI_TRY(vshi_allocate((void **)&w->channels.known, texels, sizeof *w->channels.known,
+                               receiver->output, error));
+    }
     VSHI_TRY(vshi_invalid_picture_open(&w->picture, picture, receiver->output, job->targets.count > 1,
                                        receiver->width, receiver->height, rows, error));
     if (job->options.resume) {
-        vshi_resume_key key = {.image = &w->channels.image, .band_rows = rows};
+        const vshi_bands *bands = &w->input->bands;
+        vshi_resume_key key = {.image = &w->channels.image,
+                               .band_rows = rows,
+                               .part = is_part(w),
+                               .first = bands->first,
+                               .end = bands->end};
         key.attributes = vsh_provenance_attributes(job->provenance, &key.attribute_count);
-        VSHI_TRY(
-            vshi_resume_open(receiver->output, &key, job->report.error_count, w->run, &w->resume, error));
+        char *kept = vshi_job_kept_name(job, w->index);
+        const vsh_result result =
+            kept != NULL
+                ? vshi_resume_open(kept, &key, job->report.error_count, w->run, &w->resume, error)
+                : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", receiver->path);
+        free(kept);
+        VSHI_TRY(result);
     }
     return VSH_OK;
 }
@@ -302,7 +356,7 @@ static vsh_result end_sink(work *w, vsh_result result, vsh_error *error) {
     return VSH_OK;
 }
 
-static void add_shade(vsh_shade_stats *sum, const vsh_shade_stats *baked) {
+void vshi_add_shade(vsh_shade_stats *sum, const vsh_shade_stats *baked) {
     sum->marches += baked->marches;
     sum->samples += baked->samples;
     sum->skipped += baked->skipped;
@@ -317,20 +371,23 @@ static void add_shade(vsh_shade_stats *sum, const vsh_shade_stats *baked) {
     sum->worst_error = fmax(sum->worst_error, baked->worst_error);
 }
 
+void vshi_add_bake_error(vsh_bake_error *sum, const vsh_bake_error *more) {
+    sum->values += more->values;
+    sum->square_error += more->square_error;
+    sum->held += more->held;
+    sum->held_square_error += more->held_square_error;
+    sum->worst = fmax(sum->worst, more->worst);
+}
+
 static void add_to_report(const work *w) {
     vsh_bake_report *report = &w->job->report;
     report->texels += w->baked.texels;
     report->invalid_texels += w->baked.invalid_texels;
     report->resumed_rows += w->lightmap->resumed_rows;
     report->bands += (uint64_t)w->input->bands.count;
-    add_shade(&report->shade, &w->baked.shade);
+    vshi_add_shade(&report->shade, &w->baked.shade);
     for (size_t i = 0; i < report->error_count; ++i) {
-        vsh_bake_error *sum = &w->job->errors[i];
-        sum->values += w->baked.errors[i].values;
-        sum->square_error += w->baked.errors[i].square_error;
-        sum->held += w->baked.errors[i].held;
-        sum->held_square_error += w->baked.errors[i].held_square_error;
-        sum->worst = fmax(sum->worst, w->baked.errors[i].worst);
+        vshi_add_bake_error(&w->job->errors[i], &w->baked.errors[i]);
     }
 }
 
@@ -345,11 +402,14 @@ vsh_result vshi_job_bake(vsh_bake_job *job, size_t index, const vshi_lightmap_in
               .run = run,
               .input = input,
               .target = &job->targets.list[index],
+              .index = index,
               .lightmap = &job->lightmaps[index],
               .baked = vsh_bake_stats_zero(),
               .files = {.job = job, .run = run},
               .lit = {.job = job, .run = run}};
-    w.sink = job->options.sink != NULL               ? job->sink
+    w.part = (vshi_part_sink){job, w.lightmap, &w.channels, &w.baked};
+    w.sink = is_part(&w)                             ? vshi_part_sink_of(&w.part)
+             : job->options.sink != NULL             ? job->sink
              : vsh_lit_is_output(w.lightmap->output) ? vshi_lit_sink_of(&w.lit)
                                                      : vshi_file_sink_of(&w.files);
     w.lightmap->bands = input->bands.count;

@@ -16,6 +16,7 @@ extern const cli_command cli_compare;
 extern const cli_command cli_regress;
 extern const cli_command cli_unwrap;
 extern const cli_command cli_view;
+extern const cli_command cli_merge;
 
 int cli_bake_main(int argc, char **argv);
 int cli_render_main(int argc, char **argv);

@@ -16,6 +16,10 @@ void cli_bake_expect(const vsh_scene *scene, const vsh_bake_job *job, int32_t th
  */
 int cli_bake_forecast(const vsh_scene *scene, vsh_bake_job *job, const vsh_run *run);
 
+/* Bakes, or puts parts together, by settings that were taken: frees nothing of them. CLI_OK or an exit code,
+ * having said why. */
+int cli_bake_by(const cli_bake_settings *settings);
+
 /* --view: whether the page can be written, and writing it when all is baked. CLI_OK or an exit code, having
  * said why. */
 int cli_bake_check_view(const cli_bake_settings *settings, const vsh_scene *scene);

@@ -52,6 +52,10 @@ static const cli_option options[] = {
     {KEY_RESUME, "resume", NULL,
      "keep finished rows in OUT.resume until all are there,\nand go on from them where a bake with this "
      "option was\nended; the result is the same, bit by bit"},
+    CLI_SHARD_OPTION(
+        "bake part I of N, with as much work as the others, into\nOUT.I-of-N.part: on any machine, in any "
+        "order, again where\nit failed; 'vdbshade merge OUT' puts all parts together to\nthe bits of "
+        "one bake"),
     {0, NULL, NULL, "Objects"},
     {KEY_RECEIVE, "receive", "NAME",
      "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
@@ -178,6 +182,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_RESUME:
         s->resume = true;
         return CLI_OK;
+    case CLI_KEY_SHARD:
+        return cli_parse_shard(name, value, &s->shard, &s->shard_count);
     case KEY_BAND_ROWS:
         return cli_parse_integer(name, value, 1, VSH_MAX_LIGHTMAP_SIZE, &s->band_rows);
     default:
@@ -189,6 +195,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
 int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help) {
     memset(settings, 0, sizeof *settings);
     settings->common = cli_common_default();
+    settings->words = (const char *const *)argv;
+    settings->word_count = (size_t)argc;
     const int code = cli_parse(&cli_bake, argc, argv, take, settings, "INPUT", &settings->input, help);
     return code != CLI_OK || *help ? code : cli_patch_check(&settings->patch);
 }

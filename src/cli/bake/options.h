@@ -48,6 +48,10 @@ typedef struct cli_bake_settings {
     const char *exr;                    /* beside an asset; NULL: none */
     bool preview, embed, images_beside; /* of an asset */
     bool has_sun, has_sun_angle, has_light_radius, per_object, dry_run, resume;
+    int32_t shard, shard_count; /* 0: all of it */
+    const char *const *words;   /* [word_count]: the command line that this is */
+    size_t word_count;
+    const char *merged; /* parts of this name are put together, and nothing is baked; NULL: it is baked */
 } cli_bake_settings;
 
 /* Takes an option of the tables above, a setting or one of the common ones. */

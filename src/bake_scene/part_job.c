@@ -1,0 +1,177 @@
+#include "bake_scene/part_job.h"
+
+#include "bake_scene/merge.h"
+#include "bake_scene/resume.h"
+#include "bake_scene/shares.h"
+#include "base/memory.h"
+#include "base/try.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* --- its head */
+
+/* Pieces and lightmaps of a shard; the lists are the head's. */
+static vsh_result list_pieces(const vsh_bake_job *job, vshi_part_head *head, vsh_error *error) {
+    const size_t count = job->targets.count;
+    VSHI_TRY(vshi_allocate((void **)&head->lightmaps, count + 1, sizeof *head->lightmaps, "part", error));
+    VSHI_TRY(vshi_allocate((void **)&head->pieces, count + 1, sizeof *head->pieces, "part", error));
+    head->lightmap_count = count;
+    for (size_t i = 0; i < count; ++i) {
+        const vsh_job_lightmap *own = &job->lightmaps[i];
+        int32_t first, end;
+        head->lightmaps[i] =
+            (vshi_part_lightmap){own->width, own->height, own->mesh_count, own->covered, own->samples};
+        vshi_shares_rows(job, head->shard, head->shard_count, i, &first, &end);
+        if (first < end) {
+            head->pieces[head->piece_count++] = (vshi_part_piece){i, first, end - first};
+        }
+    }
+    return VSH_OK;
+}
+
+/* Copies of texts; false where memory is short. */
+static bool copy_texts(const char *const *texts, size_t count, char ***copies, uint64_t *copied) {
+    *copies = calloc(count + 1, sizeof **copies);
+    for (size_t i = 0; *copies != NULL && i < count; ++i, ++*copied) {
+        (*copies)[i] = strdup(texts[i]);
+        if ((*copies)[i] == NULL) {
+            return false;
+        }
+    }
+    return *copies != NULL;
+}
+
+static bool copy_attributes(const vsh_bake_job *job, vshi_part_head *head) {
+    size_t count;
+    const vsh_attribute *own = vsh_provenance_attributes(job->provenance, &count);
+    head->attributes = calloc(count + 1, sizeof *head->attributes);
+    for (size_t i = 0; head->attributes != NULL && i < count; ++i) {
+        vshi_part_attribute *attribute = &head->attributes[head->attribute_count++];
+        attribute->name = strdup(own[i].name);
+        attribute->value = strdup(own[i].value);
+        if (attribute->name == NULL || attribute->value == NULL) {
+            return false;
+        }
+    }
+    return head->attributes != NULL;
+}
+
+static bool copy_channels(const vshi_channels *channels, vshi_part_head *head) {
+    return copy_texts(channels->image.names, (size_t)channels->image.channel_count, &head->channels,
+                      &head->channel_count);
+}
+
+static vsh_result begin_part(vsh_bake_job *job, vsh_error *error) {
+    const vsh_occluders_info *casters = &job->report.occluders;
+    vshi_part_head head = {.version = strdup(vsh_version()),
+                           .shard = job->options.shard,
+                           .shard_count = job->options.shard_count,
+                           .error_count = job->report.error_count,
+                           .voxel_size = casters->voxel_size,
+                           .active_voxels = casters->active_voxels,
+                           .field_bytes = casters->field_bytes,
+                           .levels = casters->levels,
+                           .has_triangles = casters->has_triangles};
+    vshi_channels channels;
+    vsh_result result;
+    char *path = vshi_part_path(vshi_parts_name(job), head.shard, head.shard_count);
+    VSHI_TRY_DONE(vshi_channels_name(&job->scene, 1, 1, &channels, error));
+    VSHI_TRY_DONE(list_pieces(job, &head, error));
+    if (path == NULL || head.version == NULL || !copy_channels(&channels, &head) ||
+        !copy_texts(job->options.words, job->options.word_count, &head.words, &head.word_count) ||
+        !copy_attributes(job, &head)) {
+        result = vshi_fail(error, VSH_ERROR_MEMORY, "part: the system refused memory");
+        goto done;
+    }
+    VSHI_TRY_DONE(vshi_part_writer_create(path, &head, &job->part, error));
+    free(job->part_path);
+    job->part_path = path;
+    path = NULL;
+done:
+    free(path);
+    vshi_part_head_free(&head);
+    vshi_channels_free(&channels);
+    return result;
+}
+
+/* --- its rows */
+
+static vsh_result begin(void *user, const vsh_job_lightmap *lightmap, const vsh_image *image,
+                        vsh_error *error) {
+    (void)user;
+    (void)lightmap;
+    (void)image;
+    (void)error;
+    return VSH_OK;
+}
+
+static vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_error *error) {
+    const vshi_part_sink *part = user;
+    (void)error; /* what could not be written is told at the end */
+    vshi_part_writer_add(part->job->part, part->lightmap->width, rows, planes, part->channels->known);
+    return VSH_OK;
+}
+
+static vsh_result end(void *user, vsh_result result, vsh_error *error) {
+    const vshi_part_sink *part = user;
+    return result == VSH_OK ? vshi_part_writer_piece(part->job->part, part->baked, error) : result;
+}
+
+vsh_row_sink vshi_part_sink_of(vshi_part_sink *part) {
+    return (vsh_row_sink){sizeof(vsh_row_sink), begin, add, end, part};
+}
+
+/* Whether a shard has rows of a lightmap. */
+static bool has_rows(const vsh_bake_job *job, size_t index) {
+    int32_t first, end;
+    vshi_shares_rows(job, job->options.shard, job->options.shard_count, index, &first, &end);
+    return first < end;
+}
+
+vsh_result vshi_job_bake_part(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
+    VSHI_TRY(begin_part(job, error));
+    if (job->options.writing != NULL) {
+        job->options.writing(job->options.user, job->part_path);
+    }
+    vsh_result result = VSH_OK;
+    for (size_t i = 0; i < job->targets.count && result == VSH_OK; ++i) {
+        result = has_rows(job, i) ? vshi_job_bake_one(job, i, run, error) : VSH_OK;
+    }
+    vshi_part_writer *part = job->part;
+    job->part = NULL;
+    if (result == VSH_OK) {
+        result = vshi_part_writer_finish(part, error);
+    } else {
+        vshi_part_writer_abandon(part);
+    }
+    if (job->options.writing != NULL) {
+        job->options.writing(job->options.user, NULL);
+    }
+    return result;
+}
+
+/* --- what is kept for the next bake */
+
+char *vshi_job_kept_name(const vsh_bake_job *job, size_t index) {
+    if (job->options.shard == 0) {
+        return strdup(job->lightmaps[index].output);
+    }
+    const size_t size = strlen(job->part_path) + 24;
+    char *name = malloc(size);
+    if (name != NULL) {
+        snprintf(name, size, "%s.%zu", job->part_path, index);
+    }
+    return name;
+}
+
+vsh_result vshi_job_forget(const vsh_bake_job *job, size_t index, vsh_error *error) {
+    char *name = vshi_job_kept_name(job, index);
+    if (name == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "lightmaps: the system refused memory");
+    }
+    vshi_resume_remove(name);
+    free(name);
+    return VSH_OK;
+}
