@@ -6,7 +6,7 @@ setup() {
     ln -s "$ASSETS/terrain.png" "$ASSETS/cloister.glb" .
 }
 
-CLOISTER=(cloister.glb --sun -0.5,0.8,-0.6 --sun-angle 10 --ao 2 --size 128 --resolution 64)
+CLOISTER=(cloister.glb --sun -0.5,0.8,-0.6 --sun-angle 10 --ao 2 --size 128)
 
 # Bakes all parts, or those that are named.
 parts() { # OUT N "I …" INPUT [options]
@@ -25,6 +25,11 @@ merged() { # OUT N INPUT [options]
     "$VDBSHADE" merge "$out" --quiet "${MERGE[@]}"
     cmp "one/$out" "$out" || fail "$n parts of $* are not one bake"
     rm -- "$out" *.part
+}
+
+# The last rows and the statistics of a part, without its checksum.
+values() { # OUT
+    tail -c 50008 "$1.2-of-3.part" | head -c 50000
 }
 
 one() { # OUT INPUT [options]
@@ -48,10 +53,10 @@ one() { # OUT INPUT [options]
     merged out.exr 3 "${CLOISTER[@]}" "${options[@]}" --padding auto
     one out.png "${CLOISTER[@]}" --seams fix --padding auto
     merged out.png 3 "${CLOISTER[@]}" --seams fix --padding auto
-    one out.exr "${CLOISTER[@]}" --padding 70 --supersample 2 --method adaptive --ao-method adaptive
-    merged out.exr 3 "${CLOISTER[@]}" --padding 70 --supersample 2 --method adaptive --ao-method adaptive
-    one out.exr "${CLOISTER[@]}" --method cone --ao-method cones --ao-spacing 8 --padding 0
-    merged out.exr 3 "${CLOISTER[@]}" --method cone --ao-method cones --ao-spacing 8 --padding 0
+    one out.exr "${CLOISTER[@]}" --padding 70 --supersample 2 --method adaptive --ao-method adaptive --resolution 48
+    merged out.exr 3 "${CLOISTER[@]}" --padding 70 --supersample 2 --method adaptive --ao-method adaptive --resolution 48
+    one out.exr "${CLOISTER[@]}" --method cone --ao-method cones --ao-spacing 8 --padding 0 --resolution 48
+    merged out.exr 3 "${CLOISTER[@]}" --method cone --ao-method cones --ao-spacing 8 --padding 0 --resolution 48
 }
 
 @test "so are an asset with its light in it, a terrain, objects of their own, and a scene of several lightmaps" {
@@ -59,7 +64,7 @@ one() { # OUT INPUT [options]
     merged out.glb 3 "${CLOISTER[@]}"
     printf '%s' '{"casters": [{"heightfield": "terrain.png", "size": [10, 10], "height": 2, "direct": true}],
         "lights": [{"name": "sun", "type": "directional", "direction": [-1, 0.5, -0.3], "angle_deg": 5}], "ao": {"distance": 2},
-        "receivers": [{"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 96, "output": "out.exr"}]}' >terrain.json
+        "receivers": [{"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 64, "output": "out.exr"}]}' >terrain.json
     one out.exr terrain.json
     for n in 2 3 7 64; do
         merged out.exr "$n" terrain.json
@@ -85,8 +90,8 @@ one() { # OUT INPUT [options]
     parts b.exr 3 2 "${CLOISTER[@]}" --threads 1 --band-rows 16
     parts c.exr 3 2 "${CLOISTER[@]}" --resume
     [ -z "$(find . -name '*.resume')" ] || fail "rows are kept of a part that is whole"
-    for other in b c; do # but for their command lines
-        [ "$(stat -c %s a.exr.2-of-3.part)" -lt "$(stat -c %s $other.exr.2-of-3.part)" ]
+    for other in b c; do # but for their command lines, which the first pages of a part have
+        cmp <(values a.exr) <(values $other.exr) || fail "$other"
     done
     one out.exr "${CLOISTER[@]}"
     parts out.exr 3 "" "${CLOISTER[@]}"
