@@ -4,6 +4,7 @@
 
 #include "image.h"
 #include "lit.h"
+#include "parts.h"
 #include "scene.h"
 
 #ifdef __cplusplus
@@ -141,16 +142,6 @@ VSH_API vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_e
  * writing of …_run(); VSH_ERROR_READ (a part is missing), VSH_ERROR_INPUT (there are none; one is damaged, or
  * of other inputs, options or another version than this job, all of which it names). */
 VSH_API vsh_result vsh_bake_job_merge(vsh_bake_job *job, const vsh_run *run, vsh_error *error);
-
-/* The words that were kept in the first part that is there of those whose names begin with `parts`
- * (vsh_bake_job_options), of `shard_count` shards, or (0) of however many there are beside it:
- * (*words)[*count], and NULL behind them, to be freed with vsh_part_words_free(). A part is whatever somebody
- * has put there: words are text that its writer chose. Errors: VSH_ERROR_ARGUMENT (NULL), VSH_ERROR_READ,
- * VSH_ERROR_INPUT (there are no parts, of several numbers of shards, or it is none), VSH_ERROR_LIMIT,
- * VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_part_words(const char *parts, int32_t shard_count, const vsh_run *run, char ***words,
-                                  size_t *count, vsh_error *error);
-VSH_API void vsh_part_words_free(char **words); /* NULL does nothing */
 
 /* How many lightmaps there are, and one of them. Cannot fail, but that `index` must be below the count. */
 VSH_API size_t vsh_bake_job_count(const vsh_bake_job *job);

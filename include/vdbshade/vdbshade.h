@@ -50,6 +50,7 @@
 #include "method.h"
 #include "occluders.h"
 #include "outline.h"
+#include "parts.h"
 #include "points.h"
 #include "provenance.h"
 #include "query.h"

@@ -3,7 +3,7 @@
 #define VSHI_MERGE_H
 
 #include "bake_scene/job.h"
-#include "bake_scene/part_file.h"
+#include "bake_scene/part_rows.h"
 
 typedef struct vshi_part_place {
     size_t part, piece;
@@ -21,9 +21,8 @@ typedef struct vshi_parts {
 /* What parts' files are named after: the options' name, or the first lightmap's output. */
 const char *vshi_parts_name(const vsh_bake_job *job);
 
-/* The number of shards of the parts beside a name, of which there may be some missing. Errors:
- * VSH_ERROR_INPUT (there are none, or of several numbers), VSH_ERROR_READ, VSH_ERROR_MEMORY. */
-vsh_result vshi_parts_count(const char *parts, int32_t *count, vsh_error *error);
+/* What its parts' files say of themselves, of `count` shards. */
+vsh_part_options vshi_job_part_options(const vsh_bake_job *job, int32_t count);
 
 /* Reads all parts of a job whose lightmaps are measured, and checks that they are its own and complete; sets
  * what the report tells of casters, and where the output comes from. Errors: as vshi_part_open();

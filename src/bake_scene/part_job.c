@@ -23,7 +23,7 @@ static vsh_result list_pieces(const vsh_bake_job *job, vshi_part_head *head, vsh
         int32_t first, end;
         head->lightmaps[i] =
             (vshi_part_lightmap){own->width, own->height, own->mesh_count, own->covered, own->samples};
-        vshi_shares_rows(job, head->shard, head->shard_count, i, &first, &end);
+        vshi_shares_rows(job, job->options.shard, job->options.shard_count, i, &first, &end);
         if (first < end) {
             head->pieces[head->piece_count++] = (vshi_part_piece){i, first, end - first};
         }
@@ -43,21 +43,6 @@ static bool copy_texts(const char *const *texts, size_t count, char ***copies, u
     return *copies != NULL;
 }
 
-static bool copy_attributes(const vsh_bake_job *job, vshi_part_head *head) {
-    size_t count;
-    const vsh_attribute *own = vsh_provenance_attributes(job->provenance, &count);
-    head->attributes = calloc(count + 1, sizeof *head->attributes);
-    for (size_t i = 0; head->attributes != NULL && i < count; ++i) {
-        vshi_part_attribute *attribute = &head->attributes[head->attribute_count++];
-        attribute->name = strdup(own[i].name);
-        attribute->value = strdup(own[i].value);
-        if (attribute->name == NULL || attribute->value == NULL) {
-            return false;
-        }
-    }
-    return head->attributes != NULL;
-}
-
 static bool copy_channels(const vshi_channels *channels, vshi_part_head *head) {
     return copy_texts(channels->image.names, (size_t)channels->image.channel_count, &head->channels,
                       &head->channel_count);
@@ -65,10 +50,8 @@ static bool copy_channels(const vshi_channels *channels, vshi_part_head *head) {
 
 static vsh_result begin_part(vsh_bake_job *job, vsh_error *error) {
     const vsh_occluders_info *casters = &job->report.occluders;
-    vshi_part_head head = {.version = strdup(vsh_version()),
-                           .shard = job->options.shard,
-                           .shard_count = job->options.shard_count,
-                           .error_count = job->report.error_count,
+    const vsh_part_options options = vshi_job_part_options(job, job->options.shard_count);
+    vshi_part_head head = {.error_count = job->report.error_count,
                            .voxel_size = casters->voxel_size,
                            .active_voxels = casters->active_voxels,
                            .field_bytes = casters->field_bytes,
@@ -76,12 +59,11 @@ static vsh_result begin_part(vsh_bake_job *job, vsh_error *error) {
                            .has_triangles = casters->has_triangles};
     vshi_channels channels;
     vsh_result result;
-    char *path = vshi_part_path(vshi_parts_name(job), head.shard, head.shard_count);
+    char *path = vshi_part_path(options.parts, options.shard, options.shard_count);
     VSHI_TRY_DONE(vshi_channels_name(&job->scene, 1, 1, &channels, error));
     VSHI_TRY_DONE(list_pieces(job, &head, error));
-    if (path == NULL || head.version == NULL || !copy_channels(&channels, &head) ||
-        !copy_texts(job->options.words, job->options.word_count, &head.words, &head.word_count) ||
-        !copy_attributes(job, &head)) {
+    VSHI_TRY_DONE(vshi_part_about_make(VSHI_PART_BAKE, &options, &head.about, error));
+    if (path == NULL || !copy_channels(&channels, &head)) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "part: the system refused memory");
         goto done;
     }

@@ -3,8 +3,7 @@
 #define VSHI_SHARES_H
 
 #include "bake_scene/job.h"
-
-enum { VSHI_MOST_SHARDS = 10000 };
+#include "base/part_about.h"
 
 /* Keeps what shares of a measured lightmap are reckoned by. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *charts, vsh_error *error);

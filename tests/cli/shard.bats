@@ -70,7 +70,7 @@ one() { # OUT INPUT [options]
         merged out.exr "$n" terrain.json
     done
     printf '%s' '{"casters": [{"mesh": "cloister.glb"}], "resolution": 48, "ao": {"distance": 2}, "receivers": [
-        {"mesh": "cloister.glb", "size": 64, "output": "a.exr"}, {"mesh": "cloister.glb", "size": 128, "output": "b.png"}]}' >two.json
+        {"mesh": "cloister.glb", "size": 64, "output": "a.exr"}, {"mesh": "cloister.glb", "size": 96, "output": "b.png"}]}' >two.json
     "$VDBSHADE" bake two.json --quiet
     mkdir one2 objects
     mv a.exr b.png one2
@@ -78,8 +78,8 @@ one() { # OUT INPUT [options]
     "$VDBSHADE" merge a.exr --quiet
     cmp one2/a.exr a.exr
     cmp one2/b.png b.png
-    "$VDBSHADE" bake "${CLOISTER[@]}" --per-object -o one2/ --quiet
-    for i in 1 2 3; do "$VDBSHADE" bake "${CLOISTER[@]}" --per-object -o objects/ --shard $i/3 --quiet; done
+    "$VDBSHADE" bake "${CLOISTER[@]}" --size 64 --per-object -o one2/ --quiet
+    for i in 1 2 3; do "$VDBSHADE" bake "${CLOISTER[@]}" --size 64 --per-object -o objects/ --shard $i/3 --quiet; done
     "$VDBSHADE" merge objects --quiet
     rm one2/a.exr one2/b.png
     diff -r one2 objects

@@ -1,19 +1,16 @@
-/* Files that hold a part of a job's lightmaps, until all of them are put together: PARTS.I-of-N.part. They
- * appear whole or not at all, hold nothing that tells of time or machine, and whoever reads one checks all of
- * it.
- *
- * A file is: magic; numbers of four and eight bytes that tell the byte order, the format, and the sizes of
- * what follows; the head, which says what the part is of; rows, from the top on, each of them its channels'
- * values, then what is known of its texels (VSHI_PART_…); the statistics of each piece; a checksum. */
-#ifndef VSHI_PART_FILE_H
-#define VSHI_PART_FILE_H
+/* Parts of a job's lightmaps, as files (base/part_file.h). The body is rows, from the top on, each of them
+ * its channels' values, then what is known of its texels (VSHI_PART_…); the tail is the statistics of each
+ * piece.
+ */
+#ifndef VSHI_PART_ROWS_H
+#define VSHI_PART_ROWS_H
 
-#include "base/error.h"
+#include "base/part_file.h"
 
-#include <stdbool.h>
 #include <vdbshade/bake.h>
 #include <vdbshade/image.h>
-#include <vdbshade/occluders.h>
+
+#define VSHI_PART_BAKE "bake" /* the kind of part */
 
 /* A lightmap of the job that a part is of. */
 typedef struct vshi_part_lightmap {
@@ -27,19 +24,9 @@ typedef struct vshi_part_piece {
     int32_t first, rows;
 } vshi_part_piece;
 
-/* What outputs tell of where they come from (vsh_attribute). */
-typedef struct vshi_part_attribute {
-    char *name, *value;
-} vshi_part_attribute;
-
 /* All of it is owned. */
 typedef struct vshi_part_head {
-    char *version; /* of the library */
-    int32_t shard, shard_count;
-    char **words; /* [word_count]: as vsh_bake_job_options.words */
-    uint64_t word_count;
-    vshi_part_attribute *attributes; /* [attribute_count] */
-    uint64_t attribute_count;
+    vshi_part_about about;
     char **channels; /* [channel_count]: names */
     uint64_t channel_count;
     uint64_t error_count; /* as in vsh_bake_report */
@@ -53,9 +40,6 @@ typedef struct vshi_part_head {
 } vshi_part_head;
 
 void vshi_part_head_free(vshi_part_head *head);
-
-/* "PARTS.I-of-N.part", to be freed; NULL where memory is short. */
-char *vshi_part_path(const char *parts, int32_t shard, int32_t count);
 
 /* --- writing */
 
@@ -86,11 +70,10 @@ typedef struct vshi_part {
     vsh_bake_stats *pieces; /* [piece_count]: statistics, with their arrays */
 } vshi_part;
 
-/* Reads all of a part but its rows. `whole`: looks over these, too, whether they are what was written.
- * Errors: VSH_ERROR_READ, VSH_ERROR_INPUT (no part, damaged, another version's), VSH_ERROR_LIMIT,
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free it also after an error. */
-vsh_result vshi_part_open(const char *path, bool whole, const vsh_run *run, vshi_part *part,
-                          vsh_error *error);
+/* Reads all of a part but its rows, which it looks over, whether they are what was written. Errors:
+ * VSH_ERROR_READ, VSH_ERROR_INPUT (no part, damaged, another version's), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY,
+ * VSH_ERROR_CANCELLED. Free it also after an error. */
+vsh_result vshi_part_open(const char *path, const vsh_run *run, vshi_part *part, vsh_error *error);
 void vshi_part_free(vshi_part *part);
 
 /* Reads rows of a piece, from `first` of the lightmap on, into planes[channel_count] and `known` from texel

@@ -1,6 +1,6 @@
-/* What stands where in a part's file. */
-#ifndef VSHI_PART_LAYOUT_H
-#define VSHI_PART_LAYOUT_H
+/* What parts' files begin with, and their checksum. */
+#ifndef VSHI_PART_SUM_H
+#define VSHI_PART_SUM_H
 
 #include <stddef.h>
 #include <stdint.h>
@@ -11,13 +11,6 @@
 #define VSHI_PART_MAGIC_BEGIN "vdbshade part "
 #define VSHI_PART_ORDER UINT64_C(0x0102030405060708)
 #define VSHI_PART_SUM UINT64_C(0xcbf29ce484222325) /* of no bytes */
-
-/* Before the head. Numbers are in the byte order of the machine that wrote them, which `order` tells. */
-typedef struct vshi_part_front {
-    char magic[16];
-    uint64_t order;
-    uint64_t head_bytes, row_bytes, tail_bytes; /* multiples of 4; a checksum of 8 is behind them */
-} vshi_part_front;
 
 /* FNV-1a (Fowler, Noll and Vo, 1991), a word of four bytes at a time. */
 static inline uint64_t vshi_part_sum(uint64_t sum, const void *bytes, size_t size) {
