@@ -21,6 +21,9 @@ vsh_result vshi_parts_count(const char *parts, int32_t *count, vsh_error *error)
 /* Whether all parts are there. Errors: VSH_ERROR_READ, with those that are missing; VSH_ERROR_MEMORY. */
 vsh_result vshi_parts_check_there(const char *parts, int32_t count, vsh_error *error);
 
+/* The path of the part with the lowest number that is there, to be freed; shard_count 0: of however many. */
+vsh_result vshi_parts_first(const char *parts, int32_t shard_count, char **path, vsh_error *error);
+
 /* Before the head. Numbers are in the byte order of the machine that wrote them, which `order` tells. */
 typedef struct vshi_part_front {
     char magic[16];

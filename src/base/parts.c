@@ -88,16 +88,20 @@ vsh_result vshi_parts_check_there(const char *name, int32_t count, vsh_error *er
                      count);
 }
 
-/* The part with the lowest number that is there. */
-static char *first_path(const char *parts, int32_t count) {
-    for (int32_t i = 1; i <= count; ++i) {
-        char *path = vshi_part_path(parts, i, count);
-        if (path == NULL || i == count || access(path, F_OK) == 0) {
-            return path;
-        }
-        free(path);
+vsh_result vshi_parts_first(const char *parts, int32_t shard_count, char **path, vsh_error *error) {
+    *path = NULL;
+    if (shard_count == 0) {
+        VSHI_TRY(vshi_parts_count(parts, &shard_count, error));
     }
-    return NULL;
+    for (int32_t i = 1; i <= shard_count; ++i) {
+        *path = vshi_part_path(parts, i, shard_count);
+        if (*path == NULL || i == shard_count || access(*path, F_OK) == 0) {
+            break;
+        }
+        free(*path);
+    }
+    return *path != NULL ? VSH_OK
+                         : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", parts);
 }
 
 vsh_result vsh_part_words(const char *parts, int32_t shard_count, const vsh_run *run, char ***words,
@@ -109,13 +113,12 @@ vsh_result vsh_part_words(const char *parts, int32_t shard_count, const vsh_run 
     VSHI_NEEDS(parts);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    if (shard_count == 0) {
-        VSHI_TRY(vshi_parts_count(parts, &shard_count, error));
+    if (shard_count < 0 || shard_count > VSHI_MOST_SHARDS) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "shard_count %d: expected 0 to %d", shard_count,
+                         VSHI_MOST_SHARDS);
     }
-    char *path = first_path(parts, shard_count);
-    if (path == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", parts);
-    }
+    char *path;
+    VSHI_TRY(vshi_parts_first(parts, shard_count, &path, error));
     vshi_part_input part;
     vshi_part_about about;
     const vsh_result result = vshi_part_input_open(path, &full, &part, &about, error);

@@ -18,6 +18,10 @@ extern const cli_command cli_unwrap;
 extern const cli_command cli_view;
 extern const cli_command cli_merge;
 
+/* The parts of a volume, by the command line that one of them kept. */
+int cli_volume_merge(int argc, char **argv, const char *output, int32_t shards, const char *stats,
+                     const cli_common *common);
+
 int cli_bake_main(int argc, char **argv);
 int cli_render_main(int argc, char **argv);
 

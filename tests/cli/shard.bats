@@ -85,6 +85,43 @@ one() { # OUT INPUT [options]
     diff -r one2 objects
 }
 
+@test "2, 3, 7 and 64 parts of a volume are one, of a band, of free space, and with and without what is inside" {
+    local volume=(box.obj --sun -0.5,0.8,-0.6 --resolution 16) n i
+    write_box box.obj
+    volume() { # N OPTIONS …
+        n=$1
+        shift
+        "$VDBSHADE" volume "${volume[@]}" "$@" -o one.vdb --quiet --stats one.json
+        for i in $(seq "$n"); do
+            "$VDBSHADE" volume "${volume[@]}" "$@" -o out.vdb --shard "$i/$n" --quiet
+        done
+        "$VDBSHADE" merge out.vdb --quiet --stats out.json
+        cmp one.vdb out.vdb || fail "$n parts of $*"
+        diff <(grep -E '"(voxels|inside_voxels|tiles|marches|rays)"' one.json) <(grep -E '"(voxels|inside_voxels|tiles|marches|rays)"' out.json)
+        rm out.vdb out.vdb.*
+    }
+    volume 2 --ao 1
+    volume 3 --box -2,-1,-2,3,2,3 --error --method adaptive
+    volume 7 --inside off
+    volume 64 --box -1,-1,-1,2,2,2 --ao 1
+    # parts of a lightmap and of a volume know each other
+    parts out.png 1 "" box.obj "${SMALL[@]}"
+    "$VDBSHADE" volume box.obj --sun 1,1,1 --resolution 24 -o b.vdb --shard 1/2 --quiet
+    shade merge b.vdb
+    refused 3 "b.vdb: a part is missing: 2 of 2"
+    cp out.png.1-of-1.part b.vdb.2-of-2.part
+    shade merge b.vdb
+    refused 2 "b.vdb.2-of-2.part: is a part of a bake, not of a volume"
+    "$VDBSHADE" volume box.obj --sun 1,1,1 --resolution 24 --inside off -o b.vdb --shard 2/2 --quiet
+    shade merge b.vdb
+    refused 2 "b.vdb.2-of-2.part: is of other inputs or options: its vdbshade_command is"
+    "$VDBSHADE" volume box.obj --sun 1,1,1 --resolution 24 -o b.vdb --shard 2/2 --quiet
+    printf x | dd of=b.vdb.2-of-2.part bs=1 seek=3000 conv=notrunc status=none
+    shade merge b.vdb
+    refused 2 "b.vdb.2-of-2.part: damaged"
+    [ ! -e b.vdb ]
+}
+
 @test "a part is the same whoever bakes it, with however many threads and bands, and goes on where it was ended" {
     parts a.exr 3 2 "${CLOISTER[@]}"
     parts b.exr 3 2 "${CLOISTER[@]}" --threads 1 --band-rows 16

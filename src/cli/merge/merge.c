@@ -4,6 +4,7 @@
 
 #include <string.h>
 
+enum { MOST_WORDS = 100000 };
 enum { KEY_SHARDS = 0x2000, KEY_STATS, KEY_INVALID, KEY_EXR, KEY_VIEW };
 
 typedef struct merge_settings {
@@ -82,6 +83,15 @@ static int merge_bake(const merge_settings *s, int argc, char **argv) {
     return cli_bake_by(&bake);
 }
 
+static int merge_volume(const merge_settings *s, int argc, char **argv) {
+    const char *given = s->invalid_picture != NULL ? "invalid"
+                        : s->exr != NULL           ? "exr"
+                        : s->view != NULL          ? "view"
+                                                   : NULL;
+    return given != NULL ? cli_usage("--%s: is for lightmaps, and %s is a volume", given, s->output)
+                         : cli_volume_merge(argc, argv, s->output, s->shards, s->stats, &s->common);
+}
+
 static int merge_main(int argc, char **argv) {
     merge_settings s = {.common = cli_common_default()};
     bool help;
@@ -96,8 +106,11 @@ static int merge_main(int argc, char **argv) {
     if (vsh_part_words(s.output, s.shards, &run, &words, &count, &error) != VSH_OK) {
         return cli_fail(&error);
     }
-    if (count > 1 && count < 100000 && strcmp(words[0], cli_bake.name) == 0) {
+    const char *kind = count > 1 && count < MOST_WORDS ? words[0] : "";
+    if (strcmp(kind, cli_bake.name) == 0) {
         code = merge_bake(&s, (int)count, words);
+    } else if (strcmp(kind, cli_volume.name) == 0) {
+        code = merge_volume(&s, (int)count, words);
     } else {
         code = cli_usage("%s: its parts are of no bake", s.output);
     }
