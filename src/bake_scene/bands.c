@@ -107,10 +107,6 @@ vsh_result vshi_bands_plan(const vsh_scene *scene, const vshi_target *target, co
                            const vshi_bands_need *need, vshi_bands *bands, vsh_error *error) {
     const vsh_receiver *receiver = &target->receiver;
     const vsh_image_options image = vshi_receiver_image(receiver);
-    if (need->first == need->end) { /* of a shard that has none of it */
-        *bands = (vshi_bands){.first = need->first, .end = need->end};
-        return VSH_OK;
-    }
     vshi_channels channels;
     const int32_t kept = (receiver->height + RESUME_BANDS - 1) / RESUME_BANDS;
     vsh_result result;

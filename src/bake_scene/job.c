@@ -230,15 +230,19 @@ static vsh_result measure(vsh_bake_job *job, size_t index, bool bakes, const vsh
     vsh_job_lightmap *lightmap = &job->lightmaps[index];
     vsh_charts *charts = NULL;
     vsh_texels *texels = NULL;
-    vshi_bands bands;
+    vshi_bands bands = {.count = 0};
     double low[3], high[3];
     vsh_result result;
+    /* the first part's bake tells of UVs */
+    const bool tells = bakes && !job->merges && job->options.shard <= 1;
     VSHI_TRY_DONE(vshi_target_charts(&job->scene, &job->targets.list[index], job->options.allow_overlap != 0,
-                                     bakes, run, &charts, error));
+                                     tells, run, &charts, error));
     vsh_charts_info counted;
     vsh_charts_get_info(charts, &counted);
     VSHI_TRY_DONE(vshi_shares_note(job, index, charts, error));
-    VSHI_TRY_DONE(vshi_job_plan(job, index, charts, 0, run, &bands, error));
+    if (!is_shard(job)) {
+        VSHI_TRY_DONE(vshi_job_plan(job, index, charts, 0, run, &bands, error));
+    }
     if (!job->merges) { /* which asks nothing of what casts */
         const bool all = bakes && bands.count == 1 && !is_shard(job);
         VSHI_TRY_DONE(find_bounds(charts, &bands, all, run, &texels, low, high, error));
@@ -388,7 +392,7 @@ vsh_result vsh_bake_job_run(vsh_bake_job *job, const vsh_run *run, vsh_error *er
         VSHI_TRY(vshi_job_bake_one(job, i, &full, error));
     }
     /* not before all are whole: a bake that goes on writes those that were again */
-    for (size_t i = 0; i < job->targets.count && job->options.resume; ++i) {
+    for (size_t i = 0; i < job->targets.count && job->options.resume && !is_shard(job); ++i) {
         VSHI_TRY(vshi_job_forget(job, i, error));
     }
     return VSH_OK;

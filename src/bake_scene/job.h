@@ -35,8 +35,10 @@ struct vsh_bake_job {
     struct vshi_share_rows *shares; /* [targets.count], once measured: what shards are reckoned by */
     struct vshi_part_writer *part;  /* under way; NULL: none */
     char *part_path;
-    const struct vshi_parts *parts; /* that lightmaps are put together from; NULL: they are baked */
-    bool merges;                    /* nothing is going to be baked */
+    const struct vshi_part_piece *pieces; /* of it */
+    size_t piece;                         /* that is baked */
+    const struct vshi_parts *parts;       /* that lightmaps are put together from; NULL: they are baked */
+    bool merges;                          /* nothing is going to be baked */
 };
 
 /* The texels of some rows, or (`kept`, where they are all of them) those that are there already. */

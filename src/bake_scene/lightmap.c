@@ -8,7 +8,6 @@
 #include "bake_scene/merge.h"
 #include "bake_scene/part_job.h"
 #include "bake_scene/resume.h"
-#include "bake_scene/shares.h"
 #include "bake_scene/warn.h"
 #include "base/clock.h"
 #include "base/job.h"
@@ -84,7 +83,8 @@ vsh_result vshi_job_plan(const vsh_bake_job *job, size_t index, const vsh_charts
     const bool shard = job->options.shard > 0;
     int32_t first = 0, end = lightmap->height;
     if (shard) {
-        vshi_shares_rows(job, job->options.shard, job->options.shard_count, index, &first, &end);
+        first = job->pieces[job->piece].first;
+        end = first + job->pieces[job->piece].rows;
     }
     const vshi_bands_need need = {.part = shard,
                                   .merge = job->merges,
@@ -331,7 +331,7 @@ static vsh_result open_all(work *w, vsh_error *error) {
                                .first = bands->first,
                                .end = bands->end};
         key.attributes = vsh_provenance_attributes(job->provenance, &key.attribute_count);
-        char *kept = vshi_job_kept_name(job, w->index);
+        char *kept = vshi_job_kept_name(job, is_part(w) ? job->piece : w->index);
         const vsh_result result =
             kept != NULL
                 ? vshi_resume_open(kept, &key, job->report.error_count, w->run, &w->resume, error)

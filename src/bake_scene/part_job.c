@@ -16,19 +16,14 @@
 static vsh_result list_pieces(const vsh_bake_job *job, vshi_part_head *head, vsh_error *error) {
     const size_t count = job->targets.count;
     VSHI_TRY(vshi_allocate((void **)&head->lightmaps, count + 1, sizeof *head->lightmaps, "part", error));
-    VSHI_TRY(vshi_allocate((void **)&head->pieces, count + 1, sizeof *head->pieces, "part", error));
     head->lightmap_count = count;
     for (size_t i = 0; i < count; ++i) {
         const vsh_job_lightmap *own = &job->lightmaps[i];
-        int32_t first, end;
         head->lightmaps[i] =
             (vshi_part_lightmap){own->width, own->height, own->mesh_count, own->covered, own->samples};
-        vshi_shares_rows(job, job->options.shard, job->options.shard_count, i, &first, &end);
-        if (first < end) {
-            head->pieces[head->piece_count++] = (vshi_part_piece){i, first, end - first};
-        }
     }
-    return VSH_OK;
+    return vshi_shares_list(job, job->options.shard, job->options.shard_count, &head->pieces,
+                            &head->piece_count, error);
 }
 
 /* Copies of texts; false where memory is short. */
@@ -48,7 +43,10 @@ static bool copy_channels(const vshi_channels *channels, vshi_part_head *head) {
                       &head->channel_count);
 }
 
-static vsh_result begin_part(vsh_bake_job *job, vsh_error *error) {
+/* Begins the part, whose pieces are the caller's to free also after an error. */
+static vsh_result begin_part(vsh_bake_job *job, vshi_part_piece **pieces, size_t *piece_count,
+                             vsh_error *error) {
+    *pieces = NULL;
     const vsh_occluders_info *casters = &job->report.occluders;
     const vsh_part_options options = vshi_job_part_options(job, job->options.shard_count);
     vshi_part_head head = {.error_count = job->report.error_count,
@@ -71,6 +69,9 @@ static vsh_result begin_part(vsh_bake_job *job, vsh_error *error) {
     free(job->part_path);
     job->part_path = path;
     path = NULL;
+    *pieces = head.pieces;
+    *piece_count = (size_t)head.piece_count;
+    head.pieces = NULL;
 done:
     free(path);
     vshi_part_head_free(&head);
@@ -105,22 +106,30 @@ vsh_row_sink vshi_part_sink_of(vshi_part_sink *part) {
     return (vsh_row_sink){sizeof(vsh_row_sink), begin, add, end, part};
 }
 
-/* Whether a shard has rows of a lightmap. */
-static bool has_rows(const vsh_bake_job *job, size_t index) {
-    int32_t first, end;
-    vshi_shares_rows(job, job->options.shard, job->options.shard_count, index, &first, &end);
-    return first < end;
+static vsh_result bake_pieces(vsh_bake_job *job, const vshi_part_piece *pieces, size_t count,
+                              const vsh_run *run, vsh_error *error) {
+    job->pieces = pieces;
+    vsh_result result = VSH_OK;
+    for (job->piece = 0; job->piece < count && result == VSH_OK; ++job->piece) {
+        result = vshi_job_bake_one(job, (size_t)pieces[job->piece].lightmap, run, error);
+    }
+    job->pieces = NULL;
+    return result;
+}
+
+static void tell_writing(const vsh_bake_job *job, const char *path) {
+    if (job->options.writing != NULL) {
+        job->options.writing(job->options.user, path);
+    }
 }
 
 vsh_result vshi_job_bake_part(vsh_bake_job *job, const vsh_run *run, vsh_error *error) {
-    VSHI_TRY(begin_part(job, error));
-    if (job->options.writing != NULL) {
-        job->options.writing(job->options.user, job->part_path);
-    }
-    vsh_result result = VSH_OK;
-    for (size_t i = 0; i < job->targets.count && result == VSH_OK; ++i) {
-        result = has_rows(job, i) ? vshi_job_bake_one(job, i, run, error) : VSH_OK;
-    }
+    vshi_part_piece *pieces;
+    size_t count = 0;
+    vsh_result result;
+    VSHI_TRY_DONE(begin_part(job, &pieces, &count, error));
+    tell_writing(job, job->part_path);
+    result = bake_pieces(job, pieces, count, run, error);
     vshi_part_writer *part = job->part;
     job->part = NULL;
     if (result == VSH_OK) {
@@ -128,9 +137,12 @@ vsh_result vshi_job_bake_part(vsh_bake_job *job, const vsh_run *run, vsh_error *
     } else {
         vshi_part_writer_abandon(part);
     }
-    if (job->options.writing != NULL) {
-        job->options.writing(job->options.user, NULL);
+    tell_writing(job, NULL);
+    for (size_t i = 0; i < count && result == VSH_OK && job->options.resume; ++i) {
+        result = vshi_job_forget(job, i, error);
     }
+done:
+    free(pieces);
     return result;
 }
 

@@ -30,34 +30,67 @@ vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *c
     return VSH_OK;
 }
 
-/* The shard that rows belong to which have so many samples, behind so many of all. */
-static int32_t shard_of(double before, double samples, double all, int32_t count) {
-    const double at = (before + 0.5 * samples) / all * (double)count;
-    return at >= (double)count ? count : 1 + (int32_t)at;
+/* Rows of tiles beside a border that AO is shaded for on both sides where texels share it, and how much more
+ * may be shaded for the sake of even shares. */
+enum { BESIDE = 9 };
+static const double MOST_BESIDE = 0.15;
+
+/* Whether shards have two stretches of rows. */
+static bool are_halved(const vsh_bake_job *job, int32_t count) {
+    double rows = 0.0, beside = 0.0;
+    for (size_t i = 0; i < job->targets.count; ++i) {
+        const struct vshi_share_rows *share = &job->shares[i];
+        rows += (double)share->count;
+        beside = share->step > 1 ? BESIDE : beside;
+    }
+    return 2.0 * ((double)count - 1.0) * (beside + 1.0) <= MOST_BESIDE * rows;
 }
 
-void vshi_shares_rows(const vsh_bake_job *job, int32_t shard, int32_t count, size_t index, int32_t *first,
-                      int32_t *end) {
+/* The shard that rows belong to which have so many samples, behind so many of all. */
+static int32_t shard_of(double before, double samples, double all, bool halved, int32_t count) {
+    const int32_t stretches = halved ? 2 * count : count;
+    const double at = (before + 0.5 * samples) / all * (double)stretches;
+    const int32_t stretch = at >= (double)stretches ? stretches - 1 : (int32_t)at;
+    return 1 + (stretch < count ? stretch : stretches - 1 - stretch);
+}
+
+/* Adds rows of tiles begin … end - 1 of a lightmap. */
+static void add_rows(vshi_part_piece *pieces, uint64_t *count, size_t lightmap, size_t begin, size_t end,
+                     int32_t height) {
+    const int32_t first = (int32_t)begin * VSHI_TILE;
+    const int32_t behind = (int32_t)end * VSHI_TILE < height ? (int32_t)end * VSHI_TILE : height;
+    vshi_part_piece *last = *count > 0 ? &pieces[*count - 1] : NULL;
+    if (last != NULL && last->lightmap == lightmap && last->first + last->rows == first) {
+        last->rows = behind - last->first;
+    } else {
+        pieces[(*count)++] = (vshi_part_piece){lightmap, first, behind - first};
+    }
+}
+
+vsh_result vshi_shares_list(const vsh_bake_job *job, int32_t shard, int32_t count, vshi_part_piece **pieces,
+                            uint64_t *piece_count, vsh_error *error) {
+    const bool halved = are_halved(job, count);
     double before = 0.0, all = 0.0;
+    *piece_count = 0;
+    VSHI_TRY(vshi_allocate((void **)pieces, 2 * job->targets.count + 2, sizeof **pieces, "shares", error));
     for (size_t i = 0; i < job->targets.count; ++i) {
-        before += i < index ? (double)job->shares[i].samples : 0.0;
         all += (double)job->shares[i].samples;
     }
-    const struct vshi_share_rows *share = &job->shares[index];
-    const int32_t height = job->lightmaps[index].height;
-    *first = *end = height;
-    for (size_t row = 0; row < share->count; row += share->step) {
-        double samples = 0.0;
-        const size_t next = row + share->step < share->count ? row + share->step : share->count;
-        for (size_t k = row; k < next; ++k) {
-            samples += (double)share->row[k];
+    for (size_t i = 0; i < job->targets.count; ++i) {
+        const struct vshi_share_rows *share = &job->shares[i];
+        for (size_t row = 0; row < share->count; row += share->step) {
+            double samples = 0.0;
+            const size_t next = row + share->step < share->count ? row + share->step : share->count;
+            for (size_t k = row; k < next; ++k) {
+                samples += (double)share->row[k];
+            }
+            if (shard_of(before, samples, all > 0.0 ? all : 1.0, halved, count) == shard) {
+                add_rows(*pieces, piece_count, i, row, next, job->lightmaps[i].height);
+            }
+            before += samples;
         }
-        const int32_t here = shard_of(before, samples, all > 0.0 ? all : 1.0, count);
-        const int32_t at = (int32_t)row * VSHI_TILE;
-        *first = here >= shard && at < *first ? at : *first;
-        *end = here > shard && at < *end ? at : *end;
-        before += samples;
     }
+    return VSH_OK;
 }
 
 void vshi_shares_free(vsh_bake_job *job) {
