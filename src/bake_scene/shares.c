@@ -37,13 +37,13 @@ static const double MOST_BESIDE = 0.15;
 
 /* Whether shards have two stretches of rows. */
 static bool are_halved(const vsh_bake_job *job, int32_t count) {
-    double rows = 0.0, beside = 0.0;
+    double rows = 0.0, beside = 1.0;
     for (size_t i = 0; i < job->targets.count; ++i) {
         const struct vshi_share_rows *share = &job->shares[i];
         rows += (double)share->count;
         beside = share->step > 1 ? BESIDE : beside;
     }
-    return 2.0 * ((double)count - 1.0) * (beside + 1.0) <= MOST_BESIDE * rows;
+    return 2.0 * ((double)count - 1.0) * beside <= MOST_BESIDE * rows;
 }
 
 /* The shard that rows belong to which have so many samples, behind so many of all. */
