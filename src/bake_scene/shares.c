@@ -30,28 +30,10 @@ vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *c
     return VSH_OK;
 }
 
-/* Rows of tiles beside a border that AO is shaded for on both sides where texels share it, and how much more
- * may be shaded for the sake of even shares. */
-enum { BESIDE = 9 };
-static const double MOST_BESIDE = 0.15;
-
-/* Whether shards have two stretches of rows. */
-static bool are_halved(const vsh_bake_job *job, int32_t count) {
-    double rows = 0.0, beside = 1.0;
-    for (size_t i = 0; i < job->targets.count; ++i) {
-        const struct vshi_share_rows *share = &job->shares[i];
-        rows += (double)share->count;
-        beside = share->step > 1 ? BESIDE : beside;
-    }
-    return 2.0 * ((double)count - 1.0) * beside <= MOST_BESIDE * rows;
-}
-
 /* The shard that rows belong to which have so many samples, behind so many of all. */
-static int32_t shard_of(double before, double samples, double all, bool halved, int32_t count) {
-    const int32_t stretches = halved ? 2 * count : count;
-    const double at = (before + 0.5 * samples) / all * (double)stretches;
-    const int32_t stretch = at >= (double)stretches ? stretches - 1 : (int32_t)at;
-    return 1 + (stretch < count ? stretch : stretches - 1 - stretch);
+static int32_t shard_of(double before, double samples, double all, int32_t count) {
+    const double at = (before + 0.5 * samples) / all * (double)count;
+    return at >= (double)count ? count : 1 + (int32_t)at;
 }
 
 /* Adds rows of tiles begin … end - 1 of a lightmap. */
@@ -69,10 +51,9 @@ static void add_rows(vshi_part_piece *pieces, uint64_t *count, size_t lightmap, 
 
 vsh_result vshi_shares_list(const vsh_bake_job *job, int32_t shard, int32_t count, vshi_part_piece **pieces,
                             uint64_t *piece_count, vsh_error *error) {
-    const bool halved = are_halved(job, count);
     double before = 0.0, all = 0.0;
     *piece_count = 0;
-    VSHI_TRY(vshi_allocate((void **)pieces, 2 * job->targets.count + 2, sizeof **pieces, "shares", error));
+    VSHI_TRY(vshi_allocate((void **)pieces, job->targets.count + 1, sizeof **pieces, "shares", error));
     for (size_t i = 0; i < job->targets.count; ++i) {
         all += (double)job->shares[i].samples;
     }
@@ -84,7 +65,7 @@ vsh_result vshi_shares_list(const vsh_bake_job *job, int32_t shard, int32_t coun
             for (size_t k = row; k < next; ++k) {
                 samples += (double)share->row[k];
             }
-            if (shard_of(before, samples, all > 0.0 ? all : 1.0, halved, count) == shard) {
+            if (shard_of(before, samples, all > 0.0 ? all : 1.0, count) == shard) {
                 add_rows(*pieces, piece_count, i, row, next, job->lightmaps[i].height);
             }
             before += samples;

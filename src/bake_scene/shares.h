@@ -9,10 +9,9 @@
 vsh_result vshi_shares_note(vsh_bake_job *job, size_t index, const vsh_charts *charts, vsh_error *error);
 
 /* The rows that shard `shard` of `count` bakes, of a measured job, in the order of lightmaps and rows;
- * *pieces is to be freed, also after an error. Each shard has as many samples as the others: one stretch of
- * all lightmaps' rows, or two, the first and the last, the second and the last but one …, where that costs
- * little, so that what gets harder from one end to the other does so for all. They begin at multiples of
- * VSH_BAND_STEP and, where texels share AO, at those of its squares. Errors: VSH_ERROR_MEMORY. */
+ * *pieces is to be freed, also after an error. Shards follow each other through all lightmaps, each with as
+ * many samples as the others, but that rows begin at multiples of VSH_BAND_STEP and, where texels share AO,
+ * at those of its squares. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_shares_list(const vsh_bake_job *job, int32_t shard, int32_t count, vshi_part_piece **pieces,
                             uint64_t *piece_count, vsh_error *error);
 

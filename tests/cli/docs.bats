@@ -100,13 +100,13 @@ run_commands() {
 # options_of FILE …: each option that is named there, once. Those of other programs are left out.
 options_of() {
     grep -ohE -- '(^|[^[:alnum:]-])--[a-z][a-z0-9-]*' "$@" | grep -oE -- '--.*' | sort -u |
-        grep -vxE -- '--(cflags|libs|install|stat|leak-check|preset|count|limit|runs|seconds)' # of CMake, pkg-config, git, tools/…
+        grep -vxE -- '--(cflags|libs|install|stat|leak-check|preset|count|limit|runs|seconds|array|partition|retries|wd|kill-on-invalid-dep)' # of CMake, pkg-config, git, tools/…
 }
 
 @test "the documents name every option of --help, and no other" {
     local command
     "$VDBSHADE" --help >help.txt
-    for command in bake voxelize info trade query volume flat render compare regress unwrap view; do
+    for command in bake voxelize info trade query volume flat render compare regress unwrap view merge; do
         "$VDBSHADE" "$command" --help >>help.txt
     done
     options_of help.txt >told.txt

@@ -27,11 +27,10 @@ static int merge_main(int argc, char **argv);
 const cli_command cli_merge = {
     "merge",
     "OUT [options]",
-    "Puts together what 'bake --shard I/N -o OUT' or 'volume --shard I/N -o OUT' left in OUT.1-of-N.part to\n"
-    "OUT.N-of-N.part: the same file, bit by bit, as without --shard. The parts say by which options; their\n"
-    "inputs are read again, from this folder where paths are relative, and must not have changed. Parts "
-    "stay.\n"
-    "docs/farm.md: baking on several machines.",
+    "Puts together what 'bake --shard I/N -o OUT' or 'volume --shard I/N -o OUT' left in\n"
+    "OUT.1-of-N.part to OUT.N-of-N.part: the same file, bit by bit, as without --shard. The parts say\n"
+    "by which options; their inputs are read again, from this folder where paths are relative, and must\n"
+    "not have changed. Parts stay. See docs/farm.md.",
     options,
     sizeof options / sizeof options[0],
     merge_main};
