@@ -93,8 +93,8 @@ typedef struct vsh_attribute {
 
 /* Told the stage ("load", "outline", "voxelize", "field", "charts", "texels", "validate", "shadow.NAME",
  * "ao", "padding", "volume", "flat", "hash", "compare", "page", "unwrap", "pack", "lit", "parts", "merge")
- * and the fraction done of it, 0 … 1, never falling within a stage. Called by one thread at a time, from any of the pool's
- * threads. Return 0 to go on; anything else cancels: the call frees what it took and returns
+ * and the fraction done of it, 0 … 1, never falling within a stage. Called by one thread at a time, from any
+ * of the pool's threads. Return 0 to go on; anything else cancels: the call frees what it took and returns
  * VSH_ERROR_CANCELLED. At 1 a stage's work may be done, and what is returned be left alone: who wants to
  * cancel says so at every call from then on. */
 typedef int32_t vsh_progress_fn(void *user, const char *stage, double fraction);
