@@ -100,7 +100,7 @@ needs_slurm() {
     cat >program <<PROGRAM
 #!/usr/bin/env bash
 case "\$SLURMD_NODENAME \$*" in
-    "n2 "*--shard*) echo \$\$ >>"$PWD/steps"; touch "$PWD/on_second"; exec sleep 50 ;;
+    "n2 "*--shard*) echo \$\$ \$PPID >>"$PWD/steps"; touch "$PWD/on_second"; exec sleep 50 ;;
     *--shard*) sleep 0.5 ;;
 esac
 exec "$VDBSHADE" "\$@"
