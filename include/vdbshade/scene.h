@@ -125,6 +125,15 @@ typedef struct vsh_receiver {
                       a warning */
 } vsh_receiver;
 
+/* A file whose lights a scene file takes, and which of the scene's they are. */
+typedef struct vsh_light_file {
+    const char *path;
+    double angle; /* these two as in vsh_lights_read() */
+    double radius;
+    size_t first; /* lights[first …] of the scene, `count` > 0 of them, are the file's */
+    size_t count;
+} vsh_light_file;
+
 /* A whole scene, read from a file or filled by the caller. Paths are as the system takes them (the reader has
  * put the scene file's folder in front of relative ones). */
 typedef struct vsh_scene {
@@ -155,16 +164,20 @@ typedef struct vsh_scene {
                              it is the default, what is baked chooses them (vsh_scene_resolution()) */
     int32_t cast_blended; /* nonzero: meshes of blended materials (VSH_ALPHA_BLENDED) cast, whole; 0: they
                              only receive */
+    const vsh_light_file *light_files; /* [light_file_count], by `first`: where some of `lights` came from,
+                                          for those who look after inputs; a scene need not have any */
+    size_t light_file_count;
 } vsh_scene;
 
-/* Reads a scene file; what it names is not opened. The scene and all it points to belong to *scene; free it
- * with vsh_scene_free(). Errors:
+/* Reads a scene file; of what it names, files of lights alone are opened. The scene and all it points to
+ * belong to *scene; free it with vsh_scene_free(). Errors:
  * - VSH_ERROR_ARGUMENT: path or scene NULL, run;
  * - VSH_ERROR_READ: no such file, no permission, no regular file;
  * - VSH_ERROR_INPUT, with line and column: no JSON, an unknown or missing key, a value of the wrong type or
  *   out of range;
  * - VSH_ERROR_LIMIT: a file of more than 64 MiB; one whose values may take more than run->memory_limit,
  * before they are read;
+ * - of files of lights: as vsh_lights_read();
  * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error);
 VSH_API void vsh_scene_free(vsh_scene *scene); /* of vsh_scene_read() only; NULL does nothing */
@@ -180,6 +193,10 @@ VSH_API void vsh_scene_free(vsh_scene *scene); /* of vsh_scene_read() only; NULL
 VSH_API vsh_result vsh_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
                                          vsh_light **lights, size_t *count, vsh_error *error);
 VSH_API void vsh_lights_free(vsh_light *lights); /* NULL does nothing */
+
+/* The same of a file that vsh_model_read() reads. Errors: as there, and those of vsh_lights_from_model(). */
+VSH_API vsh_result vsh_lights_read(const char *path, double angle, double radius, double unit,
+                                   const vsh_run *run, vsh_light **lights, size_t *count, vsh_error *error);
 
 /* What a scene's files hold, each file read once, however many casters and receivers use it. */
 typedef struct vsh_assets vsh_assets;

@@ -128,6 +128,9 @@ static void files_have_paths_and_places(void **state) {
     REFUSED(vsh_volume_write(NULL, "a.vdb", 0, NULL, 0, &error));
     MAKES_NONE(vsh_scene_read(NULL, NULL, PLACE, &error));
     REFUSED(vsh_scene_read("a.json", NULL, NULL, &error));
+    MAKES_NONE(vsh_lights_read(NULL, 0.1, 0.0, 0.0, NULL, PLACE, &count, &error));
+    REFUSED(vsh_lights_read("a.glb", 0.1, 0.0, 0.0, NULL, NULL, &count, &error));
+    MAKES_NONE(vsh_lights_read("a.glb", 0.1, 0.0, 0.0, NULL, PLACE, NULL, &error));
     MAKES_NONE(vsh_flat_scene_read(NULL, NULL, PLACE, &error));
     REFUSED(vsh_flat_scene_read("a.json", NULL, NULL, &error));
     MAKES_NONE(vsh_tolerances_read(NULL, PLACE, &error));

@@ -224,7 +224,7 @@ static int bake(const cli_bake_settings *settings, const vsh_scene *scene) {
                                                         : VSH_LIT_IMAGES_AUTO;
     options.lit_exr = settings->exr;
     options.command = cli_parsed_command();
-    const char *const files[] = {settings->input, settings->lights};
+    const char *const files[] = {settings->input, cli_bake_lights(settings)};
     options.files = files;
     options.file_count = settings->lights != NULL ? 2 : 1;
     options.done = say_lightmap;

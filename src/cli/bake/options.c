@@ -20,9 +20,7 @@ enum {
     KEY_EMBED,
     KEY_IMAGES_BESIDE,
     KEY_EXR,
-    KEY_VIEW,
-    KEY_LIGHTS,
-    KEY_LIGHT_RADIUS
+    KEY_VIEW
 };
 
 static const cli_option options[] = {
@@ -61,11 +59,6 @@ static const cli_option options[] = {
      "an image for each object: FOLDER/NAME.exr with\n-o FOLDER/, else OUT.NAME.exr, or where OUT has %s"},
     {0, NULL, NULL, "Light and occlusion"},
     CLI_LIGHT_OPTIONS,
-    {KEY_LIGHTS, "lights", "FILE",
-     "also the lights in a glTF or GLB, which may be INPUT;\ntheir channels are shadow.NAME, suns are as "
-     "wide "
-     "as\n--sun-angle says"},
-    {KEY_LIGHT_RADIUS, "light-radius", "R", "radius of its points and spots, scene units (0: hard)"},
     CLI_SETTINGS(VSH_SETTINGS_CHANNELS),
     CLI_ACCURACY_OPTIONS,
     CLI_CASTER_OPTIONS,
@@ -119,6 +112,12 @@ int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char
     case CLI_KEY_SUN_ANGLE:
         s->has_sun_angle = true;
         return cli_parse_number(name, value, 0.0, 179.0, &s->sun_angle_deg);
+    case CLI_KEY_LIGHTS:
+        s->lights = value;
+        return CLI_OK;
+    case CLI_KEY_LIGHT_RADIUS:
+        s->has_light_radius = true;
+        return cli_parse_number(name, value, 0.0, 1e12, &s->light_radius);
     case CLI_KEY_CASTER:
         return take_caster(s, name, value);
     default:
@@ -163,12 +162,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
     case KEY_VIEW:
         s->view = value;
         return CLI_OK;
-    case KEY_LIGHTS:
-        s->lights = value;
-        return CLI_OK;
-    case KEY_LIGHT_RADIUS:
-        s->has_light_radius = true;
-        return cli_parse_number(name, value, 0.0, 1e12, &s->light_radius);
     case KEY_STATS:
         s->stats = value;
         return CLI_OK;

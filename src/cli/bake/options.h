@@ -14,12 +14,22 @@ typedef struct cli_patterns {
 } cli_patterns;
 
 /* What commands that shade share. */
-enum { CLI_KEY_SUN = 0x3000, CLI_KEY_SUN_ANGLE, CLI_KEY_CASTER };
+enum { CLI_KEY_SUN = 0x3000, CLI_KEY_SUN_ANGLE, CLI_KEY_LIGHTS, CLI_KEY_LIGHT_RADIUS, CLI_KEY_CASTER };
 
-#define CLI_LIGHT_OPTIONS                                                                                    \
+/* Stands for INPUT itself, in --lights. */
+#define CLI_LIGHTS_OF_INPUT "file"
+
+#define CLI_LIGHTS                                                                                           \
     {CLI_KEY_SUN, "sun", "X,Y,Z", "direction towards the sun; its channel is shadow.sun"},                   \
         {CLI_KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},           \
-        CLI_SETTINGS(VSH_SETTINGS_OCCLUSION)
+        {CLI_KEY_LIGHTS, "lights", "FILE",                                                                   \
+         "also the lights in a glTF or GLB, or by the word file\nthose in INPUT; their channels are "        \
+         "shadow.NAME, suns\nare as wide as --sun-angle says"},                                              \
+    {                                                                                                        \
+        CLI_KEY_LIGHT_RADIUS, "light-radius", "R", "radius of its points and spots, scene units (0: hard)"   \
+    }
+
+#define CLI_LIGHT_OPTIONS CLI_LIGHTS, CLI_SETTINGS(VSH_SETTINGS_OCCLUSION)
 
 #define CLI_ACCURACY_OPTIONS {0, NULL, NULL, "Accuracy"}, CLI_SETTINGS(VSH_SETTINGS_ACCURACY)
 
@@ -40,7 +50,7 @@ typedef struct cli_bake_settings {
     cli_patch patch; /* over the scene and its receivers */
     double sun[3];
     double sun_angle_deg;
-    const char *lights; /* a file whose lights are taken; NULL: none */
+    const char *lights; /* a file whose lights are taken, or CLI_LIGHTS_OF_INPUT; NULL: none */
     double light_radius;
     int32_t band_rows; /* 0: as many as go */
     const char *casters[CLI_MAX_EXTRA_CASTERS];
@@ -52,6 +62,9 @@ typedef struct cli_bake_settings {
 
 /* Takes an option of the tables above, a setting or one of the common ones. */
 int cli_shared_parse(cli_bake_settings *settings, int key, const char *name, const char *value);
+
+/* The file of --lights; NULL: none. */
+const char *cli_bake_lights(const cli_bake_settings *settings);
 
 /* Takes the command line. */
 int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings, bool *help);

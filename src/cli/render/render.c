@@ -164,12 +164,12 @@ static int render_frames(render_work *work) {
     return CLI_OK;
 }
 
-/* Lightmaps that are shown are inputs, too. */
+/* Lightmaps that are shown are inputs, too, and so is a file whose lights are taken. */
 static int find_origin(render_work *work) {
     const render_settings *s = work->settings;
-    const char *files[1 + RENDER_MOST_LIGHTMAPS] = {s->bake.input};
-    memcpy(files + 1, s->lightmaps, s->lightmap_count * sizeof *files);
-    return cli_provenance_make(work->scene, files, 1 + s->lightmap_count, &work->stats.casters, &work->run,
+    const char *files[2 + RENDER_MOST_LIGHTMAPS] = {s->bake.input, cli_bake_lights(&s->bake)};
+    memcpy(files + 2, s->lightmaps, s->lightmap_count * sizeof *files);
+    return cli_provenance_make(work->scene, files, 2 + s->lightmap_count, &work->stats.casters, &work->run,
                                &work->origin);
 }
 

@@ -14,17 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    KEY_CSV = 0x2000,
-    KEY_PLOT,
-    KEY_RECEIVER,
-    KEY_SIZE,
-    KEY_RESOLUTIONS,
-    KEY_TRUTH_RAYS,
-    KEY_BUDGET,
-    KEY_SUN,
-    KEY_SUN_ANGLE
-};
+enum { KEY_CSV = 0x2000, KEY_PLOT, KEY_RECEIVER, KEY_SIZE, KEY_RESOLUTIONS, KEY_TRUTH_RAYS, KEY_BUDGET };
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
@@ -40,9 +30,8 @@ static const cli_option options[] = {
     {KEY_TRUTH_RAYS, "truth-rays", "N", "rays a texel of the truth, 16 to 65536 (1024)"},
     {KEY_BUDGET, "budget", "SECONDS",
      "time to spend on runs, once there is a truth: those that\ndo not fit are left out, and counted (120)"},
-    {0, NULL, NULL, "Light and occlusion, where INPUT is a mesh"},
-    {KEY_SUN, "sun", "X,Y,Z", "direction towards the sun"},
-    {KEY_SUN_ANGLE, "sun-angle", "DEG", "its angular diameter, degrees, 0 to 179 (0.53)"},
+    {0, NULL, NULL, "Light and occlusion, where INPUT is a mesh (--lights also of a scene)"},
+    CLI_LIGHTS,
     CLI_SETTING("ao"),
     CLI_SETTING("uv-set"),
     CLI_COMMON_OPTIONS,
@@ -113,18 +102,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return cli_parse_integer(name, value, 16, 65536, &s->truth_rays);
     case KEY_BUDGET:
         return cli_parse_positive(name, value, &s->budget);
-    case KEY_SUN:
-        s->bake.has_sun = true;
-        return cli_parse_vector(name, value, s->bake.sun);
-    case KEY_SUN_ANGLE:
-        s->bake.has_sun_angle = true;
-        return cli_parse_number(name, value, 0.0, 179.0, &s->bake.sun_angle_deg);
     default:
-        break;
+        return cli_shared_parse(&s->bake, key, name, value);
     }
-    bool taken;
-    const int code = cli_patch_take(&s->bake.patch, key, name, value, &taken);
-    return taken ? code : cli_common_parse(&s->bake.common, key, name, value, &taken);
 }
 
 /* --- what the measurements share */

@@ -263,9 +263,10 @@ static int write_volume(volume_work *work) {
         const vsh_error cancelled = {VSH_ERROR_CANCELLED, "write: cancelled"};
         return cli_fail(&cancelled);
     }
-    const char *const files[] = {work->settings->bake.input, work->settings->like};
+    const cli_bake_settings *bake = &work->settings->bake;
+    const char *const files[] = {bake->input, work->settings->like, cli_bake_lights(bake)};
     cli_provenance origin;
-    const int code = cli_provenance_make(work->scene, files, 2, &work->stats.casters, &work->run, &origin);
+    const int code = cli_provenance_make(work->scene, files, 3, &work->stats.casters, &work->run, &origin);
     if (code != CLI_OK) {
         return code;
     }
