@@ -335,6 +335,17 @@ static void nothing_is_drawn_or_compared_without_what_it_takes(void **state) {
     REFUSED(vsh_view_write("a.html", &seen, &no_bake, NULL, &error));
     seen.plane_count = 1;
     REFUSED(vsh_view_write("a.html", &seen, NULL, NULL, &error));
+    REFUSED(vsh_view_write_bakes("a.html", NULL, 1, NULL, &error));
+    REFUSED(vsh_view_write_bakes("a.html", (const vsh_view_bake *[]){&seen}, 0, NULL, &error));
+    seen.plane_count = 0;
+    seen.image_count = 1;
+    REFUSED(vsh_view_write("a.html", &seen, NULL, NULL, &error));
+    const char *const channel = "ao";
+    const float *no_plane = NULL;
+    const vsh_image image = {1, 1, 1, &channel, &no_plane, NULL};
+    seen.name = "seen";
+    seen.images = &image;
+    REFUSED(vsh_view_write("a.html", &seen, NULL, NULL, &error));
     assert_int_equal(vsh_comparison_alike(NULL), 0);
     assert_null(vsh_comparison_channel(NULL, 0));
     assert_null(vsh_comparison_problem(NULL, 0));

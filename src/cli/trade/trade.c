@@ -14,7 +14,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { KEY_CSV = 0x2000, KEY_PLOT, KEY_RECEIVER, KEY_SIZE, KEY_RESOLUTIONS, KEY_TRUTH_RAYS, KEY_BUDGET };
+enum {
+    KEY_CSV = 0x2000,
+    KEY_PLOT,
+    KEY_VIEW,
+    KEY_RECEIVER,
+    KEY_SIZE,
+    KEY_RESOLUTIONS,
+    KEY_TRUTH_RAYS,
+    KEY_BUDGET
+};
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
@@ -22,6 +31,8 @@ static const cli_option options[] = {
     {KEY_CSV, "csv", "FILE.csv", "write the table as CSV too"},
     {KEY_PLOT, "plot", "FILE.svg",
      "write the plot of the shadow (without lights, of AO)\nas a picture of its own too"},
+    {KEY_VIEW, "view", "PAGE.html",
+     "also a page to look at the runs in a browser, truth and\nbakes with a slider between: docs/view.md"},
     {0, NULL, NULL, "What is measured"},
     {KEY_RECEIVER, "receiver", "N", "one receiver of the scene only, from 0 (all)"},
     {KEY_SIZE, "size", "W[xH]", "texels of each lightmap, 1 to 4096 (256)"},
@@ -91,6 +102,9 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return CLI_OK;
     case KEY_PLOT:
         s->plot = value;
+        return CLI_OK;
+    case KEY_VIEW:
+        s->view = value;
         return CLI_OK;
     case KEY_RECEIVER:
         return cli_parse_integer(name, value, 0, INT32_MAX, &s->receiver);
@@ -251,6 +265,7 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
     CLI_TRY_DONE(trade_write_csv(&work));
     CLI_TRY_DONE(trade_write_plot(&work));
     CLI_TRY_DONE(trade_write_report(&work));
+    CLI_TRY_DONE(trade_write_view(&work));
     cli_signals_end();
     if (!settings->bake.common.quiet) {
         cli_say("%s: %zu runs in %.1f s, %zu left out", settings->report,
@@ -266,8 +281,8 @@ done:
 
 /* What can be refused before anything is read. */
 static int check_files(const trade_settings *s, const vsh_scene *scene) {
-    const char *const outputs[] = {s->report, s->csv, s->plot};
-    static const char *const names[] = {"output", "--csv file", "--plot file"};
+    const char *const outputs[] = {s->report, s->csv, s->plot, s->view};
+    static const char *const names[] = {"output", "--csv file", "--plot file", "--view page"};
     cli_bake_settings named = s->bake; /* by the command line, not by the scene */
     if (scene->layer_count > 0) {
         return cli_usage("%s: trade measures one field, not layers", s->bake.input);
@@ -335,6 +350,7 @@ static int trade_main(int argc, char **argv) {
     CLI_TRY_DONE(cli_bake_scene_make(&s.bake, &made));
     CLI_TRY_DONE(check_files(&s, &made.scene));
     CLI_TRY_DONE(choose_receiver(&s, &made.scene));
+    CLI_TRY_DONE(trade_check_view(&s, &made.scene));
     cli_signals_watch();
     code = trade(&s, &made.scene);
 done:
