@@ -68,7 +68,7 @@ typedef struct vsh_bake_job_options {
     const char *invalid_picture; /* PNG of the texels that are not valid, for each lightmap: where there are
                                     several, FILE.OUTPUT.png. NULL: none. Not with `resume` */
     const vsh_row_sink *sink; /* NULL: image files at the receivers' outputs, which say where they come from
-                                 (vsh_provenance); where an output's name ends in .glb or .gltf, the
+                                 (vsh_provenance); where an output's name ends in .glb, .gltf or .obj, the
                                  receiver's file with its light (vsh_lit_write()): AO as occlusion, irradiance
                                  or else the mean of the lights' shadows as lightmap, whose intensity is π:
                                  what is lit fully shows its own colour */

@@ -1,5 +1,5 @@
 /* Assets with their light: a glTF or GLB given back as it was, with one more set of UVs and with what was
- * baked in its materials; and a GLB made of a mesh file of another format (docs/lit.md). */
+ * baked in its materials; a GLB made of a mesh file of another format; an OBJ (docs/lit.md). */
 #ifndef VDBSHADE_LIT_H
 #define VDBSHADE_LIT_H
 
@@ -76,7 +76,7 @@ static inline vsh_lit_options vsh_lit_options_default(void) {
     return options;
 }
 
-/* Writes `output`, a .glb or .gltf by its ending.
+/* Writes `output`, a .glb, .gltf or .obj by its ending.
  *
  * Where `path` is a .glb or .gltf, that document with all that it holds, known or not: each primitive that
  * has uvs gets them as its first free TEXCOORD_n; vertices are doubled only where the atlas splits them, and
@@ -90,14 +90,19 @@ static inline vsh_lit_options vsh_lit_options_default(void) {
  * Of other formats, and where path is NULL, a document is made of the model: a node for each object with its
  * transform, positions, normals, the first set of UVs and the new one, white materials.
  *
+ * An .obj holds the model's meshes in the world, by their names, with the UVs that they are lit by alone. Its
+ * images are PREVIEW, and stand beside it; a material page_N for each page (OUT.mtl, where there are images)
+ * shows its image. Without images it has the UVs, and materials where there are several pages.
+ *
  * `model` is what vsh_model_read() made of `path`, whose file has not changed since; `meshes` one for each of
  * its meshes, in the order of vsh_model_mesh(); NULL: all have their lightmap in the set that
  * vsh_model_mesh() takes for -1, on page 0. Draco's data is decoded by run->reader, where there is one.
  * Stage: "lit". Files are written beside their places and renamed when all are whole; a failure leaves old
  * ones as they were. Errors:
- * - VSH_ERROR_ARGUMENT: model, output or an array NULL; options, run; an ending other than .glb and .gltf; a
+ * - VSH_ERROR_ARGUMENT: model, output or an array NULL; options, run; another ending; a
  *   mesh that does not fit the model's, a chart, page, set or image out of range, two images of one page and
- *   purpose, UVs that are not finite; an output that would replace a file that the input is made of;
+ *   purpose, UVs that are not finite; an output that would replace a file that the input is made of, or an
+ * OUT.mtl that is not ours;
  * - VSH_ERROR_INPUT: a document that is not well formed, or not the model's;
  * - VSH_ERROR_READ: as vsh_model_read(); a buffer that is short or missing;
  * - VSH_ERROR_LIMIT: run->memory_limit; a GLB of 4 GiB or more;

@@ -6,11 +6,19 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 enum { AO = 0, LIGHT = 1, PLANES = 4 };
 
 /* What viewers divide the light by that falls on a diffuse surface: light of 1 shows its own colour. */
 static const double full_light = 3.14159265358979323846;
+
+/* Whether light is shown alone, as colour: as was asked for, or because materials of an OBJ know nothing
+ * else. */
+static bool previews(const vshi_lit_sink *lit) {
+    return lit->job->options.lit_preview != 0 ||
+           strcasecmp(vshi_path_ending(lit->lightmap->output), "obj") == 0;
+}
 
 /* --- channels */
 
@@ -182,7 +190,7 @@ static vsh_result add(void *user, int32_t rows, const float *const *planes, vsh_
             to[i] = sum / (float)lit->source_count[p];
         }
     }
-    if (lit->job->options.lit_preview == 0) {
+    if (!previews(lit)) {
         open_ambient(lit, (size_t)lit->rows * width, count);
     }
     lit->rows += rows;
@@ -204,7 +212,7 @@ static size_t list_images(const vshi_lit_sink *lit, size_t number, vsh_lit_image
     const vsh_bake_job *job = lit->job;
     const vshi_lit_page *page = &job->lit_pages[number];
     const vsh_receiver *receiver = &job->scene.receivers[lit->lightmap->receiver];
-    const bool light = page->planes[LIGHT] != NULL, preview = job->options.lit_preview != 0;
+    const bool light = page->planes[LIGHT] != NULL, preview = previews(lit);
     size_t count = 0;
     if (light && preview) {
         multiply_by_ao(lit, page);

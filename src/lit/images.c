@@ -1,6 +1,5 @@
 #include "lit/images.h"
 
-#include "base/file.h"
 #include "base/memory.h"
 #include "base/srgb.h"
 #include "image/png.h"
@@ -20,19 +19,6 @@ void vshi_lit_besides_free(vshi_lit_besides *besides) {
     }
     free(besides->list);
     *besides = (vshi_lit_besides){NULL, 0};
-}
-
-char *vshi_lit_beside_name(const char *output, const char *mark, const char *ending) {
-    const char *slash = strrchr(output, '/');
-    const char *name = slash != NULL ? slash + 1 : output;
-    const char *own = vshi_path_ending(output);
-    const size_t stem = own[0] != '\0' ? (size_t)(own - name) - 1 : strlen(name);
-    const size_t size = stem + strlen(mark) + strlen(ending) + 2;
-    char *made = malloc(size);
-    if (made != NULL) {
-        snprintf(made, size, "%.*s%s.%s", (int)stem, name, mark, ending);
-    }
-    return made;
 }
 
 /* --- encoding */
@@ -141,10 +127,8 @@ static vsh_result put_beside(vshi_lit_work *work, const vsh_lit_image *image, vs
     } else {
         snprintf(mark, sizeof mark, ".%s", purpose_names[image->purpose]);
     }
-    beside->name = vshi_lit_beside_name(work->output, mark, "png");
-    return beside->name != NULL
-               ? vshi_lit_set(&work->document, made, "uri", vshi_lit_uri(beside->name), error)
-               : vshi_lit_no_memory(&work->document, error);
+    VSHI_TRY(vshi_lit_beside_name(work, mark, "png", &beside->name, error));
+    return vshi_lit_set(&work->document, made, "uri", vshi_lit_uri(beside->name), error);
 }
 
 static vsh_result add_texture(vshi_lit_work *work, const vsh_lit_image *image, json_t *made, size_t *sampler,

@@ -83,7 +83,7 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     for words in "--preview -o a.png" "--embed -o a.exr" "--exr b.exr -o a.png" "--images-beside -o a.tif"; do
         # shellcheck disable=SC2086
         shade bake in.glb "${BAKE[@]}" $words
-        refused 2 "${words%% *}" ".glb or .gltf"
+        refused 2 "${words%% *}" ".glb, .gltf or .obj"
     done
     shade bake in.glb "${BAKE[@]}" --embed --images-beside -o a.glb
     refused 2 --embed --images-beside
@@ -193,4 +193,22 @@ JSON
     shade info dark.lightmap.png
     # 0.5 of 8 bits, in every texel
     [[ $output == *"min 0.50196"*"max 0.50196"* ]] || fail "$output"
+}
+
+@test "baked again over its own output, or beside files of its input, a glTF replaces only what is its own" {
+    shade bake "$ASSETS/thin.glb" --ao 0.5 --size 32 -o lit.gltf
+    done_well
+    cp lit.gltf in.gltf # which names lit.bin and lit.occlusion.png
+    cp lit.bin bin.before
+    cp lit.occlusion.png png.before
+    for again in 1 2; do
+        shade bake in.gltf --ao 0.2 --size 32 -o new.gltf
+        done_well
+        shade bake in.gltf --ao 0.2 --size 32 -o lit.gltf
+        done_well
+    done
+    [ "$(ls lit.* new.*)" = "$(printf '%s\n' lit.1.bin lit.bin lit.gltf lit.occlusion.1.png lit.occlusion.png new.bin new.gltf new.occlusion.png)" ] || fail "$(ls)"
+    cmp lit.bin bin.before && cmp lit.occlusion.png png.before || fail 'a file of the input was replaced'
+    grep -q '"uri": "lit.1.bin"' lit.gltf && grep -q '"uri": "lit.occlusion.1.png"' lit.gltf || fail "$(grep uri lit.gltf)"
+    cmp lit.occlusion.1.png new.occlusion.png || fail 'another image'
 }

@@ -65,8 +65,8 @@ setup() {
     old_output out.obj
     shade unwrap box.obj
     refused 2 -o
-    shade unwrap box.obj -o out.glb
-    refused 2 out.glb
+    shade unwrap box.obj -o out.ply
+    refused 2 out.ply
     shade unwrap box.obj -o none/out.obj
     refused 3 none/out.obj
     shade unwrap box.obj -o box.obj

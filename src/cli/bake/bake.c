@@ -57,10 +57,10 @@ static int check_lit(const cli_bake_settings *settings, const vsh_scene *scene) 
         assets += vsh_lit_is_output(scene->receivers[i].output) != 0;
     }
     if (given != NULL && assets == 0) {
-        return cli_usage("--%s: is for outputs that end in .glb or .gltf", given);
+        return cli_usage("--%s: is for outputs that end in .glb, .gltf or .obj", given);
     }
     if (assets > 0 && settings->per_object) {
-        return cli_usage("--per-object: a .glb or .gltf has one lightmap for all its objects");
+        return cli_usage("--per-object: a .glb, .gltf or .obj has one lightmap for all its objects");
     }
     if (settings->embed && settings->images_beside) {
         return cli_usage("--embed: not together with --images-beside");

@@ -30,7 +30,7 @@ static const cli_option options[] = {
      ".png .tif .dpx .sgi .jp2 .tga .bmp .ico .iff .rla\n"
      ".hdr .ppm .pgm .jpg .webp .heic .avif .gif; what each\n"
      "can hold, and what is not written: docs/formats.md;\n"
-     ".glb .gltf: the input with its light in its materials\n(docs/lit.md)"},
+     ".glb .gltf .obj: the input with its light in its\nmaterials (docs/lit.md)"},
     {KEY_OUTPUT_FOLDER, "output-folder", "FOLDER",
      "write there what a scene's file says is written, under\nthe same names; it is made where it is not "
      "there"},

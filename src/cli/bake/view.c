@@ -17,6 +17,9 @@ int cli_bake_check_view(const cli_bake_settings *settings, const vsh_scene *scen
     if (settings->per_object || scene->receiver_count != 1 || scene->receivers[0].type != VSH_RECEIVER_MESH) {
         return cli_usage("--view '%s': shows one lightmap of one mesh; 'vdbshade view' shows others", page);
     }
+    if (cli_has_ending(scene->receivers[0].output, "obj")) {
+        return cli_usage("--view '%s': shows what a .glb, a .gltf or an image holds, not an .obj", page);
+    }
     if (cli_same_file(page, scene->receivers[0].output) || cli_same_file(page, settings->input)) {
         return cli_usage("--view '%s': is also the input or the output", page);
     }

@@ -44,8 +44,10 @@ typedef struct unwrap_settings {
 
 static const cli_option options[] = {
     {0, NULL, NULL, "Output"},
-    {'o', "output", "OUT.obj",
-     "mesh file to write: the input's meshes, in the world, with\nthe UVs that were made"},
+    {'o', "output", "OUT",
+     "mesh file to write, with the UVs that were made: .glb or\n.gltf, the input with one more set; .obj, "
+     "its meshes "
+     "in\nthe world with that set alone"},
     {KEY_PICTURE, "picture", "FILE", "picture of the charts to write, PNG or another image"},
     {0, NULL, NULL, "Atlas"},
     {KEY_SIZE, "size", "N|WxH", "texels of each page (1024)"},
@@ -64,7 +66,7 @@ static int unwrap_main(int argc, char **argv);
 
 const cli_command cli_unwrap = {
     "unwrap",
-    "INPUT -o OUT.obj [options]",
+    "INPUT -o OUT [options]",
     "Cuts the meshes of a file into charts, lays them out flat, and packs them into an atlas:\n"
     "lightmap UVs for meshes that have none. Numbers in brackets are what holds without the\n"
     "option.",
@@ -124,8 +126,8 @@ static int take(void *settings, int key, const char *name, const char *value) {
 
 /* What can be refused before anything is read. */
 static int check_files(const unwrap_settings *s) {
-    if (s->output == NULL || !cli_has_ending(s->output, "obj")) {
-        return cli_usage("%s: give -o OUT.obj", s->output != NULL ? s->output : s->input);
+    if (!vsh_lit_is_output(s->output)) {
+        return cli_usage("%s: give -o OUT.obj, .glb or .gltf", s->output != NULL ? s->output : s->input);
     }
     if (cli_same_file(s->output, s->input)) {
         return cli_usage("%s: the output is the input", s->output);
@@ -214,7 +216,7 @@ static int unwrap(unwrap_settings *s) {
     if (s->picture != NULL) {
         CLI_TRY_DONE(cli_unwrap_write_picture(s->picture, atlas));
     }
-    CLI_TRY_DONE(cli_unwrap_write_obj(s->output, meshes, atlas));
+    CLI_TRY_DONE(cli_unwrap_write_mesh(s->input, s->output, model, atlas, &run));
     cli_signals_end();
     if (!s->common.quiet) {
         say_summary(s, atlas, vshi_seconds() - start);

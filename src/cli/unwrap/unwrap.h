@@ -4,9 +4,10 @@
 
 #include <vdbshade/vdbshade.h>
 
-/* Writes meshes with their places in an atlas as an OBJ file, in the world, each page a material. CLI_OK or
- * an exit code, having said why. */
-int cli_unwrap_write_obj(const char *path, const vsh_mesh *meshes, const vsh_atlas *atlas);
+/* Writes the model that was read from `input` with its places in an atlas. CLI_OK or an exit code, having
+ * said why. */
+int cli_unwrap_write_mesh(const char *input, const char *path, const vsh_model *model, const vsh_atlas *atlas,
+                          const vsh_run *run);
 
 /* Writes a picture of the charts, pages from the top down, each chart in a colour of its own. `path` is any
  * image that vsh_image_write() writes. CLI_OK or an exit code, having said why. */
