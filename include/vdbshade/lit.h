@@ -68,11 +68,15 @@ typedef struct vsh_lit_options {
     const vsh_lit_image *images; /* [image_count], in any order. A page without any leaves its materials as
                                     they are */
     size_t image_count;
-    int32_t image_place; /* VSH_LIT_IMAGES_… */
+    int32_t image_place;             /* VSH_LIT_IMAGES_… */
+    const vsh_attribute *attributes; /* [attribute_count]: where it comes from (provenance.h): into the extras
+                                        of the document's asset, in place of earlier ones that begin with
+                                        "vdbshade_"; comments of an .obj. Extras that are no object stay */
+    size_t attribute_count;
 } vsh_lit_options;
 
 static inline vsh_lit_options vsh_lit_options_default(void) {
-    vsh_lit_options options = {sizeof(vsh_lit_options), NULL, 0, NULL, 0, VSH_LIT_IMAGES_AUTO};
+    vsh_lit_options options = {sizeof(vsh_lit_options), NULL, 0, NULL, 0, VSH_LIT_IMAGES_AUTO, NULL, 0};
     return options;
 }
 

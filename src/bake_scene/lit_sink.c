@@ -320,6 +320,7 @@ static vsh_result write(const vshi_lit_sink *lit, vsh_error *error) {
     }
     options.images = images;
     options.image_place = job->options.lit_image_place;
+    options.attributes = vsh_provenance_attributes(job->provenance, &options.attribute_count);
     VSHI_TRY_DONE(list_chart_pages(lit, &options, &pages, error));
     VSHI_TRY_DONE(list_meshes(lit, model, &meshes, error));
     tell_writing(job, lit->lightmap->output);

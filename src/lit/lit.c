@@ -4,6 +4,7 @@
 #include "lit/work.h"
 #include "lit/write.h"
 
+#include "base/attributes.h"
 #include "base/file.h"
 #include "base/floats.h"
 #include "base/memory.h"
@@ -68,6 +69,8 @@ static vsh_result check(vshi_lit_work *work, vsh_error *error) {
     }
     VSHI_TRY(vshi_output_check(work->output, error));
     VSHI_TRY(vshi_lit_check_images(work->options, error));
+    VSHI_TRY(vshi_attributes_check(work->output, work->options->attributes, work->options->attribute_count,
+                                   error));
     VSHI_TRY(count_pages(work, error));
     for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
         VSHI_TRY(vshi_lit_check_mesh(work, i, error));
@@ -159,6 +162,7 @@ static vsh_result make(vshi_lit_work *work, const char *path, const vsh_run *run
     if (!vshi_lit_is_obj(work->output)) {
         VSHI_TRY_DONE(vshi_lit_materials_apply(work, error));
         VSHI_TRY_DONE(vshi_lit_prune(&work->document, &uses, error));
+        VSHI_TRY_DONE(vshi_lit_tell_origin(work, error));
     }
     VSHI_TRY_DONE(vshi_lit_write_files(work, &besides, error));
 done:

@@ -58,6 +58,16 @@ __attribute__((format(printf, 2, 3))) static void say(text *t, const char *forma
     va_end(values);
 }
 
+/* A line of words that may be long, as they are; NULL behind the last. */
+static void say_words(text *t, const char *const *words) {
+    for (; *words != NULL; ++words) {
+        for (const char *c = *words; *c != '\0'; ++c) {
+            say(t, "%c", *c);
+        }
+    }
+    say(t, "\n");
+}
+
 /* A name as OBJ has them: no blanks, no control characters. */
 static void say_name(text *t, const char *keyword, const char *name) {
     say(t, "%s ", keyword);
@@ -175,12 +185,12 @@ vsh_result vshi_lit_put_obj(const vshi_lit_work *work, const char *mtl, vshi_lit
     counts before = {0, 0, 0};
     placed last = {.lit = NULL};
     begin(&t, put, file);
+    for (size_t i = 0; i < work->options->attribute_count; ++i) {
+        const vsh_attribute *one = &work->options->attributes[i];
+        say_words(&t, (const char *[]){"# ", one->name, ": ", one->value, NULL});
+    }
     if (mtl != NULL) {
-        say(&t, "mtllib ");
-        for (const char *c = mtl; *c != '\0'; ++c) {
-            say(&t, "%c", *c);
-        }
-        say(&t, "\n");
+        say_words(&t, (const char *[]){"mtllib ", mtl, NULL});
     }
     for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
         if (vshi_job_advance(work->document.gltf.job, 1)) {
@@ -205,11 +215,7 @@ static void put_material(text *t, const char *image) {
     say(t, "Ka 1 1 1\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
     static const char *const maps[] = {"map_Ka", "map_Kd"};
     for (size_t k = 0; k < sizeof maps / sizeof maps[0] && image != NULL; ++k) {
-        say(t, "%s ", maps[k]);
-        for (const char *c = image; *c != '\0'; ++c) {
-            say(t, "%c", *c);
-        }
-        say(t, "\n");
+        say_words(t, (const char *[]){maps[k], " ", image, NULL});
     }
 }
 

@@ -94,6 +94,9 @@ vsh_result vshi_lit_pages_make(vshi_lit_work *work, const json_t *made, const vs
                                const uint32_t *corners, size_t vertex_count, size_t set, size_t *whole,
                                json_t *list, vsh_error *error);
 
+/* The options' attributes into the extras of the asset. (origin.c) */
+vsh_result vshi_lit_tell_origin(vshi_lit_work *work, vsh_error *error);
+
 /* The only page of a mesh, or VSH_LIT_NO_CHART. */
 uint32_t vshi_lit_only_page(const vshi_lit_work *work, const vsh_lit_mesh *mesh);
 

@@ -21,16 +21,11 @@ const char *vshi_view_file_name(const char *path) {
 
 json_t *vshi_view_text(const char *text) {
     char *clean = malloc(3 * strlen(text) + 1);
-    size_t used = 0;
     if (clean == NULL) {
         return NULL;
     }
-    for (size_t length; *text != '\0'; text += length > 0 ? length : 1) {
-        length = vshi_utf8_length(text);
-        memcpy(clean + used, length > 0 ? text : VSHI_NO_CHARACTER, length > 0 ? length : 3);
-        used += length > 0 ? length : 3;
-    }
-    json_t *made = json_stringn(clean, used);
+    vshi_utf8_clean(text, clean);
+    json_t *made = json_string(clean);
     free(clean);
     return made;
 }

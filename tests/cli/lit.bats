@@ -212,3 +212,29 @@ JSON
     grep -q '"uri": "lit.1.bin"' lit.gltf && grep -q '"uri": "lit.occlusion.1.png"' lit.gltf || fail "$(grep uri lit.gltf)"
     cmp lit.occlusion.1.png new.occlusion.png || fail 'another image'
 }
+
+@test "an asset says where it comes from, in its extras, as images do" {
+    shade bake "$ASSETS/thin.glb" --ao 0.5 --size 32 -o lit.gltf --exr lit.exr
+    done_well
+    shade info lit.exr
+    told=$(grep '^vdbshade_' <<<"$output" | grep -v '^vdbshade_rgb') # which is of the EXR's own picture
+    [[ $told == *vdbshade_ao:* && $told == *vdbshade_input_0:\ sha256:*thin.glb* && $told == *"vdbshade_command: bake --ao 0.5"* ]] || fail "$told"
+    python3 -c 'import json, sys
+extras = json.load(open("lit.gltf"))["asset"]["extras"]
+print("\n".join("%s: %s" % one for one in extras.items()))' >extras
+    [ "$(cat extras)" = "$told" ] || fail "$(cat extras), not $told"
+    # others' stay, and what an earlier bake has told goes
+    sed -i 's/"extras": {/"extras": {"mine": [1], "vdbshade_old": "x",/' lit.gltf
+    grep -q '"mine"' lit.gltf
+    latin=$(printf 'n\xe9.gltf')
+    mv lit.gltf "$latin"
+    shade bake "$latin" --ao 0.2 --size 32 -o again.gltf
+    done_well
+    python3 -c 'import json, sys
+extras = json.load(open("again.gltf"))["asset"]["extras"]
+assert extras["mine"] == [1] and "vdbshade_old" not in extras and "--ao 0.2" in extras["vdbshade_command"], extras
+assert extras["vdbshade_input_0"].endswith("n\ufffd.gltf"), extras'
+    shade bake "$ASSETS/thin.glb" --ao 0.5 --size 32 -o lit.obj
+    done_well
+    grep -q '^# vdbshade_ao: ' lit.obj && grep -q '^# vdbshade_input_0: sha256' lit.obj || fail "$(head -9 lit.obj)"
+}
