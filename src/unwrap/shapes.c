@@ -160,7 +160,7 @@ static vsh_result lay_out_all(const making *m, vsh_error *error) {
         count += m->shapes->list[i].chart_count;
     }
     VSHI_TRY_DONE(vshi_allocate((void **)&charts, count, sizeof *charts, what, error));
-    for (size_t i = 0, at = 0; i < m->shapes->count; at += m->shapes->list[i++].chart_count) {
+    for (size_t i = 0, at = 0; count > 0 && i < m->shapes->count; at += m->shapes->list[i++].chart_count) {
         VSHI_TRY_DONE(list_charts(&m->shapes->list[i], charts + at, error));
     }
     VSHI_TRY_DONE(vshi_parallel_for(m->job, count, 4, 0, lay_out_charts, &(laying){m, charts}, error));

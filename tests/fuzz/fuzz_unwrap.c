@@ -33,9 +33,9 @@ static vsh_mesh take_mesh(fuzz_input *input, arrays *a) {
     for (size_t i = 0; (how & 2) != 0 && i < 2 * mesh.vertex_count; ++i) {
         a->uvs[i] = (float)fuzz_byte(input) / 128.0f;
     }
+    const size_t range = mesh.vertex_count + ((how & 4) != 0); /* one may be out of range */
     for (size_t i = 0; i < 3 * mesh.triangle_count; ++i) {
-        a->indices[i] =
-            fuzz_byte(input) % (mesh.vertex_count + ((how & 4) != 0)); /* one may be out of range */
+        a->indices[i] = range > 0 ? (uint32_t)(fuzz_byte(input) % range) : 0;
     }
     for (int i = 0; i < 12; ++i) {
         a->transform[i] = (how & 8) != 0 ? (double)number(input) : (double)(i % 5 == 0);
