@@ -65,6 +65,11 @@ TRADE=(--sun 1,0.2,1 --sun-angle 30 --size 32 --resolutions 32 --truth-rays 256 
         "receivers": [{"mesh": "corner.obj", "output": "a.exr"}, {"mesh": "corner.obj", "output": "b.exr"}]}' >scene.json
     shade trade scene.json -o trade.html --view runs.html
     refused 2 "shows one lightmap of one mesh; see --receiver"
+    sed 's/"b.exr"/"b.exr", "unwrap": "always"/' scene.json >unwrapped.json
+    shade trade unwrapped.json --receiver 1 -o trade.html --view runs.html
+    refused 2 "shows UVs of the mesh's file"
+    shade bake corner.obj --ao 1 --unwrap always -o baked.png --view baked.html
+    refused 2 "--view 'baked.html': an image does not hold the UVs that are made"
     shade trade scene.json --receiver 1 --size 16 --resolutions 16 --truth-rays 16 --budget 0.001 -o trade.html --view runs.html
     done_well
 }

@@ -261,6 +261,7 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
     }
     int code;
     CLI_TRY_DONE(trade_load(&work));
+    CLI_TRY_DONE(trade_check_view_uvs(&work));
     CLI_TRY_DONE(measure(&work));
     CLI_TRY_DONE(trade_write_csv(&work));
     CLI_TRY_DONE(trade_write_plot(&work));

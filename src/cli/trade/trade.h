@@ -124,8 +124,10 @@ int trade_write_report(const trade_work *work);
 int trade_write_csv(const trade_work *work);
 int trade_write_plot(const trade_work *work);
 
-/* --view: whether a page can show the scene; and the page, last of all: values are grown for it. */
+/* --view: whether a page can show the scene, and then what was loaded; and the page, last of all: values are
+ * grown for it. */
 int trade_check_view(const trade_settings *settings, const vsh_scene *scene);
+int trade_check_view_uvs(const trade_work *work);
 int trade_write_view(const trade_work *work);
 
 /* Bakes all receivers into planes of shadow [lights][texels], of AO or of coverage (each may be NULL). */

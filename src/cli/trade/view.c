@@ -30,6 +30,14 @@ int trade_check_view(const trade_settings *s, const vsh_scene *scene) {
     return CLI_OK;
 }
 
+int trade_check_view_uvs(const trade_work *work) {
+    const char *page = work->settings->view;
+    const size_t *numbers;
+    return page == NULL || vsh_assets_receiver_atlas(work->assets, 0, &numbers) == NULL
+               ? CLI_OK
+               : cli_usage("--view '%s': shows UVs of the mesh's file, not those that are made", page);
+}
+
 /* --- what is seen: texels that all runs have, and what is grown from them */
 
 /* One step: each texel that has no value takes the mean of its neighbours that had one before. */

@@ -38,10 +38,10 @@ class Bake:
     def begin(self, context):
         if not self.receivers:
             raise BakeError("select the mesh objects that are to be baked; they must not be hidden from renders")
-        self.context, self.program, how = context, program_of(context), self.settings.unwrap
+        self.program, how = program_of(context), self.settings.unwrap
         self.folder = tempfile.mkdtemp(prefix="vdbshade-")
         if not needs_layout(self.receivers, how):
-            self.bake()
+            self.bake(context)
             return
         self.layout = self.undo = Layout(context, self.receivers, how)
         parted = self.layout.part()
@@ -51,9 +51,8 @@ class Bake:
         context.view_layer.update()
         self.start(self.layout.command(self.program, self.folder, self.settings, context.evaluated_depsgraph_get()))
 
-    def bake(self):
+    def bake(self, context):
         """The second step, once all receivers have UVs."""
-        context = self.context
         self.uv_names = {obj.name: materials.lightmap_uv(obj) for obj in self.receivers}
         without = [name for name, uv_name in self.uv_names.items() if uv_name is None]
         if without:
@@ -102,8 +101,8 @@ class Bake:
             return code
         self.layout.take(self.folder)
         self.layout = None
-        self.context.view_layer.update()
-        self.bake()
+        bpy.context.view_layer.update()
+        self.bake(bpy.context)
         return None
 
     def wait(self):
