@@ -11,7 +11,7 @@ write_corner() {
         'vt 0.6 1' 'f 5/5 6/6 7/7' 'f 5/5 7/7 8/8' >corner.obj
 }
 
-TRADE=(--sun 1,0.2,1 --sun-angle 30 --size 32 --resolutions 32 --truth-rays 256 --budget 30 --quiet)
+TRADE=(--sun 1,0.2,1 --sun-angle 30 --size 32 --resolutions 32 --truth-rays 64 --budget 10 --quiet)
 
 @test "truth and runs: each side of the slider shows the one that is chosen, with its error and seconds" {
     write_corner
@@ -66,7 +66,7 @@ TRADE=(--sun 1,0.2,1 --sun-angle 30 --size 32 --resolutions 32 --truth-rays 256 
     shade trade scene.json -o trade.html --view runs.html
     refused 2 "shows one lightmap of one mesh; see --receiver"
     sed 's/"b.exr"/"b.exr", "unwrap": "always"/' scene.json >unwrapped.json
-    shade trade unwrapped.json --receiver 1 -o trade.html --view runs.html
+    shade trade unwrapped.json --quiet --receiver 1 -o trade.html --view runs.html
     refused 2 "shows UVs of the mesh's file"
     shade bake corner.obj --ao 1 --unwrap always -o baked.png --view baked.html
     refused 2 "--view 'baked.html': an image does not hold the UVs that are made"
