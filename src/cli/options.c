@@ -237,11 +237,18 @@ static const char *without_folder(const char *path) {
     return slash != NULL ? slash + 1 : path;
 }
 
+void cli_parsed_add(const char *option, const char *value) {
+    char name[64];
+    snprintf(name, sizeof name, "--%s", option);
+    append_word(name);
+    append_word(value);
+}
+
 static void append_option(const cli_option *option, const char *value) {
     static const char *const changes_nothing[] = {
-        "output",  "output-folder", "stats",         "threads", "memory-limit", "isa",
-        "trusted", "confined",      "allow-outside", "quiet",   "verbose",      "progress",
-        "json",    "band-rows",     "dry-run",       "resume",  "help",         "view"};
+        "output",   "output-folder", "stats", "threads", "memory-limit", "isa",  "trusted",
+        "confined", "allow-outside", "quiet", "verbose", "progress",     "json", "band-rows",
+        "dry-run",  "resume",        "help",  "view",    "field"};
     for (size_t i = 0; i < sizeof changes_nothing / sizeof changes_nothing[0]; ++i) {
         if (strcmp(option->name, changes_nothing[i]) == 0) {
             return;

@@ -189,6 +189,9 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
     if (caster->path == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: no path", index);
     }
+    if (caster->type == VSH_CASTER_VDB && scene->field != NULL) {
+        return VSH_OK; /* its field is there */
+    }
     if (caster->type == VSH_CASTER_VDB) {
         return vshi_asset_grid(&assets->files, caster->path, caster->grid, run, &place->grid, error);
     }

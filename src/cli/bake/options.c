@@ -13,7 +13,6 @@ enum {
     KEY_OUTPUT_FOLDER,
     KEY_RECEIVE,
     KEY_NO_RECEIVE,
-    KEY_NO_CAST,
     KEY_PER_OBJECT,
     KEY_INVALID,
     KEY_PREVIEW,
@@ -56,7 +55,7 @@ static const cli_option options[] = {
     {KEY_RECEIVE, "receive", "NAME",
      "only objects of this name receive, all cast; * and ?\nmatch as in a shell; may be repeated"},
     {KEY_NO_RECEIVE, "no-receive", "NAME", "objects of this name only cast; may be repeated"},
-    {KEY_NO_CAST, "no-cast", "NAME", "objects of this name only receive; may be repeated"},
+    CLI_NO_CAST_OPTION,
     {KEY_PER_OBJECT, "per-object", NULL,
      "an image for each object: FOLDER/NAME.exr with\n-o FOLDER/, else OUT.NAME.exr, or where OUT has %s"},
     {0, NULL, NULL, "Light and occlusion"},
@@ -121,6 +120,11 @@ int cli_shared_parse(cli_bake_settings *s, int key, const char *name, const char
         return cli_parse_number(name, value, 0.0, 179.0, &s->sun_angle_deg);
     case CLI_KEY_CASTER:
         return take_caster(s, name, value);
+    case CLI_KEY_NO_CAST:
+        return take_pattern(&s->no_cast, name, value);
+    case CLI_KEY_FIELD:
+        s->field = value;
+        return CLI_OK;
     default:
         code = cli_patch_take(&s->patch, key, name, value, &taken);
         return taken ? code : cli_common_parse(&s->common, key, name, value, &taken);
@@ -140,8 +144,6 @@ static int take(void *settings, int key, const char *name, const char *value) {
         return take_pattern(&s->receive, name, value);
     case KEY_NO_RECEIVE:
         return take_pattern(&s->no_receive, name, value);
-    case KEY_NO_CAST:
-        return take_pattern(&s->no_cast, name, value);
     case KEY_PER_OBJECT:
         s->per_object = true;
         return CLI_OK;

@@ -14,7 +14,7 @@ typedef struct cli_patterns {
 } cli_patterns;
 
 /* What commands that shade share. */
-enum { CLI_KEY_SUN = 0x3000, CLI_KEY_SUN_ANGLE, CLI_KEY_CASTER };
+enum { CLI_KEY_SUN = 0x3000, CLI_KEY_SUN_ANGLE, CLI_KEY_CASTER, CLI_KEY_FIELD, CLI_KEY_NO_CAST };
 
 #define CLI_LIGHT_OPTIONS                                                                                    \
     {CLI_KEY_SUN, "sun", "X,Y,Z", "direction towards the sun; its channel is shadow.sun"},                   \
@@ -23,9 +23,18 @@ enum { CLI_KEY_SUN = 0x3000, CLI_KEY_SUN_ANGLE, CLI_KEY_CASTER };
 
 #define CLI_ACCURACY_OPTIONS {0, NULL, NULL, "Accuracy"}, CLI_SETTINGS(VSH_SETTINGS_ACCURACY)
 
+#define CLI_NO_CAST_OPTION                                                                                   \
+    { CLI_KEY_NO_CAST, "no-cast", "NAME", "objects of this name only receive; may be repeated" }
+
+#define CLI_CASTER_OPTION                                                                                    \
+    { CLI_KEY_CASTER, "caster", "FILE", "another mesh or .vdb that casts shadows; may be\nrepeated" }
+
 #define CLI_CASTER_OPTIONS                                                                                   \
-    {0, NULL, NULL, "Casters and voxels"}, {                                                                 \
-        CLI_KEY_CASTER, "caster", "FILE", "another mesh or .vdb that casts shadows; may be\nrepeated"        \
+    {0, NULL, NULL, "Casters and voxels"}, CLI_CASTER_OPTION, {                                              \
+        CLI_KEY_FIELD, "field", "FILE",                                                                      \
+            "take the casters' voxels from there ('vdbshade field'),\nas it was told to make them; refused " \
+            "where "                                                                                         \
+            "it is stale;\nchanges no value"                                                                 \
     }
 
 typedef struct cli_bake_settings {
@@ -45,6 +54,7 @@ typedef struct cli_bake_settings {
     int32_t band_rows; /* 0: as many as go */
     const char *casters[CLI_MAX_EXTRA_CASTERS];
     size_t caster_count;
+    const char *field;                  /* a file of fields; NULL: they are made */
     const char *exr;                    /* beside an asset; NULL: none */
     bool preview, embed, images_beside; /* of an asset */
     bool has_sun, has_sun_angle, has_light_radius, per_object, dry_run, resume;
@@ -62,8 +72,9 @@ typedef struct cli_bake_scene {
     vsh_scene *read; /* the scene file's; NULL for a mesh */
     vsh_caster *casters;
     vsh_receiver *receivers;
-    char **outputs;    /* [receiver_count], where they are not the scene's own; NULL: none is */
-    vsh_light *lights; /* [scene.light_count], where they are not all the scene file's */
+    char **outputs;        /* [receiver_count], where they are not the scene's own; NULL: none is */
+    vsh_light *lights;     /* [scene.light_count], where they are not all the scene file's */
+    vsh_field_file *field; /* that the scene takes; NULL: none */
 } cli_bake_scene;
 
 /* Makes the scene, checks that it can be baked and that its outputs replace no input. */

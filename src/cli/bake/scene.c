@@ -277,6 +277,9 @@ int cli_bake_check_output(const cli_bake_settings *s, const vsh_scene *scene, co
     if (cli_same_file(output, s->input)) {
         return cli_usage("%s: the output is the input", output);
     }
+    if (s->field != NULL && cli_same_file(output, s->field)) {
+        return cli_usage("%s: the output is the file of --field", output);
+    }
     if (s->lights != NULL && cli_same_file(output, s->lights)) {
         return cli_usage("%s: the output is the file of --lights", output);
     }
@@ -316,6 +319,28 @@ static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
     return s->stats != NULL ? cli_bake_check_output(s, scene, s->stats) : CLI_OK;
 }
 
+/* Opens the file of fields. What it says of voxels stands in outputs as if it had been given. */
+static int use_field(const cli_bake_settings *s, cli_bake_scene *made) {
+    if (s->field == NULL) {
+        return CLI_OK;
+    }
+    const vsh_run run = cli_common_run(&s->common);
+    const int32_t named = made->scene.voxels_named;
+    vsh_error error;
+    if (vsh_field_file_open(s->field, &run, &made->field, &error) != VSH_OK ||
+        vsh_scene_use_field(&made->scene, made->field, &error) != VSH_OK) {
+        return cli_fail_of(NULL, &error);
+    }
+    if (made->scene.voxels_named != named) {
+        char text[32];
+        const vsh_grid_options *grid = &made->scene.grid;
+        const bool size = grid->voxel_size > 0.0;
+        snprintf(text, sizeof text, "%.17g", size ? grid->voxel_size : grid->resolution);
+        cli_parsed_add(size ? "voxel-size" : "resolution", text);
+    }
+    return CLI_OK;
+}
+
 /* The input, or defaults for a mesh, with what the options put over it. */
 static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scene *made) {
     memset(made, 0, sizeof *made);
@@ -336,6 +361,7 @@ static int make(const cli_bake_settings *settings, bool receivers, cli_bake_scen
         }
     }
     int code = cli_patch_scene(&settings->patch, &made->scene);
+    code = code == CLI_OK ? use_field(settings, made) : code;
     code = code == CLI_OK ? add_lights(settings, made) : code;
     code = code == CLI_OK ? cli_bake_check_shade(settings, &made->scene) : code;
     code = code == CLI_OK && receivers ? cli_bake_check_work(settings, made) : code;
@@ -360,5 +386,6 @@ void cli_bake_scene_free(cli_bake_scene *made) {
     free(made->receivers);
     free(made->casters);
     free(made->lights);
+    vsh_field_file_close(made->field);
     vsh_scene_free(made->read);
 }
