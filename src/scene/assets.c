@@ -7,6 +7,7 @@
 #include "base/memory.h"
 #include "base/try.h"
 #include "scene/asset_files.h"
+#include "scene/kept_field.h"
 #include "scene/select.h"
 #include "scene/solidity.h"
 #include "scene/unwrapped.h"
@@ -38,6 +39,7 @@ struct vsh_assets {
     asset_place *receivers;
     size_t receiver_count;
     vshi_mesh_set set; /* of the casters' meshes */
+    vshi_caster_prints prints;
 };
 
 /* Adds mesh `number` of a model, as it is or as `mesh` has it. */
@@ -324,6 +326,16 @@ static vsh_result allocate_places(vsh_assets *assets, const vsh_scene *scene, vs
     return VSH_OK;
 }
 
+/* Before the long work, as what is wrong with files is. */
+static vsh_result check_field(vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
+                              vsh_error *error) {
+    if (scene->field == NULL) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_caster_prints_make(scene, assets, run, &assets->prints, error));
+    return vshi_kept_field_check(scene, &assets->prints, error);
+}
+
 vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
                            vsh_error *error) {
     VSHI_FLOATS;
@@ -347,6 +359,7 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     VSHI_TRY_DONE(check_receivers(loaded, scene, &full, error));
     /* with the places in it, which the check asks for */
     VSHI_TRY_DONE(vshi_assets_check(loaded, scene, &full, error));
+    VSHI_TRY_DONE(check_field(loaded, scene, &full, error));
     *assets = loaded;
     loaded = NULL;
 done:
@@ -373,6 +386,7 @@ void vsh_assets_free(vsh_assets *assets) {
     if (assets == NULL) {
         return;
     }
+    vshi_caster_prints_free(&assets->prints);
     vshi_mesh_set_free(&assets->set);
     free_places(assets->receivers, assets->receiver_count);
     free_places(assets->casters, assets->caster_count);
@@ -429,6 +443,10 @@ const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t
 
 const vsh_grid *vshi_assets_grid(const vsh_assets *assets, size_t index) {
     return index < assets->caster_count ? assets->casters[index].grid : NULL;
+}
+
+const vshi_caster_prints *vshi_assets_prints(const vsh_assets *assets) {
+    return &assets->prints;
 }
 
 const vsh_outline *vshi_assets_outline(const vsh_assets *assets, size_t index) {

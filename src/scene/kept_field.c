@@ -3,6 +3,7 @@
 #include "base/floats.h"
 #include "base/numbers.h"
 #include "base/try.h"
+#include "scene/assets.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -18,41 +19,62 @@ bool vshi_layer_is_voxelised(const vsh_scene *scene, const vsh_scene_layer *laye
     return false;
 }
 
-vsh_result vshi_kept_field_find(const vsh_scene *scene, const vshi_caster_prints *prints,
-                                const vsh_scene_layer *layer, int32_t resolution, size_t *index,
-                                vsh_grid_info *info, vsh_error *error) {
-    const vsh_field_file *file = scene->field;
-    const char *path = vsh_field_file_path(file), *name = layer != NULL ? layer->name : "";
-    vsh_kept_field kept = vsh_kept_field_default();
-    size_t i = 0, count = vsh_field_file_count(file);
-    for (; i < count; ++i) {
-        vsh_field_file_get(file, i, &kept);
-        if (strcmp(kept.name, name) == 0) {
-            break;
+static vsh_result find(const vsh_scene *scene, const vsh_scene_layer *layer, size_t *index,
+                       vsh_kept_field *kept, vsh_error *error) {
+    const char *name = layer != NULL ? layer->name : "";
+    const size_t count = vsh_field_file_count(scene->field);
+    for (*index = 0; *index < count; ++*index) {
+        vsh_field_file_get(scene->field, *index, kept);
+        if (strcmp(kept->name, name) == 0) {
+            return VSH_OK;
         }
     }
-    if (i == count) {
-        return vshi_fail(error, VSH_ERROR_INPUT,
-                         "%s: is stale: holds no field of the casters in %s%s: make it anew", path,
-                         layer != NULL ? "layer " : "no layer", name);
-    }
+    return vshi_fail(error, VSH_ERROR_INPUT,
+                     "%s: is stale: holds no field of the casters in %s%s: make it anew",
+                     vsh_field_file_path(scene->field), layer != NULL ? "layer " : "no layer", name);
+}
+
+static vsh_result compare(const vsh_scene *scene, const vshi_caster_prints *prints,
+                          const vsh_scene_layer *layer, int32_t resolution, const vsh_kept_field *kept,
+                          bool casters, vsh_error *error) {
     vshi_attributes lines = {NULL, NULL, 0, 0};
     vsh_result result;
     VSHI_TRY_DONE(vshi_recipe_make(scene, prints, layer, resolution, &lines, error));
-    VSHI_TRY_DONE(vshi_recipe_compare(scene, path, kept.origin, kept.origin_count, &lines, error));
+    result = vshi_recipe_compare(scene, vsh_field_file_path(scene->field), kept->origin, kept->origin_count,
+                                 &lines, casters, error);
+done:
+    vshi_attributes_free(&lines);
+    return result;
+}
+
+vsh_result vshi_kept_field_check(const vsh_scene *scene, const vshi_caster_prints *prints, vsh_error *error) {
+    for (size_t i = 0; i <= scene->layer_count; ++i) {
+        const vsh_scene_layer *layer = i > 0 ? &scene->layers[i - 1] : NULL;
+        vsh_kept_field kept;
+        size_t index;
+        if (vshi_layer_is_voxelised(scene, layer)) {
+            VSHI_TRY(find(scene, layer, &index, &kept, error));
+            VSHI_TRY(compare(scene, prints, layer, VSH_RESOLUTION_NAMED, &kept, true, error));
+        }
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_kept_field_find(const vsh_scene *scene, const vshi_caster_prints *prints,
+                                const vsh_scene_layer *layer, int32_t resolution, size_t *index,
+                                vsh_grid_info *info, vsh_error *error) {
+    vsh_kept_field kept;
+    VSHI_TRY(find(scene, layer, index, &kept, error));
+    VSHI_TRY(compare(scene, prints, layer, resolution, &kept, false, error));
     vsh_field_info of;
     vsh_field_get_info(kept.field, &of);
     *info = (vsh_grid_info){.voxel_size = of.voxel_size,
                             .half_width = kept.half_width,
                             .shell_thickness = of.shell_thickness,
-                            .active_voxels = of.active_voxels,
-                            .bytes = kept.grid_bytes};
+                            .active_voxels = of.active_voxels};
     memcpy(info->bounds_min, of.bounds_min, sizeof info->bounds_min);
     memcpy(info->bounds_max, of.bounds_max, sizeof info->bounds_max);
-    *index = i;
-done:
-    vshi_attributes_free(&lines);
-    return result;
+    return VSH_OK;
 }
 
 /* What a file's scene named: "resolution 512", "voxel_size 0.01". */

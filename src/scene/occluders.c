@@ -25,7 +25,7 @@ typedef struct making {
     vshi_occluders_own own;
     vsh_layer *layers; /* those that were made: copied in the end */
     vsh_occluder_parts parts;
-    vshi_caster_prints prints; /* where fields are a file's */
+    vshi_caster_prints prints; /* where fields are a file's that the assets did not know of */
 } making;
 
 /* Reach for receivers in a box, or for points within a distance of the casters' box. */
@@ -94,11 +94,15 @@ static vsh_result take_field(making *m, const vsh_scene_layer *layer, int32_t re
     if (!vshi_layer_is_voxelised(m->scene, layer)) {
         return VSH_OK;
     }
-    if (m->prints.list == NULL) {
-        VSHI_TRY(vshi_caster_prints_make(m->scene, m->assets, &m->run, &m->prints, error));
+    const vshi_caster_prints *prints = vshi_assets_prints(m->assets);
+    if (prints->list == NULL) {
+        if (m->prints.list == NULL) {
+            VSHI_TRY(vshi_caster_prints_make(m->scene, m->assets, &m->run, &m->prints, error));
+        }
+        prints = &m->prints;
     }
     size_t index;
-    VSHI_TRY(vshi_kept_field_find(m->scene, &m->prints, layer, resolution, &index, voxels, error));
+    VSHI_TRY(vshi_kept_field_find(m->scene, prints, layer, resolution, &index, voxels, error));
     const vsh_field_options options = options_of(m, layer, voxels);
     return vsh_field_file_field(m->scene->field, index, &options, &m->voxel, field, error);
 }

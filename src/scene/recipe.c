@@ -10,6 +10,7 @@
 #include "base/parallel.h"
 #include "base/try.h"
 #include "outline/outline.h"
+#include "scene/assets.h"
 #include "spheres/sphere_tree.h"
 
 #include <inttypes.h>
@@ -21,7 +22,7 @@
 enum { LINE = 512, GRAIN = 4096 };
 
 static const char *const kinds[] = {"mesh", "sdf", "vdb", "heightfield", "spheres", "mask", "text"};
-static const char *const units[] = {"triangles", "nodes", "", "triangles", "spheres", "points", "points"};
+static const char *const units[] = {"triangles", "nodes", "", "triangles", "of them", "points", "points"};
 
 /* Two hashes of a row of words. */
 typedef struct row {
@@ -225,11 +226,11 @@ static vsh_result add_caster(vshi_attributes *lines, const vsh_caster *caster, c
     if (caster->type == VSH_CASTER_VDB) {
         snprintf(what, sizeof what, "vdb sha256:%s", print->digest);
     } else {
-        snprintf(what, sizeof what, "%s of %" PRIu64 " %s", kinds[caster->type], print->count,
+        snprintf(what, sizeof what, "%s, %" PRIu64 " %s", kinds[caster->type], print->count,
                  units[caster->type]);
     }
     snprintf(text, sizeof text, "%s%s, %016" PRIx64 "%016" PRIx64, what,
-             vshi_caster_in_layer(caster, layer) ? "" : " in another layer", print->sum[0], print->sum[1]);
+             vshi_caster_in_layer(caster, layer) ? "" : ", in another layer", print->sum[0], print->sum[1]);
     return add(lines, name, text, error);
 }
 
@@ -293,19 +294,24 @@ static vsh_result stale(const vsh_scene *scene, const char *path, const char *li
                      line, file, was, is);
 }
 
+static bool is_meant(const char *line, bool casters) {
+    return !casters || strncmp(line, "caster_", 7) == 0;
+}
+
 vsh_result vshi_recipe_compare(const vsh_scene *scene, const char *path, const vsh_attribute *kept,
-                               size_t kept_count, const vshi_attributes *lines, vsh_error *error) {
+                               size_t kept_count, const vshi_attributes *lines, bool casters,
+                               vsh_error *error) {
     for (size_t i = 0; i < lines->count; ++i) {
         const vsh_attribute *line = &lines->list[i];
         /* as good as always they stand at the same place */
         const bool here = i < kept_count && strcmp(kept[i].name, line->name) == 0;
         const char *was = here ? kept[i].value : value_of(kept, kept_count, line->name);
-        if (was == NULL || strcmp(was, line->value) != 0) {
+        if (is_meant(line->name, casters) && (was == NULL || strcmp(was, line->value) != 0)) {
             return stale(scene, path, line->name, was, line->value, error);
         }
     }
     for (size_t i = 0; i < kept_count && kept_count > lines->count; ++i) {
-        if (value_of(lines->list, lines->count, kept[i].name) == NULL) {
+        if (is_meant(kept[i].name, casters) && value_of(lines->list, lines->count, kept[i].name) == NULL) {
             return stale(scene, path, kept[i].name, kept[i].value, NULL, error);
         }
     }

@@ -3,7 +3,8 @@
 #define VSHI_SCENE_RECIPE_H
 
 #include "base/attributes.h"
-#include "scene/assets.h"
+
+#include <vdbshade/scene.h>
 
 /* Of what a caster is: its triangles, wherever and in whatever order its meshes have them, or its numbers. */
 typedef struct vshi_caster_print {
@@ -28,9 +29,11 @@ vsh_result vshi_recipe_make(const vsh_scene *scene, const vshi_caster_prints *pr
                             const vsh_scene_layer *layer, int32_t resolution, vshi_attributes *lines,
                             vsh_error *error);
 
-/* Errors: VSH_ERROR_INPUT, naming file, field and the first line that differs: the field is stale. */
+/* All lines, or those of casters alone. Errors: VSH_ERROR_INPUT, naming the file and the first line that
+ * differs: the field is stale. */
 vsh_result vshi_recipe_compare(const vsh_scene *scene, const char *path, const vsh_attribute *kept,
-                               size_t kept_count, const vshi_attributes *lines, vsh_error *error);
+                               size_t kept_count, const vshi_attributes *lines, bool casters,
+                               vsh_error *error);
 
 /* Whether the scene or the layer names its voxels. */
 bool vshi_scene_voxels_named(const vsh_scene *scene, const vsh_scene_layer *layer);

@@ -126,6 +126,12 @@ static int check_options(const volume_settings *s) {
     if (s->box_voxel_size > 0.0 && !s->has_box) {
         return cli_usage("--box-voxel-size: there is no --box");
     }
+    if (s->bake.field != NULL && s->like == NULL && s->box_voxel_size == 0.0) {
+        return cli_usage(
+            "--field '%s': the casters' band, and the size of its voxels, are a level set's, which such a "
+            "file does not keep: give --box and --box-voxel-size, or --like",
+            s->bake.field);
+    }
     return cli_patch_check(&s->bake.patch);
 }
 
