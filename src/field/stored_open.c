@@ -49,6 +49,10 @@ static vsh_result check_version(const char *path, const vshi_stored_head *head, 
     for (size_t i = 0; i < VSHI_STORED_VERSION && head->version[i] != '\0'; ++i) {
         version[i] = head->version[i] >= ' ' && head->version[i] <= '~' ? head->version[i] : '?';
     }
+    const size_t length = strlen(version);
+    for (size_t i = length; i < VSHI_STORED_VERSION; ++i) {
+        version[length] = head->version[i] != '\0' ? '?' : version[length];
+    }
     return strcmp(version, vsh_version()) == 0
                ? VSH_OK
                : vshi_fail(error, VSH_ERROR_INPUT,
@@ -66,9 +70,10 @@ static vsh_result check_sizes(const char *path, const vshi_stored_head *head, ui
     if (head->file_bytes < size) {
         return damaged(path, "bytes behind its end", error);
     }
-    if (head->field_count < 1 || head->field_count > VSHI_STORED_FIELDS ||
-        head->text_bytes > VSHI_STORED_TEXT || head->attribute_count > VSHI_STORED_TEXT ||
-        head->head_bytes > head->file_bytes || head->head_bytes % VSHI_STORED_ALIGN != 0) {
+    if (head->field_count < 1 || head->field_count > VSHI_STORED_FIELDS || head->reserved[0] != 0 ||
+        head->reserved[1] != 0 || head->reserved[2] != 0 || head->text_bytes > VSHI_STORED_TEXT ||
+        head->attribute_count > VSHI_STORED_TEXT || head->head_bytes > head->file_bytes ||
+        head->head_bytes % VSHI_STORED_ALIGN != 0) {
         return damaged(path, "its head's counts are out of range", error);
     }
     const uint64_t chunks = (head->file_bytes - head->head_bytes + VSHI_STORED_CHUNK - 1) / VSHI_STORED_CHUNK;
