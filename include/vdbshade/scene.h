@@ -359,9 +359,10 @@ typedef struct vsh_scene_field_report {
  * and what the casters are. Lights, receivers and accuracy shape nothing, but where the scene names no
  * voxels and those that vsh_scene_resolution() finds depend on them. Warns of what voxels make of casters.
  * Written whole or not at all. Errors:
- * - VSH_ERROR_ARGUMENT: scene, assets or path NULL, options, run; casters whose triangles would be traced
- *   alone, so that there is nothing to keep: name voxels, or a method that marches;
- * - VSH_ERROR_INPUT: no casters that are voxelised; as vsh_scene_casters() and vsh_field_create();
+ * - VSH_ERROR_ARGUMENT: scene, assets or path NULL, options, run;
+ * - VSH_ERROR_INPUT: no casters that are voxelised; casters whose triangles would be traced alone, so that
+ *   there is nothing to keep: name voxels, or a method that marches; as vsh_scene_casters() and
+ * vsh_field_create();
  * - VSH_ERROR_LIMIT, VSH_ERROR_WRITE, VSH_ERROR_UNSUPPORTED: as these and vsh_field_file_write();
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_scene_save_field_sized(const vsh_scene *scene, const vsh_assets *assets,

@@ -68,19 +68,18 @@ static double finer(const vsh_scene *scene, int32_t resolution, double trial_vox
                                         : (double)scene->grid.resolution / TRIAL_RESOLUTION;
 }
 
-/* Voxels along the longest side; 0: there are none. */
-static double resolution_of(const vsh_occluders *occluders) {
-    vsh_occluders_info made;
+/* Voxels along the longest side of a field that is there; 0: there are none. */
+static double resolution_of(const vsh_scene *scene, const vsh_occluders *occluders, double voxel_size) {
     vsh_occluder_parts parts;
     vsh_field_info info;
-    vsh_occluders_get_info(occluders, &made);
     vsh_occluders_get_parts(occluders, &parts);
     vsh_field_get_info(parts.field, &info);
     double longest = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         longest = fmax(longest, info.bounds_max[axis] - info.bounds_min[axis]);
     }
-    return made.voxel_size > 0.0 ? longest / info.voxel_size : 0.0;
+    const bool named = scene->grid.voxel_size == 0.0 && scene->grid.resolution > 0;
+    return voxel_size == 0.0 ? 0.0 : named ? scene->grid.resolution : longest / voxel_size;
 }
 
 static vsh_result try_small(const vsh_bake_job *job, const vsh_run *run, trial *t, vsh_error *error) {
@@ -101,7 +100,8 @@ static vsh_result try_small(const vsh_bake_job *job, const vsh_run *run, trial *
     VSHI_TRY(vsh_scene_occluders(&small, job->assets, &options, run, &occluders, error));
     vsh_occluders_get_info(occluders, &t->made);
     t->finer = smaller ? finer(&job->scene, resolution, t->made.voxel_size) : 1.0;
-    t->resolution = smaller ? TRIAL_RESOLUTION * t->finer : resolution_of(occluders);
+    t->resolution =
+        smaller ? TRIAL_RESOLUTION * t->finer : resolution_of(&job->scene, occluders, t->made.voxel_size);
     const vsh_result result = bake_part(job, occluders, run, t, error);
     vsh_occluders_free(occluders);
     return result;

@@ -197,7 +197,8 @@ static bool abbreviated(const cli_option *option, char **argv, const char *value
 
 /* --- the command line as outputs tell it */
 
-static char *parsed_command; /* of the process's one command line at a time */
+static char *parsed_command;  /* of the process's one command line at a time */
+static size_t parsed_options; /* bytes of it before its operands */
 
 const char *cli_parsed_command(void) {
     return parsed_command != NULL ? parsed_command : "";
@@ -238,10 +239,18 @@ static const char *without_folder(const char *path) {
 }
 
 void cli_parsed_add(const char *option, const char *value) {
+    char *operands = parsed_command != NULL ? strdup(parsed_command + parsed_options) : NULL;
+    if (operands == NULL) {
+        return;
+    }
+    parsed_command[parsed_options] = '\0';
     char name[64];
     snprintf(name, sizeof name, "--%s", option);
     append_word(name);
     append_word(value);
+    parsed_options = strlen(cli_parsed_command());
+    append(operands, strlen(operands));
+    free(operands);
 }
 
 static void append_option(const cli_option *option, const char *value) {
@@ -316,6 +325,7 @@ int cli_parse_some(const cli_command *command, int argc, char **argv, cli_option
             return code;
         }
     }
+    parsed_options = strlen(cli_parsed_command());
     for (int i = 0; i < count; ++i) {
         operands[i] = NULL;
         if (optind + i >= argc && i >= least) {

@@ -52,7 +52,7 @@ int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *
  * limits, output, …), and files by their names alone. Belongs to the parser; "" where memory was short. */
 const char *cli_parsed_command(void);
 
-/* Adds an option to it that came from elsewhere. */
+/* Adds an option to it, as its last, that came from elsewhere. */
 void cli_parsed_add(const char *option, const char *value);
 
 /* The same with `least` to `count` operands, one or more; NULL stands for those that are not there. */

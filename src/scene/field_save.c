@@ -49,11 +49,11 @@ static vsh_result choose_resolution(const saving *s, const vsh_scene_layer *laye
     const vsh_scene lit = lit_scene(s->scene);
     *resolution = vsh_scene_resolution(&lit, s->assets, layer, 0.0);
     if (*resolution != VSH_RESOLUTION_NAMED && !vsh_scene_marches(&lit, layer)) {
-        return vshi_fail(
-            error, VSH_ERROR_ARGUMENT,
-            "field: %s%s are traced as triangles, which needs no voxels, so there is nothing to keep; a "
-            "resolution, a voxel size or a method other than auto and exact asks for some",
-            layer != NULL ? "the casters in layer " : "the casters", layer != NULL ? layer->name : "");
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s%s are traced as triangles, without voxels: there is no field to keep; "
+                         "--resolution, --voxel-size or a --method that marches asks for one",
+                         layer != NULL ? "the casters in layer " : "the casters",
+                         layer != NULL ? layer->name : "");
     }
     return VSH_OK;
 }
