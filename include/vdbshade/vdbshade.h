@@ -39,6 +39,7 @@
 #include "compare.h"
 #include "digest.h"
 #include "field.h"
+#include "field_file.h"
 #include "flat.h"
 #include "grid.h"
 #include "heights.h"

@@ -1,5 +1,5 @@
-# Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/volume.md,
-# docs/render.md, docs/lit.md, docs/regression.md and docs/view.md runs.
+# Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/field.md,
+# docs/volume.md, docs/render.md, docs/lit.md, docs/regression.md and docs/view.md runs.
 load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
@@ -64,6 +64,10 @@ run_commands() {
     printf 'property float nx\nproperty float ny\nproperty float nz\nend_header\n0 0.1 0 0 1 0\n' >>props.ply
     run_commands query.md 3
     [ -s shaded.csv ] && [ -s props-lit.ply ] && [ "$(wc -l <sorted.csv)" -eq 2 ]
+}
+
+@test "every command of docs/field.md" {
+    run_commands field.md 4
 }
 
 @test "every command of docs/volume.md" {
