@@ -128,41 +128,6 @@ static vsh_result place_spheres(asset_place *place, const vsh_caster *caster, si
                                         caster->path != NULL ? ": " : "", why.message);
 }
 
-/* Takes glass and the like out of `chosen`, and tells what masks are taken for. */
-static vsh_result leave_out_blended(const vsh_scene *scene, const vsh_model *model, const char *path,
-                                    const vsh_run *run, unsigned char *chosen, vsh_error *error) {
-    const size_t count = vsh_model_mesh_count(model);
-    size_t left = 0, blended = 0, masked = 0;
-    for (size_t i = 0; i < count; ++i) {
-        const int32_t alpha = vsh_model_mesh(model, i, -1).alpha;
-        const bool out = chosen[i] != 0 && alpha == VSH_ALPHA_BLENDED && scene->cast_blended == 0;
-        blended += out;
-        masked += chosen[i] != 0 && alpha == VSH_ALPHA_MASKED;
-        chosen[i] = out ? 0 : chosen[i];
-        left += chosen[i] != 0;
-    }
-    if (left == 0) {
-        return vshi_fail(
-            error, VSH_ERROR_INPUT,
-            "%s: all its materials are blended (glass, smoke), and cast nothing; \"cast_blended\" "
-            "in a scene, or --cast-blended, has them cast",
-            path);
-    }
-    if (blended > 0) {
-        vshi_warn(run,
-                  "%s: %zu of %zu meshes have blended materials (glass, smoke) and cast no shadow; "
-                  "--cast-blended has them cast",
-                  path, blended, count);
-    }
-    if (masked > 0) {
-        vshi_warn(run,
-                  "%s: %zu of %zu meshes have masked materials (leaves, fences) and cast whole, without the "
-                  "holes of their textures",
-                  path, masked, count);
-    }
-    return VSH_OK;
-}
-
 /* The first receiver that unwraps meshes of a model; NULL: none. */
 static const asset_place *find_unwrapped(const vsh_assets *assets, const vsh_model *model) {
     for (size_t i = 0; i < assets->receiver_count; ++i) {
@@ -215,7 +180,7 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
     unsigned char *chosen = NULL;
     vsh_result result = VSH_OK;
     VSHI_TRY_DONE(vshi_select(place->model, caster->path, &caster->objects, &chosen, error));
-    VSHI_TRY_DONE(leave_out_blended(scene, place->model, caster->path, run, chosen, error));
+    VSHI_TRY_DONE(vshi_leave_out_blended(scene, place->model, caster->path, run, chosen, error));
     VSHI_TRY_DONE(place_chosen(place, place->model, chosen, find_unwrapped(assets, place->model), -1,
                                scene->unit, caster->transform, error));
 done:
@@ -326,16 +291,6 @@ static vsh_result allocate_places(vsh_assets *assets, const vsh_scene *scene, vs
     return VSH_OK;
 }
 
-/* Before the long work, as what is wrong with files is. */
-static vsh_result check_field(vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
-                              vsh_error *error) {
-    if (scene->field == NULL) {
-        return VSH_OK;
-    }
-    VSHI_TRY(vshi_caster_prints_make(scene, assets, run, &assets->prints, error));
-    return vshi_kept_field_check(scene, &assets->prints, error);
-}
-
 vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
                            vsh_error *error) {
     VSHI_FLOATS;
@@ -359,7 +314,7 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     VSHI_TRY_DONE(check_receivers(loaded, scene, &full, error));
     /* with the places in it, which the check asks for */
     VSHI_TRY_DONE(vshi_assets_check(loaded, scene, &full, error));
-    VSHI_TRY_DONE(check_field(loaded, scene, &full, error));
+    VSHI_TRY_DONE(vshi_kept_field_check(scene, loaded, &full, &loaded->prints, error));
     *assets = loaded;
     loaded = NULL;
 done:

@@ -47,7 +47,12 @@ done:
     return result;
 }
 
-vsh_result vshi_kept_field_check(const vsh_scene *scene, const vshi_caster_prints *prints, vsh_error *error) {
+vsh_result vshi_kept_field_check(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                                 vshi_caster_prints *prints, vsh_error *error) {
+    if (scene->field == NULL) {
+        return VSH_OK;
+    }
+    VSHI_TRY(vshi_caster_prints_make(scene, assets, run, prints, error));
     for (size_t i = 0; i <= scene->layer_count; ++i) {
         const vsh_scene_layer *layer = i > 0 ? &scene->layers[i - 1] : NULL;
         vsh_kept_field kept;

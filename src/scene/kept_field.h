@@ -9,9 +9,10 @@
 /* Whether a layer's casters, or (NULL) those in none, have any voxels. */
 bool vshi_layer_is_voxelised(const vsh_scene *scene, const vsh_scene_layer *layer);
 
-/* Whether scene->field is of the scene's casters, whatever its voxels. Errors: VSH_ERROR_INPUT: it is stale.
- */
-vsh_result vshi_kept_field_check(const vsh_scene *scene, const vshi_caster_prints *prints, vsh_error *error);
+/* Where the scene takes its fields from a file, looks at the casters and whether it is of them, whatever its
+ * voxels. Errors: as vshi_caster_prints_make(); VSH_ERROR_INPUT: it is stale. */
+vsh_result vshi_kept_field_check(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                                 vshi_caster_prints *prints, vsh_error *error);
 
 /* The number in scene->field of the field of a layer's casters, or (NULL) of those in none, of as many voxels
  * as vsh_scene_resolution() said; *info is what its level set was, which takes no bytes. Errors:

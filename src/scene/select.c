@@ -230,3 +230,37 @@ vsh_result vshi_select_uvs(const vsh_model *model, const vsh_receiver *receiver,
     }
     return VSH_OK;
 }
+
+vsh_result vshi_leave_out_blended(const vsh_scene *scene, const vsh_model *model, const char *path,
+                                  const vsh_run *run, unsigned char *chosen, vsh_error *error) {
+    const size_t count = vsh_model_mesh_count(model);
+    size_t left = 0, blended = 0, masked = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const int32_t alpha = vsh_model_mesh(model, i, -1).alpha;
+        const bool out = chosen[i] != 0 && alpha == VSH_ALPHA_BLENDED && scene->cast_blended == 0;
+        blended += out;
+        masked += chosen[i] != 0 && alpha == VSH_ALPHA_MASKED;
+        chosen[i] = out ? 0 : chosen[i];
+        left += chosen[i] != 0;
+    }
+    if (left == 0) {
+        return vshi_fail(
+            error, VSH_ERROR_INPUT,
+            "%s: all its materials are blended (glass, smoke), and cast nothing; \"cast_blended\" "
+            "in a scene, or --cast-blended, has them cast",
+            path);
+    }
+    if (blended > 0) {
+        vshi_warn(run,
+                  "%s: %zu of %zu meshes have blended materials (glass, smoke) and cast no shadow; "
+                  "--cast-blended has them cast",
+                  path, blended, count);
+    }
+    if (masked > 0) {
+        vshi_warn(run,
+                  "%s: %zu of %zu meshes have masked materials (leaves, fences) and cast whole, without the "
+                  "holes of their textures",
+                  path, masked, count);
+    }
+    return VSH_OK;
+}

@@ -20,4 +20,9 @@ vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const c
 vsh_result vshi_select_uvs(const vsh_model *model, const vsh_receiver *receiver, const vsh_run *run,
                            unsigned char *chosen, vsh_error *error);
 
+/* Takes glass and the like out of `chosen`, unless the scene has it cast, and tells what masks are taken for.
+ * Errors: VSH_ERROR_INPUT: nothing is left. */
+vsh_result vshi_leave_out_blended(const vsh_scene *scene, const vsh_model *model, const char *path,
+                                  const vsh_run *run, unsigned char *chosen, vsh_error *error);
+
 #endif
