@@ -52,7 +52,7 @@ same() {
     cp "$ASSETS"/{terrain,emblem}.png "$ASSETS"/{spheres.csv,seeds_floor.obj} .
     cat >s.json <<'JSON'
 {"casters": [{"mesh": "box.obj"}, {"mask": "emblem.png", "size": 1, "thickness": 0.2, "layer": "b"},
-  {"vdb": "box.vdb", "transform": {"translate": [2, 0, 0], "scale": 0.5}},
+  {"vdb": "box.vdb", "transform": {"translate": [2, 0, 0], "scale": 0.5}, "color": [1, 0, 0]},
   {"heightfield": "terrain.png", "size": [4, 4], "height": 0.5, "layer": "a"},
   {"spheres": "spheres.csv", "voxelised": true, "layer": "b"}, {"spheres": "spheres.csv"},
   {"sdf": {"shape": "sphere", "radius": 0.4, "translate": [0, 2, 0]}, "layer": "a"}],
@@ -64,6 +64,7 @@ JSON
     shade field s.json -o s.field --quiet
     done_well
     same exr s.field bake s.json
+    same png s.field render s.json --size 48
     shade info s.field
     [[ $output == "fields: 3, "*"sha256:"*" box.vdb"*"caster_2: vdb sha256:"*"field of layer 'a'"* ]] || fail "not what is there"
     [[ $output == *"field of layer 'b'"*"resolution: 40"*"caster_4: spheres, 48 of them"* ]] || fail "not what is there"
