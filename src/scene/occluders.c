@@ -95,7 +95,7 @@ static vsh_result take_field(making *m, const vsh_scene_layer *layer, int32_t re
         return VSH_OK;
     }
     const vshi_caster_prints *prints = vshi_assets_prints(m->assets);
-    if (prints->list == NULL) {
+    if (prints->count != m->scene->caster_count) { /* they were loaded before the scene took a field */
         if (m->prints.list == NULL) {
             VSHI_TRY(vshi_caster_prints_make(m->scene, m->assets, &m->run, &m->prints, error));
         }

@@ -156,7 +156,7 @@ static vsh_result print_caster(const vsh_scene *scene, const vsh_assets *assets,
         VSHI_TRY(vshi_file_digest(caster->path, print->digest, job, error));
     } else if (caster->type == VSH_CASTER_SDF) {
         print_sdf(caster, print);
-    } else if (caster->type == VSH_CASTER_SPHERES) {
+    } else if (vshi_assets_spheres(assets, i) != NULL) {
         print_spheres(vshi_assets_spheres(assets, i), print);
     } else if (vshi_assets_outline(assets, i) != NULL) {
         print_outline(vshi_assets_outline(assets, i), caster->thickness, print);
@@ -179,6 +179,7 @@ vsh_result vshi_caster_prints_make(const vsh_scene *scene, const vsh_assets *ass
     vsh_result result = VSH_OK;
     VSHI_TRY(
         vshi_allocate((void **)&prints->list, scene->caster_count, sizeof *prints->list, "casters", error));
+    prints->count = scene->caster_count;
     vshi_job *job = vshi_job_begin(run, "hash", scene->caster_count);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "casters: the system refused memory");

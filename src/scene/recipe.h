@@ -14,7 +14,8 @@ typedef struct vshi_caster_print {
 } vshi_caster_print;
 
 typedef struct vshi_caster_prints {
-    vshi_caster_print *list; /* [caster_count of the scene] */
+    vshi_caster_print *list; /* [count], of the scene's casters */
+    size_t count;
 } vshi_caster_prints;
 
 /* Looks at all casters, under the stage "hash". Errors: as vsh_file_digest(). Free also after an error. */
