@@ -29,6 +29,7 @@ static inline char *read_field_bytes(const char *path, size_t *size) {
 }
 
 static inline void write_field_bytes(const char *path, const char *bytes, size_t size) {
+    remove(path); /* file systems flush what is cut and written again */
     FILE *file = fopen(path, "wb");
     assert_non_null(file);
     assert_int_equal(fwrite(bytes, 1, size, file), size);
