@@ -103,6 +103,30 @@ typedef int32_t vsh_progress_fn(void *user, const char *stage, double fraction);
  * calling rules as vsh_progress_fn. */
 typedef void vsh_warning_fn(void *user, const char *message);
 
+/* A progress callback that hands on to another from time to time: for languages whose callbacks take long, or
+ * may be called by one thread alone. As vsh_run.progress goes vsh_progress_seldom(), as vsh_run.user the
+ * address of this, which is one call's. */
+typedef struct vsh_progress_filter {
+    size_t struct_size;
+    vsh_progress_fn *progress; /* handed on to with `user`: 0 and 1 of a stage, and in between at most every
+                                  `seconds`; else work goes on. What it answers other than 0 stays. May be
+                                  NULL */
+    void *user;
+    double seconds;   /* by the clock, ≥ 0 */
+    uint64_t thread;  /* nonzero: that thread alone hands on, (uint64_t)pthread_self(); the one that makes a
+                         call takes part in its work */
+    double last;      /* these two are kept by vsh_progress_seldom(): when it handed on last, 0: not yet; */
+    int32_t answered; /* and what the callback answered */
+} vsh_progress_filter;
+
+static inline vsh_progress_filter vsh_progress_filter_default(void) {
+    vsh_progress_filter filter = {sizeof(vsh_progress_filter), NULL, NULL, 0.02, 0, 0.0, 0};
+    return filter;
+}
+
+/* A vsh_progress_fn: `filter` points to a vsh_progress_filter. */
+VSH_API int32_t vsh_progress_seldom(void *filter, const char *stage, double fraction);
+
 /* Instruction sets that the marching kernels are built for. Other parts of the library have one build; Embree
  * chooses its own. */
 enum {

@@ -87,6 +87,17 @@ typedef struct vsh_distance {
 VSH_API vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_grid_options *options,
                                           const vsh_run *run, vsh_grid **grid, vsh_error *error);
 
+/* Signed distances at `count` world positions [count][3] into distances[count]: as vsh_distance_fn, 8 or 64
+ * positions at a time where there are so many. */
+typedef void vsh_distances_fn(void *user, size_t count, const double *positions, double *distances);
+
+/* The same level set as of vsh_grid_from_distance(), of a callback that is asked for many positions at once:
+ * `distances` in place of field->distance, which is not called. For callers to whom a call is dear. A field
+ * that is re-distanced is asked for single positions, too. Errors: as there. */
+VSH_API vsh_result vsh_grid_from_distances(const vsh_distance *field, vsh_distances_fn *distances,
+                                           const vsh_grid_options *options, const vsh_run *run,
+                                           vsh_grid **grid, vsh_error *error);
+
 /* Reads level set `name` of a .vdb file; NULL: the first grid of class level set. Translated, rotated,
  * mirrored and uniformly scaled transforms are kept, with voxels of 1e-5 … 1e12 world units. Where the
  * values are no distances, or the band is narrower than 3 voxels, distances are made anew from the zero

@@ -1,0 +1,110 @@
+"""Writes what `import vdbshade` has of the public headers: generate.py INCLUDE_FOLDER OUTPUT_FOLDER
+
+_abi.py: the declarations as cffi keeps them, so that nothing is parsed when the module is imported;
+_tables.py: words for constants; types.py: what options there are and what is told of things, with the headers'
+comments."""
+import keyword
+import pathlib
+import re
+import sys
+import textwrap
+
+import cffi
+import headers
+
+# Members that are a library's own business, or that arguments of another name stand for.
+HIDDEN = {"struct_size", "user", "checked"}
+NUMBERS = {"int32_t": "int", "uint32_t": "int", "uint64_t": "int", "size_t": "int", "double": "float", "float": "float"}
+
+# What a member is where its comment does not begin with the constants' name.
+MORE_WORDS = {("vsh_lightmap_options", "padding"): "VSH_PADDING_", ("vsh_receiver", "padding"): "VSH_PADDING_",
+              ("vsh_planes", "sky"): "VSH_UP_", ("vsh_run", "isa"): "VSH_ISA_", ("vsh_receiver", "seams"): "VSH_SEAMS_",
+              ("vsh_receiver", "type"): "VSH_RECEIVER_", ("vsh_receiver", "unwrap"): "VSH_RECEIVER_UNWRAP_",
+              ("vsh_lit_image", "purpose"): "VSH_LIT_", ("vsh_unwrap_options", "keep_uvs"): "VSH_UNWRAP_"}
+
+
+def camel(struct):
+    return "".join(word.capitalize() for word in struct[len("vsh_") :].split("_"))
+
+
+def hint(member, words, known):
+    """The type of a member as Python has it."""
+    if words:
+        return "Union[str, int]"
+    if member.type in ("const char *", "char"):
+        return "str"
+    if member.lengths:
+        return "Sequence[float]" if member.type in ("double", "float") else "Sequence[int]"
+    if member.type in known:
+        return camel(member.type)
+    return NUMBERS.get(member.type, "Any")
+
+
+
+
+def write_types(path, text):
+    found = headers.structs(text)
+    words = {**headers.words_of_members(text), **MORE_WORDS}
+    texts = ['"""Made from the public headers when vdbshade is built: what options there are, and what is told of things."""',
+             "from __future__ import annotations", "", "import typing", "from typing import Any, Sequence, Union", "",
+             "", "class Record:", '    """Values that a call tells; the same names as in C."""', "    __slots__ = (\"__dict__\",)", "",
+             "    def __init__(self, **values: Any) -> None:", "        self.__dict__.update(values)", "",
+             "    def __repr__(self) -> str:",
+             '        told = ", ".join(f"{name}={value!r}" for name, value in self.__dict__.items())',
+             '        return f"{type(self).__name__}({told})"', "",
+             "    def __eq__(self, other: object) -> bool:",
+             "        return type(self) is type(other) and self.__dict__ == other.__dict__  # type: ignore[attr-defined]", "",
+             "    __hash__ = None  # type: ignore[assignment]", ""]
+    options = [name for name, members in found.items() if any(m.name == "struct_size" for m in members) and not name.endswith("_stats")]
+    options += ["vsh_light", "vsh_tint", "vsh_sdf_node", "vsh_mesh", "vsh_receiver", "vsh_caster", "vsh_scene_layer", "vsh_planes", "vsh_selection"]
+    known = set(found)
+    for struct, members in found.items():
+        is_option = struct in options
+        base = "typing.TypedDict, total=False" if is_option else "Record"
+        texts += ["", f"class {camel(struct)}({base}):", f'    """``{struct}`` of the headers.', "",
+                  "    Attributes", "    ----------"]
+        shown = [m for m in members if m.name not in HIDDEN]
+        for member in shown:
+            texts.append(f"    {member.name} : {hint(member, words.get((struct, member.name)), known)}")
+            comment = member.comment.replace("\\", "\\\\").replace('"""', "'''")
+            texts += textwrap.wrap(comment, 108, initial_indent=" " * 8, subsequent_indent=" " * 8)
+        texts += ['    """', ""]
+        texts += [f"    {m.name}{'_' * keyword.iskeyword(m.name)}: {hint(m, words.get((struct, m.name)), known)}" for m in shown] or ["    pass"]
+        texts.append("")
+    path.write_text("\n".join(texts), encoding="utf-8")
+
+
+def write_tables(path, text):
+    constants = headers.enumerations(text)
+    words = {**headers.words_of_members(text), **MORE_WORDS}
+    tables = {}
+    for prefix in sorted(set(words.values()) | {"VSH_ERROR_", "VSH_MEASURE_", "VSH_INSIDE_", "VSH_CONFINED_", "VSH_HEIGHTS_", "VSH_COMBINE_", "VSH_SETTINGS_", "VSH_SETTING_OF_", "VSH_COLOR_", "VSH_CHANNEL_", "VSH_SOLIDITY_", "VSH_ALPHA_", "VSH_MODEL_LIGHT_", "VSH_LIT_IMAGES_", "VSH_WRAP_", "VSH_METHOD_"}):
+        longer = [p for p in set(words.values()) if p != prefix and p.startswith(prefix)]
+        table = {name[len(prefix) :].lower(): number for name, number in constants.items()
+                 if name.startswith(prefix) and not any(name.startswith(p) for p in longer)}
+        table.pop("count", None)
+        if not table:
+            raise SystemExit(f"generate.py: no constants {prefix}…")
+        tables[prefix] = table
+    members = {f"{struct}.{member}": prefix for (struct, member), prefix in sorted(words.items())}
+    lines = ['"""Made from the public headers when vdbshade is built: words for constants."""',
+             f"WORDS = {tables!r}", f"MEMBERS = {members!r}",
+             f"FUNCTIONS = {headers.functions(text)!r}",
+             "VERSION = " + repr(".".join(re.findall(r"#define VSH_VERSION_(?:MAJOR|MINOR) (\d+)", text)))]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def main(include, output):
+    text = headers.read(pathlib.Path(include) / "vdbshade")
+    output = pathlib.Path(output)
+    output.mkdir(parents=True, exist_ok=True)
+    ffi = cffi.FFI()
+    ffi.cdef(headers.declarations(text))
+    ffi.set_source("vdbshade._abi", None)
+    ffi.emit_python_code(str(output / "_abi.py"))
+    write_tables(output / "_tables.py", text)
+    write_types(output / "types.py", text)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
