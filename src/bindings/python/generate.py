@@ -13,7 +13,7 @@ import cffi
 import headers
 
 # Members that are a library's own business, or that arguments of another name stand for.
-HIDDEN = {"struct_size", "user", "checked"}
+HIDDEN = {"struct_size", "user", "checked", "sink", "done", "writing", "look"}
 NUMBERS = {"int32_t": "int", "uint32_t": "int", "uint64_t": "int", "size_t": "int", "double": "float", "float": "float"}
 
 # What a member is where its comment does not begin with the constants' name.
@@ -50,10 +50,10 @@ def write_types(path, text):
              "", "class Record:", '    """Values that a call tells; the same names as in C."""', "    __slots__ = (\"__dict__\",)", "",
              "    def __init__(self, **values: Any) -> None:", "        self.__dict__.update(values)", "",
              "    def __repr__(self) -> str:",
-             '        told = ", ".join(f"{name}={value!r}" for name, value in self.__dict__.items())',
+             '        told = ", ".join(f"{name}={value!r}" for name, value in self.__dict__.items() if name[0] != "_")',
              '        return f"{type(self).__name__}({told})"', "",
              "    def __eq__(self, other: object) -> bool:",
-             "        return type(self) is type(other) and self.__dict__ == other.__dict__  # type: ignore[attr-defined]", "",
+             "        return type(self) is type(other) and repr(self) == repr(other)", "",
              "    __hash__ = None  # type: ignore[assignment]", ""]
     options = [name for name, members in found.items() if any(m.name == "struct_size" for m in members) and not name.endswith("_stats")]
     options += ["vsh_light", "vsh_tint", "vsh_sdf_node", "vsh_mesh", "vsh_receiver", "vsh_caster", "vsh_scene_layer", "vsh_planes", "vsh_selection"]

@@ -4,6 +4,7 @@ Every call releases the GIL while it is in C."""
 from __future__ import annotations
 
 import os
+import sys
 import threading
 import warnings
 from typing import Any, Callable, Optional
@@ -22,7 +23,8 @@ def _load() -> Any:
         LIBRARY = ""
     beside = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), LIBRARY))
     name = f"libvdbshade.so.{VERSION}"
-    loaded = ffi.dlopen(beside if LIBRARY and os.path.exists(beside) else name)
+    # Never unloaded: its pool's threads wait in it when Python ends.
+    loaded = ffi.dlopen(beside if LIBRARY and os.path.exists(beside) else name, ffi.RTLD_NOW | ffi.RTLD_NODELETE)
     found = ffi.string(loaded.vsh_version()).decode()
     if ".".join(found.split(".")[:2]) != VERSION:
         raise ImportError(f"vdbshade: this module is for version {VERSION} of the library, but {name} is {found}")
@@ -250,12 +252,20 @@ def call(function: Any, *arguments: Any, run: Optional[Run] = None, made: Any = 
     if made is not None and made[1][0] != ffi.NULL:
         owned = ffi.gc(made[1][0], made[0])
     for message in running.messages:
-        warnings.warn(message, VdbshadeWarning, stacklevel=3)
+        warnings.warn(message, VdbshadeWarning, stacklevel=_level_of_caller())
     if running.raised is not None:
         raise running.raised
     if result != 0:
         fail(result, error)
     return owned
+
+
+def _level_of_caller() -> int:
+    """How far up the first frame is that is not this package's: what a warning is about."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__package__") == __package__:
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def text(pointer: Any) -> Optional[str]:

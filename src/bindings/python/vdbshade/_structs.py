@@ -88,7 +88,7 @@ class Filled:
                     raise TypeError(f"{name}: expected a number, got {value!r}")
                 setattr(struct, name, float(value) if field.cname in ("double", "float") else _whole(value, name))
             elif field.kind == "struct":
-                self.set_struct(getattr(struct, name), field.cname, value, name)
+                self.set_struct(getattr(struct, name), field.cname.replace("struct ", ""), value, name)
             elif field.kind == "array" and field.item.cname == "char":
                 encoded = value.encode()
                 if len(encoded) >= field.length or b"\0" in encoded:
@@ -178,7 +178,7 @@ def _value(value: Any, field: Any, prefix: Optional[str]) -> Any:
             return ffi.string(value).decode("utf-8", "replace")
         return tuple(word(prefix, v) for v in value) if prefix else tuple(value)
     if field.kind == "struct":
-        return told(value, field.cname)
+        return told(value, field.cname.replace("struct ", ""))
     if field.kind == "pointer" and field.item.cname in ("char", "char const"):
         return None if value == ffi.NULL else ffi.string(value).decode("utf-8", "replace")
     return None if value == ffi.NULL else value

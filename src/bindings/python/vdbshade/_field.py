@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 from ._arrays import array, output, pointer, transform as matrix
 from ._library import RUN, Handle, Run, call, ffi, handle_of, lib, make, place
 from ._structs import Filled, info, path_of, told
-from .grid import Grid
-from .light import Light
-from .mesh import Meshes, heights_source, meshes_of
-from .sdf import Solids
+from ._grid import Grid
+from ._light import Light
+from ._mesh import Meshes, heights_source, meshes_of
+from ._sdf import Solids
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

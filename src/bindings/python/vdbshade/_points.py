@@ -10,8 +10,8 @@ from . import types
 from ._arrays import array, output, pointer
 from ._library import RUN, Handle, Run, call, fail, ffi, handle_of, lib, make, place, run_of
 from ._structs import Filled, constant, told
-from .light import Light, lights_of
-from .occluders import Occluders
+from ._light import Light, lights_of
+from ._occluders import Occluders
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Any, Optional, Sequence
 
 from ._library import RUN, Handle, Run, ffi, handle_of, lib, make, place
 from ._structs import Filled, info, split
-from .field import Field, Heights, Spheres, Triangles
-from .grid import Grid
-from .mesh import Meshes, meshes_of
-from .sdf import Solids
+from ._field import Field, Heights, Spheres, Triangles
+from ._grid import Grid
+from ._mesh import Meshes, meshes_of
+from ._sdf import Solids
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

@@ -13,7 +13,7 @@ from ._library import RUN, Handle, Run, call, ffi, lib, make, place, text
 from ._structs import Filled, constant, info, path_of, told, word
 
 if TYPE_CHECKING:
-    from .light import Light
+    from ._light import Light
 
 
 class Mesh:
@@ -251,7 +251,7 @@ class Model(Handle):
         radius : float
             of points and spots, world units
         """
-        from .light import Light
+        from ._light import Light
         lights, count = ffi.new("vsh_light **"), ffi.new("size_t *")
         call(lib.vsh_lights_from_model, self.handle, angle, radius, unit, lights, count)
         owned = ffi.gc(lights[0], lib.vsh_lights_free)

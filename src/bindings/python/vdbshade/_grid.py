@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from ._arrays import output, pointer, transform as matrix
 from ._library import RUN, Handle, Run, call, ffi, handle_of, lib, make, note, place
 from ._structs import Filled, info, path_of, told
-from .mesh import Meshes, meshes_of
-from .outline import Outline
-from .sdf import Sdf
+from ._mesh import Meshes, meshes_of
+from ._outline import Outline
+from ._sdf import Sdf
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
