@@ -51,7 +51,7 @@ def declarations(text):
 
 def functions(text):
     """Names of the functions that the library exports, in the order of the headers."""
-    return list(dict.fromkeys(re.findall(r"\b(vsh_\w+)\(", declarations(text).replace("(*", ""))))
+    return list(dict.fromkeys(re.findall(r"VSH_API[^;{]*?\b(vsh_\w+)\(", COMMENT.sub(" ", text))))
 
 
 def enumerations(text):

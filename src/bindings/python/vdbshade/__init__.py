@@ -24,7 +24,8 @@ from ._lightmap import Charts, Lightmap, Texels, bake_lightmap, charts_closeness
 from ._mesh import Mesh, Model, mesh_solidity, unit
 from ._occluders import Layer, Occluders
 from ._outline import Outline
-from ._points import Query, Stats, ao_method_traits, shade_ao, shade_irradiance, shade_shadow, shade_tint, shadow_method_traits
+from ._points import (Query, Stats, ao_method_resolve, ao_method_traits, shade_ao, shade_irradiance, shade_shadow, shade_tint,
+                      shadow_method_resolve, shadow_method_traits)
 from ._render import Camera, LitMeshes, Picture, render
 from ._scene import Assets, Scene, settings
 from ._sdf import Sdf, Solids

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from . import types
 from ._arrays import array, borrowed, pointer
 from ._library import RUN, Run, call, ffi, lib, make, place, text
-from ._structs import Filled, constant, path_of, told
+from ._structs import Filled, constant, keep, path_of, told
 from ._grid import Attributes, attributes_of
 
 if TYPE_CHECKING:
@@ -53,13 +53,13 @@ class _Image:
         height, width = shape or (0, 0)
         if max(height, width) >= 2**31:
             raise ValueError(f"an image of {width} × {height}: too large")
-        self._keeps = [ffi.new("char[]", name.encode()) for name in planes]
-        self._arrays = arrays
+        texts = [ffi.new("char[]", name.encode()) for name in planes]
         count = len(planes)
-        self.names = ffi.new("char *[]", self._keeps or 1)
-        self.planes = ffi.new("float *[]", [pointer(a) for a in arrays] or 1)
-        self.holds = ffi.new("int32_t[]", [constant("VSH_CHANNEL_", kinds[n], "holds") for n in planes] or 1)
-        self.struct = ffi.new("vsh_image *", [width, height, count, self.names, self.planes, self.holds])
+        names = ffi.new("char *[]", texts or 1)
+        pointers = ffi.new("float *[]", [pointer(a) for a in arrays] or 1)
+        held = ffi.new("int32_t[]", [constant("VSH_CHANNEL_", kinds[n], "holds") for n in planes] or 1)
+        self.struct = ffi.new("vsh_image *", [width, height, count, names, pointers, held])
+        keep(self.struct, [texts, arrays, names, pointers, held])
 
 
 class Image(dict):
@@ -120,25 +120,25 @@ def image_check(path: "str | os.PathLike[str]", names: Sequence[str], shape: Tup
     """Whether such an image could be written, without writing; bytes that writing would take at most."""
     image = _named(names, shape)
     given = _options(options, attributes)
-    call(lib.vsh_image_check, path_of(path, "path"), image.struct, given.pointer)
-    return lib.vsh_image_writer_bytes(path_of(path, "path"), image.struct, given.pointer)
+    call(lib.vsh_image_check, path_of(path, "path"), image, given.pointer)
+    return lib.vsh_image_writer_bytes(path_of(path, "path"), image, given.pointer)
 
 
-def _named(names: Sequence[str], shape: Tuple[int, int], holds: Optional[Mapping[str, str]] = None) -> _Image:
-    image = _Image({}, None, shape)
-    image._keeps = [ffi.new("char[]", name.encode()) for name in names]
-    image.names = ffi.new("char *[]", image._keeps or 1)
+def _named(names: Sequence[str], shape: Tuple[int, int], holds: Optional[Mapping[str, str]] = None) -> Any:
+    """``vsh_image`` of channels' names, without planes."""
+    texts = [ffi.new("char[]", name.encode()) for name in names]
+    listed = ffi.new("char *[]", texts or 1)
     kinds = [(holds or {}).get(n, _HOLDS.get(n.split(".")[0], "data")) for n in names]
-    image.holds = ffi.new("int32_t[]", [constant("VSH_CHANNEL_", k, "holds") for k in kinds] or 1)
-    struct = image.struct
-    struct.channel_count, struct.names, struct.planes, struct.holds = len(names), image.names, ffi.NULL, image.holds
-    return image
+    held = ffi.new("int32_t[]", [constant("VSH_CHANNEL_", k, "holds") for k in kinds] or 1)
+    struct = ffi.new("vsh_image *", [shape[1], shape[0], len(names), listed, ffi.NULL, held])
+    keep(struct, [texts, listed, held])
+    return struct
 
 
 def image_default_pack(names: Sequence[str]) -> str:
     """The packing that is used where none is given: "R=irradiance.R,…"."""
     packed = ffi.new("char[]", 1024)
-    lib.vsh_image_default_pack(_named(names, (1, 1)).struct, packed, 1024)
+    lib.vsh_image_default_pack(_named(names, (1, 1)), packed, 1024)
     return ffi.string(packed).decode()
 
 
@@ -159,7 +159,7 @@ class ImageWriter:
                  **options: "Unpack[types.ImageOptions]") -> None:
         self._names, self._width = list(names), shape[1]
         self._writer = make(lib.vsh_image_writer_abandon, lib.vsh_image_writer_create, path_of(path, "path"),
-                            _named(names, shape, holds).struct, _options(options, attributes).pointer, place("vsh_image_writer"))
+                            _named(names, shape, holds), _options(options, attributes).pointer, place("vsh_image_writer"))
 
     def _open(self) -> Any:
         if self._writer is None:

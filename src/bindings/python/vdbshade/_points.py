@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 from . import types
 from ._arrays import array, output, pointer
 from ._library import RUN, Handle, Run, call, fail, ffi, handle_of, lib, make, place, run_of
-from ._structs import Filled, constant, told
+from ._structs import Filled, constant, told, word
+from ._tables import WORDS
 from ._light import Light, lights_of
 from ._occluders import Occluders
 
@@ -298,9 +299,18 @@ def ao_method_traits(method: str) -> List[str]:
     return _traits(lib.vsh_ao_method_traits(constant("VSH_AO_", method, "method")))
 
 
+def shadow_method_resolve(method: str, has_triangles: bool) -> str:
+    """What "auto" comes to with triangles or without; every other method is itself."""
+    return word("VSH_SHADOW_", lib.vsh_shadow_method_resolve(constant("VSH_SHADOW_", method, "method"), has_triangles))
+
+
+def ao_method_resolve(method: str, has_triangles: bool) -> str:
+    """Likewise of AO."""
+    return word("VSH_AO_", lib.vsh_ao_method_resolve(constant("VSH_AO_", method, "method"), has_triangles))
+
+
 def _traits(bits: int) -> List[str]:
-    from ._tables import WORDS
     return [name for name, bit in WORDS["VSH_METHOD_"].items() if bits & bit]
 
 
-__all__ = ["Query", "Stats", "ao_method_traits", "shade_ao", "shade_irradiance", "shade_shadow", "shade_tint", "shadow_method_traits"]
+__all__ = ["Query", "Stats", "ao_method_resolve", "ao_method_traits", "shadow_method_resolve", "shade_ao", "shade_irradiance", "shade_shadow", "shade_tint", "shadow_method_traits"]

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import os
+import weakref
 from typing import Any, Dict, Mapping, Optional
 
 import numpy
@@ -44,6 +45,15 @@ def path_of(given: Any, name: str) -> bytes:
     return path
 
 
+# What a struct points to lives as long as the struct.
+_KEPT: Any = weakref.WeakKeyDictionary()
+
+
+def keep(struct: Any, keeps: list) -> None:
+    """`keeps` live as long as a struct that ffi.new() made; they must not refer to it."""
+    _KEPT[struct] = keeps
+
+
 class Filled:
     """A struct of C, begun by its defaults, with what it points to.
 
@@ -59,6 +69,7 @@ class Filled:
         self.kind = kind
         self.pointer = ffi.new(kind + " *")
         self.keeps: list = []
+        keep(self.pointer, self.keeps)
         lib.vsh_struct_init(kind.encode(), self.pointer, ffi.sizeof(kind))
         for name, value in (values or {}).items():
             if value is not None:
