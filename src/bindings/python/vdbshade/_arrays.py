@@ -36,7 +36,7 @@ def array(given: Any, dtype: Any, shape: Sequence[Optional[int]], name: str) -> 
             found = found.view(numpy.uint8) if found.flags.c_contiguous else found.astype(numpy.uint8)
         else:
             raise TypeError(f"{name}: expected {dtype.name}, got {found.dtype}")
-    if found.ndim == 1 and found.size == 0 and len(shape) > 1 and shape[0] is None:
+    if found.ndim == 1 and found.size == 0 and len(shape) > 1 and not shape[0]:
         found = found.reshape([0] + [n or 0 for n in shape[1:]])
     if found.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, found.shape)):
         raise ValueError(f"{name}: expected an array of shape {_shape_text(shape)}, got {found.shape}")

@@ -261,9 +261,10 @@ class Model(Handle):
 def heights_source(values: ArrayLike, size: Sequence[float], height: float, base: float, transform: Optional[ArrayLike],
                    name: str) -> Tuple[Any, Any]:
     """``vsh_heights_source`` and what it points to."""
-    heights = array(values, numpy.float32, (None, None), "values")
-    if max(heights.shape) >= 2**31:
-        raise ValueError(f"values: expected at most 65536 rows and columns, got {heights.shape}")
+    given = numpy.asarray(values)
+    if max(given.shape, default=0) > 65536:  # before it is copied
+        raise ValueError(f"values: expected at most 65536 rows and columns, got {given.shape}")
+    heights = array(given, numpy.float32, (None, None), "values")
     filled = Filled("vsh_heights_source", dict(name=name, size=size, height=height, base=base))
     moved = matrix(transform)
     keeps = [filled, pointer(heights), pointer(moved)]
