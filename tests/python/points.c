@@ -1,7 +1,8 @@
 /* What Python does, in C: the tests compare its values, tools/bench-python its times.
- * points MODEL POINTS OUT: shadow, AO and distance at points (float64 positions, then float32 normals, native) as floats.
- * points MODEL POINTS time ROUNDS: processor seconds of a call for all of them, of each round a line, and then
- * nanoseconds of a call for one point, of one sample of a field. */
+ * points MODEL POINTS OUT: shadow, AO and distance at points (float64 positions, then float32 normals,
+ * native) as floats. points MODEL POINTS time ROUNDS: processor seconds of a call for all of them, of each
+ * round a line, and then nanoseconds of a call for one point: of a query, of a sample of a field, of
+ * vsh_shade_shadow(). */
 #include <vdbshade/vdbshade.h>
 
 #include <stdio.h>
@@ -46,7 +47,7 @@ static void *read_all(const char *path, size_t *count) {
 }
 
 static void measure(const vsh_query *query, const vsh_occluders *occluders, const vsh_points *points,
-                    const vsh_run *run, int rounds) {
+                    const vsh_light *sun, const vsh_shade_options *shade, const vsh_run *run, int rounds) {
     float *shadow = taken(points->count * sizeof *shadow);
     float *const planes[] = {shadow};
     vsh_query_output output = vsh_query_output_default();
@@ -71,6 +72,11 @@ static void measure(const vsh_query *query, const vsh_occluders *occluders, cons
     begin = seconds();
     for (int i = 0; i < CALLS; ++i) {
         vsh_field_sample(parts.field, 1, points->positions, shadow);
+    }
+    printf("%.1f\n", (seconds() - begin) / CALLS * 1e9);
+    begin = seconds();
+    for (int i = 0; i < CALLS; ++i) {
+        vsh_shade_shadow(occluders, &one, sun, shade, run, shadow, NULL, NULL, &error);
     }
     printf("%.1f\n", (seconds() - begin) / CALLS * 1e9);
     free(shadow);
@@ -130,7 +136,7 @@ int main(int argc, char **argv) {
     if (argc > 4 && strcmp(argv[3], "time") == 0) {
         vsh_run run = vsh_run_default();
         run.threads = 1;
-        measure(query, occluders, &points, &run, atoi(argv[4]));
+        measure(query, occluders, &points, &sun, &shade, &run, atoi(argv[4]));
     } else {
         write_values(query, &points, argv[3]);
     }
