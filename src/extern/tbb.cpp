@@ -1,19 +1,16 @@
 // Loops over TBB's pool.
 #include "base/parallel.h"
 #include "base/threads.h"
+#include "extern/arenas.h"
 #include "extern/guard.h"
 #include "extern/tsan.h"
 
 #include <algorithm>
-#include <memory>
-#include <mutex>
 #include <optional>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
-#include <utility>
-#include <vector>
 
 namespace {
 
@@ -37,43 +34,6 @@ struct Loop {
     }
 };
 
-// Arenas between loops, each with its number of threads. They are kept: TBB 2021.8 gives an arena's memory
-// back only where no thread of the pool was in it when it was let go (oneTBB's issue 967), and a loop cost 7
-// KB for good. There are as many as loops ran at once.
-class Arenas {
-  public:
-    using Pointer = std::unique_ptr<tbb::task_arena>;
-
-    Pointer take(int threads) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        for (auto &[size, arena] : waiting) {
-            if (size == threads && arena != nullptr) {
-                return std::move(arena);
-            }
-        }
-        waiting.emplace_back(threads, nullptr); // a place for it to come back to
-        return std::make_unique<tbb::task_arena>(threads);
-    }
-    void give(int threads, Pointer given) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        for (auto &[size, arena] : waiting) {
-            if (size == threads && arena == nullptr) {
-                arena = std::move(given);
-                return;
-            }
-        }
-    }
-
-  private:
-    std::mutex mutex;
-    std::vector<std::pair<int, Pointer>> waiting;
-};
-
-Arenas &arenas() {
-    static auto *const kept = new Arenas; // outlives what ends after main
-    return *kept;
-}
-
 // More threads than cores are allowed for as long as one of these lasts, and no more than the host allows:
 // TBB would complain on standard error.
 class Arena {
@@ -85,18 +45,13 @@ class Arena {
         }
         const size_t allowed = control::active_value(control::max_allowed_parallelism);
         const int wanted = threads > 0 ? threads : tbb::info::default_concurrency();
-        size = static_cast<int>(std::min(static_cast<size_t>(wanted), allowed));
-        arena = arenas().take(size);
+        arena.emplace(static_cast<int>(std::min(static_cast<size_t>(wanted), allowed)));
     }
-    Arena(const Arena &) = delete;
-    Arena &operator=(const Arena &) = delete;
-    ~Arena() { arenas().give(size, std::move(arena)); }
     template <typename Fn> void run(const Fn &fn) { arena->execute(fn); }
 
   private:
     std::optional<tbb::global_control> more;
-    int size;
-    Arenas::Pointer arena;
+    std::optional<vshi::LentArena> arena;
 };
 
 // What throws here is TBB, to which the system refused a thread: loops throw nothing.

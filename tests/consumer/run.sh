@@ -64,6 +64,17 @@ eval "$cc -std=c11 -g -fsanitize=address '$here/consumer.c' -o '$work/watched' \
 ASAN_OPTIONS=detect_leaks=0 "$work/watched" "$work/output" >"$work/watched.log" 2>&1 || { cat "$work/watched.log"; exit 1; }
 echo "the same values"
 
+packages=$(dirname "$(find "$prefix" -path '*-packages/vdbshade' -type d)")
+if [ "$packages" != . ]; then
+    say "Python: the module finds the library beside it"
+    python=$(sed -n 's/^VSH_PYTHON_PROGRAM:FILEPATH=//p' "$build/CMakeCache.txt")
+    (cd "$work" && PYTHONPATH=$packages "$python" -B -c '
+import vdbshade
+print(vdbshade.__version__, len(vdbshade.Model("a.obj")), vdbshade.Triangles.available())
+loaded = {line.split(maxsplit=5)[5].strip() for line in open("/proc/self/maps") if "libvdbshade.so" in line}
+assert len(loaded) == 1 and "/moved here/" in loaded.pop(), loaded')
+fi
+
 say "the examples"
 cmake -S "$here/../../examples" -B "$work/examples" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Release \
     -DCMAKE_C_FLAGS="-std=c11 -pedantic -Wall -Wextra -Werror" >"$work/cmake.log" &&

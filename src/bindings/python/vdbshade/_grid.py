@@ -108,7 +108,8 @@ class Grid(Handle):
         lipschitz : float
             bound on how much distances differ over how far positions do; 1 for true distances
         exact : bool
-            True: a true distance near the surface; False: it is measured anew
+            True: a true distance near the surface; False: it is measured anew, for which single positions are asked
+            for, too: ten times as long
         """
         if not callable(distance):
             raise TypeError(f"distance: expected a function, got {type(distance).__name__}")
