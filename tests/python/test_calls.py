@@ -68,6 +68,12 @@ class Errors(Case):
             vdbshade.Query(vdbshade.Occluders(box()), sun(), rays=2**40)
         with self.assertRaisesRegex(ValueError, "direction: expected 3 numbers, got 2"):
             sun(direction=(1, 2))
+        for bad in (1, [None] * 3):
+            with self.assertRaisesRegex(TypeError, "^direction: "):
+                sun(direction=bad)
+        with self.assertRaisesRegex(TypeError, "^angle: "):
+            sun(angle=[1])
+        self.assertEqual(sun(two_sided=numpy.bool_(True)).two_sided, 1)
         with self.assertRaisesRegex(vdbshade.ArgumentError, "angle"):
             sun(angle=4.0)
         with self.assertRaisesRegex(ValueError, "name .*: expected at most 63 bytes"):

@@ -17,6 +17,7 @@ from vdbshade import _structs, _tables, types
 from vdbshade._library import ffi, lib
 
 sys.path.insert(0, str(ROOT / "src/bindings/python"))
+import generate  # noqa: E402
 import headers  # noqa: E402
 
 TEXT = headers.read(ROOT / "include/vdbshade")
@@ -213,7 +214,7 @@ class Reach(Case):
         for struct, members in structs.items():
             self.assertEqual([m.name for m in members], _structs.members(struct), struct)
             kind = getattr(types, "".join(part.capitalize() for part in struct[4:].split("_")))
-            shown = {m.name for m in members} - {"struct_size", "user", "checked", "sink", "done", "writing", "look"}
+            shown = {m.name for m in members} - generate.HIDDEN - generate.ARGUMENTS.get(struct, set())
             self.assertEqual({n.rstrip("_") for n in kind.__annotations__}, shown, struct)
         self.assertIn("0 … 4096", types.ShadeOptions.__doc__)
 

@@ -3,6 +3,7 @@
 _abi.py: the declarations as cffi keeps them, so that nothing is parsed when the module is imported;
 _tables.py: words for constants; types.py: what options there are and what is told of things, with the headers'
 comments."""
+import contextlib
 import keyword
 import pathlib
 import re
@@ -14,6 +15,10 @@ import headers
 
 # Members that are a library's own business, or that arguments of another name stand for.
 HIDDEN = {"struct_size", "user", "checked", "sink", "done", "writing", "look"}
+# Members that arguments of their own stand for.
+ARGUMENTS = {"vsh_light": {"type"}, "vsh_sdf_node": {"shape", "left", "right"}, "vsh_compare_files_options": {"limits"},
+             "vsh_unwrap_options": {"density"}, "vsh_image_options": {"attributes", "attribute_count"},
+             "vsh_layer": {"field", "heights", "spheres", "triangles", "lights", "light_count"}}
 NUMBERS = {"int32_t": "int", "uint32_t": "int", "uint64_t": "int", "size_t": "int", "double": "float", "float": "float"}
 
 # What a member is where its comment does not begin with the constants' name.
@@ -63,7 +68,7 @@ def write_types(path, text):
         base = "typing.TypedDict, total=False" if is_option else "Record"
         texts += ["", f"class {camel(struct)}({base}):", f'    """``{struct}`` of the headers.', "",
                   "    Attributes", "    ----------"]
-        shown = [m for m in members if m.name not in HIDDEN]
+        shown = [m for m in members if m.name not in HIDDEN | ARGUMENTS.get(struct, set())]
         for member in shown:
             texts.append(f"    {member.name} : {hint(member, words.get((struct, member.name)), known)}")
             comment = member.comment.replace("\\", "\\\\").replace('"""', "'''")
@@ -101,7 +106,9 @@ def main(include, output):
     ffi = cffi.FFI()
     ffi.cdef(headers.declarations(text))
     ffi.set_source("vdbshade._abi", None)
-    ffi.emit_python_code(str(output / "_abi.py"))
+    with contextlib.redirect_stdout(None):
+        ffi.emit_python_code(str(output / "_abi.py"))
+    (output / "_abi.py").touch()  # which it leaves alone where nothing has changed
     write_tables(output / "_tables.py", text)
     write_types(output / "types.py", text)
 

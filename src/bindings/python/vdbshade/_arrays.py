@@ -20,7 +20,7 @@ def array(given: Any, dtype: Any, shape: Sequence[Optional[int]], name: str) -> 
     TypeError where its numbers are of a kind that does not become `dtype`, ValueError where its shape is another, or
     a number does not fit."""
     dtype = numpy.dtype(dtype)
-    found = numpy.asarray(given)
+    found = given if type(given) is numpy.ndarray else numpy.asarray(given)
     if found.dtype != dtype:
         if found.size == 0 and found.dtype == numpy.float64:
             found = found.astype(dtype)  # what an empty list is
@@ -36,11 +36,12 @@ def array(given: Any, dtype: Any, shape: Sequence[Optional[int]], name: str) -> 
             found = found.view(numpy.uint8) if found.flags.c_contiguous else found.astype(numpy.uint8)
         else:
             raise TypeError(f"{name}: expected {dtype.name}, got {found.dtype}")
-    if found.ndim == 1 and found.size == 0 and len(shape) > 1 and not shape[0]:
+    if found.size == 0 and found.ndim == 1 and len(shape) > 1 and not shape[0]:
         found = found.reshape([0] + [n or 0 for n in shape[1:]])
-    if found.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, found.shape)):
+    if len(found.shape) != len(shape) or [n for n, m in zip(shape, found.shape) if n != m and n is not None]:
         raise ValueError(f"{name}: expected an array of shape {_shape_text(shape)}, got {found.shape}")
-    return numpy.require(found, requirements=["C", "A"])
+    flags = found.flags
+    return found if flags.c_contiguous and flags.aligned else numpy.require(found, requirements=["C", "A"])
 
 
 def output(out: Any, dtype: Any, shape: Tuple[int, ...], name: str) -> numpy.ndarray:
@@ -76,7 +77,7 @@ class _Borrowed:
         self.__array_interface__ = {"data": (address, True), "shape": shape, "typestr": dtype.str, "version": 3}
 
 
-def borrowed(cdata: Any, shape: Tuple[int, ...], dtype: Any, owner: Any) -> Optional[numpy.ndarray]:
+def borrowed(cdata: Any, shape: Tuple[int, ...], dtype: Any, owner: Any) -> Any:
     """A view of the library's memory, read-only, that keeps `owner` alive; None for NULL."""
     if cdata == ffi.NULL:
         return None

@@ -24,11 +24,12 @@ class Measures(types.Measures):
     "widths", "edges", "shift", "lost", "gained", "nonfinite"; NaN where a measure does not apply."""
 
     value: Dict[str, float]  # type: ignore[assignment]
+    _struct: Any
 
 
 def _measures(struct: Any) -> Measures:
     found = Measures(**told(struct, "vsh_measures").__dict__)
-    found.value = dict(zip(MEASURES, found.value))
+    found.value = dict(zip(MEASURES, struct.value))
     found._struct = ffi.new("vsh_measures *", struct)
     return found
 

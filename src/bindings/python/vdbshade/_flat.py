@@ -8,7 +8,7 @@ import numpy
 from numpy.typing import ArrayLike
 
 from ._arrays import array, output, pointer
-from ._library import RUN, Run, call, ffi, handle_of, lib, make, place
+from ._library import RUN, Handle, Run, call, ffi, handle_of, lib, make, place
 from ._structs import Filled, path_of
 from ._light import Light, lights_of
 from ._outline import Outline
@@ -109,7 +109,7 @@ class FlatScene:
         if cdata is None:
             return None
         outline = Outline.__new__(Outline)
-        Outline.__bases__[0].__init__(outline, cdata)
+        Handle.__init__(outline, cdata)
         return outline
 
     def bake(self, *, irradiance: bool = True, run: Optional[Run] = None) -> Dict[str, numpy.ndarray]:

@@ -49,7 +49,7 @@ class _Image:
                 if values.ndim != 2:
                     raise ValueError(f"channel {name!r}: expected shape (height, width) or (height, width, 3), got {values.shape}")
                 shape = values.shape  # type: ignore[assignment]
-            arrays.append(array(values, numpy.float32, shape, f"channel {name!r}"))
+            arrays.append(array(values, numpy.float32, shape or (), f"channel {name!r}"))
         height, width = shape or (0, 0)
         if max(height, width) >= 2**31:
             raise ValueError(f"an image of {width} × {height}: too large")

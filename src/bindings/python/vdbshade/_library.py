@@ -7,7 +7,7 @@ import os
 import sys
 import threading
 import warnings
-from typing import Any, Callable, Optional
+from typing import Any, Callable, List, Optional
 
 from . import _abi
 from ._tables import VERSION, WORDS
@@ -188,7 +188,9 @@ class Running:
     __slots__ = ("run", "raised", "messages", "outer", "__weakref__")
 
     def __init__(self, run: Run, outer: "Optional[Running]") -> None:
-        self.run, self.raised, self.messages, self.outer = run, None, [], outer
+        self.run, self.outer = run, outer
+        self.raised: Optional[BaseException] = None
+        self.messages: List[str] = []
 
 
 _in_thread = threading.local()
@@ -226,6 +228,7 @@ def _warning(user: Any, message: Any) -> None:
 
 
 _SELDOM = ffi.addressof(lib, "vsh_progress_seldom")
+_FILTER_SIZE = ffi.sizeof("vsh_progress_filter")
 RUN: Any = object()  # stands for the run in the arguments of call()
 
 
@@ -237,15 +240,16 @@ def call(function: Any, *arguments: Any, run: Optional[Run] = None, made: Any = 
     error = ffi.new("vsh_error *")
     running = Running(given, getattr(_in_thread, "running", None))
     handle = ffi.new_handle(running)
-    filtered = ffi.new("vsh_progress_filter *", dict(
-        struct_size=ffi.sizeof("vsh_progress_filter"), user=handle, seconds=given.interval, thread=threading.get_ident()))
+    filtered = ffi.new("vsh_progress_filter *")
+    filtered.struct_size, filtered.user, filtered.seconds = _FILTER_SIZE, handle, given.interval
+    filtered.thread = threading.get_ident()
     if given.progress is not None or threading.current_thread() is threading.main_thread():
         filtered.progress = _progress
     struct = ffi.new("vsh_run *", given.struct[0])
     struct.progress, struct.warning, struct.user = _SELDOM, _warning, filtered
     _in_thread.running = running
     try:
-        result = function(*(struct if a is RUN else a for a in arguments), error)
+        result = function(*[struct if a is RUN else a for a in arguments], error)
     finally:
         _in_thread.running = running.outer
     owned = None

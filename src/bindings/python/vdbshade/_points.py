@@ -124,7 +124,9 @@ def shade_irradiance(positions: ArrayLike, normals: ArrayLike, light: Light, vis
 
 
 _SMALL = 64  # points that vsh_query_points() shades on the calling thread, without progress
-_FLOAT32, _FLOAT64, _UINT32 = numpy.dtype(numpy.float32), numpy.dtype(numpy.float64), numpy.dtype(numpy.uint32)
+_FLOAT32: numpy.dtype = numpy.dtype(numpy.float32)
+_FLOAT64: numpy.dtype = numpy.dtype(numpy.float64)
+_UINT32: numpy.dtype = numpy.dtype(numpy.uint32)
 
 
 def _rows(given: Any, kind: numpy.dtype, columns: int, name: str) -> Tuple[numpy.ndarray, int]:

@@ -87,7 +87,7 @@ def _caster(given: Any) -> Filled:
     given = dict(given)
     sdf, spheres = given.pop("sdf", None), given.pop("spheres", None)
     objects, rules, moved = given.pop("objects", {}), given.pop("solidity", {}), given.pop("transform", None)
-    vdb = os.fspath(given.get("path") or "").endswith(".vdb" if not isinstance(given.get("path"), bytes) else b".vdb")
+    vdb = os.fsencode(given.get("path") or "").endswith(b".vdb")
     kind = given.pop("type", "sdf" if sdf is not None else "spheres" if spheres is not None else "vdb" if vdb else "mesh")
     filled = Filled("vsh_caster", dict(type=kind))
     struct = filled.pointer
@@ -258,7 +258,7 @@ class Assets(Handle):
     def _views(self, meshes: Any, count: int) -> List[Mesh]:
         return [Mesh._view(meshes[i], self.handle) for i in range(count)]
 
-    def _borrowed(self, kind: type, cdata: Any) -> Any:
+    def _borrowed(self, kind: Any, cdata: Any) -> Any:
         """A handle that belongs to the assets."""
         if cdata == ffi.NULL:
             return None
@@ -355,7 +355,7 @@ class Assets(Handle):
                                   filled.pointer, RUN, place("vsh_occluders"), run=run))
 
 
-def _wrapped(kind: type, cdata: Any) -> Any:
+def _wrapped(kind: Any, cdata: Any) -> Any:
     if cdata is None:
         return None
     thing = kind.__new__(kind)

@@ -155,7 +155,7 @@ class Solids(Handle):
         trees = ffi.new("vsh_sdf[]", [sdf.struct[0] for sdf in sdfs] or 1)
         moved = None
         if transforms is not None:
-            moved = numpy.array([matrix(t, "transforms") for t in transforms], numpy.float64)
+            moved = numpy.array([matrix(t, "transforms") for t in numpy.asarray(transforms)], numpy.float64)
             moved = array(moved, numpy.float64, (len(sdfs), 3, 4), "transforms")
         super().__init__(make(lib.vsh_solids_free, lib.vsh_solids_create, trees, pointer(moved), len(sdfs), place("vsh_solids")))
 

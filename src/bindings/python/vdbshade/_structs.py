@@ -67,10 +67,14 @@ class Filled:
 
     def __init__(self, kind: str, values: Optional[Mapping[str, Any]] = None) -> None:
         self.kind = kind
-        self.pointer = ffi.new(kind + " *")
         self.keeps: list = []
+        default = _DEFAULTS.get(kind)
+        if default is None:
+            default = ffi.new(kind + " *")
+            lib.vsh_struct_init(kind.encode(), default, ffi.sizeof(kind))
+            _DEFAULTS[kind] = default
+        self.pointer = ffi.new(kind + " *", default[0])
         keep(self.pointer, self.keeps)
-        lib.vsh_struct_init(kind.encode(), self.pointer, ffi.sizeof(kind))
         for name, value in (values or {}).items():
             if value is not None:
                 self.set(self.pointer, kind, name, value)
@@ -106,7 +110,7 @@ class Filled:
                     raise ValueError(f"{name} {value!r}: expected at most {field.length - 1} bytes, without NUL")
                 setattr(struct, name, encoded)
             elif field.kind == "array":
-                numbers = [value[i] for i in range(len(value))]
+                numbers = list(value)
                 if len(numbers) != field.length:
                     raise ValueError(f"{name}: expected {field.length} numbers, got {len(numbers)}")
                 setattr(struct, name, [float(n) if field.item.cname in ("double", "float") else int(n) for n in numbers])
@@ -116,6 +120,10 @@ class Filled:
                 setattr(struct, name, value)  # a pointer of the binding's own
         except OverflowError:
             raise ValueError(f"{name} {value!r}: too large for {field.cname}") from None
+        except TypeError as error:
+            if str(error).startswith(name):
+                raise
+            raise TypeError(f"{name}: {error}") from None
 
     def set_struct(self, struct: Any, kind: str, value: Any, name: str) -> None:
         """Sets a struct in a struct from a mapping of its members, or from a struct."""
@@ -132,6 +140,7 @@ class Filled:
 
 
 _known: Dict[str, Dict[str, Any]] = {}
+_DEFAULTS: Dict[str, Any] = {}
 
 
 def _fields(kind: str) -> Dict[str, Any]:
@@ -146,6 +155,8 @@ def members(kind: str) -> list:
 
 
 def _whole(value: Any, name: str) -> int:
+    if isinstance(value, numpy.bool_):
+        return int(value)
     if isinstance(value, (float, numpy.floating)):
         if value != int(value):
             raise TypeError(f"{name} {value}: expected a whole number")
