@@ -2,6 +2,7 @@
 #include "fields.h"
 
 #include <pthread.h>
+#include <stdatomic.h>
 
 typedef struct heard {
     int calls, answer;

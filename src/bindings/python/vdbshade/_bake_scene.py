@@ -8,11 +8,11 @@ import numpy
 from . import types
 from ._library import RUN, Handle, Run, call, ffi, lib, make, note, place
 from ._structs import Filled, told
-from ._lightmap import Lightmap
+from ._lightmap import Planes
 from ._scene import Assets, Scene
 
 
-class SceneLightmap(Lightmap):
+class SceneLightmap(Planes):
     """A lightmap of a scene: planes by their channels' names, "shadow.sun", "ao", "irradiance.R", "A": arrays of float32 of
     shape (height, width), row 0 at v = 1.
 

@@ -124,7 +124,15 @@ def _freeing(free: Any, keeps: Any) -> Any:
     return freed
 
 
-class Lightmap(Dict[str, numpy.ndarray]):
+class Planes(Dict[str, numpy.ndarray]):
+    """Planes of an image by their channels' names."""
+
+    def write(self, path: "str | os.PathLike[str]", **options: Any) -> None:
+        """Writes them as an image; options of image_write()."""
+        image_write(path, self, **options)
+
+
+class Lightmap(Planes):
     """Planes of a lightmap by their names, as files name channels: arrays of float32 of shape (height, width), row 0 at
     v = 1; of "irradiance", "bent" and "tint.NAME" (height, width, 3).
 
@@ -141,10 +149,6 @@ class Lightmap(Dict[str, numpy.ndarray]):
     stats: types.BakeStats
     errors: Dict[str, float]
     field_errors: Dict[str, float]
-
-    def write(self, path: "str | os.PathLike[str]", **options: Any) -> None:
-        """Writes its planes as an image; options of image_write()."""
-        image_write(path, self, **options)
 
 
 class _Planes:
