@@ -202,6 +202,12 @@ class Reach(Case):
                     self.assertEqual(_structs.constant(f"VSH_{prefix}_", word, name), number, (name, word))
                     self.assertEqual(getattr(lib, f"vsh_{name}")(word.encode()), number)
 
+    def test_a_word_of_another_enum_is_none(self):
+        self.assertEqual(list(_tables.WORDS["VSH_FLAT_"]), ["hard", "classic", "exact"])
+        self.assertEqual(list(_tables.WORDS["VSH_CHANNEL_"]), ["data", "light", "vector"])
+        with self.assertRaisesRegex(ValueError, "method 'mask': expected one of hard, classic, exact"):
+            vdbshade.flat_bake(None, method="mask", width=8, height=8)
+
     def test_options_are_those_of_the_headers_with_their_defaults(self):
         """Each option struct is begun by its defaults, and vdbshade.types tells its members."""
         structs = headers.structs(TEXT)
@@ -227,7 +233,7 @@ class Reach(Case):
             for member in _structs.members(struct):
                 lines.append(f'printf("{struct}.{member} %zu\\n", offsetof({struct}, {member}));')
                 want.append(f"{struct}.{member} {ffi.offsetof(struct, member)}")
-        for name, number in headers.enumerations(TEXT).items():
+        for name, number in {n: v for block in headers.enumerations(TEXT) for n, v in block.items()}.items():
             lines.append(f'printf("{name} %lld\\n", (long long){name});')
             want.append(f"{name} {getattr(lib, name)}")
             self.assertEqual(number, getattr(lib, name))

@@ -26,6 +26,19 @@ MORE_WORDS = {("vsh_lightmap_options", "padding"): "VSH_PADDING_", ("vsh_receive
               ("vsh_planes", "sky"): "VSH_UP_", ("vsh_run", "isa"): "VSH_ISA_", ("vsh_receiver", "seams"): "VSH_SEAMS_",
               ("vsh_receiver", "type"): "VSH_RECEIVER_", ("vsh_receiver", "unwrap"): "VSH_RECEIVER_UNWRAP_",
               ("vsh_lit_image", "purpose"): "VSH_LIT_", ("vsh_unwrap_options", "keep_uvs"): "VSH_UNWRAP_"}
+# Words of functions' arguments, and constants that are none.
+OTHER_WORDS = ["VSH_ERROR_", "VSH_MEASURE_", "VSH_CONFINED_", "VSH_HEIGHTS_", "VSH_CHANNEL_", "VSH_METHOD_", "VSH_BENT_"]
+COUNTS = {"VSH_MEASURE_COUNT", "VSH_LIT_PURPOSES", "VSH_CONFINED_ALL", "VSH_OK"}
+# Structs without a size that are filled by keywords.
+FILLED = {"vsh_light", "vsh_tint", "vsh_sdf_node", "vsh_mesh", "vsh_receiver", "vsh_caster", "vsh_scene_layer", "vsh_planes",
+          "vsh_selection"}
+
+
+def words_of(text):
+    """{(struct, member): prefix} of members that are given as words."""
+    found = {**headers.words_of_members(text), **MORE_WORDS}
+    del found["vsh_flat_caster", "type"]  # of a file alone; an enum of the same prefix is the methods
+    return found
 
 
 def camel(struct):
@@ -45,57 +58,67 @@ def hint(member, words, known):
     return NUMBERS.get(member.type, "Any")
 
 
+RECORD = '''"""Made from the public headers when vdbshade is built: what options there are, and what is told of things."""
+from __future__ import annotations
+
+import typing
+from typing import Any, Sequence, Union
+
+
+class Record:
+    """Values that a call tells; the same names as in C."""
+
+    def __init__(self, **values: Any) -> None:
+        self.__dict__.update(values)
+
+    def __repr__(self) -> str:
+        told = ", ".join(f"{name}={value!r}" for name, value in self.__dict__.items() if name[0] != "_")
+        return f"{type(self).__name__}({told})"
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and repr(self) == repr(other)
+
+    __hash__ = None  # type: ignore[assignment]
+'''
+
+
+def is_options(name, members):
+    """Whether a struct is filled by the caller, member by member: it is a dict of keywords then."""
+    return (members[0].name == "struct_size" and not name.endswith("_stats")) or name in FILLED
 
 
 def write_types(path, text):
-    found = headers.structs(text)
-    words = {**headers.words_of_members(text), **MORE_WORDS}
-    texts = ['"""Made from the public headers when vdbshade is built: what options there are, and what is told of things."""',
-             "from __future__ import annotations", "", "import typing", "from typing import Any, Sequence, Union", "",
-             "", "class Record:", '    """Values that a call tells; the same names as in C."""', "    __slots__ = (\"__dict__\",)", "",
-             "    def __init__(self, **values: Any) -> None:", "        self.__dict__.update(values)", "",
-             "    def __repr__(self) -> str:",
-             '        told = ", ".join(f"{name}={value!r}" for name, value in self.__dict__.items() if name[0] != "_")',
-             '        return f"{type(self).__name__}({told})"', "",
-             "    def __eq__(self, other: object) -> bool:",
-             "        return type(self) is type(other) and repr(self) == repr(other)", "",
-             "    __hash__ = None  # type: ignore[assignment]", ""]
-    options = [name for name, members in found.items() if any(m.name == "struct_size" for m in members) and not name.endswith("_stats")]
-    options += ["vsh_light", "vsh_tint", "vsh_sdf_node", "vsh_mesh", "vsh_receiver", "vsh_caster", "vsh_scene_layer", "vsh_planes", "vsh_selection"]
-    known = set(found)
+    found, words = headers.structs(text), words_of(text)
+    texts = [RECORD]
     for struct, members in found.items():
-        is_option = struct in options
-        base = "typing.TypedDict, total=False" if is_option else "Record"
-        texts += ["", f"class {camel(struct)}({base}):", f'    """``{struct}`` of the headers.', "",
-                  "    Attributes", "    ----------"]
+        base = "typing.TypedDict, total=False" if is_options(struct, members) else "Record"
         shown = [m for m in members if m.name not in HIDDEN | ARGUMENTS.get(struct, set())]
-        for member in shown:
-            texts.append(f"    {member.name} : {hint(member, words.get((struct, member.name)), known)}")
+        hints = [hint(m, words.get((struct, m.name)), found) for m in shown]
+        texts += ["", f"class {camel(struct)}({base}):", f'    """``{struct}`` of the headers.', "", "    Attributes", "    ----------"]
+        for member, kind in zip(shown, hints):
+            texts.append(f"    {member.name} : {kind}")
             comment = member.comment.replace("\\", "\\\\").replace('"""', "'''")
             texts += textwrap.wrap(comment, 108, initial_indent=" " * 8, subsequent_indent=" " * 8)
         texts += ['    """', ""]
-        texts += [f"    {m.name}{'_' * keyword.iskeyword(m.name)}: {hint(m, words.get((struct, m.name)), known)}" for m in shown] or ["    pass"]
+        texts += [f"    {m.name}{'_' * keyword.iskeyword(m.name)}: {kind}" for m, kind in zip(shown, hints)] or ["    pass"]
         texts.append("")
     path.write_text("\n".join(texts), encoding="utf-8")
 
 
+def table(prefix, text):
+    """The words of an enum all of whose constants begin so."""
+    for block in headers.enumerations(text):
+        if all(name.startswith(prefix) or name == "VSH_OK" for name in block):
+            return {name[len(prefix) :].lower(): number for name, number in block.items() if name not in COUNTS}
+    raise SystemExit(f"generate.py: no enum of constants {prefix}…")
+
+
 def write_tables(path, text):
-    constants = headers.enumerations(text)
-    words = {**headers.words_of_members(text), **MORE_WORDS}
-    tables = {}
-    for prefix in sorted(set(words.values()) | {"VSH_ERROR_", "VSH_MEASURE_", "VSH_INSIDE_", "VSH_CONFINED_", "VSH_HEIGHTS_", "VSH_COMBINE_", "VSH_SETTINGS_", "VSH_SETTING_OF_", "VSH_COLOR_", "VSH_CHANNEL_", "VSH_SOLIDITY_", "VSH_ALPHA_", "VSH_MODEL_LIGHT_", "VSH_LIT_IMAGES_", "VSH_WRAP_", "VSH_METHOD_"}):
-        longer = [p for p in set(words.values()) if p != prefix and p.startswith(prefix)]
-        table = {name[len(prefix) :].lower(): number for name, number in constants.items()
-                 if name.startswith(prefix) and not any(name.startswith(p) for p in longer)}
-        table.pop("count", None)
-        if not table:
-            raise SystemExit(f"generate.py: no constants {prefix}…")
-        tables[prefix] = table
-    members = {f"{struct}.{member}": prefix for (struct, member), prefix in sorted(words.items())}
-    lines = ['"""Made from the public headers when vdbshade is built: words for constants."""',
-             f"WORDS = {tables!r}", f"MEMBERS = {members!r}",
-             f"FUNCTIONS = {headers.functions(text)!r}",
-             "VERSION = " + repr(".".join(re.findall(r"#define VSH_VERSION_(?:MAJOR|MINOR) (\d+)", text)))]
+    members = {f"{struct}.{member}": prefix for (struct, member), prefix in sorted(words_of(text).items())}
+    words = {prefix: table(prefix, text) for prefix in sorted({*members.values(), *OTHER_WORDS})}
+    version = ".".join(re.findall(r"#define VSH_VERSION_(?:MAJOR|MINOR) (\d+)", text))
+    lines = ['"""Made from the public headers when vdbshade is built: words for constants."""', f"WORDS = {words!r}",
+             f"MEMBERS = {members!r}", f"VERSION = {version!r}"]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -55,15 +55,17 @@ def functions(text):
 
 
 def enumerations(text):
-    """Each constant by its name, and the number that it stands for."""
-    constants = {}
+    """Each enum of the headers: its constants by their names, and the numbers that they stand for."""
+    constants, blocks = {}, []
     for body in re.findall(r"^enum \{(.*?)\};", COMMENT.sub(" ", text), re.S | re.M):
-        number = -1
+        number, block = -1, {}
         for entry in filter(None, (part.strip() for part in body.split(","))):
             name, _, given = entry.partition("=")
             number = eval(given.strip(), {}, constants) if given.strip() else number + 1  # our own headers' numbers
-            constants[name.strip()] = number
-    return constants
+            block[name.strip()] = number
+            constants.update(block)
+        blocks.append(block)
+    return blocks
 
 
 def _words(comment):

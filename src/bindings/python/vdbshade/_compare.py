@@ -61,7 +61,8 @@ def compare(golden: ArrayLike, values: ArrayLike, mask: Optional[ArrayLike] = No
     """
     compared, keeps = _compared(golden, values, mask)
     measures = ffi.new("vsh_measures *")
-    call(lib.vsh_compare_sized, compared, Filled("vsh_compare_options", options).pointer, RUN, measures, ffi.sizeof("vsh_measures"), run=run)
+    call(lib.vsh_compare_sized, compared, Filled("vsh_compare_options", options).pointer, RUN, measures,
+         ffi.sizeof("vsh_measures"), run=run)
     del keeps
     return _measures(measures[0])
 

@@ -32,7 +32,7 @@ def reader_confinement(*, run: Optional[Run] = None) -> List[str]:
     """How the reader that parses files is confined here: of "limits", "calls", "files"."""
     confined = ffi.new("uint32_t *")
     call(lib.vsh_reader_confinement, RUN, confined, run=run)
-    return [name for name, bit in WORDS["VSH_CONFINED_"].items() if name != "all" and confined[0] & bit]
+    return [name for name, bit in WORDS["VSH_CONFINED_"].items() if confined[0] & bit]
 
 
 def provenance(scene: Optional[Scene] = None, *, files: Sequence["str | os.PathLike[str]"] = (), command: Optional[str] = None,

@@ -38,7 +38,8 @@ class Outline(Handle):
     def from_text(cls, text: str, font: "str | os.PathLike[str]", *, run: Optional[Run] = None,
                   **options: "Unpack[types.TextOptions]") -> "Outline":
         """The letters of a text, of a font's file."""
-        return cls._made(lib.vsh_outline_from_text, text.encode(), path_of(font, "font"), Filled("vsh_text_options", options).pointer, run=run)
+        return cls._made(lib.vsh_outline_from_text, text.encode(), path_of(font, "font"),
+                         Filled("vsh_text_options", options).pointer, run=run)
 
     @classmethod
     def from_polygons(cls, polygons: Sequence[ArrayLike], *, run: Optional[Run] = None) -> "Outline":

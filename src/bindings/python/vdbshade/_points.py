@@ -315,4 +315,5 @@ def _traits(bits: int) -> List[str]:
     return [name for name, bit in WORDS["VSH_METHOD_"].items() if bits & bit]
 
 
-__all__ = ["Query", "Stats", "ao_method_resolve", "ao_method_traits", "shadow_method_resolve", "shade_ao", "shade_irradiance", "shade_shadow", "shade_tint", "shadow_method_traits"]
+__all__ = ["Query", "Stats", "ao_method_resolve", "ao_method_traits", "shadow_method_resolve",
+           "shade_ao", "shade_irradiance", "shade_shadow", "shade_tint", "shadow_method_traits"]

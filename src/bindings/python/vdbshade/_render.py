@@ -46,9 +46,11 @@ class Camera:
     def target(self) -> Tuple[float, ...]:
         return tuple(self.struct.target)
 
-    def frame(self, bounds_min: ArrayLike, bounds_max: ArrayLike, azimuth: float = 0.5, elevation: float = 0.5, aspect: float = 16 / 9) -> "Camera":
+    def frame(self, bounds_min: ArrayLike, bounds_max: ArrayLike, azimuth: float = 0.5, elevation: float = 0.5,
+              aspect: float = 16 / 9) -> "Camera":
         """Moves it so that it sees a whole world box; angles in radians, `aspect` is width over height."""
-        call(lib.vsh_camera_frame, self.struct, vector(bounds_min, 3, "bounds_min"), vector(bounds_max, 3, "bounds_max"), azimuth, elevation, aspect)
+        call(lib.vsh_camera_frame, self.struct, vector(bounds_min, 3, "bounds_min"), vector(bounds_max, 3, "bounds_max"), azimuth,
+             elevation, aspect)
         return self
 
     def frame_points(self, points: ArrayLike, azimuth: float = 0.5, elevation: float = 0.5, aspect: float = 16 / 9) -> "Camera":

@@ -164,8 +164,8 @@ def lit_write(output: "str | os.PathLike[str]", model: Model, images: Sequence[L
         pages = ffi.new("uint32_t[]", [chart.page for chart in atlas.charts] or 1)
         options.pointer.chart_pages, options.pointer.chart_count = pages, lib.vsh_atlas_chart_count(atlas.handle)
         views = [atlas[i].struct for i in range(count)]
-        meshes = ffi.new("vsh_lit_mesh[]", [dict(uvs=v.uvs, sources=v.sources, indices=v.indices, charts=v.charts, vertex_count=v.vertex_count,
-                                                 triangle_count=v.triangle_count) for v in views])
+        meshes = ffi.new("vsh_lit_mesh[]", [dict(uvs=v.uvs, sources=v.sources, indices=v.indices, charts=v.charts,
+                                                 vertex_count=v.vertex_count, triangle_count=v.triangle_count) for v in views])
         keeps += [pages, atlas.handle]
     elif uv_sets is not None:
         if len(uv_sets) != count:
