@@ -40,6 +40,12 @@ const vsh_setting *cli_setting(size_t index);
 /* The option of that name, of `length` bytes; false: it is none of the command's. */
 bool cli_find_option(const cli_command *command, const char *name, size_t length, cli_option *option);
 
+/* Its options and headings with the library's settings in the place of their rows, which last as long as the
+ * process; at most `most` of them. Returns how many. */
+size_t cli_list_options(const cli_command *command, cli_option *options, size_t most);
+
+enum { CLI_MOST_OPTIONS = 128 };
+
 /* Takes one option; returns CLI_OK or an exit code after saying why. `name` is "--sun". */
 typedef int cli_option_fn(void *settings, int key, const char *name, const char *value);
 
@@ -144,9 +150,8 @@ enum {
 /* After the common ones, in commands that shade. */
 #define CLI_ISA_OPTION                                                                                       \
     {                                                                                                        \
-        CLI_KEY_ISA, "isa", "NAME",                                                                          \
-            "instruction set to shade with, for tests: best, base,\navx2 or avx512 (best); the result is "   \
-            "the same for any"                                                                               \
+        CLI_KEY_ISA, "isa", "best|base|avx2|avx512",                                                         \
+            "instruction set to shade with, for tests (best); the\nresult is the same for any"               \
     }
 
 /* Voxels, and what meshes are taken for. */

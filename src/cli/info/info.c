@@ -51,19 +51,14 @@ static int take(void *settings, int key, const char *name, const char *value) {
 }
 
 static int print_info(const char *path, const cli_info_look *look, const vsh_run *run) {
-    static const char *const image_endings[] = {
-        "exr", "png", "tif", "tiff", "jpg", "jpeg", "hdr", "tga", "bmp", "webp", "dpx",  "psd",  "pgm",
-        "ppm", "pnm", "pfm", "gif",  "jp2", "j2k",  "sgi", "rgb", "rla", "ico",  "heic", "heif", "avif"};
     if (cli_has_ending(path, "vdb")) {
         return cli_info_vdb(path, run);
     }
     if (cli_has_ending(path, "json")) {
         return cli_info_scene(path, run);
     }
-    for (size_t i = 0; i < sizeof image_endings / sizeof image_endings[0]; ++i) {
-        if (cli_has_ending(path, image_endings[i])) {
-            return cli_info_image(path, run);
-        }
+    if (cli_has_ending_of(path, CLI_IMAGE_ENDINGS)) {
+        return cli_info_image(path, run);
     }
     return cli_info_mesh(path, look, run);
 }

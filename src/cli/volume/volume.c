@@ -31,7 +31,7 @@ static const cli_option options[] = {
     {KEY_LIKE, "like", "FILE[:GRID]",
      "the active voxels of a grid in a .vdb file, a fog say,\non its own lattice (the file's first grid of "
      "numbers)"},
-    {KEY_INSIDE, "inside", "NAME",
+    {KEY_INSIDE, "inside", "nearest|off",
      "voxels inside a solid: nearest (they take the nearest\noutside value) or off (inactive) (nearest)"},
     {0, NULL, NULL, "Light and occlusion"},
     CLI_LIGHT_OPTIONS,
