@@ -48,6 +48,21 @@ cmake -S "$here" -B "$work/cmake" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TY
 cmake --build "$work/cmake" >"$work/cmake.log" || { cat "$work/cmake.log"; exit 1; }
 mkdir "$work/output"
 "$work/cmake/consumer" "$work/output"
+"$work/cmake/grids"
+sed 's/OPTIONAL_COMPONENTS moon/moon/' "$here/CMakeLists.txt" >"$work/CMakeLists.txt"
+cp "$here"/*.c "$here"/*.cpp "$work"
+if cmake -S "$work" -B "$work/moon" -DCMAKE_PREFIX_PATH="$prefix" >"$work/cmake.log" 2>&1; then
+    echo "a component that there is not was found" && exit 1
+fi
+grep -q 'component moon' "$work/cmake.log"
+
+say "the static library: the same, and no shared one beside it"
+mkdir "$work/alone"
+"$work/cmake/consumer_static" "$work/alone"
+"$prefix/bin/vdbshade" compare "$work/output/sphere.vdb" "$work/alone/sphere.vdb" --max-difference 0 --quiet
+if ldd "$work/cmake/consumer_static" | grep libvdbshade; then
+    echo "it is linked with the shared library" && exit 1
+fi
 
 say "pkg-config"
 export PKG_CONFIG_PATH="$library/pkgconfig"
@@ -57,6 +72,10 @@ eval "$cc -std=c11 -pedantic -Wall -Wextra -Werror '$here/consumer.c' -o '$work/
     $(pkg-config --cflags --libs vdbshade) -lm"
 LD_LIBRARY_PATH=$library "$work/plain" "$work/output" >"$work/plain.log" || { cat "$work/plain.log"; exit 1; }
 echo "the same values"
+# --static names what the archive needs
+eval "$cc -std=c11 -DOWN_READER=1 '$here/consumer.c' -o '$work/plain_static' $(pkg-config --cflags vdbshade) \
+    '$library/libvdbshade.a' $(pkg-config --libs --static vdbshade | sed 's/-lvdbshade//')"
+"$work/plain_static" "$work/alone" >"$work/plain.log" || { cat "$work/plain.log"; exit 1; }
 
 say "a host with a sanitizer, whose dlopen() is not libc's"
 eval "$cc -std=c11 -g -fsanitize=address '$here/consumer.c' -o '$work/watched' \
