@@ -5,7 +5,7 @@ include(CMakePackageConfigHelpers)
 install(TARGETS vdbshade EXPORT vdbshade-targets
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development
         INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(TARGETS vdbshade_oiio vdbshade_openvdb LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library)
+install(TARGETS vdbshade_oiio vdbshade_openvdb LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/vdbshade COMPONENT library)
 
 # The program stands elsewhere, seen from the library, than in the build folder, and so is linked once more.
 cmake_path(IS_ABSOLUTE CMAKE_INSTALL_LIBDIR absolute)

@@ -115,10 +115,10 @@ say "a host stays as it was, until it makes a level set"
 eval "$cc -std=c11 -pedantic -Wall -Wextra -Werror '$here/quiet.c' -o '$work/quiet' \
     $(pkg-config --cflags --libs vdbshade)"
 LD_LIBRARY_PATH=$library "$work/quiet"
-mv "$library"/libvdbshade_openvdb.so.* "$work"
+mv "$library"/vdbshade/libvdbshade_openvdb.so.* "$work"
 LD_LIBRARY_PATH=$library "$work/quiet" without
 "$prefix/bin/vdbshade" info "$work/a.obj" >/dev/null
-mv "$work"/libvdbshade_openvdb.so.* "$library"
+mv "$work"/libvdbshade_openvdb.so.* "$library"/vdbshade
 
 say "a host with OpenVDB grids of its own"
 eval "$cxx -std=c++17 -O1 '$here/grids.cpp' -o '$work/grids' $(pkg-config --cflags --libs vdbshade) -lopenvdb -ltbb \
