@@ -14,10 +14,10 @@ extern "C" {
 
 /* A lightmap of a job. The pointers belong to the job and hold until it is freed. */
 typedef struct vsh_job_lightmap {
-    size_t receiver;    /* its number in the scene */
-    const char *path;   /* of the receiver's file */
-    const char *output; /* file that it goes to; of an object its own */
-    const vsh_mesh *meshes;
+    size_t receiver;        /* its number in the scene */
+    const char *path;       /* of the receiver's file */
+    const char *output;     /* file that it goes to; of an object its own */
+    const vsh_mesh *meshes; /* [mesh_count]: that receive */
     size_t mesh_count;
     int32_t width; /* texels */
     int32_t height;
@@ -45,7 +45,7 @@ typedef struct vsh_row_sink {
     /* It is whole, or `result` (not VSH_OK) says why it will not be, which what `end` returns then does not
      * change. Called once for each `begin` that returned VSH_OK. */
     vsh_result (*end)(void *user, vsh_result result, vsh_error *error);
-    void *user;
+    void *user; /* handed to its functions */
 } vsh_row_sink;
 
 static inline vsh_row_sink vsh_row_sink_default(void) {
@@ -139,15 +139,15 @@ VSH_API const vsh_assets *vsh_bake_job_assets(const vsh_bake_job *job);
 
 /* What a job has done so far. */
 typedef struct vsh_bake_report {
-    double load_s; /* seconds: files read and hashed */
-    double bake_s; /* texels made and shaded */
-    double write_s;
+    double load_s;   /* seconds: files read and hashed */
+    double bake_s;   /* texels made and shaded */
+    double write_s;  /* rows packed and written */
     uint64_t texels; /* these two of all lightmaps, as in vsh_bake_stats */
     uint64_t invalid_texels;
-    uint64_t resumed_rows;
-    uint64_t bands;
-    vsh_shade_stats shade;
-    vsh_occluders_info occluders;
+    uint64_t resumed_rows;        /* that earlier bakes had kept */
+    uint64_t bands;               /* baked, of all lightmaps */
+    vsh_shade_stats shade;        /* of all lightmaps */
+    vsh_occluders_info occluders; /* that all of them share */
     const vsh_bake_error *errors; /* [error_count]: of each light, of AO, of the sky; belong to the job */
     size_t error_count;           /* 2 + lights of the scene; 0 before vsh_bake_job_prepare() */
 } vsh_bake_report;
@@ -174,17 +174,17 @@ static inline vsh_result vsh_bake_scene(const vsh_scene *scene, const vsh_bake_j
 /* Found out by a small one: few voxels and a part of the texels are really made, by the same methods, and
  * what they took is scaled up. Texels, voxels and bands are close; times may be half or twice as much. */
 typedef struct vsh_bake_forecast {
-    uint64_t texels;
-    uint64_t samples;
-    double voxels; /* active, of all level sets; these three 0 where none are made */
+    uint64_t texels;  /* with at least one sample */
+    uint64_t samples; /* evaluated positions */
+    double voxels;    /* active, of all level sets; these three 0 where none are made */
     double voxel_size;
-    double resolution;  /* voxels along the longest side */
-    double peak_bytes;  /* at most */
-    double grid_bytes;  /* of the level sets */
-    double field_bytes; /* of the fields */
-    double voxelize_s;  /* seconds */
-    double field_s;
-    double bake_s;
+    double resolution;     /* voxels along the longest side */
+    double peak_bytes;     /* at most */
+    double grid_bytes;     /* of the level sets */
+    double field_bytes;    /* of the fields */
+    double voxelize_s;     /* seconds */
+    double field_s;        /* the same, fields and what rays are traced in */
+    double bake_s;         /* the same, texels */
     int32_t has_triangles; /* nonzero: they are traced, and auto is exact */
 } vsh_bake_forecast;
 

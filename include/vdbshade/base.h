@@ -38,6 +38,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* Before what the library shows. */
 #if defined(VSH_BUILD) && defined(__GNUC__)
 #define VSH_API __attribute__((visibility("default")))
 #else
@@ -48,6 +49,7 @@
 extern "C" {
 #endif
 
+/* The version of these headers; the library's is vsh_version(). */
 #define VSH_VERSION_MAJOR 0
 #define VSH_VERSION_MINOR 2
 #define VSH_VERSION_PATCH 0
@@ -76,8 +78,8 @@ VSH_API const char *vsh_result_name(vsh_result result);
 /* Filled by a call that fails; left alone by one that succeeds. The message is one line without control
  * characters, ends in NUL, and names file, place, value and limit where there are such. */
 typedef struct vsh_error {
-    vsh_result code;
-    char message[1020];
+    vsh_result code;    /* VSH_ERROR_… */
+    char message[1020]; /* what failed, in a line */
 } vsh_error;
 
 /* For bindings of other languages, which cannot call inline functions: what the …_default() or …_zero() of a

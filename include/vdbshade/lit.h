@@ -40,10 +40,10 @@ enum {
 
 /* An image of one page for one purpose, at most one each. Either `png`, or planes. */
 typedef struct vsh_lit_image {
-    int32_t purpose; /* VSH_LIT_… */
-    uint32_t page;
-    const void *png; /* [png_size] bytes of a PNG file, which are taken as they are */
-    size_t png_size;
+    int32_t purpose;       /* VSH_LIT_… */
+    uint32_t page;         /* from 0 */
+    const void *png;       /* [png_size] bytes of a PNG file, which are taken as they are */
+    size_t png_size;       /* bytes */
     int32_t width, height; /* of planes: texels, 1 … 65536 */
     const float *const
         *channels;         /* of planes: [channel_count][height × width], row 0 on top (v = 1), linear */
@@ -61,6 +61,7 @@ enum {
     VSH_LIT_IMAGES_BESIDE = 2, /* OUT.PURPOSE.png, or OUT.PURPOSE.PAGE.png where there are several pages */
 };
 
+/* How a lit file is written. */
 typedef struct vsh_lit_options {
     size_t struct_size;
     const uint32_t *chart_pages; /* [chart_count]: the page that each chart lies on */

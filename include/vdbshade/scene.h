@@ -35,10 +35,11 @@ typedef struct vsh_selection {
 
 /* What meshes are to be taken for, by a pattern as of vsh_mesh_matches(). */
 typedef struct vsh_solidity_rule {
-    const char *pattern;
-    int32_t solidity; /* VSH_SOLIDITY_… */
+    const char *pattern; /* of the names that are meant */
+    int32_t solidity;    /* VSH_SOLIDITY_… */
 } vsh_solidity_rule;
 
+/* A caster of a scene. Which members hold is told by its type. */
 typedef struct vsh_caster {
     int32_t type;         /* VSH_CASTER_… */
     const char *path;     /* mesh, vdb, heightfield, mask: file; text: font; spheres: NULL, or a file
@@ -53,13 +54,13 @@ typedef struct vsh_caster {
     int32_t direct;        /* heightfield: nonzero: cast as it is (vsh_heights), not voxelised */
     const double *spheres; /* [sphere_count][4], where there is no path: as in vsh_spheres_create() */
     size_t sphere_count;
-    int32_t voxelised; /* spheres: nonzero: part of the level set; 0: cast as they are (vsh_spheres) */
-    vsh_mask_options mask;
-    const char *text;
-    vsh_text_options letters;          /* text */
-    double thickness;                  /* mask, text: along z, local units, > 0 */
-    double color[3];                   /* in pictures, linear RGB, 0 … 1; all 0: 0.7, a light grey */
-    vsh_selection objects;             /* mesh: which of its meshes cast */
+    int32_t voxelised;        /* spheres: nonzero: part of the level set; 0: cast as they are (vsh_spheres) */
+    vsh_mask_options mask;    /* mask: how its image becomes an outline */
+    const char *text;         /* text: what is written, UTF-8 */
+    vsh_text_options letters; /* text */
+    double thickness;         /* mask, text: along z, local units, > 0 */
+    double color[3];          /* in pictures, linear RGB, 0 … 1; all 0: 0.7, a light grey */
+    vsh_selection objects;    /* mesh: which of its meshes cast */
     const vsh_solidity_rule *solidity; /* [solidity_count]; mesh: of those that cast; later ones overrule */
     size_t solidity_count;
 } vsh_caster;
@@ -94,6 +95,7 @@ enum {
 VSH_API int32_t vsh_receiver_unwrap(const char *name);
 VSH_API const char *vsh_receiver_unwrap_name(int32_t unwrap);
 
+/* What a lightmap of a scene is baked for. */
 typedef struct vsh_receiver {
     const char *path;     /* mesh file, or a heightfield's image */
     double transform[12]; /* local to world */
@@ -102,13 +104,13 @@ typedef struct vsh_receiver {
     int32_t height;
     int32_t supersample;
     int32_t padding;
-    int32_t ao_spacing;
+    int32_t ao_spacing; /* as in vsh_lightmap_options */
     const char *output; /* image file */
     int32_t bits;       /* as in vsh_image_options */
     const char *pack;   /* as in vsh_image_options; may be NULL */
     int32_t type;       /* VSH_RECEIVER_…; a heightfield is made as VSH_HEIGHTS_SURFACE, its UV set is 0 */
     double extent[2];   /* heightfield: size and height in vsh_heights_source */
-    double relief;
+    double relief;      /* heightfield: the height */
     vsh_selection objects; /* mesh: which of its meshes receive */
     int32_t partial; /* mesh: nonzero: those without UVs, or without the set, are left out with a warning,
                         as long as one has them */
@@ -128,23 +130,23 @@ typedef struct vsh_receiver {
 /* A whole scene, read from a file or filled by the caller. Paths are as the system takes them (the reader has
  * put the scene file's folder in front of relative ones). */
 typedef struct vsh_scene {
-    const vsh_caster *casters;
+    const vsh_caster *casters; /* [caster_count] */
     size_t caster_count;
     const vsh_scene_layer *layers; /* that casters may be in */
-    size_t layer_count;
-    const vsh_light *lights; /* no two names alike, none empty: channels are named after them */
-    size_t light_count;
-    const vsh_receiver *receivers;
+    size_t layer_count;            /* how many layers */
+    const vsh_light *lights;       /* no two names alike, none empty: channels are named after them */
+    size_t light_count;            /* how many lights */
+    const vsh_receiver *receivers; /* [receiver_count] */
     size_t receiver_count;
-    vsh_grid_options grid;
-    vsh_shade_options shade;
-    int32_t ao;         /* nonzero: bake AO, within shade.ao_distance */
-    int32_t bent;       /* with ao: bake bent normals in the space VSH_BENT_… + 1; 0: none */
-    int32_t irradiance; /* nonzero: bake irradiance */
-    vsh_tint tint;      /* bake tinted shadows, and irradiance by them; VSH_TINT_NONE: none */
-    int32_t has_ambient;
-    double ambient[3]; /* of irradiance, as in vsh_lightmap; where has_ambient is not 0 */
-    vsh_planes planes; /* to be baked too */
+    vsh_grid_options grid;   /* of the casters' level set */
+    vsh_shade_options shade; /* how shadow and AO are found */
+    int32_t ao;              /* nonzero: bake AO, within shade.ao_distance */
+    int32_t bent;            /* with ao: bake bent normals in the space VSH_BENT_… + 1; 0: none */
+    int32_t irradiance;      /* nonzero: bake irradiance */
+    vsh_tint tint;           /* bake tinted shadows, and irradiance by them; VSH_TINT_NONE: none */
+    int32_t has_ambient;     /* nonzero: `ambient` holds; 0: there is no such light */
+    double ambient[3];       /* of irradiance, as in vsh_lightmap; where has_ambient is not 0 */
+    vsh_planes planes;       /* to be baked too */
     int32_t error; /* nonzero: bake the error left in each shadow and AO value too, where methods know it */
     const vsh_solidity_rule *solidity; /* [solidity_count]: of all mesh casters, over what they say
                                           themselves; each must match one's mesh */
@@ -273,11 +275,13 @@ VSH_API int32_t vsh_scene_traceable(const vsh_scene *scene, const vsh_scene_laye
  * by their voxels alone; 0 where rays against triangles decide, and voxels only save rays. */
 VSH_API int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer);
 
+/* What vsh_scene_resolution() gives where it is named. */
+enum { VSH_RESOLUTION_NAMED = -1 };
+
 /* Voxels along the longest side of the casters in `layer`, or (NULL) in none, where `points` of receivers are
  * to be shaded by the scene's methods (docs/auto.md tells how they are chosen). VSH_RESOLUTION_NAMED: those
  * that the scene or the layer names; 0: none, rays against triangles are faster alone. It depends on what
  * the scene holds, and on nothing else. `assets` are those loaded for this scene. Cannot fail. */
-enum { VSH_RESOLUTION_NAMED = -1 };
 VSH_API int32_t vsh_scene_resolution(const vsh_scene *scene, const vsh_assets *assets,
                                      const vsh_scene_layer *layer, double points);
 

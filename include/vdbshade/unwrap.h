@@ -17,6 +17,7 @@ enum {
                               together in them is a chart, and is packed as it is; else as VSH_UNWRAP_ALWAYS */
 };
 
+/* How meshes are unwrapped. */
 typedef struct vsh_unwrap_options {
     size_t struct_size;
     int32_t width;     /* texels of each page, 1 … VSH_MAX_PAGE_SIZE */
@@ -38,6 +39,7 @@ static inline vsh_unwrap_options vsh_unwrap_options_default(void) {
     return options;
 }
 
+/* The chart of a triangle that is in none. */
 #define VSH_NO_CHART UINT32_MAX
 
 /* One mesh as it lies in the atlas. The arrays belong to the atlas. Triangles are those of the mesh in its
@@ -52,9 +54,10 @@ typedef struct vsh_atlas_mesh {
     size_t triangle_count;
 } vsh_atlas_mesh;
 
+/* A chart of an atlas. */
 typedef struct vsh_atlas_chart {
-    uint32_t page;
-    uint32_t mesh;
+    uint32_t page;  /* that it lies on, from 0 */
+    uint32_t mesh;  /* that it was cut from */
     float stretch;  /* root of the mean of the squared stretch of all directions from texture to surface, over
                        the chart's area, for UVs of the surface's area: 1 is isometric (Sander and others,
                        "Texture mapping progressive meshes", 2001, L2) */
@@ -63,10 +66,11 @@ typedef struct vsh_atlas_chart {
     double area;    /* of its triangles, world units² */
 } vsh_atlas_chart;
 
+/* What an atlas comes to. */
 typedef struct vsh_atlas_info {
-    uint64_t charts;
-    uint32_t pages; /* that have charts */
-    int32_t width;  /* texels of each page */
+    uint64_t charts; /* on all pages */
+    uint32_t pages;  /* that have charts */
+    int32_t width;   /* texels of each page */
     int32_t height;
     double texels_per_unit;  /* as given, or as found */
     double covered;          /* share of the texels of all pages that a chart touches, 0 … 1 */
@@ -122,7 +126,6 @@ static inline vsh_result vsh_uvs_measure(const vsh_mesh *mesh, int32_t width, in
 VSH_API size_t vsh_atlas_mesh_count(const vsh_atlas *atlas); /* as were given */
 VSH_API size_t vsh_atlas_chart_count(const vsh_atlas *atlas);
 VSH_API size_t vsh_atlas_page_count(const vsh_atlas *atlas);
-
 VSH_API void vsh_atlas_get_info_sized(const vsh_atlas *atlas, vsh_atlas_info *info, size_t info_size);
 static inline void vsh_atlas_get_info(const vsh_atlas *atlas, vsh_atlas_info *info) {
     vsh_atlas_get_info_sized(atlas, info, sizeof *info);

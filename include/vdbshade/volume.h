@@ -16,6 +16,7 @@ enum {
     VSH_INSIDE_OFF = 1      /* are left off: inactive, background */
 };
 
+/* How voxels are shaded. */
 typedef struct vsh_volume_options {
     size_t struct_size;
     int32_t inside;          /* VSH_INSIDE_… */
