@@ -63,6 +63,20 @@ static inline float vshi_plane_at(const vshi_planes *planes, const vshi_image_pl
     return plane->encode != NULL ? plane->encode(value) : value;
 }
 
+/* The same as integers hold it: 0 … 1, where it is not cut. */
+static inline float vshi_plane_unit_at(const vshi_planes *planes, const vshi_image_plane *plane, size_t at) {
+    const float value = vshi_plane_at(planes, plane, at);
+    return plane->is_signed ? 0.5f + 0.5f * value : value;
+}
+
+/* 0 … 1 to 0 … most, to nearest; NaN becomes 0 because no comparison with it holds. */
+static inline uint32_t vshi_quantise(float value, uint32_t most) {
+    if (!(value > 0.0f)) {
+        return 0;
+    }
+    return value < 1.0f ? (uint32_t)((double)value * (double)most + 0.5) : most;
+}
+
 enum { VSHI_FILE_NAME = 256 }; /* EXR's longest channel name is 255 bytes */
 
 struct vsh_image_file {

@@ -21,18 +21,32 @@ best() {
 @test "a bake of a box into 64² texels takes at most 100 ms, from start to file" {
     unless_sanitized "how long it takes is no sanitizer's claim"
     write_box box.obj
-    best 100 "$VDBSHADE" bake box.obj --sun 0.3,1,0.2 --sun-angle 5 --ao 1 --size 64 --quiet -o out.exr
-    [ -s out.exr ]
+    local out
+    for out in out.exr out.png; do
+        best 100 "$VDBSHADE" bake box.obj --sun 0.3,1,0.2 --sun-angle 5 --ao 1 --size 64 --quiet -o "$out"
+        [ -s "$out" ]
+    done
 }
 
-@test "what a bake of triangles into an EXR does not need is not loaded" {
+@test "what a bake of triangles into an EXR or a PNG does not need is not loaded" {
     unless_sanitized "with a sanitizer all is in the program"
     write_box box.obj
-    LD_DEBUG=libs LD_DEBUG_OUTPUT=loaded shade bake box.obj --sun 0.3,1,0.2 --size 64 --quiet -o out.exr
+    local out
+    for out in out.exr out.png; do
+        LD_DEBUG=libs LD_DEBUG_OUTPUT=loaded shade bake box.obj --sun 0.3,1,0.2 --size 64 --quiet -o "$out"
+        done_well
+        cat loaded.* >all.txt
+        rm loaded.*
+        grep -q 'calling init.*libvdbshade.so' all.txt
+        ! grep -qE 'calling init.*(openvdb|OpenImageIO|libboost)' all.txt || fail "$out"
+    done
+    LD_DEBUG=libs LD_DEBUG_OUTPUT=other shade info out.png
     done_well
-    cat loaded.* >all.txt
-    grep -q 'calling init.*libvdbshade.so' all.txt
-    ! grep -qE 'calling init.*(openvdb|OpenImageIO|libboost)' all.txt
+    grep -q 'calling init.*libpng' other.*
+    ! grep -q 'calling init.*OpenImageIO' other.* || fail "to read a PNG"
+    LD_DEBUG=libs LD_DEBUG_OUTPUT=image shade bake box.obj --sun 0.3,1,0.2 --size 64 --quiet -o out.tif
+    done_well
+    grep -q 'calling init.*OpenImageIO' image.* # which is how it is told
     LD_DEBUG=libs LD_DEBUG_OUTPUT=voxels shade bake box.obj --sun 0.3,1,0.2 --size 64 --method cone --quiet -o out.exr
     done_well
     grep -q 'calling init.*openvdb' voxels.* # which is how it is told
