@@ -29,9 +29,10 @@ struct Level {
 
 class Voxelizer {
   public:
-    Voxelizer(const vsh_distance &field_, const Lattice &lattice_, double band_, Stage &stage_,
-              vsh_error *error_)
-        : field(field_), lattice(lattice_), band(band_), stage(stage_), error(error_) {}
+    // `tree`: what the field is the distance of, or null.
+    Voxelizer(const vsh_distance &field_, const vsh_sdf *tree_, const Lattice &lattice_, double band_,
+              Stage &stage_, vsh_error *error_)
+        : field(field_), tree(tree_), lattice(lattice_), band(band_), stage(stage_), error(error_) {}
 
     FloatGrid::Ptr run(const Vec3d &low, const Vec3d &high);
 
@@ -40,6 +41,13 @@ class Voxelizer {
         const Vec3d position = index * lattice.voxel + lattice.translation;
         return field.distance(field.user, position.asPointer());
     }
+    // The same within a leaf, of the shapes that decide there.
+    double distance(const Vec3d &index, const std::vector<uint8_t> &keep) const {
+        const Vec3d position = index * lattice.voxel + lattice.translation;
+        return tree != nullptr ? vshi_sdf_distance_within(tree, keep.data(), position.asPointer())
+                               : field.distance(field.user, position.asPointer());
+    }
+    std::vector<uint8_t> narrow(const Coord &origin) const;
     // How far the field may lie from its value at the middle of a box of `size` voxels an edge, at its
     // voxels.
     double slack(int32_t size) const { return field.lipschitz * 0.5 * SQRT3 * (size - 1) * lattice.voxel; }
@@ -52,10 +60,12 @@ class Voxelizer {
     void foretell(const Level &level) const;
     void check_tiles(const Level &level, const std::vector<int8_t> &signs) const;
     Leaf *leaf(const Coord &origin, int8_t &sign, size_t index);
-    bool sample_block(Leaf &leaf, const Coord &corner, float &deepest, size_t index);
+    bool sample_block(Leaf &leaf, const Coord &corner, const std::vector<uint8_t> &keep, float &deepest,
+                      size_t index);
     void leaves(const Level &level);
 
     const vsh_distance &field;
+    const vsh_sdf *const tree;
     const Lattice &lattice;
     const double band; // world units of the field's value
     Stage &stage;
@@ -181,8 +191,9 @@ Level Voxelizer::split(const Level &level) {
 
 // Samples 4³ voxels of a leaf, or none but the middle where the band cannot reach them. Returns whether one
 // of them is in the band; `deepest` becomes the sign's witness where none is.
-bool Voxelizer::sample_block(Leaf &leaf, const Coord &corner, float &witness, size_t index) {
-    const double middle = distance(corner.asVec3d() + Vec3d(0.5 * (BLOCK - 1)));
+bool Voxelizer::sample_block(Leaf &leaf, const Coord &corner, const std::vector<uint8_t> &keep,
+                             float &witness, size_t index) {
+    const double middle = distance(corner.asVec3d() + Vec3d(0.5 * (BLOCK - 1)), keep);
     if (!std::isfinite(middle)) {
         note_bad(index);
         return false;
@@ -194,7 +205,7 @@ bool Voxelizer::sample_block(Leaf &leaf, const Coord &corner, float &witness, si
         for (int32_t y = 0; y < BLOCK; ++y) {
             for (int32_t z = 0; z < BLOCK; ++z) {
                 const Coord voxel = corner.offsetBy(x, y, z);
-                const double d = far ? middle : distance(voxel.asVec3d());
+                const double d = far ? middle : distance(voxel.asVec3d(), keep);
                 if (!std::isfinite(d)) {
                     note_bad(index);
                     return false;
@@ -214,7 +225,20 @@ bool Voxelizer::sample_block(Leaf &leaf, const Coord &corner, float &witness, si
     return in_band;
 }
 
+// Of the shapes of a tree, those that decide in a leaf.
+std::vector<uint8_t> Voxelizer::narrow(const Coord &origin) const {
+    constexpr double MARGIN = 1.0 + 1e-6; // for the rounding of positions
+    std::vector<uint8_t> keep;
+    if (tree != nullptr) {
+        keep.resize(tree->node_count);
+        const Vec3d middle = (origin.asVec3d() + Vec3d(3.5)) * lattice.voxel + lattice.translation;
+        vshi_sdf_narrow(tree, middle.asPointer(), MARGIN * 3.5 * SQRT3 * lattice.voxel, keep.data());
+    }
+    return keep;
+}
+
 Leaf *Voxelizer::leaf(const Coord &origin, int8_t &sign, size_t index) {
+    const std::vector<uint8_t> keep = narrow(origin);
     auto leaf = std::make_unique<Leaf>(origin, grid->background(), false);
     bool in_band = false;
     bool inside = false;
@@ -223,7 +247,7 @@ Leaf *Voxelizer::leaf(const Coord &origin, int8_t &sign, size_t index) {
         float witness = 0.0f;
         in_band |= sample_block(
             *leaf, origin.offsetBy((block & 4) ? BLOCK : 0, (block & 2) ? BLOCK : 0, (block & 1) ? BLOCK : 0),
-            witness, index);
+            keep, witness, index);
         inside |= witness < 0.0f;
         outside |= witness >= 0.0f;
     }
@@ -301,8 +325,8 @@ void check_field(const vsh_distance *field, vsh_error *error) {
     }
 }
 
-vsh_result from_distance(const vsh_distance *field, const vsh_grid_options *options, const vsh_run *given,
-                         vsh_grid **grid, vsh_error *error) {
+vsh_result from_distance(const vsh_distance *field, const vsh_sdf *tree, const vsh_grid_options *options,
+                         const vsh_run *given, vsh_grid **grid, vsh_error *error) {
     vsh_run run;
     const vsh_result result = vshi_run_resolve(given, &run, error);
     if (result != VSH_OK) {
@@ -316,7 +340,7 @@ vsh_result from_distance(const vsh_distance *field, const vsh_grid_options *opti
     // A field to be re-distanced is needed only where cells of 2³ voxels may hold its zero.
     const double band =
         field->exact ? lattice.half_width * lattice.voxel : 1.01 * SQRT3 * field->lipschitz * lattice.voxel;
-    FloatGrid::Ptr level_set = Voxelizer(*field, lattice, band, stage, error).run(low, high);
+    FloatGrid::Ptr level_set = Voxelizer(*field, tree, lattice, band, stage, error).run(low, high);
     if (!field->exact) {
         const double unit = 1.0 / (field->lipschitz * lattice.voxel);
         const IndexDistance exact = [&](const Vec3d &index) {
@@ -342,7 +366,7 @@ vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_grid_opti
     VSHI_NEEDS(grid);
     *grid = nullptr;
     return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize",
-                       [&] { return vshi::from_distance(field, options, run, grid, error); });
+                       [&] { return vshi::from_distance(field, nullptr, options, run, grid, error); });
 }
 
 vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options *options, const vsh_run *run,
@@ -357,5 +381,6 @@ vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options *options
     vsh_sdf tree = *sdf;
     vsh_distance field = {vshi::tree_distance, &tree, 1.0, vshi_sdf_exact(sdf), {0, 0, 0}, {0, 0, 0}};
     vsh_sdf_bounds(sdf, field.bounds_min, field.bounds_max);
-    return vsh_grid_from_distance(&field, options, run, grid, error);
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize",
+                       [&] { return vshi::from_distance(&field, sdf, options, run, grid, error); });
 }
